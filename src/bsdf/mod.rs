@@ -1,0 +1,1 @@
+//! How light is scattered at a surface point.

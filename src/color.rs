@@ -1,0 +1,24 @@
+//! Radiance as linear Rec.709 triples: luminance and sampling importance.
+
+use glam::Vec3;
+
+/// Rec.709 luminance of linear RGB.
+pub fn luminance(rgb: Vec3) -> f32 {
+    rgb.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
+
+/// Sampling importance of linear RGB: mean of luminance and channel average, so that a saturated
+/// blue or red lamp is not starved (RTXPT `EnvMapImportanceSamplingBaker`).
+pub fn importance(rgb: Vec3) -> f32 {
+    0.5 * (luminance(rgb) + (rgb.x + rgb.y + rgb.z) / 3.0)
+}
+
+/// sRGB transfer function, display from linear, both in `[0,1]` (IEC 61966-2-1).
+pub fn srgb_from_linear(x: f32) -> f32 {
+    if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// sRGB transfer function, linear from display, both in `[0,1]` (IEC 61966-2-1).
+pub fn linear_from_srgb(x: f32) -> f32 {
+    if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+}

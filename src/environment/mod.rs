@@ -1,0 +1,3 @@
+//! The environment map as a light.
+
+pub mod sky;

@@ -1,0 +1,68 @@
+//! The one error type: a sentence a person can act on.
+
+use std::fmt;
+use std::path::Path;
+
+/// What went wrong, as one clear sentence that names the file (if any) and the cause.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Error {
+    message: String,
+}
+
+/// Result with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// An error that is not about one file.
+    pub fn new(message: impl Into<String>) -> Self {
+        Self { message: message.into() }
+    }
+
+    /// An error about a file: reads `PATH: cause`.
+    pub fn at(path: impl AsRef<Path>, cause: impl fmt::Display) -> Self {
+        Self::new(format!("{}: {cause}", path.as_ref().display()))
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Error {}
+
+/// Things a user should know that are not errors: what was repaired, skipped or assumed.
+///
+/// Each notice is one sentence; the same sentence is kept once.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Notices {
+    sentences: Vec<String>,
+}
+
+impl Notices {
+    /// Adds a sentence unless it is already there.
+    pub fn add(&mut self, sentence: impl Into<String>) {
+        let sentence = sentence.into();
+        if !self.sentences.contains(&sentence) {
+            self.sentences.push(sentence);
+        }
+    }
+
+    /// Adds all of another list.
+    pub fn extend(&mut self, other: &Self) {
+        for sentence in other.iter() {
+            self.add(sentence);
+        }
+    }
+
+    /// The sentences in the order they came.
+    pub fn iter(&self) -> impl Iterator<Item = &str> {
+        self.sentences.iter().map(String::as_str)
+    }
+
+    /// Whether there is nothing to say.
+    pub fn is_empty(&self) -> bool {
+        self.sentences.is_empty()
+    }
+}

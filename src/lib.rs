@@ -1,0 +1,32 @@
+//! lightgrid: a progressive path tracer that learns which tiles of an HDR environment map each part
+//! of the picture can see, and samples only those.
+//!
+//! The nouns and how they meet:
+//!
+//! - An [`image::Image`] holds linear radiance; an HDR map read into one becomes an
+//!   [`environment::Environment`]: equal-size tiles, each with an importance table.
+//! - A [`scene::Scene`] is flat arrays (from a glTF file or built in); a [`bvh::Bvh`] finds what a
+//!   ray hits in it; a [`bsdf::Bsdf`] says how light is scattered there.
+//! - The [`light_grid`] maps a point to a cell (seen from the camera) and a cell to a distribution
+//!   over the map's tiles, learned by tracing paths.
+//! - [`path`] is the one loop that turns random numbers into radiance; [`render`] runs it over the
+//!   picture, pass by pass, into a film.
+//! - [`cli`] is what a person types; [`metrics`] compares pictures.
+//!
+//! Arrows point down: `cli -> render -> path -> {light_grid, bsdf, bvh} -> {scene, environment} ->
+//! {image, sampler, math, color, error}`.
+
+pub mod bsdf;
+pub mod bvh;
+pub mod cli;
+pub mod color;
+pub mod environment;
+pub mod error;
+pub mod image;
+pub mod light_grid;
+pub mod math;
+pub mod metrics;
+pub mod path;
+pub mod render;
+pub mod sampler;
+pub mod scene;

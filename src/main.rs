@@ -1,0 +1,3 @@
+//! The `lightgrid` binary.
+
+fn main() {}

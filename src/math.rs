@@ -1,0 +1,79 @@
+//! Frames, directions on the lat-long map, solid angles.
+//!
+//! Convention (glTF world: right-handed, +Y up): `u = 0.5 + atan2(z, x) / 2pi`, `v = acos(y) / pi`.
+//! The map's centre column looks along +X, `u = 0.25` along -Z, the seam is at -X, row 0 at +Y.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::{Vec2, Vec3};
+
+/// Orthonormal frame around a unit vector `z`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// First tangent.
+    pub x: Vec3,
+    /// Second tangent, `z cross x`.
+    pub y: Vec3,
+    /// The axis the frame was built around.
+    pub z: Vec3,
+}
+
+impl Frame {
+    /// Builds a frame around unit `z` without branches at the poles
+    /// (Duff et al., *Building an Orthonormal Basis, Revisited*, JCGT 6(1), 2017).
+    pub fn from_z(z: Vec3) -> Self {
+        let sign = 1.0_f32.copysign(z.z);
+        let a = -1.0 / (sign + z.z);
+        let b = z.x * z.y * a;
+        Self {
+            x: Vec3::new(1.0 + sign * z.x * z.x * a, sign * b, -sign * z.x),
+            y: Vec3::new(b, sign + z.y * z.y * a, -z.y),
+            z,
+        }
+    }
+
+    /// World vector to frame coordinates.
+    pub fn local_from_world(&self, v: Vec3) -> Vec3 {
+        Vec3::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
+    }
+
+    /// Frame coordinates to world vector.
+    pub fn world_from_local(&self, v: Vec3) -> Vec3 {
+        self.x * v.x + self.y * v.y + self.z * v.z
+    }
+}
+
+/// Lat-long coordinates in `[0,1)` x `[0,1]` of a unit direction.
+pub fn uv_from_direction(direction: Vec3) -> Vec2 {
+    let u = 0.5 + direction.z.atan2(direction.x) / TAU;
+    // Rounding may carry u to exactly 1, which is the seam, that is 0.
+    Vec2::new(if u >= 1.0 { 0.0 } else { u }, direction.y.clamp(-1.0, 1.0).acos() / PI)
+}
+
+/// Unit direction of lat-long coordinates; inverse of [`uv_from_direction`].
+pub fn direction_from_uv(uv: Vec2) -> Vec3 {
+    let (sin_phi, cos_phi) = ((uv.x - 0.5) * TAU).sin_cos();
+    let (sin_theta, cos_theta) = (uv.y * PI).sin_cos();
+    Vec3::new(sin_theta * cos_phi, cos_theta, sin_theta * sin_phi)
+}
+
+/// Turns `direction` by `angle_radians` about +Y so that lat-long `u` grows by `angle / 2pi`.
+pub fn rotate_y(direction: Vec3, angle_radians: f32) -> Vec3 {
+    let (s, c) = angle_radians.sin_cos();
+    Vec3::new(c * direction.x - s * direction.z, direction.y, s * direction.x + c * direction.z)
+}
+
+/// Exact solid angle in steradians of one pixel in row `y` of a `width` x `height` lat-long map.
+pub fn texel_solid_angle(width: u32, height: u32, y: u32) -> f64 {
+    let edge = |row: u32| (std::f64::consts::PI * f64::from(row) / f64::from(height)).cos();
+    std::f64::consts::TAU / f64::from(width) * (edge(y) - edge(y + 1))
+}
+
+/// Balance heuristic for two techniques with one sample each (Veach 1997, section 9.2.2).
+pub fn balance_heuristic(pdf: f32, other_pdf: f32) -> f32 {
+    if pdf.is_infinite() {
+        return 1.0;
+    }
+    let sum = pdf + other_pdf;
+    if sum > 0.0 { pdf / sum } else { 0.0 }
+}

@@ -1,0 +1,291 @@
+//! The scene: flat arrays and `u32` indices, everything in world space (metres, +Y up).
+
+pub mod builtin;
+pub mod gltf;
+
+use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
+
+use crate::error::Notices;
+
+/// All that can be rendered, ready for a BVH: instances are baked into world space.
+///
+/// Per-vertex arrays are either empty (nothing in the scene has it) or as long as `positions`.
+#[derive(Debug, Clone, Default)]
+pub struct Scene {
+    /// What to call it: the file name or the built-in's name.
+    pub name: String,
+    /// World-space vertex positions in metres.
+    pub positions: Vec<Vec3>,
+    /// World-space unit normals; zero where the triangle is to be shaded flat.
+    pub normals: Vec<Vec3>,
+    /// World-space unit tangents, w = +1 or -1 for the bitangent `w * (normal cross tangent)`.
+    pub tangents: Vec<Vec4>,
+    /// Texture coordinates, two sets.
+    pub uvs: [Vec<Vec2>; 2],
+    /// Linear vertex colours with alpha.
+    pub colors: Vec<Vec4>,
+    /// Vertex indices, counter-clockwise seen from the front.
+    pub triangles: Vec<[u32; 3]>,
+    /// Index into `materials` for each triangle.
+    pub triangle_materials: Vec<u32>,
+    /// Materials; never empty once loaded.
+    pub materials: Vec<Material>,
+    /// Textures: an image and how it is sampled.
+    pub textures: Vec<Texture>,
+    /// Decoded 8-bit images.
+    pub images: Vec<TextureImage>,
+    /// Cameras in file order.
+    pub cameras: Vec<Camera>,
+    /// Point, spot and directional lights.
+    pub lights: Vec<PunctualLight>,
+    /// What was repaired, skipped or assumed while loading.
+    pub notices: Notices,
+}
+
+/// How a surface's coverage is used (glTF `alphaMode`).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum AlphaMode {
+    /// Alpha is ignored.
+    #[default]
+    Opaque,
+    /// Covered where alpha is at least the cutoff, absent elsewhere.
+    Mask {
+        /// Alpha threshold in `[0,1]`.
+        cutoff: f32,
+    },
+    /// Alpha is opacity along rays.
+    Blend,
+}
+
+/// A texture with the coordinates it is read at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TextureRef {
+    /// Index into [`Scene::textures`].
+    pub texture: u32,
+    /// Which of [`Scene::uvs`].
+    pub uv_set: u8,
+    /// `KHR_texture_transform`, texture coordinates from mesh coordinates.
+    pub transform: Affine2,
+}
+
+/// glTF metallic-roughness material with the extensions lightgrid renders. Factors are linear.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    /// Name in the file, for messages and overlays.
+    pub name: String,
+    /// Base colour factor, linear RGB and alpha.
+    pub base_color: Vec4,
+    /// RGB is base colour (sRGB), A is alpha.
+    pub base_color_texture: Option<TextureRef>,
+    /// Metalness in `[0,1]`.
+    pub metallic: f32,
+    /// Perceptual roughness in `[0,1]`; GGX alpha is its square.
+    pub roughness: f32,
+    /// G is roughness, B is metalness.
+    pub metallic_roughness_texture: Option<TextureRef>,
+    /// Tangent-space normal map.
+    pub normal_texture: Option<TextureRef>,
+    /// Scale of the normal map's x and y.
+    pub normal_scale: f32,
+    /// Emitted radiance, linear, `KHR_materials_emissive_strength` included.
+    pub emissive: Vec3,
+    /// RGB multiplies `emissive` (sRGB).
+    pub emissive_texture: Option<TextureRef>,
+    /// How alpha is used.
+    pub alpha_mode: AlphaMode,
+    /// Whether the back is shaded too; if not, rays that meet the back of an opaque surface are
+    /// still stopped (a wall modelled single-sided does not leak), but camera rays pass through it.
+    pub double_sided: bool,
+    /// `KHR_materials_unlit`: base colour is emitted as it is, nothing is reflected.
+    pub unlit: bool,
+    /// `KHR_materials_ior`; 0 means infinitely high (F0 = 1), otherwise at least 1.
+    pub ior: f32,
+    /// `KHR_materials_specular` strength in `[0,1]`.
+    pub specular: f32,
+    /// A multiplies `specular`.
+    pub specular_texture: Option<TextureRef>,
+    /// F0 tint, linear.
+    pub specular_color: Vec3,
+    /// RGB multiplies `specular_color` (sRGB).
+    pub specular_color_texture: Option<TextureRef>,
+    /// `KHR_materials_transmission` in `[0,1]`.
+    pub transmission: f32,
+    /// R multiplies `transmission`.
+    pub transmission_texture: Option<TextureRef>,
+    /// `KHR_materials_volume` thickness; 0 is a thin wall, more is a solid body with an inside.
+    pub thickness: f32,
+    /// Colour that white light becomes after `attenuation_distance` inside the body.
+    pub attenuation_color: Vec3,
+    /// Metres; infinite is no absorption.
+    pub attenuation_distance: f32,
+    /// `KHR_materials_clearcoat` strength in `[0,1]`.
+    pub clearcoat: f32,
+    /// R multiplies `clearcoat`.
+    pub clearcoat_texture: Option<TextureRef>,
+    /// Perceptual roughness of the coat.
+    pub clearcoat_roughness: f32,
+    /// G multiplies `clearcoat_roughness`.
+    pub clearcoat_roughness_texture: Option<TextureRef>,
+    /// Normal map of the coat; without one the coat follows the geometric shading normal.
+    pub clearcoat_normal_texture: Option<TextureRef>,
+    /// Scale of the coat normal map's x and y.
+    pub clearcoat_normal_scale: f32,
+}
+
+impl Default for Material {
+    /// glTF's default material: white, metallic 1, roughness 1 are its factor defaults.
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color: Vec4::ONE,
+            base_color_texture: None,
+            metallic: 1.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            emissive: Vec3::ZERO,
+            emissive_texture: None,
+            alpha_mode: AlphaMode::Opaque,
+            double_sided: false,
+            unlit: false,
+            ior: 1.5,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: Vec3::ONE,
+            specular_color_texture: None,
+            transmission: 0.0,
+            transmission_texture: None,
+            thickness: 0.0,
+            attenuation_color: Vec3::ONE,
+            attenuation_distance: f32::INFINITY,
+            clearcoat: 0.0,
+            clearcoat_texture: None,
+            clearcoat_roughness: 0.0,
+            clearcoat_roughness_texture: None,
+            clearcoat_normal_texture: None,
+            clearcoat_normal_scale: 1.0,
+        }
+    }
+}
+
+/// What happens to texture coordinates outside `[0,1]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Wrap {
+    /// Tiles.
+    #[default]
+    Repeat,
+    /// Tiles, every other one mirrored.
+    MirroredRepeat,
+    /// Holds the edge.
+    ClampToEdge,
+}
+
+/// An image and how it is sampled (level 0 only: a path tracer filters by sampling).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Texture {
+    /// Index into [`Scene::images`].
+    pub image: u32,
+    /// Along u.
+    pub wrap_u: Wrap,
+    /// Along v.
+    pub wrap_v: Wrap,
+    /// Nearest texel instead of bilinear.
+    pub nearest: bool,
+    /// RGB is sRGB-encoded (colours) rather than linear (data).
+    pub srgb: bool,
+}
+
+/// 8-bit RGBA image, row 0 at v = 0.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TextureImage {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width * height` RGBA texels.
+    pub texels: Vec<[u8; 4]>,
+}
+
+/// What a camera does with distance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// Pinhole or thin lens.
+    Perspective {
+        /// Full vertical field of view in radians.
+        fov_y_radians: f32,
+    },
+    /// Parallel rays.
+    Orthographic {
+        /// Half the picture's height in metres.
+        half_height: f32,
+    },
+}
+
+/// A camera looking down its local -Z, +Y up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// Name in the file.
+    pub name: String,
+    /// World from camera; its scale is ignored.
+    pub world_from_camera: Affine3A,
+    /// Projection.
+    pub projection: Projection,
+    /// Width over height the camera was made for, if the file says so.
+    pub aspect: Option<f32>,
+    /// Radius of the thin lens in metres; 0 is a pinhole.
+    pub lens_radius: f32,
+    /// Distance in metres along the view axis at which the picture is sharp.
+    pub focus_distance: f32,
+}
+
+impl Camera {
+    /// A pinhole camera at `eye` that looks at `target`.
+    pub fn look_at(eye: Vec3, target: Vec3, fov_y_radians: f32) -> Self {
+        let z = (eye - target).normalize_or(Vec3::Z);
+        let up = if z.y.abs() > 0.999 { Vec3::Z } else { Vec3::Y };
+        let x = up.cross(z).normalize();
+        let rotation = glam::Mat3::from_cols(x, z.cross(x), z);
+        Self {
+            name: String::new(),
+            world_from_camera: Affine3A::from_mat3_translation(rotation, eye),
+            projection: Projection::Perspective { fov_y_radians },
+            aspect: None,
+            lens_radius: 0.0,
+            focus_distance: (eye - target).length(),
+        }
+    }
+}
+
+/// Shape of a punctual light (`KHR_lights_punctual`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PunctualKind {
+    /// Same radiant intensity in all directions.
+    Point,
+    /// A cone; full inside `inner`, nothing outside `outer` (half angles in radians).
+    Spot {
+        /// Half angle of full intensity.
+        inner_radians: f32,
+        /// Half angle of the cone.
+        outer_radians: f32,
+    },
+    /// Parallel light; `intensity` is irradiance on a facing plane.
+    Directional,
+}
+
+/// A light without size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PunctualLight {
+    /// Name in the file.
+    pub name: String,
+    /// Shape.
+    pub kind: PunctualKind,
+    /// World position in metres (unused by directional lights).
+    pub position: Vec3,
+    /// World direction the light travels in (unused by point lights).
+    pub direction: Vec3,
+    /// Linear colour times radiant intensity (point, spot) or irradiance (directional).
+    pub intensity: Vec3,
+    /// Metres beyond which nothing is lit; infinite if not limited.
+    pub range: f32,
+}

@@ -1,0 +1,10 @@
+//! The one integration-test binary.
+
+mod bsdf;
+mod builtin;
+mod bvh;
+mod environment;
+mod gltf_files;
+mod image_files;
+mod metrics;
+mod shared;
