@@ -1,0 +1,33 @@
+//! `lightgrid compare`.
+
+use std::path::PathBuf;
+
+use crate::error::{Error, Result};
+use crate::image::map::read_picture;
+use crate::metrics::compare;
+
+/// Arguments of `compare`.
+#[derive(Debug, clap::Args)]
+pub(super) struct CompareArguments {
+    /// The picture to judge.
+    picture: PathBuf,
+    /// The reference it is held against.
+    reference: PathBuf,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints the errors of a picture against a reference.
+pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
+    let picture = read_picture(&arguments.picture)?;
+    let reference = read_picture(&arguments.reference)?;
+    let comparison =
+        compare(&picture, &reference).map_err(|e| Error::at(&arguments.picture, e))?;
+    if arguments.json {
+        println!("{}", super::record::to_json(&comparison)?);
+    } else {
+        print!("{comparison}");
+    }
+    Ok(())
+}
