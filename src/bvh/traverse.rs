@@ -4,7 +4,7 @@ use std::mem::MaybeUninit;
 
 use glam::Vec3;
 
-use super::triangle::{self, Shear};
+use super::triangle::{self, BlockHits, Shear};
 use super::wide::{Block, LEAF, Node, Reference, STACK_CAPACITY, WIDTH};
 use super::{Hit, Ray};
 
@@ -248,14 +248,16 @@ fn distance(entry: u64) -> f32 {
     f32::from_bits((entry >> 32) as u32)
 }
 
-/// What is found in a block tells the walk how far to go on; `None` ends it.
+/// Intersects all blocks whose boxes the ray crosses before `t_max`, near ones first.
 ///
-/// Visits all blocks whose boxes the ray crosses before `t_max`, near ones first.
+/// `visit` gets the hits of a block and returns how far to go on, or `None` to end the walk. No
+/// lanes may be handled in closures: those are not always inlined, and are not compiled for the
+/// vector instructions of the function around.
 #[inline(always)]
 fn walk<L: Lanes>(
     tree: TreeRef<'_>,
     ray: &Ray,
-    mut visit: impl FnMut(&Block, &Shear, f32, f32) -> Option<f32>,
+    mut visit: impl FnMut(&Block, &BlockHits) -> Option<f32>,
 ) {
     let usable = ray.direction.is_finite() && ray.direction != Vec3::ZERO;
     if !usable || !ray.origin.is_finite() {
@@ -270,9 +272,12 @@ fn walk<L: Lanes>(
     loop {
         if current & LEAF != 0 {
             let block = &tree.blocks[(current & !LEAF) as usize];
-            match visit(block, &shear, t_min, t_max) {
-                Some(limit) => t_max = limit,
-                None => return,
+            let hits = triangle::intersect::<L>(block, &shear, t_min, t_max);
+            if hits.mask != 0 {
+                match visit(block, &hits) {
+                    Some(limit) => t_max = limit,
+                    None => return,
+                }
             }
         } else {
             let node = &tree.nodes[current as usize];
@@ -300,8 +305,7 @@ pub(super) fn closest_hit<L: Lanes>(
     accept: impl Fn(&Hit) -> bool,
 ) -> Option<Hit> {
     let mut closest = Hit { t: ray.t_max, triangle: u32::MAX, ..Hit::default() };
-    walk::<L>(tree, ray, |block, shear, t_min, t_max| {
-        let hits = triangle::intersect::<L>(block, shear, t_min, t_max);
+    walk::<L>(tree, ray, |block, hits| {
         for lane in Bits(hits.mask) {
             let hit = hits.hit(block, lane);
             // The lower index wins ties, so that hits do not depend on the shape of the tree.
@@ -324,8 +328,7 @@ pub(super) fn any_hit<L: Lanes>(
     mut blocks: impl FnMut(&Hit) -> bool,
 ) -> bool {
     let mut blocked = false;
-    walk::<L>(tree, ray, |block, shear, t_min, t_max| {
-        let hits = triangle::intersect::<L>(block, shear, t_min, t_max);
+    walk::<L>(tree, ray, |block, hits| {
         for lane in Bits(hits.mask) {
             let hit = hits.hit(block, lane);
             if blocks(&hit) {
@@ -333,7 +336,7 @@ pub(super) fn any_hit<L: Lanes>(
                 return None;
             }
         }
-        Some(t_max)
+        Some(ray.t_max)
     });
     blocked
 }

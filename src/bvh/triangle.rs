@@ -61,18 +61,10 @@ impl BlockHits {
 /// triangles agree about their shared edge, and all machines agree about the hit.
 #[inline(always)]
 pub(super) fn intersect<L: Lanes>(block: &Block, ray: &Shear, t_min: f32, t_max: f32) -> BlockHits {
-    let [x, y, z] = ray.axes;
-    let origin = ray.origin.map(L::splat);
-    let slope = [L::splat(ray.factors[0]), L::splat(ray.factors[1])];
-    let depth = [0, 1, 2].map(|vertex| L::load(axis(block, vertex, z)).sub(origin[2]));
-    let across = |vertex: usize, axis_index: usize, i: usize| {
-        let offset = L::load(axis(block, vertex, axis_index)).sub(origin[i]);
-        offset.sub(slope[i].mul(depth[vertex]))
-    };
-    let px = [0, 1, 2].map(|vertex| across(vertex, x, 0));
-    let py = [0, 1, 2].map(|vertex| across(vertex, y, 1));
-    let edge = |a: usize, b: usize| px[a].mul(py[b]).sub(py[a].mul(px[b]));
-    let mut edges = [edge(2, 1), edge(0, 2), edge(1, 0)];
+    let a = shear::<L>(&block.vertices[0], ray);
+    let b = shear::<L>(&block.vertices[1], ray);
+    let c = shear::<L>(&block.vertices[2], ray);
+    let mut edges = [edge(&c, &b), edge(&a, &c), edge(&b, &a)];
 
     let zero = L::splat(0.0);
     let least = edges[0].min(edges[1]).min(edges[2]);
@@ -83,13 +75,14 @@ pub(super) fn intersect<L: Lanes>(block: &Block, ray: &Shear, t_min: f32, t_max:
     }
     let on_edge = mask & (zero.eq(least) | zero.eq(greatest));
     if on_edge != 0 {
-        let (exact, outside) =
-            exact_edges(edges.map(L::store), px.map(L::store), py.map(L::store), on_edge);
-        edges = exact.map(|edge| L::load(&edge));
-        mask &= !outside;
+        let mut stored = [edges[0].store(), edges[1].store(), edges[2].store()];
+        let px = [a[0].store(), b[0].store(), c[0].store()];
+        let py = [a[1].store(), b[1].store(), c[1].store()];
+        mask &= !exact_edges(&mut stored, &px, &py, on_edge);
+        edges = [L::load(&stored[0]), L::load(&stored[1]), L::load(&stored[2])];
     }
     let determinant = edges[0].add(edges[1]).add(edges[2]);
-    let scaled = edges[0].mul(depth[0]).add(edges[1].mul(depth[1])).add(edges[2].mul(depth[2]));
+    let scaled = edges[0].mul(a[2]).add(edges[1].mul(b[2])).add(edges[2].mul(c[2]));
     let t = scaled.mul(L::splat(ray.factors[2])).div(determinant);
     mask &= L::splat(t_min).le(t) & t.le(L::splat(t_max));
     if mask == 0 {
@@ -102,22 +95,38 @@ pub(super) fn intersect<L: Lanes>(block: &Block, ray: &Shear, t_min: f32, t_max:
     }
 }
 
+/// Vertices relative to the ray's origin, sheared so that the ray runs along the third axis.
 #[inline(always)]
-fn axis(block: &Block, vertex: usize, axis: usize) -> &[f32; WIDTH] {
-    debug_assert!(axis < 3, "axes are a permutation of 0, 1, 2");
-    // SAFETY: `axis` comes from `Shear::axes`, whose entries are remainders of 3.
-    unsafe { block.vertices[vertex].get_unchecked(axis) }
+fn shear<L: Lanes>(vertices: &[[f32; WIDTH]; 3], ray: &Shear) -> [L; 3] {
+    let [x, y, z] = ray.axes;
+    debug_assert!(x < 3 && y < 3 && z < 3, "axes are a permutation of 0, 1, 2");
+    // SAFETY: `Shear::new` makes `axes` of remainders of 3.
+    let (x, y, z) = unsafe {
+        (vertices.get_unchecked(x), vertices.get_unchecked(y), vertices.get_unchecked(z))
+    };
+    let z = L::load(z).sub(L::splat(ray.origin[2]));
+    let x = L::load(x).sub(L::splat(ray.origin[0]));
+    let y = L::load(y).sub(L::splat(ray.origin[1]));
+    [x.sub(L::splat(ray.factors[0]).mul(z)), y.sub(L::splat(ray.factors[1]).mul(z)), z]
 }
 
-/// Edge functions of the lanes in `lanes` in f64, where products of f32 are exact, and a mask of the
-/// lanes that prove to be outside. An f32 edge function of zero says nothing about the side.
+/// On which side of the edge from `b` to `a` the ray passes: positive, negative or, within an
+/// underflow or rounding, zero.
+#[inline(always)]
+fn edge<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> L {
+    a[0].mul(b[1]).sub(a[1].mul(b[0]))
+}
+
+/// Puts the edge functions of the lanes in `lanes` computed in f64, where products of f32 are exact,
+/// and returns a mask of the lanes that prove to be outside. Zero in f32 does not tell the side.
 #[cold]
+#[inline(never)]
 fn exact_edges(
-    mut edges: [[f32; WIDTH]; 3],
-    px: [[f32; WIDTH]; 3],
-    py: [[f32; WIDTH]; 3],
+    edges: &mut [[f32; WIDTH]; 3],
+    px: &[[f32; WIDTH]; 3],
+    py: &[[f32; WIDTH]; 3],
     lanes: u32,
-) -> ([[f32; WIDTH]; 3], u32) {
+) -> u32 {
     let mut outside = 0;
     for lane in Bits(lanes) {
         let edge = |a: usize, b: usize| {
@@ -132,5 +141,5 @@ fn exact_edges(
             edge[lane] = exact as f32;
         }
     }
-    (edges, outside)
+    outside
 }
