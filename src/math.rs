@@ -43,11 +43,15 @@ impl Frame {
     }
 }
 
-/// Lat-long coordinates in `[0,1)` x `[0,1]` of a unit direction.
+/// Lat-long coordinates in `[0,1)` x `[0,1]` of a direction.
+///
+/// The polar angle comes from an arc tangent: near a pole `acos(y)` is off by up to 3e-4 radian,
+/// which is more than a row of a large map.
 pub fn uv_from_direction(direction: Vec3) -> Vec2 {
     let u = 0.5 + direction.z.atan2(direction.x) / TAU;
     // Rounding may carry u to exactly 1, which is the seam, that is 0.
-    Vec2::new(if u >= 1.0 { 0.0 } else { u }, direction.y.clamp(-1.0, 1.0).acos() / PI)
+    let sin_theta = (direction.x * direction.x + direction.z * direction.z).sqrt();
+    Vec2::new(if u >= 1.0 { 0.0 } else { u }, sin_theta.atan2(direction.y) / PI)
 }
 
 /// Unit direction of lat-long coordinates; inverse of [`uv_from_direction`].
