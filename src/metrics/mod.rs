@@ -1,1 +1,3 @@
-//! Comparing pictures.
+//! Comparing pictures, and deciding whether two estimates agree.
+
+pub mod statistics;
