@@ -2,6 +2,8 @@
 
 pub mod builtin;
 pub mod gltf;
+pub mod surface;
+pub mod texture;
 
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
 
