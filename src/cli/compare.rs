@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::error::{Error, Result};
-use crate::image::map::read_picture;
+use crate::image::read_picture;
 use crate::metrics::compare;
 
 /// Arguments of `compare`.
@@ -27,7 +27,11 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
     if arguments.json {
         println!("{}", super::record::to_json(&comparison)?);
     } else {
-        print!("{comparison}");
+        println!("mean ratio        {:.5}", comparison.mean_ratio);
+        println!("MSE               {:.4e}", comparison.mse);
+        println!("relMSE            {:.4e}", comparison.rel_mse);
+        println!("trimmed relMSE    {:.4e}", comparison.trimmed_rel_mse);
+        println!("FLIP              {:.4}", comparison.flip);
     }
     Ok(())
 }

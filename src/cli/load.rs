@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::environment::sky;
 use crate::error::{Error, Notices, Result};
 use crate::image::Image;
-use crate::image::map::{read_map, sanitise};
+use crate::image::{read_map, sanitise};
 use crate::scene::{Scene, builtin, gltf};
 
 /// Size of a built-in sky when none is asked for.

@@ -1,6 +1,6 @@
 //! `lightgrid sat`.
 
-use crate::environment::sat_report::sat_report;
+use crate::environment::sat_report;
 use crate::error::Result;
 
 /// Arguments of `sat`.

@@ -40,6 +40,19 @@ pub fn write_beside_and_rename(
     Ok(())
 }
 
+/// Whether [`write_beside_and_rename`] could write `path` now: asked before long work, so that it is
+/// not lost at its end.
+///
+/// # Errors
+/// As for writing.
+pub fn check_writable(path: &Path) -> Result<()> {
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    check_target(&target).map_err(|cause| Error::at(path, cause))?;
+    let temporary = Temporary::beside(&target);
+    File::create_new(&temporary.path).map_err(|error| Error::at(path, write_cause(&error)))?;
+    Ok(())
+}
+
 /// Why `target` cannot be written, as far as can be known before trying.
 fn check_target(target: &Path) -> std::result::Result<(), String> {
     if target.file_name().is_none() {

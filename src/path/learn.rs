@@ -51,7 +51,7 @@ impl Path<'_> {
                 let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
                 match learning.recording() {
                     Recording::VisibleCosine => {
-                        let cosine = vertex.point.frame.z.dot(sample.direction).abs();
+                        let cosine = vertex.point.shading_frame.z.dot(sample.direction).abs();
                         luminance(transmittance) * cosine
                     }
                     Recording::VisibleContribution => {

@@ -203,7 +203,7 @@ impl<'a> Path<'a> {
         if self.bounces == 0 && self.first_hit.is_none() {
             let albedo = if parameters.unlit { parameters.base_color } else { bsdf.albedo() };
             self.first_hit =
-                Some(FirstHit { albedo, normal: point.frame.z, depth: self.travelled });
+                Some(FirstHit { albedo, normal: point.shading_frame.z, depth: self.travelled });
         }
         if parameters.unlit {
             self.radiance += self.throughput * parameters.base_color;
@@ -216,7 +216,7 @@ impl<'a> Path<'a> {
             .tracer
             .grid
             .map_or(WHOLE_MAP, |grid| grid.law_of(point.position, point.geometric_normal));
-        let wo = point.frame.local_from_world(-self.ray.direction);
+        let wo = point.shading_frame.local_from_world(-self.ray.direction);
         Some(Vertex { point, bsdf, wo, law })
     }
 
@@ -301,7 +301,7 @@ impl<'a> Path<'a> {
     /// BSDF times cosine and the BSDF's density for light from `direction`; `None` where it is
     /// black, or where shading and geometric normal disagree about the side.
     fn scattered(&self, vertex: &Vertex, direction: Vec3) -> Option<(Vec3, f32)> {
-        let wi = vertex.point.frame.local_from_world(direction);
+        let wi = vertex.point.shading_frame.local_from_world(direction);
         if (wi.z > 0.0) != (vertex.point.geometric_normal.dot(direction) > 0.0) {
             return None;
         }
@@ -326,7 +326,7 @@ impl<'a> Path<'a> {
         let Some(sample) = vertex.bsdf.sample(vertex.wo, Vec3::new(lobe, x, y)) else {
             return false;
         };
-        let direction = vertex.point.frame.world_from_local(sample.wi).normalize();
+        let direction = vertex.point.shading_frame.world_from_local(sample.wi).normalize();
         let normal = vertex.point.geometric_normal;
         let above = normal.dot(direction) > 0.0;
         if above == sample.is_transmission {

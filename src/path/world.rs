@@ -87,7 +87,7 @@ impl World {
         }
         let glass = if point.parameters.transmission > 0.0 {
             let bsdf = crate::bsdf::Bsdf::new(&point.parameters, point.front_face);
-            bsdf.straight_transmittance(point.frame.local_from_world(-direction))
+            bsdf.straight_transmittance(point.shading_frame.local_from_world(-direction))
         } else {
             Vec3::ZERO
         };

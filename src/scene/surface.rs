@@ -45,30 +45,11 @@ pub struct SurfaceParameters {
     pub unlit: bool,
 }
 
-impl SurfaceParameters {
-    /// An opaque surface that neither scatters nor emits.
-    pub const BLACK: Self = Self {
-        base_color: Vec3::ZERO,
-        alpha: 1.0,
-        metallic: 0.0,
-        roughness: 1.0,
-        ior: 1.5,
-        specular: 0.0,
-        specular_color: Vec3::ONE,
-        transmission: 0.0,
-        thin: true,
-        absorption: Vec3::ZERO,
-        clearcoat: 0.0,
-        clearcoat_roughness: 0.0,
-        clearcoat_normal: Vec3::Z,
-        emissive: Vec3::ZERO,
-        unlit: false,
-    };
-}
-
 /// A point on a triangle as a ray sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint {
+    /// Index of the triangle.
+    pub triangle: u32,
     /// World position in metres, from the triangle's corners (more exact than from the ray).
     pub position: Vec3,
     /// Unit normal of the triangle on the viewer's side.
@@ -88,7 +69,8 @@ impl SurfacePoint {
     /// The point of `triangle` at `barycentric` (weights of its second and third corner), met by a
     /// ray that travels along `ray_direction`.
     ///
-    /// The back of a single-sided opaque material is black: it stops light but is not shaded.
+    /// The back of a single-sided material is shaded like its front: only camera rays, which pass it,
+    /// tell the difference.
     pub fn at(scene: &Scene, triangle: u32, barycentric: Vec2, ray_direction: Vec3) -> Self {
         let corner = Corner::new(scene, triangle, barycentric);
         let material = corner.material();
@@ -109,11 +91,8 @@ impl SurfacePoint {
             let coat = facing.turned(corner.mapped(unmapped, texture, scale), unmapped);
             parameters.clearcoat_normal = shading_frame.local_from_world(coat);
         }
-        if !front_face && !material.double_sided && material.transmission == 0.0 {
-            parameters = SurfaceParameters { alpha: parameters.alpha, ..SurfaceParameters::BLACK };
-        }
         let uv = corner.uv(0);
-        Self { position, geometric_normal, shading_frame, front_face, uv, parameters }
+        Self { triangle, position, geometric_normal, shading_frame, front_face, uv, parameters }
     }
 }
 
