@@ -9,6 +9,7 @@
 //! shows at `u` is seen at lat-long `u + rotation / 2pi`. Tiles turn with the map.
 
 mod options;
+mod sat_report;
 pub mod sky;
 mod summed_area;
 mod table;
@@ -22,6 +23,7 @@ use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 pub use self::options::{EnvironmentOptions, Lookup, TableKind};
+pub use self::sat_report::{SatReport, SatReportRow, sat_report};
 use self::table::Table;
 use self::tiles::TileGrid;
 use self::weights::Weights;

@@ -1,11 +1,13 @@
 //! The choice of importance table behind one face.
 
+use std::sync::Arc;
+
 use glam::DVec2;
 
 use super::TableKind;
-use super::summed_area::SummedArea;
+use super::summed_area::{RectangleTable, SummedArea};
 use super::tile_local::TileLocal;
-use super::tiles::{TileGrid, TileTexels};
+use super::tiles::TileGrid;
 use super::weights::Weights;
 
 /// A texel chosen by a table.
@@ -25,9 +27,7 @@ pub(crate) struct TexelSample {
 #[derive(Debug, Clone)]
 pub(crate) enum Table {
     TileLocal(TileLocal),
-    U32(SummedArea<u32>),
-    F32(SummedArea<f32>),
-    F64(SummedArea<f64>),
+    SummedArea(Arc<dyn RectangleTable>),
 }
 
 impl Table {
@@ -37,39 +37,24 @@ impl Table {
         weights: &Weights<'_>,
         grid: &TileGrid,
     ) -> (Self, Vec<f64>) {
-        let energies = |energy: &dyn Fn(&TileTexels) -> f64| {
-            (0..grid.count()).map(|tile| energy(&grid.texels(tile))).collect()
-        };
-        match kind {
+        let table: Arc<dyn RectangleTable> = match kind {
             TableKind::TileLocal => {
                 let (table, energies) = TileLocal::build(weights, grid);
-                (Self::TileLocal(table), energies)
+                return (Self::TileLocal(table), energies);
             }
-            TableKind::U32 => {
-                let table = SummedArea::<u32>::build(weights);
-                let energies = energies(&|texels| table.energy(texels));
-                (Self::U32(table), energies)
-            }
-            TableKind::F32 => {
-                let table = SummedArea::<f32>::build(weights);
-                let energies = energies(&|texels| table.energy(texels));
-                (Self::F32(table), energies)
-            }
-            TableKind::F64 => {
-                let table = SummedArea::<f64>::build(weights);
-                let energies = energies(&|texels| table.energy(texels));
-                (Self::F64(table), energies)
-            }
-        }
+            TableKind::U32 => Arc::new(SummedArea::<u32>::build(weights)),
+            TableKind::F32 => Arc::new(SummedArea::<f32>::build(weights)),
+            TableKind::F64 => Arc::new(SummedArea::<f64>::build(weights)),
+        };
+        let energies = (0..grid.count()).map(|tile| table.energy(&grid.texels(tile))).collect();
+        (Self::SummedArea(table), energies)
     }
 
     /// Chooses a texel of a tile with `u` in `[0,1)`^2; `None` where the table has no mass.
     pub(crate) fn sample(&self, grid: &TileGrid, tile: u32, u: DVec2) -> Option<TexelSample> {
         match self {
             Self::TileLocal(table) => table.sample(grid, tile, u),
-            Self::U32(table) => table.sample(&grid.texels(tile), u),
-            Self::F32(table) => table.sample(&grid.texels(tile), u),
-            Self::F64(table) => table.sample(&grid.texels(tile), u),
+            Self::SummedArea(table) => table.sample(&grid.texels(tile), u),
         }
     }
 
@@ -77,18 +62,14 @@ impl Table {
     pub(crate) fn sample_probability(&self, grid: &TileGrid, tile: u32, x: u32, y: u32) -> f64 {
         match self {
             Self::TileLocal(table) => table.sample_probability(grid, tile, x, y),
-            Self::U32(table) => table.sample_probability(&grid.texels(tile), x, y),
-            Self::F32(table) => table.sample_probability(&grid.texels(tile), x, y),
-            Self::F64(table) => table.sample_probability(&grid.texels(tile), x, y),
+            Self::SummedArea(table) => table.sample_probability(&grid.texels(tile), x, y),
         }
     }
 
     pub(crate) fn memory_bytes(&self) -> usize {
         match self {
             Self::TileLocal(table) => table.memory_bytes(),
-            Self::U32(table) => table.memory_bytes(),
-            Self::F32(table) => table.memory_bytes(),
-            Self::F64(table) => table.memory_bytes(),
+            Self::SummedArea(table) => table.memory_bytes(),
         }
     }
 }

@@ -54,6 +54,11 @@ impl TileGrid {
         }
     }
 
+    /// All texels of the map.
+    pub(crate) fn whole(&self) -> TileTexels {
+        TileTexels { x: 0..self.width, y: 0..self.row_of_texel.len() as u32 }
+    }
+
     /// Where a tile's texels begin when tiles are stored one after another, row of tiles after row.
     pub(crate) fn first_texel(&self, texels: &TileTexels) -> usize {
         texels.y.start as usize * self.width as usize

@@ -1,11 +1,14 @@
 //! The environment map as a light: tables, tiles, sampling and densities.
 
+mod tables;
+
 use std::f32::consts::TAU;
 
 use glam::{DVec3, Vec2, Vec3};
 use lightgrid::environment::{Environment, EnvironmentOptions, Lookup, TableKind};
 use lightgrid::image::Image;
 use lightgrid::math::{direction_from_uv, rotate_y, texel_solid_angle, uv_from_direction};
+use lightgrid::metrics::statistics::{chi_square_test, sidak};
 
 /// SplitMix64, enough for tests.
 struct Random(u64);
@@ -143,6 +146,95 @@ fn a_sample_has_the_density_and_the_radiance_of_its_direction() {
             }
         }
     });
+}
+
+#[test]
+fn a_sample_is_found_in_its_texel_on_maps_as_fine_as_f32_directions_allow() {
+    for (width, height) in [(16384, 16), (16, 8192), (4096, 2048)] {
+        let map = random(width, height, 21);
+        let mut random = Random(22);
+        for lookup in [Lookup::Bilinear, Lookup::Nearest] {
+            let mut environment = environment(&map, TableKind::TileLocal, lookup);
+            for i in 0..200_000 {
+                // Edges of the unit square lead to edges of texels.
+                let mut u = random.next2();
+                if i % 4 == 0 {
+                    u = (u * 4096.0).floor() / 4096.0;
+                }
+                let tile = (random.next() * environment.tile_count() as f32) as u32;
+                environment.set_rotation(7.0 * u.x);
+                let sample = environment.sample_in_tile(tile, u).unwrap();
+                let found = environment.tile_pdf_solid_angle(sample.direction);
+                assert_eq!(found, (tile, sample.pdf_solid_angle), "{width} x {height}");
+            }
+        }
+    }
+}
+
+#[test]
+fn samples_follow_their_density() {
+    const SAMPLES: u32 = 60_000;
+    let cases = maps().len() * 8;
+    for_each_case(|case, map, environment, table| {
+        // Where rounding moves more than a test of this size can see, the table report says so.
+        let exact = matches!(table, TableKind::TileLocal | TableKind::F64);
+        if environment.is_black() || !exact && case.starts_with("sun") {
+            return;
+        }
+        // Tiles in turn, whatever their energy, so that a sun does not draw all samples.
+        let lit: Vec<u32> = (0..environment.tile_count())
+            .filter(|tile| environment.tile_energies()[*tile as usize] > 0.0)
+            .collect();
+        let per_tile = SAMPLES / lit.len() as u32;
+        let mut observed = vec![0.0; map.pixels.len()];
+        let mut random = Random(31);
+        for tile in lit {
+            for _ in 0..per_tile {
+                let sample = environment.sample_in_tile(tile, random.next2()).unwrap();
+                let (x, y) = texel(map, sample.direction);
+                observed[(y * map.width + x) as usize] += 1.0;
+            }
+        }
+        let mut expected = Vec::new();
+        for y in 0..map.height {
+            for x in 0..map.width {
+                let (_, pdf) = environment.tile_pdf_solid_angle(centre(map, x, y));
+                let solid_angle = texel_solid_angle(map.width, map.height, y);
+                expected.push(f64::from(pdf) * solid_angle * f64::from(per_tile));
+            }
+        }
+        if expected.iter().filter(|count| **count > 0.0).count() == 1 {
+            let expected: Vec<f64> = expected.iter().map(|count| count.round()).collect();
+            assert_eq!(observed, expected, "{case}");
+            return;
+        }
+        let test = chi_square_test(&observed, &expected, sidak(0.01, cases)).unwrap();
+        assert!(test.passed, "{case}: {test:?}");
+    });
+}
+
+#[test]
+fn places_in_a_texel_are_uniform_in_solid_angle() {
+    const SAMPLES: u32 = 100_000;
+    for (width, height) in [(1, 1), (2, 1), (3, 2)] {
+        let map = Image::filled(width, height, [1.0; 3]);
+        for table in TableKind::ALL {
+            let environment = environment(&map, table, Lookup::Bilinear);
+            let (columns, rows) = (14, 10);
+            let mut observed = vec![0.0; columns * rows];
+            let mut random = Random(41);
+            for _ in 0..SAMPLES {
+                let (tile, _) = choose_tile(&environment, &mut random).unwrap();
+                let direction = environment.sample_in_tile(tile, random.next2()).unwrap().direction;
+                let u = uv_from_direction(direction).x;
+                let row = (0.5 * (1.0 - direction.y) * rows as f32) as usize;
+                observed[row.min(rows - 1) * columns + (u * columns as f32) as usize] += 1.0;
+            }
+            let expected = vec![f64::from(SAMPLES) / (columns * rows) as f64; columns * rows];
+            let test = chi_square_test(&observed, &expected, sidak(0.01, 12)).unwrap();
+            assert!(test.passed, "{width} x {height}, {table}: {test:?}");
+        }
+    }
 }
 
 #[test]
