@@ -77,7 +77,6 @@ impl Bsdf {
     /// The scattering of a surface; `entering` says that the viewer is outside of the solid, i.e. on
     /// the front side. Thin walls are alike from both sides. An unlit surface scatters nothing.
     pub fn new(p: &SurfaceParameters, entering: bool) -> Self {
-        let p = if p.unlit { &SurfaceParameters::BLACK } else { p };
         let f90 = p.specular;
         let f0 = (normal_reflectance(p.ior) * p.specular_color).min(Vec3::ONE) * p.specular;
         let f0_f90 = Vec2::new(f0.max_element(), f90);

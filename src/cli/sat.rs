@@ -1,7 +1,7 @@
 //! `lightgrid sat`.
 
-use crate::environment::sat_report;
-use crate::error::Result;
+use crate::environment::{Lookup, sat_report};
+use crate::error::{Error, Result};
 
 /// Arguments of `sat`.
 #[derive(Debug, clap::Args)]
@@ -17,6 +17,9 @@ pub(super) struct SatArguments {
 const TALKS_CASES: [&str; 4] =
     ["sky:hallway@10000x5000", "sky:day@15000x7500", "sky:night@3000x1500", "sky:sunset@3000x1500"];
 
+/// Samples drawn to time a table.
+const SAMPLES: u32 = 1 << 20;
+
 /// Prints one table a map.
 pub(super) fn run(arguments: &SatArguments) -> Result<()> {
     let maps: Vec<&str> = if arguments.maps.is_empty() {
@@ -28,7 +31,7 @@ pub(super) fn run(arguments: &SatArguments) -> Result<()> {
     for name in maps {
         let (map, notices) = super::load::map(name)?;
         notices.iter().for_each(|sentence| eprintln!("notice: {name}: {sentence}"));
-        let report = sat_report(&map);
+        let report = sat_report(&map, Lookup::Bilinear, SAMPLES).map_err(|e| Error::at(name, e))?;
         if arguments.json {
             reports.insert(name.to_owned(), super::record::to_value(&report)?);
         } else {

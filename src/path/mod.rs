@@ -200,13 +200,13 @@ impl<'a> Path<'a> {
     fn arrive(&mut self, hit: &Hit, point: SurfacePoint) -> Option<Vertex> {
         let parameters = &point.parameters;
         let bsdf = Bsdf::new(parameters, point.front_face);
-        if self.bounces == 0 && self.first_hit.is_none() {
+        if self.bounces == 0 {
             let albedo = if parameters.unlit { parameters.base_color } else { bsdf.albedo() };
             self.first_hit =
                 Some(FirstHit { albedo, normal: point.shading_frame.z, depth: self.travelled });
         }
         if parameters.unlit {
-            self.radiance += self.throughput * parameters.base_color;
+            self.radiance += self.throughput * parameters.emissive;
             return None;
         }
         if self.tracer.world.needs.emitters {
