@@ -36,16 +36,18 @@ pub(super) struct Record<'a> {
 impl Record<'_> {
     /// Key and value pairs for pictures: scene, map, settings, samples, seconds.
     pub(super) fn metadata(&self) -> Vec<(String, String)> {
+        let film = self.session.film();
         let mut pairs = vec![
-            ("software".to_owned(), concat!("lightgrid ", env!("CARGO_PKG_VERSION")).to_owned()),
-            ("scene".to_owned(), self.scene.to_owned()),
-            ("map".to_owned(), self.map.to_owned()),
-            ("samples_per_pixel".to_owned(), self.session.film().min_samples().to_string()),
-            ("seconds".to_owned(), format!("{:.3}", self.session.elapsed_seconds())),
+            ("lightgrid.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+            ("lightgrid.scene".to_owned(), self.scene.to_owned()),
+            ("lightgrid.map".to_owned(), self.map.to_owned()),
+            ("lightgrid.samples_per_pixel".to_owned(), film.min_samples().to_string()),
+            ("lightgrid.seconds".to_owned(), format!("{:.3}", self.session.elapsed_seconds())),
         ];
+        // A prefix keeps clear of the names that OpenEXR reserves.
         pairs.extend(self.options.iter().map(|(key, value)| {
             let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-            ((*key).to_owned(), text)
+            (format!("lightgrid.{key}"), text)
         }));
         pairs
     }

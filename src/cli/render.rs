@@ -66,9 +66,9 @@ pub(super) struct RenderArguments {
     /// Pixel filter.
     #[arg(long, default_value = "blackman-harris", value_enum, help_heading = "Picture")]
     filter: PixelFilter,
-    /// Exposure of .png pictures in stops, or `auto`. Built-in scenes bring their own.
-    #[arg(long, allow_hyphen_values = true, value_name = "EV|auto", help_heading = "Picture")]
-    exposure: Option<String>,
+    /// Exposure of .png pictures in stops, or `auto`.
+    #[arg(long, default_value = "auto", value_parser = parse_exposure, allow_hyphen_values = true, value_name = "EV|auto", help_heading = "Picture")]
+    exposure: Exposure,
     /// Tone curve of .png pictures: agx, aces, neutral, reinhard, none.
     #[arg(long, default_value = "agx", value_name = "CURVE", help_heading = "Picture")]
     tonemap: ToneCurve,
@@ -143,7 +143,6 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     for output in arguments.outputs.iter().chain(&arguments.json) {
         check_output(output, arguments.json.as_ref() == Some(output))?;
     }
-    let exposure = parse_exposure(arguments.exposure.as_deref())?;
     start_threads(arguments.threads)?;
     let cancel = super::interrupt::flag();
     let progress = Progress::start("loading");
@@ -196,7 +195,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         options: settings(arguments),
     };
     for output in &arguments.outputs {
-        write_picture(output, arguments, exposure, &record)?;
+        write_picture(output, arguments, &record)?;
     }
     if let Some(path) = &arguments.json {
         record::write_json(path, &record.figures())?;
@@ -236,21 +235,20 @@ fn environment_options(arguments: &RenderArguments) -> EnvironmentOptions {
     }
 }
 
-/// Exposure as typed: `None` leaves it to the scene.
+/// Exposure as typed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Exposure {
     Stops(f32),
     Auto,
 }
 
-fn parse_exposure(text: Option<&str>) -> Result<Option<Exposure>> {
-    match text {
-        None => Ok(None),
-        Some("auto") => Ok(Some(Exposure::Auto)),
-        Some(text) => values::finite(text)
-            .map(|ev| Some(Exposure::Stops(ev as f32)))
-            .map_err(|e| Error::new(format!("--exposure {text}: {e} of stops, or auto"))),
+fn parse_exposure(text: &str) -> std::result::Result<Exposure, String> {
+    if text == "auto" {
+        return Ok(Exposure::Auto);
     }
+    values::finite(text)
+        .map(|stops| Exposure::Stops(stops as f32))
+        .map_err(|e| format!("{e} of stops, or auto"))
 }
 
 fn stop_rule(arguments: &RenderArguments) -> StopRule {
@@ -356,7 +354,6 @@ fn settings(arguments: &RenderArguments) -> Vec<(&'static str, serde_json::Value
 fn write_picture(
     path: &Path,
     arguments: &RenderArguments,
-    exposure: Option<Exposure>,
     record: &Record<'_>,
 ) -> Result<()> {
     let film = record.session.film();
@@ -366,15 +363,12 @@ fn write_picture(
         let layers = layers(film, &arguments.layers);
         return write_exr(path, ExrPicture { image: &image, layers, metadata: &metadata });
     }
-    let stops = match exposure {
-        Some(Exposure::Stops(ev)) => ev,
-        None if builtin::names().contains(&arguments.scene.as_str()) => {
-            builtin::exposure_ev(&arguments.scene, &arguments.env)
-        }
-        Some(Exposure::Auto) | None => auto_exposure_ev(&image),
+    let stops = match arguments.exposure {
+        Exposure::Stops(stops) => stops,
+        Exposure::Auto => auto_exposure_ev(&image),
     };
-    metadata.push(("exposure_ev".to_owned(), format!("{stops:.3}")));
-    metadata.push(("tonemap".to_owned(), arguments.tonemap.name().to_owned()));
+    metadata.push(("lightgrid.exposure_ev".to_owned(), format!("{stops:.3}")));
+    metadata.push(("lightgrid.tonemap".to_owned(), arguments.tonemap.name().to_owned()));
     write_png(path, &display_rgb8(&image, stops, arguments.tonemap), &metadata)
 }
 
