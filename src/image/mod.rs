@@ -1,5 +1,7 @@
 //! Linear f32 pictures, and the files they come from and go to.
 
+pub mod ldr;
+
 /// A picture: linear Rec.709 radiance, row 0 at the top.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
