@@ -26,7 +26,7 @@ pub struct LdrImage {
 /// # Errors
 /// When the format is not recognised or the header is damaged; the sentence begins with `name`.
 pub fn ldr_size(bytes: &[u8], name: &str) -> Result<(u32, u32)> {
-    reader(bytes, name)?.into_dimensions().map_err(|cause| Error::at(name, cause))
+    reader(bytes, name)?.into_dimensions().map_err(|cause| damaged(name, &cause))
 }
 
 /// Decodes a picture whose format is told by its content; deeper channels are rounded to 8 bits.
@@ -41,7 +41,7 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
     limits.max_image_height = Some(MAX_SIDE);
     limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);
-    let rgba = reader.decode().map_err(|cause| Error::at(name, cause))?.into_rgba8();
+    let rgba = reader.decode().map_err(|cause| damaged(name, &cause))?.into_rgba8();
     let (width, height) = rgba.dimensions();
     let pixels = bytemuck::allocation::try_cast_vec(rgba.into_raw())
         .unwrap_or_else(|(_, raw)| raw.as_chunks::<4>().0.to_vec());
@@ -53,9 +53,14 @@ fn reader<'a>(bytes: &'a [u8], name: &str) -> Result<image::ImageReader<Cursor<&
         .with_guessed_format()
         .map_err(|cause| Error::at(name, cause))?;
     if reader.format().is_none() {
-        return Err(Error::at(name, "is not a picture in a known format (PNG, JPEG, WebP)"));
+        return Err(Error::at(name, "not a picture in a known format (PNG, JPEG, WebP)"));
     }
     Ok(reader)
+}
+
+/// The library's words on one line.
+fn damaged(name: &str, cause: &image::ImageError) -> Error {
+    Error::at(name, cause.to_string().replace('\n', " "))
 }
 
 #[cfg(test)]
@@ -88,6 +93,22 @@ mod tests {
         bytes[16..24].copy_from_slice(&[0, 0, 0xff, 0xff, 0, 0, 0xff, 0xff]);
         let error = decode_ldr(&bytes, "bomb.png").unwrap_err().to_string();
         assert!(error.starts_with("bomb.png: "), "{error}");
+    }
+
+    #[test]
+    fn the_three_formats_of_gltf_are_read() {
+        let red = image::RgbImage::from_pixel(8, 4, image::Rgb([255, 0, 0]));
+        for format in [image::ImageFormat::Png, image::ImageFormat::Jpeg, image::ImageFormat::WebP]
+        {
+            let mut bytes = Cursor::new(Vec::new());
+            red.write_to(&mut bytes, format).unwrap();
+            let bytes = bytes.into_inner();
+            assert_eq!(ldr_size(&bytes, "red").unwrap(), (8, 4));
+            let decoded = decode_ldr(&bytes, "red").unwrap();
+            assert_eq!((decoded.width, decoded.height, decoded.pixels.len()), (8, 4, 32));
+            let [r, g, b, a] = decoded.pixels[31];
+            assert!(r > 250 && g < 5 && b < 5 && a == 255, "{format:?}");
+        }
     }
 
     #[test]

@@ -41,19 +41,19 @@ impl<'a> Elements<'a> {
         types: &[Type],
     ) -> Fallible<Self> {
         let accessor = find(&file.root.accessors, index, "accessor")?;
-        Self::of(file, accessor, types).map_err(|cause| format!("accessor {index} {cause}"))
+        Self::of(file, accessor, types).map_err(|cause| format!("accessor {index}: {cause}"))
     }
 
     fn of(file: &'a File<'_>, accessor: &json::Accessor, types: &[Type]) -> Fallible<Self> {
         let (Checked::Valid(component), Checked::Valid(kind)) =
             (accessor.component_type, accessor.type_)
         else {
-            return Err("has a type that glTF 2.0 does not know".into());
+            return Err("its type is unknown to glTF 2.0".into());
         };
         if !types.contains(&kind) {
-            return Err(format!("is of type {kind:?}, which does not fit its use"));
+            return Err(format!("its type {kind:?} does not fit its use"));
         }
-        let count = usize::try_from(accessor.count.0).map_err(|_| "is too large")?;
+        let count = usize::try_from(accessor.count.0).map_err(|_| "its count is too large")?;
         let (component, components) = (component.0, kind.multiplicity());
         let size = component.size() * components;
         let base = match accessor.buffer_view {
@@ -62,7 +62,7 @@ impl<'a> Elements<'a> {
         };
         // Zeros cost no bytes, so a count of them must be held against something that does.
         if base.is_none() && count > file.total_bytes() {
-            return Err(format!("claims {count} elements without any data"));
+            return Err(format!("{count} elements are claimed without any data"));
         }
         let sparse = match &accessor.sparse {
             Some(sparse) => Some(Sparse::open(file, sparse, size, count)?),
@@ -72,7 +72,7 @@ impl<'a> Elements<'a> {
     }
 
     /// Reads integers as fractions of their largest value even if the file forgets to say so.
-    pub(super) fn as_fractions(mut self) -> Self {
+    pub(super) fn with_fractions(mut self) -> Self {
         self.normalized = true;
         self
     }
@@ -156,7 +156,7 @@ impl<'a> Strided<'a> {
         match (bytes, needed) {
             (Some(bytes), Some(needed)) if needed <= bytes.len() => Ok(Self { bytes, stride }),
             _ => Err(format!(
-                "has {count} elements from byte {offset} on, more than buffer view {view} holds"
+                "{count} elements from byte {offset} on are more than buffer view {view} holds"
             )),
         }
     }
@@ -174,9 +174,10 @@ impl<'a> Sparse<'a> {
         size: usize,
         count: usize,
     ) -> Fallible<Self> {
-        let rows = usize::try_from(sparse.count.0).map_err(|_| "has too many sparse elements")?;
+        let rows = usize::try_from(sparse.count.0)
+            .map_err(|_| "its count of sparse elements is too large")?;
         let Checked::Valid(component) = sparse.indices.component_type else {
-            return Err("has sparse indices of an unknown type".into());
+            return Err("the type of its sparse indices is unknown to glTF 2.0".into());
         };
         let width = component.0.size();
         let (indices, values) = (&sparse.indices, &sparse.values);
@@ -189,7 +190,7 @@ impl<'a> Sparse<'a> {
             let bytes = indices.row(row, width).iter().rev();
             let element = bytes.fold(0_u32, |word, &byte| word << 8 | u32::from(byte));
             if element as usize >= count {
-                return Err(format!("replaces element {element} of {count} (sparse)"));
+                return Err(format!("its sparse element {element} is beyond its {count} elements"));
             }
             elements.push((element, row as u32));
         }

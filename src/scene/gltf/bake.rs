@@ -60,8 +60,10 @@ fn check_limits(scene: &Scene, part: &Part, copies: usize) -> Fallible<()> {
         let millions = MAX_TRIANGLES / 1_000_000;
         return Err(format!("with all instances there are more than {millions} million triangles"));
     }
-    if total(scene.positions.len(), part.positions.len()) > u64::from(u32::MAX) {
-        return Err("with all instances there are more than 2^32 vertices".into());
+    // Three per triangle, unless most triangles of a part were dropped; far below 2^32.
+    if total(scene.positions.len(), part.positions.len()) > 3 * MAX_TRIANGLES {
+        let millions = 3 * MAX_TRIANGLES / 1_000_000;
+        return Err(format!("with all instances there are more than {millions} million vertices"));
     }
     Ok(())
 }

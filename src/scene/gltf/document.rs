@@ -29,9 +29,9 @@ pub(super) fn parse<'a>(
         .map_err(|cause| format!("it is neither GLB nor valid glTF JSON ({cause})"))?;
     check_version(&value)?;
     extensions::check(&value, notices)?;
-    // Scenes are shown at rest, and animations of newer extensions would not fit the types.
-    if let Some(root) = value.as_object_mut() {
-        root.remove("animations");
+    // Animations of newer extensions would not even fit the types.
+    if value.as_object_mut().and_then(|root| root.remove("animations")).is_some() {
+        notices.add("The file has animations; its rest pose is shown.");
     }
     let root = json::deserialize::from_value(value)
         .map_err(|cause| format!("its JSON does not describe glTF 2.0 ({cause})"))?;

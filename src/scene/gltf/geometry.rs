@@ -8,6 +8,7 @@ use json::validation::Checked;
 
 use super::accessor::Elements;
 use super::buffers::File;
+use super::pose::unit;
 use super::{Fallible, MAX_TRIANGLES, tangents};
 use crate::scene::{Material, TextureRef};
 
@@ -111,6 +112,9 @@ pub(super) fn read_part(
     let positions = &part.positions;
     part.triangles.retain(|corners| corners.iter().all(|&v| positions[v as usize].is_finite()));
     tally.dropped_triangles += before - part.triangles.len();
+    if part.triangles.is_empty() {
+        return Ok(None);
+    }
     match needs.normal_map {
         Some(map) if part.tangents.is_empty() => {
             tangents::generate(&mut part, usize::from(map.uv_set), map.transform);
@@ -160,7 +164,7 @@ impl<'a> Source<'a> {
         tally: &mut Tally,
     ) -> Fallible<Option<Self>> {
         let Checked::Valid(mode) = primitive.mode else {
-            return Err("has a mode that glTF 2.0 does not know".into());
+            return Err("its mode is unknown to glTF 2.0".into());
         };
         match mode {
             Mode::Points => tally.points += 1,
@@ -194,7 +198,7 @@ impl<'a> Source<'a> {
         if elements.count < self.positions.count {
             let (count, vertices) = (elements.count, self.positions.count);
             return Err(format!(
-                "accessor {accessor} has {count} elements for {vertices} vertices"
+                "accessor {accessor}: {count} elements are too few for {vertices} vertices"
             ));
         }
         Ok(elements)
@@ -212,11 +216,14 @@ impl<'a> Source<'a> {
             None => None,
         };
         if indices.as_ref().is_some_and(|indices| !indices.is_unsigned()) {
-            return Err("has indices that are not unsigned integers".into());
+            return Err("its indices are not unsigned integers".into());
         }
         let corners = indices.as_ref().map_or(vertices, |indices| indices.count);
         if corners as u64 > 3 * MAX_TRIANGLES {
-            return Err(format!("has more than {} million triangles", MAX_TRIANGLES / 1_000_000));
+            return Err(format!(
+                "it has more than {} million triangles",
+                MAX_TRIANGLES / 1_000_000
+            ));
         }
         let vertex = |corner| match &indices {
             Some(indices) => indices.integers::<1>(corner)[0],
@@ -248,7 +255,7 @@ impl<'a> Source<'a> {
             return Ok(());
         };
         for &vertex in vertices {
-            let normal = Vec3::from_array(elements.floats(vertex as usize)).normalize_or_zero();
+            let normal = unit(Vec3::from_array(elements.floats(vertex as usize)));
             tally.bad_normals += usize::from(normal == Vec3::ZERO);
             part.normals.push(normal);
         }
@@ -272,7 +279,7 @@ impl<'a> Source<'a> {
         let Some(elements) = self.attribute(Semantic::Colors(0), &types)? else {
             return Ok(Vec::new());
         };
-        let elements = elements.as_fractions();
+        let elements = elements.with_fractions();
         let read = |&vertex: &u32| {
             let mut color = Vec4::from_array(elements.floats(vertex as usize));
             if elements.components == 3 {
@@ -291,7 +298,8 @@ impl<'a> Source<'a> {
             let tangents = vertices.iter().map(|&vertex| {
                 let tangent = Vec4::from_array(elements.floats(vertex as usize));
                 let sign = if tangent.w < 0.0 { -1.0 } else { 1.0 };
-                Some(tangent.truncate().try_normalize()?.extend(sign))
+                let direction = unit(tangent.truncate());
+                (direction != Vec3::ZERO).then(|| direction.extend(sign))
             });
             // One bad tangent, and MikkTSpace makes them all.
             part.tangents = tangents.collect::<Option<_>>().unwrap_or_default();
@@ -306,9 +314,9 @@ impl<'a> Source<'a> {
             let weights = self.attribute(Semantic::Weights(set), &[Type::Vec4])?;
             let (Some(joints), Some(weights)) = (joints, weights) else { break };
             if !joints.is_unsigned() {
-                return Err("has joints that are not unsigned integers".into());
+                return Err("its joints are not unsigned integers".into());
             }
-            sets.push((joints, weights.as_fractions()));
+            sets.push((joints, weights.with_fractions()));
         }
         part.influences_per_vertex = 4 * sets.len();
         for &vertex in vertices {
@@ -345,7 +353,7 @@ impl<'a> Source<'a> {
             }
         }
         for normal in &mut part.normals {
-            *normal = normal.normalize_or_zero();
+            *normal = unit(*normal);
         }
         Ok(())
     }

@@ -92,7 +92,7 @@ impl From<&json::material::NormalTexture> for Info {
     fn from(info: &json::material::NormalTexture) -> Self {
         let transform = info.extensions.as_ref();
         let transform = transform.and_then(|all| all.others.get("KHR_texture_transform"));
-        let transform = transform.and_then(|value| parsed(value));
+        let transform = transform.and_then(parsed);
         Self { index: info.index, tex_coord: info.tex_coord, transform }
     }
 }

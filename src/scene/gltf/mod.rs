@@ -88,13 +88,13 @@ fn read(bytes: &[u8], base_dir: Option<&Path>) -> Fallible<Scene> {
             },
         )?;
     }
-    report(&tally, &mut notices);
     if scene.triangles.is_empty() {
-        let mut cause = "it shows no triangles, so there is nothing to render".to_owned();
-        for notice in notices.iter() {
-            cause = format!("{cause}; {notice}");
-        }
-        return Err(cause);
+        let reasons = repairs(&tally).join(", ");
+        let reasons = if reasons.is_empty() { reasons } else { format!(" ({reasons})") };
+        return Err(format!("it shows no triangles, so there is nothing to render{reasons}"));
+    }
+    for repair in repairs(&tally) {
+        notices.add(format!("{repair}."));
     }
     bake::finish(&mut scene);
     scene.materials = materials.materials;
@@ -198,13 +198,14 @@ fn read_parts(
     Ok(parts)
 }
 
-/// One notice for each kind of repair.
-fn report(tally: &Tally, notices: &mut Notices) {
+/// A clause for each kind of repair that was needed.
+fn repairs(tally: &Tally) -> Vec<String> {
     let Tally { points, lines, without_positions, dropped_triangles, bad_normals, bad_values } =
         tally;
+    let mut repairs = Vec::new();
     if points + lines > 0 {
-        notices.add(format!(
-            "Only triangles are rendered: {points} point and {lines} line primitives were skipped."
+        repairs.push(format!(
+            "{points} point and {lines} line primitives were skipped: only triangles are rendered"
         ));
     }
     for (count, what) in [
@@ -214,7 +215,8 @@ fn report(tally: &Tally, notices: &mut Notices) {
         (bad_values, "texture coordinates or colours that are not finite were replaced"),
     ] {
         if *count > 0 {
-            notices.add(format!("{count} {what}."));
+            repairs.push(format!("{count} {what}"));
         }
     }
+    repairs
 }

@@ -1,6 +1,6 @@
 //! The node hierarchy at rest: what is in the shown scene, and where.
 
-use glam::{Affine3A, DAffine3, DMat3, DQuat, DVec3, Mat3A, Vec3, Vec3A};
+use glam::{Affine3A, DAffine3, DMat3, DQuat, DVec3, Mat3A, Vec3, Vec3A, Vec4};
 use gltf::json;
 use json::accessor::Type;
 use serde_json::Value;
@@ -213,12 +213,18 @@ impl Placing {
 
     /// Unit world normal; zero stays zero.
     pub(super) fn normal(&self, normal: Vec3) -> Vec3 {
-        Vec3::from(self.normal * Vec3A::from(normal)).normalize_or_zero()
+        unit(Vec3::from(self.normal * Vec3A::from(normal)))
     }
 
     /// Unit world tangent with its handedness.
-    pub(super) fn tangent(&self, tangent: glam::Vec4) -> glam::Vec4 {
-        let direction = self.affine.transform_vector3(tangent.truncate());
-        direction.normalize_or(Vec3::X).extend(tangent.w * self.handedness)
+    pub(super) fn tangent(&self, tangent: Vec4) -> Vec4 {
+        let direction = unit(self.affine.transform_vector3(tangent.truncate()));
+        let direction = if direction == Vec3::ZERO { Vec3::X } else { direction };
+        direction.extend(tangent.w * self.handedness)
     }
+}
+
+/// Unit vector, zero if there is none; in f64, where the squares of tiny values do not vanish.
+pub(super) fn unit(vector: Vec3) -> Vec3 {
+    vector.as_dvec3().normalize_or_zero().as_vec3()
 }

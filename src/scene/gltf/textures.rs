@@ -19,6 +19,9 @@ use crate::scene::{Texture, TextureImage, Wrap};
 /// Most texels all images may have together: 4 GiB.
 const MAX_TEXELS: u64 = 1 << 30;
 
+/// How the JSON types say that a texture names no image.
+const NO_IMAGE: u32 = u32::MAX;
+
 /// What the materials have asked for so far. Until [`Wanted::decode`] the `image` of a texture is
 /// the number of an image in the file.
 #[derive(Default)]
@@ -95,13 +98,13 @@ impl Wanted {
     }
 }
 
-/// Number of the image of a texture, WebP preferred; `u32::MAX` is none.
+/// Number of the image of a texture, WebP preferred, or [`NO_IMAGE`].
 fn image_of(texture: &json::Texture) -> u32 {
     let extension = texture.extensions.as_ref();
     let webp = extension.and_then(|all| all.others.get("EXT_texture_webp"));
     let webp = webp.and_then(|webp| webp.get("source")).and_then(Value::as_u64);
     webp.and_then(|image| u32::try_from(image).ok())
-        .unwrap_or_else(|| u32::try_from(texture.source.value()).unwrap_or(u32::MAX))
+        .unwrap_or_else(|| u32::try_from(texture.source.value()).unwrap_or(NO_IMAGE))
 }
 
 fn wrap(mode: Checked<WrappingMode>) -> Wrap {
@@ -117,13 +120,16 @@ fn image_name(root: &json::Root, number: u32) -> String {
     let name = image.and_then(|image| image.name.as_deref().or(image.uri.as_deref()));
     match name {
         Some(name) => format!("Image {number} ({})", uri::shown(name)),
-        None if number == u32::MAX => "A texture without an image".into(),
+        None if number == NO_IMAGE => "The image of a texture".into(),
         None => format!("Image {number}"),
     }
 }
 
 /// The file's bytes of an image, not decoded yet.
 fn encoded<'a>(file: &'a File<'_>, number: u32) -> Fallible<Cow<'a, [u8]>> {
+    if number == NO_IMAGE {
+        return Err("it has none in a supported format".into());
+    }
     let image = file.root.images.get(number as usize).ok_or("it is not in the file")?;
     match (image.buffer_view, &image.uri) {
         (Some(view), _) => Ok(Cow::Borrowed(file.view(view)?.0)),
