@@ -20,6 +20,8 @@ pub use file::{check_writable, write_beside_and_rename};
 pub use map::{LoadedMap, read_map, read_picture, sanitise};
 pub use png::write_png;
 
+pub mod ldr;
+
 /// A picture: linear Rec.709 radiance, row 0 at the top.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
