@@ -129,7 +129,7 @@ fn check_plausible(headers: &[Header], file_bytes: u64) -> Decoded<()> {
     let chunks: u64 = headers.iter().map(|header| header.chunk_count as u64).sum();
     // The best ratio of any codec on a picture that is not quite black is far below this.
     const PIXELS_PER_BYTE: u64 = 10_000;
-    let pixels: u64 = headers.iter().map(|header| header.layer_size.area() as u64).sum();
+    let pixels: u64 = headers.iter().map(pixels_to_hold).fold(0, u64::saturating_add);
     if chunks.saturating_mul(16) > file_bytes
         || pixels > (1 << 20) + file_bytes.saturating_mul(PIXELS_PER_BYTE)
     {
@@ -140,12 +140,19 @@ fn check_plausible(headers: &[Header], file_bytes: u64) -> Decoded<()> {
     Ok(())
 }
 
-/// Chunks to hold in memory at once: enough to keep all threads busy, some 64 MB decoded.
+/// Pixels of a part's data window or of its display window, whichever has more.
+fn pixels_to_hold(header: &Header) -> u64 {
+    let display = header.shared_attributes.display_window.size;
+    let display_pixels = (display.0 as u64).saturating_mul(display.1 as u64);
+    display_pixels.max(header.layer_size.area() as u64)
+}
+
+/// Chunks to hold in memory at once: some 64 MB decoded, more where that would leave threads idle.
 fn batch_size(header: &Header) -> usize {
-    const BATCH_BYTES: usize = 64 << 20;
     let Vec2(width, height) = header.max_block_pixel_size();
-    let block_bytes = width.saturating_mul(height).saturating_mul(header.channels.bytes_per_pixel);
-    (BATCH_BYTES / block_bytes.max(1)).clamp(rayon::current_num_threads(), 1024)
+    let block_bytes = (width * height * header.channels.bytes_per_pixel).max(1);
+    let batch_bytes = (block_bytes * rayon::current_num_threads()).clamp(64 << 20, 256 << 20);
+    (batch_bytes / block_bytes).clamp(1, 1024)
 }
 
 /// Where the data window lies in the picture that is returned.
