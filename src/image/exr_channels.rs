@@ -140,3 +140,77 @@ fn is_picture_name(layer: &str) -> bool {
 fn part_name(header: &Header) -> String {
     header.own_attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exr::meta::attribute::{SampleType, Text};
+
+    /// A part with `f32` channels, in the order of the file.
+    fn part(name: &str, channels: &[&str]) -> Header {
+        let mut names = channels.to_vec();
+        names.sort_unstable();
+        let channels =
+            names.iter().map(|name| ChannelDescription::named(*name, SampleType::F32)).collect();
+        Header::new(Text::new_or_panic(name), (4, 4), channels)
+    }
+
+    /// The part, and the names of the channels that are read.
+    fn selected(headers: &[Header]) -> (usize, Vec<String>, Notices) {
+        let mut notices = Notices::default();
+        let selection = select(headers, &mut notices).unwrap();
+        let list = &headers[selection.part].channels.list;
+        let names = selection.channels.indices().into_iter().map(|i| list[i].name.to_string());
+        (selection.part, names.collect(), notices)
+    }
+
+    fn assert_selected(headers: &[Header], part: usize, names: &[&str], notice: &str) {
+        let (got_part, got_names, notices) = selected(headers);
+        assert_eq!((got_part, got_names), (part, names.iter().map(|n| (*n).to_owned()).collect()));
+        let notices: Vec<&str> = notices.iter().collect();
+        assert!(notices.is_empty() == notice.is_empty(), "{notices:?}");
+        assert!(notices.join(" ").contains(notice), "{notices:?}");
+    }
+
+    #[test]
+    fn top_level_rgb_comes_first() {
+        let file = part("", &["A", "B", "G", "R", "albedo.R", "albedo.G", "albedo.B", "beauty.R"]);
+        assert_selected(&[file], 0, &["R", "G", "B"], "");
+    }
+
+    #[test]
+    fn a_blender_file_gives_its_combined_layer() {
+        let layer = |name: &str| ["R", "G", "B"].map(|c| format!("ViewLayer.{name}.{c}"));
+        let all = [layer("AO"), layer("Combined"), layer("DiffDir")].concat();
+        let file = part("", &all.iter().map(String::as_str).collect::<Vec<_>>());
+        let names: Vec<&str> = all[3..6].iter().map(String::as_str).collect();
+        assert_selected(&[file], 0, &names, "layer 'ViewLayer.Combined'");
+    }
+
+    #[test]
+    fn the_part_named_like_a_picture_comes_first() {
+        let rgb = ["R", "G", "B"];
+        let parts = [part("depth", &["Z"]), part("albedo", &rgb), part("ViewLayer.Combined", &rgb)];
+        assert_selected(&parts, 2, &rgb, "of the 3 parts of the file, only 'ViewLayer.Combined'");
+        assert_selected(&parts[..2], 1, &rgb, "only 'albedo'");
+    }
+
+    #[test]
+    fn other_names_and_kinds_of_channels() {
+        assert_selected(&[part("", &["red", "green", "blue"])], 0, &["red", "green", "blue"], "");
+        assert_selected(&[part("", &["BY", "RY", "Y"])], 0, &["Y", "RY", "BY"], "");
+        assert_selected(&[part("", &["A", "Y"])], 0, &["Y"], "channel 'Y' is read as grey");
+        assert_selected(&[part("", &["A", "mask"])], 0, &["mask"], "'mask' is read as grey");
+        // A normal is not luminance.
+        let normals = part("", &["N.X", "N.Y", "N.Z", "lum.Y"]);
+        assert_selected(&[normals], 0, &["lum.Y"], "'lum.Y' is read as grey");
+    }
+
+    #[test]
+    fn deep_parts_are_passed_over() {
+        let mut deep = part("deep", &["R", "G", "B"]);
+        deep.deep = true;
+        assert!(select(&[deep.clone()], &mut Notices::default()).is_err());
+        assert_selected(&[deep, part("flat", &["R", "G", "B"])], 1, &["R", "G", "B"], "'flat'");
+    }
+}

@@ -19,7 +19,7 @@ use super::exr_channels::{Channels, select};
 use super::file::read_cause;
 use super::guard::catch_panic;
 use super::primaries::rec709_conversion;
-use super::{Decoded, Image, MAX_PIXELS, check_size};
+use super::{Decoded, Image, check_size};
 use crate::error::{Error, Notices, Result};
 
 /// Linear Rec.709 pixels of an OpenEXR file, not repaired in any way.
@@ -108,15 +108,20 @@ fn decode(file: File, file_bytes: u64) -> Decoded<Exr> {
     Ok(Exr { image, notices, is_cube_map: is_cube_map(&header) })
 }
 
+/// Largest tile, or group of rows, that is decoded as one.
+const MAX_BLOCK_BYTES: usize = 1 << 30;
+
 /// Refuses files whose header claims more than the file can hold, before anything is allocated.
 fn check_plausible(headers: &[Header], file_bytes: u64) -> Decoded<()> {
     for header in headers {
         let Vec2(width, height) = header.layer_size;
         check_size(width as u64, height as u64)?;
+        // The crate allocates a block of this size as soon as a chunk claims to be as large.
         let Vec2(block_width, block_height) = header.max_block_pixel_size();
-        let (across, down) = (block_width.min(width) as u64, block_height.min(height) as u64);
-        let block_bytes = across * down * header.channels.bytes_per_pixel as u64;
-        if block_bytes > MAX_PIXELS {
+        let block_bytes = block_width
+            .saturating_mul(block_height)
+            .saturating_mul(header.channels.bytes_per_pixel);
+        if block_bytes > MAX_BLOCK_BYTES {
             return Err("is damaged: its blocks of pixels are implausibly large".into());
         }
     }
@@ -124,7 +129,7 @@ fn check_plausible(headers: &[Header], file_bytes: u64) -> Decoded<()> {
     let chunks: u64 = headers.iter().map(|header| header.chunk_count as u64).sum();
     // The best ratio of any codec on a picture that is not quite black is far below this.
     const PIXELS_PER_BYTE: u64 = 10_000;
-    let pixels: u64 = headers.iter().map(|header| header.layer_size.area() as u64).sum();
+    let pixels: u64 = headers.iter().map(pixels_to_hold).fold(0, u64::saturating_add);
     if chunks.saturating_mul(16) > file_bytes
         || pixels > (1 << 20) + file_bytes.saturating_mul(PIXELS_PER_BYTE)
     {
@@ -135,12 +140,19 @@ fn check_plausible(headers: &[Header], file_bytes: u64) -> Decoded<()> {
     Ok(())
 }
 
-/// Chunks to hold in memory at once: enough to keep all threads busy, some 64 MB decoded.
+/// Pixels of a part's data window or of its display window, whichever has more.
+fn pixels_to_hold(header: &Header) -> u64 {
+    let display = header.shared_attributes.display_window.size;
+    let display_pixels = (display.0 as u64).saturating_mul(display.1 as u64);
+    display_pixels.max(header.layer_size.area() as u64)
+}
+
+/// Chunks to hold in memory at once: some 64 MB decoded, more where that would leave threads idle.
 fn batch_size(header: &Header) -> usize {
-    const BATCH_BYTES: usize = 64 << 20;
     let Vec2(width, height) = header.max_block_pixel_size();
-    let block_bytes = width.saturating_mul(height).saturating_mul(header.channels.bytes_per_pixel);
-    (BATCH_BYTES / block_bytes.max(1)).clamp(rayon::current_num_threads(), 1024)
+    let block_bytes = (width * height * header.channels.bytes_per_pixel).max(1);
+    let batch_bytes = (block_bytes * rayon::current_num_threads()).clamp(64 << 20, 256 << 20);
+    (batch_bytes / block_bytes).clamp(1, 1024)
 }
 
 /// Where the data window lies in the picture that is returned.
@@ -310,6 +322,8 @@ fn decode_cause(error: &exr::error::Error) -> String {
         {
             "is not an OpenEXR file".into()
         }
+        // What the crate makes of an unexpected end of the file.
+        Exr::Invalid(what) if what.contains("missing bytes") => "is cut short or damaged".into(),
         Exr::Invalid(what) => format!("is a damaged OpenEXR file ({what})"),
         Exr::NotSupported(what) if what.contains("subsampling") => {
             "stores colour at a lower resolution (Y/RY/BY), which lightgrid does not read; save it \
@@ -323,5 +337,35 @@ fn decode_cause(error: &exr::error::Error) -> String {
             format!("uses a feature of OpenEXR that lightgrid does not read ({what})")
         }
         Exr::Aborted => "was not read to its end".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colour_differences_give_back_the_colour() {
+        let rgb = [0.5f32, 0.25, 2.0];
+        let y = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+        let back = rgb_from_ycc([y, (rgb[0] - y) / y, (rgb[2] - y) / y]);
+        assert!(back.iter().zip(&rgb).all(|(a, b)| (a - b).abs() < 1e-6), "{back:?}");
+        assert_eq!(rgb_from_ycc([0.0, 3.0, 4.0]), [0.0; 3]);
+    }
+
+    /// Blocks left of, right of and across each edge of a picture with an offset data window.
+    #[test]
+    fn blocks_are_clipped_to_the_picture() {
+        let placement = Placement { width: 4, height: 3, x: -2, y: -1 };
+        let mut image = Image::filled(4, 3, [0.0; 3]);
+        for y in 0..6 {
+            for x in 0..4 {
+                let value = (10 * y + x) as f32;
+                let block = Block { x: 3 * x, y, width: 3, pixels: vec![[value; 3]; 3] };
+                placement.copy(&block, &mut image);
+            }
+        }
+        let reds: Vec<f32> = image.pixels.iter().map(|p| p[0]).collect();
+        assert_eq!(reds, [10., 11., 11., 11., 20., 21., 21., 21., 30., 31., 31., 31.]);
     }
 }

@@ -122,12 +122,12 @@ fn what_cannot_be_read_is_said_in_one_sentence() {
         ("odd/deep-Balls-lowres.exr", "holds deep data"),
         ("malformed/bomb-40000.hdr", "claims 40000 x 40000 pixels"),
         ("malformed/comp_early_eof_piz.exr", "is a damaged OpenEXR file"),
-        ("malformed/comp_invalid_unknown.exr", "is a damaged OpenEXR file"),
+        ("malformed/comp_invalid_unknown.exr", "is cut short or damaged"),
         ("malformed/piz_short_code.exr", "is a damaged OpenEXR file"),
         ("malformed/tiled_with_scanlineimage_type.exr", "is a damaged OpenEXR file"),
         ("malformed/zero-tilesize.exr", "is a damaged OpenEXR file"),
         ("malformed/openexr-damaged/memory_DOS_1.exr", "claims 1 x 452984833 pixels"),
-        ("malformed/openexr-damaged/oom_exr.exr", "is a damaged OpenEXR file"),
+        ("malformed/openexr-damaged/oom_exr.exr", "is cut short or damaged"),
     ];
     for (name, sentence) in sentences {
         let Some(path) = shared(&format!("data/{name}")) else { return };
@@ -235,6 +235,39 @@ fn hdr_run_lengths_xyz_and_truncation() {
     assert!(bomb.contains("2 bytes cannot hold 16384 x 16384 pixels"), "{bomb}");
     let none = read_hdr_bytes(b"P6 no radiance here").unwrap_err();
     assert!(none.contains("does not begin with #?"), "{none}");
+}
+
+/// A 2 x 1 picture, red then mid grey, as an uncompressed TGA and as a BMP.
+#[test]
+fn ldr_maps_are_told_by_content_or_extension() {
+    let pixels_bgr = [0, 0, 255, 128, 128, 128];
+    let tga_header = [0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, 24, 0x20];
+    let tga = [&tga_header[..], &pixels_bgr].concat();
+    let mut bmp = b"BM\x3e\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\x02\0\0\0\x01\0\0\0".to_vec();
+    bmp.extend([1, 0, 24, 0, 0, 0, 0, 0, 8, 0, 0, 0]);
+    bmp.extend([0; 16]);
+    bmp.extend([&pixels_bgr[..], &[0, 0]].concat());
+    let grey = lightgrid::color::linear_from_srgb(128.0 / 255.0);
+    for (name, bytes) in [("map.tga", &tga), ("map.bmp", &bmp), ("map.unknown", &bmp)] {
+        let (_folder, path) = temporary(name);
+        fs::write(&path, bytes).unwrap();
+        let map = read_map(&path).unwrap();
+        assert_eq!(map.image.pixels, [[1.0, 0.0, 0.0], [grey; 3]], "{name}");
+        assert!(notices(&map).contains("8-bit sRGB"), "{name}: {}", notices(&map));
+    }
+    for (name, bytes, sentence) in [
+        ("notes.txt", &b"no picture at all"[..], "is not a picture of a known format"),
+        ("empty", b"", "is not a picture of a known format"),
+        ("empty.exr", b"", "is cut short"),
+        ("empty.hdr", b"", "is not a Radiance picture"),
+        ("text.exr", b"no picture at all", "is not an OpenEXR file"),
+        ("half.png", b"\x89PNG\r\n\x1a\n\0\0", "cannot be decoded"),
+    ] {
+        let (_folder, path) = temporary(name);
+        fs::write(&path, bytes).unwrap();
+        let error = read_map(&path).unwrap_err().to_string();
+        assert!(error.contains(sentence) && !error.contains('\n'), "{name}: {error}");
+    }
 }
 
 #[test]
