@@ -26,6 +26,7 @@ pub mod image;
 pub mod light_grid;
 pub mod math;
 pub mod metrics;
+pub mod noise;
 pub mod path;
 pub mod render;
 pub mod sampler;

@@ -1,1 +1,51 @@
-//! Scenes made by code.
+//! Scenes made by code: places to render without any file.
+//!
+//! | name | what it is | light |
+//! |---|---|---|
+//! | `living-room` | furnished room | a large window that the sun enters, a round opening |
+//! | `office` | closed office | two small windows, 3 % of the walls, no direct sun |
+//! | `exterior` | a street with arcade, trees and a café | the sky, partly occluded |
+//! | `fog` | the same street along its lamps | as `exterior`; the place for a medium |
+//! | `open` | sculptures on a terrace | the whole sky, nothing occludes |
+//! | `crack` | brick store room | a slit of 1.5 m x 2 cm |
+
+mod crack;
+mod facade;
+mod furniture;
+mod living_room;
+mod materials;
+mod mesh;
+mod objects;
+mod office;
+mod open;
+mod plants;
+mod room;
+mod street;
+mod textures;
+
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+
+/// The scene shown when none is asked for.
+pub const DEFAULT_SCENE: &str = "living-room";
+
+/// Names of the built-in scenes.
+pub fn names() -> &'static [&'static str] {
+    &["living-room", "office", "exterior", "fog", "open", "crack"]
+}
+
+/// Builds the scene called `name`; an error lists the names there are.
+pub fn build(name: &str) -> Result<Scene> {
+    match name {
+        "living-room" => Ok(living_room::build()),
+        "office" => Ok(office::build()),
+        "exterior" => Ok(street::exterior()),
+        "fog" => Ok(street::fog()),
+        "open" => Ok(open::build()),
+        "crack" => Ok(crack::build()),
+        _ => Err(Error::new(format!(
+            "there is no built-in scene called \"{name}\"; there are {}",
+            names().join(", ")
+        ))),
+    }
+}

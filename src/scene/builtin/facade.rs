@@ -1,0 +1,283 @@
+//! Houses: a plain core behind pierced fronts with windows, doors, sills and cornices.
+
+use std::f32::consts::PI;
+
+use glam::{Affine3A, Vec2, Vec3};
+
+use super::mesh::{Builder, Mat};
+use super::room::{Hole, Wall, pierced, window_frame};
+
+/// Materials of a house.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct HouseMats {
+    pub(super) wall: Mat,
+    pub(super) base: Mat,
+    pub(super) trim: Mat,
+    pub(super) frame: Mat,
+    pub(super) pane: Mat,
+    pub(super) roof: Mat,
+    pub(super) shutter: Option<Mat>,
+}
+
+/// A front's windows: `bays` columns on `floors` floors, `ground` metres up to the first of them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rhythm {
+    pub(super) bays: u32,
+    pub(super) floors: u32,
+    pub(super) ground: f32,
+    pub(super) shops: bool,
+}
+
+/// How far fronts stand before the core.
+const FRONT: f32 = 0.28;
+
+/// A house over `[x0, x1] x [z0, z1]` of `height`; fronts with windows on the sides marked in
+/// the order -X, +X, -Z, +Z.
+pub(super) fn house(
+    b: &mut Builder,
+    m: &HouseMats,
+    [x0, z0, x1, z1]: [f32; 4],
+    height: f32,
+    fronts: [bool; 4],
+    rhythm: Rhythm,
+) {
+    let inset = fronts.map(|front| if front { FRONT - 0.02 } else { 0.0 });
+    b.slab(
+        m.pane,
+        [x0 + inset[0], -0.02, z0 + inset[2]],
+        [x1 - inset[1], height - 0.05, z1 - inset[3]],
+        0.0,
+    );
+    let sides = [
+        (Vec3::new(x0, 0., z0), Vec3::Z, z1 - z0),
+        (Vec3::new(x1, 0., z1), Vec3::NEG_Z, z1 - z0),
+        (Vec3::new(x1, 0., z0), Vec3::NEG_X, x1 - x0),
+        (Vec3::new(x0, 0., z1), Vec3::X, x1 - x0),
+    ];
+    for (side, (origin, along, width)) in sides.into_iter().enumerate() {
+        if fronts[side] {
+            // Seen from the street the front looks "into the room".
+            let wall = Wall { origin, along, width };
+            b.part(wall.frame(), |b| front(b, m, [width, height], rhythm, side));
+        }
+    }
+    let over = 0.28;
+    b.slab(
+        m.trim,
+        [x0 - over, height - 0.22, z0 - over],
+        [x1 + over, height + 0.06, z1 + over],
+        0.03,
+    );
+    b.slab(
+        m.trim,
+        [x0 - 0.12, height - 0.42, z0 - 0.12],
+        [x1 + 0.12, height - 0.20, z1 + 0.12],
+        0.03,
+    );
+    b.slab(m.roof, [x0 + 0.1, height, z0 + 0.1], [x1 - 0.1, height + 0.5, z1 - 0.1], 0.05);
+}
+
+fn front(b: &mut Builder, m: &HouseMats, [width, height]: [f32; 2], rhythm: Rhythm, side: usize) {
+    let bay = width / rhythm.bays as f32;
+    let storey = (height - rhythm.ground - 0.4) / rhythm.floors as f32;
+    let (w, h) = ((0.42 * bay).min(1.15), (0.60 * storey).min(1.9));
+    let mut windows = Vec::new();
+    for i in 0..rhythm.bays {
+        let middle = bay * (i as f32 + 0.5);
+        for j in 0..rhythm.floors {
+            let sill = rhythm.ground + storey * j as f32 + 0.24 * storey;
+            windows.push([middle - 0.5 * w, sill, middle + 0.5 * w, sill + h]);
+        }
+    }
+    let mut openings = Vec::new();
+    for i in 0..rhythm.bays {
+        let middle = bay * (i as f32 + 0.5);
+        let half = if rhythm.shops { (0.36 * bay).min(1.3) } else { 0.5 * w };
+        let is_door = i % 3 == 1;
+        let sill = if is_door {
+            0.02
+        } else if rhythm.shops {
+            0.55
+        } else {
+            1.0
+        };
+        let half = if is_door { 0.55 } else { half };
+        openings.push(([middle - half, sill, middle + half, 0.80 * rhythm.ground], is_door));
+    }
+    let holes: Vec<Hole> =
+        windows.iter().copied().chain(openings.iter().map(|o| o.0)).map(Hole::Rectangle).collect();
+    // Fronts of neighbouring sides meet in a mitre of a few millimetres' difference.
+    let reach = if side < 2 { 0.0 } else { -0.004 };
+    pierced(b, m.wall, [-reach, -0.03, width + reach, height - 0.1], FRONT, &holes);
+    b.slab(m.trim, [-0.03, rhythm.ground - 0.14, -0.05], [width + 0.03, rhythm.ground, 0.07], 0.02);
+    plinth(b, m.base, width, &openings);
+    for window in &windows {
+        window_frame(b, m.frame, *window, 0.12, [2, 3]);
+        surround(b, m, *window);
+    }
+    for (opening, is_door) in &openings {
+        if *is_door {
+            door_leaf(b, m, *opening);
+        } else {
+            window_frame(b, m.frame, *opening, 0.10, [if rhythm.shops { 3 } else { 2 }, 2]);
+            sill(b, m.trim, *opening);
+        }
+        let [u0, _, u1, v1] = *opening;
+        b.slab(m.trim, [u0 - 0.14, v1 + 0.001, -0.05], [u1 + 0.14, v1 + 0.19, 0.045], 0.012);
+    }
+}
+
+/// The base course, interrupted by doors.
+fn plinth(b: &mut Builder, mat: Mat, width: f32, openings: &[([f32; 4], bool)]) {
+    let mut from = -0.035;
+    for ([u0, _, u1, _], _) in openings.iter().filter(|o| o.1) {
+        b.slab(mat, [from, -0.03, -0.05], [u0 - 0.10, 0.45, 0.055], 0.015);
+        from = u1 + 0.10;
+    }
+    b.slab(mat, [from, -0.03, -0.05], [width + 0.035, 0.45, 0.055], 0.015);
+}
+
+fn sill(b: &mut Builder, mat: Mat, [u0, v0, u1, _]: [f32; 4]) {
+    b.slab(mat, [u0 - 0.08, v0 - 0.09, -0.10], [u1 + 0.08, v0 + 0.012, 0.09], 0.012);
+}
+
+fn surround(b: &mut Builder, m: &HouseMats, window: [f32; 4]) {
+    let [u0, v0, u1, v1] = window;
+    sill(b, m.trim, window);
+    b.slab(m.trim, [u0 - 0.10, v1 + 0.001, -0.05], [u1 + 0.10, v1 + 0.16, 0.03], 0.012);
+    if let Some(shutter) = m.shutter {
+        let w = 0.5 * (u1 - u0);
+        for (left, right) in [(u0 - w - 0.012, u0 - 0.012), (u1 + 0.012, u1 + w + 0.012)] {
+            b.slab(shutter, [left, v0 + 0.02, 0.004], [right, v1 - 0.002, 0.03], 0.004);
+            let louvres = ((v1 - v0) / 0.11) as u32;
+            for k in 0..louvres {
+                let v = v0 + 0.09 + (v1 - v0 - 0.16) * k as f32 / louvres as f32;
+                b.slab(shutter, [left + 0.05, v, 0.02], [right - 0.05, v + 0.05, 0.042], 0.01);
+            }
+        }
+    }
+}
+
+fn door_leaf(b: &mut Builder, m: &HouseMats, [u0, v0, u1, v1]: [f32; 4]) {
+    let leaf = m.shutter.unwrap_or(m.frame);
+    let light = v1 - 0.5;
+    b.slab(leaf, [u0 - 0.01, v0 - 0.04, -0.21], [u1 + 0.01, light, -0.15], 0.006);
+    window_frame(b, m.frame, [u0, light, u1, v1], 0.13, [3, 1]);
+    let middle = 0.5 * (u0 + u1);
+    for (left, right) in [(u0 + 0.07, middle - 0.04), (middle + 0.04, u1 - 0.07)] {
+        for (low, high) in [(v0 + 0.2, v0 + 0.9), (v0 + 1.05, light - 0.15)] {
+            b.slab(leaf, [left, low, -0.16], [right, high, -0.13], 0.018);
+        }
+    }
+    b.ball(m.trim, Vec3::new(middle + 0.02, v0 + 1.0, -0.12), 0.028);
+    b.slab(m.base, [u0 - 0.08, -0.02, -0.27], [u1 + 0.08, 0.015, 0.30], 0.01);
+}
+
+/// A round arch in a wall's frame between columns at `u0` and `u1`: the wall above it from
+/// `spring` to `top`, `depth` deep behind z = 0.
+pub(super) fn arch(
+    b: &mut Builder,
+    mat: Mat,
+    [u0, u1]: [f32; 2],
+    [spring, top]: [f32; 2],
+    depth: f32,
+) {
+    const STEPS: u32 = 24;
+    let (middle, r) = (0.5 * (u0 + u1), 0.5 * (u1 - u0));
+    let at = |k: u32| {
+        let (s, c) = (PI * k as f32 / STEPS as f32).sin_cos();
+        (Vec3::new(-c, s, 0.0), Vec3::new(middle - r * c, spring + r * s, 0.0))
+    };
+    let back = Vec3::NEG_Z * depth;
+    for k in 0..STEPS {
+        let ((n0, p0), (n1, p1)) = (at(k), at(k + 1));
+        let high = |p: Vec3| Vec3::new(p.x, top, 0.0);
+        for (offset, outward) in [(Vec3::ZERO, Vec3::Z), (back, Vec3::NEG_Z)] {
+            let face =
+                [p0, p1, high(p1), high(p0)].map(|p| (p + offset, Vec3::ZERO, Vec2::new(p.x, p.y)));
+            b.polygon(mat, &face[..3], outward);
+            b.polygon(mat, &[face[0], face[2], face[3]], outward);
+        }
+        let soffit = [(p0, n0), (p1, n1), (p1 + back, n1), (p0 + back, n0)]
+            .map(|(p, n)| (p, -n, Vec2::new(p.z, r * PI * k as f32 / STEPS as f32)));
+        b.polygon(mat, &soffit, -n0 - n1);
+    }
+}
+
+/// A column with base and capital up to `height`.
+pub(super) fn column(b: &mut Builder, mat: Mat, height: f32, radius: f32) {
+    let r = radius;
+    b.slab(mat, [-1.45 * r, -0.02, -1.45 * r], [1.45 * r, 0.14, 1.45 * r], 0.012);
+    b.slab(mat, [-1.5 * r, height - 0.13, -1.5 * r], [1.5 * r, height, 1.5 * r], 0.012);
+    let mut profile = vec![(1.35 * r, 0.13)];
+    for k in 0..=8 {
+        let (s, c) = (PI * (k as f32 / 8.0 - 0.5)).sin_cos();
+        profile.push((1.2 * r + 0.15 * r * c, 0.17 + 0.04 * s));
+    }
+    profile.push((1.05 * r, 0.22));
+    for k in 0..=10 {
+        let t = k as f32 / 10.0;
+        profile.push((r * (1.0 - 0.12 * t * t), 0.25 + (height - 0.62) * t));
+    }
+    profile.extend([
+        (0.98 * r, height - 0.34),
+        (0.98 * r, height - 0.31),
+        (0.9 * r, height - 0.29),
+    ]);
+    for k in 0..=6 {
+        let (s, c) = (k as f32 / 6.0 * 0.5 * PI).sin_cos();
+        profile.push((0.9 * r + 0.45 * r * (1.0 - c), height - 0.27 + 0.15 * s));
+    }
+    b.lathe(mat, 40, &profile);
+}
+
+/// A street lamp with a lantern (unlit).
+pub(super) fn street_lamp(b: &mut Builder, metal: Mat, pane: Mat, height: f32) {
+    let h = height;
+    b.lathe(
+        metal,
+        24,
+        &[
+            (0.17, -0.01),
+            (0.17, 0.10),
+            (0.13, 0.14),
+            (0.10, 0.55),
+            (0.12, 0.58),
+            (0.12, 0.64),
+            (0.065, 0.70),
+            (0.05, 0.75 * h),
+            (0.075, 0.76 * h),
+            (0.075, 0.775 * h),
+            (0.042, 0.79 * h),
+            (0.038, h - 0.62),
+            (0.09, h - 0.58),
+            (0.11, h - 0.55),
+        ],
+    );
+    b.part(Affine3A::from_translation(Vec3::Y * (h - 0.56)), |b| {
+        b.lathe(pane, 6, &[(0.10, 0.0), (0.19, 0.40)]);
+        for k in 0..6 {
+            let (s, c) = (k as f32 * PI / 3.0).sin_cos();
+            b.rod(
+                metal,
+                Vec3::new(0.10 * c, 0.0, 0.10 * s),
+                Vec3::new(0.192 * c, 0.40, 0.192 * s),
+                0.009,
+            );
+        }
+        b.lathe(
+            metal,
+            24,
+            &[
+                (0.0, 0.395),
+                (0.215, 0.395),
+                (0.22, 0.41),
+                (0.13, 0.50),
+                (0.05, 0.55),
+                (0.05, 0.58),
+                (0.022, 0.60),
+                (0.0, 0.66),
+            ],
+        );
+    });
+}

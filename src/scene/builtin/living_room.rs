@@ -1,0 +1,309 @@
+//! A living room, 6 x 3 x 5 m: a 2.6 m window in the +X wall lets the suns of `sky:day` and
+//! `sky:sunset` in, a round opening in the +Z wall does not.
+
+use glam::{Vec2, Vec3};
+
+use super::furniture::{self as piece, placed};
+use super::materials::{self as make, matte, textured, two_sided, varnished};
+use super::mesh::{Builder, LIFT, Mat};
+use super::objects as thing;
+use super::plants;
+use super::room::{self, Hole, Shell};
+use super::textures as paint;
+use crate::scene::Scene;
+
+const SIZE: [f32; 3] = [6.0, 3.0, 5.0];
+const THICKNESS: f32 = 0.24;
+const WINDOW: [f32; 4] = [1.2, 0.5, 3.8, 2.3];
+const ROUND: [f32; 3] = [4.4, 1.9, 0.45];
+
+struct Palette {
+    wall: Mat,
+    accent: Mat,
+    ceiling: Mat,
+    parquet: Mat,
+    white: Mat,
+    oak: Mat,
+    walnut: Mat,
+    velvet: Mat,
+    boucle: Mat,
+    linen: Mat,
+    cotton: Mat,
+    rug: Mat,
+    brass: Mat,
+    copper: Mat,
+    steel: Mat,
+    ceramic: Mat,
+    stone: Mat,
+    clay: Mat,
+    soil: Mat,
+    leaf: Mat,
+    bark: Mat,
+    glass: Mat,
+    black: Mat,
+    cover: Mat,
+    paper: Mat,
+    skin: Mat,
+    arts: [Mat; 3],
+}
+
+impl Palette {
+    fn new(b: &mut Builder) -> Self {
+        let parquet = b.texture(paint::herringbone([0.46, 0.29, 0.16]), Vec2::splat(1.9));
+        let oak = b.texture(paint::timber([0.50, 0.34, 0.19]), Vec2::new(1.4, 0.7));
+        let walnut = b.texture(paint::timber([0.23, 0.13, 0.075]), Vec2::new(1.4, 0.7));
+        let plaster = b.texture(paint::plaster([0.78, 0.75, 0.69], 0.10), Vec2::splat(2.5));
+        let accent = b.texture(paint::plaster([0.24, 0.33, 0.30], 0.16), Vec2::splat(2.5));
+        let velvet = b.texture(paint::weave([0.52, 0.20, 0.085], 64), Vec2::splat(0.20));
+        let boucle = b.texture(paint::weave([0.74, 0.69, 0.60], 32), Vec2::splat(0.16));
+        let linen = b.texture(paint::weave([0.76, 0.71, 0.62], 128), Vec2::splat(0.30));
+        let rug = b.texture(
+            paint::rug([0.66, 0.60, 0.50], [0.09, 0.14, 0.22], [0.46, 0.17, 0.09]),
+            Vec2::new(2.9, 2.0),
+        );
+        let arts = [0, 1, 2].map(|k| {
+            let art = b.texture(paint::painting(k), Vec2::ONE);
+            b.material(textured("painting", art, 0.55))
+        });
+        Self {
+            wall: b.material(textured("wall", plaster, 0.85)),
+            accent: b.material(textured("green wall", accent, 0.8)),
+            ceiling: b.material(matte("ceiling", [0.80, 0.79, 0.77], 0.9)),
+            parquet: b.material(varnished(textured("parquet", parquet, 0.55), 0.35, 0.22)),
+            white: b.material(matte("white paint", [0.78, 0.77, 0.74], 0.35)),
+            oak: b.material(textured("oak", oak, 0.5)),
+            walnut: b.material(varnished(textured("walnut", walnut, 0.5), 0.6, 0.15)),
+            velvet: b.material(textured("velvet", velvet, 0.9)),
+            boucle: b.material(textured("boucle", boucle, 0.95)),
+            linen: b.material(two_sided(textured("linen", linen, 0.9))),
+            cotton: b.material(textured("cotton", boucle, 0.9)),
+            rug: b.material(two_sided(textured("rug", rug, 0.95))),
+            brass: b.material(make::brass()),
+            copper: b.material(make::copper()),
+            steel: b.material(make::steel()),
+            ceramic: b.material(make::ceramic()),
+            stone: b.material(matte("marble", [0.70, 0.69, 0.67], 0.2)),
+            clay: b.material(matte("terracotta", [0.52, 0.24, 0.14], 0.8)),
+            soil: b.material(matte("soil", [0.06, 0.04, 0.03], 1.0)),
+            leaf: b.material(two_sided(matte("leaf", [0.10, 0.24, 0.07], 0.4))),
+            bark: b.material(matte("bark", [0.22, 0.15, 0.10], 0.9)),
+            glass: b.material(make::glass("vase glass", [0.86, 0.95, 0.93])),
+            black: b.material(matte("black metal", [0.03, 0.03, 0.03], 0.45)),
+            cover: b.material(matte("book cover", [0.95; 3], 0.7)),
+            paper: b.material(matte("paper", [0.78, 0.75, 0.68], 0.9)),
+            skin: b.material(matte("fruit", [0.95; 3], 0.35)),
+            arts,
+        }
+    }
+}
+
+/// Builds the scene.
+pub(super) fn build() -> Scene {
+    let b = &mut Builder::new("living-room");
+    let m = &Palette::new(b);
+    shell(b, m);
+    window(b, m);
+    pictures(b, m);
+    seating(b, m);
+    coffee_table(b, m);
+    library(b, m);
+    corners(b, m);
+    b.camera("sofa", [2.25, 1.45, 2.2], [-0.75, 0.86, -0.95], 56.0);
+    b.camera("window", [-2.3, 1.4, 2.05], [1.6, 1.0, -0.75], 58.0);
+    b.camera("round window", [1.9, 1.45, -2.1], [-1.3, 1.15, 1.8], 56.0);
+    std::mem::replace(b, Builder::new("")).finish()
+}
+
+fn shell(b: &mut Builder, m: &Palette) {
+    let shell =
+        Shell { walls: [m.wall, m.wall, m.accent, m.wall], floor: m.parquet, ceiling: m.ceiling };
+    let holes: [&[Hole]; 4] = [&[], &[Hole::Rectangle(WINDOW)], &[], &[Hole::Round(ROUND)]];
+    room::room(b, &shell, SIZE, THICKNESS, holes);
+    let walls = room::walls(SIZE);
+    for (i, wall) in walls.iter().enumerate() {
+        b.part(wall.frame(), |b| {
+            let (door_gap, whole) = ([[0.0, 0.43], [1.47, 6.0]], [[0.0, wall.width]]);
+            let stretches: &[[f32; 2]] = if i == 3 { &door_gap } else { &whole };
+            room::skirting(b, m.white, stretches, 0.12);
+            room::cornice(b, m.ceiling, wall.width, SIZE[1] + 0.004, 0.10);
+        });
+    }
+    b.part(walls[2].frame(), |b| {
+        for u in [0.25, 1.65, 3.05, 4.45] {
+            room::panel_moulding(b, m.accent, [u, 0.30, u + 1.25, 1.02]);
+            room::panel_moulding(b, m.accent, [u, 1.16, u + 1.25, 2.70]);
+        }
+        b.slab(m.accent, [0.0, 1.07, -0.01], [6.0, 1.11, 0.022], 0.008);
+    });
+    b.part(walls[3].frame(), |b| {
+        room::door(b, m.white, m.brass, 0.5, [0.9, 2.1]);
+        // A wooden ring around the round opening.
+        b.part(placed([ROUND[0], ROUND[1], 0.0], [90.0, 0.0, 0.0]), |b| {
+            let r = ROUND[2];
+            b.lathe(
+                m.oak,
+                64,
+                &[
+                    (r - 0.02, -0.10),
+                    (r - 0.02, 0.014),
+                    (r - 0.014, 0.02),
+                    (r + 0.05, 0.02),
+                    (r + 0.056, 0.014),
+                    (r + 0.056, -0.005),
+                ]
+                .map(|(r, y)| (r, y))
+                .iter()
+                .rev()
+                .copied()
+                .collect::<Vec<_>>(),
+            );
+        });
+    });
+}
+
+fn window(b: &mut Builder, m: &Palette) {
+    let wall = room::walls(SIZE)[1];
+    b.part(wall.frame(), |b| {
+        room::window_frame(b, m.white, WINDOW, 0.12, [3, 2]);
+        room::window_board(b, m.white, WINDOW, THICKNESS);
+        let [u0, v0, u1, _] = WINDOW;
+        room::curtain(b, m.linen, [u0 - 0.42, u0 + 0.06], [0.015, 2.47], 0.13, 6.0);
+        room::curtain(b, m.linen, [u1 - 0.06, u1 + 0.42], [0.015, 2.47], 0.13, 6.0);
+        room::curtain_rod(b, m.brass, [u0 - 0.55, u1 + 0.55], 2.50, 0.13);
+        for (u, kind) in [(1.62, 0), (2.72, 1), (3.36, 2)] {
+            b.standing(Vec3::new(u, v0 + 0.016, -0.03), 0.0, |b| match kind {
+                0 => {
+                    let soil = plants::pot(b, m.ceramic, m.soil, 0.065, 0.11);
+                    b.standing(Vec3::Y * soil, 0.0, |b| plants::blades(b, m.leaf, 9, 0.26, 4));
+                }
+                1 => thing::vase(b, m.ceramic, 0.19, &[0.20, 0.33, 0.30, 0.13, 0.17]),
+                _ => {
+                    let soil = plants::pot(b, m.clay, m.soil, 0.07, 0.12);
+                    b.standing(Vec3::Y * soil, 0.0, |b| plants::big_leaves(b, m.leaf, 9, 0.22, 9));
+                }
+            });
+        }
+    });
+}
+
+fn pictures(b: &mut Builder, m: &Palette) {
+    let wall = room::walls(SIZE)[2];
+    b.part(wall.frame(), |b| {
+        for (k, [u, v, w, h]) in
+            [[1.80, 1.32, 0.72, 0.94], [3.22, 1.62, 0.46, 0.60], [3.76, 1.36, 0.40, 0.52]]
+                .into_iter()
+                .enumerate()
+        {
+            let frame = if k == 0 { m.brass } else { m.walnut };
+            b.part(placed([u, v, 0.0], [0.0; 3]), |b| {
+                thing::picture(b, [frame, m.white, m.arts[k]], [w, h], 0.07);
+            });
+        }
+    });
+}
+
+fn seating(b: &mut Builder, m: &Palette) {
+    b.standing(Vec3::new(-0.1, 0.0, 0.05), 0.0, |b| piece::rug(b, m.rug, m.linen, [2.9, 2.0]));
+    b.standing(Vec3::new(-0.45, 0.0, -1.92), 0.0, |b| {
+        piece::sofa(b, m.velvet, m.walnut, 2.35, 3);
+        for (k, (x, turn, tone)) in [
+            (-0.82, -18.0, [0.95, 0.93, 0.88]),
+            (-0.52, 8.0, [0.20, 0.30, 0.30]),
+            (0.80, 20.0, [0.95, 0.72, 0.30]),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let z = if k == 1 { 0.06 } else { -0.02 };
+            b.part(placed([x, 0.685, z], [68.0, turn, 0.0]), |b| {
+                b.tinted(tone, |b| piece::pillow(b, m.cotton, 0.23));
+            });
+        }
+    });
+    b.standing(Vec3::new(1.62, 0.0, -0.72), -72.0, |b| {
+        piece::armchair(b, m.boucle, m.oak);
+    });
+    // A side table within reach of the armchair.
+    b.standing(Vec3::new(1.78, 0.0, -1.62), 0.0, |b| {
+        b.drum(m.black, [0.0, 0.018], [0.15, 0.15], 0.006);
+        b.drum(m.black, [0.01, 0.50], [0.012, 0.012], 0.002);
+        b.drum(m.walnut, [0.49, 0.512], [0.21, 0.21], 0.006);
+        b.standing(Vec3::new(-0.05, 0.512, 0.02), 24.0, |b| {
+            thing::book_stack(b, [m.cover, m.paper], 2, 8)
+        });
+        b.standing(Vec3::new(0.11, 0.512, 0.09), 140.0, |b| thing::mug(b, m.ceramic, m.soil));
+    });
+}
+
+fn coffee_table(b: &mut Builder, m: &Palette) {
+    b.standing(Vec3::new(-0.35, 0.011, -0.10), 0.0, |b| {
+        piece::round_table(b, m.walnut, m.walnut, 0.52, 0.40);
+        b.standing(Vec3::new(-0.16, 0.40, -0.18), 0.0, |b| {
+            thing::vase(b, m.glass, 0.24, &[0.19, 0.26, 0.24, 0.13, 0.15]);
+            b.standing(Vec3::Y * 0.012, 0.0, |b| plants::twigs(b, m.bark, m.leaf, 0.50, 12));
+        });
+        b.standing(Vec3::new(0.21, 0.40, -0.10), 0.0, |b| {
+            thing::bowl(b, m.brass, 0.15, 0.075);
+            thing::fruit(b, m.skin, m.bark, 0.15, 0.008);
+        });
+        b.standing(Vec3::new(0.02, 0.40, 0.24), 12.0, |b| {
+            thing::book_stack(b, [m.cover, m.paper], 3, 21)
+        });
+        b.standing(Vec3::new(-0.28, 0.40, 0.14), 200.0, |b| thing::mug(b, m.ceramic, m.soil));
+    });
+}
+
+fn library(b: &mut Builder, m: &Palette) {
+    b.standing(Vec3::new(-2.83, 0.0, -0.35), 90.0, |b| {
+        piece::bookcase(
+            b,
+            [m.oak, m.cover, m.paper],
+            [2.1, 2.15, 0.30],
+            5,
+            |b, row, free| match row {
+                0 => b.standing(Vec3::ZERO, 0.0, |b| thing::basket(b, m.linen)),
+                1 => thing::vase(b, m.ceramic, 0.26, &[0.18, 0.30, 0.36, 0.26, 0.12, 0.15]),
+                2 => thing::book_stack(b, [m.cover, m.paper], 4, 31),
+                3 => b.ball(m.copper, Vec3::Y * (0.09 - LIFT), 0.09),
+                _ if free > 0.2 => {
+                    let soil = plants::pot(b, m.clay, m.soil, 0.07, 0.11);
+                    b.standing(Vec3::Y * soil, 0.0, |b| plants::trailing(b, m.leaf, 0.07, 0.42, 2));
+                }
+                _ => thing::bowl(b, m.ceramic, 0.1, 0.06),
+            },
+        );
+    });
+}
+
+fn corners(b: &mut Builder, m: &Palette) {
+    b.standing(Vec3::new(-2.45, 0.0, -2.1), -20.0, |b| {
+        piece::arc_lamp(b, m.brass, m.linen, m.stone, 2.05, 0.85);
+    });
+    b.standing(Vec3::new(1.25, 0.0, -2.08), 0.0, |b| {
+        let soil = plants::pot(b, m.clay, m.soil, 0.20, 0.36);
+        b.standing(Vec3::Y * soil, 40.0, |b| plants::big_leaves(b, m.leaf, 17, 1.25, 3));
+    });
+    b.standing(Vec3::new(2.45, 0.0, -2.05), 0.0, |b| {
+        b.drum(m.steel, [0.0, 0.42], [0.17, 0.17], 0.01);
+        b.standing(Vec3::Y * 0.42, 0.0, |b| {
+            thing::vase(b, m.ceramic, 0.5, &[0.14, 0.22, 0.25, 0.18, 0.09, 0.12])
+        });
+    });
+    b.part(placed([-0.35, SIZE[1], -0.1], [0.0; 3]), |b| {
+        piece::pendant(b, m.copper, m.white, 0.95, 0.24);
+    });
+    // A console by the door with a lamp.
+    b.standing(Vec3::new(-1.4, 0.0, 2.28), 180.0, |b| {
+        piece::table(b, m.walnut, m.walnut, [1.2, 0.36, 0.78]);
+        b.standing(Vec3::new(-0.38, 0.78, 0.0), 0.0, |b| {
+            thing::vase(b, m.ceramic, 0.30, &[0.22, 0.34, 0.30, 0.16, 0.06]);
+            b.part(placed([0.0, 0.56, 0.0], [0.0; 3]), |b| {
+                piece::drum_shade(b, m.linen, 0.17, 0.13, 0.22)
+            });
+            b.rod(m.brass, Vec3::Y * 0.28, Vec3::Y * 0.56, 0.006);
+        });
+        b.standing(Vec3::new(0.30, 0.78, 0.02), 5.0, |b| {
+            thing::book_stack(b, [m.cover, m.paper], 4, 3)
+        });
+    });
+}

@@ -1,0 +1,373 @@
+//! Small things that stand on furniture or hang on walls: their origin is below their middle.
+
+use std::f32::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::{Affine3A, Vec2, Vec3};
+
+use super::furniture::placed;
+use super::mesh::{Builder, LIFT, Mat};
+use crate::noise::Stream;
+
+/// Cloth and paper covers, linear albedo.
+const COVERS: [[f32; 3]; 12] = [
+    [0.42, 0.08, 0.06],
+    [0.09, 0.16, 0.28],
+    [0.62, 0.50, 0.30],
+    [0.10, 0.22, 0.17],
+    [0.70, 0.66, 0.58],
+    [0.35, 0.20, 0.12],
+    [0.55, 0.28, 0.10],
+    [0.06, 0.07, 0.08],
+    [0.30, 0.36, 0.40],
+    [0.72, 0.60, 0.18],
+    [0.24, 0.12, 0.20],
+    [0.50, 0.52, 0.47],
+];
+
+/// One book standing on its lower edge, spine along +Z: (thickness, height, depth).
+fn book(b: &mut Builder, [cover, paper]: [Mat; 2], [t, h, d]: [f32; 3], stream: &mut Stream) {
+    let tone = COVERS[stream.index(COVERS.len())];
+    let shade = stream.between(0.75, 1.15);
+    b.tinted(tone.map(|c| c * shade), |b| {
+        let (x, z) = (0.5 * t, 0.5 * d);
+        b.slab(cover, [-x, 0.0, -z], [-x + 0.0025, h, z - 0.001], 0.0008);
+        b.slab(cover, [x - 0.0025, 0.0, -z], [x, h, z - 0.001], 0.0008);
+        b.slab(cover, [-x + 0.0002, 0.0003, z - 0.004], [x - 0.0002, h - 0.0003, z], 0.002);
+    });
+    b.slab(
+        paper,
+        [-0.5 * t + 0.002, 0.003, -0.5 * d + 0.004],
+        [0.5 * t - 0.002, h - 0.004, 0.5 * d - 0.002],
+        0.0,
+    );
+}
+
+/// A row of books from x = 0 to `width`, no higher than `room`, spines at z = `depth` / 2.
+pub(super) fn books(b: &mut Builder, mats: [Mat; 2], width: f32, room: f32, depth: f32, seed: u32) {
+    let mut stream = Stream::new(seed);
+    let mut x = 0.003;
+    let mut leaning = 0.0;
+    loop {
+        let t = stream.between(0.014, 0.042);
+        if x + t > width {
+            break;
+        }
+        let h = room.min(stream.between(0.68, 0.98) * room.min(0.30));
+        let d = depth.min(0.22) * stream.between(0.74, 0.98);
+        if stream.between(0.0, 1.0) < 0.04 {
+            leaning = stream.between(4.0, 9.0);
+            x += h * f32::sin(leaning.to_radians());
+        }
+        let back = stream.between(0.0, 0.02);
+        let z = 0.5 * (depth - d) - back;
+        b.part(placed([x + 0.5 * t, 0.0003, z], [0.0, 0.0, leaning]), |b| {
+            b.part(
+                Affine3A::from_translation(Vec3::Y * (0.5 * t * leaning.to_radians().sin())),
+                |b| {
+                    book(b, mats, [t, h, d], &mut stream);
+                },
+            );
+        });
+        x += (t + 0.0012) / leaning.to_radians().cos();
+        if stream.between(0.0, 1.0) < 0.3 {
+            leaning = 0.0;
+        }
+    }
+}
+
+/// Books lying on each other.
+pub(super) fn book_stack(b: &mut Builder, mats: [Mat; 2], count: u32, seed: u32) {
+    let mut stream = Stream::new(seed);
+    let mut y = 0.0;
+    for i in 0..count {
+        let t = stream.between(0.02, 0.038);
+        let size = 0.9 - 0.11 * i as f32;
+        let lying = placed([0.0, y + 0.5 * t, 0.0], [90.0, 0.0, 0.0]);
+        let turn = Affine3A::from_rotation_y(stream.between(-0.3, 0.3));
+        b.part(turn * lying * placed([0.0, 0.0, 0.0], [0.0, 90.0, 0.0]), |b| {
+            b.part(Affine3A::from_translation(Vec3::Y * (-0.13 * size)), |b| {
+                book(b, mats, [t, 0.27 * size, 0.20 * size], &mut stream);
+            });
+        });
+        y += t + LIFT;
+    }
+}
+
+/// A mug with a handle and a dark drink.
+pub(super) fn mug(b: &mut Builder, glaze: Mat, drink: Mat) {
+    b.lathe(
+        glaze,
+        40,
+        &[
+            (0.0, 0.0),
+            (0.032, 0.0),
+            (0.039, 0.006),
+            (0.041, 0.02),
+            (0.041, 0.091),
+            (0.0402, 0.0945),
+            (0.0385, 0.0945),
+            (0.0375, 0.091),
+            (0.0375, 0.012),
+            (0.030, 0.006),
+            (0.0, 0.006),
+        ],
+    );
+    b.lathe(drink, 40, &[(0.0378, 0.078), (0.0, 0.078)]);
+    let path: Vec<(Vec3, f32)> = (0..=12)
+        .map(|i| {
+            let (s, c) = (i as f32 / 12.0 * PI - FRAC_PI_2).sin_cos();
+            (Vec3::new(0.038 + 0.028 * c, 0.048 + 0.026 * s, 0.0), 0.0048)
+        })
+        .collect();
+    b.tube(glaze, 10, &path);
+}
+
+/// A vase thrown from a profile of radii (fractions of `height`) at even heights, with a thin wall.
+pub(super) fn vase(b: &mut Builder, mat: Mat, height: f32, radii: &[f32]) {
+    const STEPS: u32 = 40;
+    let last = radii.len() as f32 - 1.0;
+    let radius = |t: f32| {
+        // Catmull-Rom through the given radii.
+        let x = (t * last).clamp(0.0, last - 1e-4);
+        let i = x as usize;
+        let at = |k: isize| radii[(i as isize + k).clamp(0, last as isize) as usize];
+        let (p0, p1, p2, p3, f) = (at(-1), at(0), at(1), at(2), x.fract());
+        0.5 * (2.0 * p1
+            + f * (p2 - p0
+                + f * (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3 + f * (3.0 * p1 - p0 - 3.0 * p2 + p3))))
+    };
+    let wall = 0.014;
+    let mut profile = vec![(0.0, 0.0), (radii[0] * height - 0.002, 0.0)];
+    profile.extend(
+        (0..=STEPS)
+            .map(|k| k as f32 / STEPS as f32)
+            .map(|t| (radius(t) * height, 0.003 + t * height)),
+    );
+    let top = radius(1.0) * height;
+    profile.push((top - 0.3 * wall * height, 0.003 + height * 1.004));
+    profile.extend(
+        (3..=STEPS)
+            .rev()
+            .map(|k| k as f32 / STEPS as f32)
+            .map(|t| ((radius(t) - wall) * height, t * height)),
+    );
+    profile.push((0.0, 0.06 * height));
+    b.lathe(mat, 56, &profile);
+}
+
+/// A shallow bowl.
+pub(super) fn bowl(b: &mut Builder, mat: Mat, radius: f32, height: f32) {
+    let mut profile = vec![(0.0, 0.0), (0.35 * radius, 0.0), (0.36 * radius, 0.006)];
+    let curve = |t: f32, inset: f32| {
+        let (s, c) = (t * FRAC_PI_2 * 0.92).sin_cos();
+        ((0.36 + 0.64 * s) * radius - inset, 0.006 + (height - 0.006) * (1.0 - c) / 0.8747)
+    };
+    profile.extend((1..=20).map(|i| curve(i as f32 / 20.0, 0.0)));
+    profile.push((radius * 0.993 - 0.003, height + 0.0015));
+    profile
+        .extend((1..=20).rev().map(|i| curve(i as f32 / 20.0, 0.005)).map(|(r, y)| (r, y + 0.001)));
+    profile.push((0.0, 0.011));
+    b.lathe(mat, 56, &profile);
+}
+
+/// A heap of round fruit in a bowl of `radius`.
+pub(super) fn fruit(b: &mut Builder, skin: Mat, stalk: Mat, radius: f32, floor: f32) {
+    let mut place = |x: f32, y: f32, z: f32, tone: [f32; 3], r: f32| {
+        b.part(placed([x * radius, floor + y, z * radius], [25.0 * x, 80.0 * z, 30.0 * z]), |b| {
+            b.tinted(tone, |b| {
+                b.blob(skin, Vec3::ZERO, Vec3::new(r, 0.93 * r, r), [2.0, 2.15], 10)
+            });
+            b.rod(stalk, Vec3::Y * 0.85 * r, Vec3::new(0.004, 1.16 * r, 0.002), 0.0018);
+        });
+    };
+    let (orange, apple, green) = ([0.85, 0.32, 0.03], [0.55, 0.06, 0.04], [0.42, 0.52, 0.08]);
+    place(-0.34, 0.045, -0.12, orange, 0.040);
+    place(0.30, 0.045, -0.22, apple, 0.038);
+    place(0.05, 0.044, 0.36, green, 0.039);
+    place(0.0, 0.088, -0.02, orange, 0.039);
+}
+
+/// A framed picture with its lower left corner at the origin of a wall's frame; `art` covers
+/// texture coordinates `[0, width] x [0, height]` with v downwards.
+pub(super) fn picture(
+    b: &mut Builder,
+    [frame, mount, art]: [Mat; 3],
+    [width, height]: [f32; 2],
+    border: f32,
+) {
+    let (w, z) = (0.022, 0.028);
+    b.slab(frame, [0.0, 0.0, 0.002], [w, height, z], 0.003);
+    b.slab(frame, [width - w, 0.0, 0.002], [width, height, z], 0.003);
+    b.slab(frame, [0.001, 0.0004, 0.0025], [width - 0.001, w, z - 0.0006], 0.003);
+    b.slab(frame, [0.001, height - w, 0.0025], [width - 0.001, height - 0.0004, z - 0.0006], 0.003);
+    b.slab(mount, [0.01, 0.01, 0.003], [width - 0.01, height - 0.01, 0.012], 0.0);
+    let (x0, x1, y0, y1) = (w + border, width - w - border, w + border, height - w - border);
+    let corner = |x: f32, y: f32| {
+        let uv = Vec2::new((x - x0) / (x1 - x0), (y1 - y) / (y1 - y0));
+        (Vec3::new(x, y, 0.0132), Vec3::ZERO, uv)
+    };
+    b.polygon(art, &[corner(x0, y0), corner(x1, y0), corner(x1, y1), corner(x0, y1)], Vec3::Z);
+}
+
+/// A flat monitor on a foot, screen towards +Z.
+pub(super) fn monitor(b: &mut Builder, body: Mat, screen: Mat, [width, height]: [f32; 2]) {
+    b.slab(body, [-0.12, 0.0, -0.10], [0.12, 0.012, 0.09], 0.005);
+    b.slab(body, [-0.03, 0.006, -0.075], [0.03, 0.36, -0.058], 0.006);
+    b.part(placed([0.0, 0.13, -0.035], [-4.0, 0.0, 0.0]), |b| {
+        b.slab(body, [-0.5 * width, 0.0, -0.018], [0.5 * width, height, 0.006], 0.006);
+        b.slab(body, [-0.14, 0.08, -0.045], [0.14, height - 0.08, -0.012], 0.015);
+        b.slab(
+            screen,
+            [-0.5 * width + 0.008, 0.018, 0.0],
+            [0.5 * width - 0.008, height - 0.008, 0.0072],
+            0.0006,
+        );
+    });
+}
+
+/// A keyboard of five rows.
+pub(super) fn keyboard(b: &mut Builder, body: Mat, keys: Mat) {
+    b.part(placed([0.0, 0.004, 0.0], [2.5, 0.0, 0.0]), |b| {
+        b.slab(body, [-0.215, 0.0, -0.062], [0.215, 0.011, 0.062], 0.004);
+        for row in 0..5 {
+            let z = -0.055 + 0.022 * row as f32;
+            let mut x = -0.208;
+            let mut column = 0;
+            while x < 0.19 {
+                let w: f32 = match (row, column) {
+                    (4, 4) => 0.128,
+                    (1..=3, 0) => 0.026 + 0.004 * row as f32,
+                    _ => 0.0195,
+                };
+                let right = if x + w > 0.185 { 0.208 } else { x + w };
+                b.slab(keys, [x, 0.009, z], [right, 0.0155, z + 0.0195], 0.0018);
+                x = right + 0.0022;
+                column += 1;
+            }
+        }
+    });
+}
+
+/// A computer mouse.
+pub(super) fn mouse(b: &mut Builder, body: Mat) {
+    b.blob(body, Vec3::new(0.0, 0.014, 0.0), Vec3::new(0.031, 0.0135, 0.054), [2.6, 2.4], 10);
+}
+
+/// A jointed desk lamp that bows towards +Z (unlit).
+pub(super) fn desk_lamp(b: &mut Builder, metal: Mat, inside: Mat) {
+    b.drum(metal, [0.0, 0.022], [0.085, 0.080], 0.006);
+    let joints = [Vec3::new(0., 0.02, 0.), Vec3::new(0., 0.30, -0.13), Vec3::new(0., 0.50, 0.12)];
+    for pair in joints.windows(2) {
+        for side in [-0.011, 0.011] {
+            b.rod(metal, pair[0] + Vec3::X * side, pair[1] + Vec3::X * side, 0.0045);
+        }
+    }
+    for joint in &joints[1..] {
+        b.rod(metal, *joint - Vec3::X * 0.02, *joint + Vec3::X * 0.02, 0.012);
+    }
+    b.part(placed([0.0, 0.50, 0.125], [-28.0, 0.0, 0.0]), |b| {
+        let outer =
+            [(0.018, 0.045), (0.026, 0.02), (0.035, -0.005), (0.062, -0.05), (0.078, -0.10)];
+        let mut profile: Vec<(f32, f32)> = outer.iter().rev().copied().collect();
+        profile.push((0.0, 0.05));
+        b.lathe(metal, 40, &profile);
+        let mut lining: Vec<(f32, f32)> = outer[1..].iter().map(|&(r, y)| (r - 0.002, y)).collect();
+        lining.insert(0, (0.0, 0.018));
+        b.lathe(inside, 40, &lining);
+        b.lathe(metal, 40, &[(0.076, -0.10), (0.078, -0.10)]);
+        b.ball(inside, Vec3::new(0.0, -0.035, 0.0), 0.025);
+    });
+}
+
+/// Loose sheets of A4 paper.
+pub(super) fn papers(b: &mut Builder, paper: Mat, count: u32, seed: u32) {
+    let mut stream = Stream::new(seed);
+    for i in 0..count {
+        let at = [stream.between(-0.02, 0.02), 0.0011 * i as f32, stream.between(-0.02, 0.02)];
+        b.part(placed(at, [0.0, stream.between(-12.0, 12.0), 0.0]), |b| {
+            b.slab(paper, [-0.105, 0.0, -0.1485], [0.105, 0.0005, 0.1485], 0.0);
+        });
+    }
+}
+
+/// A cup of pencils.
+pub(super) fn pencils(b: &mut Builder, cup: Mat, wood: Mat) {
+    b.lathe(
+        cup,
+        32,
+        &[
+            (0.0, 0.0),
+            (0.036, 0.0),
+            (0.038, 0.002),
+            (0.038, 0.098),
+            (0.036, 0.1),
+            (0.034, 0.098),
+            (0.034, 0.006),
+            (0.0, 0.005),
+        ],
+    );
+    let mut stream = Stream::new(3);
+    for k in 0..7 {
+        let (s, c) = (k as f32 * 0.9).sin_cos();
+        let foot = Vec3::new(-0.018 * c, 0.008, -0.018 * s);
+        let tip = Vec3::new(0.034 * c, stream.between(0.15, 0.19), 0.034 * s);
+        let tone = COVERS[stream.index(COVERS.len())];
+        b.tinted(tone, |b| {
+            b.tube(wood, 6, &[(foot, 0.0036), (tip.lerp(foot, 0.1), 0.0036), (tip, 0.0006)])
+        });
+    }
+}
+
+/// A wall clock, its centre at the origin of a wall's frame.
+pub(super) fn clock(b: &mut Builder, rim: Mat, face: Mat, hands: Mat, radius: f32) {
+    b.part(Affine3A::from_rotation_x(FRAC_PI_2), |b| {
+        b.lathe(
+            rim,
+            64,
+            &[
+                (radius - 0.02, 0.02),
+                (radius - 0.02, 0.034),
+                (radius - 0.012, 0.04),
+                (radius - 0.004, 0.034),
+                (radius, 0.024),
+                (radius, -0.002),
+            ]
+            .map(|(r, y)| (r, y))
+            .iter()
+            .rev()
+            .copied()
+            .collect::<Vec<_>>(),
+        );
+        b.lathe(face, 64, &[(radius - 0.018, 0.024), (0.0, 0.024)]);
+    });
+    for hour in 0..12 {
+        let turn = Affine3A::from_rotation_z(hour as f32 * TAU / 12.0);
+        b.part(turn, |b| {
+            b.slab(hands, [-0.003, radius * 0.72, 0.023], [0.003, radius * 0.82, 0.0255], 0.0)
+        });
+    }
+    for (turn, length, width, z) in [(1.12, 0.48, 0.0075, 0.0275), (-2.3, 0.72, 0.005, 0.031)] {
+        b.part(Affine3A::from_rotation_z(turn), |b| {
+            b.slab(hands, [-width, -0.03, z], [width, length * radius, z + 0.002], 0.0005);
+        });
+    }
+}
+
+/// A waste-paper basket.
+pub(super) fn basket(b: &mut Builder, mat: Mat) {
+    b.lathe(
+        mat,
+        40,
+        &[
+            (0.0, 0.0),
+            (0.11, 0.0),
+            (0.115, 0.004),
+            (0.145, 0.30),
+            (0.149, 0.305),
+            (0.147, 0.31),
+            (0.142, 0.305),
+            (0.112, 0.01),
+            (0.0, 0.009),
+        ],
+    );
+}

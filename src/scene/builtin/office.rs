@@ -1,0 +1,249 @@
+//! A closed office, 6 x 3 x 4 m, lit softly: two windows of 1.0 x 0.9 m clear opening in the -X wall,
+//! 3 % of the walls. The sun of `sky:day` stands on the +X side and never enters.
+
+use glam::{Vec2, Vec3};
+
+use super::furniture::{self as piece, placed};
+use super::materials::{self as make, matte, metal, textured, two_sided, varnished};
+use super::mesh::{Builder, Mat};
+use super::objects as thing;
+use super::plants;
+use super::room::{self, Hole, Shell};
+use super::textures as paint;
+use crate::scene::Scene;
+
+const SIZE: [f32; 3] = [6.0, 3.0, 4.0];
+const THICKNESS: f32 = 0.2;
+/// Holes of the windows: the frames leave 1.0 x 0.9 m.
+const WINDOWS: [[f32; 4]; 2] = [[0.44, 1.14, 1.56, 2.16], [2.44, 1.14, 3.56, 2.16]];
+
+struct Palette {
+    wall: Mat,
+    feature: Mat,
+    ceiling: Mat,
+    boards: Mat,
+    white: Mat,
+    oak: Mat,
+    cloth: Mat,
+    sofa: Mat,
+    curtain: Mat,
+    rug: Mat,
+    fringe: Mat,
+    plastic: Mat,
+    keys: Mat,
+    screen: Mat,
+    steel: Mat,
+    brass: Mat,
+    lamp: Mat,
+    ceramic: Mat,
+    clay: Mat,
+    soil: Mat,
+    leaf: Mat,
+    cover: Mat,
+    paper: Mat,
+    arts: [Mat; 2],
+}
+
+impl Palette {
+    fn new(b: &mut Builder) -> Self {
+        let boards = b.texture(paint::planks([0.40, 0.27, 0.16], 10, 2), Vec2::new(2.6, 1.6));
+        let oak = b.texture(paint::timber([0.52, 0.36, 0.21]), Vec2::new(1.4, 0.7));
+        let plaster = b.texture(paint::plaster([0.76, 0.74, 0.70], 0.10), Vec2::splat(2.5));
+        let feature = b.texture(paint::plaster([0.36, 0.43, 0.47], 0.14), Vec2::splat(2.5));
+        let blue = b.texture(paint::weave([0.16, 0.24, 0.36], 64), Vec2::splat(0.18));
+        let grey = b.texture(paint::weave([0.44, 0.43, 0.41], 64), Vec2::splat(0.2));
+        let linen = b.texture(paint::weave([0.74, 0.71, 0.65], 128), Vec2::splat(0.3));
+        let rug = b.texture(
+            paint::rug([0.55, 0.52, 0.47], [0.14, 0.20, 0.28], [0.62, 0.42, 0.16]),
+            Vec2::new(2.6, 1.7),
+        );
+        let arts = [1, 0].map(|k| {
+            let art = b.texture(paint::painting(k), Vec2::ONE);
+            b.material(textured("painting", art, 0.55))
+        });
+        Self {
+            wall: b.material(textured("wall", plaster, 0.85)),
+            feature: b.material(textured("blue wall", feature, 0.85)),
+            ceiling: b.material(matte("ceiling", [0.80, 0.79, 0.78], 0.9)),
+            boards: b.material(varnished(textured("floor boards", boards, 0.55), 0.35, 0.25)),
+            white: b.material(matte("white paint", [0.78, 0.77, 0.75], 0.35)),
+            oak: b.material(varnished(textured("oak", oak, 0.5), 0.4, 0.25)),
+            cloth: b.material(two_sided(textured("blue cloth", blue, 0.9))),
+            sofa: b.material(textured("grey cloth", grey, 0.9)),
+            curtain: b.material(two_sided(textured("curtain", linen, 0.9))),
+            rug: b.material(two_sided(textured("rug", rug, 0.95))),
+            fringe: b.material(matte("fringe", [0.62, 0.58, 0.5], 0.95)),
+            plastic: b.material(matte("black plastic", [0.035, 0.036, 0.04], 0.4)),
+            keys: b.material(matte("keys", [0.62, 0.62, 0.61], 0.45)),
+            screen: b.material(matte("screen", [0.012, 0.013, 0.016], 0.12)),
+            steel: b.material(make::steel()),
+            brass: b.material(make::brass()),
+            lamp: b.material(metal("green enamel", [0.10, 0.22, 0.17], 0.25)),
+            ceramic: b.material(make::ceramic()),
+            clay: b.material(matte("terracotta", [0.52, 0.24, 0.14], 0.8)),
+            soil: b.material(matte("soil", [0.06, 0.04, 0.03], 1.0)),
+            leaf: b.material(two_sided(matte("leaf", [0.10, 0.24, 0.07], 0.4))),
+            cover: b.material(matte("book cover", [0.95; 3], 0.7)),
+            paper: b.material(matte("paper", [0.78, 0.76, 0.72], 0.9)),
+            arts,
+        }
+    }
+}
+
+/// Builds the scene.
+pub(super) fn build() -> Scene {
+    let b = &mut Builder::new("office");
+    let m = &Palette::new(b);
+    shell(b, m);
+    wall_things(b, m);
+    for (x, yaw, seed) in [(-1.35, 168.0, 1), (0.95, 205.0, 2)] {
+        desk(b, m, x, seed);
+        b.standing(Vec3::new(x + 0.1, 0.0, -0.62), yaw, |b| {
+            piece::office_chair(b, m.cloth, m.plastic, m.steel);
+        });
+    }
+    lounge(b, m);
+    b.camera("desks", [2.65, 1.5, 1.72], [-1.25, 0.98, -0.75], 54.0);
+    b.camera("windows", [2.3, 1.45, -0.1], [-2.9, 1.15, 0.05], 56.0);
+    b.camera("door", [-2.5, 1.5, -0.9], [1.9, 1.0, 1.3], 56.0);
+    std::mem::replace(b, Builder::new("")).finish()
+}
+
+fn shell(b: &mut Builder, m: &Palette) {
+    let shell =
+        Shell { walls: [m.wall, m.wall, m.feature, m.wall], floor: m.boards, ceiling: m.ceiling };
+    let windows = WINDOWS.map(Hole::Rectangle);
+    room::room(b, &shell, SIZE, THICKNESS, [&windows, &[], &[], &[]]);
+    let walls = room::walls(SIZE);
+    for (i, wall) in walls.iter().enumerate() {
+        b.part(wall.frame(), |b| {
+            let (door_gap, whole) = ([[0.0, 0.33], [1.37, 6.0]], [[0.0, wall.width]]);
+            let stretches: &[[f32; 2]] = if i == 3 { &door_gap } else { &whole };
+            room::skirting(b, m.white, stretches, 0.10);
+            room::cornice(b, m.ceiling, wall.width, SIZE[1] + 0.004, 0.07);
+        });
+    }
+    b.part(walls[0].frame(), |b| {
+        for hole in WINDOWS {
+            room::window_frame(b, m.white, hole, 0.09, [2, 1]);
+            room::window_board(b, m.oak, hole, THICKNESS);
+            let [u0, _, u1, _] = hole;
+            room::curtain(b, m.curtain, [u0 - 0.30, u0 + 0.0], [0.95, 2.36], 0.10, 4.0);
+            room::curtain(b, m.curtain, [u1 - 0.0, u1 + 0.30], [0.95, 2.36], 0.10, 4.0);
+            room::curtain_rod(b, m.brass, [u0 - 0.36, u1 + 0.36], 2.38, 0.10);
+            b.part(placed([0.5 * (u0 + u1), 0.0, 0.0], [0.0; 3]), |b| {
+                piece::radiator(b, m.white, 0.95, 0.78)
+            });
+        }
+        let [u0, v0, ..] = WINDOWS[1];
+        b.standing(Vec3::new(u0 + 0.24, v0 + 0.016, -0.02), 0.0, |b| {
+            let soil = plants::pot(b, m.clay, m.soil, 0.055, 0.10);
+            b.standing(Vec3::Y * soil, 0.0, |b| plants::blades(b, m.leaf, 8, 0.22, 6));
+        });
+    });
+    b.part(walls[3].frame(), |b| room::door(b, m.white, m.steel, 0.4, [0.9, 2.1]));
+    for x in [-1.35, 0.95] {
+        b.part(placed([x, SIZE[1], -0.9], [0.0; 3]), |b| {
+            piece::pendant(b, m.lamp, m.white, 0.85, 0.20)
+        });
+    }
+}
+
+fn wall_things(b: &mut Builder, m: &Palette) {
+    let wall = room::walls(SIZE)[2];
+    b.part(wall.frame(), |b| {
+        for (k, [u, v, w, h]) in
+            [[0.62, 1.38, 0.62, 0.82], [2.36, 1.46, 0.50, 0.66]].into_iter().enumerate()
+        {
+            b.part(placed([u, v, 0.0], [0.0; 3]), |b| {
+                thing::picture(b, [m.oak, m.white, m.arts[k]], [w, h], 0.06)
+            });
+        }
+        b.part(placed([1.83, 1.95, 0.0], [0.0; 3]), |b| {
+            thing::clock(b, m.steel, m.white, m.plastic, 0.16)
+        });
+        for (y, seed) in [(1.52, 5), (1.92, 9)] {
+            b.slab(m.oak, [3.15, y, -0.01], [5.25, y + 0.03, 0.25], 0.004);
+            for u in [3.35, 5.05] {
+                b.slab(
+                    m.steel,
+                    [u - 0.012, y - 0.16, -0.008],
+                    [u + 0.012, y + 0.002, 0.008],
+                    0.002,
+                );
+                b.slab(
+                    m.steel,
+                    [u - 0.012, y - 0.012, -0.002],
+                    [u + 0.012, y + 0.003, 0.20],
+                    0.002,
+                );
+            }
+            b.standing(Vec3::new(3.22, y + 0.03, 0.13), 0.0, |b| {
+                thing::books(b, [m.cover, m.paper], 1.25, 0.30, 0.22, seed)
+            });
+        }
+        b.standing(Vec3::new(4.85, 1.55, 0.12), 0.0, |b| {
+            thing::vase(b, m.ceramic, 0.22, &[0.2, 0.33, 0.28, 0.12, 0.16])
+        });
+        b.standing(Vec3::new(4.85, 1.95, 0.12), 0.0, |b| {
+            let soil = plants::pot(b, m.clay, m.soil, 0.075, 0.12);
+            b.standing(Vec3::Y * soil, 0.0, |b| plants::trailing(b, m.leaf, 0.075, 0.5, 3));
+        });
+    });
+}
+
+fn desk(b: &mut Builder, m: &Palette, x: f32, seed: u32) {
+    let height = 0.74;
+    let mirror = if seed == 1 { 1.0 } else { -1.0 };
+    b.standing(Vec3::new(x, 0.0, -1.45), 0.0, |b| {
+        piece::table(b, m.oak, m.oak, [1.6, 0.8, height]);
+        b.standing(Vec3::new(0.52 * mirror, 0.0, -0.04), 0.0, |b| {
+            piece::drawers(b, m.white, m.steel, [0.36, 0.58, 0.52], [1, 3]);
+        });
+        let mut on_top = |x: f32, z: f32, yaw: f32, build: &mut dyn FnMut(&mut Builder)| {
+            b.standing(Vec3::new(x * mirror, height, z), yaw, |b| build(b));
+        };
+        on_top(0.05, -0.18, -4.0 * mirror, &mut |b| {
+            thing::monitor(b, m.plastic, m.screen, [0.60, 0.36])
+        });
+        on_top(0.03, 0.16, 2.0, &mut |b| thing::keyboard(b, m.plastic, m.keys));
+        on_top(0.34 * mirror, 0.17, -6.0, &mut |b| thing::mouse(b, m.plastic));
+        on_top(-0.62, -0.22, 40.0 * mirror, &mut |b| thing::desk_lamp(b, m.lamp, m.white));
+        on_top(-0.48, 0.18, 14.0, &mut |b| thing::papers(b, m.paper, 5, seed));
+        on_top(0.60, 0.10, 60.0, &mut |b| thing::mug(b, m.ceramic, m.soil));
+        on_top(0.66, -0.24, 0.0, &mut |b| thing::pencils(b, m.steel, m.cover));
+        on_top(0.46, -0.26, 80.0, &mut |b| thing::book_stack(b, [m.cover, m.paper], 3, seed + 40));
+    });
+    b.standing(Vec3::new(x - 0.95 * mirror, 0.0, -1.35), 0.0, |b| thing::basket(b, m.steel));
+}
+
+fn lounge(b: &mut Builder, m: &Palette) {
+    b.standing(Vec3::new(-0.5, 0.0, 0.75), 0.0, |b| piece::rug(b, m.rug, m.fringe, [2.6, 1.7]));
+    b.standing(Vec3::new(-0.2, 0.0, 1.48), 180.0, |b| {
+        piece::sofa(b, m.sofa, m.oak, 1.9, 2);
+        b.part(placed([-0.55, 0.69, 0.0], [68.0, -16.0, 0.0]), |b| {
+            b.tinted([1.5, 0.95, 0.30], |b| piece::pillow(b, m.sofa, 0.21));
+        });
+    });
+    b.standing(Vec3::new(-1.75, 0.0, 1.25), 120.0, |b| piece::side_chair(b, m.oak, m.cloth));
+    b.standing(Vec3::new(2.82, 0.0, -0.85), -90.0, |b| {
+        piece::bookcase(b, [m.oak, m.cover, m.paper], [1.9, 2.0, 0.32], 5, |b, row, _| match row {
+            0 => thing::basket(b, m.fringe),
+            2 => thing::vase(b, m.clay, 0.24, &[0.18, 0.30, 0.34, 0.2, 0.13]),
+            4 => b.ball(m.brass, Vec3::Y * 0.08, 0.08),
+            _ => thing::book_stack(b, [m.cover, m.paper], 3, row + 60),
+        });
+    });
+    b.standing(Vec3::new(-2.58, 0.0, -1.55), 0.0, |b| {
+        let soil = plants::pot(b, m.ceramic, m.soil, 0.19, 0.34);
+        b.standing(Vec3::Y * soil, 0.0, |b| plants::big_leaves(b, m.leaf, 15, 1.15, 5));
+    });
+    b.standing(Vec3::new(-2.70, 0.0, 0.0), 90.0, |b| {
+        piece::drawers(b, m.white, m.steel, [0.7, 0.95, 0.40], [1, 3]);
+        b.standing(Vec3::new(-0.15, 0.95, 0.0), 10.0, |b| thing::papers(b, m.paper, 4, 9));
+        b.standing(Vec3::new(0.18, 0.95, -0.02), 0.0, |b| {
+            let soil = plants::pot(b, m.clay, m.soil, 0.08, 0.13);
+            b.standing(Vec3::Y * soil, 0.0, |b| plants::big_leaves(b, m.leaf, 12, 0.3, 15));
+        });
+    });
+}

@@ -1,0 +1,254 @@
+//! Procedural colour textures, deterministic and tileable.
+
+use glam::{IVec2, Vec2, Vec3};
+use rayon::prelude::*;
+
+use crate::color::srgb_from_linear;
+use crate::noise::{hash, smoothstep, tiling, tiling_fbm, unit};
+use crate::scene::TextureImage;
+
+/// An image of linear colours `f(u, v)`, stored sRGB-encoded.
+fn paint(width: u32, height: u32, f: impl Fn(Vec2) -> Vec3 + Sync) -> TextureImage {
+    const STEPS: usize = 4096;
+    let encode: Vec<u8> = (0..=STEPS)
+        .map(|i| (255.0 * srgb_from_linear(i as f32 / STEPS as f32) + 0.5) as u8)
+        .collect();
+    let byte = |x: f32| encode[(x.clamp(0.0, 1.0) * STEPS as f32) as usize];
+    let texels = (0..height)
+        .into_par_iter()
+        .flat_map_iter(|y| {
+            let f = &f;
+            let byte = &byte;
+            (0..width).map(move |x| {
+                let uv =
+                    Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
+                let c = f(uv);
+                [byte(c.x), byte(c.y), byte(c.z), 255]
+            })
+        })
+        .collect();
+    TextureImage { width, height, texels }
+}
+
+/// Wood of base colour `tone` with its grain along u; `seed` tells planks apart.
+fn grain(uv: Vec2, tone: Vec3, seed: u32) -> Vec3 {
+    let shift = unit(seed) * 8.0;
+    let warp = tiling_fbm(uv * Vec2::new(4.0, 8.0) + shift, IVec2::new(4, 8), 2, seed);
+    let rings = uv.y * 14.0 + 3.2 * warp + shift;
+    let ring = 0.5 + 0.5 * (rings * std::f32::consts::TAU).sin();
+    let fibre = tiling_fbm(uv * Vec2::new(16.0, 256.0) + shift, IVec2::new(16, 256), 2, seed ^ 5);
+    let pores =
+        smoothstep(0.62, 0.8, tiling(uv * Vec2::new(40.0, 400.0), IVec2::new(40, 400), seed ^ 9));
+    let light = 0.80 + 0.13 * ring + 0.34 * (fibre - 0.5) - 0.12 * pores + 0.15 * (warp - 0.5);
+    // Darker wood is also redder.
+    tone * Vec3::new(light.powf(0.8), light, light.powf(1.25))
+}
+
+/// Timber for furniture, grain along u.
+pub(super) fn timber(tone: [f32; 3]) -> TextureImage {
+    let tone = Vec3::from(tone);
+    paint(512, 512, |uv| grain(uv, tone, 11))
+}
+
+/// Floor boards along u: `rows` of them, each of `boards` pieces, with staggered ends.
+pub(super) fn planks(tone: [f32; 3], rows: u32, boards: u32) -> TextureImage {
+    let tone = Vec3::from(tone);
+    paint(1024, 1024, |uv| {
+        let v = uv.y * rows as f32;
+        let row = v as u32;
+        let u = (uv.x * boards as f32 + unit(row * 7 + 3)).rem_euclid(boards as f32);
+        let id = hash(row * 131 + u as u32);
+        let shade = 0.78 + 0.44 * unit(id);
+        let edge = (v.fract().min(1.0 - v.fract()) / rows as f32)
+            .min(u.fract().min(1.0 - u.fract()) / boards as f32);
+        let gap = smoothstep(0.0004, 0.0022, edge);
+        grain(uv + Vec2::new(unit(id), unit(id ^ 1)), tone * shade, id) * (0.35 + 0.65 * gap)
+    })
+}
+
+/// Herringbone parquet; the texture covers 24 x 24 block widths of blocks 1 x 6.
+pub(super) fn herringbone(tone: [f32; 3]) -> TextureImage {
+    const LENGTH: i32 = 6;
+    const CELLS: i32 = 24;
+    let tone = Vec3::from(tone);
+    paint(1024, 1024, |uv| {
+        let p = uv * CELLS as f32;
+        let cell = p.as_ivec2();
+        let d = (cell.x - cell.y).rem_euclid(2 * LENGTH);
+        // Block's first cell, and the place within it along and across.
+        let lying = d < LENGTH;
+        let (start, along, across) = if lying {
+            let start = IVec2::new(cell.x - d, cell.y);
+            (start, p.x - start.x as f32, p.y.fract())
+        } else {
+            let start = IVec2::new(cell.x, cell.y - (2 * LENGTH - 1 - d));
+            (start, p.y - start.y as f32, p.x.fract())
+        };
+        let start = start.rem_euclid(IVec2::splat(CELLS));
+        let id = hash((start.x * 64 + start.y * 2 + i32::from(lying)) as u32);
+        let edge = across.min(1.0 - across).min(along).min(LENGTH as f32 - along);
+        let gap = smoothstep(0.0, 0.045, edge);
+        let wood = Vec2::new(along / 24.0 + unit(id), across / 24.0 + unit(id ^ 3));
+        let shade = 0.76 + 0.42 * unit(id ^ 7);
+        grain(wood, tone * shade, 40 + (id & 7)) * (0.45 + 0.55 * gap)
+    })
+}
+
+/// Wall paint over plaster: nearly even, a little cloudy.
+pub(super) fn plaster(tone: [f32; 3], roughness: f32) -> TextureImage {
+    let tone = Vec3::from(tone);
+    paint(512, 512, |uv| {
+        let cloud = tiling_fbm(uv * 4.0, IVec2::splat(4), 4, 21) - 0.5;
+        let speck = tiling(uv * 170.0, IVec2::splat(170), 22) - 0.5;
+        tone * (1.0 + roughness * (0.5 * cloud + 0.16 * speck))
+    })
+}
+
+/// Plain weave with uneven threads, `threads` across the texture.
+pub(super) fn weave(tone: [f32; 3], threads: i32) -> TextureImage {
+    let tone = Vec3::from(tone);
+    paint(512, 512, |uv| {
+        let p = uv * threads as f32;
+        let over = (p.x as i32 + p.y as i32) & 1 == 0;
+        let (across, thread) =
+            if over { (p.y.fract(), p.y as u32) } else { (p.x.fract(), 977 + p.x as u32) };
+        let round = 1.0 - (2.0 * across - 1.0).powi(2);
+        let slub = tiling_fbm(uv * Vec2::splat(12.0), IVec2::splat(12), 3, 31) - 0.5;
+        tone * (0.74 + 0.24 * round + 0.16 * (unit(thread) - 0.5) + 0.22 * slub)
+    })
+}
+
+/// Running-bond bricks, `columns` x `rows` of them (`rows` even).
+pub(super) fn bricks(tone: [f32; 3], mortar: [f32; 3], columns: u32, rows: u32) -> TextureImage {
+    let (tone, mortar) = (Vec3::from(tone), Vec3::from(mortar));
+    paint(1024, 1024, |uv| {
+        let v = uv.y * rows as f32;
+        let row = v as u32;
+        let u = (uv.x * columns as f32 + 0.5 * (row & 1) as f32).rem_euclid(columns as f32);
+        let id = hash(row * 57 + u as u32);
+        let wobble = 0.05 * (tiling(uv * 90.0, IVec2::splat(90), 41) - 0.5);
+        let edge =
+            (v.fract().min(1.0 - v.fract())).min(2.2 * u.fract().min(1.0 - u.fract())) + wobble;
+        let rough = tiling_fbm(uv * 40.0, IVec2::splat(40), 3, 42);
+        let hue = Vec3::new(1.0, 0.9 + 0.2 * unit(id ^ 1), 0.85 + 0.3 * unit(id ^ 2));
+        let brick = tone * hue * (0.65 + 0.5 * unit(id)) * (0.75 + 0.5 * rough);
+        mortar.lerp(brick, smoothstep(0.055, 0.10, edge)) * (0.9 + 0.2 * rough)
+    })
+}
+
+/// Square-cut stones in rows of uneven lengths, for paving and ashlar: `rows` of them (even).
+pub(super) fn stones(tone: [f32; 3], rows: u32, columns: u32, joint: f32) -> TextureImage {
+    let tone = Vec3::from(tone);
+    paint(1024, 1024, |uv| {
+        let v = uv.y * rows as f32;
+        let row = v as u32;
+        let bend = 0.25
+            * (tiling(Vec2::new(uv.x * 16.0, row as f32), IVec2::new(16, rows as i32), 51) - 0.5);
+        let u = (uv.x * columns as f32 + unit(row) + bend).rem_euclid(columns as f32);
+        let id = hash(row * 91 + u as u32 + 17);
+        let edge = (v.fract().min(1.0 - v.fract()))
+            .min(u.fract().min(1.0 - u.fract()) * rows as f32 / columns as f32);
+        let edge = edge + 0.06 * (tiling(uv * 120.0, IVec2::splat(120), 52) - 0.5);
+        let rough = tiling_fbm(uv * 24.0, IVec2::splat(24), 5, 53);
+        let dirt = tiling_fbm(uv * 3.0, IVec2::splat(3), 4, 54);
+        let hue = Vec3::new(1.0, 0.97 + 0.05 * unit(id ^ 1), 0.90 + 0.16 * unit(id ^ 2));
+        let stone = tone * hue * (0.8 + 0.35 * unit(id)) * (0.7 + 0.6 * rough) * (0.8 + 0.4 * dirt);
+        stone * (0.4 + 0.6 * smoothstep(joint, joint * 2.2, edge))
+    })
+}
+
+/// Woven rug: a field of diamonds in a double border. Covers the rug once.
+pub(super) fn rug(ground: [f32; 3], figure: [f32; 3], accent: [f32; 3]) -> TextureImage {
+    let [ground, figure, accent] = [ground, figure, accent].map(Vec3::from);
+    paint(1024, 768, |uv| {
+        // Distances in units of the shorter side.
+        let p = Vec2::new(uv.x * 4.0 / 3.0, uv.y);
+        let inset = p.x.min(4.0 / 3.0 - p.x).min(p.y).min(1.0 - p.y);
+        let cell = Vec2::new(p.x * 7.5, p.y * 6.0);
+        let diamond = (cell.fract() - 0.5).abs().element_sum();
+        let odd = (cell.x as i32 + cell.y as i32) & 1 == 1;
+        let along = (p.x + p.y) * 18.0;
+        let mut c = if inset < 0.025 {
+            ground * 0.85
+        } else if inset < 0.04 {
+            figure
+        } else if inset < 0.095 {
+            if (along.fract() - 0.5).abs() * 0.11 > (inset - 0.0675).abs() {
+                accent
+            } else {
+                ground
+            }
+        } else if inset < 0.11 {
+            figure
+        } else if diamond < 0.14 {
+            accent
+        } else if diamond < 0.30 {
+            if odd { ground } else { figure }
+        } else if diamond < 0.36 {
+            figure
+        } else {
+            ground
+        };
+        let tuft = tiling_fbm(uv * 180.0, IVec2::splat(180), 2, 61);
+        let wear = tiling_fbm(uv * 5.0, IVec2::splat(5), 4, 62);
+        c = c.lerp(ground, 0.25 * wear);
+        c * (0.72 + 0.5 * tuft) * (0.88 + 0.24 * wear)
+    })
+}
+
+/// An abstract landscape in oils, one for each seed. Covers the canvas once.
+pub(super) fn painting(seed: u32) -> TextureImage {
+    const PALETTES: [[[f32; 3]; 5]; 3] = [
+        [
+            [0.75, 0.62, 0.45],
+            [0.80, 0.35, 0.14],
+            [0.42, 0.12, 0.08],
+            [0.10, 0.13, 0.20],
+            [0.85, 0.75, 0.55],
+        ],
+        [
+            [0.55, 0.68, 0.74],
+            [0.16, 0.34, 0.44],
+            [0.05, 0.15, 0.22],
+            [0.70, 0.62, 0.45],
+            [0.88, 0.85, 0.76],
+        ],
+        [
+            [0.80, 0.74, 0.60],
+            [0.30, 0.38, 0.22],
+            [0.12, 0.20, 0.13],
+            [0.62, 0.44, 0.14],
+            [0.86, 0.80, 0.68],
+        ],
+    ];
+    let palette = PALETTES[seed as usize % PALETTES.len()].map(Vec3::from);
+    paint(384, 512, |uv| {
+        let brush = tiling_fbm(uv * Vec2::new(10.0, 60.0), IVec2::new(10, 60), 3, seed + 71) - 0.5;
+        let mut c = palette[0].lerp(palette[4], smoothstep(0.0, 0.5, uv.y) + 0.4 * brush);
+        let sun = uv.distance(Vec2::new(0.62, 0.27) + 0.006 * brush);
+        c = c.lerp(palette[1].lerp(palette[4], 0.25), 1.0 - smoothstep(0.135, 0.14, sun));
+        for layer in 0..4_u32 {
+            let base = 0.44 + 0.13 * layer as f32;
+            let hill = tiling_fbm(
+                Vec2::new(uv.x * 3.0, layer as f32),
+                IVec2::new(3, 8),
+                4,
+                seed * 31 + layer,
+            );
+            let line = base + 0.28 * (hill - 0.5);
+            let tone = palette[1 + layer as usize % 3].lerp(palette[0], 0.45 - 0.14 * layer as f32);
+            c = c.lerp(tone * (1.0 + 0.5 * brush), smoothstep(0.0, 0.008, uv.y - line));
+        }
+        c * (0.95 + 0.35 * brush)
+    })
+}
+
+/// Stripes along v, `count` pairs, for awnings.
+pub(super) fn stripes(a: [f32; 3], b: [f32; 3], count: u32) -> TextureImage {
+    let [a, b] = [a, b].map(Vec3::from);
+    paint(512, 64, |uv| {
+        let weave = tiling(uv * Vec2::new(256.0, 32.0), IVec2::new(256, 32), 81);
+        let band = (uv.x * count as f32).fract();
+        a.lerp(b, smoothstep(0.48, 0.5, band) - smoothstep(0.98, 1.0, band)) * (0.9 + 0.15 * weave)
+    })
+}
