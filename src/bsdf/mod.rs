@@ -148,7 +148,7 @@ impl Bsdf {
     /// sampling lights at this point is useless.
     pub fn is_delta_only(&self) -> bool {
         self.diffuse.color == Vec3::ZERO
-            && (self.interface.is_smooth() || self.interface.is_absent())
+            && self.interface.is_delta_or_absent()
             && self.coat.is_delta_or_absent()
     }
 
