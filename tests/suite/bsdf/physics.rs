@@ -119,11 +119,11 @@ fn lossless_surfaces_lose_nothing() {
 #[test]
 fn body_and_interface_of_plastic_add_up_to_white() {
     // Single scattering loses a little in the interface; the coupling gives it back to the body.
-    for roughness in [0.1, 0.3, 0.6, 1.0] {
-        for wo in viewers() {
+    for roughness in [0.07, 0.1, 0.3, 0.6, 1.0] {
+        for wo in viewers().chain([spherical(0.02, 0.4)]) {
             let parameters = SurfaceParameters { roughness, ..PLASTIC };
             let (energy, error) = furnace(&parameters, true, wo, 20_000);
-            assert!((energy - 1.0).abs() < 0.004 + 4.0 * error, "{roughness} {wo}: {energy}");
+            assert!((energy - 1.0).abs() < 0.008 + 4.0 * error, "{roughness} {wo}: {energy}");
         }
     }
 }
