@@ -80,8 +80,14 @@ impl Interface {
         self.glass == 0.0 && self.f90 == 0.0 && self.f0 == Vec3::ZERO
     }
 
-    /// Whether all of it is perfect reflection, refraction or straight passage.
-    pub(super) fn is_smooth(&self) -> bool {
+    /// Whether there is no lobe: all is perfect reflection, refraction or straight passage.
+    pub(super) fn is_delta_or_absent(&self) -> bool {
+        let reflects_nothing =
+            self.f90 == 0.0 && self.f0 == Vec3::ZERO && self.glass_f0 == Vec3::ZERO;
+        self.is_smooth() || self.is_absent() || (self.transmits_delta() && reflects_nothing)
+    }
+
+    fn is_smooth(&self) -> bool {
         self.ggx.is_smooth()
     }
 

@@ -8,6 +8,8 @@
 //! `specular = 0` a dielectric is exactly Lambert's `base_color / pi`; a metal is exactly
 //! `F D G / (4 cos cos)` with Schlick's Fresnel and single scattering.
 //!
+//! A point's scattering is `Bsdf::new(&point.parameters, point.front_face)`.
+//!
 //! Contract: directions are unit and local to the shading frame, whose z is the shading normal on
 //! the viewer's side; they point away from the surface. `wi.z > 0` is reflection, `wi.z < 0`
 //! transmission. The caller rejects a `wi` that lies on the other side of the geometric surface.
@@ -147,7 +149,7 @@ impl Bsdf {
     /// sampling lights at this point is useless.
     pub fn is_delta_only(&self) -> bool {
         self.diffuse.color == Vec3::ZERO
-            && (self.interface.is_smooth() || self.interface.is_absent())
+            && self.interface.is_delta_or_absent()
             && self.coat.is_delta_or_absent()
     }
 
@@ -205,13 +207,18 @@ impl Bsdf {
         if wo.z.is_nan() || wo.z <= 0.0 {
             return None;
         }
-        if self.coat.is_absent() && self.interface.is_absent() {
-            return (self.diffuse.color != Vec3::ZERO).then_some(Outgoing {
-                diffuse_left: 1.0,
-                coat_probability: 0.0,
-                interface_probability: 0.0,
-                diffuse_probability: 1.0,
-            });
+        if self.coat.is_absent() {
+            // One lobe, or none, needs no albedos.
+            let (diffuse, interface) =
+                (self.diffuse.color != Vec3::ZERO, !self.interface.is_absent());
+            if !(diffuse && interface) {
+                return (diffuse || interface).then(|| Outgoing {
+                    diffuse_left: 1.0,
+                    coat_probability: 0.0,
+                    interface_probability: f32::from(interface),
+                    diffuse_probability: f32::from(diffuse),
+                });
+            }
         }
         let terms = self.terms.at(wo.z);
         let diffuse_left = self.diffuse_left(terms);

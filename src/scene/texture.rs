@@ -14,7 +14,8 @@ static LINEAR_FROM_SRGB_BYTE: LazyLock<[f32; 256]> =
 /// The linear RGBA value of a texture at mesh coordinates `uv` (of the reference's set).
 ///
 /// Texel centres lie at half-integers; colours are decoded before they are filtered. Coordinates
-/// that are not finite read as 0, an image without texels as white.
+/// that are not finite read as 0, an image without texels as white. Indices are valid in any scene
+/// that was loaded.
 pub fn sample_texture(scene: &Scene, texture_ref: &TextureRef, uv: Vec2) -> Vec4 {
     let texture = &scene.textures[texture_ref.texture as usize];
     let image = &scene.images[texture.image as usize];
