@@ -1,5 +1,7 @@
 //! Tests of metrics.
 
+use lightgrid::image::Image;
+use lightgrid::metrics::compare;
 use lightgrid::metrics::statistics::{
     Estimate, chi_square_test, erfc, ln_gamma, sidak, upper_gamma, z_test,
 };
@@ -36,7 +38,7 @@ fn special_functions_match_reference_values() {
     for (x, want) in [
         (0.1, 2.25271265173421),
         (0.5, 0.5723649429247),
-        (3.0, 0.693147180559945),
+        (3.5, 1.20097360234707),
         (10.5, 13.9406252194038),
         (1000.0, 5905.22042320918),
     ] {
@@ -133,4 +135,70 @@ fn chi_square_tells_a_skewed_histogram_from_a_fair_one() {
     };
     assert!(chi_square_test(&histogram(1.0), &[1000.0; 64], 0.01).unwrap().passed);
     assert!(!chi_square_test(&histogram(1.05), &[1000.0; 64], 0.01).unwrap().passed);
+}
+
+/// A picture with some structure, 64 x 64, around 1.
+fn structured() -> Image {
+    Image::from_fn(64, 64, |x, y| {
+        let v = 0.2 + (x / 8 % 2) as f32 + (y as f32) / 64.0;
+        [v, 0.8 * v, 0.6 * v]
+    })
+}
+
+#[test]
+fn equal_pictures_compare_as_equal() {
+    let result = compare(&structured(), &structured()).unwrap();
+    assert_eq!(
+        (result.mse, result.rel_mse, result.trimmed_rel_mse, result.mean_ratio, result.flip),
+        (0.0, 0.0, 0.0, 1.0, 0.0)
+    );
+}
+
+#[test]
+fn errors_have_their_known_values_whatever_the_exposure() {
+    for exposure in [1.0, 1e-4, 1e4] {
+        let reference = Image::filled(50, 40, [exposure; 3]);
+        let mut image = Image::filled(50, 40, [1.1 * exposure; 3]);
+        // Two of 2000 pixels are fireflies: just what the trimmed mean drops.
+        image.pixels[7] = [101.0 * exposure; 3];
+        image.pixels[777] = [101.0 * exposure; 3];
+        let result = compare(&image, &reference).unwrap();
+        let mse = (0.01 * 1998.0 + 2.0 * 1e4) / 2000.0;
+        assert_relative(result.mse, mse, 1e-5);
+        assert_relative(result.rel_mse, mse / 1.01, 1e-5);
+        assert_relative(result.trimmed_rel_mse, 0.01 / 1.01, 1e-5);
+        assert_relative(result.mean_ratio, (1.1 * 1998.0 + 202.0) / 2000.0, 1e-6);
+    }
+}
+
+#[test]
+fn flip_grows_with_the_difference_and_is_free_of_exposure() {
+    let reference = structured();
+    let brighter = |gain: f32| {
+        let mut image = structured();
+        image.pixels.as_flattened_mut().iter_mut().for_each(|v| *v *= gain);
+        image
+    };
+    let flip = |image: &Image| compare(image, &reference).unwrap().flip;
+    let (small, large) = (flip(&brighter(1.05)), flip(&brighter(2.0)));
+    assert!(0.0 < small && small < 0.1 && small < large && large < 1.0, "{small} {large}");
+    let scaled = compare(&brighter(200.0), &brighter(100.0)).unwrap();
+    assert!((scaled.flip - large).abs() < 0.01, "{} {large}", scaled.flip);
+}
+
+#[test]
+fn what_cannot_be_compared_is_said() {
+    let picture = structured();
+    let sentence = |a: &Image, b: &Image| compare(a, b).unwrap_err().to_string();
+    let small = Image::filled(2, 2, [1.0; 3]);
+    assert_eq!(sentence(&small, &picture), "the pictures differ in size: 2 x 2 and 64 x 64");
+    let mut broken = structured();
+    broken.pixels[3][1] = f32::NAN;
+    assert_eq!(sentence(&broken, &picture), "the picture has 1 pixels that are NaN or infinite");
+    assert!(sentence(&picture, &broken).contains("the reference has 1"));
+    let black = Image::filled(64, 64, [0.0; 3]);
+    assert!(sentence(&picture, &black).contains("the reference is black"));
+    assert_eq!(compare(&black, &picture).unwrap().mean_ratio, 0.0);
+    let one = Image::filled(1, 1, [1.0; 3]);
+    assert_eq!(compare(&one, &one).unwrap().trimmed_rel_mse, 0.0);
 }
