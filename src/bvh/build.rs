@@ -287,3 +287,75 @@ impl Collapse<'_> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Depth of the tree below `reference`; checks that boxes hold what they stand for and counts
+    /// how often each triangle is referenced.
+    fn depth(tree: &Tree, reference: Reference, uses: &mut [u32], points: &mut Vec<Vec3>) -> usize {
+        if reference & LEAF != 0 {
+            let block = &tree.blocks[(reference & !LEAF) as usize];
+            for lane in (0..WIDTH).filter(|&lane| block.triangles[lane] != u32::MAX) {
+                uses[block.triangles[lane] as usize] += 1;
+                let vertex =
+                    |v: &[[f32; WIDTH]; 3]| Vec3::from_array([0, 1, 2].map(|axis| v[axis][lane]));
+                points.extend(block.vertices.iter().map(vertex));
+            }
+            return 0;
+        }
+        let node = &tree.nodes[reference as usize];
+        let mut deepest = 0;
+        for lane in 0..WIDTH {
+            let corner = |side: usize| {
+                Vec3::from_array([0, 1, 2_usize].map(|axis| node.planes[2 * axis + side][lane]))
+            };
+            let (lower, upper) = (corner(0), corner(1));
+            if lower.x.is_finite() {
+                let first = points.len();
+                deepest = deepest.max(depth(tree, node.children[lane], uses, points));
+                assert!(
+                    points[first..].iter().all(|p| p.cmpge(lower).all() && p.cmple(upper).all())
+                );
+            }
+        }
+        deepest + 1
+    }
+
+    fn check(positions: &[Vec3], triangles: &[[u32; 3]]) -> usize {
+        let tree = build(positions, triangles);
+        let mut uses = vec![0; triangles.len()];
+        let depth = depth(&tree, 0, &mut uses, &mut Vec::new());
+        assert!(uses.iter().all(|&count| count == 1));
+        assert!(depth <= MAX_DEPTH, "{depth}");
+        depth
+    }
+
+    #[test]
+    fn each_triangle_is_referenced_once_from_boxes_that_hold_it() {
+        let scatter = |i: u16| (f32::from(i) * 12.9898).sin();
+        let positions: Vec<_> = (0..3000_u16)
+            .map(|i| Vec3::new(scatter(3 * i), scatter(3 * i + 1), scatter(3 * i + 2)))
+            .collect();
+        for count in [1, 8, 9, 1000] {
+            let triangles: Vec<_> = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            check(&positions, &triangles);
+        }
+    }
+
+    /// Triangles around the origin that grow by a constant factor nest like an onion: the cheapest
+    /// tree is a chain, which must end in balanced subtrees before the stack does.
+    #[test]
+    fn onions_do_not_exceed_the_depth() {
+        let sizes = (0..1000).map(|i| 1e-15 * 1.06_f32.powi(i));
+        let positions: Vec<_> = sizes
+            .flat_map(|size| {
+                [Vec3::X, Vec3::NEG_X + Vec3::Y, Vec3::NEG_Y + Vec3::Z].map(|p| p * size)
+            })
+            .collect();
+        let triangles: Vec<_> = (0..1000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let depth = check(&positions, &triangles);
+        assert!(depth > BALANCED_FROM_DEPTH, "the case is not hard enough: {depth}");
+    }
+}

@@ -116,6 +116,7 @@ struct BoxRay {
 }
 
 impl BoxRay {
+    #[inline(always)]
     fn new(ray: &Ray, extent: f32) -> Self {
         let longest = ray.direction.abs().max_element();
         // A direction of 2^-60 is as good as zero and keeps `0 * inf` out.

@@ -20,6 +20,7 @@ pub(super) struct Shear {
 
 impl Shear {
     /// `ray.direction` is finite and not zero.
+    #[inline(always)]
     pub(super) fn new(ray: &Ray) -> Self {
         let length = ray.direction.abs();
         let z = length.max_position();
