@@ -22,3 +22,16 @@ pub fn srgb_from_linear(x: f32) -> f32 {
 pub fn linear_from_srgb(x: f32) -> f32 {
     if x <= 0.040_45 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }
+
+/// Linear Rec.709 from CIE XYZ, white D65 (IEC 61966-2-1).
+pub const REC709_FROM_XYZ: glam::Mat3 = glam::Mat3::from_cols_array(&[
+    3.240_97,
+    -0.969_243_6,
+    0.055_630_08,
+    -1.537_383_2,
+    1.875_967_5,
+    -0.203_976_96,
+    -0.498_610_76,
+    0.041_555_06,
+    1.056_971_5,
+]);

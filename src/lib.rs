@@ -31,3 +31,4 @@ pub mod path;
 pub mod render;
 pub mod sampler;
 pub mod scene;
+pub mod tone;

@@ -1,3 +1,5 @@
-//! The `lightgrid` binary.
+//! The `lightgrid` binary: everything is in the library's [`lightgrid::cli`].
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    lightgrid::cli::main()
+}

@@ -3,7 +3,7 @@
 //! Convention (glTF world: right-handed, +Y up): `u = 0.5 + atan2(z, x) / 2pi`, `v = acos(y) / pi`.
 //! The map's centre column looks along +X, `u = 0.25` along -Z, the seam is at -X, row 0 at +Y.
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
 use glam::{Vec2, Vec3};
 
@@ -43,11 +43,37 @@ impl Frame {
     }
 }
 
-/// Lat-long coordinates in `[0,1)` x `[0,1]` of a unit direction.
+/// Lat-long coordinates in `[0,1)` x `[0,1]` of a direction.
+///
+/// The polar angle comes from an arc tangent: near a pole `acos(y)` is off by up to 3e-4 radian,
+/// which is more than a row of a large map.
 pub fn uv_from_direction(direction: Vec3) -> Vec2 {
-    let u = 0.5 + direction.z.atan2(direction.x) / TAU;
+    let u = 0.5 + atan2(direction.z, direction.x) / TAU;
     // Rounding may carry u to exactly 1, which is the seam, that is 0.
-    Vec2::new(if u >= 1.0 { 0.0 } else { u }, direction.y.clamp(-1.0, 1.0).acos() / PI)
+    let sin_theta = (direction.x * direction.x + direction.z * direction.z).sqrt();
+    Vec2::new(if u >= 1.0 { 0.0 } else { u }, atan2(sin_theta, direction.y) / PI)
+}
+
+/// Angle of the vector `(x, y)` in `[-pi, pi]`, within 3e-7 radian; 0 for the zero vector.
+///
+/// The polynomial of Cephes' `atanf` (Moshier 1989), without branches. With the standard library's
+/// arc tangent, mapping a direction took 36 ns instead of 21, of some 100 for a whole look-up.
+pub fn atan2(y: f32, x: f32) -> f32 {
+    const TAN_PI_8: f32 = 0.414_213_57;
+    let (small, large) = (x.abs().min(y.abs()), x.abs().max(y.abs()));
+    // atan(t) = pi/4 + atan((t - 1) / (t + 1)) brings t = small / large below tan(pi / 8).
+    let reduce = small > TAN_PI_8 * large;
+    let (numerator, denominator) =
+        if reduce { (small - large, small + large) } else { (small, large) };
+    let t = if denominator > 0.0 { numerator / denominator } else { 0.0 };
+    let z = t * t;
+    let polynomial =
+        ((8.053_744_5e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_295e-1;
+    let reduced = polynomial * z * t + t;
+    let octant = if reduce { FRAC_PI_4 + reduced } else { reduced };
+    let quadrant = if y.abs() > x.abs() { FRAC_PI_2 - octant } else { octant };
+    let half = if x < 0.0 { PI - quadrant } else { quadrant };
+    half.copysign(y)
 }
 
 /// Unit direction of lat-long coordinates; inverse of [`uv_from_direction`].
@@ -76,4 +102,24 @@ pub fn balance_heuristic(pdf: f32, other_pdf: f32) -> f32 {
     }
     let sum = pdf + other_pdf;
     if sum > 0.0 { pdf / sum } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn atan2_is_within_its_stated_error_in_every_direction() {
+        for i in 0..1_000_000 {
+            let angle = f64::from(i) * std::f64::consts::TAU / 1e6 - std::f64::consts::PI;
+            let scale = 2.0_f64.powi(i % 200 - 100);
+            let (y, x) = ((scale * angle.sin()) as f32, (scale * angle.cos()) as f32);
+            let exact = f64::from(y).atan2(f64::from(x));
+            let error = (f64::from(atan2(y, x)) - exact).abs();
+            assert!(error < 3e-7, "{y} {x}: {error}");
+        }
+        for (y, x) in [(0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (-1.0, 0.0), (-0.0, -1.0), (0.0, 0.0)] {
+            assert!((atan2(y, x) - y.atan2(x)).abs() < 3e-7, "{y} {x}");
+        }
+    }
 }

@@ -1,1 +1,277 @@
-//! How light is scattered at a surface point.
+//! How light is scattered at a surface point: glTF 2.0 metallic-roughness with the extensions ior,
+//! specular, transmission, volume and clearcoat.
+//!
+//! From the outside in: a clearcoat, the base's GGX interface (`interface`), and a Lambertian body.
+//! Where glTF's sample formulas gain energy or are not reciprocal, they are replaced (the
+//! specification allows it): the body gets what the interface leaves over in both directions
+//! (`albedo`), and the coat attenuates what is under it on the way in and on the way out. With
+//! `specular = 0` a dielectric is exactly Lambert's `base_color / pi`; a metal is exactly
+//! `F D G / (4 cos cos)` with Schlick's Fresnel and single scattering.
+//!
+//! A point's scattering is `Bsdf::new(&point.parameters, point.front_face)`.
+//!
+//! Contract: directions are unit and local to the shading frame, whose z is the shading normal on
+//! the viewer's side; they point away from the surface. `wi.z > 0` is reflection, `wi.z < 0`
+//! transmission. The caller rejects a `wi` that lies on the other side of the geometric surface.
+
+mod albedo;
+mod coat;
+mod fresnel;
+mod interface;
+mod microfacet;
+
+use std::f32::consts::{FRAC_1_PI, TAU};
+
+use glam::{Vec2, Vec3};
+
+use crate::color::importance;
+pub use crate::scene::surface::SurfaceParameters;
+use albedo::AlbedoTerms;
+use coat::Coat;
+use fresnel::normal_reflectance;
+use interface::Interface;
+
+/// A direction drawn by [`Bsdf::sample`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BsdfSample {
+    /// Unit direction the light comes from, local.
+    pub wi: Vec3,
+    /// `f * |cos wi| / pdf`; through a solid's surface radiance scales by the squared relative index
+    /// of refraction, so this may exceed 1 on the way out and is below it on the way in.
+    pub weight: Vec3,
+    /// Density per steradian, as [`Bsdf::pdf_solid_angle`]; 1 and meaningless if `is_delta`.
+    pub pdf_solid_angle: f32,
+    /// A perfect reflection or refraction, which no other technique can find.
+    pub is_delta: bool,
+    /// Whether `wi` is on the far side.
+    pub is_transmission: bool,
+}
+
+/// The scattering at one point, for one side.
+#[derive(Debug, Clone, Copy)]
+pub struct Bsdf {
+    interface: Interface,
+    diffuse: Diffuse,
+    coat: Coat,
+    terms: AlbedoTerms,
+}
+
+/// Lambert's lobe under the opaque dielectric's share of the interface.
+#[derive(Debug, Clone, Copy)]
+struct Diffuse {
+    /// Base colour times share, over what the interface lets in on average.
+    color: Vec3,
+    /// The dielectric's largest F0 and its F90.
+    f0_f90: Vec2,
+}
+
+/// What depends on `wo` alone: what the interface leaves for the body, and the probability of each
+/// lobe, in proportion to its albedo.
+#[derive(Debug, Clone, Copy)]
+struct Outgoing {
+    diffuse_left: f32,
+    coat_probability: f32,
+    interface_probability: f32,
+    diffuse_probability: f32,
+}
+
+impl Bsdf {
+    /// The scattering of a surface; `entering` says that the viewer is outside of the solid, i.e. on
+    /// the front side. Thin walls are alike from both sides. An unlit surface scatters nothing.
+    pub fn new(p: &SurfaceParameters, entering: bool) -> Self {
+        let f90 = p.specular;
+        let f0 = (normal_reflectance(p.ior) * p.specular_color).min(Vec3::ONE) * p.specular;
+        let f0_f90 = Vec2::new(f0.max_element(), f90);
+        let terms = AlbedoTerms::of(p.roughness);
+        let mut color = p.base_color * ((1.0 - p.metallic) * (1.0 - p.transmission));
+        if f90 > 0.0 && color != Vec3::ZERO {
+            let let_in = 1.0 - f0_f90.dot(terms.mean());
+            color = if let_in > 1e-4 { color / let_in } else { Vec3::ZERO };
+        }
+        Self {
+            interface: Interface::new(p, f0, f90, entering),
+            diffuse: Diffuse { color, f0_f90 },
+            coat: Coat::new(p, entering),
+            terms,
+        }
+    }
+
+    /// `f(wo, wi) * |cos wi|` of all lobes that have a density, per steradian.
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        self.eval_pdf(wo, wi).0
+    }
+
+    /// A direction to continue in from three uniform numbers in `[0,1)`: the first chooses the lobe,
+    /// the others the direction. `None` is absorption: the sample counts as zero.
+    pub fn sample(&self, wo: Vec3, u: Vec3) -> Option<BsdfSample> {
+        let out = self.outgoing(wo)?;
+        let direction = Vec2::new(u.y, u.z);
+        let choice = u.x - out.coat_probability;
+        let lobe = if choice < 0.0 {
+            self.coat.sample(wo, direction, out.coat_probability)?
+        } else if choice < out.interface_probability {
+            let choice = (choice / out.interface_probability).min(1.0 - f32::EPSILON);
+            self.interface.sample(wo, choice, direction)?
+        } else {
+            LobeSample::Spread(cosine_hemisphere(direction))
+        };
+        match lobe {
+            LobeSample::Spread(wi) => self.spread_sample(wo, wi, &out),
+            LobeSample::Coat(wi, weight) => delta_sample(wi, weight),
+            LobeSample::Interface(wi, weight) => {
+                let coat = self.coat.attenuation(wo) * self.coat.attenuation(wi);
+                delta_sample(wi, weight * (coat / out.interface_probability))
+            }
+        }
+    }
+
+    /// Density per steradian of [`Self::sample`] at `wi`, perfect reflection and refraction left out;
+    /// its integral is below 1 by the probability of those and of absorption.
+    pub fn pdf_solid_angle(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.eval_pdf(wo, wi).1
+    }
+
+    /// [`Self::eval`] and [`Self::pdf_solid_angle`] at once.
+    pub fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
+        self.outgoing(wo).map_or((Vec3::ZERO, 0.0), |out| self.eval_pdf_with(wo, wi, &out))
+    }
+
+    /// Light that goes straight through: smooth thin-walled transmission, tinted by the base colour.
+    ///
+    /// No part of it is in `eval` or `sample`: the integrator lets paths and shadow rays through
+    /// alike. The wall's reflection is in `sample`, so the two are to be added, not mixed.
+    pub fn straight_transmittance(&self, wo: Vec3) -> Vec3 {
+        let coat = self.coat.attenuation(wo);
+        self.interface.straight_transmittance(wo.z.abs()) * (coat * coat)
+    }
+
+    /// Whether all scattering is perfect reflection or refraction (or there is none), so that
+    /// sampling lights at this point is useless.
+    pub fn is_delta_only(&self) -> bool {
+        self.diffuse.color == Vec3::ZERO
+            && self.interface.is_delta_or_absent()
+            && self.coat.is_delta_or_absent()
+    }
+
+    /// Share of uniform light from everywhere that reaches a viewer straight above, in `[0,1]`;
+    /// an estimate for guide layers of denoisers.
+    pub fn albedo(&self) -> Vec3 {
+        let terms = self.terms.at(1.0);
+        let let_in = 1.0 - self.diffuse.f0_f90.dot(self.terms.mean());
+        let diffuse = self.diffuse.color * (self.diffuse_left(terms) * let_in);
+        let interface = self.interface.albedo(1.0, terms) + self.straight_transmittance(Vec3::Z);
+        let under = self.coat.attenuation(Vec3::Z);
+        let coat = self.coat.albedo(Vec3::Z);
+        (coat + under * under * (diffuse + interface)).clamp(Vec3::ZERO, Vec3::ONE)
+    }
+
+    fn spread_sample(&self, wo: Vec3, wi: Vec3, out: &Outgoing) -> Option<BsdfSample> {
+        let (value, pdf_solid_angle) = self.eval_pdf_with(wo, wi, out);
+        let weight = value / pdf_solid_angle;
+        (pdf_solid_angle > 0.0 && weight.is_finite()).then_some(BsdfSample {
+            wi,
+            weight,
+            pdf_solid_angle,
+            is_delta: false,
+            is_transmission: wi.z < 0.0,
+        })
+    }
+
+    fn eval_pdf_with(&self, wo: Vec3, wi: Vec3, out: &Outgoing) -> (Vec3, f32) {
+        let (mut value, mut pdf) = (Vec3::ZERO, 0.0);
+        if out.diffuse_probability > 0.0 && wi.z > 0.0 {
+            let lambert = wi.z * FRAC_1_PI;
+            let left = out.diffuse_left * self.diffuse_left_at(wi.z);
+            value += self.diffuse.color * (left * lambert);
+            pdf += out.diffuse_probability * lambert;
+        }
+        if out.interface_probability > 0.0 {
+            let (interface, interface_pdf) = self.interface.eval_pdf(wo, wi);
+            value += interface;
+            pdf += out.interface_probability * interface_pdf;
+        }
+        if self.coat.is_absent() {
+            return (value, pdf);
+        }
+        value *= self.coat.attenuation(wo) * self.coat.attenuation(wi);
+        if out.coat_probability > 0.0 {
+            let (coat, coat_pdf) = self.coat.eval_pdf(wo, wi);
+            value += Vec3::splat(coat);
+            pdf += out.coat_probability * coat_pdf;
+        }
+        (value, pdf)
+    }
+
+    /// `None` if nothing is scattered towards `wo`.
+    fn outgoing(&self, wo: Vec3) -> Option<Outgoing> {
+        if wo.z.is_nan() || wo.z <= 0.0 {
+            return None;
+        }
+        if self.coat.is_absent() {
+            // One lobe, or none, needs no albedos.
+            let (diffuse, interface) =
+                (self.diffuse.color != Vec3::ZERO, !self.interface.is_absent());
+            if !(diffuse && interface) {
+                return (diffuse || interface).then(|| Outgoing {
+                    diffuse_left: 1.0,
+                    coat_probability: 0.0,
+                    interface_probability: f32::from(interface),
+                    diffuse_probability: f32::from(diffuse),
+                });
+            }
+        }
+        let terms = self.terms.at(wo.z);
+        let diffuse_left = self.diffuse_left(terms);
+        let under = self.coat.attenuation(wo);
+        let coat = self.coat.albedo(wo);
+        let interface = under * importance(self.interface.albedo(wo.z, terms));
+        let diffuse = under * diffuse_left * importance(self.diffuse.color);
+        let sum = coat + interface + diffuse;
+        (sum > 0.0).then(|| Outgoing {
+            diffuse_left,
+            coat_probability: coat / sum,
+            interface_probability: interface / sum,
+            diffuse_probability: diffuse / sum,
+        })
+    }
+
+    fn diffuse_left(&self, terms: Vec2) -> f32 {
+        (1.0 - self.diffuse.f0_f90.dot(terms)).max(0.0)
+    }
+
+    fn diffuse_left_at(&self, cos: f32) -> f32 {
+        if self.diffuse.f0_f90 == Vec2::ZERO {
+            return 1.0;
+        }
+        self.diffuse_left(self.terms.at(cos))
+    }
+}
+
+/// What sampling one lobe found.
+#[derive(Debug, Clone, Copy)]
+enum LobeSample {
+    /// A direction with a density, to be evaluated with all lobes.
+    Spread(Vec3),
+    /// Perfect reflection of the coat: direction and weight.
+    Coat(Vec3, Vec3),
+    /// Perfect reflection or refraction of the interface: direction and `f * |cos|` over the
+    /// probability of having chosen it within the interface.
+    Interface(Vec3, Vec3),
+}
+
+fn delta_sample(wi: Vec3, weight: Vec3) -> Option<BsdfSample> {
+    (weight.is_finite() && weight != Vec3::ZERO).then_some(BsdfSample {
+        wi,
+        weight,
+        pdf_solid_angle: 1.0,
+        is_delta: true,
+        is_transmission: wi.z < 0.0,
+    })
+}
+
+/// A direction around +Z with density `cos / pi`.
+fn cosine_hemisphere(u: Vec2) -> Vec3 {
+    let (sin_phi, cos_phi) = (TAU * u.x).sin_cos();
+    let r = u.y.sqrt();
+    Vec3::new(r * cos_phi, r * sin_phi, (1.0 - u.y).max(0.0).sqrt())
+}

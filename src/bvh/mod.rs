@@ -1,1 +1,160 @@
-//! What a ray hits.
+//! What a ray hits: an eight-wide bounding volume hierarchy over triangles.
+//!
+//! Watertight: a ray that starts inside a closed mesh of shared vertices hits it. Hits are the same
+//! bits on all machines: neither the vector instructions in use nor the shape of the tree matters.
+
+mod build;
+mod traverse;
+mod triangle;
+mod wide;
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+
+use std::mem::size_of_val;
+
+use glam::{IVec3, Vec2, Vec3};
+
+use traverse::{Portable, TreeRef};
+use wide::{Block, Node};
+
+/// Points `origin + t * direction` with `t_min <= t <= t_max`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Start; a ray whose origin is not finite hits nothing.
+    pub origin: Vec3,
+    /// Direction, not necessarily of unit length; a zero or infinite one hits nothing.
+    pub direction: Vec3,
+    /// Least distance in lengths of `direction`, 0 or more.
+    pub t_min: f32,
+    /// Greatest distance in lengths of `direction`; may be infinite.
+    pub t_max: f32,
+}
+
+/// Where a ray meets a triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Hit {
+    /// Distance in lengths of the ray's direction.
+    pub t: f32,
+    /// Index in the triangle list the tree was built from.
+    pub triangle: u32,
+    /// Weights of vertices 1 and 2; vertex 0 has the rest. Each in `[0,1]` up to rounding.
+    pub barycentric: Vec2,
+}
+
+/// Which instructions the walk uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Simd {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+}
+
+impl Simd {
+    fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if avx2::is_available() {
+            return Self::Avx2;
+        }
+        Self::Portable
+    }
+}
+
+/// Bounding volume hierarchy over the triangles of a scene.
+#[derive(Debug, Clone)]
+pub struct Bvh {
+    nodes: Vec<Node>,
+    blocks: Vec<Block>,
+    bounds: (Vec3, Vec3),
+    extent: f32,
+    simd: Simd,
+}
+
+impl Bvh {
+    /// Builds on all threads of the current rayon pool.
+    ///
+    /// Triangles with indices out of range, coordinates that are not finite or no area (their edges'
+    /// cross product is zero in f32) are left out: no ray hits them.
+    pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let build::Tree { nodes, blocks, bounds } = build::build(positions, triangles);
+        let extent = bounds.0.abs().max(bounds.1.abs()).max_element();
+        Self { nodes, blocks, bounds, extent, simd: Simd::detect() }
+    }
+
+    /// This tree, walked without special instructions; for comparison.
+    pub fn into_portable(mut self) -> Self {
+        self.simd = Simd::Portable;
+        self
+    }
+
+    /// The nearest hit that `accept` takes; of equally near ones that with the lowest triangle index.
+    ///
+    /// `accept` is asked about any hit nearer than the nearest so far, in no particular order.
+    /// Triangles have no back side: culling, like alpha masks, is up to `accept`.
+    #[inline]
+    pub fn closest_hit(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
+        match self.simd {
+            Simd::Portable => traverse::closest_hit::<Portable>(self.tree(), ray, accept),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
+            Simd::Avx2 => unsafe { avx2::closest_hit(self.tree(), ray, accept) },
+        }
+    }
+
+    /// Whether some hit blocks the ray.
+    ///
+    /// Every hit is offered to `blocks` exactly once, in no particular order, until it returns true.
+    #[inline]
+    pub fn any_hit(&self, ray: &Ray, blocks: impl FnMut(&Hit) -> bool) -> bool {
+        match self.simd {
+            Simd::Portable => traverse::any_hit::<Portable>(self.tree(), ray, blocks),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
+            Simd::Avx2 => unsafe { avx2::any_hit(self.tree(), ray, blocks) },
+        }
+    }
+
+    /// Lower and upper corner of the box around all triangles; both zero if there are none.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        self.bounds
+    }
+
+    /// Bytes of the tree and its copy of the triangles.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice()) + size_of_val(self.blocks.as_slice())
+    }
+
+    /// Name of the instructions in use, for logs.
+    pub fn simd_name(&self) -> &'static str {
+        match self.simd {
+            Simd::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx2 => "AVX2+FMA",
+        }
+    }
+
+    #[inline(always)]
+    fn tree(&self) -> TreeRef<'_> {
+        TreeRef { nodes: &self.nodes, blocks: &self.blocks, extent: self.extent }
+    }
+}
+
+/// Origin for a ray leaving a surface: `position` nudged along the unit `geometric_normal`, away
+/// from rounding errors of the hit (Waechter and Binder, *A Fast and Robust Method for Avoiding
+/// Self-Intersection*, Ray Tracing Gems 2019, chapter 6). Flip the normal to leave on the other side.
+///
+/// The nudge is about 2^-16 of each coordinate, and 2^-16 units within 1/32 unit of an axis' zero.
+pub fn offset_origin(position: Vec3, geometric_normal: Vec3) -> Vec3 {
+    const NEAR_ZERO: f32 = 1.0 / 32.0;
+    const FLOAT_SCALE: f32 = 1.0 / 65536.0;
+    const INT_SCALE: f32 = 256.0;
+    let steps: IVec3 = (geometric_normal * INT_SCALE).as_ivec3();
+    Vec3::from_array(std::array::from_fn(|axis| {
+        let p = position[axis];
+        if p.abs() < NEAR_ZERO {
+            return p + FLOAT_SCALE * geometric_normal[axis];
+        }
+        let away_from_zero = if p < 0.0 { -steps[axis] } else { steps[axis] };
+        f32::from_bits(p.to_bits().wrapping_add_signed(away_from_zero))
+    }))
+}

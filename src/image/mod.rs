@@ -1,4 +1,26 @@
 //! Linear f32 pictures, and the files they come from and go to.
+//!
+//! [`read_map`] reads environment maps (repaired where needed), [`read_picture`] pictures to be
+//! compared (untouched); [`write_exr`] and [`write_png`] write. Only this module knows the file
+//! formats and the crates that decode them.
+
+mod exr_channels;
+mod exr_read;
+mod exr_write;
+mod file;
+mod guard;
+mod hdr;
+mod map;
+mod png;
+mod primaries;
+
+pub use exr_read::read_exr_metadata;
+pub use exr_write::{ExrPicture, Layer, write_exr};
+pub use file::{check_writable, write_beside_and_rename};
+pub use map::{LoadedMap, read_map, read_picture, sanitise};
+pub use png::write_png;
+
+pub mod ldr;
 
 /// A picture: linear Rec.709 radiance, row 0 at the top.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,4 +54,37 @@ impl Image {
     pub fn at(&self, x: u32, y: u32) -> [f32; 3] {
         self.pixels[y as usize * self.width as usize + x as usize]
     }
+}
+
+/// A picture ready for a display: 8-bit sRGB, row 0 at the top.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rgb8 {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width * height` RGB triples, row after row.
+    pub pixels: Vec<[u8; 3]>,
+}
+
+/// What a decoder returns: the error is the cause, to which the caller adds the file's name.
+type Decoded<T> = Result<T, String>;
+
+/// Most pixels a picture may have: 16384 x 16384, 3.2 GB of RGB.
+const MAX_PIXELS: u64 = 1 << 28;
+
+/// Longest side of a picture, in pixels.
+const MAX_SIDE: u64 = 1 << 16;
+
+/// Refuses sizes that are empty or beyond what a picture may have, before anything is allocated.
+fn check_size(width: u64, height: u64) -> Decoded<(u32, u32)> {
+    if width == 0 || height == 0 {
+        return Err(format!("has no pixels ({width} x {height})"));
+    }
+    if width > MAX_SIDE || height > MAX_SIDE || width * height > MAX_PIXELS {
+        return Err(format!(
+            "claims {width} x {height} pixels, more than the 16384 x 16384 lightgrid reads"
+        ));
+    }
+    Ok((width as u32, height as u32))
 }

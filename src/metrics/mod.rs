@@ -1,1 +1,108 @@
-//! Comparing pictures.
+//! Comparing pictures, and deciding whether two estimates agree.
+
+pub mod statistics;
+
+use nv_flip::{DEFAULT_PIXELS_PER_DEGREE, FlipImageRgb8, FlipPool};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::image::Image;
+use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
+
+/// How far a picture is from its reference. All but `flip` are in units of the reference's mean, so
+/// that they do not depend on the exposure. 0 is equal (1 for `mean_ratio`).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Mean over pixels and channels of `(a - r)^2`.
+    pub mse: f64,
+    /// Mean over pixels and channels of `(a - r)^2 / (r^2 + 0.01)`.
+    pub rel_mse: f64,
+    /// [`Self::rel_mse`] without the 0.1 % of the pixels (at least one) where it is worst: robust to
+    /// fireflies.
+    pub trimmed_rel_mse: f64,
+    /// Mean of the picture over mean of the reference, all channels together.
+    pub mean_ratio: f64,
+    /// Mean LDR-FLIP error in `[0,1]` at 67 pixels per degree (Andersson et al. 2020), of both
+    /// pictures through the ACES curve at [`Self::flip_exposure_ev`].
+    pub flip: f64,
+    /// The automatic exposure of the reference, in stops.
+    pub flip_exposure_ev: f32,
+}
+
+/// Added to the squared reference in relMSE, in units of its squared mean.
+const REL_MSE_EPSILON: f64 = 1e-2;
+
+/// Compares a linear picture with its reference.
+///
+/// # Errors
+/// If the sizes differ, a pixel of either is not finite, or the reference is black.
+pub fn compare(image: &Image, reference: &Image) -> Result<Comparison> {
+    if (image.width, image.height) != (reference.width, reference.height) {
+        return Err(Error::new(format!(
+            "the pictures differ in size: {} x {} and {} x {}",
+            image.width, image.height, reference.width, reference.height
+        )));
+    }
+    check_finite(image, "the picture")?;
+    check_finite(reference, "the reference")?;
+    let reference_mean = mean(reference);
+    if reference_mean <= 0.0 {
+        return Err(Error::new("the reference is black: errors relative to it have no meaning"));
+    }
+    let mut relative: Vec<f64> = Vec::with_capacity(image.pixels.len());
+    let mut squared = 0.0;
+    for (a, r) in image.pixels.iter().zip(&reference.pixels) {
+        let mut pixel_relative = 0.0;
+        for (a, r) in a.iter().zip(r) {
+            let (a, r) = (f64::from(*a) / reference_mean, f64::from(*r) / reference_mean);
+            let difference = (a - r) * (a - r);
+            squared += difference / 3.0;
+            pixel_relative += difference / (r * r + REL_MSE_EPSILON) / 3.0;
+        }
+        relative.push(pixel_relative);
+    }
+    let flip_exposure_ev = auto_exposure_ev(reference);
+    let count = relative.len() as f64;
+    Ok(Comparison {
+        mse: squared / count,
+        rel_mse: relative.iter().sum::<f64>() / count,
+        trimmed_rel_mse: trimmed_mean(&mut relative),
+        mean_ratio: mean(image) / reference_mean,
+        flip: mean_flip(image, reference, flip_exposure_ev),
+        flip_exposure_ev,
+    })
+}
+
+fn check_finite(image: &Image, which: &str) -> Result<()> {
+    let bad = image.pixels.par_iter().filter(|rgb| !rgb.iter().all(|v| v.is_finite())).count();
+    match (bad, image.pixels.len()) {
+        (_, 0) => Err(Error::new(format!("{which} has no pixels"))),
+        (0, _) => Ok(()),
+        _ => Err(Error::new(format!("{which} has {bad} pixels that are NaN or infinite"))),
+    }
+}
+
+/// Mean over pixels and channels.
+fn mean(image: &Image) -> f64 {
+    let sum: f64 = image.pixels.as_flattened().iter().map(|&v| f64::from(v)).sum();
+    sum / (3 * image.pixels.len()) as f64
+}
+
+/// Mean without the largest thousandth, at least one value; of one value that value.
+fn trimmed_mean(values: &mut [f64]) -> f64 {
+    let trimmed = (values.len() / 1000).max(1);
+    let kept = (values.len() - trimmed).max(1);
+    values.sort_unstable_by(f64::total_cmp);
+    values[..kept].iter().sum::<f64>() / kept as f64
+}
+
+/// Mean LDR-FLIP error of both pictures through the same exposure and curve.
+fn mean_flip(image: &Image, reference: &Image, exposure_ev: f32) -> f64 {
+    let display = |image: &Image| {
+        let shown = display_rgb8(image, exposure_ev, ToneCurve::Aces);
+        FlipImageRgb8::with_data(shown.width, shown.height, shown.pixels.as_flattened())
+    };
+    let errors = nv_flip::flip(display(reference), display(image), DEFAULT_PIXELS_PER_DEGREE);
+    f64::from(FlipPool::from_image(&errors).mean())
+}

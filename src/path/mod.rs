@@ -1,1 +1,379 @@
-//! The path tracing loop.
+//! The path tracing loop: random numbers in, radiance out.
+//!
+//! A path is a chain of surface vertices. At each of at most `bounces` vertices light is gathered
+//! by next event estimation (NEE) from the environment map, and from local lights if there are any,
+//! and the path goes on in a direction the BSDF chooses; what a path then runs into counts with the
+//! balance heuristic. Alpha and smooth thin glass are passed straight through, by paths and shadow
+//! rays alike, and are no vertices: so NEE and BSDF sampling see the same light behind a pane.
+
+use glam::{Vec2, Vec3};
+
+pub mod camera;
+pub mod framing;
+mod learn;
+mod lights;
+mod world;
+
+pub use lights::{LightSample, LocalLights};
+pub use world::World;
+
+use crate::bsdf::Bsdf;
+use crate::bvh::{Hit, Ray, offset_origin};
+use crate::environment::Environment;
+use crate::light_grid::{LightGrid, WHOLE_MAP};
+use crate::math::balance_heuristic;
+use crate::sampler::{Sampler, unit_from_bits};
+use crate::scene::surface::SurfacePoint;
+
+/// What bounds a path.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PathLimits {
+    /// Most surface vertices that scatter light; 1 is direct light only, 0 sees emitters and the
+    /// environment alone.
+    pub bounces: u32,
+    /// Whether dim paths are ended at random.
+    pub russian_roulette: bool,
+}
+
+/// All that a path reads.
+#[derive(Clone, Copy)]
+pub struct PathTracer<'a> {
+    /// Scene, BVH and local lights.
+    pub world: &'a World,
+    /// The map.
+    pub environment: &'a Environment,
+    /// How NEE chooses tiles; `None` samples the map by the BSDF alone.
+    pub grid: Option<&'a LightGrid>,
+    /// When paths end.
+    pub limits: PathLimits,
+}
+
+/// What one camera path brought back.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PathResult {
+    /// Radiance along the camera ray; finite.
+    pub radiance: Vec3,
+    /// Rays traced, shadow rays included.
+    pub rays: u32,
+    /// Whether the radiance was not finite and therefore left out.
+    pub was_invalid: bool,
+    /// The first surface, if any was hit.
+    pub first_hit: Option<FirstHit>,
+}
+
+/// What the camera sees at the first surface that is not passed through.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FirstHit {
+    /// Directional albedo estimate, linear RGB.
+    pub albedo: Vec3,
+    /// World shading normal towards the camera.
+    pub normal: Vec3,
+    /// Metres along the ray.
+    pub depth: f32,
+}
+
+/// Vertices after which Russian roulette may end a path.
+const ROULETTE_AFTER: u32 = 3;
+
+/// Panes and leaves one ray may pass; only a scene that is broken has more.
+const MAX_PASSES: u32 = 1000;
+
+impl PathTracer<'_> {
+    /// Radiance along a camera ray.
+    pub fn radiance(&self, ray: Ray, sampler: Sampler) -> PathResult {
+        let mut path = Path::new(self, ray, sampler);
+        while let Some(vertex) = path.next_vertex() {
+            if path.bounces == self.limits.bounces {
+                break;
+            }
+            path.bounces += 1;
+            path.gather(&vertex);
+            if !path.scatter(&vertex) || !path.survives() {
+                break;
+            }
+        }
+        let was_invalid = !path.radiance.is_finite();
+        PathResult {
+            radiance: if was_invalid { Vec3::ZERO } else { path.radiance },
+            rays: path.rays,
+            was_invalid,
+            first_hit: path.first_hit,
+        }
+    }
+}
+
+/// A surface at which light is scattered.
+struct Vertex {
+    point: SurfacePoint,
+    bsdf: Bsdf,
+    /// Direction to where the path came from, in the shading frame.
+    wo: Vec3,
+    /// Tile law of NEE here.
+    law: u32,
+}
+
+/// The vertex a ray left from, as far as MIS asks.
+#[derive(Clone, Copy)]
+struct Departure {
+    /// Density in solid angle of the ray's direction; infinite if no NEE competes with it.
+    pdf_solid_angle: f32,
+    position: Vec3,
+    law: u32,
+}
+
+/// A path under construction.
+struct Path<'a> {
+    tracer: &'a PathTracer<'a>,
+    sampler: Sampler,
+    ray: Ray,
+    departure: Departure,
+    throughput: Vec3,
+    radiance: Vec3,
+    /// Absorption coefficient per metre of the body the ray is in.
+    absorption: Vec3,
+    /// Metres gone since the last vertex, passes included.
+    travelled: f32,
+    bounces: u32,
+    rays: u32,
+    first_hit: Option<FirstHit>,
+}
+
+impl<'a> Path<'a> {
+    fn new(tracer: &'a PathTracer<'a>, ray: Ray, sampler: Sampler) -> Self {
+        let departure =
+            Departure { pdf_solid_angle: f32::INFINITY, position: ray.origin, law: WHOLE_MAP };
+        Self {
+            tracer,
+            sampler,
+            ray,
+            departure,
+            throughput: Vec3::ONE,
+            radiance: Vec3::ZERO,
+            absorption: Vec3::ZERO,
+            travelled: 0.0,
+            bounces: 0,
+            rays: 0,
+            first_hit: None,
+        }
+    }
+
+    /// Follows the ray to the next surface that scatters; adds what is emitted on the way.
+    fn next_vertex(&mut self) -> Option<Vertex> {
+        self.travelled = 0.0;
+        for _ in 0..MAX_PASSES {
+            self.rays += 1;
+            let Some(hit) = self.tracer.world.closest_hit(&self.ray, self.bounces == 0) else {
+                self.escape();
+                return None;
+            };
+            self.absorb(hit.t);
+            self.travelled += hit.t;
+            let scene = &self.tracer.world.scene;
+            let point = SurfacePoint::at(scene, hit.triangle, hit.barycentric, self.ray.direction);
+            if self.passes(&point) {
+                self.ray.origin = offset_origin(point.position, -point.geometric_normal);
+                continue;
+            }
+            return self.arrive(&hit, point);
+        }
+        None
+    }
+
+    /// Decides whether the ray goes straight through the surface, and weighs the path accordingly.
+    fn passes(&mut self, point: &SurfacePoint) -> bool {
+        let world = self.tracer.world;
+        let through = world.straight_through(point, self.ray.direction);
+        let probability = through.max_element().min(1.0);
+        if probability <= 0.0 {
+            return false;
+        }
+        let passes = probability >= 1.0 || self.sampler.next_pair()[0] < probability;
+        self.throughput *= if passes {
+            through / probability
+        } else {
+            Vec3::splat(world.coverage(point) / (1.0 - probability))
+        };
+        passes
+    }
+
+    /// Adds what the surface emits and makes it a vertex, unless it is unlit.
+    fn arrive(&mut self, hit: &Hit, point: SurfacePoint) -> Option<Vertex> {
+        let parameters = &point.parameters;
+        let bsdf = Bsdf::new(parameters, point.front_face);
+        if self.bounces == 0 {
+            let albedo = if parameters.unlit { parameters.base_color } else { bsdf.albedo() };
+            self.first_hit =
+                Some(FirstHit { albedo, normal: point.shading_frame.z, depth: self.travelled });
+        }
+        if parameters.unlit {
+            self.radiance += self.throughput * parameters.emissive;
+            return None;
+        }
+        if self.tracer.world.needs.emitters {
+            self.add_emitted(hit, &point);
+        }
+        let law = self
+            .tracer
+            .grid
+            .map_or(WHOLE_MAP, |grid| grid.law_of(point.position, point.geometric_normal));
+        let wo = point.shading_frame.local_from_world(-self.ray.direction);
+        Some(Vertex { point, bsdf, wo, law })
+    }
+
+    fn add_emitted(&mut self, hit: &Hit, point: &SurfacePoint) {
+        let world = self.tracer.world;
+        let emitted = lights::emitted(&world.scene, point);
+        if emitted.max_element() <= 0.0 {
+            return;
+        }
+        let from = self.departure;
+        let weight = if from.pdf_solid_angle.is_infinite() {
+            1.0
+        } else {
+            let distance = from.position.distance(point.position);
+            let nee = world.lights.sample_pdf_solid_angle(
+                &world.scene,
+                hit.triangle,
+                self.ray.direction,
+                distance,
+            );
+            balance_heuristic(from.pdf_solid_angle, nee)
+        };
+        self.radiance += self.throughput * emitted * weight;
+    }
+
+    /// The ray leaves the scene: adds the map's radiance.
+    fn escape(&mut self) {
+        let environment = self.tracer.environment;
+        let from = self.departure;
+        let Some(grid) = self.tracer.grid.filter(|_| from.pdf_solid_angle.is_finite()) else {
+            self.radiance += self.throughput * environment.radiance(self.ray.direction);
+            return;
+        };
+        let (radiance, tile, in_tile) = environment.radiance_and_tile_pdf(self.ray.direction);
+        let nee = grid.laws().probability(from.law, tile) * in_tile;
+        self.radiance +=
+            self.throughput * radiance * balance_heuristic(from.pdf_solid_angle, nee);
+    }
+
+    /// Next event estimation from the map and, if there are any, one local light.
+    fn gather(&mut self, vertex: &Vertex) {
+        if vertex.bsdf.is_delta_only() {
+            return;
+        }
+        if let Some(grid) = self.tracer.grid {
+            self.gather_environment(vertex, grid);
+        }
+        if !self.tracer.world.lights.is_empty() {
+            self.gather_local(vertex);
+        }
+    }
+
+    fn gather_environment(&mut self, vertex: &Vertex, grid: &LightGrid) {
+        let [tile_bits, row_bits] = self.sampler.next_pair_bits();
+        let choice = grid.laws().sample(vertex.law, tile_bits);
+        let u = Vec2::new(choice.remainder, unit_from_bits(row_bits));
+        let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
+        let pdf = choice.probability * sample.pdf_solid_angle;
+        let Some((f, bsdf_pdf)) = self.scattered(vertex, sample.direction) else { return };
+        let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
+        if transmittance != Vec3::ZERO {
+            let weight = balance_heuristic(pdf, bsdf_pdf) / pdf;
+            self.radiance += self.throughput * f * sample.radiance * transmittance * weight;
+        }
+    }
+
+    fn gather_local(&mut self, vertex: &Vertex) {
+        let u = Vec2::from(self.sampler.next_pair());
+        let world = self.tracer.world;
+        let Some(sample) = world.lights.sample(&world.scene, vertex.point.position, u) else {
+            return;
+        };
+        let Some((f, bsdf_pdf)) = self.scattered(vertex, sample.direction) else { return };
+        let transmittance = self.transmittance(vertex, sample.direction, sample.distance);
+        if transmittance != Vec3::ZERO {
+            let weight = balance_heuristic(sample.pdf_solid_angle, bsdf_pdf);
+            self.radiance +=
+                self.throughput * f * sample.radiance_over_pdf * transmittance * weight;
+        }
+    }
+
+    /// BSDF times cosine and the BSDF's density for light from `direction`; `None` where it is
+    /// black, or where shading and geometric normal disagree about the side.
+    fn scattered(&self, vertex: &Vertex, direction: Vec3) -> Option<(Vec3, f32)> {
+        let wi = vertex.point.shading_frame.local_from_world(direction);
+        if (wi.z > 0.0) != (vertex.point.geometric_normal.dot(direction) > 0.0) {
+            return None;
+        }
+        let (f, pdf_solid_angle) = vertex.bsdf.eval_pdf(vertex.wo, wi);
+        (f.max_element() > 0.0).then_some((f, pdf_solid_angle))
+    }
+
+    fn transmittance(&mut self, vertex: &Vertex, direction: Vec3, distance: f32) -> Vec3 {
+        self.rays += 1;
+        let normal = vertex.point.geometric_normal;
+        let side = if normal.dot(direction) > 0.0 { normal } else { -normal };
+        let origin = offset_origin(vertex.point.position, side);
+        // Stop short of the light's own surface.
+        let ray = Ray { origin, direction, t_min: 0.0, t_max: distance * (1.0 - 1e-4) };
+        self.tracer.world.transmittance(&ray)
+    }
+
+    /// Chooses where the path goes on. `false` if it ends.
+    fn scatter(&mut self, vertex: &Vertex) -> bool {
+        let [lobe, _] = self.sampler.next_pair();
+        let [x, y] = self.sampler.next_pair();
+        let Some(sample) = vertex.bsdf.sample(vertex.wo, Vec3::new(lobe, x, y)) else {
+            return false;
+        };
+        let direction = vertex.point.shading_frame.world_from_local(sample.wi).normalize();
+        let normal = vertex.point.geometric_normal;
+        let above = normal.dot(direction) > 0.0;
+        if above == sample.is_transmission {
+            return false;
+        }
+        self.throughput *= sample.weight;
+        if self.throughput.max_element() <= 0.0 || !self.throughput.is_finite() {
+            return false;
+        }
+        if sample.is_transmission && !vertex.point.parameters.thin {
+            self.absorption = if vertex.point.front_face {
+                vertex.point.parameters.absorption
+            } else {
+                Vec3::ZERO
+            };
+        }
+        self.departure = Departure {
+            pdf_solid_angle: if sample.is_delta { f32::INFINITY } else { sample.pdf_solid_angle },
+            position: vertex.point.position,
+            law: vertex.law,
+        };
+        let side = if above { normal } else { -normal };
+        self.ray = Ray {
+            origin: offset_origin(vertex.point.position, side),
+            direction,
+            t_min: 0.0,
+            t_max: f32::INFINITY,
+        };
+        true
+    }
+
+    /// Russian roulette by throughput.
+    fn survives(&mut self) -> bool {
+        if !self.tracer.limits.russian_roulette || self.bounces < ROULETTE_AFTER {
+            return true;
+        }
+        let probability = self.throughput.max_element().clamp(0.05, 1.0);
+        if probability < 1.0 && self.sampler.next_pair()[1] >= probability {
+            return false;
+        }
+        self.throughput /= probability;
+        true
+    }
+
+    fn absorb(&mut self, distance: f32) {
+        if self.absorption != Vec3::ZERO {
+            self.throughput *= (-self.absorption * distance).exp();
+        }
+    }
+}

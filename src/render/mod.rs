@@ -1,1 +1,313 @@
-//! Passes over the picture.
+//! One session: learn, then render pass by pass, until told to stop.
+//!
+//! [`View`] says what is wanted, [`Session::advance`] does a bounded piece of work and says how far
+//! it is, [`film::Film`] holds the sums. A seed gives the same picture whatever the threads: every
+//! sample's random numbers depend on its pixel and index alone, a pixel's samples are added in
+//! order, and learning counts integers.
+
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use serde::Serialize;
+
+mod cpu;
+pub mod film;
+pub mod filter;
+
+use film::Film;
+use filter::PixelFilter;
+
+use crate::environment::Environment;
+use crate::light_grid::cells::SphericalGrid;
+use crate::light_grid::{LawOptions, LearningGrid, LightGrid};
+use crate::path::camera::CameraRays;
+use crate::path::{PathLimits, PathTracer, World};
+use crate::scene::Camera;
+
+/// How the environment map is sampled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    /// Learned tiles, our way: faces, cosine, pooling; with BSDF sampling.
+    #[default]
+    Adaptive,
+    /// Learned tiles as the talk describes them; with BSDF sampling.
+    Talk,
+    /// The whole map; with BSDF sampling.
+    Plain,
+    /// BSDF sampling alone.
+    Bsdf,
+}
+
+/// What is to be rendered and how. Equal views give equal pictures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// Where from.
+    pub camera: Camera,
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Pixel filter.
+    pub filter: PixelFilter,
+    /// How the map is sampled.
+    pub sampling: Sampling,
+    /// When paths end.
+    pub limits: PathLimits,
+    /// Seed of all random numbers.
+    pub seed: u32,
+    /// Light Grid cells around the horizon; half as many from top to bottom.
+    pub grid_columns: u32,
+    /// Camera paths to learn from.
+    pub learning_paths: u64,
+    /// How counters become laws in [`Sampling::Adaptive`].
+    pub laws: LawOptions,
+    /// Whether albedo, normal and depth are kept.
+    pub layers: bool,
+}
+
+impl View {
+    /// Learning paths that suit a picture of this size and sample count.
+    pub fn suitable_learning_paths(width: u32, height: u32, samples: Option<u32>) -> u64 {
+        let pixels = u64::from(width) * u64::from(height);
+        let work = pixels * u64::from(samples.unwrap_or(256));
+        (work / LEARNING_SHARE).clamp(1 << 16, 1 << 20)
+    }
+}
+
+/// One learning path for this many paths rendered.
+const LEARNING_SHARE: u64 = 32;
+
+/// When to stop; whichever comes first.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StopRule {
+    /// Samples per pixel.
+    pub samples: Option<u32>,
+    /// Seconds of learning and rendering.
+    pub seconds: Option<f64>,
+    /// Noise as [`Film::noise`] estimates it.
+    pub noise: Option<f64>,
+}
+
+/// What a session is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// Tracing learning paths.
+    Learning,
+    /// Adding samples to the film.
+    Rendering,
+}
+
+/// Figures of what has been done.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Figures {
+    /// Camera paths learned from.
+    pub learning_paths: u64,
+    /// Rays traced while learning.
+    pub learning_rays: u64,
+    /// Seconds of learning, laws included.
+    pub learning_seconds: f64,
+    /// Cells that learning paths visited.
+    pub visited_cells: usize,
+    /// Cells with a law of their own.
+    pub learned_cells: usize,
+    /// Most bytes the grid held while learning: counters and laws.
+    pub grid_peak_bytes: usize,
+    /// Bytes the grid holds while rendering.
+    pub grid_bytes: usize,
+    /// Camera paths rendered.
+    pub samples: u64,
+    /// Rays traced while rendering, shadow rays included.
+    pub rays: u64,
+    /// Seconds of rendering.
+    pub render_seconds: f64,
+}
+
+/// A picture in the making.
+pub struct Session<'a> {
+    world: &'a World,
+    environment: &'a Environment,
+    view: View,
+    rays: CameraRays,
+    film: Film,
+    whole_map: Option<LightGrid>,
+    learned: Option<LightGrid>,
+    learning: Option<Learning>,
+    target_samples: u32,
+    figures: Figures,
+}
+
+struct Learning {
+    grid: LearningGrid,
+    pass: u32,
+}
+
+impl<'a> Session<'a> {
+    /// Starts a session; nothing is traced yet.
+    pub fn new(world: &'a World, environment: &'a Environment, view: View) -> Self {
+        let rays = CameraRays::new(&view.camera, view.width, view.height);
+        let whole_map = match view.sampling {
+            Sampling::Bsdf => None,
+            _ => LightGrid::whole_map(environment.tile_energies()),
+        };
+        let learning = learning_options(&view)
+            .filter(|_| whole_map.is_some() && view.limits.bounces > 0)
+            .map(|options| {
+                let grid = SphericalGrid {
+                    center: rays.position(),
+                    columns: view.grid_columns,
+                    rows: (view.grid_columns / 2).max(1),
+                    faces: view.sampling == Sampling::Adaptive,
+                };
+                Learning {
+                    grid: LearningGrid::new(grid, environment.tile_count(), options),
+                    pass: 0,
+                }
+            });
+        Self {
+            film: Film::new(view.width, view.height, view.layers),
+            world,
+            environment,
+            view,
+            rays,
+            whole_map,
+            learned: None,
+            learning,
+            target_samples: 0,
+            figures: Figures::default(),
+        }
+    }
+
+    /// Does one piece of work: a learning pass, or one that brings every pixel `samples` further.
+    /// Returns early, with what is done so far kept, when `cancel` becomes true.
+    pub fn advance(&mut self, samples: u32, cancel: &AtomicBool) {
+        let start = Instant::now();
+        match self.phase() {
+            Phase::Learning => {
+                self.learn(cancel);
+                self.figures.learning_seconds += start.elapsed().as_secs_f64();
+            }
+            Phase::Rendering => {
+                self.target_samples = self.film.min_samples() + samples;
+                self.render(cancel);
+                self.figures.render_seconds += start.elapsed().as_secs_f64();
+            }
+        }
+    }
+
+    /// Samples per pixel that the next pass should take: growing with what is there, so that few
+    /// passes are needed and none is much longer than those before it. It depends on counts alone:
+    /// a picture that stops by noise is repeatable.
+    pub fn next_pass(&self, rule: &StopRule) -> u32 {
+        let samples = self.film.min_samples();
+        let pass = (samples / 16).clamp(1, 64);
+        rule.samples.map_or(pass, |limit| pass.min(limit.saturating_sub(samples)).max(1))
+    }
+
+    /// What the next [`Self::advance`] will do.
+    pub fn phase(&self) -> Phase {
+        if self.learning.is_some() { Phase::Learning } else { Phase::Rendering }
+    }
+
+    /// Ends learning with what was learned so far.
+    pub fn finish_learning(&mut self) {
+        let Some(learning) = self.learning.take() else { return };
+        let counters = &learning.grid.counters;
+        self.figures.visited_cells = counters.visited_cells();
+        self.figures.grid_peak_bytes = counters.memory_bytes();
+        if self.figures.learning_paths > 0 {
+            self.learned = learning.grid.laws(self.environment);
+        }
+        if let Some(grid) = &self.learned {
+            self.figures.learned_cells = grid.laws().len() as usize - 1;
+            self.figures.grid_bytes = grid.memory_bytes();
+            self.figures.grid_peak_bytes += grid.memory_bytes();
+        }
+    }
+
+    /// Replaces what was learned; for tests of unbiasedness and for inspection.
+    pub fn set_grid(&mut self, grid: LightGrid) {
+        self.learning = None;
+        self.learned = Some(grid);
+    }
+
+    /// The film so far.
+    pub fn film(&self) -> &Film {
+        &self.film
+    }
+
+    /// What is rendered.
+    pub fn view(&self) -> &View {
+        &self.view
+    }
+
+    /// The grid in use, once learning has ended.
+    pub fn grid(&self) -> Option<&LightGrid> {
+        self.learned.as_ref().or(self.whole_map.as_ref())
+    }
+
+    /// What has been done so far.
+    pub fn figures(&self) -> &Figures {
+        &self.figures
+    }
+
+    /// Seconds of learning and rendering so far.
+    pub fn elapsed_seconds(&self) -> f64 {
+        self.figures.learning_seconds + self.figures.render_seconds
+    }
+
+    /// Whether a rule says to stop. Noise is only asked for from 16 samples on.
+    pub fn is_done(&self, rule: &StopRule) -> bool {
+        let samples = self.film.min_samples();
+        rule.samples.is_some_and(|limit| samples >= limit)
+            || (samples > 0 && rule.seconds.is_some_and(|limit| self.elapsed_seconds() >= limit))
+            || (samples >= 16 && rule.noise.is_some_and(|limit| self.film.noise() <= limit))
+    }
+
+    fn tracer<'b>(&'b self, grid: Option<&'b LightGrid>) -> PathTracer<'b> {
+        PathTracer {
+            world: self.world,
+            environment: self.environment,
+            grid,
+            limits: self.view.limits,
+        }
+    }
+
+    fn learn(&mut self, cancel: &AtomicBool) {
+        let (Some(learning), Some(whole_map)) = (&self.learning, &self.whole_map) else { return };
+        let range = cpu::learning_range(&self.view, learning.pass);
+        let tracer = self.tracer(None);
+        let rays =
+            cpu::learn(&tracer, &self.rays, &self.view, range.clone(), whole_map, &learning.grid, cancel);
+        if cancel.load(std::sync::atomic::Ordering::Relaxed) {
+            return;
+        }
+        self.figures.learning_rays += rays;
+        self.figures.learning_paths = range.end;
+        if let Some(learning) = &mut self.learning {
+            learning.grid.counters.end_pass();
+            learning.pass += 1;
+        }
+        if range.end >= self.view.learning_paths {
+            self.finish_learning();
+        }
+    }
+
+    fn render(&mut self, cancel: &AtomicBool) {
+        let mut film = std::mem::replace(&mut self.film, Film::new(0, 0, false));
+        let tracer = self.tracer(self.grid());
+        let (samples, rays) =
+            cpu::render(&tracer, &self.rays, &self.view, self.target_samples, &mut film, cancel);
+        self.film = film;
+        self.figures.samples += samples;
+        self.figures.rays += rays;
+    }
+}
+
+fn learning_options(view: &View) -> Option<LawOptions> {
+    match view.sampling {
+        Sampling::Adaptive => Some(view.laws),
+        Sampling::Talk => Some(LawOptions::TALK),
+        Sampling::Plain | Sampling::Bsdf => None,
+    }
+}

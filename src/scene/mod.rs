@@ -2,6 +2,9 @@
 
 pub mod builtin;
 pub mod gltf;
+pub mod needs;
+pub mod surface;
+pub mod texture;
 
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
 
@@ -93,8 +96,8 @@ pub struct Material {
     pub emissive_texture: Option<TextureRef>,
     /// How alpha is used.
     pub alpha_mode: AlphaMode,
-    /// Whether the back is shaded too; if not, rays that meet the back of an opaque surface are
-    /// still stopped (a wall modelled single-sided does not leak), but camera rays pass through it.
+    /// Whether camera rays see the back too. All other rays meet both sides of every surface: a wall
+    /// modelled single-sided does not leak light.
     pub double_sided: bool,
     /// `KHR_materials_unlit`: base colour is emitted as it is, nothing is reflected.
     pub unlit: bool,

@@ -1,1 +1,90 @@
-//! Tests of bsdf.
+//! Tests of bsdf, and of the surfaces and textures that feed it.
+
+mod physics;
+mod sampling;
+mod surfaces;
+mod textures;
+
+use glam::{Vec2, Vec3};
+use lightgrid::bsdf::SurfaceParameters;
+
+/// SplitMix64: enough randomness for tests, the same on every machine.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    fn next_vec2(&mut self) -> Vec2 {
+        Vec2::new(self.next(), self.next())
+    }
+
+    fn next_vec3(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next())
+    }
+
+    fn direction(&mut self) -> Vec3 {
+        spherical(2.0 * self.next() - 1.0, std::f32::consts::TAU * self.next())
+    }
+}
+
+fn spherical(cos: f32, phi: f32) -> Vec3 {
+    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    Vec3::new(sin * phi.cos(), sin * phi.sin(), cos)
+}
+
+/// White dielectric without reflection: Lambert.
+const WHITE: SurfaceParameters =
+    SurfaceParameters { base_color: Vec3::ONE, ..SurfaceParameters::BLACK };
+const PLASTIC: SurfaceParameters = SurfaceParameters { specular: 1.0, roughness: 0.4, ..WHITE };
+const METAL: SurfaceParameters = SurfaceParameters { metallic: 1.0, roughness: 0.5, ..WHITE };
+const GLASS: SurfaceParameters = SurfaceParameters { transmission: 1.0, thin: false, ..PLASTIC };
+const PANE: SurfaceParameters = SurfaceParameters { thin: true, ..GLASS };
+
+fn colored(p: SurfaceParameters) -> SurfaceParameters {
+    SurfaceParameters { base_color: Vec3::new(0.8, 0.5, 0.1), ..p }
+}
+
+/// Every lobe alone and in mixtures: name, parameters, whether the viewer is outside.
+fn cases() -> Vec<(&'static str, SurfaceParameters, bool)> {
+    let tilted = Vec3::new(0.3, -0.2, 1.0).normalize();
+    let coat = |p| SurfaceParameters { clearcoat: 0.7, clearcoat_roughness: 0.5, ..p };
+    let mut cases = vec![
+        ("lambert", WHITE, true),
+        ("plastic", colored(PLASTIC), true),
+        ("rough plastic", SurfaceParameters { roughness: 1.0, ..PLASTIC }, true),
+        ("diamond-like opaque", SurfaceParameters { ior: 3.0, ..PLASTIC }, true),
+        ("smooth plastic", SurfaceParameters { roughness: 0.0, ..PLASTIC }, true),
+        ("metal", colored(METAL), true),
+        ("rough metal", SurfaceParameters { roughness: 1.0, ..METAL }, true),
+        ("half metal", SurfaceParameters { metallic: 0.5, ..colored(PLASTIC) }, true),
+        ("pane", colored(PANE), true),
+        ("half pane", SurfaceParameters { transmission: 0.5, ..colored(PANE) }, true),
+        ("coated plastic", coat(colored(PLASTIC)), true),
+        ("tilted coat", SurfaceParameters { clearcoat_normal: tilted, ..coat(PLASTIC) }, true),
+        ("smooth coat", SurfaceParameters { clearcoat_roughness: 0.0, ..coat(PLASTIC) }, true),
+    ];
+    for entering in [true, false] {
+        cases.push(("glass", GLASS, entering));
+        cases.push(("frosted", SurfaceParameters { roughness: 0.9, ..GLASS }, entering));
+        cases.push((
+            "faint glass",
+            SurfaceParameters { ior: 1.2, roughness: 0.9, ..GLASS },
+            entering,
+        ));
+        cases.push(("no bending", SurfaceParameters { ior: 1.0, ..GLASS }, entering));
+        cases.push(("dense glass", SurfaceParameters { ior: 3.0, ..GLASS }, entering));
+        cases.push(("milk", SurfaceParameters { transmission: 0.5, ..GLASS }, entering));
+        cases.push(("coated glass", coat(GLASS), entering));
+    }
+    cases
+}
+
+fn viewers() -> impl Iterator<Item = Vec3> {
+    [1.0, 0.7, 0.15].into_iter().map(|cos| spherical(cos, 0.4))
+}

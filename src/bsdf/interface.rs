@@ -1,0 +1,234 @@
+//! The outer interface of the base material: a GGX surface that reflects, and refracts or passes
+//! light if the material is transmissive.
+//!
+//! The reflection of metal and of opaque dielectric are both Schlick's, so they are one lobe with
+//! F0 and F90 added by share. The transmissive share uses the dielectric's exact Fresnel, stretched
+//! from `[F0_exact, 1]` to the `[F0, F90]` of `KHR_materials_specular`.
+
+use glam::{Vec2, Vec3};
+
+use super::fresnel::{dielectric, normal_reflectance, reflect, refract, schlick_weight};
+use super::microfacet::Ggx;
+use super::{LobeSample, SurfaceParameters};
+use crate::color::importance;
+
+/// Relative indices closer to 1 than this refract straight on: f32 half vectors vanish.
+const STRAIGHT_ETA: f32 = 1e-3;
+
+/// Reflection and transmission at one microfacet.
+#[derive(Debug, Clone, Copy)]
+struct Facet {
+    reflectance: Vec3,
+    transmittance: Vec3,
+}
+
+impl Facet {
+    const BLACK: Self = Self { reflectance: Vec3::ZERO, transmittance: Vec3::ZERO };
+
+    /// Probability of reflecting there.
+    fn reflection_probability(self) -> f32 {
+        let (r, t) = (importance(self.reflectance), importance(self.transmittance));
+        if t > 0.0 { r / (r + t) } else { 1.0 }
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Interface {
+    ggx: Ggx,
+    /// Opaque share: metal and dielectric, weights included.
+    f0: Vec3,
+    f90: f32,
+    /// Transmissive share in `[0,1]` and the F0 and F90 of its dielectric.
+    glass: f32,
+    glass_f0: Vec3,
+    glass_f90: f32,
+    /// Colour per crossing times the transmissive share.
+    tint: Vec3,
+    /// Index of refraction on the far side over this side.
+    eta: f32,
+    thin: bool,
+}
+
+impl Interface {
+    /// `f0` and `f90` are the dielectric's at normal and grazing incidence.
+    pub(super) fn new(p: &SurfaceParameters, f0: Vec3, f90: f32, entering: bool) -> Self {
+        let glass = (1.0 - p.metallic) * p.transmission;
+        let opaque = (1.0 - p.metallic) * (1.0 - p.transmission);
+        let ior = p.ior.max(1.0);
+        let eta = if (ior - 1.0).abs() < STRAIGHT_ETA {
+            1.0
+        } else if entering || p.thin {
+            ior
+        } else {
+            1.0 / ior
+        };
+        Self {
+            ggx: Ggx::from_roughness(p.roughness),
+            f0: f0 * opaque + p.base_color * p.metallic,
+            f90: f90 * opaque + p.metallic,
+            glass,
+            glass_f0: f0,
+            glass_f90: f90,
+            tint: p.base_color * glass,
+            eta,
+            thin: p.thin,
+        }
+    }
+
+    /// Whether nothing is reflected or transmitted.
+    pub(super) fn is_absent(&self) -> bool {
+        self.glass == 0.0 && self.f90 == 0.0 && self.f0 == Vec3::ZERO
+    }
+
+    /// Whether there is no lobe: all is perfect reflection, refraction or straight passage.
+    pub(super) fn is_delta_or_absent(&self) -> bool {
+        let reflects_nothing =
+            self.f90 == 0.0 && self.f0 == Vec3::ZERO && self.glass_f0 == Vec3::ZERO;
+        self.is_smooth() || self.is_absent() || (self.transmits_delta() && reflects_nothing)
+    }
+
+    fn is_smooth(&self) -> bool {
+        self.ggx.is_smooth()
+    }
+
+    /// Reflectance and transmittance of a facet seen at this cosine.
+    ///
+    /// A thin wall is two interfaces and all orders of reflection between them:
+    /// `R = 2F / (1 + F)`, `T = (1 - F) / (1 + F)`. Coloured F0 takes its largest component away
+    /// from what passes (`KHR_materials_specular`), so that white light stays white.
+    fn facet(&self, cos: f32) -> Facet {
+        let opaque = self.f0 + (self.f90 - self.f0) * schlick_weight(cos);
+        if self.glass == 0.0 {
+            return Facet { reflectance: opaque, transmittance: Vec3::ZERO };
+        }
+        let Some(exact) = dielectric(cos, self.eta) else {
+            let reflectance = opaque + self.glass;
+            return Facet { reflectance, transmittance: Vec3::ZERO };
+        };
+        let exact_f0 = normal_reflectance(self.eta);
+        let weight = ((exact - exact_f0) / (1.0 - exact_f0)).clamp(0.0, 1.0);
+        let fresnel = self.glass_f0 + (self.glass_f90 - self.glass_f0) * weight;
+        let most = fresnel.max_element();
+        let (reflected, passed) = if self.thin {
+            (2.0 * fresnel / (1.0 + fresnel), (1.0 - most) / (1.0 + most))
+        } else {
+            (fresnel, 1.0 - most)
+        };
+        Facet { reflectance: opaque + self.glass * reflected, transmittance: self.tint * passed }
+    }
+
+    /// Light that passes straight through a smooth thin wall.
+    pub(super) fn straight_transmittance(&self, cos: f32) -> Vec3 {
+        if self.passes_straight() { self.facet(cos).transmittance } else { Vec3::ZERO }
+    }
+
+    /// Smooth thin walls: the integrator passes through them.
+    fn passes_straight(&self) -> bool {
+        self.glass > 0.0 && self.thin && self.is_smooth()
+    }
+
+    /// Transmission without a lobe though the reflection may have one.
+    fn transmits_delta(&self) -> bool {
+        self.is_smooth() || (!self.thin && self.eta == 1.0)
+    }
+
+    /// The facet as far as `eval` and `sample` answer for it.
+    fn scattering_facet(&self, cos: f32) -> Facet {
+        let facet = self.facet(cos);
+        if self.passes_straight() { Facet { transmittance: Vec3::ZERO, ..facet } } else { facet }
+    }
+
+    /// Probability of reflecting at a facet; delta refraction is chosen before the facet is.
+    fn reflection_probability(&self, facet: Facet, wo: Vec3) -> f32 {
+        if self.glass > 0.0 && self.transmits_delta() {
+            self.scattering_facet(wo.z).reflection_probability()
+        } else {
+            facet.reflection_probability()
+        }
+    }
+
+    /// A direction from two uniform numbers and one that chooses between reflection and transmission.
+    pub(super) fn sample(&self, wo: Vec3, choice: f32, u: Vec2) -> Option<LobeSample> {
+        let smooth = self.is_smooth();
+        let h = if smooth { Vec3::Z } else { self.ggx.sample_visible_normal(wo, u) };
+        let facet = self.scattering_facet(wo.dot(h));
+        let probability = self.reflection_probability(facet, wo);
+        if choice < probability {
+            let wi = reflect(wo, h);
+            return if smooth {
+                Some(LobeSample::Interface(wi, facet.reflectance / probability))
+            } else {
+                (wi.z > 0.0).then_some(LobeSample::Spread(wi))
+            };
+        }
+        if self.transmits_delta() {
+            let wi = refract(wo, Vec3::Z, self.eta)?;
+            let radiance = self.scattering_facet(wo.z).transmittance / (self.eta * self.eta);
+            return Some(LobeSample::Interface(wi, radiance / (1.0 - probability)));
+        }
+        let wi = if self.thin {
+            reflect(wo, h) * Vec3::new(1.0, 1.0, -1.0)
+        } else {
+            refract(wo, h, self.eta)?
+        };
+        (wi.z < 0.0).then_some(LobeSample::Spread(wi))
+    }
+
+    /// `f * |cos wi|` of the lobes, and the density of [`Self::sample`] choosing `wi` from them.
+    pub(super) fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
+        if self.is_smooth() {
+            return (Vec3::ZERO, 0.0);
+        }
+        if wi.z > 0.0 {
+            return self.eval_pdf_mirrored(wo, wi, true);
+        }
+        if self.glass == 0.0 || self.transmits_delta() {
+            (Vec3::ZERO, 0.0)
+        } else if self.thin {
+            // KHR_materials_transmission: the reflection lobe, mirrored to the far side.
+            self.eval_pdf_mirrored(wo, wi * Vec3::new(1.0, 1.0, -1.0), false)
+        } else {
+            self.eval_pdf_refracted(wo, wi)
+        }
+    }
+
+    fn eval_pdf_mirrored(&self, wo: Vec3, wi: Vec3, reflected: bool) -> (Vec3, f32) {
+        let Some(h) = (wo + wi).try_normalize() else { return (Vec3::ZERO, 0.0) };
+        let facet = self.facet(wo.dot(h));
+        let probability = self.reflection_probability(facet, wo);
+        let (color, probability) = if reflected {
+            (facet.reflectance, probability)
+        } else {
+            (facet.transmittance, 1.0 - probability)
+        };
+        let common = self.ggx.distribution(h) * self.ggx.visibility(wo.z);
+        // Visible normals over the Jacobian 4 (wo . h).
+        (color * (common * self.ggx.visibility(wi.z) * wi.z), 0.5 * common * probability)
+    }
+
+    /// Walter et al., *Microfacet Models for Refraction through Rough Surfaces*, EGSR 2007, eq. 21,
+    /// times `1 / eta^2` for radiance.
+    fn eval_pdf_refracted(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
+        let none = (Vec3::ZERO, 0.0);
+        let Some(h) = (wo + self.eta * wi).try_normalize() else { return none };
+        let h = if h.z < 0.0 { -h } else { h };
+        let (cos_o, cos_i) = (wo.dot(h), wi.dot(h));
+        if cos_o <= 0.0 || cos_i >= 0.0 {
+            return none;
+        }
+        let facet = self.facet(cos_o);
+        let denominator = cos_o + self.eta * cos_i;
+        let jacobian = -cos_i / (denominator * denominator);
+        let visible = self.ggx.visible_normal_pdf_solid_angle(wo, h) * jacobian;
+        let masking = 2.0 * -wi.z * self.ggx.visibility(-wi.z);
+        let probability = 1.0 - facet.reflection_probability();
+        (facet.transmittance * (visible * masking), visible * self.eta * self.eta * probability)
+    }
+
+    /// Estimate of all that [`Self::sample`] carries, given the albedo terms at `wo`.
+    pub(super) fn albedo(&self, cos: f32, terms: Vec2) -> Vec3 {
+        let glass = Self { f0: Vec3::ZERO, f90: 0.0, ..*self };
+        let passing = if self.glass > 0.0 { glass.scattering_facet(cos) } else { Facet::BLACK };
+        self.f0 * terms.x + self.f90 * terms.y + passing.reflectance + passing.transmittance
+    }
+}

@@ -1,0 +1,342 @@
+//! The walk through the tree, written once over eight lanes of f32, and the portable lanes.
+
+use std::mem::MaybeUninit;
+
+use glam::Vec3;
+
+use super::triangle::{self, BlockHits, Shear};
+use super::wide::{Block, LEAF, Node, Reference, STACK_CAPACITY, WIDTH};
+use super::{Hit, Ray};
+
+/// Eight lanes of f32. Comparisons return one bit a lane and are false for NaN.
+pub(super) trait Lanes: Copy {
+    fn splat(value: f32) -> Self;
+    fn load(values: &[f32; WIDTH]) -> Self;
+    fn store(self) -> [f32; WIDTH];
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
+    /// `self * factor + term`; whether it is rounded once or twice is up to the machine.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+    fn min(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
+    fn le(self, other: Self) -> u32;
+    fn eq(self, other: Self) -> u32;
+}
+
+/// Lanes for every machine: loops that the compiler turns into whatever vectors it may use.
+#[derive(Clone, Copy)]
+pub(super) struct Portable([f32; WIDTH]);
+
+impl Portable {
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        Self(std::array::from_fn(|i| f(self.0[i], other.0[i])))
+    }
+
+    #[inline(always)]
+    fn mask(self, other: Self, f: impl Fn(f32, f32) -> bool) -> u32 {
+        (0..WIDTH).fold(0, |mask, i| mask | u32::from(f(self.0[i], other.0[i])) << i)
+    }
+}
+
+impl Lanes for Portable {
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self([value; WIDTH])
+    }
+    #[inline(always)]
+    fn load(values: &[f32; WIDTH]) -> Self {
+        Self(*values)
+    }
+    #[inline(always)]
+    fn store(self) -> [f32; WIDTH] {
+        self.0
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        self.mul(factor).add(term)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> u32 {
+        self.mask(other, |a, b| a <= b)
+    }
+    #[inline(always)]
+    fn eq(self, other: Self) -> u32 {
+        self.mask(other, |a, b| a == b)
+    }
+}
+
+/// A borrowed tree.
+#[derive(Clone, Copy)]
+pub(super) struct TreeRef<'a> {
+    pub(super) nodes: &'a [Node],
+    pub(super) blocks: &'a [Block],
+    /// Largest absolute coordinate of the scene.
+    pub(super) extent: f32,
+}
+
+/// A ray as the box test wants it.
+///
+/// Distance to a plane at `b` along an axis is `b * inverse + offset`. All rounding, here and in
+/// the sheared vertices of the triangle test, amounts to less than `13 u (|origin| + extent)` in
+/// space with `u = 2^-24`; boxes are made larger by 16 u, so that they never lose a triangle
+/// (after Ize, *Robust BVH Ray Traversal*, JCGT 2(2), 2013, which pads each distance instead).
+struct BoxRay {
+    inverse: [f32; 3],
+    near_offset: [f32; 3],
+    far_offset: [f32; 3],
+    /// Which of `Node::planes` is met first along each axis; the other one differs in the last bit.
+    near_plane: [usize; 3],
+}
+
+impl BoxRay {
+    fn new(ray: &Ray, extent: f32) -> Self {
+        let longest = ray.direction.abs().max_element();
+        // A direction of 2^-60 is as good as zero and keeps `0 * inf` out.
+        let least = longest * (0.5_f32).powi(60);
+        let reach = ray.origin.abs().max_element() + extent;
+        let pad = reach * (16.0 * 0.5_f32.powi(24)) + f32::MIN_POSITIVE;
+        let mut result = Self {
+            inverse: [0.0; 3],
+            near_offset: [0.0; 3],
+            far_offset: [0.0; 3],
+            near_plane: [0; 3],
+        };
+        for axis in 0..3 {
+            let direction = ray.direction[axis];
+            let inverse = 1.0 / direction.abs().max(least).copysign(direction);
+            let toward = pad.copysign(direction);
+            result.inverse[axis] = inverse;
+            result.near_offset[axis] = -(ray.origin[axis] + toward) * inverse;
+            result.far_offset[axis] = -(ray.origin[axis] - toward) * inverse;
+            result.near_plane[axis] = 2 * axis + usize::from(direction.is_sign_negative());
+        }
+        result
+    }
+
+    /// Mask of the boxes that the ray crosses in `[t_min, t_max]` and where it enters each.
+    #[inline(always)]
+    fn enter<L: Lanes>(&self, node: &Node, t_min: f32, t_max: f32) -> (u32, [f32; WIDTH]) {
+        let mut near = L::splat(t_min);
+        let mut far = L::splat(t_max);
+        for axis in 0..3 {
+            let inverse = L::splat(self.inverse[axis]);
+            let plane = self.near_plane[axis];
+            debug_assert!(plane < 6, "planes are 2 * axis or 2 * axis + 1");
+            // SAFETY: `near_plane` holds `2 * axis` or `2 * axis + 1` with `axis < 3`.
+            let (first, second) =
+                unsafe { (node.planes.get_unchecked(plane), node.planes.get_unchecked(plane ^ 1)) };
+            near = near.max(L::load(first).mul_add(inverse, L::splat(self.near_offset[axis])));
+            far = far.min(L::load(second).mul_add(inverse, L::splat(self.far_offset[axis])));
+        }
+        (near.le(far), near.store())
+    }
+}
+
+/// Nodes still to be visited, each with its distance: distance bits above, reference below. The
+/// bits of floats that are not negative sort as the floats do.
+struct Stack {
+    entries: [MaybeUninit<u64>; STACK_CAPACITY],
+    length: usize,
+}
+
+impl Stack {
+    #[inline(always)]
+    fn new() -> Self {
+        Self { entries: [const { MaybeUninit::uninit() }; STACK_CAPACITY], length: 0 }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, entry: u64) {
+        self.entries[self.length].write(entry);
+        self.length += 1;
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<u64> {
+        self.length = self.length.checked_sub(1)?;
+        // SAFETY: all entries below the previous length were written by `push`.
+        Some(unsafe { self.entries[self.length].assume_init() })
+    }
+
+    /// Pushes the children of `node` in the lanes of `mask`, which is not zero, far ones first, save
+    /// for the nearest, which is returned.
+    #[inline(always)]
+    fn descend(&mut self, node: &Node, mask: u32, near: &[f32; WIDTH]) -> Reference {
+        let base = self.length;
+        let mut entries = Bits(mask).map(|lane| entry(near[lane], node.children[lane]));
+        let mut nearest = entries.next().expect("the mask is not zero");
+        if let Some(second) = entries.next() {
+            self.push(nearest.max(second));
+            nearest = nearest.min(second);
+        }
+        for child in entries {
+            self.insert(base, nearest.max(child));
+            nearest = nearest.min(child);
+        }
+        nearest as Reference
+    }
+
+    /// Inserts so that entries from `base` on fall towards the top.
+    #[inline(always)]
+    fn insert(&mut self, base: usize, entry: u64) {
+        self.push(entry);
+        let mut at = self.length - 1;
+        while at > base {
+            // SAFETY: `at` and `at - 1` lie below the length, so both were written.
+            let before = unsafe { self.entries[at - 1].assume_init() };
+            if before >= entry {
+                break;
+            }
+            self.entries[at].write(before);
+            at -= 1;
+        }
+        self.entries[at].write(entry);
+    }
+}
+
+/// The positions of set bits among the lowest eight.
+pub(super) struct Bits(pub(super) u32);
+
+impl Iterator for Bits {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.0 == 0 {
+            return None;
+        }
+        let lane = self.0.trailing_zeros() as usize % WIDTH;
+        self.0 &= self.0 - 1;
+        Some(lane)
+    }
+}
+
+#[inline(always)]
+fn entry(near: f32, child: Reference) -> u64 {
+    u64::from(near.to_bits()) << 32 | u64::from(child)
+}
+
+#[inline(always)]
+fn distance(entry: u64) -> f32 {
+    f32::from_bits((entry >> 32) as u32)
+}
+
+/// Intersects all blocks whose boxes the ray crosses before `t_max`, near ones first.
+///
+/// `visit` gets the hits of a block and returns how far to go on, or `None` to end the walk. No
+/// lanes may be handled in closures: those are not always inlined, and are not compiled for the
+/// vector instructions of the function around.
+#[inline(always)]
+fn walk<L: Lanes>(
+    tree: TreeRef<'_>,
+    ray: &Ray,
+    mut visit: impl FnMut(&Block, &BlockHits) -> Option<f32>,
+) {
+    let usable = ray.direction.is_finite() && ray.direction != Vec3::ZERO;
+    if !usable || !ray.origin.is_finite() {
+        return;
+    }
+    let box_ray = BoxRay::new(ray, tree.extent);
+    let shear = Shear::new(ray);
+    let t_min = ray.t_min.max(0.0);
+    let mut t_max = ray.t_max;
+    let mut stack = Stack::new();
+    let mut current: Reference = 0;
+    loop {
+        if current & LEAF != 0 {
+            let block = &tree.blocks[(current & !LEAF) as usize];
+            let hits = triangle::intersect::<L>(block, &shear, t_min, t_max);
+            if hits.mask != 0 {
+                match visit(block, &hits) {
+                    Some(limit) => t_max = limit,
+                    None => return,
+                }
+            }
+        } else {
+            let node = &tree.nodes[current as usize];
+            let (mask, near) = box_ray.enter::<L>(node, t_min, t_max);
+            if mask != 0 {
+                current = stack.descend(node, mask, &near);
+                continue;
+            }
+        }
+        loop {
+            let Some(entry) = stack.pop() else { return };
+            if distance(entry) <= t_max {
+                current = entry as Reference;
+                break;
+            }
+        }
+    }
+}
+
+/// See [`super::Bvh::closest_hit`].
+#[inline(always)]
+pub(super) fn closest_hit<L: Lanes>(
+    tree: TreeRef<'_>,
+    ray: &Ray,
+    accept: impl Fn(&Hit) -> bool,
+) -> Option<Hit> {
+    let mut closest = Hit { t: ray.t_max, triangle: u32::MAX, ..Hit::default() };
+    walk::<L>(tree, ray, |block, hits| {
+        for lane in Bits(hits.mask) {
+            let hit = hits.hit(block, lane);
+            // The lower index wins ties, so that hits do not depend on the shape of the tree.
+            let closer =
+                hit.t < closest.t || (hit.t == closest.t && hit.triangle < closest.triangle);
+            if closer && accept(&hit) {
+                closest = hit;
+            }
+        }
+        Some(closest.t)
+    });
+    (closest.triangle != u32::MAX).then_some(closest)
+}
+
+/// See [`super::Bvh::any_hit`].
+#[inline(always)]
+pub(super) fn any_hit<L: Lanes>(
+    tree: TreeRef<'_>,
+    ray: &Ray,
+    mut blocks: impl FnMut(&Hit) -> bool,
+) -> bool {
+    let mut blocked = false;
+    walk::<L>(tree, ray, |block, hits| {
+        for lane in Bits(hits.mask) {
+            let hit = hits.hit(block, lane);
+            if blocks(&hit) {
+                blocked = true;
+                return None;
+            }
+        }
+        Some(ray.t_max)
+    });
+    blocked
+}

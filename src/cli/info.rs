@@ -1,0 +1,144 @@
+//! `lightgrid info`.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use crate::color::luminance;
+use crate::error::{Notices, Result};
+use crate::image::Image;
+use crate::path::World;
+use crate::scene::{Projection, Scene, builtin};
+
+/// Arguments of `info`.
+#[derive(Debug, clap::Args)]
+pub(super) struct InfoArguments {
+    /// A glTF file, a map (.exr, .hdr, 8-bit picture), a built-in scene or a built-in sky.
+    source: String,
+    /// Print JSON instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints what is in a scene or a map.
+pub(super) fn run(arguments: &InfoArguments) -> Result<()> {
+    let name = arguments.source.as_str();
+    let facts = if is_scene(name) {
+        scene_facts(name, super::load::scene(name)?)
+    } else {
+        let (map, notices) = super::load::map(name)?;
+        map_facts(name, &map, &notices)
+    };
+    if arguments.json {
+        println!("{}", super::record::to_json(&facts)?);
+    } else {
+        print_facts(&facts, 0);
+    }
+    Ok(())
+}
+
+fn is_scene(name: &str) -> bool {
+    let extension = Path::new(name).extension().map(|e| e.to_string_lossy().to_lowercase());
+    builtin::names().contains(&name)
+        || matches!(extension.as_deref(), Some("gltf" | "glb"))
+        || (extension.is_none() && !name.starts_with("sky:"))
+}
+
+fn scene_facts(name: &str, scene: Scene) -> Value {
+    let world = World::new(scene);
+    let scene = &world.scene;
+    let (low, high) = world.bvh.bounds();
+    let textures: usize = scene.images.iter().map(|i| i.texels.len() * 4).sum();
+    json!({
+        "scene": name,
+        "triangles": scene.triangles.len(),
+        "vertices": scene.positions.len(),
+        "materials": scene.materials.len(),
+        "textures": scene.textures.len(),
+        "texture_bytes": textures,
+        "bvh_bytes": world.bvh.memory_bytes(),
+        "emissive_triangles": world.lights.triangle_count(),
+        "punctual_lights": scene.lights.len(),
+        "size_metres": (high - low).to_array(),
+        "cameras": scene.cameras.iter().enumerate().map(|(i, camera)| {
+            let view = match camera.projection {
+                Projection::Perspective { fov_y_radians } =>
+                    format!("{:.1} degrees", fov_y_radians.to_degrees()),
+                Projection::Orthographic { half_height } =>
+                    format!("orthographic, {:.2} m high", 2.0 * half_height),
+            };
+            format!("{i}: {} ({view})", camera.name)
+        }).collect::<Vec<_>>(),
+        "left_out": world.needs.left_out(),
+        "notices": scene.notices.iter().collect::<Vec<_>>(),
+    })
+}
+
+fn map_facts(name: &str, map: &Image, notices: &Notices) -> Value {
+    let mut sums = (0.0_f64, 0.0_f64);
+    let mut brightest = (0.0_f32, 0_usize);
+    for (i, pixel) in map.pixels.iter().enumerate() {
+        let y = (i / map.width as usize) as u32;
+        let solid_angle = crate::math::texel_solid_angle(map.width, map.height, y);
+        let light = luminance((*pixel).into());
+        sums = (sums.0 + solid_angle * f64::from(light), sums.1 + solid_angle);
+        if light > brightest.0 {
+            brightest = (light, i);
+        }
+    }
+    let (x, y) = (brightest.1 % map.width as usize, brightest.1 / map.width as usize);
+    let left_out = if brightest.0 == 0.0 {
+        vec!["sampling of the map and the Light Grid: the map is black"]
+    } else {
+        Vec::new()
+    };
+    json!({
+        "map": name,
+        "size": [map.width, map.height],
+        "bytes": map.pixels.len() * 12,
+        "mean_luminance": sums.0 / sums.1,
+        "max_luminance": brightest.0,
+        "brightest_pixel": [x, y],
+        "brightest_direction_degrees": {
+            "azimuth_from_x_towards_z": ((x as f64 + 0.5) / f64::from(map.width) - 0.5) * 360.0,
+            "elevation": 90.0 - (y as f64 + 0.5) / f64::from(map.height) * 180.0,
+        },
+        "left_out": left_out,
+        "notices": notices.iter().collect::<Vec<_>>(),
+    })
+}
+
+/// Prints nested facts as indented `name: value` lines.
+fn print_facts(facts: &Value, indent: usize) {
+    let Some(map) = facts.as_object() else { return };
+    for (key, value) in map {
+        let label = key.replace('_', " ");
+        match value {
+            Value::Array(lines) if lines.iter().any(Value::is_string) => {
+                println!("{:indent$}{label}:", "");
+                for line in lines.iter().filter_map(Value::as_str) {
+                    println!("{:indent$}  - {line}", "");
+                }
+            }
+            Value::Array(numbers) if !numbers.is_empty() => {
+                let texts: Vec<String> = numbers.iter().map(number).collect();
+                println!("{:indent$}{label}: {}", "", texts.join(" x "));
+            }
+            Value::Array(_) => {}
+            Value::Object(_) => {
+                println!("{:indent$}{label}:", "");
+                print_facts(value, indent + 2);
+            }
+            _ => println!("{:indent$}{label}: {}", "", number(value)),
+        }
+    }
+}
+
+fn number(value: &Value) -> String {
+    match (value.as_str(), value.as_u64(), value.as_f64()) {
+        (Some(text), _, _) => text.to_owned(),
+        (_, Some(whole), _) => whole.to_string(),
+        (_, _, Some(x)) => format!("{x:.4}"),
+        _ => value.to_string(),
+    }
+}

@@ -1,0 +1,54 @@
+//! Scenes and maps by name: a file, or something built in.
+
+use std::path::Path;
+
+use crate::environment::sky;
+use crate::error::{Error, Notices, Result};
+use crate::image::Image;
+use crate::image::{read_map, sanitise};
+use crate::scene::{Scene, builtin, gltf};
+
+/// Size of a built-in sky when none is asked for.
+const SKY_SIZE: (u32, u32) = (2048, 1024);
+/// Largest built-in sky.
+const MAX_SKY_SIZE: (u32, u32) = (16384, 8192);
+
+/// The scene a name stands for: a built-in's name, or a glTF file.
+pub(super) fn scene(name: &str) -> Result<Scene> {
+    if builtin::names().contains(&name) {
+        return builtin::build(name);
+    }
+    let path = Path::new(name);
+    if !path.exists() && !name.contains(['.', '/', '\\']) {
+        return Err(Error::new(format!(
+            "{name}: neither a file nor a built-in scene ({})",
+            builtin::names().join(", ")
+        )));
+    }
+    gltf::load(path)
+}
+
+/// The map a name stands for: `sky:NAME`, `sky:NAME@WIDTHxHEIGHT`, or a file; repaired and ready.
+pub(super) fn map(name: &str) -> Result<(Image, Notices)> {
+    if let Some(rest) = name.strip_prefix("sky:") {
+        return Ok((built_in_sky(name, rest)?, Notices::default()));
+    }
+    let mut loaded = read_map(Path::new(name))?;
+    let repaired = sanitise(&mut loaded.image);
+    loaded.notices.extend(&repaired);
+    Ok((loaded.image, loaded.notices))
+}
+
+fn built_in_sky(name: &str, rest: &str) -> Result<Image> {
+    let (sky_name, (width, height)) = match rest.split_once('@') {
+        None => (rest, SKY_SIZE),
+        Some((sky_name, size)) => {
+            (sky_name, super::values::pair(size).map_err(|e| Error::at(name, e))?)
+        }
+    };
+    if width > MAX_SKY_SIZE.0 || height > MAX_SKY_SIZE.1 {
+        let (w, h) = MAX_SKY_SIZE;
+        return Err(Error::at(name, format!("a sky can be at most {w}x{h}")));
+    }
+    sky::build(sky_name, width, height)
+}

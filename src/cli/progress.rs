@@ -1,0 +1,79 @@
+//! The line that says how far it is; nothing when stderr is not a terminal.
+
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::render::{Phase, Session, StopRule};
+
+/// A live line on the terminal.
+pub(super) struct Progress {
+    bar: ProgressBar,
+}
+
+impl Progress {
+    /// Starts with a message; stays invisible unless stderr is a terminal (indicatif looks).
+    pub(super) fn start(message: &str) -> Self {
+        let bar = ProgressBar::new_spinner();
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed_precise} {msg}") {
+            bar.set_style(style);
+        }
+        bar.set_message(message.to_owned());
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self { bar }
+    }
+
+    /// Shows another message.
+    pub(super) fn say(&self, message: impl Into<String>) {
+        self.bar.set_message(message.into());
+    }
+
+    /// Shows where a session is.
+    pub(super) fn show(&self, session: &Session<'_>, rule: &StopRule) {
+        if !self.bar.is_hidden() {
+            self.say(line(session, rule));
+        }
+    }
+
+    /// Removes the line.
+    pub(super) fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+fn line(session: &Session<'_>, rule: &StopRule) -> String {
+    let figures = session.figures();
+    if session.phase() == Phase::Learning {
+        let (done, total) = (figures.learning_paths, session.view().learning_paths);
+        return format!("learning {}%", 100 * done / total.max(1));
+    }
+    let samples = session.film().min_samples();
+    let noise = session.film().noise();
+    let mut text = rule.samples.map_or_else(
+        || format!("rendering, {samples} samples"),
+        |limit| format!("rendering, {samples}/{limit} samples"),
+    );
+    if noise.is_finite() {
+        text += &format!(", noise {:.1}%", 100.0 * noise);
+    }
+    if let Some(left) = seconds_left(session, rule, noise) {
+        text += &format!(", {left:.0} s left");
+    }
+    text
+}
+
+/// Shortest estimate of what the rules leave: samples at the speed so far, the clock, and noise
+/// falling with the root of the samples.
+fn seconds_left(session: &Session<'_>, rule: &StopRule, noise: f64) -> Option<f64> {
+    let rendered = session.figures().render_seconds;
+    let samples = f64::from(session.film().min_samples());
+    let by_samples = rule.samples.map(|limit| rendered * (f64::from(limit) / samples - 1.0));
+    let by_clock = rule.seconds.map(|limit| limit - session.elapsed_seconds());
+    let by_noise = rule.noise.map(|limit| rendered * ((noise / limit).powi(2) - 1.0));
+    [by_samples, by_clock, by_noise]
+        .into_iter()
+        .flatten()
+        .filter(|seconds| seconds.is_finite())
+        .min_by(f64::total_cmp)
+        .map(|seconds| seconds.max(0.0))
+}

@@ -1,0 +1,107 @@
+//! What is written about a run: metadata in pictures, figures in JSON.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::environment::Environment;
+use crate::error::{Error, Notices, Result};
+use crate::image::write_beside_and_rename;
+use crate::path::World;
+use crate::render::Session;
+
+/// Seconds before the session starts.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub(super) struct Phases {
+    pub(super) load_scene_seconds: f64,
+    pub(super) build_bvh_seconds: f64,
+    pub(super) load_map_seconds: f64,
+    pub(super) build_table_seconds: f64,
+}
+
+/// Everything there is to say about a run.
+pub(super) struct Record<'a> {
+    pub(super) scene: &'a str,
+    pub(super) map: &'a str,
+    pub(super) world: &'a World,
+    pub(super) environment: &'a Environment,
+    pub(super) session: &'a Session<'a>,
+    pub(super) phases: &'a Phases,
+    pub(super) notices: &'a Notices,
+    pub(super) options: Vec<(&'static str, Value)>,
+}
+
+impl Record<'_> {
+    /// Key and value pairs for pictures: scene, map, settings, samples, seconds.
+    pub(super) fn metadata(&self) -> Vec<(String, String)> {
+        let film = self.session.film();
+        let mut pairs = vec![
+            ("lightgrid.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+            ("lightgrid.scene".to_owned(), self.scene.to_owned()),
+            ("lightgrid.map".to_owned(), self.map.to_owned()),
+            ("lightgrid.samples_per_pixel".to_owned(), film.min_samples().to_string()),
+            ("lightgrid.seconds".to_owned(), format!("{:.3}", self.session.elapsed_seconds())),
+        ];
+        // A prefix keeps clear of the names that OpenEXR reserves.
+        pairs.extend(self.options.iter().map(|(key, value)| {
+            let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+            (format!("lightgrid.{key}"), text)
+        }));
+        pairs
+    }
+
+    /// The figures of `--json`.
+    pub(super) fn figures(&self) -> Value {
+        let film = self.session.film();
+        let figures = self.session.figures();
+        let memory = self.environment.memory_bytes();
+        let noise = film.noise();
+        json!({
+            "software": concat!("lightgrid ", env!("CARGO_PKG_VERSION")),
+            "scene": self.scene,
+            "map": self.map,
+            "size": [film.width, film.height],
+            "settings": self.options.iter().cloned().map(|(k, v)| (k.to_owned(), v))
+                .collect::<serde_json::Map<_, _>>(),
+            "triangles": self.world.scene.triangles.len(),
+            "samples_per_pixel": film.min_samples(),
+            "noise": noise.is_finite().then_some(noise),
+            "invalid_samples": film.invalid_samples(),
+            "phases": self.phases,
+            "session": figures,
+            "seconds": self.session.elapsed_seconds(),
+            "rays_per_sample": figures.rays as f64 / figures.samples.max(1) as f64,
+            "rays_per_second": figures.rays as f64 / figures.render_seconds.max(1e-9),
+            "memory": {
+                "map_pixels_bytes": memory.pixels,
+                "map_table_bytes": memory.table,
+                "bvh_bytes": self.world.bvh.memory_bytes(),
+                "grid_bytes": figures.grid_bytes,
+                "grid_peak_bytes": figures.grid_peak_bytes,
+            },
+            "threads": rayon::current_num_threads(),
+            "simd": self.world.bvh.simd_name(),
+            "needs": self.world.needs,
+            "left_out": self.world.needs.left_out(),
+            "notices": self.notices.iter().collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// Pretty JSON of anything serialisable.
+pub(super) fn to_json(value: &impl Serialize) -> Result<String> {
+    serde_json::to_string_pretty(value).map_err(|e| Error::new(format!("JSON: {e}")))
+}
+
+/// A JSON value of anything serialisable.
+pub(super) fn to_value(value: &impl Serialize) -> Result<Value> {
+    serde_json::to_value(value).map_err(|e| Error::new(format!("JSON: {e}")))
+}
+
+/// Writes JSON beside and renames.
+pub(super) fn write_json(path: &Path, value: &Value) -> Result<()> {
+    let text = to_json(value)?;
+    write_beside_and_rename(path, |file| writeln!(file, "{text}"))
+}

@@ -1,0 +1,414 @@
+//! `lightgrid render`.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use glam::Vec3;
+
+use super::progress::Progress;
+use super::record::{self, Phases, Record};
+use super::values;
+use crate::environment::{Environment, EnvironmentOptions, TableKind};
+use crate::error::{Error, Notices, Result};
+use crate::image::{ExrPicture, Layer, write_exr, write_png};
+use crate::light_grid::LawOptions;
+use crate::path::{PathLimits, World, framing};
+use crate::render::film::Film;
+use crate::render::filter::PixelFilter;
+use crate::render::{Sampling, Session, StopRule, View};
+use crate::scene::{Camera, Projection, builtin};
+use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
+
+/// Arguments of `render`.
+#[derive(Debug, clap::Args)]
+pub(super) struct RenderArguments {
+    /// A glTF file (.gltf, .glb) or a built-in scene.
+    #[arg(default_value = builtin::DEFAULT_SCENE)]
+    scene: String,
+    /// The picture to write: .png or .exr; may be given twice.
+    #[arg(short, long = "output", required = true, value_name = "FILE")]
+    outputs: Vec<PathBuf>,
+
+    /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky (sky:day, sky:sunset, sky:night,
+    /// sky:overcast, sky:hallway, each with @WIDTHxHEIGHT if wanted).
+    #[arg(long, default_value = "sky:day", value_name = "MAP", help_heading = "Environment")]
+    env: String,
+    /// Turns the map about the vertical, in degrees.
+    #[arg(long, default_value = "0", value_parser = values::finite, allow_negative_numbers = true, value_name = "DEG", help_heading = "Environment")]
+    env_rotation: f64,
+    /// Multiplies the map's radiance.
+    #[arg(long, default_value = "1", value_parser = values::not_negative, value_name = "X", help_heading = "Environment")]
+    env_intensity: f32,
+
+    /// Which of the file's cameras, counted from 0.
+    #[arg(long, value_name = "N", help_heading = "Camera")]
+    camera: Option<usize>,
+    /// Camera position in metres, instead of a camera of the file.
+    #[arg(long, value_parser = values::vector, requires = "target", allow_hyphen_values = true, value_name = "X,Y,Z", help_heading = "Camera")]
+    eye: Option<Vec3>,
+    /// What the camera at --eye looks at.
+    #[arg(long, value_parser = values::vector, requires = "eye", allow_hyphen_values = true, value_name = "X,Y,Z", help_heading = "Camera")]
+    target: Option<Vec3>,
+    /// Vertical field of view in degrees.
+    #[arg(long, value_parser = values::positive, value_name = "DEG", help_heading = "Camera")]
+    fov: Option<f64>,
+    /// Radius of a thin lens in metres; 0 keeps everything sharp.
+    #[arg(long, value_parser = values::not_negative, value_name = "M", help_heading = "Camera")]
+    lens_radius: Option<f32>,
+    /// Distance at which the picture is sharp, in metres.
+    #[arg(long, value_parser = values::positive, value_name = "M", help_heading = "Camera")]
+    focus: Option<f64>,
+
+    /// Picture size in pixels.
+    #[arg(long, default_value = "1280x720", value_parser = values::size, value_name = "WxH", help_heading = "Picture")]
+    size: (u32, u32),
+    /// Pixel filter.
+    #[arg(long, default_value = "blackman-harris", value_enum, help_heading = "Picture")]
+    filter: PixelFilter,
+    /// Exposure of .png pictures in stops, or `auto`.
+    #[arg(long, default_value = "auto", value_parser = parse_exposure, allow_hyphen_values = true, value_name = "EV|auto", help_heading = "Picture")]
+    exposure: Exposure,
+    /// Tone curve of .png pictures: agx, aces, neutral, reinhard, none.
+    #[arg(long, default_value = "agx", value_name = "CURVE", help_heading = "Picture")]
+    tonemap: ToneCurve,
+    /// Extra layers in .exr pictures: albedo, normal, depth, samples, variance, or all.
+    #[arg(long, value_delimiter = ',', value_name = "LAYER", help_heading = "Picture")]
+    layers: Vec<LayerName>,
+
+    /// Stop at this many samples per pixel (256 if no stop rule is given).
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), value_name = "N", help_heading = "Stop")]
+    spp: Option<u32>,
+    /// Stop after this many seconds of learning and rendering.
+    #[arg(long, value_parser = values::positive, value_name = "S", help_heading = "Stop")]
+    seconds: Option<f64>,
+    /// Stop when the estimated relative RMS error falls below this, e.g. 0.05.
+    #[arg(long, value_parser = values::positive, value_name = "E", help_heading = "Stop")]
+    noise: Option<f64>,
+
+    /// How the map is sampled.
+    #[arg(long, default_value = "adaptive", value_enum, help_heading = "Light")]
+    sampling: Sampling,
+    /// Importance table of the map: tile-local, u32, f32, f64.
+    #[arg(long, default_value = "tile-local", value_name = "KIND", help_heading = "Light")]
+    table: TableKind,
+    /// Surface vertices at which a path gathers light; 1 is direct light only.
+    #[arg(long, default_value = "8", value_parser = clap::value_parser!(u32).range(0..=100_000), value_name = "N", help_heading = "Light")]
+    bounces: u32,
+    /// Never end dim paths at random.
+    #[arg(long, help_heading = "Light")]
+    no_russian_roulette: bool,
+    /// Tiles of the map, columns x rows.
+    #[arg(long, default_value = "32x16", value_parser = tile_grid, value_name = "CxR", help_heading = "Light")]
+    tiles: (u32, u32),
+    /// Light Grid cells around the horizon; half as many from top to bottom.
+    #[arg(long, default_value = "64", value_parser = clap::value_parser!(u32).range(2..=512), value_name = "N", help_heading = "Light")]
+    grid: u32,
+    /// Camera paths to learn from; without it, as many as suit the picture.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000), value_name = "N", help_heading = "Light")]
+    learning_paths: Option<u64>,
+
+    /// Seed of the random numbers; the same seed gives the same picture.
+    #[arg(long, default_value = "0", value_name = "N", help_heading = "Run")]
+    seed: u32,
+    /// Threads; 0 uses every core.
+    #[arg(long, default_value = "0", value_name = "N", help_heading = "Run")]
+    threads: usize,
+    /// Writes the run's figures as JSON.
+    #[arg(long, value_name = "FILE", help_heading = "Run")]
+    json: Option<PathBuf>,
+}
+
+/// A layer that can be asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum LayerName {
+    Albedo,
+    Normal,
+    Depth,
+    Samples,
+    Variance,
+    All,
+}
+
+fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
+    let (columns, rows) = values::pair(text)?;
+    if columns > 256 || rows > 256 {
+        return Err("at most 256x256 tiles".to_owned());
+    }
+    Ok((columns, rows))
+}
+
+/// Loads, learns, renders, writes.
+pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
+    for output in arguments.outputs.iter().chain(&arguments.json) {
+        check_output(output, arguments.json.as_ref() == Some(output))?;
+    }
+    start_threads(arguments.threads)?;
+    let cancel = super::interrupt::flag();
+    let progress = Progress::start("loading");
+    let mut phases = Phases::default();
+
+    let start = Instant::now();
+    let scene = super::load::scene(&arguments.scene)?;
+    phases.load_scene_seconds = lap(start);
+    progress.say("building the BVH");
+    let start = Instant::now();
+    let world = World::new(scene);
+    phases.build_bvh_seconds = lap(start);
+
+    progress.say("loading the map");
+    let start = Instant::now();
+    let (map, map_notices) = super::load::map(&arguments.env)?;
+    phases.load_map_seconds = lap(start);
+    let start = Instant::now();
+    let environment = Environment::new(map, &environment_options(arguments))
+        .map_err(|e| Error::at(&arguments.env, e))?;
+    phases.build_table_seconds = lap(start);
+
+    let mut notices = world.scene.notices.clone();
+    notices.extend(&map_notices);
+    let view = view(arguments, &world, &mut notices)?;
+    for sentence in notices.iter() {
+        eprintln!("notice: {sentence}");
+    }
+    let rule = stop_rule(arguments);
+    let mut session = Session::new(&world, &environment, view);
+    work(&mut session, &rule, &cancel, &progress);
+    progress.finish();
+    if session.film().invalid_samples() > 0 {
+        let sentence = format!(
+            "{} samples were not finite and were left out",
+            session.film().invalid_samples()
+        );
+        eprintln!("notice: {sentence}");
+        notices.add(sentence);
+    }
+
+    let record = Record {
+        scene: &arguments.scene,
+        map: &arguments.env,
+        world: &world,
+        environment: &environment,
+        session: &session,
+        phases: &phases,
+        notices: &notices,
+        options: settings(arguments),
+    };
+    for output in &arguments.outputs {
+        write_picture(output, arguments, &record)?;
+    }
+    if let Some(path) = &arguments.json {
+        record::write_json(path, &record.figures())?;
+    }
+    Ok(())
+}
+
+fn lap(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64()
+}
+
+/// Refuses an output before the work rather than after it.
+fn check_output(path: &Path, json: bool) -> Result<()> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    if !json && !matches!(extension.as_deref(), Some("png" | "exr")) {
+        return Err(Error::at(path, "pictures are written as .png or .exr"));
+    }
+    crate::image::check_writable(path)
+}
+
+fn start_threads(threads: usize) -> Result<()> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|i| format!("render {i}"))
+        .build_global()
+        .map_err(|e| Error::new(format!("{threads} threads cannot be started: {e}")))
+}
+
+fn environment_options(arguments: &RenderArguments) -> EnvironmentOptions {
+    EnvironmentOptions {
+        table: arguments.table,
+        tile_columns: arguments.tiles.0,
+        tile_rows: arguments.tiles.1,
+        rotation_radians: arguments.env_rotation.to_radians() as f32,
+        intensity: arguments.env_intensity,
+        ..EnvironmentOptions::default()
+    }
+}
+
+/// Exposure as typed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Exposure {
+    Stops(f32),
+    Auto,
+}
+
+fn parse_exposure(text: &str) -> std::result::Result<Exposure, String> {
+    if text == "auto" {
+        return Ok(Exposure::Auto);
+    }
+    values::finite(text)
+        .map(|stops| Exposure::Stops(stops as f32))
+        .map_err(|e| format!("{e} of stops, or auto"))
+}
+
+fn stop_rule(arguments: &RenderArguments) -> StopRule {
+    let none = arguments.spp.is_none() && arguments.seconds.is_none() && arguments.noise.is_none();
+    StopRule {
+        samples: arguments.spp.or(none.then_some(256)),
+        seconds: arguments.seconds,
+        noise: arguments.noise,
+    }
+}
+
+fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Result<View> {
+    let (width, height) = arguments.size;
+    Ok(View {
+        camera: camera(arguments, world, notices)?,
+        width,
+        height,
+        filter: arguments.filter,
+        sampling: arguments.sampling,
+        limits: PathLimits {
+            bounces: arguments.bounces,
+            russian_roulette: !arguments.no_russian_roulette,
+        },
+        seed: arguments.seed,
+        grid_columns: arguments.grid,
+        learning_paths: arguments
+            .learning_paths
+            .unwrap_or_else(|| View::suitable_learning_paths(width, height, arguments.spp)),
+        laws: LawOptions::ADAPTIVE,
+        layers: arguments
+            .layers
+            .iter()
+            .any(|l| !matches!(l, LayerName::Samples | LayerName::Variance)),
+    })
+}
+
+fn camera(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Result<Camera> {
+    let cameras = &world.scene.cameras;
+    let mut camera = if let (Some(eye), Some(target)) = (arguments.eye, arguments.target) {
+        if eye == target {
+            return Err(Error::new("--eye and --target are the same point"));
+        }
+        Camera::look_at(eye, target, 0.9)
+    } else if let Some(index) = arguments.camera {
+        cameras.get(index).cloned().ok_or_else(|| {
+            let count = cameras.len();
+            Error::new(format!(
+                "--camera {index}: {} has {count} cameras, counted from 0",
+                arguments.scene
+            ))
+        })?
+    } else if let Some(camera) = cameras.first() {
+        camera.clone()
+    } else {
+        notices.add(format!("{}: no camera in it, the view was chosen", arguments.scene));
+        framing::frame(world, arguments.size.0 as f32 / arguments.size.1 as f32)
+    };
+    if let Some(degrees) = arguments.fov {
+        if degrees >= 179.0 {
+            return Err(Error::new(format!("--fov {degrees}: must be below 179 degrees")));
+        }
+        camera.projection =
+            Projection::Perspective { fov_y_radians: degrees.to_radians() as f32 };
+    }
+    camera.lens_radius = arguments.lens_radius.unwrap_or(camera.lens_radius);
+    camera.focus_distance = arguments.focus.map_or(camera.focus_distance, |f| f as f32);
+    Ok(camera)
+}
+
+/// Runs the session until a rule or the user says stop; at least one sample is taken.
+fn work(session: &mut Session<'_>, rule: &StopRule, cancel: &AtomicBool, progress: &Progress) {
+    let never = AtomicBool::new(false);
+    loop {
+        progress.show(session, rule);
+        let stopped = cancel.load(Ordering::Relaxed);
+        if stopped {
+            session.finish_learning();
+        }
+        let samples = session.film().min_samples();
+        if samples > 0 && (stopped || session.is_done(rule)) {
+            return;
+        }
+        session.advance(session.next_pass(rule), if stopped { &never } else { cancel });
+    }
+}
+
+/// Settings that belong into metadata and JSON, as typed or as chosen.
+fn settings(arguments: &RenderArguments) -> Vec<(&'static str, serde_json::Value)> {
+    vec![
+        ("sampling", serde_json::json!(arguments.sampling)),
+        ("table", serde_json::json!(arguments.table.to_string())),
+        ("tiles", serde_json::json!(arguments.tiles)),
+        ("grid_columns", serde_json::json!(arguments.grid)),
+        ("bounces", serde_json::json!(arguments.bounces)),
+        ("russian_roulette", serde_json::json!(!arguments.no_russian_roulette)),
+        ("filter", serde_json::json!(format!("{:?}", arguments.filter))),
+        ("env_rotation_degrees", serde_json::json!(arguments.env_rotation)),
+        ("env_intensity", serde_json::json!(arguments.env_intensity)),
+        ("seed", serde_json::json!(arguments.seed)),
+    ]
+}
+
+fn write_picture(
+    path: &Path,
+    arguments: &RenderArguments,
+    record: &Record<'_>,
+) -> Result<()> {
+    let film = record.session.film();
+    let image = film.image();
+    let mut metadata = record.metadata();
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
+        let layers = layers(film, &arguments.layers);
+        return write_exr(path, ExrPicture { image: &image, layers, metadata: &metadata });
+    }
+    let stops = match arguments.exposure {
+        Exposure::Stops(stops) => stops,
+        Exposure::Auto => auto_exposure_ev(&image),
+    };
+    metadata.push(("lightgrid.exposure_ev".to_owned(), format!("{stops:.3}")));
+    metadata.push(("lightgrid.tonemap".to_owned(), arguments.tonemap.name().to_owned()));
+    write_png(path, &display_rgb8(&image, stops, arguments.tonemap), &metadata)
+}
+
+fn layers(film: &Film, names: &[LayerName]) -> Vec<Layer> {
+    let wanted = |name| names.contains(&name) || names.contains(&LayerName::All);
+    let mut layers = Vec::new();
+    let mut add = |name: &str, channels: Vec<(String, Vec<f32>)>| {
+        layers.push(Layer { name: name.to_owned(), channels });
+    };
+    if let Some(surface) = film.surface_layers() {
+        if wanted(LayerName::Albedo) {
+            add("albedo", split(&surface.albedo, ["R", "G", "B"]));
+        }
+        if wanted(LayerName::Normal) {
+            add("normal", split(&surface.normal, ["X", "Y", "Z"]));
+        }
+        if wanted(LayerName::Depth) {
+            add("depth", vec![("Z".to_owned(), surface.depth)]);
+        }
+    }
+    let of_pixels = |f: fn(&crate::render::film::Pixel) -> f64| {
+        film.pixels().iter().map(|p| f(p) as f32).collect()
+    };
+    if wanted(LayerName::Samples) {
+        add("samples", vec![("N".to_owned(), of_pixels(|p| f64::from(p.samples())))]);
+    }
+    if wanted(LayerName::Variance) {
+        let per_sample = |p: &crate::render::film::Pixel| match p.samples() {
+            0 | 1 => 0.0,
+            n => p.variance_of_mean() * f64::from(n),
+        };
+        add("variance", vec![("Y".to_owned(), of_pixels(per_sample))]);
+    }
+    layers
+}
+
+fn split(pixels: &[[f32; 3]], names: [&str; 3]) -> Vec<(String, Vec<f32>)> {
+    names
+        .into_iter()
+        .enumerate()
+        .map(|(i, name)| (name.to_owned(), pixels.iter().map(|p| p[i]).collect()))
+        .collect()
+}

@@ -1,0 +1,45 @@
+//! `lightgrid sat`.
+
+use crate::environment::{Lookup, sat_report};
+use crate::error::{Error, Result};
+
+/// Arguments of `sat`.
+#[derive(Debug, clap::Args)]
+pub(super) struct SatArguments {
+    /// Maps: files or built-in skies; without any, the talk's four cases and an extreme one.
+    maps: Vec<String>,
+    /// Print JSON instead of tables.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The talk's maps: sizes from its table, contents from our skies.
+const TALKS_CASES: [&str; 4] =
+    ["sky:hallway@10000x5000", "sky:day@15000x7500", "sky:night@3000x1500", "sky:sunset@3000x1500"];
+
+/// Samples drawn to time a table.
+const SAMPLES: u32 = 1 << 20;
+
+/// Prints one table a map.
+pub(super) fn run(arguments: &SatArguments) -> Result<()> {
+    let maps: Vec<&str> = if arguments.maps.is_empty() {
+        TALKS_CASES.to_vec()
+    } else {
+        arguments.maps.iter().map(String::as_str).collect()
+    };
+    let mut reports = serde_json::Map::new();
+    for name in maps {
+        let (map, notices) = super::load::map(name)?;
+        notices.iter().for_each(|sentence| eprintln!("notice: {name}: {sentence}"));
+        let report = sat_report(&map, Lookup::Bilinear, SAMPLES).map_err(|e| Error::at(name, e))?;
+        if arguments.json {
+            reports.insert(name.to_owned(), super::record::to_value(&report)?);
+        } else {
+            println!("{name}, {}x{}\n{report}", map.width, map.height);
+        }
+    }
+    if arguments.json {
+        println!("{}", super::record::to_json(&reports)?);
+    }
+    Ok(())
+}

@@ -1,0 +1,143 @@
+//! How a map is turned into a light.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+
+/// The importance table a map is sampled by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TableKind {
+    /// Exact integer sums tile by tile, 4 bytes per texel.
+    #[default]
+    TileLocal,
+    /// The talk's: a summed-area table in f64, rounded to u32.
+    U32,
+    /// A summed-area table computed in f32.
+    F32,
+    /// A summed-area table in f64, 8 bytes per texel.
+    F64,
+}
+
+impl TableKind {
+    /// All kinds, in the order they are reported.
+    pub const ALL: [Self; 4] = [Self::TileLocal, Self::U32, Self::F32, Self::F64];
+}
+
+impl fmt::Display for TableKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::TileLocal => "tile-local",
+            Self::U32 => "u32",
+            Self::F32 => "f32",
+            Self::F64 => "f64",
+        })
+    }
+}
+
+impl FromStr for TableKind {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|kind| kind.to_string() == name).ok_or_else(|| {
+            Error::new(format!("no importance table \"{name}\": tile-local, u32, f32 or f64"))
+        })
+    }
+}
+
+/// How radiance is read between texel centres.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Lookup {
+    /// Interpolated between the four nearest.
+    #[default]
+    Bilinear,
+    /// Constant over a texel.
+    Nearest,
+}
+
+impl fmt::Display for Lookup {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Bilinear => "bilinear",
+            Self::Nearest => "nearest",
+        })
+    }
+}
+
+impl FromStr for Lookup {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        match name {
+            "bilinear" => Ok(Self::Bilinear),
+            "nearest" => Ok(Self::Nearest),
+            _ => Err(Error::new(format!("no map look-up \"{name}\": bilinear or nearest"))),
+        }
+    }
+}
+
+/// What an [`super::Environment`] is built with.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EnvironmentOptions {
+    /// Importance table.
+    pub table: TableKind,
+    /// Look-up of radiance; the table matches it.
+    pub lookup: Lookup,
+    /// Tiles along u, at least 1; no more are made than the map has columns.
+    pub tile_columns: u32,
+    /// Tiles along v, at least 1; no more are made than the map has rows.
+    pub tile_rows: u32,
+    /// Turns the map about +Y so that lat-long `u` of what is seen grows.
+    pub rotation_radians: f32,
+    /// Factor on all radiance, at least 0.
+    pub intensity: f32,
+}
+
+impl Default for EnvironmentOptions {
+    fn default() -> Self {
+        Self {
+            table: TableKind::default(),
+            lookup: Lookup::default(),
+            tile_columns: 32,
+            tile_rows: 16,
+            rotation_radians: 0.0,
+            intensity: 1.0,
+        }
+    }
+}
+
+impl EnvironmentOptions {
+    /// Says which option is out of range, if any.
+    pub(crate) fn check(&self) -> Result<()> {
+        let complaint = if self.tile_columns == 0 || self.tile_rows == 0 {
+            "the environment map needs at least one tile in each axis"
+        } else if !self.rotation_radians.is_finite() {
+            "the rotation of the environment map is not a finite number"
+        } else if !(0.0..=f32::MAX).contains(&self.intensity) {
+            "the intensity of the environment map is negative or not a finite number"
+        } else {
+            return Ok(());
+        };
+        Err(Error::new(complaint))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_read_back() {
+        for kind in TableKind::ALL {
+            assert_eq!(kind.to_string().parse(), Ok(kind));
+        }
+        for lookup in [Lookup::Bilinear, Lookup::Nearest] {
+            assert_eq!(lookup.to_string().parse(), Ok(lookup));
+        }
+        assert!("u64".parse::<TableKind>().is_err());
+    }
+}

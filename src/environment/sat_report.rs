@@ -1,0 +1,255 @@
+//! The talk's claim about summed-area tables, measured: which table samples a map how truly.
+//!
+//! The talk reports the mean squared error of a density reconstructed from samples, u32 against
+//! f32, without its unit. Here it is in units of the mean texel density, and it is the limit of
+//! infinitely many samples: every table's search is followed for all random numbers at once, so
+//! the noise of a histogram does not hide what a table does.
+
+use std::fmt;
+use std::hint::black_box;
+use std::time::Instant;
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use super::summed_area::RectangleTable;
+use super::table::Table;
+use super::tile_local::TileLocal;
+use super::tiles::{TileGrid, TileTexels};
+use super::weights::Weights;
+use super::{EnvironmentOptions, Lookup, TableKind, check_size};
+use crate::error::Result;
+use crate::image::Image;
+
+/// Every table kind measured on one map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SatReport {
+    /// Columns of the map.
+    pub width: u32,
+    /// Rows of the map.
+    pub height: u32,
+    /// The look-up that the weights are for.
+    pub lookup: Lookup,
+    /// Share of the texels that have weight.
+    pub lit_share: f64,
+    /// One row per kind, in the order of [`TableKind::ALL`].
+    pub rows: Vec<SatReportRow>,
+}
+
+/// One table kind on one map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SatReportRow {
+    /// The table.
+    pub table: TableKind,
+    /// Mean over the texels of the squared difference of the sampled and the true probability,
+    /// each times the number of texels.
+    pub mean_squared_error: f64,
+    /// Share of the texels with weight that are never sampled.
+    pub missed_share: f64,
+    /// Share of all energy in texels that are never sampled.
+    pub missed_energy_share: f64,
+    /// Share of the steps from texel to texel in which the sums along a row fall.
+    pub falling_share: f64,
+    /// Total variation between the sampled and the reported probabilities, in `[0,1]`: 0 if
+    /// densities are exact, else an estimator that divides by them is biased.
+    pub misreported_share: f64,
+    /// Seconds to build the table.
+    pub build_seconds: f64,
+    /// Nanoseconds to choose a texel of a tile (tiles drawn by energy).
+    pub sample_nanoseconds: f64,
+    /// Bytes of the table.
+    pub table_bytes: u64,
+}
+
+/// Builds and measures every table kind on a map (finite, not negative). `timed_samples` is how
+/// many samples the time of one is taken over. Summed-area tables are searched over the whole map,
+/// as in the talk; the tile-local table over its default tiles, chosen by energy.
+///
+/// # Errors
+/// If the map has no pixels.
+pub fn sat_report(map: &Image, lookup: Lookup, timed_samples: u32) -> Result<SatReport> {
+    check_size(map)?;
+    let options = EnvironmentOptions::default();
+    let grid = TileGrid::new(map.width, map.height, options.tile_columns, options.tile_rows);
+    let weights = Weights::new(map, lookup);
+    let (mut total, mut lit) = (0.0, 0_u64);
+    weights.for_each_row(|row| {
+        total += row.iter().sum::<f64>();
+        lit += row.iter().filter(|weight| **weight > 0.0).count() as u64;
+    });
+    let rows = TableKind::ALL.map(|kind| {
+        let start = Instant::now();
+        let (table, energies) = Table::build(kind, &weights, &grid);
+        let build_seconds = start.elapsed().as_secs_f64();
+        let deviation = deviation(&Law::new(&table, &grid, &energies), &weights, total);
+        SatReportRow {
+            table: kind,
+            mean_squared_error: deviation.squares * map.pixels.len() as f64,
+            missed_share: deviation.missed as f64 / lit.max(1) as f64,
+            missed_energy_share: deviation.missed_energy,
+            falling_share: deviation.falling as f64 / map.pixels.len() as f64,
+            misreported_share: deviation.misreported / 2.0,
+            build_seconds,
+            sample_nanoseconds: time_samples(&table, &grid, &energies, timed_samples),
+            table_bytes: table.memory_bytes() as u64,
+        }
+    });
+    Ok(SatReport {
+        width: map.width,
+        height: map.height,
+        lookup,
+        lit_share: lit as f64 / map.pixels.len() as f64,
+        rows: rows.to_vec(),
+    })
+}
+
+/// Sums over all texels.
+#[derive(Default)]
+struct Deviation {
+    squares: f64,
+    missed: u64,
+    missed_energy: f64,
+    falling: u64,
+    misreported: f64,
+}
+
+fn deviation(law: &Law<'_>, weights: &Weights<'_>, total: f64) -> Deviation {
+    let mut sum = Deviation::default();
+    let mut y = 0;
+    weights.for_each_row(|row| {
+        let (sampled, reported) = (law.sampled(y), law.reported(y));
+        for ((weight, sampled), reported) in row.iter().zip(sampled).zip(reported) {
+            let truth = if total > 0.0 { weight / total } else { 0.0 };
+            sum.squares += (sampled - truth).powi(2);
+            if *weight > 0.0 && sampled <= 0.0 {
+                sum.missed += 1;
+                sum.missed_energy += truth;
+            }
+            sum.falling += u64::from(reported < 0.0);
+            sum.misreported += (sampled - reported.max(0.0)).abs();
+        }
+        y += 1;
+    });
+    sum
+}
+
+/// How a table samples the whole map, row by row.
+enum Law<'a> {
+    TileLocal { table: &'a TileLocal, grid: &'a TileGrid, tile_probabilities: Vec<f64> },
+    SummedArea { table: &'a dyn RectangleTable, whole: TileTexels, row_probabilities: Vec<f64> },
+}
+
+impl<'a> Law<'a> {
+    fn new(table: &'a Table, grid: &'a TileGrid, energies: &[f64]) -> Self {
+        match table {
+            Table::TileLocal(table) => {
+                let total: f64 = energies.iter().sum();
+                let share = |energy: &f64| if total > 0.0 { energy / total } else { 0.0 };
+                let tile_probabilities = energies.iter().map(share).collect();
+                Self::TileLocal { table, grid, tile_probabilities }
+            }
+            Table::SummedArea(table) => {
+                let whole = grid.whole();
+                let row_probabilities = table.row_law(&whole);
+                Self::SummedArea { table: &**table, whole, row_probabilities }
+            }
+        }
+    }
+
+    /// Probabilities with which the texels of row `y` are sampled.
+    fn sampled(&self, y: u32) -> Vec<f64> {
+        match self {
+            // Exact sums: each entry is met as often as reported.
+            Self::TileLocal { .. } => self.reported(y),
+            Self::SummedArea { table, whole, row_probabilities } => {
+                let columns = table.column_law(whole, y);
+                columns.iter().map(|column| column * row_probabilities[y as usize]).collect()
+            }
+        }
+    }
+
+    /// Probabilities that the table reports for the texels of row `y`; negative where sums fall.
+    fn reported(&self, y: u32) -> Vec<f64> {
+        match self {
+            Self::TileLocal { table, grid, tile_probabilities } => (grid.whole().x)
+                .map(|x| {
+                    let tile = grid.tile_of_texel(x, y);
+                    tile_probabilities[tile as usize] * table.sample_probability(grid, tile, x, y)
+                })
+                .collect(),
+            Self::SummedArea { table, whole, .. } => {
+                let total = table.mass(&whole.x, &whole.y);
+                let share = |mass: f64| if total > 0.0 { mass / total } else { 0.0 };
+                (whole.x.clone()).map(|x| share(table.mass(&(x..x + 1), &(y..y + 1)))).collect()
+            }
+        }
+    }
+}
+
+/// Mean time of [`Table::sample`], at the points of the R2 sequence (Roberts 2018), in tiles drawn
+/// by energy; 0 if there is nothing to sample.
+fn time_samples(table: &Table, grid: &TileGrid, energies: &[f64], samples: u32) -> f64 {
+    const TILES: u32 = 4096;
+    let total: f64 = energies.iter().sum();
+    let mut before = 0.0;
+    let mut tiles = Vec::new();
+    for (tile, energy) in (0_u32..).zip(energies) {
+        let next = before + energy / total * f64::from(TILES);
+        tiles.extend((before.ceil() as u32..next.ceil() as u32).map(|_| tile));
+        before = next;
+    }
+    if tiles.is_empty() || samples == 0 {
+        return 0.0;
+    }
+    let (step, mut u) = (DVec2::new(0.754_877_666_246_693, 0.569_840_290_998_053), DVec2::ZERO);
+    let start = Instant::now();
+    for sample in 0..samples {
+        u = (u + step).fract();
+        // A stride without a common factor with the power of two visits the tiles out of order.
+        let tile = tiles[(sample as usize * 1597) % tiles.len()];
+        black_box(table.sample(grid, tile, u));
+    }
+    start.elapsed().as_secs_f64() * 1e9 / f64::from(samples)
+}
+
+impl fmt::Display for SatReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{} x {}, {} look-up, {:.1} % of the texels lit",
+            self.width,
+            self.height,
+            self.lookup,
+            100.0 * self.lit_share
+        )?;
+        writeln!(
+            f,
+            "{:<10} {:>9} {:>9} {:>13} {:>9} {:>13} {:>9} {:>9} {:>9}",
+            "table",
+            "MSE",
+            "missed",
+            "missed energy",
+            "falling",
+            "misreported",
+            "build s",
+            "ns/sample",
+            "MiB"
+        )?;
+        for row in &self.rows {
+            writeln!(
+                f,
+                "{:<10} {:>9.1e} {:>7.2} % {:>13.1e} {:>7.2} % {:>13.1e} {:>9.3} {:>9.0} {:>9.1}",
+                row.table,
+                row.mean_squared_error,
+                100.0 * row.missed_share,
+                row.missed_energy_share,
+                100.0 * row.falling_share,
+                row.misreported_share,
+                row.build_seconds,
+                row.sample_nanoseconds,
+                row.table_bytes as f64 / f64::from(1 << 20)
+            )?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,293 @@
+//! Summed-area tables over the whole map: the talk's u32 form and the f32 and f64 ones it is
+//! measured against. Any rectangle of texels can be sampled by two binary searches.
+//!
+//! They are kept for comparison. The u32 form is an f64 table rounded corner by corner, as in the
+//! talk (Atanasov et al., SIGGRAPH 2018 Talks): the error of every corner is the same half unit,
+//! but a texel is the difference of four corners, so a dim texel can get no mass (it is then never
+//! sampled) or a negative one. The searched sums then fall here and there, and the choice follows
+//! the reported probability only nearly. Negative masses count as zero; nothing panics or loops.
+
+use std::ops::Range;
+
+use glam::DVec2;
+
+use super::table::TexelSample;
+use super::tiles::TileTexels;
+use super::weights::Weights;
+
+/// A corner's storage type; all three convert to f64 exactly.
+pub(crate) trait Corner: Copy + Default + Into<f64> + std::fmt::Debug + Send + Sync {}
+impl Corner for u32 {}
+impl Corner for f32 {}
+impl Corner for f64 {}
+
+/// Sums of all texels left of and above each texel corner, `(width + 1) * (height + 1)` of them.
+#[derive(Debug, Clone)]
+pub(crate) struct SummedArea<T> {
+    stride: usize,
+    corners: Vec<T>,
+    /// Importance x steradian of a unit of mass.
+    unit: f64,
+}
+
+impl SummedArea<f64> {
+    /// Sums in f64.
+    pub(crate) fn build(weights: &Weights<'_>) -> Self {
+        let mut table = Self::zero(weights, 1.0);
+        let mut rows = table.corners.chunks_exact_mut(table.stride).skip(1);
+        for_each_corner_row(weights, |corners| {
+            if let Some(row) = rows.next() {
+                row.copy_from_slice(corners);
+            }
+        });
+        table
+    }
+}
+
+impl SummedArea<u32> {
+    /// Sums in f64, then maps `[0, total]` to the integers `[0, 2^32 - 1]`: the talk's table.
+    pub(crate) fn build(weights: &Weights<'_>) -> Self {
+        let total = total(weights);
+        let mut table = Self::zero(weights, total / f64::from(u32::MAX));
+        let mut rows = table.corners.chunks_exact_mut(table.stride).skip(1);
+        for_each_corner_row(weights, |corners| {
+            if let Some(row) = rows.next() {
+                for (rounded, corner) in row.iter_mut().zip(corners) {
+                    // 0 / 0 of a black map converts to 0.
+                    *rounded = (corner / total * f64::from(u32::MAX)).round() as u32;
+                }
+            }
+        });
+        table
+    }
+}
+
+impl SummedArea<f32> {
+    /// Sums in f32 by the usual recurrence `w + left + above - diagonal`, of weights scaled to a
+    /// mean of 1 so that nothing overflows.
+    pub(crate) fn build(weights: &Weights<'_>) -> Self {
+        let (width, height) = weights.size();
+        let total = total(weights);
+        let mean = total / (f64::from(width) * f64::from(height));
+        let mut table = Self::zero(weights, if total > 0.0 { mean } else { 1.0 });
+        let (stride, unit) = (table.stride, table.unit);
+        let mut first = stride;
+        weights.for_each_row(|row| {
+            for (x, weight) in row.iter().enumerate() {
+                let here = first + x + 1;
+                table.corners[here] =
+                    (weight / unit) as f32 + table.corners[here - 1] + table.corners[here - stride]
+                        - table.corners[here - stride - 1];
+            }
+            first += stride;
+        });
+        table
+    }
+}
+
+impl<T: Corner> SummedArea<T> {
+    fn zero(weights: &Weights<'_>, unit: f64) -> Self {
+        let (width, height) = weights.size();
+        let stride = width as usize + 1;
+        Self { stride, corners: vec![T::default(); stride * (height as usize + 1)], unit }
+    }
+}
+
+/// A table from which any rectangle of texels can be sampled.
+pub(crate) trait RectangleTable: std::fmt::Debug + Send + Sync {
+    /// Energy of a rectangle, importance x steradian, never negative.
+    fn energy(&self, texels: &TileTexels) -> f64;
+
+    /// Chooses a texel of the rectangle: a row by `u.y`, then a column by `u.x`, both in `[0,1)`.
+    /// `None` if the table has no mass where the search ends.
+    fn sample(&self, texels: &TileTexels, u: DVec2) -> Option<TexelSample>;
+
+    /// Probability of [`Self::sample`] to choose this texel of the rectangle, exact as far as the
+    /// table's sums never fall.
+    fn sample_probability(&self, texels: &TileTexels, x: u32, y: u32) -> f64;
+
+    /// With what probability [`Self::sample`] really ends in each row of the rectangle.
+    fn row_law(&self, texels: &TileTexels) -> Vec<f64>;
+
+    /// With what probability [`Self::sample`], once in row `y`, really ends in each column.
+    fn column_law(&self, texels: &TileTexels, y: u32) -> Vec<f64>;
+
+    /// Mass of a rectangle, as the table has it: may be negative through rounding.
+    fn mass(&self, x: &Range<u32>, y: &Range<u32>) -> f64;
+
+    /// Bytes of the table.
+    fn memory_bytes(&self) -> usize;
+}
+
+impl<T: Corner> RectangleTable for SummedArea<T> {
+    fn energy(&self, texels: &TileTexels) -> f64 {
+        (self.mass(&texels.x, &texels.y) * self.unit).max(0.0)
+    }
+
+    fn sample(&self, texels: &TileTexels, u: DVec2) -> Option<TexelSample> {
+        let row = search(&texels.y, u.y, |end| self.mass(&texels.x, &(texels.y.start..end)))?;
+        let in_row = row.index..row.index + 1;
+        let column = search(&texels.x, u.x, |end| self.mass(&(texels.x.start..end), &in_row))?;
+        let probability = self.sample_probability(texels, column.index, row.index);
+        (probability > 0.0).then_some(TexelSample {
+            x: column.index,
+            y: row.index,
+            within: DVec2::new(column.fraction, row.fraction),
+            probability,
+        })
+    }
+
+    fn sample_probability(&self, texels: &TileTexels, x: u32, y: u32) -> f64 {
+        let total = self.mass(&texels.x, &texels.y);
+        let mass = self.mass(&(x..x + 1), &(y..y + 1));
+        if total > 0.0 && mass > 0.0 { mass / total } else { 0.0 }
+    }
+
+    fn row_law(&self, texels: &TileTexels) -> Vec<f64> {
+        let sum = |y| self.mass(&texels.x, &(texels.y.start..y + 1));
+        search_law(&texels.y.clone().map(sum).collect::<Vec<_>>())
+    }
+
+    fn column_law(&self, texels: &TileTexels, y: u32) -> Vec<f64> {
+        let sum = |x| self.mass(&(texels.x.start..x + 1), &(y..y + 1));
+        search_law(&texels.x.clone().map(sum).collect::<Vec<_>>())
+    }
+
+    fn mass(&self, x: &Range<u32>, y: &Range<u32>) -> f64 {
+        let at =
+            |x: u32, y: u32| -> f64 { self.corners[y as usize * self.stride + x as usize].into() };
+        (at(x.end, y.end) - at(x.start, y.end)) - (at(x.end, y.start) - at(x.start, y.start))
+    }
+
+    fn memory_bytes(&self) -> usize {
+        self.corners.len() * size_of::<T>()
+    }
+}
+
+struct Choice {
+    index: u32,
+    /// How far into the entry, in `[0,1]`.
+    fraction: f64,
+}
+
+/// Binary search for the entry of `range` where `sum_to(end)`, the sum of the entries before
+/// `end`, passes `u` of the total. `None` if that entry has no mass.
+fn search(range: &Range<u32>, u: f64, sum_to: impl Fn(u32) -> f64) -> Option<Choice> {
+    let target = u * sum_to(range.end);
+    let (mut first, mut last) = (range.start, range.end - 1);
+    while first < last {
+        let middle = first + (last - first) / 2;
+        if sum_to(middle + 1) > target {
+            last = middle;
+        } else {
+            first = middle + 1;
+        }
+    }
+    let before = sum_to(first);
+    let mass = sum_to(first + 1) - before;
+    let fraction = ((target - before) / mass).clamp(0.0, 1.0);
+    (mass > 0.0).then_some(Choice { index: first, fraction })
+}
+
+/// With what probability [`search`] ends at each entry of these inclusive sums. Each comparison
+/// cuts the interval of `u` that leads on, so this is exact even where the sums fall.
+fn search_law(sums: &[f64]) -> Vec<f64> {
+    fn descend(sums: &[f64], first: usize, last: usize, interval: [f64; 2], law: &mut [f64]) {
+        let [low, high] = interval;
+        if high <= low {
+            return;
+        }
+        if first == last {
+            let before = if first == 0 { 0.0 } else { sums[first - 1] };
+            if sums[first] > before {
+                law[first] = high - low;
+            }
+            return;
+        }
+        let middle = first + (last - first) / 2;
+        descend(sums, first, middle, [low, high.min(sums[middle])], law);
+        descend(sums, middle + 1, last, [low.max(sums[middle]), high], law);
+    }
+    let mut law = vec![0.0; sums.len()];
+    let total = sums[sums.len() - 1];
+    descend(sums, 0, sums.len() - 1, [0.0, total], &mut law);
+    if total > 0.0 {
+        law.iter_mut().for_each(|probability| *probability /= total);
+    }
+    law
+}
+
+/// Calls `f` with the f64 sums at the lower corners of each row of texels, top to bottom.
+fn for_each_corner_row(weights: &Weights<'_>, mut f: impl FnMut(&[f64])) {
+    let mut corners = vec![0.0; weights.size().0 as usize + 1];
+    weights.for_each_row(|row| {
+        let mut along_row = 0.0;
+        for (corner, weight) in corners[1..].iter_mut().zip(row) {
+            along_row += weight;
+            *corner += along_row;
+        }
+        f(&corners);
+    });
+}
+
+/// The last corner of the f64 table.
+fn total(weights: &Weights<'_>) -> f64 {
+    let mut total = 0.0;
+    for_each_corner_row(weights, |corners| total = corners[corners.len() - 1]);
+    total
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::Lookup;
+    use crate::image::Image;
+
+    #[test]
+    fn the_law_of_a_search_is_that_of_its_outcomes_even_where_sums_fall() {
+        for sums in [vec![1.0, 3.0, 6.0, 10.0, 12.0], vec![3.0, 2.0, 5.0, 4.0, 4.0, 9.0, 8.0]] {
+            let law = search_law(&sums);
+            let sum_to = |end: u32| if end == 0 { 0.0 } else { sums[end as usize - 1] };
+            let mut counts = vec![0.0; sums.len()];
+            const STEPS: u32 = 100_000;
+            for step in 0..STEPS {
+                let u = (f64::from(step) + 0.5) / f64::from(STEPS);
+                if let Some(choice) = search(&(0..sums.len() as u32), u, sum_to) {
+                    counts[choice.index as usize] += 1.0 / f64::from(STEPS);
+                }
+            }
+            for (count, probability) in counts.iter().zip(&law) {
+                assert!((count - probability).abs() < 1e-4, "{counts:?} {law:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_law_of_a_table_is_that_of_its_samples_where_texels_are_about_one_unit() {
+        let map = Image::from_fn(64, 32, |x, y| {
+            let sky = 0.1 + ((x * 7919 + y * 104_729) % 97) as f32 / 97.0;
+            if (x, y) == (20, 10) { [6e9; 3] } else { [sky; 3] }
+        });
+        let table = SummedArea::<u32>::build(&Weights::new(&map, Lookup::Nearest));
+        let sky = TileTexels { x: 10..40, y: 11..20 };
+        let mut expected = Vec::new();
+        for (row, y) in table.row_law(&sky).into_iter().zip(sky.y.clone()) {
+            expected.extend(table.column_law(&sky, y).into_iter().map(|column| row * column));
+        }
+        let falls = sky.y.clone().flat_map(|y| sky.x.clone().map(move |x| (x, y)));
+        assert!(falls.filter(|(x, y)| table.mass(&(*x..x + 1), &(*y..y + 1)) < 0.0).count() > 5);
+
+        let mut observed = vec![0.0; expected.len()];
+        const SIDE: u32 = 1000;
+        for i in 0..SIDE * SIDE {
+            let u = DVec2::new(f64::from(i % SIDE) + 0.5, f64::from(i / SIDE) + 0.5);
+            if let Some(texel) = table.sample(&sky, u / f64::from(SIDE)) {
+                let index = (texel.y - sky.y.start) * sky.width() + texel.x - sky.x.start;
+                observed[index as usize] += 1.0 / f64::from(SIDE * SIDE);
+            }
+        }
+        for (observed, expected) in observed.iter().zip(&expected) {
+            assert!((observed - expected).abs() < 5e-4, "{observed} {expected}");
+        }
+    }
+}

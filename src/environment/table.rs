@@ -1,0 +1,75 @@
+//! The choice of importance table behind one face.
+
+use std::sync::Arc;
+
+use glam::DVec2;
+
+use super::TableKind;
+use super::summed_area::{RectangleTable, SummedArea};
+use super::tile_local::TileLocal;
+use super::tiles::TileGrid;
+use super::weights::Weights;
+
+/// A texel chosen by a table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct TexelSample {
+    /// Texel column.
+    pub(crate) x: u32,
+    /// Texel row.
+    pub(crate) y: u32,
+    /// Place in the texel that the random numbers have left, uniform in `[0,1]`^2.
+    pub(crate) within: DVec2,
+    /// Probability of the texel given the tile.
+    pub(crate) probability: f64,
+}
+
+/// An importance table of any kind.
+#[derive(Debug, Clone)]
+pub(crate) enum Table {
+    TileLocal(TileLocal),
+    SummedArea(Arc<dyn RectangleTable>),
+}
+
+impl Table {
+    /// Builds a table and, from that table's own sums, the tiles' energies.
+    pub(crate) fn build(
+        kind: TableKind,
+        weights: &Weights<'_>,
+        grid: &TileGrid,
+    ) -> (Self, Vec<f64>) {
+        let table: Arc<dyn RectangleTable> = match kind {
+            TableKind::TileLocal => {
+                let (table, energies) = TileLocal::build(weights, grid);
+                return (Self::TileLocal(table), energies);
+            }
+            TableKind::U32 => Arc::new(SummedArea::<u32>::build(weights)),
+            TableKind::F32 => Arc::new(SummedArea::<f32>::build(weights)),
+            TableKind::F64 => Arc::new(SummedArea::<f64>::build(weights)),
+        };
+        let energies = (0..grid.count()).map(|tile| table.energy(&grid.texels(tile))).collect();
+        (Self::SummedArea(table), energies)
+    }
+
+    /// Chooses a texel of a tile with `u` in `[0,1)`^2; `None` where the table has no mass.
+    pub(crate) fn sample(&self, grid: &TileGrid, tile: u32, u: DVec2) -> Option<TexelSample> {
+        match self {
+            Self::TileLocal(table) => table.sample(grid, tile, u),
+            Self::SummedArea(table) => table.sample(&grid.texels(tile), u),
+        }
+    }
+
+    /// Probability of [`Self::sample`] to choose texel `(x, y)` of the tile it lies in.
+    pub(crate) fn sample_probability(&self, grid: &TileGrid, tile: u32, x: u32, y: u32) -> f64 {
+        match self {
+            Self::TileLocal(table) => table.sample_probability(grid, tile, x, y),
+            Self::SummedArea(table) => table.sample_probability(&grid.texels(tile), x, y),
+        }
+    }
+
+    pub(crate) fn memory_bytes(&self) -> usize {
+        match self {
+            Self::TileLocal(table) => table.memory_bytes(),
+            Self::SummedArea(table) => table.memory_bytes(),
+        }
+    }
+}

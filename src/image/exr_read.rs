@@ -1,0 +1,371 @@
+//! OpenEXR pictures, decoded block by block, in parallel, straight into the final pixels.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use exr::block::UncompressedBlock;
+use exr::block::chunk::Chunk;
+use exr::block::reader::ChunksReader;
+use exr::math::Vec2;
+use exr::meta::MetaData;
+use exr::meta::attribute::{AttributeValue, IntegerBounds, SampleType};
+use exr::meta::header::Header;
+use exr::prelude::f16;
+use glam::{Mat3, Vec3};
+use rayon::prelude::*;
+
+use super::exr_channels::{Channels, select};
+use super::file::read_cause;
+use super::guard::catch_panic;
+use super::primaries::rec709_conversion;
+use super::{Decoded, Image, check_size};
+use crate::error::{Error, Notices, Result};
+
+/// Linear Rec.709 pixels of an OpenEXR file, not repaired in any way.
+pub(crate) struct Exr {
+    pub(crate) image: Image,
+    pub(crate) notices: Notices,
+    /// Whether the file says that it holds the six faces of a cube.
+    pub(crate) is_cube_map: bool,
+}
+
+/// Reads the picture of an OpenEXR file: see [`select`] for which part and channels that is. Of a
+/// tiled file with levels the largest is read. Pixels of the display window outside the data window
+/// are black.
+///
+/// # Errors
+/// One sentence: missing, damaged, too large, or of a kind that is not read (deep, subsampled, an
+/// unknown compression).
+pub(crate) fn read_exr(path: &Path) -> Result<Exr> {
+    let file = File::open(path).map_err(|e| Error::at(path, read_cause(&e)))?;
+    let file_bytes = file.metadata().map_err(|e| Error::at(path, read_cause(&e)))?.len();
+    catch_panic(|| decode(file, file_bytes))
+        .unwrap_or_else(|| Err("is damaged: its decoder failed".into()))
+        .map_err(|cause| Error::at(path, cause))
+}
+
+/// The text attributes of the first part of an OpenEXR file, sorted by name: what
+/// [`write_exr`](super::write_exr) was given as metadata.
+///
+/// # Errors
+/// If the file is missing or its header is damaged.
+pub fn read_exr_metadata(path: &Path) -> Result<Vec<(String, String)>> {
+    let file = File::open(path).map_err(|e| Error::at(path, read_cause(&e)))?;
+    let meta = catch_panic(|| MetaData::read_from_buffered(BufReader::new(file), false))
+        .ok_or_else(|| Error::at(path, "is damaged: its decoder failed"))?
+        .map_err(|e| Error::at(path, decode_cause(&e)))?;
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let mut found: Vec<(String, String)> = meta.headers[0]
+        .own_attributes
+        .other
+        .iter()
+        .filter_map(|(name, value)| match value {
+            AttributeValue::Text(value) => Some((text(name.bytes()), text(value.bytes()))),
+            _ => None,
+        })
+        .collect();
+    found.sort();
+    Ok(found)
+}
+
+fn decode(file: File, file_bytes: u64) -> Decoded<Exr> {
+    let reader = exr::block::read(BufReader::with_capacity(1 << 20, file), false)
+        .map_err(|e| decode_cause(&e))?;
+    check_plausible(reader.headers(), file_bytes)?;
+    let mut notices = Notices::default();
+    let selection = select(reader.headers(), &mut notices)?;
+    let header = reader.headers()[selection.part].clone();
+    let placement = Placement::of(&header, &mut notices)?;
+    let block_decoder = BlockDecoder {
+        channels: selection.channels,
+        layout: ChannelLayout::of(&header),
+        to_rec709: rec709_conversion(&header, selection.channels, &mut notices),
+    };
+    let mut image = Image::filled(placement.width, placement.height, [0.0; 3]);
+    let mut chunks = reader
+        .filter_chunks(false, |_, tile, block| {
+            block.layer == selection.part && tile.is_largest_resolution_level()
+        })
+        .map_err(|e| decode_cause(&e))?;
+    let meta = chunks.meta_data().clone();
+    let batch_size = batch_size(&header);
+    loop {
+        let batch: Vec<Chunk> = chunks
+            .by_ref()
+            .take(batch_size)
+            .collect::<exr::error::Result<_>>()
+            .map_err(|e| decode_cause(&e))?;
+        if batch.is_empty() {
+            break;
+        }
+        let blocks: Vec<Block> = batch
+            .into_par_iter()
+            .map(|chunk| block_decoder.decode(chunk, &meta))
+            .collect::<Decoded<_>>()?;
+        blocks.iter().for_each(|block| placement.copy(block, &mut image));
+    }
+    Ok(Exr { image, notices, is_cube_map: is_cube_map(&header) })
+}
+
+/// Largest tile, or group of rows, that is decoded as one.
+const MAX_BLOCK_BYTES: usize = 1 << 30;
+
+/// Refuses files whose header claims more than the file can hold, before anything is allocated.
+fn check_plausible(headers: &[Header], file_bytes: u64) -> Decoded<()> {
+    for header in headers {
+        let Vec2(width, height) = header.layer_size;
+        check_size(width as u64, height as u64)?;
+        // The crate allocates a block of this size as soon as a chunk claims to be as large.
+        let Vec2(block_width, block_height) = header.max_block_pixel_size();
+        let block_bytes = block_width
+            .saturating_mul(block_height)
+            .saturating_mul(header.channels.bytes_per_pixel);
+        if block_bytes > MAX_BLOCK_BYTES {
+            return Err("is damaged: its blocks of pixels are implausibly large".into());
+        }
+    }
+    // Each chunk has an eight-byte offset in a table and an eight-byte header of its own.
+    let chunks: u64 = headers.iter().map(|header| header.chunk_count as u64).sum();
+    // The best ratio of any codec on a picture that is not quite black is far below this.
+    const PIXELS_PER_BYTE: u64 = 10_000;
+    let pixels: u64 = headers.iter().map(pixels_to_hold).fold(0, u64::saturating_add);
+    if chunks.saturating_mul(16) > file_bytes
+        || pixels > (1 << 20) + file_bytes.saturating_mul(PIXELS_PER_BYTE)
+    {
+        return Err(format!(
+            "is cut short or damaged: {file_bytes} bytes cannot hold the {pixels} pixels it claims"
+        ));
+    }
+    Ok(())
+}
+
+/// Pixels of a part's data window or of its display window, whichever has more.
+fn pixels_to_hold(header: &Header) -> u64 {
+    let display = header.shared_attributes.display_window.size;
+    let display_pixels = (display.0 as u64).saturating_mul(display.1 as u64);
+    display_pixels.max(header.layer_size.area() as u64)
+}
+
+/// Chunks to hold in memory at once: some 64 MB decoded, more where that would leave threads idle.
+fn batch_size(header: &Header) -> usize {
+    let Vec2(width, height) = header.max_block_pixel_size();
+    let block_bytes = (width * height * header.channels.bytes_per_pixel).max(1);
+    let batch_bytes = (block_bytes * rayon::current_num_threads()).clamp(64 << 20, 256 << 20);
+    (batch_bytes / block_bytes).clamp(1, 1024)
+}
+
+/// Where the data window lies in the picture that is returned.
+struct Placement {
+    width: u32,
+    height: u32,
+    /// Position of the first data pixel, possibly outside the picture.
+    x: i64,
+    y: i64,
+}
+
+impl Placement {
+    /// The picture is the display window, or the data window if the two do not meet.
+    fn of(header: &Header, notices: &mut Notices) -> Decoded<Self> {
+        let data = header.data_window();
+        let display = header.shared_attributes.display_window;
+        let offset = |axis: fn(Vec2<i32>) -> i32| {
+            i64::from(axis(data.position)) - i64::from(axis(display.position))
+        };
+        let (x, y) = (offset(|v| v.0), offset(|v| v.1));
+        let meets = |start: i64, data_size: usize, display_size: usize| {
+            start < display_size as i64 && start + data_size as i64 > 0
+        };
+        let inside = meets(x, data.size.0, display.size.0) && meets(y, data.size.1, display.size.1);
+        let IntegerBounds { size, .. } = if inside { display } else { data };
+        if data != display {
+            notices.add(format!(
+                "the data window ({} x {} at {x}, {y}) is not the display window ({} x {}); {}",
+                data.size.0,
+                data.size.1,
+                display.size.0,
+                display.size.1,
+                if inside { "what lies between is black" } else { "it is read alone" }
+            ));
+        }
+        let (width, height) = check_size(size.0 as u64, size.1 as u64)?;
+        let (x, y) = if inside { (x, y) } else { (0, 0) };
+        Ok(Self { width, height, x, y })
+    }
+
+    /// Copies the part of a block that lies in the picture.
+    fn copy(&self, block: &Block, image: &mut Image) {
+        let left = self.x + block.x as i64;
+        let first = (-left).clamp(0, block.width as i64);
+        let end = (i64::from(self.width) - left).clamp(first, block.width as i64);
+        for (row, pixels) in block.pixels.chunks_exact(block.width).enumerate() {
+            let y = self.y + (block.y + row) as i64;
+            if first == end || !(0..i64::from(self.height)).contains(&y) {
+                continue;
+            }
+            let start = (y * i64::from(self.width) + left + first) as usize;
+            let pixels = &pixels[first as usize..end as usize];
+            image.pixels[start..start + pixels.len()].copy_from_slice(pixels);
+        }
+    }
+}
+
+/// Decoded pixels of one chunk, at their place in the data window.
+struct Block {
+    x: usize,
+    y: usize,
+    width: usize,
+    pixels: Vec<[f32; 3]>,
+}
+
+/// Sample type of each channel, and where its samples lie in the rows of a block.
+struct ChannelLayout {
+    /// Type, and bytes per pixel of all channels before.
+    channels: Vec<(SampleType, usize)>,
+    bytes_per_pixel: usize,
+}
+
+impl ChannelLayout {
+    fn of(header: &Header) -> Self {
+        let mut bytes_per_pixel = 0;
+        let channels = header
+            .channels
+            .list
+            .iter()
+            .map(|channel| {
+                let before = bytes_per_pixel;
+                bytes_per_pixel += channel.sample_type.bytes_per_sample();
+                (channel.sample_type, before)
+            })
+            .collect();
+        Self { channels, bytes_per_pixel }
+    }
+
+    /// Hands each sample of one channel in one row (native byte order) to `put`, left to right.
+    fn for_each(&self, channel: usize, width: usize, row: &[u8], mut put: impl FnMut(usize, f32)) {
+        let (sample_type, before) = self.channels[channel];
+        let start = before * width;
+        let bytes = &row[start..start + sample_type.bytes_per_sample() * width];
+        match sample_type {
+            SampleType::F16 => bytes.as_chunks().0.iter().enumerate().for_each(|(i, b)| {
+                put(i, f16::from_ne_bytes(*b).to_f32());
+            }),
+            SampleType::F32 => bytes.as_chunks().0.iter().enumerate().for_each(|(i, b)| {
+                put(i, f32::from_ne_bytes(*b));
+            }),
+            SampleType::U32 => bytes.as_chunks().0.iter().enumerate().for_each(|(i, b)| {
+                put(i, u32::from_ne_bytes(*b) as f32);
+            }),
+        }
+    }
+}
+
+/// Turns compressed chunks into linear Rec.709 pixels.
+struct BlockDecoder {
+    channels: Channels,
+    layout: ChannelLayout,
+    to_rec709: Option<Mat3>,
+}
+
+impl BlockDecoder {
+    fn decode(&self, chunk: Chunk, meta: &MetaData) -> Decoded<Block> {
+        catch_panic(|| {
+            let block = UncompressedBlock::decompress_chunk(chunk, meta, false)
+                .map_err(|e| decode_cause(&e))?;
+            Ok(self.convert(&block))
+        })
+        .unwrap_or_else(|| Err("is damaged: its decoder failed".into()))
+    }
+
+    fn convert(&self, block: &UncompressedBlock) -> Block {
+        let Vec2(width, height) = block.index.pixel_size;
+        let mut pixels = vec![[0.0; 3]; width * height];
+        let rows = block.data.chunks_exact(width * self.layout.bytes_per_pixel);
+        for (row, pixels) in rows.zip(pixels.chunks_exact_mut(width)) {
+            for (i, channel) in self.channels.indices().into_iter().enumerate() {
+                self.layout.for_each(channel, width, row, |x, v| pixels[x][i] = v);
+            }
+        }
+        match self.channels {
+            Channels::Rgb(_) => {}
+            Channels::Grey(_) => pixels.iter_mut().for_each(|p| *p = [p[0]; 3]),
+            Channels::LumaChroma { .. } => pixels.iter_mut().for_each(|p| *p = rgb_from_ycc(*p)),
+        }
+        if let Some(matrix) = self.to_rec709 {
+            pixels.iter_mut().for_each(|p| *p = (matrix * Vec3::from(*p)).to_array());
+        }
+        let Vec2(x, y) = block.index.pixel_position;
+        Block { x, y, width, pixels }
+    }
+}
+
+/// RGB from luminance and the colour differences `(R-Y)/Y`, `(B-Y)/Y`, with Rec.709 weights (OpenEXR
+/// `ImfRgbaYca`).
+fn rgb_from_ycc([y, ry, by]: [f32; 3]) -> [f32; 3] {
+    let (r, b) = ((ry + 1.0) * y, (by + 1.0) * y);
+    [r, (y - 0.2126 * r - 0.0722 * b) / 0.7152, b]
+}
+
+/// Whether the `envmap` attribute says cube.
+fn is_cube_map(header: &Header) -> bool {
+    use exr::meta::attribute::EnvironmentMap;
+    header.own_attributes.environment_map == Some(EnvironmentMap::Cube)
+}
+
+/// A decoder's error in the words of someone who wanted a picture.
+fn decode_cause(error: &exr::error::Error) -> String {
+    use exr::error::Error as Exr;
+    match error {
+        Exr::Io(error) => read_cause(error),
+        Exr::Invalid(what)
+            if what.contains("missing magic") || what.contains("file identifier") =>
+        {
+            "is not an OpenEXR file".into()
+        }
+        // What the crate makes of an unexpected end of the file.
+        Exr::Invalid(what) if what.contains("missing bytes") => "is cut short or damaged".into(),
+        Exr::Invalid(what) => format!("is a damaged OpenEXR file ({what})"),
+        Exr::NotSupported(what) if what.contains("subsampling") => {
+            "stores colour at a lower resolution (Y/RY/BY), which lightgrid does not read; save it \
+             as RGB"
+                .into()
+        }
+        Exr::NotSupported(what) if what.contains("deep") => {
+            "holds deep data, which lightgrid does not read".into()
+        }
+        Exr::NotSupported(what) => {
+            format!("uses a feature of OpenEXR that lightgrid does not read ({what})")
+        }
+        Exr::Aborted => "was not read to its end".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colour_differences_give_back_the_colour() {
+        let rgb = [0.5f32, 0.25, 2.0];
+        let y = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+        let back = rgb_from_ycc([y, (rgb[0] - y) / y, (rgb[2] - y) / y]);
+        assert!(back.iter().zip(&rgb).all(|(a, b)| (a - b).abs() < 1e-6), "{back:?}");
+        assert_eq!(rgb_from_ycc([0.0, 3.0, 4.0]), [0.0; 3]);
+    }
+
+    /// Blocks left of, right of and across each edge of a picture with an offset data window.
+    #[test]
+    fn blocks_are_clipped_to_the_picture() {
+        let placement = Placement { width: 4, height: 3, x: -2, y: -1 };
+        let mut image = Image::filled(4, 3, [0.0; 3]);
+        for y in 0..6 {
+            for x in 0..4 {
+                let value = (10 * y + x) as f32;
+                let block = Block { x: 3 * x, y, width: 3, pixels: vec![[value; 3]; 3] };
+                placement.copy(&block, &mut image);
+            }
+        }
+        let reds: Vec<f32> = image.pixels.iter().map(|p| p[0]).collect();
+        assert_eq!(reds, [10., 11., 11., 11., 20., 21., 21., 21., 30., 31., 31., 31.]);
+    }
+}

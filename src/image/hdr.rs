@@ -1,0 +1,262 @@
+//! Radiance `.hdr` pictures (RGBE and XYZE), tolerant of what real programs write.
+//!
+//! Format: Greg Ward, "Real Pixels", Graphics Gems II; Radiance's `color.c` and `resolu.c`.
+
+use super::{Decoded, Image, check_size};
+use crate::color::REC709_FROM_XYZ;
+use glam::Vec3;
+
+/// Decodes a whole `.hdr` file. Header lines `EXPOSURE` and `COLORCORR` are undone, so that pixels
+/// are radiance again; `XYZE` is converted to Rec.709.
+///
+/// # Errors
+/// The cause, without the file's name: no Radiance header, an unknown pixel format or resolution
+/// line, an implausible size, damaged or missing rows.
+pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<Image> {
+    let mut cursor = Cursor { rest: bytes };
+    let header = Header::parse(&mut cursor)?;
+    let (major, minor) = (header.major, header.minor);
+    // A row takes four bytes at the very least.
+    if (cursor.rest.len() as u64) < 4 * u64::from(major.count) {
+        return Err(format!(
+            "is cut short: {} bytes cannot hold {} x {} pixels",
+            cursor.rest.len(),
+            header.width(),
+            header.height()
+        ));
+    }
+    let mut image = Image::filled(header.width(), header.height(), [0.0; 3]);
+    let pixels = PixelDecoder::new(&header);
+    let mut line = vec![[0u8; 4]; minor.count as usize];
+    for row in 0..major.count {
+        read_line(&mut cursor, &mut line)
+            .map_err(|cause| format!("{cause}: only {row} of {} rows can be read", major.count))?;
+        let start = major.position(row) * if major.is_y { header.width() as usize } else { 1 };
+        let stride = if major.is_y { 1 } else { header.width() as usize };
+        for (i, &rgbe) in line.iter().enumerate() {
+            image.pixels[start + minor.position(i as u32) * stride] = pixels.decode(rgbe);
+        }
+    }
+    Ok(image)
+}
+
+/// One of the two axes of the resolution line.
+#[derive(Debug, Clone, Copy)]
+struct Axis {
+    is_y: bool,
+    count: u32,
+    /// Whether pixels come in the opposite order of ours (left to right, top to bottom).
+    reversed: bool,
+}
+
+impl Axis {
+    fn parse(sign_and_name: &str, count: &str) -> Option<(bool, bool, u64)> {
+        let (is_y, reversed) = match sign_and_name {
+            "-Y" => (true, false),
+            "+Y" => (true, true),
+            "+X" => (false, false),
+            "-X" => (false, true),
+            _ => return None,
+        };
+        Some((is_y, reversed, count.parse().ok()?))
+    }
+
+    fn position(self, index: u32) -> usize {
+        (if self.reversed { self.count - 1 - index } else { index }) as usize
+    }
+}
+
+/// What the text before the pixels says.
+struct Header {
+    is_xyz: bool,
+    /// What pixels are to be divided by.
+    exposure: [f64; 3],
+    /// The axis of whole lines, then the axis along a line.
+    major: Axis,
+    minor: Axis,
+}
+
+impl Header {
+    fn parse(cursor: &mut Cursor<'_>) -> Decoded<Self> {
+        if !cursor.line().is_some_and(|line| line.starts_with("#?")) {
+            return Err("is not a Radiance picture: it does not begin with #?".into());
+        }
+        let mut is_xyz = false;
+        let mut exposure = [1.0f64; 3];
+        loop {
+            let line = cursor.line().ok_or("ends within its header")?;
+            if line.is_empty() {
+                break;
+            }
+            let Some((key, value)) = line.split_once('=').filter(|_| !line.starts_with('#')) else {
+                // A comment, or the command line of the program that made the picture.
+                continue;
+            };
+            match key.trim().to_ascii_uppercase().as_str() {
+                "FORMAT" => match value.trim().to_ascii_lowercase().as_str() {
+                    "32-bit_rle_rgbe" => is_xyz = false,
+                    "32-bit_rle_xyze" => is_xyz = true,
+                    other => return Err(format!("has pixels of the unknown format '{other}'")),
+                },
+                "EXPOSURE" => scale(&mut exposure, &[value; 3]),
+                "COLORCORR" => {
+                    scale(&mut exposure, &value.split_whitespace().collect::<Vec<_>>());
+                }
+                _ => {}
+            }
+        }
+        let line = cursor.line().ok_or("has no resolution line")?;
+        let (major, minor) = parse_resolution(&line)?;
+        Ok(Self { is_xyz, exposure, major, minor })
+    }
+
+    fn width(&self) -> u32 {
+        if self.major.is_y { self.minor.count } else { self.major.count }
+    }
+
+    fn height(&self) -> u32 {
+        if self.major.is_y { self.major.count } else { self.minor.count }
+    }
+}
+
+/// Multiplies the factors by three values given as text; values that make no sense are ignored.
+fn scale(factors: &mut [f64; 3], values: &[&str]) {
+    let parsed: Vec<f64> = values.iter().filter_map(|v| v.trim().parse().ok()).collect();
+    if let [r, g, b] = parsed[..]
+        && parsed.iter().all(|v| v.is_normal() && *v > 0.0)
+    {
+        *factors = [factors[0] * r, factors[1] * g, factors[2] * b];
+    }
+}
+
+/// The axes of a line like `-Y 512 +X 1024`.
+fn parse_resolution(line: &str) -> Decoded<(Axis, Axis)> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let axes = match words[..] {
+        [a, n, b, m] => Axis::parse(a, n).zip(Axis::parse(b, m)),
+        _ => None,
+    };
+    let Some(((major_is_y, major_reversed, n), (minor_is_y, minor_reversed, m))) =
+        axes.filter(|(major, minor)| major.0 != minor.0)
+    else {
+        let start: String = line.chars().take(40).collect();
+        return Err(format!("has no resolution like '-Y 512 +X 1024' but '{start}'"));
+    };
+    let (n, m) = if major_is_y {
+        let (width, height) = check_size(m, n)?;
+        (height, width)
+    } else {
+        check_size(n, m)?
+    };
+    Ok((
+        Axis { is_y: major_is_y, count: n, reversed: major_reversed },
+        Axis { is_y: minor_is_y, count: m, reversed: minor_reversed },
+    ))
+}
+
+/// Four bytes to linear RGB.
+struct PixelDecoder {
+    /// What a mantissa of each channel counts for, by exponent: `2^(e - 136)` without the exposure;
+    /// 0 for exponent 0, which means black.
+    scale: Vec<[f32; 3]>,
+    is_xyz: bool,
+}
+
+impl PixelDecoder {
+    fn new(header: &Header) -> Self {
+        let mut scale: Vec<[f32; 3]> = (0..256)
+            .map(|e| header.exposure.map(|exposure| (2f64.powi(e - 136) / exposure) as f32))
+            .collect();
+        scale[0] = [0.0; 3];
+        Self { scale, is_xyz: header.is_xyz }
+    }
+
+    /// The mantissas are taken as they are, as all but Radiance itself do (it adds one half).
+    fn decode(&self, [r, g, b, e]: [u8; 4]) -> [f32; 3] {
+        let scale = self.scale[e as usize];
+        let rgb = [f32::from(r) * scale[0], f32::from(g) * scale[1], f32::from(b) * scale[2]];
+        if self.is_xyz { (REC709_FROM_XYZ * Vec3::from(rgb)).to_array() } else { rgb }
+    }
+}
+
+/// What is left of the file.
+struct Cursor<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Cursor<'a> {
+    /// The next line without its end (LF or CR LF); `None` at the end of the file or if it is too
+    /// long to be text.
+    fn line(&mut self) -> Option<String> {
+        const LONGEST: usize = 1 << 16;
+        let end = self.rest.iter().take(LONGEST).position(|&b| b == b'\n')?;
+        let line = &self.rest[..end];
+        self.rest = &self.rest[end + 1..];
+        Some(String::from_utf8_lossy(line.strip_suffix(b"\r").unwrap_or(line)).into_owned())
+    }
+
+    fn take(&mut self, count: usize) -> Decoded<&'a [u8]> {
+        let (taken, rest) = self.rest.split_at_checked(count).ok_or("is cut short")?;
+        self.rest = rest;
+        Ok(taken)
+    }
+}
+
+/// Reads one line of pixels in whichever of the three encodings it is.
+fn read_line(cursor: &mut Cursor<'_>, line: &mut [[u8; 4]]) -> Decoded<()> {
+    if let [2, 2, high, low, ..] = *cursor.rest
+        && (8..0x8000).contains(&line.len())
+        && usize::from(high) << 8 | usize::from(low) == line.len()
+    {
+        cursor.take(4)?;
+        (0..4).try_for_each(|channel| read_runs(cursor, line, channel))
+    } else {
+        read_flat_or_old_runs(cursor, line)
+    }
+}
+
+/// One channel of a run-length encoded line: a count above 128 repeats one byte, others copy.
+fn read_runs(cursor: &mut Cursor<'_>, line: &mut [[u8; 4]], channel: usize) -> Decoded<()> {
+    let mut filled = 0;
+    while filled < line.len() {
+        let code = cursor.take(1)?[0];
+        let count = usize::from(if code > 128 { code - 128 } else { code });
+        let pixels = line
+            .get_mut(filled..filled + count)
+            .filter(|_| count > 0)
+            .ok_or("has a damaged row")?;
+        if code > 128 {
+            let value = cursor.take(1)?[0];
+            pixels.iter_mut().for_each(|pixel| pixel[channel] = value);
+        } else {
+            let values = cursor.take(count)?;
+            pixels.iter_mut().zip(values).for_each(|(pixel, &value)| pixel[channel] = value);
+        }
+        filled += count;
+    }
+    Ok(())
+}
+
+/// Plain pixels, where `1 1 1 n` repeats the last one `n` times; runs in a row are the digits of
+/// one count, base 256, lowest first.
+fn read_flat_or_old_runs(cursor: &mut Cursor<'_>, line: &mut [[u8; 4]]) -> Decoded<()> {
+    let mut filled = 0;
+    let mut shift = 0;
+    while filled < line.len() {
+        let pixel: [u8; 4] = cursor.take(4)?.try_into().expect("four bytes were taken");
+        if let [1, 1, 1, digit] = pixel
+            && filled > 0
+        {
+            let count = usize::from(digit) << shift;
+            let previous = line[filled - 1];
+            line.get_mut(filled..filled + count).ok_or("has a damaged row")?.fill(previous);
+            filled += count;
+            shift = (shift + 8).min(24);
+        } else {
+            line[filled] = pixel;
+            filled += 1;
+            shift = 0;
+        }
+    }
+    Ok(())
+}

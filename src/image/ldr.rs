@@ -1,0 +1,119 @@
+//! 8-bit pictures (PNG, JPEG, WebP and whatever else the library is built with).
+
+use std::io::Cursor;
+
+use crate::error::{Error, Result};
+
+/// Widest and highest picture that is decoded.
+const MAX_SIDE: u32 = 32_768;
+
+/// Most bytes one picture may take while it is decoded: 16384 x 16384 RGBA.
+const MAX_BYTES: u64 = 1 << 30;
+
+/// 8-bit RGBA picture as it is stored (usually sRGB-encoded), row 0 at the top.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LdrImage {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width * height` RGBA values, row after row; alpha is 255 where the file has none.
+    pub pixels: Vec<[u8; 4]>,
+}
+
+/// Width and height as the header claims them, without decoding.
+///
+/// # Errors
+/// When the format is not recognised or the header is damaged; the sentence begins with `name`.
+pub fn ldr_size(bytes: &[u8], name: &str) -> Result<(u32, u32)> {
+    reader(bytes, name)?.into_dimensions().map_err(|cause| damaged(name, &cause))
+}
+
+/// Decodes a picture whose format is told by its content; deeper channels are rounded to 8 bits.
+///
+/// # Errors
+/// When the format is not recognised, the data is damaged, or the picture would take more than
+/// 1 GiB or is wider or higher than 32768 pixels; the sentence begins with `name`.
+pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
+    let mut reader = reader(bytes, name)?;
+    let mut limits = image::Limits::default();
+    limits.max_image_width = Some(MAX_SIDE);
+    limits.max_image_height = Some(MAX_SIDE);
+    limits.max_alloc = Some(MAX_BYTES);
+    reader.limits(limits);
+    let rgba = reader.decode().map_err(|cause| damaged(name, &cause))?.into_rgba8();
+    let (width, height) = rgba.dimensions();
+    let pixels = bytemuck::allocation::try_cast_vec(rgba.into_raw())
+        .unwrap_or_else(|(_, raw)| raw.as_chunks::<4>().0.to_vec());
+    Ok(LdrImage { width, height, pixels })
+}
+
+fn reader<'a>(bytes: &'a [u8], name: &str) -> Result<image::ImageReader<Cursor<&'a [u8]>>> {
+    let reader = image::ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|cause| Error::at(name, cause))?;
+    if reader.format().is_none() {
+        return Err(Error::at(name, "not a picture in a known format (PNG, JPEG, WebP)"));
+    }
+    Ok(reader)
+}
+
+/// The library's words on one line.
+fn damaged(name: &str, cause: &image::ImageError) -> Error {
+    Error::at(name, cause.to_string().replace('\n', " "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn png(image: impl Into<image::DynamicImage>) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        image.into().write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn sixteen_bit_grey_becomes_eight_bit_rgba() {
+        let bytes = png(image::ImageBuffer::<image::Luma<u16>, _>::from_raw(
+            2,
+            1,
+            vec![0xffff_u16, 0x8080],
+        )
+        .unwrap());
+        let decoded = decode_ldr(&bytes, "grey").unwrap();
+        assert_eq!((decoded.width, decoded.height), (2, 1));
+        assert_eq!(decoded.pixels, [[255, 255, 255, 255], [128, 128, 128, 255]]);
+    }
+
+    #[test]
+    fn a_header_that_claims_too_much_is_refused_before_anything_is_allocated() {
+        let mut bytes = png(image::RgbaImage::new(1, 1));
+        // Width and height of the PNG header, then its checksum, which is not looked at first.
+        bytes[16..24].copy_from_slice(&[0, 0, 0xff, 0xff, 0, 0, 0xff, 0xff]);
+        let error = decode_ldr(&bytes, "bomb.png").unwrap_err().to_string();
+        assert!(error.starts_with("bomb.png: "), "{error}");
+    }
+
+    #[test]
+    fn the_three_formats_of_gltf_are_read() {
+        let red = image::RgbImage::from_pixel(8, 4, image::Rgb([255, 0, 0]));
+        for format in [image::ImageFormat::Png, image::ImageFormat::Jpeg, image::ImageFormat::WebP]
+        {
+            let mut bytes = Cursor::new(Vec::new());
+            red.write_to(&mut bytes, format).unwrap();
+            let bytes = bytes.into_inner();
+            assert_eq!(ldr_size(&bytes, "red").unwrap(), (8, 4));
+            let decoded = decode_ldr(&bytes, "red").unwrap();
+            assert_eq!((decoded.width, decoded.height, decoded.pixels.len()), (8, 4, 32));
+            let [r, g, b, a] = decoded.pixels[31];
+            assert!(r > 250 && g < 5 && b < 5 && a == 255, "{format:?}");
+        }
+    }
+
+    #[test]
+    fn text_is_not_a_picture() {
+        let error = decode_ldr(b"hello", "note.txt").unwrap_err().to_string();
+        assert!(error.contains("not a picture"), "{error}");
+    }
+}

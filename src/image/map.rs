@@ -1,0 +1,205 @@
+//! Environment maps and pictures from files of any format we read.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use super::exr_read::{Exr, read_exr};
+use super::file::read_cause;
+use super::guard::catch_panic;
+use super::hdr::decode_hdr;
+use super::{Decoded, Image, MAX_PIXELS, MAX_SIDE};
+use crate::color::linear_from_srgb;
+use crate::error::{Error, Notices, Result};
+
+/// An environment map: finite, non-negative radiance, and what had to be done to get it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadedMap {
+    /// The latitude-longitude picture.
+    pub image: Image,
+    /// What was repaired, skipped or assumed.
+    pub notices: Notices,
+}
+
+/// Reads a latitude-longitude environment map: OpenEXR, Radiance HDR, or an 8/16-bit picture (PNG,
+/// JPEG, WebP, TIFF, BMP, TGA). The format is told by the content, then by the extension.
+///
+/// Pixels are linear Rec.709, finite and `>= 0` (see [`sanitise`]).
+///
+/// # Errors
+/// One sentence: the file is missing, damaged, of a kind that is not read, too large, or an OpenEXR
+/// cube map.
+pub fn read_map(path: &Path) -> Result<LoadedMap> {
+    let LoadedMap { mut image, mut notices } = match format_of(path)? {
+        Format::Exr => match read_exr(path)? {
+            Exr { is_cube_map: true, .. } => {
+                return Err(Error::at(path, "is a cube map, lightgrid reads lat-long maps"));
+            }
+            Exr { image, notices, .. } => LoadedMap { image, notices },
+        },
+        Format::Hdr => LoadedMap { image: read_hdr(path)?, notices: Notices::default() },
+        Format::Other => read_ldr_map(path)?,
+    };
+    notices.extend(&sanitise(&mut image));
+    if image.width != 2 * image.height {
+        notices.add(format!(
+            "the map is {} x {} pixels, not twice as wide as high; it is stretched over the sphere",
+            image.width, image.height
+        ));
+    }
+    Ok(LoadedMap { image, notices })
+}
+
+/// Reads a picture as it is: no pixel is repaired. Formats as in [`read_map`].
+///
+/// # Errors
+/// As [`read_map`].
+pub fn read_picture(path: &Path) -> Result<Image> {
+    match format_of(path)? {
+        Format::Exr => Ok(read_exr(path)?.image),
+        Format::Hdr => read_hdr(path),
+        Format::Other => Ok(read_ldr_map(path)?.image),
+    }
+}
+
+/// Makes a map usable as a light: NaN and negative values become 0, infinite ones the largest finite
+/// value of the map. One notice says how many pixels were changed.
+pub fn sanitise(image: &mut Image) -> Notices {
+    const CHUNK: usize = 1 << 14;
+    let defects =
+        image.pixels.par_chunks(CHUNK).map(Defects::of).reduce(Defects::default, Defects::and);
+    let mut notices = Notices::default();
+    let found: Vec<String> = [
+        (defects.nan, "NaN (now 0)"),
+        (defects.infinite, "infinite (now the largest finite value)"),
+        (defects.negative, "negative (now 0)"),
+    ]
+    .iter()
+    .filter(|(count, _)| *count > 0)
+    .map(|(count, kind)| format!("{count} {kind}"))
+    .collect();
+    if !found.is_empty() {
+        image.pixels.par_chunks_mut(CHUNK).for_each(|pixels| {
+            for v in pixels.as_flattened_mut() {
+                *v = if *v == f32::INFINITY { defects.largest } else { v.max(0.0) };
+            }
+        });
+        notices.add(format!("pixels of the map were repaired: {}", found.join(", ")));
+    }
+    notices
+}
+
+/// How many pixels have a channel that is no radiance, and the largest finite value of all.
+#[derive(Default, Clone, Copy)]
+struct Defects {
+    nan: usize,
+    infinite: usize,
+    negative: usize,
+    largest: f32,
+}
+
+impl Defects {
+    fn of(pixels: &[[f32; 3]]) -> Self {
+        let values = pixels.as_flattened();
+        // No short-circuit: this is all that runs for a sound map, and it can be vectorised.
+        let sound = values.iter().fold(true, |sound, v| sound & (*v >= 0.0 && v.is_finite()));
+        if sound {
+            return Self { largest: values.iter().copied().fold(0.0, f32::max), ..Self::default() };
+        }
+        let count = |test: fn(f32) -> bool| {
+            pixels.iter().filter(|rgb| rgb.iter().any(|&v| test(v))).count()
+        };
+        Self {
+            nan: count(f32::is_nan),
+            infinite: count(f32::is_infinite),
+            negative: count(|v| v.is_finite() && v < 0.0),
+            largest: values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f32::max),
+        }
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            nan: self.nan + other.nan,
+            infinite: self.infinite + other.infinite,
+            negative: self.negative + other.negative,
+            largest: self.largest.max(other.largest),
+        }
+    }
+}
+
+/// Who decodes a file.
+enum Format {
+    Exr,
+    Hdr,
+    Other,
+}
+
+/// Tells the format by the first bytes, else by the extension.
+fn format_of(path: &Path) -> Result<Format> {
+    let mut magic = [0u8; 4];
+    let mut file = File::open(path).map_err(|e| Error::at(path, read_cause(&e)))?;
+    let known = match file.read_exact(&mut magic) {
+        Ok(()) => true,
+        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => false,
+        Err(e) => return Err(Error::at(path, read_cause(&e))),
+    };
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    Ok(match (&magic, extension.as_deref()) {
+        (b"\x76\x2f\x31\x01", _) if known => Format::Exr,
+        ([b'#', b'?', ..], _) if known => Format::Hdr,
+        (_, Some("exr")) => Format::Exr,
+        (_, Some("hdr" | "rgbe" | "pic" | "xyze")) => Format::Hdr,
+        _ => Format::Other,
+    })
+}
+
+fn read_hdr(path: &Path) -> Result<Image> {
+    let bytes = fs::read(path).map_err(|e| Error::at(path, read_cause(&e)))?;
+    decode_hdr(&bytes).map_err(|cause| Error::at(path, cause))
+}
+
+/// Reads an sRGB-encoded picture, or a float TIFF as it is.
+fn read_ldr_map(path: &Path) -> Result<LoadedMap> {
+    let decoded = catch_panic(|| decode_ldr_file(path))
+        .unwrap_or_else(|| Err("is damaged: its decoder failed".into()))
+        .map_err(|cause| Error::at(path, cause))?;
+    let mut notices = Notices::default();
+    let (width, height) = (decoded.width(), decoded.height());
+    let bits = match decoded.color().bytes_per_pixel() / decoded.color().channel_count() {
+        1 => 8,
+        2 => 16,
+        _ => 32,
+    };
+    let pixels = if bits == 8 {
+        let linear: Vec<f32> = (0..256).map(|v| linear_from_srgb(v as f32 / 255.0)).collect();
+        let rgb = decoded.into_rgb8();
+        rgb.pixels().map(|p| p.0.map(|v| linear[v as usize])).collect()
+    } else {
+        let rgb = decoded.into_rgb32f();
+        let transfer = if bits == 16 { linear_from_srgb } else { |v| v };
+        rgb.pixels().map(|p| p.0.map(transfer)).collect()
+    };
+    if bits < 32 {
+        notices.add(format!("the map is {bits}-bit sRGB: it holds no lights brighter than white"));
+    }
+    Ok(LoadedMap { image: Image { width, height, pixels }, notices })
+}
+
+fn decode_ldr_file(path: &Path) -> Decoded<image::DynamicImage> {
+    let mut reader = image::ImageReader::open(path)
+        .and_then(image::ImageReader::with_guessed_format)
+        .map_err(|e| read_cause(&e))?;
+    if reader.format().is_none() {
+        return Err("is not a picture of a known format (EXR, HDR, PNG, JPEG, WebP, TIFF, BMP, \
+                    TGA)"
+            .into());
+    }
+    let mut limits = image::Limits::default();
+    limits.max_image_width = Some(MAX_SIDE as u32);
+    limits.max_image_height = Some(MAX_SIDE as u32);
+    limits.max_alloc = Some(MAX_PIXELS * 4);
+    reader.limits(limits);
+    reader.decode().map_err(|e| format!("cannot be decoded: {e}"))
+}

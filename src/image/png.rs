@@ -1,0 +1,39 @@
+//! 8-bit sRGB pictures for the screen.
+
+use std::io;
+use std::path::Path;
+
+use super::{Rgb8, write_beside_and_rename};
+use crate::error::Result;
+
+/// Writes an 8-bit sRGB PNG (by [`write_beside_and_rename`]) with the metadata as text chunks.
+///
+/// # Errors
+/// If a metadata name is not 1 to 79 Latin-1 characters, or the file cannot be written.
+pub fn write_png(path: &Path, picture: &Rgb8, metadata: &[(String, String)]) -> Result<()> {
+    write_beside_and_rename(path, |file| {
+        let mut encoder = png::Encoder::new(file, picture.width, picture.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+        for (name, value) in metadata {
+            // tEXt holds Latin-1 only.
+            if value.chars().all(|c| u32::from(c) < 256) {
+                encoder.add_text_chunk(name.clone(), value.clone())
+            } else {
+                encoder.add_itxt_chunk(name.clone(), value.clone())
+            }
+            .map_err(into_io)?;
+        }
+        let mut writer = encoder.write_header().map_err(into_io)?;
+        writer.write_image_data(picture.pixels.as_flattened()).map_err(into_io)?;
+        writer.finish().map_err(into_io)
+    })
+}
+
+fn into_io(error: png::EncodingError) -> io::Error {
+    match error {
+        png::EncodingError::IoError(error) => error,
+        other => io::Error::other(other.to_string()),
+    }
+}

@@ -1,0 +1,236 @@
+//! Probability laws over tiles, sparse and exact.
+
+/// The chosen tile, its probability, and what is left of the random number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TileChoice {
+    /// Tile index.
+    pub tile: u32,
+    /// Probability of having chosen it, the very ratio of integers that was sampled.
+    pub probability: f32,
+    /// Where in the tile's share the random number fell, in `[0,1)`: a fresh uniform number.
+    pub remainder: f32,
+}
+
+/// Many discrete laws over the same tiles, in flat arrays (law 0 is the whole map's).
+///
+/// A law keeps only the tiles it can choose: interiors see few. It holds a running sum in units of
+/// `2^-32`, so that sampling is a binary search that keeps the order, and therefore the
+/// stratification, of Sobol points; a bit mask with ranks finds a tile's entry in constant time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TileLaws {
+    tile_count: u32,
+    words_per_law: u32,
+    /// First entry of each law, and one more.
+    starts: Vec<u32>,
+    /// `words_per_law` words a law: which tiles it can choose.
+    masks: Vec<u64>,
+    /// Entries before each word of the mask.
+    ranks: Vec<u16>,
+    /// Tile of each entry, ascending within a law.
+    tiles: Vec<u16>,
+    /// Largest 32-bit number that chooses this entry; ends with `u32::MAX` in every law.
+    last: Vec<u32>,
+}
+
+impl TileLaws {
+    /// No laws yet, over `tile_count` tiles (at most 65536).
+    pub fn new(tile_count: u32) -> Self {
+        assert!((1..=65536).contains(&tile_count), "tile indices are 16 bits wide");
+        Self {
+            tile_count,
+            words_per_law: tile_count.div_ceil(64),
+            starts: vec![0],
+            masks: Vec::new(),
+            ranks: Vec::new(),
+            tiles: Vec::new(),
+            last: Vec::new(),
+        }
+    }
+
+    /// Number of laws.
+    pub fn len(&self) -> u32 {
+        self.starts.len() as u32 - 1
+    }
+
+    /// Whether there is no law.
+    pub fn is_empty(&self) -> bool {
+        self.starts.len() == 1
+    }
+
+    /// Number of tiles the laws are over.
+    pub fn tile_count(&self) -> u32 {
+        self.tile_count
+    }
+
+    /// Number of tiles law `law` can choose.
+    pub fn support(&self, law: u32) -> u32 {
+        self.starts[law as usize + 1] - self.starts[law as usize]
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.starts.capacity() * 4
+            + self.masks.capacity() * 8
+            + self.ranks.capacity() * 2
+            + self.tiles.capacity() * 2
+            + self.last.capacity() * 4
+    }
+
+    /// Bytes one more law over `support` tiles takes.
+    pub fn law_bytes(tile_count: u32, support: u32) -> usize {
+        4 + tile_count.div_ceil(64) as usize * 10 + support as usize * 6
+    }
+
+    /// Makes room for exactly this much, so that growing never holds twice the memory.
+    pub fn reserve_exact(&mut self, laws: usize, entries: usize) {
+        self.starts.reserve_exact(laws);
+        self.masks.reserve_exact(laws * self.words_per_law as usize);
+        self.ranks.reserve_exact(laws * self.words_per_law as usize);
+        self.tiles.reserve_exact(entries);
+        self.last.reserve_exact(entries);
+    }
+
+    /// Appends the law proportional to `weights` (one per tile, finite, not negative) and gives its
+    /// index; `None`, and nothing appended, when no weight is positive.
+    ///
+    /// Every tile with a positive weight gets at least `2^-32`, so none becomes unreachable.
+    pub fn push(&mut self, weights: &[f64]) -> Option<u32> {
+        assert_eq!(weights.len(), self.tile_count as usize, "one weight per tile");
+        let total: f64 = weights.iter().filter(|w| **w > 0.0).sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return None;
+        }
+        let first = self.tiles.len();
+        let support = weights.iter().filter(|w| **w > 0.0).count();
+        let units = 4_294_967_296.0 - support as f64;
+        let base = self.masks.len();
+        self.masks.resize(base + self.words_per_law as usize, 0);
+        let (mut sum, mut largest) = (0_u64, (0.0, 0));
+        for (tile, &weight) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+            sum += 1 + (weight / total * units) as u64;
+            if weight > largest.0 {
+                largest = (weight, self.tiles.len());
+            }
+            self.masks[base + tile / 64] |= 1 << (tile % 64);
+            self.tiles.push(tile as u16);
+            self.last.push((sum - 1).min(u64::from(u32::MAX)) as u32);
+        }
+        // What rounding left over goes to the largest, where it is the smallest relative error.
+        let rest = u32::MAX - self.last[self.last.len() - 1];
+        for last in &mut self.last[largest.1..] {
+            *last += rest;
+        }
+        let mut rank = 0;
+        for word in &self.masks[base..] {
+            self.ranks.push(rank);
+            rank += word.count_ones() as u16;
+        }
+        debug_assert_eq!(self.tiles.len() - first, support);
+        self.starts.push(self.tiles.len() as u32);
+        Some(self.len() - 1)
+    }
+
+    /// Chooses a tile of law `law` with a uniform 32-bit number.
+    pub fn sample(&self, law: u32, bits: u32) -> TileChoice {
+        let (start, end) = self.range(law);
+        let last = &self.last[start..end];
+        let entry = last.partition_point(|&l| l < bits);
+        let low = if entry == 0 { 0 } else { last[entry - 1] + 1 };
+        let count = (last[entry] - low) as f32 + 1.0;
+        // Rounding may carry the quotient to 1, which belongs to the next tile.
+        let remainder = ((bits - low) as f32 / count).min(1.0 - f32::EPSILON / 2.0);
+        TileChoice {
+            tile: u32::from(self.tiles[start + entry]),
+            probability: count * (1.0 / 4_294_967_296.0),
+            remainder,
+        }
+    }
+
+    /// Probability that law `law` chooses `tile`.
+    pub fn probability(&self, law: u32, tile: u32) -> f32 {
+        let word = (law * self.words_per_law + tile / 64) as usize;
+        let bit = tile % 64;
+        if self.masks[word] >> bit & 1 == 0 {
+            return 0.0;
+        }
+        let rank = self.ranks[word] + (self.masks[word] & ((1 << bit) - 1)).count_ones() as u16;
+        let (start, _) = self.range(law);
+        let entry = start + rank as usize;
+        let low = if rank == 0 { 0 } else { self.last[entry - 1] + 1 };
+        ((self.last[entry] - low) as f32 + 1.0) * (1.0 / 4_294_967_296.0)
+    }
+
+    fn range(&self, law: u32) -> (usize, usize) {
+        (self.starts[law as usize] as usize, self.starts[law as usize + 1] as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn laws_of(weights: &[f64]) -> TileLaws {
+        let mut laws = TileLaws::new(weights.len() as u32);
+        laws.push(&vec![1.0; weights.len()]).expect("uniform");
+        laws.push(weights).expect("positive");
+        laws
+    }
+
+    #[test]
+    fn probabilities_are_the_weights_and_sum_to_one() {
+        let mut weights: Vec<f64> = (0..512).map(|t| f64::from(t * 7919 % 101)).collect();
+        weights[300] = 1e9;
+        weights[301] = 1e-12;
+        let laws = laws_of(&weights);
+        let total: f64 = weights.iter().sum();
+        let mut sum = 0.0;
+        for (tile, weight) in weights.iter().enumerate() {
+            let p = f64::from(laws.probability(1, tile as u32));
+            assert_eq!(p > 0.0, *weight > 0.0);
+            assert!((p - weight / total).abs() < 520.0 / 4_294_967_296.0 + 1e-7 * p, "{tile}: {p}");
+            sum += p;
+        }
+        assert!((sum - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn sample_agrees_with_probability_at_every_border() {
+        let weights: Vec<f64> = (0..100).map(|t| if t % 3 == 0 { 0.0 } else { f64::from(t) }).collect();
+        let laws = laws_of(&weights);
+        let mut previous = 0;
+        for step in 0..4096_u32 {
+            for bits in [step << 20, (step << 20) + 0xf_ffff] {
+                let choice = laws.sample(1, bits);
+                assert!(choice.tile >= previous, "order is kept");
+                previous = choice.tile;
+                assert_eq!(choice.probability, laws.probability(1, choice.tile));
+                assert!((0.0..1.0).contains(&choice.remainder));
+            }
+        }
+        assert_eq!(laws.sample(1, 0).tile, 1);
+        assert_eq!(laws.sample(1, u32::MAX).tile, 98);
+    }
+
+    #[test]
+    fn one_tile_gets_everything_and_nothing_gets_no_law() {
+        let mut laws = TileLaws::new(70);
+        assert_eq!(laws.push(&[0.0; 70]), None);
+        let mut weights = [0.0; 70];
+        weights[69] = 1e-300;
+        assert_eq!(laws.push(&weights), Some(0));
+        assert_eq!(laws.probability(0, 69), 1.0);
+        let choice = laws.sample(0, u32::MAX);
+        assert_eq!((choice.tile, choice.probability), (69, 1.0));
+        assert!(choice.remainder < 1.0);
+    }
+
+    #[test]
+    fn memory_is_as_announced() {
+        let mut laws = TileLaws::new(512);
+        laws.reserve_exact(3, 512 * 3);
+        for _ in 0..3 {
+            laws.push(&[1.0; 512]);
+        }
+        assert_eq!(laws.memory_bytes(), 4 + 3 * TileLaws::law_bytes(512, 512));
+    }
+}

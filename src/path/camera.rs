@@ -1,0 +1,121 @@
+//! From a point on the picture to a ray.
+
+use glam::{Vec2, Vec3};
+
+use crate::bvh::Ray;
+use crate::scene::{Camera, Projection};
+
+/// A camera made ready for a picture of one size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraRays {
+    position: Vec3,
+    right: Vec3,
+    up: Vec3,
+    forward: Vec3,
+    /// Half extents of the picture at distance 1 (perspective) or in metres (orthographic).
+    half_extent: Vec2,
+    picture_size: Vec2,
+    orthographic: bool,
+    lens_radius: f32,
+    focus_distance: f32,
+}
+
+impl CameraRays {
+    /// Rays of `camera` through a picture of `width` x `height` pixels; the vertical extent is the
+    /// camera's, the horizontal one follows from the picture's shape.
+    pub fn new(camera: &Camera, width: u32, height: u32) -> Self {
+        let axes = camera.world_from_camera.matrix3;
+        let (half_height, orthographic) = match camera.projection {
+            Projection::Perspective { fov_y_radians } => ((0.5 * fov_y_radians).tan(), false),
+            Projection::Orthographic { half_height } => (half_height, true),
+        };
+        let picture_size = Vec2::new(width as f32, height as f32);
+        Self {
+            position: camera.world_from_camera.translation.into(),
+            right: Vec3::from(axes.x_axis).normalize_or(Vec3::X),
+            up: Vec3::from(axes.y_axis).normalize_or(Vec3::Y),
+            forward: Vec3::from(-axes.z_axis).normalize_or(Vec3::NEG_Z),
+            half_extent: Vec2::new(half_height * picture_size.x / picture_size.y, half_height),
+            picture_size,
+            orthographic,
+            lens_radius: camera.lens_radius,
+            focus_distance: camera.focus_distance,
+        }
+    }
+
+    /// Where the camera is.
+    pub fn position(&self) -> Vec3 {
+        self.position
+    }
+
+    /// Whether [`Self::ray`] uses its second pair of random numbers.
+    pub fn has_lens(&self) -> bool {
+        self.lens_radius > 0.0
+    }
+
+    /// Ray through `pixel` (continuous pixel coordinates, origin at the top left corner); `lens` is
+    /// a point of the unit square that is mapped to the thin lens.
+    pub fn ray(&self, pixel: Vec2, lens: Vec2) -> Ray {
+        let ndc = pixel / self.picture_size * 2.0 - 1.0;
+        let offset =
+            self.right * (ndc.x * self.half_extent.x) - self.up * (ndc.y * self.half_extent.y);
+        let (mut origin, mut direction) = if self.orthographic {
+            (self.position + offset, self.forward)
+        } else {
+            (self.position, self.forward + offset)
+        };
+        if self.lens_radius > 0.0 {
+            let focus = origin + direction * self.focus_distance;
+            let on_lens = disk_from_square(lens) * self.lens_radius;
+            origin += self.right * on_lens.x + self.up * on_lens.y;
+            direction = focus - origin;
+        }
+        Ray { origin, direction: direction.normalize(), t_min: 0.0, t_max: f32::INFINITY }
+    }
+}
+
+/// Unit square to unit disk, keeping areas and neighbourhoods (Shirley and Chiu 1997).
+fn disk_from_square(u: Vec2) -> Vec2 {
+    let p = 2.0 * u - 1.0;
+    if p == Vec2::ZERO {
+        return Vec2::ZERO;
+    }
+    let (radius, angle) = if p.x.abs() > p.y.abs() {
+        (p.x, std::f32::consts::FRAC_PI_4 * (p.y / p.x))
+    } else {
+        (p.y, std::f32::consts::FRAC_PI_2 - std::f32::consts::FRAC_PI_4 * (p.x / p.y))
+    };
+    radius * Vec2::from_angle(angle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_and_centre_look_where_they_should() {
+        let camera = Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::new(1.0, 2.0, 0.0), 1.0);
+        let rays = CameraRays::new(&camera, 200, 100);
+        let centre = rays.ray(Vec2::new(100.0, 50.0), Vec2::ZERO);
+        assert!((centre.direction - Vec3::NEG_Z).length() < 1e-6);
+        let corner = rays.ray(Vec2::ZERO, Vec2::ZERO).direction;
+        let expected = Vec3::new(-2.0 * 0.5_f32.tan(), 0.5_f32.tan(), -1.0).normalize();
+        assert!((corner - expected).length() < 1e-6);
+    }
+
+    #[test]
+    fn lens_rays_meet_in_the_focal_plane() {
+        let mut camera = Camera::look_at(Vec3::ZERO, Vec3::new(0.0, 0.0, -4.0), 0.8);
+        camera.lens_radius = 0.1;
+        let rays = CameraRays::new(&camera, 64, 64);
+        let pixel = Vec2::new(10.0, 50.0);
+        let at_focus = |lens: Vec2| {
+            let ray = rays.ray(pixel, lens);
+            ray.origin + ray.direction * (-4.0 - ray.origin.z) / ray.direction.z
+        };
+        let middle = at_focus(Vec2::splat(0.5));
+        for lens in [Vec2::new(0.1, 0.9), Vec2::new(0.99, 0.5), Vec2::ZERO] {
+            assert!((at_focus(lens) - middle).length() < 1e-5);
+        }
+    }
+}

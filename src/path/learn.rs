@@ -1,0 +1,68 @@
+//! Learning paths: what the map shows to the vertices of camera paths.
+
+use glam::Vec2;
+
+use super::{Path, PathTracer, Vertex};
+use crate::bvh::Ray;
+use crate::color::{importance, luminance};
+use crate::light_grid::{LearningGrid, LightGrid, Recording, WHOLE_MAP};
+use crate::sampler::{Sampler, unit_from_bits};
+
+impl PathTracer<'_> {
+    /// Traces one camera path and records at each vertex whether a sample of the whole map is
+    /// visible. Returns the number of rays and of records.
+    pub fn learn(
+        &self,
+        ray: Ray,
+        sampler: Sampler,
+        whole_map: &LightGrid,
+        learning: &LearningGrid,
+    ) -> (u32, u32) {
+        let mut path = Path::new(self, ray, sampler);
+        let mut records = 0;
+        while let Some(vertex) = path.next_vertex() {
+            if path.bounces == self.limits.bounces {
+                break;
+            }
+            path.bounces += 1;
+            if !vertex.bsdf.is_delta_only() {
+                path.record(&vertex, whole_map, learning);
+                records += 1;
+            }
+            if !path.scatter(&vertex) || !path.survives() {
+                break;
+            }
+        }
+        (path.rays, records)
+    }
+}
+
+impl Path<'_> {
+    fn record(&mut self, vertex: &Vertex, whole_map: &LightGrid, learning: &LearningGrid) {
+        let [tile_bits, row_bits] = self.sampler.next_pair_bits();
+        let choice = whole_map.laws().sample(WHOLE_MAP, tile_bits);
+        let u = Vec2::new(choice.remainder, unit_from_bits(row_bits));
+        let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
+        let normal = vertex.point.geometric_normal;
+        let cell = learning.grid.cell_of(vertex.point.position, normal);
+        let weight = match self.scattered(vertex, sample.direction) {
+            None => 0.0,
+            Some((f, _)) => {
+                let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
+                match learning.recording() {
+                    Recording::VisibleCosine => {
+                        let cosine = vertex.point.shading_frame.z.dot(sample.direction).abs();
+                        luminance(transmittance) * cosine
+                    }
+                    Recording::VisibleContribution => {
+                        let pdf = choice.probability * sample.pdf_solid_angle;
+                        let mean = std::f32::consts::PI
+                            * importance(self.tracer.environment.mean_radiance());
+                        importance(f * sample.radiance * transmittance) / (pdf * mean)
+                    }
+                }
+            }
+        };
+        learning.counters.record(cell, choice.tile, weight);
+    }
+}

@@ -1,0 +1,132 @@
+//! A scene made ready for rays: BVH, what may be passed through, and the lights inside it.
+
+use glam::Vec3;
+
+use super::lights::LocalLights;
+use crate::bvh::{Bvh, Hit, Ray};
+use crate::scene::needs::SceneNeeds;
+use crate::scene::surface::{SurfacePoint, alpha_at};
+use crate::scene::{AlphaMode, Scene};
+
+/// Everything about the scene that paths ask for.
+pub struct World {
+    /// The scene.
+    pub scene: Scene,
+    /// What it needs.
+    pub needs: SceneNeeds,
+    /// Its triangles, sorted in space.
+    pub bvh: Bvh,
+    /// Emissive triangles and punctual lights.
+    pub lights: LocalLights,
+    passing: Vec<Passing>,
+}
+
+/// How rays deal with a material before it scatters them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Passing {
+    single_sided: bool,
+    masked: bool,
+    /// Part of the light may go straight through: blended, or thin and transmissive.
+    partial: bool,
+}
+
+impl World {
+    /// Builds the BVH and the light tables.
+    pub fn new(scene: Scene) -> Self {
+        let bvh = Bvh::build(&scene.positions, &scene.triangles);
+        let passing = scene
+            .materials
+            .iter()
+            .map(|m| Passing {
+                single_sided: !m.double_sided,
+                masked: matches!(m.alpha_mode, AlphaMode::Mask { .. }),
+                partial: m.alpha_mode == AlphaMode::Blend
+                    || (m.transmission > 0.0 && m.thickness == 0.0 && !m.unlit),
+            })
+            .collect();
+        let lights = LocalLights::new(&scene, bvh.bounds());
+        Self { needs: SceneNeeds::of(&scene), scene, bvh, lights, passing }
+    }
+
+    /// Nearest surface along a ray. A camera ray passes single-sided surfaces from behind.
+    pub fn closest_hit(&self, ray: &Ray, from_camera: bool) -> Option<Hit> {
+        if from_camera && self.needs.single_sided {
+            self.bvh.closest_hit(ray, |hit| self.faces(hit, ray) && self.is_covered(hit))
+        } else if self.needs.alpha_mask {
+            self.bvh.closest_hit(ray, |hit| self.is_covered(hit))
+        } else {
+            self.bvh.closest_hit(ray, |_| true)
+        }
+    }
+
+    /// Share of light that arrives along a shadow ray: zero if a surface scatters it all.
+    pub fn transmittance(&self, ray: &Ray) -> Vec3 {
+        let mut transmittance = Vec3::ONE;
+        let blocked = if self.needs.pass_through() {
+            self.bvh.any_hit(ray, |hit| {
+                let passing = self.passing_of(hit.triangle);
+                if !passing.partial {
+                    return self.is_covered(hit);
+                }
+                let point =
+                    SurfacePoint::at(&self.scene, hit.triangle, hit.barycentric, ray.direction);
+                transmittance *= self.straight_through(&point, ray.direction);
+                transmittance.max_element() <= 0.0
+            })
+        } else {
+            self.bvh.any_hit(ray, |_| true)
+        };
+        if blocked { Vec3::ZERO } else { transmittance }
+    }
+
+    /// Share of light that goes straight through a surface: what alpha does not cover, and what
+    /// smooth thin glass transmits.
+    pub fn straight_through(&self, point: &SurfacePoint, direction: Vec3) -> Vec3 {
+        if !self.passing_of(point.triangle).partial {
+            return Vec3::ZERO;
+        }
+        let glass = if point.parameters.transmission > 0.0 {
+            let bsdf = crate::bsdf::Bsdf::new(&point.parameters, point.front_face);
+            bsdf.straight_transmittance(point.shading_frame.local_from_world(-direction))
+        } else {
+            Vec3::ZERO
+        };
+        let coverage = self.coverage(point);
+        Vec3::splat(1.0 - coverage) + coverage * glass
+    }
+
+    /// Opacity of a surface point in `[0,1]`; 1 unless its material is blended.
+    pub fn coverage(&self, point: &SurfacePoint) -> f32 {
+        let material = self.scene.triangle_materials[point.triangle as usize];
+        match self.scene.materials[material as usize].alpha_mode {
+            AlphaMode::Blend => point.parameters.alpha.clamp(0.0, 1.0),
+            AlphaMode::Opaque | AlphaMode::Mask { .. } => 1.0,
+        }
+    }
+
+    fn passing_of(&self, triangle: u32) -> Passing {
+        self.passing[self.scene.triangle_materials[triangle as usize] as usize]
+    }
+
+    fn is_covered(&self, hit: &Hit) -> bool {
+        if !self.passing_of(hit.triangle).masked {
+            return true;
+        }
+        let material = self.scene.triangle_materials[hit.triangle as usize];
+        match self.scene.materials[material as usize].alpha_mode {
+            AlphaMode::Mask { cutoff } => {
+                alpha_at(&self.scene, hit.triangle, hit.barycentric) >= cutoff
+            }
+            AlphaMode::Opaque | AlphaMode::Blend => true,
+        }
+    }
+
+    fn faces(&self, hit: &Hit, ray: &Ray) -> bool {
+        if !self.passing_of(hit.triangle).single_sided {
+            return true;
+        }
+        let [a, b, c] =
+            self.scene.triangles[hit.triangle as usize].map(|v| self.scene.positions[v as usize]);
+        (b - a).cross(c - a).dot(ray.direction) <= 0.0
+    }
+}

@@ -1,0 +1,173 @@
+//! What the samples add up to.
+
+use glam::Vec3;
+
+use crate::color::luminance;
+use crate::image::Image;
+use crate::path::PathResult;
+
+/// Sums of one pixel in f64: at 1e6 samples an f32 sum would have lost half its digits.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Pixel {
+    sum: [f64; 3],
+    luminance_squared: f64,
+    samples: u32,
+    invalid: u32,
+}
+
+/// Sums of what the first surface looks like, when layers are asked for.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Surface {
+    albedo: Vec3,
+    normal: Vec3,
+    depth: f32,
+    hits: u32,
+}
+
+/// The picture so far.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Film {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    pub(super) pixels: Vec<Pixel>,
+    /// Empty unless layers are asked for.
+    pub(super) surfaces: Vec<Surface>,
+}
+
+impl Pixel {
+    /// Adds one sample.
+    pub fn add(&mut self, result: &PathResult) {
+        let radiance = result.radiance;
+        self.sum.iter_mut().zip(radiance.to_array()).for_each(|(s, r)| *s += f64::from(r));
+        self.luminance_squared += f64::from(luminance(radiance)).powi(2);
+        self.samples += 1;
+        self.invalid += u32::from(result.was_invalid);
+    }
+
+    /// Number of samples taken.
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    /// Mean radiance; black before the first sample.
+    pub fn mean(&self) -> [f64; 3] {
+        let count = f64::from(self.samples.max(1));
+        self.sum.map(|s| s / count)
+    }
+
+    /// Mean luminance.
+    pub fn mean_luminance(&self) -> f64 {
+        let [r, g, b] = self.mean();
+        0.2126 * r + 0.7152 * g + 0.0722 * b
+    }
+
+    /// Estimated variance of the mean luminance, from the spread of the samples. Low-discrepancy
+    /// samples do better than this says. Infinite below two samples.
+    pub fn variance_of_mean(&self) -> f64 {
+        if self.samples < 2 {
+            return f64::INFINITY;
+        }
+        let count = f64::from(self.samples);
+        let variance = (self.luminance_squared / count - self.mean_luminance().powi(2)).max(0.0);
+        variance / (count - 1.0)
+    }
+}
+
+impl Surface {
+    /// Adds the first hit of one sample, or that there was none.
+    pub fn add(&mut self, result: &PathResult) {
+        if let Some(hit) = result.first_hit {
+            self.albedo += hit.albedo;
+            self.normal += hit.normal;
+            self.depth += hit.depth;
+            self.hits += 1;
+        }
+    }
+}
+
+impl Film {
+    /// A black film; `layers` asks for albedo, normal and depth too.
+    pub fn new(width: u32, height: u32, layers: bool) -> Self {
+        let count = width as usize * height as usize;
+        Self {
+            width,
+            height,
+            pixels: vec![Pixel::default(); count],
+            surfaces: vec![Surface::default(); if layers { count } else { 0 }],
+        }
+    }
+
+    /// The pixels, row after row.
+    pub fn pixels(&self) -> &[Pixel] {
+        &self.pixels
+    }
+
+    /// Mean radiance of every pixel.
+    pub fn image(&self) -> Image {
+        let pixels = self.pixels.iter().map(|p| p.mean().map(|c| c as f32)).collect();
+        Image { width: self.width, height: self.height, pixels }
+    }
+
+    /// Fewest samples any pixel has.
+    pub fn min_samples(&self) -> u32 {
+        self.pixels.iter().map(Pixel::samples).min().unwrap_or(0)
+    }
+
+    /// All samples taken.
+    pub fn total_samples(&self) -> u64 {
+        self.pixels.iter().map(|p| u64::from(p.samples)).sum()
+    }
+
+    /// Samples that were left out because they were not finite.
+    pub fn invalid_samples(&self) -> u64 {
+        self.pixels.iter().map(|p| u64::from(p.invalid)).sum()
+    }
+
+    /// Estimated root of the relative mean squared error of the picture: the root of the mean over
+    /// pixels of `variance_of_mean / (luminance^2 + 0.01 mean_luminance^2)`.
+    ///
+    /// It is an estimate from the samples' own spread: conservative for low-discrepancy samples,
+    /// blind to light no sample has met yet. Infinite below two samples a pixel.
+    pub fn noise(&self) -> f64 {
+        let count = self.pixels.len() as f64;
+        let mean = self.pixels.iter().map(Pixel::mean_luminance).sum::<f64>() / count;
+        let floor = 0.01 * mean * mean;
+        let sum: f64 = self
+            .pixels
+            .iter()
+            .map(|p| {
+                let variance = p.variance_of_mean();
+                if variance == 0.0 { 0.0 } else { variance / (p.mean_luminance().powi(2) + floor) }
+            })
+            .sum();
+        (sum / count).sqrt()
+    }
+
+    /// Albedo, normal and depth of each pixel; `None` unless layers were asked for. Where nothing
+    /// was hit they are zero.
+    pub fn surface_layers(&self) -> Option<SurfaceLayers> {
+        if self.surfaces.is_empty() {
+            return None;
+        }
+        let mut layers = SurfaceLayers::default();
+        for (surface, pixel) in self.surfaces.iter().zip(&self.pixels) {
+            layers.albedo.push((surface.albedo / pixel.samples.max(1) as f32).to_array());
+            layers.normal.push(surface.normal.normalize_or_zero().to_array());
+            layers.depth.push(surface.depth / surface.hits.max(1) as f32);
+        }
+        Some(layers)
+    }
+}
+
+/// What the first surface of each pixel looks like.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SurfaceLayers {
+    /// Mean albedo, linear RGB.
+    pub albedo: Vec<[f32; 3]>,
+    /// Unit mean of the world shading normals.
+    pub normal: Vec<[f32; 3]>,
+    /// Mean distance from the camera in metres.
+    pub depth: Vec<f32>,
+}

@@ -1,0 +1,150 @@
+//! Placing parts in the world: the arrays of the scene.
+
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
+
+use super::geometry::{Part, Tally};
+use super::pose::Placing;
+use super::{Fallible, MAX_TRIANGLES};
+use crate::scene::Scene;
+
+/// Appends a part once for each instance. Memory is reserved only after the limits are checked.
+pub(super) fn append_instances(
+    scene: &mut Scene,
+    part: &Part,
+    instances: &[DAffine3],
+    tally: &mut Tally,
+) -> Fallible<()> {
+    check_limits(scene, part, instances.len())?;
+    for &world_from_mesh in instances {
+        let placing = Placing::new(world_from_mesh);
+        append(scene, part, |_| placing, placing.mirrors(), tally);
+    }
+    Ok(())
+}
+
+/// Appends a part whose vertices follow joints; `joints` are world from bind space.
+pub(super) fn append_skinned(
+    scene: &mut Scene,
+    part: &Part,
+    joints: &[DAffine3],
+    tally: &mut Tally,
+) -> Fallible<()> {
+    check_limits(scene, part, 1)?;
+    let stride = part.influences_per_vertex;
+    let is_missing =
+        |&&(joint, weight): &&(u32, f32)| weight != 0.0 && joint as usize >= joints.len();
+    if let Some((joint, _)) = part.influences.iter().find(is_missing) {
+        return Err(format!("joint {joint} is used, but its skin has {}", joints.len()));
+    }
+    let placing = |vertex: usize| {
+        let mut blend = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
+        for &(joint, weight) in &part.influences[vertex * stride..(vertex + 1) * stride] {
+            if let Some(transform) = joints.get(joint as usize) {
+                blend.matrix3 += transform.matrix3 * f64::from(weight);
+                blend.translation += transform.translation * f64::from(weight);
+            }
+        }
+        Placing::new(blend)
+    };
+    // Joints of one skin mirror together or not at all.
+    let mirrors = joints.first().is_some_and(|&joint| Placing::new(joint).mirrors());
+    append(scene, part, placing, mirrors, tally);
+    Ok(())
+}
+
+fn check_limits(scene: &Scene, part: &Part, copies: usize) -> Fallible<()> {
+    let total = |present: usize, added: usize| {
+        (added as u64).saturating_mul(copies as u64).saturating_add(present as u64)
+    };
+    if total(scene.triangles.len(), part.triangles.len()) > MAX_TRIANGLES {
+        let millions = MAX_TRIANGLES / 1_000_000;
+        return Err(format!("with all instances there are more than {millions} million triangles"));
+    }
+    // Three per triangle, unless most triangles of a part were dropped; far below 2^32.
+    if total(scene.positions.len(), part.positions.len()) > 3 * MAX_TRIANGLES {
+        let millions = 3 * MAX_TRIANGLES / 1_000_000;
+        return Err(format!("with all instances there are more than {millions} million vertices"));
+    }
+    Ok(())
+}
+
+fn append(
+    scene: &mut Scene,
+    part: &Part,
+    placing: impl Fn(usize) -> Placing,
+    mirrors: bool,
+    tally: &mut Tally,
+) {
+    let first = scene.positions.len();
+    extend(&mut scene.normals, first, part.normals.iter().copied(), Vec3::ZERO);
+    extend(&mut scene.tangents, first, part.tangents.iter().copied(), Vec4::X + Vec4::W);
+    extend(&mut scene.uvs[0], first, part.uvs[0].iter().copied(), Vec2::ZERO);
+    extend(&mut scene.uvs[1], first, part.uvs[1].iter().copied(), Vec2::ZERO);
+    extend(&mut scene.colors, first, part.colors.iter().copied(), Vec4::ONE);
+    scene.positions.extend_from_slice(&part.positions);
+    for vertex in 0..part.positions.len() {
+        let placing = placing(vertex);
+        let position = &mut scene.positions[first + vertex];
+        *position = placing.position(*position);
+        if !part.normals.is_empty() {
+            let normal = &mut scene.normals[first + vertex];
+            *normal = placing.normal(*normal);
+        }
+        if !part.tangents.is_empty() {
+            let tangent = &mut scene.tangents[first + vertex];
+            *tangent = placing.tangent(*tangent);
+        }
+    }
+    for &[a, b, c] in &part.triangles {
+        let [a, b, c] = [a, b, c].map(|vertex| first as u32 + vertex);
+        let triangle = if mirrors { [a, c, b] } else { [a, b, c] };
+        if has_area(triangle.map(|vertex| scene.positions[vertex as usize])) {
+            scene.triangles.push(triangle);
+            scene.triangle_materials.push(part.material);
+        } else {
+            tally.dropped_triangles += 1;
+        }
+    }
+}
+
+/// Appends vertex data behind what the earlier vertices have; `pad` for those that have none.
+fn extend<T: Clone>(
+    array: &mut Vec<T>,
+    first: usize,
+    values: impl ExactSizeIterator<Item = T>,
+    pad: T,
+) {
+    if values.len() > 0 {
+        array.resize(first, pad);
+        array.extend(values);
+    }
+}
+
+/// Makes every array that has anything as long as the positions, and all positions finite.
+pub(super) fn finish(scene: &mut Scene) {
+    fn pad<T: Clone>(array: &mut Vec<T>, length: usize, value: T) {
+        if !array.is_empty() {
+            array.resize(length, value);
+        }
+    }
+    // No triangle uses a non-finite position, but bounds are taken over all of them.
+    if let Some(&[vertex, ..]) = scene.triangles.first() {
+        let inside = scene.positions[vertex as usize];
+        for position in scene.positions.iter_mut().filter(|position| !position.is_finite()) {
+            *position = inside;
+        }
+    }
+    let length = scene.positions.len();
+    pad(&mut scene.normals, length, Vec3::ZERO);
+    pad(&mut scene.tangents, length, Vec4::X + Vec4::W);
+    pad(&mut scene.uvs[0], length, Vec2::ZERO);
+    pad(&mut scene.uvs[1], length, Vec2::ZERO);
+    pad(&mut scene.colors, length, Vec4::ONE);
+}
+
+/// Whether a triangle has an area (in f64: small scenes have areas that f32 cannot tell from 0).
+fn has_area(corners: [Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+    let twice_area = (b - a).cross(c - a).length_squared();
+    twice_area.is_finite() && twice_area > 0.0
+}

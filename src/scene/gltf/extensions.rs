@@ -1,0 +1,42 @@
+//! Which extensions are honoured, and what is said about the others.
+
+use serde_json::Value;
+
+use super::Fallible;
+use crate::error::Notices;
+
+/// Extensions that are rendered, wholly or (specular-glossiness) nearly.
+const SUPPORTED: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+/// Refuses a file that requires what is not supported; a notice where it is only used.
+pub(super) fn check(root: &Value, notices: &mut Notices) -> Fallible<()> {
+    let missing = unsupported(root, "extensionsRequired");
+    if !missing.is_empty() {
+        let plural = if missing.len() > 1 { "s" } else { "" };
+        let names = missing.join(", ");
+        return Err(format!("it requires the extension{plural} {names}, not supported here"));
+    }
+    for name in unsupported(root, "extensionsUsed") {
+        notices.add(format!("The extension {name} is not supported; what it adds is left out."));
+    }
+    Ok(())
+}
+
+fn unsupported<'a>(root: &'a Value, list: &str) -> Vec<&'a str> {
+    let names = root.get(list).and_then(Value::as_array).into_iter().flatten();
+    names.filter_map(Value::as_str).filter(|name| !SUPPORTED.contains(name)).collect()
+}

@@ -1,0 +1,311 @@
+//! Materials: metallic-roughness and the extensions that are rendered.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::{Affine2, Vec3, Vec4};
+use gltf::json;
+use json::extensions::texture::TextureTransform;
+use json::validation::Checked;
+use serde_json::{Map, Value};
+
+use super::Fallible;
+use super::buffers::{File, find};
+use super::textures::Wanted;
+use crate::error::Notices;
+use crate::scene::{AlphaMode, Material, Texture, TextureImage, TextureRef};
+
+/// The materials that primitives use, with their textures.
+pub(super) struct Materials {
+    pub(super) materials: Vec<Material>,
+    pub(super) textures: Vec<Texture>,
+    pub(super) images: Vec<TextureImage>,
+    /// Place in `materials` by number in the file (`None`: the default material).
+    pub(super) places: BTreeMap<Option<usize>, u32>,
+}
+
+impl Materials {
+    /// Reads the used materials and decodes the images they need.
+    pub(super) fn load(
+        file: &File<'_>,
+        used: &BTreeSet<Option<usize>>,
+        notices: &mut Notices,
+    ) -> Fallible<Self> {
+        let mut wanted = Wanted::default();
+        let mut materials = Vec::with_capacity(used.len());
+        let mut places = BTreeMap::new();
+        for &number in used {
+            places.insert(number, materials.len() as u32);
+            materials.push(match number {
+                None => Material::default(),
+                Some(number) => {
+                    let index = json::Index::new(number as u32);
+                    let source = find(&file.root.materials, index, "material")?;
+                    let mut reader = Reader::new(file, source, number, &mut wanted, notices);
+                    reader
+                        .material(source)
+                        .map_err(|cause| format!("material {number} ({}): {cause}", reader.name))?
+                }
+            });
+        }
+        let decoded = wanted.decode(file, notices);
+        for slot in materials.iter_mut().flat_map(slots) {
+            *slot = slot.and_then(|reference| {
+                let texture = decoded.texture_map[reference.texture as usize]?;
+                Some(TextureRef { texture, ..reference })
+            });
+        }
+        Ok(Self { materials, textures: decoded.textures, images: decoded.images, places })
+    }
+}
+
+/// Every texture slot of a material.
+pub(super) fn slots(material: &mut Material) -> [&mut Option<TextureRef>; 10] {
+    [
+        &mut material.base_color_texture,
+        &mut material.metallic_roughness_texture,
+        &mut material.normal_texture,
+        &mut material.emissive_texture,
+        &mut material.specular_texture,
+        &mut material.specular_color_texture,
+        &mut material.transmission_texture,
+        &mut material.clearcoat_texture,
+        &mut material.clearcoat_roughness_texture,
+        &mut material.clearcoat_normal_texture,
+    ]
+}
+
+/// Where a texture of the file is read.
+struct Info {
+    index: json::Index<json::Texture>,
+    tex_coord: u32,
+    transform: Option<TextureTransform>,
+}
+
+impl From<&json::texture::Info> for Info {
+    fn from(info: &json::texture::Info) -> Self {
+        let transform = info.extensions.as_ref().and_then(|all| all.texture_transform.clone());
+        Self { index: info.index, tex_coord: info.tex_coord, transform }
+    }
+}
+
+impl From<&json::material::NormalTexture> for Info {
+    fn from(info: &json::material::NormalTexture) -> Self {
+        let transform = info.extensions.as_ref();
+        let transform = transform.and_then(|all| all.others.get("KHR_texture_transform"));
+        let transform = transform.and_then(parsed);
+        Self { index: info.index, tex_coord: info.tex_coord, transform }
+    }
+}
+
+/// A JSON value as one of glTF's types, if it fits.
+fn parsed<T: for<'de> serde::Deserialize<'de>>(value: &Value) -> Option<T> {
+    json::deserialize::from_value(value.clone()).ok()
+}
+
+/// Reads one material.
+struct Reader<'a> {
+    root: &'a json::Root,
+    name: String,
+    wanted: &'a mut Wanted,
+    notices: &'a mut Notices,
+}
+
+impl<'a> Reader<'a> {
+    fn new(
+        file: &'a File<'_>,
+        source: &json::Material,
+        number: usize,
+        wanted: &'a mut Wanted,
+        notices: &'a mut Notices,
+    ) -> Self {
+        let name = source.name.clone().unwrap_or_else(|| format!("material {number}"));
+        Self { root: &file.root, name, wanted, notices }
+    }
+
+    fn material(&mut self, source: &json::Material) -> Fallible<Material> {
+        let pbr = &source.pbr_metallic_roughness;
+        let mut material = Material {
+            name: self.name.clone(),
+            base_color: Vec4::from_array(self.units(pbr.base_color_factor.0)),
+            base_color_texture: self.colour(pbr.base_color_texture.as_ref())?,
+            metallic: self.unit(pbr.metallic_factor.0),
+            roughness: self.unit(pbr.roughness_factor.0),
+            metallic_roughness_texture: self.data(pbr.metallic_roughness_texture.as_ref())?,
+            normal_texture: self.data(source.normal_texture.as_ref())?,
+            normal_scale: self.finite(source.normal_texture.as_ref().map_or(1.0, |map| map.scale)),
+            // Older files put lamps' strengths here, so there is no upper limit.
+            emissive: Vec3::from_array(source.emissive_factor.0.map(|x| self.at_least(x, 0.0))),
+            emissive_texture: self.colour(source.emissive_texture.as_ref())?,
+            alpha_mode: match source.alpha_mode {
+                Checked::Valid(json::material::AlphaMode::Mask) => {
+                    AlphaMode::Mask { cutoff: source.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0) }
+                }
+                Checked::Valid(json::material::AlphaMode::Blend) => AlphaMode::Blend,
+                _ => AlphaMode::Opaque,
+            },
+            double_sided: source.double_sided,
+            ..Material::default()
+        };
+        if let Some(extensions) = &source.extensions {
+            self.extensions(extensions, &mut material)?;
+        }
+        Ok(material)
+    }
+
+    fn extensions(
+        &mut self,
+        source: &json::extensions::material::Material,
+        material: &mut Material,
+    ) -> Fallible<()> {
+        material.unlit = source.unlit.is_some();
+        if let Some(strength) = &source.emissive_strength {
+            material.emissive *= self.at_least(strength.emissive_strength.0, 0.0);
+        }
+        if let Some(ior) = &source.ior {
+            let ior = ior.ior.0;
+            material.ior = if ior == 0.0 { 0.0 } else { self.at_least(ior, 1.0) };
+        }
+        if let Some(specular) = &source.specular {
+            material.specular = self.unit(specular.specular_factor.0);
+            material.specular_texture = self.data(specular.specular_texture.as_ref())?;
+            let tint = specular.specular_color_factor.0;
+            material.specular_color = Vec3::from_array(tint.map(|x| self.at_least(x, 0.0)));
+            material.specular_color_texture =
+                self.colour(specular.specular_color_texture.as_ref())?;
+        }
+        if let Some(transmission) = &source.transmission {
+            material.transmission = self.unit(transmission.transmission_factor.0);
+            material.transmission_texture =
+                self.data(transmission.transmission_texture.as_ref())?;
+        }
+        if let Some(volume) = &source.volume {
+            material.thickness = self.at_least(volume.thickness_factor.0, 0.0);
+            material.attenuation_color = Vec3::from_array(self.units(volume.attenuation_color.0));
+            let distance = volume.attenuation_distance.0;
+            // Zero is forbidden and means, in files that have it, that nobody set it.
+            material.attenuation_distance = if distance > 0.0 { distance } else { f32::INFINITY };
+        }
+        if let Some(Value::Object(coat)) = source.others.get("KHR_materials_clearcoat") {
+            self.clearcoat(coat, material)?;
+        }
+        if let Some(Value::Object(old)) = source.others.get("KHR_materials_pbrSpecularGlossiness") {
+            self.specular_glossiness(old, material)?;
+        }
+        Ok(())
+    }
+
+    fn clearcoat(&mut self, coat: &Map<String, Value>, material: &mut Material) -> Fallible<()> {
+        material.clearcoat = self.unit(number(coat, "clearcoatFactor", 0.0));
+        material.clearcoat_roughness = self.unit(number(coat, "clearcoatRoughnessFactor", 0.0));
+        material.clearcoat_texture = self.data(texture(coat, "clearcoatTexture").as_ref())?;
+        material.clearcoat_roughness_texture =
+            self.data(texture(coat, "clearcoatRoughnessTexture").as_ref())?;
+        let normal: Option<json::material::NormalTexture> =
+            coat.get("clearcoatNormalTexture").and_then(parsed);
+        material.clearcoat_normal_scale = self.finite(normal.as_ref().map_or(1.0, |map| map.scale));
+        material.clearcoat_normal_texture = self.data(normal.as_ref())?;
+        Ok(())
+    }
+
+    /// The archived specular-glossiness model: a dielectric whose F0 is the specular colour, which
+    /// an infinite index of refraction (`ior` 0) expresses exactly.
+    fn specular_glossiness(
+        &mut self,
+        old: &Map<String, Value>,
+        material: &mut Material,
+    ) -> Fallible<()> {
+        let diffuse: Option<[f32; 4]> = old.get("diffuseFactor").and_then(parsed);
+        material.base_color = Vec4::from_array(self.units(diffuse.unwrap_or([1.0; 4])));
+        material.base_color_texture = self.colour(texture(old, "diffuseTexture").as_ref())?;
+        let specular: Option<[f32; 3]> = old.get("specularFactor").and_then(parsed);
+        material.specular_color = Vec3::from_array(self.units(specular.unwrap_or([1.0; 3])));
+        let gloss = texture(old, "specularGlossinessTexture");
+        material.specular_color_texture = self.colour(gloss.as_ref())?;
+        material.metallic_roughness_texture = None;
+        material.metallic = 0.0;
+        material.ior = 0.0;
+        material.roughness = 1.0 - self.unit(number(old, "glossinessFactor", 1.0));
+        if gloss.is_some() {
+            // Its alpha would need an image of its own; half of the factor is its likely middle.
+            material.roughness = 0.5 + 0.5 * material.roughness;
+            self.notices.add(format!(
+                "Material {} has a glossiness texture, which is replaced by its middle value.",
+                self.name
+            ));
+        }
+        Ok(())
+    }
+
+    /// A texture whose RGB is sRGB-encoded.
+    fn colour(&mut self, info: Option<impl Into<Info>>) -> Fallible<Option<TextureRef>> {
+        info.map_or(Ok(None), |info| self.texture(&info.into(), true))
+    }
+
+    /// A texture of plain numbers.
+    fn data(&mut self, info: Option<impl Into<Info>>) -> Fallible<Option<TextureRef>> {
+        info.map_or(Ok(None), |info| self.texture(&info.into(), false))
+    }
+
+    fn texture(&mut self, info: &Info, srgb: bool) -> Fallible<Option<TextureRef>> {
+        let transform = info.transform.as_ref();
+        let uv_set = transform.and_then(|it| it.tex_coord).unwrap_or(info.tex_coord);
+        if uv_set > 1 {
+            self.notices.add(format!(
+                "Material {} has a texture on UV set {uv_set}, which is left out: sets 0 and 1 are read.",
+                self.name
+            ));
+            return Ok(None);
+        }
+        Ok(Some(TextureRef {
+            texture: self.wanted.add(self.root, info.index, srgb)?,
+            uv_set: uv_set as u8,
+            transform: transform.map_or(Affine2::IDENTITY, uv_transform),
+        }))
+    }
+
+    /// A factor clamped to `[0,1]`.
+    fn unit(&mut self, value: f32) -> f32 {
+        self.within(value, 0.0, 1.0)
+    }
+
+    fn units<const N: usize>(&mut self, values: [f32; N]) -> [f32; N] {
+        values.map(|value| self.unit(value))
+    }
+
+    fn at_least(&mut self, value: f32, least: f32) -> f32 {
+        self.within(value, least, f32::MAX)
+    }
+
+    fn finite(&mut self, value: f32) -> f32 {
+        self.within(value, f32::MIN, f32::MAX)
+    }
+
+    fn within(&mut self, value: f32, least: f32, most: f32) -> f32 {
+        if !(least..=most).contains(&value) {
+            self.notices.add(format!(
+                "Material {} has factors outside their range, which are clamped.",
+                self.name
+            ));
+        }
+        value.clamp(least, most)
+    }
+}
+
+/// `KHR_texture_transform`: scale, then rotation, then offset. The rotation is counter-clockwise
+/// as the UV map is seen, v pointing down (KhronosGroup/glTF issue 1563).
+fn uv_transform(transform: &TextureTransform) -> Affine2 {
+    let affine = Affine2::from_scale_angle_translation(
+        transform.scale.0.into(),
+        -transform.rotation.0,
+        transform.offset.0.into(),
+    );
+    if affine.is_finite() { affine } else { Affine2::IDENTITY }
+}
+
+fn number(object: &Map<String, Value>, key: &str, default: f32) -> f32 {
+    object.get(key).and_then(Value::as_f64).map_or(default, |value| value as f32)
+}
+
+fn texture(object: &Map<String, Value>, key: &str) -> Option<json::texture::Info> {
+    object.get(key).and_then(parsed)
+}

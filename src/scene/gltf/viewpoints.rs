@@ -1,0 +1,129 @@
+//! Cameras and punctual lights of the shown scene.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+use glam::{DAffine3, Vec3};
+use gltf::json;
+use json::extensions::scene::khr_lights_punctual::{Light, Type};
+use json::validation::Checked;
+
+use super::Fallible;
+use super::buffers::find;
+use super::pose::Nodes;
+use crate::error::Notices;
+use crate::scene::{Camera, Projection, PunctualKind, PunctualLight};
+
+/// Field of view where the file's is unusable.
+const DEFAULT_FOV_Y_RADIANS: f32 = 0.8;
+
+/// Cameras of the shown nodes, in the order of the file's cameras.
+pub(super) fn cameras(
+    root: &json::Root,
+    nodes: &Nodes,
+    notices: &mut Notices,
+) -> Fallible<Vec<Camera>> {
+    let mut cameras = Vec::new();
+    for &number in &nodes.shown {
+        let node = &root.nodes[number];
+        if let Some(index) = node.camera {
+            let source = find(&root.cameras, index, "camera")?;
+            let name = source.name.clone().or_else(|| node.name.clone());
+            let name = name.unwrap_or_else(|| format!("camera {index}"));
+            cameras.push((index.value(), camera(source, name, nodes.world[number], notices)));
+        }
+    }
+    cameras.sort_by_key(|&(index, _)| index);
+    Ok(cameras.into_iter().map(|(_, camera)| camera).collect())
+}
+
+fn camera(
+    source: &json::Camera,
+    name: String,
+    world_from_camera: DAffine3,
+    notices: &mut Notices,
+) -> Camera {
+    let mut usable = world_from_camera.is_finite();
+    let (projection, aspect) = match (&source.perspective, &source.orthographic) {
+        (Some(perspective), _) => {
+            let fits = perspective.yfov > 0.0 && perspective.yfov < PI;
+            usable &= fits;
+            let fov_y_radians = if fits { perspective.yfov } else { DEFAULT_FOV_Y_RADIANS };
+            (Projection::Perspective { fov_y_radians }, perspective.aspect_ratio)
+        }
+        (None, Some(parallel)) => {
+            let (x, y) = (parallel.xmag.abs(), parallel.ymag.abs());
+            let fits = y > 0.0 && y.is_finite();
+            usable &= fits;
+            (Projection::Orthographic { half_height: if fits { y } else { 1.0 } }, Some(x / y))
+        }
+        (None, None) => {
+            usable = false;
+            (Projection::Perspective { fov_y_radians: DEFAULT_FOV_Y_RADIANS }, None)
+        }
+    };
+    if !usable {
+        notices.add(format!("Camera {name} is damaged; the unusable values are replaced."));
+    }
+    let world_from_camera =
+        if world_from_camera.is_finite() { world_from_camera } else { DAffine3::IDENTITY };
+    Camera {
+        name,
+        world_from_camera: world_from_camera.as_affine3a(),
+        projection,
+        aspect: aspect.filter(|aspect| aspect.is_finite() && *aspect > 0.0),
+        lens_radius: 0.0,
+        focus_distance: 1.0,
+    }
+}
+
+/// `KHR_lights_punctual` lights of the shown nodes. Candela and lux are taken as the renderer's
+/// units: HDR maps are not calibrated either, so any other factor would be a guess.
+pub(super) fn lights(
+    root: &json::Root,
+    nodes: &Nodes,
+    notices: &mut Notices,
+) -> Fallible<Vec<PunctualLight>> {
+    let extension = root.extensions.as_ref();
+    let sources = extension.and_then(|all| all.khr_lights_punctual.as_ref());
+    let sources = sources.map_or(&[][..], |extension| &extension.lights);
+    let mut lights = Vec::new();
+    for &number in &nodes.shown {
+        let node = &root.nodes[number];
+        let extension = node.extensions.as_ref();
+        let Some(reference) = extension.and_then(|all| all.khr_lights_punctual.as_ref()) else {
+            continue;
+        };
+        let source = find(sources, reference.light, "light")?;
+        let name = source.name.clone().or_else(|| node.name.clone());
+        let name = name.unwrap_or_else(|| format!("light {}", reference.light));
+        match light(source, &name, nodes.world[number]) {
+            Some(light) => lights.push(light),
+            None => notices.add(format!("Light {name} is damaged and left out.")),
+        }
+    }
+    Ok(lights)
+}
+
+fn light(source: &Light, name: &str, world_from_light: DAffine3) -> Option<PunctualLight> {
+    let Checked::Valid(kind) = source.type_ else { return None };
+    let kind = match kind {
+        Type::Directional => PunctualKind::Directional,
+        Type::Point => PunctualKind::Point,
+        Type::Spot => {
+            let spot = source.spot.as_ref()?;
+            let outer_radians = spot.outer_cone_angle.clamp(0.0, FRAC_PI_2);
+            let inner_radians = spot.inner_cone_angle.clamp(0.0, outer_radians);
+            PunctualKind::Spot { inner_radians, outer_radians }
+        }
+    };
+    let direction = -world_from_light.matrix3.z_axis.as_vec3();
+    let light = PunctualLight {
+        name: name.to_owned(),
+        kind,
+        position: world_from_light.translation.as_vec3(),
+        direction: direction.normalize_or(Vec3::NEG_Z),
+        intensity: Vec3::from_array(source.color).max(Vec3::ZERO) * source.intensity.max(0.0),
+        range: source.range.filter(|&range| range > 0.0).unwrap_or(f32::INFINITY),
+    };
+    (light.position.is_finite() && light.intensity.is_finite()).then_some(light)
+}

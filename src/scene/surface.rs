@@ -1,0 +1,262 @@
+//! What a ray finds at a point of a triangle: where it is, how it faces, what it is made of.
+
+use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
+
+use super::texture::sample_texture;
+use super::{AlphaMode, Material, Scene, TextureRef};
+use crate::math::Frame;
+
+/// A shading normal is bent until its cosine with the viewer is at least this share of the geometric
+/// normal's: a viewer in front of the surface is in front of its shading too.
+const MIN_COSINE_SHARE: f32 = 0.05;
+
+/// Material at one point, textures already read. Colours are linear Rec.709.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceParameters {
+    /// Base colour, each component in `[0,1]`.
+    pub base_color: Vec3,
+    /// Opacity along rays in `[0,1]`: 1 if opaque, 0 or 1 if masked.
+    pub alpha: f32,
+    /// Metalness in `[0,1]`.
+    pub metallic: f32,
+    /// Perceptual roughness in `[0,1]`; GGX alpha is its square.
+    pub roughness: f32,
+    /// Index of refraction, at least 1; 0 is infinitely high (F0 = 1).
+    pub ior: f32,
+    /// Strength of the dielectric reflection in `[0,1]`.
+    pub specular: f32,
+    /// F0 tint of the dielectric.
+    pub specular_color: Vec3,
+    /// Share of the dielectric's body that is clear, in `[0,1]`.
+    pub transmission: f32,
+    /// A wall without an inside: light is not bent.
+    pub thin: bool,
+    /// Absorption coefficient of the inside per metre; zero if thin.
+    pub absorption: Vec3,
+    /// Strength of the coat in `[0,1]`.
+    pub clearcoat: f32,
+    /// Perceptual roughness of the coat in `[0,1]`.
+    pub clearcoat_roughness: f32,
+    /// Unit normal of the coat in the local shading frame; +Z unless normal maps differ.
+    pub clearcoat_normal: Vec3,
+    /// Emitted radiance; of an unlit surface its base colour.
+    pub emissive: Vec3,
+    /// Nothing is scattered.
+    pub unlit: bool,
+}
+
+/// A point on a triangle as a ray sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// Index of the triangle.
+    pub triangle: u32,
+    /// World position in metres, from the triangle's corners (more exact than from the ray).
+    pub position: Vec3,
+    /// Unit normal of the triangle on the viewer's side.
+    pub geometric_normal: Vec3,
+    /// World frame of local directions; z is the shading normal, on the viewer's side and within the
+    /// geometric normal's hemisphere.
+    pub shading_frame: Frame,
+    /// Whether the viewer sees the front (counter-clockwise) side.
+    pub front_face: bool,
+    /// Texture coordinates of the first set; zero if there are none.
+    pub uv: Vec2,
+    /// The material, textures read.
+    pub parameters: SurfaceParameters,
+}
+
+impl SurfacePoint {
+    /// The point of `triangle` at `barycentric` (weights of its second and third corner), met by a
+    /// ray that travels along `ray_direction`.
+    ///
+    /// The back of a single-sided material is shaded like its front: only camera rays, which pass it,
+    /// tell the difference.
+    pub fn at(scene: &Scene, triangle: u32, barycentric: Vec2, ray_direction: Vec3) -> Self {
+        let corner = Corner::new(scene, triangle, barycentric);
+        let material = corner.material();
+        let [a, b, c] = corner.vertices.map(|i| scene.positions[i]);
+        let position = corner.interpolate(&scene.positions);
+        let front_normal = (b - a).cross(c - a).try_normalize().unwrap_or(-ray_direction);
+        let front_face = ray_direction.dot(front_normal) < 0.0;
+        let geometric_normal = if front_face { front_normal } else { -front_normal };
+
+        let facing = Facing { geometric_normal, to_viewer: -ray_direction };
+        let unmapped = corner.smooth_normal().unwrap_or(front_normal);
+        let normal = corner.mapped(unmapped, material.normal_texture, material.normal_scale);
+        let shading_frame = Frame::from_z(facing.turned(normal, unmapped));
+        let mut parameters = corner.parameters();
+        if parameters.clearcoat > 0.0 && has_normal_map(material) {
+            let (texture, scale) =
+                (material.clearcoat_normal_texture, material.clearcoat_normal_scale);
+            let coat = facing.turned(corner.mapped(unmapped, texture, scale), unmapped);
+            parameters.clearcoat_normal = shading_frame.local_from_world(coat);
+        }
+        let uv = corner.uv(0);
+        Self { triangle, position, geometric_normal, shading_frame, front_face, uv, parameters }
+    }
+}
+
+/// Opacity in `[0,1]` of a point: 1 if the material is opaque, 0 or 1 if it is masked, its alpha if
+/// it is blended. Cheap enough for every surface a shadow ray meets.
+pub fn alpha_at(scene: &Scene, triangle: u32, barycentric: Vec2) -> f32 {
+    let material = &scene.materials[scene.triangle_materials[triangle as usize] as usize];
+    if material.alpha_mode == AlphaMode::Opaque {
+        return 1.0;
+    }
+    let corner = Corner::new(scene, triangle, barycentric);
+    opacity(material.alpha_mode, corner.base_color().w)
+}
+
+fn opacity(mode: AlphaMode, alpha: f32) -> f32 {
+    match mode {
+        AlphaMode::Opaque => 1.0,
+        AlphaMode::Mask { cutoff } => f32::from(alpha >= cutoff),
+        AlphaMode::Blend => alpha.clamp(0.0, 1.0),
+    }
+}
+
+fn has_normal_map(material: &Material) -> bool {
+    material.normal_texture.is_some() || material.clearcoat_normal_texture.is_some()
+}
+
+/// A point of a triangle, ready to interpolate what its corners have.
+struct Corner<'a> {
+    scene: &'a Scene,
+    triangle: usize,
+    vertices: [usize; 3],
+    weights: Vec3,
+}
+
+impl<'a> Corner<'a> {
+    fn new(scene: &'a Scene, triangle: u32, barycentric: Vec2) -> Self {
+        let triangle = triangle as usize;
+        let weights = Vec3::new(1.0 - barycentric.x - barycentric.y, barycentric.x, barycentric.y);
+        let vertices = scene.triangles[triangle].map(|i| i as usize);
+        Self { scene, triangle, vertices, weights }
+    }
+
+    fn material(&self) -> &'a Material {
+        &self.scene.materials[self.scene.triangle_materials[self.triangle] as usize]
+    }
+
+    fn interpolate<T>(&self, values: &[T]) -> T
+    where
+        T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>,
+    {
+        let [a, b, c] = self.vertices.map(|i| values[i]);
+        a * self.weights.x + b * self.weights.y + c * self.weights.z
+    }
+
+    fn uv(&self, set: u8) -> Vec2 {
+        let uvs = &self.scene.uvs[usize::from(set)];
+        if uvs.is_empty() { Vec2::ZERO } else { self.interpolate(uvs) }
+    }
+
+    /// The texture's value here, ones without a texture.
+    fn read(&self, texture: Option<TextureRef>) -> Vec4 {
+        texture.map_or(Vec4::ONE, |t| sample_texture(self.scene, &t, self.uv(t.uv_set)))
+    }
+
+    fn base_color(&self) -> Vec4 {
+        let material = self.material();
+        let color = material.base_color * self.read(material.base_color_texture);
+        if self.scene.colors.is_empty() {
+            return color;
+        }
+        color * self.interpolate(&self.scene.colors)
+    }
+
+    /// Interpolated normal, not of unit length; `None` where the triangle is flat.
+    fn smooth_normal(&self) -> Option<Vec3> {
+        if self.scene.normals.is_empty() {
+            return None;
+        }
+        let normals = self.vertices.map(|i| self.scene.normals[i]);
+        if normals.contains(&Vec3::ZERO) {
+            return None;
+        }
+        Some(self.interpolate(&self.scene.normals)).filter(|n| n.length_squared() > 1e-12)
+    }
+
+    /// The normal a tangent-space map makes of `normal`, not of unit length. Neither normal nor
+    /// tangent is normalised in between, as MikkTSpace demands; without tangents the map is ignored.
+    fn mapped(&self, normal: Vec3, texture: Option<TextureRef>, scale: f32) -> Vec3 {
+        let Some(texture) = texture.filter(|_| !self.scene.tangents.is_empty()) else {
+            return normal;
+        };
+        let tangent = self.interpolate(&self.scene.tangents).xyz();
+        let handedness = self.scene.tangents[self.vertices[0]].w;
+        let bitangent = normal.cross(tangent) * handedness;
+        let map = self.read(Some(texture)).xyz() * 2.0 - 1.0;
+        tangent * (map.x * scale) + bitangent * (map.y * scale) + normal * map.z
+    }
+
+    fn parameters(&self) -> SurfaceParameters {
+        let m = self.material();
+        let base = self.base_color();
+        let metallic_roughness = self.read(m.metallic_roughness_texture);
+        let base_color = base.xyz().clamp(Vec3::ZERO, Vec3::ONE);
+        let emissive = m.emissive * self.read(m.emissive_texture).xyz();
+        let thin = m.thickness <= 0.0;
+        SurfaceParameters {
+            base_color,
+            alpha: opacity(m.alpha_mode, base.w),
+            metallic: unit(m.metallic * metallic_roughness.z),
+            roughness: unit(m.roughness * metallic_roughness.y),
+            ior: m.ior,
+            specular: unit(m.specular * self.read(m.specular_texture).w),
+            specular_color: m.specular_color * self.read(m.specular_color_texture).xyz(),
+            transmission: unit(m.transmission * self.read(m.transmission_texture).x),
+            thin,
+            absorption: if thin { Vec3::ZERO } else { absorption(m) },
+            clearcoat: unit(m.clearcoat * self.read(m.clearcoat_texture).x),
+            clearcoat_roughness: unit(
+                m.clearcoat_roughness * self.read(m.clearcoat_roughness_texture).y,
+            ),
+            clearcoat_normal: Vec3::Z,
+            emissive: if m.unlit { base_color } else { emissive },
+            unlit: m.unlit,
+        }
+    }
+}
+
+fn unit(x: f32) -> f32 {
+    x.clamp(0.0, 1.0)
+}
+
+/// Coefficient that turns white into the attenuation colour over the attenuation distance
+/// (`KHR_materials_volume`); a black component absorbs as one of 1e-6.
+fn absorption(material: &Material) -> Vec3 {
+    let distance = material.attenuation_distance;
+    if !distance.is_finite() || distance <= 0.0 {
+        return Vec3::ZERO;
+    }
+    material.attenuation_color.clamp(Vec3::splat(1e-6), Vec3::ONE).map(|c| -c.ln() / distance)
+}
+
+/// Makes shading normals of one point face the viewer.
+struct Facing {
+    geometric_normal: Vec3,
+    to_viewer: Vec3,
+}
+
+impl Facing {
+    /// Turns `normal` to the side of the geometric normal that `unmapped` says it belongs to, then
+    /// bends it into sight if need be. Unit, for any finite input.
+    fn turned(&self, normal: Vec3, unmapped: Vec3) -> Vec3 {
+        let side = 1.0_f32.copysign(unmapped.dot(self.geometric_normal));
+        let normal = normal.normalize_or(self.geometric_normal * side) * side;
+        self.bent(self.bent(normal, self.geometric_normal), self.to_viewer)
+    }
+
+    /// Bends `normal` towards the geometric normal until it is on the side of `toward`.
+    fn bent(&self, normal: Vec3, toward: Vec3) -> Vec3 {
+        let (cos, geometric_cos) = (normal.dot(toward), self.geometric_normal.dot(toward));
+        let least = MIN_COSINE_SHARE * geometric_cos;
+        if cos >= least {
+            return normal;
+        }
+        let t = (least - cos) / (geometric_cos - cos);
+        normal.lerp(self.geometric_normal, t).normalize_or(self.geometric_normal)
+    }
+}
