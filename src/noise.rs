@@ -51,14 +51,17 @@ pub fn tiling(p: Vec2, period: IVec2, seed: u32) -> f32 {
     let t = p - cell;
     let t = t * t * (Vec2::splat(3.0) - 2.0 * t);
     let c = cell.as_ivec2();
-    let (x0, x1) = (c.x.rem_euclid(period.x) as u32, (c.x + 1).rem_euclid(period.x) as u32);
-    let row = |y: i32| {
-        let y = hash(y.rem_euclid(period.y) as u32 ^ seed.rotate_left(16));
+    // The lattice line after `a`, which has been wrapped already.
+    let after = |a: u32, period: i32| if a + 1 == period as u32 { 0 } else { a + 1 };
+    let (x0, y0) = (c.x.rem_euclid(period.x) as u32, c.y.rem_euclid(period.y) as u32);
+    let x1 = after(x0, period.x);
+    let row = |y: u32| {
+        let y = hash(y ^ seed.rotate_left(16));
         let (a, b) =
             (unit(y ^ x0.wrapping_mul(0x9e37_79b9)), unit(y ^ x1.wrapping_mul(0x9e37_79b9)));
         a + (b - a) * t.x
     };
-    let (a, b) = (row(c.y), row(c.y + 1));
+    let (a, b) = (row(y0), row(after(y0, period.y)));
     a + (b - a) * t.y
 }
 

@@ -89,7 +89,7 @@ fn overlap(a: [Vec2; 3], b: [Vec2; 3]) -> bool {
 }
 
 #[test]
-fn no_faces_of_different_parts_lie_in_one_plane() {
+fn no_faces_that_look_the_same_way_lie_in_one_plane() {
     for name in builtin::names() {
         let scene = builtin::build(name).expect(name);
         let mut planes: HashMap<[i32; 4], Vec<usize>> = HashMap::new();
@@ -99,30 +99,32 @@ fn no_faces_of_different_parts_lie_in_one_plane() {
             if cross.length() < 2e-4 {
                 continue;
             }
-            let mut n = cross.normalize();
-            let lead = [n.x, n.y, n.z].into_iter().find(|x| x.abs() > 1e-3).expect("unit vector");
-            n *= lead.signum();
+            let n = cross.normalize();
             let key = [n.x * 500.0, n.y * 500.0, n.z * 500.0, n.dot(a) * 4000.0]
                 .map(|x| x.round() as i32);
             planes.entry(key).or_default().push(t);
         }
-        let mut clashes: HashMap<[&str; 2], (usize, Vec3)> = HashMap::new();
+        let mut clashes: HashMap<[&str; 2], (usize, [Vec3; 3])> = HashMap::new();
         for group in planes.values().filter(|g| g.len() > 1) {
             let [a, b, c] = corners(&scene, group[0]);
             let n = (b - a).cross(c - a).normalize();
             let (x, y) = n.any_orthonormal_pair();
-            let flat: Vec<[Vec2; 3]> = group
+            let mut flat: Vec<(usize, [Vec2; 3])> = group
                 .iter()
-                .map(|&t| corners(&scene, t).map(|p| Vec2::new(p.dot(x), p.dot(y))))
+                .map(|&t| (t, corners(&scene, t).map(|p| Vec2::new(p.dot(x), p.dot(y)))))
                 .collect();
-            for i in 0..group.len() {
-                for j in 0..i {
-                    if overlap(flat[i], flat[j]) {
+            let left = |t: &[Vec2; 3]| t[0].x.min(t[1].x).min(t[2].x);
+            let right = |t: &[Vec2; 3]| t[0].x.max(t[1].x).max(t[2].x);
+            flat.sort_by(|a, b| left(&a.1).total_cmp(&left(&b.1)));
+            for (i, (t, here)) in flat.iter().enumerate() {
+                for (other, there) in flat[i + 1..].iter().take_while(|f| left(&f.1) < right(here))
+                {
+                    if overlap(*here, *there) {
                         let material = |t: usize| {
                             scene.materials[scene.triangle_materials[t] as usize].name.as_str()
                         };
-                        let key = [material(group[i]), material(group[j])];
-                        let entry = clashes.entry(key).or_insert((0, corners(&scene, group[i])[0]));
+                        let key = [material(*t), material(*other)];
+                        let entry = clashes.entry(key).or_insert((0, corners(&scene, *t)));
                         entry.0 += 1;
                     }
                 }
@@ -230,8 +232,8 @@ fn flux(name: &str, width: u32, height: u32) -> [f64; 3] {
 #[test]
 fn the_energy_of_a_sky_does_not_depend_on_its_resolution() {
     for name in sky::names() {
-        let fine = flux(name, 2048, 1024);
-        for (width, height) in [(1, 1), (3, 2), (64, 32), (777, 300), (3000, 1500)] {
+        let fine = flux(name, 1024, 512);
+        for (width, height) in [(1, 1), (3, 2), (64, 32), (555, 210), (2200, 1100)] {
             let other = flux(name, width, height);
             for k in 0..3 {
                 let ratio = other[k] / fine[k];
@@ -243,7 +245,7 @@ fn the_energy_of_a_sky_does_not_depend_on_its_resolution() {
 
 #[test]
 fn the_day_sun_is_where_and_as_strong_as_it_should_be() {
-    let (width, height) = (2048, 1024);
+    let (width, height) = (1024, 512);
     let image = sky::build("day", width, height).expect("day");
     let (mut sum, mut flux) = (Vec3::ZERO, 0.0);
     for y in 0..height {

@@ -152,7 +152,7 @@ fn surround(b: &mut Builder, m: &HouseMats, window: [f32; 4]) {
             let louvres = ((v1 - v0) / 0.11) as u32;
             for k in 0..louvres {
                 let v = v0 + 0.09 + (v1 - v0 - 0.16) * k as f32 / louvres as f32;
-                b.slab(shutter, [left + 0.05, v, 0.02], [right - 0.05, v + 0.05, 0.042], 0.01);
+                b.slab(shutter, [left + 0.05, v, 0.02], [right - 0.05, v + 0.05, 0.042], 0.0);
             }
         }
     }

@@ -30,8 +30,8 @@ fn book(b: &mut Builder, [cover, paper]: [Mat; 2], [t, h, d]: [f32; 3], stream: 
     let shade = stream.between(0.75, 1.15);
     b.tinted(tone.map(|c| c * shade), |b| {
         let (x, z) = (0.5 * t, 0.5 * d);
-        b.slab(cover, [-x, 0.0, -z], [-x + 0.0025, h, z - 0.001], 0.0008);
-        b.slab(cover, [x - 0.0025, 0.0, -z], [x, h, z - 0.001], 0.0008);
+        b.slab(cover, [-x, 0.0, -z], [-x + 0.0025, h, z - 0.001], 0.0);
+        b.slab(cover, [x - 0.0025, 0.0, -z], [x, h, z - 0.001], 0.0);
         b.slab(cover, [-x + 0.0002, 0.0003, z - 0.004], [x - 0.0002, h - 0.0003, z], 0.002);
     });
     b.slab(
@@ -124,7 +124,7 @@ pub(super) fn mug(b: &mut Builder, glaze: Mat, drink: Mat) {
 
 /// A vase thrown from a profile of radii (fractions of `height`) at even heights, with a thin wall.
 pub(super) fn vase(b: &mut Builder, mat: Mat, height: f32, radii: &[f32]) {
-    const STEPS: u32 = 40;
+    const STEPS: u32 = 24;
     let last = radii.len() as f32 - 1.0;
     let radius = |t: f32| {
         // Catmull-Rom through the given radii.
@@ -152,7 +152,7 @@ pub(super) fn vase(b: &mut Builder, mat: Mat, height: f32, radii: &[f32]) {
             .map(|t| ((radius(t) - wall) * height, t * height)),
     );
     profile.push((0.0, 0.06 * height));
-    b.lathe(mat, 56, &profile);
+    b.lathe(mat, 48, &profile);
 }
 
 /// A shallow bowl.

@@ -41,13 +41,13 @@ fn grain(uv: Vec2, tone: Vec3, seed: u32) -> Vec3 {
         smoothstep(0.62, 0.8, tiling(uv * Vec2::new(40.0, 400.0), IVec2::new(40, 400), seed ^ 9));
     let light = 0.80 + 0.13 * ring + 0.34 * (fibre - 0.5) - 0.12 * pores + 0.15 * (warp - 0.5);
     // Darker wood is also redder.
-    tone * Vec3::new(light.powf(0.8), light, light.powf(1.25))
+    tone * light * (Vec3::ONE + Vec3::new(0.2, 0.0, -0.25) * (1.0 - light))
 }
 
 /// Timber for furniture, grain along u.
 pub(super) fn timber(tone: [f32; 3]) -> TextureImage {
     let tone = Vec3::from(tone);
-    paint(512, 512, |uv| grain(uv, tone, 11))
+    paint(512, 384, |uv| grain(uv, tone, 11))
 }
 
 /// Floor boards along u: `rows` of them, each of `boards` pieces, with staggered ends.
@@ -97,9 +97,9 @@ pub(super) fn herringbone(tone: [f32; 3]) -> TextureImage {
 /// Wall paint over plaster: nearly even, a little cloudy.
 pub(super) fn plaster(tone: [f32; 3], roughness: f32) -> TextureImage {
     let tone = Vec3::from(tone);
-    paint(512, 512, |uv| {
+    paint(256, 256, |uv| {
         let cloud = tiling_fbm(uv * 4.0, IVec2::splat(4), 4, 21) - 0.5;
-        let speck = tiling(uv * 170.0, IVec2::splat(170), 22) - 0.5;
+        let speck = tiling(uv * 120.0, IVec2::splat(120), 22) - 0.5;
         tone * (1.0 + roughness * (0.5 * cloud + 0.16 * speck))
     })
 }
@@ -107,7 +107,7 @@ pub(super) fn plaster(tone: [f32; 3], roughness: f32) -> TextureImage {
 /// Plain weave with uneven threads, `threads` across the texture.
 pub(super) fn weave(tone: [f32; 3], threads: i32) -> TextureImage {
     let tone = Vec3::from(tone);
-    paint(512, 512, |uv| {
+    paint(256, 256, |uv| {
         let p = uv * threads as f32;
         let over = (p.x as i32 + p.y as i32) & 1 == 0;
         let (across, thread) =
@@ -121,7 +121,7 @@ pub(super) fn weave(tone: [f32; 3], threads: i32) -> TextureImage {
 /// Running-bond bricks, `columns` x `rows` of them (`rows` even).
 pub(super) fn bricks(tone: [f32; 3], mortar: [f32; 3], columns: u32, rows: u32) -> TextureImage {
     let (tone, mortar) = (Vec3::from(tone), Vec3::from(mortar));
-    paint(1024, 1024, |uv| {
+    paint(768, 768, |uv| {
         let v = uv.y * rows as f32;
         let row = v as u32;
         let u = (uv.x * columns as f32 + 0.5 * (row & 1) as f32).rem_euclid(columns as f32);
@@ -139,7 +139,7 @@ pub(super) fn bricks(tone: [f32; 3], mortar: [f32; 3], columns: u32, rows: u32) 
 /// Square-cut stones in rows of uneven lengths, for paving and ashlar: `rows` of them (even).
 pub(super) fn stones(tone: [f32; 3], rows: u32, columns: u32, joint: f32) -> TextureImage {
     let tone = Vec3::from(tone);
-    paint(1024, 1024, |uv| {
+    paint(768, 768, |uv| {
         let v = uv.y * rows as f32;
         let row = v as u32;
         let bend = 0.25
@@ -160,7 +160,7 @@ pub(super) fn stones(tone: [f32; 3], rows: u32, columns: u32, joint: f32) -> Tex
 /// Woven rug: a field of diamonds in a double border. Covers the rug once.
 pub(super) fn rug(ground: [f32; 3], figure: [f32; 3], accent: [f32; 3]) -> TextureImage {
     let [ground, figure, accent] = [ground, figure, accent].map(Vec3::from);
-    paint(1024, 768, |uv| {
+    paint(768, 576, |uv| {
         // Distances in units of the shorter side.
         let p = Vec2::new(uv.x * 4.0 / 3.0, uv.y);
         let inset = p.x.min(4.0 / 3.0 - p.x).min(p.y).min(1.0 - p.y);
@@ -222,7 +222,7 @@ pub(super) fn painting(seed: u32) -> TextureImage {
         ],
     ];
     let palette = PALETTES[seed as usize % PALETTES.len()].map(Vec3::from);
-    paint(384, 512, |uv| {
+    paint(240, 320, |uv| {
         let brush = tiling_fbm(uv * Vec2::new(10.0, 60.0), IVec2::new(10, 60), 3, seed + 71) - 0.5;
         let mut c = palette[0].lerp(palette[4], smoothstep(0.0, 0.5, uv.y) + 0.4 * brush);
         let sun = uv.distance(Vec2::new(0.62, 0.27) + 0.006 * brush);

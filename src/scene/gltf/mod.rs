@@ -6,7 +6,8 @@
 //! meaningless is an error.
 //!
 //! `document` parses, `buffers`, `uri` and `accessor` give access to the data, `pose` places nodes
-//! and joints, `materials` and `textures` read the look, `geometry` and `tangents` read triangles,
+//! and joints, `materials` and `textures` read the look, `primitive`, `geometry` and `tangents` read
+//! triangles,
 //! `bake` puts them into the world.
 
 mod accessor;
@@ -17,6 +18,7 @@ mod extensions;
 mod geometry;
 mod materials;
 mod pose;
+mod primitive;
 mod tangents;
 mod textures;
 mod uri;

@@ -1,0 +1,244 @@
+//! Primitives: what their accessors say, vertex by vertex.
+
+use glam::{Vec2, Vec3, Vec4};
+use gltf::json;
+use json::accessor::Type;
+use json::mesh::{Mode, Semantic};
+use json::validation::Checked;
+
+use super::accessor::Elements;
+use super::buffers::File;
+use super::geometry::{Part, Tally};
+use super::pose::unit;
+use super::{Fallible, MAX_TRIANGLES};
+
+/// A triangle primitive whose accessors are checked as they are read.
+pub(super) struct Source<'a> {
+    file: &'a File<'a>,
+    primitive: &'a json::mesh::Primitive,
+    positions: Elements<'a>,
+    mode: Mode,
+}
+
+impl<'a> Source<'a> {
+    /// `None` (and counted) for points, lines and primitives without positions.
+    pub(super) fn open(
+        file: &'a File<'_>,
+        primitive: &'a json::mesh::Primitive,
+        tally: &mut Tally,
+    ) -> Fallible<Option<Self>> {
+        let Checked::Valid(mode) = primitive.mode else {
+            return Err("its mode is unknown to glTF 2.0".into());
+        };
+        match mode {
+            Mode::Points => tally.points += 1,
+            Mode::Lines | Mode::LineLoop | Mode::LineStrip => tally.lines += 1,
+            Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan => {
+                let positions = Checked::Valid(Semantic::Positions);
+                if let Some(&accessor) = primitive.attributes.get(&positions) {
+                    let positions = Elements::open(file, accessor, &[Type::Vec3])?;
+                    return Ok(Some(Self { file, primitive, positions, mode }));
+                }
+                tally.without_positions += 1;
+            }
+        }
+        Ok(None)
+    }
+
+    /// An attribute, which must be as long as the positions.
+    fn attribute(&self, semantic: Semantic, types: &[Type]) -> Fallible<Option<Elements<'a>>> {
+        match self.primitive.attributes.get(&Checked::Valid(semantic)) {
+            Some(&accessor) => self.per_vertex(accessor, types).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    fn per_vertex(
+        &self,
+        accessor: json::Index<json::Accessor>,
+        types: &[Type],
+    ) -> Fallible<Elements<'a>> {
+        let elements = Elements::open(self.file, accessor, types)?;
+        if elements.count < self.positions.count {
+            let (count, vertices) = (elements.count, self.positions.count);
+            return Err(format!(
+                "accessor {accessor}: {count} elements are too few for {vertices} vertices"
+            ));
+        }
+        Ok(elements)
+    }
+
+    /// Vertex numbers of the triangles, all below the number of vertices.
+    pub(super) fn triangles(
+        &self,
+        file: &File<'_>,
+        primitive: &json::mesh::Primitive,
+    ) -> Fallible<Vec<[u32; 3]>> {
+        let vertices = self.positions.count;
+        let indices = match primitive.indices {
+            Some(accessor) => Some(Elements::open(file, accessor, &[Type::Scalar])?),
+            None => None,
+        };
+        if indices.as_ref().is_some_and(|indices| !indices.is_unsigned()) {
+            return Err("its indices are not unsigned integers".into());
+        }
+        let corners = indices.as_ref().map_or(vertices, |indices| indices.count);
+        if corners as u64 > 3 * MAX_TRIANGLES {
+            return Err(format!(
+                "it has more than {} million triangles",
+                MAX_TRIANGLES / 1_000_000
+            ));
+        }
+        let vertex = |corner| match &indices {
+            Some(indices) => indices.integers::<1>(corner)[0],
+            None => corner as u32,
+        };
+        if let Some(corner) = (0..corners).find(|&corner| vertex(corner) as usize >= vertices) {
+            return Err(format!("index {} is beyond its {vertices} vertices", vertex(corner)));
+        }
+        let corner_numbers = |triangle: usize| match self.mode {
+            // Odd triangles of a strip turn, so that all face the same way (section 3.7.2.1).
+            Mode::TriangleStrip if triangle % 2 == 1 => [triangle, triangle + 2, triangle + 1],
+            Mode::TriangleStrip => [triangle, triangle + 1, triangle + 2],
+            Mode::TriangleFan => [triangle + 1, triangle + 2, 0],
+            _ => [3 * triangle, 3 * triangle + 1, 3 * triangle + 2],
+        };
+        let triangles = match self.mode {
+            Mode::TriangleStrip | Mode::TriangleFan => corners.saturating_sub(2),
+            _ => corners / 3,
+        };
+        Ok((0..triangles).map(|triangle| corner_numbers(triangle).map(vertex)).collect())
+    }
+
+    /// Positions of some vertices.
+    pub(super) fn positions(&self, vertices: &[u32]) -> Vec<Vec3> {
+        vertices.iter().map(|&v| Vec3::from_array(self.positions.floats(v as usize))).collect()
+    }
+
+    /// Unit normals, zero (and counted) where they cannot be used.
+    pub(super) fn normals(
+        &self,
+        vertices: &[u32],
+        part: &mut Part,
+        tally: &mut Tally,
+    ) -> Fallible<()> {
+        let Some(elements) = self.attribute(Semantic::Normals, &[Type::Vec3])? else {
+            return Ok(());
+        };
+        for &vertex in vertices {
+            let normal = unit(Vec3::from_array(elements.floats(vertex as usize)));
+            tally.bad_normals += usize::from(normal == Vec3::ZERO);
+            part.normals.push(normal);
+        }
+        Ok(())
+    }
+
+    /// A set of texture coordinates; empty if there is none.
+    pub(super) fn uvs(&self, vertices: &[u32], set: u32, tally: &mut Tally) -> Fallible<Vec<Vec2>> {
+        let Some(elements) = self.attribute(Semantic::TexCoords(set), &[Type::Vec2])? else {
+            return Ok(Vec::new());
+        };
+        let read = |&vertex: &u32| {
+            let uv = Vec2::from_array(elements.floats(vertex as usize));
+            tally.bad_values += usize::from(!uv.is_finite());
+            if uv.is_finite() { uv } else { Vec2::ZERO }
+        };
+        Ok(vertices.iter().map(read).collect())
+    }
+
+    /// Linear colours with alpha; empty if there are none.
+    pub(super) fn colors(&self, vertices: &[u32], tally: &mut Tally) -> Fallible<Vec<Vec4>> {
+        let types = [Type::Vec3, Type::Vec4];
+        let Some(elements) = self.attribute(Semantic::Colors(0), &types)? else {
+            return Ok(Vec::new());
+        };
+        let elements = elements.with_fractions();
+        let read = |&vertex: &u32| {
+            let mut color = Vec4::from_array(elements.floats(vertex as usize));
+            if elements.components == 3 {
+                color.w = 1.0;
+            }
+            tally.bad_values += usize::from(!color.is_finite());
+            if color.is_finite() { color.max(Vec4::ZERO) } else { Vec4::ONE }
+        };
+        Ok(vertices.iter().map(read).collect())
+    }
+
+    /// Tangents of the file; without normals they mean nothing (section 3.7.2.1).
+    pub(super) fn tangents(&self, vertices: &[u32], part: &mut Part) -> Fallible<()> {
+        let elements = self.attribute(Semantic::Tangents, &[Type::Vec4])?;
+        if let Some(elements) = elements.filter(|_| !part.normals.is_empty()) {
+            let tangents = vertices.iter().map(|&vertex| {
+                let tangent = Vec4::from_array(elements.floats(vertex as usize));
+                let sign = if tangent.w < 0.0 { -1.0 } else { 1.0 };
+                let direction = unit(tangent.truncate());
+                (direction != Vec3::ZERO).then(|| direction.extend(sign))
+            });
+            // One bad tangent, and MikkTSpace makes them all.
+            part.tangents = tangents.collect::<Option<_>>().unwrap_or_default();
+        }
+        Ok(())
+    }
+
+    /// Joints and weights of all sets, weights summing to one.
+    pub(super) fn influences(&self, vertices: &[u32], part: &mut Part) -> Fallible<()> {
+        let mut sets = Vec::new();
+        for set in 0.. {
+            let joints = self.attribute(Semantic::Joints(set), &[Type::Vec4])?;
+            let weights = self.attribute(Semantic::Weights(set), &[Type::Vec4])?;
+            let (Some(joints), Some(weights)) = (joints, weights) else { break };
+            if !joints.is_unsigned() {
+                return Err("its joints are not unsigned integers".into());
+            }
+            sets.push((joints, weights.with_fractions()));
+        }
+        part.influences_per_vertex = 4 * sets.len();
+        for &vertex in vertices {
+            let first = part.influences.len();
+            for (joints, weights) in &sets {
+                let joints = joints.integers::<4>(vertex as usize);
+                let weights = weights.floats::<4>(vertex as usize);
+                part.influences.extend(joints.into_iter().zip(weights));
+            }
+            normalize(&mut part.influences[first..]);
+        }
+        Ok(())
+    }
+
+    /// Adds morph targets to positions, normals and tangents.
+    pub(super) fn morph(&self, vertices: &[u32], weights: &[f32], part: &mut Part) -> Fallible<()> {
+        for (target, &weight) in self.primitive.targets.iter().flatten().zip(weights) {
+            if weight == 0.0 {
+                continue;
+            }
+            let shift = |accessor: Option<json::Index<json::Accessor>>, values: &mut [Vec3]| {
+                let Some(accessor) = accessor else { return Ok(()) };
+                let elements = self.per_vertex(accessor, &[Type::Vec3])?;
+                for (value, &vertex) in values.iter_mut().zip(vertices) {
+                    *value += weight * Vec3::from_array(elements.floats(vertex as usize));
+                }
+                Fallible::Ok(())
+            };
+            shift(target.positions, &mut part.positions)?;
+            shift(target.normals, &mut part.normals)?;
+            let mut directions: Vec<Vec3> = part.tangents.iter().map(|t| t.truncate()).collect();
+            shift(target.tangents, &mut directions)?;
+            for (tangent, direction) in part.tangents.iter_mut().zip(directions) {
+                *tangent = direction.extend(tangent.w);
+            }
+        }
+        for normal in &mut part.normals {
+            *normal = unit(*normal);
+        }
+        Ok(())
+    }
+}
+
+/// Makes weights sum to one; a vertex that nothing holds follows its first joint.
+fn normalize(influences: &mut [(u32, f32)]) {
+    let sum: f32 = influences.iter().map(|(_, weight)| weight).sum();
+    let usable = sum.is_finite() && sum > 0.0;
+    for (number, (_, weight)) in influences.iter_mut().enumerate() {
+        *weight = if usable { *weight / sum } else { f32::from(u8::from(number == 0)) };
+    }
+}

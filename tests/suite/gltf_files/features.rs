@@ -1,0 +1,387 @@
+//! One small file made here for each feature of the format.
+
+use glam::{Vec2, Vec3, Vec4};
+use lightgrid::scene::{AlphaMode, Projection, PunctualKind, Scene, Wrap, gltf};
+
+use super::builder::{Builder, ONE_MESH, square, textured_material};
+
+fn geometric_normal(scene: &Scene, triangle: usize) -> Vec3 {
+    let [a, b, c] = scene.triangles[triangle].map(|v| scene.positions[v as usize]);
+    (b - a).cross(c - a).normalize()
+}
+
+#[test]
+fn strips_fans_and_lists_give_the_same_square() {
+    let mut builder = square();
+    let strip = builder.indices(&[0, 1, 3, 2]);
+    let fan = builder.indices(&[0, 1, 2, 3]);
+    for (mode, indices) in [(4, 1), (5, strip), (6, fan)] {
+        let scene = builder.load(&format!(
+            r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":{indices},"mode":{mode}}}]}}],"nodes":[{{"mesh":0}}]"#
+        ));
+        assert_eq!(scene.triangles.len(), 2, "mode {mode}");
+        assert!(scene.normals.is_empty());
+        for triangle in 0..2 {
+            assert_eq!(geometric_normal(&scene, triangle), Vec3::Z, "mode {mode}");
+        }
+    }
+    // Without indices a list takes its vertices three by three: one triangle of four vertices.
+    let scene = builder
+        .load(r#""meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}]"#);
+    assert_eq!((scene.triangles.len(), scene.positions.len()), (1, 3));
+}
+
+#[test]
+fn points_and_lines_are_skipped_with_one_notice() {
+    let scene = square().load(
+        r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"mode":0},
+        {"attributes":{"POSITION":0},"mode":1},{"attributes":{"POSITION":0},"mode":2},
+        {"attributes":{"POSITION":0},"indices":1}]}],"nodes":[{"mesh":0}]"#,
+    );
+    let notices: Vec<_> = scene.notices.iter().collect();
+    assert_eq!(
+        notices,
+        ["1 point and 2 line primitives were skipped: only triangles are rendered."]
+    );
+    let error = square()
+        .error(r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"mode":0}]}],"nodes":[{"mesh":0}]"#);
+    assert!(error.contains("no triangles") && error.contains("1 point"), "{error}");
+}
+
+#[test]
+fn sparse_accessors_replace_elements() {
+    let mut builder = square();
+    let indices = builder.view(&[2_u8, 3]);
+    let values = builder.view(bytemuck::cast_slice(&[5.0_f32, 5., 0., 0., 5., 0.]));
+    builder.accessors[0] = format!(
+        r#"{{"bufferView":0,"componentType":5126,"type":"VEC3","count":4,"sparse":{{"count":2,
+        "indices":{{"bufferView":{indices},"componentType":5121}},"values":{{"bufferView":{values}}}}}}}"#
+    );
+    let scene = builder.load(ONE_MESH);
+    assert_eq!(scene.positions[2], Vec3::new(5.0, 5.0, 0.0));
+    assert_eq!(scene.positions[1], Vec3::X);
+    // The same without a base: all other elements are zero.
+    builder.accessors[0] = builder.accessors[0].replacen(r#""bufferView":0,"#, "", 1);
+    let scene = builder.load(ONE_MESH);
+    assert_eq!(scene.positions[1], Vec3::ZERO);
+    assert_eq!(scene.triangles.len(), 1);
+}
+
+#[test]
+fn a_mirroring_node_turns_the_winding_and_keeps_normals_outside() {
+    let mut builder = square();
+    builder.floats("VEC3", &[0., 0., 1., 0., 0., 1., 0., 0., 1., 0., 0., 1.]);
+    let scene = builder.load(
+        r#""meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":2},"indices":1}]}],
+        "nodes":[{"children":[1],"translation":[10,0,0]},{"mesh":0,"scale":[-2,1,1]}]"#,
+    );
+    assert_eq!(scene.positions[1], Vec3::new(8.0, 0.0, 0.0));
+    assert_eq!(geometric_normal(&scene, 0), Vec3::Z);
+    assert!(scene.normals.iter().all(|&normal| normal == Vec3::Z));
+    // Sheared by non-uniform scale under rotation, a normal stays perpendicular.
+    let scene = builder.load(
+        r#""meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":2},"indices":1}]}],
+        "nodes":[{"children":[1],"scale":[1,1,5]},{"mesh":0,"rotation":[0,0.3826834,0,0.9238795]}]"#,
+    );
+    assert!(scene.normals[0].dot(geometric_normal(&scene, 0)) > 0.99999);
+}
+
+#[test]
+fn instances_are_baked() {
+    let mut builder = square();
+    let translation = builder.floats("VEC3", &[0., 0., 0., 0., 0., 7.]);
+    // Quarter turn about Y as normalized bytes: 90/127 is near the half-angle's sine.
+    let rotation =
+        builder.add(&[0, 0, 0, 127, 0, 90, 0, 90], 5120, "VEC4", 2, r#","normalized":true"#);
+    let scale = builder.floats("VEC3", &[1., 1., 1., 2., 2., 2.]);
+    let scene = builder.load(&format!(
+        r#""extensionsUsed":["EXT_mesh_gpu_instancing"],"extensionsRequired":["EXT_mesh_gpu_instancing"],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],
+        "nodes":[{{"mesh":0,"translation":[0,1,0],"extensions":{{"EXT_mesh_gpu_instancing":{{"attributes":
+        {{"TRANSLATION":{translation},"ROTATION":{rotation},"SCALE":{scale}}}}}}}}}]"#
+    ));
+    assert_eq!(scene.triangles.len(), 4);
+    assert_eq!(scene.positions[1], Vec3::new(1.0, 1.0, 0.0));
+    assert!(scene.positions[5].abs_diff_eq(Vec3::new(0.0, 1.0, 5.0), 1e-5));
+    assert!(geometric_normal(&scene, 2).abs_diff_eq(Vec3::X, 1e-5));
+    assert!(scene.notices.is_empty());
+}
+
+#[test]
+fn quantized_positions_and_texture_coordinates() {
+    let mut builder = Builder::default();
+    // Stride is a multiple of four: VEC3 of bytes with one byte of padding.
+    let positions = builder.view(&[0, 0, 0, 0, 10, 0, 0, 0, 10, 246, 0, 0]);
+    builder.views[positions] = r#"{"buffer":0,"byteLength":12,"byteStride":4}"#.into();
+    builder
+        .accessors
+        .push(r#"{"bufferView":0,"componentType":5120,"type":"VEC3","count":3}"#.into());
+    let uvs: [u16; 6] = [0, 0, 65535, 0, 65535, 32768];
+    builder.add(bytemuck::cast_slice(&uvs), 5123, "VEC2", 3, r#","normalized":true"#);
+    let scene = builder.load(&format!(
+        r#""extensionsRequired":["KHR_mesh_quantization"],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"TEXCOORD_0":1}},"material":0}}]}}],
+        "nodes":[{{"mesh":0,"scale":[0.1,0.1,0.1]}}],{}"#,
+        textured_material(r#""pbrMetallicRoughness":{"baseColorTexture":{"index":0}}"#, "{}")
+    ));
+    assert!(scene.positions[2].abs_diff_eq(Vec3::new(1.0, -1.0, 0.0), 1e-6));
+    assert!(scene.uvs[0][2].abs_diff_eq(Vec2::new(1.0, 0.5), 1e-4));
+}
+
+#[test]
+fn texture_transform_sampler_and_double_use_of_an_image() {
+    let mut builder = square();
+    builder.floats("VEC2", &[0., 0., 1., 0., 1., 1., 0., 1.]);
+    let scene = builder.load(&format!(
+        r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"TEXCOORD_1":2}},"indices":1,"material":0}}]}}],
+        "nodes":[{{"mesh":0}}],{}"#,
+        textured_material(
+            r#""alphaMode":"MASK","alphaCutoff":0.25,"doubleSided":true,
+            "pbrMetallicRoughness":{"baseColorFactor":[0.5,1,1,1],"metallicRoughnessTexture":{"index":0,"texCoord":1},
+            "baseColorTexture":{"index":0,"extensions":{"KHR_texture_transform":
+            {"offset":[0.5,0.25],"rotation":1.57079632679,"scale":[2,4],"texCoord":1}}}}"#,
+            r#"{"magFilter":9728,"wrapS":33071,"wrapT":33648}"#
+        )
+    ));
+    let material = &scene.materials[0];
+    assert_eq!(material.alpha_mode, AlphaMode::Mask { cutoff: 0.25 });
+    assert!(material.double_sided && material.base_color.x == 0.5);
+    let reference = material.base_color_texture.unwrap();
+    assert_eq!(reference.uv_set, 1);
+    // Scaled to (2, 4), turned counter-clockwise with v downwards to (4, -2), then moved.
+    let uv = reference.transform.transform_point2(Vec2::ONE);
+    assert!(uv.abs_diff_eq(Vec2::new(4.5, -1.75), 1e-5), "{uv}");
+    assert_eq!((scene.textures.len(), scene.images.len()), (2, 1));
+    let texture = scene.textures[reference.texture as usize];
+    assert!(texture.srgb && texture.nearest);
+    assert_eq!((texture.wrap_u, texture.wrap_v), (Wrap::ClampToEdge, Wrap::MirroredRepeat));
+    let data = material.metallic_roughness_texture.unwrap();
+    assert!(!scene.textures[data.texture as usize].srgb);
+    assert_eq!(scene.images[0].texels, [[255, 0, 0, 255]]);
+    assert_eq!((scene.uvs[0].len(), scene.uvs[1].len()), (0, 4));
+}
+
+/// A plane whose picture is upright: u to the right, v downwards, so the bitangent is +Y.
+#[test]
+fn mikktspace_tangents_follow_gltf_and_split_mirrored_vertices() {
+    let mut builder = square();
+    builder.floats("VEC3", &[0., 0., 1., 0., 0., 1., 0., 0., 1., 0., 0., 1.]);
+    builder.floats("VEC2", &[0., 1., 1., 1., 1., 0., 0., 0.]);
+    let rest = format!(
+        r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"NORMAL":2,"TEXCOORD_0":3}},"indices":1,"material":0}}]}}],
+        "nodes":[{{"mesh":0}}],{}"#,
+        textured_material(r#""normalTexture":{"index":0,"scale":0.5}"#, "{}")
+    );
+    let scene = builder.load(&rest);
+    assert_eq!(scene.materials[0].normal_scale, 0.5);
+    assert_eq!(scene.tangents, vec![Vec4::new(1.0, 0.0, 0.0, 1.0); 4]);
+    // Mirrored along the diagonal the two triangles cannot share tangents.
+    let mut mirrored = square();
+    mirrored.floats("VEC3", &[0., 0., 1., 0., 0., 1., 0., 0., 1., 0., 0., 1.]);
+    mirrored.floats("VEC2", &[0., 0., 1., 0., 1., 1., 1., 0.]);
+    let scene = mirrored.load(&rest);
+    assert_eq!(scene.positions.len(), 6);
+    let handedness = |triangle: [u32; 3]| triangle.map(|v| scene.tangents[v as usize].w);
+    assert_eq!(handedness(scene.triangles[0]), [-1.0; 3]);
+    assert_eq!(handedness(scene.triangles[1]), [1.0; 3]);
+}
+
+#[test]
+fn a_skin_at_rest_follows_its_joints() {
+    let mut builder = square();
+    let joints =
+        builder.add(&[0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0], 5121, "VEC4", 4, "");
+    let one = [1.0, 0.0, 0.0, 0.0];
+    let weights = builder.floats("VEC4", &[one, one, one, [0.5, 0.0, 0.0, 0.0]].concat());
+    let mut matrices = [0.0; 32];
+    for diagonal in 0..8 {
+        matrices[diagonal / 4 * 16 + diagonal % 4 * 5] = 1.0;
+    }
+    // The second joint was bound one metre up.
+    matrices[16 + 13] = -1.0;
+    let bind = builder.floats("MAT4", &matrices);
+    let scene = builder.load(&format!(
+        r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"JOINTS_0":{joints},"WEIGHTS_0":{weights}}},"indices":1}}]}}],
+        "skins":[{{"joints":[1,2],"inverseBindMatrices":{bind}}}],
+        "nodes":[{{"mesh":0,"skin":0,"translation":[100,0,0]}},{{"children":[2]}},{{"translation":[0,3,0]}}],
+        "scenes":[{{"nodes":[0,1]}}]"#
+    ));
+    // The node's own transform has no effect; joint 1 lifts its vertices by 3 - 1.
+    assert_eq!(
+        scene.positions,
+        [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 3.0, 0.0), Vec3::new(0.0, 3.0, 0.0)]
+    );
+    let error = builder.error(&format!(
+        r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"JOINTS_0":{joints},"WEIGHTS_0":{weights}}},"indices":1}}]}}],
+        "skins":[{{"joints":[1]}}],"nodes":[{{"mesh":0,"skin":0}},{{}}]"#
+    ));
+    assert!(error.contains("joint 1 is used, but its skin has 1"), "{error}");
+}
+
+#[test]
+fn morph_weights_of_the_node_go_before_those_of_the_mesh() {
+    let mut builder = square();
+    let shift = builder.floats("VEC3", &[0., 0., 1., 0., 0., 1., 0., 0., 1., 0., 0., 1.]);
+    let rest = |weights: &str| {
+        format!(
+            r#""meshes":[{{"weights":[0.5],"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,
+            "targets":[{{"POSITION":{shift}}}]}}]}}],"nodes":[{{"mesh":0{weights}}}]"#
+        )
+    };
+    assert_eq!(builder.load(&rest("")).positions[0].z, 0.5);
+    assert_eq!(builder.load(&rest(r#","weights":[2]"#)).positions[0].z, 2.0);
+}
+
+#[test]
+fn extensions_required_used_and_honoured() {
+    let error = square().error(&format!(
+        r#""extensionsRequired":["KHR_draco_mesh_compression","KHR_texture_transform"],{ONE_MESH}"#
+    ));
+    assert_eq!(
+        error,
+        "made.glb: it requires the extension KHR_draco_mesh_compression, not supported here"
+    );
+    let scene = square().load(&format!(
+        r#""extensionsUsed":["KHR_materials_sheen","KHR_materials_ior"],{ONE_MESH}"#
+    ));
+    let notices: Vec<_> = scene.notices.iter().collect();
+    assert_eq!(
+        notices,
+        ["The extension KHR_materials_sheen is not supported; what it adds is left out."]
+    );
+}
+
+#[test]
+fn material_extensions() {
+    let scene = square().load(
+        r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":1}]}],"nodes":[{"mesh":0}],
+        "materials":[{"name":"unused"},{"name":"all","emissiveFactor":[1,0.5,0],"extensions":{
+        "KHR_materials_emissive_strength":{"emissiveStrength":10},"KHR_materials_ior":{"ior":1.33},
+        "KHR_materials_specular":{"specularFactor":0.5,"specularColorFactor":[1,2,3]},
+        "KHR_materials_transmission":{"transmissionFactor":0.75},
+        "KHR_materials_volume":{"thicknessFactor":0.1,"attenuationDistance":2,"attenuationColor":[0.1,0.2,0.3]},
+        "KHR_materials_clearcoat":{"clearcoatFactor":1,"clearcoatRoughnessFactor":7},"KHR_materials_unlit":{}}}]"#,
+    );
+    assert_eq!(scene.materials.len(), 1);
+    let material = &scene.materials[0];
+    assert_eq!(material.name, "all");
+    assert_eq!(material.emissive, Vec3::new(10.0, 5.0, 0.0));
+    assert_eq!((material.ior, material.specular), (1.33, 0.5));
+    assert_eq!(material.specular_color, Vec3::new(1.0, 2.0, 3.0));
+    assert_eq!((material.transmission, material.thickness), (0.75, 0.1));
+    assert_eq!(material.attenuation_distance, 2.0);
+    assert_eq!(material.attenuation_color, Vec3::new(0.1, 0.2, 0.3));
+    assert_eq!((material.clearcoat, material.clearcoat_roughness), (1.0, 1.0));
+    assert!(material.unlit);
+    assert_eq!(
+        scene.notices.iter().collect::<Vec<_>>(),
+        ["Material all has factors outside their range, which are clamped."]
+    );
+}
+
+#[test]
+fn specular_glossiness_is_converted() {
+    let scene = square().load(
+        r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],"nodes":[{"mesh":0}],
+        "materials":[{"extensions":{"KHR_materials_pbrSpecularGlossiness":
+        {"diffuseFactor":[0.1,0.2,0.3,1],"specularFactor":[0.4,0.5,0.6],"glossinessFactor":0.75}}}]"#,
+    );
+    let material = &scene.materials[0];
+    assert_eq!(material.base_color, Vec4::new(0.1, 0.2, 0.3, 1.0));
+    assert_eq!((material.metallic, material.roughness, material.ior), (0.0, 0.25, 0.0));
+    assert_eq!(material.specular_color, Vec3::new(0.4, 0.5, 0.6));
+}
+
+#[test]
+fn cameras_and_lights() {
+    let scene = square().load(
+        r#""extensionsUsed":["KHR_lights_punctual"],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+        "cameras":[{"type":"orthographic","orthographic":{"xmag":2,"ymag":1,"znear":0,"zfar":9}},
+        {"type":"perspective","name":"Main","perspective":{"yfov":0.5,"znear":0.1}}],
+        "extensions":{"KHR_lights_punctual":{"lights":[{"type":"directional","color":[1,0.5,0],"intensity":4},
+        {"type":"spot","name":"Lamp","range":3,"spot":{"outerConeAngle":0.5}}]}},
+        "nodes":[{"mesh":0},{"camera":1,"translation":[0,0,5]},{"camera":0,"name":"Plan"},
+        {"extensions":{"KHR_lights_punctual":{"light":0}},"rotation":[-0.70710678,0,0,0.70710678]},
+        {"extensions":{"KHR_lights_punctual":{"light":1}},"translation":[1,2,3]}]"#,
+    );
+    let [plan, main] = &scene.cameras[..] else { panic!("two cameras") };
+    assert_eq!((plan.name.as_str(), plan.aspect), ("Plan", Some(2.0)));
+    assert_eq!(plan.projection, Projection::Orthographic { half_height: 1.0 });
+    assert_eq!((main.name.as_str(), main.aspect), ("Main", None));
+    assert_eq!(main.projection, Projection::Perspective { fov_y_radians: 0.5 });
+    assert_eq!(Vec3::from(main.world_from_camera.translation), Vec3::new(0.0, 0.0, 5.0));
+    let [sun, lamp] = &scene.lights[..] else { panic!("two lights") };
+    assert_eq!((sun.kind, sun.intensity), (PunctualKind::Directional, Vec3::new(4.0, 2.0, 0.0)));
+    assert!(sun.direction.abs_diff_eq(Vec3::NEG_Y, 1e-6));
+    assert_eq!((lamp.name.as_str(), lamp.range), ("Lamp", 3.0));
+    assert_eq!(lamp.kind, PunctualKind::Spot { inner_radians: 0.0, outer_radians: 0.5 });
+    assert_eq!(lamp.position, Vec3::new(1.0, 2.0, 3.0));
+}
+
+#[test]
+fn external_files_data_uris_and_missing_images() {
+    let builder = square();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("the data.bin"), &builder.data).unwrap();
+    let path = folder.path().join("scene.gltf");
+    let rest = format!(
+        r#"{ONE_MESH},"materials":[{{"name":"M","pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],
+        "textures":[{{"source":0}}],"images":[{{"uri":"gone.png"}}]"#
+    )
+    .replace(r#""indices":1"#, r#""indices":1,"material":0"#);
+    std::fs::write(&path, builder.json(&rest, r#","uri":"the%20data.bin""#)).unwrap();
+    let scene = gltf::load(&path).unwrap();
+    assert_eq!((scene.triangles.len(), scene.name.as_str()), (2, "scene.gltf"));
+    // The missing picture is named, and its material falls back to its factors.
+    assert!(scene.materials[0].base_color_texture.is_none());
+    let notice = scene.notices.iter().next().unwrap();
+    assert!(notice.contains("`gone.png` cannot be read"), "{notice}");
+    // Damaged pictures and WebP ones.
+    let pictures = |source: &str, uri: &str| {
+        let rest = rest.replace(r#""source":0"#, source).replace("gone.png", uri);
+        builder.load(&rest)
+    };
+    let scene = pictures(r#""source":0"#, "data:image/png;base64,AAAA");
+    let notice = scene.notices.iter().next().unwrap();
+    assert!(
+        notice.starts_with("Image 0 (data URI)") && notice.contains("not a picture"),
+        "{notice}"
+    );
+    let scene = pictures(
+        r#""extensions":{"EXT_texture_webp":{"source":0}}"#,
+        "data:image/webp;base64,UklGRhoAAABXRUJQVlA4TA0AAAAvAAAAEAcQERGIiP4HAA==",
+    );
+    assert!(scene.notices.is_empty());
+    assert_eq!((scene.images.len(), scene.images[0].width), (1, 1));
+    let escaped: String = builder.data.iter().map(|byte| format!("%{byte:02X}")).collect();
+    let uri = format!(r#","uri":"data:application/octet-stream,{escaped}""#);
+    let text = builder.json(ONE_MESH, &uri);
+    let scene = gltf::load_slice(text.as_bytes(), None, "text.gltf").unwrap();
+    assert_eq!(scene.triangles.len(), 2);
+}
+
+#[test]
+fn huge_claims_are_refused_before_memory_is_taken() {
+    let mut builder = square();
+    builder.accessors[0] = builder.accessors[0].replace(r#""count":4"#, r#""count":4000000000000"#);
+    assert!(builder.error(ONE_MESH).contains("more than buffer view 0 holds"));
+    builder.accessors[0] = r#"{"componentType":5126,"type":"VEC3","count":4000000000}"#.into();
+    assert!(builder.error(ONE_MESH).contains("without any data"));
+    // A chain of nodes as deep as it is long must not be walked by recursion.
+    let chain: Vec<String> =
+        (1..100_000).map(|child| format!(r#"{{"children":[{child}]}}"#)).collect();
+    let rest = ONE_MESH.replace(r#""nodes":[{"mesh":0}]"#, "");
+    let scene = square().load(&format!(r#"{rest}"nodes":[{},{{"mesh":0}}]"#, chain.join(",")));
+    assert_eq!(scene.triangles.len(), 2);
+    // Ten thousand instances of thirty thousand triangles.
+    let mut builder = square();
+    let translation = builder.floats("VEC3", &[0.0; 30_000]);
+    let node = format!(
+        r#"{{"mesh":0,"extensions":{{"EXT_mesh_gpu_instancing":{{"attributes":{{"TRANSLATION":{translation}}}}}}}}}"#
+    );
+    let large = builder.indices(&[0, 1, 2].repeat(30_000));
+    let mesh = ONE_MESH.replace(r#""indices":1"#, &format!(r#""indices":{large}"#));
+    let error = builder.error(&mesh.replace(r#"{"mesh":0}"#, &node));
+    assert!(error.contains("more than 200 million triangles"), "{error}");
+}
