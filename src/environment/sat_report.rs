@@ -10,6 +10,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use glam::DVec2;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::summed_area::RectangleTable;
@@ -81,7 +82,8 @@ pub fn sat_report(map: &Image, lookup: Lookup, timed_samples: u32) -> Result<Sat
         let start = Instant::now();
         let (table, energies) = Table::build(kind, &weights, &grid);
         let build_seconds = start.elapsed().as_secs_f64();
-        let deviation = deviation(&Law::new(&table, &grid, &energies), &weights, total);
+        let law = Law::new(&table, &grid, &energies);
+        let deviation = Deviation::of(&law, &weights, total);
         SatReportRow {
             table: kind,
             mean_squared_error: deviation.squares * map.pixels.len() as f64,
@@ -103,7 +105,7 @@ pub fn sat_report(map: &Image, lookup: Lookup, timed_samples: u32) -> Result<Sat
     })
 }
 
-/// Sums over all texels.
+/// How far a table is from the truth: sums over texels.
 #[derive(Default)]
 struct Deviation {
     squares: f64,
@@ -113,24 +115,43 @@ struct Deviation {
     misreported: f64,
 }
 
-fn deviation(law: &Law<'_>, weights: &Weights<'_>, total: f64) -> Deviation {
-    let mut sum = Deviation::default();
-    let mut y = 0;
-    weights.for_each_row(|row| {
-        let (sampled, reported) = (law.sampled(y), law.reported(y));
-        for ((weight, sampled), reported) in row.iter().zip(sampled).zip(reported) {
+impl Deviation {
+    /// Of the whole map; rows are added in order, so that the result does not depend on threads.
+    fn of(law: &Law<'_>, weights: &Weights<'_>, total: f64) -> Self {
+        let (width, height) = weights.size();
+        let rows: Vec<Self> = (0..height)
+            .into_par_iter()
+            .map_init(
+                || (vec![0.0; width as usize], Vec::new()),
+                |(row, scratch), y| {
+                    weights.row(0, y, row, scratch);
+                    Self::of_row(row, &law.sampled(y), &law.reported(y), total)
+                },
+            )
+            .collect();
+        rows.iter().fold(Self::default(), |sum, row| Self {
+            squares: sum.squares + row.squares,
+            missed: sum.missed + row.missed,
+            missed_energy: sum.missed_energy + row.missed_energy,
+            falling: sum.falling + row.falling,
+            misreported: sum.misreported + row.misreported,
+        })
+    }
+
+    fn of_row(weights: &[f64], sampled: &[f64], reported: &[f64], total: f64) -> Self {
+        let mut sum = Self::default();
+        for ((weight, sampled), reported) in weights.iter().zip(sampled).zip(reported) {
             let truth = if total > 0.0 { weight / total } else { 0.0 };
             sum.squares += (sampled - truth).powi(2);
-            if *weight > 0.0 && sampled <= 0.0 {
+            if *weight > 0.0 && *sampled <= 0.0 {
                 sum.missed += 1;
                 sum.missed_energy += truth;
             }
-            sum.falling += u64::from(reported < 0.0);
+            sum.falling += u64::from(*reported < 0.0);
             sum.misreported += (sampled - reported.max(0.0)).abs();
         }
-        y += 1;
-    });
-    sum
+        sum
+    }
 }
 
 /// How a table samples the whole map, row by row.
