@@ -39,7 +39,8 @@ impl Counters {
         let per_slot = Self::slot_bytes(tile_count);
         Self {
             tile_count,
-            capacity: (budget_bytes.saturating_sub(fixed) / per_slot).min(cell_count as usize) as u32,
+            capacity: (budget_bytes.saturating_sub(fixed) / per_slot).min(cell_count as usize)
+                as u32,
             visits: (0..cell_count).map(|_| AtomicU32::new(0)).collect(),
             slot_of_cell: vec![NO_SLOT; cell_count as usize],
             cell_of_slot: Vec::new(),
@@ -132,7 +133,8 @@ impl Counters {
     /// A digest of every counter (FNV-1a over cells in slot order), for tests of repeatability.
     pub fn digest(&self) -> u64 {
         let mut digest = 0xcbf2_9ce4_8422_2325_u64;
-        let mut eat = |word: u32| digest = (digest ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
+        let mut eat =
+            |word: u32| digest = (digest ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
         for (slot, &cell) in self.cell_of_slot.iter().enumerate() {
             eat(cell);
             for counter in &self.blocks[slot] {

@@ -195,7 +195,8 @@ mod tests {
 
     #[test]
     fn sample_agrees_with_probability_at_every_border() {
-        let weights: Vec<f64> = (0..100).map(|t| if t % 3 == 0 { 0.0 } else { f64::from(t) }).collect();
+        let weights: Vec<f64> =
+            (0..100).map(|t| if t % 3 == 0 { 0.0 } else { f64::from(t) }).collect();
         let laws = laws_of(&weights);
         let mut previous = 0;
         for step in 0..4096_u32 {

@@ -252,8 +252,7 @@ impl<'a> Path<'a> {
         };
         let (radiance, tile, in_tile) = environment.radiance_and_tile_pdf(self.ray.direction);
         let nee = grid.laws().probability(from.law, tile) * in_tile;
-        self.radiance +=
-            self.throughput * radiance * balance_heuristic(from.pdf_solid_angle, nee);
+        self.radiance += self.throughput * radiance * balance_heuristic(from.pdf_solid_angle, nee);
     }
 
     /// Next event estimation from the map and, if there are any, one local light.

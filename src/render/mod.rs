@@ -277,8 +277,15 @@ impl<'a> Session<'a> {
         let (Some(learning), Some(whole_map)) = (&self.learning, &self.whole_map) else { return };
         let range = cpu::learning_range(&self.view, learning.pass);
         let tracer = self.tracer(None);
-        let rays =
-            cpu::learn(&tracer, &self.rays, &self.view, range.clone(), whole_map, &learning.grid, cancel);
+        let rays = cpu::learn(
+            &tracer,
+            &self.rays,
+            &self.view,
+            range.clone(),
+            whole_map,
+            &learning.grid,
+            cancel,
+        );
         if cancel.load(std::sync::atomic::Ordering::Relaxed) {
             return;
         }
