@@ -3,6 +3,7 @@
 mod bsdf;
 mod builtin;
 mod bvh;
+mod cli;
 mod environment;
 mod gltf_files;
 mod image_files;
