@@ -17,7 +17,9 @@ use crate::noise::{Stream, smoothstep, solid_fbm};
 /// Widest grid that the smooth part is computed on; clouds have no finer detail.
 const SMOOTH_WIDTH: u32 = 2048;
 /// Smaller maps average at least this many directions across.
-const LEAST_SAMPLES: u32 = 256;
+const LEAST_SAMPLES: u32 = 512;
+/// Sine of an elevation that hills stay below.
+const HIGHEST_HILL: f32 = 0.062;
 /// Largest side of a map.
 const LARGEST: u32 = 16_384;
 
@@ -118,12 +120,18 @@ fn clouds(d: Vec3, amount: f32, scale: f32, seed: u32) -> (f32, f32) {
 
 /// What lies below the horizon: `near` at the nadir, fading into `haze` at the horizon.
 fn ground(d: Vec3, near: Vec3, haze: Vec3) -> Vec3 {
+    if d.y > HIGHEST_HILL {
+        return haze;
+    }
     let fields = 0.75 + 0.5 * solid_fbm(Vec3::new(d.x, 0.0, d.z) * (1.5 / (0.06 - d.y)), 4, 13);
     (near * fields).lerp(haze, (d.y * 30.0).exp())
 }
 
 /// Joins sky and ground by two ranges of hills, `far` and `near`, up to 3 degrees above the horizon.
 fn horizon(d: Vec3, above: Vec3, far: Vec3, near: Vec3, below: Vec3) -> Vec3 {
+    if d.y.abs() > HIGHEST_HILL {
+        return if d.y > 0.0 { above } else { below };
+    }
     let around = Vec3::new(d.x, 0.0, d.z).normalize_or(Vec3::X);
     let ridge = |scale: f32, seed: u32| solid_fbm(around * scale, 6, seed);
     let over = |height: f32| smoothstep(-0.0012, 0.0012, d.y - height);
@@ -258,8 +266,7 @@ fn smooth_part(radiance: fn(Vec3) -> Vec3, width: u32, height: u32) -> Image {
 
 /// Means of `radiance` over the solid angle of each texel.
 fn averaged(radiance: fn(Vec3) -> Vec3, width: u32, height: u32) -> Image {
-    let (nx, ny) =
-        (LEAST_SAMPLES.div_ceil(width).max(2), (LEAST_SAMPLES / 2).div_ceil(height).max(2));
+    let (nx, ny) = (LEAST_SAMPLES.div_ceil(width), (LEAST_SAMPLES / 2).div_ceil(height));
     rows(width, height, |x, y| {
         let (mut sum, mut weight) = (Vec3::ZERO, 0.0);
         for j in 0..ny {

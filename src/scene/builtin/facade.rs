@@ -106,8 +106,8 @@ fn front(b: &mut Builder, m: &HouseMats, [width, height]: [f32; 2], rhythm: Rhyt
     }
     let holes: Vec<Hole> =
         windows.iter().copied().chain(openings.iter().map(|o| o.0)).map(Hole::Rectangle).collect();
-    // Fronts of neighbouring sides meet in a mitre of a few millimetres' difference.
-    let reach = if side < 2 { 0.0 } else { -0.004 };
+    // Each front ends a little behind the face of its neighbour.
+    let reach = if side < 2 { -0.006 } else { -0.004 };
     pierced(b, m.wall, [-reach, -0.03, width + reach, height - 0.1], FRONT, &holes);
     b.slab(m.trim, [-0.03, rhythm.ground - 0.14, -0.05], [width + 0.03, rhythm.ground, 0.07], 0.02);
     plinth(b, m.base, width, &openings);

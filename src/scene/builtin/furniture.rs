@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{Affine3A, EulerRot, Quat, Vec2, Vec3};
 
-use super::mesh::{Builder, LIFT, Mat};
+use super::mesh::{Builder, Mat};
 use super::objects::books;
 use crate::noise::{Stream, smoothstep};
 
@@ -292,18 +292,9 @@ pub(super) fn drawers(
             let (cu, cv) = (u + 0.5 * w, v + h - 0.25 * h.min(0.2));
             let (l, r) = (Vec3::new(cu - 0.06, cv, z + 0.025), Vec3::new(cu + 0.06, cv, z + 0.025));
             let into = Vec3::Z * 0.03;
-            b.tube(
-                metal,
-                10,
-                &[
-                    (l - into, 0.005),
-                    (l - into * 0.15, 0.005),
-                    (l + Vec3::X * 0.004, 0.005),
-                    (r - Vec3::X * 0.004, 0.005),
-                    (r - into * 0.15, 0.005),
-                    (r - into, 0.005),
-                ],
-            );
+            let bend = Vec3::X * 0.009;
+            let path = [l - into, l - into * 0.3, l + bend, r - bend, r - into * 0.3, r - into];
+            b.tube(metal, 10, &path.map(|p| (p, 0.004)));
         }
     }
 }
@@ -439,10 +430,6 @@ pub(super) fn pendant(b: &mut Builder, metal: Mat, inside: Mat, drop: f32, radiu
     let inner: Vec<(f32, f32)> =
         outer.iter().rev().map(|&(r, y)| (r - 0.002, y - 0.002 * (1.0 - r / radius))).collect();
     b.lathe(inside, 64, &inner);
-    b.lathe(
-        metal,
-        64,
-        &[(radius - 0.002, -drop - 0.0002), (radius - 0.001, -drop - LIFT), (radius, -drop)],
-    );
+    b.lathe(metal, 64, &[(radius - 0.002, -drop), (radius, -drop)]);
     b.ball(inside, Vec3::Y * (0.25 * radius - drop), 0.05);
 }

@@ -112,8 +112,8 @@ pub(super) fn build() -> Scene {
     library(b, m);
     corners(b, m);
     b.camera("window", [-2.6, 1.35, 1.95], [0.5, 1.02, -0.55], 50.0);
-    b.camera("sofa", [2.3, 1.35, 2.2], [-0.95, 0.86, -1.1], 50.0);
-    b.camera("round window", [1.9, 1.45, -2.1], [-1.3, 1.15, 1.8], 56.0);
+    b.camera("sofa", [1.95, 1.35, 2.25], [-0.95, 0.88, -1.1], 50.0);
+    b.camera("round window", [2.5, 1.42, -1.35], [-1.0, 1.15, 1.75], 54.0);
     std::mem::replace(b, Builder::new("")).finish()
 }
 

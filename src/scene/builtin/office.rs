@@ -49,10 +49,10 @@ impl Palette {
         let boards = b.texture(paint::planks([0.40, 0.27, 0.16], 10, 2), Vec2::new(2.6, 1.6));
         let oak = b.texture(paint::timber([0.52, 0.36, 0.21]), Vec2::new(1.4, 0.7));
         let plaster = b.texture(paint::plaster([0.76, 0.74, 0.70], 0.10), Vec2::splat(2.5));
-        let feature = b.texture(paint::plaster([0.36, 0.43, 0.47], 0.14), Vec2::splat(2.5));
+        let feature = b.texture(paint::plaster([0.60, 0.41, 0.31], 0.14), Vec2::splat(2.5));
         let blue = b.texture(paint::weave([0.16, 0.24, 0.36], 64), Vec2::splat(0.18));
         let grey = b.texture(paint::weave([0.44, 0.43, 0.41], 64), Vec2::splat(0.2));
-        let linen = b.texture(paint::weave([0.74, 0.71, 0.65], 128), Vec2::splat(0.3));
+        let linen = b.texture(paint::weave([0.62, 0.55, 0.44], 128), Vec2::splat(0.3));
         let rug = b.texture(
             paint::rug([0.55, 0.52, 0.47], [0.14, 0.20, 0.28], [0.62, 0.42, 0.16]),
             Vec2::new(2.6, 1.7),
@@ -63,7 +63,7 @@ impl Palette {
         });
         Self {
             wall: b.material(textured("wall", plaster, 0.85)),
-            feature: b.material(textured("blue wall", feature, 0.85)),
+            feature: b.material(textured("clay wall", feature, 0.85)),
             ceiling: b.material(matte("ceiling", [0.80, 0.79, 0.78], 0.9)),
             boards: b.material(varnished(textured("floor boards", boards, 0.55), 0.35, 0.25)),
             white: b.material(matte("white paint", [0.78, 0.77, 0.75], 0.35)),

@@ -345,7 +345,7 @@ pub(super) fn curtain(
         let swell = 0.030 + 0.028 * (1.0 - t);
         let sway = 0.015 * (s * 7.0 + 1.0).sin() * (1.0 - t);
         Vec3::new(
-            u[0] + width * (s + 0.006 * (2.0 * phase).sin()),
+            u[0] + width * (s + 0.004 * (2.0 * phase).sin()),
             bottom + (top - bottom) * t,
             offset + swell * phase.sin() + sway,
         )

@@ -121,7 +121,7 @@ fn street(name: &str) -> Builder {
             facade::street_lamp(b, m.iron, m.lantern, 3.7)
         });
     }
-    for z in [-26.0, -20.5, -13.5] {
+    for z in [-20.5, -13.5] {
         b.standing(Vec3::new(-1.75, 0.0, z), 0.0, |b| {
             facade::street_lamp(b, m.iron, m.lantern, 3.7)
         });
@@ -259,7 +259,7 @@ fn greenery(b: &mut Builder, m: &Palette) {
     for (x, z, height, seed) in [(1.7, -14.0, 5.6, 1), (1.75, -21.5, 5.2, 2), (-1.2, -9.2, 4.8, 4)]
     {
         b.standing(Vec3::new(x, 0.0, z), seed as f32 * 50.0, |b| {
-            plants::tree(b, m.bark, m.leaf, height, 1500, seed);
+            plants::tree(b, m.bark, m.leaf, height, 1250, seed);
             b.drum(m.iron, [-0.01, 0.012], [0.55, 0.55], 0.004);
         });
     }
