@@ -2,10 +2,11 @@
 
 use std::f32::consts::PI;
 
-use glam::{Affine3A, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
+use super::fittings::window_frame;
 use super::mesh::{Builder, Mat};
-use super::room::{Hole, Wall, pierced, window_frame};
+use super::room::{Hole, Wall, pierced};
 
 /// Materials of a house.
 #[derive(Debug, Clone, Copy)]
@@ -229,55 +230,4 @@ pub(super) fn column(b: &mut Builder, mat: Mat, height: f32, radius: f32) {
         profile.push((0.9 * r + 0.45 * r * (1.0 - c), height - 0.27 + 0.15 * s));
     }
     b.lathe(mat, 28, &profile);
-}
-
-/// A street lamp with a lantern (unlit).
-pub(super) fn street_lamp(b: &mut Builder, metal: Mat, pane: Mat, height: f32) {
-    let h = height;
-    b.lathe(
-        metal,
-        24,
-        &[
-            (0.17, -0.01),
-            (0.17, 0.10),
-            (0.13, 0.14),
-            (0.10, 0.55),
-            (0.12, 0.58),
-            (0.12, 0.64),
-            (0.065, 0.70),
-            (0.05, 0.75 * h),
-            (0.075, 0.76 * h),
-            (0.075, 0.775 * h),
-            (0.042, 0.79 * h),
-            (0.038, h - 0.62),
-            (0.09, h - 0.58),
-            (0.11, h - 0.55),
-        ],
-    );
-    b.part(Affine3A::from_translation(Vec3::Y * (h - 0.56)), |b| {
-        b.lathe(pane, 6, &[(0.10, 0.0), (0.19, 0.40)]);
-        for k in 0..6 {
-            let (s, c) = (k as f32 * PI / 3.0).sin_cos();
-            b.rod(
-                metal,
-                Vec3::new(0.10 * c, 0.0, 0.10 * s),
-                Vec3::new(0.192 * c, 0.40, 0.192 * s),
-                0.009,
-            );
-        }
-        b.lathe(
-            metal,
-            24,
-            &[
-                (0.0, 0.395),
-                (0.215, 0.395),
-                (0.22, 0.41),
-                (0.13, 0.50),
-                (0.05, 0.55),
-                (0.05, 0.58),
-                (0.022, 0.60),
-                (0.0, 0.66),
-            ],
-        );
-    });
 }

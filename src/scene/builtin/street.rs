@@ -6,13 +6,13 @@ use std::f32::consts::TAU;
 use glam::{Vec2, Vec3};
 
 use super::facade::{self, HouseMats, Rhythm};
-use super::furniture as piece;
 use super::materials::{self as make, matte, textured, two_sided};
 use super::mesh::{Builder, Mat};
 use super::objects as thing;
 use super::plants;
 use super::room::Wall;
 use super::textures as paint;
+use super::{lamps, seating};
 use crate::scene::Scene;
 
 struct Palette {
@@ -117,13 +117,11 @@ fn street(name: &str) -> Builder {
     cafe(b, m);
     greenery(b, m);
     for z in [-24.0, -17.0, -10.0, -3.0, 4.0] {
-        b.standing(Vec3::new(2.55, 0.0, z), 0.0, |b| {
-            facade::street_lamp(b, m.iron, m.lantern, 3.7)
-        });
+        b.standing(Vec3::new(2.55, 0.0, z), 0.0, |b| lamps::street_lamp(b, m.iron, m.lantern, 3.7));
     }
     for z in [-20.5, -13.5] {
         b.standing(Vec3::new(-1.75, 0.0, z), 0.0, |b| {
-            facade::street_lamp(b, m.iron, m.lantern, 3.7)
+            lamps::street_lamp(b, m.iron, m.lantern, 3.7)
         });
     }
     builder
@@ -248,7 +246,7 @@ fn cafe(b: &mut Builder, m: &Palette) {
             for turn in [0.0, 130.0, 235.0].into_iter().take(2 + k % 2) {
                 let (s, c) = f32::to_radians(turn + 7.0 * k as f32).sin_cos();
                 b.standing(Vec3::new(0.68 * s, 0.0, 0.68 * c), 180.0 + turn, |b| {
-                    piece::side_chair(b, m.wood, m.cane)
+                    seating::side_chair(b, m.wood, m.cane)
                 });
             }
         });
