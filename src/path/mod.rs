@@ -170,11 +170,14 @@ impl<'a> Path<'a> {
             self.travelled += hit.t;
             let scene = &self.tracer.world.scene;
             let point = SurfacePoint::at(scene, hit.triangle, hit.barycentric, self.ray.direction);
+            if self.tracer.world.needs.emitters {
+                self.add_emitted(&hit, &point);
+            }
             if self.passes(&point) {
                 self.ray.origin = offset_origin(point.position, -point.geometric_normal);
                 continue;
             }
-            return self.arrive(&hit, point);
+            return self.arrive(point);
         }
         None
     }
@@ -196,8 +199,8 @@ impl<'a> Path<'a> {
         passes
     }
 
-    /// Adds what the surface emits and makes it a vertex, unless it is unlit.
-    fn arrive(&mut self, hit: &Hit, point: SurfacePoint) -> Option<Vertex> {
+    /// Makes the surface a vertex, unless it is unlit: then it is seen as it is.
+    fn arrive(&mut self, point: SurfacePoint) -> Option<Vertex> {
         let parameters = &point.parameters;
         let bsdf = Bsdf::new(parameters, point.front_face);
         if self.bounces == 0 {
@@ -209,9 +212,6 @@ impl<'a> Path<'a> {
             self.radiance += self.throughput * parameters.emissive;
             return None;
         }
-        if self.tracer.world.needs.emitters {
-            self.add_emitted(hit, &point);
-        }
         let law = self
             .tracer
             .grid
@@ -220,7 +220,11 @@ impl<'a> Path<'a> {
         Some(Vertex { point, bsdf, wo, law })
     }
 
+    /// Adds what a surface emits, whether the ray then passes it or not.
     fn add_emitted(&mut self, hit: &Hit, point: &SurfacePoint) {
+        if point.parameters.unlit {
+            return;
+        }
         let world = self.tracer.world;
         let emitted = lights::emitted(&world.scene, point);
         if emitted.max_element() <= 0.0 {
