@@ -122,8 +122,8 @@ impl TileLaws {
         }
         let mut rank = 0;
         for word in &self.masks[base..] {
-            self.ranks.push(rank);
-            rank += word.count_ones() as u16;
+            self.ranks.push(rank as u16);
+            rank += word.count_ones();
         }
         debug_assert_eq!(self.tiles.len() - first, support);
         self.starts.push(self.tiles.len() as u32);
@@ -195,7 +195,8 @@ mod tests {
 
     #[test]
     fn sample_agrees_with_probability_at_every_border() {
-        let weights: Vec<f64> = (0..100).map(|t| if t % 3 == 0 { 0.0 } else { f64::from(t) }).collect();
+        let weights: Vec<f64> =
+            (0..100).map(|t| if t % 3 == 0 { 0.0 } else { f64::from(t) }).collect();
         let laws = laws_of(&weights);
         let mut previous = 0;
         for step in 0..4096_u32 {

@@ -292,8 +292,7 @@ impl<'a> Path<'a> {
         };
         let (radiance, tile, in_tile) = environment.radiance_and_tile_pdf(self.ray.direction);
         let nee = grid.laws().probability(from.law, tile) * in_tile;
-        self.radiance +=
-            self.throughput * radiance * balance_heuristic(from.pdf_solid_angle, nee);
+        self.radiance += self.throughput * radiance * balance_heuristic(from.pdf_solid_angle, nee);
     }
 
     /// Next event estimation from the map and, if there are any, one local light.
@@ -353,8 +352,7 @@ impl<'a> Path<'a> {
         self.rays += 1;
         let normal = vertex.point.geometric_normal;
         let side = if normal.dot(direction) > 0.0 { normal } else { -normal };
-        let body =
-            if side == normal { self.body } else { vertex.body_behind(self.body) };
+        let body = if side == normal { self.body } else { vertex.body_behind(self.body) };
         let origin = offset_origin(vertex.point.position, side);
         // Stop short of the light's own surface.
         let ray = Ray { origin, direction, t_min: 0.0, t_max: distance * (1.0 - 1e-4) };

@@ -60,12 +60,7 @@ fn environment(map: Image) -> Environment {
 }
 
 /// Learns if the view asks for it, then renders.
-pub(crate) fn render(
-    world: &World,
-    environment: &Environment,
-    view: View,
-    samples: u32,
-) -> Film {
+pub(crate) fn render(world: &World, environment: &Environment, view: View, samples: u32) -> Film {
     let mut session = learned(world, environment, view);
     session.advance(samples, &AtomicBool::new(false));
     assert_eq!(session.film().min_samples(), samples);

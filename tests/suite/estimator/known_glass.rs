@@ -121,10 +121,15 @@ fn shadow_rays_pass_panes_and_veils() {
 
 #[test]
 fn a_mask_cuts_what_the_camera_sees() {
-    let stage = Stage::with_half_texture()
-        .quad(&half_masked(black()), [-1.0, -1.0, -1.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]);
+    let stage = Stage::with_half_texture().quad(
+        &half_masked(black()),
+        [-1.0, -1.0, -1.0],
+        [2.0, 0.0, 0.0],
+        [0.0, 2.0, 0.0],
+    );
     let world = wall(stage, &lamp(2.0), -2.0).build();
-    let film = render(&world, &constant(0.0), view(orthographic(Vec3::ZERO), Sampling::Plain, 1), 4);
+    let film =
+        render(&world, &constant(0.0), view(orthographic(Vec3::ZERO), Sampling::Plain, 1), 4);
     for (i, pixel) in film.pixels().iter().enumerate() {
         let expected = if i % 16 < 8 { 0.0 } else { 2.0 };
         assert_eq!(pixel.mean(), [expected; 3], "pixel {i}");
@@ -208,9 +213,8 @@ fn light_is_absorbed_on_its_way_inside_of_a_solid() {
     let (low, high) = (Vec3::new(-2.0, -1.0, -2.0), Vec3::new(2.0, 1.5, 2.0));
     let stage = Stage::new().faces(&smoke, low, high, 0..6).floor(&lambert(0.7));
     let (x, y, z) = (0.5, 0.7, 0.8);
-    let world = stage
-        .quad(&lamp(3.0), [-x, y, -z], [2.0 * x, 0.0, 0.0], [0.0, 0.0, 2.0 * z])
-        .build();
+    let world =
+        stage.quad(&lamp(3.0), [-x, y, -z], [2.0 * x, 0.0, 0.0], [0.0, 0.0, 2.0 * z]).build();
     let eye = Vec3::new(2.5, 0.5, 0.0);
     let inside = eye.length() as f64 * 2.0 / 2.5;
     let transmitted = |distance: f64| 0.5_f64.powf(distance / 0.4);

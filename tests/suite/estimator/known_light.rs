@@ -121,7 +121,12 @@ fn the_back_of_a_one_sided_lamp_is_dark_and_not_seen() {
         [0.0, 0.0, -2.0],
     );
     let world = up.build();
-    let film = render(&world, &black_map(), view(probe([0.2, 0.5, 0.1], [0.0; 3]), Sampling::Plain, 2), 64);
+    let film = render(
+        &world,
+        &black_map(),
+        view(probe([0.2, 0.5, 0.1], [0.0; 3]), Sampling::Plain, 2),
+        64,
+    );
     assert!(film.pixels().iter().all(|p| p.mean() == [0.0; 3]), "nothing shines down");
     // From below the camera looks through the lamp at the map.
     let upwards = view(probe([0.2, 0.5, 0.1], [0.2, 2.0, 0.2]), Sampling::Plain, 2);
@@ -173,11 +178,21 @@ fn punctual_lights_follow_the_inverse_square_and_the_cone() {
             .into_iter()
             .fold(Stage::new().floor(&lambert(0.6)), |stage, light| stage.light(light))
             .build();
-        let film = render(&world, &black_map(), view(probe([0.5, 1.0, 0.5], [0.0; 3]), Sampling::Plain, 1), 256);
+        let film = render(
+            &world,
+            &black_map(),
+            view(probe([0.5, 1.0, 0.5], [0.0; 3]), Sampling::Plain, 1),
+            256,
+        );
         expect(what, &film, 0.6 / PI * expected, 0.02);
     }
     let outside = Stage::new().floor(&lambert(0.6)).light(spot(0.1, angle - 0.05)).build();
-    let film = render(&outside, &black_map(), view(probe([0.5, 1.0, 0.5], [0.0; 3]), Sampling::Plain, 1), 16);
+    let film = render(
+        &outside,
+        &black_map(),
+        view(probe([0.5, 1.0, 0.5], [0.0; 3]), Sampling::Plain, 1),
+        16,
+    );
     assert!(film.pixels().iter().all(|p| p.mean() == [0.0; 3]), "outside of the cone");
 }
 

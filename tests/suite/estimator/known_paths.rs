@@ -45,8 +45,12 @@ fn a_glowing_cavity_brightens_with_every_bounce() {
     let camera = Camera::look_at(Vec3::new(0.1, 0.2, 0.3), Vec3::new(-1.0, -0.7, -1.0), 1.0);
     for bounces in [0, 1, 2, 5, 40] {
         let series: f64 = (0..=bounces).map(|n| 0.6_f64.powi(n)).sum();
-        let film =
-            render(&world, &constant(0.0), view(camera.clone(), Sampling::Plain, bounces as u32), 256);
+        let film = render(
+            &world,
+            &constant(0.0),
+            view(camera.clone(), Sampling::Plain, bounces as u32),
+            256,
+        );
         expect(&format!("{bounces} bounces"), &film, 0.5 * series, 0.02);
     }
 }

@@ -98,8 +98,7 @@ fn counters_do_not_depend_on_the_threads() {
         limits: view.limits,
     };
     let digest = |threads| {
-        let grid =
-            SphericalGrid { center: rays.position(), columns: 64, rows: 32, faces: true };
+        let grid = SphericalGrid { center: rays.position(), columns: 64, rows: 32, faces: true };
         let mut learning =
             LearningGrid::new(grid, setting.environment.tile_count(), LawOptions::ADAPTIVE);
         for pass in 0..3 {

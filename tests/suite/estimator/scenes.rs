@@ -200,12 +200,7 @@ pub(super) fn room(albedo: f32, window: Option<&Material>) -> (World, Camera) {
     let (sill, head) = (Vec3::new(2.0, 0.8, -1.0), Vec3::new(2.0, 2.2, 1.0));
     let walls = lambert(albedo);
     let frame = |stage: Stage, y: [f32; 2], z: [f32; 2]| {
-        stage.quad(
-            &walls,
-            [2.0, y[0], z[0]],
-            [0.0, y[1] - y[0], 0.0],
-            [0.0, 0.0, z[1] - z[0]],
-        )
+        stage.quad(&walls, [2.0, y[0], z[0]], [0.0, y[1] - y[0], 0.0], [0.0, 0.0, z[1] - z[0]])
     };
     let mut stage = Stage::new().faces(&walls, low, high, 1..6);
     stage = frame(stage, [low.y, sill.y], [low.z, high.z]);
