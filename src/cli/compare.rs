@@ -22,8 +22,7 @@ pub(super) struct CompareArguments {
 pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
     let picture = read_picture(&arguments.picture)?;
     let reference = read_picture(&arguments.reference)?;
-    let comparison =
-        compare(&picture, &reference).map_err(|e| Error::at(&arguments.picture, e))?;
+    let comparison = compare(&picture, &reference).map_err(|e| Error::at(&arguments.picture, e))?;
     if arguments.json {
         println!("{}", super::record::to_json(&comparison)?);
     } else {

@@ -12,10 +12,14 @@ pub(super) fn flag() -> Arc<AtomicBool> {
         if handler.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        eprintln!("\nlightgrid: stopping after this pass and writing the picture (again: leave now)");
+        eprintln!(
+            "\nlightgrid: stopping after this pass and writing the picture (again: leave now)"
+        );
     });
     if set.is_err() {
-        eprintln!("lightgrid: Ctrl-C cannot be caught here and will end the process without a picture");
+        eprintln!(
+            "lightgrid: Ctrl-C cannot be caught here and will end the process without a picture"
+        );
     }
     flag
 }

@@ -310,8 +310,7 @@ fn camera(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> 
         if degrees >= 179.0 {
             return Err(Error::new(format!("--fov {degrees}: must be below 179 degrees")));
         }
-        camera.projection =
-            Projection::Perspective { fov_y_radians: degrees.to_radians() as f32 };
+        camera.projection = Projection::Perspective { fov_y_radians: degrees.to_radians() as f32 };
     }
     camera.lens_radius = arguments.lens_radius.unwrap_or(camera.lens_radius);
     camera.focus_distance = arguments.focus.map_or(camera.focus_distance, |f| f as f32);
@@ -351,11 +350,7 @@ fn settings(arguments: &RenderArguments) -> Vec<(&'static str, serde_json::Value
     ]
 }
 
-fn write_picture(
-    path: &Path,
-    arguments: &RenderArguments,
-    record: &Record<'_>,
-) -> Result<()> {
+fn write_picture(path: &Path, arguments: &RenderArguments, record: &Record<'_>) -> Result<()> {
     let film = record.session.film();
     let image = film.image();
     let mut metadata = record.metadata();

@@ -25,8 +25,10 @@ pub(super) fn pair(text: &str) -> Result<(u32, u32), String> {
 
 /// `X,Y,Z` in metres.
 pub(super) fn vector(text: &str) -> Result<Vec3, String> {
-    let numbers: Vec<f32> =
-        text.split(',').filter_map(|t| t.trim().parse().ok().filter(|x: &f32| x.is_finite())).collect();
+    let numbers: Vec<f32> = text
+        .split(',')
+        .filter_map(|t| t.trim().parse().ok().filter(|x: &f32| x.is_finite()))
+        .collect();
     match numbers[..] {
         [x, y, z] if text.split(',').count() == 3 => Ok(Vec3::new(x, y, z)),
         _ => Err("expected three numbers like 1.5,2,-3".to_owned()),

@@ -45,7 +45,8 @@ pub struct Environment {
     inverse_texel_solid_angles: Vec<f32>,
     /// Solid-angle mean of the map, without intensity.
     map_mean: Vec3,
-    constant: bool,
+    map_is_black: bool,
+    map_is_constant: bool,
     /// Rotation in turns, in `[0,1)`.
     rotation_turns: f32,
     intensity: f32,
@@ -109,7 +110,8 @@ impl Environment {
             row_edge_cosines,
             inverse_texel_solid_angles,
             map_mean: statistics.mean,
-            constant: statistics.constant,
+            map_is_black: statistics.black,
+            map_is_constant: statistics.constant,
             rotation_turns: 0.0,
             intensity: options.intensity,
         };
@@ -201,17 +203,17 @@ impl Environment {
 
     /// Whether no light comes from anywhere.
     pub fn is_black(&self) -> bool {
-        self.intensity <= 0.0 || self.map_mean.max_element() <= 0.0
+        self.intensity <= 0.0 || self.map_is_black
     }
 
     /// Whether all pixels are the same.
     pub fn is_constant(&self) -> bool {
-        self.constant
+        self.map_is_constant
     }
 
     /// Mean radiance over the sphere.
     pub fn mean_radiance(&self) -> Vec3 {
-        self.map_mean * self.intensity
+        (self.map_mean * self.intensity).min(Vec3::MAX)
     }
 
     /// The map as it was given: not turned, at intensity 1.
@@ -321,6 +323,7 @@ fn check_size(map: &Image) -> Result<()> {
 /// What one pass over the pixels tells.
 struct Statistics {
     mean: Vec3,
+    black: bool,
     constant: bool,
 }
 
@@ -359,6 +362,7 @@ impl Statistics {
             ));
         }
         let mean = if constant { Vec3::from(first) } else { (sum / (2.0 * TAU)).as_vec3() };
-        Ok(Self { mean, constant })
+        // Decided in f64: the mean of one dim texel may be nothing in f32.
+        Ok(Self { mean, black: sum.max_element() <= 0.0, constant })
     }
 }

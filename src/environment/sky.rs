@@ -122,9 +122,14 @@ fn ground(d: Vec3, near: Vec3, haze: Vec3) -> Vec3 {
     (near * fields).lerp(haze, (d.y * 30.0).exp())
 }
 
-/// Joins sky and ground over a quarter of a degree.
-fn horizon(d: Vec3, above: Vec3, below: Vec3) -> Vec3 {
-    below.lerp(above, smoothstep(-0.003, 0.003, d.y))
+/// Joins sky and ground by two ranges of hills, `far` and `near`, up to 3 degrees above the horizon.
+fn horizon(d: Vec3, above: Vec3, far: Vec3, near: Vec3, below: Vec3) -> Vec3 {
+    let around = Vec3::new(d.x, 0.0, d.z).normalize_or(Vec3::X);
+    let ridge = |scale: f32, seed: u32| solid_fbm(around * scale, 6, seed);
+    let over = |height: f32| smoothstep(-0.0012, 0.0012, d.y - height);
+    let backdrop = far.lerp(above, over(0.075 * (ridge(3.0, 91) - 0.22).max(0.0)));
+    let hills = near.lerp(backdrop, over(0.055 * (ridge(5.0, 92) - 0.36).max(0.0)));
+    below.lerp(hills, smoothstep(-0.003, 0.003, d.y))
 }
 
 fn day(d: Vec3) -> Vec3 {
@@ -139,7 +144,8 @@ fn day(d: Vec3) -> Vec3 {
     let lit = Vec3::new(1.12, 1.08, 1.02).lerp(Vec3::new(0.50, 0.54, 0.61), 0.8 * thick);
     let silver = Vec3::new(0.9, 0.85, 0.75) * ((toward - 1.0) * 12.0).exp() * (1.0 - thick);
     sky = sky.lerp(lit + silver, 0.88 * cover);
-    horizon(d, sky, ground(d, Vec3::new(0.15, 0.14, 0.10), Vec3::new(0.34, 0.38, 0.40)))
+    let (far, near) = (Vec3::new(0.36, 0.44, 0.53), Vec3::new(0.17, 0.21, 0.17));
+    horizon(d, sky, far, near, ground(d, Vec3::new(0.15, 0.14, 0.10), Vec3::new(0.24, 0.26, 0.22)))
 }
 
 fn sunset(d: Vec3) -> Vec3 {
@@ -154,11 +160,9 @@ fn sunset(d: Vec3) -> Vec3 {
     let lit = Vec3::new(1.5, 0.50, 0.20) * (0.12 + 0.88 * side);
     let cloud = lit.lerp(Vec3::new(0.10, 0.085, 0.13), 0.75 * thick);
     sky = sky.lerp(cloud, 0.85 * cover) + Vec3::new(8.0, 3.2, 1.0) * glow;
-    horizon(
-        d,
-        sky,
-        ground(d, Vec3::new(0.045, 0.038, 0.035), Vec3::new(0.26, 0.12, 0.06) * (0.25 + side)),
-    )
+    let (far, near) = (Vec3::new(0.30, 0.14, 0.11) * (0.3 + side), Vec3::new(0.06, 0.045, 0.05));
+    let haze = Vec3::new(0.14, 0.075, 0.05) * (0.3 + side);
+    horizon(d, sky, far, near, ground(d, Vec3::new(0.045, 0.038, 0.035), haze))
 }
 
 fn night(d: Vec3) -> Vec3 {
@@ -178,7 +182,8 @@ fn night(d: Vec3) -> Vec3 {
             sky = Vec3::new(0.10, 0.065, 0.030) * (0.3 + solid_fbm(window, 1, 23));
         }
     }
-    horizon(d, sky, ground(d, Vec3::splat(0.001), Vec3::new(0.006, 0.004, 0.0025)))
+    let dark = Vec3::splat(0.0012);
+    horizon(d, sky, sky, dark, ground(d, Vec3::splat(0.001), Vec3::new(0.006, 0.004, 0.0025)))
 }
 
 fn overcast(d: Vec3) -> Vec3 {
@@ -189,7 +194,8 @@ fn overcast(d: Vec3) -> Vec3 {
     let billow = solid_fbm(on_layer, 5, 31) - 0.5;
     let sky = base * (1.0 + 0.55 * billow * smoothstep(0.0, 0.15, up))
         + Vec3::splat(0.12) * (-up * 10.0).exp();
-    horizon(d, sky, ground(d, Vec3::new(0.10, 0.11, 0.08), Vec3::new(0.26, 0.28, 0.29)))
+    let (far, near) = (Vec3::new(0.32, 0.35, 0.38), Vec3::new(0.14, 0.16, 0.14));
+    horizon(d, sky, far, near, ground(d, Vec3::new(0.10, 0.11, 0.08), Vec3::new(0.20, 0.21, 0.19)))
 }
 
 /// A corridor along X, seen from its middle: ceiling panels, a row of windows, doors at the ends.

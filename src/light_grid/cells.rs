@@ -48,11 +48,7 @@ impl SphericalGrid {
 
     /// Face, row and column of a cell.
     pub fn coordinates(&self, cell: u32) -> (u32, u32, u32) {
-        (
-            cell / (self.columns * self.rows),
-            cell / self.columns % self.rows,
-            cell % self.columns,
-        )
+        (cell / (self.columns * self.rows), cell / self.columns % self.rows, cell % self.columns)
     }
 
     /// Unit direction from the centre to the middle of a cell.
@@ -95,7 +91,8 @@ mod tests {
 
     #[test]
     fn the_middle_of_every_cell_is_in_that_cell() {
-        let grid = SphericalGrid { center: Vec3::new(1.0, -2.0, 3.0), columns: 64, rows: 32, faces: true };
+        let grid =
+            SphericalGrid { center: Vec3::new(1.0, -2.0, 3.0), columns: 64, rows: 32, faces: true };
         for cell in 0..grid.cell_count() {
             let (face, _, _) = grid.coordinates(cell);
             let point = grid.center + 7.5 * grid.direction_of(cell);
@@ -106,7 +103,15 @@ mod tests {
     #[test]
     fn odd_points_stay_inside_the_grid() {
         let grid = SphericalGrid { center: Vec3::ZERO, columns: 64, rows: 32, faces: true };
-        for position in [Vec3::ZERO, Vec3::Y, -Vec3::Y, -Vec3::X, Vec3::NAN, Vec3::splat(f32::MAX), Vec3::splat(1e-40)] {
+        for position in [
+            Vec3::ZERO,
+            Vec3::Y,
+            -Vec3::Y,
+            -Vec3::X,
+            Vec3::NAN,
+            Vec3::splat(f32::MAX),
+            Vec3::splat(1e-40),
+        ] {
             for normal in [Vec3::ZERO, Vec3::NAN, -Vec3::Z, Vec3::ONE] {
                 assert!(grid.cell_of(position, normal) < grid.cell_count());
             }

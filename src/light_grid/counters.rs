@@ -15,6 +15,15 @@ pub const MAX_RECORDS_PER_PASS: u64 = (1 << 31) / (WEIGHT_ONE as u64 * MAX_WEIGH
 
 const NO_SLOT: u32 = u32::MAX;
 
+/// What is known of one tile seen from one cell.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Tally {
+    /// Samples that fell into the tile.
+    pub tries: f64,
+    /// Sum of their weights.
+    pub weight: f64,
+}
+
 /// Learning counters of all cells: a dense visit count per cell, and tile counters for the cells
 /// that were visited, up to a memory budget.
 ///
@@ -28,7 +37,7 @@ pub struct Counters {
     visits: Vec<AtomicU32>,
     slot_of_cell: Vec<u32>,
     cell_of_slot: Vec<u32>,
-    /// One more than `tile_count` words a slot: tries, then the weight sum of every tile.
+    /// Two words a tile in each slot: tries, then weight sum.
     blocks: Vec<Box<[AtomicU32]>>,
 }
 
@@ -39,7 +48,8 @@ impl Counters {
         let per_slot = Self::slot_bytes(tile_count);
         Self {
             tile_count,
-            capacity: (budget_bytes.saturating_sub(fixed) / per_slot).min(cell_count as usize) as u32,
+            capacity: (budget_bytes.saturating_sub(fixed) / per_slot).min(cell_count as usize)
+                as u32,
             visits: (0..cell_count).map(|_| AtomicU32::new(0)).collect(),
             slot_of_cell: vec![NO_SLOT; cell_count as usize],
             cell_of_slot: Vec::new(),
@@ -49,7 +59,7 @@ impl Counters {
 
     /// Bytes of one cell's tile counters.
     pub fn slot_bytes(tile_count: u32) -> usize {
-        (tile_count as usize + 1) * 4 + size_of::<Box<[AtomicU32]>>() + 4
+        tile_count as usize * 8 + size_of::<Box<[AtomicU32]>>() + 4
     }
 
     /// Records one try in `cell`: a map sample that fell into `tile` with `weight` in
@@ -61,10 +71,11 @@ impl Counters {
             return;
         }
         let block = &self.blocks[slot as usize];
-        block[0].fetch_add(1, Ordering::Relaxed);
+        let counter = 2 * tile as usize;
+        block[counter].fetch_add(1, Ordering::Relaxed);
         let fixed = (weight.clamp(0.0, MAX_WEIGHT) * WEIGHT_ONE).round() as u32;
         if fixed > 0 {
-            block[tile as usize + 1].fetch_add(fixed, Ordering::Relaxed);
+            block[counter + 1].fetch_add(fixed, Ordering::Relaxed);
         }
     }
 
@@ -82,7 +93,7 @@ impl Counters {
         for (_, cell) in fresh.into_iter().take(free) {
             self.slot_of_cell[cell as usize] = self.blocks.len() as u32;
             self.cell_of_slot.push(cell);
-            self.blocks.push((0..=self.tile_count).map(|_| AtomicU32::new(0)).collect());
+            self.blocks.push((0..2 * self.tile_count).map(|_| AtomicU32::new(0)).collect());
         }
         for visits in &self.visits {
             visits.store(visits.load(Ordering::Relaxed).min(1 << 30), Ordering::Relaxed);
@@ -106,19 +117,12 @@ impl Counters {
         self.visits.iter().filter(|v| v.load(Ordering::Relaxed) > 0).count()
     }
 
-    /// Tries of a slot and its weight sums per tile, in units of a weight of 1.
-    pub fn read(&self, slot: usize, weights: &mut Vec<f64>) -> u32 {
-        let block = &self.blocks[slot];
-        weights.clear();
-        weights.extend(
-            block[1..].iter().map(|c| f64::from(c.load(Ordering::Relaxed)) / f64::from(WEIGHT_ONE)),
-        );
-        block[0].load(Ordering::Relaxed)
-    }
-
-    /// Gives the slot's memory back; reading it again panics.
-    pub fn release(&mut self, slot: usize) {
-        self.blocks[slot] = Box::default();
+    /// Tries and weight sums (in units of a weight of 1) of a slot's tiles.
+    pub fn tallies(&self, slot: usize) -> impl Iterator<Item = Tally> {
+        self.blocks[slot].chunks_exact(2).map(|pair| Tally {
+            tries: f64::from(pair[0].load(Ordering::Relaxed)),
+            weight: f64::from(pair[1].load(Ordering::Relaxed)) / f64::from(WEIGHT_ONE),
+        })
     }
 
     /// Bytes held.
@@ -132,7 +136,8 @@ impl Counters {
     /// A digest of every counter (FNV-1a over cells in slot order), for tests of repeatability.
     pub fn digest(&self) -> u64 {
         let mut digest = 0xcbf2_9ce4_8422_2325_u64;
-        let mut eat = |word: u32| digest = (digest ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
+        let mut eat =
+            |word: u32| digest = (digest ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
         for (slot, &cell) in self.cell_of_slot.iter().enumerate() {
             eat(cell);
             for counter in &self.blocks[slot] {
@@ -159,9 +164,9 @@ mod tests {
             assert_eq!(counters.cells(), &[40, 7, 9]);
             assert!(counters.memory_bytes() <= budget);
             counters.record(7, 3, 0.5);
-            let mut weights = Vec::new();
-            assert_eq!(counters.read(1, &mut weights), 1);
-            assert_eq!(weights[3], 0.5);
+            let tallies: Vec<Tally> = counters.tallies(1).collect();
+            assert_eq!(tallies[3], Tally { tries: 1.0, weight: 0.5 });
+            assert_eq!(tallies.iter().map(|t| t.tries).sum::<f64>(), 1.0);
         }
     }
 
@@ -170,12 +175,12 @@ mod tests {
         let mut counters = Counters::new(1, 2, 1 << 20);
         counters.record(0, 0, 1.0);
         counters.end_pass();
-        counters.blocks[0][2].store(3 << 30, Ordering::Relaxed);
-        counters.blocks[0][0].store(1000, Ordering::Relaxed);
+        counters.blocks[0][3].store(3 << 30, Ordering::Relaxed);
+        counters.blocks[0][2].store(1000, Ordering::Relaxed);
         counters.end_pass();
-        let mut weights = Vec::new();
-        assert_eq!(counters.read(0, &mut weights), 500);
-        assert_eq!(weights[1], f64::from(3_u32 << 29) / f64::from(WEIGHT_ONE));
+        let tally = counters.tallies(0).nth(1).expect("two tiles");
+        assert_eq!(tally.tries, 500.0);
+        assert_eq!(tally.weight, f64::from(3_u32 << 29) / f64::from(WEIGHT_ONE));
         let growth = MAX_RECORDS_PER_PASS * (MAX_WEIGHT * WEIGHT_ONE) as u64;
         assert!(growth < 1 << 31, "one pass cannot carry a halved counter past u32");
     }

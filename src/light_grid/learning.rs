@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::cells::{SphericalGrid, face_axis};
-use super::counters::Counters;
+use super::counters::{Counters, Tally};
 use super::tile_laws::TileLaws;
 use super::{Cells, LightGrid, MEMORY_BUDGET_BYTES, WHOLE_MAP};
 use crate::environment::Environment;
@@ -25,7 +25,8 @@ pub struct LawOptions {
     pub recording: Recording,
     /// Tries per tile that the pooled ratio of the 4x4 cells around is worth.
     pub pooling_tries: f64,
-    /// Share of samples that follow the whole map's law whatever was learned.
+    /// Share of samples that follow the whole map's law whatever was learned. It makes every law
+    /// as long as the map has tiles.
     pub whole_map_share: f64,
     /// How much of the diffuse BSDF's own density is subtracted from a law (MIS compensation,
     /// Karlik et al. 2019, on tiles).
@@ -37,7 +38,7 @@ impl LawOptions {
     pub const ADAPTIVE: Self = Self {
         recording: Recording::VisibleCosine,
         pooling_tries: 1.0,
-        whole_map_share: 0.02,
+        whole_map_share: 0.0,
         compensation: 0.5,
     };
 
@@ -64,7 +65,7 @@ pub struct LearningGrid {
 const POOL: u32 = 4;
 
 /// Share of the budget for the counters; laws take the rest while both are held.
-const COUNTER_SHARE: f64 = 0.62;
+const COUNTER_SHARE: f64 = 0.65;
 
 /// Law entries left over by MIS compensation must carry at least this much of the law.
 const LEAST_COMPENSATED: f64 = 0.05;
@@ -125,74 +126,73 @@ fn fitting(supports: &[usize], room: usize, tile_count: u32) -> usize {
         .count()
 }
 
-/// Visibility sums of a block of cells.
-struct Block {
-    tries: f64,
-    weights: Vec<f64>,
-}
-
 struct LawBuilder<'a> {
-    learned: &'a LearningGrid,
+    learning: &'a LearningGrid,
     /// Whole-map probability of each tile.
     map_law: Vec<f64>,
-    faces: BTreeMap<u32, Block>,
-    blocks: BTreeMap<u32, Block>,
+    /// Tallies of all cells of a face, and of 4x4 cells of a face.
+    faces: BTreeMap<u32, Vec<Tally>>,
+    blocks: BTreeMap<u32, Vec<Tally>>,
     /// Share of the diffuse density per face and tile; empty without compensation.
     diffuse: Vec<Vec<f64>>,
 }
 
 impl<'a> LawBuilder<'a> {
-    fn new(learned: &'a LearningGrid, environment: &Environment) -> Self {
+    fn new(learning: &'a LearningGrid, environment: &Environment) -> Self {
         let energies = environment.tile_energies();
         let total: f64 = energies.iter().sum();
         let mut builder = Self {
-            learned,
+            learning,
             map_law: energies.iter().map(|e| e / total).collect(),
             faces: BTreeMap::new(),
             blocks: BTreeMap::new(),
             diffuse: Vec::new(),
         };
-        if learned.options.pooling_tries > 0.0 {
+        if learning.options.recording == Recording::VisibleCosine {
             builder.pool();
         }
-        if learned.options.compensation > 0.0 && learned.grid.faces {
+        if learning.options.compensation > 0.0 && learning.grid.faces {
             builder.diffuse = diffuse_shares(environment);
         }
         builder
     }
 
+    fn face_of(&self, cell: u32) -> u32 {
+        self.learning.grid.coordinates(cell).0
+    }
+
     fn block_of(&self, cell: u32) -> u32 {
-        let (face, row, column) = self.learned.grid.coordinates(cell);
+        let (face, row, column) = self.learning.grid.coordinates(cell);
         (face << 24) | ((row / POOL) << 12) | (column / POOL)
     }
 
     fn pool(&mut self) {
-        let mut weights = Vec::new();
-        for (slot, &cell) in self.learned.counters.cells().iter().enumerate() {
-            let tries = f64::from(self.learned.counters.read(slot, &mut weights));
-            let (face, _, _) = self.learned.grid.coordinates(cell);
-            let block = self.block_of(cell);
+        let counters = &self.learning.counters;
+        for (slot, &cell) in counters.cells().iter().enumerate() {
+            let (face, block) = (self.face_of(cell), self.block_of(cell));
             for (map, key) in [(&mut self.faces, face), (&mut self.blocks, block)] {
-                let sums = map
-                    .entry(key)
-                    .or_insert_with(|| Block { tries: 0.0, weights: vec![0.0; weights.len()] });
-                sums.tries += tries;
-                sums.weights.iter_mut().zip(&weights).for_each(|(sum, w)| *sum += w);
+                let sums =
+                    map.entry(key).or_insert_with(|| vec![Tally::default(); self.map_law.len()]);
+                for (sum, tally) in sums.iter_mut().zip(counters.tallies(slot)) {
+                    sum.tries += tally.tries;
+                    sum.weight += tally.weight;
+                }
             }
         }
     }
 
     /// Unnormalised law of a slot.
     fn weights(&self, slot: usize, weights: &mut Vec<f64>) {
-        let tries = f64::from(self.learned.counters.read(slot, weights));
-        let cell = self.learned.counters.cells()[slot];
-        let (face, _, _) = self.learned.grid.coordinates(cell);
-        if self.learned.options.recording == Recording::VisibleCosine {
-            self.shrink(tries, face, self.block_of(cell), weights);
+        let cell = self.learning.counters.cells()[slot];
+        let tallies = self.learning.counters.tallies(slot);
+        weights.clear();
+        match self.learning.options.recording {
+            Recording::VisibleContribution => weights.extend(tallies.map(|t| t.weight)),
+            Recording::VisibleCosine => self.visible_energies(cell, tallies, weights),
         }
-        self.compensate(face as usize, weights);
+        self.compensate(self.face_of(cell) as usize, weights);
         let total: f64 = weights.iter().sum();
-        let share = self.learned.options.whole_map_share;
+        let share = self.learning.options.whole_map_share;
         if total > 0.0 && share > 0.0 {
             for (weight, map) in weights.iter_mut().zip(&self.map_law) {
                 *weight = (1.0 - share) * *weight / total + share * map;
@@ -200,29 +200,31 @@ impl<'a> LawBuilder<'a> {
         }
     }
 
-    /// Visibility ratio of each tile, drawn towards the block's (which is drawn towards the face's)
-    /// where the tile was tried too seldom, times the tile's energy.
-    fn shrink(&self, tries: f64, face: u32, block: u32, weights: &mut [f64]) {
-        let k = self.learned.options.pooling_tries;
-        let sums = self.faces.get(&face).zip(self.blocks.get(&block));
-        for (tile, weight) in weights.iter_mut().enumerate() {
-            let map = self.map_law[tile];
-            let ratio = sums.map_or(0.0, |(face, block)| {
-                let expected = face.tries * map;
-                let face_ratio =
-                    if expected > 0.0 { (face.weights[tile] / expected).min(1.0) } else { 0.0 };
-                (block.weights[tile] + k * face_ratio) / (block.tries * map + k)
-            });
-            let expected = tries * map + k;
-            *weight = if expected > 0.0 { map * (*weight + k * ratio) / expected } else { 0.0 };
-        }
+    /// Energy of each tile times its visibility ratio, which is drawn towards the block's, and that
+    /// towards the face's, where the tile was tried too seldom.
+    fn visible_energies(
+        &self,
+        cell: u32,
+        tallies: impl Iterator<Item = Tally>,
+        weights: &mut Vec<f64>,
+    ) {
+        let k = self.learning.options.pooling_tries;
+        let shrink = |tally: &Tally, ratio: f64| {
+            let tries = tally.tries + k;
+            if tries > 0.0 { (tally.weight + k * ratio) / tries } else { 0.0 }
+        };
+        let face = &self.faces[&self.face_of(cell)];
+        let block = &self.blocks[&self.block_of(cell)];
+        weights.extend(tallies.zip(face).zip(block).zip(&self.map_law).map(
+            |(((own, face), block), map)| map * shrink(&own, shrink(block, shrink(face, 0.0))),
+        ));
     }
 
     fn compensate(&self, face: usize, weights: &mut [f64]) {
         let Some(diffuse) = self.diffuse.get(face) else { return };
         let total: f64 = weights.iter().sum();
         let excess = |weight: f64, share: f64| {
-            (weight - self.learned.options.compensation * share * total).max(0.0)
+            (weight - self.learning.options.compensation * share * total).max(0.0)
         };
         let left: f64 = weights.iter().zip(diffuse).map(|(w, d)| excess(*w, *d)).sum();
         if left >= LEAST_COMPENSATED * total {

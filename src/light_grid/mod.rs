@@ -88,7 +88,8 @@ impl LightGrid {
             result.laws.push(&weights);
         }
         for (cell, law) in law_of_cell.iter_mut().enumerate() {
-            *law = (crate::sampler::hash(seed.wrapping_add(cell as u32)) % result.laws.len()) as u16;
+            *law =
+                (crate::sampler::hash(seed.wrapping_add(cell as u32)) % result.laws.len()) as u16;
         }
         result.cells = Some(Cells { grid, law_of_cell });
         Some(result)

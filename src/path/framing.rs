@@ -14,7 +14,11 @@ const FOV_Y_RADIANS: f32 = 0.87;
 pub fn frame(world: &World, aspect: f32) -> Camera {
     let (low, high) = world.bvh.bounds();
     let centre = 0.5 * (low + high);
-    if enclosure(world, centre) > 0.7 { inside(world, low, high) } else { outside(low, high, aspect) }
+    if enclosure(world, centre) > 0.7 {
+        inside(world, low, high)
+    } else {
+        outside(low, high, aspect)
+    }
 }
 
 /// Directions that cover the sphere about evenly.
@@ -52,8 +56,7 @@ fn inside(world: &World, low: Vec3, high: Vec3) -> Camera {
     let mut best = (f32::MIN, 0.5 * (low + high), Vec3::NEG_Z);
     for (x, z) in (0..49).map(|i| ((i % 7) as f32 / 6.0, (i / 7) as f32 / 6.0)) {
         let spread = |t: f32| 0.12 + 0.76 * t;
-        let eye =
-            Vec3::new(low.x + size.x * spread(x), eye_height, low.z + size.z * spread(z));
+        let eye = Vec3::new(low.x + size.x * spread(x), eye_height, low.z + size.z * spread(z));
         let nearest = directions(64)
             .filter_map(|d| free_distance(world, eye, d))
             .fold(f32::INFINITY, f32::min);

@@ -5,42 +5,40 @@ use glam::Vec2;
 use super::{Path, PathTracer, Vertex};
 use crate::bvh::Ray;
 use crate::color::{importance, luminance};
-use crate::light_grid::{LearningGrid, LightGrid, Recording, WHOLE_MAP};
+use crate::light_grid::{LearningGrid, Recording, WHOLE_MAP};
 use crate::sampler::{Sampler, unit_from_bits};
 
 impl PathTracer<'_> {
-    /// Traces one camera path and records at each vertex whether a sample of the whole map is
-    /// visible. Returns the number of rays and of records.
-    pub fn learn(
-        &self,
-        ray: Ray,
-        sampler: Sampler,
-        whole_map: &LightGrid,
-        learning: &LearningGrid,
-    ) -> (u32, u32) {
+    /// Traces one camera path and records at each vertex whether a sample of the map is visible,
+    /// drawn half from the whole map and half from what [`PathTracer::grid`] has learned so far: a
+    /// tile's visibility ratio does not depend on how often it is tried. Returns the number of rays.
+    pub fn learn(&self, ray: Ray, sampler: Sampler, learning: &LearningGrid) -> u32 {
         let mut path = Path::new(self, ray, sampler);
-        let mut records = 0;
         while let Some(vertex) = path.next_vertex() {
             if path.bounces == self.limits.bounces {
                 break;
             }
             path.bounces += 1;
             if !vertex.bsdf.is_delta_only() {
-                path.record(&vertex, whole_map, learning);
-                records += 1;
+                path.record(&vertex, learning);
             }
             if !path.scatter(&vertex) || !path.survives() {
                 break;
             }
         }
-        (path.rays, records)
+        path.rays
     }
 }
 
 impl Path<'_> {
-    fn record(&mut self, vertex: &Vertex, whole_map: &LightGrid, learning: &LearningGrid) {
+    fn record(&mut self, vertex: &Vertex, learning: &LearningGrid) {
+        let Some(grid) = self.tracer.grid else { return };
+        let law = match learning.recording() {
+            Recording::VisibleCosine if self.sampler.next_pair_bits()[0] >> 31 == 0 => vertex.law,
+            _ => WHOLE_MAP,
+        };
         let [tile_bits, row_bits] = self.sampler.next_pair_bits();
-        let choice = whole_map.laws().sample(WHOLE_MAP, tile_bits);
+        let choice = grid.laws().sample(law, tile_bits);
         let u = Vec2::new(choice.remainder, unit_from_bits(row_bits));
         let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
         let normal = vertex.point.geometric_normal;

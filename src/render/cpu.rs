@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use super::View;
 use super::film::{Film, Pixel, Surface};
+use crate::light_grid::LearningGrid;
 use crate::light_grid::counters::MAX_RECORDS_PER_PASS;
-use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::PathTracer;
 use crate::path::camera::CameraRays;
 use crate::sampler::Sampler;
@@ -40,7 +40,6 @@ pub(super) fn learn(
     rays: &CameraRays,
     view: &View,
     paths: Range<u64>,
-    whole_map: &LightGrid,
     learning: &LearningGrid,
     cancel: &AtomicBool,
 ) -> u64 {
@@ -61,7 +60,7 @@ pub(super) fn learn(
                     let lens = lens_point(rays, &mut sampler);
                     let pixel = on_picture * Vec2::new(view.width as f32, view.height as f32);
                     let ray = rays.ray(pixel, lens);
-                    u64::from(tracer.learn(ray, sampler, whole_map, learning).0)
+                    u64::from(tracer.learn(ray, sampler, learning))
                 })
                 .sum::<u64>()
         })

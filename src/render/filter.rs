@@ -74,9 +74,11 @@ mod tests {
 
     #[test]
     fn filters_are_centred_and_as_wide_as_they_say() {
-        for (filter, variance) in
-            [(PixelFilter::Box, 1.0 / 12.0), (PixelFilter::Gauss, 0.2), (PixelFilter::BlackmanHarris, 0.15)]
-        {
+        for (filter, variance) in [
+            (PixelFilter::Box, 1.0 / 12.0),
+            (PixelFilter::Gauss, 0.2),
+            (PixelFilter::BlackmanHarris, 0.15),
+        ] {
             let count = 10_000;
             let xs: Vec<f32> = (0..count)
                 .map(|i| filter.sample(Vec2::new((i as f32 + 0.5) / count as f32, 0.3)).x)

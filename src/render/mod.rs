@@ -150,20 +150,7 @@ impl<'a> Session<'a> {
             Sampling::Bsdf => None,
             _ => LightGrid::whole_map(environment.tile_energies()),
         };
-        let learning = learning_options(&view)
-            .filter(|_| whole_map.is_some() && view.limits.bounces > 0)
-            .map(|options| {
-                let grid = SphericalGrid {
-                    center: rays.position(),
-                    columns: view.grid_columns,
-                    rows: (view.grid_columns / 2).max(1),
-                    faces: view.sampling == Sampling::Adaptive,
-                };
-                Learning {
-                    grid: LearningGrid::new(grid, environment.tile_count(), options),
-                    pass: 0,
-                }
-            });
+        let learning = new_learning(environment, &view, &rays);
         Self {
             film: Film::new(view.width, view.height, view.layers),
             world,
@@ -211,17 +198,9 @@ impl<'a> Session<'a> {
 
     /// Ends learning with what was learned so far.
     pub fn finish_learning(&mut self) {
-        let Some(learning) = self.learning.take() else { return };
-        let counters = &learning.grid.counters;
-        self.figures.visited_cells = counters.visited_cells();
-        self.figures.grid_peak_bytes = counters.memory_bytes();
-        if self.figures.learning_paths > 0 {
-            self.learned = learning.grid.laws(self.environment);
-        }
-        if let Some(grid) = &self.learned {
-            self.figures.learned_cells = grid.laws().len() as usize - 1;
-            self.figures.grid_bytes = grid.memory_bytes();
-            self.figures.grid_peak_bytes += grid.memory_bytes();
+        if let Some(learning) = self.learning.take() {
+            self.figures.visited_cells = learning.grid.counters.visited_cells();
+            self.figures.grid_bytes = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
         }
     }
 
@@ -274,23 +253,38 @@ impl<'a> Session<'a> {
     }
 
     fn learn(&mut self, cancel: &AtomicBool) {
-        let (Some(learning), Some(whole_map)) = (&self.learning, &self.whole_map) else { return };
+        let Some(learning) = &self.learning else { return };
         let range = cpu::learning_range(&self.view, learning.pass);
-        let tracer = self.tracer(None);
+        let tracer = self.tracer(self.grid());
         let rays =
-            cpu::learn(&tracer, &self.rays, &self.view, range.clone(), whole_map, &learning.grid, cancel);
+            cpu::learn(&tracer, &self.rays, &self.view, range.clone(), &learning.grid, cancel);
         if cancel.load(std::sync::atomic::Ordering::Relaxed) {
+            // Which paths of the pass were counted depends on the threads: start over.
+            self.learned = None;
+            self.learning = new_learning(self.environment, &self.view, &self.rays);
             return;
         }
         self.figures.learning_rays += rays;
         self.figures.learning_paths = range.end;
-        if let Some(learning) = &mut self.learning {
-            learning.grid.counters.end_pass();
-            learning.pass += 1;
-        }
+        self.update_laws();
         if range.end >= self.view.learning_paths {
             self.finish_learning();
         }
+    }
+
+    /// Makes laws of what all passes so far counted: the next pass draws from them.
+    fn update_laws(&mut self) {
+        let Some(learning) = &mut self.learning else { return };
+        learning.grid.counters.end_pass();
+        learning.pass += 1;
+        // The old laws go first: both together would not fit the budget.
+        self.learned = None;
+        self.learned = learning.grid.laws(self.environment);
+        let laws = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
+        let held = learning.grid.counters.memory_bytes() + laws;
+        self.figures.grid_peak_bytes = self.figures.grid_peak_bytes.max(held);
+        self.figures.learned_cells =
+            self.learned.as_ref().map_or(0, |grid| grid.laws().len() as usize - 1);
     }
 
     fn render(&mut self, cancel: &AtomicBool) {
@@ -304,10 +298,21 @@ impl<'a> Session<'a> {
     }
 }
 
-fn learning_options(view: &View) -> Option<LawOptions> {
-    match view.sampling {
-        Sampling::Adaptive => Some(view.laws),
-        Sampling::Talk => Some(LawOptions::TALK),
-        Sampling::Plain | Sampling::Bsdf => None,
+/// An untaught grid, if the view is to learn and the map has anything to learn about.
+fn new_learning(environment: &Environment, view: &View, rays: &CameraRays) -> Option<Learning> {
+    let options = match view.sampling {
+        Sampling::Adaptive => view.laws,
+        Sampling::Talk => LawOptions::TALK,
+        Sampling::Plain | Sampling::Bsdf => return None,
+    };
+    if environment.is_black() || view.limits.bounces == 0 {
+        return None;
     }
+    let grid = SphericalGrid {
+        center: rays.position(),
+        columns: view.grid_columns,
+        rows: (view.grid_columns / 2).max(1),
+        faces: view.sampling == Sampling::Adaptive,
+    };
+    Some(Learning { grid: LearningGrid::new(grid, environment.tile_count(), options), pass: 0 })
 }

@@ -287,14 +287,15 @@ fn an_irradiance_estimate_agrees_with_quadrature() {
         if matches!(table, TableKind::U32 | TableKind::F32) && case.starts_with("sun") {
             return; // Their losses are reported by the table report, not hidden here.
         }
-        let normal = Vec3::new(0.3, 0.8, -0.5).normalize();
+        // Its horizon crosses none of the lone lit texels: quadrature is poor there.
+        let normal = Vec3::new(-0.3, 0.6, -0.75).normalize();
         let exact = irradiance(environment, map, normal);
         let (mut sum, mut squares, mut random) = (DVec3::ZERO, DVec3::ZERO, Random(2));
         const SAMPLES: u32 = 20_000;
         for _ in 0..SAMPLES {
             let Some((tile, probability)) = choose_tile(environment, &mut random) else { continue };
             let Some(sample) = environment.sample_in_tile(tile, random.next2()) else { continue };
-            let cosine = sample.direction.dot(normal).max(0.0);
+            let cosine = sample.direction.dot(normal).abs();
             let value = sample.radiance.as_dvec3() * f64::from(cosine)
                 / (probability * f64::from(sample.pdf_solid_angle));
             sum += value;
@@ -320,7 +321,8 @@ impl MapSqrt for DVec3 {
     }
 }
 
-/// Midpoint rule with 4 x 4 points a texel, at least 256 x 128 in all.
+/// Irradiance on both sides of a surface, by the midpoint rule with 4 x 4 points a texel, at least
+/// 256 x 128 in all.
 fn irradiance(environment: &Environment, map: &Image, normal: Vec3) -> DVec3 {
     let (columns, rows) = ((4 * map.width).max(256), (4 * map.height).max(128));
     let mut sum = DVec3::ZERO;
@@ -329,7 +331,7 @@ fn irradiance(environment: &Environment, map: &Image, normal: Vec3) -> DVec3 {
         for x in 0..columns {
             let uv = Vec2::new((x as f32 + 0.5) / columns as f32, (y as f32 + 0.5) / rows as f32);
             let direction = rotate_y(direction_from_uv(uv), 1.2345);
-            let cosine = f64::from(direction.dot(normal).max(0.0));
+            let cosine = f64::from(direction.dot(normal).abs());
             sum += environment.radiance(direction).as_dvec3() * cosine * solid_angle;
         }
     }
@@ -394,7 +396,9 @@ fn the_largest_and_smallest_radiance_can_be_sampled() {
         for table in TableKind::ALL {
             let mut map = Image::filled(64, 32, [dim; 3]);
             map.pixels[700] = [bright; 3];
-            let environment = environment(&map, table, Lookup::Bilinear);
+            let mut environment = environment(&map, table, Lookup::Bilinear);
+            environment.set_intensity(10.0);
+            assert!(!environment.is_black() && environment.mean_radiance().is_finite());
             let mut random = Random(1);
             let mut samples = 0;
             for tile in 0..environment.tile_count() {

@@ -112,14 +112,14 @@ fn front(b: &mut Builder, m: &HouseMats, [width, height]: [f32; 2], rhythm: Rhyt
     b.slab(m.trim, [-0.03, rhythm.ground - 0.14, -0.05], [width + 0.03, rhythm.ground, 0.07], 0.02);
     plinth(b, m.base, width, &openings);
     for window in &windows {
-        window_frame(b, m.frame, *window, 0.12, [2, 3]);
+        window_frame(b, m.frame, *window, 0.12, [2, 3], 0.0);
         surround(b, m, *window);
     }
     for (opening, is_door) in &openings {
         if *is_door {
             door_leaf(b, m, *opening);
         } else {
-            window_frame(b, m.frame, *opening, 0.10, [if rhythm.shops { 3 } else { 2 }, 2]);
+            window_frame(b, m.frame, *opening, 0.10, [if rhythm.shops { 3 } else { 2 }, 2], 0.0);
             sill(b, m.trim, *opening);
         }
         let [u0, _, u1, v1] = *opening;
@@ -149,10 +149,10 @@ fn surround(b: &mut Builder, m: &HouseMats, window: [f32; 4]) {
         let w = 0.5 * (u1 - u0);
         for (left, right) in [(u0 - w - 0.012, u0 - 0.012), (u1 + 0.012, u1 + w + 0.012)] {
             b.slab(shutter, [left, v0 + 0.02, 0.004], [right, v1 - 0.002, 0.03], 0.004);
-            let louvres = ((v1 - v0) / 0.11) as u32;
+            let louvres = ((v1 - v0) / 0.15) as u32;
             for k in 0..louvres {
                 let v = v0 + 0.09 + (v1 - v0 - 0.16) * k as f32 / louvres as f32;
-                b.slab(shutter, [left + 0.05, v, 0.02], [right - 0.05, v + 0.05, 0.042], 0.0);
+                b.slab(shutter, [left + 0.05, v, 0.02], [right - 0.05, v + 0.08, 0.042], 0.0);
             }
         }
     }
@@ -162,7 +162,7 @@ fn door_leaf(b: &mut Builder, m: &HouseMats, [u0, v0, u1, v1]: [f32; 4]) {
     let leaf = m.shutter.unwrap_or(m.frame);
     let light = v1 - 0.5;
     b.slab(leaf, [u0 - 0.01, v0 - 0.04, -0.21], [u1 + 0.01, light, -0.15], 0.006);
-    window_frame(b, m.frame, [u0, light, u1, v1], 0.13, [3, 1]);
+    window_frame(b, m.frame, [u0, light, u1, v1], 0.13, [3, 1], 0.0);
     let middle = 0.5 * (u0 + u1);
     for (left, right) in [(u0 + 0.07, middle - 0.04), (middle + 0.04, u1 - 0.07)] {
         for (low, high) in [(v0 + 0.2, v0 + 0.9), (v0 + 1.05, light - 0.15)] {
@@ -228,7 +228,7 @@ pub(super) fn column(b: &mut Builder, mat: Mat, height: f32, radius: f32) {
         let (s, c) = (k as f32 / 6.0 * 0.5 * PI).sin_cos();
         profile.push((0.9 * r + 0.45 * r * (1.0 - c), height - 0.27 + 0.15 * s));
     }
-    b.lathe(mat, 40, &profile);
+    b.lathe(mat, 28, &profile);
 }
 
 /// A street lamp with a lantern (unlit).

@@ -6,7 +6,7 @@ use glam::{Affine3A, EulerRot, Quat, Vec2, Vec3};
 
 use super::mesh::{Builder, LIFT, Mat};
 use super::objects::books;
-use crate::noise::Stream;
+use crate::noise::{Stream, smoothstep};
 
 /// A rotation by degrees about X, then Y, then Z, and a translation.
 pub(super) fn placed(at: [f32; 3], degrees: [f32; 3]) -> Affine3A {
@@ -106,9 +106,8 @@ pub(super) fn armchair(b: &mut Builder, cloth: Mat, wood: Mat) {
     let wall = |turn: f32, inward: f32, up: f32| {
         let angle = PI + (turn - 0.5) * 1.32 * PI;
         let (s, c) = angle.sin_cos();
-        let height = 0.30
-            + 0.30
-                * (0.5 - 0.5 * (angle - PI).abs().min(PI).cos().mul_add(-1.0, 0.0)).clamp(0.0, 1.0);
+        let behind = 0.5 + 0.5 * (angle - PI).cos();
+        let height = 0.30 + 0.26 * smoothstep(0.25, 0.95, behind);
         let lean = 1.0 + 0.18 * up * (height - 0.25);
         let r = 0.37 - inward;
         Vec3::new(r * s * lean, 0.26 + up * height, r * c * lean * 0.98)
@@ -122,7 +121,7 @@ pub(super) fn armchair(b: &mut Builder, cloth: Mat, wood: Mat) {
     });
     for end in [0.0, 1.0] {
         b.sheet(cloth, [8, 24], Vec2::new(0.1, 1.2), |u, v| {
-            let turn = if end > 0.5 { v } else { 1.0 - v };
+            let turn = if end > 0.5 { 1.0 - v } else { v };
             let (s, c) = (turn * TAU).sin_cos();
             let up = 0.5 - 0.5 * c.signum() * c.abs().powf(0.35);
             let inward = 0.045 * (1.0 - s.signum() * s.abs().powf(0.6));
@@ -151,11 +150,11 @@ pub(super) fn side_chair(b: &mut Builder, wood: Mat, seat: Mat) {
         b.rod(wood, Vec3::new(sx * 0.186, 0.22, 0.18), Vec3::new(sx * 0.178, 0.22, -0.19), 0.009);
     }
     b.slab(wood, [-0.20, 0.40, -0.19], [0.20, 0.435, 0.20], 0.008);
-    b.blob(seat, Vec3::new(0.0, 0.445, 0.005), Vec3::new(0.205, 0.028, 0.195), [6.0, 2.6], 12);
-    b.sheet(wood, [12, 12], Vec2::new(0.4, 0.12), |u, v| {
+    b.blob(seat, Vec3::new(0.0, 0.445, 0.005), Vec3::new(0.205, 0.028, 0.195), [6.0, 2.6], 7);
+    b.sheet(wood, [8, 12], Vec2::new(0.4, 0.12), |u, v| {
         // A bent back rest, closed around its section.
         let x = (u - 0.5) * 0.39;
-        let (s, c) = (-v * TAU).sin_cos();
+        let (s, c) = (v * TAU).sin_cos();
         Vec3::new(x, 0.775 + 0.055 * s, -0.225 - 0.14 * (0.04 - x * x) + 0.009 * c)
     });
 }

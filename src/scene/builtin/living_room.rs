@@ -29,6 +29,7 @@ struct Palette {
     boucle: Mat,
     linen: Mat,
     cotton: Mat,
+    curtain: Mat,
     rug: Mat,
     brass: Mat,
     copper: Mat,
@@ -56,7 +57,8 @@ impl Palette {
         let accent = b.texture(paint::plaster([0.24, 0.33, 0.30], 0.16), Vec2::splat(2.5));
         let velvet = b.texture(paint::weave([0.52, 0.20, 0.085], 64), Vec2::splat(0.20));
         let boucle = b.texture(paint::weave([0.74, 0.69, 0.60], 32), Vec2::splat(0.16));
-        let linen = b.texture(paint::weave([0.76, 0.71, 0.62], 128), Vec2::splat(0.30));
+        let linen = b.texture(paint::weave([0.72, 0.66, 0.56], 128), Vec2::splat(0.30));
+        let ochre = b.texture(paint::weave([0.58, 0.45, 0.27], 128), Vec2::splat(0.30));
         let rug = b.texture(
             paint::rug([0.66, 0.60, 0.50], [0.09, 0.14, 0.22], [0.46, 0.17, 0.09]),
             Vec2::new(2.9, 2.0),
@@ -77,6 +79,7 @@ impl Palette {
             boucle: b.material(textured("boucle", boucle, 0.95)),
             linen: b.material(two_sided(textured("linen", linen, 0.9))),
             cotton: b.material(textured("cotton", boucle, 0.9)),
+            curtain: b.material(two_sided(textured("ochre linen", ochre, 0.9))),
             rug: b.material(two_sided(textured("rug", rug, 0.95))),
             brass: b.material(make::brass()),
             copper: b.material(make::copper()),
@@ -108,8 +111,8 @@ pub(super) fn build() -> Scene {
     coffee_table(b, m);
     library(b, m);
     corners(b, m);
-    b.camera("sofa", [2.25, 1.45, 2.2], [-0.75, 0.86, -0.95], 56.0);
-    b.camera("window", [-2.3, 1.4, 2.05], [1.6, 1.0, -0.75], 58.0);
+    b.camera("window", [-2.6, 1.35, 1.95], [0.5, 1.02, -0.55], 50.0);
+    b.camera("sofa", [2.3, 1.35, 2.2], [-0.95, 0.86, -1.1], 50.0);
     b.camera("round window", [1.9, 1.45, -2.1], [-1.3, 1.15, 1.8], 56.0);
     std::mem::replace(b, Builder::new("")).finish()
 }
@@ -164,11 +167,11 @@ fn shell(b: &mut Builder, m: &Palette) {
 fn window(b: &mut Builder, m: &Palette) {
     let wall = room::walls(SIZE)[1];
     b.part(wall.frame(), |b| {
-        room::window_frame(b, m.white, WINDOW, 0.12, [3, 2]);
+        room::window_frame(b, m.white, WINDOW, 0.12, [3, 2], 0.004);
         room::window_board(b, m.white, WINDOW, THICKNESS);
         let [u0, v0, u1, _] = WINDOW;
-        room::curtain(b, m.linen, [u0 - 0.42, u0 + 0.06], [0.015, 2.47], 0.13, 6.0);
-        room::curtain(b, m.linen, [u1 - 0.06, u1 + 0.42], [0.015, 2.47], 0.13, 6.0);
+        room::curtain(b, m.curtain, [u0 - 0.42, u0 + 0.06], [0.015, 2.47], 0.13, 6.0);
+        room::curtain(b, m.curtain, [u1 - 0.06, u1 + 0.42], [0.015, 2.47], 0.13, 6.0);
         room::curtain_rod(b, m.brass, [u0 - 0.55, u1 + 0.55], 2.50, 0.13);
         for (u, kind) in [(1.62, 0), (2.72, 1), (3.36, 2)] {
             b.standing(Vec3::new(u, v0 + 0.016, -0.03), 0.0, |b| match kind {
@@ -254,7 +257,7 @@ fn coffee_table(b: &mut Builder, m: &Palette) {
 }
 
 fn library(b: &mut Builder, m: &Palette) {
-    b.standing(Vec3::new(-2.83, 0.0, -0.35), 90.0, |b| {
+    b.standing(Vec3::new(-2.83, 0.0, -0.45), 90.0, |b| {
         piece::bookcase(
             b,
             [m.oak, m.cover, m.paper],
@@ -291,6 +294,10 @@ fn corners(b: &mut Builder, m: &Palette) {
     });
     b.part(placed([-0.35, SIZE[1], -0.1], [0.0; 3]), |b| {
         piece::pendant(b, m.copper, m.white, 0.95, 0.24);
+    });
+    b.standing(Vec3::new(2.42, 0.0, 1.52), 0.0, |b| {
+        let soil = plants::pot(b, m.ceramic, m.soil, 0.19, 0.40);
+        b.standing(Vec3::Y * soil, 0.0, |b| plants::blades(b, m.leaf, 22, 0.95, 14));
     });
     // A console by the door with a lamp.
     b.standing(Vec3::new(-1.4, 0.0, 2.28), 180.0, |b| {

@@ -103,7 +103,7 @@ pub(super) fn build() -> Scene {
         });
     }
     lounge(b, m);
-    b.camera("desks", [2.65, 1.5, 1.72], [-1.25, 0.98, -0.75], 54.0);
+    b.camera("desks", [2.65, 1.5, 1.62], [-1.0, 0.98, -0.92], 50.0);
     b.camera("windows", [2.3, 1.45, -0.1], [-2.9, 1.15, 0.05], 56.0);
     b.camera("door", [-2.5, 1.5, -0.9], [1.9, 1.0, 1.3], 56.0);
     std::mem::replace(b, Builder::new("")).finish()
@@ -125,7 +125,7 @@ fn shell(b: &mut Builder, m: &Palette) {
     }
     b.part(walls[0].frame(), |b| {
         for hole in WINDOWS {
-            room::window_frame(b, m.white, hole, 0.09, [2, 1]);
+            room::window_frame(b, m.white, hole, 0.09, [2, 1], 0.004);
             room::window_board(b, m.oak, hole, THICKNESS);
             let [u0, _, u1, _] = hole;
             room::curtain(b, m.curtain, [u0 - 0.30, u0 + 0.0], [0.95, 2.36], 0.10, 4.0);

@@ -74,7 +74,7 @@ fn knot(b: &mut Builder, mat: Mat) {
             let forward = (curve(t + 1e-2) - curve(t - 1e-2)).normalize();
             let side = forward.cross(curve(t).normalize_or(Vec3::Z)).normalize();
             let (s, c) = (v * TAU).sin_cos();
-            curve(t) + (side * c + forward.cross(side) * s) * 0.115
+            curve(t) + (side * c - forward.cross(side) * s) * 0.115
         });
     });
 }

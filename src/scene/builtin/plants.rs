@@ -184,7 +184,7 @@ pub(super) fn foliage(
         let tone = GREENS[stream.index(GREENS.len())];
         b.tinted(tone, |b| {
             b.part(growing(at, out + wander), |b| {
-                leaf(b, mat, [length, 0.55 * length], 0.6, [2, 3])
+                leaf(b, mat, [length, 0.6 * length], 0.6, [2, 2])
             });
         });
     }

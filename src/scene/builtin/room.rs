@@ -192,19 +192,20 @@ fn round_hole(b: &mut Builder, mat: Mat, [u, v, r]: [f32; 3], thickness: f32) {
 }
 
 /// A wooden window frame without panes in a wall's frame: `hole` as given to the wall, sitting
-/// `depth` behind the inner face, with `columns` x `rows` lights.
+/// `depth` behind the inner face, with `columns` x `rows` lights and edges rounded by `bevel`.
 pub(super) fn window_frame(
     b: &mut Builder,
     mat: Mat,
     hole: [f32; 4],
     depth: f32,
     [columns, rows]: [u32; 2],
+    bevel: f32,
 ) {
     let [u0, v0, u1, v1] = hole;
     let (bar, thick, bury) = (0.045, 0.05, 0.006);
     let (z0, z1) = (-depth - thick, -depth);
     let mut piece = |u: [f32; 2], v: [f32; 2], z: [f32; 2]| {
-        b.slab(mat, [u[0], v[0], z[0]], [u[1], v[1], z[1]], 0.004);
+        b.slab(mat, [u[0], v[0], z[0]], [u[1], v[1], z[1]], bevel);
     };
     piece([u0 - bury, u0 + bar], [v0 - bury, v1 + bury], [z0, z1]);
     piece([u1 - bar, u1 + bury], [v0 - bury, v1 + bury], [z0, z1]);

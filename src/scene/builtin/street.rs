@@ -160,16 +160,16 @@ fn houses(b: &mut Builder, m: &Palette) {
         &m.ochre_house,
         [-16.0, -6.0, -7.0, 9.0],
         9.0,
-        [false, true, true, true],
+        [false, true, true, false],
         row(5, 2, true),
     );
     facade::house(
         b,
         &m.ochre_house,
         [7.0, -7.5, 16.0, 9.0],
-        10.0,
+        6.6,
         [true, false, true, false],
-        row(6, 2, false),
+        row(6, 1, false),
     );
 }
 
@@ -230,8 +230,20 @@ fn cafe(b: &mut Builder, m: &Palette) {
             b.drum(m.iron, [0.02, 0.70], [0.025, 0.022], 0.004);
             b.drum(m.marble, [0.70, 0.728], [0.36, 0.36], 0.008);
             b.standing(Vec3::new(0.12, 0.728, 0.05), 60.0, |b| thing::mug(b, m.ceramic, m.coffee));
-            b.standing(Vec3::new(-0.14, 0.728, 0.08), 10.0, |b| {
-                thing::vase(b, m.ceramic, 0.14, &[0.2, 0.3, 0.22, 0.13, 0.16])
+            b.standing(Vec3::new(-0.15, 0.728, 0.10), 200.0, |b| {
+                thing::mug(b, m.ceramic, m.coffee)
+            });
+            b.standing(Vec3::new(-0.02, 0.728, -0.10), 0.0, |b| {
+                b.drum(m.ceramic, [0.0, 0.05], [0.03, 0.04], 0.003);
+                plants::foliage(
+                    b,
+                    m.leaf,
+                    Vec3::Y * 0.10,
+                    Vec3::new(0.05, 0.06, 0.05),
+                    24,
+                    0.05,
+                    k as u32,
+                );
             });
             for turn in [0.0, 130.0, 235.0].into_iter().take(2 + k % 2) {
                 let (s, c) = f32::to_radians(turn + 7.0 * k as f32).sin_cos();
@@ -247,7 +259,7 @@ fn greenery(b: &mut Builder, m: &Palette) {
     for (x, z, height, seed) in [(1.7, -14.0, 5.6, 1), (1.75, -21.5, 5.2, 2), (-1.2, -9.2, 4.8, 4)]
     {
         b.standing(Vec3::new(x, 0.0, z), seed as f32 * 50.0, |b| {
-            plants::tree(b, m.bark, m.leaf, height, 2600, seed);
+            plants::tree(b, m.bark, m.leaf, height, 1500, seed);
             b.drum(m.iron, [-0.01, 0.012], [0.55, 0.55], 0.004);
         });
     }
@@ -262,7 +274,7 @@ fn greenery(b: &mut Builder, m: &Palette) {
                 m.leaf,
                 Vec3::Y * (soil + 0.26),
                 Vec3::new(0.30, 0.32, 0.30),
-                420,
+                300,
                 0.10,
                 k as u32 + 3,
             );

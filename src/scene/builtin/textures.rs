@@ -149,8 +149,8 @@ pub(super) fn stones(tone: [f32; 3], rows: u32, columns: u32, joint: f32) -> Tex
         let edge = (v.fract().min(1.0 - v.fract()))
             .min(u.fract().min(1.0 - u.fract()) * rows as f32 / columns as f32);
         let edge = edge + 0.06 * (tiling(uv * 120.0, IVec2::splat(120), 52) - 0.5);
-        let rough = tiling_fbm(uv * 24.0, IVec2::splat(24), 5, 53);
-        let dirt = tiling_fbm(uv * 3.0, IVec2::splat(3), 4, 54);
+        let rough = tiling_fbm(uv * 24.0, IVec2::splat(24), 3, 53);
+        let dirt = tiling_fbm(uv * 3.0, IVec2::splat(3), 3, 54);
         let hue = Vec3::new(1.0, 0.97 + 0.05 * unit(id ^ 1), 0.90 + 0.16 * unit(id ^ 2));
         let stone = tone * hue * (0.8 + 0.35 * unit(id)) * (0.7 + 0.6 * rough) * (0.8 + 0.4 * dirt);
         stone * (0.4 + 0.6 * smoothstep(joint, joint * 2.2, edge))

@@ -4,6 +4,7 @@ use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 
 use super::geometry::{Part, Tally};
 use super::pose::Placing;
+use super::tangents::NO_TANGENT;
 use super::{Fallible, MAX_TRIANGLES};
 use crate::scene::Scene;
 
@@ -77,7 +78,7 @@ fn append(
 ) {
     let first = scene.positions.len();
     extend(&mut scene.normals, first, part.normals.iter().copied(), Vec3::ZERO);
-    extend(&mut scene.tangents, first, part.tangents.iter().copied(), Vec4::X + Vec4::W);
+    extend(&mut scene.tangents, first, part.tangents.iter().copied(), NO_TANGENT);
     extend(&mut scene.uvs[0], first, part.uvs[0].iter().copied(), Vec2::ZERO);
     extend(&mut scene.uvs[1], first, part.uvs[1].iter().copied(), Vec2::ZERO);
     extend(&mut scene.colors, first, part.colors.iter().copied(), Vec4::ONE);
@@ -136,7 +137,7 @@ pub(super) fn finish(scene: &mut Scene) {
     }
     let length = scene.positions.len();
     pad(&mut scene.normals, length, Vec3::ZERO);
-    pad(&mut scene.tangents, length, Vec4::X + Vec4::W);
+    pad(&mut scene.tangents, length, NO_TANGENT);
     pad(&mut scene.uvs[0], length, Vec2::ZERO);
     pad(&mut scene.uvs[1], length, Vec2::ZERO);
     pad(&mut scene.colors, length, Vec4::ONE);

@@ -87,7 +87,7 @@ pub(super) fn read_part(
     tally: &mut Tally,
 ) -> Fallible<Option<Part>> {
     let Some(source) = Source::open(file, primitive, tally)? else { return Ok(None) };
-    let (vertices, triangles) = compact(source.triangles(file, primitive)?);
+    let (vertices, triangles) = compact(source.triangles()?);
     if triangles.is_empty() {
         return Ok(None);
     }

@@ -69,14 +69,10 @@ impl<'a> Source<'a> {
     }
 
     /// Vertex numbers of the triangles, all below the number of vertices.
-    pub(super) fn triangles(
-        &self,
-        file: &File<'_>,
-        primitive: &json::mesh::Primitive,
-    ) -> Fallible<Vec<[u32; 3]>> {
+    pub(super) fn triangles(&self) -> Fallible<Vec<[u32; 3]>> {
         let vertices = self.positions.count;
-        let indices = match primitive.indices {
-            Some(accessor) => Some(Elements::open(file, accessor, &[Type::Scalar])?),
+        let indices = match self.primitive.indices {
+            Some(accessor) => Some(Elements::open(self.file, accessor, &[Type::Scalar])?),
             None => None,
         };
         if indices.as_ref().is_some_and(|indices| !indices.is_unsigned()) {

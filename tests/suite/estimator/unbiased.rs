@@ -108,7 +108,12 @@ fn builtin_agrees(name: &str, map: &str, modes: &[Sampling], precision: f64) {
     };
     let plain = film(Sampling::Plain, 1);
     for (seed, mode) in (2..).zip(modes) {
-        expect_agreement(&format!("{name}, {map}, {mode:?}"), &plain, &film(*mode, seed), precision);
+        expect_agreement(
+            &format!("{name}, {map}, {mode:?}"),
+            &plain,
+            &film(*mode, seed),
+            precision,
+        );
     }
 }
 

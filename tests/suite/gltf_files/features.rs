@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3, Vec4};
 use lightgrid::scene::{AlphaMode, Projection, PunctualKind, Scene, Wrap, gltf};
 
-use super::builder::{Builder, ONE_MESH, square, textured_material};
+use super::builder::{Builder, ONE_MESH, SQUARE, square, textured_material};
 
 fn geometric_normal(scene: &Scene, triangle: usize) -> Vec3 {
     let [a, b, c] = scene.triangles[triangle].map(|v| scene.positions[v as usize]);
@@ -184,6 +184,23 @@ fn mikktspace_tangents_follow_gltf_and_split_mirrored_vertices() {
     let handedness = |triangle: [u32; 3]| triangle.map(|v| scene.tangents[v as usize].w);
     assert_eq!(handedness(scene.triangles[0]), [-1.0; 3]);
     assert_eq!(handedness(scene.triangles[1]), [1.0; 3]);
+}
+
+/// Thirty thousand triangles on the same corners would keep MikkTSpace busy for a minute.
+#[test]
+fn crowded_triangles_get_tangents_of_their_own() {
+    let mut builder = Builder::default();
+    builder.floats("VEC3", &SQUARE);
+    builder.indices(&[0, 1, 2, 0, 2, 3].repeat(15_000));
+    builder.floats("VEC3", &[0., 0., 1., 0., 0., 1., 0., 0., 1., 0., 0., 1.]);
+    builder.floats("VEC2", &[0., 1., 1., 1., 1., 0., 0., 0.]);
+    let scene = builder.load(&format!(
+        r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"NORMAL":2,"TEXCOORD_0":3}},"indices":1,"material":0}}]}}],
+        "nodes":[{{"mesh":0}}],{}"#,
+        textured_material(r#""normalTexture":{"index":0}"#, "{}")
+    ));
+    assert_eq!(scene.triangles.len(), 30_000);
+    assert_eq!(scene.tangents, vec![Vec4::new(1.0, 0.0, 0.0, 1.0); 4]);
 }
 
 #[test]
