@@ -85,7 +85,7 @@ pub(super) fn pencils(b: &mut Builder, cup: Mat, wood: Mat) {
         let tip = Vec3::new(0.034 * c, stream.between(0.15, 0.19), 0.034 * s);
         let tone = COVERS[stream.index(COVERS.len())];
         b.tinted(tone, |b| {
-            b.tube(wood, 6, &[(foot, 0.0036), (tip.lerp(foot, 0.1), 0.0036), (tip, 0.0006)])
+            b.tube(wood, 6, &[(foot, 0.0036), (tip.lerp(foot, 0.1), 0.0036), (tip, 0.0006)]);
         });
     }
 }

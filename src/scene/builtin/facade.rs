@@ -11,24 +11,35 @@ use super::room::{Hole, Wall, pierced};
 /// Materials of a house.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct HouseMats {
+    /// Walls.
     pub(super) wall: Mat,
+    /// Base course.
     pub(super) base: Mat,
+    /// Sills, lintels, cornices.
     pub(super) trim: Mat,
+    /// Window frames.
     pub(super) frame: Mat,
+    /// What is seen behind windows.
     pub(super) pane: Mat,
+    /// Roof.
     pub(super) roof: Mat,
+    /// Shutters and doors, if any.
     pub(super) shutter: Option<Mat>,
 }
 
-/// A front's windows: `bays` columns on `floors` floors, `ground` metres up to the first of them.
+/// A front's windows: columns about [`BAY`] apart on `floors` floors, `ground` metres up to the first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rhythm {
-    pub(super) bays: u32,
+    /// Floors above the ground floor.
     pub(super) floors: u32,
+    /// Height of the ground floor in metres.
     pub(super) ground: f32,
+    /// Whether the ground floor has shop windows.
     pub(super) shops: bool,
 }
 
+/// Usual distance of windows in metres.
+const BAY: f32 = 3.0;
 /// How far fronts stand before the core.
 const FRONT: f32 = 0.28;
 
@@ -79,11 +90,12 @@ pub(super) fn house(
 }
 
 fn front(b: &mut Builder, m: &HouseMats, [width, height]: [f32; 2], rhythm: Rhythm, side: usize) {
-    let bay = width / rhythm.bays as f32;
+    let bays = (width / BAY).round().max(1.0) as u32;
+    let bay = width / bays as f32;
     let storey = (height - rhythm.ground - 0.4) / rhythm.floors as f32;
     let (w, h) = ((0.42 * bay).min(1.15), (0.60 * storey).min(1.9));
     let mut windows = Vec::new();
-    for i in 0..rhythm.bays {
+    for i in 0..bays {
         let middle = bay * (i as f32 + 0.5);
         for j in 0..rhythm.floors {
             let sill = rhythm.ground + storey * j as f32 + 0.24 * storey;
@@ -91,7 +103,7 @@ fn front(b: &mut Builder, m: &HouseMats, [width, height]: [f32; 2], rhythm: Rhyt
         }
     }
     let mut openings = Vec::new();
-    for i in 0..rhythm.bays {
+    for i in 0..bays {
         let middle = bay * (i as f32 + 0.5);
         let half = if rhythm.shops { (0.36 * bay).min(1.3) } else { 0.5 * w };
         let is_door = i % 3 == 1;

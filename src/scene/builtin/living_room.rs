@@ -148,18 +148,13 @@ fn shell(b: &mut Builder, m: &Palette) {
                 m.oak,
                 64,
                 &[
-                    (r - 0.02, -0.10),
-                    (r - 0.02, 0.014),
-                    (r - 0.014, 0.02),
-                    (r + 0.05, 0.02),
-                    (r + 0.056, 0.014),
                     (r + 0.056, -0.005),
-                ]
-                .map(|(r, y)| (r, y))
-                .iter()
-                .rev()
-                .copied()
-                .collect::<Vec<_>>(),
+                    (r + 0.056, 0.014),
+                    (r + 0.05, 0.02),
+                    (r - 0.014, 0.02),
+                    (r - 0.02, 0.014),
+                    (r - 0.02, -0.10),
+                ],
             );
         });
     });
@@ -233,7 +228,7 @@ fn seating(b: &mut Builder, m: &Palette) {
         b.drum(m.black, [0.01, 0.50], [0.012, 0.012], 0.002);
         b.drum(m.walnut, [0.49, 0.512], [0.21, 0.21], 0.006);
         b.standing(Vec3::new(-0.05, 0.512, 0.02), 24.0, |b| {
-            thing::book_stack(b, [m.cover, m.paper], 2, 8)
+            thing::book_stack(b, [m.cover, m.paper], 2, 8);
         });
         b.standing(Vec3::new(0.11, 0.512, 0.09), 140.0, |b| thing::mug(b, m.ceramic, m.soil));
     });
@@ -251,7 +246,7 @@ fn coffee_table(b: &mut Builder, m: &Palette) {
             thing::fruit(b, m.skin, m.bark, 0.15, 0.008);
         });
         b.standing(Vec3::new(0.02, 0.40, 0.24), 12.0, |b| {
-            thing::book_stack(b, [m.cover, m.paper], 3, 21)
+            thing::book_stack(b, [m.cover, m.paper], 3, 21);
         });
         b.standing(Vec3::new(-0.28, 0.40, 0.14), 200.0, |b| thing::mug(b, m.ceramic, m.soil));
     });
@@ -290,7 +285,7 @@ fn corners(b: &mut Builder, m: &Palette) {
     b.standing(Vec3::new(2.45, 0.0, -2.05), 0.0, |b| {
         b.drum(m.steel, [0.0, 0.42], [0.17, 0.17], 0.01);
         b.standing(Vec3::Y * 0.42, 0.0, |b| {
-            thing::vase(b, m.ceramic, 0.5, &[0.14, 0.22, 0.25, 0.18, 0.09, 0.12])
+            thing::vase(b, m.ceramic, 0.5, &[0.14, 0.22, 0.25, 0.18, 0.09, 0.12]);
         });
     });
     b.part(placed([-0.35, SIZE[1], -0.1], [0.0; 3]), |b| {
@@ -306,12 +301,12 @@ fn corners(b: &mut Builder, m: &Palette) {
         b.standing(Vec3::new(-0.38, 0.78, 0.0), 0.0, |b| {
             thing::vase(b, m.ceramic, 0.30, &[0.22, 0.34, 0.30, 0.16, 0.06]);
             b.part(placed([0.0, 0.56, 0.0], [0.0; 3]), |b| {
-                lamps::drum_shade(b, m.linen, 0.17, 0.13, 0.22)
+                lamps::drum_shade(b, m.linen, 0.17, 0.13, 0.22);
             });
             b.rod(m.brass, Vec3::Y * 0.28, Vec3::Y * 0.56, 0.006);
         });
         b.standing(Vec3::new(0.30, 0.78, 0.02), 5.0, |b| {
-            thing::book_stack(b, [m.cover, m.paper], 4, 3)
+            thing::book_stack(b, [m.cover, m.paper], 4, 3);
         });
     });
 }

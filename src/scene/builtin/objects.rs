@@ -175,7 +175,7 @@ pub(super) fn fruit(b: &mut Builder, skin: Mat, stalk: Mat, radius: f32, floor: 
     let mut place = |x: f32, y: f32, z: f32, tone: [f32; 3], r: f32| {
         b.part(placed([x * radius, floor + y, z * radius], [25.0 * x, 80.0 * z, 30.0 * z]), |b| {
             b.tinted(tone, |b| {
-                b.blob(skin, Vec3::ZERO, Vec3::new(r, 0.93 * r, r), [2.0, 2.15], 10)
+                b.blob(skin, Vec3::ZERO, Vec3::new(r, 0.93 * r, r), [2.0, 2.15], 10);
             });
             b.rod(stalk, Vec3::Y * 0.85 * r, Vec3::new(0.004, 1.16 * r, 0.002), 0.0018);
         });
@@ -216,25 +216,20 @@ pub(super) fn clock(b: &mut Builder, rim: Mat, face: Mat, hands: Mat, radius: f3
             rim,
             64,
             &[
-                (radius - 0.02, 0.02),
-                (radius - 0.02, 0.034),
-                (radius - 0.012, 0.04),
-                (radius - 0.004, 0.034),
-                (radius, 0.024),
                 (radius, -0.002),
-            ]
-            .map(|(r, y)| (r, y))
-            .iter()
-            .rev()
-            .copied()
-            .collect::<Vec<_>>(),
+                (radius, 0.024),
+                (radius - 0.004, 0.034),
+                (radius - 0.012, 0.04),
+                (radius - 0.02, 0.034),
+                (radius - 0.02, 0.02),
+            ],
         );
         b.lathe(face, 64, &[(radius - 0.018, 0.024), (0.0, 0.024)]);
     });
     for hour in 0..12 {
         let turn = Affine3A::from_rotation_z(hour as f32 * TAU / 12.0);
         b.part(turn, |b| {
-            b.slab(hands, [-0.003, radius * 0.72, 0.023], [0.003, radius * 0.82, 0.0255], 0.0)
+            b.slab(hands, [-0.003, radius * 0.72, 0.023], [0.003, radius * 0.82, 0.0255], 0.0);
         });
     }
     for (turn, length, width, z) in [(1.12, 0.48, 0.0075, 0.0275), (-2.3, 0.72, 0.005, 0.031)] {

@@ -133,7 +133,7 @@ fn shell(b: &mut Builder, m: &Palette) {
             fittings::curtain(b, m.curtain, [u1 - 0.0, u1 + 0.30], [0.95, 2.36], 0.10, 4.0);
             fittings::curtain_rod(b, m.brass, [u0 - 0.36, u1 + 0.36], 2.38, 0.10);
             b.part(placed([0.5 * (u0 + u1), 0.0, 0.0], [0.0; 3]), |b| {
-                piece::radiator(b, m.white, 0.95, 0.78)
+                piece::radiator(b, m.white, 0.95, 0.78);
             });
         }
         let [u0, v0, ..] = WINDOWS[1];
@@ -145,7 +145,7 @@ fn shell(b: &mut Builder, m: &Palette) {
     b.part(walls[3].frame(), |b| fittings::door(b, m.white, m.steel, 0.4, [0.9, 2.1]));
     for x in [-1.35, 0.95] {
         b.part(placed([x, SIZE[1], -0.9], [0.0; 3]), |b| {
-            lamps::pendant(b, m.lamp, m.white, 0.85, 0.20)
+            lamps::pendant(b, m.lamp, m.white, 0.85, 0.20);
         });
     }
 }
@@ -157,11 +157,11 @@ fn wall_things(b: &mut Builder, m: &Palette) {
             [[0.62, 1.38, 0.62, 0.82], [2.36, 1.46, 0.50, 0.66]].into_iter().enumerate()
         {
             b.part(placed([u, v, 0.0], [0.0; 3]), |b| {
-                thing::picture(b, [m.oak, m.white, m.arts[k]], [w, h], 0.06)
+                thing::picture(b, [m.oak, m.white, m.arts[k]], [w, h], 0.06);
             });
         }
         b.part(placed([1.83, 1.95, 0.0], [0.0; 3]), |b| {
-            thing::clock(b, m.steel, m.white, m.plastic, 0.16)
+            thing::clock(b, m.steel, m.white, m.plastic, 0.16);
         });
         for (y, seed) in [(1.52, 5), (1.92, 9)] {
             b.slab(m.oak, [3.15, y, -0.01], [5.25, y + 0.03, 0.25], 0.004);
@@ -180,11 +180,11 @@ fn wall_things(b: &mut Builder, m: &Palette) {
                 );
             }
             b.standing(Vec3::new(3.22, y + 0.03, 0.13), 0.0, |b| {
-                thing::books(b, [m.cover, m.paper], 1.25, 0.30, 0.22, seed)
+                thing::books(b, [m.cover, m.paper], 1.25, 0.30, 0.22, seed);
             });
         }
         b.standing(Vec3::new(4.85, 1.55, 0.12), 0.0, |b| {
-            thing::vase(b, m.ceramic, 0.22, &[0.2, 0.33, 0.28, 0.12, 0.16])
+            thing::vase(b, m.ceramic, 0.22, &[0.2, 0.33, 0.28, 0.12, 0.16]);
         });
         b.standing(Vec3::new(4.85, 1.95, 0.12), 0.0, |b| {
             let soil = plants::pot(b, m.clay, m.soil, 0.075, 0.12);
@@ -205,7 +205,7 @@ fn desk(b: &mut Builder, m: &Palette, x: f32, seed: u32) {
             b.standing(Vec3::new(x * mirror, height, z), yaw, |b| build(b));
         };
         on_top(0.05, -0.18, -4.0 * mirror, &mut |b| {
-            desktop::monitor(b, m.plastic, m.screen, [0.60, 0.36])
+            desktop::monitor(b, m.plastic, m.screen, [0.60, 0.36]);
         });
         on_top(0.03, 0.16, 2.0, &mut |b| desktop::keyboard(b, m.plastic, m.keys));
         on_top(0.34 * mirror, 0.17, -6.0, &mut |b| desktop::mouse(b, m.plastic));

@@ -103,9 +103,9 @@ pub(super) fn side_chair(b: &mut Builder, wood: Mat, seat: Mat) {
     b.blob(seat, Vec3::new(0.0, 0.445, 0.005), Vec3::new(0.205, 0.028, 0.195), [6.0, 2.6], 7);
     b.sheet(wood, [8, 12], Vec2::new(0.4, 0.12), |u, v| {
         // A bent back rest, closed around its section.
-        let x = (u - 0.5) * 0.39;
+        let x = (u - 0.5) * 0.32;
         let (s, c) = (v * TAU).sin_cos();
-        Vec3::new(x, 0.775 + 0.055 * s, -0.225 - 0.14 * (0.04 - x * x) + 0.009 * c)
+        Vec3::new(x, 0.775 + 0.055 * s, -0.213 - 0.012 * s - 0.14 * (0.04 - x * x) + 0.009 * c)
     });
 }
 
