@@ -122,7 +122,8 @@ fn print_facts(facts: &Value, indent: usize) {
             }
             Value::Array(numbers) if !numbers.is_empty() => {
                 let texts: Vec<String> = numbers.iter().map(number).collect();
-                println!("{:indent$}{label}: {}", "", texts.join(" x "));
+                let separator = if key.starts_with("size") { " x " } else { ", " };
+                println!("{:indent$}{label}: {}", "", texts.join(separator));
             }
             Value::Array(_) => {}
             Value::Object(_) => {
@@ -138,6 +139,7 @@ fn number(value: &Value) -> String {
     match (value.as_str(), value.as_u64(), value.as_f64()) {
         (Some(text), _, _) => text.to_owned(),
         (_, Some(whole), _) => whole.to_string(),
+        (_, _, Some(x)) if x != 0.0 && !(1e-3..1e6).contains(&x.abs()) => format!("{x:.4e}"),
         (_, _, Some(x)) => format!("{x:.4}"),
         _ => value.to_string(),
     }

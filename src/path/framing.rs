@@ -1,6 +1,6 @@
 //! A sensible view of a scene that brings no camera.
 
-use glam::Vec3;
+use glam::{Mat3A, Vec3, Vec3A};
 
 use super::World;
 use crate::bvh::Ray;
@@ -8,17 +8,15 @@ use crate::math::direction_from_uv;
 use crate::scene::Camera;
 
 const FOV_Y_RADIANS: f32 = 0.87;
+/// Share of the picture's width or height that an object fills.
+const FILL: f32 = 0.9;
+/// A scene is a room if from places in it at least this share of directions shows it from inside.
+const ROOM_ENCLOSURE: f32 = 0.6;
 
-/// Frames the scene: from inside if its middle is mostly enclosed, else from the front, a little
-/// from above and the right.
+/// Frames the scene for a picture of `aspect` (width over height): a room from inside, anything else
+/// from outside, a little from above and the right, filling the picture.
 pub fn frame(world: &World, aspect: f32) -> Camera {
-    let (low, high) = world.bvh.bounds();
-    let centre = 0.5 * (low + high);
-    if enclosure(world, centre) > 0.7 {
-        inside(world, low, high)
-    } else {
-        outside(low, high, aspect)
-    }
+    if enclosure(world) > ROOM_ENCLOSURE { inside(world) } else { outside(world, aspect) }
 }
 
 /// Directions that cover the sphere about evenly.
@@ -30,27 +28,48 @@ fn directions(count: u32) -> impl Iterator<Item = Vec3> {
     })
 }
 
-fn free_distance(world: &World, origin: Vec3, direction: Vec3) -> Option<f32> {
-    let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
-    world.bvh.closest_hit(&ray, |_| true).map(|hit| hit.t)
+/// The first surface in a direction.
+struct Sight {
+    distance: f32,
+    /// Whether its triangle faces the viewer; from within an object none does.
+    from_front: bool,
 }
 
-/// Share of directions from a point that meet a surface, the lower hemisphere counted half, for an
-/// object on a ground plane is not inside anything.
-fn enclosure(world: &World, point: Vec3) -> f32 {
-    let mut sums = (0.0, 0.0);
-    for direction in directions(256) {
-        let weight = if direction.y < 0.0 { 0.25 } else { 1.0 };
-        sums.1 += weight;
-        if free_distance(world, point, direction).is_some() {
-            sums.0 += weight;
-        }
-    }
-    sums.0 / sums.1
+fn look(world: &World, origin: Vec3, direction: Vec3) -> Option<Sight> {
+    let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
+    let hit = world.bvh.closest_hit(&ray, |_| true)?;
+    let scene = &world.scene;
+    let [a, b, c] = scene.triangles[hit.triangle as usize].map(|v| scene.positions[v as usize]);
+    let from_front = (b - a).cross(c - a).dot(direction) < 0.0;
+    Some(Sight { distance: hit.t, from_front })
+}
+
+/// Share of directions, over places spread through the middle of the scene, in which a surface is
+/// seen from its front: near 1 in a room, near 0 within an object. Looking down does not count, for
+/// an object on a ground plane is not inside anything.
+fn enclosure(world: &World) -> f32 {
+    let (low, high) = world.bvh.bounds();
+    let mut shares: Vec<f32> = (0..27)
+        .map(|i| {
+            let at = Vec3::new((i % 3) as f32, (i / 3 % 3) as f32, (i / 9) as f32);
+            let place = low + (high - low) * (0.3 + 0.2 * at);
+            let (mut fronts, mut count) = (0, 0);
+            for direction in directions(128).filter(|d| d.y > -0.2) {
+                count += 1;
+                let sight = look(world, place, direction);
+                fronts += u32::from(sight.is_some_and(|s| s.from_front && s.distance > 0.0));
+            }
+            fronts as f32 / count as f32
+        })
+        .collect();
+    // The median: furniture and pillars have an inside too.
+    shares.sort_by(f32::total_cmp);
+    shares[shares.len() / 2]
 }
 
 /// Looks across the room from the place, at eye height, that sees farthest.
-fn inside(world: &World, low: Vec3, high: Vec3) -> Camera {
+fn inside(world: &World) -> Camera {
+    let (low, high) = world.bvh.bounds();
     let size = high - low;
     let eye_height = low.y + (0.5 * size.y).min(0.45 * size.y.max(3.2));
     let mut best = (f32::MIN, 0.5 * (low + high), Vec3::NEG_Z);
@@ -58,17 +77,19 @@ fn inside(world: &World, low: Vec3, high: Vec3) -> Camera {
         let spread = |t: f32| 0.12 + 0.76 * t;
         let eye = Vec3::new(low.x + size.x * spread(x), eye_height, low.z + size.z * spread(z));
         let nearest = directions(64)
-            .filter_map(|d| free_distance(world, eye, d))
+            .filter_map(|d| look(world, eye, d))
+            .map(|sight| sight.distance)
             .fold(f32::INFINITY, f32::min);
+        let crowded = if nearest < 0.04 * size.min_element() { 0.3 } else { 1.0 };
         for step in 0..16 {
             let angle = step as f32 * std::f32::consts::TAU / 16.0;
             let forward = Vec3::new(angle.cos(), -0.1, angle.sin()).normalize();
-            // Mean free distance over the picture's width; what is outdoors counts little.
+            // Mean free distance over the picture's width; backs and what is outdoors count nothing.
             let score: f32 = (-4..=4)
                 .map(|i| crate::math::rotate_y(forward, i as f32 * 0.15))
-                .map(|d| free_distance(world, eye, d).unwrap_or(0.0).min(size.length()))
+                .filter_map(|d| look(world, eye, d).filter(|sight| sight.from_front))
+                .map(|sight| sight.distance)
                 .sum();
-            let crowded = if nearest < 0.04 * size.min_element() { 0.3 } else { 1.0 };
             if score * crowded > best.0 {
                 best = (score * crowded, eye, forward);
             }
@@ -77,11 +98,43 @@ fn inside(world: &World, low: Vec3, high: Vec3) -> Camera {
     Camera::look_at(best.1, best.1 + best.2 * 0.3 * size.length(), FOV_Y_RADIANS)
 }
 
-fn outside(low: Vec3, high: Vec3, aspect: f32) -> Camera {
+/// Looks at the scene from where it just fits the picture.
+fn outside(world: &World, aspect: f32) -> Camera {
+    let (low, high) = world.bvh.bounds();
+    let size = (high - low).max(Vec3::splat(f32::MIN_POSITIVE));
+    // Panels are seen nearly straight on, deep things from the side, flat ones from above.
+    let deep = (1.0 - size.x / size.z).max(0.0);
+    let flat = (1.0 - size.y / size.x.max(size.z)).max(0.0);
+    let panel = (1.0 - size.z / size.x.min(size.y)).max(0.0);
+    let side = 0.4 + 0.6 * deep - 0.25 * panel;
+    let above = 0.3 + 0.6 * flat * flat - 0.2 * panel;
+    let direction = Vec3::new(side, above, 1.0).normalize();
     let centre = 0.5 * (low + high);
-    let radius = (0.5 * (high - low).length()).max(f32::MIN_POSITIVE);
-    let half = (0.5 * FOV_Y_RADIANS).tan() * aspect.min(1.0);
-    let distance = radius / half.atan().sin();
-    let direction = Vec3::new(0.45, 0.35, 1.0).normalize();
-    Camera::look_at(centre + direction * distance, centre, FOV_Y_RADIANS)
+    let axes = Camera::look_at(centre + direction, centre, 1.0).world_from_camera.matrix3;
+    let eye = centre + fitting_eye(world, centre, axes, aspect);
+    let depth = (eye - centre).dot(direction);
+    Camera::look_at(eye, eye - direction * depth, FOV_Y_RADIANS)
+}
+
+/// Where the eye must be, relative to `centre`, so that a camera with these axes (right, up, back)
+/// just sees every corner of the scene. A corner at (x, y, z) in camera axes is seen from (X, Y, Z)
+/// if |x - X| <= h (Z - z) and |y - Y| <= v (Z - z), with h and v the slopes of the picture's edges;
+/// the four tightest of these decide.
+fn fitting_eye(world: &World, centre: Vec3, axes: Mat3A, aspect: f32) -> Vec3 {
+    let vertical = FILL * (0.5 * FOV_Y_RADIANS).tan();
+    let horizontal = vertical * aspect;
+    let camera_from_world = axes.transpose();
+    let mut tightest = [f32::MIN; 4];
+    for &vertex in world.scene.triangles.iter().flatten() {
+        let corner = Vec3A::from(world.scene.positions[vertex as usize] - centre);
+        let p = camera_from_world * corner;
+        let (across, along) = (horizontal * p.z, vertical * p.z);
+        let bounds = [across + p.x, across - p.x, along + p.y, along - p.y];
+        tightest.iter_mut().zip(bounds).for_each(|(t, b)| *t = t.max(b));
+    }
+    let [right, left, top, bottom] = tightest;
+    let x = 0.5 * (right - left);
+    let y = 0.5 * (top - bottom);
+    let z = (0.5 * (right + left) / horizontal).max(0.5 * (top + bottom) / vertical);
+    (axes * Vec3A::new(x, y, z)).into()
 }
