@@ -25,6 +25,10 @@ pub struct LawOptions {
     pub recording: Recording,
     /// Tries per tile that the pooled ratio of the 4x4 cells around is worth.
     pub pooling_tries: f64,
+    /// Power of the visibility ratio: 1 weighs a tile by its mean visible energy, 1/2 by its root
+    /// mean square, which is best where each point of a cell sees either all or nothing of it
+    /// (Rath et al. 2020).
+    pub ratio_exponent: f64,
     /// Share of samples that follow the whole map's law whatever was learned. It makes every law
     /// as long as the map has tiles.
     pub whole_map_share: f64,
@@ -38,6 +42,7 @@ impl LawOptions {
     pub const ADAPTIVE: Self = Self {
         recording: Recording::VisibleCosine,
         pooling_tries: 16.0,
+        ratio_exponent: 0.75,
         whole_map_share: 0.0,
         compensation: 0.5,
     };
@@ -46,6 +51,7 @@ impl LawOptions {
     pub const TALK: Self = Self {
         recording: Recording::VisibleContribution,
         pooling_tries: 0.0,
+        ratio_exponent: 1.0,
         whole_map_share: 0.0,
         compensation: 0.0,
     };
@@ -226,6 +232,7 @@ impl<'a> LawBuilder<'a> {
             let tries = tally.tries + k;
             if tries > 0.0 { (tally.weight + k * ratio) / tries } else { 0.0 }
         };
+        let exponent = self.learning.options.ratio_exponent;
         let key = self.block_of(cell);
         if self.block.as_ref().is_none_or(|(block, _)| *block != key) {
             self.block = Some((key, self.sum(&self.slots_of_block[&key])));
@@ -234,7 +241,9 @@ impl<'a> LawBuilder<'a> {
         let face = &self.faces[self.face_of(cell) as usize];
         let own = self.learning.counters.tallies(slot);
         weights.extend(own.zip(block).zip(face).zip(&self.map_law).map(
-            |(((own, block), face), map)| map * shrink(&own, shrink(block, shrink(face, 0.0))),
+            |(((own, block), face), map)| {
+                map * shrink(&own, shrink(block, shrink(face, 0.0))).powf(exponent)
+            },
         ));
     }
 
