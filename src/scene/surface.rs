@@ -10,6 +10,10 @@ use crate::math::Frame;
 /// normal's: a viewer in front of the surface is in front of its shading too.
 const MIN_COSINE_SHARE: f32 = 0.05;
 
+/// Least cosine with the geometric normal of the direction in which a mirror shows the viewer
+/// something (Cycles' `ensure_valid_specular_reflection`).
+const MIN_MIRROR_COSINE: f32 = 0.01;
+
 /// Material at one point, textures already read. Colours are linear Rec.709.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceParameters {
@@ -82,14 +86,17 @@ impl SurfacePoint {
 
         let facing = Facing { geometric_normal, to_viewer: -ray_direction };
         let unmapped = corner.smooth_normal().unwrap_or(front_normal);
-        let normal = corner.mapped(unmapped, material.normal_texture, material.normal_scale);
-        let shading_frame = Frame::from_z(facing.turned(normal, unmapped));
         let mut parameters = corner.parameters();
+        let normal = corner.mapped(unmapped, material.normal_texture, material.normal_scale);
+        let normal = facing.turned(normal, unmapped);
+        // What is not metal hardly needs its reflection, but its diffuse light needs the slope.
+        let normal = normal.lerp(facing.mirroring(normal), parameters.metallic);
+        let shading_frame = Frame::from_z(normal.normalize());
         if parameters.clearcoat > 0.0 && has_normal_map(material) {
             let (texture, scale) =
                 (material.clearcoat_normal_texture, material.clearcoat_normal_scale);
             let coat = facing.turned(corner.mapped(unmapped, texture, scale), unmapped);
-            parameters.clearcoat_normal = shading_frame.local_from_world(coat);
+            parameters.clearcoat_normal = shading_frame.local_from_world(facing.mirroring(coat));
         }
         let uv = corner.uv(0);
         Self { triangle, position, geometric_normal, shading_frame, front_face, uv, parameters }
@@ -258,5 +265,48 @@ impl Facing {
         }
         let t = (least - cos) / (geometric_cos - cos);
         normal.lerp(self.geometric_normal, t).normalize_or(self.geometric_normal)
+    }
+
+    /// Tilts a unit `normal` back until a mirror there reflects the viewer to above the surface: a
+    /// steep normal map on flat metal would be black otherwise.
+    ///
+    /// With x and z the viewer's components along the tilt and along the geometric normal, a normal
+    /// tilted by `a` reflects the viewer to the height `x sin 2a + z cos 2a`.
+    fn mirroring(&self, normal: Vec3) -> Vec3 {
+        let z = self.to_viewer.dot(self.geometric_normal);
+        let least = MIN_MIRROR_COSINE.min(0.9 * z);
+        let mirrored = 2.0 * normal.dot(self.to_viewer) * normal - self.to_viewer;
+        if mirrored.dot(self.geometric_normal) >= least {
+            return normal;
+        }
+        let along = normal.reject_from_normalized(self.geometric_normal).normalize_or_zero();
+        let x = self.to_viewer.dot(along);
+        let (sin, cos) = (0.5 * (x.atan2(z) + (least / x.hypot(z)).acos())).sin_cos();
+        sin * along + cos * self.geometric_normal
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mirror_never_shows_the_viewer_what_is_below_the_surface() {
+        for (to_viewer, normal) in [
+            (Vec3::Z, Vec3::new(0.9, 0.0, 0.435)),
+            (Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.8, 0.1, 0.6)),
+            (Vec3::new(-0.6, 0.3, 0.1), Vec3::new(0.1, -0.2, 0.9)),
+            (Vec3::new(0.9, 0.0, 0.002), Vec3::new(0.3, 0.5, 0.7)),
+        ] {
+            let to_viewer = to_viewer.normalize();
+            let facing = Facing { geometric_normal: Vec3::Z, to_viewer };
+            let normal = facing.turned(normal, Vec3::Z);
+            let tilted = facing.mirroring(normal);
+            let height = (2.0 * tilted.dot(to_viewer) * tilted - to_viewer).z;
+            let least = MIN_MIRROR_COSINE.min(0.9 * to_viewer.z);
+            assert!(height > least - 1e-5 && tilted.is_normalized(), "{tilted}: {height}");
+            // It keeps what was right and tilts no further than needed.
+            assert!(tilted == normal || (height - least).abs() < 1e-5, "{normal}: {height}");
+        }
     }
 }
