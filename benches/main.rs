@@ -1,9 +1,21 @@
 //! Criterion benches, one module a subject: `cargo bench -- bvh`.
+//!
+//! `cargo bench -- efficiency` prints the table of speed-ups instead.
 
-use criterion::{criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group};
 
 mod bvh;
+mod efficiency;
 mod environment;
+mod path;
 
-criterion_group!(benches, bvh::bench, environment::bench);
-criterion_main!(benches);
+criterion_group!(benches, bvh::bench, environment::bench, path::bench);
+
+fn main() {
+    if std::env::args().any(|argument| argument == "efficiency") {
+        efficiency::report();
+        return;
+    }
+    benches();
+    Criterion::default().configure_from_args().final_summary();
+}

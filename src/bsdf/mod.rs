@@ -77,7 +77,8 @@ struct Outgoing {
 
 impl Bsdf {
     /// The scattering of a surface; `entering` says that the viewer is outside of the solid, i.e. on
-    /// the front side. Thin walls are alike from both sides. An unlit surface scatters nothing.
+    /// the front side. Thin walls are alike from both sides. Whether the surface is unlit is up to
+    /// the caller.
     pub fn new(p: &SurfaceParameters, entering: bool) -> Self {
         let f90 = p.specular;
         let f0 = (normal_reflectance(p.ior) * p.specular_color).min(Vec3::ONE) * p.specular;

@@ -4,6 +4,8 @@
 //! (sun, lamps) whose energy is exact at any resolution. Radiance is linear Rec.709 in units in which
 //! the mean sky of a clear day is about 1/2, so that `day` is well exposed outdoors at EV 0.
 
+mod disc;
+
 use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
@@ -11,22 +13,18 @@ use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::math::{direction_from_uv, uv_from_direction};
+use crate::math::direction_from_uv;
 use crate::noise::{Stream, smoothstep, solid_fbm};
+use disc::{Disc, add_disc};
 
 /// Widest grid that the smooth part is computed on; clouds have no finer detail.
 const SMOOTH_WIDTH: u32 = 2048;
 /// Smaller maps average at least this many directions across.
-const LEAST_SAMPLES: u32 = 256;
+const LEAST_SAMPLES: u32 = 512;
+/// Sine of an elevation that hills stay below.
+const HIGHEST_HILL: f32 = 0.062;
 /// Largest side of a map.
 const LARGEST: u32 = 16_384;
-
-/// A disc of even radiance, far away.
-struct Disc {
-    direction: Vec3,
-    radius_radians: f64,
-    radiance: Vec3,
-}
 
 /// Names of the built-in skies.
 pub fn names() -> &'static [&'static str] {
@@ -118,12 +116,18 @@ fn clouds(d: Vec3, amount: f32, scale: f32, seed: u32) -> (f32, f32) {
 
 /// What lies below the horizon: `near` at the nadir, fading into `haze` at the horizon.
 fn ground(d: Vec3, near: Vec3, haze: Vec3) -> Vec3 {
+    if d.y > HIGHEST_HILL {
+        return haze;
+    }
     let fields = 0.75 + 0.5 * solid_fbm(Vec3::new(d.x, 0.0, d.z) * (1.5 / (0.06 - d.y)), 4, 13);
     (near * fields).lerp(haze, (d.y * 30.0).exp())
 }
 
 /// Joins sky and ground by two ranges of hills, `far` and `near`, up to 3 degrees above the horizon.
 fn horizon(d: Vec3, above: Vec3, far: Vec3, near: Vec3, below: Vec3) -> Vec3 {
+    if d.y.abs() > HIGHEST_HILL {
+        return if d.y > 0.0 { above } else { below };
+    }
     let around = Vec3::new(d.x, 0.0, d.z).normalize_or(Vec3::X);
     let ridge = |scale: f32, seed: u32| solid_fbm(around * scale, 6, seed);
     let over = |height: f32| smoothstep(-0.0012, 0.0012, d.y - height);
@@ -258,8 +262,7 @@ fn smooth_part(radiance: fn(Vec3) -> Vec3, width: u32, height: u32) -> Image {
 
 /// Means of `radiance` over the solid angle of each texel.
 fn averaged(radiance: fn(Vec3) -> Vec3, width: u32, height: u32) -> Image {
-    let (nx, ny) =
-        (LEAST_SAMPLES.div_ceil(width).max(2), (LEAST_SAMPLES / 2).div_ceil(height).max(2));
+    let (nx, ny) = (LEAST_SAMPLES.div_ceil(width), (LEAST_SAMPLES / 2).div_ceil(height));
     rows(width, height, |x, y| {
         let (mut sum, mut weight) = (Vec3::ZERO, 0.0);
         for j in 0..ny {
@@ -300,72 +303,4 @@ fn rows(width: u32, height: u32, f: impl Fn(u32, u32) -> Vec3 + Sync) -> Image {
         }
     });
     image
-}
-
-/// Adds a disc so that the sum of radiance times solid angle over the texels is exactly the disc's,
-/// however small it is: coverage by supersampling, scaled to the true solid angle.
-fn add_disc(image: &mut Image, disc: &Disc) {
-    let (w, h) = (f64::from(image.width), f64::from(image.height));
-    let centre = uv_from_direction(disc.direction);
-    let (u0, v0) = (f64::from(centre.x), f64::from(centre.y));
-    let r = disc.radius_radians / std::f64::consts::PI;
-    let sin_least =
-        (std::f64::consts::PI * v0).sin().min((std::f64::consts::PI * (v0 + r)).sin()).max(0.02);
-    let rows = ((v0 - r) * h).floor().max(0.0) as u32..=((v0 + r) * h).floor().min(h - 1.0) as u32;
-    let half_width = (0.5 * r / sin_least * w).ceil() as i64 + 1;
-    let middle = (u0 * w) as i64;
-    let columns = if 2 * half_width + 1 >= i64::from(image.width) {
-        0..=i64::from(image.width) - 1
-    } else {
-        middle - half_width..=middle + half_width
-    };
-    let (ss_x, ss_y) = (samples_across(r * w), samples_across(2.0 * r * h));
-    let cos_radius = disc.radius_radians.cos();
-    let axis = disc.direction.as_dvec3();
-    let mut covered = Vec::new();
-    let mut total = 0.0;
-    for y in rows {
-        for x in columns.clone() {
-            let mut inside = 0.0;
-            for j in 0..ss_y {
-                let theta = std::f64::consts::PI
-                    * (f64::from(y) + (f64::from(j) + 0.5) / f64::from(ss_y))
-                    / h;
-                for i in 0..ss_x {
-                    let phi = std::f64::consts::TAU
-                        * ((x as f64 + (f64::from(i) + 0.5) / f64::from(ss_x)) / w - 0.5);
-                    let d = glam::DVec3::new(
-                        theta.sin() * phi.cos(),
-                        theta.cos(),
-                        theta.sin() * phi.sin(),
-                    );
-                    if d.dot(axis) > cos_radius {
-                        inside += 1.0;
-                    }
-                }
-            }
-            if inside > 0.0 {
-                let fraction = inside / f64::from(ss_x * ss_y);
-                let column = x.rem_euclid(i64::from(image.width)) as u32;
-                covered.push((column, y, fraction));
-                total += fraction * crate::math::texel_solid_angle(image.width, image.height, y);
-            }
-        }
-    }
-    let solid_angle = std::f64::consts::TAU * (1.0 - cos_radius);
-    if covered.is_empty() {
-        let y = ((v0 * h) as u32).min(image.height - 1);
-        covered.push((middle.rem_euclid(i64::from(image.width)) as u32, y, 1.0));
-        total = crate::math::texel_solid_angle(image.width, image.height, y);
-    }
-    let scale = solid_angle / total;
-    for (x, y, fraction) in covered {
-        let pixel = &mut image.pixels[y as usize * image.width as usize + x as usize];
-        *pixel = (Vec3::from(*pixel) + disc.radiance * (fraction * scale) as f32).to_array();
-    }
-}
-
-/// Supersamples per texel for a disc `texels` wide: enough that a small one is hit, few for a large one.
-fn samples_across(texels: f64) -> u32 {
-    (48.0 / texels.max(0.1)).ceil().clamp(2.0, 64.0) as u32
 }

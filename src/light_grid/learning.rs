@@ -25,6 +25,10 @@ pub struct LawOptions {
     pub recording: Recording,
     /// Tries per tile that the pooled ratio of the 4x4 cells around is worth.
     pub pooling_tries: f64,
+    /// Power of the visibility ratio: 1 weighs a tile by its mean visible energy, 1/2 by its root
+    /// mean square, which is best where each point of a cell sees either all or nothing of it
+    /// (Rath et al. 2020).
+    pub ratio_exponent: f64,
     /// Share of samples that follow the whole map's law whatever was learned. It makes every law
     /// as long as the map has tiles.
     pub whole_map_share: f64,
@@ -37,7 +41,8 @@ impl LawOptions {
     /// Our own laws.
     pub const ADAPTIVE: Self = Self {
         recording: Recording::VisibleCosine,
-        pooling_tries: 1.0,
+        pooling_tries: 16.0,
+        ratio_exponent: 0.75,
         whole_map_share: 0.0,
         compensation: 0.5,
     };
@@ -46,6 +51,7 @@ impl LawOptions {
     pub const TALK: Self = Self {
         recording: Recording::VisibleContribution,
         pooling_tries: 0.0,
+        ratio_exponent: 1.0,
         whole_map_share: 0.0,
         compensation: 0.0,
     };
@@ -86,23 +92,22 @@ impl LearningGrid {
     pub fn laws(&self, environment: &Environment) -> Option<LightGrid> {
         let energies = environment.tile_energies();
         let mut result = LightGrid::whole_map(energies)?;
-        let builder = LawBuilder::new(self, environment);
+        let mut builder = LawBuilder::new(self, environment);
         let mut weights = Vec::new();
-        let slots = self.counters.cells().len();
-        let supports: Vec<usize> = (0..slots)
-            .map(|slot| {
-                builder.weights(slot, &mut weights);
-                weights.iter().filter(|w| **w > 0.0).count()
-            })
-            .collect();
+        let mut supports = vec![0; self.counters.cells().len()];
+        let order = builder.slots_by_block();
+        for &slot in &order {
+            builder.weights(slot, &mut weights);
+            supports[slot] = weights.iter().filter(|w| **w > 0.0).count();
+        }
         let mut law_of_cell = vec![WHOLE_MAP as u16; self.grid.cell_count() as usize];
         let room = MEMORY_BUDGET_BYTES
             .saturating_sub(self.counters.memory_bytes() + law_of_cell.len() * 2)
-            .saturating_sub(result.laws.memory_bytes());
+            .saturating_sub(result.laws.memory_bytes() + builder.memory_bytes());
+        // The most visited cells have the lowest slots.
         let kept = fitting(&supports, room, energies.len() as u32);
-        let entries = supports[..kept].iter().sum::<usize>();
-        result.laws.reserve_exact(kept, entries);
-        for slot in 0..kept {
+        result.laws.reserve_exact(kept, supports[..kept].iter().sum());
+        for slot in order.into_iter().filter(|slot| *slot < kept) {
             builder.weights(slot, &mut weights);
             if let Some(law) = result.laws.push(&weights) {
                 law_of_cell[self.counters.cells()[slot] as usize] = law as u16;
@@ -130,9 +135,12 @@ struct LawBuilder<'a> {
     learning: &'a LearningGrid,
     /// Whole-map probability of each tile.
     map_law: Vec<f64>,
-    /// Tallies of all cells of a face, and of 4x4 cells of a face.
-    faces: BTreeMap<u32, Vec<Tally>>,
-    blocks: BTreeMap<u32, Vec<Tally>>,
+    /// Tallies of all cells of each face; empty if nothing is pooled.
+    faces: Vec<Vec<Tally>>,
+    /// Slots of each block of 4x4 cells of a face.
+    slots_of_block: BTreeMap<u32, Vec<usize>>,
+    /// The block last asked for and the tallies of all its cells.
+    block: Option<(u32, Vec<Tally>)>,
     /// Share of the diffuse density per face and tile; empty without compensation.
     diffuse: Vec<Vec<f64>>,
 }
@@ -144,17 +152,47 @@ impl<'a> LawBuilder<'a> {
         let mut builder = Self {
             learning,
             map_law: energies.iter().map(|e| e / total).collect(),
-            faces: BTreeMap::new(),
-            blocks: BTreeMap::new(),
+            faces: Vec::new(),
+            slots_of_block: BTreeMap::new(),
+            block: None,
             diffuse: Vec::new(),
         };
+        let mut slots_of_face = vec![Vec::new(); learning.grid.face_count() as usize];
+        for (slot, &cell) in learning.counters.cells().iter().enumerate() {
+            slots_of_face[builder.face_of(cell) as usize].push(slot);
+            let block = builder.block_of(cell);
+            builder.slots_of_block.entry(block).or_default().push(slot);
+        }
         if learning.options.recording == Recording::VisibleCosine {
-            builder.pool();
+            builder.faces = slots_of_face.iter().map(|slots| builder.sum(slots)).collect();
         }
         if learning.options.compensation > 0.0 && learning.grid.faces {
             builder.diffuse = diffuse_shares(environment);
         }
         builder
+    }
+
+    /// All slots, those of a block together: so one block's tallies at a time are enough.
+    fn slots_by_block(&self) -> Vec<usize> {
+        self.slots_of_block.values().flatten().copied().collect()
+    }
+
+    /// Bytes held beside the counters.
+    fn memory_bytes(&self) -> usize {
+        let tallies = (self.faces.len() + 1) * self.map_law.len() * size_of::<Tally>();
+        let doubles = (self.diffuse.len() + 1) * self.map_law.len() * size_of::<f64>();
+        tallies + doubles + 2 * self.learning.counters.cells().len() * size_of::<usize>()
+    }
+
+    fn sum(&self, slots: &[usize]) -> Vec<Tally> {
+        let mut sums = vec![Tally::default(); self.map_law.len()];
+        for &slot in slots {
+            for (sum, tally) in sums.iter_mut().zip(self.learning.counters.tallies(slot)) {
+                sum.tries += tally.tries;
+                sum.weight += tally.weight;
+            }
+        }
+        sums
     }
 
     fn face_of(&self, cell: u32) -> u32 {
@@ -166,29 +204,15 @@ impl<'a> LawBuilder<'a> {
         (face << 24) | ((row / POOL) << 12) | (column / POOL)
     }
 
-    fn pool(&mut self) {
-        let counters = &self.learning.counters;
-        for (slot, &cell) in counters.cells().iter().enumerate() {
-            let (face, block) = (self.face_of(cell), self.block_of(cell));
-            for (map, key) in [(&mut self.faces, face), (&mut self.blocks, block)] {
-                let sums =
-                    map.entry(key).or_insert_with(|| vec![Tally::default(); self.map_law.len()]);
-                for (sum, tally) in sums.iter_mut().zip(counters.tallies(slot)) {
-                    sum.tries += tally.tries;
-                    sum.weight += tally.weight;
-                }
-            }
-        }
-    }
-
     /// Unnormalised law of a slot.
-    fn weights(&self, slot: usize, weights: &mut Vec<f64>) {
+    fn weights(&mut self, slot: usize, weights: &mut Vec<f64>) {
         let cell = self.learning.counters.cells()[slot];
-        let tallies = self.learning.counters.tallies(slot);
         weights.clear();
         match self.learning.options.recording {
-            Recording::VisibleContribution => weights.extend(tallies.map(|t| t.weight)),
-            Recording::VisibleCosine => self.visible_energies(cell, tallies, weights),
+            Recording::VisibleContribution => {
+                weights.extend(self.learning.counters.tallies(slot).map(|t| t.weight));
+            }
+            Recording::VisibleCosine => self.visible_energies(cell, slot, weights),
         }
         self.compensate(self.face_of(cell) as usize, weights);
         let total: f64 = weights.iter().sum();
@@ -202,21 +226,24 @@ impl<'a> LawBuilder<'a> {
 
     /// Energy of each tile times its visibility ratio, which is drawn towards the block's, and that
     /// towards the face's, where the tile was tried too seldom.
-    fn visible_energies(
-        &self,
-        cell: u32,
-        tallies: impl Iterator<Item = Tally>,
-        weights: &mut Vec<f64>,
-    ) {
+    fn visible_energies(&mut self, cell: u32, slot: usize, weights: &mut Vec<f64>) {
         let k = self.learning.options.pooling_tries;
         let shrink = |tally: &Tally, ratio: f64| {
             let tries = tally.tries + k;
             if tries > 0.0 { (tally.weight + k * ratio) / tries } else { 0.0 }
         };
-        let face = &self.faces[&self.face_of(cell)];
-        let block = &self.blocks[&self.block_of(cell)];
-        weights.extend(tallies.zip(face).zip(block).zip(&self.map_law).map(
-            |(((own, face), block), map)| map * shrink(&own, shrink(block, shrink(face, 0.0))),
+        let exponent = self.learning.options.ratio_exponent;
+        let key = self.block_of(cell);
+        if self.block.as_ref().is_none_or(|(block, _)| *block != key) {
+            self.block = Some((key, self.sum(&self.slots_of_block[&key])));
+        }
+        let block = self.block.iter().flat_map(|(_, tallies)| tallies);
+        let face = &self.faces[self.face_of(cell) as usize];
+        let own = self.learning.counters.tallies(slot);
+        weights.extend(own.zip(block).zip(face).zip(&self.map_law).map(
+            |(((own, block), face), map)| {
+                map * shrink(&own, shrink(block, shrink(face, 0.0))).powf(exponent)
+            },
         ));
     }
 

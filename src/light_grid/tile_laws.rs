@@ -122,8 +122,8 @@ impl TileLaws {
         }
         let mut rank = 0;
         for word in &self.masks[base..] {
-            self.ranks.push(rank);
-            rank += word.count_ones() as u16;
+            self.ranks.push(rank as u16);
+            rank += word.count_ones();
         }
         debug_assert_eq!(self.tiles.len() - first, support);
         self.starts.push(self.tiles.len() as u32);

@@ -112,6 +112,43 @@ struct Vertex {
     law: u32,
 }
 
+impl Vertex {
+    /// What lies behind the surface, given what lies before it.
+    fn body_behind(&self, before: Body) -> Body {
+        let parameters = &self.point.parameters;
+        if parameters.thin {
+            before
+        } else if self.point.front_face {
+            let index = parameters.ior.max(1.0);
+            Body { absorption: parameters.absorption, squared_index: index * index }
+        } else {
+            Body::AIR
+        }
+    }
+}
+
+/// What a ray is in.
+#[derive(Clone, Copy)]
+struct Body {
+    /// Absorption coefficient per metre.
+    absorption: Vec3,
+    /// Squared index of refraction, by which radiance, hence throughput, is smaller than in air.
+    squared_index: f32,
+}
+
+impl Body {
+    const AIR: Self = Self { absorption: Vec3::ZERO, squared_index: 1.0 };
+
+    /// Share of light left after `distance` metres. Rays that leave the scene from inside of a body
+    /// have met a mesh with holes: nothing is absorbed on their infinite way.
+    fn transmittance(&self, distance: f32) -> Vec3 {
+        if self.absorption == Vec3::ZERO || distance.is_infinite() {
+            return Vec3::ONE;
+        }
+        (-self.absorption * distance).exp()
+    }
+}
+
 /// The vertex a ray left from, as far as MIS asks.
 #[derive(Clone, Copy)]
 struct Departure {
@@ -129,8 +166,7 @@ struct Path<'a> {
     departure: Departure,
     throughput: Vec3,
     radiance: Vec3,
-    /// Absorption coefficient per metre of the body the ray is in.
-    absorption: Vec3,
+    body: Body,
     /// Metres gone since the last vertex, passes included.
     travelled: f32,
     bounces: u32,
@@ -149,7 +185,7 @@ impl<'a> Path<'a> {
             departure,
             throughput: Vec3::ONE,
             radiance: Vec3::ZERO,
-            absorption: Vec3::ZERO,
+            body: Body::AIR,
             travelled: 0.0,
             bounces: 0,
             rays: 0,
@@ -166,15 +202,18 @@ impl<'a> Path<'a> {
                 self.escape();
                 return None;
             };
-            self.absorb(hit.t);
+            self.throughput *= self.body.transmittance(hit.t);
             self.travelled += hit.t;
             let scene = &self.tracer.world.scene;
             let point = SurfacePoint::at(scene, hit.triangle, hit.barycentric, self.ray.direction);
+            if self.tracer.world.needs.emitters {
+                self.add_emitted(&hit, &point);
+            }
             if self.passes(&point) {
                 self.ray.origin = offset_origin(point.position, -point.geometric_normal);
                 continue;
             }
-            return self.arrive(&hit, point);
+            return self.arrive(point);
         }
         None
     }
@@ -196,8 +235,8 @@ impl<'a> Path<'a> {
         passes
     }
 
-    /// Adds what the surface emits and makes it a vertex, unless it is unlit.
-    fn arrive(&mut self, hit: &Hit, point: SurfacePoint) -> Option<Vertex> {
+    /// Makes the surface a vertex, unless it is unlit: then it is seen as it is.
+    fn arrive(&mut self, point: SurfacePoint) -> Option<Vertex> {
         let parameters = &point.parameters;
         let bsdf = Bsdf::new(parameters, point.front_face);
         if self.bounces == 0 {
@@ -209,9 +248,6 @@ impl<'a> Path<'a> {
             self.radiance += self.throughput * parameters.emissive;
             return None;
         }
-        if self.tracer.world.needs.emitters {
-            self.add_emitted(hit, &point);
-        }
         let law = self
             .tracer
             .grid
@@ -220,7 +256,11 @@ impl<'a> Path<'a> {
         Some(Vertex { point, bsdf, wo, law })
     }
 
+    /// Adds what a surface emits, whether the ray then passes it or not.
     fn add_emitted(&mut self, hit: &Hit, point: &SurfacePoint) {
+        if point.parameters.unlit {
+            return;
+        }
         let world = self.tracer.world;
         let emitted = lights::emitted(&world.scene, point);
         if emitted.max_element() <= 0.0 {
@@ -312,10 +352,11 @@ impl<'a> Path<'a> {
         self.rays += 1;
         let normal = vertex.point.geometric_normal;
         let side = if normal.dot(direction) > 0.0 { normal } else { -normal };
+        let body = if side == normal { self.body } else { vertex.body_behind(self.body) };
         let origin = offset_origin(vertex.point.position, side);
         // Stop short of the light's own surface.
         let ray = Ray { origin, direction, t_min: 0.0, t_max: distance * (1.0 - 1e-4) };
-        self.tracer.world.transmittance(&ray)
+        self.tracer.world.transmittance(&ray) * body.transmittance(distance)
     }
 
     /// Chooses where the path goes on. `false` if it ends.
@@ -335,12 +376,8 @@ impl<'a> Path<'a> {
         if self.throughput.max_element() <= 0.0 || !self.throughput.is_finite() {
             return false;
         }
-        if sample.is_transmission && !vertex.point.parameters.thin {
-            self.absorption = if vertex.point.front_face {
-                vertex.point.parameters.absorption
-            } else {
-                Vec3::ZERO
-            };
+        if sample.is_transmission {
+            self.body = vertex.body_behind(self.body);
         }
         self.departure = Departure {
             pdf_solid_angle: if sample.is_delta { f32::INFINITY } else { sample.pdf_solid_angle },
@@ -357,22 +394,17 @@ impl<'a> Path<'a> {
         true
     }
 
-    /// Russian roulette by throughput.
+    /// Russian roulette by throughput, as it would be in air: refraction into a body is no loss.
     fn survives(&mut self) -> bool {
         if !self.tracer.limits.russian_roulette || self.bounces < ROULETTE_AFTER {
             return true;
         }
-        let probability = self.throughput.max_element().clamp(0.05, 1.0);
+        let in_air = self.throughput.max_element() * self.body.squared_index;
+        let probability = in_air.clamp(0.05, 1.0);
         if probability < 1.0 && self.sampler.next_pair()[1] >= probability {
             return false;
         }
         self.throughput /= probability;
         true
-    }
-
-    fn absorb(&mut self, distance: f32) {
-        if self.absorption != Vec3::ZERO {
-            self.throughput *= (-self.absorption * distance).exp();
-        }
     }
 }

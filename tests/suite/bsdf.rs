@@ -38,9 +38,26 @@ fn spherical(cos: f32, phi: f32) -> Vec3 {
     Vec3::new(sin * phi.cos(), sin * phi.sin(), cos)
 }
 
+/// Neither scatters nor emits.
+const BLACK: SurfaceParameters = SurfaceParameters {
+    base_color: Vec3::ZERO,
+    alpha: 1.0,
+    metallic: 0.0,
+    roughness: 1.0,
+    ior: 1.5,
+    specular: 0.0,
+    specular_color: Vec3::ONE,
+    transmission: 0.0,
+    thin: true,
+    absorption: Vec3::ZERO,
+    clearcoat: 0.0,
+    clearcoat_roughness: 0.0,
+    clearcoat_normal: Vec3::Z,
+    emissive: Vec3::ZERO,
+    unlit: false,
+};
 /// White dielectric without reflection: Lambert.
-const WHITE: SurfaceParameters =
-    SurfaceParameters { base_color: Vec3::ONE, ..SurfaceParameters::BLACK };
+const WHITE: SurfaceParameters = SurfaceParameters { base_color: Vec3::ONE, ..BLACK };
 const PLASTIC: SurfaceParameters = SurfaceParameters { specular: 1.0, roughness: 0.4, ..WHITE };
 const METAL: SurfaceParameters = SurfaceParameters { metallic: 1.0, roughness: 0.5, ..WHITE };
 const GLASS: SurfaceParameters = SurfaceParameters { transmission: 1.0, thin: false, ..PLASTIC };

@@ -43,18 +43,18 @@ pub(super) fn build() -> Scene {
         ([0.75, 0.0, 0.22], -15.0, [0.62, 0.46, 0.52]),
     ] {
         b.standing(Vec3::from(at) + Vec3::Y * if at[1] > 0.0 { 0.001 } else { 0.0 }, yaw, |b| {
-            crate_box(b, wood, iron, size)
+            crate_box(b, wood, iron, size);
         });
     }
     for (x, z, s) in [(-1.45, -1.0, 1.0), (-1.50, 0.95, 0.9)] {
         b.standing(Vec3::new(x, 0.0, z), 30.0, |b| barrel(b, wood, iron, 0.85 * s));
     }
     b.standing(Vec3::new(0.62, 0.461, 0.20), 30.0, |b| {
-        thing::vase(b, clay, 0.34, &[0.20, 0.34, 0.38, 0.26, 0.11, 0.14])
+        thing::vase(b, clay, 0.34, &[0.20, 0.34, 0.38, 0.26, 0.11, 0.14]);
     });
     b.standing(Vec3::new(0.88, 0.461, 0.28), 0.0, |b| thing::bowl(b, copper, 0.11, 0.07));
     b.standing(Vec3::new(-0.50, 0.982, -0.62), 0.0, |b| {
-        thing::vase(b, copper, 0.24, &[0.3, 0.42, 0.36, 0.2, 0.24])
+        thing::vase(b, copper, 0.24, &[0.3, 0.42, 0.36, 0.2, 0.24]);
     });
     for (x, y, z, yaw, half) in [
         (0.55, 0.15, -1.15, 10.0, 0.30),
@@ -93,7 +93,7 @@ fn crate_box(b: &mut Builder, wood: Mat, iron: Mat, [w, h, d]: [f32; 3]) {
     for k in 0..lids {
         let (z0, z1) =
             (d * k as f32 / lids as f32 - z + 0.002, d * (k + 1) as f32 / lids as f32 - z - 0.002);
-        b.slab(wood, [-x + 0.001, h - 0.018, z0], [x - 0.001, h, z1], 0.003);
+        b.slab(wood, [-x - 0.004, h - 0.018, z0], [x + 0.004, h, z1], 0.003);
     }
     for (sx, sz) in [(-1., -1.), (1., -1.), (1., 1.), (-1., 1.)] {
         let (cx, cz) = (sx * (x - 0.035), sz * (z + 0.006));

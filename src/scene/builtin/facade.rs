@@ -2,32 +2,44 @@
 
 use std::f32::consts::PI;
 
-use glam::{Affine3A, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
+use super::fittings::window_frame;
 use super::mesh::{Builder, Mat};
-use super::room::{Hole, Wall, pierced, window_frame};
+use super::room::{Hole, Wall, pierced};
 
 /// Materials of a house.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct HouseMats {
+    /// Walls.
     pub(super) wall: Mat,
+    /// Base course.
     pub(super) base: Mat,
+    /// Sills, lintels, cornices.
     pub(super) trim: Mat,
+    /// Window frames.
     pub(super) frame: Mat,
+    /// What is seen behind windows.
     pub(super) pane: Mat,
+    /// Roof.
     pub(super) roof: Mat,
+    /// Shutters and doors, if any.
     pub(super) shutter: Option<Mat>,
 }
 
-/// A front's windows: `bays` columns on `floors` floors, `ground` metres up to the first of them.
+/// A front's windows: columns about [`BAY`] apart on `floors` floors, `ground` metres up to the first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rhythm {
-    pub(super) bays: u32,
+    /// Floors above the ground floor.
     pub(super) floors: u32,
+    /// Height of the ground floor in metres.
     pub(super) ground: f32,
+    /// Whether the ground floor has shop windows.
     pub(super) shops: bool,
 }
 
+/// Usual distance of windows in metres.
+const BAY: f32 = 3.0;
 /// How far fronts stand before the core.
 const FRONT: f32 = 0.28;
 
@@ -78,11 +90,12 @@ pub(super) fn house(
 }
 
 fn front(b: &mut Builder, m: &HouseMats, [width, height]: [f32; 2], rhythm: Rhythm, side: usize) {
-    let bay = width / rhythm.bays as f32;
+    let bays = (width / BAY).round().max(1.0) as u32;
+    let bay = width / bays as f32;
     let storey = (height - rhythm.ground - 0.4) / rhythm.floors as f32;
     let (w, h) = ((0.42 * bay).min(1.15), (0.60 * storey).min(1.9));
     let mut windows = Vec::new();
-    for i in 0..rhythm.bays {
+    for i in 0..bays {
         let middle = bay * (i as f32 + 0.5);
         for j in 0..rhythm.floors {
             let sill = rhythm.ground + storey * j as f32 + 0.24 * storey;
@@ -90,7 +103,7 @@ fn front(b: &mut Builder, m: &HouseMats, [width, height]: [f32; 2], rhythm: Rhyt
         }
     }
     let mut openings = Vec::new();
-    for i in 0..rhythm.bays {
+    for i in 0..bays {
         let middle = bay * (i as f32 + 0.5);
         let half = if rhythm.shops { (0.36 * bay).min(1.3) } else { 0.5 * w };
         let is_door = i % 3 == 1;
@@ -106,8 +119,8 @@ fn front(b: &mut Builder, m: &HouseMats, [width, height]: [f32; 2], rhythm: Rhyt
     }
     let holes: Vec<Hole> =
         windows.iter().copied().chain(openings.iter().map(|o| o.0)).map(Hole::Rectangle).collect();
-    // Fronts of neighbouring sides meet in a mitre of a few millimetres' difference.
-    let reach = if side < 2 { 0.0 } else { -0.004 };
+    // Each front ends a little behind the face of its neighbour.
+    let reach = if side < 2 { -0.006 } else { -0.004 };
     pierced(b, m.wall, [-reach, -0.03, width + reach, height - 0.1], FRONT, &holes);
     b.slab(m.trim, [-0.03, rhythm.ground - 0.14, -0.05], [width + 0.03, rhythm.ground, 0.07], 0.02);
     plinth(b, m.base, width, &openings);
@@ -229,55 +242,4 @@ pub(super) fn column(b: &mut Builder, mat: Mat, height: f32, radius: f32) {
         profile.push((0.9 * r + 0.45 * r * (1.0 - c), height - 0.27 + 0.15 * s));
     }
     b.lathe(mat, 28, &profile);
-}
-
-/// A street lamp with a lantern (unlit).
-pub(super) fn street_lamp(b: &mut Builder, metal: Mat, pane: Mat, height: f32) {
-    let h = height;
-    b.lathe(
-        metal,
-        24,
-        &[
-            (0.17, -0.01),
-            (0.17, 0.10),
-            (0.13, 0.14),
-            (0.10, 0.55),
-            (0.12, 0.58),
-            (0.12, 0.64),
-            (0.065, 0.70),
-            (0.05, 0.75 * h),
-            (0.075, 0.76 * h),
-            (0.075, 0.775 * h),
-            (0.042, 0.79 * h),
-            (0.038, h - 0.62),
-            (0.09, h - 0.58),
-            (0.11, h - 0.55),
-        ],
-    );
-    b.part(Affine3A::from_translation(Vec3::Y * (h - 0.56)), |b| {
-        b.lathe(pane, 6, &[(0.10, 0.0), (0.19, 0.40)]);
-        for k in 0..6 {
-            let (s, c) = (k as f32 * PI / 3.0).sin_cos();
-            b.rod(
-                metal,
-                Vec3::new(0.10 * c, 0.0, 0.10 * s),
-                Vec3::new(0.192 * c, 0.40, 0.192 * s),
-                0.009,
-            );
-        }
-        b.lathe(
-            metal,
-            24,
-            &[
-                (0.0, 0.395),
-                (0.215, 0.395),
-                (0.22, 0.41),
-                (0.13, 0.50),
-                (0.05, 0.55),
-                (0.05, 0.58),
-                (0.022, 0.60),
-                (0.0, 0.66),
-            ],
-        );
-    });
 }

@@ -10,6 +10,7 @@ use super::objects as thing;
 use super::plants;
 use super::room::{self, Hole, Shell};
 use super::textures as paint;
+use super::{fittings, lamps, seating};
 use crate::scene::Scene;
 
 const SIZE: [f32; 3] = [6.0, 3.0, 5.0];
@@ -112,8 +113,8 @@ pub(super) fn build() -> Scene {
     library(b, m);
     corners(b, m);
     b.camera("window", [-2.6, 1.35, 1.95], [0.5, 1.02, -0.55], 50.0);
-    b.camera("sofa", [2.3, 1.35, 2.2], [-0.95, 0.86, -1.1], 50.0);
-    b.camera("round window", [1.9, 1.45, -2.1], [-1.3, 1.15, 1.8], 56.0);
+    b.camera("sofa", [1.95, 1.35, 2.25], [-0.95, 0.88, -1.1], 50.0);
+    b.camera("round window", [2.5, 1.42, -1.35], [-1.0, 1.15, 1.75], 54.0);
     std::mem::replace(b, Builder::new("")).finish()
 }
 
@@ -127,19 +128,19 @@ fn shell(b: &mut Builder, m: &Palette) {
         b.part(wall.frame(), |b| {
             let (door_gap, whole) = ([[0.0, 0.43], [1.47, 6.0]], [[0.0, wall.width]]);
             let stretches: &[[f32; 2]] = if i == 3 { &door_gap } else { &whole };
-            room::skirting(b, m.white, stretches, 0.12);
-            room::cornice(b, m.ceiling, wall.width, SIZE[1] + 0.004, 0.10);
+            fittings::skirting(b, m.white, stretches, 0.12);
+            fittings::cornice(b, m.ceiling, wall.width, SIZE[1] + 0.004, 0.10);
         });
     }
     b.part(walls[2].frame(), |b| {
         for u in [0.25, 1.65, 3.05, 4.45] {
-            room::panel_moulding(b, m.accent, [u, 0.30, u + 1.25, 1.02]);
-            room::panel_moulding(b, m.accent, [u, 1.16, u + 1.25, 2.70]);
+            fittings::panel_moulding(b, m.accent, [u, 0.30, u + 1.25, 1.02]);
+            fittings::panel_moulding(b, m.accent, [u, 1.16, u + 1.25, 2.70]);
         }
         b.slab(m.accent, [0.0, 1.07, -0.01], [6.0, 1.11, 0.022], 0.008);
     });
     b.part(walls[3].frame(), |b| {
-        room::door(b, m.white, m.brass, 0.5, [0.9, 2.1]);
+        fittings::door(b, m.white, m.brass, 0.5, [0.9, 2.1]);
         // A wooden ring around the round opening.
         b.part(placed([ROUND[0], ROUND[1], 0.0], [90.0, 0.0, 0.0]), |b| {
             let r = ROUND[2];
@@ -147,18 +148,13 @@ fn shell(b: &mut Builder, m: &Palette) {
                 m.oak,
                 64,
                 &[
-                    (r - 0.02, -0.10),
-                    (r - 0.02, 0.014),
-                    (r - 0.014, 0.02),
-                    (r + 0.05, 0.02),
-                    (r + 0.056, 0.014),
                     (r + 0.056, -0.005),
-                ]
-                .map(|(r, y)| (r, y))
-                .iter()
-                .rev()
-                .copied()
-                .collect::<Vec<_>>(),
+                    (r + 0.056, 0.014),
+                    (r + 0.05, 0.02),
+                    (r - 0.014, 0.02),
+                    (r - 0.02, 0.014),
+                    (r - 0.02, -0.10),
+                ],
             );
         });
     });
@@ -167,12 +163,12 @@ fn shell(b: &mut Builder, m: &Palette) {
 fn window(b: &mut Builder, m: &Palette) {
     let wall = room::walls(SIZE)[1];
     b.part(wall.frame(), |b| {
-        room::window_frame(b, m.white, WINDOW, 0.12, [3, 2], 0.004);
-        room::window_board(b, m.white, WINDOW, THICKNESS);
+        fittings::window_frame(b, m.white, WINDOW, 0.12, [3, 2], 0.004);
+        fittings::window_board(b, m.white, WINDOW, THICKNESS);
         let [u0, v0, u1, _] = WINDOW;
-        room::curtain(b, m.curtain, [u0 - 0.42, u0 + 0.06], [0.015, 2.47], 0.13, 6.0);
-        room::curtain(b, m.curtain, [u1 - 0.06, u1 + 0.42], [0.015, 2.47], 0.13, 6.0);
-        room::curtain_rod(b, m.brass, [u0 - 0.55, u1 + 0.55], 2.50, 0.13);
+        fittings::curtain(b, m.curtain, [u0 - 0.42, u0 + 0.06], [0.015, 2.47], 0.13, 6.0);
+        fittings::curtain(b, m.curtain, [u1 - 0.06, u1 + 0.42], [0.015, 2.47], 0.13, 6.0);
+        fittings::curtain_rod(b, m.brass, [u0 - 0.55, u1 + 0.55], 2.50, 0.13);
         for (u, kind) in [(1.62, 0), (2.72, 1), (3.36, 2)] {
             b.standing(Vec3::new(u, v0 + 0.016, -0.03), 0.0, |b| match kind {
                 0 => {
@@ -208,7 +204,7 @@ fn pictures(b: &mut Builder, m: &Palette) {
 fn seating(b: &mut Builder, m: &Palette) {
     b.standing(Vec3::new(-0.1, 0.0, 0.05), 0.0, |b| piece::rug(b, m.rug, m.linen, [2.9, 2.0]));
     b.standing(Vec3::new(-0.45, 0.0, -1.92), 0.0, |b| {
-        piece::sofa(b, m.velvet, m.walnut, 2.35, 3);
+        seating::sofa(b, m.velvet, m.walnut, 2.35, 3);
         for (k, (x, turn, tone)) in [
             (-0.82, -18.0, [0.95, 0.93, 0.88]),
             (-0.52, 8.0, [0.20, 0.30, 0.30]),
@@ -219,12 +215,12 @@ fn seating(b: &mut Builder, m: &Palette) {
         {
             let z = if k == 1 { 0.06 } else { -0.02 };
             b.part(placed([x, 0.685, z], [68.0, turn, 0.0]), |b| {
-                b.tinted(tone, |b| piece::pillow(b, m.cotton, 0.23));
+                b.tinted(tone, |b| seating::pillow(b, m.cotton, 0.23));
             });
         }
     });
     b.standing(Vec3::new(1.62, 0.0, -0.72), -72.0, |b| {
-        piece::armchair(b, m.boucle, m.oak);
+        seating::armchair(b, m.boucle, m.oak);
     });
     // A side table within reach of the armchair.
     b.standing(Vec3::new(1.78, 0.0, -1.62), 0.0, |b| {
@@ -232,7 +228,7 @@ fn seating(b: &mut Builder, m: &Palette) {
         b.drum(m.black, [0.01, 0.50], [0.012, 0.012], 0.002);
         b.drum(m.walnut, [0.49, 0.512], [0.21, 0.21], 0.006);
         b.standing(Vec3::new(-0.05, 0.512, 0.02), 24.0, |b| {
-            thing::book_stack(b, [m.cover, m.paper], 2, 8)
+            thing::book_stack(b, [m.cover, m.paper], 2, 8);
         });
         b.standing(Vec3::new(0.11, 0.512, 0.09), 140.0, |b| thing::mug(b, m.ceramic, m.soil));
     });
@@ -250,7 +246,7 @@ fn coffee_table(b: &mut Builder, m: &Palette) {
             thing::fruit(b, m.skin, m.bark, 0.15, 0.008);
         });
         b.standing(Vec3::new(0.02, 0.40, 0.24), 12.0, |b| {
-            thing::book_stack(b, [m.cover, m.paper], 3, 21)
+            thing::book_stack(b, [m.cover, m.paper], 3, 21);
         });
         b.standing(Vec3::new(-0.28, 0.40, 0.14), 200.0, |b| thing::mug(b, m.ceramic, m.soil));
     });
@@ -280,7 +276,7 @@ fn library(b: &mut Builder, m: &Palette) {
 
 fn corners(b: &mut Builder, m: &Palette) {
     b.standing(Vec3::new(-2.45, 0.0, -2.1), -20.0, |b| {
-        piece::arc_lamp(b, m.brass, m.linen, m.stone, 2.05, 0.85);
+        lamps::arc_lamp(b, m.brass, m.linen, m.stone, 2.05, 0.85);
     });
     b.standing(Vec3::new(1.25, 0.0, -2.08), 0.0, |b| {
         let soil = plants::pot(b, m.clay, m.soil, 0.20, 0.36);
@@ -289,11 +285,11 @@ fn corners(b: &mut Builder, m: &Palette) {
     b.standing(Vec3::new(2.45, 0.0, -2.05), 0.0, |b| {
         b.drum(m.steel, [0.0, 0.42], [0.17, 0.17], 0.01);
         b.standing(Vec3::Y * 0.42, 0.0, |b| {
-            thing::vase(b, m.ceramic, 0.5, &[0.14, 0.22, 0.25, 0.18, 0.09, 0.12])
+            thing::vase(b, m.ceramic, 0.5, &[0.14, 0.22, 0.25, 0.18, 0.09, 0.12]);
         });
     });
     b.part(placed([-0.35, SIZE[1], -0.1], [0.0; 3]), |b| {
-        piece::pendant(b, m.copper, m.white, 0.95, 0.24);
+        lamps::pendant(b, m.copper, m.white, 0.95, 0.24);
     });
     b.standing(Vec3::new(2.42, 0.0, 1.52), 0.0, |b| {
         let soil = plants::pot(b, m.ceramic, m.soil, 0.19, 0.40);
@@ -305,12 +301,12 @@ fn corners(b: &mut Builder, m: &Palette) {
         b.standing(Vec3::new(-0.38, 0.78, 0.0), 0.0, |b| {
             thing::vase(b, m.ceramic, 0.30, &[0.22, 0.34, 0.30, 0.16, 0.06]);
             b.part(placed([0.0, 0.56, 0.0], [0.0; 3]), |b| {
-                piece::drum_shade(b, m.linen, 0.17, 0.13, 0.22)
+                lamps::drum_shade(b, m.linen, 0.17, 0.13, 0.22);
             });
             b.rod(m.brass, Vec3::Y * 0.28, Vec3::Y * 0.56, 0.006);
         });
         b.standing(Vec3::new(0.30, 0.78, 0.02), 5.0, |b| {
-            thing::book_stack(b, [m.cover, m.paper], 4, 3)
+            thing::book_stack(b, [m.cover, m.paper], 4, 3);
         });
     });
 }

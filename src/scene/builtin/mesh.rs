@@ -1,7 +1,5 @@
 //! Triangles from a few parametric shapes, in metres: the tools all built-in scenes are made with.
 
-use std::f32::consts::{FRAC_PI_4, TAU};
-
 use glam::{Affine3A, Mat3, Quat, Vec2, Vec3, Vec4};
 
 use crate::scene::{Camera, Material, Scene, Texture, TextureImage, TextureRef, Wrap};
@@ -14,8 +12,8 @@ pub(super) type Mat = u32;
 
 /// Collects the parts of a scene; shapes are placed by the current part's frame.
 pub(super) struct Builder {
-    scene: Scene,
-    world_from_part: Affine3A,
+    pub(super) scene: Scene,
+    pub(super) world_from_part: Affine3A,
     normal_from_part: Mat3,
     tint: Vec4,
 }
@@ -98,7 +96,8 @@ impl Builder {
         self.tint = outer;
     }
 
-    fn vertex(&mut self, (position, normal, uv): Corner) -> u32 {
+    /// Adds a vertex given in the part's frame.
+    pub(super) fn vertex(&mut self, (position, normal, uv): Corner) -> u32 {
         self.scene.positions.push(self.world_from_part.transform_point3(position));
         self.scene.normals.push((self.normal_from_part * normal).normalize_or_zero());
         self.scene.uvs[0].push(uv);
@@ -107,7 +106,7 @@ impl Builder {
     }
 
     /// Adds a triangle of vertices, counter-clockwise in the part's frame; one without area is left out.
-    fn triangle(&mut self, mat: Mat, [a, b, c]: [u32; 3]) {
+    pub(super) fn triangle(&mut self, mat: Mat, [a, b, c]: [u32; 3]) {
         let p = |i: u32| self.scene.positions[i as usize];
         if (p(b) - p(a)).cross(p(c) - p(a)).length() < 1e-10 {
             return;
@@ -188,198 +187,5 @@ impl Builder {
                 self.polygon(mat, &tip.map(|(p, n)| (p, n, uv(p, 0))), outward);
             }
         }
-    }
-
-    /// A smooth grid of `nu` x `nv` quads over `surface(u, v)`, u and v in `[0,1]`; its front looks
-    /// along the derivative by u cross that by v. Texture coordinates cover `uv_size` metres.
-    pub(super) fn sheet(
-        &mut self,
-        mat: Mat,
-        [nu, nv]: [u32; 2],
-        uv_size: Vec2,
-        surface: impl Fn(f32, f32) -> Vec3,
-    ) {
-        const STEP: f32 = 2e-3;
-        let first = self.scene.positions.len() as u32;
-        for j in 0..=nv {
-            for i in 0..=nu {
-                let (u, v) = (i as f32 / nu as f32, j as f32 / nv as f32);
-                let du = surface(u + STEP, v) - surface(u - STEP, v);
-                let dv = surface(u, v + STEP) - surface(u, v - STEP);
-                let normal = du.cross(dv).normalize_or_zero();
-                self.vertex((surface(u, v), normal, Vec2::new(u, v) * uv_size));
-            }
-        }
-        for j in 0..nv {
-            for i in 0..nu {
-                let a = first + j * (nu + 1) + i;
-                let (b, c, d) = (a + 1, a + nu + 2, a + nu + 1);
-                self.triangle(mat, [a, b, c]);
-                self.triangle(mat, [a, c, d]);
-            }
-        }
-    }
-
-    /// Surface of revolution about +Y of a `profile` of (radius, height), whose front is on the
-    /// right of the way along it (upwards: outside). Corners sharper than 40 degrees stay creases.
-    pub(super) fn lathe(&mut self, mat: Mat, segments: u32, profile: &[(f32, f32)]) {
-        let points: Vec<Vec2> = profile.iter().map(|&(r, y)| Vec2::new(r, y)).collect();
-        let normal = |i: usize| {
-            let d = points[i + 1] - points[i];
-            Vec2::new(d.y, -d.x).normalize_or_zero()
-        };
-        let smooth = |here: Vec2, other: Vec2| {
-            if here.dot(other) > 0.766 { (here + other).normalize() } else { here }
-        };
-        let girth = TAU * points.iter().map(|p| p.x).fold(0.0, f32::max);
-        let mut length = 0.0;
-        for i in 0..points.len() - 1 {
-            let here = normal(i);
-            let start = if i > 0 { smooth(here, normal(i - 1)) } else { here };
-            let end = if i + 2 < points.len() { smooth(here, normal(i + 1)) } else { here };
-            let next = length + points[i].distance(points[i + 1]);
-            let first = self.scene.positions.len() as u32;
-            for k in 0..=segments {
-                let turn = k as f32 / segments as f32;
-                let (sin, cos) = (turn * TAU).sin_cos();
-                for (p, n, along) in [(points[i], start, length), (points[i + 1], end, next)] {
-                    self.vertex((
-                        Vec3::new(p.x * cos, p.y, p.x * sin),
-                        Vec3::new(n.x * cos, n.y, n.x * sin),
-                        Vec2::new(turn * girth, along),
-                    ));
-                }
-            }
-            for k in 0..segments {
-                let a = first + 2 * k;
-                self.triangle(mat, [a, a + 1, a + 3]);
-                self.triangle(mat, [a, a + 3, a + 2]);
-            }
-            length = next;
-        }
-    }
-
-    /// An upright cylinder or cone frustum with rounded-off rims, centred on the part's +Y axis.
-    pub(super) fn drum(&mut self, mat: Mat, y: [f32; 2], radius: [f32; 2], bevel: f32) {
-        let segments = if radius[0].max(radius[1]) > 0.06 { 48 } else { 20 };
-        let [y0, y1] = y;
-        let [r0, r1] = radius;
-        let profile = [
-            (0.0, y0),
-            (r0 - bevel, y0),
-            (r0 - 0.3 * bevel, y0 + 0.3 * bevel),
-            (r0, y0 + bevel),
-            (r1, y1 - bevel),
-            (r1 - 0.3 * bevel, y1 - 0.3 * bevel),
-            (r1 - bevel, y1),
-            (0.0, y1),
-        ];
-        self.lathe(mat, segments, &profile);
-    }
-
-    /// A round tube along `path` of (centre, radius), closed by flat ends.
-    pub(super) fn tube(&mut self, mat: Mat, segments: u32, path: &[(Vec3, f32)]) {
-        let tangent = |i: usize| {
-            let (before, after) =
-                (path[i.saturating_sub(1)].0, path[(i + 1).min(path.len() - 1)].0);
-            (after - before).normalize_or(Vec3::Y)
-        };
-        let first = self.scene.positions.len() as u32;
-        let mut side = tangent(0).any_orthonormal_vector();
-        let mut length = 0.0;
-        for (i, &(centre, radius)) in path.iter().enumerate() {
-            let forward = tangent(i);
-            side =
-                (side - forward * side.dot(forward)).normalize_or(forward.any_orthonormal_vector());
-            let other = forward.cross(side);
-            length += if i > 0 { centre.distance(path[i - 1].0) } else { 0.0 };
-            for k in 0..=segments {
-                let turn = k as f32 / segments as f32;
-                let (sin, cos) = (turn * TAU).sin_cos();
-                let normal = side * cos + other * sin;
-                self.vertex((
-                    centre + normal * radius,
-                    normal,
-                    Vec2::new(length, turn * TAU * radius),
-                ));
-            }
-        }
-        let ring = segments + 1;
-        for i in 0..path.len() as u32 - 1 {
-            for k in 0..segments {
-                let a = first + i * ring + k;
-                self.triangle(mat, [a, a + 1, a + ring + 1]);
-                self.triangle(mat, [a, a + ring + 1, a + ring]);
-            }
-        }
-        let last = first + (path.len() as u32 - 1) * ring;
-        for (start, outward) in [(first, -tangent(0)), (last, tangent(path.len() - 1))] {
-            let local = self.world_from_part.inverse();
-            let cap: Vec<Corner> = (start..start + segments)
-                .map(|i| {
-                    let p = local.transform_point3(self.scene.positions[i as usize]);
-                    (p, Vec3::ZERO, Vec2::new(p.x, p.z))
-                })
-                .collect();
-            self.polygon(mat, &cap, outward);
-        }
-    }
-
-    /// A straight rod.
-    pub(super) fn rod(&mut self, mat: Mat, from: Vec3, to: Vec3, radius: f32) {
-        let segments = if radius > 0.012 { 20 } else { 10 };
-        self.tube(mat, segments, &[(from, radius), (to, radius)]);
-    }
-
-    /// The body `(|x|^k + |z|^k)^(j/k) + |y|^j = 1`, scaled to `half` extents about `centre`, of
-    /// `6 n^2` quads: an ellipsoid for `[k, j] = [2, 2]`, a cushion for `[6, 2.4]`.
-    pub(super) fn blob(&mut self, mat: Mat, centre: Vec3, half: Vec3, [k, j]: [f32; 2], n: u32) {
-        let axes = [Vec3::X, Vec3::Y, Vec3::Z];
-        for face in 0..6 {
-            let (axis, sign) = (face % 3, if face < 3 { 1.0 } else { -1.0 });
-            let (b, c) = (axes[(axis + 1) % 3] * sign, axes[(axis + 2) % 3]);
-            let first = self.scene.positions.len() as u32;
-            for row in 0..=n {
-                for column in 0..=n {
-                    let [s, t] = [column, row]
-                        .map(|i| (FRAC_PI_4 * (2.0 * i as f32 / n as f32 - 1.0)).tan());
-                    let cube = axes[axis] * sign + b * s + c * t;
-                    let flat =
-                        (cube.x.abs().powf(k) + cube.z.abs().powf(k)).powf(1.0 / k).max(1e-4);
-                    let p = cube / (flat.powf(j) + cube.y.abs().powf(j)).powf(1.0 / j);
-                    let flat = flat * p.length() / cube.length();
-                    let slope = |x: f32, power: f32| x.abs().powf(power - 1.0).copysign(x);
-                    let wide = flat.powf(j - k);
-                    let gradient =
-                        Vec3::new(wide * slope(p.x, k), slope(p.y, j), wide * slope(p.z, k));
-                    let place = p * half;
-                    let uv = Vec2::new(place.dot(b.abs()), place.dot(c));
-                    self.vertex((
-                        centre + place,
-                        (gradient / half).normalize_or(axes[axis] * sign),
-                        uv,
-                    ));
-                }
-            }
-            for row in 0..n {
-                for column in 0..n {
-                    let a = first + row * (n + 1) + column;
-                    self.triangle(mat, [a, a + 1, a + n + 2]);
-                    self.triangle(mat, [a, a + n + 2, a + n + 1]);
-                }
-            }
-        }
-    }
-
-    /// A sphere.
-    pub(super) fn ball(&mut self, mat: Mat, centre: Vec3, radius: f32) {
-        let n = if radius > 0.3 {
-            24
-        } else if radius > 0.05 {
-            12
-        } else {
-            6
-        };
-        self.blob(mat, centre, Vec3::splat(radius), [2.0, 2.0], n);
     }
 }

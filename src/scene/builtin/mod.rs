@@ -10,8 +10,12 @@
 //! | `crack` | brick store room | a slit of 1.5 m x 2 cm |
 
 mod crack;
+mod curved;
+mod desktop;
 mod facade;
+mod fittings;
 mod furniture;
+mod lamps;
 mod living_room;
 mod materials;
 mod mesh;
@@ -20,6 +24,7 @@ mod office;
 mod open;
 mod plants;
 mod room;
+mod seating;
 mod street;
 mod textures;
 

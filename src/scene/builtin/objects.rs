@@ -9,7 +9,7 @@ use super::mesh::{Builder, LIFT, Mat};
 use crate::noise::Stream;
 
 /// Cloth and paper covers, linear albedo.
-const COVERS: [[f32; 3]; 12] = [
+pub(super) const COVERS: [[f32; 3]; 12] = [
     [0.42, 0.08, 0.06],
     [0.09, 0.16, 0.28],
     [0.62, 0.50, 0.30],
@@ -175,7 +175,7 @@ pub(super) fn fruit(b: &mut Builder, skin: Mat, stalk: Mat, radius: f32, floor: 
     let mut place = |x: f32, y: f32, z: f32, tone: [f32; 3], r: f32| {
         b.part(placed([x * radius, floor + y, z * radius], [25.0 * x, 80.0 * z, 30.0 * z]), |b| {
             b.tinted(tone, |b| {
-                b.blob(skin, Vec3::ZERO, Vec3::new(r, 0.93 * r, r), [2.0, 2.15], 10)
+                b.blob(skin, Vec3::ZERO, Vec3::new(r, 0.93 * r, r), [2.0, 2.15], 10);
             });
             b.rod(stalk, Vec3::Y * 0.85 * r, Vec3::new(0.004, 1.16 * r, 0.002), 0.0018);
         });
@@ -209,115 +209,6 @@ pub(super) fn picture(
     b.polygon(art, &[corner(x0, y0), corner(x1, y0), corner(x1, y1), corner(x0, y1)], Vec3::Z);
 }
 
-/// A flat monitor on a foot, screen towards +Z.
-pub(super) fn monitor(b: &mut Builder, body: Mat, screen: Mat, [width, height]: [f32; 2]) {
-    b.slab(body, [-0.12, 0.0, -0.10], [0.12, 0.012, 0.09], 0.005);
-    b.slab(body, [-0.03, 0.006, -0.075], [0.03, 0.36, -0.058], 0.006);
-    b.part(placed([0.0, 0.13, -0.035], [-4.0, 0.0, 0.0]), |b| {
-        b.slab(body, [-0.5 * width, 0.0, -0.018], [0.5 * width, height, 0.006], 0.006);
-        b.slab(body, [-0.14, 0.08, -0.045], [0.14, height - 0.08, -0.012], 0.015);
-        b.slab(
-            screen,
-            [-0.5 * width + 0.008, 0.018, 0.0],
-            [0.5 * width - 0.008, height - 0.008, 0.0072],
-            0.0006,
-        );
-    });
-}
-
-/// A keyboard of five rows.
-pub(super) fn keyboard(b: &mut Builder, body: Mat, keys: Mat) {
-    b.part(placed([0.0, 0.004, 0.0], [2.5, 0.0, 0.0]), |b| {
-        b.slab(body, [-0.215, 0.0, -0.062], [0.215, 0.011, 0.062], 0.004);
-        for row in 0..5 {
-            let z = -0.055 + 0.022 * row as f32;
-            let mut x = -0.208;
-            let mut column = 0;
-            while x < 0.19 {
-                let w: f32 = match (row, column) {
-                    (4, 4) => 0.128,
-                    (1..=3, 0) => 0.026 + 0.004 * row as f32,
-                    _ => 0.0195,
-                };
-                let right = if x + w > 0.185 { 0.208 } else { x + w };
-                b.slab(keys, [x, 0.009, z], [right, 0.0155, z + 0.0195], 0.0018);
-                x = right + 0.0022;
-                column += 1;
-            }
-        }
-    });
-}
-
-/// A computer mouse.
-pub(super) fn mouse(b: &mut Builder, body: Mat) {
-    b.blob(body, Vec3::new(0.0, 0.014, 0.0), Vec3::new(0.031, 0.0135, 0.054), [2.6, 2.4], 10);
-}
-
-/// A jointed desk lamp that bows towards +Z (unlit).
-pub(super) fn desk_lamp(b: &mut Builder, metal: Mat, inside: Mat) {
-    b.drum(metal, [0.0, 0.022], [0.085, 0.080], 0.006);
-    let joints = [Vec3::new(0., 0.02, 0.), Vec3::new(0., 0.30, -0.13), Vec3::new(0., 0.50, 0.12)];
-    for pair in joints.windows(2) {
-        for side in [-0.011, 0.011] {
-            b.rod(metal, pair[0] + Vec3::X * side, pair[1] + Vec3::X * side, 0.0045);
-        }
-    }
-    for joint in &joints[1..] {
-        b.rod(metal, *joint - Vec3::X * 0.02, *joint + Vec3::X * 0.02, 0.012);
-    }
-    b.part(placed([0.0, 0.50, 0.125], [-28.0, 0.0, 0.0]), |b| {
-        let outer =
-            [(0.018, 0.045), (0.026, 0.02), (0.035, -0.005), (0.062, -0.05), (0.078, -0.10)];
-        let mut profile: Vec<(f32, f32)> = outer.iter().rev().copied().collect();
-        profile.push((0.0, 0.05));
-        b.lathe(metal, 40, &profile);
-        let mut lining: Vec<(f32, f32)> = outer[1..].iter().map(|&(r, y)| (r - 0.002, y)).collect();
-        lining.insert(0, (0.0, 0.018));
-        b.lathe(inside, 40, &lining);
-        b.lathe(metal, 40, &[(0.076, -0.10), (0.078, -0.10)]);
-        b.ball(inside, Vec3::new(0.0, -0.035, 0.0), 0.025);
-    });
-}
-
-/// Loose sheets of A4 paper.
-pub(super) fn papers(b: &mut Builder, paper: Mat, count: u32, seed: u32) {
-    let mut stream = Stream::new(seed);
-    for i in 0..count {
-        let at = [stream.between(-0.02, 0.02), 0.0011 * i as f32, stream.between(-0.02, 0.02)];
-        b.part(placed(at, [0.0, stream.between(-12.0, 12.0), 0.0]), |b| {
-            b.slab(paper, [-0.105, 0.0, -0.1485], [0.105, 0.0005, 0.1485], 0.0);
-        });
-    }
-}
-
-/// A cup of pencils.
-pub(super) fn pencils(b: &mut Builder, cup: Mat, wood: Mat) {
-    b.lathe(
-        cup,
-        32,
-        &[
-            (0.0, 0.0),
-            (0.036, 0.0),
-            (0.038, 0.002),
-            (0.038, 0.098),
-            (0.036, 0.1),
-            (0.034, 0.098),
-            (0.034, 0.006),
-            (0.0, 0.005),
-        ],
-    );
-    let mut stream = Stream::new(3);
-    for k in 0..7 {
-        let (s, c) = (k as f32 * 0.9).sin_cos();
-        let foot = Vec3::new(-0.018 * c, 0.008, -0.018 * s);
-        let tip = Vec3::new(0.034 * c, stream.between(0.15, 0.19), 0.034 * s);
-        let tone = COVERS[stream.index(COVERS.len())];
-        b.tinted(tone, |b| {
-            b.tube(wood, 6, &[(foot, 0.0036), (tip.lerp(foot, 0.1), 0.0036), (tip, 0.0006)])
-        });
-    }
-}
-
 /// A wall clock, its centre at the origin of a wall's frame.
 pub(super) fn clock(b: &mut Builder, rim: Mat, face: Mat, hands: Mat, radius: f32) {
     b.part(Affine3A::from_rotation_x(FRAC_PI_2), |b| {
@@ -325,25 +216,20 @@ pub(super) fn clock(b: &mut Builder, rim: Mat, face: Mat, hands: Mat, radius: f3
             rim,
             64,
             &[
-                (radius - 0.02, 0.02),
-                (radius - 0.02, 0.034),
-                (radius - 0.012, 0.04),
-                (radius - 0.004, 0.034),
-                (radius, 0.024),
                 (radius, -0.002),
-            ]
-            .map(|(r, y)| (r, y))
-            .iter()
-            .rev()
-            .copied()
-            .collect::<Vec<_>>(),
+                (radius, 0.024),
+                (radius - 0.004, 0.034),
+                (radius - 0.012, 0.04),
+                (radius - 0.02, 0.034),
+                (radius - 0.02, 0.02),
+            ],
         );
         b.lathe(face, 64, &[(radius - 0.018, 0.024), (0.0, 0.024)]);
     });
     for hour in 0..12 {
         let turn = Affine3A::from_rotation_z(hour as f32 * TAU / 12.0);
         b.part(turn, |b| {
-            b.slab(hands, [-0.003, radius * 0.72, 0.023], [0.003, radius * 0.82, 0.0255], 0.0)
+            b.slab(hands, [-0.003, radius * 0.72, 0.023], [0.003, radius * 0.82, 0.0255], 0.0);
         });
     }
     for (turn, length, width, z) in [(1.12, 0.48, 0.0075, 0.0275), (-2.3, 0.72, 0.005, 0.031)] {

@@ -10,6 +10,7 @@ use super::objects as thing;
 use super::plants;
 use super::room::{self, Hole, Shell};
 use super::textures as paint;
+use super::{desktop, fittings, lamps, seating};
 use crate::scene::Scene;
 
 const SIZE: [f32; 3] = [6.0, 3.0, 4.0];
@@ -49,10 +50,10 @@ impl Palette {
         let boards = b.texture(paint::planks([0.40, 0.27, 0.16], 10, 2), Vec2::new(2.6, 1.6));
         let oak = b.texture(paint::timber([0.52, 0.36, 0.21]), Vec2::new(1.4, 0.7));
         let plaster = b.texture(paint::plaster([0.76, 0.74, 0.70], 0.10), Vec2::splat(2.5));
-        let feature = b.texture(paint::plaster([0.36, 0.43, 0.47], 0.14), Vec2::splat(2.5));
+        let feature = b.texture(paint::plaster([0.60, 0.41, 0.31], 0.14), Vec2::splat(2.5));
         let blue = b.texture(paint::weave([0.16, 0.24, 0.36], 64), Vec2::splat(0.18));
         let grey = b.texture(paint::weave([0.44, 0.43, 0.41], 64), Vec2::splat(0.2));
-        let linen = b.texture(paint::weave([0.74, 0.71, 0.65], 128), Vec2::splat(0.3));
+        let linen = b.texture(paint::weave([0.62, 0.55, 0.44], 128), Vec2::splat(0.3));
         let rug = b.texture(
             paint::rug([0.55, 0.52, 0.47], [0.14, 0.20, 0.28], [0.62, 0.42, 0.16]),
             Vec2::new(2.6, 1.7),
@@ -63,7 +64,7 @@ impl Palette {
         });
         Self {
             wall: b.material(textured("wall", plaster, 0.85)),
-            feature: b.material(textured("blue wall", feature, 0.85)),
+            feature: b.material(textured("clay wall", feature, 0.85)),
             ceiling: b.material(matte("ceiling", [0.80, 0.79, 0.78], 0.9)),
             boards: b.material(varnished(textured("floor boards", boards, 0.55), 0.35, 0.25)),
             white: b.material(matte("white paint", [0.78, 0.77, 0.75], 0.35)),
@@ -99,7 +100,7 @@ pub(super) fn build() -> Scene {
     for (x, yaw, seed) in [(-1.35, 168.0, 1), (0.95, 205.0, 2)] {
         desk(b, m, x, seed);
         b.standing(Vec3::new(x + 0.1, 0.0, -0.62), yaw, |b| {
-            piece::office_chair(b, m.cloth, m.plastic, m.steel);
+            seating::office_chair(b, m.cloth, m.plastic, m.steel);
         });
     }
     lounge(b, m);
@@ -119,20 +120,20 @@ fn shell(b: &mut Builder, m: &Palette) {
         b.part(wall.frame(), |b| {
             let (door_gap, whole) = ([[0.0, 0.33], [1.37, 6.0]], [[0.0, wall.width]]);
             let stretches: &[[f32; 2]] = if i == 3 { &door_gap } else { &whole };
-            room::skirting(b, m.white, stretches, 0.10);
-            room::cornice(b, m.ceiling, wall.width, SIZE[1] + 0.004, 0.07);
+            fittings::skirting(b, m.white, stretches, 0.10);
+            fittings::cornice(b, m.ceiling, wall.width, SIZE[1] + 0.004, 0.07);
         });
     }
     b.part(walls[0].frame(), |b| {
         for hole in WINDOWS {
-            room::window_frame(b, m.white, hole, 0.09, [2, 1], 0.004);
-            room::window_board(b, m.oak, hole, THICKNESS);
+            fittings::window_frame(b, m.white, hole, 0.09, [2, 1], 0.004);
+            fittings::window_board(b, m.oak, hole, THICKNESS);
             let [u0, _, u1, _] = hole;
-            room::curtain(b, m.curtain, [u0 - 0.30, u0 + 0.0], [0.95, 2.36], 0.10, 4.0);
-            room::curtain(b, m.curtain, [u1 - 0.0, u1 + 0.30], [0.95, 2.36], 0.10, 4.0);
-            room::curtain_rod(b, m.brass, [u0 - 0.36, u1 + 0.36], 2.38, 0.10);
+            fittings::curtain(b, m.curtain, [u0 - 0.30, u0 + 0.0], [0.95, 2.36], 0.10, 4.0);
+            fittings::curtain(b, m.curtain, [u1 - 0.0, u1 + 0.30], [0.95, 2.36], 0.10, 4.0);
+            fittings::curtain_rod(b, m.brass, [u0 - 0.36, u1 + 0.36], 2.38, 0.10);
             b.part(placed([0.5 * (u0 + u1), 0.0, 0.0], [0.0; 3]), |b| {
-                piece::radiator(b, m.white, 0.95, 0.78)
+                piece::radiator(b, m.white, 0.95, 0.78);
             });
         }
         let [u0, v0, ..] = WINDOWS[1];
@@ -141,10 +142,10 @@ fn shell(b: &mut Builder, m: &Palette) {
             b.standing(Vec3::Y * soil, 0.0, |b| plants::blades(b, m.leaf, 8, 0.22, 6));
         });
     });
-    b.part(walls[3].frame(), |b| room::door(b, m.white, m.steel, 0.4, [0.9, 2.1]));
+    b.part(walls[3].frame(), |b| fittings::door(b, m.white, m.steel, 0.4, [0.9, 2.1]));
     for x in [-1.35, 0.95] {
         b.part(placed([x, SIZE[1], -0.9], [0.0; 3]), |b| {
-            piece::pendant(b, m.lamp, m.white, 0.85, 0.20)
+            lamps::pendant(b, m.lamp, m.white, 0.85, 0.20);
         });
     }
 }
@@ -156,11 +157,11 @@ fn wall_things(b: &mut Builder, m: &Palette) {
             [[0.62, 1.38, 0.62, 0.82], [2.36, 1.46, 0.50, 0.66]].into_iter().enumerate()
         {
             b.part(placed([u, v, 0.0], [0.0; 3]), |b| {
-                thing::picture(b, [m.oak, m.white, m.arts[k]], [w, h], 0.06)
+                thing::picture(b, [m.oak, m.white, m.arts[k]], [w, h], 0.06);
             });
         }
         b.part(placed([1.83, 1.95, 0.0], [0.0; 3]), |b| {
-            thing::clock(b, m.steel, m.white, m.plastic, 0.16)
+            thing::clock(b, m.steel, m.white, m.plastic, 0.16);
         });
         for (y, seed) in [(1.52, 5), (1.92, 9)] {
             b.slab(m.oak, [3.15, y, -0.01], [5.25, y + 0.03, 0.25], 0.004);
@@ -179,11 +180,11 @@ fn wall_things(b: &mut Builder, m: &Palette) {
                 );
             }
             b.standing(Vec3::new(3.22, y + 0.03, 0.13), 0.0, |b| {
-                thing::books(b, [m.cover, m.paper], 1.25, 0.30, 0.22, seed)
+                thing::books(b, [m.cover, m.paper], 1.25, 0.30, 0.22, seed);
             });
         }
         b.standing(Vec3::new(4.85, 1.55, 0.12), 0.0, |b| {
-            thing::vase(b, m.ceramic, 0.22, &[0.2, 0.33, 0.28, 0.12, 0.16])
+            thing::vase(b, m.ceramic, 0.22, &[0.2, 0.33, 0.28, 0.12, 0.16]);
         });
         b.standing(Vec3::new(4.85, 1.95, 0.12), 0.0, |b| {
             let soil = plants::pot(b, m.clay, m.soil, 0.075, 0.12);
@@ -204,14 +205,14 @@ fn desk(b: &mut Builder, m: &Palette, x: f32, seed: u32) {
             b.standing(Vec3::new(x * mirror, height, z), yaw, |b| build(b));
         };
         on_top(0.05, -0.18, -4.0 * mirror, &mut |b| {
-            thing::monitor(b, m.plastic, m.screen, [0.60, 0.36])
+            desktop::monitor(b, m.plastic, m.screen, [0.60, 0.36]);
         });
-        on_top(0.03, 0.16, 2.0, &mut |b| thing::keyboard(b, m.plastic, m.keys));
-        on_top(0.34 * mirror, 0.17, -6.0, &mut |b| thing::mouse(b, m.plastic));
-        on_top(-0.62, -0.22, 40.0 * mirror, &mut |b| thing::desk_lamp(b, m.lamp, m.white));
-        on_top(-0.48, 0.18, 14.0, &mut |b| thing::papers(b, m.paper, 5, seed));
+        on_top(0.03, 0.16, 2.0, &mut |b| desktop::keyboard(b, m.plastic, m.keys));
+        on_top(0.34 * mirror, 0.17, -6.0, &mut |b| desktop::mouse(b, m.plastic));
+        on_top(-0.62, -0.22, 40.0 * mirror, &mut |b| lamps::desk_lamp(b, m.lamp, m.white));
+        on_top(-0.48, 0.18, 14.0, &mut |b| desktop::papers(b, m.paper, 5, seed));
         on_top(0.60, 0.10, 60.0, &mut |b| thing::mug(b, m.ceramic, m.soil));
-        on_top(0.66, -0.24, 0.0, &mut |b| thing::pencils(b, m.steel, m.cover));
+        on_top(0.66, -0.24, 0.0, &mut |b| desktop::pencils(b, m.steel, m.cover));
         on_top(0.46, -0.26, 80.0, &mut |b| thing::book_stack(b, [m.cover, m.paper], 3, seed + 40));
     });
     b.standing(Vec3::new(x - 0.95 * mirror, 0.0, -1.35), 0.0, |b| thing::basket(b, m.steel));
@@ -220,12 +221,12 @@ fn desk(b: &mut Builder, m: &Palette, x: f32, seed: u32) {
 fn lounge(b: &mut Builder, m: &Palette) {
     b.standing(Vec3::new(-0.5, 0.0, 0.75), 0.0, |b| piece::rug(b, m.rug, m.fringe, [2.6, 1.7]));
     b.standing(Vec3::new(-0.2, 0.0, 1.48), 180.0, |b| {
-        piece::sofa(b, m.sofa, m.oak, 1.9, 2);
+        seating::sofa(b, m.sofa, m.oak, 1.9, 2);
         b.part(placed([-0.55, 0.69, 0.0], [68.0, -16.0, 0.0]), |b| {
-            b.tinted([1.5, 0.95, 0.30], |b| piece::pillow(b, m.sofa, 0.21));
+            b.tinted([1.5, 0.95, 0.30], |b| seating::pillow(b, m.sofa, 0.21));
         });
     });
-    b.standing(Vec3::new(-1.75, 0.0, 1.25), 120.0, |b| piece::side_chair(b, m.oak, m.cloth));
+    b.standing(Vec3::new(-1.75, 0.0, 1.25), 120.0, |b| seating::side_chair(b, m.oak, m.cloth));
     b.standing(Vec3::new(2.82, 0.0, -0.85), -90.0, |b| {
         piece::bookcase(b, [m.oak, m.cover, m.paper], [1.9, 2.0, 0.32], 5, |b, row, _| match row {
             0 => thing::basket(b, m.fringe),
@@ -240,7 +241,7 @@ fn lounge(b: &mut Builder, m: &Palette) {
     });
     b.standing(Vec3::new(-2.70, 0.0, 0.0), 90.0, |b| {
         piece::drawers(b, m.white, m.steel, [0.7, 0.95, 0.40], [1, 3]);
-        b.standing(Vec3::new(-0.15, 0.95, 0.0), 10.0, |b| thing::papers(b, m.paper, 4, 9));
+        b.standing(Vec3::new(-0.15, 0.95, 0.0), 10.0, |b| desktop::papers(b, m.paper, 4, 9));
         b.standing(Vec3::new(0.18, 0.95, -0.02), 0.0, |b| {
             let soil = plants::pot(b, m.clay, m.soil, 0.08, 0.13);
             b.standing(Vec3::Y * soil, 0.0, |b| plants::big_leaves(b, m.leaf, 12, 0.3, 15));

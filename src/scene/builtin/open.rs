@@ -14,7 +14,7 @@ use crate::scene::Scene;
 /// Builds the scene.
 pub(super) fn build() -> Scene {
     let b = &mut Builder::new("open");
-    let paving = b.texture(paint::stones([0.56, 0.53, 0.48], 4, 4, 0.012), Vec2::splat(3.6));
+    let paving = b.texture(paint::stones([0.62, 0.55, 0.45], 4, 4, 0.012), Vec2::splat(3.6));
     let oak = b.texture(paint::timber([0.46, 0.30, 0.17]), Vec2::new(1.4, 0.7));
     let ground = b.material(textured("paving", paving, 0.75));
     let stone = b.material(matte("limestone", [0.66, 0.63, 0.57], 0.8));
@@ -33,7 +33,7 @@ pub(super) fn build() -> Scene {
     b.standing(Vec3::new(1.75, 0.0, -0.9), 25.0, |b| {
         b.slab(stone, [-0.55, 0.0, -0.55], [0.55, 1.1, 0.55], 0.03);
         b.standing(Vec3::Y * 1.1, 0.0, |b| {
-            thing::vase(b, blue, 0.62, &[0.2, 0.36, 0.40, 0.27, 0.11, 0.17])
+            thing::vase(b, blue, 0.62, &[0.2, 0.36, 0.40, 0.27, 0.11, 0.17]);
         });
     });
     b.standing(Vec3::new(1.35, 0.0, 0.75), -20.0, |b| bench(b, wood, steel));
@@ -46,7 +46,7 @@ pub(super) fn build() -> Scene {
         }
     });
     b.standing(Vec3::new(3.6, 0.0, -3.2), 0.0, |b| {
-        thing::vase(b, ceramic, 1.5, &[0.14, 0.25, 0.30, 0.22, 0.10, 0.13])
+        thing::vase(b, ceramic, 1.5, &[0.14, 0.25, 0.30, 0.22, 0.10, 0.13]);
     });
     b.camera("terrace", [0.6, 1.6, 6.0], [0.0, 0.78, 0.0], 40.0);
     std::mem::replace(b, Builder::new("")).finish()

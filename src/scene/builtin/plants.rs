@@ -72,7 +72,7 @@ pub(super) fn blades(b: &mut Builder, mat: Mat, count: u32, height: f32, seed: u
         let tone = GREENS[stream.index(GREENS.len())];
         b.part(growing(out * (0.02 + 0.1 * lean * height), Vec3::Y + out * lean), |b| {
             b.tinted(tone, |b| {
-                leaf(b, mat, [h, 0.14 * height.sqrt() * 0.6], stream.between(-0.25, 0.25), [4, 10])
+                leaf(b, mat, [h, 0.14 * height.sqrt() * 0.6], stream.between(-0.25, 0.25), [4, 10]);
             });
         });
     }
@@ -103,7 +103,7 @@ pub(super) fn big_leaves(b: &mut Builder, mat: Mat, count: u32, height: f32, see
             let size = height * stream.between(0.26, 0.36);
             let rise = stream.between(-0.1, 0.5);
             b.part(growing(tip, out + Vec3::Y * rise), |b| {
-                leaf(b, mat, [size, 0.62 * size], stream.between(0.6, 1.3), [8, 12])
+                leaf(b, mat, [size, 0.62 * size], stream.between(0.6, 1.3), [8, 12]);
             });
         });
     }
@@ -184,7 +184,7 @@ pub(super) fn foliage(
         let tone = GREENS[stream.index(GREENS.len())];
         b.tinted(tone, |b| {
             b.part(growing(at, out + wander), |b| {
-                leaf(b, mat, [length, 0.6 * length], 0.6, [2, 2])
+                leaf(b, mat, [length, 0.6 * length], 0.6, [2, 2]);
             });
         });
     }

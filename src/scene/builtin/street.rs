@@ -6,13 +6,13 @@ use std::f32::consts::TAU;
 use glam::{Vec2, Vec3};
 
 use super::facade::{self, HouseMats, Rhythm};
-use super::furniture as piece;
 use super::materials::{self as make, matte, textured, two_sided};
 use super::mesh::{Builder, Mat};
 use super::objects as thing;
 use super::plants;
 use super::room::Wall;
 use super::textures as paint;
+use super::{lamps, seating};
 use crate::scene::Scene;
 
 struct Palette {
@@ -117,27 +117,25 @@ fn street(name: &str) -> Builder {
     cafe(b, m);
     greenery(b, m);
     for z in [-24.0, -17.0, -10.0, -3.0, 4.0] {
-        b.standing(Vec3::new(2.55, 0.0, z), 0.0, |b| {
-            facade::street_lamp(b, m.iron, m.lantern, 3.7)
-        });
+        b.standing(Vec3::new(2.55, 0.0, z), 0.0, |b| lamps::street_lamp(b, m.iron, m.lantern, 3.7));
     }
-    for z in [-26.0, -20.5, -13.5] {
+    for z in [-20.5, -13.5] {
         b.standing(Vec3::new(-1.75, 0.0, z), 0.0, |b| {
-            facade::street_lamp(b, m.iron, m.lantern, 3.7)
+            lamps::street_lamp(b, m.iron, m.lantern, 3.7);
         });
     }
     builder
 }
 
 fn houses(b: &mut Builder, m: &Palette) {
-    let row = |bays, floors, shops| Rhythm { bays, floors, ground: 3.6, shops };
+    let row = |floors, shops| Rhythm { floors, ground: 3.6, shops };
     facade::house(
         b,
         &m.brick_house,
         [-14.0, -30.0, -6.0, -8.0],
         11.0,
         [false, true, false, true],
-        row(7, 2, true),
+        row(2, true),
     );
     facade::house(
         b,
@@ -145,7 +143,7 @@ fn houses(b: &mut Builder, m: &Palette) {
         [5.0, -34.0, 14.0, -10.0],
         14.0,
         [true, false, false, true],
-        row(8, 3, true),
+        row(3, true),
     );
     facade::house(
         b,
@@ -153,7 +151,7 @@ fn houses(b: &mut Builder, m: &Palette) {
         [-5.0, -41.0, 4.0, -35.0],
         18.0,
         [false, false, false, true],
-        row(3, 4, false),
+        row(4, false),
     );
     facade::house(
         b,
@@ -161,7 +159,7 @@ fn houses(b: &mut Builder, m: &Palette) {
         [-16.0, -6.0, -7.0, 9.0],
         9.0,
         [false, true, true, false],
-        row(5, 2, true),
+        row(2, true),
     );
     facade::house(
         b,
@@ -169,7 +167,7 @@ fn houses(b: &mut Builder, m: &Palette) {
         [7.0, -7.5, 16.0, 9.0],
         6.6,
         [true, false, true, false],
-        row(6, 1, false),
+        row(1, false),
     );
 }
 
@@ -179,7 +177,7 @@ fn arcade(b: &mut Builder, m: &Palette) {
     let (x, z0, bay, spring, top) = (3.25, -9.0, 2.33, 2.35, 3.75);
     for k in 0..7 {
         b.standing(Vec3::new(x + 0.2, 0.09, z0 + bay * k as f32), 0.0, |b| {
-            facade::column(b, stone, spring - 0.09, 0.17)
+            facade::column(b, stone, spring - 0.09, 0.17);
         });
     }
     let wall = Wall { origin: Vec3::new(x, 0.0, z0 - 0.22), along: Vec3::Z, width: 6.0 * bay };
@@ -231,7 +229,7 @@ fn cafe(b: &mut Builder, m: &Palette) {
             b.drum(m.marble, [0.70, 0.728], [0.36, 0.36], 0.008);
             b.standing(Vec3::new(0.12, 0.728, 0.05), 60.0, |b| thing::mug(b, m.ceramic, m.coffee));
             b.standing(Vec3::new(-0.15, 0.728, 0.10), 200.0, |b| {
-                thing::mug(b, m.ceramic, m.coffee)
+                thing::mug(b, m.ceramic, m.coffee);
             });
             b.standing(Vec3::new(-0.02, 0.728, -0.10), 0.0, |b| {
                 b.drum(m.ceramic, [0.0, 0.05], [0.03, 0.04], 0.003);
@@ -248,7 +246,7 @@ fn cafe(b: &mut Builder, m: &Palette) {
             for turn in [0.0, 130.0, 235.0].into_iter().take(2 + k % 2) {
                 let (s, c) = f32::to_radians(turn + 7.0 * k as f32).sin_cos();
                 b.standing(Vec3::new(0.68 * s, 0.0, 0.68 * c), 180.0 + turn, |b| {
-                    piece::side_chair(b, m.wood, m.cane)
+                    seating::side_chair(b, m.wood, m.cane);
                 });
             }
         });
@@ -259,7 +257,7 @@ fn greenery(b: &mut Builder, m: &Palette) {
     for (x, z, height, seed) in [(1.7, -14.0, 5.6, 1), (1.75, -21.5, 5.2, 2), (-1.2, -9.2, 4.8, 4)]
     {
         b.standing(Vec3::new(x, 0.0, z), seed as f32 * 50.0, |b| {
-            plants::tree(b, m.bark, m.leaf, height, 1500, seed);
+            plants::tree(b, m.bark, m.leaf, height, 1250, seed);
             b.drum(m.iron, [-0.01, 0.012], [0.55, 0.55], 0.004);
         });
     }

@@ -36,7 +36,7 @@ fn grain(uv: Vec2, tone: Vec3, seed: u32) -> Vec3 {
     let warp = tiling_fbm(uv * Vec2::new(4.0, 8.0) + shift, IVec2::new(4, 8), 2, seed);
     let rings = uv.y * 14.0 + 3.2 * warp + shift;
     let ring = 0.5 + 0.5 * (rings * std::f32::consts::TAU).sin();
-    let fibre = tiling_fbm(uv * Vec2::new(16.0, 256.0) + shift, IVec2::new(16, 256), 2, seed ^ 5);
+    let fibre = tiling(uv * Vec2::new(20.0, 300.0) + shift, IVec2::new(20, 300), seed ^ 5);
     let pores =
         smoothstep(0.62, 0.8, tiling(uv * Vec2::new(40.0, 400.0), IVec2::new(40, 400), seed ^ 9));
     let light = 0.80 + 0.13 * ring + 0.34 * (fibre - 0.5) - 0.12 * pores + 0.15 * (warp - 0.5);
@@ -229,6 +229,10 @@ pub(super) fn painting(seed: u32) -> TextureImage {
         c = c.lerp(palette[1].lerp(palette[4], 0.25), 1.0 - smoothstep(0.135, 0.14, sun));
         for layer in 0..4_u32 {
             let base = 0.44 + 0.13 * layer as f32;
+            // Hills rise at most 0.14 above their base.
+            if uv.y < base - 0.15 {
+                break;
+            }
             let hill = tiling_fbm(
                 Vec2::new(uv.x * 3.0, layer as f32),
                 IVec2::new(3, 8),

@@ -1,0 +1,180 @@
+//! What is fitted to walls, in a wall's frame: window frames, mouldings, doors, curtains.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::{Affine3A, Vec2, Vec3};
+
+use super::mesh::{Builder, LIFT, Mat};
+
+/// A wooden window frame without panes in a wall's frame: `hole` as given to the wall, sitting
+/// `depth` behind the inner face, with `columns` x `rows` lights and edges rounded by `bevel`.
+pub(super) fn window_frame(
+    b: &mut Builder,
+    mat: Mat,
+    hole: [f32; 4],
+    depth: f32,
+    [columns, rows]: [u32; 2],
+    bevel: f32,
+) {
+    let [u0, v0, u1, v1] = hole;
+    let (bar, thick, bury) = (0.045, 0.05, 0.006);
+    let (z0, z1) = (-depth - thick, -depth);
+    let mut piece = |u: [f32; 2], v: [f32; 2], z: [f32; 2]| {
+        b.slab(mat, [u[0], v[0], z[0]], [u[1], v[1], z[1]], bevel);
+    };
+    piece([u0 - bury, u0 + bar], [v0 - bury, v1 + bury], [z0, z1]);
+    piece([u1 - bar, u1 + bury], [v0 - bury, v1 + bury], [z0, z1]);
+    piece([u0 + 0.01, u1 - 0.01], [v0 - bury, v0 + bar], [z0 + 0.001, z1 - 0.001]);
+    piece([u0 + 0.01, u1 - 0.01], [v1 - bar, v1 + bury], [z0 + 0.001, z1 - 0.001]);
+    for i in 1..columns {
+        let u = u0 + (u1 - u0) * i as f32 / columns as f32;
+        piece([u - 0.016, u + 0.016], [v0 + 0.01, v1 - 0.01], [z0 + 0.008, z1 - 0.008]);
+    }
+    for j in 1..rows {
+        let v = v0 + (v1 - v0) * j as f32 / rows as f32;
+        piece([u0 + 0.01, u1 - 0.01], [v - 0.013, v + 0.013], [z0 + 0.012, z1 - 0.012]);
+    }
+}
+
+/// A window board that reaches into the room below a window.
+pub(super) fn window_board(b: &mut Builder, mat: Mat, hole: [f32; 4], thickness: f32) {
+    let [u0, v0, u1, _] = hole;
+    b.slab(
+        mat,
+        [u0 + 0.002, v0 - 0.02, -thickness + 0.01],
+        [u1 - 0.002, v0 + 0.015, 0.0 + LIFT],
+        0.003,
+    );
+    b.slab(mat, [u0 - 0.06, v0 - 0.018, -0.01], [u1 + 0.06, v0 + 0.014, 0.07], 0.008);
+}
+
+/// A flat moulding around an opening on the room's side, open at the bottom if `to_floor`.
+pub(super) fn architrave(b: &mut Builder, mat: Mat, hole: [f32; 4], to_floor: bool) {
+    let [u0, v0, u1, v1] = hole;
+    let (w, z) = (0.07, [-0.005, 0.018]);
+    let foot = if to_floor { v0 } else { v0 - w };
+    b.slab(mat, [u0 - w, foot, z[0]], [u0, v1 + w, z[1]], 0.006);
+    b.slab(mat, [u1, foot, z[0]], [u1 + w, v1 + w, z[1]], 0.006);
+    b.slab(mat, [u0 - 0.003, v1 + 0.0006, z[0]], [u1 + 0.003, v1 + w - 0.001, z[1] - 0.001], 0.006);
+    if !to_floor {
+        b.slab(
+            mat,
+            [u0 - 0.003, foot + 0.001, z[0]],
+            [u1 + 0.003, v0 - 0.0006, z[1] - 0.001],
+            0.006,
+        );
+    }
+}
+
+/// Skirting along a wall between the given stretches (u from, u to), in the wall's frame.
+pub(super) fn skirting(b: &mut Builder, mat: Mat, stretches: &[[f32; 2]], height: f32) {
+    for &[u0, u1] in stretches {
+        b.slab(mat, [u0, -0.01, -0.01], [u1, height - 0.025, 0.018], 0.002);
+        b.slab(mat, [u0 + 0.0005, height - 0.03, -0.009], [u1 - 0.0005, height, 0.012], 0.006);
+    }
+}
+
+/// A quarter-round ceiling moulding along a wall of `width`, in the wall's frame.
+pub(super) fn cornice(b: &mut Builder, mat: Mat, width: f32, height: f32, radius: f32) {
+    b.sheet(mat, [1, 12], Vec2::new(width, radius), |u, v| {
+        let (s, c) = (v * 0.5 * PI).sin_cos();
+        let swell = 0.12 * radius * (v * TAU).sin();
+        Vec3::new(
+            u * (width + 0.02) - 0.01,
+            height - radius * (1.0 - s) - 0.5 * swell,
+            radius * (1.0 - c) + 0.5 * swell,
+        )
+    });
+}
+
+/// Raised rectangular moulding on a wall, in the wall's frame.
+pub(super) fn panel_moulding(b: &mut Builder, mat: Mat, [u0, v0, u1, v1]: [f32; 4]) {
+    let (w, z) = (0.03, [-0.004, 0.012]);
+    for (u, v) in [([u0, u0 + w], [v0, v1]), ([u1 - w, u1], [v0, v1])] {
+        b.slab(mat, [u[0], v[0], z[0]], [u[1], v[1], z[1]], 0.006);
+    }
+    for v in [v0, v1 - w] {
+        b.slab(
+            mat,
+            [u0 + 0.002, v + 0.0005, z[0]],
+            [u1 - 0.002, v + w - 0.0005, z[1] - 0.0008],
+            0.006,
+        );
+    }
+}
+
+/// A closed panelled door of `width` x `height` with handle and architrave on the wall's inner face,
+/// its left edge at `u`.
+pub(super) fn door(b: &mut Builder, leaf: Mat, metal: Mat, u: f32, [width, height]: [f32; 2]) {
+    b.slab(leaf, [u + 0.003, 0.005, -0.01], [u + width - 0.003, height - 0.003, 0.010], 0.003);
+    architrave(b, leaf, [u, 0.001, u + width, height], true);
+    let (stile, middle) = (0.11, 0.92);
+    for [v0, v1] in [[0.22, middle - 0.06], [middle + 0.06, height - 0.12]] {
+        panel_moulding_at(b, leaf, [u + stile, v0, u + width - stile, v1], 0.010);
+        b.slab(
+            leaf,
+            [u + stile + 0.06, v0 + 0.06, 0.0],
+            [u + width - stile - 0.06, v1 - 0.06, 0.017],
+            0.007,
+        );
+    }
+    let knob = Vec3::new(u + width - 0.06, 1.02, 0.012);
+    b.part(Affine3A::from_translation(knob) * Affine3A::from_rotation_x(0.5 * PI), |b| {
+        b.drum(metal, [-0.005, 0.006], [0.027, 0.026], 0.002);
+    });
+    let elbow = knob + Vec3::Z * 0.045;
+    let grip = elbow - Vec3::X * 0.12;
+    b.tube(
+        metal,
+        14,
+        &[
+            (knob, 0.009),
+            (elbow - Vec3::Z * 0.008, 0.009),
+            (elbow - Vec3::new(0.008, 0.0, 0.0), 0.009),
+            (grip, 0.0085),
+            (grip - Vec3::X * 0.003, 0.004),
+        ],
+    );
+}
+
+/// [`panel_moulding`] raised to stand on a leaf of thickness `z`.
+fn panel_moulding_at(b: &mut Builder, mat: Mat, panel: [f32; 4], z: f32) {
+    b.part(Affine3A::from_translation(Vec3::Z * z), |b| panel_moulding(b, mat, panel));
+}
+
+/// A curtain that hangs from `top` to `bottom` between `u` in a wall's frame, `offset` before the wall,
+/// with `folds` folds, gathered a little at the top.
+pub(super) fn curtain(
+    b: &mut Builder,
+    mat: Mat,
+    u: [f32; 2],
+    [bottom, top]: [f32; 2],
+    offset: f32,
+    folds: f32,
+) {
+    let width = u[1] - u[0];
+    let length = width * 2.0;
+    b.sheet(mat, [(folds * 16.0) as u32, 16], Vec2::new(length, top - bottom), |s, t| {
+        let phase =
+            s * folds * TAU + 0.9 * (s * 9.0 + u[0]).sin() + 0.25 * (t * 5.0 + s * 20.0).sin();
+        let swell = 0.030 + 0.028 * (1.0 - t);
+        let sway = 0.015 * (s * 7.0 + 1.0).sin() * (1.0 - t);
+        Vec3::new(
+            u[0] + width * (s + 0.004 * (2.0 * phase).sin()),
+            bottom + (top - bottom) * t,
+            offset + swell * phase.sin() + sway,
+        )
+    });
+}
+
+/// A curtain rod with end knobs and rings, in a wall's frame.
+pub(super) fn curtain_rod(b: &mut Builder, mat: Mat, u: [f32; 2], height: f32, offset: f32) {
+    b.rod(mat, Vec3::new(u[0], height, offset), Vec3::new(u[1], height, offset), 0.013);
+    for end in u {
+        b.ball(mat, Vec3::new(end, height, offset), 0.028);
+    }
+    for s in [0.08, 0.5, 0.92] {
+        let at = u[0] + s * (u[1] - u[0]);
+        b.rod(mat, Vec3::new(at, height, offset), Vec3::new(at, height, -0.01), 0.008);
+    }
+}

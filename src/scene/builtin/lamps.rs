@@ -1,0 +1,157 @@
+//! Lamps, all unlit: their origin is below their middle, or at the ceiling.
+
+use std::f32::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::{Affine3A, Vec3};
+
+use super::furniture::placed;
+use super::mesh::{Builder, Mat};
+
+/// A floor lamp: a curved arm over a heavy foot, and a linen drum shade (unlit).
+pub(super) fn arc_lamp(
+    b: &mut Builder,
+    metal: Mat,
+    shade: Mat,
+    stone: Mat,
+    height: f32,
+    reach: f32,
+) {
+    b.drum(stone, [0.0, 0.05], [0.17, 0.17], 0.012);
+    let mut path = vec![(Vec3::Y * 0.04, 0.011), (Vec3::Y * height * 0.55, 0.011)];
+    for i in 1..=24 {
+        let t = i as f32 / 24.0;
+        let (s, c) = (t * 0.62 * PI).sin_cos();
+        path.push((
+            Vec3::new(reach * 0.5 * (1.0 - c) * 1.5, height * (0.55 + 0.45 * s), 0.0),
+            0.011 - 0.003 * t,
+        ));
+    }
+    let tip = path[path.len() - 1].0;
+    path.push((tip - Vec3::Y * 0.08, 0.008));
+    b.tube(metal, 14, &path);
+    b.part(Affine3A::from_translation(tip - Vec3::Y * 0.09), |b| {
+        b.drum(metal, [-0.05, 0.03], [0.022, 0.014], 0.003);
+        drum_shade(b, shade, 0.21, 0.17, 0.25);
+        b.ball(shade, Vec3::new(0.0, -0.09, 0.0), 0.05);
+    });
+}
+
+/// A lamp shade open at top and bottom, its top at y = 0.
+pub(super) fn drum_shade(b: &mut Builder, cloth: Mat, bottom: f32, top: f32, height: f32) {
+    let wall = 0.003;
+    b.lathe(
+        cloth,
+        64,
+        &[
+            (bottom - wall, -height),
+            (bottom, -height),
+            (top, 0.0),
+            (top - wall, 0.0),
+            (bottom - wall, -height),
+        ],
+    );
+    for k in 0..3 {
+        let (s, c) = (k as f32 * TAU / 3.0).sin_cos();
+        b.rod(cloth, Vec3::Y * -0.02, Vec3::new(top * s * 0.99, -0.012, top * c * 0.99), 0.002);
+    }
+}
+
+/// A pendant on a cable from the ceiling at y = 0, its shade `drop` below (unlit).
+pub(super) fn pendant(b: &mut Builder, metal: Mat, inside: Mat, drop: f32, radius: f32) {
+    b.drum(metal, [-0.03, 0.01], [0.05, 0.055], 0.004);
+    b.rod(inside, Vec3::Y * -0.02, Vec3::Y * (0.10 - drop), 0.003);
+    let mut outer = Vec::new();
+    for i in 0..=16 {
+        let (s, c) = (i as f32 / 16.0 * FRAC_PI_2).sin_cos();
+        outer.push((radius * c.max(0.07), radius * 0.75 * s - drop));
+    }
+    b.lathe(metal, 64, &outer);
+    b.drum(
+        metal,
+        [radius * 0.75 - drop - 0.01, radius * 0.75 - drop + 0.05],
+        [radius * 0.1, 0.012],
+        0.003,
+    );
+    let inner: Vec<(f32, f32)> =
+        outer.iter().rev().map(|&(r, y)| (r - 0.002, y - 0.002 * (1.0 - r / radius))).collect();
+    b.lathe(inside, 64, &inner);
+    b.lathe(metal, 64, &[(radius - 0.002, -drop), (radius, -drop)]);
+    b.ball(inside, Vec3::Y * (0.25 * radius - drop), 0.05);
+}
+
+/// A jointed desk lamp that bows towards +Z (unlit).
+pub(super) fn desk_lamp(b: &mut Builder, metal: Mat, inside: Mat) {
+    b.drum(metal, [0.0, 0.022], [0.085, 0.080], 0.006);
+    let joints = [Vec3::new(0., 0.02, 0.), Vec3::new(0., 0.30, -0.13), Vec3::new(0., 0.50, 0.12)];
+    for pair in joints.windows(2) {
+        for side in [-0.011, 0.011] {
+            b.rod(metal, pair[0] + Vec3::X * side, pair[1] + Vec3::X * side, 0.0045);
+        }
+    }
+    for joint in &joints[1..] {
+        b.rod(metal, *joint - Vec3::X * 0.02, *joint + Vec3::X * 0.02, 0.012);
+    }
+    b.part(placed([0.0, 0.50, 0.125], [-28.0, 0.0, 0.0]), |b| {
+        let outer =
+            [(0.018, 0.045), (0.026, 0.02), (0.035, -0.005), (0.062, -0.05), (0.078, -0.10)];
+        let mut profile: Vec<(f32, f32)> = outer.iter().rev().copied().collect();
+        profile.push((0.0, 0.05));
+        b.lathe(metal, 40, &profile);
+        let mut lining: Vec<(f32, f32)> = outer[1..].iter().map(|&(r, y)| (r - 0.002, y)).collect();
+        lining.insert(0, (0.0, 0.018));
+        b.lathe(inside, 40, &lining);
+        b.lathe(metal, 40, &[(0.076, -0.10), (0.078, -0.10)]);
+        b.ball(inside, Vec3::new(0.0, -0.035, 0.0), 0.025);
+    });
+}
+
+/// A street lamp with a lantern (unlit).
+pub(super) fn street_lamp(b: &mut Builder, metal: Mat, pane: Mat, height: f32) {
+    let h = height;
+    b.lathe(
+        metal,
+        24,
+        &[
+            (0.17, -0.01),
+            (0.17, 0.10),
+            (0.13, 0.14),
+            (0.10, 0.55),
+            (0.12, 0.58),
+            (0.12, 0.64),
+            (0.065, 0.70),
+            (0.05, 0.75 * h),
+            (0.075, 0.76 * h),
+            (0.075, 0.775 * h),
+            (0.042, 0.79 * h),
+            (0.038, h - 0.62),
+            (0.09, h - 0.58),
+            (0.11, h - 0.55),
+        ],
+    );
+    b.part(Affine3A::from_translation(Vec3::Y * (h - 0.56)), |b| {
+        b.lathe(pane, 6, &[(0.10, 0.0), (0.19, 0.40)]);
+        for k in 0..6 {
+            let (s, c) = (k as f32 * PI / 3.0).sin_cos();
+            b.rod(
+                metal,
+                Vec3::new(0.10 * c, 0.0, 0.10 * s),
+                Vec3::new(0.192 * c, 0.40, 0.192 * s),
+                0.009,
+            );
+        }
+        b.lathe(
+            metal,
+            24,
+            &[
+                (0.0, 0.395),
+                (0.215, 0.395),
+                (0.22, 0.41),
+                (0.13, 0.50),
+                (0.05, 0.55),
+                (0.05, 0.58),
+                (0.022, 0.60),
+                (0.0, 0.66),
+            ],
+        );
+    });
+}

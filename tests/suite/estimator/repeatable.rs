@@ -1,0 +1,201 @@
+//! The same seed gives the same bits.
+
+use std::sync::atomic::AtomicBool;
+
+use glam::Vec2;
+use lightgrid::environment::{Environment, sky};
+use lightgrid::light_grid::cells::SphericalGrid;
+use lightgrid::light_grid::{LawOptions, LearningGrid, LightGrid};
+use lightgrid::path::camera::CameraRays;
+use lightgrid::path::{PathLimits, PathTracer, World};
+use lightgrid::render::film::Film;
+use lightgrid::render::{Phase, Sampling, Session, View};
+use lightgrid::sampler::Sampler;
+use lightgrid::scene::Camera;
+use rayon::prelude::*;
+
+use super::scenes::{pane, room};
+use super::{environment, learned, view};
+
+struct Setting {
+    world: World,
+    camera: Camera,
+    environment: Environment,
+}
+
+impl Setting {
+    fn new() -> Self {
+        let (world, camera) = room(0.6, Some(&pane()));
+        Self { world, camera, environment: environment(sky::build("day", 128, 64).expect("a sky")) }
+    }
+
+    fn view(&self, sampling: Sampling) -> View {
+        View {
+            width: 33,
+            height: 17,
+            limits: PathLimits { bounces: 5, russian_roulette: true },
+            ..view(self.camera.clone(), sampling, 5)
+        }
+    }
+
+    fn session(&self, view: View) -> Session<'_> {
+        learned(&self.world, &self.environment, view)
+    }
+}
+
+fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    pool.install(work)
+}
+
+/// Every probability of every cell's law.
+fn laws(grid: &LightGrid) -> Vec<(u32, Vec<u32>)> {
+    let cells = grid.grid().map_or(0, |grid| grid.cell_count());
+    let laws = grid.laws();
+    let of_law = |law| -> Vec<u32> {
+        (0..laws.tile_count()).map(|tile| laws.probability(law, tile).to_bits()).collect()
+    };
+    let used = (0..cells).map(|cell| (cell, grid.law_of_cell(cell))).filter(|(_, law)| *law > 0);
+    used.map(|(cell, law)| (cell, of_law(law))).collect()
+}
+
+#[test]
+fn film_and_laws_do_not_depend_on_the_threads() {
+    let setting = Setting::new();
+    for sampling in [Sampling::Adaptive, Sampling::Talk] {
+        let result = |threads| {
+            with_threads(threads, || {
+                let mut session = setting.session(setting.view(sampling));
+                session.advance(8, &AtomicBool::new(false));
+                let laws = laws(session.grid().expect("a map with light"));
+                (session.film().clone(), laws, *session.figures())
+            })
+        };
+        let (film, laws, figures) = result(1);
+        assert!(figures.learned_cells > 50, "{figures:?}");
+        assert_eq!(laws.len(), figures.learned_cells);
+        for threads in [2, 5] {
+            let other = result(threads);
+            assert!(film == other.0, "{sampling:?}: the film differs with {threads} threads");
+            assert!(laws == other.1, "{sampling:?}: the laws differ with {threads} threads");
+            assert_eq!(figures.rays, other.2.rays);
+            assert_eq!(figures.learning_rays, other.2.learning_rays);
+        }
+    }
+}
+
+#[test]
+fn counters_do_not_depend_on_the_threads() {
+    let setting = Setting::new();
+    let view = setting.view(Sampling::Adaptive);
+    let rays = CameraRays::new(&view.camera, view.width, view.height);
+    let energies = setting.environment.tile_energies();
+    let whole_map = LightGrid::whole_map(energies).expect("a map with light");
+    let tracer = PathTracer {
+        world: &setting.world,
+        environment: &setting.environment,
+        grid: Some(&whole_map),
+        limits: view.limits,
+    };
+    let digest = |threads| {
+        let grid = SphericalGrid { center: rays.position(), columns: 64, rows: 32, faces: true };
+        let mut learning =
+            LearningGrid::new(grid, setting.environment.tile_count(), LawOptions::ADAPTIVE);
+        for pass in 0..3 {
+            with_threads(threads, || {
+                (0..4096_u32).into_par_iter().for_each(|path| {
+                    let mut sampler = Sampler::new(7, pass, path);
+                    let [x, y] = sampler.next_pair();
+                    let pixel = Vec2::new(x * view.width as f32, y * view.height as f32);
+                    tracer.learn(rays.ray(pixel, Vec2::ZERO), sampler, &learning);
+                });
+            });
+            learning.counters.end_pass();
+        }
+        (learning.counters.digest(), learning.counters.cells().len())
+    };
+    let (expected, cells) = digest(1);
+    assert!(cells > 50);
+    for threads in [2, 5] {
+        assert_eq!(digest(threads), (expected, cells), "{threads} threads");
+    }
+}
+
+#[test]
+fn passes_may_be_cut_anywhere() {
+    let setting = Setting::new();
+    let film = |passes: &[u32]| -> Film {
+        let mut session = setting.session(setting.view(Sampling::Adaptive));
+        for &samples in passes {
+            session.advance(samples, &AtomicBool::new(false));
+        }
+        session.film().clone()
+    };
+    let whole = film(&[8]);
+    assert_eq!(whole.min_samples(), 8);
+    for passes in [&[1; 8][..], &[3, 5], &[7, 1]] {
+        assert!(whole == film(passes), "passes of {passes:?}");
+    }
+}
+
+#[test]
+fn a_cancelled_pass_resumes_to_the_same_picture() {
+    let setting = Setting::new();
+    let whole = {
+        let mut session = setting.session(setting.view(Sampling::Adaptive));
+        session.advance(8, &AtomicBool::new(false));
+        session.film().clone()
+    };
+    let mut session = setting.session(setting.view(Sampling::Adaptive));
+    session.advance(3, &AtomicBool::new(false));
+    // Cancelled somewhere in the middle, at the latest after the pass.
+    let cancel = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            std::thread::sleep(std::time::Duration::from_millis(1));
+            cancel.store(true, std::sync::atomic::Ordering::Relaxed);
+        });
+        session.advance(200, &cancel);
+    });
+    assert!(session.film().total_samples() < 203 * 33 * 17, "it was too fast to be cancelled");
+    assert!(session.film().min_samples() >= 3, "what was done is kept");
+    let mut reference = setting.session(setting.view(Sampling::Adaptive));
+    while session.film().min_samples() < 203 {
+        let missing = 203 - session.film().min_samples();
+        session.advance(missing, &AtomicBool::new(false));
+    }
+    reference.advance(203, &AtomicBool::new(false));
+    assert!(session.film() == reference.film(), "cancelled and resumed");
+    assert!(whole != *reference.film(), "the comparison can fail");
+}
+
+#[test]
+fn cancelled_learning_gives_the_same_laws_in_the_end() {
+    let setting = Setting::new();
+    let view = setting.view(Sampling::Adaptive);
+    let mut session = Session::new(&setting.world, &setting.environment, view.clone());
+    session.advance(1, &AtomicBool::new(false));
+    session.advance(1, &AtomicBool::new(true));
+    assert_eq!(session.phase(), Phase::Learning);
+    while session.phase() == Phase::Learning {
+        session.advance(1, &AtomicBool::new(false));
+    }
+    let other = setting.session(view);
+    let of = |session: &Session<'_>| laws(session.grid().expect("a map with light"));
+    assert!(of(&session) == of(&other));
+}
+
+#[test]
+fn another_seed_gives_another_picture() {
+    let setting = Setting::new();
+    let film = |seed| {
+        let view = View { seed, ..setting.view(Sampling::Adaptive) };
+        let mut session = setting.session(view);
+        session.advance(2, &AtomicBool::new(false));
+        (session.film().clone(), laws(session.grid().expect("a map with light")))
+    };
+    let (a, b) = (film(1), film(2));
+    assert!(a.0 != b.0 && a.1 != b.1);
+    let same = a.0.pixels().iter().zip(b.0.pixels()).filter(|(a, b)| a == b).count();
+    assert!(same < a.0.pixels().len() / 10, "{same} pixels are the same");
+}
