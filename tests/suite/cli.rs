@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::shared::shared;
 
-/// A floor of 2 m under a 0.8 m wide triangle; no camera.
+/// A square of 2 m under a triangle 0.8 m high; no camera.
 const SCENE: &str = r#"{
     "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
     "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
@@ -172,18 +172,24 @@ fn the_same_seed_gives_the_same_picture_whatever_the_threads() {
 #[test]
 fn a_view_chosen_for_a_scene_without_camera_fills_the_picture() {
     let bench = Bench::new();
-    bench.render("-o a.exr --layers depth --sampling plain --filter box --spp 8");
-    let output = bench.run("info a.exr --json");
-    assert!(output.status.success());
-    // With a black map only what is hit has depth; ask the scene under a black map instead.
-    bench.render("-o b.exr --env-intensity 0");
-    let black = read_picture(&bench.path("b.exr")).expect("it");
-    assert!(black.pixels.iter().all(|p| *p == [0.0; 3]));
-    let picture = read_picture(&bench.path("a.exr")).expect("it");
-    let is_sky = |p: &[f32; 3]| (p[0] / p[2] - 0.5 / 0.8).abs() < 1e-3;
-    let rows: Vec<bool> = picture.pixels.chunks(32).map(|row| !row.iter().all(is_sky)).collect();
-    let seen = rows.iter().filter(|r| **r).count();
-    assert!(seen >= 14 && !(rows[0] && rows[17]), "{rows:?}");
+    for (width, height) in [(64, 36), (20, 60)] {
+        // Without bounces surfaces are black and the sky is not.
+        bench.render(&format!("-o a.exr --bounces 0 --filter box --size {width}x{height}"));
+        let picture = read_picture(&bench.path("a.exr")).expect("it");
+        let seen: Vec<(usize, usize)> = (0..width * height)
+            .filter(|&i| picture.pixels[i] == [0.0; 3])
+            .map(|i| (i % width, i / width))
+            .collect();
+        let columns = extent(seen.iter().map(|p| p.0)) as f32 / width as f32;
+        let rows = extent(seen.iter().map(|p| p.1)) as f32 / height as f32;
+        let fill = columns.max(rows);
+        assert!((0.8..1.0).contains(&fill), "{width}x{height}: {columns} by {rows}");
+    }
+}
+
+fn extent(numbers: impl Iterator<Item = usize> + Clone) -> usize {
+    let (low, high) = (numbers.clone().min(), numbers.max());
+    low.zip(high).map_or(0, |(low, high)| high - low + 1)
 }
 
 #[test]
