@@ -9,12 +9,13 @@ use glam::Vec3;
 use super::progress::Progress;
 use super::record::{self, Phases, Record};
 use super::values;
+use crate::color::luminance;
 use crate::environment::{Environment, EnvironmentOptions, TableKind};
 use crate::error::{Error, Notices, Result};
-use crate::image::{ExrPicture, Layer, write_exr, write_png};
+use crate::image::{ExrPicture, Layer, check_writable, is_same_file, write_exr, write_png};
 use crate::light_grid::LawOptions;
 use crate::path::{PathLimits, World, framing};
-use crate::render::film::Film;
+use crate::render::film::{Film, Pixel};
 use crate::render::filter::PixelFilter;
 use crate::render::{Sampling, Session, StopRule, View};
 use crate::scene::{Camera, Projection, builtin};
@@ -22,6 +23,11 @@ use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
 
 /// Arguments of `render`.
 #[derive(Debug, clap::Args)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Ctrl-C ends the work early, writes the pictures and counts as success; a second \
+                  one leaves at once with status 130."
+)]
 pub(super) struct RenderArguments {
     /// A glTF file (.gltf, .glb) or a built-in scene.
     #[arg(default_value = builtin::DEFAULT_SCENE)]
@@ -35,7 +41,7 @@ pub(super) struct RenderArguments {
     #[arg(long, default_value = "sky:day", value_name = "MAP", help_heading = "Environment")]
     env: String,
     /// Turns the map about the vertical, in degrees.
-    #[arg(long, default_value = "0", value_parser = values::finite, allow_negative_numbers = true, value_name = "DEG", help_heading = "Environment")]
+    #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG", help_heading = "Environment")]
     env_rotation: f64,
     /// Multiplies the map's radiance.
     #[arg(long, default_value = "1", value_parser = values::not_negative, value_name = "X", help_heading = "Environment")]
@@ -112,8 +118,8 @@ pub(super) struct RenderArguments {
     #[arg(long, default_value = "0", value_name = "N", help_heading = "Run")]
     seed: u32,
     /// Threads; 0 uses every core.
-    #[arg(long, default_value = "0", value_name = "N", help_heading = "Run")]
-    threads: usize,
+    #[arg(long, default_value = "0", value_parser = clap::value_parser!(u16).range(0..=1024), value_name = "N", help_heading = "Run")]
+    threads: u16,
     /// Writes the run's figures as JSON.
     #[arg(long, value_name = "FILE", help_heading = "Run")]
     json: Option<PathBuf>,
@@ -140,9 +146,7 @@ fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
 
 /// Loads, learns, renders, writes.
 pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
-    for output in arguments.outputs.iter().chain(&arguments.json) {
-        check_output(output, arguments.json.as_ref() == Some(output))?;
-    }
+    check_outputs(arguments)?;
     start_threads(arguments.threads)?;
     let cancel = super::interrupt::flag();
     let progress = Progress::start("loading");
@@ -175,11 +179,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     let mut session = Session::new(&world, &environment, view);
     work(&mut session, &rule, &cancel, &progress);
     progress.finish();
-    if session.film().invalid_samples() > 0 {
-        let sentence = format!(
-            "{} samples were not finite and were left out",
-            session.film().invalid_samples()
-        );
+    for sentence in remarks(session.film(), &environment) {
         eprintln!("notice: {sentence}");
         notices.add(sentence);
     }
@@ -207,18 +207,27 @@ fn lap(start: Instant) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
-/// Refuses an output before the work rather than after it.
-fn check_output(path: &Path, json: bool) -> Result<()> {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    if !json && !matches!(extension.as_deref(), Some("png" | "exr")) {
-        return Err(Error::at(path, "pictures are written as .png or .exr"));
+/// Refuses outputs before the work rather than after it.
+fn check_outputs(arguments: &RenderArguments) -> Result<()> {
+    for picture in &arguments.outputs {
+        let extension = picture.extension().map(|e| e.to_string_lossy().to_lowercase());
+        if !matches!(extension.as_deref(), Some("png" | "exr")) {
+            return Err(Error::at(picture, "pictures are written as .png or .exr"));
+        }
     }
-    crate::image::check_writable(path)
+    let files: Vec<&PathBuf> = arguments.outputs.iter().chain(&arguments.json).collect();
+    for (i, file) in files.iter().enumerate() {
+        if files[..i].iter().any(|other| is_same_file(other, file)) {
+            return Err(Error::at(file, "two outputs would be written to this one file"));
+        }
+        check_writable(file)?;
+    }
+    Ok(())
 }
 
-fn start_threads(threads: usize) -> Result<()> {
+fn start_threads(threads: u16) -> Result<()> {
     rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
+        .num_threads(usize::from(threads))
         .thread_name(|i| format!("render {i}"))
         .build_global()
         .map_err(|e| Error::new(format!("{threads} threads cannot be started: {e}")))
@@ -294,17 +303,31 @@ fn camera(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> 
         Camera::look_at(eye, target, 0.9)
     } else if let Some(index) = arguments.camera {
         cameras.get(index).cloned().ok_or_else(|| {
-            let count = cameras.len();
-            Error::new(format!(
-                "--camera {index}: {} has {count} cameras, counted from 0",
-                arguments.scene
-            ))
+            let there_are = match cameras.len() {
+                0 => "no camera".to_owned(),
+                1 => "one camera, number 0".to_owned(),
+                count => format!("cameras 0 to {}", count - 1),
+            };
+            Error::new(format!("--camera {index}: {} has {there_are}", arguments.scene))
         })?
     } else if let Some(camera) = cameras.first() {
         camera.clone()
     } else {
-        notices.add(format!("{}: no camera in it, the view was chosen", arguments.scene));
-        framing::frame(world, arguments.size.0 as f32 / arguments.size.1 as f32)
+        let chosen = framing::frame(world, arguments.size.0 as f32 / arguments.size.1 as f32);
+        let eye = chosen.world_from_camera.translation;
+        let target = eye - chosen.world_from_camera.matrix3.z_axis * chosen.focus_distance;
+        notices.add(format!(
+            "{} has no camera; the view is --eye {},{},{} --target {},{},{} --fov {:.1}",
+            arguments.scene,
+            eye.x,
+            eye.y,
+            eye.z,
+            target.x,
+            target.y,
+            target.z,
+            framing::FOV_Y_RADIANS.to_degrees(),
+        ));
+        chosen
     };
     if let Some(degrees) = arguments.fov {
         if degrees >= 179.0 {
@@ -334,16 +357,35 @@ fn work(session: &mut Session<'_>, rule: &StopRule, cancel: &AtomicBool, progres
     }
 }
 
+/// What a person should know about a finished picture.
+fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if film.invalid_samples() > 0 {
+        remarks
+            .push(format!("{} samples were not finite and were left out", film.invalid_samples()));
+    }
+    let mean =
+        film.pixels().iter().map(Pixel::mean_luminance).sum::<f64>() / film.pixels().len() as f64;
+    if mean <= BLACK_SHARE * f64::from(luminance(environment.mean_radiance())) {
+        remarks.push("the picture is black: hardly any light reaches what the camera sees".into());
+    }
+    remarks
+}
+
+/// Share of the map's mean luminance below which a picture is called black: between the gaps of
+/// sealed rooms as they are modelled (1e-9 to 1e-6) and what comes through a crack.
+const BLACK_SHARE: f64 = 2e-6;
+
 /// Settings that belong into metadata and JSON, as typed or as chosen.
 fn settings(arguments: &RenderArguments) -> Vec<(&'static str, serde_json::Value)> {
     vec![
         ("sampling", serde_json::json!(arguments.sampling)),
         ("table", serde_json::json!(arguments.table.to_string())),
-        ("tiles", serde_json::json!(arguments.tiles)),
+        ("tiles", serde_json::json!(format!("{}x{}", arguments.tiles.0, arguments.tiles.1))),
         ("grid_columns", serde_json::json!(arguments.grid)),
         ("bounces", serde_json::json!(arguments.bounces)),
         ("russian_roulette", serde_json::json!(!arguments.no_russian_roulette)),
-        ("filter", serde_json::json!(format!("{:?}", arguments.filter))),
+        ("filter", serde_json::json!(arguments.filter)),
         ("env_rotation_degrees", serde_json::json!(arguments.env_rotation)),
         ("env_intensity", serde_json::json!(arguments.env_intensity)),
         ("seed", serde_json::json!(arguments.seed)),
@@ -384,14 +426,12 @@ fn layers(film: &Film, names: &[LayerName]) -> Vec<Layer> {
             add("depth", vec![("Z".to_owned(), surface.depth)]);
         }
     }
-    let of_pixels = |f: fn(&crate::render::film::Pixel) -> f64| {
-        film.pixels().iter().map(|p| f(p) as f32).collect()
-    };
+    let of_pixels = |f: fn(&Pixel) -> f64| film.pixels().iter().map(|p| f(p) as f32).collect();
     if wanted(LayerName::Samples) {
         add("samples", vec![("N".to_owned(), of_pixels(|p| f64::from(p.samples())))]);
     }
     if wanted(LayerName::Variance) {
-        let per_sample = |p: &crate::render::film::Pixel| match p.samples() {
+        let per_sample = |p: &Pixel| match p.samples() {
             0 | 1 => 0.0,
             n => p.variance_of_mean() * f64::from(n),
         };

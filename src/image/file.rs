@@ -53,6 +53,17 @@ pub fn check_writable(path: &Path) -> Result<()> {
     Ok(())
 }
 
+/// Whether two paths name the same file, there already or yet to be written.
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    let place = |path: &Path| {
+        fs::canonicalize(path).or_else(|_| {
+            let folder = fs::canonicalize(folder_of(path))?;
+            Ok::<_, io::Error>(folder.join(path.file_name().unwrap_or_default()))
+        })
+    };
+    matches!((place(a), place(b)), (Ok(a), Ok(b)) if a == b)
+}
+
 /// Why `target` cannot be written, as far as can be known before trying.
 fn check_target(target: &Path) -> std::result::Result<(), String> {
     if target.file_name().is_none() {
@@ -117,7 +128,7 @@ pub(crate) fn read_cause(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "there is no such file".into(),
         io::ErrorKind::PermissionDenied => "may not be read: permission denied".into(),
-        io::ErrorKind::IsADirectory => "is a folder, not a picture".into(),
+        io::ErrorKind::IsADirectory => "is a folder, not a file".into(),
         io::ErrorKind::UnexpectedEof => "is cut short".into(),
         _ => format!("cannot be read: {error}"),
     }

@@ -16,7 +16,8 @@ mod primaries;
 
 pub use exr_read::read_exr_metadata;
 pub use exr_write::{ExrPicture, Layer, write_exr};
-pub use file::{check_writable, write_beside_and_rename};
+pub(crate) use file::read_cause;
+pub use file::{check_writable, is_same_file, write_beside_and_rename};
 pub use map::{LoadedMap, read_map, read_picture, sanitise};
 pub use png::write_png;
 

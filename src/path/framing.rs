@@ -7,7 +7,8 @@ use crate::bvh::Ray;
 use crate::math::direction_from_uv;
 use crate::scene::Camera;
 
-const FOV_Y_RADIANS: f32 = 0.87;
+/// Vertical field of view of every view chosen here, in radians.
+pub const FOV_Y_RADIANS: f32 = 0.87;
 /// Share of the picture's width or height that an object fills.
 const FILL: f32 = 0.9;
 /// A scene is a room if from places in it at least this share of directions shows it from inside.

@@ -142,7 +142,7 @@ fn what_cannot_be_read_is_said_in_one_sentence() {
     let missing = read_map(Path::new("no-such.hdr")).unwrap_err().to_string();
     assert_eq!(missing, "no-such.hdr: there is no such file");
     let folder = read_map(Path::new("src")).unwrap_err().to_string();
-    assert_eq!(folder, "src: is a folder, not a picture");
+    assert_eq!(folder, "src: is a folder, not a file");
 }
 
 /// A file in a folder of its own that lives as long as the test.

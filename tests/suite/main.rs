@@ -3,6 +3,7 @@
 mod bsdf;
 mod builtin;
 mod bvh;
+mod cli;
 mod environment;
 mod estimator;
 mod gltf_files;

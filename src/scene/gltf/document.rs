@@ -31,7 +31,7 @@ pub(super) fn parse<'a>(
     extensions::check(&value, notices)?;
     // Animations of newer extensions would not even fit the types.
     if value.as_object_mut().and_then(|root| root.remove("animations")).is_some() {
-        notices.add("The file has animations; its rest pose is shown.");
+        notices.add("the file has animations; its rest pose is shown");
     }
     let root = json::deserialize::from_value(value)
         .map_err(|cause| format!("its JSON does not describe glTF 2.0 ({cause})"))?;

@@ -31,7 +31,7 @@ pub(super) fn check(root: &Value, notices: &mut Notices) -> Fallible<()> {
         return Err(format!("it requires the extension{plural} {names}, not supported here"));
     }
     for name in unsupported(root, "extensionsUsed") {
-        notices.add(format!("The extension {name} is not supported; what it adds is left out."));
+        notices.add(format!("the extension {name} is not supported; what it adds is left out"));
     }
     Ok(())
 }

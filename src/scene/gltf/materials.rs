@@ -229,7 +229,7 @@ impl<'a> Reader<'a> {
             // Its alpha would need an image of its own; half of the factor is its likely middle.
             material.roughness = 0.5 + 0.5 * material.roughness;
             self.notices.add(format!(
-                "Material {} has a glossiness texture, which is replaced by its middle value.",
+                "material {} has a glossiness texture, which is replaced by its middle value",
                 self.name
             ));
         }
@@ -251,7 +251,7 @@ impl<'a> Reader<'a> {
         let uv_set = transform.and_then(|it| it.tex_coord).unwrap_or(info.tex_coord);
         if uv_set > 1 {
             self.notices.add(format!(
-                "Material {} has a texture on UV set {uv_set}, which is left out: sets 0 and 1 are read.",
+                "material {} has a texture on UV set {uv_set}, which is left out: sets 0 and 1 are read",
                 self.name
             ));
             return Ok(None);
@@ -283,7 +283,7 @@ impl<'a> Reader<'a> {
     fn within(&mut self, value: f32, least: f32, most: f32) -> f32 {
         if !(least..=most).contains(&value) {
             self.notices.add(format!(
-                "Material {} has factors outside their range, which are clamped.",
+                "material {} has factors outside their range, which are clamped",
                 self.name
             ));
         }

@@ -31,6 +31,7 @@ use glam::DAffine3;
 use gltf::json;
 
 use crate::error::{Error, Notices, Result};
+use crate::image::read_cause;
 use crate::scene::Scene;
 
 use buffers::{File, find};
@@ -50,8 +51,7 @@ type Fallible<T> = std::result::Result<T, String>;
 /// One sentence with the path and the cause: a file that cannot be read, is cut off, refers to
 /// what is not there, requires an unsupported extension, or has no triangles.
 pub fn load(path: &Path) -> Result<Scene> {
-    let bytes = std::fs::read(path)
-        .map_err(|cause| Error::at(path, format!("the file cannot be read ({cause})")))?;
+    let bytes = std::fs::read(path).map_err(|e| Error::at(path, read_cause(&e)))?;
     let base_dir = path.parent().unwrap_or(Path::new(""));
     let mut scene = read(&bytes, Some(base_dir)).map_err(|cause| Error::at(path, cause))?;
     scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -96,7 +96,7 @@ fn read(bytes: &[u8], base_dir: Option<&Path>) -> Fallible<Scene> {
         return Err(format!("it shows no triangles, so there is nothing to render{reasons}"));
     }
     for repair in repairs(&tally) {
-        notices.add(format!("{repair}."));
+        notices.add(repair);
     }
     bake::finish(&mut scene);
     scene.materials = materials.materials;

@@ -80,7 +80,7 @@ fn scene_roots(root: &json::Root, notices: &mut Notices) -> Fallible<Option<Vec<
     };
     if root.scenes.len() > 1 {
         let shown = root.scene.map_or(0, |index| index.value());
-        notices.add(format!("The file has {} scenes; scene {shown} is shown.", root.scenes.len()));
+        notices.add(format!("the file has {} scenes; scene {shown} is shown", root.scenes.len()));
     }
     for &node in &scene.nodes {
         find(&root.nodes, node, "node")?;

@@ -82,7 +82,7 @@ impl Wanted {
                     images.push(image);
                 }
                 Err(cause) => notices.add(format!(
-                    "{} cannot be used: {cause}; materials do without it.",
+                    "{} cannot be used: {cause}; materials do without it",
                     image_name(&file.root, number)
                 )),
             }

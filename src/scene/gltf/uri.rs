@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::Fallible;
+use crate::image::read_cause;
 
 /// The bytes a URI stands for; relative ones are files beside the glTF file.
 pub(super) fn read(uri: &str, base_dir: Option<&Path>) -> Fallible<Vec<u8>> {
@@ -17,8 +18,7 @@ pub(super) fn read(uri: &str, base_dir: Option<&Path>) -> Fallible<Vec<u8>> {
     let base_dir = base_dir.ok_or_else(|| {
         format!("`{path}` cannot be looked up: the folder of the file is unknown")
     })?;
-    std::fs::read(base_dir.join(&path))
-        .map_err(|cause| format!("`{path}` cannot be read ({cause})"))
+    std::fs::read(base_dir.join(&path)).map_err(|e| format!("`{path}`: {}", read_cause(&e)))
 }
 
 /// A URI as it is shown to a person: data URIs would fill pages.

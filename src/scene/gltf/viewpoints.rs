@@ -62,7 +62,7 @@ fn camera(
         }
     };
     if !usable {
-        notices.add(format!("Camera {name} is damaged; the unusable values are replaced."));
+        notices.add(format!("camera {name} is damaged; the unusable values are replaced"));
     }
     let world_from_camera =
         if world_from_camera.is_finite() { world_from_camera } else { DAffine3::IDENTITY };
@@ -98,7 +98,7 @@ pub(super) fn lights(
         let name = name.unwrap_or_else(|| format!("light {}", reference.light));
         match light(source, &name, nodes.world[number]) {
             Some(light) => lights.push(light),
-            None => notices.add(format!("Light {name} is damaged and left out.")),
+            None => notices.add(format!("light {name} is damaged and left out")),
         }
     }
     Ok(lights)

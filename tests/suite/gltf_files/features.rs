@@ -264,7 +264,7 @@ fn extensions_required_used_and_honoured() {
     let notices: Vec<_> = scene.notices.iter().collect();
     assert_eq!(
         notices,
-        ["The extension KHR_materials_sheen is not supported; what it adds is left out."]
+        ["the extension KHR_materials_sheen is not supported; what it adds is left out"]
     );
 }
 
@@ -292,7 +292,7 @@ fn material_extensions() {
     assert!(material.unlit);
     assert_eq!(
         scene.notices.iter().collect::<Vec<_>>(),
-        ["Material all has factors outside their range, which are clamped."]
+        ["material all has factors outside their range, which are clamped"]
     );
 }
 

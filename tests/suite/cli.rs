@@ -1,0 +1,374 @@
+//! The binary as a person uses it: what it writes, says and refuses.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use lightgrid::image::{ExrPicture, Image, read_exr_metadata, read_picture, write_exr};
+use serde_json::Value;
+
+use crate::shared::shared;
+
+/// A floor of 2 m under a 0.8 m wide triangle; no camera.
+const SCENE: &str = r#"{
+    "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+    "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 9, "type": "VEC3",
+        "min": [-1, 0, -1], "max": [1, 1, 1]}],
+    "bufferViews": [{"buffer": 0, "byteLength": 108}],
+    "buffers": [{"uri": "scene.bin", "byteLength": 108}]
+}"#;
+const CORNERS: [[f32; 3]; 9] = [
+    [-1.0, 0.0, -1.0],
+    [-1.0, 0.0, 1.0],
+    [1.0, 0.0, 1.0],
+    [-1.0, 0.0, -1.0],
+    [1.0, 0.0, 1.0],
+    [1.0, 0.0, -1.0],
+    [-0.4, 0.2, 0.0],
+    [0.4, 0.2, 0.0],
+    [0.0, 1.0, 0.0],
+];
+
+/// A folder with `scene.gltf` and `map.exr`, in which commands run.
+struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let bytes: Vec<u8> = CORNERS.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+        fs::write(folder.path().join("scene.bin"), bytes).expect("written");
+        fs::write(folder.path().join("scene.gltf"), SCENE).expect("written");
+        let mut map = Image::filled(32, 16, [0.5, 0.6, 0.8]);
+        map.pixels[3 * 32 + 7] = [900.0, 800.0, 700.0];
+        let picture = ExrPicture { image: &map, layers: vec![], metadata: &[] };
+        write_exr(&folder.path().join("map.exr"), picture).expect("written");
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn command(&self, line: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lightgrid"));
+        command.current_dir(self.folder.path()).args(line.split_whitespace());
+        command
+    }
+
+    fn run(&self, line: &str) -> Output {
+        self.command(line).output().expect("the binary starts")
+    }
+
+    /// Renders 32x18 pixels with 2 samples unless `rest` says otherwise; must succeed.
+    fn render(&self, rest: &str) -> Output {
+        let output = self.run(&render_line(rest));
+        assert!(output.status.success(), "{rest}: {}", text(&output.stderr));
+        output
+    }
+
+    /// What a command that must fail says; it must leave no new file behind.
+    fn refusal(&self, line: &str, status: i32) -> String {
+        let before = self.files();
+        let output = self.run(line);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(status), "{line}: {message}");
+        assert!(output.stdout.is_empty(), "{line}: stdout is for results");
+        assert!(!message.contains("panicked"), "{line}: {message}");
+        assert_eq!(self.files(), before, "{line}");
+        message
+    }
+
+    fn files(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.folder.path()).expect("readable");
+        let mut names: Vec<String> = entries
+            .map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    fn json(&self, name: &str) -> Value {
+        serde_json::from_slice(&fs::read(self.path(name)).expect("written")).expect("JSON")
+    }
+}
+
+fn render_line(rest: &str) -> String {
+    let mut line = format!("render scene.gltf --env map.exr {rest}");
+    for (option, value) in [("--size", "32x18"), ("--spp", "2"), ("--learning-paths", "500")] {
+        if !rest.contains(option) {
+            line += &format!(" {option} {value}");
+        }
+    }
+    line
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[test]
+fn without_arguments_it_prints_help() {
+    let output = Bench::new().run("");
+    let help = text(&output.stderr) + &text(&output.stdout);
+    for word in ["render", "compare", "info", "sat"] {
+        assert!(help.contains(word), "{help}");
+    }
+}
+
+#[test]
+fn a_render_writes_picture_figures_and_metadata() {
+    let bench = Bench::new();
+    let output = bench.render("-o a.png -o a.exr --json a.json --layers all --seed 7");
+    assert!(output.stdout.is_empty());
+    let says = text(&output.stderr);
+    assert!(says.contains("has no camera") && says.lines().count() == 1, "{says}");
+    assert_eq!(
+        bench.files(),
+        ["a.exr", "a.json", "a.png", "map.exr", "scene.bin", "scene.gltf"],
+        "nothing else is left behind"
+    );
+
+    let figures = bench.json("a.json");
+    assert_eq!(figures["samples_per_pixel"], 2);
+    assert_eq!(figures["session"]["samples"], 2 * 32 * 18);
+    assert_eq!(figures["session"]["learning_paths"], 500);
+    assert_eq!(figures["triangles"], 3);
+    assert_eq!(figures["invalid_samples"], 0);
+    assert_eq!(figures["settings"]["tiles"], "32x16");
+    assert_eq!(figures["settings"]["filter"], "blackman-harris");
+    assert!(figures["memory"]["grid_bytes"].as_u64().expect("bytes") < 10 << 20);
+
+    let metadata = read_exr_metadata(&bench.path("a.exr")).expect("attributes");
+    for (key, value) in [
+        ("lightgrid.scene", "scene.gltf"),
+        ("lightgrid.map", "map.exr"),
+        ("lightgrid.samples_per_pixel", "2"),
+        ("lightgrid.seed", "7"),
+        ("lightgrid.sampling", "adaptive"),
+    ] {
+        let found = metadata.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
+        assert_eq!(found, Some(value), "{key}");
+    }
+    let png = fs::read(bench.path("a.png")).expect("written");
+    for part in ["lightgrid.scene\0scene.gltf", "lightgrid.map\0map.exr", "lightgrid.seconds\0"] {
+        assert!(png.windows(part.len()).any(|w| w == part.as_bytes()), "{part}");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_picture_whatever_the_threads() {
+    let bench = Bench::new();
+    for (name, rest) in [("a", "--threads 1"), ("b", "--threads 3"), ("c", "--seed 1")] {
+        bench.render(&format!("-o {name}.exr {rest}"));
+    }
+    let [a, b, c] = ["a.exr", "b.exr", "c.exr"].map(|n| read_picture(&bench.path(n)).expect("it"));
+    assert_eq!(a, b);
+    assert_ne!(a, c);
+}
+
+#[test]
+fn a_view_chosen_for_a_scene_without_camera_fills_the_picture() {
+    let bench = Bench::new();
+    bench.render("-o a.exr --layers depth --sampling plain --filter box --spp 8");
+    let output = bench.run("info a.exr --json");
+    assert!(output.status.success());
+    // With a black map only what is hit has depth; ask the scene under a black map instead.
+    bench.render("-o b.exr --env-intensity 0");
+    let black = read_picture(&bench.path("b.exr")).expect("it");
+    assert!(black.pixels.iter().all(|p| *p == [0.0; 3]));
+    let picture = read_picture(&bench.path("a.exr")).expect("it");
+    let is_sky = |p: &[f32; 3]| (p[0] / p[2] - 0.5 / 0.8).abs() < 1e-3;
+    let rows: Vec<bool> = picture.pixels.chunks(32).map(|row| !row.iter().all(is_sky)).collect();
+    let seen = rows.iter().filter(|r| **r).count();
+    assert!(seen >= 14 && !(rows[0] && rows[17]), "{rows:?}");
+}
+
+#[test]
+fn a_black_picture_is_remarked() {
+    let output = Bench::new().render("-o a.png --env-intensity 0");
+    assert!(text(&output.stderr).contains("the picture is black"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn odd_but_sound_settings_render() {
+    let bench = Bench::new();
+    for rest in [
+        "--size 1x1",
+        "--tiles 1x1",
+        "--tiles 256x256",
+        "--grid 2",
+        "--grid 512",
+        "--bounces 0",
+        "--sampling talk",
+        "--sampling bsdf",
+        "--table f32",
+        "--table u32",
+        "--env-rotation -90",
+        "--exposure -2.5 --tonemap none",
+        "--eye -1,2,-3 --target 0,0.5,0",
+        "--lens-radius 0.1 --focus 2",
+        "--seconds 0.05 --spp 1000000",
+        "--noise 0.9 --spp 1000000",
+    ] {
+        bench.render(&format!("-o a.png {rest}"));
+    }
+}
+
+#[test]
+fn wrong_values_are_refused_with_the_reason() {
+    let bench = Bench::new();
+    for (rest, reason) in [
+        ("--size 0x9", "two positive whole numbers"),
+        ("--size 100000x100000", "more than"),
+        ("--spp 0", "0 is not in 1.."),
+        ("--spp -1", "-1 is not in 1.."),
+        ("--seconds nan", "expected a number"),
+        ("--noise -1", "must be above 0"),
+        ("--env-intensity -1", "must not be negative"),
+        ("--threads 1000000", "is not in 0..=1024"),
+        ("--tiles 257x1", "at most 256x256"),
+        ("--grid 1", "1 is not in 2..=512"),
+        ("--eye nan,0,0 --target 0,0,0", "three numbers"),
+        ("--eye 0,0,0", "--target"),
+        ("--layers foo", "albedo, normal, depth"),
+        ("--table foo", "tile-local"),
+    ] {
+        let message = bench.refusal(&render_line(&format!("-o a.png {rest}")), 2);
+        assert!(message.contains(reason), "{rest}: {message}");
+    }
+}
+
+#[test]
+fn what_cannot_be_done_is_one_sentence_and_status_1() {
+    let bench = Bench::new();
+    let line = render_line;
+    for (line, reason) in [
+        (line("-o a.png --camera 3"), "--camera 3: scene.gltf has no camera"),
+        (line("-o a.png --fov 180"), "--fov 180"),
+        (line("-o a.png --eye 1,1,1 --target 1,1,1"), "the same point"),
+        (line("-o a.jpg"), "a.jpg: pictures are written as .png or .exr"),
+        (line("-o none/a.png"), "there is no folder none"),
+        (line("-o a.png -o ./a.png"), "./a.png: two outputs"),
+        (line("-o a.png --json a.png"), "a.png: two outputs"),
+        ("render none.glb -o a.png".into(), "none.glb: there is no such file"),
+        ("render none -o a.png".into(), "neither a file nor a built-in scene"),
+        ("render map.exr -o a.png".into(), "map.exr: it is neither GLB nor valid glTF"),
+        ("render scene.gltf -o a.png --env none.hdr".into(), "none.hdr: there is no such file"),
+        ("render scene.gltf -o a.png --env scene.gltf".into(), "scene.gltf: is not a picture"),
+        ("render scene.gltf -o a.png --env sky:mars".into(), "no built-in sky called \"mars\""),
+        ("compare map.exr none.exr".into(), "none.exr: there is no such file"),
+        ("info none.exr".into(), "none.exr: there is no such file"),
+    ] {
+        let message = bench.refusal(&line, 1);
+        assert!(message.contains(reason), "{line}: {message}");
+        assert_eq!(message.lines().count(), 1, "{line}: {message}");
+    }
+}
+
+#[test]
+fn comparing_tells_equal_pictures_from_others() {
+    let bench = Bench::new();
+    bench.render("-o a.exr");
+    bench.render("-o b.exr --seed 1");
+    bench.render("-o c.exr --size 16x16");
+    let figures = |line: &str| -> Value {
+        serde_json::from_slice(&bench.run(line).stdout).expect("JSON on stdout")
+    };
+    assert_eq!(figures("compare a.exr a.exr --json")["mse"], 0.0);
+    assert!(figures("compare a.exr b.exr --json")["mse"].as_f64().expect("a number") > 0.0);
+    let message = bench.refusal("compare a.exr c.exr", 1);
+    assert!(message.contains("differ in size: 32 x 18 and 16 x 16"), "{message}");
+}
+
+#[test]
+fn info_and_sat_print_facts() {
+    let bench = Bench::new();
+    let map = text(&bench.run("info map.exr").stdout);
+    assert!(map.contains("size: 32 x 16") && map.contains("brightest pixel: 7, 3"), "{map}");
+    let scene = text(&bench.run("info scene.gltf").stdout);
+    assert!(scene.contains("triangles: 3") && scene.contains("no material"), "{scene}");
+    let sat = text(&bench.run("sat map.exr").stdout);
+    for kind in ["tile-local", "u32", "f32", "f64"] {
+        assert!(sat.contains(kind), "{sat}");
+    }
+}
+
+/// Malformed files of others: one sentence that names the file, quickly, and no picture.
+#[test]
+fn malformed_files_are_refused_by_name() {
+    let Some(folder) = shared("data/malformed") else { return };
+    let bench = Bench::new();
+    let mut refused = 0;
+    for file in files_below(&folder) {
+        let name = file.file_name().expect("a file").to_string_lossy().into_owned();
+        let mut command = match file.extension().and_then(|e| e.to_str()) {
+            // Reading these is sound: one lies in its normals only, one is part of another.
+            _ if name.starts_with("BoxBadNormals") => continue,
+            Some("gltf" | "glb") => bench.command("render --env map.exr -o a.png"),
+            Some("exr" | "hdr") => bench.command("render scene.gltf -o a.png --env"),
+            _ => continue,
+        };
+        let output = command.arg(&file).output().expect("the binary starts");
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{name}: {message}");
+        assert!(message.lines().count() == 1 && message.contains(&name), "{message}");
+        assert!(!bench.path("a.png").exists(), "{name}");
+        refused += 1;
+    }
+    assert!(refused > 20, "{refused}");
+}
+
+fn files_below(folder: &Path) -> Vec<std::path::PathBuf> {
+    let entries = fs::read_dir(folder).expect("readable").map(|e| e.expect("an entry").path());
+    entries.flat_map(|path| if path.is_dir() { files_below(&path) } else { vec![path] }).collect()
+}
+
+#[cfg(unix)]
+mod signals {
+    use std::process::Stdio;
+    use std::time::Duration;
+
+    use super::*;
+
+    fn start(bench: &Bench, rest: &str) -> std::process::Child {
+        let mut command = bench.command(&render_line(rest));
+        let child = command.stderr(Stdio::piped()).spawn().expect("the binary starts");
+        std::thread::sleep(Duration::from_millis(700));
+        child
+    }
+
+    fn send(child: &std::process::Child, signal: &str) {
+        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
+        assert!(sent.expect("kill is there").success());
+    }
+
+    #[test]
+    fn an_interrupt_writes_the_picture_so_far() {
+        let bench = Bench::new();
+        let child = start(&bench, "-o a.png --spp 100000000 --json a.json");
+        send(&child, "-INT");
+        let output = child.wait_with_output().expect("it ends");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(bench.json("a.json")["samples_per_pixel"].as_u64().expect("a count") > 0);
+        assert_eq!(
+            bench.files(),
+            ["a.json", "a.png", "map.exr", "scene.bin", "scene.gltf"],
+            "no half-written file"
+        );
+    }
+
+    #[test]
+    fn a_second_interrupt_leaves_at_once() {
+        let bench = Bench::new();
+        // One pass of this size takes longer than anyone waits.
+        let mut child = start(&bench, "-o a.png --size 8192x8192 --bounces 64");
+        send(&child, "-INT");
+        std::thread::sleep(Duration::from_millis(200));
+        send(&child, "-INT");
+        assert_eq!(child.wait().expect("it ends").code(), Some(130));
+        assert!(!bench.path("a.png").exists());
+    }
+}
