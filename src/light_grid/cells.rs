@@ -82,7 +82,7 @@ pub fn dominant_face(normal: Vec3) -> u32 {
 /// Unit axis of a face; inverse of [`dominant_face`].
 pub fn face_axis(face: u32) -> Vec3 {
     let axis = [Vec3::X, Vec3::Y, Vec3::Z][(face / 2) as usize];
-    if face % 2 == 0 { axis } else { -axis }
+    if face.is_multiple_of(2) { axis } else { -axis }
 }
 
 #[cfg(test)]

@@ -73,12 +73,13 @@ fn invert(table: &Cumulative, u: f32) -> f32 {
 mod tests {
     use super::*;
 
+    // Variances by hand: 1/12; a Gaussian cut at 3.3 standard deviations; the window's cosine series.
     #[test]
     fn filters_are_centred_and_as_wide_as_they_say() {
         for (filter, variance) in [
             (PixelFilter::Box, 1.0 / 12.0),
-            (PixelFilter::Gauss, 0.2),
-            (PixelFilter::BlackmanHarris, 0.15),
+            (PixelFilter::Gauss, 0.2003),
+            (PixelFilter::BlackmanHarris, 0.1726),
         ] {
             let count = 10_000;
             let xs: Vec<f32> = (0..count)
@@ -87,7 +88,7 @@ mod tests {
             let mean = xs.iter().sum::<f32>() / count as f32;
             let spread = xs.iter().map(|x| x * x).sum::<f32>() / count as f32;
             assert!(mean.abs() < 1e-3, "{filter:?}: {mean}");
-            assert!((spread / variance - 1.0).abs() < 0.06, "{filter:?}: {spread}");
+            assert!((spread / variance - 1.0).abs() < 0.02, "{filter:?}: {spread}");
             assert!(xs.windows(2).all(|w| w[0] <= w[1]), "{filter:?} keeps the order");
         }
     }
