@@ -68,7 +68,7 @@ fn zero_normals_are_flat_and_others_are_interpolated() {
 
 #[test]
 fn normal_maps_use_tangent_handedness_and_scale() {
-    let mut scene = triangle(two_sided());
+    let mut scene = triangle(Material { metallic: 0.0, ..two_sided() });
     let map = add_texel(&mut scene, [255, 204, 255, 255], false); // (1, 0.6, 1)
     scene.normals = vec![Vec3::Z; 3];
     scene.materials[0].normal_texture = Some(map);
@@ -119,7 +119,13 @@ fn shading_never_turns_away() {
         scene.positions = (0..3).map(|_| random.direction()).collect();
         let direction = random.direction();
         let barycentric = random.next_vec2() * 0.5;
+        let mirror = SurfacePoint::at(&scene, 0, barycentric, direction);
+        let shown =
+            2.0 * mirror.shading_frame.z.dot(-direction) * mirror.shading_frame.z + direction;
+        assert!(shown.dot(mirror.geometric_normal) > 0.0, "{shown}");
+        scene.materials[0].metallic = 0.0;
         let point = SurfacePoint::at(&scene, 0, barycentric, direction);
+        scene.materials[0].metallic = 1.0;
         let (wo, frame) = (-direction, point.shading_frame);
         assert!((point.geometric_normal.length() - 1.0).abs() < 1e-5);
         assert!((frame.z.length() - 1.0).abs() < 1e-5, "{}", frame.z);

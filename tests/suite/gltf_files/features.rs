@@ -41,7 +41,7 @@ fn points_and_lines_are_skipped_with_one_notice() {
     let notices: Vec<_> = scene.notices.iter().collect();
     assert_eq!(
         notices,
-        ["1 point and 2 line primitives were skipped: only triangles are rendered."]
+        ["1 point and 2 line primitives were skipped: only triangles are rendered"]
     );
     let error = square()
         .error(r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"mode":0}]}],"nodes":[{"mesh":0}]"#);
@@ -353,7 +353,7 @@ fn external_files_data_uris_and_missing_images() {
     // The missing picture is named, and its material falls back to its factors.
     assert!(scene.materials[0].base_color_texture.is_none());
     let notice = scene.notices.iter().next().unwrap();
-    assert!(notice.contains("`gone.png` cannot be read"), "{notice}");
+    assert!(notice.contains("`gone.png`: there is no such file"), "{notice}");
     // Damaged pictures and WebP ones.
     let pictures = |source: &str, uri: &str| {
         let rest = rest.replace(r#""source":0"#, source).replace("gone.png", uri);
