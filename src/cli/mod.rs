@@ -8,6 +8,7 @@ mod compare;
 mod info;
 mod interrupt;
 mod load;
+mod output;
 mod progress;
 mod record;
 mod render;

@@ -1,25 +1,23 @@
 //! `lightgrid render`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use glam::Vec3;
 
+use super::output::{self, Exposure, LayerName};
 use super::progress::Progress;
 use super::record::{self, Phases, Record};
 use super::values;
-use crate::color::luminance;
 use crate::environment::{Environment, EnvironmentOptions, TableKind};
 use crate::error::{Error, Notices, Result};
-use crate::image::{ExrPicture, Layer, check_writable, is_same_file, write_exr, write_png};
 use crate::light_grid::LawOptions;
 use crate::path::{PathLimits, World, framing};
-use crate::render::film::{Film, Pixel};
 use crate::render::filter::PixelFilter;
 use crate::render::{Sampling, Session, StopRule, View};
 use crate::scene::{Camera, Projection, builtin};
-use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
+use crate::tone::ToneCurve;
 
 /// Arguments of `render`.
 #[derive(Debug, clap::Args)]
@@ -34,7 +32,7 @@ pub(super) struct RenderArguments {
     scene: String,
     /// The picture to write: .png or .exr; may be given twice.
     #[arg(short, long = "output", required = true, value_name = "FILE")]
-    outputs: Vec<PathBuf>,
+    pub(super) outputs: Vec<PathBuf>,
 
     /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky (sky:day, sky:sunset, sky:night,
     /// sky:overcast, sky:hallway, each with @WIDTHxHEIGHT if wanted).
@@ -73,14 +71,14 @@ pub(super) struct RenderArguments {
     #[arg(long, default_value = "blackman-harris", value_enum, help_heading = "Picture")]
     filter: PixelFilter,
     /// Exposure of .png pictures in stops, or `auto`.
-    #[arg(long, default_value = "auto", value_parser = parse_exposure, allow_hyphen_values = true, value_name = "EV|auto", help_heading = "Picture")]
-    exposure: Exposure,
+    #[arg(long, default_value = "auto", value_parser = output::parse_exposure, allow_hyphen_values = true, value_name = "EV|auto", help_heading = "Picture")]
+    pub(super) exposure: Exposure,
     /// Tone curve of .png pictures: agx, aces, neutral, reinhard, none.
     #[arg(long, default_value = "agx", value_name = "CURVE", help_heading = "Picture")]
-    tonemap: ToneCurve,
+    pub(super) tonemap: ToneCurve,
     /// Extra layers in .exr pictures: albedo, normal, depth, samples, variance, or all.
     #[arg(long, value_delimiter = ',', value_name = "LAYER", help_heading = "Picture")]
-    layers: Vec<LayerName>,
+    pub(super) layers: Vec<LayerName>,
 
     /// Stop at this many samples per pixel (256 if no stop rule is given).
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..), value_name = "N", help_heading = "Stop")]
@@ -122,18 +120,7 @@ pub(super) struct RenderArguments {
     threads: u16,
     /// Writes the run's figures as JSON.
     #[arg(long, value_name = "FILE", help_heading = "Run")]
-    json: Option<PathBuf>,
-}
-
-/// A layer that can be asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum LayerName {
-    Albedo,
-    Normal,
-    Depth,
-    Samples,
-    Variance,
-    All,
+    pub(super) json: Option<PathBuf>,
 }
 
 fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
@@ -146,7 +133,7 @@ fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
 
 /// Loads, learns, renders, writes.
 pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
-    check_outputs(arguments)?;
+    output::check_outputs(arguments)?;
     start_threads(arguments.threads)?;
     let cancel = super::interrupt::flag();
     let progress = Progress::start("loading");
@@ -179,7 +166,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     let mut session = Session::new(&world, &environment, view);
     work(&mut session, &rule, &cancel, &progress);
     progress.finish();
-    for sentence in remarks(session.film(), &environment) {
+    for sentence in output::remarks(session.film(), &environment) {
         eprintln!("notice: {sentence}");
         notices.add(sentence);
     }
@@ -195,7 +182,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         options: settings(arguments),
     };
     for output in &arguments.outputs {
-        write_picture(output, arguments, &record)?;
+        output::write_picture(output, arguments, &record)?;
     }
     if let Some(path) = &arguments.json {
         record::write_json(path, &record.figures())?;
@@ -205,24 +192,6 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
 
 fn lap(start: Instant) -> f64 {
     start.elapsed().as_secs_f64()
-}
-
-/// Refuses outputs before the work rather than after it.
-fn check_outputs(arguments: &RenderArguments) -> Result<()> {
-    for picture in &arguments.outputs {
-        let extension = picture.extension().map(|e| e.to_string_lossy().to_lowercase());
-        if !matches!(extension.as_deref(), Some("png" | "exr")) {
-            return Err(Error::at(picture, "pictures are written as .png or .exr"));
-        }
-    }
-    let files: Vec<&PathBuf> = arguments.outputs.iter().chain(&arguments.json).collect();
-    for (i, file) in files.iter().enumerate() {
-        if files[..i].iter().any(|other| is_same_file(other, file)) {
-            return Err(Error::at(file, "two outputs would be written to this one file"));
-        }
-        check_writable(file)?;
-    }
-    Ok(())
 }
 
 fn start_threads(threads: u16) -> Result<()> {
@@ -242,22 +211,6 @@ fn environment_options(arguments: &RenderArguments) -> EnvironmentOptions {
         intensity: arguments.env_intensity,
         ..EnvironmentOptions::default()
     }
-}
-
-/// Exposure as typed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Exposure {
-    Stops(f32),
-    Auto,
-}
-
-fn parse_exposure(text: &str) -> std::result::Result<Exposure, String> {
-    if text == "auto" {
-        return Ok(Exposure::Auto);
-    }
-    values::finite(text)
-        .map(|stops| Exposure::Stops(stops as f32))
-        .map_err(|e| format!("{e} of stops, or auto"))
 }
 
 fn stop_rule(arguments: &RenderArguments) -> StopRule {
@@ -357,25 +310,6 @@ fn work(session: &mut Session<'_>, rule: &StopRule, cancel: &AtomicBool, progres
     }
 }
 
-/// What a person should know about a finished picture.
-fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
-    let mut remarks = Vec::new();
-    if film.invalid_samples() > 0 {
-        remarks
-            .push(format!("{} samples were not finite and were left out", film.invalid_samples()));
-    }
-    let mean =
-        film.pixels().iter().map(Pixel::mean_luminance).sum::<f64>() / film.pixels().len() as f64;
-    if mean <= BLACK_SHARE * f64::from(luminance(environment.mean_radiance())) {
-        remarks.push("the picture is black: hardly any light reaches what the camera sees".into());
-    }
-    remarks
-}
-
-/// Share of the map's mean luminance below which a picture is called black: between the gaps of
-/// sealed rooms as they are modelled (1e-9 to 1e-6) and what comes through a crack.
-const BLACK_SHARE: f64 = 2e-6;
-
 /// Settings that belong into metadata and JSON, as typed or as chosen.
 fn settings(arguments: &RenderArguments) -> Vec<(&'static str, serde_json::Value)> {
     vec![
@@ -390,60 +324,4 @@ fn settings(arguments: &RenderArguments) -> Vec<(&'static str, serde_json::Value
         ("env_intensity", serde_json::json!(arguments.env_intensity)),
         ("seed", serde_json::json!(arguments.seed)),
     ]
-}
-
-fn write_picture(path: &Path, arguments: &RenderArguments, record: &Record<'_>) -> Result<()> {
-    let film = record.session.film();
-    let image = film.image();
-    let mut metadata = record.metadata();
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
-        let layers = layers(film, &arguments.layers);
-        return write_exr(path, ExrPicture { image: &image, layers, metadata: &metadata });
-    }
-    let stops = match arguments.exposure {
-        Exposure::Stops(stops) => stops,
-        Exposure::Auto => auto_exposure_ev(&image),
-    };
-    metadata.push(("lightgrid.exposure_ev".to_owned(), format!("{stops:.3}")));
-    metadata.push(("lightgrid.tonemap".to_owned(), arguments.tonemap.name().to_owned()));
-    write_png(path, &display_rgb8(&image, stops, arguments.tonemap), &metadata)
-}
-
-fn layers(film: &Film, names: &[LayerName]) -> Vec<Layer> {
-    let wanted = |name| names.contains(&name) || names.contains(&LayerName::All);
-    let mut layers = Vec::new();
-    let mut add = |name: &str, channels: Vec<(String, Vec<f32>)>| {
-        layers.push(Layer { name: name.to_owned(), channels });
-    };
-    if let Some(surface) = film.surface_layers() {
-        if wanted(LayerName::Albedo) {
-            add("albedo", split(&surface.albedo, ["R", "G", "B"]));
-        }
-        if wanted(LayerName::Normal) {
-            add("normal", split(&surface.normal, ["X", "Y", "Z"]));
-        }
-        if wanted(LayerName::Depth) {
-            add("depth", vec![("Z".to_owned(), surface.depth)]);
-        }
-    }
-    let of_pixels = |f: fn(&Pixel) -> f64| film.pixels().iter().map(|p| f(p) as f32).collect();
-    if wanted(LayerName::Samples) {
-        add("samples", vec![("N".to_owned(), of_pixels(|p| f64::from(p.samples())))]);
-    }
-    if wanted(LayerName::Variance) {
-        let per_sample = |p: &Pixel| match p.samples() {
-            0 | 1 => 0.0,
-            n => p.variance_of_mean() * f64::from(n),
-        };
-        add("variance", vec![("Y".to_owned(), of_pixels(per_sample))]);
-    }
-    layers
-}
-
-fn split(pixels: &[[f32; 3]], names: [&str; 3]) -> Vec<(String, Vec<f32>)> {
-    names
-        .into_iter()
-        .enumerate()
-        .map(|(i, name)| (name.to_owned(), pixels.iter().map(|p| p[i]).collect()))
-        .collect()
 }
