@@ -22,6 +22,7 @@ pub mod cli;
 pub mod color;
 pub mod environment;
 pub mod error;
+mod huge_pages;
 pub mod image;
 pub mod light_grid;
 pub mod math;

@@ -13,6 +13,7 @@ mod avx2;
 
 use std::mem::size_of_val;
 
+use crate::huge_pages::on_huge_pages;
 use glam::{IVec3, Vec2, Vec3};
 
 use traverse::{Portable, TreeRef};
@@ -78,7 +79,13 @@ impl Bvh {
     pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let build::Tree { nodes, blocks, bounds } = build::build(positions, triangles);
         let extent = bounds.0.abs().max(bounds.1.abs()).max_element();
-        Self { nodes, blocks, bounds, extent, simd: Simd::detect() }
+        Self {
+            nodes: on_huge_pages(nodes),
+            blocks: on_huge_pages(blocks),
+            bounds,
+            extent,
+            simd: Simd::detect(),
+        }
     }
 
     /// This tree, walked without special instructions; for comparison.

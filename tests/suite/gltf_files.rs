@@ -58,7 +58,7 @@ const MALFORMED: &[(&str, &str)] = &[
     ("gltf/mesh_data/index_buffer_oob.gltf", "`index_buffer_oob.bin` cannot be read"),
     ("gltf/node/node_loop.gltf", "form a loop"),
     ("gltf-assimp/IndexOutOfRange/IndexOutOfRange.gltf", "index 255 is beyond its 24 vertices"),
-    ("gltf-assimp/MissingBin/BoxTextured.gltf", "`BoxTextured0.bin` cannot be read"),
+    ("gltf-assimp/MissingBin/BoxTextured.gltf", "`BoxTextured0.bin`: there is no such file"),
     ("gltf-assimp/RecursiveNodes/RecursiveNodes.gltf", "form a loop"),
 ];
 
