@@ -2,16 +2,11 @@
 
 use glam::{IVec2, IVec3, Vec2, Vec3};
 
-/// Avalanching 32-bit hash (`lowbias32`, Wellons, *Prospecting for Hash Functions*, 2018).
-pub fn hash(mut x: u32) -> u32 {
-    x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
-    x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
-    x ^ (x >> 16)
-}
+use crate::sampler::{hash, unit_from_bits};
 
 /// Hash of `seed` as a number in `[0,1)`.
 pub fn unit(seed: u32) -> f32 {
-    (hash(seed) >> 8) as f32 / (1 << 24) as f32
+    unit_from_bits(hash(seed))
 }
 
 /// A reproducible stream of numbers.

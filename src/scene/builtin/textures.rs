@@ -4,7 +4,8 @@ use glam::{IVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::color::srgb_from_linear;
-use crate::noise::{hash, smoothstep, tiling, tiling_fbm, unit};
+use crate::noise::{smoothstep, tiling, tiling_fbm, unit};
+use crate::sampler::hash;
 use crate::scene::TextureImage;
 
 /// An image of linear colours `f(u, v)`, stored sRGB-encoded.
