@@ -1,7 +1,5 @@
 //! Which cell a point belongs to.
 
-use std::f32::consts::PI;
-
 use glam::Vec3;
 
 use crate::math::uv_from_direction;
@@ -58,11 +56,6 @@ impl SphericalGrid {
             (column as f32 + 0.5) / self.columns as f32,
             (row as f32 + 0.5) / self.rows as f32,
         ))
-    }
-
-    /// Largest angle a cell spans in radians.
-    pub fn cell_angle_radians(&self) -> f32 {
-        (2.0 * PI / self.columns as f32).max(PI / self.rows as f32)
     }
 }
 

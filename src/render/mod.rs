@@ -133,7 +133,6 @@ pub struct Session<'a> {
     whole_map: Option<LightGrid>,
     learned: Option<LightGrid>,
     learning: Option<Learning>,
-    target_samples: u32,
     figures: Figures,
 }
 
@@ -160,7 +159,6 @@ impl<'a> Session<'a> {
             whole_map,
             learned: None,
             learning,
-            target_samples: 0,
             figures: Figures::default(),
         }
     }
@@ -175,8 +173,7 @@ impl<'a> Session<'a> {
                 self.figures.learning_seconds += start.elapsed().as_secs_f64();
             }
             Phase::Rendering => {
-                self.target_samples = self.film.min_samples() + samples;
-                self.render(cancel);
+                self.render(self.film.min_samples() + samples, cancel);
                 self.figures.render_seconds += start.elapsed().as_secs_f64();
             }
         }
@@ -287,11 +284,11 @@ impl<'a> Session<'a> {
             self.learned.as_ref().map_or(0, |grid| grid.laws().len() as usize - 1);
     }
 
-    fn render(&mut self, cancel: &AtomicBool) {
+    fn render(&mut self, target_samples: u32, cancel: &AtomicBool) {
         let mut film = std::mem::replace(&mut self.film, Film::new(0, 0, false));
         let tracer = self.tracer(self.grid());
         let (samples, rays) =
-            cpu::render(&tracer, &self.rays, &self.view, self.target_samples, &mut film, cancel);
+            cpu::render(&tracer, &self.rays, &self.view, target_samples, &mut film, cancel);
         self.film = film;
         self.figures.samples += samples;
         self.figures.rays += rays;

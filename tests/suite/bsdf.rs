@@ -8,16 +8,14 @@ mod textures;
 use glam::{Vec2, Vec3};
 use lightgrid::bsdf::SurfaceParameters;
 
-/// SplitMix64: enough randomness for tests, the same on every machine.
-struct Random(u64);
+use crate::shared::SplitMix;
+
+/// Random numbers, points and directions.
+struct Random(SplitMix);
 
 impl Random {
     fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
+        self.0.next_f32()
     }
 
     fn next_vec2(&mut self) -> Vec2 {

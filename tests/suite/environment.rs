@@ -10,16 +10,14 @@ use lightgrid::image::Image;
 use lightgrid::math::{direction_from_uv, rotate_y, texel_solid_angle, uv_from_direction};
 use lightgrid::metrics::statistics::{chi_square_test, sidak};
 
-/// SplitMix64, enough for tests.
-struct Random(u64);
+use crate::shared::SplitMix;
+
+/// Random numbers, points and directions.
+struct Random(SplitMix);
 
 impl Random {
     fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1 << 24) as f32
+        self.0.next_f32()
     }
 
     fn next2(&mut self) -> Vec2 {
@@ -44,7 +42,7 @@ fn lit(width: u32, height: u32, texels: &[(u32, u32)]) -> Image {
 }
 
 fn random(width: u32, height: u32, seed: u64) -> Image {
-    let mut random = Random(seed);
+    let mut random = Random(SplitMix(seed));
     Image::from_fn(width, height, |_, _| std::array::from_fn(|_| random.next()))
 }
 
@@ -120,7 +118,7 @@ fn choose_tile(environment: &Environment, random: &mut Random) -> Option<(u32, f
 #[test]
 fn a_sample_has_the_density_and_the_radiance_of_its_direction() {
     for_each_case(|case, _, environment, table| {
-        let mut random = Random(1);
+        let mut random = Random(SplitMix(1));
         for tile in 0..environment.tile_count() {
             for _ in 0..40 {
                 let Some(sample) = environment.sample_in_tile(tile, random.next2()) else {
@@ -152,7 +150,7 @@ fn a_sample_has_the_density_and_the_radiance_of_its_direction() {
 fn a_sample_is_found_in_its_texel_on_maps_as_fine_as_f32_directions_allow() {
     for (width, height) in [(16384, 16), (16, 8192), (4096, 2048)] {
         let map = random(width, height, 21);
-        let mut random = Random(22);
+        let mut random = Random(SplitMix(22));
         for lookup in [Lookup::Bilinear, Lookup::Nearest] {
             let mut environment = environment(&map, TableKind::TileLocal, lookup);
             for i in 0..60_000 {
@@ -187,7 +185,7 @@ fn samples_follow_their_density() {
             .collect();
         let per_tile = SAMPLES / lit.len() as u32;
         let mut observed = vec![0.0; map.pixels.len()];
-        let mut random = Random(31);
+        let mut random = Random(SplitMix(31));
         for tile in lit {
             for _ in 0..per_tile {
                 let sample = environment.sample_in_tile(tile, random.next2()).unwrap();
@@ -222,7 +220,7 @@ fn places_in_a_texel_are_uniform_in_solid_angle() {
             let environment = environment(&map, table, Lookup::Bilinear);
             let (columns, rows) = (14, 10);
             let mut observed = vec![0.0; columns * rows];
-            let mut random = Random(41);
+            let mut random = Random(SplitMix(41));
             for _ in 0..SAMPLES {
                 let (tile, _) = choose_tile(&environment, &mut random).unwrap();
                 let direction = environment.sample_in_tile(tile, random.next2()).unwrap().direction;
@@ -269,7 +267,7 @@ fn what_is_lit_can_be_reached() {
         if !exact.contains(&table) {
             return;
         }
-        let mut random = Random(11);
+        let mut random = Random(SplitMix(11));
         for _ in 0..20_000 {
             let direction = random.direction();
             let (radiance, tile, pdf) = environment.radiance_and_tile_pdf(direction);
@@ -290,7 +288,7 @@ fn an_irradiance_estimate_agrees_with_quadrature() {
         // Its horizon crosses none of the lone lit texels: quadrature is poor there.
         let normal = Vec3::new(-0.3, 0.6, -0.75).normalize();
         let exact = irradiance(environment, map, normal);
-        let (mut sum, mut squares, mut random) = (DVec3::ZERO, DVec3::ZERO, Random(2));
+        let (mut sum, mut squares, mut random) = (DVec3::ZERO, DVec3::ZERO, Random(SplitMix(2)));
         const SAMPLES: u32 = 20_000;
         for _ in 0..SAMPLES {
             let Some((tile, probability)) = choose_tile(environment, &mut random) else { continue };
@@ -343,7 +341,7 @@ fn what_the_map_shows_turns_with_it() {
     let map = random(64, 32, 9);
     let mut environment = Environment::new(map.clone(), &EnvironmentOptions::default()).unwrap();
     let unturned = environment.clone();
-    let mut random = Random(4);
+    let mut random = Random(SplitMix(4));
     for angle in [0.0, 0.7, -0.7, 3.0, 100.0, -1e-9] {
         environment.set_rotation(angle);
         for _ in 0..500 {
@@ -399,7 +397,7 @@ fn the_largest_and_smallest_radiance_can_be_sampled() {
             let mut environment = environment(&map, table, Lookup::Bilinear);
             environment.set_intensity(10.0);
             assert!(!environment.is_black() && environment.mean_radiance().is_finite());
-            let mut random = Random(1);
+            let mut random = Random(SplitMix(1));
             let mut samples = 0;
             for tile in 0..environment.tile_count() {
                 assert!(environment.tile_energies()[tile as usize].is_finite());

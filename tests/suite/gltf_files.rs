@@ -7,7 +7,7 @@ use std::path::Path;
 
 use lightgrid::scene::{Projection, gltf};
 
-use crate::shared::shared;
+use crate::shared::{SplitMix, shared};
 use builder::{check_consistency, square, textured_material};
 
 /// File, triangles (instances counted), of which without area, materials used, images used.
@@ -132,14 +132,6 @@ fn cameras_and_glass_of_the_kitchen() {
     assert!(scene.materials.iter().any(|material| material.base_color_texture.is_some()));
 }
 
-/// SplitMix64 (Steele et al. 2014): enough to choose bytes to spoil.
-fn next_random(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (*state ^ (*state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
 #[test]
 fn spoilt_files_never_panic() {
     let mut builder = square();
@@ -160,21 +152,21 @@ fn spoilt_files_never_panic() {
     // Numbers and binary data: spoiling them keeps the JSON whole and reaches further.
     let values: Vec<usize> =
         (20..sound.len()).filter(|&at| at > binary || sound[at].is_ascii_digit()).collect();
-    let mut random = 1;
+    let mut random = SplitMix(1);
     let mut loaded = 0;
     for round in 0..20_000 {
         let mut spoilt = sound.clone();
         for _ in 0..=round % 4 {
-            let choice = next_random(&mut random) as usize;
+            let choice = random.next_bits() as usize;
             let anywhere = round % 4 == 0;
             let at = if anywhere { choice % spoilt.len() } else { values[choice % values.len()] };
-            spoilt[at] = match next_random(&mut random) {
+            spoilt[at] = match random.next_bits() {
                 bits if at > binary || anywhere => bits as u8,
                 bits => b'0' + (bits % 10) as u8,
             };
         }
         if round % 16 == 0 {
-            spoilt.truncate(next_random(&mut random) as usize % spoilt.len());
+            spoilt.truncate(random.next_bits() as usize % spoilt.len());
         }
         match gltf::load_slice(&spoilt, None, "spoilt.glb") {
             Ok(scene) => {

@@ -6,6 +6,8 @@ use lightgrid::metrics::statistics::{
     Estimate, chi_square_test, erfc, ln_gamma, sidak, upper_gamma, z_test,
 };
 
+use crate::shared::SplitMix;
+
 fn assert_relative(got: f64, want: f64, tolerance: f64) {
     assert!((got - want).abs() <= tolerance * want.abs(), "got {got:e}, want {want:e}");
 }
@@ -48,26 +50,13 @@ fn special_functions_match_reference_values() {
     assert_eq!(upper_gamma(2.0, f64::INFINITY), 0.0);
 }
 
-/// A small deterministic generator: the tests must not depend on the renderer's own sampler.
-struct Uniform(u64);
-
-impl Uniform {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
-
 /// Means of 64 uniform variables per pixel, shifted by `bias`.
 fn noisy_means(seed: u64, bias: f64) -> (Vec<f64>, Vec<f64>) {
-    let mut random = Uniform(seed);
+    let mut random = SplitMix(seed);
     let samples = 64;
     (0..10_000)
         .map(|_| {
-            let values: Vec<f64> = (0..samples).map(|_| random.next() + bias).collect();
+            let values: Vec<f64> = (0..samples).map(|_| random.next_f64() + bias).collect();
             let mean = values.iter().sum::<f64>() / samples as f64;
             let squares = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
             (mean, squares / ((samples - 1) * samples) as f64)
@@ -126,10 +115,10 @@ fn chi_square_known_answer_and_pooling() {
 #[test]
 fn chi_square_tells_a_skewed_histogram_from_a_fair_one() {
     let histogram = |power: f64| {
-        let mut random = Uniform(7);
+        let mut random = SplitMix(7);
         let mut cells = vec![0.0; 64];
         for _ in 0..64_000 {
-            cells[(random.next().powf(power) * 64.0) as usize] += 1.0;
+            cells[(random.next_f64().powf(power) * 64.0) as usize] += 1.0;
         }
         cells
     };

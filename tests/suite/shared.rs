@@ -1,4 +1,4 @@
-//! Where the shared test data lies, and how its absence is said.
+//! Where the shared test data lies, how its absence is said, and random numbers for tests.
 
 use std::path::PathBuf;
 
@@ -14,4 +14,28 @@ pub(crate) fn shared(relative: &str) -> Option<PathBuf> {
     }
     eprintln!("SKIPPED: {} is not there", path.display());
     None
+}
+
+/// SplitMix64: the same on every machine, and not the renderer's own sampler.
+pub(crate) struct SplitMix(pub(crate) u64);
+
+impl SplitMix {
+    /// The next 64 bits.
+    pub(crate) fn next_bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// The next f32 in `[0,1)`.
+    pub(crate) fn next_f32(&mut self) -> f32 {
+        (self.next_bits() >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    /// The next f64 in `[0,1)`.
+    pub(crate) fn next_f64(&mut self) -> f64 {
+        (self.next_bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
 }

@@ -8,10 +8,11 @@ use lightgrid::bsdf::{Bsdf, SurfaceParameters};
 use super::{
     BLACK, GLASS, METAL, PANE, PLASTIC, Random, WHITE, cases, colored, spherical, viewers,
 };
+use crate::shared::SplitMix;
 
 #[test]
 fn reflection_is_reciprocal() {
-    let mut random = Random(3);
+    let mut random = Random(SplitMix(3));
     for (name, parameters, entering) in cases() {
         if name == "tilted coat" {
             continue; // its cosine is against the coat's normal
@@ -30,7 +31,7 @@ fn reflection_is_reciprocal() {
 /// `f(a, b) / n_a^2`-weighted reciprocity of refraction (Veach 1997, equation 5.14).
 #[test]
 fn refraction_is_reciprocal_up_to_the_squared_index() {
-    let mut random = Random(4);
+    let mut random = Random(SplitMix(4));
     let mut compared = 0;
     for (name, parameters, _) in cases().into_iter().filter(|c| !c.1.thin && !c.2) {
         let [outside, inside] = [true, false].map(|entering| Bsdf::new(&parameters, entering));
@@ -57,7 +58,7 @@ fn furnace(parameters: &SurfaceParameters, entering: bool, wo: Vec3, count: usiz
     let bsdf = Bsdf::new(parameters, entering);
     let ior = parameters.ior.max(1.0);
     let eta = if entering { ior } else { 1.0 / ior };
-    let mut random = Random(5);
+    let mut random = Random(SplitMix(5));
     let (mut sum, mut square) = (0.0, 0.0);
     for _ in 0..count {
         let weight = bsdf.sample(wo, random.next_vec3()).map_or(0.0, |s| {
@@ -74,7 +75,7 @@ fn furnace(parameters: &SurfaceParameters, entering: bool, wo: Vec3, count: usiz
 
 #[test]
 fn white_surfaces_never_gain_energy() {
-    let mut random = Random(6);
+    let mut random = Random(SplitMix(6));
     let mut worst = 0.0_f32;
     for case in 0..600 {
         let mut pick = |choices: &[f32]| choices[(random.next() * choices.len() as f32) as usize];
@@ -134,7 +135,7 @@ fn body_and_interface_of_plastic_add_up_to_white() {
 fn lambert_is_exact() {
     let color = Vec3::new(0.25, 0.5, 0.75);
     let bsdf = Bsdf::new(&SurfaceParameters { base_color: color, ..WHITE }, true);
-    let mut random = Random(7);
+    let mut random = Random(SplitMix(7));
     for wo in viewers() {
         let s = bsdf.sample(wo, random.next_vec3()).unwrap();
         assert!((s.weight - color).abs().max_element() < 1e-6);
@@ -149,7 +150,7 @@ fn metal_is_the_specified_formula() {
     let parameters = colored(METAL);
     let bsdf = Bsdf::new(&parameters, true);
     let a2 = f64::from(parameters.roughness).powi(4);
-    let mut random = Random(8);
+    let mut random = Random(SplitMix(8));
     for _ in 0..200 {
         let [wo, wi] = [random.direction(), random.direction()]
             .map(|d| Vec3::new(d.x, d.y, d.z.abs().max(0.05)).normalize());
@@ -184,7 +185,7 @@ fn smooth_pane_lets_the_textbook_share_through() {
 fn smooth_glass_bends_and_scales_radiance() {
     let clear = SurfaceParameters { roughness: 0.0, ..GLASS };
     let wo = Vec3::new(0.6, 0.0, 0.8);
-    let mut random = Random(9);
+    let mut random = Random(SplitMix(9));
     let mut refracted = 0;
     for _ in 0..100 {
         let s = Bsdf::new(&clear, true).sample(wo, random.next_vec3()).unwrap();
@@ -236,7 +237,7 @@ fn guide_albedo_is_what_a_furnace_shows() {
 
 #[test]
 fn extremes_stay_finite() {
-    let mut random = Random(10);
+    let mut random = Random(SplitMix(10));
     let mut scattered = 0;
     for _ in 0..60_000 {
         let mut pick = |choices: &[f32]| choices[(random.next() * choices.len() as f32) as usize];

@@ -7,6 +7,7 @@ use lightgrid::bsdf::Bsdf;
 use lightgrid::metrics::statistics::chi_square_test;
 
 use super::{METAL, PANE, Random, WHITE, cases, spherical, viewers};
+use crate::shared::SplitMix;
 
 const ROWS: usize = 32;
 const COLUMNS: usize = 32;
@@ -40,7 +41,7 @@ fn cell_of(wi: Vec3) -> usize {
 #[test]
 fn samples_follow_their_density_and_cover_the_value() {
     const SAMPLES: usize = 40_000;
-    let mut random = Random(1);
+    let mut random = Random(SplitMix(1));
     for (name, parameters, entering) in cases() {
         let bsdf = Bsdf::new(&parameters, entering);
         for wo in viewers() {
@@ -104,7 +105,7 @@ fn densities_integrate_to_known_totals() {
 
 #[test]
 fn sample_and_eval_agree() {
-    let mut random = Random(2);
+    let mut random = Random(SplitMix(2));
     for (name, parameters, entering) in cases() {
         let bsdf = Bsdf::new(&parameters, entering);
         let mut spread = 0;

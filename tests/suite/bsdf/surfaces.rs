@@ -5,6 +5,7 @@ use lightgrid::scene::surface::{SurfacePoint, alpha_at};
 use lightgrid::scene::{AlphaMode, Material, Scene, Texture, TextureImage, TextureRef, Wrap};
 
 use super::Random;
+use crate::shared::SplitMix;
 
 const CENTRE: Vec2 = Vec2::splat(1.0 / 3.0);
 const DOWN: Vec3 = Vec3::NEG_Z;
@@ -106,7 +107,7 @@ fn the_coat_has_its_own_normal() {
 
 #[test]
 fn shading_never_turns_away() {
-    let mut random = Random(11);
+    let mut random = Random(SplitMix(11));
     let mut scene = triangle(Material { clearcoat: 1.0, ..two_sided() });
     let map = add_texel(&mut scene, [0, 0, 0, 255], false);
     scene.materials[0].normal_texture = Some(map);

@@ -4,6 +4,7 @@ use lightgrid::environment::{Lookup, SatReport, SatReportRow, TableKind, sat_rep
 use lightgrid::image::Image;
 
 use super::{Random, sun};
+use crate::shared::SplitMix;
 
 fn row(report: &SatReport, table: TableKind) -> SatReportRow {
     *report.rows.iter().find(|row| row.table == table).expect("every kind is reported")
@@ -11,7 +12,7 @@ fn row(report: &SatReport, table: TableKind) -> SatReportRow {
 
 /// An outdoor map without a sun in the frame: a gradient with clouds and a dark, grainy ground.
 fn cloudy(width: u32, height: u32) -> Image {
-    let mut random = Random(3);
+    let mut random = Random(SplitMix(3));
     Image::from_fn(width, height, |x, y| {
         let (u, v) = (x as f32 / width as f32, y as f32 / height as f32);
         let cloud = (40.0 * u).sin() * (25.0 * v).cos();
