@@ -137,9 +137,9 @@ impl Case<'_> {
         let never = AtomicBool::new(false);
         let mut session = Session::new(self.world, self.environment, view);
         while session.phase() == Phase::Learning {
-            session.advance(1, &never);
+            session.advance(1, &never).expect("the CPU does not fail");
         }
-        session.advance(samples, &never);
+        session.advance(samples, &never).expect("the CPU does not fail");
         (session.film().pixels().iter().map(|p| p.mean()).collect(), *session.figures())
     }
 }

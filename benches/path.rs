@@ -35,7 +35,7 @@ pub(crate) fn bench(criterion: &mut Criterion) {
     for sampling in [Sampling::Plain, Sampling::Adaptive] {
         let mut session = Session::new(&world, &environment, view(sampling, 1 << 16));
         while session.film().min_samples() == 0 {
-            session.advance(1, &never);
+            session.advance(1, &never).expect("the CPU does not fail");
         }
         let figures = session.figures();
         group.throughput(Throughput::Elements(figures.rays));
@@ -46,7 +46,7 @@ pub(crate) fn bench(criterion: &mut Criterion) {
     let learn = || {
         let mut session = Session::new(&world, &environment, view(Sampling::Adaptive, 1 << 13));
         while session.phase() == lightgrid::render::Phase::Learning {
-            session.advance(1, &never);
+            session.advance(1, &never).expect("the CPU does not fail");
         }
         session.figures().learning_rays
     };

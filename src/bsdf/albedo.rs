@@ -64,6 +64,13 @@ impl AlbedoTerms {
     }
 }
 
+/// The table as `shaders/bsdf.wgsl` reads it: for each roughness the terms, then their mean.
+pub(crate) fn table_words() -> Vec<f32> {
+    ROWS.iter()
+        .flat_map(|row| row.terms.iter().chain([&row.mean]).flat_map(|terms| terms.to_array()))
+        .collect()
+}
+
 fn row(index: usize) -> Row {
     let ggx = Ggx::from_roughness(index as f32 / (ROUGHNESSES - 1) as f32);
     let step = 1.0 / (COSINES - 1) as f32;

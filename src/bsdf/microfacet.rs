@@ -1,9 +1,11 @@
 //! The GGX microfacet distribution (Trowbridge-Reitz), isotropic, with separable Smith masking
 //! (glTF 2.0 appendix B.3.2), in a frame whose z is the surface normal.
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
+
+use crate::math::sin_cos_turns;
 
 /// Below this GGX alpha a surface is taken as perfectly smooth: the lobe is narrower than any pixel
 /// of an environment map, and f32 half vectors no longer resolve it.
@@ -47,7 +49,7 @@ impl Ggx {
         let wo_std = Vec3::new(self.alpha * wo.x, self.alpha * wo.y, wo.z).normalize();
         let z = (1.0 - u.y) * (1.0 + wo_std.z) - wo_std.z;
         let r = (1.0 - z * z).max(0.0).sqrt();
-        let (sin_phi, cos_phi) = (TAU * u.x).sin_cos();
+        let (sin_phi, cos_phi) = sin_cos_turns(u.x);
         let h_std = Vec3::new(r * cos_phi, r * sin_phi, z) + wo_std;
         Vec3::new(self.alpha * h_std.x, self.alpha * h_std.y, h_std.z.max(1e-7)).normalize()
     }

@@ -14,17 +14,18 @@
 //! the viewer's side; they point away from the surface. `wi.z > 0` is reflection, `wi.z < 0`
 //! transmission. The caller rejects a `wi` that lies on the other side of the geometric surface.
 
-mod albedo;
+pub(crate) mod albedo;
 mod coat;
 mod fresnel;
 mod interface;
 mod microfacet;
 
-use std::f32::consts::{FRAC_1_PI, TAU};
+use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 
 use crate::color::importance;
+use crate::math::sin_cos_turns;
 pub use crate::scene::surface::SurfaceParameters;
 use albedo::AlbedoTerms;
 use coat::Coat;
@@ -272,7 +273,7 @@ fn delta_sample(wi: Vec3, weight: Vec3) -> Option<BsdfSample> {
 
 /// A direction around +Z with density `cos / pi`.
 fn cosine_hemisphere(u: Vec2) -> Vec3 {
-    let (sin_phi, cos_phi) = (TAU * u.x).sin_cos();
+    let (sin_phi, cos_phi) = sin_cos_turns(u.x);
     let r = u.y.sqrt();
     Vec3::new(r * cos_phi, r * sin_phi, (1.0 - u.y).max(0.0).sqrt())
 }

@@ -26,17 +26,36 @@ pub(super) struct Tree {
 
 /// Builds over all triangles that have an area; `nodes[0]` is the root, even of an empty scene.
 pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Tree {
+    let Some((kept, binary)) = binary(positions, triangles) else {
+        return Tree {
+            nodes: vec![Node::EMPTY],
+            blocks: Vec::new(),
+            bounds: (Vec3::ZERO, Vec3::ZERO),
+        };
+    };
+    let costs = subtree_costs(&binary);
+    let mut collapse = Collapse {
+        sources: Sources { positions, triangles },
+        kept: &kept,
+        binary: &binary,
+        costs: &costs,
+        nodes: Vec::with_capacity(kept.len() / 24),
+        blocks: Vec::with_capacity(kept.len() / 4),
+    };
+    collapse.root();
+    let bounds = bounds(&binary, 0);
+    Tree { nodes: collapse.nodes, blocks: collapse.blocks, bounds }
+}
+
+/// The triangles that have an area and the binary tree over them; `None` if there are none.
+pub(super) fn binary(positions: &[Vec3], triangles: &[[u32; 3]]) -> Option<(Vec<u32>, Bvh2)> {
     let sources = Sources { positions, triangles };
     let kept: Vec<u32> = (0..u32::try_from(triangles.len()).unwrap_or(u32::MAX))
         .into_par_iter()
         .filter(|&triangle| sources.has_area(triangle))
         .collect();
     if kept.is_empty() {
-        return Tree {
-            nodes: vec![Node::EMPTY],
-            blocks: Vec::new(),
-            bounds: (Vec3::ZERO, Vec3::ZERO),
-        };
+        return None;
     }
     let boxes: Vec<Aabb> = kept
         .par_iter()
@@ -50,19 +69,7 @@ pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Tree {
         ..BvhBuildParams::medium_build()
     };
     let binary = build_bvh2(&boxes, parameters, &mut Duration::default());
-    drop(boxes);
-    let costs = subtree_costs(&binary);
-    let mut collapse = Collapse {
-        sources,
-        kept: &kept,
-        binary: &binary,
-        costs: &costs,
-        nodes: Vec::with_capacity(kept.len() / 24),
-        blocks: Vec::with_capacity(kept.len() / 4),
-    };
-    collapse.root();
-    let bounds = bounds(&binary, 0);
-    Tree { nodes: collapse.nodes, blocks: collapse.blocks, bounds }
+    Some((kept, binary))
 }
 
 /// The scene as the caller gave it.

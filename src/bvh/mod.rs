@@ -4,6 +4,7 @@
 //! bits on all machines: neither the vector instructions in use nor the shape of the tree matters.
 
 mod build;
+pub(crate) mod compressed;
 mod traverse;
 mod triangle;
 mod wide;

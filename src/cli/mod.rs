@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod compare;
+mod device;
 mod info;
 mod interrupt;
 mod load;
@@ -32,6 +33,8 @@ enum Command {
     Compare(compare::CompareArguments),
     /// Say what is in a scene or a map, and what the renderer leaves out.
     Info(info::InfoArguments),
+    /// List the GPUs and what they allow.
+    Devices(device::DevicesArguments),
     /// Compare the importance tables' accuracy on maps (the talk's summed-area-table claim).
     Sat(sat::SatArguments),
 }
@@ -43,6 +46,7 @@ pub fn main() -> ExitCode {
         Command::Render(arguments) => render::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Info(arguments) => info::run(arguments),
+        Command::Devices(arguments) => device::run(arguments),
         Command::Sat(arguments) => sat::run(arguments),
     };
     match result {

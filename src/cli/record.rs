@@ -83,6 +83,7 @@ impl Record<'_> {
             },
             "threads": rayon::current_num_threads(),
             "simd": self.world.bvh.simd_name(),
+            "gpu": self.session.gpu_figures(),
             "needs": self.world.needs,
             "left_out": self.world.needs.left_out(),
             "notices": self.notices.iter().collect::<Vec<_>>(),

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use glam::Vec3;
 
+use super::device::{self, DeviceChoice};
 use super::output::{self, Exposure, LayerName};
 use super::progress::Progress;
 use super::record::{self, Phases, Record};
@@ -115,6 +116,12 @@ pub(super) struct RenderArguments {
     /// Seed of the random numbers; the same seed gives the same picture.
     #[arg(long, default_value = "0", value_name = "N", help_heading = "Run")]
     seed: u32,
+    /// Where to render: auto takes a GPU if there is a real one and everything fits on it.
+    #[arg(long, default_value = "auto", value_enum, help_heading = "Run")]
+    device: DeviceChoice,
+    /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
+    #[arg(long, value_name = "NAME", help_heading = "Run")]
+    adapter: Option<String>,
     /// Threads; 0 uses every core.
     #[arg(long, default_value = "0", value_parser = clap::value_parser!(u16).range(0..=1024), value_name = "N", help_heading = "Run")]
     threads: u16,
@@ -163,9 +170,15 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         eprintln!("notice: {sentence}");
     }
     let rule = stop_rule(arguments);
-    let mut session = Session::new(&world, &environment, view);
-    work(&mut session, &rule, &cancel, &progress);
+    let gpu = device::open(arguments.device, arguments.adapter.as_deref(), &mut notices)?;
+    let mut session =
+        device::start(arguments.device, gpu.as_ref(), &world, &environment, view, &mut notices)?;
+    let outcome = work(&mut session, &rule, &cancel, &progress, arguments, &mut notices);
     progress.finish();
+    if session.film().min_samples() == 0 {
+        outcome?;
+        return Ok(());
+    }
     for sentence in output::remarks(session.film(), &environment) {
         eprintln!("notice: {sentence}");
         notices.add(sentence);
@@ -187,7 +200,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     if let Some(path) = &arguments.json {
         record::write_json(path, &record.figures())?;
     }
-    Ok(())
+    outcome
 }
 
 fn lap(start: Instant) -> f64 {
@@ -293,8 +306,16 @@ fn camera(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> 
     Ok(camera)
 }
 
-/// Runs the session until a rule or the user says stop; at least one sample is taken.
-fn work(session: &mut Session<'_>, rule: &StopRule, cancel: &AtomicBool, progress: &Progress) {
+/// Runs the session until a rule or the user says stop; at least one sample is taken. If a GPU that
+/// was not asked for by name fails, the CPU takes over.
+fn work(
+    session: &mut Session<'_>,
+    rule: &StopRule,
+    cancel: &AtomicBool,
+    progress: &Progress,
+    arguments: &RenderArguments,
+    notices: &mut Notices,
+) -> Result<()> {
     let never = AtomicBool::new(false);
     loop {
         progress.show(session, rule);
@@ -304,9 +325,16 @@ fn work(session: &mut Session<'_>, rule: &StopRule, cancel: &AtomicBool, progres
         }
         let samples = session.film().min_samples();
         if samples > 0 && (stopped || session.is_done(rule)) {
-            return;
+            return Ok(());
         }
-        session.advance(session.next_pass(rule), if stopped { &never } else { cancel });
+        let cancel = if stopped { &never } else { cancel };
+        if let Err(failure) = session.advance(session.next_pass(rule), cancel) {
+            if arguments.device != DeviceChoice::Auto {
+                return Err(failure);
+            }
+            device::say(notices, format!("{failure}; the CPU goes on"));
+            session.continue_on_cpu();
+        }
     }
 }
 

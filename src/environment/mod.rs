@@ -17,6 +17,7 @@ mod tile_local;
 mod tiles;
 mod weights;
 
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use glam::{DVec2, Vec2, Vec3};
@@ -29,7 +30,8 @@ use self::tiles::TileGrid;
 use self::weights::Weights;
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::math::{texel_solid_angle, uv_from_direction};
+use crate::math::{sin_cos_turns, texel_solid_angle, uv_from_direction};
+use crate::sampler::hash;
 
 /// A lat-long map of radiance that can be looked up and sampled.
 #[derive(Debug, Clone)]
@@ -171,8 +173,7 @@ impl Environment {
 
         let x = f64::from(texel.x) + within.x;
         let world_turns = x / width + f64::from(self.rotation_turns) - 0.5;
-        let phi = (world_turns - world_turns.round()) * TAU;
-        let (sin_phi, cos_phi) = (phi as f32).sin_cos();
+        let (sin_phi, cos_phi) = sin_cos_turns((world_turns - world_turns.round()) as f32);
         let row = texel.y as usize;
         let (top, bottom) = (self.row_edge_cosines[row], self.row_edge_cosines[row + 1]);
         let cos_theta = top + within.y * (bottom - top);
@@ -219,6 +220,26 @@ impl Environment {
     /// The map as it was given: not turned, at intensity 1.
     pub fn map(&self) -> &Image {
         &self.map
+    }
+
+    /// The table's words, part after part, for a GPU; summed-area tables have one part.
+    pub(crate) fn table_words(&self) -> Vec<Cow<'_, [u32]>> {
+        self.table.words()
+    }
+
+    /// Which table, and how radiance is read.
+    pub(crate) fn kind(&self) -> (TableKind, Lookup) {
+        (self.table.kind(), self.lookup)
+    }
+
+    /// Rotation in turns, in `[0,1)`, and the factor on all radiance.
+    pub(crate) fn rotation_and_intensity(&self) -> (f32, f32) {
+        (self.rotation_turns, self.intensity)
+    }
+
+    /// 1 / steradian of a texel, per row.
+    pub(crate) fn inverse_texel_solid_angles(&self) -> &[f32] {
+        &self.inverse_texel_solid_angles
     }
 
     /// What the pixels and the table take.
@@ -288,19 +309,17 @@ pub const EDGE_MARGIN_TURNS: f64 = 1.0 / (1 << 22) as f64;
 /// Gives f32 random numbers the bits that choosing among 2^32 takes.
 ///
 /// A uniform f32 has 24 good bits: entries of less than 2^-24 of a table would be met by chance of
-/// rounding only. So each number gets 24 more, hashed from both (the finaliser of SplitMix64,
-/// Steele et al., OOPSLA 2014), below its last bit: order, hence stratification, stays.
+/// rounding only. So each number gets 24 more, hashed from both, below its last bit: order, hence
+/// stratification, stays.
 fn refine(u: Vec2) -> DVec2 {
     const STEPS: f32 = (1 << 24) as f32;
     let (x, y) = (lattice(u.x * STEPS), lattice(u.y * STEPS));
-    let mut hash = (u64::from(x) << 24 | u64::from(y)).wrapping_add(0x9e37_79b9_7f4a_7c15);
-    hash = (hash ^ (hash >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    hash = (hash ^ (hash >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    hash ^= hash >> 31;
-    let refined = |coarse: u32, fine: u64| {
-        ((u64::from(coarse) << 24) | (fine & 0xff_ffff)) as f64 / (1_u64 << 48) as f64
+    let fine_x = hash(hash(x) ^ y);
+    let fine_y = hash(fine_x ^ x);
+    let refined = |coarse: u32, fine: u32| {
+        ((u64::from(coarse) << 24) | u64::from(fine >> 8)) as f64 / (1_u64 << 48) as f64
     };
-    DVec2::new(refined(x, hash), refined(y, hash >> 32))
+    DVec2::new(refined(x, fine_x), refined(y, fine_y))
 }
 
 fn lattice(steps: f32) -> u32 {

@@ -11,15 +11,46 @@ use std::ops::Range;
 
 use glam::DVec2;
 
+use super::TableKind;
 use super::table::TexelSample;
 use super::tiles::TileTexels;
 use super::weights::Weights;
 
 /// A corner's storage type; all three convert to f64 exactly.
-pub(crate) trait Corner: Copy + Default + Into<f64> + std::fmt::Debug + Send + Sync {}
-impl Corner for u32 {}
-impl Corner for f32 {}
-impl Corner for f64 {}
+pub(crate) trait Corner: Copy + Default + Into<f64> + std::fmt::Debug + Send + Sync {
+    /// The table of such corners.
+    const KIND: TableKind;
+
+    /// The corner as 32-bit words, given the table's last corner.
+    fn words(self, total: Self) -> impl Iterator<Item = u32>;
+}
+
+impl Corner for u32 {
+    const KIND: TableKind = TableKind::U32;
+
+    fn words(self, _: Self) -> impl Iterator<Item = u32> {
+        [self].into_iter()
+    }
+}
+
+impl Corner for f32 {
+    const KIND: TableKind = TableKind::F32;
+
+    fn words(self, _: Self) -> impl Iterator<Item = u32> {
+        [self.to_bits()].into_iter()
+    }
+}
+
+impl Corner for f64 {
+    const KIND: TableKind = TableKind::F64;
+
+    /// Share of the total as two f32 that add up to it to 48 bits, the larger one first.
+    fn words(self, total: Self) -> impl Iterator<Item = u32> {
+        let share = if total > 0.0 { self / total } else { 0.0 };
+        let high = share as f32;
+        [high.to_bits(), ((share - Self::from(high)) as f32).to_bits()].into_iter()
+    }
+}
 
 /// Sums of all texels left of and above each texel corner, `(width + 1) * (height + 1)` of them.
 #[derive(Debug, Clone)]
@@ -115,6 +146,12 @@ pub(crate) trait RectangleTable: std::fmt::Debug + Send + Sync {
     /// Mass of a rectangle, as the table has it: may be negative through rounding.
     fn mass(&self, x: &Range<u32>, y: &Range<u32>) -> f64;
 
+    /// Which table it is.
+    fn kind(&self) -> TableKind;
+
+    /// The corners as 32-bit words; f64 ones as two f32 a corner, in shares of the last one.
+    fn words(&self) -> Vec<u32>;
+
     /// Bytes of the table.
     fn memory_bytes(&self) -> usize;
 }
@@ -157,6 +194,15 @@ impl<T: Corner> RectangleTable for SummedArea<T> {
         let at =
             |x: u32, y: u32| -> f64 { self.corners[y as usize * self.stride + x as usize].into() };
         (at(x.end, y.end) - at(x.start, y.end)) - (at(x.end, y.start) - at(x.start, y.start))
+    }
+
+    fn kind(&self) -> TableKind {
+        T::KIND
+    }
+
+    fn words(&self) -> Vec<u32> {
+        let total = self.corners[self.corners.len() - 1];
+        self.corners.iter().flat_map(|corner| corner.words(total)).collect()
     }
 
     fn memory_bytes(&self) -> usize {

@@ -1,5 +1,6 @@
 //! The choice of importance table behind one face.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::DVec2;
@@ -63,6 +64,22 @@ impl Table {
         match self {
             Self::TileLocal(table) => table.sample_probability(grid, tile, x, y),
             Self::SummedArea(table) => table.sample_probability(&grid.texels(tile), x, y),
+        }
+    }
+
+    /// Which kind it is.
+    pub(crate) fn kind(&self) -> TableKind {
+        match self {
+            Self::TileLocal(_) => TableKind::TileLocal,
+            Self::SummedArea(table) => table.kind(),
+        }
+    }
+
+    /// The sums as 32-bit words, part after part.
+    pub(crate) fn words(&self) -> Vec<Cow<'_, [u32]>> {
+        match self {
+            Self::TileLocal(table) => table.sums().map(Cow::Borrowed).into(),
+            Self::SummedArea(table) => vec![Cow::Owned(table.words())],
         }
     }
 

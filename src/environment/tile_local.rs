@@ -86,6 +86,11 @@ impl TileLocal {
         f64::from(columns[column] - before) / f64::from(total)
     }
 
+    /// Sums along the rows of tiles, and down the tiles.
+    pub(crate) fn sums(&self) -> [&[u32]; 2] {
+        [&self.row_sums, &self.tile_sums]
+    }
+
     /// Bytes of both arrays.
     pub(crate) fn memory_bytes(&self) -> usize {
         (self.row_sums.len() + self.tile_sums.len()) * size_of::<u32>()

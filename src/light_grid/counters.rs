@@ -79,6 +79,22 @@ impl Counters {
         }
     }
 
+    /// Visits of each cell, the slot of each cell (`u32::MAX` without one) and the words of each
+    /// slot: what a GPU needs to count on.
+    pub(crate) fn words(&self) -> (Vec<u32>, &[u32], Vec<u32>) {
+        let load = |word: &AtomicU32| word.load(Ordering::Relaxed);
+        let blocks = self.blocks.iter().flat_map(|block| block.iter().map(load)).collect();
+        (self.visits.iter().map(load).collect(), &self.slot_of_cell, blocks)
+    }
+
+    /// Takes back what [`Self::words`] gave, counted on.
+    pub(crate) fn set_words(&self, visits: &[u32], blocks: &[u32]) {
+        let slots = self.blocks.iter().flat_map(|block| block.iter());
+        for (word, value) in self.visits.iter().zip(visits).chain(slots.zip(blocks)) {
+            word.store(*value, Ordering::Relaxed);
+        }
+    }
+
     /// Ends a pass: newly visited cells get tile counters, counters past 2^31 are halved.
     pub fn end_pass(&mut self) {
         let free = self.capacity as usize - self.blocks.len();

@@ -70,6 +70,11 @@ impl LightGrid {
         self.cells.as_ref().map_or(WHOLE_MAP, |cells| u32::from(cells.law_of_cell[cell as usize]))
     }
 
+    /// Where the cells lie and which law each uses; `None` if every point uses the whole map.
+    pub(crate) fn cells(&self) -> Option<(&SphericalGrid, &[u16])> {
+        self.cells.as_ref().map(|cells| (&cells.grid, cells.law_of_cell.as_slice()))
+    }
+
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
         self.laws.memory_bytes() + self.cells.as_ref().map_or(0, |c| c.law_of_cell.capacity() * 2)

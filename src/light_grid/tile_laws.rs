@@ -32,7 +32,30 @@ pub struct TileLaws {
     last: Vec<u32>,
 }
 
+/// The arrays of [`TileLaws`], for a GPU.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LawArrays<'a> {
+    pub(crate) words_per_law: u32,
+    pub(crate) starts: &'a [u32],
+    pub(crate) masks: &'a [u64],
+    pub(crate) ranks: &'a [u16],
+    pub(crate) tiles: &'a [u16],
+    pub(crate) last: &'a [u32],
+}
+
 impl TileLaws {
+    /// The arrays.
+    pub(crate) fn arrays(&self) -> LawArrays<'_> {
+        LawArrays {
+            words_per_law: self.words_per_law,
+            starts: &self.starts,
+            masks: &self.masks,
+            ranks: &self.ranks,
+            tiles: &self.tiles,
+            last: &self.last,
+        }
+    }
+
     /// No laws yet, over `tile_count` tiles (at most 65536).
     pub fn new(tile_count: u32) -> Self {
         assert!((1..=65536).contains(&tile_count), "tile indices are 16 bits wide");

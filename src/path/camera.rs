@@ -8,16 +8,16 @@ use crate::scene::{Camera, Projection};
 /// A camera made ready for a picture of one size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraRays {
-    position: Vec3,
-    right: Vec3,
-    up: Vec3,
-    forward: Vec3,
+    pub(crate) position: Vec3,
+    pub(crate) right: Vec3,
+    pub(crate) up: Vec3,
+    pub(crate) forward: Vec3,
     /// Half extents of the picture at distance 1 (perspective) or in metres (orthographic).
-    half_extent: Vec2,
+    pub(crate) half_extent: Vec2,
     picture_size: Vec2,
-    orthographic: bool,
-    lens_radius: f32,
-    focus_distance: f32,
+    pub(crate) orthographic: bool,
+    pub(crate) lens_radius: f32,
+    pub(crate) focus_distance: f32,
 }
 
 impl CameraRays {

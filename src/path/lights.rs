@@ -34,7 +34,24 @@ pub struct LocalLights {
     cumulative: Vec<f32>,
 }
 
+/// The arrays of [`LocalLights`], for a GPU.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LightArrays<'a> {
+    pub(crate) triangles: &'a [u32],
+    pub(crate) probabilities: &'a [f32],
+    pub(crate) cumulative: &'a [f32],
+}
+
 impl LocalLights {
+    /// The arrays.
+    pub(crate) fn arrays(&self) -> LightArrays<'_> {
+        LightArrays {
+            triangles: &self.triangles,
+            probabilities: &self.probabilities,
+            cumulative: &self.cumulative,
+        }
+    }
+
     /// Collects the lights of a scene with bounds `(min, max)`.
     pub fn new(scene: &Scene, bounds: (Vec3, Vec3)) -> Self {
         let emits: Vec<bool> = scene.materials.iter().map(is_emitter).collect();

@@ -104,6 +104,11 @@ impl World {
         }
     }
 
+    /// Whether part of the light may go straight through surfaces of a material.
+    pub(crate) fn may_pass_light(&self, material: usize) -> bool {
+        self.passing[material].partial
+    }
+
     fn passing_of(&self, triangle: u32) -> Passing {
         self.passing[self.scene.triangle_materials[triangle as usize] as usize]
     }

@@ -46,6 +46,20 @@ impl Pixel {
         self.invalid += u32::from(result.was_invalid);
     }
 
+    /// Adds what a device has summed up over `samples` samples.
+    pub(super) fn add_sums(
+        &mut self,
+        sum: Vec3,
+        luminance_squared: f32,
+        samples: u32,
+        invalid: u32,
+    ) {
+        self.sum.iter_mut().zip(sum.to_array()).for_each(|(s, r)| *s += f64::from(r));
+        self.luminance_squared += f64::from(luminance_squared);
+        self.samples += samples;
+        self.invalid += invalid;
+    }
+
     /// Number of samples taken.
     pub fn samples(&self) -> u32 {
         self.samples
@@ -87,6 +101,16 @@ impl Surface {
     }
 }
 
+impl Surface {
+    /// Adds what a device has summed up over `hits` first hits.
+    pub(super) fn add_sums(&mut self, albedo: Vec3, normal: Vec3, depth: f32, hits: f32) {
+        self.albedo += albedo;
+        self.normal += normal;
+        self.depth += depth;
+        self.hits += hits as u32;
+    }
+}
+
 impl Film {
     /// A black film; `layers` asks for albedo, normal and depth too.
     pub fn new(width: u32, height: u32, layers: bool) -> Self {
@@ -97,6 +121,11 @@ impl Film {
             pixels: vec![Pixel::default(); count],
             surfaces: vec![Surface::default(); if layers { count } else { 0 }],
         }
+    }
+
+    /// Whether albedo, normal and depth are kept.
+    pub fn has_layers(&self) -> bool {
+        !self.surfaces.is_empty()
     }
 
     /// The pixels, row after row.

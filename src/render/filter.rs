@@ -31,6 +31,17 @@ impl PixelFilter {
     }
 }
 
+impl PixelFilter {
+    /// Running integral over the filter's width, which [`Self::sample`] inverts; none for a box.
+    pub(super) fn cumulative(self) -> &'static [f32] {
+        match self {
+            Self::Box => &[],
+            Self::Gauss => &*GAUSS,
+            Self::BlackmanHarris => &*BLACKMAN_HARRIS,
+        }
+    }
+}
+
 /// Half width of the wide filters in pixels.
 const FILTER_RADIUS: f32 = 1.5;
 

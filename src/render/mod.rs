@@ -13,11 +13,13 @@ use serde::Serialize;
 mod cpu;
 pub mod film;
 pub mod filter;
+pub mod gpu;
 
 use film::Film;
 use filter::PixelFilter;
 
 use crate::environment::Environment;
+use crate::error::Result;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LawOptions, LearningGrid, LightGrid};
 use crate::path::camera::CameraRays;
@@ -123,12 +125,19 @@ pub struct Figures {
     pub render_seconds: f64,
 }
 
+/// What does the work.
+enum Engine<'a> {
+    Cpu,
+    Gpu(Box<gpu::Renderer<'a>>),
+}
+
 /// A picture in the making.
 pub struct Session<'a> {
     world: &'a World,
     environment: &'a Environment,
     view: View,
     rays: CameraRays,
+    engine: Engine<'a>,
     film: Film,
     whole_map: Option<LightGrid>,
     learned: Option<LightGrid>,
@@ -142,8 +151,35 @@ struct Learning {
 }
 
 impl<'a> Session<'a> {
-    /// Starts a session; nothing is traced yet.
+    /// Starts a session on the CPU; nothing is traced yet.
     pub fn new(world: &'a World, environment: &'a Environment, view: View) -> Self {
+        Self::with_engine(world, environment, view, Engine::Cpu)
+    }
+
+    /// Starts a session on a GPU: uploads the scene and the map.
+    ///
+    /// # Errors
+    /// If they do not fit on the device.
+    pub fn on_gpu(
+        world: &'a World,
+        environment: &'a Environment,
+        view: View,
+        gpu: &'a gpu::Gpu,
+    ) -> Result<Self> {
+        let rays = CameraRays::new(&view.camera, view.width, view.height);
+        let renderer = gpu::Renderer::new(gpu, world, environment, &view, &rays)?;
+        let engine = Engine::Gpu(Box::new(renderer));
+        let mut session = Self::with_engine(world, environment, view, engine);
+        session.upload_grid()?;
+        Ok(session)
+    }
+
+    fn with_engine(
+        world: &'a World,
+        environment: &'a Environment,
+        view: View,
+        engine: Engine<'a>,
+    ) -> Self {
         let rays = CameraRays::new(&view.camera, view.width, view.height);
         let whole_map = match view.sampling {
             Sampling::Bsdf => None,
@@ -156,6 +192,7 @@ impl<'a> Session<'a> {
             environment,
             view,
             rays,
+            engine,
             whole_map,
             learned: None,
             learning,
@@ -165,17 +202,35 @@ impl<'a> Session<'a> {
 
     /// Does one piece of work: a learning pass, or one that brings every pixel `samples` further.
     /// Returns early, with what is done so far kept, when `cancel` becomes true.
-    pub fn advance(&mut self, samples: u32, cancel: &AtomicBool) {
+    ///
+    /// # Errors
+    /// If the GPU fails; the film so far is kept, and [`Self::continue_on_cpu`] goes on from there.
+    pub fn advance(&mut self, samples: u32, cancel: &AtomicBool) -> Result<()> {
         let start = Instant::now();
         match self.phase() {
             Phase::Learning => {
-                self.learn(cancel);
+                let result = self.learn(cancel);
                 self.figures.learning_seconds += start.elapsed().as_secs_f64();
+                result
             }
             Phase::Rendering => {
-                self.render(self.film.min_samples() + samples, cancel);
+                let result = self.render(self.film.min_samples() + samples, cancel);
                 self.figures.render_seconds += start.elapsed().as_secs_f64();
+                result
             }
+        }
+    }
+
+    /// Lets the CPU take over from a GPU, with everything learned and rendered so far.
+    pub fn continue_on_cpu(&mut self) {
+        self.engine = Engine::Cpu;
+    }
+
+    /// Figures of the GPU at work; `None` on the CPU.
+    pub fn gpu_figures(&self) -> Option<gpu::GpuFigures> {
+        match &self.engine {
+            Engine::Cpu => None,
+            Engine::Gpu(renderer) => Some(renderer.figures()),
         }
     }
 
@@ -202,9 +257,13 @@ impl<'a> Session<'a> {
     }
 
     /// Replaces what was learned; for tests of unbiasedness and for inspection.
-    pub fn set_grid(&mut self, grid: LightGrid) {
+    ///
+    /// # Errors
+    /// If it does not fit on the GPU.
+    pub fn set_grid(&mut self, grid: LightGrid) -> Result<()> {
         self.learning = None;
         self.learned = Some(grid);
+        self.upload_grid()
     }
 
     /// The film so far.
@@ -249,23 +308,37 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn learn(&mut self, cancel: &AtomicBool) {
-        let Some(learning) = &self.learning else { return };
+    fn learn(&mut self, cancel: &AtomicBool) -> Result<()> {
+        let Some(learning) = &self.learning else { return Ok(()) };
         let range = cpu::learning_range(&self.view, learning.pass);
-        let tracer = self.tracer(self.grid());
-        let rays =
-            cpu::learn(&tracer, &self.rays, &self.view, range.clone(), &learning.grid, cancel);
+        let rays = match &mut self.engine {
+            Engine::Cpu => {
+                let tracer = self.tracer(self.grid());
+                cpu::learn(&tracer, &self.rays, &self.view, range.clone(), &learning.grid, cancel)
+            }
+            Engine::Gpu(renderer) => renderer.learn(range.clone(), &learning.grid, cancel)?,
+        };
         if cancel.load(std::sync::atomic::Ordering::Relaxed) {
             // Which paths of the pass were counted depends on the threads: start over.
             self.learned = None;
             self.learning = new_learning(self.environment, &self.view, &self.rays);
-            return;
+            return self.upload_grid();
         }
         self.figures.learning_rays += rays;
         self.figures.learning_paths = range.end;
         self.update_laws();
         if range.end >= self.view.learning_paths {
             self.finish_learning();
+        }
+        self.upload_grid()
+    }
+
+    /// Gives the GPU, if one is at work, the laws in use.
+    fn upload_grid(&mut self) -> Result<()> {
+        let grid = self.learned.as_ref().or(self.whole_map.as_ref());
+        match &mut self.engine {
+            Engine::Cpu => Ok(()),
+            Engine::Gpu(renderer) => renderer.set_grid(grid),
         }
     }
 
@@ -284,14 +357,21 @@ impl<'a> Session<'a> {
             self.learned.as_ref().map_or(0, |grid| grid.laws().len() as usize - 1);
     }
 
-    fn render(&mut self, target_samples: u32, cancel: &AtomicBool) {
+    fn render(&mut self, target_samples: u32, cancel: &AtomicBool) -> Result<()> {
         let mut film = std::mem::replace(&mut self.film, Film::new(0, 0, false));
-        let tracer = self.tracer(self.grid());
-        let (samples, rays) =
-            cpu::render(&tracer, &self.rays, &self.view, target_samples, &mut film, cancel);
+        let done = match &mut self.engine {
+            Engine::Cpu => {
+                let tracer = self.tracer(self.grid());
+                let (rays, view) = (&self.rays, &self.view);
+                Ok(cpu::render(&tracer, rays, view, target_samples, &mut film, cancel))
+            }
+            Engine::Gpu(renderer) => renderer.render(target_samples, &mut film, cancel),
+        };
         self.film = film;
+        let (samples, rays) = done?;
         self.figures.samples += samples;
         self.figures.rays += rays;
+        Ok(())
     }
 }
 

@@ -233,7 +233,7 @@ fn unit(x: f32) -> f32 {
 
 /// Coefficient that turns white into the attenuation colour over the attenuation distance
 /// (`KHR_materials_volume`); a black component absorbs as one of 1e-6.
-fn absorption(material: &Material) -> Vec3 {
+pub(crate) fn absorption(material: &Material) -> Vec3 {
     let distance = material.attenuation_distance;
     if !distance.is_finite() || distance <= 0.0 {
         return Vec3::ZERO;

@@ -62,7 +62,7 @@ fn environment(map: Image) -> Environment {
 /// Learns if the view asks for it, then renders.
 pub(crate) fn render(world: &World, environment: &Environment, view: View, samples: u32) -> Film {
     let mut session = learned(world, environment, view);
-    session.advance(samples, &AtomicBool::new(false));
+    session.advance(samples, &AtomicBool::new(false)).expect("the CPU does not fail");
     assert_eq!(session.film().min_samples(), samples);
     session.film().clone()
 }
@@ -71,7 +71,7 @@ pub(crate) fn render(world: &World, environment: &Environment, view: View, sampl
 fn learned<'a>(world: &'a World, environment: &'a Environment, view: View) -> Session<'a> {
     let mut session = Session::new(world, environment, view);
     while session.phase() == Phase::Learning {
-        session.advance(0, &AtomicBool::new(false));
+        session.advance(0, &AtomicBool::new(false)).expect("the CPU does not fail");
     }
     session
 }

@@ -83,7 +83,9 @@ fn a_black_map_is_black_without_shadow_rays() {
         let view = view(camera.clone(), sampling, 4);
         let environment = environment(Image::filled(8, 4, [0.0; 3]));
         let mut session = learned(&world, &environment, view);
-        session.advance(8, &std::sync::atomic::AtomicBool::new(false));
+        session
+            .advance(8, &std::sync::atomic::AtomicBool::new(false))
+            .expect("the CPU does not fail");
         let figures = session.figures();
         assert!(is_black(session.film()), "{sampling:?}");
         assert_eq!(figures.learning_rays, 0, "{sampling:?}: there is nothing to learn");

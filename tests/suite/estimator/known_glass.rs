@@ -199,7 +199,7 @@ fn roulette_does_not_take_refraction_for_darkness() {
         let view = View { limits, ..view(camera.clone(), Sampling::Bsdf, 64) };
         let bright = constant(1.0);
         let mut session = Session::new(&world, &bright, view);
-        session.advance(64, &AtomicBool::new(false));
+        session.advance(64, &AtomicBool::new(false)).expect("the CPU does not fail");
         expect("clear cube", session.film(), 1.0, 0.02);
         session.figures().rays as f64
     });

@@ -66,7 +66,7 @@ fn film_and_laws_do_not_depend_on_the_threads() {
         let result = |threads| {
             with_threads(threads, || {
                 let mut session = setting.session(setting.view(sampling));
-                session.advance(8, &AtomicBool::new(false));
+                session.advance(8, &AtomicBool::new(false)).expect("the CPU does not fail");
                 let laws = laws(session.grid().expect("a map with light"));
                 (session.film().clone(), laws, *session.figures())
             })
@@ -127,7 +127,7 @@ fn passes_may_be_cut_anywhere() {
     let film = |passes: &[u32]| -> Film {
         let mut session = setting.session(setting.view(Sampling::Adaptive));
         for &samples in passes {
-            session.advance(samples, &AtomicBool::new(false));
+            session.advance(samples, &AtomicBool::new(false)).expect("the CPU does not fail");
         }
         session.film().clone()
     };
@@ -143,11 +143,11 @@ fn a_cancelled_pass_resumes_to_the_same_picture() {
     let setting = Setting::new();
     let whole = {
         let mut session = setting.session(setting.view(Sampling::Adaptive));
-        session.advance(8, &AtomicBool::new(false));
+        session.advance(8, &AtomicBool::new(false)).expect("the CPU does not fail");
         session.film().clone()
     };
     let mut session = setting.session(setting.view(Sampling::Adaptive));
-    session.advance(3, &AtomicBool::new(false));
+    session.advance(3, &AtomicBool::new(false)).expect("the CPU does not fail");
     // Cancelled somewhere in the middle, at the latest after the pass.
     let cancel = AtomicBool::new(false);
     std::thread::scope(|scope| {
@@ -155,16 +155,16 @@ fn a_cancelled_pass_resumes_to_the_same_picture() {
             std::thread::sleep(std::time::Duration::from_millis(1));
             cancel.store(true, std::sync::atomic::Ordering::Relaxed);
         });
-        session.advance(200, &cancel);
+        session.advance(200, &cancel).expect("the CPU does not fail");
     });
     assert!(session.film().total_samples() < 203 * 33 * 17, "it was too fast to be cancelled");
     assert!(session.film().min_samples() >= 3, "what was done is kept");
     let mut reference = setting.session(setting.view(Sampling::Adaptive));
     while session.film().min_samples() < 203 {
         let missing = 203 - session.film().min_samples();
-        session.advance(missing, &AtomicBool::new(false));
+        session.advance(missing, &AtomicBool::new(false)).expect("the CPU does not fail");
     }
-    reference.advance(203, &AtomicBool::new(false));
+    reference.advance(203, &AtomicBool::new(false)).expect("the CPU does not fail");
     assert!(session.film() == reference.film(), "cancelled and resumed");
     assert!(whole != *reference.film(), "the comparison can fail");
 }
@@ -174,11 +174,11 @@ fn cancelled_learning_gives_the_same_laws_in_the_end() {
     let setting = Setting::new();
     let view = setting.view(Sampling::Adaptive);
     let mut session = Session::new(&setting.world, &setting.environment, view.clone());
-    session.advance(1, &AtomicBool::new(false));
-    session.advance(1, &AtomicBool::new(true));
+    session.advance(1, &AtomicBool::new(false)).expect("the CPU does not fail");
+    session.advance(1, &AtomicBool::new(true)).expect("the CPU does not fail");
     assert_eq!(session.phase(), Phase::Learning);
     while session.phase() == Phase::Learning {
-        session.advance(1, &AtomicBool::new(false));
+        session.advance(1, &AtomicBool::new(false)).expect("the CPU does not fail");
     }
     let other = setting.session(view);
     let of = |session: &Session<'_>| laws(session.grid().expect("a map with light"));
@@ -191,7 +191,7 @@ fn another_seed_gives_another_picture() {
     let film = |seed| {
         let view = View { seed, ..setting.view(Sampling::Adaptive) };
         let mut session = setting.session(view);
-        session.advance(2, &AtomicBool::new(false));
+        session.advance(2, &AtomicBool::new(false)).expect("the CPU does not fail");
         (session.film().clone(), laws(session.grid().expect("a map with light")))
     };
     let (a, b) = (film(1), film(2));

@@ -1,0 +1,581 @@
+// How light is scattered at a surface point: twin of src/bsdf/ (mod.rs, interface.rs, coat.rs,
+// albedo.rs). Directions are unit, local to the shading frame, z on the viewer's side.
+
+const STRAIGHT_ETA = 1e-3;
+// Rows and columns of the table of directional albedos.
+const ALBEDO_NODES = 32u;
+
+struct Interface {
+    f0: vec3f,
+    f90: f32,
+    alpha: f32,
+//#if transmission
+    glass: f32,
+    glass_f90: f32,
+    eta: f32,
+    glass_f0: vec3f,
+    thin: bool,
+    tint: vec3f,
+//#end
+}
+
+struct Bsdf {
+    interface_: Interface,
+    // Lambert's lobe: base colour times share, over what the interface lets in on average.
+    diffuse_color: vec3f,
+    // The dielectric's largest F0 and its F90.
+    f0_f90: vec2f,
+    roughness: f32,
+//#if clearcoat
+    coat: Coat,
+//#end
+}
+
+struct Facet {
+    reflectance: vec3f,
+    transmittance: vec3f,
+}
+
+// What depends on `wo` alone. All probabilities are zero if nothing is scattered.
+struct Outgoing {
+    diffuse_left: f32,
+    coat_probability: f32,
+    interface_probability: f32,
+    diffuse_probability: f32,
+}
+
+// Value times cosine, and density per steradian.
+struct EvalPdf {
+    value: vec3f,
+    pdf_solid_angle: f32,
+}
+
+const ABSORBED = 0u;
+// A direction with a density, to be evaluated with all lobes.
+const SPREAD = 1u;
+// Perfect reflection or refraction: direction and weight.
+const DELTA = 2u;
+const COAT_DELTA = 3u;
+
+struct LobeSample {
+    kind: u32,
+    wi: vec3f,
+    weight: vec3f,
+}
+
+struct BsdfSample {
+    // Unit local direction the light comes from.
+    wi: vec3f,
+    // f |cos wi| / pdf; zero means absorption.
+    weight: vec3f,
+    pdf_solid_angle: f32,
+    is_delta: bool,
+}
+
+const NO_SAMPLE = LobeSample(ABSORBED, vec3f(0.0), vec3f(0.0));
+
+fn albedo_node(row: u32, column: u32) -> vec2f {
+    let at = ALBEDO_AT + 2u * (row * (ALBEDO_NODES + 1u) + column);
+    return vec2f(tables[at], tables[at + 1u]);
+}
+
+// `AlbedoTerms::at`: (A, B) seen from a direction of this cosine.
+fn albedo_terms_at(roughness: f32, cosine: f32) -> vec2f {
+    let y = roughness * f32(ALBEDO_NODES - 1u);
+    let row = min(u32(y), ALBEDO_NODES - 2u);
+    let x = sqrt(saturate(cosine)) * f32(ALBEDO_NODES - 1u);
+    let column = min(u32(x), ALBEDO_NODES - 2u);
+    let across = x - f32(column);
+    return mix(
+        mix(albedo_node(row, column), albedo_node(row, column + 1u), across),
+        mix(albedo_node(row + 1u, column), albedo_node(row + 1u, column + 1u), across),
+        y - f32(row),
+    );
+}
+
+// `AlbedoTerms::mean`: the last column.
+fn albedo_terms_mean(roughness: f32) -> vec2f {
+    let y = roughness * f32(ALBEDO_NODES - 1u);
+    let row = min(u32(y), ALBEDO_NODES - 2u);
+    return mix(albedo_node(row, ALBEDO_NODES), albedo_node(row + 1u, ALBEDO_NODES), y - f32(row));
+}
+
+fn interface_new(p: SurfaceParameters, f0: vec3f, f90: f32, entering: bool) -> Interface {
+    var i: Interface;
+    i.alpha = p.roughness * p.roughness;
+    let opaque_share = (1.0 - p.metallic) * (1.0 - p.transmission);
+    i.f0 = f0 * opaque_share + p.base_color * p.metallic;
+    i.f90 = f90 * opaque_share + p.metallic;
+//#if transmission
+    i.glass = (1.0 - p.metallic) * p.transmission;
+    i.glass_f0 = f0;
+    i.glass_f90 = f90;
+    i.tint = p.base_color * i.glass;
+    i.thin = p.thin;
+    let ior = max(p.ior, 1.0);
+    i.eta = select(1.0 / ior, ior, entering || p.thin);
+    if abs(ior - 1.0) < STRAIGHT_ETA {
+        i.eta = 1.0;
+    }
+//#end
+    return i;
+}
+
+fn is_smooth(alpha: f32) -> bool {
+    return alpha < SMOOTH_ALPHA;
+}
+
+fn interface_is_absent(i: Interface) -> bool {
+    var absent = i.f90 == 0.0 && all(i.f0 == vec3f(0.0));
+//#if transmission
+    absent = absent && i.glass == 0.0;
+//#end
+    return absent;
+}
+
+fn interface_is_delta_or_absent(i: Interface) -> bool {
+    if is_smooth(i.alpha) || interface_is_absent(i) {
+        return true;
+    }
+//#if transmission
+    let reflects_nothing = i.f90 == 0.0 && all(i.f0 == vec3f(0.0)) && all(i.glass_f0 == vec3f(0.0));
+    return transmits_delta(i) && reflects_nothing;
+//#else
+    return false;
+//#end
+}
+
+// Reflectance and transmittance of a facet seen at this cosine.
+fn interface_facet(i: Interface, cosine: f32) -> Facet {
+    let opaque_share = i.f0 + (i.f90 - i.f0) * schlick_weight(cosine);
+//#if transmission
+    if i.glass > 0.0 {
+        let exact = dielectric(cosine, i.eta);
+        if exact == TOTAL_REFLECTION {
+            return Facet(opaque_share + i.glass, vec3f(0.0));
+        }
+        let exact_f0 = normal_reflectance(i.eta);
+        let weight = saturate((exact - exact_f0) / (1.0 - exact_f0));
+        let fresnel = i.glass_f0 + (i.glass_f90 - i.glass_f0) * weight;
+        let most = max_element(fresnel);
+        if i.thin {
+            return Facet(
+                opaque_share + i.glass * (2.0 * fresnel / (1.0 + fresnel)),
+                i.tint * ((1.0 - most) / (1.0 + most)),
+            );
+        }
+        return Facet(opaque_share + i.glass * fresnel, i.tint * (1.0 - most));
+    }
+//#end
+    return Facet(opaque_share, vec3f(0.0));
+}
+
+fn facet_reflection_probability(facet: Facet) -> f32 {
+    let r = importance(facet.reflectance);
+    let t = importance(facet.transmittance);
+    return select(1.0, r / (r + t), t > 0.0);
+}
+
+//#if transmission
+fn passes_straight(i: Interface) -> bool {
+    return i.glass > 0.0 && i.thin && is_smooth(i.alpha);
+}
+
+fn transmits_delta(i: Interface) -> bool {
+    return is_smooth(i.alpha) || (!i.thin && i.eta == 1.0);
+}
+
+fn interface_straight_transmittance(i: Interface, cosine: f32) -> vec3f {
+    if passes_straight(i) {
+        return interface_facet(i, cosine).transmittance;
+    }
+    return vec3f(0.0);
+}
+//#end
+
+// The facet as far as evaluation and sampling answer for it.
+fn scattering_facet(i: Interface, cosine: f32) -> Facet {
+    var facet = interface_facet(i, cosine);
+//#if transmission
+    if passes_straight(i) {
+        facet.transmittance = vec3f(0.0);
+    }
+//#end
+    return facet;
+}
+
+// Probability of reflecting at a facet; delta refraction is chosen before the facet is.
+fn reflection_probability(i: Interface, facet: Facet, wo: vec3f) -> f32 {
+//#if transmission
+    if i.glass > 0.0 && transmits_delta(i) {
+        return facet_reflection_probability(scattering_facet(i, wo.z));
+    }
+//#end
+    return facet_reflection_probability(facet);
+}
+
+fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSample {
+    let smooth_ = is_smooth(i.alpha);
+    var h = vec3f(0.0, 0.0, 1.0);
+    if !smooth_ {
+        h = ggx_sample_visible_normal(i.alpha, wo, u);
+    }
+    let facet = scattering_facet(i, dot(wo, h));
+    let probability = reflection_probability(i, facet, wo);
+    if choice < probability {
+        let wi = reflected(wo, h);
+        if smooth_ {
+            return LobeSample(DELTA, wi, facet.reflectance / probability);
+        }
+        return LobeSample(select(ABSORBED, SPREAD, wi.z > 0.0), wi, vec3f(0.0));
+    }
+//#if transmission
+    if transmits_delta(i) {
+        let wi = refracted(wo, vec3f(0.0, 0.0, 1.0), i.eta);
+        if all(wi == vec3f(0.0)) {
+            return NO_SAMPLE;
+        }
+        let radiance = scattering_facet(i, wo.z).transmittance / (i.eta * i.eta);
+        return LobeSample(DELTA, wi, radiance / (1.0 - probability));
+    }
+    var wi = reflected(wo, h) * vec3f(1.0, 1.0, -1.0);
+    if !i.thin {
+        wi = refracted(wo, h, i.eta);
+    }
+    return LobeSample(select(ABSORBED, SPREAD, wi.z < 0.0), wi, vec3f(0.0));
+//#else
+    return NO_SAMPLE;
+//#end
+}
+
+fn interface_eval_pdf(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
+    if is_smooth(i.alpha) {
+        return EvalPdf(vec3f(0.0), 0.0);
+    }
+    if wi.z > 0.0 {
+        return eval_pdf_mirrored(i, wo, wi, true);
+    }
+//#if transmission
+    if i.glass == 0.0 || transmits_delta(i) {
+        return EvalPdf(vec3f(0.0), 0.0);
+    }
+    if i.thin {
+        return eval_pdf_mirrored(i, wo, wi * vec3f(1.0, 1.0, -1.0), false);
+    }
+    return eval_pdf_refracted(i, wo, wi);
+//#else
+    return EvalPdf(vec3f(0.0), 0.0);
+//#end
+}
+
+fn eval_pdf_mirrored(i: Interface, wo: vec3f, wi: vec3f, is_reflected: bool) -> EvalPdf {
+    let h = normalize_or(wo + wi, vec3f(0.0));
+    if all(h == vec3f(0.0)) {
+        return EvalPdf(vec3f(0.0), 0.0);
+    }
+    let facet = interface_facet(i, dot(wo, h));
+    let reflects = reflection_probability(i, facet, wo);
+    let color = select(facet.transmittance, facet.reflectance, is_reflected);
+    let probability = select(1.0 - reflects, reflects, is_reflected);
+    let visible = ggx_distribution(i.alpha, h) * ggx_visibility(i.alpha, wo.z);
+    return EvalPdf(
+        color * (visible * ggx_visibility(i.alpha, wi.z) * wi.z),
+        0.5 * visible * probability,
+    );
+}
+
+//#if transmission
+fn eval_pdf_refracted(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
+    let none = EvalPdf(vec3f(0.0), 0.0);
+    var h = normalize_or(wo + i.eta * wi, vec3f(0.0));
+    h = select(h, -h, h.z < 0.0);
+    let cos_o = dot(wo, h);
+    let cos_i = dot(wi, h);
+    if cos_o <= 0.0 || cos_i >= 0.0 {
+        return none;
+    }
+    let facet = interface_facet(i, cos_o);
+    let denominator = cos_o + i.eta * cos_i;
+    let jacobian = -cos_i / (denominator * denominator);
+    let visible = ggx_visible_normal_pdf_solid_angle(i.alpha, wo, h) * jacobian;
+    let masking = 2.0 * -wi.z * ggx_visibility(i.alpha, -wi.z);
+    let probability = 1.0 - facet_reflection_probability(facet);
+    return EvalPdf(
+        facet.transmittance * (visible * masking),
+        visible * i.eta * i.eta * probability,
+    );
+}
+//#end
+
+fn interface_albedo(i: Interface, cosine: f32, terms: vec2f) -> vec3f {
+    var albedo = i.f0 * terms.x + i.f90 * terms.y;
+//#if transmission
+    if i.glass > 0.0 {
+        var glass = i;
+        glass.f0 = vec3f(0.0);
+        glass.f90 = 0.0;
+        let passing = scattering_facet(glass, cosine);
+        albedo += passing.reflectance + passing.transmittance;
+    }
+//#end
+    return albedo;
+}
+
+//#if clearcoat
+const COAT_F0 = 0.04;
+
+struct Coat {
+    strength: f32,
+    alpha: f32,
+    frame: Frame,
+    thin: bool,
+    entering: bool,
+}
+
+fn coat_new(p: SurfaceParameters, entering: bool) -> Coat {
+    return Coat(
+        p.clearcoat,
+        p.clearcoat_roughness * p.clearcoat_roughness,
+        frame_from_z(p.clearcoat_normal),
+        p.thin,
+        entering,
+    );
+}
+
+fn coat_is_outside(coat: Coat, z: f32) -> bool {
+    return coat.thin || (z > 0.0) == coat.entering;
+}
+
+fn coat_fresnel(cosine: f32) -> f32 {
+    return COAT_F0 + (1.0 - COAT_F0) * schlick_weight(cosine);
+}
+
+fn coat_is_delta_or_absent(coat: Coat) -> bool {
+    return coat.strength == 0.0 || !coat_is_outside(coat, 1.0) || is_smooth(coat.alpha);
+}
+
+fn coat_attenuation(coat: Coat, v: vec3f) -> f32 {
+    if coat.strength == 0.0 || !coat_is_outside(coat, v.z) {
+        return 1.0;
+    }
+    return 1.0 - coat.strength * coat_fresnel(abs(dot(v, coat.frame.z)));
+}
+
+fn coat_albedo(coat: Coat, wo: vec3f) -> f32 {
+    let cosine = dot(wo, coat.frame.z);
+    let reflects = coat_is_outside(coat, wo.z) && cosine > 0.0;
+    return select(0.0, coat.strength * coat_fresnel(cosine), reflects);
+}
+
+fn coat_sample(coat: Coat, wo: vec3f, u: vec2f, probability: f32) -> LobeSample {
+    let local = local_from_world(coat.frame, wo);
+    let smooth_ = is_smooth(coat.alpha);
+    var h = vec3f(0.0, 0.0, 1.0);
+    if !smooth_ {
+        h = ggx_sample_visible_normal(coat.alpha, local, u);
+    }
+    let local_wi = reflected(local, h);
+    let wi = world_from_local(coat.frame, local_wi);
+    if local_wi.z <= 0.0 || wi.z <= 0.0 {
+        return NO_SAMPLE;
+    }
+    if smooth_ {
+        let weight = vec3f(coat.strength * coat_fresnel(local.z) / probability);
+        return LobeSample(COAT_DELTA, wi, weight);
+    }
+    return LobeSample(SPREAD, wi, vec3f(0.0));
+}
+
+fn coat_eval_pdf(coat: Coat, wo: vec3f, wi: vec3f) -> vec2f {
+    let o = local_from_world(coat.frame, wo);
+    let i = local_from_world(coat.frame, wi);
+    if is_smooth(coat.alpha) || wi.z <= 0.0 || o.z <= 0.0 || i.z <= 0.0 {
+        return vec2f(0.0);
+    }
+    let h = normalize(o + i);
+    let visible = ggx_distribution(coat.alpha, h) * ggx_visibility(coat.alpha, o.z);
+    let value = coat.strength * coat_fresnel(dot(o, h)) * visible
+        * ggx_visibility(coat.alpha, i.z) * i.z;
+    return vec2f(value, 0.5 * visible);
+}
+//#end
+
+fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
+    let f90 = p.specular;
+    let f0 = min(normal_reflectance(p.ior) * p.specular_color, vec3f(1.0)) * p.specular;
+    var b: Bsdf;
+    b.f0_f90 = vec2f(max_element(f0), f90);
+    b.roughness = p.roughness;
+    b.diffuse_color = p.base_color * ((1.0 - p.metallic) * (1.0 - p.transmission));
+    if f90 > 0.0 && any(b.diffuse_color != vec3f(0.0)) {
+        let let_in = 1.0 - dot(b.f0_f90, albedo_terms_mean(p.roughness));
+        b.diffuse_color = select(vec3f(0.0), b.diffuse_color / let_in, let_in > 1e-4);
+    }
+    b.interface_ = interface_new(p, f0, f90, entering);
+//#if clearcoat
+    b.coat = coat_new(p, entering);
+//#end
+    return b;
+}
+
+fn bsdf_is_delta_only(b: Bsdf) -> bool {
+    var delta = all(b.diffuse_color == vec3f(0.0)) && interface_is_delta_or_absent(b.interface_);
+//#if clearcoat
+    delta = delta && coat_is_delta_or_absent(b.coat);
+//#end
+    return delta;
+}
+
+fn bsdf_diffuse_left(b: Bsdf, terms: vec2f) -> f32 {
+    return max(1.0 - dot(b.f0_f90, terms), 0.0);
+}
+
+fn bsdf_diffuse_left_at(b: Bsdf, cosine: f32) -> f32 {
+    if all(b.f0_f90 == vec2f(0.0)) {
+        return 1.0;
+    }
+    return bsdf_diffuse_left(b, albedo_terms_at(b.roughness, cosine));
+}
+
+fn bsdf_outgoing(b: Bsdf, wo: vec3f) -> Outgoing {
+    let none = Outgoing(0.0, 0.0, 0.0, 0.0);
+    if !(wo.z > 0.0) {
+        return none;
+    }
+    let has_diffuse = any(b.diffuse_color != vec3f(0.0));
+    let has_interface = !interface_is_absent(b.interface_);
+    var bare = true;
+//#if clearcoat
+    bare = b.coat.strength == 0.0;
+//#end
+    if bare && !(has_diffuse && has_interface) {
+        return Outgoing(1.0, 0.0, select(0.0, 1.0, has_interface), select(0.0, 1.0, has_diffuse));
+    }
+    let terms = albedo_terms_at(b.roughness, wo.z);
+    let diffuse_left = bsdf_diffuse_left(b, terms);
+    var interface_albedo_ = importance(interface_albedo(b.interface_, wo.z, terms));
+    var diffuse = diffuse_left * importance(b.diffuse_color);
+    var coat = 0.0;
+//#if clearcoat
+    let under = coat_attenuation(b.coat, wo);
+    interface_albedo_ *= under;
+    diffuse *= under;
+    coat = coat_albedo(b.coat, wo);
+//#end
+    let sum = coat + interface_albedo_ + diffuse;
+    if !(sum > 0.0) {
+        return none;
+    }
+    return Outgoing(diffuse_left, coat / sum, interface_albedo_ / sum, diffuse / sum);
+}
+
+fn bsdf_eval_pdf_with(b: Bsdf, wo: vec3f, wi: vec3f, out: Outgoing) -> EvalPdf {
+    var result = EvalPdf(vec3f(0.0), 0.0);
+    if out.diffuse_probability > 0.0 && wi.z > 0.0 {
+        let lambert = wi.z * FRAC_1_PI;
+        let left = out.diffuse_left * bsdf_diffuse_left_at(b, wi.z);
+        result.value += b.diffuse_color * (left * lambert);
+        result.pdf_solid_angle += out.diffuse_probability * lambert;
+    }
+    if out.interface_probability > 0.0 {
+        let lobe = interface_eval_pdf(b.interface_, wo, wi);
+        result.value += lobe.value;
+        result.pdf_solid_angle += out.interface_probability * lobe.pdf_solid_angle;
+    }
+//#if clearcoat
+    if b.coat.strength > 0.0 {
+        result.value *= coat_attenuation(b.coat, wo) * coat_attenuation(b.coat, wi);
+        if out.coat_probability > 0.0 {
+            let coat = coat_eval_pdf(b.coat, wo, wi);
+            result.value += vec3f(coat.x);
+            result.pdf_solid_angle += out.coat_probability * coat.y;
+        }
+    }
+//#end
+    return result;
+}
+
+// Zero if nothing is scattered towards `wo`.
+fn bsdf_eval_pdf(b: Bsdf, wo: vec3f, wi: vec3f) -> EvalPdf {
+    return bsdf_eval_pdf_with(b, wo, wi, bsdf_outgoing(b, wo));
+}
+
+fn cosine_hemisphere(u: vec2f) -> vec3f {
+    let sin_cos = sin_cos_turns(u.x);
+    let r = sqrt(u.y);
+    return vec3f(r * sin_cos.y, r * sin_cos.x, sqrt(max(1.0 - u.y, 0.0)));
+}
+
+// A direction to continue in; weight zero is absorption.
+fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
+    let none = BsdfSample(vec3f(0.0), vec3f(0.0), 0.0, false);
+    let out = bsdf_outgoing(b, wo);
+    if out.coat_probability + out.interface_probability + out.diffuse_probability <= 0.0 {
+        return none;
+    }
+    var lobe: LobeSample;
+    let choice = u.x - out.coat_probability;
+    if choice < 0.0 {
+//#if clearcoat
+        lobe = coat_sample(b.coat, wo, u.yz, out.coat_probability);
+//#end
+    } else if choice < out.interface_probability {
+        let within = min(choice / out.interface_probability, 0.99999988);
+        lobe = interface_sample(b.interface_, wo, within, u.yz);
+    } else {
+        lobe = LobeSample(SPREAD, cosine_hemisphere(u.yz), vec3f(0.0));
+    }
+    if lobe.kind == ABSORBED {
+        return none;
+    }
+    if lobe.kind == SPREAD {
+        let f = bsdf_eval_pdf_with(b, wo, lobe.wi, out);
+        let weight = f.value / f.pdf_solid_angle;
+        if !(f.pdf_solid_angle > 0.0) || !is_finite3(weight) {
+            return none;
+        }
+        return BsdfSample(lobe.wi, weight, f.pdf_solid_angle, false);
+    }
+    var weight = lobe.weight;
+    if lobe.kind == DELTA {
+        weight /= out.interface_probability;
+//#if clearcoat
+        weight *= coat_attenuation(b.coat, wo) * coat_attenuation(b.coat, lobe.wi);
+//#end
+    }
+    if !is_finite3(weight) {
+        return none;
+    }
+    return BsdfSample(lobe.wi, weight, 1.0, true);
+}
+
+//#if transmission
+// Light that goes straight through: smooth thin-walled transmission.
+fn bsdf_straight_transmittance(b: Bsdf, wo: vec3f) -> vec3f {
+    var through = interface_straight_transmittance(b.interface_, abs(wo.z));
+//#if clearcoat
+    let coat = coat_attenuation(b.coat, wo);
+    through *= coat * coat;
+//#end
+    return through;
+}
+//#end
+
+//#if layers
+// Share of uniform light that reaches a viewer straight above, for guide layers.
+fn bsdf_albedo(b: Bsdf) -> vec3f {
+    let terms = albedo_terms_at(b.roughness, 1.0);
+    let let_in = 1.0 - dot(b.f0_f90, albedo_terms_mean(b.roughness));
+    var albedo = b.diffuse_color * (bsdf_diffuse_left(b, terms) * let_in)
+        + interface_albedo(b.interface_, 1.0, terms);
+    let up = vec3f(0.0, 0.0, 1.0);
+//#if transmission
+    albedo += bsdf_straight_transmittance(b, up);
+//#end
+//#if clearcoat
+    let under = coat_attenuation(b.coat, up);
+    albedo = coat_albedo(b.coat, up) + under * under * albedo;
+//#end
+    return saturate(albedo);
+}
+//#end

@@ -1,0 +1,281 @@
+// What a ray hits: obvhs' compressed wide BVH (Ylitie, Karras, Laine, HPG 2017) and a watertight
+// triangle test (Woop, Benthin, Wald, JCGT 2013). The same hits as src/bvh/, by another tree.
+
+// No hit: Hit.t.
+const MISS = F32_MAX;
+
+struct Ray {
+    origin: vec3f,
+    direction: vec3f,
+    t_max: f32,
+}
+
+struct Hit {
+    // Distance in lengths of the ray's direction; MISS if there is none.
+    t: f32,
+    // Index in the scene's list of triangles.
+    triangle: u32,
+    // Weights of the second and the third vertex.
+    barycentric: vec2f,
+}
+
+// A ray as the boxes want it. Boxes are made larger by 16 u (|origin| + extent), u = 2^-24, which
+// covers all rounding here and in the triangle test (see `BoxRay` in src/bvh/traverse.rs).
+struct BoxRay {
+    inverse: vec3f,
+    near_origin: vec3f,
+    far_origin: vec3f,
+    // Which bytes of a node hold the planes met first.
+    negative: vec3<bool>,
+    octant: u32,
+}
+
+// A ray as the triangles want it: the frame in which it runs along the third axis.
+struct Shear {
+    axis: u32,
+    factors: vec3f,
+    origin: vec3f,
+}
+
+fn box_ray_new(ray: Ray) -> BoxRay {
+    let size = abs(ray.direction);
+    let least = max_element(size) * 8.6736174e-19; // 2^-60
+    let inverse = 1.0 / vec3f(
+        copysign(max(size.x, least), ray.direction.x),
+        copysign(max(size.y, least), ray.direction.y),
+        copysign(max(size.z, least), ray.direction.z),
+    );
+    let reach = max_element(abs(ray.origin)) + globals.scene_extent;
+    let pad = reach * 9.536743e-7 + 1.1754944e-38; // 16 * 2^-24
+    let negative = inverse < vec3f(0.0);
+    let toward = select(vec3f(pad), vec3f(-pad), negative);
+    let octant = select(4u, 0u, negative.x) | select(2u, 0u, negative.y) | select(1u, 0u, negative.z);
+    return BoxRay(inverse, ray.origin + toward, ray.origin - toward, negative, octant * 0x01010101u);
+}
+
+fn shear_new(ray: Ray) -> Shear {
+    let size = abs(ray.direction);
+    var axis = 0u;
+    if size.y > size.x { axis = 1u; }
+    if size.z > max(size.x, size.y) { axis = 2u; }
+    let d = along_axis(ray.direction, axis);
+    return Shear(axis, vec3f(d.x / d.z, d.y / d.z, 1.0 / d.z), along_axis(ray.origin, axis));
+}
+
+// Cyclic permutation that puts `axis` last.
+fn along_axis(v: vec3f, axis: u32) -> vec3f {
+    return select(select(v.xyz, v.zxy, axis == 1u), v.yzx, axis == 0u);
+}
+
+fn sheared(vertex: vec3f, shear: Shear) -> vec3f {
+    let v = along_axis(vertex, shear.axis) - shear.origin;
+    return vec3f(v.x - shear.factors.x * v.z, v.y - shear.factors.y * v.z, v.z);
+}
+
+// On which side of the edge from `b` to `a` the ray passes. The ends are put in order first: two
+// triangles then compute the same number for their shared edge, fused or not, and a ray cannot
+// slip between them.
+fn edge(a: vec3f, b: vec3f) -> f32 {
+    let swap = a.x > b.x || (a.x == b.x && a.y > b.y);
+    let first = select(a.xy, b.xy, swap);
+    let second = select(b.xy, a.xy, swap);
+    let area = first.x * second.y - first.y * second.x;
+    return select(area, -area, swap);
+}
+
+// The hit of one triangle of the tree, MISS if there is none within `t_max`.
+fn intersect_triangle(index: u32, shear: Shear, t_max: f32) -> Hit {
+    let v0 = bvh_triangles(3u * index);
+    let v1 = bvh_triangles(3u * index + 1u);
+    let v2 = bvh_triangles(3u * index + 2u);
+    let a = sheared(v0.xyz, shear);
+    let b = sheared(v1.xyz, shear);
+    let c = sheared(v2.xyz, shear);
+    let edges = vec3f(edge(c, b), edge(a, c), edge(b, a));
+    let none = Hit(MISS, 0u, vec2f(0.0));
+    if any(edges < vec3f(0.0)) && any(edges > vec3f(0.0)) {
+        return none;
+    }
+    let determinant = edges.x + edges.y + edges.z;
+    if determinant == 0.0 {
+        return none;
+    }
+    let t = (edges.x * a.z + edges.y * b.z + edges.z * c.z) * shear.factors.z / determinant;
+    if !(t >= 0.0 && t <= t_max) {
+        return none;
+    }
+    return Hit(t, bitcast<u32>(v0.w), edges.yz / determinant);
+}
+
+// Four of a node's eight boxes; bits for the hit mask.
+fn enter_four(
+    meta4: u32,
+    planes: array<u32, 6>,
+    scale: vec3f,
+    near_offset: vec3f,
+    far_offset: vec3f,
+    ray: BoxRay,
+    t_max: f32,
+) -> u32 {
+    let is_inner4 = (meta4 & (meta4 << 1u)) & 0x10101010u;
+    let inner_mask4 = (is_inner4 >> 4u) * 0xffu;
+    let bit_index4 = (meta4 ^ (ray.octant & inner_mask4)) & 0x1f1f1f1fu;
+    let child_bits4 = (meta4 >> 5u) & 0x07070707u;
+    let near_x = select(planes[0], planes[1], ray.negative.x);
+    let far_x = select(planes[1], planes[0], ray.negative.x);
+    let near_y = select(planes[2], planes[3], ray.negative.y);
+    let far_y = select(planes[3], planes[2], ray.negative.y);
+    let near_z = select(planes[4], planes[5], ray.negative.z);
+    let far_z = select(planes[5], planes[4], ray.negative.z);
+    var mask = 0u;
+    for (var i = 0u; i < 4u; i++) {
+        let shift = 8u * i;
+        let near = vec3f(
+            f32((near_x >> shift) & 0xffu),
+            f32((near_y >> shift) & 0xffu),
+            f32((near_z >> shift) & 0xffu),
+        ) * scale + near_offset;
+        let far = vec3f(
+            f32((far_x >> shift) & 0xffu),
+            f32((far_y >> shift) & 0xffu),
+            f32((far_z >> shift) & 0xffu),
+        ) * scale + far_offset;
+        let enters = max(max_element(near), 0.0);
+        let leaves = min(min(far.x, min(far.y, far.z)), t_max);
+        let bits = ((child_bits4 >> shift) & 0xffu) << ((bit_index4 >> shift) & 0xffu);
+        mask |= select(0u, bits, enters <= leaves);
+    }
+    return mask;
+}
+
+struct Entered {
+    child_base: u32,
+    inner: u32,
+    triangle_base: u32,
+    triangles: u32,
+}
+
+// Which children of a node the ray enters: inner ones in the high byte of `inner` (its low byte
+// says which children are inner), triangles as bits of `triangles`.
+fn enter_node(index: u32, ray: BoxRay, t_max: f32) -> Entered {
+    let n0 = bvh_nodes(5u * index);
+    let n1 = bvh_nodes(5u * index + 1u);
+    let n2 = bvh_nodes(5u * index + 2u);
+    let n3 = bvh_nodes(5u * index + 3u);
+    let n4 = bvh_nodes(5u * index + 4u);
+    let corner = bitcast<vec3f>(n0.xyz);
+    let exponents = vec3u(n0.w & 0xffu, (n0.w >> 8u) & 0xffu, (n0.w >> 16u) & 0xffu);
+    let scale = bitcast<vec3f>(exponents << vec3u(23u)) * ray.inverse;
+    let near_offset = (corner - ray.near_origin) * ray.inverse;
+    let far_offset = (corner - ray.far_origin) * ray.inverse;
+    let low = array<u32, 6>(n2.x, n2.z, n3.x, n3.z, n4.x, n4.z);
+    let high = array<u32, 6>(n2.y, n2.w, n3.y, n3.w, n4.y, n4.w);
+    let mask = enter_four(n1.z, low, scale, near_offset, far_offset, ray, t_max)
+        | enter_four(n1.w, high, scale, near_offset, far_offset, ray, t_max);
+    return Entered(n1.x, (mask & 0xff000000u) | (n0.w >> 24u), n1.y, mask & 0x00ffffffu);
+}
+
+// The next inner child of a group, nearest octant first: its node. Takes it out of the group.
+fn take_child(group: ptr<function, vec2u>, octant: u32) -> u32 {
+    let inner = (*group).y;
+    let bit = firstLeadingBit(inner);
+    (*group).y = inner & ~(1u << bit);
+    let slot = (bit - 24u) ^ (octant & 0xffu);
+    return (*group).x + countOneBits(inner & ~(0xffffffffu << slot));
+}
+
+// Nearest surface along a ray; of equally near ones that with the lowest index.
+fn closest_hit(ray: Ray, from_camera: bool) -> Hit {
+    let boxes = box_ray_new(ray);
+    let shear = shear_new(ray);
+    var best = Hit(MISS, 0xffffffffu, vec2f(0.0));
+    var t_max = ray.t_max;
+    var stack: array<vec2u, STACK_SIZE>;
+    var height = 0u;
+    var group = vec2u(0u, 0x80000000u);
+    loop {
+        let node = take_child(&group, boxes.octant);
+        if group.y > 0x00ffffffu {
+            stack[height] = group;
+            height += 1u;
+        }
+        let entered = enter_node(node, boxes, t_max);
+        var triangles = entered.triangles;
+        while triangles != 0u {
+            let bit = firstTrailingBit(triangles);
+            triangles &= triangles - 1u;
+            let hit = intersect_triangle(entered.triangle_base + bit, shear, t_max);
+            let nearer = hit.t < best.t || (hit.t == best.t && hit.triangle < best.triangle);
+            if hit.t < MISS && nearer {
+//#if filtered_hits
+                if !accepts(hit, ray.direction, from_camera) {
+                    continue;
+                }
+//#end
+                best = hit;
+                t_max = hit.t;
+            }
+        }
+        group = vec2u(entered.child_base, entered.inner);
+        if group.y <= 0x00ffffffu {
+            if height == 0u {
+                break;
+            }
+            height -= 1u;
+            group = stack[height];
+        }
+    }
+    return best;
+}
+
+// Share of light that arrives along a shadow ray: zero if a surface scatters it all.
+fn transmittance_along(ray: Ray) -> vec3f {
+    let boxes = box_ray_new(ray);
+    let shear = shear_new(ray);
+    var transmittance = vec3f(1.0);
+    var stack: array<vec2u, STACK_SIZE>;
+    var height = 0u;
+    var group = vec2u(0u, 0x80000000u);
+    loop {
+        let node = take_child(&group, boxes.octant);
+        if group.y > 0x00ffffffu {
+            stack[height] = group;
+            height += 1u;
+        }
+        let entered = enter_node(node, boxes, ray.t_max);
+        var triangles = entered.triangles;
+        while triangles != 0u {
+            let bit = firstTrailingBit(triangles);
+            triangles &= triangles - 1u;
+            let hit = intersect_triangle(entered.triangle_base + bit, shear, ray.t_max);
+            if hit.t < MISS {
+//#if pass_through
+                transmittance *= passed(hit, ray.direction);
+                if max_element(transmittance) <= 0.0 {
+                    return vec3f(0.0);
+                }
+//#else
+                return vec3f(0.0);
+//#end
+            }
+        }
+        group = vec2u(entered.child_base, entered.inner);
+        if group.y <= 0x00ffffffu {
+            if height == 0u {
+                break;
+            }
+            height -= 1u;
+            group = stack[height];
+        }
+    }
+    return transmittance;
+}
+
+// Twin of `bvh::offset_origin`.
+fn offset_origin(position: vec3f, geometric_normal: vec3f) -> vec3f {
+    let steps = vec3i(geometric_normal * 256.0);
+    let away = select(steps, -steps, position < vec3f(0.0));
+    let moved = bitcast<vec3f>(bitcast<vec3i>(position) + away);
+    let near_zero = position + geometric_normal * (1.0 / 65536.0);
+    return select(moved, near_zero, abs(position) < vec3f(1.0 / 32.0));
+}

@@ -1,0 +1,70 @@
+// What all shaders read. The host writes both structs; see src/render/gpu/layout.rs.
+
+// An array that the scene does not have.
+const NO_ARRAY = 0xffffffffu;
+
+struct Globals {
+    camera_position: vec3f,
+    lens_radius: f32,
+    camera_right: vec3f,
+    focus_distance: f32,
+    camera_up: vec3f,
+    half_width: f32,
+    camera_forward: vec3f,
+    half_height: f32,
+    grid_center: vec3f,
+    grid_columns: u32,
+    // Words of `geometry` at which each array begins.
+    uvs_at: vec2u,
+    positions_at: u32,
+    normals_at: u32,
+    tangents_at: u32,
+    colors_at: u32,
+    triangles_at: u32,
+    triangle_materials_at: u32,
+    // Words of `laws` at which each array begins.
+    law_starts_at: u32,
+    law_masks_at: u32,
+    law_ranks_at: u32,
+    law_tiles_at: u32,
+    law_last_at: u32,
+    law_of_cell_at: u32,
+    words_per_law: u32,
+    grid_rows: u32,
+    map_width: u32,
+    map_height: u32,
+    tile_columns: u32,
+    tile_rows: u32,
+    rotation_turns: f32,
+    intensity: f32,
+    // Word of `sums` at which the rows' sums begin.
+    tile_sums_at: u32,
+    light_count: u32,
+    light_triangle_count: u32,
+    width: u32,
+    height: u32,
+    seed: u32,
+    bounces: u32,
+    russian_roulette: u32,
+    orthographic: u32,
+    scene_extent: f32,
+    // What a learned contribution is divided by.
+    mean_contribution: f32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
+}
+
+// What one dispatch does.
+struct Work {
+    // First 8x8 tile of pixels, or first learning path (low and high word).
+    first: u32,
+    first_high: u32,
+    // Tiles or paths.
+    count: u32,
+    first_sample: u32,
+    samples: u32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
+}

@@ -1,0 +1,101 @@
+// Which law over the map's tiles a point uses, and the laws: twin of src/light_grid/.
+
+const WHOLE_MAP = 0u;
+
+//#if map_sampling
+struct TileChoice {
+    tile: u32,
+    probability: f32,
+    remainder: f32,
+}
+
+// Twin of `cells::dominant_face`.
+fn dominant_face(normal: vec3f) -> u32 {
+    let a = abs(normal);
+    if a.x >= a.y && a.x >= a.z {
+        return select(0u, 1u, normal.x < 0.0);
+    }
+    if a.y >= a.z {
+        return select(2u, 3u, normal.y < 0.0);
+    }
+    return select(4u, 5u, normal.z < 0.0);
+}
+
+fn cell_of(position: vec3f, normal: vec3f) -> u32 {
+    let direction = normalize_or(position - globals.grid_center, vec3f(0.0, 1.0, 0.0));
+    let uv = uv_from_direction(direction);
+    let column = min(u32(max(uv.x, 0.0) * f32(globals.grid_columns)), globals.grid_columns - 1u);
+    let row = min(u32(max(uv.y, 0.0) * f32(globals.grid_rows)), globals.grid_rows - 1u);
+//#if faces
+    let face = dominant_face(normal);
+//#else
+    let face = 0u;
+//#end
+    return (face * globals.grid_rows + row) * globals.grid_columns + column;
+}
+
+// The 16-bit number `index` of an array that begins at word `at`.
+fn law_u16(at: u32, index: u32) -> u32 {
+    return (laws[at + index / 2u] >> (16u * (index & 1u))) & 0xffffu;
+}
+
+fn law_of(position: vec3f, normal: vec3f) -> u32 {
+    if globals.law_of_cell_at == NO_ARRAY {
+        return WHOLE_MAP;
+    }
+    return law_u16(globals.law_of_cell_at, cell_of(position, normal));
+}
+
+// Probability of the entry with numbers `low..=last`.
+fn entry_probability(low: u32, last: u32) -> f32 {
+    return (f32(last - low) + 1.0) * (1.0 / 4294967296.0);
+}
+
+fn sample_tile(law: u32, bits: u32) -> TileChoice {
+    let start = laws[globals.law_starts_at + law];
+    let first = globals.law_last_at + start;
+    var below = 0u;
+    var above = laws[globals.law_starts_at + law + 1u] - start - 1u;
+    while below < above {
+        let middle = (below + above) / 2u;
+        if laws[first + middle] < bits {
+            below = middle + 1u;
+        } else {
+            above = middle;
+        }
+    }
+    var low = 0u;
+    if below > 0u {
+        low = laws[first + below - 1u] + 1u;
+    }
+    let last = laws[first + below];
+    let count = f32(last - low) + 1.0;
+    return TileChoice(
+        law_u16(globals.law_tiles_at, start + below),
+        entry_probability(low, last),
+        min(f32(bits - low) / count, 0.99999994),
+    );
+}
+
+fn tile_probability(law: u32, tile: u32) -> f32 {
+    let word = law * globals.words_per_law + tile / 64u;
+    let mask = vec2u(
+        laws[globals.law_masks_at + 2u * word],
+        laws[globals.law_masks_at + 2u * word + 1u],
+    );
+    let in_high = (tile & 32u) != 0u;
+    let bit = 1u << (tile & 31u);
+    if (select(mask.x, mask.y, in_high) & bit) == 0u {
+        return 0.0;
+    }
+    let below = select(countOneBits(mask.x & (bit - 1u)),
+        countOneBits(mask.x) + countOneBits(mask.y & (bit - 1u)), in_high);
+    let rank = law_u16(globals.law_ranks_at, word) + below;
+    let entry = globals.law_last_at + laws[globals.law_starts_at + law] + rank;
+    var low = 0u;
+    if rank > 0u {
+        low = laws[entry - 1u] + 1u;
+    }
+    return entry_probability(low, laws[entry]);
+}
+//#end

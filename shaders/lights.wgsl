@@ -1,0 +1,165 @@
+// Light sources inside the scene: twin of src/path/lights.rs. `lights` holds the cumulative
+// probabilities, the probabilities, the emissive triangles (ascending) and the punctual lights.
+
+// Words of a punctual light; packed by `layout::light_words`.
+const PUNCTUAL_WORDS = 16u;
+const POINT_LIGHT = 0u;
+const SPOT_LIGHT = 1u;
+const DIRECTIONAL_LIGHT = 2u;
+
+struct LightSample {
+    direction: vec3f,
+    distance: f32,
+    // Zero where no light shines that way.
+    radiance_over_pdf: vec3f,
+    // F32_MAX for a light without size.
+    pdf_solid_angle: f32,
+}
+
+fn light_f32(at: u32) -> f32 {
+    return bitcast<f32>(lights[at]);
+}
+
+fn light_vec3(at: u32) -> vec3f {
+    return vec3f(light_f32(at), light_f32(at + 1u), light_f32(at + 2u));
+}
+
+fn light_probability(index: u32) -> f32 {
+    return light_f32(globals.light_count + index);
+}
+
+fn light_triangle(index: u32) -> u32 {
+    return lights[2u * globals.light_count + index];
+}
+
+fn sample_local_light(position: vec3f, u: vec2f) -> LightSample {
+    var none: LightSample;
+    var low = 0u;
+    var high = globals.light_count - 1u;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if light_f32(middle) <= u.x {
+            low = middle + 1u;
+        } else {
+            high = middle;
+        }
+    }
+    let index = low;
+    let probability = light_probability(index);
+    if probability <= 0.0 {
+        return none;
+    }
+//#if punctual_lights
+    if index >= globals.light_triangle_count {
+        return sample_punctual(index - globals.light_triangle_count, position, probability);
+    }
+//#end
+//#if emitters
+    var below = 0.0;
+    if index > 0u {
+        below = light_f32(index - 1u);
+    }
+    let remainder = saturate((u.x - below) / probability);
+    let root = sqrt(remainder);
+    let barycentric = vec2f(root * (1.0 - u.y), root * u.y);
+    let triangle = light_triangle(index);
+    let corners = light_corners(triangle);
+    let target_ = corners[0] + (corners[1] - corners[0]) * barycentric.x
+        + (corners[2] - corners[0]) * barycentric.y;
+    let to_light = target_ - position;
+    let distance = length(to_light);
+    let direction = to_light / distance;
+    let pdf = probability * area_to_solid_angle(corners, direction, distance * distance);
+    if !(pdf > 0.0 && is_finite(pdf)) {
+        return none;
+    }
+    let point = surface_at(triangle, barycentric, direction);
+    return LightSample(direction, distance, emitted(point) / pdf, pdf);
+//#else
+    return none;
+//#end
+}
+
+//#if emitters
+fn light_corners(triangle: u32) -> array<vec3f, 3> {
+    let first = globals.triangles_at + 3u * triangle;
+    return array<vec3f, 3>(
+        vertex_position(geometry(first)),
+        vertex_position(geometry(first + 1u)),
+        vertex_position(geometry(first + 2u)),
+    );
+}
+
+// Density in solid angle of a uniform point on a triangle; zero where it is seen edge-on.
+fn area_to_solid_angle(corners: array<vec3f, 3>, direction: vec3f, squared: f32) -> f32 {
+    let normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    let projected_area = 0.5 * abs(dot(normal, direction));
+    let density = squared / projected_area;
+    return select(0.0, density, is_finite(density));
+}
+
+// Density with which a triangle's point along `direction` is chosen; zero if it is no light.
+fn local_light_pdf_solid_angle(triangle: u32, direction: vec3f, distance: f32) -> f32 {
+    if globals.light_triangle_count == 0u {
+        return 0.0;
+    }
+    var low = 0u;
+    var high = globals.light_triangle_count - 1u;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if light_triangle(middle) < triangle {
+            low = middle + 1u;
+        } else {
+            high = middle;
+        }
+    }
+    if light_triangle(low) != triangle {
+        return 0.0;
+    }
+    let density = area_to_solid_angle(light_corners(triangle), direction, distance * distance);
+    return light_probability(low) * density;
+}
+
+// Radiance a surface point sends towards its viewer: as much as alpha covers it.
+fn emitted(point: SurfacePoint) -> vec3f {
+    let both_sides = (materials[point.material].flags & DOUBLE_SIDED) != 0u;
+    if point.front_face || both_sides {
+        return point.parameters.emissive * point.parameters.alpha;
+    }
+    return vec3f(0.0);
+}
+//#end
+
+//#if punctual_lights
+fn sample_punctual(index: u32, position: vec3f, probability: f32) -> LightSample {
+    var none: LightSample;
+    let at = 2u * globals.light_count + globals.light_triangle_count + PUNCTUAL_WORDS * index;
+    let kind = lights[at];
+    let light_position = light_vec3(at + 1u);
+    let light_direction = light_vec3(at + 4u);
+    let intensity = light_vec3(at + 7u);
+    let range = light_f32(at + 10u);
+    if kind == DIRECTIONAL_LIGHT {
+        return LightSample(-light_direction, F32_MAX, intensity / probability, F32_MAX);
+    }
+    let to_light = light_position - position;
+    let distance = length(to_light);
+    let direction = to_light / distance;
+    var attenuation = 1.0;
+    if kind == SPOT_LIGHT {
+        let inner = light_f32(at + 11u);
+        let outer = light_f32(at + 12u);
+        let t = saturate((dot(light_direction, -direction) - outer) / max(inner - outer, 1e-4));
+        attenuation = t * t;
+    }
+    if range < F32_MAX {
+        let near = distance / range;
+        attenuation *= saturate(1.0 - near * near * near * near);
+    }
+    let irradiance = intensity * attenuation / (distance * distance);
+    if !is_finite3(irradiance) {
+        return none;
+    }
+    return LightSample(direction, distance, irradiance / probability, F32_MAX);
+}
+//#end

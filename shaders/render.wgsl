@@ -1,0 +1,69 @@
+// Adds samples to pixels: one invocation a pixel, which starts its next sample as soon as the last
+// path has ended, so that no lane waits for the longest path of each sample.
+
+struct PixelSums {
+    sum: vec3f,
+    luminance_squared: f32,
+    rays: u32,
+    invalid: u32,
+    padding_0: u32,
+    padding_1: u32,
+}
+
+fn start_sample(x: u32, y: u32, index: u32) -> Path {
+    var sampler = sampler_new(globals.seed, y * globals.width + x, index);
+    let offset = filter_sample(next_pair(&sampler));
+    let lens = lens_point(&sampler);
+    let centre = vec2f(f32(x) + 0.5, f32(y) + 0.5);
+    return path_new(camera_ray(centre + offset, lens), sampler);
+}
+
+@compute @workgroup_size(64)
+fn render(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let tiles_across = (globals.width + 7u) / 8u;
+    let tile = work.first + group.x;
+    let x = (tile % tiles_across) * 8u + (lane & 7u);
+    let y = (tile / tiles_across) * 8u + (lane >> 3u);
+    if x >= globals.width || y >= globals.height {
+        return;
+    }
+    var sums: PixelSums;
+//#if layers
+    var surface = FirstHit(vec3f(0.0), 0.0, vec3f(0.0), 0.0);
+//#end
+    var index = work.first_sample;
+    let end = work.first_sample + work.samples;
+    var path = start_sample(x, y, index);
+    loop {
+        if path_step(&path) {
+            continue;
+        }
+        if is_finite3(path.radiance) {
+            sums.sum += path.radiance;
+            let light = luminance(path.radiance);
+            sums.luminance_squared = min(sums.luminance_squared + light * light, F32_MAX);
+        } else {
+            sums.invalid += 1u;
+        }
+        sums.rays += path.rays;
+//#if layers
+        surface.albedo += path.first_hit.albedo;
+        surface.depth += path.first_hit.depth;
+        surface.normal += path.first_hit.normal;
+        surface.hits += path.first_hit.hits;
+//#end
+        index += 1u;
+        if index == end {
+            break;
+        }
+        path = start_sample(x, y, index);
+    }
+    let pixel = y * globals.width + x;
+    film[pixel] = sums;
+//#if layers
+    surfaces[pixel] = surface;
+//#end
+}

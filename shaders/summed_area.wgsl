@@ -1,0 +1,113 @@
+// Summed-area tables over the whole map: twin of src/environment/summed_area.rs. Masses are pairs
+// of f32 that add up to them (48 bits), for want of f64; so are their sums and differences.
+
+// Sum of two f32 and what rounding left of it (Knuth's two-sum).
+fn two_sum(a: f32, b: f32) -> vec2f {
+    let s = a + b;
+    let v = s - a;
+    return vec2f(s, (a - (s - v)) + (b - v));
+}
+
+fn pair_difference(a: vec2f, b: vec2f) -> vec2f {
+    let s = two_sum(a.x, -b.x);
+    return two_sum(s.x, s.y + (a.y - b.y));
+}
+
+fn corner_at(x: u32, y: u32) -> vec2f {
+    let index = y * (globals.map_width + 1u) + x;
+//#if table_u32
+    let bits = sums(index);
+    return vec2f(f32(bits & 0xffff0000u), f32(bits & 0xffffu));
+//#end
+//#if table_f32
+    return vec2f(bitcast<f32>(sums(index)), 0.0);
+//#end
+//#if table_f64
+    return vec2f(bitcast<f32>(sums(2u * index)), bitcast<f32>(sums(2u * index + 1u)));
+//#end
+}
+
+fn rectangle_mass(first: vec2u, end: vec2u) -> vec2f {
+    return pair_difference(
+        pair_difference(corner_at(end.x, end.y), corner_at(first.x, end.y)),
+        pair_difference(corner_at(end.x, first.y), corner_at(first.x, first.y)),
+    );
+}
+
+struct Choice {
+    index: u32,
+    mass: f32,
+    fraction: f32,
+}
+
+// Mass of the entries before `end`: rows of the rectangle, or columns of its row.
+fn mass_before(texels: TileTexels, along_y: bool, end: u32) -> vec2f {
+    if along_y {
+        return rectangle_mass(texels.first, vec2u(texels.end.x, end));
+    }
+    return rectangle_mass(texels.first, vec2u(end, texels.end.y));
+}
+
+fn search(texels: TileTexels, along_y: bool, u: vec2u) -> Choice {
+    let first = select(texels.first.x, texels.first.y, along_y);
+    let end = select(texels.end.x, texels.end.y, along_y);
+    let total = mass_before(texels, along_y, end);
+    let unit = f32(u.x) * (1.0 / 16777216.0);
+    let rest = f32(u.y) * 3.5527137e-15; // 2^-48
+    // The product with 24 more bits below: exact as far as the sums are.
+    let high = total.x * unit;
+    let error = product_error(total.x, unit, high);
+    let sought = two_sum(high, error + total.x * rest + total.y * unit);
+    var low = first;
+    var last = end - 1u;
+    while low < last {
+        let middle = low + (last - low) / 2u;
+        let above = pair_difference(mass_before(texels, along_y, middle + 1u), sought);
+        if above.x + above.y > 0.0 {
+            last = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    let before = mass_before(texels, along_y, low);
+    let mass = pair_difference(mass_before(texels, along_y, low + 1u), before);
+    let into = pair_difference(sought, before);
+    return Choice(low, mass.x, saturate(into.x / mass.x));
+}
+
+// What rounding left of the product `a * b = p` (Dekker's).
+fn product_error(a: f32, b: f32, p: f32) -> f32 {
+    let a_high = bitcast<f32>(bitcast<u32>(a) & 0xfffff000u);
+    let b_high = bitcast<f32>(bitcast<u32>(b) & 0xfffff000u);
+    let a_low = a - a_high;
+    let b_low = b - b_high;
+    return ((a_high * b_high - p) + a_high * b_low + a_low * b_high) + a_low * b_low;
+}
+
+fn sample_texel(tile: u32, u: vec2f) -> TexelSample {
+    var result: TexelSample;
+    var texels = tile_texels(tile);
+    let fine = refine(u);
+    let total = rectangle_mass(texels.first, texels.end);
+    let row = search(texels, true, fine[1]);
+    if !(row.mass > 0.0 && total.x > 0.0) {
+        return result;
+    }
+    texels.first.y = row.index;
+    texels.end.y = row.index + 1u;
+    let column = search(texels, false, fine[0]);
+    if !(column.mass > 0.0) {
+        return result;
+    }
+    result.texel = vec2u(column.index, row.index);
+    result.within = vec2f(column.fraction, row.fraction);
+    result.probability = texel_probability(tile, result.texel);
+    return result;
+}
+
+fn texel_probability(tile: u32, texel: vec2u) -> f32 {
+    let texels = tile_texels(tile);
+    let total = rectangle_mass(texels.first, texels.end);
+    let mass = rectangle_mass(texel, texel + 1u);
+    return select(0.0, mass.x / total.x, total.x > 0.0 && mass.x > 0.0);
+}

@@ -1,0 +1,202 @@
+//! Adapters: what there is, which one to take, and a connection to it.
+
+use std::sync::{Arc, Mutex};
+
+use serde::Serialize;
+use wgpu::{Adapter, Backends, DeviceType, Features, Limits};
+
+use crate::error::{Error, Result};
+
+/// What an adapter is and how much it allows.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct AdapterFacts {
+    /// Name of the device.
+    pub name: String,
+    /// Vulkan, OpenGL, Metal or DX12.
+    pub backend: String,
+    /// `discrete`, `integrated`, `virtual`, `software` or `other`.
+    pub kind: &'static str,
+    /// Driver and version.
+    pub driver: String,
+    /// Most bytes of one storage binding.
+    pub storage_binding_bytes: u64,
+    /// Most bytes of one buffer.
+    pub buffer_bytes: u64,
+    /// Most storage buffers of a shader.
+    pub storage_buffers: u32,
+    /// Whether path tracing shaders can run at all.
+    pub can_compute: bool,
+}
+
+impl AdapterFacts {
+    fn of(adapter: &Adapter) -> Self {
+        let info = adapter.get_info();
+        let limits = adapter.limits();
+        Self {
+            name: info.name,
+            backend: match info.backend {
+                wgpu::Backend::Gl => "OpenGL".to_owned(),
+                other => format!("{other:?}"),
+            },
+            kind: match info.device_type {
+                DeviceType::DiscreteGpu => "discrete",
+                DeviceType::IntegratedGpu => "integrated",
+                DeviceType::VirtualGpu => "virtual",
+                DeviceType::Cpu => "software",
+                DeviceType::Other => "other",
+            },
+            driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+            storage_binding_bytes: limits.max_storage_buffer_binding_size,
+            buffer_bytes: limits.max_buffer_size,
+            storage_buffers: limits.max_storage_buffers_per_shader_stage,
+            can_compute: limits.max_compute_invocations_per_workgroup >= 64,
+        }
+    }
+
+    /// Whether it only pretends to be a GPU.
+    pub fn is_software(&self) -> bool {
+        self.kind == "software"
+    }
+
+    /// Discrete before integrated before the rest, Vulkan, Metal and DX12 before OpenGL.
+    fn rank(&self) -> (u32, bool) {
+        let kind = match self.kind {
+            "discrete" => 0,
+            "integrated" => 1,
+            "virtual" => 2,
+            "other" => 3,
+            _ => 4,
+        };
+        (kind, self.backend == "OpenGL")
+    }
+}
+
+/// All adapters of this machine, the best one first.
+pub fn adapters() -> Vec<AdapterFacts> {
+    enumerate(PRIMARY | Backends::GL).into_iter().map(|(facts, _)| facts).collect()
+}
+
+/// What is asked first: OpenGL is only the fallback.
+const PRIMARY: Backends = Backends::VULKAN.union(Backends::METAL).union(Backends::DX12);
+
+fn enumerate(backends: Backends) -> Vec<(AdapterFacts, Adapter)> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+        backends,
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    });
+    let mut found: Vec<_> = pollster::block_on(instance.enumerate_adapters(Backends::all()))
+        .into_iter()
+        .map(|adapter| (AdapterFacts::of(&adapter), adapter))
+        .filter(|(facts, _)| facts.can_compute)
+        .collect();
+    found.sort_by_key(|(facts, _)| facts.rank());
+    found
+}
+
+/// A connection to an adapter.
+pub struct Gpu {
+    facts: AdapterFacts,
+    pub(crate) limits: Limits,
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    trouble: Arc<Mutex<Option<String>>>,
+}
+
+impl Gpu {
+    /// Opens the best adapter, or the best of those whose name or backend contains `name` (in any
+    /// case).
+    ///
+    /// # Errors
+    /// If there is none, or it cannot be opened.
+    pub fn open(name: Option<&str>) -> Result<Self> {
+        let wanted = name.map(str::to_lowercase);
+        let title = |facts: &AdapterFacts| format!("{} ({})", facts.name, facts.backend);
+        let mut all = Vec::new();
+        for backends in [PRIMARY, Backends::GL] {
+            for (facts, adapter) in enumerate(backends) {
+                let text = title(&facts).to_lowercase();
+                if wanted.as_ref().is_none_or(|wanted| text.contains(wanted)) {
+                    return Self::connect(facts, &adapter);
+                }
+                all.push(title(&facts));
+            }
+        }
+        Err(Error::new(match name {
+            Some(name) if !all.is_empty() => {
+                format!("no adapter is called {name}; there are {}", all.join(", "))
+            }
+            _ => "no GPU: neither Vulkan, Metal, DX12 nor OpenGL has an adapter".to_owned(),
+        }))
+    }
+
+    fn connect(facts: AdapterFacts, adapter: &Adapter) -> Result<Self> {
+        let limits = adapter.limits();
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("lightgrid"),
+            required_features: Features::empty(),
+            required_limits: limits.clone(),
+            ..wgpu::DeviceDescriptor::default()
+        }))
+        .map_err(|e| Error::new(format!("{} cannot be opened: {e}", facts.name)))?;
+        let trouble = Arc::new(Mutex::new(None));
+        let note = |trouble: &Arc<Mutex<Option<String>>>, sentence: String| {
+            if let Ok(mut first) = trouble.lock() {
+                first.get_or_insert(sentence);
+            }
+        };
+        let (lost, failed) = (Arc::clone(&trouble), Arc::clone(&trouble));
+        device.set_device_lost_callback(move |_, message| {
+            note(&lost, format!("the device was lost: {}", one_line(&message)));
+        });
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            note(
+                &failed,
+                match error {
+                    wgpu::Error::OutOfMemory { .. } => "it is out of memory".to_owned(),
+                    other => one_line(&other.to_string()),
+                },
+            );
+        }));
+        Ok(Self { facts, limits, device, queue, trouble })
+    }
+
+    /// What it is.
+    pub fn facts(&self) -> &AdapterFacts {
+        &self.facts
+    }
+
+    /// The first thing that went wrong on the device, if any did; it is of no use afterwards.
+    ///
+    /// # Errors
+    /// One sentence with the adapter's name.
+    pub fn check(&self) -> Result<()> {
+        match self.trouble.lock() {
+            Ok(trouble) => trouble
+                .as_ref()
+                .map_or(Ok(()), |t| Err(Error::new(format!("{}: {t}", self.facts.name)))),
+            Err(_) => Err(Error::new(format!("{}: its state is unknown", self.facts.name))),
+        }
+    }
+
+    /// Waits until everything submitted so far is done.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub(crate) fn wait_for(&self, submission: Option<wgpu::SubmissionIndex>) -> Result<()> {
+        let waited =
+            self.device.poll(wgpu::PollType::Wait { submission_index: submission, timeout: None });
+        self.check()?;
+        waited.map(|_| ()).map_err(|e| Error::new(format!("{}: {e}", self.facts.name)))
+    }
+
+    /// Gives the device up, as a driver reset would; for tests of what happens then.
+    pub fn lose(&self) {
+        self.device.destroy();
+        let _ = self.device.poll(wgpu::PollType::Poll);
+    }
+}
+
+/// A message of several lines as one sentence.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,490 @@
+//! What the shaders read, as bytes: twins of the structs in `shaders/`, checked through naga in the
+//! tests.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3, Vec4};
+
+use super::super::View;
+use crate::color::importance;
+use crate::environment::Environment;
+use crate::light_grid::LightGrid;
+use crate::light_grid::cells::SphericalGrid;
+use crate::path::World;
+use crate::path::camera::CameraRays;
+use crate::scene::surface::absorption;
+use crate::scene::{self, AlphaMode, PunctualKind, Scene, Wrap};
+
+/// An array that the scene does not have.
+pub(crate) const NO_ARRAY: u32 = u32::MAX;
+/// A material without this texture.
+const NO_TEXTURE: u32 = u32::MAX;
+
+/// Twin of `Globals` in `globals.wgsl`.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Globals {
+    pub(crate) camera_position: Vec3,
+    pub(crate) lens_radius: f32,
+    pub(crate) camera_right: Vec3,
+    pub(crate) focus_distance: f32,
+    pub(crate) camera_up: Vec3,
+    pub(crate) half_width: f32,
+    pub(crate) camera_forward: Vec3,
+    pub(crate) half_height: f32,
+    pub(crate) grid_center: Vec3,
+    pub(crate) grid_columns: u32,
+    pub(crate) uvs_at: [u32; 2],
+    pub(crate) positions_at: u32,
+    pub(crate) normals_at: u32,
+    pub(crate) tangents_at: u32,
+    pub(crate) colors_at: u32,
+    pub(crate) triangles_at: u32,
+    pub(crate) triangle_materials_at: u32,
+    pub(crate) law_starts_at: u32,
+    pub(crate) law_masks_at: u32,
+    pub(crate) law_ranks_at: u32,
+    pub(crate) law_tiles_at: u32,
+    pub(crate) law_last_at: u32,
+    pub(crate) law_of_cell_at: u32,
+    pub(crate) words_per_law: u32,
+    pub(crate) grid_rows: u32,
+    pub(crate) map_width: u32,
+    pub(crate) map_height: u32,
+    pub(crate) tile_columns: u32,
+    pub(crate) tile_rows: u32,
+    pub(crate) rotation_turns: f32,
+    pub(crate) intensity: f32,
+    pub(crate) tile_sums_at: u32,
+    pub(crate) light_count: u32,
+    pub(crate) light_triangle_count: u32,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) seed: u32,
+    pub(crate) bounces: u32,
+    pub(crate) russian_roulette: u32,
+    pub(crate) orthographic: u32,
+    pub(crate) scene_extent: f32,
+    pub(crate) mean_contribution: f32,
+    pub(crate) padding: [u32; 3],
+}
+
+/// Twin of `Work` in `globals.wgsl`.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Work {
+    pub(crate) first: u32,
+    pub(crate) first_high: u32,
+    pub(crate) count: u32,
+    pub(crate) first_sample: u32,
+    pub(crate) samples: u32,
+    pub(crate) padding: [u32; 3],
+}
+
+/// Twin of `Material` in `surface.wgsl`.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Material {
+    pub(crate) base_color: Vec4,
+    pub(crate) emissive: Vec3,
+    pub(crate) alpha_cutoff: f32,
+    pub(crate) specular_color: Vec3,
+    pub(crate) specular: f32,
+    pub(crate) absorption: Vec3,
+    pub(crate) ior: f32,
+    pub(crate) metallic: f32,
+    pub(crate) roughness: f32,
+    pub(crate) transmission: f32,
+    pub(crate) clearcoat: f32,
+    pub(crate) clearcoat_roughness: f32,
+    pub(crate) normal_scale: f32,
+    pub(crate) clearcoat_normal_scale: f32,
+    pub(crate) flags: u32,
+    pub(crate) base_color_texture: u32,
+    pub(crate) metallic_roughness_texture: u32,
+    pub(crate) normal_texture: u32,
+    pub(crate) emissive_texture: u32,
+    pub(crate) specular_texture: u32,
+    pub(crate) specular_color_texture: u32,
+    pub(crate) transmission_texture: u32,
+    pub(crate) clearcoat_texture: u32,
+    pub(crate) clearcoat_roughness_texture: u32,
+    pub(crate) clearcoat_normal_texture: u32,
+    pub(crate) padding: [u32; 2],
+}
+
+/// Twin of `TextureRef` in `texture.wgsl`.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct TextureRef {
+    pub(crate) first_texel: u32,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) flags: u32,
+    pub(crate) matrix: Vec4,
+    pub(crate) translation: Vec2,
+    pub(crate) padding: Vec2,
+}
+
+/// Twin of `PixelSums` in `render.wgsl`: one pixel's share of a pass.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct PixelSums {
+    pub(crate) sum: Vec3,
+    pub(crate) luminance_squared: f32,
+    pub(crate) rays: u32,
+    pub(crate) invalid: u32,
+    pub(crate) padding: [u32; 2],
+}
+
+/// Twin of `FirstHit` in `path.wgsl`: sums over a pass.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct SurfaceSums {
+    pub(crate) albedo: Vec3,
+    pub(crate) depth: f32,
+    pub(crate) normal: Vec3,
+    pub(crate) hits: f32,
+}
+
+/// Flags of `Material`, as in `surface.wgsl`.
+mod material_flags {
+    pub(super) const ALPHA_MASK: u32 = 1;
+    pub(super) const ALPHA_BLEND: u32 = 2;
+    pub(super) const DOUBLE_SIDED: u32 = 4;
+    pub(super) const UNLIT: u32 = 8;
+    pub(super) const THIN: u32 = 16;
+    pub(super) const PARTIAL: u32 = 32;
+    pub(super) const NORMAL_MAPPED: u32 = 64;
+}
+
+/// Flags of `TextureRef`, as in `texture.wgsl`.
+mod texture_flags {
+    pub(super) const SECOND_UV_SET: u32 = 1;
+    pub(super) const NEAREST: u32 = 2;
+    pub(super) const SRGB: u32 = 4;
+    pub(super) const WRAP_U_SHIFT: u32 = 4;
+    pub(super) const WRAP_V_SHIFT: u32 = 6;
+}
+
+/// Parts of one array of words, and where each begins.
+#[derive(Debug, Default)]
+pub(crate) struct Words<'a> {
+    parts: Vec<&'a [u8]>,
+    length: u64,
+}
+
+impl<'a> Words<'a> {
+    /// Appends an array; its first word, or [`NO_ARRAY`] if it is empty.
+    pub(crate) fn push<T: Pod>(&mut self, values: &'a [T]) -> u32 {
+        if values.is_empty() {
+            return NO_ARRAY;
+        }
+        let at = self.length;
+        let bytes: &[u8] = bytemuck::cast_slice(values);
+        self.length += bytes.len() as u64 / 4;
+        self.parts.push(bytes);
+        u32::try_from(at).unwrap_or(NO_ARRAY)
+    }
+
+    /// The bytes, part by part; their number is a multiple of 4 each.
+    pub(crate) fn parts(&self) -> &[&'a [u8]] {
+        &self.parts
+    }
+}
+
+impl Globals {
+    /// Sets what the view asks for.
+    pub(crate) fn set_view(&mut self, view: &View, rays: &CameraRays) {
+        self.camera_position = rays.position;
+        self.camera_right = rays.right;
+        self.camera_up = rays.up;
+        self.camera_forward = rays.forward;
+        self.half_width = rays.half_extent.x;
+        self.half_height = rays.half_extent.y;
+        self.lens_radius = rays.lens_radius;
+        self.focus_distance = rays.focus_distance;
+        self.orthographic = rays.orthographic.into();
+        (self.width, self.height) = (view.width, view.height);
+        self.seed = view.seed;
+        self.bounces = view.limits.bounces;
+        self.russian_roulette = view.limits.russian_roulette.into();
+    }
+
+    /// Sets what is known of the map.
+    pub(crate) fn set_environment(&mut self, environment: &Environment) {
+        (self.map_width, self.map_height) = (environment.map().width, environment.map().height);
+        (self.tile_columns, self.tile_rows) = environment.tile_grid();
+        (self.rotation_turns, self.intensity) = environment.rotation_and_intensity();
+        self.mean_contribution = std::f32::consts::PI * importance(environment.mean_radiance());
+    }
+
+    /// Sets where the cells lie.
+    pub(crate) fn set_cells(&mut self, grid: &SphericalGrid) {
+        self.grid_center = grid.center;
+        self.grid_columns = grid.columns;
+        self.grid_rows = grid.rows;
+    }
+}
+
+/// The scene's arrays; sets where each begins.
+pub(crate) fn geometry<'a>(scene: &'a Scene, globals: &mut Globals) -> Words<'a> {
+    let mut words = Words::default();
+    globals.positions_at = words.push(&scene.positions);
+    globals.normals_at = words.push(&scene.normals);
+    globals.tangents_at = words.push(&scene.tangents);
+    globals.uvs_at = [words.push(&scene.uvs[0]), words.push(&scene.uvs[1])];
+    globals.colors_at = words.push(&scene.colors);
+    globals.triangles_at = words.push(&scene.triangles);
+    globals.triangle_materials_at = words.push(&scene.triangle_materials);
+    words
+}
+
+/// The laws of a grid; sets where each array begins.
+pub(crate) fn laws(grid: &LightGrid, globals: &mut Globals) -> Vec<u32> {
+    let laws = grid.laws().arrays();
+    let mut words = Vec::new();
+    let mut push = |part: &mut dyn Iterator<Item = u32>| {
+        let at = words.len() as u32;
+        words.extend(part);
+        at
+    };
+    globals.law_starts_at = push(&mut laws.starts.iter().copied());
+    globals.law_masks_at =
+        push(&mut laws.masks.iter().flat_map(|mask| [*mask as u32, (mask >> 32) as u32]));
+    globals.law_ranks_at = push(&mut pairs(laws.ranks));
+    globals.law_tiles_at = push(&mut pairs(laws.tiles));
+    globals.law_last_at = push(&mut laws.last.iter().copied());
+    globals.law_of_cell_at = NO_ARRAY;
+    if let Some((cells, law_of_cell)) = grid.cells() {
+        globals.law_of_cell_at = push(&mut pairs(law_of_cell));
+        globals.set_cells(cells);
+    }
+    globals.words_per_law = laws.words_per_law;
+    words
+}
+
+/// Two 16-bit numbers a word.
+fn pairs(values: &[u16]) -> impl Iterator<Item = u32> {
+    values
+        .chunks(2)
+        .map(|pair| u32::from(pair[0]) | u32::from(pair.get(1).copied().unwrap_or(0)) << 16)
+}
+
+/// Materials and the textures they refer to.
+pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
+    let scene = &world.scene;
+    let mut first_texels = Vec::with_capacity(scene.images.len());
+    let mut texels = 0_u64;
+    for image in &scene.images {
+        first_texels.push(u32::try_from(texels).unwrap_or(u32::MAX));
+        texels += image.texels.len() as u64;
+    }
+    let mut refs = Vec::new();
+    let mut reference = |texture: &Option<scene::TextureRef>| match texture {
+        None => NO_TEXTURE,
+        Some(texture) => {
+            refs.push(texture_ref(scene, &first_texels, texture));
+            refs.len() as u32 - 1
+        }
+    };
+    let materials = scene
+        .materials
+        .iter()
+        .enumerate()
+        .map(|(index, m)| Material {
+            base_color: m.base_color,
+            emissive: m.emissive,
+            alpha_cutoff: if let AlphaMode::Mask { cutoff } = m.alpha_mode { cutoff } else { 0.0 },
+            specular_color: m.specular_color,
+            specular: m.specular,
+            absorption: if m.thickness > 0.0 { absorption(m) } else { Vec3::ZERO },
+            ior: m.ior,
+            metallic: m.metallic,
+            roughness: m.roughness,
+            transmission: m.transmission,
+            clearcoat: m.clearcoat,
+            clearcoat_roughness: m.clearcoat_roughness,
+            normal_scale: m.normal_scale,
+            clearcoat_normal_scale: m.clearcoat_normal_scale,
+            flags: flags(m, world.may_pass_light(index)),
+            base_color_texture: reference(&m.base_color_texture),
+            metallic_roughness_texture: reference(&m.metallic_roughness_texture),
+            normal_texture: reference(&m.normal_texture),
+            emissive_texture: reference(&m.emissive_texture),
+            specular_texture: reference(&m.specular_texture),
+            specular_color_texture: reference(&m.specular_color_texture),
+            transmission_texture: reference(&m.transmission_texture),
+            clearcoat_texture: reference(&m.clearcoat_texture),
+            clearcoat_roughness_texture: reference(&m.clearcoat_roughness_texture),
+            clearcoat_normal_texture: reference(&m.clearcoat_normal_texture),
+            padding: [0; 2],
+        })
+        .collect();
+    (materials, refs)
+}
+
+fn flags(m: &scene::Material, partial: bool) -> u32 {
+    use material_flags::{
+        ALPHA_BLEND, ALPHA_MASK, DOUBLE_SIDED, NORMAL_MAPPED, PARTIAL, THIN, UNLIT,
+    };
+    [
+        (ALPHA_MASK, matches!(m.alpha_mode, AlphaMode::Mask { .. })),
+        (ALPHA_BLEND, m.alpha_mode == AlphaMode::Blend),
+        (DOUBLE_SIDED, m.double_sided),
+        (UNLIT, m.unlit),
+        (THIN, m.thickness <= 0.0),
+        (PARTIAL, partial),
+        (NORMAL_MAPPED, m.normal_texture.is_some() || m.clearcoat_normal_texture.is_some()),
+    ]
+    .into_iter()
+    .filter(|(_, set)| *set)
+    .fold(0, |flags, (flag, _)| flags | flag)
+}
+
+fn texture_ref(scene: &Scene, first_texels: &[u32], reference: &scene::TextureRef) -> TextureRef {
+    use texture_flags::{NEAREST, SECOND_UV_SET, SRGB, WRAP_U_SHIFT, WRAP_V_SHIFT};
+    let texture = &scene.textures[reference.texture as usize];
+    let image = &scene.images[texture.image as usize];
+    let is_empty = image.texels.is_empty();
+    let transform = reference.transform;
+    let mut flags = wrap_code(texture.wrap_u) << WRAP_U_SHIFT;
+    flags |= wrap_code(texture.wrap_v) << WRAP_V_SHIFT;
+    flags |= if reference.uv_set == 1 { SECOND_UV_SET } else { 0 };
+    flags |= if texture.nearest { NEAREST } else { 0 };
+    flags |= if texture.srgb { SRGB } else { 0 };
+    TextureRef {
+        first_texel: first_texels[texture.image as usize],
+        width: if is_empty { 0 } else { image.width },
+        height: image.height,
+        flags,
+        matrix: Vec4::new(
+            transform.matrix2.x_axis.x,
+            transform.matrix2.x_axis.y,
+            transform.matrix2.y_axis.x,
+            transform.matrix2.y_axis.y,
+        ),
+        translation: transform.translation,
+        padding: Vec2::ZERO,
+    }
+}
+
+fn wrap_code(wrap: Wrap) -> u32 {
+    match wrap {
+        Wrap::Repeat => 0,
+        Wrap::MirroredRepeat => 1,
+        Wrap::ClampToEdge => 2,
+    }
+}
+
+/// Local lights as `lights.wgsl` reads them; sets their numbers.
+pub(crate) fn light_words(world: &World, globals: &mut Globals) -> Vec<u32> {
+    const PUNCTUAL_WORDS: usize = 16;
+    let lights = world.lights.arrays();
+    globals.light_count = lights.probabilities.len() as u32;
+    globals.light_triangle_count = lights.triangles.len() as u32;
+    let mut words: Vec<u32> =
+        lights.cumulative.iter().chain(lights.probabilities).map(|p| p.to_bits()).collect();
+    words.extend(lights.triangles);
+    for light in &world.scene.lights {
+        let (kind, cosines) = match light.kind {
+            PunctualKind::Point => (0, [0.0; 2]),
+            PunctualKind::Spot { inner_radians, outer_radians } => {
+                (1, [inner_radians.cos(), outer_radians.cos()])
+            }
+            PunctualKind::Directional => (2, [0.0; 2]),
+        };
+        let mut record = [0_u32; PUNCTUAL_WORDS];
+        record[0] = kind;
+        let vectors = [light.position, light.direction, light.intensity];
+        let floats = vectors.iter().flat_map(Vec3::to_array).chain([light.range.min(f32::MAX)]);
+        for (word, value) in record[1..].iter_mut().zip(floats.chain(cosines)) {
+            *word = value.to_bits();
+        }
+        words.extend(record);
+    }
+    words
+}
+
+/// Three 18-bit mantissas and a common exponent, twin of `unpack_radiance` in `environment.wgsl`.
+/// A component is kept to 2^-18 of the largest one; below 1e-38 all is black.
+pub(crate) fn pack_radiance(rgb: [f32; 3]) -> [u32; 2] {
+    const BITS: i32 = 18;
+    let largest = rgb[0].max(rgb[1]).max(rgb[2]);
+    // Biased exponent, stored so that the mantissas count units of 2^(stored - 127 - 17).
+    let stored = (largest.to_bits() >> 23) as i32;
+    if stored == 0 {
+        return [0; 2];
+    }
+    let pack = |stored: i32| {
+        let units = 2.0_f64.powi(BITS - 1 + 127 - stored);
+        rgb.map(|value| (f64::from(value) * units).round() as u32)
+    };
+    let mut exponent = stored;
+    let mut mantissas = pack(exponent);
+    if mantissas.iter().any(|m| *m >= 1 << BITS) {
+        if exponent == 254 {
+            mantissas = mantissas.map(|m| m.min((1 << BITS) - 1));
+        } else {
+            exponent += 1;
+            mantissas = pack(exponent);
+        }
+    }
+    let [r, g, b] = mantissas;
+    [r | g << 18, g >> 14 | b << 4 | (exponent as u32) << 24]
+}
+
+/// `pack_radiance` undone, as the shader does it.
+#[cfg(test)]
+fn unpack_radiance(words: [u32; 2]) -> [f32; 3] {
+    let mantissas = [
+        words[0] & 0x3_ffff,
+        (words[0] >> 18 | words[1] << 14) & 0x3_ffff,
+        words[1] >> 4 & 0x3_ffff,
+    ];
+    let scale = f32::from_bits(words[1] >> 24 << 23);
+    mantissas.map(|m| m as f32 * (1.0 / 131_072.0) * scale)
+}
+
+/// Per row of the map: distance of the cosine at its upper and lower edge from that of the pole of
+/// its hemisphere, and 1 / steradian of a texel.
+pub(crate) fn row_words(environment: &Environment) -> Vec<f32> {
+    let height = environment.map().height;
+    let pole_distance = |edge: u32, is_upper: bool| {
+        let turns = f64::from(if is_upper { edge } else { height - edge }) / f64::from(height);
+        // 1 - cos without cancellation.
+        (2.0 * (0.5 * std::f64::consts::PI * turns).sin().powi(2)) as f32
+    };
+    (0..height)
+        .zip(environment.inverse_texel_solid_angles())
+        .flat_map(|(row, inverse)| {
+            let is_upper = 2 * row + 1 <= height;
+            [pole_distance(row, is_upper), pole_distance(row + 1, is_upper), *inverse]
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn radiance_survives_packing_to_a_part_in_2_to_the_17() {
+        for rgb in [
+            [1.0, 0.5, 0.25],
+            [1e-37, 1e-38, 0.0],
+            [f32::MAX, 1.0, 0.0],
+            [0.999_999_94, 0.3, 0.1],
+            [65_504.0, 12.0, 3e4],
+            [2e-30, 1e-30, 1.9e-30],
+        ] {
+            let largest = rgb.iter().copied().fold(0.0, f32::max);
+            for (value, packed) in rgb.iter().zip(unpack_radiance(pack_radiance(rgb))) {
+                assert!(packed.is_finite());
+                let error = f64::from(packed - value).abs();
+                assert!(error <= f64::from(largest) / 131_072.0, "{rgb:?}: {packed}");
+            }
+        }
+        assert_eq!(unpack_radiance(pack_radiance([0.0; 3])), [0.0; 3]);
+        assert_eq!(unpack_radiance(pack_radiance([f32::from_bits(1); 3])), [0.0; 3]);
+    }
+}

@@ -1,0 +1,503 @@
+//! The GPU's schedule: the same paths in compute shaders, in dispatches too short to be felt.
+//!
+//! [`Renderer`] holds the scene, the map and the laws on a device and brings a [`Film`] forward as
+//! `cpu` does. A pass sums at most [`MAX_PASS_SAMPLES`] samples of a pixel in f32 on the device; the
+//! f64 film on the host adds up the passes, so that no precision is lost at any number of samples
+//! and the work so far survives the device.
+
+mod buffers;
+mod device;
+pub(crate) mod layout;
+mod pacer;
+pub(crate) mod shader;
+
+use std::borrow::Cow;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+
+use super::View;
+use super::film::Film;
+use crate::bsdf::albedo;
+use crate::bvh::compressed::CompressedTree;
+use crate::environment::Environment;
+use crate::error::{Error, Result};
+use crate::light_grid::{LearningGrid, LightGrid};
+use crate::path::World;
+use crate::path::camera::CameraRays;
+use crate::scene::texture::LINEAR_FROM_SRGB_BYTE;
+use buffers::Buffers;
+use layout::{Globals, PixelSums, SurfaceSums, Work};
+use pacer::Pacer;
+use shader::{Access, Constants, Features, Kernel, Program};
+
+pub use device::{AdapterFacts, Gpu, adapters};
+
+/// Most samples of a pixel that one pass sums in f32.
+const MAX_PASS_SAMPLES: u32 = 64;
+/// Pixels along a side of a workgroup's tile.
+const TILE: u32 = 8;
+/// Paths of a workgroup.
+const GROUP: u64 = 64;
+/// Most workgroups of one dispatch (WebGPU's limit along an axis).
+const MAX_GROUPS: u64 = 65_535;
+/// Deepest tree a traversal's stack is made for.
+const MAX_DEPTH: u32 = 96;
+
+/// What the device holds of a picture in the making.
+pub(crate) struct Renderer<'a> {
+    gpu: &'a Gpu,
+    buffers: Buffers<'a>,
+    globals: Globals,
+    features: Features,
+    constants: Constants,
+    render: Option<Pipeline>,
+    learn: Option<Pipeline>,
+    render_pacer: Pacer,
+    learn_pacer: Pacer,
+    kernel_bytes: usize,
+}
+
+/// A kernel ready to run.
+struct Pipeline {
+    pipeline: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+    program: Program,
+}
+
+/// What was left out of the kernels and what they take.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct GpuFigures {
+    /// The device.
+    pub adapter: AdapterFacts,
+    /// Bytes of all buffers on it.
+    pub device_bytes: u64,
+    /// Features the kernels were built with.
+    pub features: Vec<&'static str>,
+    /// Bytes of the render kernel's source, and what they would be with every feature.
+    pub kernel_source_bytes: [usize; 2],
+}
+
+impl<'a> Renderer<'a> {
+    /// Uploads a scene and a map and builds the kernel for the view.
+    ///
+    /// # Errors
+    /// If something does not fit on the device, with the numbers.
+    pub(crate) fn new(
+        gpu: &'a Gpu,
+        world: &World,
+        environment: &Environment,
+        view: &View,
+        rays: &CameraRays,
+    ) -> Result<Self> {
+        let features = Features::of(world, environment, view);
+        let mut buffers = Buffers::new(gpu);
+        let mut globals = Globals::default();
+        globals.set_view(view, rays);
+        globals.set_environment(environment);
+        let stack_size = upload_world(&mut buffers, &mut globals, world, &features)?;
+        upload_map(&mut buffers, &mut globals, environment, &features)?;
+        let constants = upload_tables(&mut buffers, view, environment, stack_size)?;
+        let pixels = u64::from(view.width) * u64::from(view.height);
+        buffers.make("film", pixels * size_of::<PixelSums>() as u64, "the picture")?;
+        if features.has("layers") {
+            let bytes = pixels * size_of::<SurfaceSums>() as u64;
+            buffers.make("surfaces", bytes, "the picture's layers")?;
+        }
+        buffers.make("work", size_of::<Work>() as u64, "a dispatch")?;
+        buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
+        let mut renderer = Self {
+            gpu,
+            buffers,
+            globals,
+            features,
+            constants,
+            render: None,
+            learn: None,
+            render_pacer: Pacer::default(),
+            learn_pacer: Pacer::default(),
+            kernel_bytes: 0,
+        };
+        renderer.write_globals();
+        let render = renderer.pipeline(Kernel::Render)?;
+        renderer.kernel_bytes = render.program.source.len();
+        renderer.render = Some(render);
+        Ok(renderer)
+    }
+
+    /// Uploads the laws paths choose tiles by.
+    pub(crate) fn set_grid(&mut self, grid: Option<&LightGrid>) -> Result<()> {
+        let Some(grid) = grid.filter(|_| self.features.has("map_sampling")) else { return Ok(()) };
+        let words = layout::laws(grid, &mut self.globals);
+        self.buffers.put("laws", bytemuck::cast_slice(&words), "the light grid")?;
+        self.write_globals();
+        Ok(())
+    }
+
+    /// Traces the learning paths in `paths`, drawing from the laws last set; returns the number of
+    /// rays. The counters are as before if it is cancelled or fails.
+    pub(crate) fn learn(
+        &mut self,
+        paths: Range<u64>,
+        learning: &LearningGrid,
+        cancel: &AtomicBool,
+    ) -> Result<u64> {
+        self.globals.set_cells(&learning.grid);
+        self.write_globals();
+        let (visits, slots, blocks) = learning.counters.words();
+        self.buffers.put("visits", bytemuck::cast_slice(&visits), "the light grid's cells")?;
+        self.buffers.put("slot_of_cell", bytemuck::cast_slice(slots), "the light grid's cells")?;
+        let mut counters: &[u32] = &blocks;
+        if counters.is_empty() {
+            counters = &[0];
+        }
+        self.buffers.put("counters", bytemuck::cast_slice(counters), "the learning counters")?;
+        self.buffers.put("learning_rays", &[0; 4], "a count")?;
+        if self.learn.is_none() {
+            self.learn = Some(self.pipeline(Kernel::Learn)?);
+        }
+        let mut first = paths.start;
+        while first < paths.end {
+            if cancel.load(Ordering::Relaxed) {
+                return Ok(0);
+            }
+            let groups = self.learn_pacer.units().min(MAX_GROUPS);
+            let count = (groups * GROUP).min(paths.end - first);
+            let work = Work {
+                first: first as u32,
+                first_high: (first >> 32) as u32,
+                count: count as u32,
+                ..Work::default()
+            };
+            let groups = count.div_ceil(GROUP);
+            let seconds = self.dispatch(Kernel::Learn, &work, groups as u32)?;
+            self.learn_pacer.record(groups, seconds);
+            first += count;
+        }
+        let visits = self.read_words("visits", visits.len())?;
+        let counted = self.read_words("counters", blocks.len())?;
+        learning.counters.set_words(&visits, &counted);
+        Ok(self.read_words("learning_rays", 1)?.first().copied().map_or(0, u64::from))
+    }
+
+    /// Brings every pixel of the film to `target` samples; returns the numbers of samples and rays.
+    pub(crate) fn render(
+        &mut self,
+        target: u32,
+        film: &mut Film,
+        cancel: &AtomicBool,
+    ) -> Result<(u64, u64)> {
+        let tiles = u64::from(film.width.div_ceil(TILE)) * u64::from(film.height.div_ceil(TILE));
+        let mut done = (0, 0);
+        while film.min_samples() < target && !cancel.load(Ordering::Relaxed) {
+            let first_sample = film.min_samples();
+            // With few tiles a dispatch, a sample at a time keeps them short.
+            let most = (self.render_pacer.units() / tiles.min(LEAST_TILES)).max(1);
+            let samples = (target - first_sample).min(MAX_PASS_SAMPLES).min(most as u32);
+            let finished = self.render_pass(first_sample, samples, tiles, cancel)?;
+            let (samples, rays) = self.add_to(film, first_sample, samples, finished)?;
+            done = (done.0 + samples, done.1 + rays);
+        }
+        Ok(done)
+    }
+
+    /// Takes `samples` samples of each pixel; returns how many tiles are done.
+    fn render_pass(
+        &mut self,
+        first_sample: u32,
+        samples: u32,
+        tiles: u64,
+        cancel: &AtomicBool,
+    ) -> Result<u64> {
+        let mut first = 0;
+        while first < tiles && !cancel.load(Ordering::Relaxed) {
+            let affordable = (self.render_pacer.units() / u64::from(samples)).max(1);
+            let count = affordable.min(tiles - first).min(MAX_GROUPS);
+            let work = Work {
+                first: first as u32,
+                count: count as u32,
+                first_sample,
+                samples,
+                ..Work::default()
+            };
+            let seconds = self.dispatch(Kernel::Render, &work, count as u32)?;
+            self.render_pacer.record(count * u64::from(samples), seconds);
+            first += count;
+        }
+        Ok(first)
+    }
+
+    /// Adds what a pass has summed up in its first `tiles` tiles.
+    fn add_to(
+        &self,
+        film: &mut Film,
+        first_sample: u32,
+        samples: u32,
+        tiles: u64,
+    ) -> Result<(u64, u64)> {
+        let width = film.width as usize;
+        let pixels = film.pixels.len();
+        let bytes = self.buffers.read("film", (pixels * size_of::<PixelSums>()) as u64)?;
+        let sums: Vec<PixelSums> = bytemuck::pod_collect_to_vec(&bytes);
+        let tiles_across = u64::from(film.width.div_ceil(TILE));
+        let is_done = |index: usize| {
+            let (x, y) = ((index % width) as u32 / TILE, (index / width) as u32 / TILE);
+            u64::from(y) * tiles_across + u64::from(x) < tiles
+        };
+        // A pixel that an interrupted pass has brought further keeps what it has.
+        let is_new = |film: &Film, index: usize| {
+            is_done(index) && film.pixels[index].samples() == first_sample
+        };
+        if film.has_layers() {
+            let bytes =
+                self.buffers.read("surfaces", (pixels * size_of::<SurfaceSums>()) as u64)?;
+            let surfaces: Vec<SurfaceSums> = bytemuck::pod_collect_to_vec(&bytes);
+            for (index, sums) in surfaces.iter().enumerate() {
+                if is_new(film, index) {
+                    film.surfaces[index].add_sums(sums.albedo, sums.normal, sums.depth, sums.hits);
+                }
+            }
+        }
+        let done = film
+            .pixels
+            .par_iter_mut()
+            .zip(&sums)
+            .enumerate()
+            .map(|(index, (pixel, sums))| {
+                if !is_done(index) || pixel.samples() != first_sample {
+                    return (0, 0);
+                }
+                pixel.add_sums(sums.sum, sums.luminance_squared, samples, sums.invalid);
+                (u64::from(samples), u64::from(sums.rays))
+            })
+            .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        Ok(done)
+    }
+
+    /// Figures of the device and of what the kernels leave out.
+    pub(crate) fn figures(&self) -> GpuFigures {
+        let every = Features::from_names(
+            Features::ALL.into_iter().filter(|n| !n.starts_with("table_")).map(|n| (n, true)),
+        );
+        let full = Program::new(Kernel::Render, &every, &self.constants, self.buffers.splits());
+        GpuFigures {
+            adapter: self.gpu.facts().clone(),
+            device_bytes: self.buffers.bytes(),
+            features: self.features.names().collect(),
+            kernel_source_bytes: [self.kernel_bytes, full.source.len()],
+        }
+    }
+
+    fn write_globals(&self) {
+        self.buffers.write("globals", 0, bytemuck::bytes_of(&self.globals));
+    }
+
+    fn read_words(&self, name: &str, count: usize) -> Result<Vec<u32>> {
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        Ok(bytemuck::pod_collect_to_vec(&self.buffers.read(name, 4 * count as u64)?))
+    }
+
+    /// Runs a kernel to its end; returns the seconds it took.
+    fn dispatch(&self, kernel: Kernel, work: &Work, groups: u32) -> Result<f64> {
+        let pipeline = match kernel {
+            Kernel::Render => &self.render,
+            Kernel::Learn => &self.learn,
+        };
+        let Some(pipeline) = pipeline else { return Ok(0.0) };
+        let bind_group = self.bind_group(pipeline)?;
+        self.buffers.write("work", 0, bytemuck::bytes_of(work));
+        let mut commands = self.gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = commands.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&pipeline.pipeline);
+            pass.set_bind_group(0, &bind_group, &[]);
+            pass.dispatch_workgroups(groups, 1, 1);
+        }
+        let start = std::time::Instant::now();
+        let submission = self.gpu.queue.submit([commands.finish()]);
+        self.gpu.wait_for(Some(submission))?;
+        Ok(start.elapsed().as_secs_f64())
+    }
+
+    fn bind_group(&self, pipeline: &Pipeline) -> Result<wgpu::BindGroup> {
+        let mut entries = Vec::new();
+        for (index, binding) in pipeline.program.bindings.iter().enumerate() {
+            let Some(buffer) = self.buffers.get(&binding.name) else {
+                return Err(Error::new(format!("the shader's {} was not uploaded", binding.name)));
+            };
+            entries.push(wgpu::BindGroupEntry {
+                binding: index as u32,
+                resource: buffer.as_entire_binding(),
+            });
+        }
+        Ok(self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.layout,
+            entries: &entries,
+        }))
+    }
+
+    fn pipeline(&self, kernel: Kernel) -> Result<Pipeline> {
+        let program = Program::new(kernel, &self.features, &self.constants, self.buffers.splits());
+        let storage = program.bindings.iter().filter(|b| b.access != Access::Uniform).count();
+        let allowed = self.gpu.limits.max_storage_buffers_per_shader_stage as usize;
+        if storage > allowed {
+            return Err(Error::new(format!(
+                "the scene and the map need {storage} storage buffers; {} allows {allowed}",
+                self.gpu.facts().name
+            )));
+        }
+        let device = &self.gpu.device;
+        let entries: Vec<_> = program
+            .bindings
+            .iter()
+            .enumerate()
+            .map(|(index, binding)| wgpu::BindGroupLayoutEntry {
+                binding: index as u32,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty: wgpu::BindingType::Buffer {
+                    ty: match binding.access {
+                        Access::Uniform => wgpu::BufferBindingType::Uniform,
+                        access => {
+                            wgpu::BufferBindingType::Storage { read_only: access == Access::Read }
+                        }
+                    },
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            })
+            .collect();
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(kernel.name()),
+            entries: &entries,
+        });
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(kernel.name()),
+            source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(&program.source)),
+        });
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(kernel.name()),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(kernel.name()),
+            layout: Some(&pipeline_layout),
+            module: &module,
+            entry_point: Some(kernel.name()),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        });
+        self.gpu.check()?;
+        Ok(Pipeline { pipeline, layout, program })
+    }
+}
+
+/// Tiles that keep a device with few cores busy.
+const LEAST_TILES: u64 = 8;
+
+/// Uploads geometry, materials, textures and lights; returns the depth of the tree.
+fn upload_world(
+    buffers: &mut Buffers<'_>,
+    globals: &mut Globals,
+    world: &World,
+    features: &Features,
+) -> Result<u32> {
+    let scene = &world.scene;
+    let tree = CompressedTree::build(&scene.positions, &scene.triangles);
+    if tree.depth > MAX_DEPTH {
+        return Err(Error::new(format!(
+            "the scene's tree is {} levels deep; a GPU walks at most {MAX_DEPTH}",
+            tree.depth
+        )));
+    }
+    let bounds = world.bvh.bounds();
+    globals.scene_extent = bounds.0.abs().max(bounds.1.abs()).max_element();
+    put_slice(buffers, "bvh_nodes", "the scene's tree", &tree.nodes)?;
+    put_slice(buffers, "bvh_triangles", "the scene's geometry", &tree.triangles)?;
+    let geometry = layout::geometry(scene, globals);
+    put_parts(buffers, "geometry", "the scene's geometry", geometry.parts())?;
+    let (materials, texture_refs) = layout::materials(world);
+    buffers.put("materials", bytemuck::cast_slice(&materials), "the list of materials")?;
+    if features.has("textures") {
+        buffers.put("texture_refs", bytemuck::cast_slice(&texture_refs), "the list of textures")?;
+        let images: Vec<&[u8]> =
+            scene.images.iter().map(|image| bytemuck::cast_slice(&image.texels)).collect();
+        put_parts(buffers, "texels", "the set of textures", &images)?;
+    }
+    if features.has("scene_lights") {
+        let mut lights = layout::light_words(world, globals);
+        lights.push(0);
+        buffers.put("lights", bytemuck::cast_slice(&lights), "the list of lights")?;
+    }
+    Ok(tree.depth)
+}
+
+fn put_slice<T: bytemuck::Pod>(
+    buffers: &mut Buffers<'_>,
+    name: &'static str,
+    what: &str,
+    values: &[T],
+) -> Result<()> {
+    put_parts(buffers, name, what, &[bytemuck::cast_slice(values)])
+}
+
+fn put_parts(
+    buffers: &mut Buffers<'_>,
+    name: &'static str,
+    what: &str,
+    parts: &[&[u8]],
+) -> Result<()> {
+    let bytes = parts.iter().map(|part| part.len() as u64).sum();
+    if bytes / 4 >= u64::from(u32::MAX) {
+        return Err(Error::new(format!("{what} takes {} MiB, more than 16384", bytes >> 20)));
+    }
+    buffers.put_split(name, what, bytes, parts.iter().map(|part| Cow::Borrowed(*part)))
+}
+
+/// Uploads the map's radiance and its importance table.
+fn upload_map(
+    buffers: &mut Buffers<'_>,
+    globals: &mut Globals,
+    environment: &Environment,
+    features: &Features,
+) -> Result<()> {
+    if features.has("map") {
+        let map = environment.map();
+        let rows = map.pixels.chunks(map.width as usize * 64).map(|rows| {
+            let words: Vec<[u32; 2]> =
+                rows.par_iter().map(|rgb| layout::pack_radiance(*rgb)).collect();
+            Cow::Owned(bytemuck::pod_collect_to_vec(&words))
+        });
+        buffers.put_split("map_texels", "the map", map.pixels.len() as u64 * 8, rows)?;
+    }
+    if features.has("map_sampling") {
+        let words = environment.table_words();
+        globals.tile_sums_at = words[0].len() as u32;
+        let parts: Vec<&[u8]> = words.iter().map(|part| bytemuck::cast_slice(part)).collect();
+        put_parts(buffers, "sums", "the map's importance table", &parts)?;
+    }
+    Ok(())
+}
+
+/// Uploads the small tables of floats; says where each begins.
+fn upload_tables(
+    buffers: &mut Buffers<'_>,
+    view: &View,
+    environment: &Environment,
+    stack_size: u32,
+) -> Result<Constants> {
+    let mut words: Vec<f32> = LINEAR_FROM_SRGB_BYTE.to_vec();
+    let albedo_at = words.len() as u32;
+    words.extend(albedo::table_words());
+    let filter_at = words.len() as u32;
+    words.extend(view.filter.cumulative());
+    let rows_at = words.len() as u32;
+    words.extend(layout::row_words(environment));
+    buffers.put("tables", bytemuck::cast_slice(&words), "the list of constants")?;
+    Ok(Constants { stack_size, srgb_at: 0, albedo_at, filter_at, rows_at })
+}

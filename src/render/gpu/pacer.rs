@@ -1,0 +1,65 @@
+//! How much work one dispatch may hold.
+
+/// Longest time one dispatch should take: a desktop stays smooth, no driver resets, and a cancelled
+/// render ends at once.
+const TARGET_SECONDS: f64 = 0.012;
+
+/// Adapts the size of dispatches (in workgroup samples) to what the device manages.
+#[derive(Debug, Clone)]
+pub(super) struct Pacer {
+    units: f64,
+}
+
+impl Default for Pacer {
+    fn default() -> Self {
+        Self { units: 4.0 }
+    }
+}
+
+impl Pacer {
+    /// Units the next dispatch may hold, at least one.
+    pub(super) fn units(&self) -> u64 {
+        self.units as u64
+    }
+
+    /// Notes that `units` took `seconds`: shrinks at once, grows at most twofold.
+    pub(super) fn record(&mut self, units: u64, seconds: f64) {
+        let affordable = units as f64 * TARGET_SECONDS / seconds.max(1e-6);
+        // A dispatch much smaller than allowed says little about larger ones.
+        let says_more = units as f64 >= 0.5 * self.units;
+        let most = if says_more { 2.0 * self.units } else { self.units };
+        self.units = affordable.min(most).clamp(1.0, 1e9);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A device that does `rate` units a second after a fixed cost.
+    fn settled(rate: f64) -> f64 {
+        let mut pacer = Pacer::default();
+        for _ in 0..200 {
+            let units = pacer.units();
+            pacer.record(units, 5e-5 + units as f64 / rate);
+        }
+        5e-5 + pacer.units() as f64 / rate
+    }
+
+    #[test]
+    fn dispatches_settle_near_the_target_on_slow_and_fast_devices() {
+        for rate in [1e3, 1e4, 1e6, 1e9] {
+            let seconds = settled(rate);
+            assert!((0.5..=1.1).contains(&(seconds / TARGET_SECONDS)), "{rate}: {seconds}");
+        }
+        // A device too slow for even one unit gets one.
+        assert!(settled(10.0) < 0.11);
+    }
+
+    #[test]
+    fn a_sudden_slow_part_is_answered_at_once() {
+        let mut pacer = Pacer { units: 1000.0 };
+        pacer.record(1000, 0.12);
+        assert!(pacer.units() < 400);
+    }
+}
