@@ -3,7 +3,22 @@
 // An array that the scene does not have.
 const NO_ARRAY = 0xffffffffu;
 
+// What one dispatch does; the host writes it alone.
+struct Work {
+    // First 8x8 tile of pixels, or first learning path (low and high word).
+    first: u32,
+    first_high: u32,
+    // Tiles or paths.
+    count: u32,
+    first_sample: u32,
+    samples: u32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
+}
+
 struct Globals {
+    work: Work,
     camera_position: vec3f,
     lens_radius: f32,
     camera_right: vec3f,
@@ -50,20 +65,6 @@ struct Globals {
     scene_extent: f32,
     // What a learned contribution is divided by.
     mean_contribution: f32,
-    padding_0: u32,
-    padding_1: u32,
-    padding_2: u32,
-}
-
-// What one dispatch does.
-struct Work {
-    // First 8x8 tile of pixels, or first learning path (low and high word).
-    first: u32,
-    first_high: u32,
-    // Tiles or paths.
-    count: u32,
-    first_sample: u32,
-    samples: u32,
     padding_0: u32,
     padding_1: u32,
     padding_2: u32,

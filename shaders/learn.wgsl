@@ -55,12 +55,12 @@ fn learn(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let offset = group.x * 64u + lane;
-    if offset >= work.count {
+    if offset >= globals.work.count {
         return;
     }
     // One long sequence over the whole picture; its high bits count its restarts.
-    let index = work.first + offset;
-    let restarts = work.first_high + select(0u, 1u, index < work.first);
+    let index = globals.work.first + offset;
+    let restarts = globals.work.first_high + select(0u, 1u, index < globals.work.first);
     var sampler = sampler_new(globals.seed ^ LEARNING_SEED, restarts, index);
     let on_picture = next_pair(&sampler);
     let lens = lens_point(&sampler);

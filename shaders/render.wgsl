@@ -24,7 +24,7 @@ fn render(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let tiles_across = (globals.width + 7u) / 8u;
-    let tile = work.first + group.x;
+    let tile = globals.work.first + group.x;
     let x = (tile % tiles_across) * 8u + (lane & 7u);
     let y = (tile / tiles_across) * 8u + (lane >> 3u);
     if x >= globals.width || y >= globals.height {
@@ -34,8 +34,8 @@ fn render(
 //#if layers
     var surface = FirstHit(vec3f(0.0), 0.0, vec3f(0.0), 0.0);
 //#end
-    var index = work.first_sample;
-    let end = work.first_sample + work.samples;
+    var index = globals.work.first_sample;
+    let end = globals.work.first_sample + globals.work.samples;
     var path = start_sample(x, y, index);
     loop {
         if path_step(&path) {

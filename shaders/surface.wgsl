@@ -31,19 +31,24 @@ struct Material {
     normal_scale: f32,
     clearcoat_normal_scale: f32,
     flags: u32,
-    base_color_texture: u32,
-    metallic_roughness_texture: u32,
-    normal_texture: u32,
-    emissive_texture: u32,
-    specular_texture: u32,
-    specular_color_texture: u32,
-    transmission_texture: u32,
-    clearcoat_texture: u32,
-    clearcoat_roughness_texture: u32,
-    clearcoat_normal_texture: u32,
+    // By the numbers below.
+    textures: array<u32, 10>,
     padding_0: u32,
     padding_1: u32,
 }
+
+// Material.textures
+const BASE_COLOR = 0u;
+const METALLIC_ROUGHNESS = 1u;
+const NORMAL = 2u;
+const EMISSIVE = 3u;
+const SPECULAR = 4u;
+const SPECULAR_COLOR = 5u;
+const TRANSMISSION = 6u;
+const CLEARCOAT = 7u;
+const CLEARCOAT_ROUGHNESS = 8u;
+const CLEARCOAT_NORMAL = 9u;
+const TEXTURES = 10u;
 
 struct SurfaceParameters {
     base_color: vec3f,
@@ -135,9 +140,17 @@ fn read_texture(corner: Corner, reference: u32) -> vec4f {
     return vec4f(1.0);
 }
 
-fn corner_base_color(corner: Corner) -> vec4f {
-    var color = materials[corner.material].base_color
-        * read_texture(corner, materials[corner.material].base_color_texture);
+// All textures of the material here. One loop: a shader holds the code of a texture read once.
+fn read_textures(corner: Corner) -> array<vec4f, TEXTURES> {
+    var values: array<vec4f, TEXTURES>;
+    for (var i = 0u; i < TEXTURES; i++) {
+        values[i] = read_texture(corner, materials[corner.material].textures[i]);
+    }
+    return values;
+}
+
+fn corner_base_color(corner: Corner, texture: vec4f) -> vec4f {
+    var color = materials[corner.material].base_color * texture;
 //#if vertex_colors
     let at = globals.colors_at;
     color *= geometry_vec4(at + 4u * corner.vertices.x) * corner.weights.x
@@ -164,16 +177,16 @@ fn smooth_normal(corner: Corner, flat_normal: vec3f) -> vec3f {
 }
 
 // The normal a tangent-space map makes of `normal`, not of unit length (see `Corner::mapped`).
-fn mapped_normal(corner: Corner, normal: vec3f, reference: u32, scale: f32) -> vec3f {
+fn mapped_normal(corner: Corner, normal: vec3f, slot: u32, texture: vec4f, scale: f32) -> vec3f {
 //#if normal_maps
     let at = globals.tangents_at;
-    if reference != NO_TEXTURE && at != NO_ARRAY {
+    if materials[corner.material].textures[slot] != NO_TEXTURE && at != NO_ARRAY {
         let first = geometry_vec4(at + 4u * corner.vertices.x);
         let tangent = first.xyz * corner.weights.x
             + geometry_vec3(at + 4u * corner.vertices.y) * corner.weights.y
             + geometry_vec3(at + 4u * corner.vertices.z) * corner.weights.z;
         let bitangent = cross(normal, tangent) * first.w;
-        let map = read_texture(corner, reference).xyz * 2.0 - 1.0;
+        let map = texture.xyz * 2.0 - 1.0;
         return tangent * (map.x * scale) + bitangent * (map.y * scale) + normal * map.z;
     }
 //#end
@@ -194,36 +207,38 @@ fn alpha_at(triangle: u32, barycentric: vec2f) -> f32 {
     if (flags & (ALPHA_MASK | ALPHA_BLEND)) == 0u {
         return 1.0;
     }
-    let alpha = corner_base_color(corner_new(triangle, barycentric)).w;
+    let corner = corner_new(triangle, barycentric);
+    let texture = read_texture(corner, materials[material].textures[BASE_COLOR]);
+    let alpha = corner_base_color(corner, texture).w;
     return opacity(flags, materials[material].alpha_cutoff, alpha);
 }
 
-fn corner_parameters(corner: Corner) -> SurfaceParameters {
+fn corner_parameters(corner: Corner, textures: array<vec4f, TEXTURES>) -> SurfaceParameters {
     let m = corner.material;
     let flags = materials[m].flags;
-    let base = corner_base_color(corner);
-    let metallic_roughness = read_texture(corner, materials[m].metallic_roughness_texture);
+    let base = corner_base_color(corner, textures[BASE_COLOR]);
+    let metallic_roughness = textures[METALLIC_ROUGHNESS];
     var p: SurfaceParameters;
     p.base_color = saturate(base.xyz);
     p.alpha = opacity(flags, materials[m].alpha_cutoff, base.w);
     p.metallic = saturate(materials[m].metallic * metallic_roughness.z);
     p.roughness = saturate(materials[m].roughness * metallic_roughness.y);
     p.ior = materials[m].ior;
-    p.specular = saturate(materials[m].specular * read_texture(corner, materials[m].specular_texture).w);
+    p.specular = saturate(materials[m].specular * textures[SPECULAR].w);
     p.specular_color = materials[m].specular_color
-        * read_texture(corner, materials[m].specular_color_texture).xyz;
+        * textures[SPECULAR_COLOR].xyz;
     p.thin = (flags & THIN) != 0u;
 //#if transmission
     p.transmission = saturate(
-        materials[m].transmission * read_texture(corner, materials[m].transmission_texture).x);
+        materials[m].transmission * textures[TRANSMISSION].x);
     p.absorption = materials[m].absorption;
 //#end
     p.clearcoat_normal = vec3f(0.0, 0.0, 1.0);
 //#if clearcoat
     p.clearcoat = saturate(
-        materials[m].clearcoat * read_texture(corner, materials[m].clearcoat_texture).x);
+        materials[m].clearcoat * textures[CLEARCOAT].x);
     p.clearcoat_roughness = saturate(materials[m].clearcoat_roughness
-        * read_texture(corner, materials[m].clearcoat_roughness_texture).y);
+        * textures[CLEARCOAT_ROUGHNESS].y);
 //#end
     p.unlit = (flags & UNLIT) != 0u;
     if p.unlit {
@@ -231,7 +246,7 @@ fn corner_parameters(corner: Corner) -> SurfaceParameters {
     } else {
 //#if emitters
         p.emissive = materials[m].emissive
-            * read_texture(corner, materials[m].emissive_texture).xyz;
+            * textures[EMISSIVE].xyz;
 //#end
     }
     return p;
@@ -250,11 +265,12 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
     point.geometric_normal = select(-front_normal, front_normal, point.front_face);
     point.triangle = triangle;
     point.material = corner.material;
-    point.parameters = corner_parameters(corner);
+    let textures = read_textures(corner);
+    point.parameters = corner_parameters(corner, textures);
 
     let to_viewer = -ray_direction;
     let unmapped = smooth_normal(corner, front_normal);
-    var normal = mapped_normal(corner, unmapped, materials[corner.material].normal_texture,
+    var normal = mapped_normal(corner, unmapped, NORMAL, textures[NORMAL],
         materials[corner.material].normal_scale);
     normal = turned(normal, unmapped, point.geometric_normal, to_viewer);
 //#if metals
@@ -267,10 +283,9 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
 //#if clearcoat
     let is_mapped = (materials[corner.material].flags & NORMAL_MAPPED) != 0u;
     if point.parameters.clearcoat > 0.0 && is_mapped {
-        let texture = materials[corner.material].clearcoat_normal_texture;
-        let scale = materials[corner.material].clearcoat_normal_scale;
-        let coat = turned(mapped_normal(corner, unmapped, texture, scale), unmapped,
-            point.geometric_normal, to_viewer);
+        let mapped = mapped_normal(corner, unmapped, CLEARCOAT_NORMAL, textures[CLEARCOAT_NORMAL],
+            materials[corner.material].clearcoat_normal_scale);
+        let coat = turned(mapped, unmapped, point.geometric_normal, to_viewer);
         point.parameters.clearcoat_normal = local_from_world(
             point.shading_frame, mirroring_normal(coat, point.geometric_normal, to_viewer));
     }

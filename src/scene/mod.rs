@@ -172,6 +172,24 @@ impl Default for Material {
     }
 }
 
+impl Material {
+    /// All textures, in the order in which `shaders/surface.wgsl` numbers them.
+    pub fn textures(&self) -> [&Option<TextureRef>; 10] {
+        [
+            &self.base_color_texture,
+            &self.metallic_roughness_texture,
+            &self.normal_texture,
+            &self.emissive_texture,
+            &self.specular_texture,
+            &self.specular_color_texture,
+            &self.transmission_texture,
+            &self.clearcoat_texture,
+            &self.clearcoat_roughness_texture,
+            &self.clearcoat_normal_texture,
+        ]
+    }
+}
+
 /// What happens to texture coordinates outside `[0,1]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Wrap {

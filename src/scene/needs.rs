@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{AlphaMode, Material, Scene, TextureRef};
+use super::{AlphaMode, Material, Scene};
 
 /// Features a scene uses; what is `false` here is neither evaluated nor, on a GPU, compiled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -58,7 +58,7 @@ impl SceneNeeds {
     }
 
     fn add(&mut self, m: &Material) {
-        for texture in textures_of(m) {
+        for texture in m.textures().into_iter().flatten() {
             self.textures = true;
             self.second_uv_set |= texture.uv_set == 1;
         }
@@ -107,22 +107,4 @@ impl SceneNeeds {
 /// Whether triangles of this material are light sources.
 pub fn is_emitter(material: &Material) -> bool {
     !material.unlit && material.emissive.max_element() > 0.0
-}
-
-/// All textures of a material.
-fn textures_of(m: &Material) -> impl Iterator<Item = &TextureRef> {
-    [
-        &m.base_color_texture,
-        &m.metallic_roughness_texture,
-        &m.normal_texture,
-        &m.emissive_texture,
-        &m.specular_texture,
-        &m.specular_color_texture,
-        &m.transmission_texture,
-        &m.clearcoat_texture,
-        &m.clearcoat_roughness_texture,
-        &m.clearcoat_normal_texture,
-    ]
-    .into_iter()
-    .flatten()
 }

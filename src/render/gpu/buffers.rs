@@ -162,12 +162,10 @@ impl<'a> Buffers<'a> {
     }
 
     fn create(&self, name: &str, bytes: u64) -> Buffer {
-        let uniform = matches!(name, "globals" | "work");
-        let kind = if uniform { BufferUsages::UNIFORM } else { BufferUsages::STORAGE };
         self.gpu.device.create_buffer(&BufferDescriptor {
             label: Some(name),
             size: bytes.next_multiple_of(16).max(16),
-            usage: kind | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
+            usage: BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         })
     }

@@ -19,10 +19,23 @@ pub(crate) const NO_ARRAY: u32 = u32::MAX;
 /// A material without this texture.
 const NO_TEXTURE: u32 = u32::MAX;
 
+/// Twin of `Work` in `globals.wgsl`.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Work {
+    pub(crate) first: u32,
+    pub(crate) first_high: u32,
+    pub(crate) count: u32,
+    pub(crate) first_sample: u32,
+    pub(crate) samples: u32,
+    pub(crate) padding: [u32; 3],
+}
+
 /// Twin of `Globals` in `globals.wgsl`.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Globals {
+    pub(crate) work: Work,
     pub(crate) camera_position: Vec3,
     pub(crate) lens_radius: f32,
     pub(crate) camera_right: Vec3,
@@ -68,18 +81,6 @@ pub(crate) struct Globals {
     pub(crate) padding: [u32; 3],
 }
 
-/// Twin of `Work` in `globals.wgsl`.
-#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct Work {
-    pub(crate) first: u32,
-    pub(crate) first_high: u32,
-    pub(crate) count: u32,
-    pub(crate) first_sample: u32,
-    pub(crate) samples: u32,
-    pub(crate) padding: [u32; 3],
-}
-
 /// Twin of `Material` in `surface.wgsl`.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -99,16 +100,7 @@ pub(crate) struct Material {
     pub(crate) normal_scale: f32,
     pub(crate) clearcoat_normal_scale: f32,
     pub(crate) flags: u32,
-    pub(crate) base_color_texture: u32,
-    pub(crate) metallic_roughness_texture: u32,
-    pub(crate) normal_texture: u32,
-    pub(crate) emissive_texture: u32,
-    pub(crate) specular_texture: u32,
-    pub(crate) specular_color_texture: u32,
-    pub(crate) transmission_texture: u32,
-    pub(crate) clearcoat_texture: u32,
-    pub(crate) clearcoat_roughness_texture: u32,
-    pub(crate) clearcoat_normal_texture: u32,
+    pub(crate) textures: [u32; 10],
     pub(crate) padding: [u32; 2],
 }
 
@@ -307,16 +299,7 @@ pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
             normal_scale: m.normal_scale,
             clearcoat_normal_scale: m.clearcoat_normal_scale,
             flags: flags(m, world.may_pass_light(index)),
-            base_color_texture: reference(&m.base_color_texture),
-            metallic_roughness_texture: reference(&m.metallic_roughness_texture),
-            normal_texture: reference(&m.normal_texture),
-            emissive_texture: reference(&m.emissive_texture),
-            specular_texture: reference(&m.specular_texture),
-            specular_color_texture: reference(&m.specular_color_texture),
-            transmission_texture: reference(&m.transmission_texture),
-            clearcoat_texture: reference(&m.clearcoat_texture),
-            clearcoat_roughness_texture: reference(&m.clearcoat_roughness_texture),
-            clearcoat_normal_texture: reference(&m.clearcoat_normal_texture),
+            textures: m.textures().map(&mut reference),
             padding: [0; 2],
         })
         .collect();

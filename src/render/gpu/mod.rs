@@ -105,7 +105,6 @@ impl<'a> Renderer<'a> {
             let bytes = pixels * size_of::<SurfaceSums>() as u64;
             buffers.make("surfaces", bytes, "the picture's layers")?;
         }
-        buffers.make("work", size_of::<Work>() as u64, "a dispatch")?;
         buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
         let mut renderer = Self {
             gpu,
@@ -308,7 +307,7 @@ impl<'a> Renderer<'a> {
         };
         let Some(pipeline) = pipeline else { return Ok(0.0) };
         let bind_group = self.bind_group(pipeline)?;
-        self.buffers.write("work", 0, bytemuck::bytes_of(work));
+        self.buffers.write("globals", 0, bytemuck::bytes_of(work));
         let mut commands = self.gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = commands.begin_compute_pass(&Default::default());
@@ -342,7 +341,7 @@ impl<'a> Renderer<'a> {
 
     fn pipeline(&self, kernel: Kernel) -> Result<Pipeline> {
         let program = Program::new(kernel, &self.features, &self.constants, self.buffers.splits());
-        let storage = program.bindings.iter().filter(|b| b.access != Access::Uniform).count();
+        let storage = program.bindings.len();
         let allowed = self.gpu.limits.max_storage_buffers_per_shader_stage as usize;
         if storage > allowed {
             return Err(Error::new(format!(
@@ -359,11 +358,8 @@ impl<'a> Renderer<'a> {
                 binding: index as u32,
                 visibility: wgpu::ShaderStages::COMPUTE,
                 ty: wgpu::BindingType::Buffer {
-                    ty: match binding.access {
-                        Access::Uniform => wgpu::BufferBindingType::Uniform,
-                        access => {
-                            wgpu::BufferBindingType::Storage { read_only: access == Access::Read }
-                        }
+                    ty: wgpu::BufferBindingType::Storage {
+                        read_only: binding.access == Access::Read,
                     },
                     has_dynamic_offset: false,
                     min_binding_size: None,
