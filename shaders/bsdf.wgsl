@@ -74,9 +74,9 @@ struct BsdfSample {
 
 const NO_SAMPLE = LobeSample(ABSORBED, vec3f(0.0), vec3f(0.0));
 
-fn albedo_node(row: u32, column: u32) -> vec2f {
-    let at = ALBEDO_AT + 2u * (row * (ALBEDO_NODES + 1u) + column);
-    return vec2f(tables[at], tables[at + 1u]);
+// Terms of a row and a column, and of the row after it.
+fn albedo_nodes(row: u32, column: u32) -> vec4f {
+    return tables(ALBEDO_AT + row * (ALBEDO_NODES + 1u) + column);
 }
 
 // `AlbedoTerms::at`: (A, B) seen from a direction of this cosine.
@@ -85,19 +85,16 @@ fn albedo_terms_at(roughness: f32, cosine: f32) -> vec2f {
     let row = min(u32(y), ALBEDO_NODES - 2u);
     let x = sqrt(saturate(cosine)) * f32(ALBEDO_NODES - 1u);
     let column = min(u32(x), ALBEDO_NODES - 2u);
-    let across = x - f32(column);
-    return mix(
-        mix(albedo_node(row, column), albedo_node(row, column + 1u), across),
-        mix(albedo_node(row + 1u, column), albedo_node(row + 1u, column + 1u), across),
-        y - f32(row),
-    );
+    let terms = mix(albedo_nodes(row, column), albedo_nodes(row, column + 1u), x - f32(column));
+    return mix(terms.xy, terms.zw, y - f32(row));
 }
 
 // `AlbedoTerms::mean`: the last column.
 fn albedo_terms_mean(roughness: f32) -> vec2f {
     let y = roughness * f32(ALBEDO_NODES - 1u);
     let row = min(u32(y), ALBEDO_NODES - 2u);
-    return mix(albedo_node(row, ALBEDO_NODES), albedo_node(row + 1u, ALBEDO_NODES), y - f32(row));
+    let terms = albedo_nodes(row, ALBEDO_NODES);
+    return mix(terms.xy, terms.zw, y - f32(row));
 }
 
 fn interface_new(p: SurfaceParameters, f0: vec3f, f90: f32, entering: bool) -> Interface {

@@ -86,11 +86,9 @@ fn edge(a: vec3f, b: vec3f) -> f32 {
 // The hit of one triangle of the tree, MISS if there is none within `t_max`.
 fn intersect_triangle(index: u32, shear: Shear, t_max: f32) -> Hit {
     let v0 = bvh_triangles(3u * index);
-    let v1 = bvh_triangles(3u * index + 1u);
-    let v2 = bvh_triangles(3u * index + 2u);
-    let a = sheared(v0.xyz, shear);
-    let b = sheared(v1.xyz, shear);
-    let c = sheared(v2.xyz, shear);
+    let a = sheared(bitcast<vec3f>(v0.xyz), shear);
+    let b = sheared(bitcast<vec3f>(bvh_triangles(3u * index + 1u).xyz), shear);
+    let c = sheared(bitcast<vec3f>(bvh_triangles(3u * index + 2u).xyz), shear);
     let edges = vec3f(edge(c, b), edge(a, c), edge(b, a));
     let none = Hit(MISS, 0u, vec2f(0.0));
     if any(edges < vec3f(0.0)) && any(edges > vec3f(0.0)) {
@@ -104,7 +102,7 @@ fn intersect_triangle(index: u32, shear: Shear, t_max: f32) -> Hit {
     if !(t >= 0.0 && t <= t_max) {
         return none;
     }
-    return Hit(t, bitcast<u32>(v0.w), edges.yz / determinant);
+    return Hit(t, v0.w, edges.yz / determinant);
 }
 
 // Four of a node's eight boxes; bits for the hit mask.

@@ -52,14 +52,14 @@ fn invert_filter(u: f32) -> f32 {
     var last = FILTER_STEPS;
     while upper < last {
         let middle = (upper + last) / 2u;
-        if tables[FILTER_AT + middle] <= u {
+        if tables(FILTER_AT + middle).x <= u {
             upper = middle + 1u;
         } else {
             last = middle;
         }
     }
-    let low = tables[FILTER_AT + upper - 1u];
-    let high = tables[FILTER_AT + upper];
+    let low = tables(FILTER_AT + upper - 1u).x;
+    let high = tables(FILTER_AT + upper).x;
     var fraction = 0.5;
     if high > low {
         fraction = (u - low) / (high - low);

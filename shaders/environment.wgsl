@@ -58,7 +58,7 @@ fn map_point(direction: vec3f) -> MapPoint {
 
 //#if map
 fn map_texel(x: u32, y: u32) -> vec3f {
-    return unpack_radiance(map_texels(y * globals.map_width + x));
+    return unpack_radiance(map_texels(y * globals.map_width + x).xy);
 }
 
 // Three 18-bit mantissas and a common exponent; packed by `layout::pack_radiance`.
@@ -103,9 +103,10 @@ fn environment_radiance(direction: vec3f) -> vec3f {
 }
 
 //#if map_sampling
-// 1 / steradian of a texel in a row.
-fn inverse_texel_solid_angle(row: u32) -> f32 {
-    return tables[ROWS_AT + 3u * row + 2u];
+// Distance of the cosine at a row's upper and lower edge from its pole's, which keeps its digits
+// near it; 1 / steradian of a texel.
+fn map_row(row: u32) -> vec3f {
+    return tables(ROWS_AT + row).xyz;
 }
 
 fn radiance_and_tile_pdf(direction: vec3f) -> RadianceAndTilePdf {
@@ -115,7 +116,7 @@ fn radiance_and_tile_pdf(direction: vec3f) -> RadianceAndTilePdf {
     return RadianceAndTilePdf(
         radiance_at(point),
         tile,
-        probability * inverse_texel_solid_angle(point.texel.y),
+        probability * map_row(point.texel.y).z,
     );
 }
 
@@ -133,9 +134,8 @@ fn sample_in_tile(tile: u32, u: vec2f) -> EnvironmentSample {
     let x = f32(chosen.texel.x) + within.x;
     let world_turns = x / size.x + globals.rotation_turns - 0.5;
     let sin_cos_phi = sin_cos_turns(world_turns - round(world_turns));
-    // Distance of the cosine from the row's pole, which keeps its digits near it.
-    let row = ROWS_AT + 3u * chosen.texel.y;
-    let z = mix(tables[row], tables[row + 1u], within.y);
+    let row = map_row(chosen.texel.y);
+    let z = mix(row.x, row.y, within.y);
     let is_upper = 2u * chosen.texel.y + 1u <= globals.map_height;
     let cos_theta = select(z - 1.0, 1.0 - z, is_upper);
     let sin_theta = sqrt(max(z * (2.0 - z), 0.0));
@@ -143,7 +143,7 @@ fn sample_in_tile(tile: u32, u: vec2f) -> EnvironmentSample {
 
     let y = uv_from_direction(result.direction).y * size.y;
     result.radiance = radiance_at(MapPoint(vec2f(x, y), chosen.texel));
-    result.pdf_solid_angle = chosen.probability * inverse_texel_solid_angle(chosen.texel.y);
+    result.pdf_solid_angle = chosen.probability * row.z;
     return result;
 }
 

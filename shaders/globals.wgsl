@@ -29,14 +29,6 @@ struct Globals {
     half_height: f32,
     grid_center: vec3f,
     grid_columns: u32,
-    // Words of `geometry` at which each array begins.
-    uvs_at: vec2u,
-    positions_at: u32,
-    normals_at: u32,
-    tangents_at: u32,
-    colors_at: u32,
-    triangles_at: u32,
-    triangle_materials_at: u32,
     // Words of `laws` at which each array begins.
     law_starts_at: u32,
     law_masks_at: u32,

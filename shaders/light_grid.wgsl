@@ -36,7 +36,7 @@ fn cell_of(position: vec3f, normal: vec3f) -> u32 {
 
 // The 16-bit number `index` of an array that begins at word `at`.
 fn law_u16(at: u32, index: u32) -> u32 {
-    return (laws[at + index / 2u] >> (16u * (index & 1u))) & 0xffffu;
+    return (laws(at + index / 2u).x >> (16u * (index & 1u))) & 0xffffu;
 }
 
 fn law_of(position: vec3f, normal: vec3f) -> u32 {
@@ -52,13 +52,13 @@ fn entry_probability(low: u32, last: u32) -> f32 {
 }
 
 fn sample_tile(law: u32, bits: u32) -> TileChoice {
-    let start = laws[globals.law_starts_at + law];
+    let start = laws(globals.law_starts_at + law).x;
     let first = globals.law_last_at + start;
     var below = 0u;
-    var above = laws[globals.law_starts_at + law + 1u] - start - 1u;
+    var above = laws(globals.law_starts_at + law + 1u).x - start - 1u;
     while below < above {
         let middle = (below + above) / 2u;
-        if laws[first + middle] < bits {
+        if laws(first + middle).x < bits {
             below = middle + 1u;
         } else {
             above = middle;
@@ -66,9 +66,9 @@ fn sample_tile(law: u32, bits: u32) -> TileChoice {
     }
     var low = 0u;
     if below > 0u {
-        low = laws[first + below - 1u] + 1u;
+        low = laws(first + below - 1u).x + 1u;
     }
-    let last = laws[first + below];
+    let last = laws(first + below).x;
     let count = f32(last - low) + 1.0;
     return TileChoice(
         law_u16(globals.law_tiles_at, start + below),
@@ -80,8 +80,8 @@ fn sample_tile(law: u32, bits: u32) -> TileChoice {
 fn tile_probability(law: u32, tile: u32) -> f32 {
     let word = law * globals.words_per_law + tile / 64u;
     let mask = vec2u(
-        laws[globals.law_masks_at + 2u * word],
-        laws[globals.law_masks_at + 2u * word + 1u],
+        laws(globals.law_masks_at + 2u * word).x,
+        laws(globals.law_masks_at + 2u * word + 1u).x,
     );
     let in_high = (tile & 32u) != 0u;
     let bit = 1u << (tile & 31u);
@@ -91,11 +91,11 @@ fn tile_probability(law: u32, tile: u32) -> f32 {
     let below = select(countOneBits(mask.x & (bit - 1u)),
         countOneBits(mask.x) + countOneBits(mask.y & (bit - 1u)), in_high);
     let rank = law_u16(globals.law_ranks_at, word) + below;
-    let entry = globals.law_last_at + laws[globals.law_starts_at + law] + rank;
+    let entry = globals.law_last_at + laws(globals.law_starts_at + law).x + rank;
     var low = 0u;
     if rank > 0u {
-        low = laws[entry - 1u] + 1u;
+        low = laws(entry - 1u).x + 1u;
     }
-    return entry_probability(low, laws[entry]);
+    return entry_probability(low, laws(entry).x);
 }
 //#end

@@ -17,7 +17,7 @@ struct LightSample {
 }
 
 fn light_f32(at: u32) -> f32 {
-    return bitcast<f32>(lights[at]);
+    return bitcast<f32>(lights(at).x);
 }
 
 fn light_vec3(at: u32) -> vec3f {
@@ -29,7 +29,7 @@ fn light_probability(index: u32) -> f32 {
 }
 
 fn light_triangle(index: u32) -> u32 {
-    return lights[2u * globals.light_count + index];
+    return lights(2u * globals.light_count + index).x;
 }
 
 fn sample_local_light(position: vec3f, u: vec2f) -> LightSample {
@@ -82,11 +82,11 @@ fn sample_local_light(position: vec3f, u: vec2f) -> LightSample {
 
 //#if emitters
 fn light_corners(triangle: u32) -> array<vec3f, 3> {
-    let first = globals.triangles_at + 3u * triangle;
+    let corners = triangles(triangle).xyz;
     return array<vec3f, 3>(
-        vertex_position(geometry(first)),
-        vertex_position(geometry(first + 1u)),
-        vertex_position(geometry(first + 2u)),
+        vertex_position(corners.x),
+        vertex_position(corners.y),
+        vertex_position(corners.z),
     );
 }
 
@@ -122,7 +122,7 @@ fn local_light_pdf_solid_angle(triangle: u32, direction: vec3f, distance: f32) -
 
 // Radiance a surface point sends towards its viewer: as much as alpha covers it.
 fn emitted(point: SurfacePoint) -> vec3f {
-    let both_sides = (materials[point.material].flags & DOUBLE_SIDED) != 0u;
+    let both_sides = (material_flags(point.material) & DOUBLE_SIDED) != 0u;
     if point.front_face || both_sides {
         return point.parameters.emissive * point.parameters.alpha;
     }
@@ -134,7 +134,7 @@ fn emitted(point: SurfacePoint) -> vec3f {
 fn sample_punctual(index: u32, position: vec3f, probability: f32) -> LightSample {
     var none: LightSample;
     let at = 2u * globals.light_count + globals.light_triangle_count + PUNCTUAL_WORDS * index;
-    let kind = lights[at];
+    let kind = lights(at).x;
     let light_position = light_vec3(at + 1u);
     let light_direction = light_vec3(at + 4u);
     let intensity = light_vec3(at + 7u);

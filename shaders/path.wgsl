@@ -96,7 +96,7 @@ fn path_pair(path: ptr<function, Path>) -> vec2f {
 // Share of light that goes straight through a surface: what alpha does not cover, and what smooth
 // thin glass transmits.
 fn straight_through(point: SurfacePoint, direction: vec3f) -> vec3f {
-    if (materials[point.material].flags & PARTIAL) == 0u {
+    if (material_flags(point.material) & PARTIAL) == 0u {
         return vec3f(0.0);
     }
     var glass = vec3f(0.0);
@@ -112,7 +112,7 @@ fn straight_through(point: SurfacePoint, direction: vec3f) -> vec3f {
 }
 
 fn coverage(point: SurfacePoint) -> f32 {
-    let blended = (materials[point.material].flags & ALPHA_BLEND) != 0u;
+    let blended = (material_flags(point.material) & ALPHA_BLEND) != 0u;
     return select(1.0, saturate(point.parameters.alpha), blended);
 }
 //#end
@@ -120,12 +120,12 @@ fn coverage(point: SurfacePoint) -> f32 {
 //#if filtered_hits
 // Whether a path sees a hit: not where a mask cuts it out, nor, for camera rays, a back side.
 fn accepts(hit: Hit, direction: vec3f, from_camera: bool) -> bool {
-    let flags = materials[material_of(hit.triangle)].flags;
+    let flags = material_flags(material_of(hit.triangle));
     if from_camera && (flags & DOUBLE_SIDED) == 0u {
-        let first = globals.triangles_at + 3u * hit.triangle;
-        let a = vertex_position(geometry(first));
-        let b = vertex_position(geometry(first + 1u));
-        let c = vertex_position(geometry(first + 2u));
+        let corners = triangles(hit.triangle).xyz;
+        let a = vertex_position(corners.x);
+        let b = vertex_position(corners.y);
+        let c = vertex_position(corners.z);
         if dot(cross(b - a, c - a), direction) > 0.0 {
             return false;
         }
@@ -142,7 +142,7 @@ fn accepts(hit: Hit, direction: vec3f, from_camera: bool) -> bool {
 //#if pass_through
 // Share of light that a surface on a shadow ray's way lets through.
 fn passed(hit: Hit, direction: vec3f) -> vec3f {
-    let flags = materials[material_of(hit.triangle)].flags;
+    let flags = material_flags(material_of(hit.triangle));
 //#if partial
     if (flags & PARTIAL) != 0u {
         return straight_through(surface_at(hit.triangle, hit.barycentric, direction), direction);

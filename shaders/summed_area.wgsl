@@ -16,14 +16,14 @@ fn pair_difference(a: vec2f, b: vec2f) -> vec2f {
 fn corner_at(x: u32, y: u32) -> vec2f {
     let index = y * (globals.map_width + 1u) + x;
 //#if table_u32
-    let bits = sums(index);
+    let bits = sums(index).x;
     return vec2f(f32(bits & 0xffff0000u), f32(bits & 0xffffu));
 //#end
 //#if table_f32
-    return vec2f(bitcast<f32>(sums(index)), 0.0);
+    return vec2f(bitcast<f32>(sums(index).x), 0.0);
 //#end
 //#if table_f64
-    return vec2f(bitcast<f32>(sums(2u * index)), bitcast<f32>(sums(2u * index + 1u)));
+    return vec2f(bitcast<f32>(sums(2u * index).x), bitcast<f32>(sums(2u * index + 1u).x));
 //#end
 }
 

@@ -3,7 +3,7 @@
 const MIN_COSINE_SHARE = 0.05;
 const MIN_MIRROR_COSINE = 0.01;
 
-// Material.flags
+// Flags of a material.
 const ALPHA_MASK = 1u;
 const ALPHA_BLEND = 2u;
 const DOUBLE_SIDED = 4u;
@@ -15,29 +15,19 @@ const NORMAL_MAPPED = 64u;
 
 const NO_TEXTURE = 0xffffffffu;
 
-struct Material {
-    base_color: vec4f,
-    emissive: vec3f,
-    alpha_cutoff: f32,
-    specular_color: vec3f,
-    specular: f32,
-    absorption: vec3f,
-    ior: f32,
-    metallic: f32,
-    roughness: f32,
-    transmission: f32,
-    clearcoat: f32,
-    clearcoat_roughness: f32,
-    normal_scale: f32,
-    clearcoat_normal_scale: f32,
-    flags: u32,
-    // By the numbers below.
-    textures: array<u32, 10>,
-    padding_0: u32,
-    padding_1: u32,
-}
+// Texels of a material in `materials`, as `layout::Material` has them.
+const MATERIAL_TEXELS = 9u;
+const BASE_COLOR_ALPHA = 0u;
+const EMISSIVE_CUTOFF = 1u;
+const SPECULAR_COLOR_STRENGTH = 2u;
+const ABSORPTION_IOR = 3u;
+// Metallic, roughness, transmission, clearcoat.
+const FACTORS = 4u;
+// Clearcoat roughness, normal scale, clearcoat normal scale, flags.
+const SCALES_FLAGS = 5u;
+const FIRST_TEXTURES = 6u;
 
-// Material.textures
+// Textures of a material.
 const BASE_COLOR = 0u;
 const METALLIC_ROUGHNESS = 1u;
 const NORMAL = 2u;
@@ -86,105 +76,89 @@ struct Corner {
 }
 
 fn corner_new(triangle: u32, barycentric: vec2f) -> Corner {
-    let first = globals.triangles_at + 3u * triangle;
-    return Corner(
-        vec3u(geometry(first), geometry(first + 1u), geometry(first + 2u)),
-        vec3f(1.0 - barycentric.x - barycentric.y, barycentric),
-        material_of(triangle),
-    );
+    let record = triangles(triangle);
+    let weights = vec3f(1.0 - barycentric.x - barycentric.y, barycentric);
+    return Corner(record.xyz, weights, record.w);
 }
 
 fn material_of(triangle: u32) -> u32 {
-    return geometry(globals.triangle_materials_at + triangle);
+    return triangles(triangle).w;
 }
 
-fn geometry_f32(at: u32) -> f32 {
-    return bitcast<f32>(geometry(at));
+fn material_words(material: u32, texel: u32) -> vec4u {
+    return materials(MATERIAL_TEXELS * material + texel);
 }
 
-fn geometry_vec2(at: u32) -> vec2f {
-    return vec2f(geometry_f32(at), geometry_f32(at + 1u));
+fn material_numbers(material: u32, texel: u32) -> vec4f {
+    return bitcast<vec4f>(material_words(material, texel));
 }
 
-fn geometry_vec3(at: u32) -> vec3f {
-    return vec3f(geometry_f32(at), geometry_f32(at + 1u), geometry_f32(at + 2u));
+fn material_flags(material: u32) -> u32 {
+    return material_words(material, SCALES_FLAGS).w;
 }
 
-fn geometry_vec4(at: u32) -> vec4f {
-    return vec4f(geometry_vec3(at), geometry_f32(at + 3u));
+// One of the texels of a vertex: position and normal.x, normal.yz and first texture coordinates,
+// then those that the scene needs.
+fn vertex_texel(vertex: u32, texel: u32) -> vec4f {
+    return bitcast<vec4f>(vertices(VERTEX_TEXELS * vertex + texel));
 }
 
 fn vertex_position(vertex: u32) -> vec3f {
-    return geometry_vec3(globals.positions_at + 3u * vertex);
+    return vertex_texel(vertex, 0u).xyz;
 }
 
-//#if textures
-fn corner_uv(corner: Corner, uv_set: u32) -> vec2f {
-    let at = select(globals.uvs_at.x, globals.uvs_at.y, uv_set == 1u);
-    if at == NO_ARRAY {
-        return vec2f(0.0);
-    }
-    return geometry_vec2(at + 2u * corner.vertices.x) * corner.weights.x
-        + geometry_vec2(at + 2u * corner.vertices.y) * corner.weights.y
-        + geometry_vec2(at + 2u * corner.vertices.z) * corner.weights.z;
+fn interpolate(corner: Corner, texel: u32) -> vec4f {
+    return vertex_texel(corner.vertices.x, texel) * corner.weights.x
+        + vertex_texel(corner.vertices.y, texel) * corner.weights.y
+        + vertex_texel(corner.vertices.z, texel) * corner.weights.z;
 }
-//#end
 
-// The texture's value here, ones without a texture.
-fn read_texture(corner: Corner, reference: u32) -> vec4f {
+// The texture's value at coordinates of both sets, ones without a texture.
+fn read_texture(reference: u32, uvs: vec4f) -> vec4f {
 //#if textures
     if reference != NO_TEXTURE {
-        return sample_texture(reference, corner_uv(corner, texture_uv_set(reference)));
+        return sample_texture(reference, uvs);
     }
 //#end
     return vec4f(1.0);
 }
 
+// Texture coordinates of both sets.
+fn corner_uvs(corner: Corner, first_set: vec2f) -> vec4f {
+//#if second_uv_set
+    return vec4f(first_set, interpolate(corner, SECOND_UV_TEXEL).xy);
+//#else
+    return vec4f(first_set, 0.0, 0.0);
+//#end
+}
+
 // All textures of the material here. One loop: a shader holds the code of a texture read once.
-fn read_textures(corner: Corner) -> array<vec4f, TEXTURES> {
+fn read_textures(corner: Corner, uvs: vec4f) -> array<vec4f, TEXTURES> {
     var values: array<vec4f, TEXTURES>;
     for (var i = 0u; i < TEXTURES; i++) {
-        values[i] = read_texture(corner, materials[corner.material].textures[i]);
+        values[i] = read_texture(texture_of(corner.material, i), uvs);
     }
     return values;
 }
 
-fn corner_base_color(corner: Corner, texture: vec4f) -> vec4f {
-    var color = materials[corner.material].base_color * texture;
-//#if vertex_colors
-    let at = globals.colors_at;
-    color *= geometry_vec4(at + 4u * corner.vertices.x) * corner.weights.x
-        + geometry_vec4(at + 4u * corner.vertices.y) * corner.weights.y
-        + geometry_vec4(at + 4u * corner.vertices.z) * corner.weights.z;
-//#end
-    return color;
+fn texture_of(material: u32, texture: u32) -> u32 {
+    return material_words(material, FIRST_TEXTURES + texture / 4u)[texture % 4u];
 }
 
-// Interpolated normal, not of unit length; `flat_normal` where the triangle is flat.
-fn smooth_normal(corner: Corner, flat_normal: vec3f) -> vec3f {
-    let at = globals.normals_at;
-    if at == NO_ARRAY {
-        return flat_normal;
-    }
-    let a = geometry_vec3(at + 3u * corner.vertices.x);
-    let b = geometry_vec3(at + 3u * corner.vertices.y);
-    let c = geometry_vec3(at + 3u * corner.vertices.z);
-    if all(a == vec3f(0.0)) || all(b == vec3f(0.0)) || all(c == vec3f(0.0)) {
-        return flat_normal;
-    }
-    let normal = a * corner.weights.x + b * corner.weights.y + c * corner.weights.z;
-    return select(flat_normal, normal, dot(normal, normal) > 1e-12);
+fn corner_base_color(corner: Corner, texture: vec4f) -> vec4f {
+    var color = material_numbers(corner.material, BASE_COLOR_ALPHA) * texture;
+//#if vertex_colors
+    color *= interpolate(corner, COLOR_TEXEL);
+//#end
+    return color;
 }
 
 // The normal a tangent-space map makes of `normal`, not of unit length (see `Corner::mapped`).
 fn mapped_normal(corner: Corner, normal: vec3f, slot: u32, texture: vec4f, scale: f32) -> vec3f {
 //#if normal_maps
-    let at = globals.tangents_at;
-    if materials[corner.material].textures[slot] != NO_TEXTURE && at != NO_ARRAY {
-        let first = geometry_vec4(at + 4u * corner.vertices.x);
-        let tangent = first.xyz * corner.weights.x
-            + geometry_vec3(at + 4u * corner.vertices.y) * corner.weights.y
-            + geometry_vec3(at + 4u * corner.vertices.z) * corner.weights.z;
+    if texture_of(corner.material, slot) != NO_TEXTURE {
+        let first = vertex_texel(corner.vertices.x, TANGENT_TEXEL);
+        let tangent = interpolate(corner, TANGENT_TEXEL).xyz;
         let bitangent = cross(normal, tangent) * first.w;
         let map = texture.xyz * 2.0 - 1.0;
         return tangent * (map.x * scale) + bitangent * (map.y * scale) + normal * map.z;
@@ -202,51 +176,50 @@ fn opacity(flags: u32, cutoff: f32, alpha: f32) -> f32 {
 
 // Twin of `surface::alpha_at`.
 fn alpha_at(triangle: u32, barycentric: vec2f) -> f32 {
-    let material = material_of(triangle);
-    let flags = materials[material].flags;
+    let corner = corner_new(triangle, barycentric);
+    let flags = material_flags(corner.material);
     if (flags & (ALPHA_MASK | ALPHA_BLEND)) == 0u {
         return 1.0;
     }
-    let corner = corner_new(triangle, barycentric);
-    let texture = read_texture(corner, materials[material].textures[BASE_COLOR]);
-    let alpha = corner_base_color(corner, texture).w;
-    return opacity(flags, materials[material].alpha_cutoff, alpha);
+    let uvs = corner_uvs(corner, interpolate(corner, 1u).zw);
+    let texture = read_texture(texture_of(corner.material, BASE_COLOR), uvs);
+    let cutoff = material_numbers(corner.material, EMISSIVE_CUTOFF).w;
+    return opacity(flags, cutoff, corner_base_color(corner, texture).w);
 }
 
 fn corner_parameters(corner: Corner, textures: array<vec4f, TEXTURES>) -> SurfaceParameters {
     let m = corner.material;
-    let flags = materials[m].flags;
+    let flags = material_flags(m);
+    let factors = material_numbers(m, FACTORS);
+    let specular = material_numbers(m, SPECULAR_COLOR_STRENGTH);
+    let emissive = material_numbers(m, EMISSIVE_CUTOFF);
+    let absorption_ior = material_numbers(m, ABSORPTION_IOR);
     let base = corner_base_color(corner, textures[BASE_COLOR]);
-    let metallic_roughness = textures[METALLIC_ROUGHNESS];
     var p: SurfaceParameters;
     p.base_color = saturate(base.xyz);
-    p.alpha = opacity(flags, materials[m].alpha_cutoff, base.w);
-    p.metallic = saturate(materials[m].metallic * metallic_roughness.z);
-    p.roughness = saturate(materials[m].roughness * metallic_roughness.y);
-    p.ior = materials[m].ior;
-    p.specular = saturate(materials[m].specular * textures[SPECULAR].w);
-    p.specular_color = materials[m].specular_color
-        * textures[SPECULAR_COLOR].xyz;
+    p.alpha = opacity(flags, emissive.w, base.w);
+    p.metallic = saturate(factors.x * textures[METALLIC_ROUGHNESS].z);
+    p.roughness = saturate(factors.y * textures[METALLIC_ROUGHNESS].y);
+    p.ior = absorption_ior.w;
+    p.specular = saturate(specular.w * textures[SPECULAR].w);
+    p.specular_color = specular.xyz * textures[SPECULAR_COLOR].xyz;
     p.thin = (flags & THIN) != 0u;
 //#if transmission
-    p.transmission = saturate(
-        materials[m].transmission * textures[TRANSMISSION].x);
-    p.absorption = materials[m].absorption;
+    p.transmission = saturate(factors.z * textures[TRANSMISSION].x);
+    p.absorption = absorption_ior.xyz;
 //#end
     p.clearcoat_normal = vec3f(0.0, 0.0, 1.0);
 //#if clearcoat
-    p.clearcoat = saturate(
-        materials[m].clearcoat * textures[CLEARCOAT].x);
-    p.clearcoat_roughness = saturate(materials[m].clearcoat_roughness
-        * textures[CLEARCOAT_ROUGHNESS].y);
+    let roughness = material_numbers(m, SCALES_FLAGS).x;
+    p.clearcoat = saturate(factors.w * textures[CLEARCOAT].x);
+    p.clearcoat_roughness = saturate(roughness * textures[CLEARCOAT_ROUGHNESS].y);
 //#end
     p.unlit = (flags & UNLIT) != 0u;
     if p.unlit {
         p.emissive = p.base_color;
     } else {
 //#if emitters
-        p.emissive = materials[m].emissive
-            * textures[EMISSIVE].xyz;
+        p.emissive = emissive.xyz * textures[EMISSIVE].xyz;
 //#end
     }
     return p;
@@ -255,23 +228,29 @@ fn corner_parameters(corner: Corner, textures: array<vec4f, TEXTURES>) -> Surfac
 // The point of `triangle` at `barycentric`, met by a ray that travels along `ray_direction`.
 fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> SurfacePoint {
     let corner = corner_new(triangle, barycentric);
-    let a = vertex_position(corner.vertices.x);
-    let b = vertex_position(corner.vertices.y);
-    let c = vertex_position(corner.vertices.z);
-    let front_normal = normalize_or(cross(b - a, c - a), -ray_direction);
+    let w = corner.weights;
+    let a0 = vertex_texel(corner.vertices.x, 0u);
+    let b0 = vertex_texel(corner.vertices.y, 0u);
+    let c0 = vertex_texel(corner.vertices.z, 0u);
+    let a1 = vertex_texel(corner.vertices.x, 1u);
+    let b1 = vertex_texel(corner.vertices.y, 1u);
+    let c1 = vertex_texel(corner.vertices.z, 1u);
+    let front_normal = normalize_or(cross(b0.xyz - a0.xyz, c0.xyz - a0.xyz), -ray_direction);
     var point: SurfacePoint;
-    point.position = a * corner.weights.x + b * corner.weights.y + c * corner.weights.z;
+    point.position = a0.xyz * w.x + b0.xyz * w.y + c0.xyz * w.z;
     point.front_face = dot(ray_direction, front_normal) < 0.0;
     point.geometric_normal = select(-front_normal, front_normal, point.front_face);
     point.triangle = triangle;
     point.material = corner.material;
-    let textures = read_textures(corner);
+    let uvs = corner_uvs(corner, a1.zw * w.x + b1.zw * w.y + c1.zw * w.z);
+    let textures = read_textures(corner, uvs);
     point.parameters = corner_parameters(corner, textures);
 
     let to_viewer = -ray_direction;
-    let unmapped = smooth_normal(corner, front_normal);
-    var normal = mapped_normal(corner, unmapped, NORMAL, textures[NORMAL],
-        materials[corner.material].normal_scale);
+    let unmapped = smooth_normal(
+        mat3x3f(vec3f(a0.w, a1.xy), vec3f(b0.w, b1.xy), vec3f(c0.w, c1.xy)), w, front_normal);
+    let scales = material_numbers(corner.material, SCALES_FLAGS);
+    var normal = mapped_normal(corner, unmapped, NORMAL, textures[NORMAL], scales.y);
     normal = turned(normal, unmapped, point.geometric_normal, to_viewer);
 //#if metals
     if point.parameters.metallic > 0.0 {
@@ -281,16 +260,27 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
 //#end
     point.shading_frame = frame_from_z(normalize(normal));
 //#if clearcoat
-    let is_mapped = (materials[corner.material].flags & NORMAL_MAPPED) != 0u;
+    let is_mapped = (bitcast<u32>(scales.w) & NORMAL_MAPPED) != 0u;
     if point.parameters.clearcoat > 0.0 && is_mapped {
         let mapped = mapped_normal(corner, unmapped, CLEARCOAT_NORMAL, textures[CLEARCOAT_NORMAL],
-            materials[corner.material].clearcoat_normal_scale);
+            scales.z);
         let coat = turned(mapped, unmapped, point.geometric_normal, to_viewer);
         point.parameters.clearcoat_normal = local_from_world(
             point.shading_frame, mirroring_normal(coat, point.geometric_normal, to_viewer));
     }
 //#end
     return point;
+}
+
+// Interpolated normal of the corners' (the columns), not of unit length; `flat_normal` where the
+// triangle is flat.
+fn smooth_normal(normals: mat3x3f, weights: vec3f, flat_normal: vec3f) -> vec3f {
+    let zero = vec3f(0.0);
+    if all(normals[0] == zero) || all(normals[1] == zero) || all(normals[2] == zero) {
+        return flat_normal;
+    }
+    let normal = normals * weights;
+    return select(flat_normal, normal, dot(normal, normal) > 1e-12);
 }
 
 // Twin of `Facing::turned`.

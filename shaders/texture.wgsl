@@ -1,6 +1,6 @@
 // Reading textures: twin of src/scene/texture.rs. Texels of all images lie in one array.
 
-// TextureRef.flags
+// Flags of a texture.
 const SECOND_UV_SET = 1u;
 const NEAREST = 2u;
 const SRGB = 4u;
@@ -9,17 +9,6 @@ const WRAP_V_SHIFT = 6u;
 const REPEAT = 0u;
 const MIRRORED_REPEAT = 1u;
 
-struct TextureRef {
-    first_texel: u32,
-    width: u32,
-    height: u32,
-    flags: u32,
-    // Columns of the texture transform.
-    matrix: vec4f,
-    translation: vec2f,
-    padding: vec2f,
-}
-
 struct Footprint {
     low: u32,
     high: u32,
@@ -27,46 +16,39 @@ struct Footprint {
     nearest: u32,
 }
 
-fn texture_uv_set(reference: u32) -> u32 {
-    return texture_refs[reference].flags & SECOND_UV_SET;
-}
-
-fn sample_texture(reference: u32, mesh_uv: vec2f) -> vec4f {
-    let t = texture_refs[reference];
-    if t.width == 0u {
+fn sample_texture(reference: u32, mesh_uvs: vec4f) -> vec4f {
+    // First texel, width, height, flags; columns of the texture transform; its translation.
+    let head = texture_refs(3u * reference);
+    let matrix = bitcast<vec4f>(texture_refs(3u * reference + 1u));
+    let translation = bitcast<vec2f>(texture_refs(3u * reference + 2u).xy);
+    if head.y == 0u {
         return vec4f(1.0);
     }
-    let uv = t.matrix.xy * mesh_uv.x + t.matrix.zw * mesh_uv.y + t.translation;
-    let x = footprint(uv.x, t.width, (t.flags >> WRAP_U_SHIFT) & 3u);
-    let y = footprint(uv.y, t.height, (t.flags >> WRAP_V_SHIFT) & 3u);
-    let srgb = (t.flags & SRGB) != 0u;
-    if (t.flags & NEAREST) != 0u {
-        return texel(t.first_texel + y.nearest * t.width + x.nearest, srgb);
+    let flags = head.w;
+    let mesh_uv = select(mesh_uvs.xy, mesh_uvs.zw, (flags & SECOND_UV_SET) != 0u);
+    let uv = matrix.xy * mesh_uv.x + matrix.zw * mesh_uv.y + translation;
+    let x = footprint(uv.x, head.y, (flags >> WRAP_U_SHIFT) & 3u);
+    let y = footprint(uv.y, head.z, (flags >> WRAP_V_SHIFT) & 3u);
+    let srgb = (flags & SRGB) != 0u;
+    if (flags & NEAREST) != 0u {
+        return texel(head.x + y.nearest * head.y + x.nearest, srgb);
     }
-    let upper = t.first_texel + y.low * t.width;
-    let lower = t.first_texel + y.high * t.width;
+    let upper = head.x + y.low * head.y;
+    let lower = head.x + y.high * head.y;
     let top = mix(texel(upper + x.low, srgb), texel(upper + x.high, srgb), x.fraction);
     let bottom = mix(texel(lower + x.low, srgb), texel(lower + x.high, srgb), x.fraction);
     return mix(top, bottom, y.fraction);
 }
 
 fn texel(index: u32, srgb: bool) -> vec4f {
-    let bytes = texels(index);
-    let linear = vec4f(
-        f32(bytes & 0xffu),
-        f32((bytes >> 8u) & 0xffu),
-        f32((bytes >> 16u) & 0xffu),
-        f32(bytes >> 24u),
-    ) / 255.0;
-    if !srgb {
-        return linear;
-    }
-    return vec4f(
-        tables[SRGB_AT + (bytes & 0xffu)],
-        tables[SRGB_AT + ((bytes >> 8u) & 0xffu)],
-        tables[SRGB_AT + ((bytes >> 16u) & 0xffu)],
-        linear.w,
+    let encoded = texels(index);
+    let x = encoded.xyz;
+    let linear = select(
+        pow((x + 0.055) / 1.055, vec3f(2.4)),
+        x / 12.92,
+        x <= vec3f(0.04045),
     );
+    return vec4f(select(x, linear, srgb), encoded.w);
 }
 
 fn footprint(t: f32, size: u32, wrap: u32) -> Footprint {

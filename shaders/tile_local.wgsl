@@ -6,9 +6,9 @@ struct Choice {
     fraction: f32,
 }
 
-// Finds the entry of the inclusive prefix sums `sums(first)..` that holds `u` of the total.
+// Finds the entry of the inclusive prefix sums `sums(first).x..` that holds `u` of the total.
 fn choose(first: u32, count: u32, u: vec2u) -> Choice {
-    let total = sums(first + count - 1u);
+    let total = sums(first + count - 1u).x;
     // total * u as whole units and 2^-32 parts of one.
     let coarse = multiply_wide(total, u.x);
     let fine = multiply_wide(total, u.y);
@@ -20,7 +20,7 @@ fn choose(first: u32, count: u32, u: vec2u) -> Choice {
     var high = count - 1u;
     while low < high {
         let middle = (low + high) / 2u;
-        if sums(first + middle) <= whole {
+        if sums(first + middle).x <= whole {
             low = middle + 1u;
         } else {
             high = middle;
@@ -28,9 +28,9 @@ fn choose(first: u32, count: u32, u: vec2u) -> Choice {
     }
     var before = 0u;
     if low > 0u {
-        before = sums(first + low - 1u);
+        before = sums(first + low - 1u).x;
     }
-    let mass = sums(first + low) - before;
+    let mass = sums(first + low).x - before;
     let into = f32(whole - before) + f32(parts) * (1.0 / 4294967296.0);
     return Choice(low, mass, min(into / f32(mass), 1.0));
 }
@@ -51,7 +51,7 @@ fn sample_texel(tile: u32, u: vec2f) -> TexelSample {
     let texels = tile_texels(tile);
     let size = texels.end - texels.first;
     let rows = first_row_sum(tile, texels);
-    let total = sums(rows + size.y - 1u);
+    let total = sums(rows + size.y - 1u).x;
     if total == 0u {
         return result;
     }
@@ -67,7 +67,7 @@ fn sample_texel(tile: u32, u: vec2f) -> TexelSample {
 fn texel_probability(tile: u32, texel: vec2u) -> f32 {
     let texels = tile_texels(tile);
     let size = texels.end - texels.first;
-    let total = sums(first_row_sum(tile, texels) + size.y - 1u);
+    let total = sums(first_row_sum(tile, texels) + size.y - 1u).x;
     if total == 0u {
         return 0.0;
     }
@@ -75,7 +75,7 @@ fn texel_probability(tile: u32, texel: vec2u) -> f32 {
     let column = texel.x - texels.first.x;
     var before = 0u;
     if column > 0u {
-        before = sums(columns + column - 1u);
+        before = sums(columns + column - 1u).x;
     }
-    return f32(sums(columns + column) - before) / f32(total);
+    return f32(sums(columns + column).x - before) / f32(total);
 }

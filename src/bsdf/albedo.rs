@@ -64,10 +64,13 @@ impl AlbedoTerms {
     }
 }
 
-/// The table as `shaders/bsdf.wgsl` reads it: for each roughness the terms, then their mean.
-pub(crate) fn table_words() -> Vec<f32> {
-    ROWS.iter()
-        .flat_map(|row| row.terms.iter().chain([&row.mean]).flat_map(|terms| terms.to_array()))
+/// The table as `shaders/bsdf.wgsl` reads it: row by row the terms and their mean, each with those of
+/// the row after it.
+pub(crate) fn texels() -> Vec<[f32; 4]> {
+    let entries = |row: &'static Row| row.terms.iter().chain([&row.mean]);
+    ROWS.windows(2)
+        .flat_map(|pair| entries(&pair[0]).zip(entries(&pair[1])))
+        .map(|(here, next)| [here.x, here.y, next.x, next.y])
         .collect()
 }
 

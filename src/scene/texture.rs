@@ -8,7 +8,7 @@ use glam::{Vec2, Vec4};
 use super::{Scene, TextureImage, TextureRef, Wrap};
 use crate::color::linear_from_srgb;
 
-pub(crate) static LINEAR_FROM_SRGB_BYTE: LazyLock<[f32; 256]> =
+static LINEAR_FROM_SRGB_BYTE: LazyLock<[f32; 256]> =
     LazyLock::new(|| array::from_fn(|i| linear_from_srgb(i as f32 / 255.0)));
 
 /// The linear RGBA value of a texture at mesh coordinates `uv` (of the reference's set).

@@ -1,18 +1,21 @@
-//! Buffers by name, large arrays in as many bindings as they need.
+//! Buffers and arrays by name.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 use super::device::Gpu;
-use super::shader::{SPLIT_ARRAYS, SplitArray, chunk_name};
+use super::shader::{ARRAYS, ArrayKind, TexelFormat};
 use crate::error::{Error, Result};
 
-/// Every buffer the kernels bind, by the name of its variable.
+/// Everything the kernels bind, by the name of its variable.
 pub(super) struct Buffers<'a> {
     gpu: &'a Gpu,
-    by_name: BTreeMap<String, Buffer>,
-    splits: Vec<SplitArray>,
+    by_name: BTreeMap<&'static str, Buffer>,
+    arrays: BTreeMap<&'static str, (wgpu::Texture, u64)>,
+    /// Texels of a row of every array, as a power of two.
+    width_log2: u32,
 }
 
 /// Most bytes written to the device at once: they are copied in host memory first.
@@ -20,12 +23,13 @@ const PIECE_BYTES: usize = 16 << 20;
 
 impl<'a> Buffers<'a> {
     pub(super) fn new(gpu: &'a Gpu) -> Self {
-        Self { gpu, by_name: BTreeMap::new(), splits: Vec::new() }
+        let width_log2 = gpu.limits.max_texture_dimension_2d.ilog2().min(14);
+        Self { gpu, by_name: BTreeMap::new(), arrays: BTreeMap::new(), width_log2 }
     }
 
-    /// How large arrays are split.
-    pub(super) fn splits(&self) -> &[SplitArray] {
-        &self.splits
+    /// Texels of a row of every array, as a power of two.
+    pub(super) fn width_log2(&self) -> u32 {
+        self.width_log2
     }
 
     /// The buffer of a binding.
@@ -33,22 +37,28 @@ impl<'a> Buffers<'a> {
         self.by_name.get(name)
     }
 
-    /// Bytes of all buffers.
+    /// The texture of an array.
+    pub(super) fn array(&self, name: &str) -> Option<&wgpu::Texture> {
+        self.arrays.get(name).map(|(texture, _)| texture)
+    }
+
+    /// Bytes of all buffers and arrays.
     pub(super) fn bytes(&self) -> u64 {
-        self.by_name.values().map(Buffer::size).sum()
+        self.by_name.values().map(Buffer::size).sum::<u64>()
+            + self.arrays.values().map(|(_, bytes)| bytes).sum::<u64>()
     }
 
     /// Makes an empty buffer, or an empty one in place of the one of this name. `what` is said if it
     /// does not fit.
-    pub(super) fn make(&mut self, name: &str, bytes: u64, what: &str) -> Result<()> {
+    pub(super) fn make(&mut self, name: &'static str, bytes: u64, what: &str) -> Result<()> {
         self.fits(bytes, what)?;
         let buffer = self.create(name, bytes);
-        self.by_name.insert(name.to_owned(), buffer);
+        self.by_name.insert(name, buffer);
         self.gpu.check()
     }
 
     /// Makes a buffer of these bytes, or reuses the one of this name if they fit into it.
-    pub(super) fn put(&mut self, name: &str, bytes: &[u8], what: &str) -> Result<()> {
+    pub(super) fn put(&mut self, name: &'static str, bytes: &[u8], what: &str) -> Result<()> {
         if self.get(name).is_none_or(|buffer| buffer.size() < bytes.len() as u64) {
             self.make(name, bytes.len() as u64, what)?;
         }
@@ -56,55 +66,112 @@ impl<'a> Buffers<'a> {
         self.gpu.check()
     }
 
-    /// Makes one of [`SPLIT_ARRAYS`] out of `bytes` bytes that `parts` yields piece by piece.
-    pub(super) fn put_split<'b>(
+    /// Makes one of [`ARRAYS`] of `texels` texels whose bytes `parts` yields one after another.
+    pub(super) fn put_array<'b>(
         &mut self,
         name: &'static str,
         what: &str,
-        bytes: u64,
-        parts: impl Iterator<Item = std::borrow::Cow<'b, [u8]>>,
+        texels: u64,
+        parts: impl Iterator<Item = Cow<'b, [u8]>>,
     ) -> Result<()> {
-        let element_bytes =
-            SPLIT_ARRAYS.iter().find(|(n, ..)| *n == name).map_or(4, |(_, _, bytes)| *bytes) as u64;
-        let most = self.most_bytes() / element_bytes * element_bytes;
-        let bytes = bytes.max(element_bytes);
-        let chunks = bytes.div_ceil(most);
-        if chunks > MAX_CHUNKS {
+        let Some(kind) = ARRAYS.into_iter().find(|kind| kind.name == name) else { return Ok(()) };
+        let (width, most) = (1_u64 << self.width_log2, self.gpu.limits.max_texture_dimension_2d);
+        let rows = texels.div_ceil(width).max(1);
+        if rows > u64::from(most) {
             return Err(Error::new(format!(
-                "{what} takes {} MiB; {} allows {MAX_CHUNKS} buffers of {} MiB for it",
-                bytes >> 20,
+                "{what} takes {} MiB; {} allows {} MiB for it",
+                (texels * kind.format.bytes()) >> 20,
                 self.gpu.facts().name,
-                most >> 20
+                (width * u64::from(most) * kind.format.bytes()) >> 20
             )));
         }
-        for chunk in 0..chunks {
-            let size = most.min(bytes - chunk * most);
-            self.make(&chunk_name(name, chunk as u32), size, what)?;
-        }
-        let mut at = 0;
-        for part in parts {
-            for piece in part.chunks(PIECE_BYTES) {
-                self.write_split(name, most, at, piece);
-                at += piece.len() as u64;
-                // Staging memory is given back once the device has copied it.
-                self.gpu.queue.submit([]);
-                self.gpu.wait_for(None)?;
-            }
-        }
-        let chunk_elements = (most / element_bytes) as u32;
-        self.splits.push(SplitArray { name, chunks: chunks as u32, chunk_elements });
+        let texture = self.create_array(kind, rows as u32);
+        self.gpu.check().map_err(|e| {
+            let mebibytes = (rows * width * kind.format.bytes()).div_ceil(1 << 20);
+            Error::new(format!("{e} ({what} takes {mebibytes} MiB)"))
+        })?;
+        self.upload(&texture, kind.format.bytes(), parts)?;
+        self.arrays.insert(name, (texture, rows * width * kind.format.bytes()));
         Ok(())
     }
 
-    fn write_split(&self, name: &str, chunk_bytes: u64, at: u64, bytes: &[u8]) {
-        let (mut at, mut rest) = (at, bytes);
-        while !rest.is_empty() {
-            let (chunk, offset) = (at / chunk_bytes, at % chunk_bytes);
-            let length = (chunk_bytes - offset).min(rest.len() as u64) as usize;
-            self.write(&chunk_name(name, chunk as u32), offset, &rest[..length]);
-            at += length as u64;
-            rest = &rest[length..];
+    /// Fills whole rows first; what is left of a part waits for the next.
+    fn upload<'b>(
+        &self,
+        texture: &wgpu::Texture,
+        texel_bytes: u64,
+        parts: impl Iterator<Item = Cow<'b, [u8]>>,
+    ) -> Result<()> {
+        let row_bytes = (texel_bytes << self.width_log2) as usize;
+        let piece = (PIECE_BYTES / row_bytes).max(1) * row_bytes;
+        let (mut waiting, mut row) = (Vec::new(), 0);
+        for part in parts {
+            let mut rest = &part[..];
+            while !rest.is_empty() {
+                let taken = rest.len().min(piece - waiting.len());
+                waiting.extend_from_slice(&rest[..taken]);
+                rest = &rest[taken..];
+                if waiting.len() == piece {
+                    row += self.write_rows(texture, row, row_bytes, &waiting)?;
+                    waiting.clear();
+                }
+            }
         }
+        waiting.resize(waiting.len().next_multiple_of(row_bytes), 0);
+        self.write_rows(texture, row, row_bytes, &waiting).map(|_| ())
+    }
+
+    /// Writes whole rows and waits for the copy, so that staging memory is given back; returns how
+    /// many rows they were.
+    fn write_rows(
+        &self,
+        texture: &wgpu::Texture,
+        row: u32,
+        row_bytes: usize,
+        bytes: &[u8],
+    ) -> Result<u32> {
+        let rows = (bytes.len() / row_bytes) as u32;
+        if rows == 0 {
+            return Ok(0);
+        }
+        let mut place = texture.as_image_copy();
+        place.origin.y = row;
+        self.gpu.queue.write_texture(
+            place,
+            bytes,
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(row_bytes as u32),
+                rows_per_image: None,
+            },
+            wgpu::Extent3d { width: 1 << self.width_log2, height: rows, depth_or_array_layers: 1 },
+        );
+        self.gpu.queue.submit([]);
+        self.gpu.wait_for(None)?;
+        Ok(rows)
+    }
+
+    fn create_array(&self, kind: ArrayKind, rows: u32) -> wgpu::Texture {
+        self.gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(kind.name),
+            size: wgpu::Extent3d {
+                width: 1 << self.width_log2,
+                height: rows,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: match kind.format {
+                TexelFormat::Words1 => wgpu::TextureFormat::R32Uint,
+                TexelFormat::Words2 => wgpu::TextureFormat::Rg32Uint,
+                TexelFormat::Words4 => wgpu::TextureFormat::Rgba32Uint,
+                TexelFormat::Floats4 => wgpu::TextureFormat::Rgba32Float,
+                TexelFormat::Bytes4 => wgpu::TextureFormat::Rgba8Unorm,
+            },
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        })
     }
 
     /// Writes into a buffer that exists.
@@ -170,6 +237,3 @@ impl<'a> Buffers<'a> {
         })
     }
 }
-
-/// Bindings one array may take.
-const MAX_CHUNKS: u64 = 16;

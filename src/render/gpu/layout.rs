@@ -5,6 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3, Vec4};
 
 use super::super::View;
+use super::shader::VertexTexels;
 use crate::color::importance;
 use crate::environment::Environment;
 use crate::light_grid::LightGrid;
@@ -14,7 +15,7 @@ use crate::path::camera::CameraRays;
 use crate::scene::surface::absorption;
 use crate::scene::{self, AlphaMode, PunctualKind, Scene, Wrap};
 
-/// An array that the scene does not have.
+/// No law of cells.
 pub(crate) const NO_ARRAY: u32 = u32::MAX;
 /// A material without this texture.
 const NO_TEXTURE: u32 = u32::MAX;
@@ -46,13 +47,6 @@ pub(crate) struct Globals {
     pub(crate) half_height: f32,
     pub(crate) grid_center: Vec3,
     pub(crate) grid_columns: u32,
-    pub(crate) uvs_at: [u32; 2],
-    pub(crate) positions_at: u32,
-    pub(crate) normals_at: u32,
-    pub(crate) tangents_at: u32,
-    pub(crate) colors_at: u32,
-    pub(crate) triangles_at: u32,
-    pub(crate) triangle_materials_at: u32,
     pub(crate) law_starts_at: u32,
     pub(crate) law_masks_at: u32,
     pub(crate) law_ranks_at: u32,
@@ -158,32 +152,6 @@ mod texture_flags {
     pub(super) const WRAP_V_SHIFT: u32 = 6;
 }
 
-/// Parts of one array of words, and where each begins.
-#[derive(Debug, Default)]
-pub(crate) struct Words<'a> {
-    parts: Vec<&'a [u8]>,
-    length: u64,
-}
-
-impl<'a> Words<'a> {
-    /// Appends an array; its first word, or [`NO_ARRAY`] if it is empty.
-    pub(crate) fn push<T: Pod>(&mut self, values: &'a [T]) -> u32 {
-        if values.is_empty() {
-            return NO_ARRAY;
-        }
-        let at = self.length;
-        let bytes: &[u8] = bytemuck::cast_slice(values);
-        self.length += bytes.len() as u64 / 4;
-        self.parts.push(bytes);
-        u32::try_from(at).unwrap_or(NO_ARRAY)
-    }
-
-    /// The bytes, part by part; their number is a multiple of 4 each.
-    pub(crate) fn parts(&self) -> &[&'a [u8]] {
-        &self.parts
-    }
-}
-
 impl Globals {
     /// Sets what the view asks for.
     pub(crate) fn set_view(&mut self, view: &View, rays: &CameraRays) {
@@ -218,17 +186,36 @@ impl Globals {
     }
 }
 
-/// The scene's arrays; sets where each begins.
-pub(crate) fn geometry<'a>(scene: &'a Scene, globals: &mut Globals) -> Words<'a> {
-    let mut words = Words::default();
-    globals.positions_at = words.push(&scene.positions);
-    globals.normals_at = words.push(&scene.normals);
-    globals.tangents_at = words.push(&scene.tangents);
-    globals.uvs_at = [words.push(&scene.uvs[0]), words.push(&scene.uvs[1])];
-    globals.colors_at = words.push(&scene.colors);
-    globals.triangles_at = words.push(&scene.triangles);
-    globals.triangle_materials_at = words.push(&scene.triangle_materials);
-    words
+/// Corners and material of each triangle.
+pub(crate) fn triangles(scene: &Scene) -> Vec<[u32; 4]> {
+    let corners = scene.triangles.iter().zip(&scene.triangle_materials);
+    corners.map(|(&[a, b, c], &material)| [a, b, c, material]).collect()
+}
+
+/// Texels of each vertex: position and normal.x, normal.yz and first texture coordinates, then
+/// those of `texels`.
+pub(crate) fn vertices(scene: &Scene, texels: &VertexTexels) -> Vec<[f32; 4]> {
+    let zero = [0.0; 4];
+    let mut result = vec![zero; scene.positions.len() * texels.count as usize];
+    let at = |values: &[Vec2], i: usize| values.get(i).copied().unwrap_or_default();
+    for (i, vertex) in result.chunks_exact_mut(texels.count as usize).enumerate() {
+        let normal = scene.normals.get(i).copied().unwrap_or_default();
+        let uv = at(&scene.uvs[0], i);
+        vertex[0] = scene.positions[i].extend(normal.x).to_array();
+        vertex[1] = [normal.y, normal.z, uv.x, uv.y];
+        let optional = [
+            (texels.second_uv, at(&scene.uvs[1], i).extend(0.0).extend(0.0).to_array()),
+            (texels.tangent, scene.tangents.get(i).map_or(zero, Vec4::to_array)),
+            (texels.color, scene.colors.get(i).map_or(zero, Vec4::to_array)),
+        ];
+        // Where the scene does not need one, the next one has its place.
+        for (index, value) in optional {
+            if let Some(texel) = vertex.get_mut(index as usize) {
+                *texel = value;
+            }
+        }
+    }
+    result
 }
 
 /// The laws of a grid; sets where each array begins.
@@ -430,20 +417,17 @@ fn unpack_radiance(words: [u32; 2]) -> [f32; 3] {
 
 /// Per row of the map: distance of the cosine at its upper and lower edge from that of the pole of
 /// its hemisphere, and 1 / steradian of a texel.
-pub(crate) fn row_words(environment: &Environment) -> Vec<f32> {
+pub(crate) fn map_rows(environment: &Environment) -> impl Iterator<Item = [f32; 4]> {
     let height = environment.map().height;
-    let pole_distance = |edge: u32, is_upper: bool| {
+    let pole_distance = move |edge: u32, is_upper: bool| {
         let turns = f64::from(if is_upper { edge } else { height - edge }) / f64::from(height);
         // 1 - cos without cancellation.
         (2.0 * (0.5 * std::f64::consts::PI * turns).sin().powi(2)) as f32
     };
-    (0..height)
-        .zip(environment.inverse_texel_solid_angles())
-        .flat_map(|(row, inverse)| {
-            let is_upper = 2 * row + 1 <= height;
-            [pole_distance(row, is_upper), pole_distance(row + 1, is_upper), *inverse]
-        })
-        .collect()
+    (0..height).zip(environment.inverse_texel_solid_angles()).map(move |(row, inverse)| {
+        let is_upper = 2 * row < height;
+        [pole_distance(row, is_upper), pole_distance(row + 1, is_upper), *inverse, 0.0]
+    })
 }
 
 #[cfg(test)]

@@ -26,11 +26,10 @@ use crate::error::{Error, Result};
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::path::camera::CameraRays;
-use crate::scene::texture::LINEAR_FROM_SRGB_BYTE;
 use buffers::Buffers;
 use layout::{Globals, PixelSums, SurfaceSums, Work};
 use pacer::Pacer;
-use shader::{Access, Constants, Features, Kernel, Program};
+use shader::{Binding, Constants, Features, Kernel, Program, VertexTexels};
 
 pub use device::{AdapterFacts, Gpu, adapters};
 
@@ -96,9 +95,9 @@ impl<'a> Renderer<'a> {
         let mut globals = Globals::default();
         globals.set_view(view, rays);
         globals.set_environment(environment);
-        let stack_size = upload_world(&mut buffers, &mut globals, world, &features)?;
+        let mut constants = upload_world(&mut buffers, &mut globals, world, &features)?;
         upload_map(&mut buffers, &mut globals, environment, &features)?;
-        let constants = upload_tables(&mut buffers, view, environment, stack_size)?;
+        upload_tables(&mut buffers, view, environment, &mut constants)?;
         let pixels = u64::from(view.width) * u64::from(view.height);
         buffers.make("film", pixels * size_of::<PixelSums>() as u64, "the picture")?;
         if features.has("layers") {
@@ -129,7 +128,7 @@ impl<'a> Renderer<'a> {
     pub(crate) fn set_grid(&mut self, grid: Option<&LightGrid>) -> Result<()> {
         let Some(grid) = grid.filter(|_| self.features.has("map_sampling")) else { return Ok(()) };
         let words = layout::laws(grid, &mut self.globals);
-        self.buffers.put("laws", bytemuck::cast_slice(&words), "the light grid")?;
+        put_array(&mut self.buffers, "laws", "the light grid", &words)?;
         self.write_globals();
         Ok(())
     }
@@ -279,7 +278,7 @@ impl<'a> Renderer<'a> {
         let every = Features::from_names(
             Features::ALL.into_iter().filter(|n| !n.starts_with("table_")).map(|n| (n, true)),
         );
-        let full = Program::new(Kernel::Render, &every, &self.constants, self.buffers.splits());
+        let full = Program::new(Kernel::Render, &every, &self.constants, self.buffers.width_log2());
         GpuFigures {
             adapter: self.gpu.facts().clone(),
             device_bytes: self.buffers.bytes(),
@@ -322,15 +321,26 @@ impl<'a> Renderer<'a> {
     }
 
     fn bind_group(&self, pipeline: &Pipeline) -> Result<wgpu::BindGroup> {
+        let missing = |name| Error::new(format!("the shader's {name} was not uploaded"));
+        let mut views = Vec::new();
+        for binding in &pipeline.program.bindings {
+            if let Binding::Array(array) = binding {
+                let texture = self.buffers.array(array.name).ok_or_else(|| missing(array.name))?;
+                views.push(texture.create_view(&wgpu::TextureViewDescriptor::default()));
+            }
+        }
+        let mut next_view = views.iter();
         let mut entries = Vec::new();
-        for (index, binding) in pipeline.program.bindings.iter().enumerate() {
-            let Some(buffer) = self.buffers.get(&binding.name) else {
-                return Err(Error::new(format!("the shader's {} was not uploaded", binding.name)));
+        for (binding, index) in pipeline.program.bindings.iter().zip(0..) {
+            let resource = match binding {
+                Binding::Buffer { name, .. } => {
+                    self.buffers.get(name).ok_or_else(|| missing(name))?.as_entire_binding()
+                }
+                Binding::Array(array) => wgpu::BindingResource::TextureView(
+                    next_view.next().ok_or_else(|| missing(array.name))?,
+                ),
             };
-            entries.push(wgpu::BindGroupEntry {
-                binding: index as u32,
-                resource: buffer.as_entire_binding(),
-            });
+            entries.push(wgpu::BindGroupEntry { binding: index, resource });
         }
         Ok(self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
@@ -340,30 +350,17 @@ impl<'a> Renderer<'a> {
     }
 
     fn pipeline(&self, kernel: Kernel) -> Result<Pipeline> {
-        let program = Program::new(kernel, &self.features, &self.constants, self.buffers.splits());
-        let storage = program.bindings.len();
-        let allowed = self.gpu.limits.max_storage_buffers_per_shader_stage as usize;
-        if storage > allowed {
-            return Err(Error::new(format!(
-                "the scene and the map need {storage} storage buffers; {} allows {allowed}",
-                self.gpu.facts().name
-            )));
-        }
+        let program =
+            Program::new(kernel, &self.features, &self.constants, self.buffers.width_log2());
         let device = &self.gpu.device;
         let entries: Vec<_> = program
             .bindings
             .iter()
-            .enumerate()
-            .map(|(index, binding)| wgpu::BindGroupLayoutEntry {
-                binding: index as u32,
+            .zip(0..)
+            .map(|(binding, index)| wgpu::BindGroupLayoutEntry {
+                binding: index,
                 visibility: wgpu::ShaderStages::COMPUTE,
-                ty: wgpu::BindingType::Buffer {
-                    ty: wgpu::BufferBindingType::Storage {
-                        read_only: binding.access == Access::Read,
-                    },
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
-                },
+                ty: binding_type(binding),
                 count: None,
             })
             .collect();
@@ -393,16 +390,35 @@ impl<'a> Renderer<'a> {
     }
 }
 
+fn binding_type(binding: &Binding) -> wgpu::BindingType {
+    match binding {
+        Binding::Buffer { is_written, .. } => wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Storage { read_only: !is_written },
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+        Binding::Array(array) => wgpu::BindingType::Texture {
+            sample_type: if array.format.is_float() {
+                wgpu::TextureSampleType::Float { filterable: false }
+            } else {
+                wgpu::TextureSampleType::Uint
+            },
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        },
+    }
+}
+
 /// Tiles that keep a device with few cores busy.
 const LEAST_TILES: u64 = 8;
 
-/// Uploads geometry, materials, textures and lights; returns the depth of the tree.
+/// Uploads geometry, materials, textures and lights; returns what kernels are told of them.
 fn upload_world(
     buffers: &mut Buffers<'_>,
     globals: &mut Globals,
     world: &World,
     features: &Features,
-) -> Result<u32> {
+) -> Result<Constants> {
     let scene = &world.scene;
     let tree = CompressedTree::build(&scene.positions, &scene.triangles);
     if tree.depth > MAX_DEPTH {
@@ -413,46 +429,37 @@ fn upload_world(
     }
     let bounds = world.bvh.bounds();
     globals.scene_extent = bounds.0.abs().max(bounds.1.abs()).max_element();
-    put_slice(buffers, "bvh_nodes", "the scene's tree", &tree.nodes)?;
-    put_slice(buffers, "bvh_triangles", "the scene's geometry", &tree.triangles)?;
-    let geometry = layout::geometry(scene, globals);
-    put_parts(buffers, "geometry", "the scene's geometry", geometry.parts())?;
+    put_array(buffers, "bvh_nodes", "the scene's tree", tree.nodes.as_flattened())?;
+    put_array(buffers, "bvh_triangles", "the scene's geometry", tree.triangles.as_flattened())?;
+    let vertex = VertexTexels::of(features);
+    put_array(buffers, "triangles", "the scene's geometry", &layout::triangles(scene))?;
+    put_array(buffers, "vertices", "the scene's geometry", &layout::vertices(scene, &vertex))?;
     let (materials, texture_refs) = layout::materials(world);
-    buffers.put("materials", bytemuck::cast_slice(&materials), "the list of materials")?;
+    put_array(buffers, "materials", "the list of materials", &materials)?;
     if features.has("textures") {
-        buffers.put("texture_refs", bytemuck::cast_slice(&texture_refs), "the list of textures")?;
-        let images: Vec<&[u8]> =
-            scene.images.iter().map(|image| bytemuck::cast_slice(&image.texels)).collect();
-        put_parts(buffers, "texels", "the set of textures", &images)?;
+        put_array(buffers, "texture_refs", "the list of textures", &texture_refs)?;
+        let texels = scene.images.iter().map(|image| image.texels.len() as u64).sum();
+        let images = scene.images.iter().map(|image| bytemuck::cast_slice(&image.texels));
+        buffers.put_array("texels", "the set of textures", texels, images.map(Cow::Borrowed))?;
     }
     if features.has("scene_lights") {
-        let mut lights = layout::light_words(world, globals);
-        lights.push(0);
-        buffers.put("lights", bytemuck::cast_slice(&lights), "the list of lights")?;
+        let lights = layout::light_words(world, globals);
+        put_array(buffers, "lights", "the list of lights", &lights)?;
     }
-    Ok(tree.depth)
+    Ok(Constants { stack_size: tree.depth, vertex, ..Constants::default() })
 }
 
-fn put_slice<T: bytemuck::Pod>(
+/// Makes an array of values that take whole texels or parts of one.
+fn put_array<T: bytemuck::Pod>(
     buffers: &mut Buffers<'_>,
     name: &'static str,
     what: &str,
     values: &[T],
 ) -> Result<()> {
-    put_parts(buffers, name, what, &[bytemuck::cast_slice(values)])
-}
-
-fn put_parts(
-    buffers: &mut Buffers<'_>,
-    name: &'static str,
-    what: &str,
-    parts: &[&[u8]],
-) -> Result<()> {
-    let bytes = parts.iter().map(|part| part.len() as u64).sum();
-    if bytes / 4 >= u64::from(u32::MAX) {
-        return Err(Error::new(format!("{what} takes {} MiB, more than 16384", bytes >> 20)));
-    }
-    buffers.put_split(name, what, bytes, parts.iter().map(|part| Cow::Borrowed(*part)))
+    let bytes: &[u8] = bytemuck::cast_slice(values);
+    let texel_bytes = shader::ARRAYS.iter().find(|kind| kind.name == name);
+    let texels = bytes.len() as u64 / texel_bytes.map_or(4, |kind| kind.format.bytes());
+    buffers.put_array(name, what, texels, std::iter::once(Cow::Borrowed(bytes)))
 }
 
 /// Uploads the map's radiance and its importance table.
@@ -469,31 +476,29 @@ fn upload_map(
                 rows.par_iter().map(|rgb| layout::pack_radiance(*rgb)).collect();
             Cow::Owned(bytemuck::pod_collect_to_vec(&words))
         });
-        buffers.put_split("map_texels", "the map", map.pixels.len() as u64 * 8, rows)?;
+        buffers.put_array("map_texels", "the map", map.pixels.len() as u64, rows)?;
     }
     if features.has("map_sampling") {
-        let words = environment.table_words();
-        globals.tile_sums_at = words[0].len() as u32;
-        let parts: Vec<&[u8]> = words.iter().map(|part| bytemuck::cast_slice(part)).collect();
-        put_parts(buffers, "sums", "the map's importance table", &parts)?;
+        let parts = environment.table_words();
+        globals.tile_sums_at = parts[0].len() as u32;
+        let words = parts.iter().map(|part| part.len() as u64).sum();
+        let bytes = parts.iter().map(|part| Cow::Borrowed(bytemuck::cast_slice(part)));
+        buffers.put_array("sums", "the map's importance table", words, bytes)?;
     }
     Ok(())
 }
 
-/// Uploads the small tables of floats; says where each begins.
+/// Uploads the small tables of numbers; says where each begins.
 fn upload_tables(
     buffers: &mut Buffers<'_>,
     view: &View,
     environment: &Environment,
-    stack_size: u32,
-) -> Result<Constants> {
-    let mut words: Vec<f32> = LINEAR_FROM_SRGB_BYTE.to_vec();
-    let albedo_at = words.len() as u32;
-    words.extend(albedo::table_words());
-    let filter_at = words.len() as u32;
-    words.extend(view.filter.cumulative());
-    let rows_at = words.len() as u32;
-    words.extend(layout::row_words(environment));
-    buffers.put("tables", bytemuck::cast_slice(&words), "the list of constants")?;
-    Ok(Constants { stack_size, srgb_at: 0, albedo_at, filter_at, rows_at })
+    constants: &mut Constants,
+) -> Result<()> {
+    let mut texels = albedo::texels();
+    constants.filter_at = texels.len() as u32;
+    texels.extend(view.filter.cumulative().iter().map(|&sum| [sum, 0.0, 0.0, 0.0]));
+    constants.rows_at = texels.len() as u32;
+    texels.extend(layout::map_rows(environment));
+    put_array(buffers, "tables", "the list of constants", &texels)
 }

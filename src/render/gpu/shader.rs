@@ -35,7 +35,7 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 32] = [
+    pub(crate) const ALL: [&'static str; 33] = [
         "alpha_mask",
         "clearcoat",
         "emitters",
@@ -56,6 +56,7 @@ impl Features {
         "punctual_lights",
         "record_cosine",
         "scene_lights",
+        "second_uv_set",
         "shadow_rays",
         "single_sided",
         "solid_transmission",
@@ -89,10 +90,11 @@ impl Features {
             ("map_sampling", samples_map),
             ("metals", needs.metals),
             ("nearest_lookup", options.1 == Lookup::Nearest),
-            ("normal_maps", needs.normal_maps),
+            ("normal_maps", needs.normal_maps && !world.scene.tangents.is_empty()),
             ("partial", needs.alpha_blend || needs.thin_transmission),
             ("punctual_lights", needs.punctual_lights),
             ("record_cosine", view.sampling == Sampling::Adaptive),
+            ("second_uv_set", needs.second_uv_set),
             ("single_sided", needs.single_sided),
             ("solid_transmission", needs.solid_transmission),
             ("table_f32", options.0 == TableKind::F32),
@@ -148,53 +150,137 @@ impl Features {
 }
 
 /// Numbers of a shader that are known when it is built.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Constants {
     /// Groups of nodes the traversal may have to remember.
     pub(crate) stack_size: u32,
-    /// Words of `tables` at which each begins.
-    pub(crate) srgb_at: u32,
+    /// Texels of a vertex, and which of them hold what only some scenes need.
+    pub(crate) vertex: VertexTexels,
+    /// Texels of `tables` at which each begins.
     pub(crate) albedo_at: u32,
     pub(crate) filter_at: u32,
     pub(crate) rows_at: u32,
 }
 
-/// How a buffer is bound.
+/// Texels of a vertex: two, and one for each of these that the scene needs.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct VertexTexels {
+    pub(crate) count: u32,
+    pub(crate) second_uv: u32,
+    pub(crate) tangent: u32,
+    pub(crate) color: u32,
+}
+
+impl VertexTexels {
+    pub(crate) fn of(features: &Features) -> Self {
+        let mut count = 2;
+        let mut next = |name: &str| {
+            let at = count;
+            count += u32::from(features.has(name));
+            at
+        };
+        let (second_uv, tangent, color) =
+            (next("second_uv_set"), next("normal_maps"), next("vertex_colors"));
+        Self { count, second_uv, tangent, color }
+    }
+}
+
+/// A read-only array, kept in a texture: it may be larger than a storage binding, and software
+/// Vulkan reads texels several times faster than storage buffers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Access {
-    Read,
-    ReadWrite,
+pub(crate) struct ArrayKind {
+    /// Name of the function that reads an element.
+    pub(crate) name: &'static str,
+    pub(crate) format: TexelFormat,
+    /// Feature without which there is no such array.
+    feature: Option<&'static str>,
+}
+
+/// What a texel holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TexelFormat {
+    Words1,
+    Words2,
+    Words4,
+    Floats4,
+    Bytes4,
+}
+
+impl TexelFormat {
+    /// Bytes of a texel.
+    pub(crate) fn bytes(self) -> u64 {
+        match self {
+            Self::Words1 | Self::Bytes4 => 4,
+            Self::Words2 => 8,
+            Self::Words4 | Self::Floats4 => 16,
+        }
+    }
+
+    /// Whether shaders see floats.
+    pub(crate) fn is_float(self) -> bool {
+        matches!(self, Self::Floats4 | Self::Bytes4)
+    }
+}
+
+/// All arrays.
+pub(crate) const ARRAYS: [ArrayKind; 12] = {
+    use TexelFormat::{Bytes4, Floats4, Words1, Words2, Words4};
+    const fn array(
+        name: &'static str,
+        format: TexelFormat,
+        feature: Option<&'static str>,
+    ) -> ArrayKind {
+        ArrayKind { name, format, feature }
+    }
+    [
+        array("bvh_nodes", Words4, None),
+        array("bvh_triangles", Words4, None),
+        array("triangles", Words4, None),
+        array("vertices", Words4, None),
+        array("materials", Words4, None),
+        array("tables", Floats4, None),
+        array("texture_refs", Words4, Some("textures")),
+        array("texels", Bytes4, Some("textures")),
+        array("map_texels", Words2, Some("map")),
+        array("sums", Words1, Some("map_sampling")),
+        array("laws", Words1, Some("map_sampling")),
+        array("lights", Words1, Some("scene_lights")),
+    ]
+};
+
+impl ArrayKind {
+    /// Whether a picture with these features reads it.
+    pub(crate) fn is_needed(&self, features: &Features) -> bool {
+        self.feature.is_none_or(|feature| features.has(feature))
+    }
+
+    /// The declaration and the function that reads an element. Rows of the texture hold
+    /// `2^width_log2` texels.
+    fn accessor(&self, binding: usize, width_log2: u32) -> String {
+        let Self { name, format, .. } = self;
+        let scalar = if format.is_float() { "f32" } else { "u32" };
+        let last = (1_u32 << width_log2) - 1;
+        format!(
+            "@group(0) @binding({binding}) var {name}_texture: texture_2d<{scalar}>;\n\
+             fn {name}(index: u32) -> vec4<{scalar}> {{\n    return textureLoad({name}_texture, \
+             vec2u(index & {last}u, index >> {width_log2}u), 0);\n}}\n"
+        )
+    }
 }
 
 /// One binding of a kernel, in order.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Binding {
-    /// Name of the variable and of the buffer.
-    pub(crate) name: String,
-    pub(crate) access: Access,
-    element: &'static str,
-}
-
-/// An array that may be too large for one binding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct SplitArray {
-    /// Name of the function that reads an element.
-    pub(crate) name: &'static str,
-    /// Bindings it takes, at least one.
-    pub(crate) chunks: u32,
-    /// Elements in every chunk but the last.
-    pub(crate) chunk_elements: u32,
+pub(crate) enum Binding {
+    /// A buffer of this name.
+    Buffer {
+        name: &'static str,
+        /// Type of the variable.
+        store: &'static str,
+        is_written: bool,
+    },
+    /// One of [`ARRAYS`].
+    Array(ArrayKind),
 }
-
-/// Names, WGSL element types and bytes of the arrays that may be split.
-pub(crate) const SPLIT_ARRAYS: [(&str, &str, usize); 6] = [
-    ("bvh_nodes", "vec4u", 16),
-    ("bvh_triangles", "vec4f", 16),
-    ("geometry", "u32", 4),
-    ("texels", "u32", 4),
-    ("map_texels", "vec2u", 8),
-    ("sums", "u32", 4),
-];
 
 /// A kernel's source and what it binds.
 #[derive(Debug, Clone)]
@@ -204,20 +290,23 @@ pub(crate) struct Program {
 }
 
 impl Program {
-    /// Puts a kernel together.
+    /// Puts a kernel together. Arrays are `2^width_log2` texels wide.
     pub(crate) fn new(
         kernel: Kernel,
         features: &Features,
         constants: &Constants,
-        arrays: &[SplitArray],
+        width_log2: u32,
     ) -> Self {
         let features = features.in_kernel(kernel);
-        let bindings = bindings(kernel, &features, arrays);
+        let bindings = bindings(kernel, &features);
         let mut source = String::new();
-        let Constants { stack_size, srgb_at, albedo_at, filter_at, rows_at } = constants;
+        let Constants { stack_size, vertex, albedo_at, filter_at, rows_at } = *constants;
         for (name, value) in [
             ("STACK_SIZE", stack_size),
-            ("SRGB_AT", srgb_at),
+            ("VERTEX_TEXELS", vertex.count),
+            ("SECOND_UV_TEXEL", vertex.second_uv),
+            ("TANGENT_TEXEL", vertex.tangent),
+            ("COLOR_TEXEL", vertex.color),
             ("ALBEDO_AT", albedo_at),
             ("FILTER_AT", filter_at),
             ("ROWS_AT", rows_at),
@@ -225,15 +314,16 @@ impl Program {
             let _ = writeln!(source, "const {name} = {value}u;");
         }
         for (index, binding) in bindings.iter().enumerate() {
-            let Binding { name, access, element } = binding;
-            let space = match access {
-                Access::Read => "storage, read",
-                Access::ReadWrite => "storage, read_write",
-            };
-            let _ = writeln!(source, "@group(0) @binding({index}) var<{space}> {name}: {element};");
-        }
-        for array in arrays.iter().filter(|array| is_needed(array.name, &features)) {
-            source.push_str(&accessor(array));
+            match binding {
+                Binding::Buffer { name, store, is_written } => {
+                    let access = if *is_written { "read_write" } else { "read" };
+                    let _ = writeln!(
+                        source,
+                        "@group(0) @binding({index}) var<storage, {access}> {name}: {store};"
+                    );
+                }
+                Binding::Array(array) => source.push_str(&array.accessor(index, width_log2)),
+            }
         }
         for (text, is_needed) in files(kernel, &features) {
             if is_needed {
@@ -274,79 +364,25 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 18] {
     ]
 }
 
-fn is_needed(array: &str, features: &Features) -> bool {
-    match array {
-        "texels" => features.has("textures"),
-        "map_texels" => features.has("map"),
-        "sums" => features.has("map_sampling"),
-        _ => true,
-    }
-}
-
-fn bindings(kernel: Kernel, features: &Features, arrays: &[SplitArray]) -> Vec<Binding> {
+fn bindings(kernel: Kernel, features: &Features) -> Vec<Binding> {
     let learns = kernel == Kernel::Learn;
-    use Access::{Read, ReadWrite};
-    let mut bindings: Vec<Binding> = [
+    let buffers = [
         // Not a uniform: software Vulkan optimises a shader anew, for 40 ms, before each dispatch if
         // it branches on uniforms.
-        ("globals", Read, "Globals", true),
-        ("materials", Read, "array<Material>", true),
-        ("tables", Read, "array<f32>", true),
-        ("texture_refs", Read, "array<TextureRef>", features.has("textures")),
-        ("laws", Read, "array<u32>", features.has("map_sampling")),
-        ("lights", Read, "array<u32>", features.has("scene_lights")),
-        ("film", ReadWrite, "array<PixelSums>", !learns),
-        ("surfaces", ReadWrite, "array<FirstHit>", features.has("layers")),
-        ("visits", ReadWrite, "array<atomic<u32>>", learns),
-        ("counters", ReadWrite, "array<atomic<u32>>", learns),
-        ("slot_of_cell", Read, "array<u32>", learns),
-        ("learning_rays", ReadWrite, "atomic<u32>", learns),
-    ]
-    .into_iter()
-    .filter(|(.., is_needed)| *is_needed)
-    .map(|(name, access, element, _)| Binding { name: name.to_owned(), access, element })
-    .collect();
-    for array in arrays.iter().filter(|array| is_needed(array.name, features)) {
-        let element = match element_of(array.name) {
-            "vec4u" => "array<vec4u>",
-            "vec4f" => "array<vec4f>",
-            "vec2u" => "array<vec2u>",
-            _ => "array<u32>",
-        };
-        bindings.extend((0..array.chunks).map(|chunk| Binding {
-            name: chunk_name(array.name, chunk),
-            access: Read,
-            element,
-        }));
-    }
-    bindings
-}
-
-/// Name of one binding of a split array.
-pub(crate) fn chunk_name(array: &str, chunk: u32) -> String {
-    format!("{array}_{chunk}")
-}
-
-fn element_of(array: &str) -> &'static str {
-    SPLIT_ARRAYS.iter().find(|(name, ..)| *name == array).map_or("u32", |(_, element, _)| element)
-}
-
-/// The function that reads an element, whichever binding it lies in.
-fn accessor(array: &SplitArray) -> String {
-    let SplitArray { name, chunks, chunk_elements } = *array;
-    let mut function = format!("fn {name}(index: u32) -> {} {{\n", element_of(name));
-    for chunk in 1..chunks {
-        let end = u64::from(chunk) * u64::from(chunk_elements);
-        let start = end - u64::from(chunk_elements);
-        let _ = writeln!(
-            function,
-            "    if index < {end}u {{ return {name}_{}[index - {start}u]; }}",
-            chunk - 1
-        );
-    }
-    let start = u64::from(chunks - 1) * u64::from(chunk_elements);
-    let _ = writeln!(function, "    return {name}_{}[index - {start}u];\n}}", chunks - 1);
-    function
+        ("globals", "Globals", false, true),
+        ("film", "array<PixelSums>", true, !learns),
+        ("surfaces", "array<FirstHit>", true, features.has("layers")),
+        ("visits", "array<atomic<u32>>", true, learns),
+        ("counters", "array<atomic<u32>>", true, learns),
+        ("slot_of_cell", "array<u32>", false, learns),
+        ("learning_rays", "atomic<u32>", true, learns),
+    ];
+    let buffers = buffers
+        .into_iter()
+        .filter(|(.., is_needed)| *is_needed)
+        .map(|(name, store, is_written, _)| Binding::Buffer { name, store, is_written });
+    let arrays = ARRAYS.into_iter().filter(|array| array.is_needed(features)).map(Binding::Array);
+    buffers.chain(arrays).collect()
 }
 
 /// Appends the lines of `text` whose conditions hold.
@@ -382,13 +418,13 @@ mod tests {
         assert_eq!(kept, "a\nb\nd\nf\n");
     }
 
-    const CONSTANTS: Constants =
-        Constants { stack_size: 20, srgb_at: 0, albedo_at: 256, filter_at: 2368, rows_at: 2625 };
-
-    fn validate(kernel: Kernel, features: &Features, chunks: u32) {
-        let arrays =
-            SPLIT_ARRAYS.map(|(name, ..)| SplitArray { name, chunks, chunk_elements: 1 << 20 });
-        let program = Program::new(kernel, features, &CONSTANTS, &arrays);
+    fn validate(kernel: Kernel, features: &Features) {
+        let constants = Constants {
+            stack_size: 20,
+            vertex: VertexTexels::of(features),
+            ..Constants::default()
+        };
+        let program = Program::new(kernel, features, &constants, 12);
         let names: Vec<_> = features.names().collect();
         let module = naga::front::wgsl::parse_str(&program.source)
             .unwrap_or_else(|e| panic!("{names:?}: {}", e.emit_to_string(&program.source)));
@@ -451,20 +487,11 @@ mod tests {
             let bits = crate::sampler::hash(seed + 1);
             sets.push(reachable(|i| bits >> i & 1 == 1, tables[seed as usize % 4]));
         }
-        for (index, features) in sets.iter().enumerate() {
-            validate(Kernel::Render, features, 1 + index as u32 % 3);
+        for features in &sets {
+            validate(Kernel::Render, features);
             if features.has("light_grid") {
-                validate(Kernel::Learn, features, 1 + index as u32 % 3);
+                validate(Kernel::Learn, features);
             }
         }
-    }
-
-    #[test]
-    fn a_split_array_is_read_from_the_right_chunk() {
-        let array = SplitArray { name: "geometry", chunks: 3, chunk_elements: 100 };
-        let function = accessor(&array);
-        assert!(function.contains("if index < 100u { return geometry_0[index - 0u]; }"));
-        assert!(function.contains("if index < 200u { return geometry_1[index - 100u]; }"));
-        assert!(function.contains("return geometry_2[index - 200u];"));
     }
 }
