@@ -12,9 +12,10 @@ struct Work {
     count: u32,
     first_sample: u32,
     samples: u32,
+    // Whether to add to the sums that are there.
+    resumes: u32,
     padding_0: u32,
     padding_1: u32,
-    padding_2: u32,
 }
 
 struct Globals {

@@ -30,10 +30,17 @@ fn render(
     if x >= globals.width || y >= globals.height {
         return;
     }
+    let pixel = y * globals.width + x;
     var sums: PixelSums;
 //#if layers
     var surface = FirstHit(vec3f(0.0), 0.0, vec3f(0.0), 0.0);
 //#end
+    if globals.work.resumes != 0u {
+        sums = film[pixel];
+//#if layers
+        surface = surfaces[pixel];
+//#end
+    }
     var index = globals.work.first_sample;
     let end = globals.work.first_sample + globals.work.samples;
     var path = start_sample(x, y, index);
@@ -61,7 +68,6 @@ fn render(
         }
         path = start_sample(x, y, index);
     }
-    let pixel = y * globals.width + x;
     film[pixel] = sums;
 //#if layers
     surfaces[pixel] = surface;

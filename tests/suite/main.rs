@@ -7,6 +7,7 @@ mod cli;
 mod environment;
 mod estimator;
 mod gltf_files;
+mod gpu;
 mod image_files;
 mod metrics;
 mod peers;

@@ -29,7 +29,8 @@ pub(crate) struct Work {
     pub(crate) count: u32,
     pub(crate) first_sample: u32,
     pub(crate) samples: u32,
-    pub(crate) padding: [u32; 3],
+    pub(crate) resumes: u32,
+    pub(crate) padding: [u32; 2],
 }
 
 /// Twin of `Globals` in `globals.wgsl`.

@@ -1,0 +1,222 @@
+//! The GPU against the CPU: the same picture, the same learning, and what happens when it fails.
+//!
+//! On a machine without Vulkan, Metal, DX12 or OpenGL the tests say so and skip; software Vulkan
+//! (Debian's mesa-vulkan-drivers) is enough.
+
+use std::sync::atomic::AtomicBool;
+
+use lightgrid::environment::{Environment, EnvironmentOptions, TableKind, sky};
+use lightgrid::metrics::statistics::{Estimate, z_test};
+use lightgrid::path::{PathLimits, World, framing};
+use lightgrid::render::film::{Film, Pixel};
+use lightgrid::render::filter::PixelFilter;
+use lightgrid::render::gpu::Gpu;
+use lightgrid::render::{Phase, Sampling, Session, View};
+use lightgrid::scene::{builtin, gltf};
+
+use crate::estimator::{MODES, mean, render, view};
+use crate::shared::shared;
+
+/// Chance that a sound pair of devices fails one comparison.
+const ALPHA: f64 = 1e-3;
+
+/// The best adapter; `None`, said on stderr, where there is none.
+fn gpu() -> Option<Gpu> {
+    Gpu::open(None).inspect_err(|reason| eprintln!("SKIPPED: {reason}")).ok()
+}
+
+fn finish(mut session: Session<'_>, samples: u32) -> Film {
+    let never = AtomicBool::new(false);
+    while session.phase() == Phase::Learning {
+        session.advance(0, &never).expect("learning");
+    }
+    session.advance(samples, &never).expect("rendering");
+    assert_eq!(session.film().min_samples(), samples);
+    session.film().clone()
+}
+
+fn sky_map(name: &str) -> Environment {
+    let map = sky::build(name, 128, 64).expect("a sky");
+    Environment::new(map, &EnvironmentOptions::default()).expect("a sound map")
+}
+
+/// A picture of a scene from its first camera, or a framed one.
+fn picture(world: &World, sampling: Sampling) -> View {
+    let camera = match world.scene.cameras.first() {
+        Some(camera) => camera.clone(),
+        None => framing::frame(world, 1.5),
+    };
+    View { width: 36, height: 24, ..view(camera, sampling, 4) }
+}
+
+/// Share of pixels whose luminance differs by more than 0.2 %: with the same random numbers only
+/// paths that rounding sends to another triangle, texel or tile do.
+fn differing(a: &Film, b: &Film) -> f64 {
+    let floor = 1e-3 * mean(a).luminance;
+    let differs = |(a, b): (&Pixel, &Pixel)| {
+        let (a, b) = (a.mean_luminance(), b.mean_luminance());
+        (a - b).abs() > 2e-3 * a.max(b) + floor
+    };
+    let count = a.pixels().iter().zip(b.pixels()).filter(|pair| differs(*pair)).count();
+    count as f64 / a.pixels().len() as f64
+}
+
+/// Asserts that two films of independent samples have the same mean in every pixel.
+fn expect_agreement(what: &str, a: &Film, b: &Film) {
+    let floor = (1e-3 * mean(a).luminance).powi(2);
+    let of = |film: &Film| -> (Vec<f64>, Vec<f64>) {
+        let pixels = film.pixels().iter();
+        pixels.map(|p| (p.mean_luminance(), p.variance_of_mean() + floor)).unzip()
+    };
+    let ((a_mean, a_variance), (b_mean, b_variance)) = (of(a), of(b));
+    let test = z_test(
+        Estimate { mean: &a_mean, variance_of_mean: &a_variance },
+        Estimate { mean: &b_mean, variance_of_mean: &b_variance },
+        ALPHA,
+    );
+    let test = test.expect("two pictures of one size");
+    assert!(test.passed(), "{what}: {test:?}");
+}
+
+/// The same seed draws nearly the same paths, and other seeds the same expectation.
+fn compare(gpu: &Gpu, what: &str, world: &World, environment: &Environment, sampling: Sampling) {
+    let samples = 16;
+    let view = picture(world, sampling);
+    let session = Session::on_gpu(world, environment, view.clone(), gpu).expect("it fits");
+    let gpu_film = finish(session, samples);
+    let same = render(world, environment, view.clone(), samples);
+    let share = differing(&same, &gpu_film);
+    let ratio = mean(&gpu_film).luminance / mean(&same).luminance;
+    eprintln!(
+        "{what}, {sampling:?}: {:.1} % of pixels differ, mean ratio {ratio:.4}",
+        100.0 * share
+    );
+    // One path that is counted elsewhere moves the laws of sixteen cells, hence all samples there.
+    let learns = matches!(sampling, Sampling::Adaptive | Sampling::Talk);
+    let most = if learns { 0.5 } else { 0.05 };
+    assert!(share < most, "{what}, {sampling:?}: {share} of the pixels differ");
+    let other = render(world, environment, View { seed: 77, ..view }, 4 * samples);
+    expect_agreement(&format!("{what}, {sampling:?}"), &other, &gpu_film);
+}
+
+#[test]
+fn a_room_looks_the_same_in_every_mode() {
+    let Some(gpu) = gpu() else { return };
+    let world = World::new(builtin::build("crack").expect("built in"));
+    for sampling in MODES {
+        compare(&gpu, "crack", &world, &sky_map("day"), sampling);
+    }
+}
+
+/// Software Vulkan takes seconds to compile each of the 36 kernels.
+#[test]
+#[ignore = "takes minutes on software Vulkan"]
+fn every_built_in_scene_looks_the_same_in_every_mode() {
+    let Some(gpu) = gpu() else { return };
+    for name in builtin::names() {
+        let world = World::new(builtin::build(name).expect("built in"));
+        for sampling in MODES {
+            compare(&gpu, name, &world, &sky_map("day"), sampling);
+        }
+    }
+}
+
+#[test]
+fn every_table_draws_the_same_picture() {
+    let Some(gpu) = gpu() else { return };
+    let world = World::new(builtin::build("crack").expect("built in"));
+    for table in [TableKind::U32, TableKind::F32, TableKind::F64] {
+        let options = EnvironmentOptions {
+            table,
+            rotation_radians: 0.7,
+            intensity: 2.0,
+            ..Default::default()
+        };
+        let map = sky::build("sunset", 128, 64).expect("a sky");
+        let environment = Environment::new(map, &options).expect("a sound map");
+        compare(&gpu, &table.to_string(), &world, &environment, Sampling::Plain);
+    }
+}
+
+#[test]
+fn every_kind_of_material_looks_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let files = [
+        "objects/01_alpha_mask/01_alpha_mask.gltf",
+        "objects/AttenuationTest.glb",
+        "objects/ClearCoatTest.glb",
+        "objects/TransmissionRoughnessTest.glb",
+        "interiors/room-anex.glb",
+    ];
+    for file in files {
+        let Some(path) = shared(&format!("data/{file}")) else { continue };
+        let world = World::new(gltf::load(&path).expect("a scene"));
+        compare(&gpu, file, &world, &sky_map("overcast"), Sampling::Plain);
+    }
+}
+
+#[test]
+fn layers_lens_and_filters_are_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let world = World::new(builtin::build("open").expect("built in"));
+    let environment = sky_map("day");
+    {
+        let filter = PixelFilter::BlackmanHarris;
+        let mut view = View { filter, layers: true, ..picture(&world, Sampling::Plain) };
+        view.camera.lens_radius = 0.05;
+        let session = Session::on_gpu(&world, &environment, view.clone(), &gpu).expect("it fits");
+        let gpu_film = finish(session, 8);
+        let cpu_film = render(&world, &environment, view, 8);
+        assert!(differing(&cpu_film, &gpu_film) < 0.1);
+        let (a, b) = (cpu_film.surface_layers(), gpu_film.surface_layers());
+        let (a, b) = (a.expect("layers"), b.expect("layers"));
+        let differ = |a: f32, b: f32| f64::from(u8::from((a - b).abs() > 1e-3 * a.abs() + 1e-4));
+        let depth: f64 = a.depth.iter().zip(&b.depth).map(|(a, b)| differ(*a, *b)).sum();
+        let flat = |values: &[[f32; 3]]| values.as_flattened().to_vec();
+        let pairs = flat(&a.albedo).into_iter().zip(flat(&b.albedo));
+        let albedo: f64 = pairs.map(|(a, b)| differ(a, b)).sum();
+        let pairs = flat(&a.normal).into_iter().zip(flat(&b.normal));
+        let normal: f64 = pairs.map(|(a, b)| differ(a, b)).sum();
+        let pixels = a.depth.len() as f64;
+        assert!(depth < 0.02 * pixels, "{depth} of {pixels} depths differ");
+        assert!(albedo < 0.06 * pixels && normal < 0.06 * pixels, "{albedo}, {normal}");
+    }
+}
+
+#[test]
+fn the_cpu_takes_over_when_the_device_is_lost() {
+    let Some(gpu) = gpu() else { return };
+    let world = World::new(builtin::build("open").expect("built in"));
+    let environment = sky_map("day");
+    let view = picture(&world, Sampling::Plain);
+    let never = AtomicBool::new(false);
+    let mut session = Session::on_gpu(&world, &environment, view.clone(), &gpu).expect("it fits");
+    session.advance(3, &never).expect("rendering");
+    let before = session.film().clone();
+    gpu.lose();
+    let failure = session.advance(2, &never).expect_err("the device is gone").to_string();
+    assert!(failure.contains(&gpu.facts().name), "{failure}");
+    assert_eq!(*session.film(), before, "what was rendered is kept");
+    session.continue_on_cpu();
+    session.advance(2, &never).expect("the CPU does not fail");
+    assert_eq!(session.film().min_samples(), 5);
+    let whole = render(&world, &environment, view, 5);
+    assert!(differing(&whole, session.film()) < 0.1);
+}
+
+#[test]
+fn a_cancelled_picture_goes_on_where_it_stopped() {
+    let Some(gpu) = gpu() else { return };
+    let world = World::new(builtin::build("open").expect("built in"));
+    let environment = sky_map("day");
+    let view = View {
+        limits: PathLimits { bounces: 2, russian_roulette: true },
+        ..picture(&world, Sampling::Plain)
+    };
+    let mut session = Session::on_gpu(&world, &environment, view.clone(), &gpu).expect("it fits");
+    session.advance(4, &AtomicBool::new(true)).expect("cancelled");
+    assert_eq!(session.film().min_samples(), 0);
+    session.advance(4, &AtomicBool::new(false)).expect("rendering");
+    let at_once = Session::on_gpu(&world, &environment, view, &gpu).expect("it fits");
+    assert_eq!(*session.film(), finish(at_once, 4), "the same bits in one piece or several");
+}
