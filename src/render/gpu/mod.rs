@@ -563,7 +563,7 @@ mod tests {
     }
 
     /// Rounding sends a path in a thousand to another triangle, texel or cell; what it meets from
-    /// there on differs. So less than 1 % of all counts may lie elsewhere.
+    /// there on differs. So one count in 500 may lie elsewhere.
     #[test]
     fn both_devices_learn_the_same_counters() {
         let gpu = match Gpu::open(None) {
@@ -580,7 +580,7 @@ mod tests {
                 let total: u64 = a.iter().map(|n| u64::from(*n)).sum();
                 let moved: u64 = a.iter().zip(&b).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
                 eprintln!("{what}: {moved} of {total} differ");
-                assert!(total > 10_000 && moved * 100 < total, "{what}: {moved} of {total}");
+                assert!(total > 10_000 && moved * 500 < total, "{what}: {moved} of {total}");
             }
             assert!(cpu_rays.abs_diff(gpu_rays) * 1000 < cpu_rays, "{cpu_rays} {gpu_rays}");
         }
