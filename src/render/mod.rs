@@ -123,6 +123,13 @@ pub struct Figures {
     pub render_seconds: f64,
 }
 
+impl Figures {
+    /// Seconds of learning and rendering.
+    pub fn elapsed_seconds(&self) -> f64 {
+        self.learning_seconds + self.render_seconds
+    }
+}
+
 /// A picture in the making.
 pub struct Session<'a> {
     world: &'a World,
@@ -229,7 +236,7 @@ impl<'a> Session<'a> {
 
     /// Seconds of learning and rendering so far.
     pub fn elapsed_seconds(&self) -> f64 {
-        self.figures.learning_seconds + self.figures.render_seconds
+        self.figures.elapsed_seconds()
     }
 
     /// Whether a rule says to stop. Noise is only asked for from 16 samples on.
