@@ -16,10 +16,12 @@
 //! Arrows point down: `cli -> render -> path -> {light_grid, bsdf, bvh} -> {scene, environment} ->
 //! {image, sampler, math, color, error}`.
 
+pub mod app;
 pub mod bsdf;
 pub mod bvh;
 pub mod cli;
 pub mod color;
+pub mod denoise;
 pub mod environment;
 pub mod error;
 mod huge_pages;

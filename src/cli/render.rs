@@ -1,6 +1,6 @@
 //! `lightgrid render`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -154,6 +154,49 @@ fn check_outputs(arguments: &RenderArguments) -> Result<()> {
         check_writable(file)?;
     }
     Ok(())
+}
+
+impl RenderArguments {
+    /// Defaults but for scene, map, picture, sampling and (size, samples, seconds).
+    pub(super) fn for_picture(
+        scene: &str,
+        map: &str,
+        picture: &Path,
+        sampling: Sampling,
+        (size, samples, seconds): (Option<(u32, u32)>, Option<u32>, Option<f64>),
+    ) -> Self {
+        Self {
+            scene: scene.to_owned(),
+            outputs: vec![picture.to_owned()],
+            env: map.to_owned(),
+            env_rotation: 0.0,
+            env_intensity: 1.0,
+            camera: None,
+            eye: None,
+            target: None,
+            fov: None,
+            lens_radius: None,
+            focus: None,
+            size: size.unwrap_or((1280, 720)),
+            filter: PixelFilter::default(),
+            exposure: Exposure::Auto,
+            tonemap: ToneCurve::default(),
+            layers: Vec::new(),
+            spp: samples,
+            seconds,
+            noise: None,
+            sampling,
+            table: TableKind::default(),
+            bounces: 8,
+            no_russian_roulette: false,
+            tiles: (32, 16),
+            grid: 64,
+            learning_paths: None,
+            seed: 0,
+            threads: 0,
+            json: None,
+        }
+    }
 }
 
 /// Loads, learns, renders, writes.

@@ -8,7 +8,7 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 mod cpu;
 pub mod film;
@@ -25,7 +25,7 @@ use crate::path::{PathLimits, PathTracer, World};
 use crate::scene::Camera;
 
 /// How the environment map is sampled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
     /// Learned tiles, our way: faces, cosine, pooling; with BSDF sampling.
@@ -79,7 +79,7 @@ impl View {
 const LEARNING_SHARE: u64 = 32;
 
 /// When to stop; whichever comes first.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct StopRule {
     /// Samples per pixel.
     pub samples: Option<u32>,
@@ -140,6 +140,7 @@ pub struct Session<'a> {
     whole_map: Option<LightGrid>,
     learned: Option<LightGrid>,
     learning: Option<Learning>,
+    finished: Option<LearningGrid>,
     figures: Figures,
 }
 
@@ -166,6 +167,7 @@ impl<'a> Session<'a> {
             whole_map,
             learned: None,
             learning,
+            finished: None,
             figures: Figures::default(),
         }
     }
@@ -205,6 +207,7 @@ impl<'a> Session<'a> {
         if let Some(learning) = self.learning.take() {
             self.figures.visited_cells = learning.grid.counters.visited_cells();
             self.figures.grid_bytes = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
+            self.finished = Some(learning.grid);
         }
     }
 
@@ -212,6 +215,12 @@ impl<'a> Session<'a> {
     pub fn set_grid(&mut self, grid: LightGrid) {
         self.learning = None;
         self.learned = Some(grid);
+    }
+
+    /// The counters of a learning that has ended, for inspection; they can be taken once and are
+    /// not needed for rendering.
+    pub fn take_counters(&mut self) -> Option<LearningGrid> {
+        self.finished.take()
     }
 
     /// The film so far.

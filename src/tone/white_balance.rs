@@ -58,7 +58,7 @@ const BRADFORD: Mat3 = Mat3::from_cols_array(&[
 /// XYZ (Y = 1) of a white on the Planckian locus (Krystek 1985, in CIE 1960 uv), `tint` off it.
 fn white_xyz(kelvin: f32, tint: f32) -> Vec3 {
     let t = kelvin;
-    let u = (0.860_117_76 + 1.541_182_5e-4 * t + 1.286_412_1e-7 * t * t)
+    let u = (0.860_117_76 + 1.541_182_5e-4 * t + 1.286_412e-7 * t * t)
         / (1.0 + 8.424_202_4e-4 * t + 7.081_451_6e-7 * t * t);
     let v = (0.317_398_73 + 4.228_062_4e-5 * t + 4.204_817e-8 * t * t)
         / (1.0 - 2.897_418_2e-5 * t + 1.614_560_5e-7 * t * t);
