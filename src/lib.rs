@@ -11,9 +11,10 @@
 //!   over the map's tiles, learned by tracing paths.
 //! - [`path`] is the one loop that turns random numbers into radiance; [`render`] runs it over the
 //!   picture, pass by pass, into a film.
-//! - [`cli`] is what a person types; [`metrics`] compares pictures.
+//! - [`app`] is the window, [`cli`] what a person types; both find files by [`sources`], and write by
+//!   [`output`]. [`metrics`] compares pictures, [`denoise`] smooths them, [`tone`] develops them.
 //!
-//! Arrows point down: `cli -> render -> path -> {light_grid, bsdf, bvh} -> {scene, environment} ->
+//! Arrows point down: `cli -> app -> render -> path -> {light_grid, bsdf, bvh} -> {scene, environment} ->
 //! {image, sampler, math, color, error}`.
 
 pub mod app;

@@ -62,10 +62,12 @@ pub enum Command {
     ChooseExport,
     /// Write all laws.
     Export(PathBuf),
+    /// Close the window.
+    Quit,
 }
 
 /// Keys, what they do, and the command.
-pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 15] = [
+pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 16] = [
     (plain(Key::Space), "Pause, resume", Command::TogglePause),
     (plain(Key::R), "Restart the picture", Command::Restart),
     (plain(Key::F), "Frame the whole scene", Command::FrameAll),
@@ -81,6 +83,7 @@ pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 15] = [
     (control(Key::M), "Open a map", Command::ChooseMap),
     (control(Key::Z), "Undo", Command::Undo),
     (control(Key::Y), "Redo", Command::Redo),
+    (control(Key::Q), "Quit", Command::Quit),
 ];
 
 /// What the mouse and held keys do in the picture.

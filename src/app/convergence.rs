@@ -1,21 +1,10 @@
 //! How the estimated error fell, run by run.
 
-use super::worker::Snapshot;
+use super::worker::{Point, Snapshot};
 use crate::render::Sampling;
 
 /// Earlier runs kept.
 const MOST_RUNS: usize = 8;
-
-/// The state of a run at one moment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
-    /// Seconds of learning and rendering.
-    pub seconds: f64,
-    /// Samples per pixel.
-    pub samples: f64,
-    /// Estimated relative RMS error.
-    pub noise: f64,
-}
 
 /// One picture from its start on.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,48 +25,23 @@ pub struct Convergence {
 }
 
 impl Convergence {
-    /// Adds what a snapshot says.
+    /// Takes over what a snapshot says.
     pub fn add(&mut self, snapshot: &Snapshot) {
-        if snapshot.is_preview || snapshot.request.moving {
-            return;
-        }
-        let add = |run: &mut Run, take: &super::worker::Take| {
-            let film = &take.film;
-            let point = Point {
-                seconds: take.figures.elapsed_seconds(),
-                samples: film.total_samples() as f64 / film.pixels().len().max(1) as f64,
-                noise: take.noise,
-            };
-            let is_later = run.points.last().is_none_or(|last| point.seconds > last.seconds);
-            if point.noise.is_finite() && point.noise > 0.0 && is_later {
-                run.points.push(point);
-            }
-        };
-        let seconds = snapshot.main.figures.elapsed_seconds();
-        let is_new = self
-            .runs
-            .last()
-            .and_then(|run| run.points.last())
-            .is_none_or(|last| seconds < last.seconds);
-        let name = name_of(snapshot.main.sampling);
+        let [main, plain] = &snapshot.curves;
+        let Some(first) = main.first() else { return };
+        let is_new = self.runs.last().and_then(|run| run.points.first()) != Some(first);
         if is_new {
-            self.runs.retain(|run| run.points.len() > 1);
-            self.runs.push(Run { name: name.to_owned(), points: Vec::new() });
-            self.plain = None;
+            self.runs
+                .push(Run { name: name_of(snapshot.main.sampling).to_owned(), points: Vec::new() });
             if self.runs.len() > MOST_RUNS {
                 self.runs.remove(0);
             }
         }
         if let Some(run) = self.runs.last_mut() {
-            add(run, &snapshot.main);
+            run.points.clone_from(main);
         }
-        if let Some(take) = &snapshot.plain {
-            let run = self.plain.get_or_insert_with(|| Run {
-                name: "plain, beside it".to_owned(),
-                points: Vec::new(),
-            });
-            add(run, take);
-        }
+        self.plain =
+            (!plain.is_empty()).then(|| Run { name: "plain".to_owned(), points: plain.clone() });
     }
 
     /// Runs, oldest first; the last one is going on.

@@ -68,6 +68,7 @@ impl App {
             Command::ToggleDeveloper => interface.toggle_developer(),
             Command::ToggleShortcuts => interface.shortcuts = !interface.shortcuts,
             Command::KeepPicture => self.keep(),
+            Command::Quit => self.is_closing = true,
             Command::MeasureTruth => {
                 if let Some(snapshot) = &self.snapshot {
                     self.inspector.measure(snapshot);

@@ -91,6 +91,7 @@ pub struct App {
     later: (Sender<Later>, Receiver<Later>),
     wake: Wake,
     is_repeatable: bool,
+    is_closing: bool,
 }
 
 /// An environment and what it was made from.
@@ -139,6 +140,7 @@ impl App {
             later: channel(),
             wake,
             is_repeatable: start.is_repeatable,
+            is_closing: false,
         })
     }
 
@@ -170,6 +172,11 @@ impl App {
             && self.shown.is_some()
             && self.presenter.is_settled()
             && !self.inspector.is_busy()
+    }
+
+    /// Whether somebody asked to close the window.
+    pub fn is_closing(&self) -> bool {
+        self.is_closing
     }
 
     /// The first thing that went wrong, if anything did.

@@ -4,13 +4,13 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-use glam::Vec2;
+use glam::{UVec2, Vec2, Vec3};
 
 use super::Wake;
 use super::document::Look;
 use super::overlays::{CellFacts, Legend, Overlay, Sources};
 use super::surface_map::SurfaceMap;
-use super::worker::{Request, Snapshot};
+use super::worker::{Activity, Request, Snapshot};
 use crate::denoise::denoise;
 use crate::error::{Error, Result};
 use crate::image::{Image, Rgb8};
@@ -273,9 +273,11 @@ const EXPOSURE_WIDTH: u32 = 64;
 /// The linear picture; pixels without samples show the small one.
 fn develop(snapshot: &Snapshot, is_denoised: bool) -> Image {
     let film = &snapshot.main.film;
-    let mut image = if is_denoised { denoise(film) } else { film.image() };
+    // A small picture is there to see where one is going, not to judge noise.
+    let is_moving = snapshot.activity == Activity::Moving;
+    let mut image = if is_denoised || is_moving { denoise(film) } else { film.image() };
     if let Some(under) = snapshot.under.as_ref().filter(|_| film.min_samples() == 0) {
-        fill_from(&mut image, film, &under.image());
+        fill_from(&mut image, film, &denoise(under));
     }
     image
 }
@@ -287,16 +289,22 @@ fn blend(pixel: &mut [u8; 3], color: [u8; 3], opacity: f32) {
     }
 }
 
-/// Gives pixels without samples the radiance at the same place of another picture.
+/// Gives pixels without samples the radiance at the same place of another picture, bilinear.
 fn fill_from(image: &mut Image, film: &Film, before: &Image) {
     let size = Vec2::new(image.width as f32, image.height as f32);
-    let other = Vec2::new(before.width as f32, before.height as f32);
+    let last = UVec2::new(before.width - 1, before.height - 1);
+    let scale = Vec2::new(before.width as f32, before.height as f32) / size;
     let width = image.width;
+    let at = |x: u32, y: u32| Vec3::from(before.at(x.min(last.x), y.min(last.y)));
     for (i, (rgb, pixel)) in image.pixels.iter_mut().zip(film.pixels()).enumerate() {
-        if pixel.samples() == 0 {
-            let place = Vec2::new((i as u32 % width) as f32, (i as u32 / width) as f32) + 0.5;
-            let there = (place / size * other).as_uvec2();
-            *rgb = before.at(there.x.min(before.width - 1), there.y.min(before.height - 1));
+        if pixel.samples() > 0 {
+            continue;
         }
+        let place = Vec2::new((i as u32 % width) as f32, (i as u32 / width) as f32) + 0.5;
+        let there = (place * scale - 0.5).max(Vec2::ZERO);
+        let (low, t) = (there.as_uvec2(), there.fract());
+        let upper = at(low.x, low.y).lerp(at(low.x + 1, low.y), t.x);
+        let lower = at(low.x, low.y + 1).lerp(at(low.x + 1, low.y + 1), t.x);
+        *rgb = upper.lerp(lower, t.y).to_array();
     }
 }

@@ -174,6 +174,9 @@ impl ApplicationHandler<Repaint> for Runner {
             }
             WindowEvent::RedrawRequested => {
                 running.draw();
+                if running.app.is_closing() {
+                    self.close(event_loop);
+                }
                 return;
             }
             WindowEvent::Resized(size) => {

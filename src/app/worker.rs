@@ -73,6 +73,17 @@ pub enum Activity {
     Done,
 }
 
+/// How good a picture was at one moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// Seconds of learning and rendering.
+    pub seconds: f64,
+    /// Samples per pixel.
+    pub samples: f64,
+    /// Estimated relative RMS error.
+    pub noise: f64,
+}
+
 /// One picture and what was done for it.
 #[derive(Clone)]
 pub struct Take {
@@ -107,6 +118,8 @@ pub struct Snapshot {
     pub counters: Option<Arc<LearningGrid>>,
     /// Figures of the session that learns, while `main` is a preview.
     pub learning: Figures,
+    /// How the error of `main` and of `plain` fell.
+    pub curves: [Vec<Point>; 2],
     /// A small picture of the same view, for pixels that have no samples yet.
     pub under: Option<Arc<Film>>,
 }
@@ -114,7 +127,7 @@ pub struct Snapshot {
 /// Longest piece of rendering between two looks at requests and clocks.
 const SLICE: Duration = Duration::from_millis(120);
 /// A moving camera's picture should take about this long.
-const MOVING_SECONDS: f64 = 0.04;
+const MOVING_SECONDS: f64 = 0.07;
 /// Publishing may take at most about one part in this of the time.
 const PUBLISH_SHARE: u32 = 20;
 
@@ -223,6 +236,8 @@ fn lower_priority() {
 struct Legacy {
     /// The last laws that learning ended with, and the map they are for.
     learned: Option<(Arc<LightGrid>, Arc<Environment>)>,
+    /// Whether that learning came to its end.
+    is_complete: bool,
     /// The world they were learned in.
     world: Option<Arc<World>>,
     /// Seconds one camera path takes, all threads together.
@@ -233,6 +248,12 @@ struct Legacy {
 }
 
 impl Legacy {
+    /// Whether learning has come to its end in this scene.
+    fn has_learned_in(&self, request: &Request) -> bool {
+        self.is_complete
+            && self.world.as_ref().is_some_and(|world| Arc::ptr_eq(world, &request.world))
+    }
+
     /// Laws for this request from the last ones, if they are of the same scene.
     fn laws_for(&self, request: &Request) -> Option<Arc<LightGrid>> {
         if !self.world.as_ref().is_some_and(|world| Arc::ptr_eq(world, &request.world)) {
@@ -262,6 +283,8 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool) {
                 }
                 match &slot.request {
                     Some(new) if done.as_ref().is_none_or(|old| !old.is_same(new)) => {
+                        // What was to be ended has ended.
+                        shared.cancel.store(false, Ordering::Relaxed);
                         break Arc::clone(new);
                     }
                     _ => {
@@ -281,6 +304,7 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool) {
             published: Instant::now(),
             publish_gap: Duration::ZERO,
             laws: None,
+            curves: [Vec::new(), Vec::new()],
         };
         pool.install(|| {
             if job.request.moving {
@@ -352,6 +376,8 @@ struct Job<'a> {
     publish_gap: Duration,
     /// The laws published last, with what tells whether they are still those in use.
     laws: Option<((usize, u64), Arc<LightGrid>)>,
+    /// How the error of the main and of the plain picture fell.
+    curves: [Vec<Point>; 2],
 }
 
 impl Job<'_> {
@@ -483,6 +509,10 @@ impl Job<'_> {
                 preview = None;
             }
             let due = self.published.elapsed() >= self.publish_gap;
+            if due || !self.request.previews {
+                self.note(0, &main);
+                plain.iter().for_each(|plain| self.note(1, plain));
+            }
             if due && self.request.previews && !self.is_superseded() {
                 self.publish(activity, &main, plain.as_ref(), preview.as_ref());
             }
@@ -540,13 +570,19 @@ impl Job<'_> {
             return;
         }
         main.advance(1, &self.shared.cancel);
-        if main.phase() == Phase::Rendering {
+        let is_done = main.phase() == Phase::Rendering;
+        if is_done {
             self.counters = main.take_counters().map(Arc::new);
-            if let Some(laws) = main.grid() {
-                let map = Arc::clone(&self.request.environment);
-                self.legacy.learned = Some((Arc::new(laws.clone()), map));
-                self.legacy.world = Some(Arc::clone(&self.request.world));
-            }
+        }
+        // A little learned is better than nothing, but what was learned to the end is better still.
+        if (is_done
+            || (main.figures().learned_cells > 0 && !self.legacy.has_learned_in(&self.request)))
+            && let Some(laws) = main.grid()
+        {
+            let map = Arc::clone(&self.request.environment);
+            self.legacy.learned = Some((Arc::new(laws.clone()), map));
+            self.legacy.world = Some(Arc::clone(&self.request.world));
+            self.legacy.is_complete = is_done;
         }
     }
 
@@ -601,12 +637,28 @@ impl Job<'_> {
             counters: self.counters.clone(),
             learning: *main.figures(),
             under: self.under(),
+            curves: self.curves.clone(),
         };
         *lock(&self.shared.snapshot) = Some(Arc::new(snapshot));
         (self.shared.wake)();
         self.published = Instant::now();
         let cost = self.published - start;
         self.publish_gap = (cost * PUBLISH_SHARE).clamp(SLICE, Duration::from_secs(3));
+    }
+
+    /// Adds a point to a curve, unless nothing has happened since the last one.
+    fn note(&mut self, curve: usize, session: &Session<'_>) {
+        let film = session.film();
+        let point = Point {
+            seconds: session.elapsed_seconds(),
+            samples: film.total_samples() as f64 / film.pixels().len().max(1) as f64,
+            noise: film.noise(),
+        };
+        let curve = &mut self.curves[curve];
+        let is_later = curve.last().is_none_or(|last| point.samples > last.samples);
+        if point.noise.is_finite() && point.noise > 0.0 && is_later {
+            curve.push(point);
+        }
     }
 
     fn take(&mut self, session: &Session<'_>) -> Take {

@@ -233,7 +233,7 @@ impl Sources<'_> {
             }
             Overlay::Sky => by_cell(
                 &|cell| facts.visible_share(cell),
-                Range::between(0.0, 1.0),
+                Range::Logarithmic,
                 "visibility times cosine",
             ),
             Overlay::BestTile => {

@@ -3,8 +3,9 @@
 use egui::{Color32, Ui, Vec2b};
 use egui_plot::{GridMark, Legend, Line, Plot, PlotPoints};
 
-use crate::app::convergence::{Convergence, Point, Run};
+use crate::app::convergence::{Convergence, Run};
 use crate::app::theme;
+use crate::app::worker::Point;
 
 /// Draws the plot of all runs; `by_samples_only` leaves the clock out.
 pub(in crate::app) fn show(ui: &mut Ui, convergence: &mut Convergence, by_samples_only: bool) {

@@ -27,6 +27,10 @@ pub(in crate::app) fn show(ui: &mut Ui, scene: Option<&LoadedScene>, map: Option
         (needs.punctual_lights, "Point, spot or directional lights"),
     ];
     ui.columns_const(|[left, right]| {
+        for column in [&mut *left, &mut *right] {
+            // Columns stretch lines to their width otherwise.
+            column.style_mut().wrap_mode = Some(egui::TextWrapMode::Truncate);
+        }
         theme::heading(left, "USED");
         for (_, name) in used.iter().filter(|(is_used, _)| *is_used) {
             left.label(RichText::new(*name).size(12.5));

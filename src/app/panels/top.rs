@@ -65,19 +65,39 @@ fn steps(ui: &mut Ui, undo: &Undo<Document>, commands: &mut Vec<Command>) {
 }
 
 fn sampling(ui: &mut Ui, document: &mut Document) {
-    ui.spacing_mut().item_spacing.x = 3.0;
-    for (sampling, hint) in [
-        (Sampling::Adaptive, "Learned tiles, with faces, cosine weights and pooling"),
-        (Sampling::Talk, "Learned tiles as the SIGGRAPH talk describes them"),
-        (Sampling::Plain, "The whole map by its brightness"),
-        (Sampling::Bsdf, "Directions of the surfaces alone"),
-    ] {
+    let capital = |sampling| {
         let name = name_of(sampling);
-        let label = format!("{}{}", name[..1].to_uppercase(), &name[1..]);
-        ui.selectable_value(&mut document.light.sampling, sampling, label).on_hover_text(hint);
+        format!("{}{}", name[..1].to_uppercase(), &name[1..])
+    };
+    let chosen = &mut document.light.sampling;
+    if ui.ctx().content_rect().width() < NARROW {
+        egui::ComboBox::from_id_salt("sampling")
+            .width(90.0)
+            .selected_text(capital(*chosen))
+            .show_ui(ui, |ui| {
+                for (sampling, hint) in WAYS {
+                    ui.selectable_value(chosen, sampling, capital(sampling)).on_hover_text(hint);
+                }
+            });
+        return;
+    }
+    ui.spacing_mut().item_spacing.x = 3.0;
+    for (sampling, hint) in WAYS {
+        ui.selectable_value(chosen, sampling, capital(sampling)).on_hover_text(hint);
     }
     ui.spacing_mut().item_spacing.x = 8.0;
 }
+
+/// Below this width in points the ways of sampling fold into a list.
+const NARROW: f32 = 1120.0;
+
+/// Ways of sampling the map, and what they do.
+const WAYS: [(Sampling, &str); 4] = [
+    (Sampling::Adaptive, "Learned tiles, with faces, cosine weights and pooling"),
+    (Sampling::Talk, "Learned tiles as the SIGGRAPH talk describes them"),
+    (Sampling::Plain, "The whole map by its brightness"),
+    (Sampling::Bsdf, "Directions of the surfaces alone"),
+];
 
 fn running(
     ui: &mut Ui,
