@@ -11,15 +11,18 @@
 //!   over the map's tiles, learned by tracing paths.
 //! - [`path`] is the one loop that turns random numbers into radiance; [`render`] runs it over the
 //!   picture, pass by pass, into a film.
-//! - [`cli`] is what a person types; [`metrics`] compares pictures.
+//! - [`app`] is the window, [`cli`] what a person types; both find files by [`sources`], and write by
+//!   [`output`]. [`metrics`] compares pictures, [`denoise`] smooths them, [`tone`] develops them.
 //!
-//! Arrows point down: `cli -> render -> path -> {light_grid, bsdf, bvh} -> {scene, environment} ->
+//! Arrows point down: `cli -> app -> render -> path -> {light_grid, bsdf, bvh} -> {scene, environment} ->
 //! {image, sampler, math, color, error}`.
 
+pub mod app;
 pub mod bsdf;
 pub mod bvh;
 pub mod cli;
 pub mod color;
+pub mod denoise;
 pub mod environment;
 pub mod error;
 mod huge_pages;
@@ -28,8 +31,10 @@ pub mod light_grid;
 pub mod math;
 pub mod metrics;
 pub mod noise;
+pub mod output;
 pub mod path;
 pub mod render;
 pub mod sampler;
 pub mod scene;
+pub mod sources;
 pub mod tone;

@@ -1,17 +1,23 @@
 //! From linear radiance to 8-bit pictures for a display: exposure, tone curve, sRGB, dither.
 
+mod white_balance;
+
 use std::fmt;
 use std::str::FromStr;
 
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::color::{luminance, srgb_from_linear};
 use crate::error::Error;
 use crate::image::{Image, Rgb8};
 
+pub use white_balance::{DAYLIGHT_KELVIN, WhiteBalance};
+
 /// How radiance of any size becomes display light in `[0,1]`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum ToneCurve {
     /// Troy Sobotka's AgX, in Benjamin Wrensch's polynomial fit ("Minimal AgX Implementation").
     #[default]

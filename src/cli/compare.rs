@@ -24,7 +24,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
     let reference = read_picture(&arguments.reference)?;
     let comparison = compare(&picture, &reference).map_err(|e| Error::at(&arguments.picture, e))?;
     if arguments.json {
-        println!("{}", super::record::to_json(&comparison)?);
+        println!("{}", crate::output::record::to_json(&comparison)?);
     } else {
         println!("mean ratio        {:.5}", comparison.mean_ratio);
         println!("MSE               {:.4e}", comparison.mse);

@@ -24,13 +24,13 @@ pub(super) struct InfoArguments {
 pub(super) fn run(arguments: &InfoArguments) -> Result<()> {
     let name = arguments.source.as_str();
     let facts = if is_scene(name) {
-        scene_facts(name, super::load::scene(name)?)
+        scene_facts(name, crate::sources::scene(name)?)
     } else {
-        let (map, notices) = super::load::map(name)?;
+        let (map, notices) = crate::sources::map(name)?;
         map_facts(name, &map, &notices)
     };
     if arguments.json {
-        println!("{}", super::record::to_json(&facts)?);
+        println!("{}", crate::output::record::to_json(&facts)?);
     } else {
         print_facts(&facts, 0);
     }

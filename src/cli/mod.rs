@@ -8,25 +8,32 @@ mod compare;
 mod device;
 mod info;
 mod interrupt;
-mod load;
-mod output;
 mod progress;
-mod record;
 mod render;
 mod sat;
+mod screenshot;
 mod values;
+mod view;
 
 /// A progressive path tracer for scenes lit by an HDR environment map. It learns which tiles of the
 /// map each part of the picture can see, and samples only those.
 #[derive(Debug, Parser)]
-#[command(name = "lightgrid", version, arg_required_else_help = true)]
+#[command(
+    name = "lightgrid",
+    version,
+    after_help = "Without a command the window opens with the built-in living room."
+)]
 struct Arguments {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Open the window.
+    View(view::ViewArguments),
+    /// Draw the window's content into a file; no display is needed.
+    Screenshot(Box<screenshot::ScreenshotArguments>),
     /// Render a scene into a picture.
     Render(Box<render::RenderArguments>),
     /// Measure how far a picture is from a reference.
@@ -42,7 +49,10 @@ enum Command {
 /// Runs the command line; errors become one sentence on stderr and a non-zero exit.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let result = match &arguments.command {
+    let command = arguments.command.unwrap_or_else(|| Command::View(view::ViewArguments::plain()));
+    let result = match &command {
+        Command::View(arguments) => view::run(arguments),
+        Command::Screenshot(arguments) => screenshot::run(arguments),
         Command::Render(arguments) => render::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Info(arguments) => info::run(arguments),

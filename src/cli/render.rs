@@ -1,24 +1,25 @@
 //! `lightgrid render`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use glam::Vec3;
 
 use super::device::{self, DeviceChoice};
-use super::output::{self, Exposure, LayerName};
 use super::progress::Progress;
-use super::record::{self, Phases, Record};
 use super::values;
 use crate::environment::{Environment, EnvironmentOptions, TableKind};
 use crate::error::{Error, Notices, Result};
+use crate::image::{check_writable, is_same_file};
 use crate::light_grid::LawOptions;
+use crate::output::record::{self, Phases, Record};
+use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::path::{PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
 use crate::render::{Sampling, Session, StopRule, View};
 use crate::scene::{Camera, Projection, builtin};
-use crate::tone::ToneCurve;
+use crate::tone::{ToneCurve, WhiteBalance};
 
 /// Arguments of `render`.
 #[derive(Debug, clap::Args)]
@@ -33,7 +34,7 @@ pub(super) struct RenderArguments {
     scene: String,
     /// The picture to write: .png or .exr; may be given twice.
     #[arg(short, long = "output", required = true, value_name = "FILE")]
-    pub(super) outputs: Vec<PathBuf>,
+    outputs: Vec<PathBuf>,
 
     /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky (sky:day, sky:sunset, sky:night,
     /// sky:overcast, sky:hallway, each with @WIDTHxHEIGHT if wanted).
@@ -72,14 +73,14 @@ pub(super) struct RenderArguments {
     #[arg(long, default_value = "blackman-harris", value_enum, help_heading = "Picture")]
     filter: PixelFilter,
     /// Exposure of .png pictures in stops, or `auto`.
-    #[arg(long, default_value = "auto", value_parser = output::parse_exposure, allow_hyphen_values = true, value_name = "EV|auto", help_heading = "Picture")]
-    pub(super) exposure: Exposure,
+    #[arg(long, default_value = "auto", value_parser = parse_exposure, allow_hyphen_values = true, value_name = "EV|auto", help_heading = "Picture")]
+    exposure: Exposure,
     /// Tone curve of .png pictures: agx, aces, neutral, reinhard, none.
     #[arg(long, default_value = "agx", value_name = "CURVE", help_heading = "Picture")]
-    pub(super) tonemap: ToneCurve,
+    tonemap: ToneCurve,
     /// Extra layers in .exr pictures: albedo, normal, depth, samples, variance, or all.
     #[arg(long, value_delimiter = ',', value_name = "LAYER", help_heading = "Picture")]
-    pub(super) layers: Vec<LayerName>,
+    layers: Vec<LayerName>,
 
     /// Stop at this many samples per pixel (256 if no stop rule is given).
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..), value_name = "N", help_heading = "Stop")]
@@ -127,7 +128,7 @@ pub(super) struct RenderArguments {
     threads: u16,
     /// Writes the run's figures as JSON.
     #[arg(long, value_name = "FILE", help_heading = "Run")]
-    pub(super) json: Option<PathBuf>,
+    json: Option<PathBuf>,
 }
 
 fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
@@ -138,16 +139,85 @@ fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
     Ok((columns, rows))
 }
 
+fn parse_exposure(text: &str) -> std::result::Result<Exposure, String> {
+    if text == "auto" {
+        return Ok(Exposure::Auto);
+    }
+    values::finite(text)
+        .map(|stops| Exposure::Stops(stops as f32))
+        .map_err(|e| format!("{e} of stops, or auto"))
+}
+
+/// Refuses outputs before the work rather than after it.
+fn check_outputs(arguments: &RenderArguments) -> Result<()> {
+    for picture in &arguments.outputs {
+        output::check_extension(picture)?;
+    }
+    let files: Vec<&PathBuf> = arguments.outputs.iter().chain(&arguments.json).collect();
+    for (i, file) in files.iter().enumerate() {
+        if files[..i].iter().any(|other| is_same_file(other, file)) {
+            return Err(Error::at(file, "two outputs would be written to this one file"));
+        }
+        check_writable(file)?;
+    }
+    Ok(())
+}
+
+impl RenderArguments {
+    /// Defaults but for scene, map, picture, sampling and (size, samples, seconds).
+    pub(super) fn for_picture(
+        scene: &str,
+        map: &str,
+        picture: &Path,
+        sampling: Sampling,
+        (size, samples, seconds): (Option<(u32, u32)>, Option<u32>, Option<f64>),
+    ) -> Self {
+        Self {
+            scene: scene.to_owned(),
+            outputs: vec![picture.to_owned()],
+            env: map.to_owned(),
+            env_rotation: 0.0,
+            env_intensity: 1.0,
+            camera: None,
+            eye: None,
+            target: None,
+            fov: None,
+            lens_radius: None,
+            focus: None,
+            size: size.unwrap_or((1280, 720)),
+            filter: PixelFilter::default(),
+            exposure: Exposure::Auto,
+            tonemap: ToneCurve::default(),
+            layers: Vec::new(),
+            spp: samples,
+            seconds,
+            noise: None,
+            sampling,
+            table: TableKind::default(),
+            bounces: 8,
+            no_russian_roulette: false,
+            tiles: (32, 16),
+            grid: 64,
+            learning_paths: None,
+            seed: 0,
+            device: DeviceChoice::Cpu,
+            adapter: None,
+            threads: 0,
+            json: None,
+        }
+    }
+}
+
 /// Loads, learns, renders, writes.
 pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
-    output::check_outputs(arguments)?;
+    check_outputs(arguments)?;
     start_threads(arguments.threads)?;
     let cancel = super::interrupt::flag();
     let progress = Progress::start("loading");
     let mut phases = Phases::default();
 
     let start = Instant::now();
-    let scene = super::load::scene(&arguments.scene)?;
+    let scene = crate::sources::scene(&arguments.scene)?;
     phases.load_scene_seconds = lap(start);
     progress.say("building the BVH");
     let start = Instant::now();
@@ -156,7 +226,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
 
     progress.say("loading the map");
     let start = Instant::now();
-    let (map, map_notices) = super::load::map(&arguments.env)?;
+    let (map, map_notices) = crate::sources::map(&arguments.env)?;
     phases.load_map_seconds = lap(start);
     let start = Instant::now();
     let environment = Environment::new(map, &environment_options(arguments))
@@ -189,16 +259,24 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         map: &arguments.env,
         world: &world,
         environment: &environment,
-        session: &session,
+        film: session.film(),
+        figures: session.figures(),
+        gpu: session.gpu_figures(),
         phases: &phases,
         notices: &notices,
         options: settings(arguments),
     };
-    for output in &arguments.outputs {
-        output::write_picture(output, arguments, &record)?;
+    let options = PictureOptions {
+        exposure: arguments.exposure,
+        tone_curve: arguments.tonemap,
+        white_balance: WhiteBalance::default(),
+        layers: arguments.layers.clone(),
+    };
+    for picture in &arguments.outputs {
+        output::write_picture(picture, &options, &record)?;
     }
     if let Some(path) = &arguments.json {
-        record::write_json(path, &record.figures())?;
+        record::write_json(path, &record.to_json())?;
     }
     outcome
 }

@@ -29,17 +29,17 @@ pub(super) fn run(arguments: &SatArguments) -> Result<()> {
     };
     let mut reports = serde_json::Map::new();
     for name in maps {
-        let (map, notices) = super::load::map(name)?;
+        let (map, notices) = crate::sources::map(name)?;
         notices.iter().for_each(|sentence| eprintln!("notice: {name}: {sentence}"));
         let report = sat_report(&map, Lookup::Bilinear, SAMPLES).map_err(|e| Error::at(name, e))?;
         if arguments.json {
-            reports.insert(name.to_owned(), super::record::to_value(&report)?);
+            reports.insert(name.to_owned(), crate::output::record::to_value(&report)?);
         } else {
             println!("{name}, {}x{}\n{report}", map.width, map.height);
         }
     }
     if arguments.json {
-        println!("{}", super::record::to_json(&reports)?);
+        println!("{}", crate::output::record::to_json(&reports)?);
     }
     Ok(())
 }

@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+pub(super) use crate::sources::size_pair as pair;
+
 /// Largest picture in pixels: 40 bytes a pixel stay under 5.4 GB.
 const MAX_PIXELS: u64 = 1 << 27;
 
@@ -13,14 +15,6 @@ pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
         return Err(format!("{pixels} pixels are more than the {MAX_PIXELS} a picture may have"));
     }
     Ok((width, height))
-}
-
-/// Two positive whole numbers joined by `x`.
-pub(super) fn pair(text: &str) -> Result<(u32, u32), String> {
-    let number = |t: &str| t.trim().parse::<u32>().ok().filter(|n| *n > 0);
-    text.split_once(['x', 'X'])
-        .and_then(|(a, b)| number(a).zip(number(b)))
-        .ok_or_else(|| "expected two positive whole numbers like 1280x720".to_owned())
 }
 
 /// `X,Y,Z` in metres.

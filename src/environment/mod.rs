@@ -19,6 +19,7 @@ mod weights;
 
 use std::borrow::Cow;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
@@ -30,16 +31,16 @@ use self::tiles::TileGrid;
 use self::weights::Weights;
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::math::{sin_cos_turns, texel_solid_angle, uv_from_direction};
+use crate::math::{direction_from_uv, sin_cos_turns, texel_solid_angle, uv_from_direction};
 use crate::sampler::hash;
 
-/// A lat-long map of radiance that can be looked up and sampled.
+/// A lat-long map of radiance that can be looked up and sampled. Clones share pixels and table.
 #[derive(Debug, Clone)]
 pub struct Environment {
-    map: Image,
+    map: Arc<Image>,
     lookup: Lookup,
     grid: TileGrid,
-    table: Table,
+    table: Arc<Table>,
     tile_energies: Vec<f64>,
     /// Cosine of the polar angle at the edges of the rows, `height + 1` of them.
     row_edge_cosines: Vec<f64>,
@@ -104,10 +105,10 @@ impl Environment {
             .map(|row| (1.0 / texel_solid_angle(map.width, map.height, row)) as f32)
             .collect();
         let mut environment = Self {
-            map,
+            map: Arc::new(map),
             lookup: options.lookup,
             grid,
-            table,
+            table: Arc::new(table),
             tile_energies,
             row_edge_cosines,
             inverse_texel_solid_angles,
@@ -145,6 +146,16 @@ impl Environment {
     /// Columns and rows of tiles; tile `t` is in row `t / columns`, column `t % columns`.
     pub fn tile_grid(&self) -> (u32, u32) {
         self.grid.size()
+    }
+
+    /// Unit world direction of a place in a tile, `within` in `[0,1]`^2 of its extent in u and v.
+    pub fn direction_in_tile(&self, tile: u32, within: Vec2) -> Vec3 {
+        let texels = self.grid.texels(tile);
+        let size = Vec2::new(self.map.width as f32, self.map.height as f32);
+        let first = Vec2::new(texels.x.start as f32, texels.y.start as f32);
+        let extent = Vec2::new(texels.width() as f32, texels.height() as f32);
+        let uv = (first + within * extent) / size;
+        direction_from_uv(Vec2::new(uv.x + self.rotation_turns, uv.y))
     }
 
     /// The tile seen in a unit world direction.

@@ -28,7 +28,7 @@ pub(crate) trait Corner: Copy + Default + Into<f64> + std::fmt::Debug + Send + S
 impl Corner for u32 {
     const KIND: TableKind = TableKind::U32;
 
-    fn words(self, _: Self) -> impl Iterator<Item = u32> {
+    fn words(self, _: Self) -> impl Iterator<Item = Self> {
         [self].into_iter()
     }
 }

@@ -51,6 +51,27 @@ impl Image {
         Self { width, height, pixels }
     }
 
+    /// The picture at most `width` pixels wide, each the mean of those it covers.
+    pub fn shrunk(&self, width: u32) -> Self {
+        let width = width.clamp(1, self.width);
+        let height = (u64::from(width) * u64::from(self.height) / u64::from(self.width)) as u32;
+        let height = height.clamp(1, self.height);
+        let covered = |i: u32, count: u32, all: u32| {
+            let edge = |i: u32| (u64::from(i) * u64::from(all) / u64::from(count)) as u32;
+            edge(i)..edge(i + 1).max(edge(i) + 1)
+        };
+        Self::from_fn(width, height, |x, y| {
+            let columns = covered(x, width, self.width);
+            let rows = covered(y, height, self.height);
+            let count = (columns.len() * rows.len()) as f64;
+            let mut sum = [0.0_f64; 3];
+            for (x, y) in rows.flat_map(|y| columns.clone().map(move |x| (x, y))) {
+                sum.iter_mut().zip(self.at(x, y)).for_each(|(s, v)| *s += f64::from(v));
+            }
+            sum.map(|s| (s / count) as f32)
+        })
+    }
+
     /// The pixel in column `x` of row `y`.
     pub fn at(&self, x: u32, y: u32) -> [f32; 3] {
         self.pixels[y as usize * self.width as usize + x as usize]

@@ -12,6 +12,7 @@ pub mod cells;
 pub mod counters;
 mod learning;
 pub mod tile_laws;
+mod transfer;
 
 use cells::SphericalGrid;
 use tile_laws::TileLaws;

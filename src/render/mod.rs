@@ -8,7 +8,7 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 mod cpu;
 pub mod film;
@@ -27,7 +27,7 @@ use crate::path::{PathLimits, PathTracer, World};
 use crate::scene::Camera;
 
 /// How the environment map is sampled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
     /// Learned tiles, our way: faces, cosine, pooling; with BSDF sampling.
@@ -81,7 +81,7 @@ impl View {
 const LEARNING_SHARE: u64 = 32;
 
 /// When to stop; whichever comes first.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct StopRule {
     /// Samples per pixel.
     pub samples: Option<u32>,
@@ -131,6 +131,13 @@ enum Engine<'a> {
     Gpu(Box<gpu::Renderer<'a>>),
 }
 
+impl Figures {
+    /// Seconds of learning and rendering.
+    pub fn elapsed_seconds(&self) -> f64 {
+        self.learning_seconds + self.render_seconds
+    }
+}
+
 /// A picture in the making.
 pub struct Session<'a> {
     world: &'a World,
@@ -142,6 +149,7 @@ pub struct Session<'a> {
     whole_map: Option<LightGrid>,
     learned: Option<LightGrid>,
     learning: Option<Learning>,
+    finished: Option<LearningGrid>,
     figures: Figures,
 }
 
@@ -196,6 +204,7 @@ impl<'a> Session<'a> {
             whole_map,
             learned: None,
             learning,
+            finished: None,
             figures: Figures::default(),
         }
     }
@@ -253,6 +262,7 @@ impl<'a> Session<'a> {
         if let Some(learning) = self.learning.take() {
             self.figures.visited_cells = learning.grid.counters.visited_cells();
             self.figures.grid_bytes = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
+            self.finished = Some(learning.grid);
         }
     }
 
@@ -264,6 +274,12 @@ impl<'a> Session<'a> {
         self.learning = None;
         self.learned = Some(grid);
         self.upload_grid()
+    }
+
+    /// The counters of a learning that has ended, for inspection; they can be taken once and are
+    /// not needed for rendering.
+    pub fn take_counters(&mut self) -> Option<LearningGrid> {
+        self.finished.take()
     }
 
     /// The film so far.
@@ -288,7 +304,7 @@ impl<'a> Session<'a> {
 
     /// Seconds of learning and rendering so far.
     pub fn elapsed_seconds(&self) -> f64 {
-        self.figures.learning_seconds + self.figures.render_seconds
+        self.figures.elapsed_seconds()
     }
 
     /// Whether a rule says to stop. Noise is only asked for from 16 samples on.

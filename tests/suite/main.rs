@@ -1,5 +1,6 @@
 //! The one integration-test binary.
 
+mod app;
 mod bsdf;
 mod builtin;
 mod bvh;

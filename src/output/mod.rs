@@ -1,64 +1,70 @@
 //! What a render leaves behind: pictures, their layers, and what is to be said about them.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::record::Record;
-use super::render::RenderArguments;
-use super::values;
+pub mod record;
+
+use self::record::Record;
 use crate::color::luminance;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::image::{ExrPicture, Layer, check_writable, is_same_file, write_exr, write_png};
+use crate::image::{ExrPicture, Layer, write_exr, write_png};
 use crate::render::film::{Film, Pixel};
-use crate::tone::{auto_exposure_ev, display_rgb8};
+use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev, display_rgb8};
 
 /// A layer that can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum LayerName {
+pub enum LayerName {
+    /// Mean albedo of the first surface.
     Albedo,
+    /// World normal of the first surface.
     Normal,
+    /// Metres to the first surface.
     Depth,
+    /// Samples per pixel.
     Samples,
+    /// Variance of one sample's luminance.
     Variance,
+    /// All of them.
     All,
 }
 
-/// Exposure as typed.
+/// Exposure of 8-bit pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Exposure {
+pub enum Exposure {
+    /// Stops.
     Stops(f32),
+    /// What brings the picture to middle grey.
     Auto,
 }
 
-pub(super) fn parse_exposure(text: &str) -> std::result::Result<Exposure, String> {
-    if text == "auto" {
-        return Ok(Exposure::Auto);
-    }
-    values::finite(text)
-        .map(|stops| Exposure::Stops(stops as f32))
-        .map_err(|e| format!("{e} of stops, or auto"))
+/// How a picture is written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PictureOptions {
+    /// Exposure of `.png` pictures.
+    pub exposure: Exposure,
+    /// Tone curve of `.png` pictures.
+    pub tone_curve: ToneCurve,
+    /// White balance of `.png` pictures.
+    pub white_balance: WhiteBalance,
+    /// Extra layers of `.exr` pictures.
+    pub layers: Vec<LayerName>,
 }
 
-/// Refuses outputs before the work rather than after it.
-pub(super) fn check_outputs(arguments: &RenderArguments) -> Result<()> {
-    for picture in &arguments.outputs {
-        let extension = picture.extension().map(|e| e.to_string_lossy().to_lowercase());
-        if !matches!(extension.as_deref(), Some("png" | "exr")) {
-            return Err(Error::at(picture, "pictures are written as .png or .exr"));
-        }
+/// Refuses pictures that are neither `.png` nor `.exr`.
+///
+/// # Errors
+/// One sentence that names the file.
+pub fn check_extension(path: &Path) -> Result<()> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    match extension.as_deref() {
+        Some("png" | "exr") => Ok(()),
+        _ => Err(Error::at(path, "pictures are written as .png or .exr")),
     }
-    let files: Vec<&PathBuf> = arguments.outputs.iter().chain(&arguments.json).collect();
-    for (i, file) in files.iter().enumerate() {
-        if files[..i].iter().any(|other| is_same_file(other, file)) {
-            return Err(Error::at(file, "two outputs would be written to this one file"));
-        }
-        check_writable(file)?;
-    }
-    Ok(())
 }
 
 /// What a person should know about a finished picture.
-pub(super) fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
+pub fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
     let mut remarks = Vec::new();
     if film.invalid_samples() > 0 {
         remarks
@@ -76,25 +82,28 @@ pub(super) fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
 /// sealed rooms as they are modelled (1e-9 to 1e-6) and what comes through a crack.
 const BLACK_SHARE: f64 = 2e-6;
 
-pub(super) fn write_picture(
-    path: &Path,
-    arguments: &RenderArguments,
-    record: &Record<'_>,
-) -> Result<()> {
-    let film = record.session.film();
+/// Writes the film as `.exr` (linear, with layers) or `.png` (8 bits), told by the extension, with
+/// the record's metadata.
+///
+/// # Errors
+/// If the file is of another kind or cannot be written.
+pub fn write_picture(path: &Path, options: &PictureOptions, record: &Record<'_>) -> Result<()> {
+    check_extension(path)?;
+    let film = record.film;
     let image = film.image();
     let mut metadata = record.metadata();
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
-        let layers = layers(film, &arguments.layers);
+        let layers = layers(film, &options.layers);
         return write_exr(path, ExrPicture { image: &image, layers, metadata: &metadata });
     }
-    let stops = match arguments.exposure {
+    let image = options.white_balance.apply(image);
+    let stops = match options.exposure {
         Exposure::Stops(stops) => stops,
         Exposure::Auto => auto_exposure_ev(&image),
     };
     metadata.push(("lightgrid.exposure_ev".to_owned(), format!("{stops:.3}")));
-    metadata.push(("lightgrid.tonemap".to_owned(), arguments.tonemap.name().to_owned()));
-    write_png(path, &display_rgb8(&image, stops, arguments.tonemap), &metadata)
+    metadata.push(("lightgrid.tonemap".to_owned(), options.tone_curve.name().to_owned()));
+    write_png(path, &display_rgb8(&image, stops, options.tone_curve), &metadata)
 }
 
 fn layers(film: &Film, names: &[LayerName]) -> Vec<Layer> {

@@ -14,7 +14,10 @@ const SKY_SIZE: (u32, u32) = (2048, 1024);
 const MAX_SKY_SIZE: (u32, u32) = (16384, 8192);
 
 /// The scene a name stands for: a built-in's name, or a glTF file.
-pub(super) fn scene(name: &str) -> Result<Scene> {
+///
+/// # Errors
+/// One sentence: the name is neither, or the file cannot be read.
+pub fn scene(name: &str) -> Result<Scene> {
     if builtin::names().contains(&name) {
         return builtin::build(name);
     }
@@ -29,7 +32,10 @@ pub(super) fn scene(name: &str) -> Result<Scene> {
 }
 
 /// The map a name stands for: `sky:NAME`, `sky:NAME@WIDTHxHEIGHT`, or a file; repaired and ready.
-pub(super) fn map(name: &str) -> Result<(Image, Notices)> {
+///
+/// # Errors
+/// One sentence: there is no such sky, its size is out of range, or the file cannot be read.
+pub fn map(name: &str) -> Result<(Image, Notices)> {
     if let Some(rest) = name.strip_prefix("sky:") {
         return Ok((built_in_sky(name, rest)?, Notices::default()));
     }
@@ -42,13 +48,19 @@ pub(super) fn map(name: &str) -> Result<(Image, Notices)> {
 fn built_in_sky(name: &str, rest: &str) -> Result<Image> {
     let (sky_name, (width, height)) = match rest.split_once('@') {
         None => (rest, SKY_SIZE),
-        Some((sky_name, size)) => {
-            (sky_name, super::values::pair(size).map_err(|e| Error::at(name, e))?)
-        }
+        Some((sky_name, size)) => (sky_name, size_pair(size).map_err(|e| Error::at(name, e))?),
     };
     if width > MAX_SKY_SIZE.0 || height > MAX_SKY_SIZE.1 {
         let (w, h) = MAX_SKY_SIZE;
         return Err(Error::at(name, format!("a sky can be at most {w}x{h}")));
     }
     sky::build(sky_name, width, height)
+}
+
+/// Two positive whole numbers joined by `x`.
+pub(crate) fn size_pair(text: &str) -> std::result::Result<(u32, u32), String> {
+    let number = |t: &str| t.trim().parse::<u32>().ok().filter(|n| *n > 0);
+    text.split_once(['x', 'X'])
+        .and_then(|(a, b)| number(a).zip(number(b)))
+        .ok_or_else(|| "expected two positive whole numbers like 1280x720".to_owned())
 }

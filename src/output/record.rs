@@ -10,39 +10,57 @@ use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
 use crate::image::write_beside_and_rename;
 use crate::path::World;
-use crate::render::Session;
+use crate::render::Figures;
+use crate::render::film::Film;
+use crate::render::gpu::GpuFigures;
 
 /// Seconds before the session starts.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
-pub(super) struct Phases {
-    pub(super) load_scene_seconds: f64,
-    pub(super) build_bvh_seconds: f64,
-    pub(super) load_map_seconds: f64,
-    pub(super) build_table_seconds: f64,
+pub struct Phases {
+    /// Reading the scene.
+    pub load_scene_seconds: f64,
+    /// Building its BVH and light tables.
+    pub build_bvh_seconds: f64,
+    /// Reading the map.
+    pub load_map_seconds: f64,
+    /// Building its importance table.
+    pub build_table_seconds: f64,
 }
 
 /// Everything there is to say about a run.
-pub(super) struct Record<'a> {
-    pub(super) scene: &'a str,
-    pub(super) map: &'a str,
-    pub(super) world: &'a World,
-    pub(super) environment: &'a Environment,
-    pub(super) session: &'a Session<'a>,
-    pub(super) phases: &'a Phases,
-    pub(super) notices: &'a Notices,
-    pub(super) options: Vec<(&'static str, Value)>,
+pub struct Record<'a> {
+    /// Name or path of the scene.
+    pub scene: &'a str,
+    /// Name or path of the map.
+    pub map: &'a str,
+    /// The scene.
+    pub world: &'a World,
+    /// The map.
+    pub environment: &'a Environment,
+    /// The picture.
+    pub film: &'a Film,
+    /// What was done for it.
+    pub figures: &'a Figures,
+    /// The device, if it was not the CPU.
+    pub gpu: Option<GpuFigures>,
+    /// What was done before.
+    pub phases: &'a Phases,
+    /// What was said about it.
+    pub notices: &'a Notices,
+    /// Settings by name.
+    pub options: Vec<(&'static str, Value)>,
 }
 
 impl Record<'_> {
     /// Key and value pairs for pictures: scene, map, settings, samples, seconds.
-    pub(super) fn metadata(&self) -> Vec<(String, String)> {
-        let film = self.session.film();
+    pub fn metadata(&self) -> Vec<(String, String)> {
+        let film = self.film;
         let mut pairs = vec![
             ("lightgrid.version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
             ("lightgrid.scene".to_owned(), self.scene.to_owned()),
             ("lightgrid.map".to_owned(), self.map.to_owned()),
             ("lightgrid.samples_per_pixel".to_owned(), film.min_samples().to_string()),
-            ("lightgrid.seconds".to_owned(), format!("{:.3}", self.session.elapsed_seconds())),
+            ("lightgrid.seconds".to_owned(), format!("{:.3}", self.figures.elapsed_seconds())),
         ];
         // A prefix keeps clear of the names that OpenEXR reserves.
         pairs.extend(self.options.iter().map(|(key, value)| {
@@ -53,9 +71,9 @@ impl Record<'_> {
     }
 
     /// The figures of `--json`.
-    pub(super) fn figures(&self) -> Value {
-        let film = self.session.film();
-        let figures = self.session.figures();
+    pub fn to_json(&self) -> Value {
+        let film = self.film;
+        let figures = self.figures;
         let memory = self.environment.memory_bytes();
         let noise = film.noise();
         json!({
@@ -71,7 +89,7 @@ impl Record<'_> {
             "invalid_samples": film.invalid_samples(),
             "phases": self.phases,
             "session": figures,
-            "seconds": self.session.elapsed_seconds(),
+            "seconds": self.figures.elapsed_seconds(),
             "rays_per_sample": figures.rays as f64 / figures.samples.max(1) as f64,
             "rays_per_second": figures.rays as f64 / figures.render_seconds.max(1e-9),
             "memory": {
@@ -83,7 +101,7 @@ impl Record<'_> {
             },
             "threads": rayon::current_num_threads(),
             "simd": self.world.bvh.simd_name(),
-            "gpu": self.session.gpu_figures(),
+            "gpu": self.gpu,
             "needs": self.world.needs,
             "left_out": self.world.needs.left_out(),
             "notices": self.notices.iter().collect::<Vec<_>>(),
@@ -92,17 +110,26 @@ impl Record<'_> {
 }
 
 /// Pretty JSON of anything serialisable.
-pub(super) fn to_json(value: &impl Serialize) -> Result<String> {
+///
+/// # Errors
+/// If a value has no JSON form.
+pub fn to_json(value: &impl Serialize) -> Result<String> {
     serde_json::to_string_pretty(value).map_err(|e| Error::new(format!("JSON: {e}")))
 }
 
 /// A JSON value of anything serialisable.
-pub(super) fn to_value(value: &impl Serialize) -> Result<Value> {
+///
+/// # Errors
+/// If a value has no JSON form.
+pub fn to_value(value: &impl Serialize) -> Result<Value> {
     serde_json::to_value(value).map_err(|e| Error::new(format!("JSON: {e}")))
 }
 
 /// Writes JSON beside and renames.
-pub(super) fn write_json(path: &Path, value: &Value) -> Result<()> {
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_json(path: &Path, value: &Value) -> Result<()> {
     let text = to_json(value)?;
     write_beside_and_rename(path, |file| writeln!(file, "{text}"))
 }

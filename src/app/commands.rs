@@ -1,0 +1,134 @@
+//! What a person can ask for, and the keys that ask for it.
+
+use std::path::PathBuf;
+
+use egui::{Key, KeyboardShortcut, Modifiers};
+
+use super::document::Viewpoint;
+use super::interface::Purpose;
+
+/// Something asked for by a panel, a key or a dropped file; the application carries it out.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Command {
+    /// Show another scene: a file or a built-in.
+    OpenScene(String),
+    /// Light with another map: a file or a built-in sky.
+    OpenMap(String),
+    /// Ask for a scene file.
+    ChooseScene,
+    /// Ask for a map file.
+    ChooseMap,
+    /// Ask where to write the picture.
+    ChooseSave,
+    /// Open the system's file dialogue.
+    Browse(Purpose),
+    /// Write the picture.
+    Save(PathBuf),
+    /// Put the picture on the clipboard.
+    Copy,
+    /// Look from here.
+    LookFrom(Viewpoint),
+    /// Keep the present viewpoint.
+    Bookmark,
+    /// Drop a kept viewpoint.
+    ForgetBookmark(usize),
+    /// Show the whole scene.
+    FrameAll,
+    /// Show the surface that was clicked last.
+    FrameSelected,
+    /// Halt or go on.
+    TogglePause,
+    /// Start the picture again.
+    Restart,
+    /// Take a change back.
+    Undo,
+    /// Bring it again.
+    Redo,
+    /// Show or hide the plain half.
+    ToggleSplit,
+    /// Filter noise out or not.
+    ToggleDenoise,
+    /// Show or hide the panels.
+    TogglePanels,
+    /// Show or hide the developer's panel.
+    ToggleDeveloper,
+    /// Show or hide the list of keys.
+    ToggleShortcuts,
+    /// Keep the present picture for comparison.
+    KeepPicture,
+    /// Compute the true visible energy at the inspected point.
+    MeasureTruth,
+    /// Ask where to write the inspected cell's law.
+    ChooseExport,
+    /// Write all laws.
+    Export(PathBuf),
+    /// Close the window.
+    Quit,
+}
+
+/// Keys, what they do, and the command.
+pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 16] = [
+    (plain(Key::Space), "Pause, resume", Command::TogglePause),
+    (plain(Key::R), "Restart the picture", Command::Restart),
+    (plain(Key::F), "Frame the whole scene", Command::FrameAll),
+    (shift(Key::F), "Frame the surface clicked last", Command::FrameSelected),
+    (plain(Key::B), "Keep this viewpoint", Command::Bookmark),
+    (plain(Key::K), "Keep this picture for comparison", Command::KeepPicture),
+    (plain(Key::V), "Split view: plain | adaptive", Command::ToggleSplit),
+    (plain(Key::N), "Denoise, before and after", Command::ToggleDenoise),
+    (plain(Key::H), "Hide or show the panels", Command::TogglePanels),
+    (plain(Key::F12), "Hide or show the developer's panel", Command::ToggleDeveloper),
+    (control(Key::S), "Save the picture", Command::ChooseSave),
+    (control(Key::O), "Open a scene", Command::ChooseScene),
+    (control(Key::M), "Open a map", Command::ChooseMap),
+    (control(Key::Z), "Undo", Command::Undo),
+    (control(Key::Y), "Redo", Command::Redo),
+    (control(Key::Q), "Quit", Command::Quit),
+];
+
+/// What the mouse and held keys do in the picture.
+pub const GESTURES: [(&str, &str); 7] = [
+    ("Drag", "Orbit around the pivot"),
+    ("Shift drag, middle drag", "Pan"),
+    ("Right drag", "Look around"),
+    ("Wheel", "Dolly"),
+    ("W A S D, E Q", "Fly; Shift is faster"),
+    ("Double click", "Orbit around this point"),
+    ("Ctrl click", "Focus on this point"),
+];
+
+const fn plain(key: Key) -> KeyboardShortcut {
+    KeyboardShortcut::new(Modifiers::NONE, key)
+}
+
+const fn shift(key: Key) -> KeyboardShortcut {
+    KeyboardShortcut::new(Modifiers::SHIFT, key)
+}
+
+const fn control(key: Key) -> KeyboardShortcut {
+    KeyboardShortcut::new(Modifiers::COMMAND, key)
+}
+
+/// Takes the shortcuts pressed in this frame, unless somebody is typing.
+pub fn pressed(context: &egui::Context) -> Vec<Command> {
+    if context.text_edit_focused() {
+        return Vec::new();
+    }
+    context.input_mut(|input| {
+        let mut commands: Vec<Command> = SHORTCUTS
+            .iter()
+            .rev()
+            .filter(|(shortcut, _, _)| input.consume_shortcut(shortcut))
+            .map(|(_, _, command)| command.clone())
+            .collect();
+        let asks = input.events.iter().any(|e| matches!(e, egui::Event::Text(t) if t == "?"));
+        if asks || input.consume_key(Modifiers::NONE, Key::F1) {
+            commands.push(Command::ToggleShortcuts);
+        }
+        let copies = input.events.iter().any(|e| matches!(e, egui::Event::Copy));
+        if copies {
+            commands.push(Command::Copy);
+        }
+        commands
+    })
+}

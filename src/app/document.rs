@@ -1,0 +1,215 @@
+//! What the window shows, as plain data: undo compares it, the settings file keeps part of it, the
+//! worker's request follows from it.
+
+use glam::{Affine3A, Mat3A, Quat, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::light_grid::LawOptions;
+use crate::path::PathLimits;
+use crate::render::filter::PixelFilter;
+use crate::render::{Sampling, StopRule, View};
+use crate::scene::{Camera, Projection, builtin};
+use crate::tone::{ToneCurve, WhiteBalance};
+
+/// Everything a person sets about the picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Document {
+    /// Scene file or built-in scene.
+    pub scene: String,
+    /// Map file or built-in sky.
+    pub map: String,
+    /// Turn of the map in degrees, `[0, 360)`.
+    pub rotation_degrees: f32,
+    /// Factor on the map's radiance.
+    pub intensity: f32,
+    /// Where from; `None` until the scene is loaded and says it.
+    pub viewpoint: Option<Viewpoint>,
+    /// How light is found.
+    pub light: Light,
+    /// How the picture is developed.
+    pub look: Look,
+    /// How large it is.
+    pub size: PictureSize,
+    /// When it is done.
+    pub stop: StopRule,
+    /// Kept viewpoints of this scene.
+    pub bookmarks: Vec<Viewpoint>,
+}
+
+/// How light is found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Light {
+    /// How the map is sampled.
+    pub sampling: Sampling,
+    /// Whether the plain method runs beside it for comparison.
+    pub split: bool,
+    /// Surface vertices at which a path gathers light.
+    pub bounces: u32,
+    /// Seed of the random numbers.
+    pub seed: u32,
+}
+
+/// How linear radiance becomes a picture; nothing of it restarts rendering.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Look {
+    /// Whether the exposure follows the picture; `exposure_ev` is added to it then.
+    pub auto_exposure: bool,
+    /// Stops.
+    pub exposure_ev: f32,
+    /// Tone curve.
+    pub curve: ToneCurve,
+    /// The light that looks white.
+    pub white_balance: WhiteBalance,
+    /// Whether noise is filtered out for display and 8-bit pictures.
+    pub denoise: bool,
+}
+
+/// Size of the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PictureSize {
+    /// As large as the viewport, divided by this.
+    Viewport(u32),
+    /// Pixels across and down.
+    Fixed(u32, u32),
+}
+
+impl Default for Document {
+    fn default() -> Self {
+        Self {
+            scene: builtin::DEFAULT_SCENE.to_owned(),
+            map: "sky:day".to_owned(),
+            rotation_degrees: 0.0,
+            intensity: 1.0,
+            viewpoint: None,
+            light: Light { sampling: Sampling::Adaptive, split: false, bounces: 8, seed: 0 },
+            look: Look {
+                auto_exposure: true,
+                exposure_ev: 0.0,
+                curve: ToneCurve::Agx,
+                white_balance: WhiteBalance::default(),
+                denoise: false,
+            },
+            size: PictureSize::Viewport(1),
+            stop: StopRule::default(),
+            bookmarks: Vec::new(),
+        }
+    }
+}
+
+impl Document {
+    /// The render settings that follow for a picture of this size; `None` without a viewpoint.
+    pub fn view(&self, width: u32, height: u32) -> Option<View> {
+        Some(View {
+            camera: self.viewpoint.as_ref()?.camera(),
+            width,
+            height,
+            filter: PixelFilter::default(),
+            sampling: self.light.sampling,
+            limits: PathLimits { bounces: self.light.bounces, russian_roulette: true },
+            seed: self.light.seed,
+            grid_columns: 64,
+            learning_paths: View::suitable_learning_paths(width, height, self.stop.samples),
+            laws: LawOptions::ADAPTIVE,
+            // The denoiser, focusing and the surface overlays need them.
+            layers: true,
+        })
+    }
+}
+
+/// A camera with the point it turns around.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Viewpoint {
+    /// What to call it.
+    pub name: String,
+    /// World position in metres.
+    pub eye: [f32; 3],
+    /// World from camera, a unit quaternion (x, y, z, w).
+    pub rotation: [f32; 4],
+    /// Metres along the view axis to the point that orbiting turns around.
+    pub pivot_distance: f32,
+    /// Vertical field of view in degrees; `None` for parallel projection.
+    pub fov_y_degrees: Option<f32>,
+    /// Half the picture's height in metres, for parallel projection.
+    pub half_height: f32,
+    /// Radius of the lens in metres; 0 keeps everything sharp.
+    pub lens_radius: f32,
+    /// Metres at which the picture is sharp.
+    pub focus_distance: f32,
+}
+
+impl Viewpoint {
+    /// Of a scene's camera; `pivot_distance` in metres.
+    pub fn of(camera: &Camera, pivot_distance: f32) -> Self {
+        let axes = camera.world_from_camera.matrix3;
+        let rotation = Quat::from_mat3a(&Mat3A::from_cols(
+            axes.x_axis.normalize_or(glam::Vec3A::X),
+            axes.y_axis.normalize_or(glam::Vec3A::Y),
+            axes.z_axis.normalize_or(glam::Vec3A::Z),
+        ));
+        let (fov_y_degrees, half_height) = match camera.projection {
+            Projection::Perspective { fov_y_radians } => (Some(fov_y_radians.to_degrees()), 1.0),
+            Projection::Orthographic { half_height } => (None, half_height),
+        };
+        Self {
+            name: camera.name.clone(),
+            eye: Vec3::from(camera.world_from_camera.translation).to_array(),
+            rotation: rotation.to_array(),
+            pivot_distance: pivot_distance.max(0.01),
+            fov_y_degrees,
+            half_height,
+            lens_radius: camera.lens_radius,
+            focus_distance: camera.focus_distance,
+        }
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> Camera {
+        Camera {
+            name: self.name.clone(),
+            world_from_camera: Affine3A::from_rotation_translation(self.rotation(), self.eye()),
+            projection: match self.fov_y_degrees {
+                Some(degrees) => Projection::Perspective { fov_y_radians: degrees.to_radians() },
+                None => Projection::Orthographic { half_height: self.half_height },
+            },
+            aspect: None,
+            lens_radius: self.lens_radius,
+            focus_distance: self.focus_distance,
+        }
+    }
+
+    /// World position in metres.
+    pub fn eye(&self) -> Vec3 {
+        Vec3::from(self.eye)
+    }
+
+    /// World from camera.
+    pub fn rotation(&self) -> Quat {
+        Quat::from_array(self.rotation)
+    }
+
+    /// Unit direction it looks in.
+    pub fn forward(&self) -> Vec3 {
+        self.rotation() * Vec3::NEG_Z
+    }
+
+    /// The point orbiting turns around.
+    pub fn pivot(&self) -> Vec3 {
+        self.eye() + self.forward() * self.pivot_distance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_viewpoint_is_the_camera_it_came_from() {
+        let mut camera = Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::new(-1.0, 0.5, 0.0), 0.7);
+        camera.lens_radius = 0.03;
+        let viewpoint = Viewpoint::of(&camera, camera.focus_distance);
+        let again = viewpoint.camera();
+        assert!(again.world_from_camera.abs_diff_eq(camera.world_from_camera, 1e-5));
+        assert_eq!(again.lens_radius, 0.03);
+        assert!((viewpoint.pivot() - Vec3::new(-1.0, 0.5, 0.0)).length() < 1e-5);
+    }
+}

@@ -1,0 +1,284 @@
+//! Carrying out commands.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::commands::Command;
+use super::document::Viewpoint;
+use super::interface::{Dock, Interface, Prompt, Purpose, Tab};
+use super::{App, Later, convergence, save, surface_map, theme};
+use crate::error::{Error, Result};
+
+impl App {
+    pub(super) fn execute(&mut self, command: Command, context: &egui::Context) {
+        let interface = &mut self.interface;
+        match command {
+            Command::OpenScene(name) => {
+                if self.scene.as_ref().is_none_or(|scene| scene.name != name) {
+                    // A file that cannot be read must leave what is shown as it is.
+                    self.document.scene = name;
+                    self.document.viewpoint = None;
+                    self.document.bookmarks.clear();
+                    interface.pinned = None;
+                }
+            }
+            Command::OpenMap(name) => self.document.map = name,
+            Command::ChooseScene => interface.ask(Purpose::Scene, String::new()),
+            Command::ChooseMap => interface.ask(Purpose::Map, String::new()),
+            Command::ChooseSave => {
+                let file = self.suggested_file();
+                self.interface.ask(Purpose::Picture, file);
+            }
+            Command::ChooseExport => interface.ask(Purpose::Laws, "laws.csv".to_owned()),
+            Command::Browse(purpose) => self.browse(purpose),
+            Command::Save(path) => self.save(path),
+            Command::Export(path) => self.export(path),
+            Command::Copy => self.copy(context),
+            Command::LookFrom(viewpoint) => self.document.viewpoint = Some(viewpoint),
+            Command::Bookmark => self.bookmark(),
+            Command::ForgetBookmark(index) => {
+                self.document.bookmarks.remove(index);
+            }
+            Command::FrameAll => {
+                let bounds = self.scene.as_ref().map(|scene| scene.world.bvh.bounds());
+                self.frame(bounds);
+            }
+            Command::FrameSelected => {
+                let bounds = self.selected_bounds();
+                self.frame(bounds);
+            }
+            Command::TogglePause => interface.paused = !interface.paused,
+            Command::Restart => {
+                interface.run = interface.run.wrapping_add(1);
+                interface.paused = false;
+            }
+            Command::Undo => {
+                if let Some(document) = self.undo.undo() {
+                    self.document = document;
+                }
+            }
+            Command::Redo => {
+                if let Some(document) = self.undo.redo() {
+                    self.document = document;
+                }
+            }
+            Command::ToggleSplit => self.document.light.split = !self.document.light.split,
+            Command::ToggleDenoise => self.document.look.denoise = !self.document.look.denoise,
+            Command::TogglePanels => interface.panels = !interface.panels,
+            Command::ToggleDeveloper => interface.toggle_developer(),
+            Command::ToggleShortcuts => interface.shortcuts = !interface.shortcuts,
+            Command::KeepPicture => self.keep(),
+            Command::Quit => self.is_closing = true,
+            Command::MeasureTruth => {
+                if let Some(snapshot) = &self.snapshot {
+                    self.inspector.measure(snapshot);
+                }
+            }
+        }
+    }
+
+    /// Files dropped onto the window: scenes and maps are told apart by their extension.
+    pub(super) fn dropped_files(&mut self, context: &egui::Context) -> Vec<Command> {
+        let paths: Vec<PathBuf> = context.input(|input| {
+            input.raw.dropped_files.iter().map(|f| f.path().to_path_buf()).collect()
+        });
+        paths.iter().map(|path| open_command(path)).collect()
+    }
+
+    fn keep(&mut self) {
+        let Some(snapshot) = &self.snapshot else { return };
+        let summary = format!(
+            "{}, {} samples, {}",
+            convergence::name_of(snapshot.main.sampling),
+            snapshot.main.film.min_samples(),
+            self.document.scene
+        );
+        self.history.keep(snapshot, summary);
+        self.interface.compared = Some(self.history.list().len() - 1);
+        self.interface.tab = Tab::Picture;
+    }
+
+    fn bookmark(&mut self) {
+        let Some(viewpoint) = &self.document.viewpoint else { return };
+        let name = format!("View {}", self.document.bookmarks.len() + 1);
+        self.document.bookmarks.push(Viewpoint { name, ..viewpoint.clone() });
+    }
+
+    fn frame(&mut self, bounds: Option<(glam::Vec3, glam::Vec3)>) {
+        let aspect = self.interface.aspect();
+        if let (Some(bounds), Some(viewpoint)) = (bounds, &mut self.document.viewpoint) {
+            viewpoint.frame(bounds, aspect);
+        }
+    }
+
+    /// The box around all surfaces of the material at the pinned or pointed place.
+    fn selected_bounds(&self) -> Option<(glam::Vec3, glam::Vec3)> {
+        let place = self.interface.inspected()?;
+        let request = &self.snapshot.as_ref()?.request;
+        let scene = &request.world.scene;
+        let spot = surface_map::look_at_place(&request.world, &request.view, place)?;
+        let corners = scene
+            .triangles
+            .iter()
+            .zip(&scene.triangle_materials)
+            .filter(|(_, material)| **material == spot.material)
+            .flat_map(|(triangle, _)| triangle.map(|v| scene.positions[v as usize]));
+        Some(
+            corners
+                .fold((spot.position, spot.position), |(low, high), p| (low.min(p), high.max(p))),
+        )
+    }
+
+    fn suggested_file(&self) -> String {
+        let stem = Path::new(&self.document.scene).file_stem();
+        let stem = stem.map_or_else(|| "picture".into(), |s| s.to_string_lossy());
+        let folder = self.settings.save_folder.clone().unwrap_or_default();
+        folder.join(format!("{stem}.png")).display().to_string()
+    }
+
+    fn save(&mut self, path: PathBuf) {
+        let Some(picture) = self.picture() else {
+            self.messages.error("there is no picture yet to be written");
+            return;
+        };
+        self.settings.save_folder = path.parent().map(Path::to_path_buf);
+        let sentence = format!("Saved {}", path.display());
+        self.do_later("save", move || {
+            save::picture(&path, &picture)?;
+            let remarks = save::remarks(&picture);
+            Ok(remarks.iter().fold(sentence, |all, remark| format!("{all}; {remark}")))
+        });
+    }
+
+    fn picture(&self) -> Option<save::Picture> {
+        Some(save::Picture {
+            snapshot: Arc::clone(self.snapshot.as_ref()?),
+            shown: Arc::clone(self.shown.as_ref()?),
+            document: self.document.clone(),
+            scene: self.scene.clone()?,
+            map: self.map.clone()?,
+        })
+    }
+
+    fn export(&mut self, path: PathBuf) {
+        let grid = self.snapshot.as_ref().and_then(|s| s.main.grid.clone());
+        let Some(grid) = grid else {
+            self.messages
+                .error("there are no laws to export: the map is sampled by the BSDF alone");
+            return;
+        };
+        let sentence = format!("Exported {} laws to {}", grid.laws().len(), path.display());
+        self.do_later("export", move || save::laws(&path, &grid).map(|()| sentence));
+    }
+
+    /// Runs something slow on a thread; what it says becomes a message.
+    fn do_later(&mut self, name: &str, work: impl FnOnce() -> Result<String> + Send + 'static) {
+        let (sender, wake) = (self.later.0.clone(), self.wake.clone());
+        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
+            let later = match work() {
+                Ok(sentence) => Later::Done(sentence),
+                Err(error) => Later::Failed(error.to_string()),
+            };
+            // The window may have gone meanwhile.
+            let _ = sender.send(later);
+            wake();
+        });
+        if let Err(error) = thread {
+            self.messages.error(Error::new(format!("no thread to {name}: {error}")).to_string());
+        }
+    }
+
+    /// Opens the system's file dialogue for the prompt; its answer comes as a command.
+    fn browse(&mut self, purpose: Purpose) {
+        let dialog = rfd::AsyncFileDialog::new();
+        let (sender, wake) = (self.later.0.clone(), self.wake.clone());
+        let chosen: std::pin::Pin<Box<dyn Future<Output = Option<rfd::FileHandle>> + Send>> =
+            match purpose {
+                Purpose::Scene => {
+                    Box::pin(dialog.add_filter("glTF scene", &["gltf", "glb"]).pick_file())
+                }
+                Purpose::Map => Box::pin(dialog.add_filter("Map", &MAP_EXTENSIONS).pick_file()),
+                Purpose::Picture => {
+                    Box::pin(dialog.add_filter("Picture", &["png", "exr"]).save_file())
+                }
+                Purpose::Laws => {
+                    Box::pin(dialog.add_filter("Laws", &["csv", "json", "exr"]).save_file())
+                }
+            };
+        let thread = std::thread::Builder::new().name("dialogue".to_owned()).spawn(move || {
+            if let Some(file) = pollster::block_on(chosen) {
+                let command = purpose.command(&file.path().display().to_string());
+                // The window may have gone meanwhile.
+                let _ = sender.send(Later::Command(command));
+                wake();
+            }
+        });
+        if thread.is_err() {
+            self.messages.error("the file dialogue cannot be opened; a path can be typed instead");
+        }
+    }
+
+    fn copy(&mut self, context: &egui::Context) {
+        let Some(shown) = &self.shown else { return };
+        context.copy_image(super::panels::viewport::color_image(&shown.picture));
+        let (width, height) = (shown.picture.width, shown.picture.height);
+        self.messages.notice(format!("Copied the picture, {width} x {height} pixels"));
+    }
+}
+
+/// What maps' files are called.
+const MAP_EXTENSIONS: [&str; 9] =
+    ["exr", "hdr", "png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp"];
+
+/// How to open a file: what is not a glTF file is taken for a map.
+fn open_command(path: &Path) -> Command {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let name = path.display().to_string();
+    match extension.as_deref() {
+        Some("gltf" | "glb") => Command::OpenScene(name),
+        _ => Command::OpenMap(name),
+    }
+}
+
+impl Purpose {
+    /// What to do with the path.
+    pub fn command(self, path: &str) -> Command {
+        match self {
+            Self::Scene => Command::OpenScene(path.to_owned()),
+            Self::Map => Command::OpenMap(path.to_owned()),
+            Self::Picture => Command::Save(path.into()),
+            Self::Laws => Command::Export(path.into()),
+        }
+    }
+}
+
+impl Interface {
+    fn ask(&mut self, purpose: Purpose, path: String) {
+        self.prompt = Some(Prompt { purpose, path, is_focused: false });
+    }
+
+    fn toggle_developer(&mut self) {
+        if self.dock.is_some() || self.tab == Tab::Inspect {
+            self.dock = None;
+            self.tab = Tab::Picture;
+            self.overlay = None;
+        } else {
+            self.dock = Some(Dock::Convergence);
+            self.tab = Tab::Inspect;
+        }
+    }
+
+    fn aspect(&self) -> f32 {
+        self.viewport_pixels.map_or(16.0 / 9.0, |[w, h]| w as f32 / h.max(1) as f32)
+    }
+}
+
+/// Sentence for the tooltip of memory, used by the status bar.
+pub(super) fn memory_sentence(grid: usize, table: usize, pixels: usize) -> String {
+    format!(
+        "Light Grid {}, importance table {}, map {}",
+        theme::bytes(grid),
+        theme::bytes(table),
+        theme::bytes(pixels)
+    )
+}

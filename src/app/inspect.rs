@@ -1,0 +1,183 @@
+//! What the grid knows at one point, and what is true there.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use glam::{Vec2, Vec3};
+
+use super::Wake;
+use super::interface::Interface;
+use super::surface_map::{Spot, look_at_place};
+use super::worker::Snapshot;
+use crate::bvh::{Ray, offset_origin};
+use crate::color::importance;
+use crate::environment::Environment;
+use crate::light_grid::WHOLE_MAP;
+use crate::light_grid::counters::Tally;
+use crate::path::World;
+
+/// Directions per tile for the truth: a standard error of some per cent for tiles half seen.
+const TRUTH_SAMPLES: u32 = 256;
+
+/// What is known of the cell behind a pixel.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Inspected {
+    /// The surface.
+    pub(super) spot: Spot,
+    /// Its material's name.
+    pub(super) material: String,
+    /// Index of its cell; `None` without a grid.
+    pub(super) cell: Option<u32>,
+    /// Face, row and column of the cell.
+    pub(super) coordinates: [u32; 3],
+    /// Index of its law.
+    pub(super) law: u32,
+    /// Probability of each tile.
+    pub(super) probabilities: Vec<f32>,
+    /// What learning counted for each tile; empty where nothing was.
+    pub(super) tallies: Vec<Tally>,
+}
+
+/// True visible energy of each tile at a point, normalised to 1.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Truth {
+    /// Where.
+    pub(super) position: Vec3,
+    /// Share of each tile.
+    pub(super) shares: Vec<f32>,
+}
+
+/// Follows the pointer.
+pub(super) struct Inspector {
+    inspected: Option<Inspected>,
+    truth: Option<Truth>,
+    source: Option<(Vec2, u64)>,
+    sender: Sender<Truth>,
+    receiver: Receiver<Truth>,
+    busy: bool,
+    wake: Wake,
+}
+
+impl Inspector {
+    /// `wake` is called when a truth is known.
+    pub(super) fn new(wake: Wake) -> Self {
+        let (sender, receiver) = channel();
+        Self { inspected: None, truth: None, source: None, sender, receiver, busy: false, wake }
+    }
+
+    /// What is inspected.
+    pub(super) fn inspected(&self) -> Option<&Inspected> {
+        self.inspected.as_ref()
+    }
+
+    /// The truth at the inspected point, if it was measured.
+    pub(super) fn truth(&self) -> Option<&Truth> {
+        let here = self.inspected.as_ref()?.spot.position;
+        self.truth.as_ref().filter(|truth| truth.position == here)
+    }
+
+    /// Whether a truth is being measured.
+    pub(super) fn is_busy(&self) -> bool {
+        self.busy
+    }
+
+    /// Forgets everything: another scene is shown.
+    pub(super) fn forget(&mut self) {
+        self.inspected = None;
+        self.source = None;
+    }
+
+    /// Takes a truth that is ready.
+    pub(super) fn collect(&mut self) {
+        while let Ok(truth) = self.receiver.try_recv() {
+            self.truth = Some(truth);
+            self.busy = false;
+        }
+    }
+
+    /// Looks again if the pointer or the grid has changed.
+    pub(super) fn update(&mut self, interface: &Interface, snapshot: Option<&Arc<Snapshot>>) {
+        let (Some(place), Some(snapshot)) = (interface.inspected(), snapshot) else { return };
+        if interface.tab != super::interface::Tab::Inspect || !interface.panels {
+            return;
+        }
+        let source = Some((place, snapshot.number));
+        if self.source == source {
+            return;
+        }
+        self.source = source;
+        self.inspected = inspect(snapshot, place);
+    }
+
+    /// Measures the truth at the inspected point by brute force, beside the window.
+    pub(super) fn measure(&mut self, snapshot: &Arc<Snapshot>) {
+        let Some(inspected) = self.inspected.as_ref().filter(|_| !self.busy) else { return };
+        let (spot, snapshot) = (inspected.spot, Arc::clone(snapshot));
+        let (sender, wake) = (self.sender.clone(), self.wake.clone());
+        let thread = std::thread::Builder::new().name("truth".to_owned()).spawn(move || {
+            let shares = true_shares(&snapshot.request.world, &snapshot.request.environment, &spot);
+            // The window may have gone meanwhile.
+            let _ = sender.send(Truth { position: spot.position, shares });
+            wake();
+        });
+        self.busy = thread.is_ok();
+    }
+}
+
+fn inspect(snapshot: &Snapshot, place: Vec2) -> Option<Inspected> {
+    let world = &snapshot.request.world;
+    let spot = look_at_place(world, &snapshot.request.view, place)?;
+    let material = world.scene.materials[spot.material as usize].name.clone();
+    let mut inspected = Inspected {
+        spot,
+        material,
+        cell: None,
+        coordinates: [0; 3],
+        law: WHOLE_MAP,
+        probabilities: Vec::new(),
+        tallies: Vec::new(),
+    };
+    let Some(grid) = &snapshot.main.grid else { return Some(inspected) };
+    inspected.law = grid.law_of(spot.position, spot.normal);
+    inspected.probabilities = (0..grid.laws().tile_count())
+        .map(|tile| grid.laws().probability(inspected.law, tile))
+        .collect();
+    if let Some(cells) = grid.grid() {
+        let cell = cells.cell_of(spot.position, spot.normal);
+        inspected.cell = Some(cell);
+        inspected.coordinates = cells.coordinates(cell).into();
+        if let Some(learning) = snapshot.counters.as_ref().filter(|l| l.grid == *cells)
+            && let Some(slot) = learning.counters.cells().iter().position(|c| *c == cell)
+        {
+            inspected.tallies = learning.counters.tallies(slot).collect();
+        }
+    }
+    Some(inspected)
+}
+
+/// Share of each tile in what a Lambertian surface at the spot would reflect of the map.
+fn true_shares(world: &World, environment: &Environment, spot: &Spot) -> Vec<f32> {
+    let origin = offset_origin(spot.position, spot.normal);
+    let energies: Vec<f64> = (0..environment.tile_count())
+        .map(|tile| {
+            (0..TRUTH_SAMPLES)
+                .map(|i| {
+                    // R2 sequence (Roberts 2018).
+                    let n = i as f32 + 0.5;
+                    let u = Vec2::new((n * 0.754_877_7).fract(), (n * 0.569_840_3).fract());
+                    let Some(sample) = environment.sample_in_tile(tile, u) else { return 0.0 };
+                    let cosine = spot.normal.dot(sample.direction);
+                    if cosine <= 0.0 {
+                        return 0.0;
+                    }
+                    let direction = sample.direction;
+                    let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
+                    let light = importance(sample.radiance * world.transmittance(&ray));
+                    f64::from(light * cosine / sample.pdf_solid_angle)
+                })
+                .sum()
+        })
+        .collect();
+    let total: f64 = energies.iter().sum();
+    energies.iter().map(|e| if total > 0.0 { (e / total) as f32 } else { 0.0 }).collect()
+}

@@ -1,0 +1,132 @@
+//! What is open, chosen and pointed at: nothing of it changes the picture's samples.
+
+use glam::Vec2;
+use serde::{Deserialize, Serialize};
+
+use super::overlays::Overlay;
+
+/// State of the window that is not the picture's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Interface {
+    /// Whether panels are shown.
+    pub panels: bool,
+    /// What the right panel shows.
+    pub tab: Tab,
+    /// What is open below the picture.
+    pub dock: Option<Dock>,
+    /// Whether the list of keys is open.
+    pub shortcuts: bool,
+    /// What is asked in a prompt.
+    pub prompt: Option<Prompt>,
+    /// What is drawn over the picture.
+    pub overlay: Option<Overlay>,
+    /// How much of the picture it covers, `[0,1]`.
+    pub overlay_opacity: f32,
+    /// The tile chosen on the map.
+    pub tile: Option<u32>,
+    /// Place of the picture under the pointer, both coordinates in `[0,1]`.
+    pub pointed: Option<Vec2>,
+    /// Place the inspector stays at.
+    pub pinned: Option<Vec2>,
+    /// Which picture of the history is compared.
+    pub compared: Option<usize>,
+    /// Where the wipe is, `[0,1]` across the picture.
+    pub wipe: f32,
+    /// Whether rendering is halted.
+    pub paused: bool,
+    /// Counts restarts by hand.
+    pub run: u32,
+    /// Size of the viewport in pixels, once it was drawn.
+    pub viewport_pixels: Option<[u32; 2]>,
+    /// Until when the camera counts as moving, in the window's seconds.
+    pub moving_until: f64,
+}
+
+/// What the right panel shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Tab {
+    /// Settings of the picture.
+    Picture,
+    /// Overlays and inspector.
+    Inspect,
+}
+
+/// What is open below the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Dock {
+    /// Error against time.
+    Convergence,
+    /// What the scene needs of the renderer.
+    Needs,
+}
+
+/// A question with a path for an answer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Prompt {
+    /// What the path is for.
+    pub purpose: Purpose,
+    /// What has been typed.
+    pub path: String,
+    /// Whether the field has been given the keyboard.
+    pub is_focused: bool,
+}
+
+/// What a path is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// A scene to open.
+    Scene,
+    /// A map to open.
+    Map,
+    /// A picture to write.
+    Picture,
+    /// A file for the laws.
+    Laws,
+}
+
+impl Default for Interface {
+    fn default() -> Self {
+        Self {
+            panels: true,
+            tab: Tab::Picture,
+            dock: None,
+            shortcuts: false,
+            prompt: None,
+            overlay: None,
+            overlay_opacity: 0.75,
+            tile: None,
+            pointed: None,
+            pinned: None,
+            compared: None,
+            wipe: 0.5,
+            paused: false,
+            run: 0,
+            viewport_pixels: None,
+            moving_until: f64::NEG_INFINITY,
+        }
+    }
+}
+
+impl Interface {
+    /// Whether the camera or the map is being moved.
+    pub fn is_moving(&self, now: f64) -> bool {
+        now < self.moving_until
+    }
+
+    /// Tells that something moves: for a moment small pictures are better than good ones.
+    ///
+    /// It lasts for some frames, so that it does not flicker where frames take long.
+    pub fn keep_moving(&mut self, now: f64, frame_seconds: f32) {
+        self.moving_until = now + f64::from((3.0 * frame_seconds).clamp(0.18, 1.0));
+    }
+
+    /// Whether a dialogue has the keyboard.
+    pub fn is_modal(&self) -> bool {
+        self.prompt.is_some()
+    }
+
+    /// The place that is inspected.
+    pub fn inspected(&self) -> Option<Vec2> {
+        self.pinned.or(self.pointed)
+    }
+}

@@ -1,0 +1,134 @@
+//! Reads scenes and maps beside the window: a large file never holds it up.
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use super::Wake;
+use crate::environment::{Environment, EnvironmentOptions};
+use crate::error::{Error, Notices, Result};
+use crate::image::Image;
+use crate::path::World;
+use crate::sources;
+
+/// A scene ready for rays.
+#[derive(Clone)]
+pub struct LoadedScene {
+    /// What was asked for.
+    pub name: String,
+    /// The scene.
+    pub world: Arc<World>,
+    /// Seconds of reading and of building the BVH.
+    pub seconds: [f64; 2],
+}
+
+/// A map ready to be sampled, not turned, at intensity 1.
+#[derive(Clone)]
+pub struct LoadedMap {
+    /// What was asked for.
+    pub name: String,
+    /// The map.
+    pub environment: Arc<Environment>,
+    /// A small copy for the panel.
+    pub preview: Arc<Image>,
+    /// What was repaired or assumed.
+    pub notices: Notices,
+    /// Seconds of reading and of building the table.
+    pub seconds: [f64; 2],
+}
+
+/// What loading came to.
+pub enum Loaded {
+    /// A scene, or why not.
+    Scene(String, Result<LoadedScene>),
+    /// A map, or why not.
+    Map(String, Result<LoadedMap>),
+}
+
+/// Loads one scene and one map at a time; results are collected with [`Loader::take`].
+pub struct Loader {
+    sender: Sender<Loaded>,
+    receiver: Receiver<Loaded>,
+    wake: Wake,
+    in_flight: [Option<String>; 2],
+    /// One file at a time: two large ones together may not fit into memory.
+    turn: Arc<Mutex<()>>,
+}
+
+impl Loader {
+    /// `wake` is called when something has been loaded.
+    pub fn new(wake: Wake) -> Self {
+        let (sender, receiver) = channel();
+        Self { sender, receiver, wake, in_flight: [None, None], turn: Arc::default() }
+    }
+
+    /// Starts to load a scene unless it is being loaded.
+    pub fn load_scene(&mut self, name: &str) {
+        self.start(0, name, |name| Loaded::Scene(name.to_owned(), load_scene(name)));
+    }
+
+    /// Starts to load a map unless it is being loaded.
+    pub fn load_map(&mut self, name: &str) {
+        self.start(1, name, |name| Loaded::Map(name.to_owned(), load_map(name)));
+    }
+
+    /// What is being loaded.
+    pub fn busy_with(&self) -> impl Iterator<Item = &str> {
+        self.in_flight.iter().flatten().map(String::as_str)
+    }
+
+    /// What has been loaded since the last call; results nobody waits for any more are dropped.
+    pub fn take(&mut self) -> Vec<Loaded> {
+        let mut results = Vec::new();
+        for loaded in self.receiver.try_iter() {
+            let (kind, name) = match &loaded {
+                Loaded::Scene(name, _) => (0, name),
+                Loaded::Map(name, _) => (1, name),
+            };
+            if self.in_flight[kind].as_ref() == Some(name) {
+                self.in_flight[kind] = None;
+                results.push(loaded);
+            }
+        }
+        results
+    }
+
+    fn start(&mut self, kind: usize, name: &str, load: fn(&str) -> Loaded) {
+        if self.in_flight[kind].as_deref() == Some(name) {
+            return;
+        }
+        self.in_flight[kind] = Some(name.to_owned());
+        let (sender, wake, turn) = (self.sender.clone(), self.wake.clone(), self.turn.clone());
+        let name = name.to_owned();
+        let thread = std::thread::Builder::new().name("load".to_owned()).spawn(move || {
+            let _turn = turn.lock().unwrap_or_else(PoisonError::into_inner);
+            // The window may have gone meanwhile.
+            let _ = sender.send(load(&name));
+            wake();
+        });
+        if thread.is_err() {
+            self.in_flight[kind] = None;
+        }
+    }
+}
+
+fn load_scene(name: &str) -> Result<LoadedScene> {
+    let start = Instant::now();
+    let scene = sources::scene(name)?;
+    let read = start.elapsed().as_secs_f64();
+    let world = Arc::new(World::new(scene));
+    let seconds = [read, start.elapsed().as_secs_f64() - read];
+    Ok(LoadedScene { name: name.to_owned(), world, seconds })
+}
+
+fn load_map(name: &str) -> Result<LoadedMap> {
+    let start = Instant::now();
+    let (map, notices) = sources::map(name)?;
+    let read = start.elapsed().as_secs_f64();
+    let preview = Arc::new(map.shrunk(256));
+    let environment = Environment::new(map, &EnvironmentOptions::default())
+        .map_err(|cause| Error::at(name, cause))?;
+    let seconds = [read, start.elapsed().as_secs_f64() - read];
+    let environment = Arc::new(environment);
+    Ok(LoadedMap { name: name.to_owned(), environment, preview, notices, seconds })
+}

@@ -1,0 +1,53 @@
+//! Sentences for the person: what went wrong stays until it is closed, notices go by themselves.
+
+/// Most messages shown at a time.
+const MOST: usize = 5;
+/// Seconds a notice stays.
+pub const NOTICE_SECONDS: f64 = 8.0;
+
+/// One sentence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Message {
+    /// What to say.
+    pub sentence: String,
+    /// Whether something failed.
+    pub is_error: bool,
+    /// When it was first drawn, in the window's seconds.
+    pub since: Option<f64>,
+}
+
+/// What is to be said, newest last.
+#[derive(Debug, Clone, Default)]
+pub struct Messages {
+    list: Vec<Message>,
+}
+
+impl Messages {
+    /// Something worth knowing.
+    pub fn notice(&mut self, sentence: impl Into<String>) {
+        self.add(sentence.into(), false);
+    }
+
+    /// Something that failed.
+    pub fn error(&mut self, sentence: impl Into<String>) {
+        self.add(sentence.into(), true);
+    }
+
+    fn add(&mut self, sentence: String, is_error: bool) {
+        self.list.retain(|message| message.sentence != sentence);
+        self.list.push(Message { sentence, is_error, since: None });
+        if self.list.len() > MOST {
+            self.list.remove(0);
+        }
+    }
+
+    /// The messages, to be drawn and closed.
+    pub fn list(&mut self) -> &mut Vec<Message> {
+        &mut self.list
+    }
+
+    /// The oldest error.
+    pub fn first_error(&self) -> Option<&str> {
+        self.list.iter().find(|m| m.is_error).map(|m| m.sentence.as_str())
+    }
+}

@@ -1,0 +1,433 @@
+//! The window: what a person sees and does, as plain data that is sent down.
+//!
+//! [`App`] holds a [`document::Document`] (what the picture is, undone by comparing snapshots) and an
+//! [`interface::Interface`] (what is open and pointed at). Every frame panels draw from them and
+//! change them or ask for a [`commands::Command`]; then the [`worker`] is told what to render and the
+//! [`presenter`] what to show. Both take the latest value and publish the latest picture: nothing
+//! here waits. [`window`] shows it on a display, [`screenshot`] in a texture without one.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use glam::Vec2;
+
+pub mod commands;
+pub mod convergence;
+pub mod document;
+mod execute;
+pub mod history;
+mod inspect;
+pub mod interface;
+pub mod loader;
+pub mod messages;
+mod navigation;
+pub mod overlays;
+mod panels;
+pub mod presenter;
+mod save;
+pub mod screenshot;
+pub mod settings_file;
+mod speed_up;
+pub mod surface_map;
+mod theme;
+mod undo;
+pub mod window;
+pub mod worker;
+
+use crate::environment::Environment;
+use crate::error::Result;
+use crate::path::framing;
+
+use commands::Command;
+use convergence::Convergence;
+use document::{Document, PictureSize, Viewpoint};
+use history::History;
+use inspect::Inspector;
+use interface::Interface;
+use loader::{Loaded, LoadedMap, LoadedScene, Loader};
+use messages::Messages;
+use presenter::{Order, Presenter, Shown};
+use settings_file::Settings;
+use undo::Undo;
+use worker::{Activity, Request, Snapshot, Worker};
+
+/// Called from any thread when there is something new to draw.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// What is shown at the start.
+#[derive(Debug, Clone, Default)]
+pub struct Start {
+    /// The picture.
+    pub document: Document,
+    /// What is open.
+    pub interface: Interface,
+    /// What earlier windows left.
+    pub settings: Settings,
+    /// For screenshots: no previews on the way, and no figures that depend on the clock.
+    pub is_repeatable: bool,
+}
+
+/// The application.
+pub struct App {
+    document: Document,
+    undo: Undo<Document>,
+    interface: Interface,
+    settings: Settings,
+    messages: Messages,
+    history: History,
+    convergence: Convergence,
+    inspector: Inspector,
+    loader: Loader,
+    worker: Worker,
+    presenter: Presenter,
+    scene: Option<LoadedScene>,
+    map: Option<LoadedMap>,
+    /// The map turned and scaled as the document says.
+    lit: Option<Lit>,
+    snapshot: Option<Arc<Snapshot>>,
+    shown: Option<Arc<Shown>>,
+    textures: panels::viewport::Textures,
+    /// Results of files being chosen and written.
+    later: (Sender<Later>, Receiver<Later>),
+    wake: Wake,
+    is_repeatable: bool,
+    is_closing: bool,
+}
+
+/// An environment and what it was made from.
+struct Lit {
+    map: Arc<Environment>,
+    rotation_degrees: f32,
+    intensity: f32,
+    environment: Arc<Environment>,
+}
+
+/// What comes back from a thread.
+enum Later {
+    /// Somebody chose a file.
+    Command(Command),
+    /// A file was written.
+    Done(String),
+    /// Something failed.
+    Failed(String),
+}
+
+impl App {
+    /// Starts the threads; `wake` asks for a new frame.
+    ///
+    /// # Errors
+    /// If the system gives no threads.
+    pub fn new(start: Start, context: &egui::Context, wake: Wake) -> Result<Self> {
+        theme::apply(context);
+        Ok(Self {
+            undo: Undo::new(start.document.clone()),
+            document: start.document,
+            interface: start.interface,
+            settings: start.settings,
+            messages: Messages::default(),
+            history: History::default(),
+            convergence: Convergence::default(),
+            inspector: Inspector::new(wake.clone()),
+            loader: Loader::new(wake.clone()),
+            worker: Worker::start(wake.clone())?,
+            presenter: Presenter::start(wake.clone())?,
+            scene: None,
+            map: None,
+            lit: None,
+            snapshot: None,
+            shown: None,
+            textures: panels::viewport::Textures::default(),
+            later: channel(),
+            wake,
+            is_repeatable: start.is_repeatable,
+            is_closing: false,
+        })
+    }
+
+    /// One frame: collects, draws, carries out, sends down.
+    pub fn show(&mut self, ui: &mut egui::Ui) {
+        let context = ui.ctx().clone();
+        self.collect(&context);
+        let mut commands = Vec::new();
+        if !self.interface.is_modal() {
+            commands.extend(commands::pressed(&context));
+        }
+        commands.extend(self.dropped_files(&context));
+        self.panels(ui, &mut commands);
+        for command in commands {
+            self.execute(command, &context);
+        }
+        self.settle(&context);
+        self.send_down(&context);
+    }
+
+    /// Adds a message from outside, such as what the settings file had wrong.
+    pub fn say(&mut self, sentence: impl Into<String>) {
+        self.messages.notice(sentence);
+    }
+
+    /// Whether the picture asked for is done and on the screen.
+    pub fn is_settled(&self) -> bool {
+        self.snapshot.as_ref().is_some_and(|s| s.activity == Activity::Done)
+            && self.shown.is_some()
+            && self.presenter.is_settled()
+            && !self.inspector.is_busy()
+    }
+
+    /// Whether somebody asked to close the window.
+    pub fn is_closing(&self) -> bool {
+        self.is_closing
+    }
+
+    /// The first thing that went wrong, if anything did.
+    pub fn failure(&self) -> Option<&str> {
+        self.messages.first_error()
+    }
+
+    /// What is to be kept for the next window.
+    pub fn settings(&self) -> Settings {
+        let mut settings = self.settings.clone();
+        settings.remember(&self.document, &self.interface);
+        settings
+    }
+
+    /// Title of the window.
+    pub fn title(&self) -> String {
+        format!("{} - lightgrid", self.document.scene)
+    }
+
+    fn panels(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
+        let snapshot = self.snapshot.as_deref();
+        if self.interface.panels {
+            panels::top::show(ui, &mut self.document, &mut self.interface, &self.undo, commands);
+            let status = panels::status::Status {
+                snapshot,
+                loading: self.loader.busy_with().collect(),
+                threads: self.worker.threads(),
+                hides_clock: self.is_repeatable,
+            };
+            panels::status::show(ui, &status);
+            panels::left::show(
+                ui,
+                &mut self.document,
+                &mut self.interface,
+                panels::left::Sources {
+                    scene: self.scene.as_ref(),
+                    map: self.map.as_ref(),
+                    settings: &self.settings,
+                },
+                commands,
+            );
+            self.right(ui, commands);
+            self.dock(ui);
+        }
+        self.viewport(ui, commands);
+        panels::prompt::show(ui.ctx(), &mut self.interface, &self.settings, commands);
+        panels::shortcuts::show(ui.ctx(), &mut self.interface);
+        panels::messages::show(ui.ctx(), &mut self.messages);
+    }
+
+    fn right(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
+        let shown = self.shown.as_deref();
+        let snapshot = self.snapshot.as_deref();
+        panels::right::show(ui, &mut self.interface, |ui, interface| match interface.tab {
+            interface::Tab::Picture => {
+                panels::picture::show(ui, &mut self.document, shown, commands);
+                panels::history::show(ui, &mut self.history, interface, commands);
+            }
+            interface::Tab::Inspect => {
+                panels::overlay::show(ui, interface, shown);
+                panels::inspector::show(
+                    ui,
+                    interface,
+                    &self.inspector,
+                    self.map.as_ref(),
+                    snapshot,
+                    commands,
+                );
+            }
+        });
+    }
+
+    fn dock(&mut self, ui: &mut egui::Ui) {
+        let scene = self.scene.as_ref();
+        panels::dock::show(ui, &mut self.interface, |ui, dock| match dock {
+            interface::Dock::Convergence => {
+                panels::convergence::show(ui, &mut self.convergence, self.is_repeatable);
+            }
+            interface::Dock::Needs => panels::needs::show(ui, scene, self.map.as_ref()),
+        });
+    }
+
+    fn viewport(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
+        let speed_up = self
+            .snapshot
+            .as_ref()
+            .and_then(|s| s.plain.as_ref().and_then(|plain| speed_up::SpeedUp::of(&s.main, plain)));
+        let past = self.interface.compared.and_then(|i| self.history.get(i));
+        let mut scope = panels::viewport::Scope {
+            document: &mut self.document,
+            interface: &mut self.interface,
+            textures: &mut self.textures,
+            shown: self.shown.as_deref(),
+            snapshot: self.snapshot.as_deref(),
+            speed_up: speed_up.filter(|_| !self.is_repeatable),
+            past: past.map(|kept| kept.name.as_str()),
+            scene: self.scene.as_ref(),
+            loading: self.loader.busy_with().next().is_some(),
+            commands,
+        };
+        panels::viewport::show(ui, &mut scope);
+    }
+
+    /// Takes what the threads have ready.
+    fn collect(&mut self, context: &egui::Context) {
+        for loaded in self.loader.take() {
+            match loaded {
+                Loaded::Scene(_, Ok(scene)) => self.take_scene(scene),
+                Loaded::Map(_, Ok(map)) => {
+                    map.notices.iter().for_each(|sentence| self.messages.notice(sentence));
+                    self.settings.recent_map(&map.name);
+                    self.map = Some(map);
+                }
+                // What is shown stays, and the document says so again.
+                Loaded::Scene(_, Err(error)) => {
+                    self.messages.error(error.to_string());
+                    if let Some(scene) = &self.scene {
+                        self.document.scene.clone_from(&scene.name);
+                    }
+                }
+                Loaded::Map(_, Err(error)) => {
+                    self.messages.error(error.to_string());
+                    if let Some(map) = &self.map {
+                        self.document.map.clone_from(&map.name);
+                    }
+                }
+            }
+        }
+        while let Ok(later) = self.later.1.try_recv() {
+            match later {
+                Later::Command(command) => self.execute(command, context),
+                Later::Done(sentence) => self.messages.notice(sentence),
+                Later::Failed(sentence) => self.messages.error(sentence),
+            }
+        }
+        self.inspector.collect();
+        let snapshot = self.worker.snapshot();
+        if let Some(snapshot) = snapshot
+            && self.snapshot.as_ref().is_none_or(|old| old.number != snapshot.number)
+        {
+            self.convergence.add(&snapshot);
+            self.snapshot = Some(snapshot);
+        }
+        self.shown = self.presenter.shown();
+    }
+
+    fn take_scene(&mut self, scene: LoadedScene) {
+        scene.world.scene.notices.iter().for_each(|sentence| self.messages.notice(sentence));
+        self.settings.recent_scene(&scene.name);
+        if self.document.viewpoint.is_none() {
+            let camera = scene.world.scene.cameras.first().cloned();
+            let camera = camera.unwrap_or_else(|| framing::frame(&scene.world, 16.0 / 9.0));
+            let distance = self.pivot_distance(&scene, &camera);
+            let mut viewpoint = Viewpoint::of(&camera, distance);
+            if !(viewpoint.focus_distance.is_finite() && viewpoint.focus_distance > 0.0) {
+                viewpoint.focus_distance = distance;
+            }
+            self.document.viewpoint = Some(viewpoint);
+            self.undo.amend(&self.document);
+        }
+        self.scene = Some(scene);
+        self.inspector.forget();
+    }
+
+    /// Metres to what is in the middle of a camera's picture.
+    fn pivot_distance(&self, scene: &LoadedScene, camera: &crate::scene::Camera) -> f32 {
+        let rays = crate::path::camera::CameraRays::new(camera, 16, 9);
+        let ray = rays.ray(Vec2::new(8.0, 4.5), Vec2::splat(0.5));
+        let (low, high) = scene.world.bvh.bounds();
+        surface_map::look(&scene.world, ray)
+            .map_or(0.5 * (high - low).length(), |spot| spot.position.distance(ray.origin))
+            .max(0.05)
+    }
+
+    /// Keeps a step for undo once nobody drags or types any more.
+    fn settle(&mut self, context: &egui::Context) {
+        let busy = context.input(|i| i.pointer.any_down() || !i.keys_down.is_empty())
+            || context.text_edit_focused();
+        if !busy && !self.interface.is_moving(context.time()) && self.scene.is_some() {
+            self.undo.settle(&self.document);
+        }
+    }
+
+    /// Tells the loader, the worker and the presenter what is wanted now.
+    fn send_down(&mut self, context: &egui::Context) {
+        if self.scene.as_ref().is_none_or(|scene| scene.name != self.document.scene) {
+            self.loader.load_scene(&self.document.scene);
+        }
+        if self.map.as_ref().is_none_or(|map| map.name != self.document.map) {
+            self.loader.load_map(&self.document.map);
+        }
+        if let Some(request) = self.request(context.time()) {
+            if request.moving {
+                context.request_repaint_after(std::time::Duration::from_millis(60));
+            }
+            self.inspector.update(&self.interface, self.snapshot.as_ref());
+            self.worker.submit(request);
+        }
+        if let Some(snapshot) = &self.snapshot {
+            let past = self.interface.compared.and_then(|i| self.history.get(i));
+            self.presenter.order(Order {
+                snapshot: Arc::clone(snapshot),
+                look: self.document.look,
+                overlay: self.interface.overlay.map(|o| (o, self.interface.overlay_opacity)),
+                tile: self.interface.tile,
+                past: past.map(|kept| Arc::clone(&kept.image)),
+            });
+        }
+    }
+
+    fn request(&mut self, now: f64) -> Option<Request> {
+        let scene = self.scene.as_ref()?;
+        let world = Arc::clone(&scene.world);
+        let environment = self.environment()?;
+        let (width, height) = match self.document.size {
+            PictureSize::Fixed(width, height) => (width, height),
+            PictureSize::Viewport(divisor) => {
+                let size = self.interface.viewport_pixels?;
+                ((size[0] / divisor).max(1), (size[1] / divisor).max(1))
+            }
+        };
+        Some(Request {
+            world,
+            environment,
+            view: self.document.view(width, height)?,
+            split: self.document.light.split,
+            moving: self.interface.is_moving(now) && !self.is_repeatable,
+            previews: !self.is_repeatable,
+            rule: self.document.stop,
+            paused: self.interface.paused,
+            run: self.interface.run,
+        })
+    }
+
+    /// The map as the document turns and scales it; made anew only when that changes.
+    fn environment(&mut self) -> Option<Arc<Environment>> {
+        let map = &self.map.as_ref()?.environment;
+        let (rotation_degrees, intensity) =
+            (self.document.rotation_degrees, self.document.intensity);
+        let is_current = self.lit.as_ref().is_some_and(|lit| {
+            Arc::ptr_eq(&lit.map, map)
+                && lit.rotation_degrees == rotation_degrees
+                && lit.intensity == intensity
+        });
+        if !is_current {
+            let mut environment = (**map).clone();
+            environment.set_rotation(rotation_degrees.to_radians());
+            environment.set_intensity(intensity);
+            let environment = Arc::new(environment);
+            self.lit = Some(Lit { map: Arc::clone(map), rotation_degrees, intensity, environment });
+        }
+        self.lit.as_ref().map(|lit| Arc::clone(&lit.environment))
+    }
+}

@@ -1,0 +1,382 @@
+//! Pictures over the picture: what the grid knows and how sure the samples are, with legends.
+
+use std::sync::Arc;
+
+use crate::environment::Environment;
+use crate::light_grid::cells::SphericalGrid;
+use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
+use crate::render::film::{Film, Pixel};
+
+use super::surface_map::{Spot, SurfaceMap};
+
+mod cell_facts;
+pub mod palette;
+
+pub use cell_facts::CellFacts;
+
+/// What can be drawn over the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
+pub enum Overlay {
+    /// Cells of the Light Grid.
+    Cells,
+    /// Six-fold split of cells by the direction a surface faces.
+    Faces,
+    /// Cells with laws of their own.
+    Learned,
+    /// Learning visits of each cell.
+    Visits,
+    /// How much of the sky learning found visible.
+    Sky,
+    /// Each cell's most important tile.
+    BestTile,
+    /// Entropy of the cell's law.
+    Entropy,
+    /// Distance of the cell's law from the whole map's.
+    Distance,
+    /// Each cell's probability of the tile chosen on the map.
+    Tile,
+    /// Samples of each pixel.
+    Samples,
+    /// Estimated error of each pixel.
+    Error,
+    /// Albedo of the first surface.
+    Albedo,
+    /// Normal of the first surface.
+    Normal,
+    /// Distance of the first surface.
+    Depth,
+}
+
+impl Overlay {
+    /// All of them, in the order they are offered.
+    pub const ALL: [Self; 14] = [
+        Self::Cells,
+        Self::Faces,
+        Self::Learned,
+        Self::Visits,
+        Self::Sky,
+        Self::BestTile,
+        Self::Entropy,
+        Self::Distance,
+        Self::Tile,
+        Self::Samples,
+        Self::Error,
+        Self::Albedo,
+        Self::Normal,
+        Self::Depth,
+    ];
+
+    /// What to call it.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Cells => "Cells",
+            Self::Faces => "Faces",
+            Self::Learned => "Learned cells",
+            Self::Visits => "Learning visits",
+            Self::Sky => "Visible sky",
+            Self::BestTile => "Most important tile",
+            Self::Entropy => "Entropy of the law",
+            Self::Distance => "Distance from the whole map's law",
+            Self::Tile => "Wish for the chosen tile",
+            Self::Samples => "Samples",
+            Self::Error => "Estimated error",
+            Self::Albedo => "Albedo",
+            Self::Normal => "Normal",
+            Self::Depth => "Depth",
+        }
+    }
+
+    /// What it shows, in a sentence.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::Cells => "Cells of the grid around the camera; borders are bright.",
+            Self::Faces => "Cells are split by the axis that a surface's normal is nearest to.",
+            Self::Learned => "Where a cell has its own law; elsewhere the whole map is sampled.",
+            Self::Visits => "How often learning paths tried the map from each cell.",
+            Self::Sky => {
+                "Mean visibility times cosine over all tiles of the map, as learning found it."
+            }
+            Self::BestTile => {
+                "The tile each cell samples most; hue is its azimuth, darker is lower on the map."
+            }
+            Self::Entropy => "0 bits: always the same tile. High: no preference.",
+            Self::Distance => {
+                "Total variation between the cell's law and the whole map's: 0 equal, 1 disjoint."
+            }
+            Self::Tile => "Probability with which each cell samples the tile chosen on the map.",
+            Self::Samples => "Samples each pixel has.",
+            Self::Error => "Standard error of a pixel's luminance over its luminance.",
+            Self::Albedo => "Directional albedo of the first surface.",
+            Self::Normal => "World shading normal, -1 to 1 as 0 to 255.",
+            Self::Depth => "Metres from the camera to the first surface.",
+        }
+    }
+
+    /// Whether it is about the grid, hence needs the surfaces behind the pixels.
+    pub fn needs_surfaces(self) -> bool {
+        !matches!(self, Self::Samples | Self::Error | Self::Albedo | Self::Normal | Self::Depth)
+    }
+
+    /// Whether it replaces the picture rather than tinting it.
+    pub fn is_opaque(self) -> bool {
+        matches!(self, Self::Albedo | Self::Normal | Self::Depth)
+    }
+}
+
+/// What the colours of an overlay mean.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Legend {
+    /// Viridis from `low` to `high`.
+    Scale {
+        /// Value of the darkest colour.
+        low: f32,
+        /// Value of the brightest.
+        high: f32,
+        /// Whether colours follow the logarithm.
+        logarithmic: bool,
+        /// Unit of the values.
+        unit: &'static str,
+    },
+    /// One colour, one meaning.
+    Names(Vec<([u8; 3], String)>),
+    /// Colours of places on the map.
+    Map,
+    /// Nothing to explain.
+    None,
+}
+
+/// An overlay's colours, one per pixel (`None` where it has nothing to say), and their meaning.
+pub struct Painted {
+    /// sRGB.
+    pub colors: Vec<Option<[u8; 3]>>,
+    /// What they mean.
+    pub legend: Legend,
+}
+
+/// What overlays are drawn from.
+pub struct Sources<'a> {
+    /// The film.
+    pub film: &'a Film,
+    /// The map.
+    pub environment: &'a Environment,
+    /// The laws in use.
+    pub grid: Option<&'a Arc<LightGrid>>,
+    /// What learning counted.
+    pub counters: Option<&'a LearningGrid>,
+    /// Surfaces behind the film's pixels; only for overlays that need them.
+    pub surfaces: Option<&'a SurfaceMap>,
+    /// Facts of the cells of `grid`.
+    pub facts: Option<&'a CellFacts>,
+    /// The tile chosen on the map.
+    pub tile: Option<u32>,
+}
+
+impl Sources<'_> {
+    /// Draws; `None` while what it needs is not there.
+    pub fn paint(&self, overlay: Overlay) -> Option<Painted> {
+        match overlay {
+            Overlay::Samples => Some(scaled(
+                self.film.pixels().iter().map(|p| Some(p.samples() as f32)),
+                Range::WHOLE,
+                "samples",
+            )),
+            Overlay::Error => Some(scaled(
+                self.film.pixels().iter().map(relative_error),
+                Range::LOGARITHMIC,
+                "of the luminance",
+            )),
+            Overlay::Albedo | Overlay::Normal | Overlay::Depth => self.layer(overlay),
+            _ => self.cells(overlay),
+        }
+    }
+
+    fn layer(&self, overlay: Overlay) -> Option<Painted> {
+        let layers = self.film.surface_layers()?;
+        let srgb = |v: f32| (crate::color::srgb_from_linear(v.clamp(0.0, 1.0)) * 255.0) as u8;
+        let is_hit = |normal: &[f32; 3]| *normal != [0.0; 3];
+        let of = |color: fn([f32; 3]) -> [f32; 3], values: &[[f32; 3]]| {
+            let colors = values.iter().zip(&layers.normal);
+            colors.map(|(value, normal)| is_hit(normal).then(|| color(*value).map(srgb))).collect()
+        };
+        Some(match overlay {
+            Overlay::Albedo => {
+                Painted { colors: of(|albedo| albedo, &layers.albedo), legend: Legend::None }
+            }
+            Overlay::Normal => {
+                let byte = |v: f32| ((v * 0.5 + 0.5) * 255.0).round() as u8;
+                let colors = layers.normal.iter().map(|n| is_hit(n).then(|| n.map(byte)));
+                Painted { colors: colors.collect(), legend: axes_legend() }
+            }
+            _ => {
+                let depths = layers.depth.iter().zip(&layers.normal);
+                scaled(depths.map(|(d, n)| is_hit(n).then_some(*d)), Range::LOGARITHMIC, "m")
+            }
+        })
+    }
+
+    fn cells(&self, overlay: Overlay) -> Option<Painted> {
+        let surfaces = self.surfaces?;
+        let grid = self.grid?;
+        let cells = grid.grid()?;
+        let facts = self.facts?;
+        let cell_of = |spot: &Option<Spot>| spot.map(|s| cells.cell_of(s.position, s.normal));
+        let by_cell = |value: &dyn Fn(u32) -> Option<f32>, range: Range, unit| {
+            scaled(surfaces.spots.iter().map(|s| cell_of(s).and_then(value)), range, unit)
+        };
+        let law = |cell: u32| grid.law_of_cell(cell) as usize;
+        Some(match overlay {
+            Overlay::Cells => with_borders(surfaces, cells),
+            Overlay::Faces => faces(surfaces, cells),
+            Overlay::Learned => learned(surfaces, cells, grid),
+            Overlay::Visits => {
+                by_cell(&|cell| facts.visits(cell), Range::LOGARITHMIC, "tries a cell")
+            }
+            Overlay::Sky => by_cell(
+                &|cell| facts.visible_share(cell),
+                Range::Logarithmic,
+                "visibility times cosine",
+            ),
+            Overlay::BestTile => {
+                let (columns, rows) = self.environment.tile_grid();
+                let color = |cell| {
+                    let tile = facts.best_tile[law(cell)];
+                    let u = (f64::from(tile % columns) + 0.5) / f64::from(columns);
+                    let v = (f64::from(tile / columns) + 0.5) / f64::from(rows);
+                    palette::of_map_place(u as f32, v as f32)
+                };
+                let colors = surfaces.spots.iter().map(|s| cell_of(s).map(color)).collect();
+                Painted { colors, legend: Legend::Map }
+            }
+            Overlay::Entropy => {
+                let most = (self.environment.tile_count() as f32).log2();
+                by_cell(&|cell| Some(facts.entropy[law(cell)]), Range::between(0.0, most), "bits")
+            }
+            Overlay::Distance => by_cell(
+                &|cell| Some(facts.distance[law(cell)]),
+                Range::between(0.0, 1.0),
+                "total variation",
+            ),
+            _ => {
+                let tile = self.tile?;
+                let probability = |cell| {
+                    Some(grid.laws().probability(grid.law_of_cell(cell), tile)).filter(|p| *p > 0.0)
+                };
+                by_cell(&probability, Range::LOGARITHMIC, "probability")
+            }
+        })
+    }
+}
+
+fn relative_error(pixel: &Pixel) -> Option<f32> {
+    let error = pixel.variance_of_mean().sqrt() / pixel.mean_luminance();
+    (error.is_finite() && error > 0.0).then_some(error as f32)
+}
+
+fn with_borders(surfaces: &SurfaceMap, grid: &SphericalGrid) -> Painted {
+    let width = surfaces.width as usize;
+    let cells: Vec<Option<u32>> = surfaces
+        .spots
+        .iter()
+        .map(|spot| spot.map(|s| grid.cell_of(s.position, s.normal)))
+        .collect();
+    let colors = cells.iter().enumerate().map(|(i, cell)| {
+        let left = if i % width > 0 { cells[i - 1] } else { *cell };
+        let above = if i >= width { cells[i - width] } else { *cell };
+        cell.map(|own| {
+            let is_border = left != *cell || above != *cell;
+            if is_border { [245, 245, 250] } else { palette::of_number(own) }
+        })
+    });
+    let shown = cells.iter().flatten().collect::<std::collections::BTreeSet<_>>().len();
+    let legend = Legend::Names(vec![(
+        [245, 245, 250],
+        format!("{shown} of {} cells are in view", grid.cell_count()),
+    )]);
+    Painted { colors: colors.collect(), legend }
+}
+
+const FACE_COLORS: [[u8; 3]; 6] =
+    [[224, 92, 92], [132, 52, 60], [120, 205, 110], [48, 104, 62], [98, 140, 235], [50, 66, 140]];
+
+fn axes_legend() -> Legend {
+    let names = [([255, 128, 128], "+X"), ([128, 255, 128], "+Y"), ([128, 128, 255], "+Z")];
+    Legend::Names(names.map(|(color, name)| (color, name.to_owned())).to_vec())
+}
+
+fn faces(surfaces: &SurfaceMap, grid: &SphericalGrid) -> Painted {
+    let face_of = |spot: &Spot| {
+        let cell = grid.cell_of(spot.position, spot.normal);
+        FACE_COLORS[grid.coordinates(cell).0 as usize % 6]
+    };
+    let colors = surfaces.spots.iter().map(|s| s.as_ref().map(face_of)).collect();
+    let names = ["+X", "-X", "+Y (up)", "-Y (down)", "+Z", "-Z"];
+    let count = grid.face_count() as usize;
+    let legend = FACE_COLORS.into_iter().zip(names).take(count);
+    Painted { colors, legend: Legend::Names(legend.map(|(c, n)| (c, n.to_owned())).collect()) }
+}
+
+fn learned(surfaces: &SurfaceMap, grid: &SphericalGrid, laws: &LightGrid) -> Painted {
+    const OWN: [u8; 3] = [84, 190, 140];
+    const NONE: [u8; 3] = [226, 120, 70];
+    let is_learned =
+        |spot: &Spot| laws.law_of_cell(grid.cell_of(spot.position, spot.normal)) != WHOLE_MAP;
+    let colors: Vec<Option<[u8; 3]>> = surfaces
+        .spots
+        .iter()
+        .map(|s| s.as_ref().map(|spot| if is_learned(spot) { OWN } else { NONE }))
+        .collect();
+    let pixels = colors.iter().flatten().count().max(1);
+    let own = colors.iter().flatten().filter(|c| **c == OWN).count();
+    let percent = 100.0 * own as f32 / pixels as f32;
+    let legend = Legend::Names(vec![
+        (OWN, format!("a law of its own, {percent:.1} % of the pixels")),
+        (NONE, "the whole map's law".to_owned()),
+    ]);
+    Painted { colors, legend }
+}
+
+/// What a scale spans.
+#[derive(Clone, Copy)]
+enum Range {
+    /// As given.
+    Fixed(f32, f32),
+    /// From 0 to the largest value.
+    Whole,
+    /// Between the 2nd and 98th percentile, by the logarithm.
+    Logarithmic,
+}
+
+impl Range {
+    const WHOLE: Self = Self::Whole;
+    const LOGARITHMIC: Self = Self::Logarithmic;
+
+    fn between(low: f32, high: f32) -> Self {
+        Self::Fixed(low, high)
+    }
+}
+
+fn scaled(values: impl Iterator<Item = Option<f32>>, range: Range, unit: &'static str) -> Painted {
+    let values: Vec<Option<f32>> = values.collect();
+    let mut sorted: Vec<f32> = values.iter().flatten().copied().collect();
+    sorted.sort_unstable_by(f32::total_cmp);
+    let percentile =
+        |share: f32| sorted.get((sorted.len() as f32 * share) as usize).copied().unwrap_or(1.0);
+    let logarithmic = matches!(range, Range::Logarithmic);
+    let (low, high) = match range {
+        Range::Fixed(low, high) => (low, high),
+        Range::Whole => (0.0, sorted.last().copied().unwrap_or(1.0).max(1.0)),
+        Range::Logarithmic => {
+            let low = percentile(0.02).max(f32::MIN_POSITIVE);
+            (low, percentile(0.98).max(low * 1.01))
+        }
+    };
+    let position = |value: f32| {
+        if logarithmic {
+            (value / low).ln() / (high / low).ln()
+        } else {
+            (value - low) / (high - low)
+        }
+    };
+    let colors = values.iter().map(|v| v.map(|v| palette::viridis(position(v)))).collect();
+    Painted { colors, legend: Legend::Scale { low, high, logarithmic, unit } }
+}

@@ -1,0 +1,64 @@
+//! Colours for values.
+
+use glam::Vec3;
+
+/// Viridis (van der Walt and Smith 2015) in Matt Zucker's polynomial fit, sRGB, for `t` in `[0,1]`.
+pub fn viridis(t: f32) -> [u8; 3] {
+    const C: [[f32; 3]; 7] = [
+        [0.277_727_3, 0.005_407_344_5, 0.334_099_8],
+        [0.105_093_04, 1.404_613_5, 1.384_590_2],
+        [-0.330_861_83, 0.214_847_56, 0.095_095_165],
+        [-4.634_230_5, -5.799_101, -19.332_441],
+        [6.228_27, 14.179_933, 56.690_55],
+        [4.776_385, -13.745_145, -65.353_03],
+        [-5.435_456, 4.645_852_6, 26.312_435],
+    ];
+    let t = t.clamp(0.0, 1.0);
+    let sum = C.iter().rev().fold(Vec3::ZERO, |sum, c| sum * t + Vec3::from(*c));
+    bytes(sum)
+}
+
+/// A colour of the given hue (turns), saturation and value, sRGB.
+pub fn hsv(hue_turns: f32, saturation: f32, value: f32) -> [u8; 3] {
+    let channel = |n: f32| {
+        let k = (n + hue_turns * 6.0).rem_euclid(6.0);
+        value - value * saturation * k.min(4.0 - k).clamp(0.0, 1.0)
+    };
+    bytes(Vec3::new(channel(5.0), channel(3.0), channel(1.0)))
+}
+
+/// A colour that differs from those of neighbouring numbers.
+pub fn of_number(number: u32) -> [u8; 3] {
+    let hash = crate::sampler::hash(number.wrapping_add(0x51ed));
+    let unit = |shift: u32| (hash >> shift & 0xff) as f32 / 255.0;
+    hsv(unit(0), 0.35 + 0.3 * unit(8), 0.65 + 0.3 * unit(16))
+}
+
+/// The colour of a place on the map: hue around the horizon, brighter towards the zenith.
+pub fn of_map_place(u: f32, v: f32) -> [u8; 3] {
+    hsv(u, 0.35 + 0.5 * v.clamp(0.0, 1.0), 1.0 - 0.65 * v.clamp(0.0, 1.0))
+}
+
+fn bytes(rgb: Vec3) -> [u8; 3] {
+    rgb.to_array().map(|v| (v.clamp(0.0, 1.0) * 255.0).round() as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hues_are_where_they_should_be() {
+        assert_eq!(hsv(0.0, 1.0, 1.0), [255, 0, 0]);
+        assert_eq!(hsv(1.0 / 3.0, 1.0, 1.0), [0, 255, 0]);
+        assert_eq!(hsv(2.0 / 3.0, 1.0, 1.0), [0, 0, 255]);
+        assert_eq!(hsv(0.5, 0.0, 0.5), [128, 128, 128]);
+    }
+
+    #[test]
+    fn viridis_goes_from_dark_violet_to_yellow() {
+        let ([r0, g0, b0], [r1, g1, b1]) = (viridis(0.0), viridis(1.0));
+        assert!(r0 < 90 && g0 < 20 && b0 > 70, "{r0} {g0} {b0}");
+        assert!(r1 > 220 && g1 > 210 && b1 < 80, "{r1} {g1} {b1}");
+    }
+}

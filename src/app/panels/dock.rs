@@ -1,0 +1,40 @@
+//! The panel below the picture: tabs over what is passed in.
+
+use egui::{Align, Layout, Margin, Panel, ScrollArea, Ui};
+
+use crate::app::interface::{Dock, Interface, Tab};
+use crate::app::theme;
+
+/// Draws the tabs and what `content` draws for the chosen one; nothing when closed.
+pub(in crate::app) fn show(
+    ui: &mut Ui,
+    interface: &mut Interface,
+    content: impl FnOnce(&mut Ui, Dock),
+) {
+    if interface.dock.is_none() && interface.tab == Tab::Picture {
+        return;
+    }
+    let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 6));
+    let panel = Panel::bottom("dock").frame(frame);
+    let Some(dock) = interface.dock else {
+        panel.show(ui, |ui| tabs(ui, interface));
+        return;
+    };
+    panel.resizable(true).default_size(230.0).min_size(120.0).show(ui, |ui| {
+        tabs(ui, interface);
+        ui.add_space(2.0);
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| content(ui, dock));
+    });
+}
+
+fn tabs(ui: &mut Ui, interface: &mut Interface) {
+    ui.horizontal(|ui| {
+        ui.selectable_value(&mut interface.dock, Some(Dock::Convergence), "Convergence");
+        ui.selectable_value(&mut interface.dock, Some(Dock::Needs), "What the scene needs");
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if interface.dock.is_some() && ui.small_button("×").on_hover_text("Close").clicked() {
+                interface.dock = None;
+            }
+        });
+    });
+}

@@ -1,0 +1,250 @@
+//! The map with its tiles, and what the cell under the pointer knows of them.
+
+use egui::{Color32, Grid, Rect, RichText, Stroke, StrokeKind, Ui};
+
+use super::map_view;
+use crate::app::commands::Command;
+use crate::app::inspect::{Inspected, Inspector};
+use crate::app::interface::Interface;
+use crate::app::loader::LoadedMap;
+use crate::app::overlays::palette;
+use crate::app::theme;
+use crate::app::worker::Snapshot;
+
+/// Tiles listed in the table.
+const LISTED: usize = 6;
+
+/// Draws the map view and the inspector.
+pub(in crate::app) fn show(
+    ui: &mut Ui,
+    interface: &mut Interface,
+    inspector: &Inspector,
+    map: Option<&LoadedMap>,
+    snapshot: Option<&Snapshot>,
+    commands: &mut Vec<Command>,
+) {
+    let Some(map) = map else { return };
+    let size = map.environment.tile_grid();
+    ui.add_space(4.0);
+    ui.separator();
+    theme::heading(ui, "TILES OF THE MAP, BY ENERGY");
+    let energies: Vec<f32> =
+        map.environment.tile_energies().iter().map(|energy| *energy as f32).collect();
+    tiles(ui, interface, map, size, &shares(&energies));
+    if let Some(tile) = interface.tile {
+        chosen_tile(ui, interface, size, tile, &shares(&energies));
+    } else {
+        ui.label(theme::quiet("Click a tile to see which cells want it."));
+    }
+    ui.add_space(4.0);
+    ui.separator();
+    theme::heading(ui, "CELL UNDER THE POINTER");
+    match inspector.inspected() {
+        Some(inspected) => cell(ui, interface, inspector, inspected, (map, size), commands),
+        None => {
+            ui.label(theme::quiet("Point at a surface; click to stay there."));
+        }
+    }
+    if snapshot.is_some_and(|s| s.main.grid.is_some()) {
+        ui.add_space(4.0);
+        let hint = "All laws as .csv, .json or .exr (one row a law, one column a tile)";
+        if ui.button("Export laws…").on_hover_text(hint).clicked() {
+            commands.push(Command::ChooseExport);
+        }
+    }
+}
+
+fn shares(values: &[f32]) -> Vec<f32> {
+    let total: f32 = values.iter().sum();
+    values.iter().map(|v| if total > 0.0 { v / total } else { 0.0 }).collect()
+}
+
+/// The map under a heatmap of shares; a click chooses a tile.
+fn tiles(
+    ui: &mut Ui,
+    interface: &mut Interface,
+    map: &LoadedMap,
+    size: (u32, u32),
+    shares: &[f32],
+) {
+    let (rect, response) = map_view::ground(ui, map);
+    heatmap(ui, rect, size, shares);
+    if let Some(tile) = interface.tile {
+        mark(ui, map_view::tile_rect(rect, size, tile), theme::ACCENT);
+    }
+    let pointed = response.hover_pos().and_then(|at| map_view::tile_at(rect, size, at));
+    if response.clicked() {
+        interface.tile = if interface.tile == pointed { None } else { pointed };
+    }
+    if let Some(tile) = pointed {
+        mark(ui, map_view::tile_rect(rect, size, tile), Color32::WHITE);
+        let share = shares.get(tile as usize).copied().unwrap_or(0.0);
+        response.on_hover_text(format!(
+            "Tile {tile}: row {}, column {}\n{}",
+            tile / size.0,
+            tile % size.0,
+            percent(share)
+        ));
+    }
+}
+
+/// Logarithmic shares over the map: 0.01 % is transparent, the largest opaque.
+fn heatmap(ui: &Ui, rect: Rect, size: (u32, u32), shares: &[f32]) {
+    const LEAST: f32 = 1e-4;
+    let largest = shares.iter().copied().fold(LEAST * 10.0, f32::max);
+    let painter = ui.painter_at(rect);
+    for (tile, share) in shares.iter().enumerate().filter(|(_, share)| **share > LEAST) {
+        let t = (share / LEAST).ln() / (largest / LEAST).ln();
+        let [r, g, b] = palette::viridis(t);
+        let color = Color32::from_rgba_unmultiplied(r, g, b, (90.0 + 150.0 * t) as u8);
+        painter.rect_filled(map_view::tile_rect(rect, size, tile as u32), 0.0, color);
+    }
+}
+
+fn mark(ui: &Ui, rect: Rect, color: Color32) {
+    ui.painter().rect_stroke(rect, 0.0, Stroke::new(1.5, color), StrokeKind::Outside);
+}
+
+fn chosen_tile(
+    ui: &mut Ui,
+    interface: &mut Interface,
+    (columns, _): (u32, u32),
+    tile: u32,
+    shares: &[f32],
+) {
+    let share = shares.get(tile as usize).copied().unwrap_or(0.0);
+    let place = format!("row {}, column {}", tile / columns, tile % columns);
+    ui.label(format!("Tile {tile}, {place}: {} of the map", percent(share)));
+    let is_shown = interface.overlay == Some(crate::app::overlays::Overlay::Tile);
+    if !is_shown && ui.button("Show which cells want it").clicked() {
+        interface.overlay = Some(crate::app::overlays::Overlay::Tile);
+    }
+}
+
+fn cell(
+    ui: &mut Ui,
+    interface: &mut Interface,
+    inspector: &Inspector,
+    inspected: &Inspected,
+    (map, size): (&LoadedMap, (u32, u32)),
+    commands: &mut Vec<Command>,
+) {
+    facts(ui, inspected);
+    if !inspected.probabilities.is_empty() {
+        let (rect, _) = map_view::ground(ui, map);
+        heatmap(ui, rect, size, &inspected.probabilities);
+        ui.label(theme::quiet("Probability of each tile, learned"));
+    }
+    if let Some(truth) = inspector.truth() {
+        let (rect, _) = map_view::ground(ui, map);
+        heatmap(ui, rect, size, &truth.shares);
+        let distance: f32 = truth
+            .shares
+            .iter()
+            .zip(&inspected.probabilities)
+            .map(|(a, b)| 0.5 * (a - b).abs())
+            .sum();
+        ui.label(theme::quiet(format!(
+            "Visible energy times cosine here, by brute force; total variation {distance:.2}"
+        )));
+    }
+    ui.horizontal(|ui| {
+        let label = if inspector.is_busy() { "Measuring…" } else { "Measure the truth" };
+        let button = ui.add_enabled(!inspector.is_busy(), egui::Button::new(label));
+        let hint = "256 shadow rays for every tile from this very point";
+        if button.on_hover_text(hint).clicked() {
+            if interface.pinned.is_none() {
+                interface.pinned = interface.pointed;
+            }
+            commands.push(Command::MeasureTruth);
+        }
+        if interface.pinned.is_some() && ui.button("Let go").clicked() {
+            interface.pinned = None;
+        }
+    });
+    table(ui, inspected, inspector);
+}
+
+fn facts(ui: &mut Ui, inspected: &Inspected) {
+    let p = inspected.spot.position;
+    let [face, row, column] = inspected.coordinates;
+    let faces = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
+    let face = faces.get(face as usize).copied().unwrap_or("all");
+    let cell = match inspected.cell {
+        Some(cell) => format!("{cell}: row {row}, column {column}, face {face}"),
+        None => "no grid: the whole map everywhere".to_owned(),
+    };
+    let law = match inspected.law {
+        crate::light_grid::WHOLE_MAP => "the whole map's".to_owned(),
+        law => law.to_string(),
+    };
+    let tries: f64 = inspected.tallies.iter().map(|t| t.tries).sum();
+    Grid::new("cell").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
+        let mut line = |name: &str, value: String| {
+            ui.label(theme::quiet(name));
+            ui.label(RichText::new(value).size(12.5));
+            ui.end_row();
+        };
+        line("Cell", cell);
+        line("Law", law);
+        line("Position", format!("{:.2}, {:.2}, {:.2} m", p.x, p.y, p.z));
+        line("Material", inspected.material.clone());
+        if !inspected.probabilities.is_empty() {
+            let p = &inspected.probabilities;
+            let entropy: f32 = p.iter().map(|p| if *p > 0.0 { -p * p.log2() } else { 0.0 }).sum();
+            let support = p.iter().filter(|p| **p > 0.0).count();
+            line("Entropy", format!("{entropy:.2} bits over {support} tiles"));
+        }
+        if tries > 0.0 {
+            line("Learned from", format!("{} tries", theme::count(tries as u64)));
+        }
+    });
+}
+
+/// The likeliest tiles in numbers.
+fn table(ui: &mut Ui, inspected: &Inspected, inspector: &Inspector) {
+    let mut tiles: Vec<usize> = (0..inspected.probabilities.len()).collect();
+    tiles.sort_by(|a, b| inspected.probabilities[*b].total_cmp(&inspected.probabilities[*a]));
+    let truth = inspector.truth();
+    Grid::new("tiles").num_columns(5).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
+        for name in ["Tile", "Law", "Tries", "Ratio"] {
+            ui.label(theme::quiet(name));
+        }
+        if truth.is_some() {
+            ui.label(theme::quiet("Truth"));
+        }
+        ui.end_row();
+        for tile in tiles.into_iter().take(LISTED) {
+            let p = inspected.probabilities[tile];
+            if p <= 0.0 {
+                break;
+            }
+            let mut number = |text: String| ui.label(RichText::new(text).size(12.5));
+            number(tile.to_string());
+            number(percent(p));
+            match inspected.tallies.get(tile) {
+                Some(tally) if tally.tries > 0.0 => {
+                    number(theme::count(tally.tries as u64));
+                    number(format!("{:.3}", tally.weight / tally.tries));
+                }
+                _ => {
+                    number("0".to_owned());
+                    number("pooled".to_owned());
+                }
+            }
+            if let Some(truth) = truth {
+                number(percent(truth.shares[tile]));
+            }
+            ui.end_row();
+        }
+    });
+}
+
+fn percent(share: f32) -> String {
+    match 100.0 * share {
+        p if p >= 9.95 => format!("{p:.1} %"),
+        p if p >= 0.01 => format!("{p:.2} %"),
+        p if p > 0.0 => format!("{p:.0e} %"),
+        _ => "0 %".to_owned(),
+    }
+}

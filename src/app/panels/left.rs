@@ -1,0 +1,224 @@
+//! The left panel: scene, cameras, environment.
+
+use egui::{Margin, Panel, RichText, ScrollArea, Slider, Ui};
+
+use super::map_view;
+use crate::app::commands::Command;
+use crate::app::document::{Document, Viewpoint};
+use crate::app::interface::Interface;
+use crate::app::loader::{LoadedMap, LoadedScene};
+use crate::app::settings_file::Settings;
+use crate::app::theme;
+use crate::environment::sky;
+use crate::scene::builtin;
+
+/// What the panel is drawn from.
+#[derive(Clone, Copy)]
+pub(in crate::app) struct Sources<'a> {
+    /// The scene shown.
+    pub(in crate::app) scene: Option<&'a LoadedScene>,
+    /// The map in use.
+    pub(in crate::app) map: Option<&'a LoadedMap>,
+    /// Recent files.
+    pub(in crate::app) settings: &'a Settings,
+}
+
+/// Draws the panel.
+pub(in crate::app) fn show(
+    ui: &mut Ui,
+    document: &mut Document,
+    interface: &mut Interface,
+    sources: Sources<'_>,
+    commands: &mut Vec<Command>,
+) {
+    let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 8));
+    Panel::left("left").frame(frame).exact_size(286.0).show(ui, |ui| {
+        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            theme::heading(ui, "SCENE");
+            scene(ui, document, sources, commands);
+            theme::heading(ui, "CAMERA");
+            cameras(ui, document, sources.scene, commands);
+            ui.add_space(4.0);
+            ui.separator();
+            theme::heading(ui, "ENVIRONMENT");
+            environment(ui, document, interface, sources, commands);
+        });
+    });
+}
+
+fn short(name: &str) -> String {
+    std::path::Path::new(name)
+        .file_name()
+        .map_or_else(|| name.to_owned(), |file| file.to_string_lossy().into_owned())
+}
+
+fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut Vec<Command>) {
+    let mut chosen = None;
+    egui::ComboBox::from_id_salt("scene")
+        .width(ui.available_width())
+        .selected_text(short(&document.scene))
+        .show_ui(ui, |ui| {
+            ui.label(theme::quiet("Built in"));
+            for name in builtin::names() {
+                if ui.selectable_label(document.scene == *name, *name).clicked() {
+                    chosen = Some((*name).to_owned());
+                }
+            }
+            recent(ui, &sources.settings.recent_scenes, &document.scene, &mut chosen);
+        });
+    commands.extend(chosen.map(Command::OpenScene));
+    if let Some(scene) = sources.scene {
+        let (low, high) = scene.world.bvh.bounds();
+        let size = high - low;
+        let text = format!(
+            "{} triangles, {:.1} x {:.1} x {:.1} m",
+            theme::count(scene.world.scene.triangles.len() as u64),
+            size.x,
+            size.y,
+            size.z
+        );
+        ui.label(theme::quiet(text)).on_hover_text(format!(
+            "{} materials, {} textures; BVH {}",
+            scene.world.scene.materials.len(),
+            scene.world.scene.textures.len(),
+            theme::bytes(scene.world.bvh.memory_bytes())
+        ));
+    }
+}
+
+fn recent(ui: &mut Ui, list: &[String], current: &str, chosen: &mut Option<String>) {
+    if list.is_empty() {
+        return;
+    }
+    ui.separator();
+    ui.label(theme::quiet("Recent"));
+    for name in list {
+        let label = ui.selectable_label(current == name, short(name)).on_hover_text(name);
+        if label.clicked() {
+            *chosen = Some(name.clone());
+        }
+    }
+}
+
+fn cameras(
+    ui: &mut Ui,
+    document: &mut Document,
+    scene: Option<&LoadedScene>,
+    commands: &mut Vec<Command>,
+) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = egui::Vec2::splat(4.0);
+        for (i, camera) in scene.iter().flat_map(|s| s.world.scene.cameras.iter()).enumerate() {
+            let name = if camera.name.is_empty() {
+                format!("Camera {}", i + 1)
+            } else {
+                camera.name.clone()
+            };
+            if ui.button(name).on_hover_text("Look through this camera of the scene").clicked() {
+                let distance = document.viewpoint.as_ref().map_or(3.0, |v| v.pivot_distance);
+                commands.push(Command::LookFrom(Viewpoint::of(camera, distance)));
+            }
+        }
+        for (i, viewpoint) in document.bookmarks.iter().enumerate() {
+            let button = ui.button(viewpoint.name.clone());
+            let button = button.on_hover_text("Click: look from here. Right click: forget it");
+            if button.clicked() {
+                commands.push(Command::LookFrom(viewpoint.clone()));
+            }
+            if button.secondary_clicked() {
+                commands.push(Command::ForgetBookmark(i));
+            }
+        }
+        if ui.button("+ Keep").on_hover_text("Keep this viewpoint (B)").clicked() {
+            commands.push(Command::Bookmark);
+        }
+        if ui.button("Frame all").on_hover_text("Show the whole scene (F)").clicked() {
+            commands.push(Command::FrameAll);
+        }
+    });
+    let Some(viewpoint) = &mut document.viewpoint else { return };
+    if let Some(degrees) = &mut viewpoint.fov_y_degrees {
+        theme::row(ui, "Field of view", "Vertical", |ui| {
+            ui.add(Slider::new(degrees, 5.0..=120.0).suffix("°").fixed_decimals(0));
+        });
+    }
+    theme::row(ui, "Lens radius", "0 keeps everything sharp", |ui| {
+        let mut millimetres = viewpoint.lens_radius * 1000.0;
+        let slider = Slider::new(&mut millimetres, 0.0..=100.0).suffix(" mm");
+        if ui.add(slider.fixed_decimals(0)).changed() {
+            viewpoint.lens_radius = millimetres / 1000.0;
+        }
+    });
+    if viewpoint.lens_radius > 0.0 {
+        theme::row(ui, "Focus at", "Ctrl click on the picture sets it", |ui| {
+            let range = 0.05..=1000.0;
+            ui.add(
+                Slider::new(&mut viewpoint.focus_distance, range).logarithmic(true).suffix(" m"),
+            );
+        });
+    }
+}
+
+fn environment(
+    ui: &mut Ui,
+    document: &mut Document,
+    interface: &mut Interface,
+    sources: Sources<'_>,
+    commands: &mut Vec<Command>,
+) {
+    if let Some(map) = sources.map {
+        let turn = document.rotation_degrees / 360.0;
+        let response = map_view::preview(ui, map, turn);
+        if response.dragged() {
+            let degrees = response.drag_delta().x / response.rect.width() * 360.0;
+            document.rotation_degrees = (document.rotation_degrees + degrees).rem_euclid(360.0);
+            interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
+        }
+        response.on_hover_text(
+            "Drag to turn the map. The middle of the picture is seen along +X, the left quarter \
+             along -Z",
+        );
+    }
+    let mut chosen = None;
+    egui::ComboBox::from_id_salt("map")
+        .width(ui.available_width())
+        .selected_text(short(&document.map))
+        .show_ui(ui, |ui| {
+            ui.label(theme::quiet("Built in"));
+            for name in sky::names() {
+                let name = format!("sky:{name}");
+                if ui.selectable_label(document.map == name, &name).clicked() {
+                    chosen = Some(name);
+                }
+            }
+            recent(ui, &sources.settings.recent_maps, &document.map, &mut chosen);
+        });
+    commands.extend(chosen.map(Command::OpenMap));
+    if let Some(map) = sources.map {
+        let image = map.environment.map();
+        let text = format!("{} x {} pixels", image.width, image.height);
+        ui.label(theme::quiet(text)).on_hover_text(format!(
+            "Importance table: {}",
+            theme::bytes(map.environment.memory_bytes().table)
+        ));
+    }
+    theme::row(ui, "Rotation", "Turns the map about the vertical", |ui| {
+        let slider = Slider::new(&mut document.rotation_degrees, 0.0..=360.0).suffix("°");
+        if ui.add(slider.fixed_decimals(0)).dragged() {
+            interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
+        }
+    });
+    theme::row(ui, "Intensity", "Multiplies the map's light", |ui| {
+        let slider = Slider::new(&mut document.intensity, 0.0..=10.0).logarithmic(true);
+        let slider = slider.smallest_positive(0.01).fixed_decimals(2).prefix("× ");
+        if ui.add(slider).dragged() {
+            interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
+        }
+    });
+    if document.rotation_degrees != 0.0 || document.intensity != 1.0 {
+        let text = RichText::new("Reset rotation and intensity").size(12.0);
+        if ui.button(text).clicked() {
+            (document.rotation_degrees, document.intensity) = (0.0, 1.0);
+        }
+    }
+}

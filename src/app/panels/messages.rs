@@ -1,0 +1,44 @@
+//! Messages over the picture.
+
+use egui::{Align2, Area, Color32, Context, Frame, Id, Margin, RichText, Stroke};
+
+use crate::app::messages::{Messages, NOTICE_SECONDS};
+use crate::app::theme;
+
+/// Draws the messages; errors stay until they are closed.
+pub(in crate::app) fn show(context: &Context, messages: &mut Messages) {
+    let now = context.time();
+    messages.list().retain(|message| {
+        message.is_error || message.since.is_none_or(|since| now - since < NOTICE_SECONDS)
+    });
+    if messages.list().is_empty() {
+        return;
+    }
+    context.request_repaint_after(std::time::Duration::from_secs(1));
+    let area = Area::new(Id::unique("messages")).anchor(Align2::CENTER_BOTTOM, [0.0, -44.0]);
+    area.show(context, |ui| {
+        let mut closed = None;
+        for (i, message) in messages.list().iter_mut().enumerate() {
+            message.since.get_or_insert(now);
+            let color = if message.is_error { theme::ALERT } else { theme::TEXT };
+            let edge = if message.is_error { theme::ALERT } else { Color32::from_rgb(70, 74, 82) };
+            Frame::new()
+                .fill(Color32::from_rgb(40, 42, 48))
+                .stroke(Stroke::new(1.0, edge))
+                .corner_radius(6)
+                .inner_margin(Margin::symmetric(12, 7))
+                .show(ui, |ui| {
+                    ui.set_max_width(620.0);
+                    ui.horizontal_wrapped(|ui| {
+                        ui.label(RichText::new(&message.sentence).color(color));
+                        if ui.small_button("×").clicked() {
+                            closed = Some(i);
+                        }
+                    });
+                });
+        }
+        if let Some(index) = closed {
+            messages.list().remove(index);
+        }
+    });
+}

@@ -1,0 +1,18 @@
+//! What is drawn: free functions over plain data. No panel knows another one.
+
+pub(super) mod convergence;
+pub(super) mod dock;
+pub(super) mod history;
+pub(super) mod inspector;
+pub(super) mod left;
+mod map_view;
+pub(super) mod messages;
+pub(super) mod needs;
+pub(super) mod overlay;
+pub(super) mod picture;
+pub(super) mod prompt;
+pub(super) mod right;
+pub(super) mod shortcuts;
+pub(super) mod status;
+pub(super) mod top;
+pub(super) mod viewport;

@@ -1,0 +1,49 @@
+//! What the scene and the map need of the renderer, and what is left out.
+
+use egui::{RichText, Ui};
+
+use crate::app::loader::{LoadedMap, LoadedScene};
+use crate::app::theme;
+
+/// Draws two columns: what is used, what is left out.
+pub(in crate::app) fn show(ui: &mut Ui, scene: Option<&LoadedScene>, map: Option<&LoadedMap>) {
+    let Some(scene) = scene else { return };
+    let needs = &scene.world.needs;
+    let used = [
+        (needs.textures, "Textures"),
+        (needs.normal_maps, "Normal maps"),
+        (needs.second_uv_set, "A second set of texture coordinates"),
+        (needs.vertex_colors, "Vertex colours"),
+        (needs.alpha_mask, "Alpha tests"),
+        (needs.alpha_blend, "Opacity along rays"),
+        (needs.single_sided, "Single-sided surfaces"),
+        (needs.metals, "Metals"),
+        (needs.thin_transmission, "Thin glass"),
+        (needs.solid_transmission, "Refraction"),
+        (needs.absorption, "Absorption"),
+        (needs.clearcoat, "Clearcoat"),
+        (needs.unlit, "Unlit surfaces"),
+        (needs.emitters, "Emissive triangles"),
+        (needs.punctual_lights, "Point, spot or directional lights"),
+    ];
+    ui.columns_const(|[left, right]| {
+        for column in [&mut *left, &mut *right] {
+            // Columns stretch lines to their width otherwise.
+            column.style_mut().wrap_mode = Some(egui::TextWrapMode::Truncate);
+        }
+        theme::heading(left, "USED");
+        for (_, name) in used.iter().filter(|(is_used, _)| *is_used) {
+            left.label(RichText::new(*name).size(12.5));
+        }
+        theme::heading(right, "LEFT OUT");
+        for sentence in needs.left_out() {
+            right.label(theme::quiet(sentence));
+        }
+        if map.is_some_and(|map| map.environment.is_black()) {
+            right.label(theme::quiet("sampling of the map and the Light Grid: the map is black"));
+        }
+        if map.is_some_and(|map| map.environment.is_constant()) {
+            right.label(theme::quiet("nothing more for the map: it is the same everywhere"));
+        }
+    });
+}

@@ -1,0 +1,169 @@
+//! Settings of the picture: how it is developed, how light is found, when it is done.
+
+use egui::{DragValue, Slider, Ui};
+
+use crate::app::commands::Command;
+use crate::app::document::{Document, PictureSize};
+use crate::app::presenter::Shown;
+use crate::app::theme;
+use crate::tone::{DAYLIGHT_KELVIN, ToneCurve, WhiteBalance};
+
+/// Draws the settings.
+pub(in crate::app) fn show(
+    ui: &mut Ui,
+    document: &mut Document,
+    shown: Option<&Shown>,
+    commands: &mut Vec<Command>,
+) {
+    theme::heading(ui, "DEVELOP");
+    exposure(ui, document, shown);
+    curve(ui, document);
+    white_balance(ui, &mut document.look.white_balance);
+    ui.checkbox(&mut document.look.denoise, "Denoise")
+        .on_hover_text("Edge-avoiding filter over albedo and normals; not in .exr files (N)");
+    ui.add_space(4.0);
+    ui.separator();
+    theme::heading(ui, "LIGHT");
+    theme::row(ui, "Bounces", "Surfaces at which a path gathers light; 1 is direct light", |ui| {
+        ui.add(Slider::new(&mut document.light.bounces, 0..=32));
+    });
+    theme::row(ui, "Seed", "The same seed gives the same picture", |ui| {
+        ui.add(DragValue::new(&mut document.light.seed).range(0..=u32::MAX));
+    });
+    ui.add_space(4.0);
+    ui.separator();
+    theme::heading(ui, "SIZE");
+    size(ui, &mut document.size);
+    ui.add_space(4.0);
+    ui.separator();
+    theme::heading(ui, "STOP AT");
+    stop(ui, document);
+    ui.add_space(4.0);
+    ui.separator();
+    theme::heading(ui, "COMPARE");
+    if ui
+        .button("Keep this picture")
+        .on_hover_text("Wipe between it and what is rendered next (K)")
+        .clicked()
+    {
+        commands.push(Command::KeepPicture);
+    }
+}
+
+fn exposure(ui: &mut Ui, document: &mut Document, shown: Option<&Shown>) {
+    let look = &mut document.look;
+    theme::row(ui, "Exposure", "Stops; double the light is one more", |ui| {
+        ui.add(Slider::new(&mut look.exposure_ev, -8.0..=8.0).suffix(" EV").fixed_decimals(1));
+    });
+    theme::row(ui, "", "", |ui| {
+        ui.checkbox(&mut look.auto_exposure, "Automatic")
+            .on_hover_text("Bring the picture to middle grey, then add the stops above");
+        if let Some(shown) = shown.filter(|_| look.auto_exposure) {
+            ui.label(theme::quiet(format!("{:+.1} EV in all", shown.exposure_ev)));
+        }
+    });
+}
+
+fn curve(ui: &mut Ui, document: &mut Document) {
+    theme::row(ui, "Tone curve", "How bright light fades into white", |ui| {
+        egui::ComboBox::from_id_salt("curve")
+            .width(ui.available_width())
+            .selected_text(curve_name(document.look.curve))
+            .show_ui(ui, |ui| {
+                for curve in ToneCurve::ALL {
+                    ui.selectable_value(&mut document.look.curve, curve, curve_name(curve));
+                }
+            });
+    });
+}
+
+fn curve_name(curve: ToneCurve) -> &'static str {
+    match curve {
+        ToneCurve::Agx => "AgX",
+        ToneCurve::Aces => "ACES",
+        ToneCurve::Neutral => "Khronos Neutral",
+        ToneCurve::Reinhard => "Reinhard",
+        ToneCurve::None => "None",
+    }
+}
+
+fn white_balance(ui: &mut Ui, balance: &mut WhiteBalance) {
+    theme::row(ui, "White", "Colour temperature of the light that looks white", |ui| {
+        let slider = Slider::new(&mut balance.kelvin, 2000.0..=12000.0).suffix(" K");
+        ui.add(slider.fixed_decimals(0).logarithmic(true));
+    });
+    theme::row(ui, "Tint", "Green to magenta", |ui| {
+        ui.add(Slider::new(&mut balance.tint, -1.0..=1.0).fixed_decimals(2));
+    });
+    let is_changed = *balance != WhiteBalance::default();
+    if is_changed && ui.button(format!("Daylight, {DAYLIGHT_KELVIN:.0} K")).clicked() {
+        *balance = WhiteBalance::default();
+    }
+}
+
+fn size(ui: &mut Ui, size: &mut PictureSize) {
+    const FIXED: [(u32, u32); 4] = [(1280, 720), (1920, 1080), (2560, 1440), (3840, 2160)];
+    let name = |size: PictureSize| match size {
+        PictureSize::Viewport(1) => "Viewport".to_owned(),
+        PictureSize::Viewport(divisor) => format!("Viewport / {divisor}"),
+        PictureSize::Fixed(width, height) => format!("{width} x {height}"),
+    };
+    theme::row(ui, "Pixels", "Size of the picture", |ui| {
+        egui::ComboBox::from_id_salt("size")
+            .width(ui.available_width())
+            .selected_text(name(*size))
+            .show_ui(ui, |ui| {
+                let viewport = [1, 2, 4].map(PictureSize::Viewport);
+                let fixed = FIXED.map(|(w, h)| PictureSize::Fixed(w, h));
+                for choice in viewport.into_iter().chain(fixed) {
+                    ui.selectable_value(size, choice, name(choice));
+                }
+            });
+    });
+    if let PictureSize::Fixed(width, height) = size {
+        theme::row(ui, "", "", |ui| {
+            ui.add(DragValue::new(width).range(1..=16384).speed(4));
+            ui.label("x");
+            ui.add(DragValue::new(height).range(1..=8192).speed(4));
+        });
+    }
+}
+
+fn stop(ui: &mut Ui, document: &mut Document) {
+    let stop = &mut document.stop;
+    let mut percent = stop.noise.map(|noise| noise * 100.0);
+    optional(ui, "Samples", &mut stop.samples, 256, |v| DragValue::new(v).range(1..=1_000_000));
+    optional(ui, "Time", &mut stop.seconds, 60.0, |v| {
+        DragValue::new(v).range(0.1..=1e6).suffix(" s").speed(1.0)
+    });
+    optional(ui, "Noise", &mut percent, 5.0, |v| {
+        DragValue::new(v).range(0.01..=100.0).suffix(" %").speed(0.1)
+    });
+    stop.noise = percent.map(|percent| percent / 100.0);
+    if stop.samples.is_none() && stop.seconds.is_none() && stop.noise.is_none() {
+        ui.label(theme::quiet("Nothing chosen: it never stops by itself"));
+    }
+}
+
+/// A checkbox and, when it is checked, a number.
+fn optional<T: Copy>(
+    ui: &mut Ui,
+    name: &str,
+    value: &mut Option<T>,
+    first: T,
+    edit: impl FnOnce(&mut T) -> DragValue<'_>,
+) {
+    ui.horizontal(|ui| {
+        let mut is_on = value.is_some();
+        ui.scope(|ui| {
+            ui.set_min_width(88.0);
+            ui.checkbox(&mut is_on, name);
+        });
+        if is_on != value.is_some() {
+            *value = is_on.then_some(first);
+        }
+        if let Some(number) = value {
+            ui.add(edit(number));
+        }
+    });
+}

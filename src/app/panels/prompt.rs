@@ -1,0 +1,70 @@
+//! Asking for a path: typed, pasted, recent, or from the system's dialogue.
+
+use egui::{Context, Id, Key, Modal, RichText, TextEdit};
+
+use crate::app::commands::Command;
+use crate::app::interface::{Interface, Purpose};
+use crate::app::settings_file::Settings;
+use crate::app::theme;
+
+/// Draws the open prompt, if any.
+pub(in crate::app) fn show(
+    context: &Context,
+    interface: &mut Interface,
+    settings: &Settings,
+    commands: &mut Vec<Command>,
+) {
+    let Some(prompt) = &mut interface.prompt else { return };
+    let (title, hint, accept, recent): (_, _, _, &[String]) = match prompt.purpose {
+        Purpose::Scene => {
+            ("Open a scene", "Path of a .gltf or .glb file", "Open", &settings.recent_scenes)
+        }
+        Purpose::Map => {
+            ("Open a map", "Path of an .exr, .hdr or 8-bit picture", "Open", &settings.recent_maps)
+        }
+        Purpose::Picture => (
+            "Save the picture",
+            "Path of a .png (as shown) or .exr (linear, all layers)",
+            "Save",
+            &[],
+        ),
+        Purpose::Laws => ("Export the laws", "Path of a .csv, .json or .exr file", "Export", &[]),
+    };
+    let (mut is_done, mut is_closed) = (false, false);
+    let response = Modal::new(Id::unique("prompt")).show(context, |ui| {
+        ui.set_width(520.0);
+        ui.label(RichText::new(title).heading());
+        ui.add_space(4.0);
+        let field = ui.add(
+            TextEdit::singleline(&mut prompt.path).hint_text(hint).desired_width(f32::INFINITY),
+        );
+        if !prompt.is_focused {
+            field.request_focus();
+            prompt.is_focused = true;
+        }
+        is_done |= field.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
+        for name in recent {
+            if ui.link(RichText::new(name).size(12.5)).clicked() {
+                prompt.path.clone_from(name);
+                is_done = true;
+            }
+        }
+        ui.add_space(6.0);
+        ui.horizontal(|ui| {
+            is_done |= ui.button(RichText::new(accept).color(theme::ACCENT)).clicked();
+            if ui.button("Browse…").on_hover_text("The system's file dialogue").clicked() {
+                commands.push(Command::Browse(prompt.purpose));
+                is_closed = true;
+            }
+            is_closed |= ui.button("Cancel").clicked();
+        });
+    });
+    let path = prompt.path.trim();
+    if is_done && !path.is_empty() {
+        commands.push(prompt.purpose.command(path));
+        is_closed = true;
+    }
+    if is_closed || response.should_close() {
+        interface.prompt = None;
+    }
+}

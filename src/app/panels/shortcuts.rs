@@ -1,0 +1,50 @@
+//! The sheet of keys and gestures.
+
+use egui::{Align2, Color32, Context, Frame, Grid, Margin, RichText, Ui, Window};
+
+use crate::app::commands::{GESTURES, SHORTCUTS};
+use crate::app::interface::Interface;
+use crate::app::theme;
+
+/// Draws the sheet while it is open.
+pub(in crate::app) fn show(context: &Context, interface: &mut Interface) {
+    let mut is_open = interface.shortcuts;
+    Window::new("Keys and gestures")
+        .open(&mut is_open)
+        .collapsible(false)
+        .resizable(false)
+        .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
+        .show(context, |ui| {
+            ui.add_space(4.0);
+            ui.horizontal_top(|ui| {
+                list(
+                    ui,
+                    "keys",
+                    SHORTCUTS.iter().map(|(keys, what, _)| (context.format_shortcut(keys), *what)),
+                );
+                ui.add_space(24.0);
+                ui.vertical(|ui| {
+                    let gestures = GESTURES.iter().map(|(how, what)| ((*how).to_owned(), *what));
+                    list(ui, "gestures", gestures);
+                    ui.add_space(10.0);
+                    let more = [("? or F1", "This sheet"), ("Ctrl+C", "Copy the picture")];
+                    list(ui, "more", more.into_iter().map(|(k, w)| (k.to_owned(), w)));
+                });
+            });
+        });
+    interface.shortcuts = is_open;
+}
+
+fn list<'a>(ui: &mut Ui, id: &str, lines: impl Iterator<Item = (String, &'a str)>) {
+    Grid::new(id).num_columns(2).spacing([16.0, 7.0]).show(ui, |ui| {
+        for (keys, what) in lines {
+            Frame::new()
+                .fill(Color32::from_rgb(56, 59, 66))
+                .corner_radius(4)
+                .inner_margin(Margin::symmetric(7, 2))
+                .show(ui, |ui| ui.label(RichText::new(keys).size(12.5).color(theme::ACCENT)));
+            ui.label(what);
+            ui.end_row();
+        }
+    });
+}

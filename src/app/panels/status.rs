@@ -1,0 +1,126 @@
+//! The line below: what is going on, in numbers.
+
+use egui::{Align, Color32, Layout, Margin, Panel, RichText, Ui};
+
+use crate::app::theme;
+use crate::app::worker::{Activity, Snapshot};
+
+/// What the line is drawn from.
+pub(in crate::app) struct Status<'a> {
+    /// The latest picture.
+    pub(in crate::app) snapshot: Option<&'a Snapshot>,
+    /// Files being loaded.
+    pub(in crate::app) loading: Vec<&'a str>,
+    /// Render threads.
+    pub(in crate::app) threads: usize,
+    /// Figures that depend on the clock are left out.
+    pub(in crate::app) hides_clock: bool,
+}
+
+/// Draws the line.
+pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
+    let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 5));
+    Panel::bottom("status").frame(frame).show(ui, |ui| {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 18.0;
+            phase(ui, status);
+            if let Some(snapshot) = status.snapshot {
+                figures(ui, snapshot, status.hides_clock);
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                    device(ui, snapshot, status.threads);
+                });
+            }
+        });
+    });
+}
+
+fn phase(ui: &mut Ui, status: &Status<'_>) {
+    if let Some(name) = status.loading.first() {
+        ui.spinner();
+        ui.label(RichText::new(format!("Loading {name}")).color(theme::ACCENT));
+        return;
+    }
+    let Some(snapshot) = status.snapshot else {
+        ui.label(RichText::new("Starting").color(theme::ACCENT));
+        return;
+    };
+    match snapshot.activity {
+        Activity::Moving => word(ui, "Moving", theme::SECOND, "A small picture while it moves"),
+        Activity::Learning(share) => {
+            let learning = &snapshot.learning;
+            let all = snapshot.request.view.learning_paths;
+            let text = format!(
+                "Learning {} / {} paths",
+                theme::count(learning.learning_paths),
+                theme::count(all)
+            );
+            ui.add(
+                egui::ProgressBar::new(share)
+                    .desired_width(190.0)
+                    .desired_height(16.0)
+                    .fill(Color32::from_rgb(122, 86, 34))
+                    .text(RichText::new(text).size(11.5).color(theme::TEXT)),
+            )
+            .on_hover_text(
+                "Finding out which tiles of the map each part of the picture can see; until then \
+                 the picture is made with what was learned before",
+            );
+        }
+        Activity::Rendering => word(ui, "Rendering", theme::ACCENT, "Adding samples"),
+        Activity::Paused => word(ui, "Paused", theme::SECOND, "Space goes on"),
+        Activity::Done => word(ui, "Done", Color32::from_rgb(120, 200, 130), "A stop rule was met"),
+    }
+}
+
+fn word(ui: &mut Ui, text: &str, color: Color32, hint: &str) {
+    ui.label(RichText::new(text).color(color).strong()).on_hover_text(hint);
+}
+
+fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
+    let take = &snapshot.main;
+    let film = &take.film;
+    let pixels = film.pixels().len().max(1) as f64;
+    let mean = film.total_samples() as f64 / pixels;
+    let samples = if mean < 10.0 { format!("{mean:.1}") } else { theme::count(mean as u64) };
+    number(ui, &samples, "samples", "Mean samples per pixel");
+    if !hides_clock {
+        let seconds = take.figures.elapsed_seconds();
+        number(ui, &theme::clock(seconds), "", "Learning and rendering");
+        let rate = take.figures.rays as f64 / take.figures.render_seconds.max(1e-9);
+        number(ui, &theme::figure(rate), "rays/s", "Rays, shadow rays included, while rendering");
+    }
+    if take.noise.is_finite() {
+        let percent = format!("{:.1} %", 100.0 * take.noise);
+        number(
+            ui,
+            &percent,
+            "noise",
+            "Estimated relative RMS error of the pixels, from the samples' own spread",
+        );
+    }
+    let grid = take.grid.as_ref().map_or(0, |grid| grid.memory_bytes());
+    let map = snapshot.request.environment.memory_bytes();
+    number(
+        ui,
+        &theme::bytes(grid),
+        "grid",
+        &crate::app::execute::memory_sentence(grid, map.table, map.pixels),
+    );
+}
+
+fn number(ui: &mut Ui, value: &str, unit: &str, hint: &str) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.label(RichText::new(value).color(theme::TEXT));
+        ui.label(theme::quiet(unit));
+    })
+    .response
+    .on_hover_text(hint);
+}
+
+fn device(ui: &mut Ui, snapshot: &Snapshot, threads: usize) {
+    let film = &snapshot.main.film;
+    let word = if threads == 1 { "thread" } else { "threads" };
+    let text = format!("{} x {}  ·  CPU, {threads} {word}", film.width, film.height);
+    ui.label(theme::quiet(text)).on_hover_text("Size of the picture in pixels, and who renders it");
+}

@@ -1,0 +1,147 @@
+//! Writing pictures and laws, on a thread of its own.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use serde_json::json;
+
+use super::document::Document;
+use super::loader::{LoadedMap, LoadedScene};
+use super::presenter::Shown;
+use super::worker::Snapshot;
+use crate::error::{Error, Notices, Result};
+use crate::image::{
+    ExrPicture, Image, Layer, check_writable, write_beside_and_rename, write_exr, write_png,
+};
+use crate::light_grid::LightGrid;
+use crate::output::record::{Phases, Record};
+use crate::output::{Exposure, LayerName, PictureOptions, write_picture};
+use crate::tone::display_rgb8;
+
+/// What a picture is written from.
+pub(super) struct Picture {
+    /// The film and what was done for it.
+    pub(super) snapshot: std::sync::Arc<Snapshot>,
+    /// How it is shown.
+    pub(super) shown: std::sync::Arc<Shown>,
+    /// The settings.
+    pub(super) document: Document,
+    /// The scene.
+    pub(super) scene: LoadedScene,
+    /// The map.
+    pub(super) map: LoadedMap,
+}
+
+/// Writes what is shown as `.png`, or the film with all layers as `.exr`.
+pub(super) fn picture(path: &Path, picture: &Picture) -> Result<()> {
+    check_writable(path)?;
+    let snapshot = &picture.snapshot;
+    let document = &picture.document;
+    let mut notices = picture.scene.world.scene.notices.clone();
+    notices.extend(&picture.map.notices);
+    let record = Record {
+        scene: &document.scene,
+        map: &document.map,
+        world: &snapshot.request.world,
+        environment: &snapshot.request.environment,
+        film: &snapshot.main.film,
+        figures: &snapshot.main.figures,
+        gpu: None,
+        phases: &Phases {
+            load_scene_seconds: picture.scene.seconds[0],
+            build_bvh_seconds: picture.scene.seconds[1],
+            load_map_seconds: picture.map.seconds[0],
+            build_table_seconds: picture.map.seconds[1],
+        },
+        notices: &notices,
+        options: settings(picture),
+    };
+    let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    if document.look.denoise && !is_exr {
+        crate::output::check_extension(path)?;
+        let linear = crate::denoise::denoise(&snapshot.main.film);
+        let balanced = document.look.white_balance.apply(linear);
+        let rgb = display_rgb8(&balanced, picture.shown.exposure_ev, document.look.curve);
+        return write_png(path, &rgb, &record.metadata());
+    }
+    let options = PictureOptions {
+        exposure: Exposure::Stops(picture.shown.exposure_ev),
+        tone_curve: document.look.curve,
+        white_balance: document.look.white_balance,
+        layers: vec![LayerName::All],
+    };
+    write_picture(path, &options, &record)
+}
+
+fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
+    let view = &picture.snapshot.request.view;
+    let document = &picture.document;
+    let camera = document.viewpoint.as_ref();
+    vec![
+        ("sampling", json!(view.sampling)),
+        ("grid_columns", json!(view.grid_columns)),
+        ("bounces", json!(view.limits.bounces)),
+        ("filter", json!(view.filter)),
+        ("env_rotation_degrees", json!(document.rotation_degrees)),
+        ("env_intensity", json!(document.intensity)),
+        ("seed", json!(view.seed)),
+        ("denoised", json!(document.look.denoise)),
+        ("white_balance_kelvin", json!(document.look.white_balance.kelvin)),
+        ("camera_eye", json!(camera.map(|c| c.eye))),
+        ("camera_rotation", json!(camera.map(|c| c.rotation))),
+    ]
+}
+
+/// Writes the laws of all cells: `.csv` (law, tile, probability), `.json`, or `.exr` (one row a law,
+/// one column a tile).
+pub(super) fn laws(path: &Path, grid: &LightGrid) -> Result<()> {
+    let laws = grid.laws();
+    let tiles = laws.tile_count();
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let cells: Vec<(u32, u32)> = grid.grid().map_or_else(Vec::new, |cells| {
+        (0..cells.cell_count())
+            .map(|cell| (cell, grid.law_of_cell(cell)))
+            .filter(|(_, law)| *law != crate::light_grid::WHOLE_MAP)
+            .collect()
+    });
+    let row = |law: u32| (0..tiles).map(move |tile| laws.probability(law, tile));
+    match extension.as_deref() {
+        Some("csv") => write_beside_and_rename(path, |file| {
+            writeln!(file, "cell,law,tile,probability")?;
+            for (cell, law) in &cells {
+                for (tile, p) in row(*law).enumerate().filter(|(_, p)| *p > 0.0) {
+                    writeln!(file, "{cell},{law},{tile},{p:e}")?;
+                }
+            }
+            Ok(())
+        }),
+        Some("json") => {
+            let all: Vec<Vec<f32>> = (0..laws.len()).map(|law| row(law).collect()).collect();
+            let cells: serde_json::Map<_, _> =
+                cells.iter().map(|(cell, law)| (cell.to_string(), json!(law))).collect();
+            let value = json!({ "tiles": tiles, "law_of_cell": cells, "laws": all });
+            crate::output::record::write_json(path, &value)
+        }
+        Some("exr") => {
+            let values: Vec<f32> = (0..laws.len()).flat_map(row).collect();
+            let image = Image {
+                width: tiles,
+                height: laws.len(),
+                pixels: values.iter().map(|p| [*p; 3]).collect(),
+            };
+            let layer = Layer { name: "law".to_owned(), channels: vec![("p".to_owned(), values)] };
+            write_exr(path, ExrPicture { image: &image, layers: vec![layer], metadata: &[] })
+        }
+        _ => Err(Error::at(path, "laws are written as .csv, .json or .exr")),
+    }
+}
+
+/// What is remarkable about a picture that was written, for the message.
+pub(super) fn remarks(picture: &Picture) -> Notices {
+    let mut notices = Notices::default();
+    let snapshot = &picture.snapshot;
+    for sentence in crate::output::remarks(&snapshot.main.film, &snapshot.request.environment) {
+        notices.add(sentence);
+    }
+    notices
+}

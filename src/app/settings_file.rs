@@ -1,0 +1,174 @@
+//! What one window leaves for the next.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::document::{Document, Light, Look, PictureSize};
+use super::interface::{Dock, Interface, Tab};
+use crate::error::{Error, Result};
+use crate::image::write_beside_and_rename;
+use crate::render::StopRule;
+
+/// Recent files kept.
+const MOST_RECENT: usize = 8;
+
+/// Kept settings; what a file does not say stays at its default.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    /// Scene files, latest first.
+    pub recent_scenes: Vec<String>,
+    /// Map files, latest first.
+    pub recent_maps: Vec<String>,
+    /// Where pictures were written last.
+    pub save_folder: Option<PathBuf>,
+    /// Size of the window in points.
+    pub window_size: [f32; 2],
+    /// How the picture is developed.
+    pub look: Look,
+    /// How light is found.
+    pub light: Light,
+    /// Size of the picture.
+    pub size: PictureSize,
+    /// When to stop.
+    pub stop: StopRule,
+    /// What the right panel shows.
+    pub tab: Tab,
+    /// What is open below the picture.
+    pub dock: Option<Dock>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        let document = Document::default();
+        Self {
+            recent_scenes: Vec::new(),
+            recent_maps: Vec::new(),
+            save_folder: None,
+            window_size: [1440.0, 900.0],
+            look: document.look,
+            light: document.light,
+            size: document.size,
+            stop: document.stop,
+            tab: Tab::Picture,
+            dock: None,
+        }
+    }
+}
+
+impl Settings {
+    /// Where they are kept: under the user's folder for configuration; `None` if there is none.
+    pub fn default_path() -> Option<PathBuf> {
+        let folder = |variable: &str| std::env::var_os(variable).map(PathBuf::from);
+        let folder = if cfg!(windows) {
+            folder("APPDATA")
+        } else if cfg!(target_os = "macos") {
+            folder("HOME").map(|home| home.join("Library/Application Support"))
+        } else {
+            folder("XDG_CONFIG_HOME")
+                .filter(|path| path.is_absolute())
+                .or_else(|| folder("HOME").map(|home| home.join(".config")))
+        };
+        Some(folder?.join("lightgrid").join("window.json"))
+    }
+
+    /// Reads them; a file that is not there gives the defaults.
+    ///
+    /// # Errors
+    /// If the file is there but cannot be read or understood.
+    pub fn read(path: &Path) -> Result<Self> {
+        match std::fs::read(path) {
+            Ok(bytes) => serde_json::from_slice(&bytes)
+                .map_err(|e| Error::at(path, format!("settings not understood: {e}"))),
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Self::default()),
+            Err(e) => Err(Error::at(path, e)),
+        }
+    }
+
+    /// Writes them, making the folder if need be.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder).map_err(|e| Error::at(folder, e))?;
+        }
+        let text = crate::output::record::to_json(self)?;
+        write_beside_and_rename(path, |file| writeln!(file, "{text}"))
+    }
+
+    /// The document a new window starts from.
+    pub fn document(&self) -> Document {
+        Document {
+            look: self.look,
+            light: self.light,
+            size: self.size,
+            stop: self.stop,
+            ..Document::default()
+        }
+    }
+
+    /// The interface a new window starts from.
+    pub fn interface(&self) -> Interface {
+        Interface { tab: self.tab, dock: self.dock, ..Interface::default() }
+    }
+
+    /// Takes over what a window has.
+    pub fn remember(&mut self, document: &Document, interface: &Interface) {
+        self.look = document.look;
+        self.light = document.light;
+        self.size = document.size;
+        self.stop = document.stop;
+        self.tab = interface.tab;
+        self.dock = interface.dock;
+    }
+
+    /// Notes a scene that was opened; built-in ones are always offered.
+    pub fn recent_scene(&mut self, name: &str) {
+        if !crate::scene::builtin::names().contains(&name) {
+            put_first(&mut self.recent_scenes, name);
+        }
+    }
+
+    /// Notes a map that was opened; built-in skies are always offered.
+    pub fn recent_map(&mut self, name: &str) {
+        if !name.starts_with("sky:") {
+            put_first(&mut self.recent_maps, name);
+        }
+    }
+}
+
+fn put_first(list: &mut Vec<String>, name: &str) {
+    list.retain(|other| other != name);
+    list.insert(0, name.to_owned());
+    list.truncate(MOST_RECENT);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_read_back_and_old_files_are_understood() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("deep/window.json");
+        assert_eq!(Settings::read(&path), Ok(Settings::default()));
+        let mut settings = Settings { window_size: [800.0, 600.0], ..Settings::default() };
+        settings.stop.noise = Some(0.05);
+        for i in 0..20 {
+            settings.recent_map(&format!("{i}.hdr"));
+        }
+        settings.recent_scene("office");
+        settings.write(&path).expect("written");
+        let again = Settings::read(&path).expect("read");
+        assert_eq!(again, settings);
+        assert_eq!((again.recent_maps.len(), again.recent_maps[0].as_str()), (8, "19.hdr"));
+        assert!(again.recent_scenes.is_empty());
+        std::fs::write(&path, r#"{"window_size": [1, 2], "gone": 3}"#).expect("written");
+        assert_eq!(Settings::read(&path).expect("read").window_size, [1.0, 2.0]);
+        std::fs::write(&path, "{").expect("written");
+        assert!(Settings::read(&path).expect_err("broken").to_string().contains("window.json"));
+    }
+}

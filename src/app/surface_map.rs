@@ -1,0 +1,83 @@
+//! The surface behind every pixel: what overlays, the inspector and focusing ask for.
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use crate::bvh::{Ray, offset_origin};
+use crate::path::World;
+use crate::path::camera::CameraRays;
+use crate::render::View;
+use crate::scene::surface::SurfacePoint;
+
+/// Panes and leaves that a look passes at most.
+const MAX_PASSES: u32 = 32;
+
+/// A point of a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spot {
+    /// World position in metres.
+    pub position: Vec3,
+    /// Unit geometric normal towards the viewer.
+    pub normal: Vec3,
+    /// Material index.
+    pub material: u32,
+}
+
+/// What the middle of every pixel shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceMap {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `None` where no surface is.
+    pub spots: Vec<Option<Spot>>,
+}
+
+impl SurfaceMap {
+    /// Looks through the middle of every pixel.
+    pub fn of(world: &World, view: &View) -> Self {
+        let rays = CameraRays::new(&view.camera, view.width, view.height);
+        let width = view.width.max(1);
+        let spots = (0..width * view.height)
+            .into_par_iter()
+            .map(|i| {
+                let pixel = Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+                look(world, rays.ray(pixel, Vec2::splat(0.5)))
+            })
+            .collect();
+        Self { width: view.width, height: view.height, spots }
+    }
+
+    /// What a place of the picture shows, both coordinates in `[0,1]`.
+    pub fn at(&self, place: Vec2) -> Option<Spot> {
+        let size = Vec2::new(self.width as f32, self.height as f32);
+        let pixel = (place * size).as_uvec2();
+        (pixel.x < self.width && pixel.y < self.height)
+            .then(|| self.spots[(pixel.y * self.width + pixel.x) as usize])?
+    }
+}
+
+/// The first surface along a camera ray that is mostly not seen through.
+pub fn look(world: &World, mut ray: Ray) -> Option<Spot> {
+    for _ in 0..MAX_PASSES {
+        let hit = world.closest_hit(&ray, true)?;
+        let point = SurfacePoint::at(&world.scene, hit.triangle, hit.barycentric, ray.direction);
+        if world.straight_through(&point, ray.direction).max_element() < 0.5 {
+            return Some(Spot {
+                position: point.position,
+                normal: point.geometric_normal,
+                material: world.scene.triangle_materials[hit.triangle as usize],
+            });
+        }
+        ray.origin = offset_origin(point.position, -point.geometric_normal);
+    }
+    None
+}
+
+/// The surface seen at a place of the picture, both coordinates in `[0,1]`.
+pub fn look_at_place(world: &World, view: &View, place: Vec2) -> Option<Spot> {
+    let rays = CameraRays::new(&view.camera, view.width, view.height);
+    let pixel = place * Vec2::new(view.width as f32, view.height as f32);
+    look(world, rays.ray(pixel, Vec2::splat(0.5)))
+}

@@ -1,0 +1,175 @@
+//! Colours, spacing and small pieces of layout that all panels share.
+
+use egui::{Color32, CornerRadius, FontId, Margin, RichText, Stroke, TextStyle, Ui, Vec2, Visuals};
+
+/// Behind everything.
+pub(super) const BACKGROUND: Color32 = Color32::from_rgb(24, 25, 28);
+/// Panels.
+pub(super) const PANEL: Color32 = Color32::from_rgb(33, 34, 38);
+/// Fields and buttons.
+pub(super) const FIELD: Color32 = Color32::from_rgb(48, 50, 56);
+/// Text that matters.
+pub(super) const TEXT: Color32 = Color32::from_rgb(224, 226, 230);
+/// Text that explains.
+pub(super) const QUIET: Color32 = Color32::from_rgb(152, 156, 164);
+/// What is chosen or in progress.
+pub(super) const ACCENT: Color32 = Color32::from_rgb(240, 176, 84);
+/// What went wrong.
+pub(super) const ALERT: Color32 = Color32::from_rgb(238, 120, 104);
+/// The other of two compared things.
+pub(super) const SECOND: Color32 = Color32::from_rgb(110, 168, 240);
+
+/// Sets fonts, colours and spacing of a context.
+pub(super) fn apply(context: &egui::Context) {
+    context.set_theme(egui::Theme::Dark);
+    context.all_styles_mut(|style| {
+        style.text_styles = [
+            (TextStyle::Heading, FontId::proportional(16.0)),
+            (TextStyle::Body, FontId::proportional(13.5)),
+            (TextStyle::Button, FontId::proportional(13.5)),
+            (TextStyle::Small, FontId::proportional(11.5)),
+            (TextStyle::Monospace, FontId::monospace(12.5)),
+        ]
+        .into();
+        style.spacing.item_spacing = Vec2::new(8.0, 7.0);
+        style.spacing.button_padding = Vec2::new(9.0, 4.0);
+        style.spacing.interact_size = Vec2::new(44.0, 24.0);
+        style.spacing.slider_width = 96.0;
+        style.spacing.combo_width = 120.0;
+        style.spacing.window_margin = Margin::same(16);
+        style.spacing.menu_margin = Margin::same(8);
+        style.spacing.indent = 14.0;
+        style.interaction.tooltip_delay = 0.4;
+        style.visuals = visuals();
+    });
+}
+
+fn visuals() -> Visuals {
+    let mut visuals = Visuals::dark();
+    let radius = CornerRadius::same(5);
+    visuals.panel_fill = PANEL;
+    visuals.window_fill = Color32::from_rgb(38, 40, 45);
+    visuals.window_stroke = Stroke::new(1.0, Color32::from_rgb(62, 65, 72));
+    visuals.extreme_bg_color = Color32::from_rgb(22, 23, 26);
+    visuals.faint_bg_color = Color32::from_rgb(38, 40, 44);
+    visuals.hyperlink_color = SECOND;
+    visuals.warn_fg_color = ACCENT;
+    visuals.error_fg_color = ALERT;
+    visuals.weak_text_color = Some(QUIET);
+    visuals.slider_trailing_fill = true;
+    visuals.selection.bg_fill = Color32::from_rgb(122, 86, 34);
+    visuals.selection.stroke = Stroke::new(1.0, Color32::from_rgb(255, 232, 196));
+    let widgets = &mut visuals.widgets;
+    for widget in [
+        &mut widgets.noninteractive,
+        &mut widgets.inactive,
+        &mut widgets.hovered,
+        &mut widgets.active,
+        &mut widgets.open,
+    ] {
+        widget.corner_radius = radius;
+        widget.fg_stroke = Stroke::new(1.0, TEXT);
+    }
+    widgets.noninteractive.bg_stroke = Stroke::new(1.0, Color32::from_rgb(50, 52, 58));
+    widgets.inactive.bg_fill = FIELD;
+    widgets.inactive.weak_bg_fill = FIELD;
+    widgets.hovered.bg_fill = Color32::from_rgb(66, 69, 77);
+    widgets.hovered.weak_bg_fill = Color32::from_rgb(66, 69, 77);
+    widgets.hovered.bg_stroke = Stroke::new(1.0, Color32::from_rgb(96, 100, 110));
+    widgets.active.bg_fill = Color32::from_rgb(122, 86, 34);
+    widgets.active.weak_bg_fill = Color32::from_rgb(122, 86, 34);
+    visuals
+}
+
+/// The heading of a group of settings.
+pub(super) fn heading(ui: &mut Ui, text: &str) {
+    ui.add_space(6.0);
+    ui.label(RichText::new(text).color(QUIET).size(12.0).strong());
+    ui.add_space(-2.0);
+}
+
+/// One setting: its name on the left, what sets it on the right.
+pub(super) fn row<R>(ui: &mut Ui, name: &str, hint: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
+    ui.horizontal(|ui| {
+        let height = ui.spacing().interact_size.y;
+        let (rect, response) =
+            ui.allocate_exact_size(Vec2::new(LABEL_WIDTH, height), egui::Sense::hover());
+        ui.painter().text(
+            rect.left_center(),
+            egui::Align2::LEFT_CENTER,
+            name,
+            TextStyle::Body.resolve(ui.style()),
+            TEXT,
+        );
+        response.on_hover_text(hint);
+        add(ui)
+    })
+    .inner
+}
+
+/// Width of the names of settings, in points.
+const LABEL_WIDTH: f32 = 84.0;
+
+/// Text that explains.
+pub(super) fn quiet(text: impl Into<String>) -> RichText {
+    RichText::new(text).color(QUIET).size(12.0)
+}
+
+/// A number with as many digits as help: 1.23, 45.6, 789, 12.3 k, 4.5 M.
+pub(super) fn figure(value: f64) -> String {
+    let (value, suffix) = match value.abs() {
+        x if x >= 1e9 => (value / 1e9, " G"),
+        x if x >= 1e6 => (value / 1e6, " M"),
+        x if x >= 1e4 => (value / 1e3, " k"),
+        _ => (value, ""),
+    };
+    let digits = match value.abs() {
+        x if x >= 100.0 || x == 0.0 => 0,
+        x if x >= 10.0 => 1,
+        x if x >= 0.1 => 2,
+        _ => return format!("{value:.1e}{suffix}"),
+    };
+    format!("{value:.digits$}{suffix}")
+}
+
+/// A whole number: 0, 999, 12.3 k.
+pub(super) fn count(value: u64) -> String {
+    if value < 10_000 { value.to_string() } else { figure(value as f64) }
+}
+
+/// Bytes in the unit that suits.
+pub(super) fn bytes(count: usize) -> String {
+    match count as f64 {
+        b if b < 1024.0 => format!("{count} B"),
+        b if b < 1024.0 * 1024.0 => format!("{:.0} KB", b / 1024.0),
+        b if b < 1024.0 * 1024.0 * 1024.0 => format!("{:.1} MB", b / 1048576.0),
+        b => format!("{:.2} GB", b / 1_073_741_824.0),
+    }
+}
+
+/// Seconds as a person says them: 4.2 s, 3:07, 1:02:03.
+pub(super) fn clock(seconds: f64) -> String {
+    let whole = seconds as u64;
+    match whole {
+        0..60 => format!("{seconds:.1} s"),
+        60..3600 => format!("{}:{:02}", whole / 60, whole % 60),
+        _ => format!("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_read_well() {
+        let cases = [(0.0, "0"), (0.012, "1.2e-2"), (0.5, "0.50"), (12.34, "12.3"), (999.4, "999")];
+        for (value, text) in cases {
+            assert_eq!(figure(value), text);
+        }
+        assert_eq!(figure(1_234_567.0), "1.23 M");
+        assert_eq!((bytes(10), bytes(3 << 20)), ("10 B".into(), "3.0 MB".into()));
+        assert_eq!((clock(4.25), clock(187.0)), ("4.2 s".into(), "3:07".into()));
+        assert_eq!(clock(3723.0), "1:02:03");
+    }
+}

@@ -1,0 +1,79 @@
+//! Undo and redo by comparing snapshots.
+
+/// Snapshots kept.
+const MOST: usize = 200;
+
+/// What was, what is, and what was taken back.
+#[derive(Debug, Clone)]
+pub(super) struct Undo<T> {
+    past: Vec<T>,
+    present: T,
+    future: Vec<T>,
+}
+
+impl<T: Clone + PartialEq> Undo<T> {
+    /// Nothing to take back yet.
+    pub(super) fn new(present: T) -> Self {
+        Self { past: Vec::new(), present, future: Vec::new() }
+    }
+
+    /// Tells the state at rest: if it differs from the last one, that one can be gone back to.
+    pub(super) fn settle(&mut self, now: &T) {
+        if *now == self.present {
+            return;
+        }
+        self.past.push(std::mem::replace(&mut self.present, now.clone()));
+        self.future.clear();
+        if self.past.len() > MOST {
+            self.past.remove(0);
+        }
+    }
+
+    /// Replaces what is, without a step to go back to: for what the program filled in by itself.
+    pub(super) fn amend(&mut self, now: &T) {
+        self.present = now.clone();
+    }
+
+    /// The state before, if any.
+    pub(super) fn undo(&mut self) -> Option<T> {
+        let before = self.past.pop()?;
+        self.future.push(std::mem::replace(&mut self.present, before.clone()));
+        Some(before)
+    }
+
+    /// The state that was taken back last, if any.
+    pub(super) fn redo(&mut self) -> Option<T> {
+        let after = self.future.pop()?;
+        self.past.push(std::mem::replace(&mut self.present, after.clone()));
+        Some(after)
+    }
+
+    /// Whether there is something to go back to.
+    pub(super) fn can_undo(&self) -> bool {
+        !self.past.is_empty()
+    }
+
+    /// Whether there is something that was taken back.
+    pub(super) fn can_redo(&self) -> bool {
+        !self.future.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_go_back_and_forth_and_a_new_one_forgets_the_future() {
+        let mut undo = Undo::new(1);
+        undo.settle(&1);
+        assert!(!undo.can_undo());
+        undo.settle(&2);
+        undo.settle(&3);
+        assert_eq!((undo.undo(), undo.undo(), undo.undo()), (Some(2), Some(1), None));
+        assert_eq!(undo.redo(), Some(2));
+        undo.settle(&9);
+        assert!(!undo.can_redo());
+        assert_eq!(undo.undo(), Some(2));
+    }
+}

@@ -1,0 +1,150 @@
+//! `lightgrid screenshot`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use glam::Vec2;
+
+use super::values;
+use crate::app::Start;
+use crate::app::document::{Document, Light};
+use crate::app::interface::{Dock, Interface, Tab};
+use crate::app::overlays::Overlay;
+use crate::app::screenshot::{Shot, Studio};
+use crate::error::{Error, Result};
+use crate::image::{check_writable, write_png};
+use crate::render::{Sampling, StopRule};
+use crate::scene::builtin;
+
+/// A part of the window that can be asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum PanelName {
+    /// Settings of the picture, which are open anyway.
+    Picture,
+    /// Overlays, map view and inspector.
+    Inspect,
+    /// Error against samples.
+    Convergence,
+    /// What the scene needs.
+    Needs,
+    /// Keys and gestures.
+    Shortcuts,
+    /// No panel: the viewport alone.
+    None,
+}
+
+/// Arguments of `screenshot`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Figures that depend on the clock are left out: a seed gives the same \
+                        screenshot on the same machine. No display is needed, but a graphics \
+                        device is; software Vulkan will do.")]
+pub(super) struct ScreenshotArguments {
+    /// A glTF file (.gltf, .glb) or a built-in scene.
+    #[arg(default_value = builtin::DEFAULT_SCENE)]
+    scene: String,
+    /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky.
+    #[arg(long, default_value = "sky:day", value_name = "MAP")]
+    env: String,
+    /// What is drawn over the picture.
+    #[arg(long, value_enum, value_name = "NAME")]
+    overlay: Option<Overlay>,
+    /// What else is open; may be given several times.
+    #[arg(long, value_enum, value_name = "NAME")]
+    panel: Vec<PanelName>,
+    /// Samples per pixel.
+    #[arg(long, default_value = "16", value_parser = clap::value_parser!(u32).range(1..), value_name = "N")]
+    samples: u32,
+    /// Size of the window in pixels.
+    #[arg(long, default_value = "1440x900", value_parser = values::size, value_name = "WxH")]
+    size: (u32, u32),
+    /// How the map is sampled.
+    #[arg(long, default_value = "adaptive", value_enum)]
+    sampling: Sampling,
+    /// Plain on the left, the chosen sampling on the right; not repeatable, for it is by time.
+    #[arg(long)]
+    split: bool,
+    /// Filter noise out.
+    #[arg(long)]
+    denoise: bool,
+    /// The place to inspect, X,Y in [0,1] of the picture, with its brute-force truth.
+    #[arg(long, value_parser = place, value_name = "X,Y")]
+    inspect: Option<Vec2>,
+    /// The tile chosen on the map, for the overlay `tile`.
+    #[arg(long, value_name = "N")]
+    tile: Option<u32>,
+    /// Turns the map about the vertical, in degrees.
+    #[arg(long, default_value = "0", value_parser = values::finite, allow_negative_numbers = true, value_name = "DEG")]
+    env_rotation: f64,
+    /// Seed of the random numbers.
+    #[arg(long, default_value = "0", value_name = "N")]
+    seed: u32,
+    /// Give up after this many seconds.
+    #[arg(long, default_value = "600", value_parser = values::positive, value_name = "S")]
+    patience: f64,
+    /// The picture to write, .png.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+fn place(text: &str) -> std::result::Result<Vec2, String> {
+    let numbers: Vec<f32> = text.split(',').filter_map(|t| t.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x, y] if (0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y) => Ok(Vec2::new(x, y)),
+        _ => Err("expected two numbers from 0 to 1 like 0.25,0.7".to_owned()),
+    }
+}
+
+/// Draws the window's content and writes it.
+pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
+    let path = &arguments.output;
+    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
+        return Err(Error::at(path, "screenshots are written as .png"));
+    }
+    check_writable(path)?;
+    let defaults = Document::default();
+    let document = Document {
+        scene: arguments.scene.clone(),
+        map: arguments.env.clone(),
+        rotation_degrees: arguments.env_rotation.rem_euclid(360.0) as f32,
+        light: Light {
+            sampling: arguments.sampling,
+            split: arguments.split,
+            seed: arguments.seed,
+            ..defaults.light
+        },
+        look: crate::app::document::Look { denoise: arguments.denoise, ..defaults.look },
+        stop: StopRule { samples: Some(arguments.samples), ..StopRule::default() },
+        ..defaults
+    };
+    let mut studio = Studio::open(Shot {
+        start: Start { document, interface: interface(arguments), ..Start::default() },
+        size: arguments.size,
+        patience: Duration::from_secs_f64(arguments.patience.min(1e9)),
+    })?;
+    if arguments.inspect.is_some() {
+        studio.measure_truth()?;
+    }
+    write_png(path, &studio.take()?, &[])
+}
+
+fn interface(arguments: &ScreenshotArguments) -> Interface {
+    let has = |panel| arguments.panel.contains(&panel);
+    let is_inspecting = has(PanelName::Inspect)
+        || arguments.overlay.is_some()
+        || arguments.inspect.is_some()
+        || arguments.tile.is_some();
+    Interface {
+        panels: !has(PanelName::None),
+        tab: if is_inspecting { Tab::Inspect } else { Tab::Picture },
+        dock: if has(PanelName::Convergence) {
+            Some(Dock::Convergence)
+        } else {
+            has(PanelName::Needs).then_some(Dock::Needs)
+        },
+        shortcuts: has(PanelName::Shortcuts),
+        overlay: arguments.overlay,
+        tile: arguments.tile,
+        pinned: arguments.inspect,
+        ..Interface::default()
+    }
+}

@@ -1,0 +1,110 @@
+//! `lightgrid view`, and `lightgrid` alone.
+
+use std::path::PathBuf;
+
+use super::values;
+use crate::app::Start;
+use crate::app::document::{Document, PictureSize};
+use crate::app::settings_file::Settings;
+use crate::app::window;
+use crate::error::{Error, Result};
+use crate::render::{Sampling, StopRule};
+use crate::scene::builtin;
+
+/// Seconds of rendering when there is no display and nothing else says when to stop.
+const HEADLESS_SECONDS: f64 = 60.0;
+
+/// Arguments of `view`.
+#[derive(Debug, clap::Args)]
+pub(super) struct ViewArguments {
+    /// A glTF file (.gltf, .glb) or a built-in scene.
+    #[arg(default_value = builtin::DEFAULT_SCENE)]
+    scene: String,
+    /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky.
+    #[arg(long, default_value = "sky:day", value_name = "MAP")]
+    env: String,
+    /// How the map is sampled.
+    #[arg(long, value_enum)]
+    sampling: Option<Sampling>,
+    /// Picture size in pixels; without it, that of the viewport.
+    #[arg(long, value_parser = values::size, value_name = "WxH")]
+    size: Option<(u32, u32)>,
+    /// Stop at this many samples per pixel.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), value_name = "N")]
+    samples: Option<u32>,
+    /// Settings file of the window; without it, the user's own.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Where the picture is written if there is no display.
+    #[arg(short, long, default_value = "lightgrid.png", value_name = "FILE")]
+    output: PathBuf,
+}
+
+impl ViewArguments {
+    /// What `lightgrid` alone stands for.
+    pub(super) fn plain() -> Self {
+        Self {
+            scene: builtin::DEFAULT_SCENE.to_owned(),
+            env: "sky:day".to_owned(),
+            sampling: None,
+            size: None,
+            samples: None,
+            settings: None,
+            output: "lightgrid.png".into(),
+        }
+    }
+}
+
+/// Opens the window; without a display, says so and renders the picture into a file.
+pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
+    let path = arguments.settings.clone().or_else(Settings::default_path);
+    let mut notices = Vec::new();
+    let settings = path.as_deref().map_or_else(|| Ok(Settings::default()), Settings::read);
+    let settings = settings.unwrap_or_else(|error: Error| {
+        notices.push(error.to_string());
+        Settings::default()
+    });
+    let start = Start {
+        document: document(arguments, &settings),
+        interface: settings.interface(),
+        settings,
+        is_repeatable: false,
+    };
+    match window::run(start, notices, path) {
+        Ok(()) => Ok(()),
+        Err(error) => {
+            let picture = arguments.output.display();
+            eprintln!("lightgrid: {error}; rendering into {picture} instead");
+            super::render::run(&headless(arguments))
+        }
+    }
+}
+
+fn document(arguments: &ViewArguments, settings: &Settings) -> Document {
+    let mut document = Document {
+        scene: arguments.scene.clone(),
+        map: arguments.env.clone(),
+        ..settings.document()
+    };
+    if let Some(sampling) = arguments.sampling {
+        document.light.sampling = sampling;
+    }
+    if let Some((width, height)) = arguments.size {
+        document.size = PictureSize::Fixed(width, height);
+    }
+    if let Some(samples) = arguments.samples {
+        document.stop = StopRule { samples: Some(samples), ..StopRule::default() };
+    }
+    document
+}
+
+fn headless(arguments: &ViewArguments) -> super::render::RenderArguments {
+    let seconds = arguments.samples.is_none().then_some(HEADLESS_SECONDS);
+    super::render::RenderArguments::for_picture(
+        &arguments.scene,
+        &arguments.env,
+        &arguments.output,
+        arguments.sampling.unwrap_or_default(),
+        (arguments.size, arguments.samples, seconds),
+    )
+}

@@ -1,0 +1,314 @@
+//! The window: its content drawn offscreen against kept pictures, and a real window under Xvfb.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use lightgrid::app::Start;
+use lightgrid::app::document::{Document, PictureSize};
+use lightgrid::app::interface::{Dock, Interface, Tab};
+use lightgrid::app::overlays::Overlay;
+use lightgrid::app::screenshot::{Shot, Studio};
+use lightgrid::image::{Rgb8, read_picture, write_png};
+use lightgrid::render::StopRule;
+
+/// Mean absolute difference of 8-bit levels that a snapshot may have: drivers and processors differ
+/// in rounding, and samples of a path tracer with them.
+const MEAN_ERROR: f64 = 2.5;
+
+fn start() -> Start {
+    let document = Document {
+        scene: "office".to_owned(),
+        map: "sky:day@256x128".to_owned(),
+        size: PictureSize::Fixed(180, 120),
+        stop: StopRule { samples: Some(4), ..StopRule::default() },
+        ..Document::default()
+    };
+    Start { document, ..Start::default() }
+}
+
+fn studio(start: Start) -> Option<Studio> {
+    let shot = Shot { start, size: (1000, 640), patience: Duration::from_secs(300) };
+    match Studio::open(shot) {
+        Ok(studio) => Some(studio),
+        Err(error) => {
+            eprintln!("SKIPPED: {error}");
+            None
+        }
+    }
+}
+
+/// Every overlay and panel of one picture, and the kept picture it must look like.
+#[test]
+fn overlays_and_panels_look_as_they_did() {
+    let Some(mut studio) = studio(start()) else { return };
+    let base = Interface::default();
+    let inspect = Interface { tab: Tab::Inspect, ..base.clone() };
+    let mut states = vec![
+        ("panel-picture".to_owned(), base.clone()),
+        ("panel-inspect".to_owned(), inspect.clone()),
+        ("panel-needs".to_owned(), Interface { dock: Some(Dock::Needs), ..base.clone() }),
+        ("panel-shortcuts".to_owned(), Interface { shortcuts: true, ..base.clone() }),
+        ("panel-none".to_owned(), Interface { panels: false, ..base }),
+    ];
+    for overlay in Overlay::ALL {
+        let name = format!("overlay-{}", overlay.title().to_lowercase().replace([' ', '\''], "-"));
+        let state = Interface { overlay: Some(overlay), tile: Some(146), ..inspect.clone() };
+        states.push((name, state));
+    }
+    let mut different = Vec::new();
+    let mut pictures: Vec<Rgb8> = Vec::new();
+    for (name, interface) in states {
+        studio.arrange(interface);
+        let picture = studio.take().expect("drawn");
+        if let Err(why) = compare(&name, &picture) {
+            different.push(why);
+        }
+        assert!(!pictures.contains(&picture), "{name} looks like another state");
+        pictures.push(picture);
+    }
+    assert!(different.is_empty(), "{different:#?}");
+}
+
+/// Compares with `tests/snapshots/NAME.png`; with UPDATE_SNAPSHOTS set, writes it instead.
+fn compare(name: &str, picture: &Rgb8) -> Result<(), String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots");
+    let path = folder.join(format!("{name}.png"));
+    let small = shrunk(picture);
+    if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
+        std::fs::create_dir_all(&folder).expect("a folder");
+        write_png(&path, &small, &[]).expect("written");
+        return Ok(());
+    }
+    let kept = image::open(&path).map_err(|e| format!("{name}: {e}"))?.into_rgb8();
+    if kept.dimensions() != (small.width, small.height) {
+        return Err(format!("{name}: the size changed from {:?}", kept.dimensions()));
+    }
+    let sum: u64 = kept
+        .as_raw()
+        .iter()
+        .zip(small.pixels.as_flattened())
+        .map(|(a, b)| u64::from(a.abs_diff(*b)))
+        .sum();
+    let mean = sum as f64 / kept.as_raw().len() as f64;
+    if mean > MEAN_ERROR {
+        let now = std::env::temp_dir().join(format!("lightgrid-{name}.png"));
+        write_png(&now, &small, &[]).expect("written");
+        return Err(format!("{name}: mean error {mean:.2}, see {}", now.display()));
+    }
+    Ok(())
+}
+
+/// Half the size, each pixel the mean of four: snapshots are kept small.
+fn shrunk(picture: &Rgb8) -> Rgb8 {
+    let (width, height) = (picture.width / 2, picture.height / 2);
+    let at = |x: u32, y: u32| picture.pixels[(y * picture.width + x) as usize];
+    let pixels = (0..width * height)
+        .map(|i| {
+            let (x, y) = (2 * (i % width), 2 * (i / width));
+            let four = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
+            std::array::from_fn(|c| (four.iter().map(|p| u32::from(p[c])).sum::<u32>() / 4) as u8)
+        })
+        .collect();
+    Rgb8 { width, height, pixels }
+}
+
+#[test]
+fn a_screenshot_is_repeatable_and_says_what_is_wrong() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let shoot = |rest: &str| {
+        let line = format!(
+            "screenshot crack --env sky:day@64x32 --size 640x400 --samples 1 {rest} -o a.png"
+        );
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lightgrid"));
+        let output = command.current_dir(folder.path()).args(line.split_whitespace()).output();
+        output.expect("the binary starts")
+    };
+    let says = |output: &std::process::Output| String::from_utf8_lossy(&output.stderr).into_owned();
+    let first = shoot("--overlay cells");
+    if says(&first).contains("no graphics device") {
+        eprintln!("SKIPPED: {}", says(&first));
+        return;
+    }
+    assert!(first.status.success(), "{}", says(&first));
+    let path = folder.path().join("a.png");
+    let one = std::fs::read(&path).expect("written");
+    assert!(shoot("--overlay cells").status.success());
+    assert_eq!(one, std::fs::read(&path).expect("written"), "the same again");
+    assert!(shoot("--overlay cells --seed 1").status.success());
+    assert_ne!(one, std::fs::read(&path).expect("written"));
+    let missing = Command::new(env!("CARGO_BIN_EXE_lightgrid"))
+        .current_dir(folder.path())
+        .args("screenshot none.glb --size 640x400 -o a.png".split_whitespace())
+        .output()
+        .expect("the binary starts");
+    assert_eq!(missing.status.code(), Some(1));
+    assert!(says(&missing).contains("none.glb: there is no such file"), "{}", says(&missing));
+}
+
+#[test]
+fn without_a_display_the_picture_is_rendered_into_a_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = Command::new(env!("CARGO_BIN_EXE_lightgrid"))
+        .current_dir(folder.path())
+        .args("view crack --env sky:day@64x32 --size 32x18 --samples 1".split_whitespace())
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET")
+        .output()
+        .expect("the binary starts");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    if cfg!(target_os = "linux") {
+        assert!(output.status.success(), "{message}");
+        assert!(message.contains("no window can be opened"), "{message}");
+        assert!(message.contains("rendering into lightgrid.png instead"), "{message}");
+        let picture = read_picture(&folder.path().join("lightgrid.png")).expect("a picture");
+        assert_eq!((picture.width, picture.height), (32, 18));
+    }
+}
+
+/// An X server without a screen, and a window of ours in it.
+struct Desk {
+    server: Child,
+    window: Option<Child>,
+    display: String,
+    folder: tempfile::TempDir,
+}
+
+impl Drop for Desk {
+    fn drop(&mut self) {
+        for child in self.window.iter_mut().chain([&mut self.server]) {
+            // It may have ended by itself.
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+impl Desk {
+    /// `None`, said on stderr, where Xvfb or xdotool is not installed.
+    fn open() -> Option<Self> {
+        let is_there = |tool: &str| {
+            let which = Command::new("which").arg(tool).stdout(Stdio::null()).status();
+            which.is_ok_and(|status| status.success())
+        };
+        if let Some(tool) = ["Xvfb", "xdotool"].into_iter().find(|tool| !is_there(tool)) {
+            eprintln!("SKIPPED: {tool} is not installed");
+            return None;
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "1100x760x24", "-nolisten", "tcp"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb starts");
+        let mut number = String::new();
+        let stdout = server.stdout.take().expect("piped");
+        std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut number)
+            .expect("Xvfb says its display");
+        let display = format!(":{}", number.trim());
+        Some(Self { server, window: None, display, folder })
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn start(&mut self, line: &str) {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lightgrid"));
+        command.current_dir(self.folder.path()).args(line.split_whitespace());
+        command.env("DISPLAY", &self.display).env_remove("WAYLAND_DISPLAY");
+        command.stderr(std::fs::File::create(self.path("says.txt")).expect("a file"));
+        self.window = Some(command.spawn().expect("the binary starts"));
+    }
+
+    fn xdotool(&self, line: &str) -> String {
+        let output = Command::new("xdotool")
+            .args(line.split_whitespace())
+            .env("DISPLAY", &self.display)
+            .output()
+            .expect("xdotool starts");
+        String::from_utf8_lossy(&output.stdout).trim().to_owned()
+    }
+
+    fn says(&self) -> String {
+        std::fs::read_to_string(self.path("says.txt")).unwrap_or_default()
+    }
+
+    /// Waits for something for at most a minute.
+    fn wait_for<T>(&self, what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
+        let start = Instant::now();
+        loop {
+            if let Some(it) = ready() {
+                return it;
+            }
+            assert!(start.elapsed() < Duration::from_secs(90), "no {what}: {}", self.says());
+            std::thread::sleep(Duration::from_millis(250));
+        }
+    }
+
+    /// Types a path into the prompt that a key opened.
+    fn answer(&self, key: &str, path: &str) {
+        self.xdotool(&format!("key {key}"));
+        std::thread::sleep(Duration::from_millis(1500));
+        self.xdotool("key ctrl+a");
+        self.xdotool(&format!("type --delay 60 {path}"));
+        std::thread::sleep(Duration::from_millis(1000));
+        self.xdotool("key Return");
+    }
+
+    /// Saves a picture and waits until it is there.
+    fn save(&self, name: &str) -> lightgrid::image::Image {
+        self.answer("ctrl+s", name);
+        let path = self.path(name);
+        self.wait_for(name, || path.exists().then(|| read_picture(&path).expect("a picture")))
+    }
+}
+
+#[test]
+fn a_real_window_moves_opens_saves_and_remembers() {
+    let Some(mut desk) = Desk::open() else { return };
+    desk.start("view open --env sky:day@64x32 --size 96x64 --samples 2 --settings window.json");
+    let window = desk.wait_for("window", || {
+        let found = desk.xdotool("search --name lightgrid");
+        found.lines().next().map(str::to_owned).filter(|id| !id.is_empty())
+    });
+    desk.xdotool(&format!("windowfocus {window}"));
+    std::thread::sleep(Duration::from_secs(4));
+    let first = desk.save("first.exr");
+    assert_eq!((first.width, first.height), (96, 64));
+    let metadata = lightgrid::image::read_exr_metadata(&desk.path("first.exr")).expect("metadata");
+    let of = |key: &str| metadata.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
+    assert_eq!(of("lightgrid.scene"), Some("open"));
+    assert_eq!(of("lightgrid.sampling"), Some("adaptive"));
+
+    // A drag turns the camera: another picture. Slowly, for software draws some frames a second.
+    desk.xdotool("mousemove 560 400 mousedown 1");
+    for _ in 0..10 {
+        std::thread::sleep(Duration::from_millis(300));
+        desk.xdotool("mousemove_relative -- -12 2");
+    }
+    desk.xdotool("mouseup 1");
+    std::thread::sleep(Duration::from_secs(4));
+    let turned = desk.save("turned.exr");
+    assert!(first.pixels != turned.pixels, "the camera has turned");
+
+    // A file that is not there changes nothing; another scene does.
+    desk.answer("ctrl+o", "none.glb");
+    std::thread::sleep(Duration::from_secs(2));
+    let title = |desk: &Desk| desk.xdotool(&format!("getwindowname {window}"));
+    desk.wait_for("old scene", || title(&desk).starts_with("open").then_some(()));
+    desk.answer("ctrl+o", "crack");
+    desk.wait_for("new scene", || title(&desk).starts_with("crack").then_some(()));
+    std::thread::sleep(Duration::from_secs(4));
+    desk.save("crack.png");
+
+    desk.xdotool("key ctrl+q");
+    let mut child = desk.window.take().expect("started");
+    let status = desk.wait_for("end", || child.try_wait().expect("asked"));
+    assert!(status.success(), "{}", desk.says());
+    assert!(!desk.says().contains("panicked"), "{}", desk.says());
+    let settings = std::fs::read_to_string(desk.path("window.json")).expect("settings");
+    assert!(settings.contains("window_size"), "{settings}");
+}
