@@ -5,24 +5,27 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use lightgrid::app::Start;
-use lightgrid::app::document::{Document, PictureSize};
+use lightgrid::app::document::{Document, Light, PictureSize};
 use lightgrid::app::interface::{Dock, Interface, Tab};
 use lightgrid::app::overlays::Overlay;
 use lightgrid::app::screenshot::{Shot, Studio};
 use lightgrid::image::{Rgb8, read_picture, write_png};
 use lightgrid::render::StopRule;
+use lightgrid::render::gpu::DeviceChoice;
 
 /// Mean absolute difference of 8-bit levels that a snapshot may have: drivers and processors differ
 /// in rounding, and samples of a path tracer with them.
 const MEAN_ERROR: f64 = 2.5;
 
 fn start() -> Start {
+    let defaults = Document::default();
     let document = Document {
+        light: Light { device: DeviceChoice::Cpu, ..defaults.light },
         scene: "office".to_owned(),
         map: "sky:day@256x128".to_owned(),
         size: PictureSize::Fixed(180, 120),
         stop: StopRule { samples: Some(4), ..StopRule::default() },
-        ..Document::default()
+        ..defaults
     };
     Start { document, ..Start::default() }
 }
