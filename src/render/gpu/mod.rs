@@ -35,6 +35,7 @@ use shader::{Binding, Constants, Features, Kernel, Program};
 use stage::put_array;
 
 pub use device::{AdapterFacts, DeviceChoice, Gpu, adapters};
+pub use shader::KernelFacts;
 pub use stage::Stage;
 
 /// Most samples of a pixel that one pass sums in f32.
@@ -59,7 +60,7 @@ pub(crate) struct Renderer {
     learn: Option<Arc<Pipeline>>,
     render_pacer: Pacer,
     learn_pacer: Pacer,
-    kernel_source_bytes: [usize; 2],
+    kernel_facts: KernelFacts,
 }
 
 /// What was left out of the kernels and what they take.
@@ -69,10 +70,8 @@ pub struct GpuFigures {
     pub adapter: AdapterFacts,
     /// Bytes of all buffers on it.
     pub device_bytes: u64,
-    /// Features the kernels were built with.
-    pub features: Vec<&'static str>,
-    /// Bytes of the render kernel's source, and what they would be with every feature.
-    pub kernel_source_bytes: [usize; 2],
+    /// What its render kernel holds.
+    pub kernel: KernelFacts,
 }
 
 impl Renderer {
@@ -102,8 +101,7 @@ impl Renderer {
         buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
         let width_log2 = buffers.width_log2();
         let program = Program::new(Kernel::Render, &features, &constants, width_log2);
-        let full = Program::new(Kernel::Render, &Features::most(), &constants, width_log2);
-        let kernel_source_bytes = [program.source.len(), full.source.len()];
+        let kernel_facts = KernelFacts::of(&features);
         let renderer = Self {
             render: stage.gpu.pipeline(Kernel::Render, program)?,
             learn: None,
@@ -114,7 +112,7 @@ impl Renderer {
             constants,
             render_pacer: Pacer::default(),
             learn_pacer: Pacer::default(),
-            kernel_source_bytes,
+            kernel_facts,
         };
         renderer.write_globals();
         Ok(renderer)
@@ -279,8 +277,7 @@ impl Renderer {
         GpuFigures {
             adapter: self.gpu.facts().clone(),
             device_bytes: self.buffers.bytes(),
-            features: self.features.names().collect(),
-            kernel_source_bytes: self.kernel_source_bytes,
+            kernel: self.kernel_facts.clone(),
         }
     }
 
