@@ -13,9 +13,10 @@
 //!   picture, pass by pass, into a film.
 //! - [`app`] is the window, [`cli`] what a person types; both find files by [`sources`], and write by
 //!   [`output`]. [`metrics`] compares pictures, [`denoise`] smooths them, [`tone`] develops them.
+//! - [`stability`] tries all of it on stiff and extreme cases.
 //!
-//! Arrows point down: `cli -> app -> render -> path -> {light_grid, bsdf, bvh} -> {scene, environment} ->
-//! {image, sampler, math, color, error}`.
+//! Arrows point down: `cli -> stability -> app -> render -> path -> {light_grid, bsdf, bvh} ->
+//! {scene, environment} -> {image, sampler, math, color, error}`.
 
 pub mod app;
 pub mod bsdf;
@@ -37,4 +38,5 @@ pub mod render;
 pub mod sampler;
 pub mod scene;
 pub mod sources;
+pub mod stability;
 pub mod tone;

@@ -12,6 +12,7 @@ mod progress;
 mod render;
 mod sat;
 mod screenshot;
+mod stability;
 mod values;
 mod view;
 
@@ -44,6 +45,8 @@ enum Command {
     Devices(device::DevicesArguments),
     /// Compare the importance tables' accuracy on maps (the talk's summed-area-table claim).
     Sat(sat::SatArguments),
+    /// Try stiff and extreme cases on this machine; fails if one does.
+    Stability(stability::StabilityArguments),
 }
 
 /// Runs the command line; errors become one sentence on stderr and a non-zero exit.
@@ -58,6 +61,7 @@ pub fn main() -> ExitCode {
         Command::Info(arguments) => info::run(arguments),
         Command::Devices(arguments) => device::run(arguments),
         Command::Sat(arguments) => sat::run(arguments),
+        Command::Stability(arguments) => stability::run(arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -66,4 +70,10 @@ pub fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Whether these words after the program's name are a command line that would be run.
+pub fn accepts(words: &[String]) -> bool {
+    let program = "lightgrid".to_owned();
+    Arguments::try_parse_from(std::iter::once(&program).chain(words)).is_ok()
 }
