@@ -96,10 +96,16 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<()> {
 
 fn choose(arguments: &StabilityArguments) -> Result<Vec<&'static Case>> {
     let with_gpu = arguments.device == Device::Gpu;
+    // A whole name means that case or that group; part of one, all that contain it.
+    let is_named = |case: &Case, name: &str| {
+        if cases().any(|other| other.group == name || other.title() == name) {
+            case.group == name || case.title() == name
+        } else {
+            case.title().contains(name)
+        }
+    };
     let named = |case: &Case| {
-        let title = case.title();
-        arguments.cases.is_empty()
-            || arguments.cases.iter().any(|name| title.contains(name.as_str()))
+        arguments.cases.is_empty() || arguments.cases.iter().any(|name| is_named(case, name))
     };
     let chosen: Vec<&Case> = cases().filter(|case| case.runs(with_gpu) && named(case)).collect();
     if chosen.is_empty() {

@@ -131,7 +131,7 @@ fn read_only_folder(setting: &Setting) -> Result<Outcome> {
         std::fs::set_permissions(scratch.folder(), locked)
             .map_err(|e| Error::new(e.to_string()))?;
         let may_write = std::fs::write(scratch.path("probe"), b"").is_ok();
-        let line = format!("{LINE} --size 640x480 --spp 1000000 -o a.exr");
+        let line = format!("{LINE} --size 640x480 -o a.exr").replace("--spp 1", "--spp 1000000");
         let mut command = scratch.lightgrid(setting, &line);
         if may_write {
             let _ = std::fs::remove_file(scratch.path("probe"));

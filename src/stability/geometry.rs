@@ -108,7 +108,7 @@ fn leaks_on_axes(setting: &Setting) -> Outcome {
 }
 
 fn leaks_anywhere(setting: &Setting) -> Outcome {
-    let count = setting.count(3_000_000, 300_000_000);
+    let count = setting.count(1_000_000, 300_000_000);
     let mut outcome = Outcome::new();
     for size in [1e-4, 1.0, 1e6] {
         let tree = cube(17, size);

@@ -43,7 +43,7 @@ pub(super) const CASES: &[Case] = &[
     case("crack-of-2-cm", On::Any, |s| crack(s, 0.02)),
     case("crack-of-0.2-mm", On::Any, |s| crack(s, 2e-4)),
     case("empty-cells", On::Any, empty_cells),
-    case("counters-after-2^32-hits", On::Cpu, |s| saturation(s)),
+    case("counters-after-2^32-hits", On::Cpu, saturation),
     case("moving-camera", On::Any, moving_camera),
     case("1-learning-path", On::Any, |s| learning_paths(s, 1)),
     case("1e8-learning-paths", On::Any, |s| learning_paths(s, s.count(1_000_000, 100_000_000))),
@@ -187,7 +187,7 @@ fn crack(setting: &Setting, width: f32) -> Result<Outcome> {
         }
     }
     let view = View { learning_paths: 1 << 16, ..view(camera, Sampling::Adaptive, 1) };
-    let film = render(setting, &world, &constant(1.0)?, view, setting.count(1024, 16_384))?;
+    let film = render(setting, &world, &constant(1.0)?, view, setting.count(4096, 65_536))?;
     let found = mean(&film);
     let expected = irradiance / std::f64::consts::PI;
     Ok(Outcome::new()

@@ -41,6 +41,8 @@ impl Figure {
         match self.limit {
             _ if !self.holds() => f64::INFINITY,
             Limit::AtMost(most) if most > 0.0 => (self.value / most).max(0.0),
+            // Met to the letter: a count, or a yes.
+            Limit::AtLeast(least) if self.value == least => 0.0,
             Limit::AtLeast(least) if self.value > 0.0 => (least / self.value).max(0.0),
             Limit::AtMost(_) | Limit::AtLeast(_) => 0.0,
             Limit::Told => -1.0,

@@ -13,3 +13,4 @@ mod image_files;
 mod metrics;
 mod peers;
 mod shared;
+mod stability;

@@ -84,16 +84,21 @@ pub(super) fn settings() -> Result<Vec<Vec<u8>>> {
     Ok(vec![plain.into_bytes(), crate::output::record::to_json(&settings)?.into_bytes()])
 }
 
-/// A GLB with most of what is read, and a glTF with its data in itself.
-pub(super) fn gltf() -> Vec<Vec<u8>> {
-    vec![glb(), embedded()]
+/// JSON and data of a GLB with most of what is read, and of a glTF with its data in itself.
+pub(super) fn gltf() -> Vec<(String, Vec<u8>)> {
+    vec![featured(), (embedded(), Vec::new())]
+}
+
+/// The bytes of a glTF file: a GLB if there is data beside the JSON.
+pub(super) fn gltf_file((json, data): (String, Vec<u8>)) -> Vec<u8> {
+    if data.is_empty() { json.into_bytes() } else { container(json, data) }
 }
 
 /// A PNG of one red pixel.
 const PNG: &str =
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC";
 
-fn embedded() -> Vec<u8> {
+fn embedded() -> String {
     // Three corners of 36 bytes: (0,0,0), (1,0,0), (0,1,0).
     let corners = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
     format!(
@@ -108,10 +113,9 @@ fn embedded() -> Vec<u8> {
         2,"attenuationColor":[0.5,0.5,1]}},"KHR_materials_ior":{{"ior":1.3}}}},"pbrMetallicRoughness":
         {{"metallicFactor":0.5,"roughnessFactor":0.1}}}}]}}"#
     )
-    .into_bytes()
 }
 
-fn glb() -> Vec<u8> {
+fn featured() -> (String, Vec<u8>) {
     let mut data: Vec<u8> = Vec::new();
     let mut views = Vec::new();
     let mut add = |values: &[f32]| {
@@ -157,7 +161,7 @@ fn glb() -> Vec<u8> {
         views.join(","),
         accessors.join(",")
     );
-    container(json, data)
+    (json, data)
 }
 
 /// JSON and data in one GLB file.

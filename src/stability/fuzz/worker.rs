@@ -29,10 +29,11 @@ enum Found {
 pub fn work(kind: Kind, first: u64, count: u64, accepts: fn(&[String]) -> bool) -> Result<()> {
     let scratch = Scratch::new()?;
     let entries = match kind {
-        Kind::Gltf => corpus::gltf(),
+        Kind::Gltf => corpus::gltf().into_iter().map(corpus::gltf_file).collect(),
         Kind::Maps => corpus::maps()?,
         Kind::Settings => corpus::settings()?,
-        Kind::CommandLines | Kind::Bombs => Vec::new(),
+        Kind::CommandLines => Vec::new(),
+        Kind::Bombs => corpus::maps()?,
     };
     // Sound input first: thread pools, tables and the allocator's own growth are no input's doing.
     for entry in &entries {
@@ -59,6 +60,12 @@ pub fn work(kind: Kind, first: u64, count: u64, accepts: fn(&[String]) -> bool) 
                 let (name, bytes) = bombs::all().swap_remove(number as usize);
                 let kind = if name.contains(".gl") { Kind::Gltf } else { Kind::Maps };
                 (bytes.len(), read(kind, name, &bytes, &scratch)?)
+            }
+            Kind::Gltf if random.below(4) > 0 => {
+                let sources = corpus::gltf();
+                let source = &sources[random.below(sources.len())];
+                let bytes = corpus::gltf_file(mutate::gltf(source, &mut random));
+                (bytes.len(), read(kind, "spoilt", &bytes, &scratch)?)
             }
             _ => {
                 let bytes = mutate::bytes(&entries, &mut random);
