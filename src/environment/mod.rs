@@ -8,6 +8,7 @@
 //! Rotation turns the map about +Y as [`crate::math::rotate_y`] turns directions: what the map
 //! shows at `u` is seen at lat-long `u + rotation / 2pi`. Tiles turn with the map.
 
+pub mod landmarks;
 mod options;
 mod sat_report;
 pub mod sky;
