@@ -9,6 +9,8 @@ mod buffers;
 mod device;
 pub(crate) mod layout;
 mod pacer;
+#[cfg(test)]
+mod parity;
 mod pipeline;
 pub(crate) mod shader;
 mod stage;
@@ -87,6 +89,20 @@ impl Renderer {
         view: &View,
         rays: &CameraRays,
     ) -> Result<Self> {
+        Self::with_kernel(stage, world, environment, view, rays, |gpu, program| {
+            gpu.pipeline(Kernel::Render, program)
+        })
+    }
+
+    /// [`Self::new`] with the kernel that `compile` makes of the program for rendering.
+    fn with_kernel(
+        stage: &Stage,
+        world: &World,
+        environment: &Environment,
+        view: &View,
+        rays: &CameraRays,
+        compile: impl FnOnce(&Gpu, Program) -> Result<Arc<Pipeline>>,
+    ) -> Result<Self> {
         let features = Features::of(world, environment, view);
         let mut buffers = stage.buffers.clone();
         let mut globals = stage.globals;
@@ -105,7 +121,7 @@ impl Renderer {
         let full = Program::new(Kernel::Render, &Features::most(), &constants, width_log2);
         let kernel_source_bytes = [program.source.len(), full.source.len()];
         let renderer = Self {
-            render: stage.gpu.pipeline(Kernel::Render, program)?,
+            render: compile(&stage.gpu, program)?,
             learn: None,
             gpu: stage.gpu.clone(),
             buffers,

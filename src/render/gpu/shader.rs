@@ -115,10 +115,11 @@ impl Features {
         Self::from_names(Self::of_world(world).0.into_iter().map(|n| (n, true)).chain(of_view))
     }
 
-    /// Every feature at once, with the table that is used by default.
+    /// All that rendering can need at once, with the table that is used by default.
     pub(crate) fn most() -> Self {
         let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_"));
-        Self::from_names(names.filter(|n| *n != "summed_area").map(|n| (n, true)))
+        let others = ["learning", "summed_area"];
+        Self::from_names(names.filter(|n| !others.contains(n)).map(|n| (n, true)))
     }
 
     /// Features by name, and those that follow from them.
