@@ -205,6 +205,7 @@ impl<'a> Job<'a> {
             preview = Some(self.experienced_session(world, environment, view));
         }
         while let Some(activity) = self.next_activity(&main) {
+            self.place(&mut main);
             match activity {
                 Activity::Paused | Activity::Done => {
                     self.publish(activity, &main, plain.as_ref(), preview.as_ref());
@@ -302,7 +303,6 @@ impl<'a> Job<'a> {
         if self.is_superseded() {
             return;
         }
-        self.place(main);
         let learned = main.advance(1, &self.shared.cancel);
         self.go_on(main, learned);
         let is_done = main.phase() == Phase::Rendering;
