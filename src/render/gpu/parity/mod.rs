@@ -6,7 +6,7 @@
 //! that what runs is what renders. Helpers are compared through those that call them;
 //! [`no_function_is_left_out`] sees to it that all are.
 //!
-//! Bounds were measured on software Vulkan (llvmpipe), where they are taken up to 0.6 at most, save
+//! Bounds were measured on software Vulkan (llvmpipe), where two thirds are taken up at most, save
 //! for whole paths. It computes most functions bit by bit as the CPU does; their bounds of some units
 //! in the last place are for devices that divide, take roots and fuse products with sums otherwise,
 //! as WGSL allows. `cargo test gpu::parity -- --nocapture` prints how much of its bound each probe
