@@ -331,6 +331,7 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
             .learning_paths
             .unwrap_or_else(|| View::suitable_learning_paths(width, height, arguments.spp)),
         laws: LawOptions::ADAPTIVE,
+        medium: None,
         layers: arguments
             .layers
             .iter()

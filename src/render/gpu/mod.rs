@@ -529,10 +529,17 @@ mod tests {
             grid_columns: 64,
             learning_paths: 1 << 13,
             laws: recording,
+            medium: None,
             layers: false,
         };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
-        let grid = SphericalGrid { center: rays.position, columns: 64, rows: 32, faces: !talk };
+        let grid = SphericalGrid {
+            center: rays.position,
+            columns: 64,
+            rows: 32,
+            faces: !talk,
+            medium: false,
+        };
         let mut learning = LearningGrid::new(grid, environment.tile_count(), recording);
         let mut laws = LightGrid::whole_map(environment.tile_energies());
         let never = AtomicBool::new(false);
@@ -550,6 +557,7 @@ mod tests {
                         world: &world,
                         environment: &environment,
                         grid: laws.as_ref(),
+                        fog: view.fog(&world),
                         limits: view.limits,
                     };
                     cpu::learn(&tracer, &rays, &view, pass, &learning, &never)
