@@ -105,13 +105,18 @@ fn optical_depth(bits: u32) -> f32 {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Phase {
     /// Mean cosine between the directions of travel before and after; 0 is the same to all sides.
-    pub(crate) mean_cosine: f32,
+    mean_cosine: f32,
 }
 
 impl Phase {
     /// With this mean cosine, clamped to what can be sampled.
     pub fn new(mean_cosine: f32) -> Self {
         Self { mean_cosine: mean_cosine.clamp(-MAX_ANISOTROPY, MAX_ANISOTROPY) }
+    }
+
+    /// Mean cosine between the directions of travel before and after, in `[-0.99, 0.99]`.
+    pub fn mean_cosine(&self) -> f32 {
+        self.mean_cosine
     }
 
     /// A direction for light that travels along `direction`, in proportion to the phase function.

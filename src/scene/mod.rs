@@ -64,6 +64,18 @@ pub struct Medium {
     pub bounds: Option<[Vec3; 2]>,
 }
 
+impl Medium {
+    /// Whether all numbers are in range and the box, if any, has a volume.
+    pub fn is_sound(&self) -> bool {
+        let coefficients = [self.scattering, self.absorption];
+        coefficients.iter().all(|c| c.is_finite() && c.min_element() >= 0.0)
+            && self.anisotropy.abs() <= 1.0
+            && self.bounds.is_none_or(|[low, high]| {
+                low.is_finite() && high.is_finite() && low.cmplt(high).all()
+            })
+    }
+}
+
 /// How a surface's coverage is used (glTF `alphaMode`).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum AlphaMode {

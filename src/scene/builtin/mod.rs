@@ -5,7 +5,7 @@
 //! | `living-room` | furnished room | a large window that the sun enters, a round opening |
 //! | `office` | closed office | two small windows, 3 % of the walls, no direct sun |
 //! | `exterior` | a street with arcade, trees and a café | the sky, partly occluded |
-//! | `fog` | the same street along its lamps | as `exterior`; the place for a medium |
+//! | `fog` | the same street along its lamps, in mist | as `exterior`, scattered on its way |
 //! | `open` | sculptures on a terrace | the whole sky, nothing occludes |
 //! | `crack` | brick store room | a slit of 1.5 m x 2 cm |
 
