@@ -10,7 +10,7 @@ use lightgrid::metrics::statistics::{Estimate, z_test};
 use lightgrid::path::{PathLimits, World, framing};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::gpu::Gpu;
+use lightgrid::render::gpu::{Gpu, Stage};
 use lightgrid::render::{Phase, Sampling, Session, View};
 use lightgrid::scene::{builtin, gltf};
 
@@ -23,6 +23,17 @@ const ALPHA: f64 = 1e-3;
 /// The best adapter; `None`, said on stderr, where there is none.
 fn gpu() -> Option<Gpu> {
     Gpu::open(None).inspect_err(|reason| eprintln!("SKIPPED: {reason}")).ok()
+}
+
+/// A session on a stage of its own.
+fn on_gpu<'a>(
+    world: &'a World,
+    environment: &'a Environment,
+    view: View,
+    gpu: &Gpu,
+) -> Session<'a> {
+    let stage = Stage::new(gpu, world, environment).expect("it fits");
+    Session::on_gpu(world, environment, view, &stage).expect("it fits")
 }
 
 fn finish(mut session: Session<'_>, samples: u32) -> Film {
@@ -82,7 +93,7 @@ fn expect_agreement(what: &str, a: &Film, b: &Film) {
 fn compare(gpu: &Gpu, what: &str, world: &World, environment: &Environment, sampling: Sampling) {
     let samples = 16;
     let view = picture(world, sampling);
-    let session = Session::on_gpu(world, environment, view.clone(), gpu).expect("it fits");
+    let session = on_gpu(world, environment, view.clone(), gpu);
     let gpu_film = finish(session, samples);
     let same = render(world, environment, view.clone(), samples);
     let share = differing(&same, &gpu_film);
@@ -164,7 +175,7 @@ fn layers_lens_and_filters_are_the_same() {
         let filter = PixelFilter::BlackmanHarris;
         let mut view = View { filter, layers: true, ..picture(&world, Sampling::Plain) };
         view.camera.lens_radius = 0.05;
-        let session = Session::on_gpu(&world, &environment, view.clone(), &gpu).expect("it fits");
+        let session = on_gpu(&world, &environment, view.clone(), &gpu);
         let gpu_film = finish(session, 8);
         let cpu_film = render(&world, &environment, view, 8);
         assert!(differing(&cpu_film, &gpu_film) < 0.1);
@@ -190,7 +201,7 @@ fn the_cpu_takes_over_when_the_device_is_lost() {
     let environment = sky_map("day");
     let view = picture(&world, Sampling::Plain);
     let never = AtomicBool::new(false);
-    let mut session = Session::on_gpu(&world, &environment, view.clone(), &gpu).expect("it fits");
+    let mut session = on_gpu(&world, &environment, view.clone(), &gpu);
     session.advance(3, &never).expect("rendering");
     let before = session.film().clone();
     gpu.lose();
@@ -213,10 +224,10 @@ fn a_cancelled_picture_goes_on_where_it_stopped() {
         limits: PathLimits { bounces: 2, russian_roulette: true },
         ..picture(&world, Sampling::Plain)
     };
-    let mut session = Session::on_gpu(&world, &environment, view.clone(), &gpu).expect("it fits");
+    let mut session = on_gpu(&world, &environment, view.clone(), &gpu);
     session.advance(4, &AtomicBool::new(true)).expect("cancelled");
     assert_eq!(session.film().min_samples(), 0);
     session.advance(4, &AtomicBool::new(false)).expect("rendering");
-    let at_once = Session::on_gpu(&world, &environment, view, &gpu).expect("it fits");
+    let at_once = on_gpu(&world, &environment, view, &gpu);
     assert_eq!(*session.film(), finish(at_once, 4), "the same bits in one piece or several");
 }

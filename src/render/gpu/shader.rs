@@ -71,41 +71,54 @@ impl Features {
         "wide_filter",
     ];
 
-    /// What a picture needs: the scene's materials and lights, the map, how it is sampled.
-    pub(crate) fn of(world: &World, environment: &Environment, view: &View) -> Self {
+    /// What a scene needs: its materials and lights.
+    pub(crate) fn of_world(world: &World) -> Self {
         let needs = &world.needs;
-        let samples_map = view.sampling != Sampling::Bsdf && !environment.is_black();
-        let learns = matches!(view.sampling, Sampling::Adaptive | Sampling::Talk);
-        let options = environment.kind();
         Self::from_names([
             ("alpha_mask", needs.alpha_mask),
             ("clearcoat", needs.clearcoat),
             ("emitters", needs.emitters),
-            ("faces", view.sampling == Sampling::Adaptive),
-            ("layers", view.layers),
-            ("lens", view.camera.lens_radius > 0.0),
-            ("light_grid", samples_map && learns),
             ("local_lights", !world.lights.is_empty()),
-            ("map", !environment.is_black()),
-            ("map_sampling", samples_map),
             ("metals", needs.metals),
-            ("nearest_lookup", options.1 == Lookup::Nearest),
             ("normal_maps", needs.normal_maps && !world.scene.tangents.is_empty()),
             ("partial", needs.alpha_blend || needs.thin_transmission),
             ("punctual_lights", needs.punctual_lights),
-            ("record_cosine", view.sampling == Sampling::Adaptive),
             ("second_uv_set", needs.second_uv_set),
             ("single_sided", needs.single_sided),
             ("solid_transmission", needs.solid_transmission),
-            ("table_f32", options.0 == TableKind::F32),
-            ("table_f64", options.0 == TableKind::F64),
-            ("table_u32", options.0 == TableKind::U32),
             ("textures", needs.textures),
             ("transmission", needs.thin_transmission || needs.solid_transmission),
             ("unlit", needs.unlit),
             ("vertex_colors", needs.vertex_colors),
-            ("wide_filter", view.filter != PixelFilter::Box),
         ])
+    }
+
+    /// What a picture needs: the scene's materials and lights, the map, how it is sampled.
+    pub(crate) fn of(world: &World, environment: &Environment, view: &View) -> Self {
+        let samples_map = view.sampling != Sampling::Bsdf && !environment.is_black();
+        let learns = matches!(view.sampling, Sampling::Adaptive | Sampling::Talk);
+        let options = environment.kind();
+        let of_view = [
+            ("faces", view.sampling == Sampling::Adaptive),
+            ("layers", view.layers),
+            ("lens", view.camera.lens_radius > 0.0),
+            ("light_grid", samples_map && learns),
+            ("map", !environment.is_black()),
+            ("map_sampling", samples_map),
+            ("nearest_lookup", options.1 == Lookup::Nearest),
+            ("record_cosine", view.sampling == Sampling::Adaptive),
+            ("table_f32", options.0 == TableKind::F32),
+            ("table_f64", options.0 == TableKind::F64),
+            ("table_u32", options.0 == TableKind::U32),
+            ("wide_filter", view.filter != PixelFilter::Box),
+        ];
+        Self::from_names(Self::of_world(world).0.into_iter().map(|n| (n, true)).chain(of_view))
+    }
+
+    /// Every feature at once, with the table that is used by default.
+    pub(crate) fn most() -> Self {
+        let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_"));
+        Self::from_names(names.filter(|n| *n != "summed_area").map(|n| (n, true)))
     }
 
     /// Features by name, and those that follow from them.
