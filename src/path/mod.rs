@@ -295,7 +295,9 @@ impl<'a> Path<'a> {
         let flight = interior.fly(self.throughput, to - from, bits);
         self.throughput *= flight.weight;
         let position = origin + direction * (from + flight.scattered_at?);
-        let law = self.tracer.grid.map_or(WHOLE_MAP, |grid| grid.law_in_medium(position));
+        // From inside of a solid the map is not seen anyway.
+        let grid = self.tracer.grid.filter(|_| self.body.interior.is_none());
+        let law = grid.map_or(WHOLE_MAP, |grid| grid.law_in_medium(position));
         Some(Vertex { position, law, scatterer: Scatterer::Medium(interior.phase) })
     }
 

@@ -29,8 +29,10 @@ pub struct SceneNeeds {
     pub solid_transmission: bool,
     /// Absorption inside solid bodies.
     pub absorption: bool,
-    /// A medium between surfaces, or scattering inside solid bodies.
+    /// A medium between surfaces.
     pub medium: bool,
+    /// Scattering inside solid bodies.
+    pub scattering_solids: bool,
     /// Clearcoat.
     pub clearcoat: bool,
     /// Unlit surfaces.
@@ -74,7 +76,7 @@ impl SceneNeeds {
         self.solid_transmission |= m.transmission > 0.0 && m.thickness > 0.0;
         self.absorption |=
             m.transmission > 0.0 && m.thickness > 0.0 && m.attenuation_distance.is_finite();
-        self.medium |=
+        self.scattering_solids |=
             m.transmission > 0.0 && m.thickness > 0.0 && m.scattering != glam::Vec3::ZERO;
         self.clearcoat |= m.clearcoat > 0.0;
         self.unlit |= m.unlit;
@@ -98,7 +100,8 @@ impl SceneNeeds {
             (self.thin_transmission, "thin glass: no material transmits without volume"),
             (self.solid_transmission, "refraction: no material is a transmitting solid"),
             (self.absorption, "absorption: no solid absorbs"),
-            (self.medium, "scattering between surfaces: there is no medium"),
+            (self.medium, "fog: the scene has none"),
+            (self.scattering_solids, "scattering inside of solids: none is filled"),
             (self.clearcoat, "clearcoat: no material is coated"),
             (self.emitters, "sampling of emissive triangles: nothing emits"),
             (self.punctual_lights, "punctual lights: the scene has none"),

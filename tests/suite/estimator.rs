@@ -9,7 +9,7 @@ mod known_light;
 mod known_media;
 mod known_paths;
 mod repeatable;
-mod scenes;
+pub(crate) mod scenes;
 mod unbiased;
 
 use std::sync::atomic::AtomicBool;

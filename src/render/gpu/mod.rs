@@ -91,6 +91,7 @@ impl Renderer {
         let mut buffers = stage.buffers.clone();
         let mut globals = stage.globals;
         globals.set_view(view, rays);
+        globals.set_fog(view.fog(world).as_ref());
         let mut constants = stage.constants;
         upload_tables(&mut buffers, view, environment, &mut constants)?;
         let pixels = u64::from(view.width) * u64::from(view.height);
