@@ -114,6 +114,7 @@ struct Vertex {
 }
 
 /// What scatters light at a vertex.
+#[allow(clippy::large_enum_variant, reason = "a path has one at a time, on the stack")]
 enum Scatterer {
     Surface(SurfaceScatterer),
     Medium(Phase),
