@@ -132,6 +132,7 @@ impl Case<'_> {
             grid_columns: 64,
             learning_paths: LEARNING_PATHS,
             laws: LawOptions::ADAPTIVE,
+            medium: None,
             layers: false,
         };
         let never = AtomicBool::new(false);

@@ -50,6 +50,7 @@ fn row(gpu: &Gpu, name: &str, world: &World, environment: &Environment, bounces:
         grid_columns: 64,
         learning_paths: 1 << 14,
         laws: LawOptions::ADAPTIVE,
+        medium: None,
         layers: false,
     };
     let stage = Stage::new(gpu, world, environment).expect("it fits");

@@ -28,6 +28,7 @@ pub(crate) fn bench(criterion: &mut Criterion) {
         grid_columns: 64,
         learning_paths,
         laws: LawOptions::ADAPTIVE,
+        medium: None,
         layers: false,
     };
     let mut group = criterion.benchmark_group("path");

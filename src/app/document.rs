@@ -125,6 +125,7 @@ impl Document {
             grid_columns: 64,
             learning_paths: View::suitable_learning_paths(width, height, self.stop.samples),
             laws: LawOptions::ADAPTIVE,
+            medium: None,
             // The denoiser, focusing and the surface overlays need them.
             layers: true,
         })

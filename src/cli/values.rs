@@ -29,6 +29,37 @@ pub(super) fn vector(text: &str) -> Result<Vec3, String> {
     }
 }
 
+/// One number of at least zero, or three joined by commas (linear RGB).
+pub(super) fn coefficient(text: &str) -> Result<Vec3, String> {
+    let parts: Result<Vec<f32>, String> = text.split(',').map(not_negative).collect();
+    match parts?[..] {
+        [grey] => Ok(Vec3::splat(grey)),
+        [r, g, b] => Ok(Vec3::new(r, g, b)),
+        _ => Err("expected one number or three like 0.1,0.2,0.3".to_owned()),
+    }
+}
+
+/// A number from -1 to 1.
+pub(super) fn mean_cosine(text: &str) -> Result<f32, String> {
+    let x = finite(text)?;
+    if x.abs() <= 1.0 { Ok(x as f32) } else { Err("must be between -1 and 1".to_owned()) }
+}
+
+/// `X,Y,Z,X,Y,Z`: lower and upper corner of a box in metres.
+pub(super) fn corners(text: &str) -> Result<[Vec3; 2], String> {
+    let numbers: Result<Vec<f32>, String> =
+        text.split(',').map(|t| finite(t).map(|x| x as f32)).collect();
+    let [a, b, c, d, e, f] = numbers?[..] else {
+        return Err("expected six numbers: the lower and the upper corner".to_owned());
+    };
+    let (low, high) = (Vec3::new(a, b, c), Vec3::new(d, e, f));
+    if low.cmplt(high).all() {
+        Ok([low, high])
+    } else {
+        Err("the first corner must be the lower one along every axis".to_owned())
+    }
+}
+
 /// A finite number above zero.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     let x = finite(text)?;

@@ -22,9 +22,10 @@ use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LawOptions, LearningGrid, LightGrid};
+use crate::medium::Fog;
 use crate::path::camera::CameraRays;
 use crate::path::{PathLimits, PathTracer, World};
-use crate::scene::Camera;
+use crate::scene::{Camera, Medium};
 
 /// How the environment map is sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
@@ -64,6 +65,9 @@ pub struct View {
     pub learning_paths: u64,
     /// How counters become laws in [`Sampling::Adaptive`].
     pub laws: LawOptions,
+    /// What fills the space between surfaces, in place of the scene's own medium; `None` keeps that,
+    /// and a medium that is all zero is clear air.
+    pub medium: Option<Medium>,
     /// Whether albedo, normal and depth are kept.
     pub layers: bool,
 }
@@ -74,6 +78,12 @@ impl View {
         let pixels = u64::from(width) * u64::from(height);
         let work = pixels * u64::from(samples.unwrap_or(256));
         (work / LEARNING_SHARE).clamp(1 << 16, 1 << 20)
+    }
+
+    /// The medium that is rendered, in its box; `None` in clear air.
+    pub fn fog(&self, world: &World) -> Option<Fog> {
+        let medium = self.medium.or(world.scene.medium)?;
+        Fog::new(&medium, world.bvh.bounds())
     }
 }
 
@@ -144,6 +154,7 @@ pub struct Session<'a> {
     environment: &'a Environment,
     view: View,
     rays: CameraRays,
+    fog: Option<Fog>,
     engine: Engine,
     film: Film,
     whole_map: Option<LightGrid>,
@@ -166,11 +177,12 @@ impl<'a> Session<'a> {
             Sampling::Bsdf => None,
             _ => LightGrid::whole_map(environment.tile_energies()),
         };
-        let learning = new_learning(environment, &view, &rays);
+        let learning = new_learning(world, environment, &view, &rays);
         Self {
             film: Film::new(view.width, view.height, view.layers),
             world,
             environment,
+            fog: view.fog(world),
             view,
             rays,
             engine: Engine::Cpu,
@@ -321,6 +333,7 @@ impl<'a> Session<'a> {
             world: self.world,
             environment: self.environment,
             grid,
+            fog: self.fog,
             limits: self.view.limits,
         }
     }
@@ -338,7 +351,7 @@ impl<'a> Session<'a> {
         if cancel.load(std::sync::atomic::Ordering::Relaxed) {
             // Which paths of the pass were counted depends on the threads: start over.
             self.learned = None;
-            self.learning = new_learning(self.environment, &self.view, &self.rays);
+            self.learning = new_learning(self.world, self.environment, &self.view, &self.rays);
             return self.upload_grid();
         }
         self.figures.learning_rays += rays;
@@ -393,7 +406,12 @@ impl<'a> Session<'a> {
 }
 
 /// An untaught grid, if the view is to learn and the map has anything to learn about.
-fn new_learning(environment: &Environment, view: &View, rays: &CameraRays) -> Option<Learning> {
+fn new_learning(
+    world: &World,
+    environment: &Environment,
+    view: &View,
+    rays: &CameraRays,
+) -> Option<Learning> {
     let options = match view.sampling {
         Sampling::Adaptive => view.laws,
         Sampling::Talk => LawOptions::TALK,
@@ -407,6 +425,7 @@ fn new_learning(environment: &Environment, view: &View, rays: &CameraRays) -> Op
         columns: view.grid_columns,
         rows: (view.grid_columns / 2).max(1),
         faces: view.sampling == Sampling::Adaptive,
+        medium: view.fog(world).is_some(),
     };
     Some(Learning { grid: LearningGrid::new(grid, environment.tile_count(), options), pass: 0 })
 }

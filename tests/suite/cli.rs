@@ -217,6 +217,8 @@ fn odd_but_sound_settings_render() {
         "--lens-radius 0.1 --focus 2",
         "--seconds 0.05 --spp 1000000",
         "--noise 0.9 --spp 1000000",
+        "--fog 0.1,0.2,0.3 --fog-anisotropy -0.5 --fog-box -1,-1,-1,1,2,3",
+        "--fog 0",
     ] {
         bench.render(&format!("-o a.png {rest}"));
     }
@@ -240,6 +242,10 @@ fn wrong_values_are_refused_with_the_reason() {
         ("--eye 0,0,0", "--target"),
         ("--layers foo", "albedo, normal, depth"),
         ("--table foo", "tile-local"),
+        ("--fog -1", "must not be negative"),
+        ("--fog 1,2", "one number or three"),
+        ("--fog-anisotropy 2", "between -1 and 1"),
+        ("--fog-box 0,0,0,1,0,1", "the lower one"),
     ] {
         let message = bench.refusal(&render_line(&format!("-o a.png {rest}")), 2);
         assert!(message.contains(reason), "{rest}: {message}");

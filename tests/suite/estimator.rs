@@ -6,9 +6,10 @@
 mod bounds;
 mod known_glass;
 mod known_light;
+mod known_media;
 mod known_paths;
 mod repeatable;
-mod scenes;
+pub(crate) mod scenes;
 mod unbiased;
 
 use std::sync::atomic::AtomicBool;
@@ -42,6 +43,7 @@ pub(crate) fn view(camera: Camera, sampling: Sampling, bounces: u32) -> View {
         grid_columns: 64,
         learning_paths: 1 << 13,
         laws: LawOptions::ADAPTIVE,
+        medium: None,
         layers: false,
     }
 }

@@ -106,6 +106,7 @@ impl Renderer {
         let mut buffers = stage.buffers.clone();
         let mut globals = stage.globals;
         globals.set_view(view, rays);
+        globals.set_fog(view.fog(world).as_ref());
         let mut constants = stage.constants;
         upload_tables(&mut buffers, view, environment, &mut constants)?;
         let pixels = u64::from(view.width) * u64::from(view.height);
@@ -398,10 +399,17 @@ mod tests {
             grid_columns: 64,
             learning_paths: 1 << 13,
             laws: recording,
+            medium: None,
             layers: false,
         };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
-        let grid = SphericalGrid { center: rays.position, columns: 64, rows: 32, faces: !talk };
+        let grid = SphericalGrid {
+            center: rays.position,
+            columns: 64,
+            rows: 32,
+            faces: !talk,
+            medium: false,
+        };
         let mut learning = LearningGrid::new(grid, environment.tile_count(), recording);
         let mut laws = LightGrid::whole_map(environment.tile_energies());
         let never = AtomicBool::new(false);
@@ -421,6 +429,7 @@ mod tests {
                         world: &world,
                         environment: &environment,
                         grid: laws.as_ref(),
+                        fog: view.fog(&world),
                         limits: view.limits,
                     };
                     cpu::learn(&tracer, &rays, &view, pass, &learning, &never)

@@ -37,7 +37,7 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 33] = [
+    pub(crate) const ALL: [&'static str; 34] = [
         "alpha_mask",
         "clearcoat",
         "emitters",
@@ -50,6 +50,7 @@ impl Features {
         "local_lights",
         "map",
         "map_sampling",
+        "medium",
         "metals",
         "nearest_lookup",
         "normal_maps",
@@ -107,6 +108,7 @@ impl Features {
             ("light_grid", samples_map && learns),
             ("map", !environment.is_black()),
             ("map_sampling", samples_map),
+            ("medium", world.needs.scattering_solids || view.fog(world).is_some()),
             ("nearest_lookup", options.1 == Lookup::Nearest),
             ("record_cosine", view.sampling == Sampling::Adaptive),
             ("table_f32", options.0 == TableKind::F32),
@@ -398,7 +400,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 18] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 19] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -419,6 +421,7 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 18] {
         (wgsl!("tile_local"), samples_map && !features.has("summed_area")),
         (wgsl!("summed_area"), samples_map && features.has("summed_area")),
         (wgsl!("lights"), features.has("scene_lights")),
+        (wgsl!("medium"), features.has("medium")),
         (wgsl!("bvh"), true),
         (wgsl!("camera"), true),
         (wgsl!("path"), true),

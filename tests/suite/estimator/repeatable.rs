@@ -95,10 +95,17 @@ fn counters_do_not_depend_on_the_threads() {
         world: &setting.world,
         environment: &setting.environment,
         grid: Some(&whole_map),
+        fog: None,
         limits: view.limits,
     };
     let digest = |threads| {
-        let grid = SphericalGrid { center: rays.position(), columns: 64, rows: 32, faces: true };
+        let grid = SphericalGrid {
+            center: rays.position(),
+            columns: 64,
+            rows: 32,
+            faces: true,
+            medium: false,
+        };
         let mut learning =
             LearningGrid::new(grid, setting.environment.tile_count(), LawOptions::ADAPTIVE);
         for pass in 0..3 {
