@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LawOptions;
-use lightgrid::path::{PathLimits, World};
+use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Figures, Phase, Sampling, Session, View};
 use lightgrid::scene::builtin;
@@ -133,6 +133,8 @@ impl Case<'_> {
             learning_paths: LEARNING_PATHS,
             laws: LawOptions::ADAPTIVE,
             medium: None,
+            background: Background::Map,
+            crop: None,
             layers: false,
         };
         let never = AtomicBool::new(false);

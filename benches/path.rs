@@ -7,7 +7,7 @@ use criterion::{Criterion, Throughput};
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LawOptions;
 use lightgrid::light_grid::tile_laws::TileLaws;
-use lightgrid::path::{PathLimits, World};
+use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Sampling, Session, View};
 use lightgrid::scene::builtin;
@@ -29,6 +29,8 @@ pub(crate) fn bench(criterion: &mut Criterion) {
         learning_paths,
         laws: LawOptions::ADAPTIVE,
         medium: None,
+        background: Background::Map,
+        crop: None,
         layers: false,
     };
     let mut group = criterion.benchmark_group("path");

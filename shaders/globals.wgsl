@@ -72,4 +72,7 @@ struct Globals {
     padding_3: u32,
     fog_extinction: vec3f,
     padding_4: u32,
+    // What the camera sees in place of the map: a colour, or how little the map is blurred.
+    background: vec3f,
+    background_concentration: f32,
 }

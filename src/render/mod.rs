@@ -24,7 +24,7 @@ use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LawOptions, LearningGrid, LightGrid};
 use crate::medium::Fog;
 use crate::path::camera::CameraRays;
-use crate::path::{PathLimits, PathTracer, World};
+use crate::path::{Background, PathLimits, PathTracer, World};
 use crate::scene::{Camera, Medium};
 
 /// How the environment map is sampled.
@@ -68,8 +68,21 @@ pub struct View {
     /// What fills the space between surfaces, in place of the scene's own medium; `None` keeps that,
     /// and a medium that is all zero is clear air.
     pub medium: Option<Medium>,
+    /// What the camera sees where it sees no surface.
+    pub background: Background,
+    /// The part of a larger picture that this one is; `None` is the whole.
+    pub crop: Option<Crop>,
     /// Whether albedo, normal and depth are kept.
     pub layers: bool,
+}
+
+/// Where a part lies in the whole picture, in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Crop {
+    /// Column and row of the part's first pixel.
+    pub corner: [u32; 2],
+    /// Width and height of the whole.
+    pub whole: [u32; 2],
 }
 
 impl View {
@@ -78,6 +91,22 @@ impl View {
         let pixels = u64::from(width) * u64::from(height);
         let work = pixels * u64::from(samples.unwrap_or(256));
         (work / LEARNING_SHARE).clamp(1 << 16, 1 << 20)
+    }
+
+    /// Width and height of the picture that this one is a part of.
+    pub fn whole_size(&self) -> [u32; 2] {
+        self.crop.map_or([self.width, self.height], |crop| crop.whole)
+    }
+
+    /// The camera's rays through this picture.
+    pub fn rays(&self) -> CameraRays {
+        match self.crop {
+            None => CameraRays::new(&self.camera, self.width, self.height),
+            Some(Crop { corner, whole: [width, height] }) => {
+                let whole = CameraRays::new(&self.camera, width, height);
+                whole.cropped(corner, [self.width, self.height])
+            }
+        }
     }
 
     /// The medium that is rendered, in its box; `None` in clear air.
@@ -172,7 +201,7 @@ struct Learning {
 impl<'a> Session<'a> {
     /// Starts a session on the CPU; nothing is traced yet.
     pub fn new(world: &'a World, environment: &'a Environment, view: View) -> Self {
-        let rays = CameraRays::new(&view.camera, view.width, view.height);
+        let rays = view.rays();
         let whole_map = match view.sampling {
             Sampling::Bsdf => None,
             _ => LightGrid::whole_map(environment.tile_energies()),
@@ -334,6 +363,7 @@ impl<'a> Session<'a> {
             environment: self.environment,
             grid,
             fog: self.fog,
+            background: self.view.background,
             limits: self.view.limits,
         }
     }

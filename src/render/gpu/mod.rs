@@ -377,7 +377,7 @@ mod tests {
     use crate::environment::EnvironmentOptions;
     use crate::light_grid::LawOptions;
     use crate::light_grid::cells::SphericalGrid;
-    use crate::path::{PathLimits, PathTracer};
+    use crate::path::{Background, PathLimits, PathTracer};
     use crate::render::{Sampling, cpu};
     use crate::scene::builtin;
 
@@ -400,6 +400,8 @@ mod tests {
             learning_paths: 1 << 13,
             laws: recording,
             medium: None,
+            background: Background::Map,
+            crop: None,
             layers: false,
         };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
@@ -430,6 +432,7 @@ mod tests {
                         environment: &environment,
                         grid: laws.as_ref(),
                         fog: view.fog(&world),
+                        background: Background::Map,
                         limits: view.limits,
                     };
                     cpu::learn(&tracer, &rays, &view, pass, &learning, &never)

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::super::filter::PixelFilter;
 use super::super::{Sampling, View};
 use crate::environment::{Environment, Lookup, TableKind};
-use crate::path::World;
+use crate::path::{Background, World};
 
 /// Entry points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,8 +37,10 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 34] = [
+    pub(crate) const ALL: [&'static str; 36] = [
         "alpha_mask",
+        "background_blur",
+        "background_color",
         "clearcoat",
         "emitters",
         "faces",
@@ -102,6 +104,8 @@ impl Features {
         let learns = matches!(view.sampling, Sampling::Adaptive | Sampling::Talk);
         let options = environment.kind();
         let of_view = [
+            ("background_blur", matches!(view.background, Background::Blurred(_))),
+            ("background_color", matches!(view.background, Background::Color(_))),
             ("faces", view.sampling == Sampling::Adaptive),
             ("layers", view.layers),
             ("lens", view.camera.lens_radius > 0.0),

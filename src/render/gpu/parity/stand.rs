@@ -11,7 +11,7 @@ use crate::image::Image;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LawOptions, LightGrid};
 use crate::path::camera::CameraRays;
-use crate::path::{PathLimits, PathTracer, World};
+use crate::path::{Background, PathLimits, PathTracer, World};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::layout::{pack_radiance, unpack_radiance};
 use crate::render::{Sampling, View};
@@ -87,6 +87,7 @@ impl Stand {
             grid: Some(&self.grid),
             limits: self.view.limits,
             fog: self.view.fog(&self.world),
+            background: self.view.background,
         }
     }
 }
@@ -119,6 +120,8 @@ fn view(camera: Camera, filter: PixelFilter, sampling: Sampling) -> View {
         learning_paths: 0,
         laws: LawOptions::ADAPTIVE,
         medium: None,
+        background: Background::Map,
+        crop: None,
         layers: true,
     }
 }
