@@ -22,7 +22,7 @@ fn count(cell: u32, tile: u32, weight: f32) {
 
 fn record(path: ptr<function, Path>, vertex: Vertex) {
     var law = WHOLE_MAP;
-//#if record_cosine
+//#if record_ratio
     if (path_pair_bits(path).x >> 31u) == 0u {
         law = vertex.law;
     }
@@ -38,8 +38,15 @@ fn record(path: ptr<function, Path>, vertex: Vertex) {
     let f = scattered(vertex, sample.direction);
     if max_element(f.value) > 0.0 {
         let visible = transmittance(path, vertex, sample.direction, F32_MAX);
+//#if record_ratio
+        weight = luminance(visible);
+        let cosine = abs(dot(vertex.point.shading_frame.z, sample.direction));
 //#if record_cosine
-        weight = luminance(visible) * abs(dot(vertex.point.shading_frame.z, sample.direction));
+        weight *= cosine;
+//#end
+//#if record_squared_cosine
+        weight *= cosine * cosine;
+//#end
 //#else
         let pdf = choice.probability * sample.pdf_solid_angle;
         weight = importance(f.value * sample.radiance * visible)

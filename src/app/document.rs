@@ -5,6 +5,7 @@ use glam::{Affine3A, Mat3A, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::light_grid::LawOptions;
+use crate::sampler::Points;
 use crate::path::PathLimits;
 use crate::render::filter::PixelFilter;
 use crate::render::{Sampling, StopRule, View};
@@ -107,6 +108,7 @@ impl Document {
             sampling: self.light.sampling,
             limits: PathLimits { bounces: self.light.bounces, russian_roulette: true },
             seed: self.light.seed,
+            points: Points::Sobol,
             grid_columns: 64,
             learning_paths: View::suitable_learning_paths(width, height, self.stop.samples),
             laws: LawOptions::ADAPTIVE,

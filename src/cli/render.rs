@@ -18,6 +18,7 @@ use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::path::{PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
 use crate::render::{Sampling, Session, StopRule, View};
+use crate::sampler::Points;
 use crate::scene::{Camera, Projection, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
 
@@ -326,6 +327,7 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
             russian_roulette: !arguments.no_russian_roulette,
         },
         seed: arguments.seed,
+        points: Points::Sobol,
         grid_columns: arguments.grid,
         learning_paths: arguments
             .learning_paths

@@ -12,6 +12,7 @@ pub mod camera;
 pub mod framing;
 mod learn;
 mod lights;
+mod ray_clock;
 mod world;
 
 pub use lights::{LightSample, LocalLights};

@@ -121,6 +121,10 @@ impl<'a> Renderer<'a> {
         let render = renderer.pipeline(Kernel::Render)?;
         renderer.kernel_bytes = render.program.source.len();
         renderer.render = Some(render);
+        // Now rather than when it is used: building kernels is no learning.
+        if renderer.features.has("light_grid") {
+            renderer.learn = Some(renderer.pipeline(Kernel::Learn)?);
+        }
         Ok(renderer)
     }
 
@@ -152,9 +156,6 @@ impl<'a> Renderer<'a> {
         }
         self.buffers.put("counters", bytemuck::cast_slice(counters), "the learning counters")?;
         self.buffers.put("learning_rays", &[0; 4], "a count")?;
-        if self.learn.is_none() {
-            self.learn = Some(self.pipeline(Kernel::Learn)?);
-        }
         let mut first = paths.start;
         while first < paths.end {
             if cancel.load(Ordering::Relaxed) {
@@ -509,6 +510,7 @@ mod tests {
     use crate::light_grid::cells::SphericalGrid;
     use crate::path::{PathLimits, PathTracer};
     use crate::render::{Sampling, cpu};
+    use crate::sampler::Points;
     use crate::scene::builtin;
 
     /// Visits of each cell and tile counters after two passes, the second with laws of the first.
@@ -526,6 +528,7 @@ mod tests {
             sampling: if talk { Sampling::Talk } else { Sampling::Adaptive },
             limits: PathLimits { bounces: 4, russian_roulette: true },
             seed: 5,
+            points: Points::Sobol,
             grid_columns: 64,
             learning_paths: 1 << 13,
             laws: recording,

@@ -8,7 +8,9 @@ use std::fmt::Write as _;
 use super::super::filter::PixelFilter;
 use super::super::{Sampling, View};
 use crate::environment::{Environment, Lookup, TableKind};
+use crate::light_grid::Recording;
 use crate::path::World;
+use crate::sampler::Points;
 
 /// Entry points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,12 +37,13 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 33] = [
+    pub(crate) const ALL: [&'static str; 36] = [
         "alpha_mask",
         "clearcoat",
         "emitters",
         "faces",
         "filtered_hits",
+        "independent_points",
         "learning",
         "layers",
         "lens",
@@ -55,6 +58,8 @@ impl Features {
         "pass_through",
         "punctual_lights",
         "record_cosine",
+        "record_ratio",
+        "record_squared_cosine",
         "scene_lights",
         "second_uv_set",
         "shadow_rays",
@@ -77,11 +82,14 @@ impl Features {
         let samples_map = view.sampling != Sampling::Bsdf && !environment.is_black();
         let learns = matches!(view.sampling, Sampling::Adaptive | Sampling::Talk);
         let options = environment.kind();
+        let recording = view.law_options().map(|laws| laws.recording);
+        let cosine_power = recording.map_or(0, Recording::cosine_power);
         Self::from_names([
             ("alpha_mask", needs.alpha_mask),
             ("clearcoat", needs.clearcoat),
             ("emitters", needs.emitters),
-            ("faces", view.sampling == Sampling::Adaptive),
+            ("faces", view.law_options().is_some_and(|laws| laws.faces)),
+            ("independent_points", view.points == Points::Independent),
             ("layers", view.layers),
             ("lens", view.camera.lens_radius > 0.0),
             ("light_grid", samples_map && learns),
@@ -93,7 +101,9 @@ impl Features {
             ("normal_maps", needs.normal_maps && !world.scene.tangents.is_empty()),
             ("partial", needs.alpha_blend || needs.thin_transmission),
             ("punctual_lights", needs.punctual_lights),
-            ("record_cosine", view.sampling == Sampling::Adaptive),
+            ("record_cosine", cosine_power == 1),
+            ("record_ratio", recording.is_some_and(Recording::is_ratio)),
+            ("record_squared_cosine", cosine_power == 2),
             ("second_uv_set", needs.second_uv_set),
             ("single_sided", needs.single_sided),
             ("solid_transmission", needs.solid_transmission),
@@ -133,6 +143,7 @@ impl Features {
         if kernel == Kernel::Learn {
             set.insert("learning");
             set.remove("layers");
+            set.remove("independent_points");
         }
         Self(set)
     }
