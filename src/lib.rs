@@ -34,6 +34,7 @@ pub mod noise;
 pub mod output;
 pub mod path;
 pub mod render;
+pub mod report;
 pub mod sampler;
 pub mod scene;
 pub mod sources;

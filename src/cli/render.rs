@@ -213,7 +213,7 @@ impl RenderArguments {
 pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     check_outputs(arguments)?;
     start_threads(arguments.threads)?;
-    let cancel = super::interrupt::flag();
+    let cancel = super::interrupt::flag("stopping after this pass and writing the picture");
     let progress = Progress::start("loading");
     let mut phases = Phases::default();
 
@@ -286,7 +286,7 @@ fn lap(start: Instant) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
-fn start_threads(threads: u16) -> Result<()> {
+pub(super) fn start_threads(threads: u16) -> Result<()> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(usize::from(threads))
         .thread_name(|i| format!("render {i}"))
