@@ -87,13 +87,13 @@ struct EffortArguments {
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Seconds of every run, learning included.
-    #[arg(long, default_value = "20", value_parser = values::positive, value_name = "S")]
+    #[arg(long, default_value = "30", value_parser = values::positive, value_name = "S")]
     seconds: f64,
     /// Independent runs of every combination; intervals need two at least.
     #[arg(long, default_value = "6", value_parser = clap::value_parser!(u32).range(1..=10_000), value_name = "N")]
     seeds: u32,
     /// Picture size in pixels.
-    #[arg(long, default_value = "320x180", value_parser = values::size, value_name = "WxH")]
+    #[arg(long, default_value = "240x135", value_parser = values::size, value_name = "WxH")]
     size: (u32, u32),
     /// Surface vertices at which a path gathers light; 1 is direct light only.
     #[arg(long, default_value = "5", value_parser = clap::value_parser!(u32).range(1..=1000), value_name = "N")]

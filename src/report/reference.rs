@@ -83,7 +83,7 @@ pub(super) struct Reference {
 const FIRST_SEED: u32 = 0x5265_6600;
 
 /// Fewest pictures: their spread must be worth something.
-pub(super) const LEAST_PICTURES: u32 = 4;
+pub(super) const LEAST_PICTURES: u32 = 8;
 
 impl Reference {
     /// The one kept in `folder`, or an empty one that will be.

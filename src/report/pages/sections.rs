@@ -37,7 +37,11 @@ pub(super) fn overview(report: &Report, html: &mut String) {
         plan.methods.iter().map(|m| m.name.as_str()).filter(|name| *name != baseline).collect();
     let mut head = vec!["", "device"];
     head.extend(&others);
-    head.extend(["the talk", "target", "reference noise"]);
+    let is_beside_talk = plan.rows.iter().any(|row| row.published.is_some() || row.target.is_some());
+    if is_beside_talk {
+        head.extend(["published", "target"]);
+    }
+    head.push("reference noise");
     let mut table = Table::new(&head);
     for row in &report.rows {
         if let Some(reason) = &row.not_measured {
@@ -51,9 +55,11 @@ pub(super) fn overview(report: &Report, html: &mut String) {
             }
             let mut cells = vec![row.row.title.clone(), device.device.title().to_owned()];
             cells.extend(others.iter().map(|name| ratio_cell(device, name, baseline)));
-            let published = words::published(row, device.device);
-            cells.push(published.map_or_else(String::new, words::ratio));
-            cells.push(words::target_cell(row, device, baseline).trim_matches('-').to_owned());
+            if is_beside_talk {
+                let published = words::published(row, device.device);
+                cells.push(published.map_or_else(String::new, words::ratio));
+                cells.push(words::target_cell(row, device, baseline).trim_matches('-').to_owned());
+            }
             let share = row.reference.as_ref().and_then(|r| r.share);
             cells.push(share.map_or_else(|| "unknown".to_owned(), percent));
             table.row(&cells);
@@ -93,8 +99,8 @@ pub(super) fn overview_plot(report: &Report) -> Option<String> {
 }
 
 fn ratio_cell(device: &DeviceReport, name: &str, baseline: &str) -> String {
-    let found = device.method(name).and_then(|m| m.speed_up(baseline, Measure::TrimmedRelMse));
-    found.map_or_else(String::new, words::speed_up)
+    let method = device.method(name);
+    method.map_or_else(String::new, |m| words::speed_up_cell(m, baseline, Measure::TrimmedRelMse))
 }
 
 /// Methods down, rows across: speed-ups over the last baseline, and their geometric mean.
@@ -236,7 +242,7 @@ fn pictures(report: &Report, row: &RowReport, html: &mut String) -> Result<()> {
     let mut figure = |picture: &crate::image::Rgb8, width: u32, caption: &str| -> Result<()> {
         let _ = writeln!(
             html,
-            "<figure><img src=\"{}\" width=\"{width}\" alt=\"\"><figcaption>{caption}</figcaption>\
+            "<figure><img src=\"{}\" style=\"width:{width}px\" alt=\"\"><figcaption>{caption}</figcaption>\
              </figure>",
             data_uri(picture)?
         );
@@ -263,23 +269,11 @@ fn pictures(report: &Report, row: &RowReport, html: &mut String) -> Result<()> {
 }
 
 fn errors(report: &Report, device: &DeviceReport, html: &mut String) {
-    let _ = writeln!(
-        html,
-        "<h3>{}: errors after {} s, and time to equal error</h3>",
-        device.device.title(),
-        report.plan.effort.seconds
-    );
-    let names: Vec<&str> =
-        report.plan.baselines.iter().map(|b| report.plan.methods[*b].name.as_str()).collect();
-    let mut head: Vec<String> = ["", "runs"].map(str::to_owned).to_vec();
-    head.extend(Measure::ALL.map(|m| m.title().to_owned()));
-    head.push("slope".to_owned());
-    for name in &names {
-        head.push(format!("x {name}"));
-    }
-    head.extend(["by relMSE", "by MSE", "by FLIP"].map(|m| format!("x {}, {m}", names[0])));
-    head.push("mean ratio".to_owned());
-    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let title = device.device.title();
+    let _ = writeln!(html, "<h3>{title}: errors after {} s</h3>", report.plan.effort.seconds);
+    let mut head = vec!["", "runs"];
+    head.extend(Measure::ALL.map(Measure::title));
+    head.extend(["slope", "mean ratio"]);
     let mut table = Table::new(&head);
     for method in device.methods.iter().filter(|m| !m.runs.is_empty()) {
         let mut cells = vec![method.method.name.clone(), method.runs.len().to_string()];
@@ -287,67 +281,88 @@ fn errors(report: &Report, device: &DeviceReport, html: &mut String) {
             Measure::ALL.map(|m| method.error(m).map_or_else(String::new, words::estimate)),
         );
         let slope = method.slopes.iter().find(|(m, _)| *m == Measure::TrimmedRelMse);
-        cells.push(slope.map_or_else(String::new, |(_, s)| match s.standard_error {
-            Some(e) => format!("{:.2} ± {e:.2}", s.mean),
-            None => format!("{:.2}", s.mean),
-        }));
-        let over = |name: &str, measure: Measure| {
-            method.speed_up(name, measure).map_or_else(String::new, words::speed_up)
-        };
-        cells.extend(names.iter().map(|name| over(name, Measure::TrimmedRelMse)));
-        cells.extend(Measure::ALL[1..].iter().map(|m| over(names[0], *m)));
-        cells.push(method.mean_ratio.map_or_else(String::new, |r| match r.standard_error {
-            Some(e) => format!("{:.4} ± {e:.4}", r.mean),
-            None => format!("{:.4}", r.mean),
-        }));
+        cells.push(words::plain_estimate(slope.map(|(_, s)| *s), 2));
+        cells.push(words::plain_estimate(method.mean_ratio, 4));
+        table.row(&cells);
+    }
+    html.push_str(&table.finish());
+
+    let _ = writeln!(html, "<h3>{title}: how much sooner to the same error</h3>");
+    let names: Vec<&str> =
+        report.plan.baselines.iter().map(|b| report.plan.methods[*b].name.as_str()).collect();
+    let mut head: Vec<String> = vec![String::new()];
+    head.extend(names.iter().skip(1).map(|name| format!("over {name}")));
+    head.push(format!("over {}", names[0]));
+    head.extend(Measure::ALL[1..].iter().map(|m| format!("by {}", m.title())));
+    head.push("without learning".to_owned());
+    let mut table = Table::new(&head.iter().map(String::as_str).collect::<Vec<_>>());
+    for method in device.methods.iter().filter(|m| !m.runs.is_empty()) {
+        let mut cells = vec![method.method.name.clone()];
+        let over = |name: &str, measure| words::speed_up_cell(method, name, measure);
+        cells.extend(names.iter().skip(1).map(|name| over(name, Measure::TrimmedRelMse)));
+        cells.extend(Measure::ALL.iter().map(|m| over(names[0], *m)));
+        cells.push(method.without_learning.map_or_else(String::new, words::ratio));
         table.row(&cells);
     }
     html.push_str(&table.finish());
 }
 
 fn costs(report: &Report, device: &DeviceReport, html: &mut String) {
-    let _ = writeln!(html, "<h3>{}: where the time and the memory go</h3>", device.device.title());
+    let title = device.device.title();
+    let _ = writeln!(html, "<h3>{title}: where the time goes</h3>");
     let mut table = Table::new(&[
-        "", "learning s", "tables s", "rays s", "shading s", "set-up s", "samples / pixel",
-        "rays / sample", "Mrays / s", "learning paths", "cells", "x without learning", "grid MB",
-        "at most", "map table MB", "tree MB", "device MB",
+        "", "learning", "tables", "rays", "shading", "set-up", "samples / pixel", "rays / sample",
+        "Mrays / s", "learning paths",
     ]);
+    let (width, height) = report.plan.effort.frame.size;
     for method in device.methods.iter().filter(|m| !m.runs.is_empty()) {
-        let (c, m) = (&method.costs, &method.memory);
-        let (width, height) = report.plan.effort.frame.size;
+        let c = &method.costs;
         let rays = c.rays_per_sample * c.samples * f64::from(width) * f64::from(height);
         let shading = c.ray_seconds.map(|rays| c.render_seconds - rays);
-        let rendering = format!("{:.2} in all", c.render_seconds);
+        let rendering = format!("{:.2} s in all", c.render_seconds);
         table.row(&[
             method.method.name.clone(),
-            format!("{:.2}", c.learn_seconds),
-            format!("{:.3}", c.table_seconds),
-            c.ray_seconds.map_or(rendering, |s| format!("{s:.2}")),
-            shading.map_or_else(String::new, |s| format!("{s:.2}")),
-            format!("{:.2}", c.setup_seconds),
+            format!("{:.2} s", c.learn_seconds),
+            format!("{:.2} s", c.table_seconds),
+            c.ray_seconds.map_or(rendering, |s| format!("{s:.2} s")),
+            shading.map_or_else(String::new, |s| format!("{s:.2} s")),
+            format!("{:.2} s", c.setup_seconds),
             format!("{:.0}", c.samples),
             format!("{:.2}", c.rays_per_sample),
             format!("{:.2}", rays / c.render_seconds.max(1e-9) / 1e6),
             c.learning_paths.to_string(),
-            format!("{:.0}", c.learned_cells),
-            method.without_learning.map_or_else(String::new, words::ratio),
+        ]);
+    }
+    html.push_str(&table.finish());
+    let remark = if device.methods.iter().any(|m| m.costs.ray_seconds.is_some()) {
+        "Rays: their number times what one took when they were timed one by one, in a measurement of \
+         its own with what the first run had learned; shading is the rest of rendering."
+    } else {
+        "A GPU's kernel traces and shades in one: the two are not told apart."
+    };
+    let _ = writeln!(html, "<p class=\"soft\">{remark}</p>");
+    memory(device, html);
+}
+
+fn memory(device: &DeviceReport, html: &mut String) {
+    let _ = writeln!(html, "<h3>{}: memory, MB</h3>", device.device.title());
+    let mut table = Table::new(&[
+        "", "Light Grid", "while learning, at most", "cells with a law", "map's table", "scene's tree",
+        "all on the device",
+    ]);
+    for method in device.methods.iter().filter(|m| !m.runs.is_empty()) {
+        let m = &method.memory;
+        table.row(&[
+            method.method.name.clone(),
             words::megabytes(m.grid_bytes),
             words::megabytes(m.grid_peak_bytes),
+            format!("{:.0}", method.costs.learned_cells),
             words::megabytes(m.table_bytes),
             words::megabytes(m.bvh_bytes),
             m.device_bytes.map_or_else(String::new, words::megabytes),
         ]);
     }
     html.push_str(&table.finish());
-    let remark = if device.methods.iter().any(|m| m.costs.ray_seconds.is_some()) {
-        "Rays: their number times what one took when they were timed one by one, in a measurement of \
-         its own with what the first run had learned; shading is the rest of rendering. \
-         \"Without learning\": ratio of error times rendering time."
-    } else {
-        "A GPU's kernel traces and shades in one: the two are not told apart. \"Without learning\": \
-         ratio of error times rendering time."
-    };
-    let _ = writeln!(html, "<p class=\"soft\">{remark}</p>");
 }
 
 fn what_is_left(report: &Report, row: &RowReport, html: &mut String) {

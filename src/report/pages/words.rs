@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::super::plan::Device;
 use super::super::shares::Shares;
 use super::super::statistics::{Estimate, SpeedUp};
-use super::super::summary::{DeviceReport, Measure, Report, RowReport};
+use super::super::summary::{DeviceReport, Measure, MethodReport, Report, RowReport};
 
 /// Seconds in words.
 pub fn duration(seconds: f64) -> String {
@@ -33,10 +33,14 @@ pub(super) fn error(value: f64) -> String {
 
 /// An error with its standard error.
 pub(super) fn estimate(estimate: Estimate) -> String {
-    match estimate.standard_error {
-        Some(s) => format!("{} ± {}", error(estimate.mean), error(s)),
-        None => error(estimate.mean),
+    let Some(s) = estimate.standard_error else { return error(estimate.mean) };
+    if estimate.mean >= 0.01 {
+        return format!("{:.3} ± {s:.3}", estimate.mean);
     }
+    // Both in the same power of ten.
+    let exponent = estimate.mean.max(f64::MIN_POSITIVE).log10().floor() as i32;
+    let unit = 10f64.powi(exponent);
+    format!("({:.2} ± {:.2})e{exponent}", estimate.mean / unit, s / unit)
 }
 
 /// A share as percent.
@@ -48,6 +52,24 @@ pub(super) fn percent(share: f64) -> String {
 /// Bytes as MB.
 pub(super) fn megabytes(bytes: u64) -> String {
     format!("{:.1}", bytes as f64 / 1e6)
+}
+
+/// A number with its standard error, to so many digits after the point.
+pub(super) fn plain_estimate(estimate: Option<Estimate>, digits: usize) -> String {
+    match estimate {
+        None => String::new(),
+        Some(Estimate { mean, standard_error: None }) => format!("{mean:.digits$}"),
+        Some(Estimate { mean, standard_error: Some(s) }) => format!("{mean:.digits$} ± {s:.digits$}"),
+    }
+}
+
+/// A method's speed-up over another, or why there is none.
+pub(super) fn speed_up_cell(method: &MethodReport, baseline: &str, measure: Measure) -> String {
+    match method.speed_up(baseline, measure) {
+        Some(found) => speed_up(found),
+        None if method.method.name == baseline || method.runs.is_empty() => String::new(),
+        None => "no picture in time".to_owned(),
+    }
 }
 
 /// A speed-up with its interval.
@@ -173,9 +195,10 @@ pub fn markdown_table(report: &Report) -> String {
         for device in &row.devices {
             let mut cells = vec![row.row.title.clone(), device.device.title().to_owned()];
             cells.extend(others.iter().map(|name| {
-                let found = device.method(name);
-                let found = found.and_then(|m| m.speed_up(baseline, Measure::TrimmedRelMse));
-                found.map_or_else(|| "-".to_owned(), speed_up)
+                let cell = device
+                    .method(name)
+                    .map(|m| speed_up_cell(m, baseline, Measure::TrimmedRelMse));
+                cell.filter(|text| !text.is_empty()).unwrap_or_else(|| "-".to_owned())
             }));
             if has_published {
                 cells.push(published(row, device.device).map_or_else(|| "-".to_owned(), ratio));
