@@ -6,7 +6,7 @@ use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LawOptions;
 use lightgrid::path::{PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::gpu::Gpu;
+use lightgrid::render::gpu::{Gpu, Stage};
 use lightgrid::render::{Sampling, Session, View};
 use lightgrid::sampler::Points;
 use lightgrid::scene::builtin;
@@ -54,9 +54,10 @@ fn row(gpu: &Gpu, name: &str, world: &World, environment: &Environment, bounces:
         laws: LawOptions::ADAPTIVE,
         layers: false,
     };
+    let stage = Stage::new(gpu, world, environment).expect("it fits");
     let mut sessions = [
         Session::new(world, environment, view.clone()),
-        Session::on_gpu(world, environment, view, gpu).expect("it fits"),
+        Session::on_gpu(world, environment, view, &stage).expect("it fits"),
     ];
     let never = AtomicBool::new(false);
     // Learning and the first pass, with which kernels are compiled, do not count.

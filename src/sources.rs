@@ -19,7 +19,11 @@ const MAX_SKY_SIZE: (u32, u32) = (16384, 8192);
 /// One sentence: the name is neither, or the file cannot be read.
 pub fn scene(name: &str) -> Result<Scene> {
     check_scene(name)?;
-    if builtin::names().contains(&name) { builtin::build(name) } else { gltf::load(Path::new(name)) }
+    if builtin::names().contains(&name) {
+        builtin::build(name)
+    } else {
+        gltf::load(Path::new(name))
+    }
 }
 
 /// Whether there is such a scene, without reading it.

@@ -46,6 +46,8 @@ pub enum Command {
     Redo,
     /// Show or hide the plain half.
     ToggleSplit,
+    /// Render on the other device.
+    ToggleDevice,
     /// Filter noise out or not.
     ToggleDenoise,
     /// Show or hide the panels.
@@ -67,7 +69,7 @@ pub enum Command {
 }
 
 /// Keys, what they do, and the command.
-pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 16] = [
+pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 17] = [
     (plain(Key::Space), "Pause, resume", Command::TogglePause),
     (plain(Key::R), "Restart the picture", Command::Restart),
     (plain(Key::F), "Frame the whole scene", Command::FrameAll),
@@ -75,6 +77,7 @@ pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 16] = [
     (plain(Key::B), "Keep this viewpoint", Command::Bookmark),
     (plain(Key::K), "Keep this picture for comparison", Command::KeepPicture),
     (plain(Key::V), "Split view: plain | adaptive", Command::ToggleSplit),
+    (plain(Key::G), "CPU or GPU", Command::ToggleDevice),
     (plain(Key::N), "Denoise, before and after", Command::ToggleDenoise),
     (plain(Key::H), "Hide or show the panels", Command::TogglePanels),
     (plain(Key::F12), "Hide or show the developer's panel", Command::ToggleDeveloper),

@@ -5,10 +5,11 @@ use glam::{Affine3A, Mat3A, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::light_grid::LawOptions;
-use crate::sampler::Points;
 use crate::path::PathLimits;
 use crate::render::filter::PixelFilter;
+use crate::render::gpu::DeviceChoice;
 use crate::render::{Sampling, StopRule, View};
+use crate::sampler::Points;
 use crate::scene::{Camera, Projection, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
 
@@ -40,6 +41,9 @@ pub struct Document {
 /// How light is found.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Light {
+    /// Where the picture is rendered.
+    #[serde(default)]
+    pub device: DeviceChoice,
     /// How the map is sampled.
     pub sampling: Sampling,
     /// Whether the plain method runs beside it for comparison.
@@ -82,7 +86,13 @@ impl Default for Document {
             rotation_degrees: 0.0,
             intensity: 1.0,
             viewpoint: None,
-            light: Light { sampling: Sampling::Adaptive, split: false, bounces: 8, seed: 0 },
+            light: Light {
+                device: DeviceChoice::Auto,
+                sampling: Sampling::Adaptive,
+                split: false,
+                bounces: 8,
+                seed: 0,
+            },
             look: Look {
                 auto_exposure: true,
                 exposure_ev: 0.0,

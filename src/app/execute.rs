@@ -8,6 +8,7 @@ use super::document::Viewpoint;
 use super::interface::{Dock, Interface, Prompt, Purpose, Tab};
 use super::{App, Later, convergence, save, surface_map, theme};
 use crate::error::{Error, Result};
+use crate::render::gpu::DeviceChoice;
 
 impl App {
     pub(super) fn execute(&mut self, command: Command, context: &egui::Context) {
@@ -63,6 +64,11 @@ impl App {
                 }
             }
             Command::ToggleSplit => self.document.light.split = !self.document.light.split,
+            Command::ToggleDevice => {
+                let is_on_gpu = self.snapshot.as_ref().is_some_and(|s| s.main.gpu.is_some());
+                self.document.light.device =
+                    if is_on_gpu { DeviceChoice::Cpu } else { DeviceChoice::Gpu };
+            }
             Command::ToggleDenoise => self.document.look.denoise = !self.document.look.denoise,
             Command::TogglePanels => interface.panels = !interface.panels,
             Command::ToggleDeveloper => interface.toggle_developer(),

@@ -9,6 +9,7 @@ use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{Error, Notices, Result};
 use crate::image::Image;
 use crate::path::World;
+use crate::render::gpu::KernelFacts;
 use crate::sources;
 
 /// A scene ready for rays.
@@ -18,6 +19,8 @@ pub struct LoadedScene {
     pub name: String,
     /// The scene.
     pub world: Arc<World>,
+    /// What a GPU's kernel for it holds.
+    pub kernel: KernelFacts,
     /// Seconds of reading and of building the BVH.
     pub seconds: [f64; 2],
 }
@@ -118,7 +121,8 @@ fn load_scene(name: &str) -> Result<LoadedScene> {
     let read = start.elapsed().as_secs_f64();
     let world = Arc::new(World::new(scene));
     let seconds = [read, start.elapsed().as_secs_f64() - read];
-    Ok(LoadedScene { name: name.to_owned(), world, seconds })
+    let kernel = KernelFacts::of_scene(&world);
+    Ok(LoadedScene { name: name.to_owned(), world, kernel, seconds })
 }
 
 fn load_map(name: &str) -> Result<LoadedMap> {

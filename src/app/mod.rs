@@ -37,6 +37,7 @@ pub mod worker;
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::path::framing;
+use crate::render::gpu::DeviceChoice;
 
 use commands::Command;
 use convergence::Convergence;
@@ -63,6 +64,8 @@ pub struct Start {
     pub interface: Interface,
     /// What earlier windows left.
     pub settings: Settings,
+    /// The GPU to take where one is wanted: part of its name or backend.
+    pub adapter: Option<String>,
     /// For screenshots: no previews on the way, and no figures that depend on the clock.
     pub is_repeatable: bool,
 }
@@ -129,7 +132,7 @@ impl App {
             convergence: Convergence::default(),
             inspector: Inspector::new(wake.clone()),
             loader: Loader::new(wake.clone()),
-            worker: Worker::start(wake.clone())?,
+            worker: Worker::start(wake.clone(), start.adapter)?,
             presenter: Presenter::start(wake.clone())?,
             scene: None,
             map: None,
@@ -199,11 +202,20 @@ impl App {
     fn panels(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
         let snapshot = self.snapshot.as_deref();
         if self.interface.panels {
-            panels::top::show(ui, &mut self.document, &mut self.interface, &self.undo, commands);
+            let is_on_gpu = snapshot.is_some_and(|s| s.main.gpu.is_some());
+            panels::top::show(
+                ui,
+                &mut self.document,
+                &mut self.interface,
+                &self.undo,
+                is_on_gpu,
+                commands,
+            );
             let status = panels::status::Status {
                 snapshot,
                 loading: self.loader.busy_with().collect(),
                 threads: self.worker.threads(),
+                is_preparing: self.worker.is_preparing(),
                 hides_clock: self.is_repeatable,
             };
             panels::status::show(ui, &status);
@@ -312,6 +324,12 @@ impl App {
                 Later::Failed(sentence) => self.messages.error(sentence),
             }
         }
+        for sentence in self.worker.take_failures() {
+            self.messages.error(sentence);
+            // Asked for again, it is tried again.
+            self.document.light.device = DeviceChoice::Cpu;
+            self.undo.amend(&self.document);
+        }
         self.inspector.collect();
         let snapshot = self.worker.snapshot();
         if let Some(snapshot) = snapshot
@@ -405,6 +423,7 @@ impl App {
             split: self.document.light.split,
             moving: self.interface.is_moving(now) && !self.is_repeatable,
             previews: !self.is_repeatable,
+            device: self.document.light.device,
             rule: self.document.stop,
             paused: self.interface.paused,
             run: self.interface.run,

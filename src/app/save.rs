@@ -46,7 +46,7 @@ pub(super) fn picture(path: &Path, picture: &Picture) -> Result<()> {
         environment: &snapshot.request.environment,
         film: &snapshot.main.film,
         figures: &snapshot.main.figures,
-        gpu: None,
+        gpu: snapshot.main.gpu.as_deref().cloned(),
         phases: &Phases {
             load_scene_seconds: picture.scene.seconds[0],
             build_bvh_seconds: picture.scene.seconds[1],

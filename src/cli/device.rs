@@ -1,26 +1,12 @@
 //! Which device renders, and `lightgrid devices`.
 
-use serde::Serialize;
 use serde_json::json;
 
 use crate::environment::Environment;
-use crate::error::{Error, Notices, Result};
+use crate::error::{Notices, Result};
 use crate::path::World;
-use crate::render::gpu::{Gpu, adapters};
+use crate::render::gpu::{DeviceChoice, Gpu, Stage, adapters};
 use crate::render::{Session, View};
-
-/// Where to render.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum DeviceChoice {
-    /// A real GPU if there is one and everything fits on it, else the CPU.
-    #[default]
-    Auto,
-    /// A GPU, be it a software one, or an error.
-    Gpu,
-    /// The CPU.
-    Cpu,
-}
 
 /// Arguments of `devices`.
 #[derive(Debug, clap::Args)]
@@ -64,36 +50,28 @@ pub(super) fn open(
     adapter: Option<&str>,
     notices: &mut Notices,
 ) -> Result<Option<Gpu>> {
-    match (choice, adapter) {
-        (DeviceChoice::Cpu, Some(name)) => {
-            Err(Error::new(format!("--adapter {name} and --device cpu exclude each other")))
+    match choice.open(adapter) {
+        Err(failure) if choice == DeviceChoice::Auto && adapter.is_none() => {
+            say(notices, format!("{failure}; the CPU renders"));
+            Ok(None)
         }
-        (DeviceChoice::Cpu, None) => Ok(None),
-        (DeviceChoice::Gpu, name) | (DeviceChoice::Auto, name @ Some(_)) => {
-            Gpu::open(name).map(Some)
-        }
-        (DeviceChoice::Auto, None) => {
-            if adapters().first().is_none_or(|best| best.is_software()) {
-                return Ok(None);
-            }
-            Ok(Gpu::open(None)
-                .inspect_err(|failure| say(notices, format!("{failure}; the CPU renders")))
-                .ok())
-        }
+        opened => opened,
     }
 }
 
 /// Starts the session on the GPU, or on the CPU if there is none or, with `auto`, if it does not fit.
 pub(super) fn start<'a>(
     choice: DeviceChoice,
-    gpu: Option<&'a Gpu>,
+    gpu: Option<&Gpu>,
     world: &'a World,
     environment: &'a Environment,
     view: View,
     notices: &mut Notices,
 ) -> Result<Session<'a>> {
     let Some(gpu) = gpu else { return Ok(Session::new(world, environment, view)) };
-    match Session::on_gpu(world, environment, view.clone(), gpu) {
+    let on_gpu = Stage::new(gpu, world, environment)
+        .and_then(|stage| Session::on_gpu(world, environment, view.clone(), &stage));
+    match on_gpu {
         Ok(session) => Ok(session),
         Err(failure) if choice == DeviceChoice::Auto => {
             say(notices, format!("{failure}; the CPU renders"));

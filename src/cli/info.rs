@@ -8,6 +8,7 @@ use crate::color::luminance;
 use crate::error::{Notices, Result};
 use crate::image::Image;
 use crate::path::World;
+use crate::render::gpu::KernelFacts;
 use crate::scene::{Projection, Scene, builtin};
 
 /// Arguments of `info`.
@@ -70,6 +71,7 @@ fn scene_facts(name: &str, scene: Scene) -> Value {
             format!("{i}: {} ({view})", camera.name)
         }).collect::<Vec<_>>(),
         "left_out": world.needs.left_out(),
+        "gpu_kernel": KernelFacts::of_scene(&world),
         "notices": scene.notices.iter().collect::<Vec<_>>(),
     })
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use glam::Vec3;
 
-use super::device::{self, DeviceChoice};
+use super::device;
 use super::progress::Progress;
 use super::values;
 use crate::environment::{Environment, EnvironmentOptions, TableKind};
@@ -17,6 +17,7 @@ use crate::output::record::{self, Phases, Record};
 use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::path::{PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
+use crate::render::gpu::DeviceChoice;
 use crate::render::{Sampling, Session, StopRule, View};
 use crate::sampler::Points;
 use crate::scene::{Camera, Projection, builtin};
@@ -165,13 +166,14 @@ fn check_outputs(arguments: &RenderArguments) -> Result<()> {
 }
 
 impl RenderArguments {
-    /// Defaults but for scene, map, picture, sampling and (size, samples, seconds).
+    /// Defaults but for scene, map, picture, sampling, (size, samples, seconds) and (device, adapter).
     pub(super) fn for_picture(
         scene: &str,
         map: &str,
         picture: &Path,
         sampling: Sampling,
         (size, samples, seconds): (Option<(u32, u32)>, Option<u32>, Option<f64>),
+        (device, adapter): (DeviceChoice, Option<String>),
     ) -> Self {
         Self {
             scene: scene.to_owned(),
@@ -201,8 +203,8 @@ impl RenderArguments {
             grid: 64,
             learning_paths: None,
             seed: 0,
-            device: DeviceChoice::Cpu,
-            adapter: None,
+            device,
+            adapter,
             threads: 0,
             json: None,
         }

@@ -44,7 +44,13 @@ struct FreeArguments {
     #[command(flatten)]
     places: PlaceArguments,
     /// How the map is sampled; the first one is what the others are held against.
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "plain,talk,adaptive", value_name = "LIST")]
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        default_value = "plain,talk,adaptive",
+        value_name = "LIST"
+    )]
     sampling: Vec<Sampling>,
     /// A picture to take as the reference, linear, of the size of the runs (box filter, as many
     /// bounces); without it one is computed and kept.

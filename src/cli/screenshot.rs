@@ -13,6 +13,7 @@ use crate::app::overlays::Overlay;
 use crate::app::screenshot::{Shot, Studio};
 use crate::error::{Error, Result};
 use crate::image::{check_writable, write_png};
+use crate::render::gpu::DeviceChoice;
 use crate::render::{Sampling, StopRule};
 use crate::scene::builtin;
 
@@ -60,6 +61,9 @@ pub(super) struct ScreenshotArguments {
     /// How the map is sampled.
     #[arg(long, default_value = "adaptive", value_enum)]
     sampling: Sampling,
+    /// Where to render the picture; the window itself is always drawn by a graphics device.
+    #[arg(long, default_value = "cpu", value_enum)]
+    device: DeviceChoice,
     /// Plain on the left, the chosen sampling on the right; not repeatable, for it is by time.
     #[arg(long)]
     split: bool,
@@ -107,6 +111,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
         map: arguments.env.clone(),
         rotation_degrees: arguments.env_rotation.rem_euclid(360.0) as f32,
         light: Light {
+            device: arguments.device,
             sampling: arguments.sampling,
             split: arguments.split,
             seed: arguments.seed,

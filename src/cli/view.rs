@@ -8,6 +8,7 @@ use crate::app::document::{Document, PictureSize};
 use crate::app::settings_file::Settings;
 use crate::app::window;
 use crate::error::{Error, Result};
+use crate::render::gpu::DeviceChoice;
 use crate::render::{Sampling, StopRule};
 use crate::scene::builtin;
 
@@ -26,6 +27,12 @@ pub(super) struct ViewArguments {
     /// How the map is sampled.
     #[arg(long, value_enum)]
     sampling: Option<Sampling>,
+    /// Where to render: auto takes a GPU if there is a real one and everything fits on it.
+    #[arg(long, value_enum)]
+    device: Option<DeviceChoice>,
+    /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
     /// Picture size in pixels; without it, that of the viewport.
     #[arg(long, value_parser = values::size, value_name = "WxH")]
     size: Option<(u32, u32)>,
@@ -47,6 +54,8 @@ impl ViewArguments {
             scene: builtin::DEFAULT_SCENE.to_owned(),
             env: "sky:day".to_owned(),
             sampling: None,
+            device: None,
+            adapter: None,
             size: None,
             samples: None,
             settings: None,
@@ -68,6 +77,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
         document: document(arguments, &settings),
         interface: settings.interface(),
         settings,
+        adapter: arguments.adapter.clone(),
         is_repeatable: false,
     };
     match window::run(start, notices, path) {
@@ -89,6 +99,9 @@ fn document(arguments: &ViewArguments, settings: &Settings) -> Document {
     if let Some(sampling) = arguments.sampling {
         document.light.sampling = sampling;
     }
+    if let Some(device) = arguments.device {
+        document.light.device = device;
+    }
     if let Some((width, height)) = arguments.size {
         document.size = PictureSize::Fixed(width, height);
     }
@@ -106,5 +119,6 @@ fn headless(arguments: &ViewArguments) -> super::render::RenderArguments {
         &arguments.output,
         arguments.sampling.unwrap_or_default(),
         (arguments.size, arguments.samples, seconds),
+        (arguments.device.unwrap_or_default(), arguments.adapter.clone()),
     )
 }

@@ -274,6 +274,11 @@ impl Environment {
         probability as f32 * self.inverse_texel_solid_angles[row as usize]
     }
 
+    /// Whether both are one map with one table, turned or scaled differently.
+    pub fn shares_map_with(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.map, &other.map) && Arc::ptr_eq(&self.table, &other.table)
+    }
+
     fn map_point(&self, direction: Vec3) -> MapPoint {
         let uv = uv_from_direction(direction);
         let turned = uv.x - self.rotation_turns;

@@ -52,6 +52,11 @@ pub struct Record<'a> {
 }
 
 impl Record<'_> {
+    /// Name of what rendered last.
+    fn device(&self) -> &str {
+        self.gpu.as_ref().map_or("CPU", |gpu| &gpu.adapter.name)
+    }
+
     /// Key and value pairs for pictures: scene, map, settings, samples, seconds.
     pub fn metadata(&self) -> Vec<(String, String)> {
         let film = self.film;
@@ -61,6 +66,7 @@ impl Record<'_> {
             ("lightgrid.map".to_owned(), self.map.to_owned()),
             ("lightgrid.samples_per_pixel".to_owned(), film.min_samples().to_string()),
             ("lightgrid.seconds".to_owned(), format!("{:.3}", self.figures.elapsed_seconds())),
+            ("lightgrid.device".to_owned(), self.device().to_owned()),
         ];
         // A prefix keeps clear of the names that OpenEXR reserves.
         pairs.extend(self.options.iter().map(|(key, value)| {
@@ -101,6 +107,7 @@ impl Record<'_> {
             },
             "threads": rayon::current_num_threads(),
             "simd": self.world.bvh.simd_name(),
+            "device": self.device(),
             "gpu": self.gpu,
             "needs": self.world.needs,
             "left_out": self.world.needs.left_out(),

@@ -51,8 +51,8 @@ impl Path<'_> {
                     luminance(transmittance) * cosine.powi(recording.cosine_power())
                 } else {
                     let pdf = choice.probability * sample.pdf_solid_angle;
-                    let mean = std::f32::consts::PI
-                        * importance(self.tracer.environment.mean_radiance());
+                    let mean =
+                        std::f32::consts::PI * importance(self.tracer.environment.mean_radiance());
                     importance(f * sample.radiance * transmittance) / (pdf * mean)
                 }
             }

@@ -140,9 +140,9 @@ pub struct Figures {
 }
 
 /// What does the work.
-enum Engine<'a> {
+enum Engine {
     Cpu,
-    Gpu(Box<gpu::Renderer<'a>>),
+    Gpu(Box<gpu::Renderer>),
 }
 
 impl Figures {
@@ -158,7 +158,7 @@ pub struct Session<'a> {
     environment: &'a Environment,
     view: View,
     rays: CameraRays,
-    engine: Engine<'a>,
+    engine: Engine,
     film: Film,
     whole_map: Option<LightGrid>,
     learned: Option<LightGrid>,
@@ -175,33 +175,6 @@ struct Learning {
 impl<'a> Session<'a> {
     /// Starts a session on the CPU; nothing is traced yet.
     pub fn new(world: &'a World, environment: &'a Environment, view: View) -> Self {
-        Self::with_engine(world, environment, view, Engine::Cpu)
-    }
-
-    /// Starts a session on a GPU: uploads the scene and the map.
-    ///
-    /// # Errors
-    /// If they do not fit on the device.
-    pub fn on_gpu(
-        world: &'a World,
-        environment: &'a Environment,
-        view: View,
-        gpu: &'a gpu::Gpu,
-    ) -> Result<Self> {
-        let rays = CameraRays::new(&view.camera, view.width, view.height);
-        let renderer = gpu::Renderer::new(gpu, world, environment, &view, &rays)?;
-        let engine = Engine::Gpu(Box::new(renderer));
-        let mut session = Self::with_engine(world, environment, view, engine);
-        session.upload_grid()?;
-        Ok(session)
-    }
-
-    fn with_engine(
-        world: &'a World,
-        environment: &'a Environment,
-        view: View,
-        engine: Engine<'a>,
-    ) -> Self {
         let rays = CameraRays::new(&view.camera, view.width, view.height);
         let whole_map = match view.sampling {
             Sampling::Bsdf => None,
@@ -214,13 +187,28 @@ impl<'a> Session<'a> {
             environment,
             view,
             rays,
-            engine,
+            engine: Engine::Cpu,
             whole_map,
             learned: None,
             learning,
             finished: None,
             figures: Figures::default(),
         }
+    }
+
+    /// Starts a session on a GPU, on whose stage are this world and this environment.
+    ///
+    /// # Errors
+    /// If it does not fit on the device.
+    pub fn on_gpu(
+        world: &'a World,
+        environment: &'a Environment,
+        view: View,
+        stage: &gpu::Stage,
+    ) -> Result<Self> {
+        let mut session = Self::new(world, environment, view);
+        session.continue_on_gpu(stage)?;
+        Ok(session)
     }
 
     /// Does one piece of work: a learning pass, or one that brings every pixel `samples` further.
@@ -247,6 +235,19 @@ impl<'a> Session<'a> {
     /// Lets the CPU take over from a GPU, with everything learned and rendered so far.
     pub fn continue_on_cpu(&mut self) {
         self.engine = Engine::Cpu;
+    }
+
+    /// Lets a GPU take over, on whose stage are this session's world and environment, with
+    /// everything learned and rendered so far.
+    ///
+    /// # Errors
+    /// If it does not fit on the device; the session stays where it is.
+    pub fn continue_on_gpu(&mut self, stage: &gpu::Stage) -> Result<()> {
+        let (world, environment) = (self.world, self.environment);
+        let mut renderer = gpu::Renderer::new(stage, world, environment, &self.view, &self.rays)?;
+        renderer.set_grid(self.learned.as_ref().or(self.whole_map.as_ref()))?;
+        self.engine = Engine::Gpu(Box::new(renderer));
+        Ok(())
     }
 
     /// Figures of the GPU at work; `None` on the CPU.

@@ -22,7 +22,8 @@ pub fn plan(rows: Vec<Row>, only: &[String], effort: Effort, command: String) ->
         if rows.is_empty() { ROWS.map(|(scene, map)| Row::new(scene, map)).to_vec() } else { rows };
     let is_asked = |method: &Method| {
         let group = method.group.unwrap_or_default();
-        let is_in = |word: &String| group.contains(word.as_str()) || method.name.contains(word.as_str());
+        let is_in =
+            |word: &String| group.contains(word.as_str()) || method.name.contains(word.as_str());
         only.is_empty() || only.iter().any(is_in)
     };
     let mut methods = [Sampling::Plain, Sampling::Adaptive].map(Method::of).to_vec();
@@ -77,8 +78,7 @@ fn modes(add: &mut Add<'_>) {
 
 /// From counted visibility, without anything, to what the design study left unmeasured.
 fn steps(add: &mut Add<'_>) {
-    const VISIBLE: LawOptions =
-        LawOptions { recording: Recording::Visible, ..LawOptions::TALK };
+    const VISIBLE: LawOptions = LawOptions { recording: Recording::Visible, ..LawOptions::TALK };
     const COSINE: LawOptions =
         LawOptions { recording: Recording::VisibleCosine, ..LawOptions::TALK };
     let group = "step by step, neither pooling nor powers";

@@ -8,11 +8,11 @@ use std::time::{Duration, Instant};
 use super::digest::Digest;
 use super::machine::{Machine, OpenDevice};
 use super::measure::{Run, measure};
+use super::pages::{duration, row_sentence};
 use super::plan::{Device, Method, Plan, Row};
 use super::reference::{LEAST_PICTURES, Noise, Reference, read_reference};
 use super::shares::shares;
 use super::stage::Stage;
-use super::pages::{duration, row_sentence};
 use super::store::Store;
 use super::summary::{
     DeviceReport, Measure, Pictures, ReferenceReport, Report, RowReport, summarise,
@@ -44,6 +44,9 @@ pub struct Options<'a> {
 /// If a scene or map cannot be used, a device fails, or something cannot be written; what was measured
 /// is on disk and will be taken when the same plan is made again.
 pub fn make(plan: &Plan, options: &Options<'_>) -> Result<Report> {
+    let size = plan.effort.frame.size;
+    let file_reference =
+        plan.reference.as_deref().map(|path| read_reference(path, size)).transpose()?;
     let store = Store::open(options.folder, options.references)?;
     let machine = Machine::here();
     let devices = plan
@@ -52,8 +55,6 @@ pub fn make(plan: &Plan, options: &Options<'_>) -> Result<Report> {
         .iter()
         .map(|device| OpenDevice::open(*device, options.adapter, &machine))
         .collect::<Result<Vec<_>>>()?;
-    let file_reference =
-        plan.reference.as_deref().map(|path| read_reference(path, plan.effort.frame.size)).transpose()?;
     let mut conductor = Conductor {
         machine_digest: machine.digest(),
         report: Report { plan: plan.clone(), machine, rows: Vec::new(), is_finished: false },
@@ -101,6 +102,8 @@ struct Work {
     runs: Vec<Vec<Vec<(String, Run)>>>,
     /// Why a device cannot do this row.
     refusals: Vec<Option<String>>,
+    /// Methods that the GPU is ready for.
+    is_ready: Vec<bool>,
 }
 
 impl Conductor<'_> {
@@ -134,9 +137,17 @@ impl Conductor<'_> {
         let mut work = Work {
             runs: vec![vec![Vec::new(); self.plan.methods.len()]; self.devices.len()],
             refusals: vec![None; self.devices.len()],
+            is_ready: vec![false; self.plan.methods.len()],
             stage,
             reference,
         };
+        for device in 0..self.devices.len() {
+            let uploaded = work.stage.upload(&self.devices[device]);
+            self.can(&mut work, device, uploaded);
+        }
+        if work.refusals.iter().all(Option::is_some) {
+            return self.update(&mut work);
+        }
         let is_whole = self.grow_reference(&mut work, LEAST_PICTURES)?
             && self.all_runs(&mut work)?
             && self.judge_well(&mut work)?;
@@ -180,15 +191,10 @@ impl Conductor<'_> {
         self.say_run(work, device, method, seed);
         let name = &plan.methods[method].name;
         let settings = &plan.methods[method].settings;
-        let place = work.stage.place(plan, &self.devices[device], settings);
-        if seed == 0
-            && method == 0
-            && let Err(reason) = place.session(settings, seed)
-        {
-            (self.options.tell)(format!("{}: {reason}", work.stage.title));
-            work.refusals[device] = Some(format!("not measured: {reason}"));
+        if !self.make_ready(work, device, method) {
             return Ok(true);
         }
+        let place = work.stage.place(plan, &self.devices[device], settings);
         let seconds = plan.effort.seconds;
         let cancel = self.options.cancel;
         let Some(mut done) = measure(&place, (name, settings), seed, seconds, cancel)? else {
@@ -219,6 +225,34 @@ impl Conductor<'_> {
         Ok(!self.is_cancelled())
     }
 
+    /// Builds what a GPU needs for a method, once; `false` if it cannot do it.
+    fn make_ready(&self, work: &mut Work, device: usize, method: usize) -> bool {
+        if self.devices[device].gpu.is_none() || work.is_ready[method] {
+            return true;
+        }
+        let settings = &self.plan.methods[method].settings;
+        let place = work.stage.place(self.plan, &self.devices[device], settings);
+        let ready = place.warm_up(settings);
+        work.is_ready[method] = ready.is_ok();
+        self.can(work, device, ready)
+    }
+
+    /// Notes why a device cannot do a row, if it cannot; whether it can.
+    fn can(&self, work: &mut Work, device: usize, outcome: Result<()>) -> bool {
+        if let Err(reason) = &outcome {
+            (self.options.tell)(format!("{}: {reason}", work.stage.title));
+            work.refusals[device] = Some(format!("not measured: {reason}"));
+        }
+        outcome.is_ok()
+    }
+
+    /// The device that references are made on: a real GPU that can do the row, or the first.
+    fn fastest(&self, work: &Work) -> usize {
+        let can = |index: &usize| work.refusals[*index].is_none();
+        let all = || (0..self.devices.len()).filter(can);
+        all().find(|index| self.devices[*index].is_real_gpu()).or_else(|| all().next()).unwrap_or(0)
+    }
+
     /// The reference so far, if it is worth anything, and its number of pictures.
     fn reference(&self, work: &Work) -> Option<(Image, Option<u32>)> {
         if let Some(image) = &self.file_reference {
@@ -231,7 +265,7 @@ impl Conductor<'_> {
 
     /// Adds pictures to the reference until there are so many; `false` if it was cancelled.
     fn grow_reference(&self, work: &mut Work, pictures: u32) -> Result<bool> {
-        let fastest = self.devices.iter().position(OpenDevice::is_real_gpu).unwrap_or(0);
+        let fastest = self.fastest(work);
         let settings = &super::plan::Settings::of(crate::render::Sampling::Adaptive);
         let Some(mut reference) = work.reference.take() else { return Ok(true) };
         let mut is_whole = true;
@@ -242,8 +276,10 @@ impl Conductor<'_> {
                 f64::from(pictures - done) * self.plan.effort.seconds,
             );
             let place = work.stage.place(self.plan, &self.devices[fastest], settings);
-            is_whole = reference.add_picture(&place, self.plan.effort.seconds, self.options.cancel)?
-                && !self.is_cancelled();
+            let (seconds, cancel) = (self.plan.effort.seconds, self.options.cancel);
+            is_whole =
+                reference.add_picture(&place, &self.devices[fastest].name, seconds, cancel)?
+                    && !self.is_cancelled();
         }
         work.reference = Some(reference);
         Ok(is_whole)
@@ -255,8 +291,10 @@ impl Conductor<'_> {
         loop {
             self.judge_again(work)?;
             let Some(reference) = &work.reference else { return Ok(true) };
-            let missing = reference
-                .pictures_missing(self.plan.effort.reference_noise, smallest_error(work).unwrap_or(0.0));
+            let missing = reference.pictures_missing(
+                self.plan.effort.reference_noise,
+                smallest_error(work).unwrap_or(0.0),
+            );
             if missing == 0 {
                 return Ok(true);
             }
@@ -278,7 +316,8 @@ impl Conductor<'_> {
             if is_new {
                 continue;
             }
-            let films = self.store.read_pictures(key, self.plan.effort.frame.size).unwrap_or_default();
+            let films =
+                self.store.read_pictures(key, self.plan.effort.frame.size).unwrap_or_default();
             if films.len() == run.points.len() {
                 run.judge(&films, &reference)?;
                 run.reference_pictures = pictures;
@@ -290,7 +329,7 @@ impl Conductor<'_> {
 
     /// Takes the error of the methods that matter apart; `false` if it was cancelled.
     fn take_apart(&mut self, work: &Work) -> Result<bool> {
-        let fastest = self.devices.iter().position(OpenDevice::is_real_gpu).unwrap_or(0);
+        let fastest = self.fastest(work);
         let Some((reference, _)) = self.reference(work) else { return Ok(true) };
         for method in self.plan.compared() {
             let runs = self.plan.methods.iter().position(|m| m.name == method.name);
@@ -310,8 +349,7 @@ impl Conductor<'_> {
                         work.stage.place(self.plan, &self.devices[fastest], &method.settings);
                     let method = (method.name.as_str(), &method.settings);
                     let samples = (samples / 8).max(4);
-                    let found =
-                        shares(&place, method, samples, &reference, self.options.cancel)?;
+                    let found = shares(&place, method, samples, &reference, self.options.cancel)?;
                     let Some(found) = found else { return Ok(false) };
                     self.store.write(&key, &found)?;
                     found
@@ -332,7 +370,8 @@ impl Conductor<'_> {
                 self.store.remove_pictures(key);
                 continue;
             }
-            let films = self.store.read_pictures(key, self.plan.effort.frame.size).unwrap_or_default();
+            let films =
+                self.store.read_pictures(key, self.plan.effort.frame.size).unwrap_or_default();
             if let [_, .., last] = films.as_slice() {
                 // A run with all its pictures is as good as one with the last of them.
                 let _ = self.store.write_pictures(key, std::slice::from_ref(last));
@@ -350,10 +389,8 @@ impl Conductor<'_> {
             let (key, _) = runs.first()?;
             self.store.read_pictures(key, plan.effort.frame.size)?.pop()
         };
-        let mut pictures = Pictures {
-            reference: reference.map(|(image, _)| image),
-            runs: Vec::new(),
-        };
+        let mut pictures =
+            Pictures { reference: reference.map(|(image, _)| image), runs: Vec::new() };
         let mut devices = Vec::new();
         for (index, device) in self.devices.iter().enumerate() {
             for (method, runs) in plan.methods.iter().zip(&work.runs[index]) {
@@ -444,10 +481,12 @@ impl Conductor<'_> {
     /// Name of a run: readable, and a digest of all that it depends on.
     fn key(&self, work: &Work, device: usize, method: &Method, seed: u32) -> String {
         let device = &self.devices[device];
-        let digest = self
-            .machine_digest
-            .debug(&work.stage.digest)
-            .debug(&(&method.settings, &device.name, self.plan.effort.seconds, seed));
+        let digest = self.machine_digest.debug(&work.stage.digest).debug(&(
+            &method.settings,
+            &device.name,
+            self.plan.effort.seconds,
+            seed,
+        ));
         let readable = format!("{}-{}-{}", work.stage.title, device.device.title(), method.name);
         let readable: String = readable
             .chars()
@@ -461,9 +500,10 @@ impl Conductor<'_> {
         let plan = self.plan;
         let done: usize = work.runs.iter().flatten().map(Vec::len).sum();
         let all = plan.methods.len() * plan.effort.devices.len() * plan.effort.seeds as usize;
-        let reference = work.reference.as_ref().map_or(0, |reference| {
-            reference.pictures_missing(plan.effort.reference_noise, 0.0)
-        });
+        let reference = work
+            .reference
+            .as_ref()
+            .map_or(0, |reference| reference.pictures_missing(plan.effort.reference_noise, 0.0));
         let left = (all - done) as f64 + f64::from(reference) + super::plan::SHARE_RUNS;
         self.say(
             &format!(
@@ -500,7 +540,6 @@ fn mean_error(runs: &[(String, Run)]) -> f64 {
     };
     runs.iter().map(error).sum::<f64>() / runs.len() as f64
 }
-
 
 /// Refuses what can be seen to be wrong before hours of work.
 ///

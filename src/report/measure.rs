@@ -1,11 +1,9 @@
 //! One run: error against time of one method with one seed, on one device.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::machine::OpenDevice;
 use super::plan::{Frame, Settings};
 use crate::environment::Environment;
 use crate::error::Result;
@@ -13,7 +11,7 @@ use crate::image::Image;
 use crate::light_grid::LightGrid;
 use crate::metrics::compare;
 use crate::path::World;
-use crate::render::{Figures, Phase, Session, StopRule};
+use crate::render::{Figures, Phase, Session, StopRule, gpu};
 use crate::scene::Camera;
 
 /// Where runs take place.
@@ -25,17 +23,29 @@ pub(super) struct Place<'a> {
     pub(super) environment: &'a Environment,
     /// Seconds that the map's importance table took.
     pub(super) table_seconds: f64,
-    pub(super) device: &'a OpenDevice,
+    /// Scene and map on the GPU, if that is the device.
+    pub(super) upload: Option<&'a gpu::Stage>,
 }
 
 impl<'a> Place<'a> {
-    /// A session of one method; uploading and building kernels happens here.
+    /// A session of one method.
     pub(super) fn session(&self, settings: &Settings, seed: u32) -> Result<Session<'a>> {
         let view = settings.view(self.camera, self.frame, seed);
-        match &self.device.gpu {
+        match self.upload {
             None => Ok(Session::new(self.world, self.environment, view)),
-            Some(gpu) => Session::on_gpu(self.world, self.environment, view, gpu),
+            Some(upload) => Session::on_gpu(self.world, self.environment, view, upload),
         }
+    }
+
+    /// Learns and renders a little, so that all kernels are built.
+    pub(super) fn warm_up(&self, settings: &Settings) -> Result<()> {
+        let never = AtomicBool::new(false);
+        let mut session = self.session(settings, 0)?;
+        if session.phase() == Phase::Learning {
+            session.advance(0, &never)?;
+            session.finish_learning();
+        }
+        session.advance(1, &never)
     }
 
     /// A session that has learned; `None` if it was cancelled.
@@ -110,8 +120,6 @@ pub struct Run {
     pub seed: u32,
     /// Seconds of building the map's importance table.
     pub table_seconds: f64,
-    /// Seconds of uploading and building kernels, which do not count.
-    pub setup_seconds: f64,
     /// What the session says.
     pub figures: Figures,
     /// What it held.
@@ -146,9 +154,7 @@ pub(super) fn measure(
     seconds: f64,
     cancel: &AtomicBool,
 ) -> Result<Option<Finished>> {
-    let start = Instant::now();
     let mut session = place.session(method.1, seed)?;
-    let setup_seconds = start.elapsed().as_secs_f64();
     while session.phase() == Phase::Learning {
         session.advance(0, cancel)?;
         if cancel.load(Ordering::Relaxed) {
@@ -184,7 +190,6 @@ pub(super) fn measure(
         method: method.0.to_owned(),
         seed,
         table_seconds: place.table_seconds,
-        setup_seconds,
         figures: *session.figures(),
         memory: memory(place, &session),
         nanoseconds_per_ray: None,

@@ -88,10 +88,7 @@ impl Settings {
             height,
             filter: PixelFilter::Box,
             sampling: self.sampling,
-            limits: PathLimits {
-                bounces: frame.bounces,
-                russian_roulette: self.russian_roulette,
-            },
+            limits: PathLimits { bounces: frame.bounces, russian_roulette: self.russian_roulette },
             seed,
             points: self.points,
             grid_columns: self.grid_columns,
@@ -215,7 +212,8 @@ impl Plan {
     /// The same for one row.
     pub(super) fn expected_row_seconds(&self) -> f64 {
         let runs = self.methods.len() * self.effort.devices.len() * self.effort.seeds as usize;
-        let reference = if self.reference.is_some() { 0.0 } else { 1.0 / self.effort.reference_noise };
+        let reference =
+            if self.reference.is_some() { 0.0 } else { 1.0 / self.effort.reference_noise };
         let shares = SHARE_RUNS * self.compared().len() as f64;
         (runs as f64 + reference + shares) * self.effort.seconds * OVERHEAD
     }

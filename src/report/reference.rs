@@ -138,6 +138,7 @@ impl Reference {
     pub(super) fn add_picture(
         &mut self,
         place: &Place<'_>,
+        device: &str,
         seconds: f64,
         cancel: &AtomicBool,
     ) -> Result<bool> {
@@ -160,7 +161,7 @@ impl Reference {
         }
         self.add(session.film());
         self.facts.seconds += session.elapsed_seconds();
-        self.facts.device = place.device.name.clone();
+        device.clone_into(&mut self.facts.device);
         self.write()?;
         Ok(true)
     }

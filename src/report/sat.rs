@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::machine::Machine;
 use super::store::Store;
 use crate::environment::{Lookup, SatReport, TableKind, sat_report};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::image::{Image, write_beside_and_rename};
 use crate::math::direction_from_uv;
 
@@ -82,10 +82,7 @@ fn extreme(width: u32, height: u32) -> Image {
     // A sun smaller than a texel is one texel large.
     let radius = SUN_RADIUS_RADIANS.max(0.75 * std::f32::consts::PI / height as f32);
     Image::from_fn(width, height, |x, y| {
-        let uv = glam::Vec2::new(
-            (x as f32 + 0.5) / width as f32,
-            (y as f32 + 0.5) / height as f32,
-        );
+        let uv = glam::Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
         let is_sun = direction_from_uv(uv).distance(sun) < radius;
         let grain = 0.5 + crate::noise::unit(y * width + x);
         [if is_sun { 1e8 } else { grain }; 3]
@@ -194,14 +191,3 @@ pub const REMARK: &str = "MSE: in units of the mean texel density, exact (the se
     followed for all random numbers at once). The talk does not say its unit, nor are its maps public: \
     compare ratios. Zero mass: share of the lit texels that are never sampled. Falling steps: share of \
     the steps along a row in which the sums fall.";
-
-/// The case of a title; for tests and the command line.
-///
-/// # Errors
-/// If there is none.
-pub fn case(title: &str) -> Result<&'static Case> {
-    CASES
-        .iter()
-        .find(|case| case.title.eq_ignore_ascii_case(title))
-        .ok_or_else(|| Error::new(format!("the talk's table has no map called {title}")))
-}

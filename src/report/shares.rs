@@ -13,8 +13,8 @@ use super::plan::{Frame, Settings};
 use crate::error::Result;
 use crate::image::Image;
 use crate::metrics::REL_MSE_EPSILON;
-use crate::render::film::Pixel;
 use crate::render::Session;
+use crate::render::film::Pixel;
 
 /// Variance of the parts of a picture, each as trimmed relMSE (the same pixels left out in all).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -132,7 +132,8 @@ fn trimmed(sums: &[Sums], reference: &Image) -> [f64; 4] {
                     let average = sums.value[part][c] / count;
                     let spread = sums.square[part][c] / count - average * average;
                     let r = f64::from(pixel[c]) / mean;
-                    spread.max(0.0) * count / (count - 1.0)
+                    spread.max(0.0) * count
+                        / (count - 1.0)
                         / (mean * mean * (r * r + REL_MSE_EPSILON))
                 };
                 (channel(0) + channel(1) + channel(2)) / 3.0

@@ -12,7 +12,7 @@ use crate::error::{Error, Notices, Result};
 use crate::light_grid::LightGrid;
 use crate::output::record::to_value;
 use crate::path::{World, framing};
-use crate::render::Sampling;
+use crate::render::{Sampling, gpu};
 use crate::scene::Camera;
 
 /// A scene under a map.
@@ -32,6 +32,8 @@ struct Light {
     options: EnvironmentOptions,
     environment: Environment,
     seconds: f64,
+    /// The scene under it on the GPU.
+    upload: Option<gpu::Stage>,
 }
 
 impl Stage {
@@ -53,14 +55,16 @@ impl Stage {
             let start = Instant::now();
             let environment =
                 Environment::new(map, &options).map_err(|e| Error::at(&row.map, e))?;
-            lights.push(Light { options, environment, seconds: start.elapsed().as_secs_f64() });
+            let seconds = start.elapsed().as_secs_f64();
+            lights.push(Light { options, environment, seconds, upload: None });
         }
         let aspect = plan.effort.frame.size.0 as f32 / plan.effort.frame.size.1 as f32;
         let camera = match world.scene.cameras.first() {
             Some(camera) => camera.clone(),
             None => framing::frame(&world, aspect),
         };
-        let digest = digest::of_picture(&world, &lights[0].environment, &camera, &plan.effort.frame)?;
+        let digest =
+            digest::of_picture(&world, &lights[0].environment, &camera, &plan.effort.frame)?;
         Ok(Self { title: row.title.clone(), world, camera, lights, map_size, notices, digest })
     }
 
@@ -70,11 +74,30 @@ impl Stage {
         Ok(needs.get("medium").is_some_and(|medium| medium == true))
     }
 
+    /// Puts the scene under every map onto a GPU; nothing for the CPU.
+    ///
+    /// # Errors
+    /// If it does not fit.
+    pub(super) fn upload(&mut self, device: &OpenDevice) -> Result<()> {
+        let Some(gpu) = &device.gpu else { return Ok(()) };
+        let mut uploads: Vec<gpu::Stage> = Vec::new();
+        for light in &self.lights {
+            uploads.push(match uploads.first() {
+                Some(first) => first.relit(&light.environment)?,
+                None => gpu::Stage::new(gpu, &self.world, &light.environment)?,
+            });
+        }
+        for (light, upload) in self.lights.iter_mut().zip(uploads) {
+            light.upload = Some(upload);
+        }
+        Ok(())
+    }
+
     /// Where runs with these settings take place.
     pub(super) fn place<'a>(
         &'a self,
         plan: &'a Plan,
-        device: &'a OpenDevice,
+        device: &OpenDevice,
         settings: &Settings,
     ) -> Place<'a> {
         let options = settings.environment();
@@ -86,7 +109,7 @@ impl Stage {
             frame: &plan.effort.frame,
             environment: &light.environment,
             table_seconds: light.seconds,
-            device,
+            upload: light.upload.as_ref().filter(|_| device.gpu.is_some()),
         }
     }
 

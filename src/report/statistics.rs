@@ -181,10 +181,7 @@ const RESAMPLES: u32 = 2000;
 /// (Hesterberg, *What Teachers Should Know About the Bootstrap*, 2015), whose percentiles are moved
 /// outwards so that it is as wide as Student's for small groups. It is the same for the same runs.
 /// `None` if a group has fewer than two runs, or the statistic is not finite.
-pub fn bootstrap(
-    counts: [usize; 2],
-    statistic: impl Fn([&[usize]; 2]) -> f64,
-) -> Option<Interval> {
+pub fn bootstrap(counts: [usize; 2], statistic: impl Fn([&[usize]; 2]) -> f64) -> Option<Interval> {
     let smaller = counts[0].min(counts[1]);
     if smaller < 2 {
         return None;

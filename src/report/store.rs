@@ -26,7 +26,8 @@ impl Store {
     pub(super) fn open(root: &Path, references: Option<&Path>) -> Result<Self> {
         let references = references.map_or_else(|| root.join("references"), Path::to_owned);
         for folder in [root, &root.join("runs"), &references] {
-            fs::create_dir_all(folder).map_err(|e| Error::at(folder, format!("cannot be made: {e}")))?;
+            fs::create_dir_all(folder)
+                .map_err(|e| Error::at(folder, format!("cannot be made: {e}")))?;
             crate::image::check_writable(&folder.join("test"))?;
         }
         Ok(Self { root: root.to_owned(), references })
@@ -72,9 +73,10 @@ impl Store {
     /// Keeps pictures of one size under a name, as bare little-endian floats.
     pub(super) fn write_pictures(&self, key: &str, pictures: &[Image]) -> Result<()> {
         write_beside_and_rename(&self.path(key, "f32"), |file| {
-            pictures.iter().flat_map(|p| p.pixels.as_flattened()).try_for_each(|x| {
-                file.write_all(&x.to_le_bytes())
-            })
+            pictures
+                .iter()
+                .flat_map(|p| p.pixels.as_flattened())
+                .try_for_each(|x| file.write_all(&x.to_le_bytes()))
         })
     }
 

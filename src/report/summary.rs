@@ -156,8 +156,6 @@ pub struct Costs {
     pub ray_seconds: Option<f64>,
     /// Seconds of rendering.
     pub render_seconds: f64,
-    /// Seconds of uploading and building kernels, which do not count.
-    pub setup_seconds: f64,
     /// Rays per camera path, shadow rays included.
     pub rays_per_sample: f64,
     /// Samples per pixel at the end.
@@ -259,7 +257,7 @@ fn slope(run: &Run, measure: Measure) -> Option<f64> {
         .filter(|p| p.samples >= SLOPE_FROM.1 && p.render_seconds >= SLOPE_FROM.0 * end)
         .filter_map(|p| Some((p.render_seconds, measure.of(&p.errors?))))
         .collect();
-    power_law_slope(&points)
+    if points.len() < 3 { None } else { power_law_slope(&points) }
 }
 
 /// Mean of error times rendering time at the end.
@@ -280,10 +278,8 @@ fn costs(runs: &[Run], threads: usize) -> Costs {
     Costs {
         learn_seconds: mean(&|r| r.figures.learning_seconds - r.figures.law_seconds),
         table_seconds: mean(&|r| r.table_seconds + r.figures.law_seconds),
-        ray_seconds: nanoseconds
-            .map(|ns| (ns * 1e-9 * rays / threads as f64).min(render_seconds)),
+        ray_seconds: nanoseconds.map(|ns| (ns * 1e-9 * rays / threads as f64).min(render_seconds)),
         render_seconds,
-        setup_seconds: mean(&|r| r.setup_seconds),
         rays_per_sample: rays / mean(&|r| r.figures.samples as f64).max(1.0),
         samples: mean(&|r| r.points.last().map_or(0.0, |p| f64::from(p.samples))),
         learning_paths: runs.first().map_or(0, |r| r.figures.learning_paths),

@@ -5,24 +5,29 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use lightgrid::app::Start;
-use lightgrid::app::document::{Document, PictureSize};
+use lightgrid::app::document::{Document, Light, Look, PictureSize};
 use lightgrid::app::interface::{Dock, Interface, Tab};
 use lightgrid::app::overlays::Overlay;
 use lightgrid::app::screenshot::{Shot, Studio};
 use lightgrid::image::{Rgb8, read_picture, write_png};
 use lightgrid::render::StopRule;
+use lightgrid::render::gpu::DeviceChoice;
 
 /// Mean absolute difference of 8-bit levels that a snapshot may have: drivers and processors differ
 /// in rounding, and samples of a path tracer with them.
 const MEAN_ERROR: f64 = 2.5;
 
 fn start() -> Start {
+    let defaults = Document::default();
     let document = Document {
+        light: Light { device: DeviceChoice::Cpu, ..defaults.light },
+        // Less depends on the very random numbers, and the files are smaller.
+        look: Look { denoise: true, ..defaults.look },
         scene: "office".to_owned(),
         map: "sky:day@256x128".to_owned(),
         size: PictureSize::Fixed(180, 120),
         stop: StopRule { samples: Some(4), ..StopRule::default() },
-        ..Document::default()
+        ..defaults
     };
     Start { document, ..Start::default() }
 }
@@ -269,7 +274,7 @@ impl Desk {
 #[test]
 fn a_real_window_moves_opens_saves_and_remembers() {
     let Some(mut desk) = Desk::open() else { return };
-    desk.start("view open --env sky:day@64x32 --size 96x64 --samples 2 --settings window.json");
+    desk.start("view open --env sky:day@64x32 --size 96x64 --samples 2 --device cpu --settings window.json");
     let window = desk.wait_for("window", || {
         let found = desk.xdotool("search --name lightgrid");
         found.lines().next().map(str::to_owned).filter(|id| !id.is_empty())
@@ -282,6 +287,20 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     let of = |key: &str| metadata.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
     assert_eq!(of("lightgrid.scene"), Some("open"));
     assert_eq!(of("lightgrid.sampling"), Some("adaptive"));
+    assert_eq!(of("lightgrid.device"), Some("CPU"));
+
+    // The other device goes on; software Vulkan takes seconds to compile for it.
+    desk.xdotool("key g");
+    desk.xdotool("key r");
+    desk.wait_for("picture from the GPU", || {
+        desk.save("gpu.exr");
+        let path = desk.path("gpu.exr");
+        let metadata = lightgrid::image::read_exr_metadata(&path).expect("metadata");
+        std::fs::remove_file(path).expect("removed");
+        let device = metadata.into_iter().find(|(key, _)| key == "lightgrid.device");
+        device.filter(|(_, name)| name != "CPU")
+    });
+    desk.xdotool("key g");
 
     // A drag turns the camera: another picture. Slowly, for software draws some frames a second.
     desk.xdotool("mousemove 560 400 mousedown 1");

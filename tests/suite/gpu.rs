@@ -10,7 +10,7 @@ use lightgrid::metrics::statistics::{Estimate, z_test};
 use lightgrid::path::{PathLimits, World, framing};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::gpu::Gpu;
+use lightgrid::render::gpu::{Gpu, Stage};
 use lightgrid::render::{Phase, Sampling, Session, View};
 use lightgrid::scene::{builtin, gltf};
 
@@ -23,6 +23,17 @@ const ALPHA: f64 = 1e-3;
 /// The best adapter; `None`, said on stderr, where there is none.
 fn gpu() -> Option<Gpu> {
     Gpu::open(None).inspect_err(|reason| eprintln!("SKIPPED: {reason}")).ok()
+}
+
+/// A session on a stage of its own.
+fn on_gpu<'a>(
+    world: &'a World,
+    environment: &'a Environment,
+    view: View,
+    gpu: &Gpu,
+) -> Session<'a> {
+    let stage = Stage::new(gpu, world, environment).expect("it fits");
+    Session::on_gpu(world, environment, view, &stage).expect("it fits")
 }
 
 fn finish(mut session: Session<'_>, samples: u32) -> Film {
@@ -82,7 +93,7 @@ fn expect_agreement(what: &str, a: &Film, b: &Film) {
 fn compare(gpu: &Gpu, what: &str, world: &World, environment: &Environment, sampling: Sampling) {
     let samples = 16;
     let view = picture(world, sampling);
-    let session = Session::on_gpu(world, environment, view.clone(), gpu).expect("it fits");
+    let session = on_gpu(world, environment, view.clone(), gpu);
     let gpu_film = finish(session, samples);
     let same = render(world, environment, view.clone(), samples);
     let share = differing(&same, &gpu_film);
@@ -164,7 +175,7 @@ fn layers_lens_and_filters_are_the_same() {
         let filter = PixelFilter::BlackmanHarris;
         let mut view = View { filter, layers: true, ..picture(&world, Sampling::Plain) };
         view.camera.lens_radius = 0.05;
-        let session = Session::on_gpu(&world, &environment, view.clone(), &gpu).expect("it fits");
+        let session = on_gpu(&world, &environment, view.clone(), &gpu);
         let gpu_film = finish(session, 8);
         let cpu_film = render(&world, &environment, view, 8);
         assert!(differing(&cpu_film, &gpu_film) < 0.1);
@@ -190,7 +201,7 @@ fn the_cpu_takes_over_when_the_device_is_lost() {
     let environment = sky_map("day");
     let view = picture(&world, Sampling::Plain);
     let never = AtomicBool::new(false);
-    let mut session = Session::on_gpu(&world, &environment, view.clone(), &gpu).expect("it fits");
+    let mut session = on_gpu(&world, &environment, view.clone(), &gpu);
     session.advance(3, &never).expect("rendering");
     let before = session.film().clone();
     gpu.lose();
@@ -213,10 +224,51 @@ fn a_cancelled_picture_goes_on_where_it_stopped() {
         limits: PathLimits { bounces: 2, russian_roulette: true },
         ..picture(&world, Sampling::Plain)
     };
-    let mut session = Session::on_gpu(&world, &environment, view.clone(), &gpu).expect("it fits");
+    let mut session = on_gpu(&world, &environment, view.clone(), &gpu);
     session.advance(4, &AtomicBool::new(true)).expect("cancelled");
     assert_eq!(session.film().min_samples(), 0);
     session.advance(4, &AtomicBool::new(false)).expect("rendering");
-    let at_once = Session::on_gpu(&world, &environment, view, &gpu).expect("it fits");
+    let at_once = on_gpu(&world, &environment, view, &gpu);
     assert_eq!(*session.film(), finish(at_once, 4), "the same bits in one piece or several");
+}
+
+/// Runs the binary in a folder of its own.
+fn lightgrid(folder: &std::path::Path, line: &str) -> (bool, String, String) {
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_lightgrid"))
+        .current_dir(folder)
+        .args(line.split_whitespace())
+        .output()
+        .expect("the binary starts");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.success(), text(&output.stdout), text(&output.stderr))
+}
+
+#[test]
+fn the_command_line_lists_and_chooses_devices() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let render = "render open --env sky:overcast@64x32 --size 32x18 --spp 2 --bounces 1 -o a.png";
+    let run = |rest: &str| lightgrid(folder.path(), &format!("{render} {rest}"));
+    let (ok, _, says) = run("--device cpu --adapter x");
+    assert!(!ok && says.contains("exclude each other") && says.lines().count() == 1, "{says}");
+    let (ok, _, says) = run("--device gpu --adapter nonsense");
+    assert!(!ok && says.lines().count() == 1, "{says}");
+    assert!(says.contains("no adapter is called nonsense") || says.contains("no GPU"), "{says}");
+
+    let Some(gpu) = gpu() else { return };
+    let (ok, list, says) = lightgrid(folder.path(), "devices --json");
+    assert!(ok, "{says}");
+    let list: serde_json::Value = serde_json::from_str(&list).expect("JSON");
+    assert_eq!(list[0]["name"], gpu.facts().name.as_str());
+    let (_, text, _) = lightgrid(folder.path(), "devices");
+    assert!(text.contains(&gpu.facts().name), "{text}");
+
+    let (ok, _, says) = run("--device gpu --json a.json");
+    assert!(ok, "{says}");
+    let json = std::fs::read_to_string(folder.path().join("a.json")).expect("written");
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(json["device"], gpu.facts().name.as_str());
+    let kernel = &json["gpu"]["kernel"];
+    assert!(kernel["source_bytes"].as_u64() < kernel["full_source_bytes"].as_u64(), "{json}");
+    assert!(kernel["left_out"].as_array().is_some_and(|names| !names.is_empty()), "{json}");
+    assert!(json["gpu"]["device_bytes"].as_u64() > Some(0), "{json}");
 }

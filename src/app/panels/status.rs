@@ -11,6 +11,8 @@ pub(in crate::app) struct Status<'a> {
     pub(in crate::app) snapshot: Option<&'a Snapshot>,
     /// Files being loaded.
     pub(in crate::app) loading: Vec<&'a str>,
+    /// Whether a GPU is being made ready.
+    pub(in crate::app) is_preparing: bool,
     /// Render threads.
     pub(in crate::app) threads: usize,
     /// Figures that depend on the clock are left out.
@@ -38,6 +40,14 @@ fn phase(ui: &mut Ui, status: &Status<'_>) {
     if let Some(name) = status.loading.first() {
         ui.spinner();
         ui.label(RichText::new(format!("Loading {name}")).color(theme::ACCENT));
+        return;
+    }
+    if status.is_preparing {
+        ui.spinner();
+        ui.label(RichText::new("Preparing the GPU").color(theme::ACCENT)).on_hover_text(
+            "The scene is uploaded and the kernels are compiled; software Vulkan takes some \
+             seconds for it",
+        );
         return;
     }
     let Some(snapshot) = status.snapshot else {
@@ -120,7 +130,26 @@ fn number(ui: &mut Ui, value: &str, unit: &str, hint: &str) {
 
 fn device(ui: &mut Ui, snapshot: &Snapshot, threads: usize) {
     let film = &snapshot.main.film;
-    let word = if threads == 1 { "thread" } else { "threads" };
-    let text = format!("{} x {}  ·  CPU, {threads} {word}", film.width, film.height);
-    ui.label(theme::quiet(text)).on_hover_text("Size of the picture in pixels, and who renders it");
+    let (name, hint) = match &snapshot.main.gpu {
+        Some(gpu) => {
+            let adapter = &gpu.adapter;
+            let hint = format!(
+                "{}, {}, driver {}; {} on the device",
+                adapter.name,
+                adapter.backend,
+                adapter.driver,
+                theme::bytes(gpu.device_bytes as usize)
+            );
+            (format!("GPU, {}", adapter.short_name()), hint)
+        }
+        None => {
+            let word = if threads == 1 { "thread" } else { "threads" };
+            (
+                format!("CPU, {threads} {word}"),
+                "Size of the picture in pixels, and who renders it".to_owned(),
+            )
+        }
+    };
+    ui.label(theme::quiet(format!("{} x {}  ·  {name}", film.width, film.height)))
+        .on_hover_text(hint);
 }

@@ -9,6 +9,7 @@ use crate::app::interface::{Interface, Tab};
 use crate::app::theme;
 use crate::app::undo::Undo;
 use crate::render::Sampling;
+use crate::render::gpu::DeviceChoice;
 
 /// Draws the bar.
 pub(in crate::app) fn show(
@@ -16,6 +17,7 @@ pub(in crate::app) fn show(
     document: &mut Document,
     interface: &mut Interface,
     undo: &Undo<Document>,
+    is_on_gpu: bool,
     commands: &mut Vec<Command>,
 ) {
     let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(10, 7));
@@ -26,6 +28,8 @@ pub(in crate::app) fn show(
             steps(ui, undo, commands);
             ui.separator();
             sampling(ui, document);
+            ui.separator();
+            device(ui, document, is_on_gpu);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 running(ui, document, interface, commands);
             });
@@ -85,6 +89,19 @@ fn sampling(ui: &mut Ui, document: &mut Document) {
     for (sampling, hint) in WAYS {
         ui.selectable_value(chosen, sampling, capital(sampling)).on_hover_text(hint);
     }
+    ui.spacing_mut().item_spacing.x = 8.0;
+}
+
+/// Who renders; what is highlighted is what does, not what was asked for.
+fn device(ui: &mut Ui, document: &mut Document, is_on_gpu: bool) {
+    ui.spacing_mut().item_spacing.x = 3.0;
+    let mut choose = |text: &str, hint: &str, is_on: bool, choice: DeviceChoice| {
+        if ui.selectable_label(is_on, text).on_hover_text(hint).clicked() {
+            document.light.device = choice;
+        }
+    };
+    choose("CPU", "Render on the processor (G changes)", !is_on_gpu, DeviceChoice::Cpu);
+    choose("GPU", "Render on the graphics card (G changes)", is_on_gpu, DeviceChoice::Gpu);
     ui.spacing_mut().item_spacing.x = 8.0;
 }
 

@@ -9,9 +9,10 @@ use super::device::Gpu;
 use super::shader::{ARRAYS, ArrayKind, TexelFormat};
 use crate::error::{Error, Result};
 
-/// Everything the kernels bind, by the name of its variable.
-pub(super) struct Buffers<'a> {
-    gpu: &'a Gpu,
+/// Everything the kernels bind, by the name of its variable. Clones share what was made before.
+#[derive(Clone)]
+pub(super) struct Buffers {
+    gpu: Gpu,
     by_name: BTreeMap<&'static str, Buffer>,
     arrays: BTreeMap<&'static str, (wgpu::Texture, u64)>,
     /// Texels of a row of every array, as a power of two.
@@ -21,10 +22,10 @@ pub(super) struct Buffers<'a> {
 /// Most bytes written to the device at once: they are copied in host memory first.
 const PIECE_BYTES: usize = 16 << 20;
 
-impl<'a> Buffers<'a> {
-    pub(super) fn new(gpu: &'a Gpu) -> Self {
+impl Buffers {
+    pub(super) fn new(gpu: &Gpu) -> Self {
         let width_log2 = gpu.limits.max_texture_dimension_2d.ilog2().min(14);
-        Self { gpu, by_name: BTreeMap::new(), arrays: BTreeMap::new(), width_log2 }
+        Self { gpu: gpu.clone(), by_name: BTreeMap::new(), arrays: BTreeMap::new(), width_log2 }
     }
 
     /// Texels of a row of every array, as a power of two.

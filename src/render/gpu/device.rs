@@ -1,10 +1,12 @@
 //! Adapters: what there is, which one to take, and a connection to it.
 
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use wgpu::{Adapter, Backends, DeviceType, Features, Limits};
 
+use super::pipeline::Pipeline;
 use crate::error::{Error, Result};
 
 /// What an adapter is and how much it allows.
@@ -53,6 +55,11 @@ impl AdapterFacts {
         }
     }
 
+    /// The name without what stands in brackets.
+    pub fn short_name(&self) -> &str {
+        self.name.split(" (").next().unwrap_or(&self.name)
+    }
+
     /// Whether it only pretends to be a GPU.
     pub fn is_software(&self) -> bool {
         self.kind == "software"
@@ -93,13 +100,49 @@ fn enumerate(backends: Backends) -> Vec<(AdapterFacts, Adapter)> {
     found
 }
 
-/// A connection to an adapter.
+/// Where to render.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum DeviceChoice {
+    /// A real GPU if there is one and everything fits on it, else the CPU.
+    #[default]
+    Auto,
+    /// A GPU, be it a software one, or an error.
+    Gpu,
+    /// The CPU.
+    Cpu,
+}
+
+impl DeviceChoice {
+    /// Connects to the GPU that is chosen, the best whose name or backend contains `adapter`;
+    /// `None` is the CPU.
+    ///
+    /// # Errors
+    /// If it cannot be opened; with [`Self::Auto`] and no name this is no reason to stop.
+    pub fn open(self, adapter: Option<&str>) -> Result<Option<Gpu>> {
+        match (self, adapter) {
+            (Self::Cpu, Some(name)) => {
+                Err(Error::new(format!("--adapter {name} and --device cpu exclude each other")))
+            }
+            (Self::Cpu, None) => Ok(None),
+            (Self::Auto, None) if adapters().first().is_none_or(AdapterFacts::is_software) => {
+                Ok(None)
+            }
+            (_, name) => Gpu::open(name).map(Some),
+        }
+    }
+}
+
+/// A connection to an adapter; clones share it.
+#[derive(Clone)]
 pub struct Gpu {
     facts: AdapterFacts,
     pub(crate) limits: Limits,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     trouble: Arc<Mutex<Option<String>>>,
+    /// Kernels compiled so far, by their source.
+    pub(super) pipelines: Arc<Mutex<HashMap<String, Arc<Pipeline>>>>,
 }
 
 impl Gpu {
@@ -157,7 +200,7 @@ impl Gpu {
                 },
             );
         }));
-        Ok(Self { facts, limits, device, queue, trouble })
+        Ok(Self { facts, limits, device, queue, trouble, pipelines: Arc::default() })
     }
 
     /// What it is.

@@ -9,10 +9,12 @@ mod buffers;
 mod device;
 pub(crate) mod layout;
 mod pacer;
+mod pipeline;
 pub(crate) mod shader;
+mod stage;
 
-use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
@@ -20,7 +22,6 @@ use rayon::prelude::*;
 use super::View;
 use super::film::Film;
 use crate::bsdf::albedo;
-use crate::bvh::compressed::CompressedTree;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::light_grid::{LearningGrid, LightGrid};
@@ -29,9 +30,13 @@ use crate::path::camera::CameraRays;
 use buffers::Buffers;
 use layout::{Globals, PixelSums, SurfaceSums, Work};
 use pacer::Pacer;
-use shader::{Binding, Constants, Features, Kernel, Program, VertexTexels};
+use pipeline::Pipeline;
+use shader::{Binding, Constants, Features, Kernel, Program};
+use stage::put_array;
 
-pub use device::{AdapterFacts, Gpu, adapters};
+pub use device::{AdapterFacts, DeviceChoice, Gpu, adapters};
+pub use shader::KernelFacts;
+pub use stage::Stage;
 
 /// Most samples of a pixel that one pass sums in f32.
 const MAX_PASS_SAMPLES: u32 = 64;
@@ -41,28 +46,21 @@ const TILE: u32 = 8;
 const GROUP: u64 = 64;
 /// Most workgroups of one dispatch (WebGPU's limit along an axis).
 const MAX_GROUPS: u64 = 65_535;
-/// Deepest tree a traversal's stack is made for.
-const MAX_DEPTH: u32 = 96;
+/// Tiles of a dispatch that keep a device with few cores busy.
+const LEAST_TILES: u64 = 4;
 
 /// What the device holds of a picture in the making.
-pub(crate) struct Renderer<'a> {
-    gpu: &'a Gpu,
-    buffers: Buffers<'a>,
+pub(crate) struct Renderer {
+    gpu: Gpu,
+    buffers: Buffers,
     globals: Globals,
     features: Features,
     constants: Constants,
-    render: Option<Pipeline>,
-    learn: Option<Pipeline>,
+    render: Arc<Pipeline>,
+    learn: Option<Arc<Pipeline>>,
     render_pacer: Pacer,
     learn_pacer: Pacer,
-    kernel_bytes: usize,
-}
-
-/// A kernel ready to run.
-struct Pipeline {
-    pipeline: wgpu::ComputePipeline,
-    layout: wgpu::BindGroupLayout,
-    program: Program,
+    kernel_facts: KernelFacts,
 }
 
 /// What was left out of the kernels and what they take.
@@ -72,31 +70,27 @@ pub struct GpuFigures {
     pub adapter: AdapterFacts,
     /// Bytes of all buffers on it.
     pub device_bytes: u64,
-    /// Features the kernels were built with.
-    pub features: Vec<&'static str>,
-    /// Bytes of the render kernel's source, and what they would be with every feature.
-    pub kernel_source_bytes: [usize; 2],
+    /// What its render kernel holds.
+    pub kernel: KernelFacts,
 }
 
-impl<'a> Renderer<'a> {
-    /// Uploads a scene and a map and builds the kernel for the view.
+impl Renderer {
+    /// Builds the kernel for a view of what is on the stage.
     ///
     /// # Errors
     /// If something does not fit on the device, with the numbers.
     pub(crate) fn new(
-        gpu: &'a Gpu,
+        stage: &Stage,
         world: &World,
         environment: &Environment,
         view: &View,
         rays: &CameraRays,
     ) -> Result<Self> {
         let features = Features::of(world, environment, view);
-        let mut buffers = Buffers::new(gpu);
-        let mut globals = Globals::default();
+        let mut buffers = stage.buffers.clone();
+        let mut globals = stage.globals;
         globals.set_view(view, rays);
-        globals.set_environment(environment);
-        let mut constants = upload_world(&mut buffers, &mut globals, world, &features)?;
-        upload_map(&mut buffers, &mut globals, environment, &features)?;
+        let mut constants = stage.constants;
         upload_tables(&mut buffers, view, environment, &mut constants)?;
         let pixels = u64::from(view.width) * u64::from(view.height);
         buffers.make("film", pixels * size_of::<PixelSums>() as u64, "the picture")?;
@@ -105,26 +99,22 @@ impl<'a> Renderer<'a> {
             buffers.make("surfaces", bytes, "the picture's layers")?;
         }
         buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
-        let mut renderer = Self {
-            gpu,
+        let width_log2 = buffers.width_log2();
+        let program = Program::new(Kernel::Render, &features, &constants, width_log2);
+        let kernel_facts = KernelFacts::of(&features);
+        let renderer = Self {
+            render: stage.gpu.pipeline(Kernel::Render, program)?,
+            learn: None,
+            gpu: stage.gpu.clone(),
             buffers,
             globals,
             features,
             constants,
-            render: None,
-            learn: None,
             render_pacer: Pacer::default(),
             learn_pacer: Pacer::default(),
-            kernel_bytes: 0,
+            kernel_facts,
         };
         renderer.write_globals();
-        let render = renderer.pipeline(Kernel::Render)?;
-        renderer.kernel_bytes = render.program.source.len();
-        renderer.render = Some(render);
-        // Now rather than when it is used: building kernels is no learning.
-        if renderer.features.has("light_grid") {
-            renderer.learn = Some(renderer.pipeline(Kernel::Learn)?);
-        }
         Ok(renderer)
     }
 
@@ -156,6 +146,16 @@ impl<'a> Renderer<'a> {
         }
         self.buffers.put("counters", bytemuck::cast_slice(counters), "the learning counters")?;
         self.buffers.put("learning_rays", &[0; 4], "a count")?;
+        let learn = match &self.learn {
+            Some(learn) => Arc::clone(learn),
+            None => {
+                let width_log2 = self.buffers.width_log2();
+                let program =
+                    Program::new(Kernel::Learn, &self.features, &self.constants, width_log2);
+                self.gpu.pipeline(Kernel::Learn, program)?
+            }
+        };
+        self.learn = Some(Arc::clone(&learn));
         let mut first = paths.start;
         while first < paths.end {
             if cancel.load(Ordering::Relaxed) {
@@ -170,7 +170,7 @@ impl<'a> Renderer<'a> {
                 ..Work::default()
             };
             let groups = count.div_ceil(GROUP);
-            let seconds = self.dispatch(Kernel::Learn, &work, groups as u32)?;
+            let seconds = self.dispatch(&learn, &work, groups as u32)?;
             self.learn_pacer.record(groups, seconds);
             first += count;
         }
@@ -221,7 +221,7 @@ impl<'a> Renderer<'a> {
                     resumes: (sample > pass.start).into(),
                     ..Work::default()
                 };
-                let seconds = self.dispatch(Kernel::Render, &work, count as u32)?;
+                let seconds = self.dispatch(&self.render, &work, count as u32)?;
                 self.render_pacer.record(count * u64::from(work.samples), seconds);
                 sample += work.samples;
             }
@@ -274,15 +274,10 @@ impl<'a> Renderer<'a> {
 
     /// Figures of the device and of what the kernels leave out.
     pub(crate) fn figures(&self) -> GpuFigures {
-        let every = Features::from_names(
-            Features::ALL.into_iter().filter(|n| !n.starts_with("table_")).map(|n| (n, true)),
-        );
-        let full = Program::new(Kernel::Render, &every, &self.constants, self.buffers.width_log2());
         GpuFigures {
             adapter: self.gpu.facts().clone(),
             device_bytes: self.buffers.bytes(),
-            features: self.features.names().collect(),
-            kernel_source_bytes: [self.kernel_bytes, full.source.len()],
+            kernel: self.kernel_facts.clone(),
         }
     }
 
@@ -298,12 +293,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// Runs a kernel to its end; returns the seconds it took.
-    fn dispatch(&self, kernel: Kernel, work: &Work, groups: u32) -> Result<f64> {
-        let pipeline = match kernel {
-            Kernel::Render => &self.render,
-            Kernel::Learn => &self.learn,
-        };
-        let Some(pipeline) = pipeline else { return Ok(0.0) };
+    fn dispatch(&self, pipeline: &Pipeline, work: &Work, groups: u32) -> Result<f64> {
         let bind_group = self.bind_group(pipeline)?;
         self.buffers.write("globals", 0, bytemuck::bytes_of(work));
         let mut commands = self.gpu.device.create_command_encoder(&Default::default());
@@ -347,149 +337,11 @@ impl<'a> Renderer<'a> {
             entries: &entries,
         }))
     }
-
-    fn pipeline(&self, kernel: Kernel) -> Result<Pipeline> {
-        let program =
-            Program::new(kernel, &self.features, &self.constants, self.buffers.width_log2());
-        let device = &self.gpu.device;
-        let entries: Vec<_> = program
-            .bindings
-            .iter()
-            .zip(0..)
-            .map(|(binding, index)| wgpu::BindGroupLayoutEntry {
-                binding: index,
-                visibility: wgpu::ShaderStages::COMPUTE,
-                ty: binding_type(binding),
-                count: None,
-            })
-            .collect();
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some(kernel.name()),
-            entries: &entries,
-        });
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(kernel.name()),
-            source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(&program.source)),
-        });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(kernel.name()),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(kernel.name()),
-            layout: Some(&pipeline_layout),
-            module: &module,
-            entry_point: Some(kernel.name()),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            cache: None,
-        });
-        self.gpu.check()?;
-        Ok(Pipeline { pipeline, layout, program })
-    }
-}
-
-fn binding_type(binding: &Binding) -> wgpu::BindingType {
-    match binding {
-        Binding::Buffer { is_written, .. } => wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Storage { read_only: !is_written },
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
-        Binding::Array(array) => wgpu::BindingType::Texture {
-            sample_type: if array.format.is_float() {
-                wgpu::TextureSampleType::Float { filterable: false }
-            } else {
-                wgpu::TextureSampleType::Uint
-            },
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
-        },
-    }
-}
-
-/// Tiles of a dispatch that keep a device with few cores busy.
-const LEAST_TILES: u64 = 4;
-
-/// Uploads geometry, materials, textures and lights; returns what kernels are told of them.
-fn upload_world(
-    buffers: &mut Buffers<'_>,
-    globals: &mut Globals,
-    world: &World,
-    features: &Features,
-) -> Result<Constants> {
-    let scene = &world.scene;
-    let tree = CompressedTree::build(&scene.positions, &scene.triangles);
-    if tree.depth > MAX_DEPTH {
-        return Err(Error::new(format!(
-            "the scene's tree is {} levels deep; a GPU walks at most {MAX_DEPTH}",
-            tree.depth
-        )));
-    }
-    let bounds = world.bvh.bounds();
-    globals.scene_extent = bounds.0.abs().max(bounds.1.abs()).max_element();
-    put_array(buffers, "bvh_nodes", "the scene's tree", tree.nodes.as_flattened())?;
-    put_array(buffers, "bvh_triangles", "the scene's geometry", tree.triangles.as_flattened())?;
-    let vertex = VertexTexels::of(features);
-    put_array(buffers, "triangles", "the scene's geometry", &layout::triangles(scene))?;
-    put_array(buffers, "vertices", "the scene's geometry", &layout::vertices(scene, &vertex))?;
-    let (materials, texture_refs) = layout::materials(world);
-    put_array(buffers, "materials", "the list of materials", &materials)?;
-    if features.has("textures") {
-        put_array(buffers, "texture_refs", "the list of textures", &texture_refs)?;
-        let texels = scene.images.iter().map(|image| image.texels.len() as u64).sum();
-        let images = scene.images.iter().map(|image| bytemuck::cast_slice(&image.texels));
-        buffers.put_array("texels", "the set of textures", texels, images.map(Cow::Borrowed))?;
-    }
-    if features.has("scene_lights") {
-        let lights = layout::light_words(world, globals);
-        put_array(buffers, "lights", "the list of lights", &lights)?;
-    }
-    Ok(Constants { stack_size: tree.depth, vertex, ..Constants::default() })
-}
-
-/// Makes an array of values that take whole texels or parts of one.
-fn put_array<T: bytemuck::Pod>(
-    buffers: &mut Buffers<'_>,
-    name: &'static str,
-    what: &str,
-    values: &[T],
-) -> Result<()> {
-    let bytes: &[u8] = bytemuck::cast_slice(values);
-    let texel_bytes = shader::ARRAYS.iter().find(|kind| kind.name == name);
-    let texels = bytes.len() as u64 / texel_bytes.map_or(4, |kind| kind.format.bytes());
-    buffers.put_array(name, what, texels, std::iter::once(Cow::Borrowed(bytes)))
-}
-
-/// Uploads the map's radiance and its importance table.
-fn upload_map(
-    buffers: &mut Buffers<'_>,
-    globals: &mut Globals,
-    environment: &Environment,
-    features: &Features,
-) -> Result<()> {
-    if features.has("map") {
-        let map = environment.map();
-        let rows = map.pixels.chunks(map.width as usize * 64).map(|rows| {
-            let words: Vec<[u32; 2]> =
-                rows.par_iter().map(|rgb| layout::pack_radiance(*rgb)).collect();
-            Cow::Owned(bytemuck::pod_collect_to_vec(&words))
-        });
-        buffers.put_array("map_texels", "the map", map.pixels.len() as u64, rows)?;
-    }
-    if features.has("map_sampling") {
-        let parts = environment.table_words();
-        globals.tile_sums_at = parts[0].len() as u32;
-        let words = parts.iter().map(|part| part.len() as u64).sum();
-        let bytes = parts.iter().map(|part| Cow::Borrowed(bytemuck::cast_slice(part)));
-        buffers.put_array("sums", "the map's importance table", words, bytes)?;
-    }
-    Ok(())
 }
 
 /// Uploads the small tables of numbers; says where each begins.
 fn upload_tables(
-    buffers: &mut Buffers<'_>,
+    buffers: &mut Buffers,
     view: &View,
     environment: &Environment,
     constants: &mut Constants,
@@ -539,8 +391,10 @@ mod tests {
         let mut learning = LearningGrid::new(grid, environment.tile_count(), recording);
         let mut laws = LightGrid::whole_map(environment.tile_energies());
         let never = AtomicBool::new(false);
-        let mut renderer =
-            gpu.map(|gpu| Renderer::new(gpu, &world, &environment, &view, &rays).expect("it fits"));
+        let mut renderer = gpu.map(|gpu| {
+            let stage = Stage::new(gpu, &world, &environment).expect("it fits");
+            Renderer::new(&stage, &world, &environment, &view, &rays).expect("it fits")
+        });
         let mut traced = 0;
         for pass in [0..2048, 2048..8192] {
             traced += match &mut renderer {

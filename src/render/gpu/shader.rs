@@ -5,6 +5,8 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use serde::Serialize;
+
 use super::super::filter::PixelFilter;
 use super::super::{Sampling, View};
 use crate::environment::{Environment, Lookup, TableKind};
@@ -76,46 +78,58 @@ impl Features {
         "wide_filter",
     ];
 
-    /// What a picture needs: the scene's materials and lights, the map, how it is sampled.
-    pub(crate) fn of(world: &World, environment: &Environment, view: &View) -> Self {
+    /// What a scene needs: its materials and lights.
+    pub(crate) fn of_world(world: &World) -> Self {
         let needs = &world.needs;
-        let samples_map = view.sampling != Sampling::Bsdf && !environment.is_black();
-        let learns = matches!(view.sampling, Sampling::Adaptive | Sampling::Talk);
-        let options = environment.kind();
-        let recording = view.law_options().map(|laws| laws.recording);
-        let cosine_power = recording.map_or(0, Recording::cosine_power);
         Self::from_names([
             ("alpha_mask", needs.alpha_mask),
             ("clearcoat", needs.clearcoat),
             ("emitters", needs.emitters),
-            ("faces", view.law_options().is_some_and(|laws| laws.faces)),
-            ("independent_points", view.points == Points::Independent),
-            ("layers", view.layers),
-            ("lens", view.camera.lens_radius > 0.0),
-            ("light_grid", samples_map && learns),
             ("local_lights", !world.lights.is_empty()),
-            ("map", !environment.is_black()),
-            ("map_sampling", samples_map),
             ("metals", needs.metals),
-            ("nearest_lookup", options.1 == Lookup::Nearest),
             ("normal_maps", needs.normal_maps && !world.scene.tangents.is_empty()),
             ("partial", needs.alpha_blend || needs.thin_transmission),
             ("punctual_lights", needs.punctual_lights),
-            ("record_cosine", cosine_power == 1),
-            ("record_ratio", recording.is_some_and(Recording::is_ratio)),
-            ("record_squared_cosine", cosine_power == 2),
             ("second_uv_set", needs.second_uv_set),
             ("single_sided", needs.single_sided),
             ("solid_transmission", needs.solid_transmission),
-            ("table_f32", options.0 == TableKind::F32),
-            ("table_f64", options.0 == TableKind::F64),
-            ("table_u32", options.0 == TableKind::U32),
             ("textures", needs.textures),
             ("transmission", needs.thin_transmission || needs.solid_transmission),
             ("unlit", needs.unlit),
             ("vertex_colors", needs.vertex_colors),
-            ("wide_filter", view.filter != PixelFilter::Box),
         ])
+    }
+
+    /// What a picture needs: the scene's materials and lights, the map, how it is sampled.
+    pub(crate) fn of(world: &World, environment: &Environment, view: &View) -> Self {
+        let samples_map = view.sampling != Sampling::Bsdf && !environment.is_black();
+        let recording = view.law_options().map(|laws| laws.recording);
+        let cosine_power = recording.map_or(0, Recording::cosine_power);
+        let options = environment.kind();
+        let of_view = [
+            ("faces", view.law_options().is_some_and(|laws| laws.faces)),
+            ("independent_points", view.points == Points::Independent),
+            ("layers", view.layers),
+            ("lens", view.camera.lens_radius > 0.0),
+            ("light_grid", samples_map && recording.is_some()),
+            ("map", !environment.is_black()),
+            ("map_sampling", samples_map),
+            ("nearest_lookup", options.1 == Lookup::Nearest),
+            ("record_cosine", cosine_power == 1),
+            ("record_ratio", recording.is_some_and(Recording::is_ratio)),
+            ("record_squared_cosine", cosine_power == 2),
+            ("table_f32", options.0 == TableKind::F32),
+            ("table_f64", options.0 == TableKind::F64),
+            ("table_u32", options.0 == TableKind::U32),
+            ("wide_filter", view.filter != PixelFilter::Box),
+        ];
+        Self::from_names(Self::of_world(world).0.into_iter().map(|n| (n, true)).chain(of_view))
+    }
+
+    /// Every feature at once, with the table that is used by default.
+    pub(crate) fn most() -> Self {
+        let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_") && *n != "learning");
+        Self::from_names(names.filter(|n| *n != "summed_area").map(|n| (n, true)))
     }
 
     /// Features by name, and those that follow from them.
@@ -157,6 +171,54 @@ impl Features {
     /// Names of the features that are on.
     pub(crate) fn names(&self) -> impl Iterator<Item = &'static str> {
         self.0.iter().copied()
+    }
+}
+
+/// What the render kernel of a picture holds and what was left out of it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct KernelFacts {
+    /// Features it was built with.
+    pub features: Vec<&'static str>,
+    /// Features it does without.
+    pub left_out: Vec<&'static str>,
+    /// Bytes of its source.
+    pub source_bytes: usize,
+    /// Bytes of the source with every feature.
+    pub full_source_bytes: usize,
+    /// Bytes of a vertex on the device.
+    pub vertex_bytes: u32,
+    /// Bytes of a vertex with everything a scene can have.
+    pub full_vertex_bytes: u32,
+}
+
+impl KernelFacts {
+    /// Of the kernel for these features.
+    pub(crate) fn of(features: &Features) -> Self {
+        let bytes_of = |features: &Features| {
+            let vertex = VertexTexels::of(features);
+            let constants = Constants { vertex, ..Constants::default() };
+            let program = Program::new(Kernel::Render, features, &constants, 14);
+            (program.source.len(), 16 * vertex.count)
+        };
+        let (source_bytes, vertex_bytes) = bytes_of(features);
+        let (full_source_bytes, full_vertex_bytes) = bytes_of(&Features::most());
+        let most = Features::most();
+        Self {
+            features: features.names().collect(),
+            left_out: most.names().filter(|name| !features.0.contains(name)).collect(),
+            source_bytes,
+            full_source_bytes,
+            vertex_bytes,
+            full_vertex_bytes,
+        }
+    }
+
+    /// Of the kernel for a scene with a map that is not black, with the defaults of `render`.
+    pub fn of_scene(world: &World) -> Self {
+        let defaults =
+            ["faces", "light_grid", "map", "map_sampling", "record_cosine", "wide_filter"];
+        let names = Features::of_world(world).0.into_iter().chain(defaults);
+        Self::of(&Features::from_names(names.map(|name| (name, true))))
     }
 }
 

@@ -74,7 +74,8 @@ fn introduction(report: &Report, html: &mut String) {
     places.extend(gpu.map(|gpu| gpu.name.clone()));
     let _ = write!(html, "<p class=\"soft\">Measured on {}.", escape(&places.join(", and on ")));
     if let Some(load) = machine.load {
-        let _ = write!(html, " Load of the machine in the minute before the last start: {load:.2}.");
+        let _ =
+            write!(html, " Load of the machine in the minute before the last start: {load:.2}.");
     }
     html.push_str("</p>\n");
     if !report.is_finished {
@@ -130,8 +131,8 @@ fn method(report: &Report, html: &mut String) {
         ),
         "Time counts from the start of building the map's importance table and includes learning and \
          the making of tile laws. It does not include reading files, building the scene's tree, and, on \
-         a GPU, uploading and building kernels, which are the same for all methods or nearly so; they \
-         are in the table of costs as set-up. Errors are taken while the clock stands still."
+         a GPU, uploading and building kernels, which are the same for all methods or nearly so and are \
+         done once beforehand. Errors are taken while the clock stands still."
             .to_owned(),
         "MSE and relMSE are in units of the reference's mean; relMSE divides each squared difference by \
          the squared reference plus 0.01; trimmed relMSE leaves out the 0.1 % of the pixels where it is \

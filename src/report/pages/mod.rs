@@ -31,7 +31,8 @@ pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
     }
     for row in &report.rows {
         for device in &row.devices {
-            let plot = plots::error_plot(device, Measure::TrimmedRelMse, report.plan.effort.seconds);
+            let plot =
+                plots::error_plot(device, Measure::TrimmedRelMse, report.plan.effort.seconds);
             if let Some(plot) = plot {
                 let name = format!("{}-{}.svg", row.row.title, device.device.title());
                 write_text(&plots.join(file_name(&name)), &plot)?;
@@ -47,7 +48,8 @@ fn write_text(path: &Path, text: &str) -> Result<()> {
 
 /// A title as the name of a file.
 fn file_name(title: &str) -> String {
-    let keep = |c: char| if c.is_ascii_alphanumeric() || c == '.' { c.to_ascii_lowercase() } else { '-' };
+    let keep =
+        |c: char| if c.is_ascii_alphanumeric() || c == '.' { c.to_ascii_lowercase() } else { '-' };
     let name: String = title.chars().map(keep).collect();
     name.split('-').filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-")
 }

@@ -83,13 +83,9 @@ mod tests {
 
     #[test]
     fn base64_is_as_in_the_standard() {
-        for (plain, coded) in [
-            ("", ""),
-            ("f", "Zg=="),
-            ("fo", "Zm8="),
-            ("foo", "Zm9v"),
-            ("foobar", "Zm9vYmFy"),
-        ] {
+        for (plain, coded) in
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")]
+        {
             assert_eq!(base64(plain.as_bytes()), coded);
         }
         assert_eq!(base64(&[0xfb, 0xff, 0xfe]), "+//+");
@@ -98,7 +94,8 @@ mod tests {
     #[test]
     fn the_window_shows_where_the_noise_is() {
         let reference = Image::filled(36, 24, [1.0; 3]);
-        let noisy = Image::from_fn(36, 24, |x, y| if x >= 24 && y < 8 { [2.0; 3] } else { [1.0; 3] });
+        let noisy =
+            Image::from_fn(36, 24, |x, y| if x >= 24 && y < 8 { [2.0; 3] } else { [1.0; 3] });
         let window = Window::most_telling(&noisy, &reference);
         assert_eq!(window, Window { x: 24, y: 0, width: 12, height: 8 });
         let cut = window.of(&Rgb8 {

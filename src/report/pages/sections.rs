@@ -37,7 +37,8 @@ pub(super) fn overview(report: &Report, html: &mut String) {
         plan.methods.iter().map(|m| m.name.as_str()).filter(|name| *name != baseline).collect();
     let mut head = vec!["", "device"];
     head.extend(&others);
-    let is_beside_talk = plan.rows.iter().any(|row| row.published.is_some() || row.target.is_some());
+    let is_beside_talk =
+        plan.rows.iter().any(|row| row.published.is_some() || row.target.is_some());
     if is_beside_talk {
         head.extend(["published", "target"]);
     }
@@ -109,10 +110,8 @@ fn ablation_table(report: &Report, html: &mut String) {
     let Some(last) = plan.baselines.last().map(|b| plan.methods[*b].name.as_str()) else { return };
     let columns: Vec<(&RowReport, &DeviceReport)> =
         report.rows.iter().flat_map(|row| row.devices.iter().map(move |d| (row, d))).collect();
-    let titles: Vec<String> = columns
-        .iter()
-        .map(|(row, d)| format!("{}, {}", row.row.title, d.device.title()))
-        .collect();
+    let titles: Vec<String> =
+        columns.iter().map(|(row, d)| format!("{}, {}", row.row.title, d.device.title())).collect();
     let mut head = vec!["", "mean"];
     head.extend(titles.iter().map(String::as_str));
     let mut table = Table::new(&head);
@@ -128,15 +127,20 @@ fn ablation_table(report: &Report, html: &mut String) {
             .map(|(_, d)| d.method(&method.name)?.speed_up(last, Measure::TrimmedRelMse))
             .collect();
         let known: Vec<f64> = found.iter().flatten().map(|s| s.ratio.ln()).collect();
-        let mean = (!known.is_empty())
-            .then(|| (known.iter().sum::<f64>() / known.len() as f64).exp());
+        let mean =
+            (!known.is_empty()).then(|| (known.iter().sum::<f64>() / known.len() as f64).exp());
         let mut cells = vec![method.name.clone()];
         cells.push(mean.map_or_else(String::new, words::ratio));
         cells.extend(found.into_iter().map(|s| s.map_or_else(String::new, words::speed_up)));
         table.row(&cells);
         if let Some(mean) = mean {
             let ratios = vec![(method.name.clone(), mean, None)];
-            entries.push(Entry { title: method.name.clone(), ratios, published: None, target: None });
+            entries.push(Entry {
+                title: method.name.clone(),
+                ratios,
+                published: None,
+                target: None,
+            });
         }
     }
     let _ = writeln!(
@@ -261,8 +265,7 @@ fn pictures(report: &Report, row: &RowReport, html: &mut String) -> Result<()> {
             .map_or_else(String::new, |e| {
                 format!(", trimmed relMSE {}", words::error(e.trimmed_rel_mse))
             });
-        let caption =
-            format!("<b>{}</b>, {}, {seconds} s{error}", escape(name), device.title());
+        let caption = format!("<b>{}</b>, {}, {seconds} s{error}", escape(name), device.title());
         figure(&window.of(&developed(picture, reference)), 260, &caption)?;
     }
     Ok(())
@@ -311,8 +314,15 @@ fn costs(report: &Report, device: &DeviceReport, html: &mut String) {
     let title = device.device.title();
     let _ = writeln!(html, "<h3>{title}: where the time goes</h3>");
     let mut table = Table::new(&[
-        "", "learning", "tables", "rays", "shading", "set-up", "samples / pixel", "rays / sample",
-        "Mrays / s", "learning paths",
+        "",
+        "learning",
+        "tables",
+        "rays",
+        "shading",
+        "samples / pixel",
+        "rays / sample",
+        "Mrays / s",
+        "learning paths",
     ]);
     let (width, height) = report.plan.effort.frame.size;
     for method in device.methods.iter().filter(|m| !m.runs.is_empty()) {
@@ -326,7 +336,6 @@ fn costs(report: &Report, device: &DeviceReport, html: &mut String) {
             format!("{:.2} s", c.table_seconds),
             c.ray_seconds.map_or(rendering, |s| format!("{s:.2} s")),
             shading.map_or_else(String::new, |s| format!("{s:.2} s")),
-            format!("{:.2} s", c.setup_seconds),
             format!("{:.0}", c.samples),
             format!("{:.2}", c.rays_per_sample),
             format!("{:.2}", rays / c.render_seconds.max(1e-9) / 1e6),
@@ -347,7 +356,12 @@ fn costs(report: &Report, device: &DeviceReport, html: &mut String) {
 fn memory(device: &DeviceReport, html: &mut String) {
     let _ = writeln!(html, "<h3>{}: memory, MB</h3>", device.device.title());
     let mut table = Table::new(&[
-        "", "Light Grid", "while learning, at most", "cells with a law", "map's table", "scene's tree",
+        "",
+        "Light Grid",
+        "while learning, at most",
+        "cells with a law",
+        "map's table",
+        "scene's tree",
         "all on the device",
     ]);
     for method in device.methods.iter().filter(|m| !m.runs.is_empty()) {
@@ -372,7 +386,12 @@ fn what_is_left(report: &Report, row: &RowReport, html: &mut String) {
     let baseline = baseline(report);
     html.push_str("<h3>Where the error is left</h3>\n");
     let mut table = Table::new(&[
-        "", "samples / pixel", "trimmed relMSE", "first vertex", "later vertices", "pixel filter",
+        "",
+        "samples / pixel",
+        "trimmed relMSE",
+        "first vertex",
+        "later vertices",
+        "pixel filter",
         "together",
     ]);
     for s in &row.shares {

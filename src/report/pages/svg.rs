@@ -29,7 +29,14 @@ impl Svg {
         Self { width, height, body: String::new() }
     }
 
-    pub(super) fn line(&mut self, a: (f64, f64), b: (f64, f64), ink: &str, width: f64, dashes: &str) {
+    pub(super) fn line(
+        &mut self,
+        a: (f64, f64),
+        b: (f64, f64),
+        ink: &str,
+        width: f64,
+        dashes: &str,
+    ) {
         let _ = writeln!(
             self.body,
             "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" stroke=\"{ink}\" \

@@ -59,7 +59,9 @@ pub(super) fn plain_estimate(estimate: Option<Estimate>, digits: usize) -> Strin
     match estimate {
         None => String::new(),
         Some(Estimate { mean, standard_error: None }) => format!("{mean:.digits$}"),
-        Some(Estimate { mean, standard_error: Some(s) }) => format!("{mean:.digits$} ± {s:.digits$}"),
+        Some(Estimate { mean, standard_error: Some(s) }) => {
+            format!("{mean:.digits$} ± {s:.digits$}")
+        }
     }
 }
 
@@ -130,7 +132,11 @@ pub(super) fn shares_sentence(shares: &Shares) -> String {
 }
 
 /// How far better sampling of the first vertex alone could carry.
-pub(super) fn bound_sentence(row: &RowReport, device: &DeviceReport, baseline: &str) -> Option<String> {
+pub(super) fn bound_sentence(
+    row: &RowReport,
+    device: &DeviceReport,
+    baseline: &str,
+) -> Option<String> {
     let ours = row.shares.iter().find(|s| s.method == "adaptive")?;
     let found = device.method("adaptive")?.speed_up(baseline, Measure::TrimmedRelMse)?;
     let left = |part: f64| found.ratio * ours.total / (ours.total - part).max(1e-3 * ours.total);
@@ -195,9 +201,8 @@ pub fn markdown_table(report: &Report) -> String {
         for device in &row.devices {
             let mut cells = vec![row.row.title.clone(), device.device.title().to_owned()];
             cells.extend(others.iter().map(|name| {
-                let cell = device
-                    .method(name)
-                    .map(|m| speed_up_cell(m, baseline, Measure::TrimmedRelMse));
+                let cell =
+                    device.method(name).map(|m| speed_up_cell(m, baseline, Measure::TrimmedRelMse));
                 cell.filter(|text| !text.is_empty()).unwrap_or_else(|| "-".to_owned())
             }));
             if has_published {

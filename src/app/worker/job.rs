@@ -1,128 +1,20 @@
-//! The render thread: takes the latest request, publishes the latest picture.
-//!
-//! The only place that runs a [`Session`]. A request that differs in what is seen starts anew; one
-//! that differs in when to stop or whether to pause is taken on the way. While learning for a new
-//! view, a second session renders with what was learned for the view before, around its centre, so
-//! that there is a picture at once.
+//! One request being worked on.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
+use std::sync::Arc;
+use std::sync::PoisonError;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use super::Wake;
+use super::alarm::Alarm;
+use super::device::Device;
+use super::{Activity, Point, Request, Shared, Snapshot, Take, lock};
 use crate::environment::Environment;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::render::film::Film;
-use crate::render::{Figures, Phase, Sampling, Session, StopRule, View};
+use crate::render::{Phase, Sampling, Session, StopRule, View};
 use crate::scene::Camera;
-
-/// What is to be rendered.
-#[derive(Clone)]
-pub struct Request {
-    /// The scene.
-    pub world: Arc<World>,
-    /// The map, turned and scaled.
-    pub environment: Arc<Environment>,
-    /// What is seen and how.
-    pub view: View,
-    /// Render plainly beside it, at equal time.
-    pub split: bool,
-    /// The camera moves: a small picture at once rather than a good one.
-    pub moving: bool,
-    /// Show pictures on the way; else only what [`View`] asks for, for repeatable screenshots.
-    pub previews: bool,
-    /// When to stop.
-    pub rule: StopRule,
-    /// Do nothing for now.
-    pub paused: bool,
-    /// Counts restarts asked for by hand.
-    pub run: u32,
-}
-
-impl Request {
-    /// Whether what is rendered for `self` is of no use for `new`.
-    fn restarts(&self, new: &Self) -> bool {
-        !Arc::ptr_eq(&self.world, &new.world)
-            || !Arc::ptr_eq(&self.environment, &new.environment)
-            || self.view != new.view
-            || self.split != new.split
-            || self.moving != new.moving
-            || self.run != new.run
-    }
-
-    fn is_same(&self, new: &Self) -> bool {
-        !self.restarts(new) && self.rule == new.rule && self.paused == new.paused
-    }
-}
-
-/// What the worker is doing.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Activity {
-    /// A small picture while the camera moves.
-    Moving,
-    /// Learning, the share done in `[0,1]`.
-    Learning(f32),
-    /// Adding samples.
-    Rendering,
-    /// Asked to pause.
-    Paused,
-    /// A stop rule was met.
-    Done,
-}
-
-/// How good a picture was at one moment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
-    /// Seconds of learning and rendering.
-    pub seconds: f64,
-    /// Samples per pixel.
-    pub samples: f64,
-    /// Estimated relative RMS error.
-    pub noise: f64,
-}
-
-/// One picture and what was done for it.
-#[derive(Clone)]
-pub struct Take {
-    /// How the map was sampled.
-    pub sampling: Sampling,
-    /// The sums.
-    pub film: Arc<Film>,
-    /// What was done.
-    pub figures: Figures,
-    /// [`Film::noise`].
-    pub noise: f64,
-    /// The laws in use.
-    pub grid: Option<Arc<LightGrid>>,
-}
-
-/// The latest picture.
-#[derive(Clone)]
-pub struct Snapshot {
-    /// Counts snapshots.
-    pub number: u64,
-    /// What it was rendered for.
-    pub request: Arc<Request>,
-    /// What is going on.
-    pub activity: Activity,
-    /// The picture.
-    pub main: Take,
-    /// The plain picture of a split view.
-    pub plain: Option<Take>,
-    /// Whether `main` only bridges the time until learning is done.
-    pub is_preview: bool,
-    /// What learning counted, once it has ended.
-    pub counters: Option<Arc<LearningGrid>>,
-    /// Figures of the session that learns, while `main` is a preview.
-    pub learning: Figures,
-    /// How the error of `main` and of `plain` fell.
-    pub curves: [Vec<Point>; 2],
-    /// A small picture of the same view, for pixels that have no samples yet.
-    pub under: Option<Arc<Film>>,
-}
 
 /// Longest piece of rendering between two looks at requests and clocks.
 const SLICE: Duration = Duration::from_millis(120);
@@ -131,109 +23,10 @@ const MOVING_SECONDS: f64 = 0.07;
 /// Publishing may take at most about one part in this of the time.
 const PUBLISH_SHARE: u32 = 20;
 
-struct Shared {
-    slot: Mutex<Slot>,
-    changed: Condvar,
-    cancel: Arc<AtomicBool>,
-    snapshot: Mutex<Option<Arc<Snapshot>>>,
-    wake: Wake,
-}
-
-#[derive(Default)]
-struct Slot {
-    request: Option<Arc<Request>>,
-    quit: bool,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// The handle of the render thread; it ends when dropped.
-pub struct Worker {
-    shared: Arc<Shared>,
-    thread: Option<JoinHandle<()>>,
-    pool: Arc<rayon::ThreadPool>,
-}
-
-impl Worker {
-    /// Starts the thread; `wake` is called at every new snapshot.
-    ///
-    /// # Errors
-    /// If the system gives no thread.
-    pub fn start(wake: Wake) -> Result<Self> {
-        let no_thread = |e: &dyn std::fmt::Display| {
-            Error::new(format!("the render threads cannot be started: {e}"))
-        };
-        let pool = rayon::ThreadPoolBuilder::new()
-            .thread_name(|i| format!("render {i}"))
-            .start_handler(|_| lower_priority())
-            .build()
-            .map_err(|e| no_thread(&e))?;
-        let pool = Arc::new(pool);
-        let shared = Arc::new(Shared {
-            slot: Mutex::default(),
-            changed: Condvar::new(),
-            cancel: Arc::default(),
-            snapshot: Mutex::default(),
-            wake,
-        });
-        let (inside, render_pool) = (Arc::clone(&shared), Arc::clone(&pool));
-        let thread = std::thread::Builder::new()
-            .name("worker".to_owned())
-            .spawn(move || run(&inside, &render_pool))
-            .map_err(|e| no_thread(&e))?;
-        Ok(Self { shared, thread: Some(thread), pool })
-    }
-
-    /// Asks for a picture; the latest request counts.
-    pub fn submit(&self, request: Request) {
-        let mut slot = lock(&self.shared.slot);
-        if slot.request.as_ref().is_some_and(|old| old.is_same(&request)) {
-            return;
-        }
-        if slot.request.as_ref().is_some_and(|old| old.restarts(&request)) {
-            self.shared.cancel.store(true, Ordering::Relaxed);
-        }
-        slot.request = Some(Arc::new(request));
-        self.shared.changed.notify_all();
-    }
-
-    /// The latest picture.
-    pub fn snapshot(&self) -> Option<Arc<Snapshot>> {
-        lock(&self.shared.snapshot).clone()
-    }
-
-    /// Threads that render.
-    pub fn threads(&self) -> usize {
-        self.pool.current_num_threads()
-    }
-}
-
-impl Drop for Worker {
-    fn drop(&mut self) {
-        lock(&self.shared.slot).quit = true;
-        self.shared.cancel.store(true, Ordering::Relaxed);
-        self.shared.changed.notify_all();
-        if let Some(thread) = self.thread.take() {
-            // A panic there was reported there.
-            let _ = thread.join();
-        }
-    }
-}
-
-/// The window comes first: render threads give way to it.
-fn lower_priority() {
-    #[cfg(target_os = "linux")]
-    // SAFETY: plain system call; 0 names the calling thread, and failing is harmless.
-    unsafe {
-        libc::setpriority(libc::PRIO_PROCESS, 0, 5);
-    }
-}
-
 /// What one job leaves for the next.
 #[derive(Default)]
-struct Legacy {
+pub(super) struct Legacy {
+    device: Device,
     /// The last laws that learning ended with, and the map they are for.
     learned: Option<(Arc<LightGrid>, Arc<Environment>)>,
     /// Whether that learning came to its end.
@@ -248,6 +41,11 @@ struct Legacy {
 }
 
 impl Legacy {
+    /// Of a worker that has done nothing yet.
+    pub(super) fn new(adapter: Option<String>) -> Self {
+        Self { device: Device::new(adapter), ..Self::default() }
+    }
+
     /// Whether learning has come to its end in this scene.
     fn has_learned_in(&self, request: &Request) -> bool {
         self.is_complete
@@ -270,103 +68,7 @@ impl Legacy {
     }
 }
 
-fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool) {
-    let mut legacy = Legacy::default();
-    let alarm = Alarm::start(Arc::clone(&shared.cancel));
-    let mut done: Option<Arc<Request>> = None;
-    loop {
-        let request = {
-            let mut slot = lock(&shared.slot);
-            loop {
-                if slot.quit {
-                    return;
-                }
-                match &slot.request {
-                    Some(new) if done.as_ref().is_none_or(|old| !old.is_same(new)) => {
-                        // What was to be ended has ended.
-                        shared.cancel.store(false, Ordering::Relaxed);
-                        break Arc::clone(new);
-                    }
-                    _ => {
-                        slot = shared.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
-                    }
-                }
-            }
-        };
-        let world = Arc::clone(&request.world);
-        let environment = Arc::clone(&request.environment);
-        let mut job = Job {
-            shared,
-            alarm: &alarm,
-            legacy: &mut legacy,
-            request,
-            counters: None,
-            published: Instant::now(),
-            publish_gap: Duration::ZERO,
-            laws: None,
-            curves: [Vec::new(), Vec::new()],
-        };
-        pool.install(|| {
-            if job.request.moving {
-                job.follow(&world, &environment);
-            } else {
-                job.render(&world, &environment);
-            }
-        });
-        done = Some(job.request);
-    }
-}
-
-/// Sets the cancel flag after a while, so that a pass ends with what it has.
-struct Alarm {
-    state: Arc<(Mutex<AlarmState>, Condvar)>,
-}
-
-#[derive(Default)]
-struct AlarmState {
-    at: Option<Instant>,
-    quit: bool,
-}
-
-impl Alarm {
-    fn start(cancel: Arc<AtomicBool>) -> Self {
-        let state = Arc::new((Mutex::new(AlarmState::default()), Condvar::new()));
-        let inside = Arc::clone(&state);
-        // Without the thread passes are merely not cut short.
-        let _ = std::thread::Builder::new().name("alarm".to_owned()).spawn(move || {
-            let (mutex, changed) = &*inside;
-            let mut state = lock(mutex);
-            while !state.quit {
-                state = match state.at.map(|at| at.saturating_duration_since(Instant::now())) {
-                    None => changed.wait(state).unwrap_or_else(PoisonError::into_inner),
-                    Some(Duration::ZERO) => {
-                        cancel.store(true, Ordering::Relaxed);
-                        state.at = None;
-                        state
-                    }
-                    Some(left) => {
-                        changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0
-                    }
-                };
-            }
-        });
-        Self { state }
-    }
-
-    fn set(&self, at: Option<Instant>) {
-        lock(&self.state.0).at = at;
-        self.state.1.notify_all();
-    }
-}
-
-impl Drop for Alarm {
-    fn drop(&mut self) {
-        lock(&self.state.0).quit = true;
-        self.state.1.notify_all();
-    }
-}
-
-struct Job<'a> {
+pub(super) struct Job<'a> {
     shared: &'a Shared,
     alarm: &'a Alarm,
     legacy: &'a mut Legacy,
@@ -380,9 +82,38 @@ struct Job<'a> {
     curves: [Vec<Point>; 2],
 }
 
-impl Job<'_> {
+impl<'a> Job<'a> {
+    pub(super) fn new(
+        shared: &'a Shared,
+        alarm: &'a Alarm,
+        legacy: &'a mut Legacy,
+        request: Arc<Request>,
+    ) -> Self {
+        Self {
+            shared,
+            alarm,
+            legacy,
+            request,
+            counters: None,
+            published: Instant::now(),
+            publish_gap: Duration::ZERO,
+            laws: None,
+            curves: [Vec::new(), Vec::new()],
+        }
+    }
+
+    /// Whether the camera moves.
+    pub(super) fn is_moving(&self) -> bool {
+        self.request.moving
+    }
+
+    /// What was worked on last.
+    pub(super) fn into_request(self) -> Arc<Request> {
+        self.request
+    }
+
     /// Small pictures for as long as the camera rests at this very place.
-    fn follow(&mut self, world: &World, environment: &Environment) {
+    pub(super) fn follow(&mut self, world: &World, environment: &Environment) {
         let mut session = self.small_session(world, environment);
         while !self.is_superseded() {
             // The first pass is never cut short: some picture is better than none.
@@ -401,7 +132,7 @@ impl Job<'_> {
     }
 
     /// A session for a small picture, with what was learned before.
-    fn small_session<'b>(&self, world: &'b World, environment: &'b Environment) -> Session<'b> {
+    fn small_session<'b>(&mut self, world: &'b World, environment: &'b Environment) -> Session<'b> {
         let mut view = self.request.view.clone();
         let shrink = self.shrink(&view);
         view.width = (view.width / shrink).max(1);
@@ -411,7 +142,7 @@ impl Job<'_> {
 
     /// A session that does not learn but uses what was learned before.
     fn experienced_session<'b>(
-        &self,
+        &mut self,
         world: &'b World,
         environment: &'b Environment,
         view: View,
@@ -419,7 +150,8 @@ impl Job<'_> {
         let mut session = Session::new(world, environment, view);
         session.finish_learning();
         if let Some(laws) = self.legacy.laws_for(&self.request) {
-            session.set_grid((*laws).clone());
+            let given = session.set_grid((*laws).clone());
+            self.go_on(&mut session, given);
         }
         session
     }
@@ -459,7 +191,7 @@ impl Job<'_> {
     }
 
     /// The full picture: learning first, with a preview meanwhile, then samples until a rule is met.
-    fn render(&mut self, world: &World, environment: &Environment) {
+    pub(super) fn render(&mut self, world: &World, environment: &Environment) {
         self.glance(world, environment);
         let mut main = Session::new(world, environment, self.request.view.clone());
         let mut plain = self.request.split.then(|| {
@@ -473,6 +205,7 @@ impl Job<'_> {
             preview = Some(self.experienced_session(world, environment, view));
         }
         while let Some(activity) = self.next_activity(&main) {
+            self.place(&mut main);
             match activity {
                 Activity::Paused | Activity::Done => {
                     self.publish(activity, &main, plain.as_ref(), preview.as_ref());
@@ -485,7 +218,8 @@ impl Job<'_> {
                     if let (Some(preview), Some(laws)) = (&mut preview, main.grid())
                         && !is_experienced
                     {
-                        preview.set_grid(laws.clone());
+                        let given = preview.set_grid(laws.clone());
+                        self.go_on(preview, given);
                     }
                 }
                 Activity::Rendering | Activity::Moving => {
@@ -569,7 +303,8 @@ impl Job<'_> {
         if self.is_superseded() {
             return;
         }
-        main.advance(1, &self.shared.cancel);
+        let learned = main.advance(1, &self.shared.cancel);
+        self.go_on(main, learned);
         let is_done = main.phase() == Phase::Rendering;
         if is_done {
             self.counters = main.take_counters().map(Arc::new);
@@ -587,13 +322,46 @@ impl Job<'_> {
     }
 
     /// One pass, cut short after a slice if asked for.
-    fn advance(&self, session: &mut Session<'_>, rule: Option<StopRule>, cut: bool) {
+    fn advance(&mut self, session: &mut Session<'_>, rule: Option<StopRule>, cut: bool) {
+        self.place(session);
         self.alarm.set(cut.then(|| Instant::now() + SLICE));
-        session.advance(session.next_pass(&rule.unwrap_or_default()), &self.shared.cancel);
+        let samples = session.next_pass(&rule.unwrap_or_default());
+        let advanced = session.advance(samples, &self.shared.cancel);
         self.alarm.set(None);
+        self.go_on(session, advanced);
         let slot = lock(&self.shared.slot);
         if !slot.quit && slot.request.as_ref().is_none_or(|new| !self.request.restarts(new)) {
             self.shared.cancel.store(false, Ordering::Relaxed);
+        }
+    }
+
+    /// Lets the session run on the device that is asked for now.
+    fn place(&mut self, session: &mut Session<'_>) {
+        let is_long = self.legacy.device.needs_preparation(&self.request);
+        if is_long {
+            self.shared.is_preparing.store(true, Ordering::Relaxed);
+            (self.shared.wake)();
+            // The other device's speed says nothing.
+            self.legacy.seconds_per_path = None;
+        }
+        self.legacy.device.place(session, &self.request);
+        self.shared.is_preparing.store(false, Ordering::Relaxed);
+        self.tell_failure();
+    }
+
+    /// Goes on where it can if a GPU has failed.
+    fn go_on(&mut self, session: &mut Session<'_>, outcome: Result<()>) {
+        if let Err(failure) = outcome {
+            session.continue_on_cpu();
+            self.legacy.device.give_up(&failure);
+            self.tell_failure();
+        }
+    }
+
+    fn tell_failure(&mut self) {
+        if let Some(sentence) = self.legacy.device.take_failure() {
+            lock(&self.shared.failures).push(sentence);
+            (self.shared.wake)();
         }
     }
 
@@ -668,6 +436,7 @@ impl Job<'_> {
             noise: film.noise(),
             film: Arc::new(film.clone()),
             figures: *session.figures(),
+            gpu: session.gpu_figures().map(Arc::new),
             grid: session.grid().map(|grid| {
                 // Laws are megabytes and seldom change: they are copied once.
                 let key = (std::ptr::from_ref(grid).addr(), session.figures().learning_paths);

@@ -1,0 +1,94 @@
+//! Where sessions run: the GPU that was asked for, as long as it does what it should, else the CPU.
+
+use std::sync::Arc;
+
+use super::Request;
+use crate::environment::Environment;
+use crate::error::{Error, Result};
+use crate::path::World;
+use crate::render::Session;
+use crate::render::gpu::{DeviceChoice, Gpu, Stage};
+
+/// The device in use and what is on it.
+#[derive(Default)]
+pub(super) struct Device {
+    /// Name of the adapter to take, if one was asked for.
+    adapter: Option<String>,
+    choice: Option<DeviceChoice>,
+    gpu: Option<Gpu>,
+    staged: Option<Staged>,
+    failure: Option<String>,
+}
+
+/// What is on the GPU.
+struct Staged {
+    world: Arc<World>,
+    environment: Arc<Environment>,
+    stage: Stage,
+}
+
+impl Device {
+    pub(super) fn new(adapter: Option<String>) -> Self {
+        Self { adapter, ..Self::default() }
+    }
+
+    /// Whether [`Self::place`] may take long.
+    pub(super) fn needs_preparation(&self, request: &Request) -> bool {
+        let is_staged =
+            self.staged.as_ref().is_some_and(|on| Arc::ptr_eq(&on.world, &request.world));
+        self.choice != Some(request.device) || (self.gpu.is_some() && !is_staged)
+    }
+
+    /// Lets the session run where the request says; what it has so far is kept.
+    pub(super) fn place(&mut self, session: &mut Session<'_>, request: &Request) {
+        if self.choice != Some(request.device) {
+            self.choose(request.device);
+        }
+        let Some(gpu) = self.gpu.clone() else {
+            session.continue_on_cpu();
+            return;
+        };
+        if session.gpu_figures().is_some() {
+            return;
+        }
+        let placed = self.stage(&gpu, request).and_then(|stage| session.continue_on_gpu(stage));
+        if let Err(failure) = placed {
+            self.give_up(&failure);
+        }
+    }
+
+    /// Does without the GPU until something else is chosen.
+    pub(super) fn give_up(&mut self, failure: &Error) {
+        self.failure.get_or_insert_with(|| format!("{failure}; the CPU renders"));
+        (self.gpu, self.staged) = (None, None);
+    }
+
+    /// What went wrong since this was asked last.
+    pub(super) fn take_failure(&mut self) -> Option<String> {
+        self.failure.take()
+    }
+
+    fn choose(&mut self, choice: DeviceChoice) {
+        self.choice = Some(choice);
+        (self.gpu, self.staged) = (None, None);
+        // The name only says which GPU is meant.
+        let adapter = self.adapter.as_deref().filter(|_| choice != DeviceChoice::Cpu);
+        match choice.open(adapter) {
+            Ok(gpu) => self.gpu = gpu,
+            Err(failure) => self.give_up(&failure),
+        }
+    }
+
+    /// The request's scene and map on the GPU; what is there already is not uploaded again.
+    fn stage(&mut self, gpu: &Gpu, request: &Request) -> Result<&Stage> {
+        let (world, environment) = (&request.world, &request.environment);
+        let before = self.staged.take().filter(|on| Arc::ptr_eq(&on.world, world));
+        let stage = match before {
+            Some(on) if Arc::ptr_eq(&on.environment, environment) => on.stage,
+            Some(on) => on.stage.relit(environment)?,
+            None => Stage::new(gpu, world, environment)?,
+        };
+        let (world, environment) = (Arc::clone(world), Arc::clone(environment));
+        Ok(&self.staged.insert(Staged { world, environment, stage }).stage)
+    }
+}

@@ -1,0 +1,290 @@
+//! The render thread: takes the latest request, publishes the latest picture.
+//!
+//! The only place that runs a [`crate::render::Session`]. A request that differs in what is seen starts anew; one
+//! that differs in when to stop or whether to pause is taken on the way. While learning for a new
+//! view, a second session renders with what was learned for the view before, around its centre, so
+//! that there is a picture at once.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+
+mod alarm;
+mod device;
+mod job;
+
+use alarm::Alarm;
+use job::{Job, Legacy};
+
+use super::Wake;
+use crate::environment::Environment;
+use crate::error::{Error, Result};
+use crate::light_grid::{LearningGrid, LightGrid};
+use crate::path::World;
+use crate::render::film::Film;
+use crate::render::gpu::{DeviceChoice, GpuFigures};
+use crate::render::{Figures, Sampling, StopRule, View};
+
+/// What is to be rendered.
+#[derive(Clone)]
+pub struct Request {
+    /// The scene.
+    pub world: Arc<World>,
+    /// The map, turned and scaled.
+    pub environment: Arc<Environment>,
+    /// What is seen and how.
+    pub view: View,
+    /// Render plainly beside it, at equal time.
+    pub split: bool,
+    /// The camera moves: a small picture at once rather than a good one.
+    pub moving: bool,
+    /// Show pictures on the way; else only what [`View`] asks for, for repeatable screenshots.
+    pub previews: bool,
+    /// Where it is rendered.
+    pub device: DeviceChoice,
+    /// When to stop.
+    pub rule: StopRule,
+    /// Do nothing for now.
+    pub paused: bool,
+    /// Counts restarts asked for by hand.
+    pub run: u32,
+}
+
+impl Request {
+    /// Whether what is rendered for `self` is of no use for `new`.
+    fn restarts(&self, new: &Self) -> bool {
+        !Arc::ptr_eq(&self.world, &new.world)
+            || !Arc::ptr_eq(&self.environment, &new.environment)
+            || self.view != new.view
+            || self.split != new.split
+            || self.moving != new.moving
+            || self.run != new.run
+    }
+
+    fn is_same(&self, new: &Self) -> bool {
+        !self.restarts(new)
+            && self.device == new.device
+            && self.rule == new.rule
+            && self.paused == new.paused
+    }
+}
+
+/// What the worker is doing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Activity {
+    /// A small picture while the camera moves.
+    Moving,
+    /// Learning, the share done in `[0,1]`.
+    Learning(f32),
+    /// Adding samples.
+    Rendering,
+    /// Asked to pause.
+    Paused,
+    /// A stop rule was met.
+    Done,
+}
+
+/// How good a picture was at one moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// Seconds of learning and rendering.
+    pub seconds: f64,
+    /// Samples per pixel.
+    pub samples: f64,
+    /// Estimated relative RMS error.
+    pub noise: f64,
+}
+
+/// One picture and what was done for it.
+#[derive(Clone)]
+pub struct Take {
+    /// How the map was sampled.
+    pub sampling: Sampling,
+    /// The sums.
+    pub film: Arc<Film>,
+    /// What was done.
+    pub figures: Figures,
+    /// [`Film::noise`].
+    pub noise: f64,
+    /// The laws in use.
+    pub grid: Option<Arc<LightGrid>>,
+    /// The GPU at work; `None` is the CPU.
+    pub gpu: Option<Arc<GpuFigures>>,
+}
+
+/// The latest picture.
+#[derive(Clone)]
+pub struct Snapshot {
+    /// Counts snapshots.
+    pub number: u64,
+    /// What it was rendered for.
+    pub request: Arc<Request>,
+    /// What is going on.
+    pub activity: Activity,
+    /// The picture.
+    pub main: Take,
+    /// The plain picture of a split view.
+    pub plain: Option<Take>,
+    /// Whether `main` only bridges the time until learning is done.
+    pub is_preview: bool,
+    /// What learning counted, once it has ended.
+    pub counters: Option<Arc<LearningGrid>>,
+    /// Figures of the session that learns, while `main` is a preview.
+    pub learning: Figures,
+    /// How the error of `main` and of `plain` fell.
+    pub curves: [Vec<Point>; 2],
+    /// A small picture of the same view, for pixels that have no samples yet.
+    pub under: Option<Arc<Film>>,
+}
+
+struct Shared {
+    slot: Mutex<Slot>,
+    changed: Condvar,
+    cancel: Arc<AtomicBool>,
+    snapshot: Mutex<Option<Arc<Snapshot>>>,
+    is_preparing: AtomicBool,
+    failures: Mutex<Vec<String>>,
+    wake: Wake,
+}
+
+#[derive(Default)]
+struct Slot {
+    request: Option<Arc<Request>>,
+    quit: bool,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The handle of the render thread; it ends when dropped.
+pub struct Worker {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+    pool: Arc<rayon::ThreadPool>,
+}
+
+impl Worker {
+    /// Starts the thread; `wake` is called at every new snapshot, `adapter` names the GPU to take
+    /// where one is wanted.
+    ///
+    /// # Errors
+    /// If the system gives no thread.
+    pub fn start(wake: Wake, adapter: Option<String>) -> Result<Self> {
+        let no_thread = |e: &dyn std::fmt::Display| {
+            Error::new(format!("the render threads cannot be started: {e}"))
+        };
+        let pool = rayon::ThreadPoolBuilder::new()
+            .thread_name(|i| format!("render {i}"))
+            .start_handler(|_| lower_priority())
+            .build()
+            .map_err(|e| no_thread(&e))?;
+        let pool = Arc::new(pool);
+        let shared = Arc::new(Shared {
+            slot: Mutex::default(),
+            changed: Condvar::new(),
+            cancel: Arc::default(),
+            snapshot: Mutex::default(),
+            is_preparing: AtomicBool::default(),
+            failures: Mutex::default(),
+            wake,
+        });
+        let (inside, render_pool) = (Arc::clone(&shared), Arc::clone(&pool));
+        let thread = std::thread::Builder::new()
+            .name("worker".to_owned())
+            .spawn(move || run(&inside, &render_pool, adapter))
+            .map_err(|e| no_thread(&e))?;
+        Ok(Self { shared, thread: Some(thread), pool })
+    }
+
+    /// Asks for a picture; the latest request counts.
+    pub fn submit(&self, request: Request) {
+        let mut slot = lock(&self.shared.slot);
+        if slot.request.as_ref().is_some_and(|old| old.is_same(&request)) {
+            return;
+        }
+        if slot.request.as_ref().is_some_and(|old| old.restarts(&request)) {
+            self.shared.cancel.store(true, Ordering::Relaxed);
+        }
+        slot.request = Some(Arc::new(request));
+        self.shared.changed.notify_all();
+    }
+
+    /// The latest picture.
+    pub fn snapshot(&self) -> Option<Arc<Snapshot>> {
+        lock(&self.shared.snapshot).clone()
+    }
+
+    /// Whether a GPU is being opened, filled or programmed.
+    pub fn is_preparing(&self) -> bool {
+        self.shared.is_preparing.load(Ordering::Relaxed)
+    }
+
+    /// Failures of GPUs since this was asked last, a sentence each.
+    pub fn take_failures(&self) -> Vec<String> {
+        std::mem::take(&mut lock(&self.shared.failures))
+    }
+
+    /// Threads that render.
+    pub fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        lock(&self.shared.slot).quit = true;
+        self.shared.cancel.store(true, Ordering::Relaxed);
+        self.shared.changed.notify_all();
+        if let Some(thread) = self.thread.take() {
+            // A panic there was reported there.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The window comes first: render threads give way to it.
+fn lower_priority() {
+    #[cfg(target_os = "linux")]
+    // SAFETY: plain system call; 0 names the calling thread, and failing is harmless.
+    unsafe {
+        libc::setpriority(libc::PRIO_PROCESS, 0, 5);
+    }
+}
+
+fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, adapter: Option<String>) {
+    let mut legacy = Legacy::new(adapter);
+    let alarm = Alarm::start(Arc::clone(&shared.cancel));
+    let mut done: Option<Arc<Request>> = None;
+    loop {
+        let request = {
+            let mut slot = lock(&shared.slot);
+            loop {
+                if slot.quit {
+                    return;
+                }
+                match &slot.request {
+                    Some(new) if done.as_ref().is_none_or(|old| !old.is_same(new)) => {
+                        // What was to be ended has ended.
+                        shared.cancel.store(false, Ordering::Relaxed);
+                        break Arc::clone(new);
+                    }
+                    _ => {
+                        slot = shared.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
+                    }
+                }
+            }
+        };
+        let world = Arc::clone(&request.world);
+        let environment = Arc::clone(&request.environment);
+        let mut job = Job::new(shared, &alarm, &mut legacy, request);
+        pool.install(|| {
+            if job.is_moving() {
+                job.follow(&world, &environment);
+            } else {
+                job.render(&world, &environment);
+            }
+        });
+        done = Some(job.into_request());
+    }
+}

@@ -1,0 +1,95 @@
+//! Kernels ready to run.
+
+use std::borrow::Cow;
+use std::sync::{Arc, PoisonError};
+
+use super::device::Gpu;
+use super::shader::{Binding, Kernel, Program};
+use crate::error::Result;
+
+/// A kernel ready to run.
+pub(super) struct Pipeline {
+    pub(super) pipeline: wgpu::ComputePipeline,
+    pub(super) layout: wgpu::BindGroupLayout,
+    pub(super) program: Program,
+}
+
+impl Pipeline {
+    /// Compiles a program; this can take seconds.
+    ///
+    /// # Errors
+    /// If the driver refuses it.
+    pub(super) fn new(gpu: &Gpu, entry: &str, program: Program) -> Result<Arc<Self>> {
+        let device = &gpu.device;
+        let entries: Vec<_> = program
+            .bindings
+            .iter()
+            .zip(0..)
+            .map(|(binding, index)| wgpu::BindGroupLayoutEntry {
+                binding: index,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty: binding_type(binding),
+                count: None,
+            })
+            .collect();
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(entry),
+            entries: &entries,
+        });
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(entry),
+            source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(&program.source)),
+        });
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(entry),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(entry),
+            layout: Some(&pipeline_layout),
+            module: &module,
+            entry_point: Some(entry),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        });
+        gpu.check()?;
+        Ok(Arc::new(Self { pipeline, layout, program }))
+    }
+}
+
+impl Gpu {
+    /// A kernel, compiled unless this device has run it before.
+    ///
+    /// # Errors
+    /// If the driver refuses it.
+    pub(super) fn pipeline(&self, kernel: Kernel, program: Program) -> Result<Arc<Pipeline>> {
+        let mut known = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pipeline) = known.get(&program.source) {
+            return Ok(Arc::clone(pipeline));
+        }
+        let source = program.source.clone();
+        let pipeline = Pipeline::new(self, kernel.name(), program)?;
+        known.insert(source, Arc::clone(&pipeline));
+        Ok(pipeline)
+    }
+}
+
+fn binding_type(binding: &Binding) -> wgpu::BindingType {
+    match binding {
+        Binding::Buffer { is_written, .. } => wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Storage { read_only: !is_written },
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+        Binding::Array(array) => wgpu::BindingType::Texture {
+            sample_type: if array.format.is_float() {
+                wgpu::TextureSampleType::Float { filterable: false }
+            } else {
+                wgpu::TextureSampleType::Uint
+            },
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        },
+    }
+}

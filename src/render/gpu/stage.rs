@@ -1,0 +1,136 @@
+//! What does not change with the view: a scene and a map on a device.
+
+use std::borrow::Cow;
+
+use rayon::prelude::*;
+
+use super::buffers::Buffers;
+use super::device::Gpu;
+use super::layout::{self, Globals};
+use super::shader::{self, Constants, Features, VertexTexels};
+use crate::bvh::compressed::CompressedTree;
+use crate::environment::Environment;
+use crate::error::{Error, Result};
+use crate::path::World;
+
+/// Deepest tree a traversal's stack is made for.
+const MAX_DEPTH: u32 = 96;
+
+/// A scene and a map uploaded once for any number of views.
+pub struct Stage {
+    pub(super) gpu: Gpu,
+    pub(super) buffers: Buffers,
+    pub(super) globals: Globals,
+    pub(super) constants: Constants,
+    /// The map that is uploaded; it shares its pixels with the one it was cloned from.
+    environment: Environment,
+}
+
+impl Stage {
+    /// Uploads both.
+    ///
+    /// # Errors
+    /// If something does not fit on the device, with the numbers.
+    pub fn new(gpu: &Gpu, world: &World, environment: &Environment) -> Result<Self> {
+        let mut buffers = Buffers::new(gpu);
+        let mut globals = Globals::default();
+        let constants = upload_world(&mut buffers, &mut globals, world)?;
+        upload_map(&mut buffers, &mut globals, environment)?;
+        let environment = environment.clone();
+        Ok(Self { gpu: gpu.clone(), buffers, globals, constants, environment })
+    }
+
+    /// The same scene under another map; one that is only turned or scaled is not uploaded again.
+    ///
+    /// # Errors
+    /// If it does not fit on the device, with the numbers.
+    pub fn relit(&self, environment: &Environment) -> Result<Self> {
+        let mut stage = Self {
+            gpu: self.gpu.clone(),
+            buffers: self.buffers.clone(),
+            globals: self.globals,
+            constants: self.constants,
+            environment: environment.clone(),
+        };
+        if environment.shares_map_with(&self.environment) {
+            stage.globals.set_environment(environment);
+        } else {
+            upload_map(&mut stage.buffers, &mut stage.globals, environment)?;
+        }
+        Ok(stage)
+    }
+
+    /// The device it is on.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+}
+
+/// Uploads geometry, materials, textures and lights; returns what kernels are told of them.
+fn upload_world(buffers: &mut Buffers, globals: &mut Globals, world: &World) -> Result<Constants> {
+    let scene = &world.scene;
+    let features = Features::of_world(world);
+    let tree = CompressedTree::build(&scene.positions, &scene.triangles);
+    if tree.depth > MAX_DEPTH {
+        return Err(Error::new(format!(
+            "the scene's tree is {} levels deep; a GPU walks at most {MAX_DEPTH}",
+            tree.depth
+        )));
+    }
+    let bounds = world.bvh.bounds();
+    globals.scene_extent = bounds.0.abs().max(bounds.1.abs()).max_element();
+    put_array(buffers, "bvh_nodes", "the scene's tree", tree.nodes.as_flattened())?;
+    put_array(buffers, "bvh_triangles", "the scene's geometry", tree.triangles.as_flattened())?;
+    let vertex = VertexTexels::of(&features);
+    put_array(buffers, "triangles", "the scene's geometry", &layout::triangles(scene))?;
+    put_array(buffers, "vertices", "the scene's geometry", &layout::vertices(scene, &vertex))?;
+    let (materials, texture_refs) = layout::materials(world);
+    put_array(buffers, "materials", "the list of materials", &materials)?;
+    if features.has("textures") {
+        put_array(buffers, "texture_refs", "the list of textures", &texture_refs)?;
+        let texels = scene.images.iter().map(|image| image.texels.len() as u64).sum();
+        let images = scene.images.iter().map(|image| bytemuck::cast_slice(&image.texels));
+        buffers.put_array("texels", "the set of textures", texels, images.map(Cow::Borrowed))?;
+    }
+    if features.has("scene_lights") {
+        let lights = layout::light_words(world, globals);
+        put_array(buffers, "lights", "the list of lights", &lights)?;
+    }
+    Ok(Constants { stack_size: tree.depth, vertex, ..Constants::default() })
+}
+
+/// Makes an array of values that take whole texels or parts of one.
+pub(super) fn put_array<T: bytemuck::Pod>(
+    buffers: &mut Buffers,
+    name: &'static str,
+    what: &str,
+    values: &[T],
+) -> Result<()> {
+    let bytes: &[u8] = bytemuck::cast_slice(values);
+    let texel_bytes = shader::ARRAYS.iter().find(|kind| kind.name == name);
+    let texels = bytes.len() as u64 / texel_bytes.map_or(4, |kind| kind.format.bytes());
+    buffers.put_array(name, what, texels, std::iter::once(Cow::Borrowed(bytes)))
+}
+
+/// Uploads the map's radiance and its importance table.
+fn upload_map(
+    buffers: &mut Buffers,
+    globals: &mut Globals,
+    environment: &Environment,
+) -> Result<()> {
+    globals.set_environment(environment);
+    if environment.is_black() {
+        return Ok(());
+    }
+    let map = environment.map();
+    let rows = map.pixels.chunks(map.width as usize * 64).map(|rows| {
+        let words: Vec<[u32; 2]> = rows.par_iter().map(|rgb| layout::pack_radiance(*rgb)).collect();
+        Cow::Owned(bytemuck::pod_collect_to_vec(&words))
+    });
+    buffers.put_array("map_texels", "the map", map.pixels.len() as u64, rows)?;
+    let parts = environment.table_words();
+    globals.tile_sums_at = parts[0].len() as u32;
+    let words = parts.iter().map(|part| part.len() as u64).sum();
+    let bytes = parts.iter().map(|part| Cow::Borrowed(bytemuck::cast_slice(part)));
+    buffers.put_array("sums", "the map's importance table", words, bytes)
+}
