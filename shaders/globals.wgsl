@@ -58,7 +58,8 @@ struct Globals {
     scene_extent: f32,
     // What a learned contribution is divided by.
     mean_contribution: f32,
+    // What no compiler can know; see `rounded`.
+    zero: u32,
     padding_0: u32,
     padding_1: u32,
-    padding_2: u32,
 }

@@ -1,7 +1,7 @@
 //! The GPU's schedule: the same paths in compute shaders, in dispatches too short to be felt.
 //!
-//! [`Renderer`] holds the scene, the map and the laws on a device and brings a [`Film`] forward as
-//! `cpu` does. A pass sums at most [`MAX_PASS_SAMPLES`] samples of a pixel in f32 on the device; the
+//! `Renderer` holds the scene, the map and the laws on a device and brings a [`Film`] forward as
+//! `cpu` does. A pass sums at most `MAX_PASS_SAMPLES` samples of a pixel in f32 on the device; the
 //! f64 film on the host adds up the passes, so that no precision is lost at any number of samples
 //! and the work so far survives the device.
 
@@ -9,6 +9,8 @@ mod buffers;
 mod device;
 pub(crate) mod layout;
 mod pacer;
+#[cfg(test)]
+mod parity;
 mod pipeline;
 pub(crate) mod shader;
 mod stage;
@@ -86,6 +88,20 @@ impl Renderer {
         view: &View,
         rays: &CameraRays,
     ) -> Result<Self> {
+        Self::with_kernel(stage, world, environment, view, rays, |gpu, program| {
+            gpu.pipeline(Kernel::Render, program)
+        })
+    }
+
+    /// [`Self::new`] with the kernel that `compile` makes of the program for rendering.
+    fn with_kernel(
+        stage: &Stage,
+        world: &World,
+        environment: &Environment,
+        view: &View,
+        rays: &CameraRays,
+        compile: impl FnOnce(&Gpu, Program) -> Result<Arc<Pipeline>>,
+    ) -> Result<Self> {
         let features = Features::of(world, environment, view);
         let mut buffers = stage.buffers.clone();
         let mut globals = stage.globals;
@@ -103,7 +119,7 @@ impl Renderer {
         let program = Program::new(Kernel::Render, &features, &constants, width_log2);
         let kernel_facts = KernelFacts::of(&features);
         let renderer = Self {
-            render: stage.gpu.pipeline(Kernel::Render, program)?,
+            render: compile(&stage.gpu, program)?,
             learn: None,
             gpu: stage.gpu.clone(),
             buffers,
