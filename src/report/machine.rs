@@ -76,7 +76,8 @@ impl OpenDevice {
         }
         let gpu = Gpu::open(adapter)?;
         let facts = gpu.facts();
-        let name = format!("{} ({}, driver {})", facts.name, facts.backend, facts.driver);
+        let kind = if facts.is_software() { "software, " } else { "" };
+        let name = format!("{} ({kind}{}, driver {})", facts.name, facts.backend, facts.driver);
         Ok(Self { device, gpu: Some(gpu), name })
     }
 

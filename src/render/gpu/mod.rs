@@ -374,7 +374,7 @@ fn upload_tables(
 mod tests {
     use super::*;
     use crate::environment::EnvironmentOptions;
-    use crate::light_grid::LawOptions;
+    use crate::light_grid::{LawOptions, Recording};
     use crate::light_grid::cells::SphericalGrid;
     use crate::path::{PathLimits, PathTracer};
     use crate::render::{Sampling, cpu};
@@ -403,7 +403,7 @@ mod tests {
             layers: false,
         };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
-        let grid = SphericalGrid { center: rays.position, columns: 64, rows: 32, faces: !talk };
+        let grid = SphericalGrid { center: rays.position, columns: 64, rows: 32, faces: recording.faces };
         let mut learning = LearningGrid::new(grid, environment.tile_count(), recording);
         let mut laws = LightGrid::whole_map(environment.tile_energies());
         let never = AtomicBool::new(false);
@@ -443,7 +443,12 @@ mod tests {
             Ok(gpu) => gpu,
             Err(reason) => return eprintln!("SKIPPED: {reason}"),
         };
-        for recording in [LawOptions::ADAPTIVE, LawOptions::TALK] {
+        let squared = LawOptions {
+            faces: false,
+            recording: Recording::VisibleCosineSquared,
+            ..LawOptions::ADAPTIVE
+        };
+        for recording in [LawOptions::ADAPTIVE, LawOptions::TALK, squared] {
             let (cpu_visits, cpu_blocks, cpu_rays) = learn(None, recording);
             let (gpu_visits, gpu_blocks, gpu_rays) = learn(Some(&gpu), recording);
             assert_eq!(cpu_blocks.len(), gpu_blocks.len(), "the same cells have counters");

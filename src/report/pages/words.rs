@@ -167,8 +167,8 @@ pub fn row_sentence(report: &Report, row: &RowReport) -> String {
             .methods
             .iter()
             .filter_map(|m| {
-                let found = m.speed_up(baseline, Measure::TrimmedRelMse)?;
-                Some(format!("{} {}", m.method.name, speed_up(found)))
+                let cell = speed_up_cell(m, baseline, Measure::TrimmedRelMse);
+                (!cell.is_empty()).then(|| format!("{} {cell}", m.method.name))
             })
             .collect();
         parts.push(format!("{}: {}", device.device.title(), ratios.join(", ")));
