@@ -13,6 +13,7 @@ use lightgrid::light_grid::LawOptions;
 use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Figures, Phase, Sampling, Session, View};
+use lightgrid::sampler::Points;
 use lightgrid::scene::builtin;
 
 const SIZE: (u32, u32) = (128, 72);
@@ -129,6 +130,7 @@ impl Case<'_> {
             sampling,
             limits: PathLimits { bounces, russian_roulette: true },
             seed,
+            points: Points::Sobol,
             grid_columns: 64,
             learning_paths: LEARNING_PATHS,
             laws: LawOptions::ADAPTIVE,

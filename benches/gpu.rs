@@ -8,6 +8,7 @@ use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::gpu::{Gpu, Stage};
 use lightgrid::render::{Sampling, Session, View};
+use lightgrid::sampler::Points;
 use lightgrid::scene::builtin;
 
 /// Rounds in which both devices take their turn; the best round of each counts.
@@ -47,6 +48,7 @@ fn row(gpu: &Gpu, name: &str, world: &World, environment: &Environment, bounces:
         sampling: Sampling::Adaptive,
         limits: PathLimits { bounces, russian_roulette: true },
         seed: 0,
+        points: Points::Sobol,
         grid_columns: 64,
         learning_paths: 1 << 14,
         laws: LawOptions::ADAPTIVE,

@@ -10,6 +10,7 @@ use lightgrid::light_grid::tile_laws::TileLaws;
 use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Sampling, Session, View};
+use lightgrid::sampler::Points;
 use lightgrid::scene::builtin;
 
 pub(crate) fn bench(criterion: &mut Criterion) {
@@ -25,6 +26,7 @@ pub(crate) fn bench(criterion: &mut Criterion) {
         sampling,
         limits: PathLimits { bounces: 5, russian_roulette: true },
         seed: 0,
+        points: Points::Sobol,
         grid_columns: 64,
         learning_paths,
         laws: LawOptions::ADAPTIVE,

@@ -10,6 +10,7 @@ use crate::path::{Background, PathLimits};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::DeviceChoice;
 use crate::render::{Crop, Sampling, StopRule, View};
+use crate::sampler::Points;
 use crate::scene::{Camera, Medium, Projection, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
 
@@ -134,6 +135,7 @@ impl Document {
             sampling: self.light.sampling,
             limits: PathLimits { bounces: self.light.bounces, russian_roulette: true },
             seed: self.light.seed,
+            points: Points::Sobol,
             grid_columns: 64,
             learning_paths: View::suitable_learning_paths(width, height, self.stop.samples),
             laws: LawOptions::ADAPTIVE,

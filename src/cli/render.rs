@@ -21,6 +21,7 @@ use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::DeviceChoice;
 use crate::render::{Crop, Sampling, Session, StopRule, View};
+use crate::sampler::Points;
 use crate::scene::{Camera, Medium, Projection, Scene, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
 
@@ -271,7 +272,7 @@ impl RenderArguments {
 pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     check_outputs(arguments)?;
     start_threads(arguments.threads)?;
-    let cancel = super::interrupt::flag();
+    let cancel = super::interrupt::flag("stopping after this pass and writing the picture");
     let progress = Progress::start("loading");
     let mut phases = Phases::default();
 
@@ -345,7 +346,7 @@ fn lap(start: Instant) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
-fn start_threads(threads: u16) -> Result<()> {
+pub(super) fn start_threads(threads: u16) -> Result<()> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(usize::from(threads))
         .thread_name(|i| format!("render {i}"))
@@ -386,6 +387,7 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
             russian_roulette: !arguments.no_russian_roulette,
         },
         seed: arguments.seed,
+        points: Points::Sobol,
         grid_columns: arguments.grid,
         learning_paths: arguments
             .learning_paths

@@ -13,6 +13,7 @@ pub mod camera;
 pub mod framing;
 mod learn;
 mod lights;
+mod ray_clock;
 mod world;
 
 pub use background::Background;

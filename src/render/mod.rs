@@ -25,6 +25,7 @@ use crate::light_grid::{LawOptions, LearningGrid, LightGrid};
 use crate::medium::Fog;
 use crate::path::camera::CameraRays;
 use crate::path::{Background, PathLimits, PathTracer, World};
+use crate::sampler::Points;
 use crate::scene::{Camera, Medium};
 
 /// How the environment map is sampled.
@@ -59,6 +60,8 @@ pub struct View {
     pub limits: PathLimits,
     /// Seed of all random numbers.
     pub seed: u32,
+    /// Which points samples are taken at; learning always takes [`Points::Sobol`].
+    pub points: Points,
     /// Light Grid cells around the horizon; half as many from top to bottom.
     pub grid_columns: u32,
     /// Camera paths to learn from.
@@ -86,6 +89,15 @@ pub struct Crop {
 }
 
 impl View {
+    /// How counters become laws; `None` if nothing is learned.
+    pub fn law_options(&self) -> Option<LawOptions> {
+        match self.sampling {
+            Sampling::Adaptive => Some(self.laws),
+            Sampling::Talk => Some(LawOptions::TALK),
+            Sampling::Plain | Sampling::Bsdf => None,
+        }
+    }
+
     /// Learning paths that suit a picture of this size and sample count.
     pub fn suitable_learning_paths(width: u32, height: u32, samples: Option<u32>) -> u64 {
         let pixels = u64::from(width) * u64::from(height);
@@ -140,7 +152,7 @@ pub enum Phase {
 }
 
 /// Figures of what has been done.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
     /// Camera paths learned from.
     pub learning_paths: u64,
@@ -148,6 +160,8 @@ pub struct Figures {
     pub learning_rays: u64,
     /// Seconds of learning, laws included.
     pub learning_seconds: f64,
+    /// Seconds of learning that went into making laws.
+    pub law_seconds: f64,
     /// Cells that learning paths visited.
     pub visited_cells: usize,
     /// Cells with a law of their own.
@@ -405,6 +419,7 @@ impl<'a> Session<'a> {
     /// Makes laws of what all passes so far counted: the next pass draws from them.
     fn update_laws(&mut self) {
         let Some(learning) = &mut self.learning else { return };
+        let start = Instant::now();
         learning.grid.counters.end_pass();
         learning.pass += 1;
         // The old laws go first: both together would not fit the budget.
@@ -415,6 +430,7 @@ impl<'a> Session<'a> {
         self.figures.grid_peak_bytes = self.figures.grid_peak_bytes.max(held);
         self.figures.learned_cells =
             self.learned.as_ref().map_or(0, |grid| grid.laws().len() as usize - 1);
+        self.figures.law_seconds += start.elapsed().as_secs_f64();
     }
 
     fn render(&mut self, target_samples: u32, cancel: &AtomicBool) -> Result<()> {
@@ -442,11 +458,7 @@ fn new_learning(
     view: &View,
     rays: &CameraRays,
 ) -> Option<Learning> {
-    let options = match view.sampling {
-        Sampling::Adaptive => view.laws,
-        Sampling::Talk => LawOptions::TALK,
-        Sampling::Plain | Sampling::Bsdf => return None,
-    };
+    let options = view.law_options()?;
     if environment.is_black() || view.limits.bounces == 0 {
         return None;
     }
@@ -454,7 +466,7 @@ fn new_learning(
         center: rays.position(),
         columns: view.grid_columns,
         rows: (view.grid_columns / 2).max(1),
-        faces: view.sampling == Sampling::Adaptive,
+        faces: options.faces,
         medium: view.fog(world).is_some(),
     };
     Some(Learning { grid: LearningGrid::new(grid, environment.tile_count(), options), pass: 0 })

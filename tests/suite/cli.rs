@@ -31,12 +31,12 @@ const CORNERS: [[f32; 3]; 9] = [
 ];
 
 /// A folder with `scene.gltf` and `map.exr`, in which commands run.
-struct Bench {
+pub(crate) struct Bench {
     folder: tempfile::TempDir,
 }
 
 impl Bench {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let bytes: Vec<u8> = CORNERS.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
         fs::write(folder.path().join("scene.bin"), bytes).expect("written");
@@ -48,17 +48,17 @@ impl Bench {
         Self { folder }
     }
 
-    fn path(&self, name: &str) -> std::path::PathBuf {
+    pub(crate) fn path(&self, name: &str) -> std::path::PathBuf {
         self.folder.path().join(name)
     }
 
-    fn command(&self, line: &str) -> Command {
+    pub(crate) fn command(&self, line: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_lightgrid"));
         command.current_dir(self.folder.path()).args(line.split_whitespace());
         command
     }
 
-    fn run(&self, line: &str) -> Output {
+    pub(crate) fn run(&self, line: &str) -> Output {
         self.command(line).output().expect("the binary starts")
     }
 
@@ -70,7 +70,7 @@ impl Bench {
     }
 
     /// What a command that must fail says; it must leave no new file behind.
-    fn refusal(&self, line: &str, status: i32) -> String {
+    pub(crate) fn refusal(&self, line: &str, status: i32) -> String {
         let before = self.files();
         let output = self.run(line);
         let message = text(&output.stderr);
@@ -81,7 +81,7 @@ impl Bench {
         message
     }
 
-    fn files(&self) -> Vec<String> {
+    pub(crate) fn files(&self) -> Vec<String> {
         let entries = fs::read_dir(self.folder.path()).expect("readable");
         let mut names: Vec<String> = entries
             .map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned())
@@ -90,7 +90,7 @@ impl Bench {
         names
     }
 
-    fn json(&self, name: &str) -> Value {
+    pub(crate) fn json(&self, name: &str) -> Value {
         serde_json::from_slice(&fs::read(self.path(name)).expect("written")).expect("JSON")
     }
 }
@@ -105,14 +105,14 @@ fn render_line(rest: &str) -> String {
     line
 }
 
-fn text(bytes: &[u8]) -> String {
+pub(crate) fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
 #[test]
 fn help_names_every_command() {
     let help = text(&Bench::new().run("--help").stdout);
-    for word in ["view", "screenshot", "render", "compare", "info", "sat"] {
+    for word in ["view", "screenshot", "render", "compare", "info", "report", "sat"] {
         assert!(help.contains(word), "{help}");
     }
 }

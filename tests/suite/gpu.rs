@@ -13,6 +13,7 @@ use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::gpu::{Gpu, Stage};
 use lightgrid::render::{Crop, Phase, Sampling, Session, View};
+use lightgrid::sampler::Points;
 use lightgrid::scene::{Camera, Material, Medium, builtin, gltf};
 
 use crate::estimator::scenes::{self, lambert, lamp, room, smoked_glass};
@@ -237,6 +238,20 @@ fn layers_lens_filters_background_and_crops_are_the_same() {
         assert!(depth < 0.02 * pixels, "{depth} of {pixels} depths differ");
         assert!(albedo < 0.06 * pixels && normal < 0.06 * pixels, "{albedo}, {normal}");
     }
+}
+
+#[test]
+fn independent_points_are_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let world = World::new(builtin::build("open").expect("built in"));
+    let environment = sky_map("overcast");
+    let points = Points::Independent;
+    let view = View { points, ..picture(&world, Sampling::Plain) };
+    let gpu_film = finish(on_gpu(&world, &environment, view.clone(), &gpu), 8);
+    let cpu_film = render(&world, &environment, view.clone(), 8);
+    assert!(differing(&cpu_film, &gpu_film) < 0.05);
+    let even = render(&world, &environment, View { points: Points::Sobol, ..view }, 8);
+    assert!(differing(&even, &gpu_film) > 0.5, "they are other points");
 }
 
 #[test]

@@ -375,10 +375,11 @@ fn upload_tables(
 mod tests {
     use super::*;
     use crate::environment::EnvironmentOptions;
-    use crate::light_grid::LawOptions;
     use crate::light_grid::cells::SphericalGrid;
+    use crate::light_grid::{LawOptions, Recording};
     use crate::path::{Background, PathLimits, PathTracer};
     use crate::render::{Sampling, cpu};
+    use crate::sampler::Points;
     use crate::scene::builtin;
 
     /// Visits of each cell and tile counters after two passes, the second with laws of the first.
@@ -396,6 +397,7 @@ mod tests {
             sampling: if talk { Sampling::Talk } else { Sampling::Adaptive },
             limits: PathLimits { bounces: 4, russian_roulette: true },
             seed: 5,
+            points: Points::Sobol,
             grid_columns: 64,
             learning_paths: 1 << 13,
             laws: recording,
@@ -409,7 +411,7 @@ mod tests {
             center: rays.position,
             columns: 64,
             rows: 32,
-            faces: !talk,
+            faces: recording.faces,
             medium: false,
         };
         let mut learning = LearningGrid::new(grid, environment.tile_count(), recording);
@@ -453,7 +455,12 @@ mod tests {
             Ok(gpu) => gpu,
             Err(reason) => return eprintln!("SKIPPED: {reason}"),
         };
-        for recording in [LawOptions::ADAPTIVE, LawOptions::TALK] {
+        let squared = LawOptions {
+            faces: false,
+            recording: Recording::VisibleCosineSquared,
+            ..LawOptions::ADAPTIVE
+        };
+        for recording in [LawOptions::ADAPTIVE, LawOptions::TALK, squared] {
             let (cpu_visits, cpu_blocks, cpu_rays) = learn(None, recording);
             let (gpu_visits, gpu_blocks, gpu_rays) = learn(Some(&gpu), recording);
             assert_eq!(cpu_blocks.len(), gpu_blocks.len(), "the same cells have counters");

@@ -15,7 +15,7 @@ use crate::path::{Background, PathLimits, PathTracer, World};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::layout::{pack_radiance, unpack_radiance};
 use crate::render::{Sampling, View};
-use crate::sampler::Sampler;
+use crate::sampler::{Points, Sampler};
 use crate::scene::{
     AlphaMode, Camera, Material, Medium, Projection, PunctualKind, PunctualLight, Scene, Texture,
     TextureImage, TextureRef, Wrap,
@@ -116,6 +116,7 @@ fn view(camera: Camera, filter: PixelFilter, sampling: Sampling) -> View {
         sampling,
         limits: PathLimits { bounces: 6, russian_roulette: true },
         seed: 11,
+        points: Points::Sobol,
         grid_columns: 64,
         learning_paths: 0,
         laws: LawOptions::ADAPTIVE,
