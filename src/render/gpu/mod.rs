@@ -374,8 +374,8 @@ fn upload_tables(
 mod tests {
     use super::*;
     use crate::environment::EnvironmentOptions;
-    use crate::light_grid::{LawOptions, Recording};
     use crate::light_grid::cells::SphericalGrid;
+    use crate::light_grid::{LawOptions, Recording};
     use crate::path::{PathLimits, PathTracer};
     use crate::render::{Sampling, cpu};
     use crate::sampler::Points;
@@ -403,7 +403,8 @@ mod tests {
             layers: false,
         };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
-        let grid = SphericalGrid { center: rays.position, columns: 64, rows: 32, faces: recording.faces };
+        let grid =
+            SphericalGrid { center: rays.position, columns: 64, rows: 32, faces: recording.faces };
         let mut learning = LearningGrid::new(grid, environment.tile_count(), recording);
         let mut laws = LightGrid::whole_map(environment.tile_energies());
         let never = AtomicBool::new(false);
