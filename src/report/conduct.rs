@@ -137,7 +137,7 @@ impl Conductor<'_> {
         };
         for device in 0..self.devices.len() {
             let uploaded = work.stage.upload(&self.devices[device]);
-            self.can(&mut work, device, uploaded);
+            self.can(&mut work, device, &uploaded);
         }
         if work.refusals.iter().all(Option::is_some) {
             return self.update(&mut work);
@@ -228,12 +228,12 @@ impl Conductor<'_> {
         let place = work.stage.place(self.plan, &self.devices[device], settings);
         let ready = place.warm_up(settings);
         work.is_ready[method] = ready.is_ok();
-        self.can(work, device, ready)
+        self.can(work, device, &ready)
     }
 
     /// Notes why a device cannot do a row, if it cannot; whether it can.
-    fn can(&self, work: &mut Work, device: usize, outcome: Result<()>) -> bool {
-        if let Err(reason) = &outcome {
+    fn can(&self, work: &mut Work, device: usize, outcome: &Result<()>) -> bool {
+        if let Err(reason) = outcome {
             (self.options.tell)(format!("{}: {reason}", work.stage.title));
             work.refusals[device] = Some(format!("not measured: {reason}"));
         }

@@ -191,7 +191,7 @@ pub fn bootstrap(counts: [usize; 2], statistic: impl Fn([&[usize]; 2]) -> f64) -
         (0..count)
             .map(|_| {
                 state += 1;
-                (u64::from(hash(state)) * count as u64 >> 32) as usize
+                ((u64::from(hash(state)) * count as u64) >> 32) as usize
             })
             .collect()
     };

@@ -70,7 +70,10 @@ pub(super) fn speed_up_cell(method: &MethodReport, baseline: &str, measure: Meas
     match method.speed_up(baseline, measure) {
         Some(found) => speed_up(found),
         None if method.method.name == baseline || method.runs.is_empty() => String::new(),
-        None => "no picture in time".to_owned(),
+        None => {
+            let firsts = method.runs.iter().filter_map(|run| Some(run.points.first()?.seconds));
+            format!("no picture before {:.1} s", firsts.fold(0.0, f64::max))
+        }
     }
 }
 
