@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use super::Wake;
+use crate::environment::landmarks::{Sun, equal_energy_tiles};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{Error, Notices, Result};
 use crate::image::Image;
@@ -34,6 +35,10 @@ pub struct LoadedMap {
     pub environment: Arc<Environment>,
     /// A small copy for the panel.
     pub preview: Arc<Image>,
+    /// Where it is brightest; `None` on a black map.
+    pub sun: Option<Sun>,
+    /// As many tiles of equal energy, in texels of `preview`.
+    pub equal_energy: Arc<[[u32; 4]]>,
     /// What was repaired or assumed.
     pub notices: Notices,
     /// Seconds of reading and of building the table.
@@ -130,9 +135,13 @@ fn load_map(name: &str) -> Result<LoadedMap> {
     let (map, notices) = sources::map(name)?;
     let read = start.elapsed().as_secs_f64();
     let preview = Arc::new(map.shrunk(256));
+    let sun = Sun::of(&map);
     let environment = Environment::new(map, &EnvironmentOptions::default())
         .map_err(|cause| Error::at(name, cause))?;
     let seconds = [read, start.elapsed().as_secs_f64() - read];
     let environment = Arc::new(environment);
-    Ok(LoadedMap { name: name.to_owned(), environment, preview, notices, seconds })
+    let count = environment.tile_count() as usize;
+    let equal_energy = equal_energy_tiles(&preview, count).into();
+    let name = name.to_owned();
+    Ok(LoadedMap { name, environment, preview, sun, equal_energy, notices, seconds })
 }

@@ -6,6 +6,7 @@ use nv_flip::{DEFAULT_PIXELS_PER_DEGREE, FlipImageRgb8, FlipPool};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::color::luminance;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
@@ -31,7 +32,7 @@ pub struct Comparison {
 }
 
 /// Added to the squared reference in relMSE, in units of its squared mean.
-const REL_MSE_EPSILON: f64 = 1e-2;
+pub(crate) const REL_MSE_EPSILON: f64 = 1e-2;
 
 /// Compares a linear picture with its reference.
 ///
@@ -74,6 +75,27 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison> {
     })
 }
 
+/// What `Film::noise` estimates: the root of the mean over pixels of
+/// `(a - r)^2 / (r^2 + 0.01 mean(r)^2)` of luminances. `None` if the sizes differ or the reference is
+/// black.
+pub fn relative_rms_error(image: &Image, reference: &Image) -> Option<f64> {
+    if (image.width, image.height) != (reference.width, reference.height) {
+        return None;
+    }
+    let light = |rgb: &[f32; 3]| f64::from(luminance((*rgb).into()));
+    let count = reference.pixels.len() as f64;
+    let mean = reference.pixels.iter().map(light).sum::<f64>() / count;
+    let floor = REL_MSE_EPSILON * mean * mean;
+    let pairs = image.pixels.iter().zip(&reference.pixels);
+    let sum: f64 = pairs
+        .map(|(a, r)| {
+            let (a, r) = (light(a), light(r));
+            (a - r) * (a - r) / (r * r + floor)
+        })
+        .sum();
+    (mean > 0.0).then(|| (sum / count).sqrt())
+}
+
 fn check_finite(image: &Image, which: &str) -> Result<()> {
     let bad = image.pixels.par_iter().filter(|rgb| !rgb.iter().all(|v| v.is_finite())).count();
     match (bad, image.pixels.len()) {
@@ -84,13 +106,13 @@ fn check_finite(image: &Image, which: &str) -> Result<()> {
 }
 
 /// Mean over pixels and channels.
-fn mean(image: &Image) -> f64 {
+pub(crate) fn mean(image: &Image) -> f64 {
     let sum: f64 = image.pixels.as_flattened().iter().map(|&v| f64::from(v)).sum();
     sum / (3 * image.pixels.len()) as f64
 }
 
 /// Mean without the largest thousandth, at least one value; of one value that value.
-fn trimmed_mean(values: &mut [f64]) -> f64 {
+pub(crate) fn trimmed_mean(values: &mut [f64]) -> f64 {
     let trimmed = (values.len() / 1000).max(1);
     let kept = (values.len() - trimmed).max(1);
     values.sort_unstable_by(f64::total_cmp);

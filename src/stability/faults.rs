@@ -41,7 +41,7 @@ fn killed_while_saving(setting: &Setting) -> Result<Outcome> {
     }
     let scratch = Scratch::new()?;
     let mut random = Random(3);
-    let (mut spoilt, mut caught, mut finished) = (0, 0, 0);
+    let (mut spoilt, mut caught, mut finished) = (0_u32, 0_u32, 0_u32);
     for round in 0..setting.count(6, 100) {
         let picture = if round % 2 == 0 { "a.exr" } else { "a.png" };
         finish(&mut scratch.lightgrid(setting, &format!("{LINE} --size 16x9 -o {picture}")), 60)?;
@@ -64,11 +64,9 @@ fn killed_while_saving(setting: &Setting) -> Result<Outcome> {
         // SIGKILL, as kill -9.
         let _ = child.kill();
         let ended = child.wait().map_err(|e| Error::new(e.to_string()))?;
-        if ended.code().is_none() {
-            caught += 1
-        } else {
-            finished += 1
-        };
+        let was_killed = ended.code().is_none();
+        caught += u32::from(was_killed);
+        finished += u32::from(!was_killed);
         let now = scratch.read(picture)?;
         let whole = read_picture(&scratch.path(picture)).is_ok_and(|image| image.width == 1024);
         spoilt += u32::from(now != before && !whole);

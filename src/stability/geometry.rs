@@ -28,7 +28,7 @@ pub(super) const CASES: &[Case] = &[
     case("rays-along-shared-edges", On::Cpu, |s| Ok(leaks_on_axes(s))),
     case("rays-anywhere", On::Cpu, |s| Ok(leaks_anywhere(s))),
     case("paths-in-a-closed-room", On::Cpu, |s| Ok(bouncing_leaks(s))),
-    case("1e-3-m-room-by-a-1e4-m-ground", On::Any, small_beside_large),
+    case("1e-3-m-room-on-1e4-m-ground", On::Any, small_beside_large),
 ];
 
 /// A closed box of `2 n^2` triangles a face in `[-size,size]^3`, vertices shared.

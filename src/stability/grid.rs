@@ -56,7 +56,7 @@ fn cells() -> Outcome {
     for (columns, faces) in [(1, true), (2, false), (64, true), (512, true), (512, false)] {
         let rows = (columns / 2).max(1);
         for center in [Vec3::ZERO, Vec3::new(1e6, -3.0, 2e5)] {
-            let grid = SphericalGrid { center, columns, rows, faces };
+            let grid = SphericalGrid { center, columns, rows, faces, medium: false };
             for cell in 0..grid.cell_count() {
                 let (face, _, _) = grid.coordinates(cell);
                 let mut normal = Vec3::ZERO;
@@ -102,7 +102,7 @@ fn against_plain(
     setting: &Setting,
     world: &World,
     environment: &Environment,
-    view: View,
+    view: &View,
     samples: u32,
 ) -> Result<Outcome> {
     let plain = View { sampling: Sampling::Plain, seed: 77, ..view.clone() };
@@ -121,7 +121,7 @@ fn against_plain(
 
 fn in_the_room(setting: &Setting, scale: f32, center: Vec3, camera: Camera) -> Result<Outcome> {
     let world = room(0.7, scale, center).0.build();
-    against_plain(setting, &world, &sky("day")?, view(camera, Sampling::Adaptive, 3), 128)
+    against_plain(setting, &world, &sky("day")?, &view(camera, Sampling::Adaptive, 3), 128)
 }
 
 /// A camera in a closed box that stands in the room sees that box from inside, black.
@@ -295,7 +295,7 @@ fn moving_camera(setting: &Setting) -> Result<Outcome> {
         let taught = learned(setting, &world, &environment, view(camera, Sampling::Adaptive, 2))?;
         before = taught.grid().cloned();
     }
-    let grid = SphericalGrid { center: Vec3::Y, columns: 64, rows: 32, faces: true };
+    let grid = SphericalGrid { center: Vec3::Y, columns: 64, rows: 32, faces: true, medium: false };
     let garbage = LightGrid::with_garbage_laws(grid, environment.tile_energies(), 9);
     let garbage = garbage.ok_or_else(|| Error::new("the sky is black"))?;
     let camera = room(0.7, 1.0, Vec3::ZERO).1;

@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::path::World;
 use crate::render::film::Film;
 use crate::render::{Sampling, View};
-use crate::scene::{Camera, Material};
+use crate::scene::{Camera, Material, Medium};
 
 const fn case(name: &'static str, run: fn(&Setting) -> Result<Outcome>) -> Case {
     Case { group: "materials", name, on: On::Any, run }
@@ -28,6 +28,7 @@ pub(super) const CASES: &[Case] = &[
     case("near-grazing", grazing),
     case("nested-glass", nested),
     case("optical-depths", optical_depths),
+    case("media-of-all-depths", media),
     case("random-materials", random_materials),
     case("overflow-is-counted", overflow),
 ];
@@ -205,6 +206,42 @@ fn optical_depths(setting: &Setting) -> Result<Outcome> {
         }
     }
     Ok(furnaces.judged("absorbing glass").at_least("clearest glass", clearest, 0.95))
+}
+
+/// Fog that loses nothing, from hardly there to a wall, around a floor; and milk in a glass ball.
+fn media(setting: &Setting) -> Result<Outcome> {
+    let mut furnaces = Furnaces::new();
+    let mut thinnest = f64::INFINITY;
+    let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::ZERO, 0.5);
+    for scattering in [1e-40, 1e-20, 1e-3, 1.0, 1e3, 1e10, 1e30] {
+        for anisotropy in [-0.99, 0.0, 0.99] {
+            let fog = Medium {
+                scattering: Vec3::new(scattering, 0.5 * scattering, 0.0),
+                absorption: Vec3::ZERO,
+                anisotropy,
+                bounds: Some([Vec3::splat(-2.0), Vec3::splat(2.0)]),
+            };
+            let world = Stage::default().floor(&lambert(1.0), Vec3::ZERO, 3.0).build();
+            let view = View {
+                width: 12,
+                height: 12,
+                medium: Some(fog),
+                ..view(camera.clone(), Sampling::Plain, 64)
+            };
+            let film = render(setting, &world, &constant(1.0)?, view, setting.count(16, 512))?;
+            if scattering < 1e-3 {
+                thinnest = thinnest.min(mean(&film).luminance);
+            }
+            furnaces.add(&film);
+            let milk = Material {
+                scattering: Vec3::splat(scattering),
+                scatter_anisotropy: anisotropy,
+                ..glass(1.5, 0.0)
+            };
+            furnaces.add(&furnace(setting, ball(&milk), 64)?);
+        }
+    }
+    Ok(furnaces.judged("media").at_least("thinnest fog", thinnest, 0.999))
 }
 
 /// Whatever a file may say: a ball of it in a room of it.

@@ -137,7 +137,7 @@ impl Report {
             _ => ("", String::new(), String::new()),
         };
         let mut line = format!(
-            "{:<32} {what:<58} {value:>9}  {limit:<12} {verdict:<7} {:>5.1} s",
+            "{:<35} {what:<64} {value:>9}  {limit:<12} {verdict:<7} {:>5.1} s",
             self.title, self.seconds
         );
         let remarks = &self.outcome.remarks;

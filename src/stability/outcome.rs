@@ -41,9 +41,7 @@ impl Figure {
         match self.limit {
             _ if !self.holds() => f64::INFINITY,
             Limit::AtMost(most) if most > 0.0 => (self.value / most).max(0.0),
-            // Met to the letter: a count, or a yes.
-            Limit::AtLeast(least) if self.value == least => 0.0,
-            Limit::AtLeast(least) if self.value > 0.0 => (least / self.value).max(0.0),
+            // Lower limits mostly say that the case had something to judge.
             Limit::AtMost(_) | Limit::AtLeast(_) => 0.0,
             Limit::Told => -1.0,
         }
@@ -201,7 +199,7 @@ mod tests {
     fn what_fails_decides_and_nothing_measured_is_no_pass() {
         let sound = Outcome::new().at_most("a", 1.0, 10.0).at_least("b", 2.0, 1.0).told("c", 9e9);
         assert_eq!(sound.verdict(), Verdict::Passed);
-        assert_eq!(sound.decisive().map(|f| f.what.as_str()), Some("b"));
+        assert_eq!(sound.decisive().map(|f| f.what.as_str()), Some("a"));
         let failed = sound.clone().at_most("d", 1.0, 0.0).at_most("e", 1.0, 1.0);
         assert_eq!(failed.verdict(), Verdict::Failed);
         assert_eq!(failed.decisive().map(|f| f.what.as_str()), Some("d"));

@@ -9,11 +9,12 @@ use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::Result;
 use crate::image::Image;
 use crate::light_grid::LawOptions;
-use crate::path::{PathLimits, World};
+use crate::path::{Background, PathLimits, World};
 use crate::render::film::{Film, Pixel};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::Stage as GpuStage;
 use crate::render::{Phase, Sampling, Session, View};
+use crate::sampler::Points;
 use crate::scene::{Camera, Material, Scene, Texture, TextureImage, TextureRef, Wrap};
 
 /// Lambert's reflectance alone, both sides alike.
@@ -202,6 +203,10 @@ pub(super) fn view(camera: Camera, sampling: Sampling, bounces: u32) -> View {
         learning_paths: 1 << 13,
         laws: LawOptions::ADAPTIVE,
         layers: false,
+        points: Points::Sobol,
+        medium: None,
+        background: Background::default(),
+        crop: None,
     }
 }
 

@@ -33,6 +33,9 @@ fn maps(setting: &Setting) -> Result<[(&'static str, Image); 4]> {
     ])
 }
 
+/// A figure of a row.
+type Measure = fn(&SatReportRow) -> f64;
+
 /// One table on every map; the worst map of each figure is named.
 fn everywhere(setting: &Setting, table: TableKind) -> Result<Outcome> {
     let mut rows: Vec<(&str, SatReportRow)> = Vec::new();
@@ -41,7 +44,7 @@ fn everywhere(setting: &Setting, table: TableKind) -> Result<Outcome> {
         let row = report.rows.into_iter().find(|row| row.table == table);
         rows.push((name, row.ok_or_else(|| Error::new("a table is missing from the report"))?));
     }
-    let figures: [(&str, fn(&SatReportRow) -> f64); 4] = [
+    let figures: [(&str, Measure); 4] = [
         ("lit texels never sampled", |row| row.missed_share),
         ("falling steps", |row| row.falling_share),
         ("density off what is sampled", |row| row.misreported_share),

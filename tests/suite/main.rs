@@ -12,5 +12,6 @@ mod gpu;
 mod image_files;
 mod metrics;
 mod peers;
+mod report;
 mod shared;
 mod stability;

@@ -6,6 +6,7 @@ use crate::app::commands::Command;
 use crate::app::document::{Document, PictureSize};
 use crate::app::presenter::Shown;
 use crate::app::theme;
+use crate::denoise::Denoiser;
 use crate::tone::{DAYLIGHT_KELVIN, ToneCurve, WhiteBalance};
 
 /// Draws the settings.
@@ -19,8 +20,7 @@ pub(in crate::app) fn show(
     exposure(ui, document, shown);
     curve(ui, document);
     white_balance(ui, &mut document.look.white_balance);
-    ui.checkbox(&mut document.look.denoise, "Denoise")
-        .on_hover_text("Edge-avoiding filter over albedo and normals; not in .exr files (N)");
+    denoiser(ui, document);
     ui.add_space(4.0);
     ui.separator();
     theme::heading(ui, "LIGHT");
@@ -34,6 +34,7 @@ pub(in crate::app) fn show(
     ui.separator();
     theme::heading(ui, "SIZE");
     size(ui, &mut document.size);
+    region(ui, document.region.is_some(), commands);
     ui.add_space(4.0);
     ui.separator();
     theme::heading(ui, "STOP AT");
@@ -48,6 +49,22 @@ pub(in crate::app) fn show(
     {
         commands.push(Command::KeepPicture);
     }
+}
+
+fn denoiser(ui: &mut Ui, document: &mut Document) {
+    ui.horizontal(|ui| {
+        ui.checkbox(&mut document.look.denoise, "Denoise")
+            .on_hover_text("For display and .png; .exr files keep what was rendered (N)");
+        // The library is looked for once.
+        if !document.look.denoise || Denoiser::Oidn.check().is_err() {
+            return;
+        }
+        let chosen = &mut document.look.denoiser;
+        ui.selectable_value(chosen, Denoiser::ATrous, "À-trous")
+            .on_hover_text("Edge-avoiding filter over albedo, normals and depth: fast");
+        ui.selectable_value(chosen, Denoiser::Oidn, "Open Image Denoise")
+            .on_hover_text("Intel's trained filter, found on this machine: slower, smoother");
+    });
 }
 
 fn exposure(ui: &mut Ui, document: &mut Document, shown: Option<&Shown>) {
@@ -126,6 +143,17 @@ fn size(ui: &mut Ui, size: &mut PictureSize) {
             ui.label("x");
             ui.add(DragValue::new(height).range(1..=8192).speed(4));
         });
+    }
+}
+
+fn region(ui: &mut Ui, has_region: bool, commands: &mut Vec<Command>) {
+    let (text, hint) = if has_region {
+        ("Render the whole again", "The region is given up (X)")
+    } else {
+        ("Render a region…", "Then drag over the part that is to be rendered (X)")
+    };
+    if ui.button(text).on_hover_text(hint).clicked() {
+        commands.push(Command::ToggleRegion);
     }
 }
 

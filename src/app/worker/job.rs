@@ -11,9 +11,10 @@ use super::{Activity, Point, Request, Shared, Snapshot, Take, lock};
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
+use crate::metrics;
 use crate::path::World;
 use crate::render::film::Film;
-use crate::render::{Phase, Sampling, Session, StopRule, View};
+use crate::render::{Crop, Phase, Sampling, Session, StopRule, View};
 use crate::scene::Camera;
 
 /// Longest piece of rendering between two looks at requests and clocks.
@@ -37,7 +38,7 @@ pub(super) struct Legacy {
     seconds_per_path: Option<f64>,
     snapshots: u64,
     /// The last small picture and its camera.
-    under: Option<(Camera, Arc<Film>)>,
+    under: Option<(Camera, Option<Crop>, Arc<Film>)>,
 }
 
 impl Legacy {
@@ -137,6 +138,10 @@ impl<'a> Job<'a> {
         let shrink = self.shrink(&view);
         view.width = (view.width / shrink).max(1);
         view.height = (view.height / shrink).max(1);
+        if let Some(crop) = &mut view.crop {
+            crop.corner = crop.corner.map(|pixel| pixel / shrink);
+            crop.whole = crop.whole.map(|pixels| (pixels / shrink).max(1));
+        }
         self.experienced_session(world, environment, view)
     }
 
@@ -172,14 +177,15 @@ impl<'a> Job<'a> {
 
     /// The small picture of this view, if there is one.
     fn under(&self) -> Option<Arc<Film>> {
-        let (camera, film) = self.legacy.under.as_ref()?;
-        (*camera == self.request.view.camera).then(|| Arc::clone(film))
+        let (camera, crop, film) = self.legacy.under.as_ref()?;
+        let view = &self.request.view;
+        (*camera == view.camera && *crop == view.crop).then(|| Arc::clone(film))
     }
 
     /// Keeps the small picture for the good one's first moments.
     fn keep_under(&mut self, session: &Session<'_>) {
-        let camera = self.request.view.camera.clone();
-        self.legacy.under = Some((camera, Arc::new(session.film().clone())));
+        let View { camera, crop, .. } = &self.request.view;
+        self.legacy.under = Some((camera.clone(), *crop, Arc::new(session.film().clone())));
     }
 
     /// By what the picture's sides are divided while the camera moves.
@@ -193,7 +199,12 @@ impl<'a> Job<'a> {
     /// The full picture: learning first, with a preview meanwhile, then samples until a rule is met.
     pub(super) fn render(&mut self, world: &World, environment: &Environment) {
         self.glance(world, environment);
-        let mut main = Session::new(world, environment, self.request.view.clone());
+        let keeps_laws = self.request.is_frozen && self.legacy.laws_for(&self.request).is_some();
+        let mut main = if keeps_laws {
+            self.experienced_session(world, environment, self.request.view.clone())
+        } else {
+            Session::new(world, environment, self.request.view.clone())
+        };
         let mut plain = self.request.split.then(|| {
             let view = View { sampling: Sampling::Plain, ..self.request.view.clone() };
             Session::new(world, environment, view)
@@ -417,11 +428,15 @@ impl<'a> Job<'a> {
     /// Adds a point to a curve, unless nothing has happened since the last one.
     fn note(&mut self, curve: usize, session: &Session<'_>) {
         let film = session.film();
-        let point = Point {
-            seconds: session.elapsed_seconds(),
-            samples: film.total_samples() as f64 / film.pixels().len().max(1) as f64,
-            noise: film.noise(),
-        };
+        let point =
+            Point {
+                seconds: session.elapsed_seconds(),
+                samples: film.total_samples() as f64 / film.pixels().len().max(1) as f64,
+                noise: film.noise(),
+                error: self.request.reference.as_ref().and_then(|reference| {
+                    metrics::relative_rms_error(&film.image(), &reference.image)
+                }),
+            };
         let curve = &mut self.curves[curve];
         let is_later = curve.last().is_none_or(|last| point.samples > last.samples);
         if point.noise.is_finite() && point.noise > 0.0 && is_later {

@@ -10,7 +10,9 @@ use crate::color::importance;
 use crate::environment::Environment;
 use crate::light_grid::LightGrid;
 use crate::light_grid::cells::SphericalGrid;
+use crate::medium::{Fog, Phase};
 use crate::path::World;
+use crate::path::background::{Background, concentration};
 use crate::path::camera::CameraRays;
 use crate::scene::surface::absorption;
 use crate::scene::{self, AlphaMode, PunctualKind, Scene, Wrap};
@@ -73,7 +75,19 @@ pub(crate) struct Globals {
     pub(crate) orthographic: u32,
     pub(crate) scene_extent: f32,
     pub(crate) mean_contribution: f32,
-    pub(crate) padding: [u32; 3],
+    pub(crate) zero: u32,
+    pub(crate) grid_medium: u32,
+    pub(crate) padding_1: u32,
+    pub(crate) fog_low: Vec3,
+    pub(crate) fog_mean_cosine: f32,
+    pub(crate) fog_high: Vec3,
+    pub(crate) padding_2: u32,
+    pub(crate) fog_scattering: Vec3,
+    pub(crate) padding_3: u32,
+    pub(crate) fog_extinction: Vec3,
+    pub(crate) padding_4: u32,
+    pub(crate) background: Vec3,
+    pub(crate) background_concentration: f32,
 }
 
 /// Twin of `Material` in `surface.wgsl`.
@@ -97,6 +111,8 @@ pub(crate) struct Material {
     pub(crate) flags: u32,
     pub(crate) textures: [u32; 10],
     pub(crate) padding: [u32; 2],
+    pub(crate) scattering: Vec3,
+    pub(crate) scatter_mean_cosine: f32,
 }
 
 /// Twin of `TextureRef` in `texture.wgsl`.
@@ -134,23 +150,23 @@ pub(crate) struct SurfaceSums {
 }
 
 /// Flags of `Material`, as in `surface.wgsl`.
-mod material_flags {
-    pub(super) const ALPHA_MASK: u32 = 1;
-    pub(super) const ALPHA_BLEND: u32 = 2;
-    pub(super) const DOUBLE_SIDED: u32 = 4;
-    pub(super) const UNLIT: u32 = 8;
-    pub(super) const THIN: u32 = 16;
-    pub(super) const PARTIAL: u32 = 32;
-    pub(super) const NORMAL_MAPPED: u32 = 64;
+pub(super) mod material_flags {
+    pub(in super::super) const ALPHA_MASK: u32 = 1;
+    pub(in super::super) const ALPHA_BLEND: u32 = 2;
+    pub(in super::super) const DOUBLE_SIDED: u32 = 4;
+    pub(in super::super) const UNLIT: u32 = 8;
+    pub(in super::super) const THIN: u32 = 16;
+    pub(in super::super) const PARTIAL: u32 = 32;
+    pub(in super::super) const NORMAL_MAPPED: u32 = 64;
 }
 
 /// Flags of `TextureRef`, as in `texture.wgsl`.
-mod texture_flags {
-    pub(super) const SECOND_UV_SET: u32 = 1;
-    pub(super) const NEAREST: u32 = 2;
-    pub(super) const SRGB: u32 = 4;
-    pub(super) const WRAP_U_SHIFT: u32 = 4;
-    pub(super) const WRAP_V_SHIFT: u32 = 6;
+pub(super) mod texture_flags {
+    pub(in super::super) const SECOND_UV_SET: u32 = 1;
+    pub(in super::super) const NEAREST: u32 = 2;
+    pub(in super::super) const SRGB: u32 = 4;
+    pub(in super::super) const WRAP_U_SHIFT: u32 = 4;
+    pub(in super::super) const WRAP_V_SHIFT: u32 = 6;
 }
 
 impl Globals {
@@ -167,6 +183,13 @@ impl Globals {
         self.orthographic = rays.orthographic.into();
         (self.width, self.height) = (view.width, view.height);
         self.seed = view.seed;
+        match view.background {
+            Background::Map => {}
+            Background::Blurred(radians) => {
+                self.background_concentration = concentration(radians);
+            }
+            Background::Color(rgb) => self.background = rgb.into(),
+        }
         self.bounces = view.limits.bounces;
         self.russian_roulette = view.limits.russian_roulette.into();
     }
@@ -179,11 +202,24 @@ impl Globals {
         self.mean_contribution = std::f32::consts::PI * importance(environment.mean_radiance());
     }
 
+    /// Sets what lies between surfaces.
+    pub(crate) fn set_fog(&mut self, fog: Option<&Fog>) {
+        let Some(fog) = fog else {
+            (self.fog_low, self.fog_high) = (Vec3::ONE, Vec3::ZERO);
+            return;
+        };
+        [self.fog_low, self.fog_high] = fog.bounds;
+        self.fog_scattering = fog.interior.scattering;
+        self.fog_extinction = fog.interior.extinction;
+        self.fog_mean_cosine = fog.interior.phase.mean_cosine();
+    }
+
     /// Sets where the cells lie.
     pub(crate) fn set_cells(&mut self, grid: &SphericalGrid) {
         self.grid_center = grid.center;
         self.grid_columns = grid.columns;
         self.grid_rows = grid.rows;
+        self.grid_medium = grid.medium.into();
     }
 }
 
@@ -289,6 +325,8 @@ pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
             flags: flags(m, world.may_pass_light(index)),
             textures: m.textures().map(&mut reference),
             padding: [0; 2],
+            scattering: m.scattering,
+            scatter_mean_cosine: Phase::new(m.scatter_anisotropy).mean_cosine(),
         })
         .collect();
     (materials, refs)
@@ -406,7 +444,7 @@ pub(crate) fn pack_radiance(rgb: [f32; 3]) -> [u32; 2] {
 
 /// `pack_radiance` undone, as the shader does it.
 #[cfg(test)]
-fn unpack_radiance(words: [u32; 2]) -> [f32; 3] {
+pub(super) fn unpack_radiance(words: [u32; 2]) -> [f32; 3] {
     let mantissas = [
         words[0] & 0x3_ffff,
         (words[0] >> 18 | words[1] << 14) & 0x3_ffff,

@@ -1,7 +1,7 @@
 //! The GPU's schedule: the same paths in compute shaders, in dispatches too short to be felt.
 //!
-//! [`Renderer`] holds the scene, the map and the laws on a device and brings a [`Film`] forward as
-//! `cpu` does. A pass sums at most [`MAX_PASS_SAMPLES`] samples of a pixel in f32 on the device; the
+//! `Renderer` holds the scene, the map and the laws on a device and brings a [`Film`] forward as
+//! `cpu` does. A pass sums at most `MAX_PASS_SAMPLES` samples of a pixel in f32 on the device; the
 //! f64 film on the host adds up the passes, so that no precision is lost at any number of samples
 //! and the work so far survives the device.
 
@@ -9,6 +9,8 @@ mod buffers;
 mod device;
 pub(crate) mod layout;
 mod pacer;
+#[cfg(test)]
+mod parity;
 mod pipeline;
 pub(crate) mod shader;
 mod stage;
@@ -86,10 +88,25 @@ impl Renderer {
         view: &View,
         rays: &CameraRays,
     ) -> Result<Self> {
+        Self::with_kernel(stage, world, environment, view, rays, |gpu, program| {
+            gpu.pipeline(Kernel::Render, program)
+        })
+    }
+
+    /// [`Self::new`] with the kernel that `compile` makes of the program for rendering.
+    fn with_kernel(
+        stage: &Stage,
+        world: &World,
+        environment: &Environment,
+        view: &View,
+        rays: &CameraRays,
+        compile: impl FnOnce(&Gpu, Program) -> Result<Arc<Pipeline>>,
+    ) -> Result<Self> {
         let features = Features::of(world, environment, view);
         let mut buffers = stage.buffers.clone();
         let mut globals = stage.globals;
         globals.set_view(view, rays);
+        globals.set_fog(view.fog(world).as_ref());
         let mut constants = stage.constants;
         upload_tables(&mut buffers, view, environment, &mut constants)?;
         let pixels = u64::from(view.width) * u64::from(view.height);
@@ -103,7 +120,7 @@ impl Renderer {
         let program = Program::new(Kernel::Render, &features, &constants, width_log2);
         let kernel_facts = KernelFacts::of(&features);
         let renderer = Self {
-            render: stage.gpu.pipeline(Kernel::Render, program)?,
+            render: compile(&stage.gpu, program)?,
             learn: None,
             gpu: stage.gpu.clone(),
             buffers,
@@ -358,10 +375,11 @@ fn upload_tables(
 mod tests {
     use super::*;
     use crate::environment::EnvironmentOptions;
-    use crate::light_grid::LawOptions;
     use crate::light_grid::cells::SphericalGrid;
-    use crate::path::{PathLimits, PathTracer};
+    use crate::light_grid::{LawOptions, Recording};
+    use crate::path::{Background, PathLimits, PathTracer};
     use crate::render::{Sampling, cpu};
+    use crate::sampler::Points;
     use crate::scene::builtin;
 
     /// Visits of each cell and tile counters after two passes, the second with laws of the first.
@@ -379,13 +397,23 @@ mod tests {
             sampling: if talk { Sampling::Talk } else { Sampling::Adaptive },
             limits: PathLimits { bounces: 4, russian_roulette: true },
             seed: 5,
+            points: Points::Sobol,
             grid_columns: 64,
             learning_paths: 1 << 13,
             laws: recording,
+            medium: None,
+            background: Background::Map,
+            crop: None,
             layers: false,
         };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
-        let grid = SphericalGrid { center: rays.position, columns: 64, rows: 32, faces: !talk };
+        let grid = SphericalGrid {
+            center: rays.position,
+            columns: 64,
+            rows: 32,
+            faces: recording.faces,
+            medium: false,
+        };
         let mut learning = LearningGrid::new(grid, environment.tile_count(), recording);
         let mut laws = LightGrid::whole_map(environment.tile_energies());
         let never = AtomicBool::new(false);
@@ -405,6 +433,8 @@ mod tests {
                         world: &world,
                         environment: &environment,
                         grid: laws.as_ref(),
+                        fog: view.fog(&world),
+                        background: Background::Map,
                         limits: view.limits,
                     };
                     cpu::learn(&tracer, &rays, &view, pass, &learning, &never)
@@ -425,7 +455,12 @@ mod tests {
             Ok(gpu) => gpu,
             Err(reason) => return eprintln!("SKIPPED: {reason}"),
         };
-        for recording in [LawOptions::ADAPTIVE, LawOptions::TALK] {
+        let squared = LawOptions {
+            faces: false,
+            recording: Recording::VisibleCosineSquared,
+            ..LawOptions::ADAPTIVE
+        };
+        for recording in [LawOptions::ADAPTIVE, LawOptions::TALK, squared] {
             let (cpu_visits, cpu_blocks, cpu_rays) = learn(None, recording);
             let (gpu_visits, gpu_blocks, gpu_rays) = learn(Some(&gpu), recording);
             assert_eq!(cpu_blocks.len(), gpu_blocks.len(), "the same cells have counters");

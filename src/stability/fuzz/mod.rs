@@ -9,7 +9,7 @@ mod corpus;
 mod mutate;
 mod worker;
 
-use std::io::{BufRead, BufReader, Read as _};
+use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
@@ -17,6 +17,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 pub use self::worker::work;
+use super::scratch::Scratch;
 use super::{Case, On, Outcome, Setting};
 use crate::error::{Error, Result};
 
@@ -29,7 +30,7 @@ pub(super) const CASES: &[Case] = &[
     case("maps", |s| mutations(s, Kind::Maps, s.count(4000, 400_000))),
     case("command-lines", |s| mutations(s, Kind::CommandLines, s.count(5000, 500_000))),
     case("settings", |s| mutations(s, Kind::Settings, s.count(4000, 400_000))),
-    case("bombs", |s| claims(s)),
+    case("bombs", claims),
 ];
 
 /// What is spoilt.
@@ -85,56 +86,48 @@ const ALLOWANCE_BYTES: f64 = (64 << 20) as f64;
 const PATIENCE: Duration = Duration::from_secs(10);
 
 fn mutations(setting: &Setting, kind: Kind, count: u64) -> Result<Outcome> {
-    let outcome = judged(setting, kind, count)?;
-    Ok(match outcome {
-        Ok((tally, outcome)) => outcome
-            // Both outcomes are met often, or the case would show little.
-            .at_least("share accepted", tally.accepted as f64 / count as f64, 0.02)
-            .at_least("share refused", tally.refused as f64 / count as f64, 0.02),
-        Err(broken) => broken,
-    })
+    let (tally, outcome) = judged(setting, kind, count)?;
+    // Both outcomes are met often, or the case would show little.
+    Ok(outcome.at_least("share accepted", tally.accepted as f64 / count as f64, 0.05).at_least(
+        "share refused",
+        tally.refused as f64 / count as f64,
+        0.05,
+    ))
 }
 
 fn claims(setting: &Setting) -> Result<Outcome> {
     let count = bombs::all().len() as u64;
-    Ok(match judged(setting, Kind::Bombs, count)? {
-        Ok((tally, outcome)) => {
-            outcome.at_least("false claims refused", tally.refused as f64, count as f64)
-        }
-        Err(broken) => broken,
-    })
+    let (tally, outcome) = judged(setting, Kind::Bombs, count)?;
+    Ok(outcome.at_least("false claims refused", tally.refused as f64, count as f64))
 }
 
 /// What a worker says of inputs `0..count`, and the figures all kinds share.
-fn judged(
-    setting: &Setting,
-    kind: Kind,
-    count: u64,
-) -> Result<std::result::Result<(Tally, Outcome), Outcome>> {
-    let tally = match run(setting, kind, count)? {
-        Ok(tally) => tally,
-        Err(end) => {
-            let name = kind.name();
-            return Ok(Err(Outcome::new()
-                .at_most("inputs that end or stop the process", 1.0, 0.0)
-                .remark(format!(
-                    "{end}; repeat: lightgrid stability --fuzz {name} --first N --count 1"
-                ))));
-        }
-    };
-    let excess = (tally.worst_excess_bytes.max(0)) as f64;
+fn judged(setting: &Setting, kind: Kind, count: u64) -> Result<(Tally, Outcome)> {
+    let tally = run(setting, kind, count)?;
+    let excess = tally.worst_excess_bytes.max(0) as f64;
+    let read = (tally.accepted + tally.refused) as f64;
     let outcome = Outcome::new()
-        .at_most(format!("panics and hangs in {count} inputs"), 0.0, 0.0)
-        .at_most("bytes beyond 4x the honest size", excess, ALLOWANCE_BYTES)
+        .at_most(format!("{count} inputs: panics and hangs"), count as f64 - read, 0.0)
+        .at_most(
+            format!("{count} inputs: bytes beyond 4x the honest size"),
+            excess,
+            ALLOWANCE_BYTES,
+        )
         .at_most("refusals that are not one line", tally.unclear as f64, 0.0)
         .at_most("accepted, but out of bounds", tally.unsound as f64, 0.0)
         .remark(format!("input {} took most", tally.worst));
-    Ok(Ok((tally, outcome)))
+    Ok((tally, outcome))
 }
 
-/// Runs a worker over inputs `0..count`; the inner error says at which input it ended.
-fn run(setting: &Setting, kind: Kind, count: u64) -> Result<std::result::Result<Tally, String>> {
+/// Runs a worker over inputs `0..count`.
+///
+/// # Errors
+/// If an input ends or stops the process, with its number.
+fn run(setting: &Setting, kind: Kind, count: u64) -> Result<Tally> {
     let failed = |e: std::io::Error| Error::new(format!("the fuzzing process: {e}"));
+    let scratch = Scratch::new()?;
+    // A panic's words may be more than a pipe holds.
+    let complaints = std::fs::File::create(scratch.path("stderr")).map_err(failed)?;
     let mut child = guarded(setting)
         .args(["stability", "--fuzz", kind.name(), "--first", "0", "--count", &count.to_string()])
         // One thread and one arena: what memory grows by is then the input's doing.
@@ -142,51 +135,43 @@ fn run(setting: &Setting, kind: Kind, count: u64) -> Result<std::result::Result<
         .env("MALLOC_ARENA_MAX", "1")
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
+        .stderr(complaints)
         .spawn()
         .map_err(failed)?;
     let (sender, receiver) = channel();
     let lines = child.stdout.take().map(BufReader::new);
-    let reader = std::thread::spawn(move || {
-        for line in lines.into_iter().flat_map(BufRead::lines).map_while(std::result::Result::ok) {
-            if sender.send(line).is_err() {
-                break;
-            }
-        }
+    let reader = std::thread::Builder::new().name("fuzzing".to_owned()).spawn(move || {
+        let lines = lines.into_iter().flat_map(BufRead::lines);
+        // Whoever listens no longer has an end to report.
+        lines.map_while(std::result::Result::ok).all(|line| sender.send(line).is_ok())
     });
-    let errors = child.stderr.take();
-    let complaints = std::thread::spawn(move || {
-        let mut text = String::new();
-        errors.map(|mut pipe| pipe.read_to_string(&mut text));
-        text
-    });
+    let reader = reader.map_err(failed)?;
     let mut at = "before the first input".to_owned();
     let mut tally = None;
-    let mut hung = false;
-    loop {
+    let end = loop {
         match receiver.recv_timeout(PATIENCE) {
             Ok(line) if line.starts_with('{') => tally = serde_json::from_str(&line).ok(),
             Ok(line) => at = format!("at input {line}"),
-            Err(RecvTimeoutError::Disconnected) => break,
-            Err(RecvTimeoutError::Timeout) => {
-                hung = true;
-                let _ = child.kill();
-                break;
-            }
+            Err(end) => break end,
         }
+    };
+    if end == RecvTimeoutError::Timeout {
+        let _ = child.kill();
     }
     let status = child.wait().map_err(failed)?;
-    let (_, said) = (reader.join(), complaints.join().unwrap_or_default());
-    if hung {
-        return Ok(Err(format!("no progress for 10 s {at}")));
+    let _ = reader.join();
+    if let (Some(tally), true) = (tally, status.success()) {
+        return Ok(tally);
     }
-    match tally {
-        Some(tally) if status.success() => Ok(Ok(tally)),
-        _ => {
-            let said = said.lines().take(3).collect::<Vec<_>>().join(" ");
-            Ok(Err(format!("{status} {at}: {said}")))
-        }
-    }
+    let end = match end {
+        RecvTimeoutError::Timeout => "no progress for 10 s".to_owned(),
+        RecvTimeoutError::Disconnected => status.to_string(),
+    };
+    let said = String::from_utf8_lossy(&scratch.read("stderr")?).replace('\n', " ");
+    Err(Error::new(format!(
+        "{end} {at} (repeat: lightgrid stability --fuzz {} --first NUMBER): {said}",
+        kind.name()
+    )))
 }
 
 /// The binary, where a shell can do it with an end to its memory: a runaway must not take the

@@ -87,11 +87,8 @@ pub(super) fn bytes(entries: &[Vec<u8>], random: &mut Random) -> Vec<u8> {
 /// A glTF file whose container is whole: one to three numbers of its JSON exchanged, a few bytes of its
 /// data overwritten. So more of the reader is reached than by spoiling anything anywhere.
 pub(super) fn gltf((json, data): &(String, Vec<u8>), random: &mut Random) -> (String, Vec<u8>) {
-    let (mut json, mut data) = (json.clone().into_bytes(), data.clone());
-    for _ in 0..1 + random.below(3) {
-        let at = random.below(json.len());
-        replace_number(&mut json, at, random);
-    }
+    let json = numbers(json.as_bytes(), random);
+    let mut data = data.clone();
     for _ in 0..random.below(4) {
         if !data.is_empty() {
             let at = random.below(data.len());
@@ -99,6 +96,16 @@ pub(super) fn gltf((json, data): &(String, Vec<u8>), random: &mut Random) -> (St
         }
     }
     (String::from_utf8_lossy(&json).into_owned(), data)
+}
+
+/// Text with one to three of its numbers exchanged.
+pub(super) fn numbers(text: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut text = text.to_vec();
+    for _ in 0..1 + random.below(3) {
+        let at = random.below(text.len());
+        replace_number(&mut text, at, random);
+    }
+    text
 }
 
 /// Writes a telling number of one to eight bytes, either end first.

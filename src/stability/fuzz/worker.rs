@@ -61,6 +61,10 @@ pub fn work(kind: Kind, first: u64, count: u64, accepts: fn(&[String]) -> bool) 
                 let kind = if name.contains(".gl") { Kind::Gltf } else { Kind::Maps };
                 (bytes.len(), read(kind, name, &bytes, &scratch)?)
             }
+            Kind::Settings if random.below(4) > 0 => {
+                let bytes = mutate::numbers(&entries[random.below(entries.len())], &mut random);
+                (bytes.len(), read(kind, "spoilt", &bytes, &scratch)?)
+            }
             Kind::Gltf if random.below(4) > 0 => {
                 let sources = corpus::gltf();
                 let source = &sources[random.below(sources.len())];
