@@ -58,17 +58,18 @@ struct Globals {
     scene_extent: f32,
     // What a learned contribution is divided by.
     mean_contribution: f32,
+    // What no compiler can know; see `rounded`.
+    zero: u32,
     // Whether points in a medium have a face of their own.
     grid_medium: u32,
     padding_0: u32,
-    padding_1: u32,
     // Corners and coefficients of the fog; without fog the lower corner is above the upper one.
     fog_low: vec3f,
     fog_mean_cosine: f32,
     fog_high: vec3f,
-    padding_2: u32,
+    padding_1: u32,
     fog_scattering: vec3f,
-    padding_3: u32,
+    padding_2: u32,
     fog_extinction: vec3f,
-    padding_4: u32,
+    padding_3: u32,
 }

@@ -1,11 +1,17 @@
 // Summed-area tables over the whole map: twin of src/environment/summed_area.rs. Masses are pairs
 // of f32 that add up to them (48 bits), for want of f64; so are their sums and differences.
 
+// `x` as an f32 of its own: drivers (Mesa, for one) take `(a + b) - a` for `b` and fuse products with
+// sums, which would leave nothing of the errors computed below.
+fn rounded(x: f32) -> f32 {
+    return bitcast<f32>(bitcast<u32>(x) ^ globals.zero);
+}
+
 // Sum of two f32 and what rounding left of it (Knuth's two-sum).
 fn two_sum(a: f32, b: f32) -> vec2f {
-    let s = a + b;
-    let v = s - a;
-    return vec2f(s, (a - (s - v)) + (b - v));
+    let s = rounded(a + b);
+    let v = rounded(s - a);
+    return vec2f(s, (a - rounded(s - v)) + (b - v));
 }
 
 fn pair_difference(a: vec2f, b: vec2f) -> vec2f {
@@ -55,7 +61,7 @@ fn search(texels: TileTexels, along_y: bool, u: vec2u) -> Choice {
     let unit = f32(u.x) * (1.0 / 16777216.0);
     let rest = f32(u.y) * 3.5527137e-15; // 2^-48
     // The product with 24 more bits below: exact as far as the sums are.
-    let high = total.x * unit;
+    let high = rounded(total.x * unit);
     let error = product_error(total.x, unit, high);
     let sought = two_sum(high, error + total.x * rest + total.y * unit);
     var low = first;

@@ -70,7 +70,8 @@ fn into_unit(t: f32, wrap: u32) -> f32 {
         return t - floor(t);
     }
     if wrap == MIRRORED_REPEAT {
-        return 1.0 - abs(t - 2.0 * floor(0.5 * t) - 1.0);
+        let half = 0.5 * t;
+        return 1.0 - abs(2.0 * (half - floor(half)) - 1.0);
     }
     return saturate(t);
 }

@@ -64,6 +64,12 @@ pub enum Command {
     ChooseExport,
     /// Write all laws.
     Export(PathBuf),
+    /// Ask for a picture without noise.
+    ChooseReference,
+    /// Measure errors against this picture.
+    OpenReference(String),
+    /// Measure no errors any more.
+    ForgetReference,
     /// Close the window.
     Quit,
 }

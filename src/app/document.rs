@@ -4,6 +4,7 @@
 use glam::{Affine3A, Mat3A, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::denoise::Denoiser;
 use crate::light_grid::LawOptions;
 use crate::path::PathLimits;
 use crate::render::filter::PixelFilter;
@@ -66,6 +67,9 @@ pub struct Look {
     pub white_balance: WhiteBalance,
     /// Whether noise is filtered out for display and 8-bit pictures.
     pub denoise: bool,
+    /// What filters it out.
+    #[serde(default)]
+    pub denoiser: Denoiser,
 }
 
 /// Size of the picture.
@@ -98,6 +102,7 @@ impl Default for Document {
                 curve: ToneCurve::Agx,
                 white_balance: WhiteBalance::default(),
                 denoise: false,
+                denoiser: Denoiser::default(),
             },
             size: PictureSize::Viewport(1),
             stop: StopRule::default(),

@@ -1,13 +1,15 @@
 //! Carrying out commands.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use super::commands::Command;
 use super::document::Viewpoint;
 use super::interface::{Dock, Interface, Prompt, Purpose, Tab};
+use super::worker::Reference;
 use super::{App, Later, convergence, save, surface_map, theme};
 use crate::error::{Error, Result};
+use crate::image::read_picture;
 use crate::render::gpu::DeviceChoice;
 
 impl App {
@@ -31,6 +33,9 @@ impl App {
                 self.interface.ask(Purpose::Picture, file);
             }
             Command::ChooseExport => interface.ask(Purpose::Laws, "laws.csv".to_owned()),
+            Command::ChooseReference => interface.ask(Purpose::Reference, String::new()),
+            Command::OpenReference(path) => self.open_reference(path),
+            Command::ForgetReference => self.reference = None,
             Command::Browse(purpose) => self.browse(purpose),
             Command::Save(path) => self.save(path),
             Command::Export(path) => self.export(path),
@@ -177,6 +182,23 @@ impl App {
         self.do_later("export", move || save::laws(&path, &grid).map(|()| sentence));
     }
 
+    /// Reads a reference on a thread; its arrival is a message.
+    fn open_reference(&mut self, path: String) {
+        let slot = Arc::clone(&self.arriving);
+        self.do_later("reference", move || {
+            let image = read_picture(Path::new(&path))?;
+            let (width, height) = (image.width, image.height);
+            let sentence = format!(
+                "Errors are measured against {path}; the picture must be {width} x {height} pixels \
+                 for that"
+            );
+            let name = path.clone();
+            *slot.lock().unwrap_or_else(PoisonError::into_inner) =
+                Some(Arc::new(Reference { name, image }));
+            Ok(sentence)
+        });
+    }
+
     /// Runs something slow on a thread; what it says becomes a message.
     fn do_later(&mut self, name: &str, work: impl FnOnce() -> Result<String> + Send + 'static) {
         let (sender, wake) = (self.later.0.clone(), self.wake.clone());
@@ -202,6 +224,9 @@ impl App {
             match purpose {
                 Purpose::Scene => {
                     Box::pin(dialog.add_filter("glTF scene", &["gltf", "glb"]).pick_file())
+                }
+                Purpose::Reference => {
+                    Box::pin(dialog.add_filter("Picture", &["exr", "hdr"]).pick_file())
                 }
                 Purpose::Map => Box::pin(dialog.add_filter("Map", &MAP_EXTENSIONS).pick_file()),
                 Purpose::Picture => {
@@ -254,6 +279,7 @@ impl Purpose {
             Self::Map => Command::OpenMap(path.to_owned()),
             Self::Picture => Command::Save(path.into()),
             Self::Laws => Command::Export(path.into()),
+            Self::Reference => Command::OpenReference(path.to_owned()),
         }
     }
 }

@@ -12,8 +12,8 @@ use super::worker::Snapshot;
 use crate::bvh::{Ray, offset_origin};
 use crate::color::importance;
 use crate::environment::Environment;
-use crate::light_grid::WHOLE_MAP;
 use crate::light_grid::counters::Tally;
+use crate::light_grid::{LightGrid, WHOLE_MAP};
 use crate::path::World;
 
 /// Directions per tile for the truth: a standard error of some per cent for tiles half seen.
@@ -51,6 +51,7 @@ pub(super) struct Truth {
 pub(super) struct Inspector {
     inspected: Option<Inspected>,
     truth: Option<Truth>,
+    learned: Option<(Arc<LightGrid>, Vec<f32>)>,
     source: Option<(Vec2, u64)>,
     sender: Sender<Truth>,
     receiver: Receiver<Truth>,
@@ -62,7 +63,16 @@ impl Inspector {
     /// `wake` is called when a truth is known.
     pub(super) fn new(wake: Wake) -> Self {
         let (sender, receiver) = channel();
-        Self { inspected: None, truth: None, source: None, sender, receiver, busy: false, wake }
+        Self {
+            inspected: None,
+            truth: None,
+            learned: None,
+            source: None,
+            sender,
+            receiver,
+            busy: false,
+            wake,
+        }
     }
 
     /// What is inspected.
@@ -74,6 +84,11 @@ impl Inspector {
     pub(super) fn truth(&self) -> Option<&Truth> {
         let here = self.inspected.as_ref()?.spot.position;
         self.truth.as_ref().filter(|truth| truth.position == here)
+    }
+
+    /// Probability of each tile summed over all learned laws, `None` before anything was learned.
+    pub(super) fn learned(&self) -> Option<&[f32]> {
+        self.learned.as_ref().map(|(_, sums)| &sums[..])
     }
 
     /// Whether a truth is being measured.
@@ -97,16 +112,34 @@ impl Inspector {
 
     /// Looks again if the pointer or the grid has changed.
     pub(super) fn update(&mut self, interface: &Interface, snapshot: Option<&Arc<Snapshot>>) {
-        let (Some(place), Some(snapshot)) = (interface.inspected(), snapshot) else { return };
         if interface.tab != super::interface::Tab::Inspect || !interface.panels {
             return;
         }
+        let Some(snapshot) = snapshot else { return };
+        self.sum_up(snapshot);
+        let Some(place) = interface.inspected() else { return };
         let source = Some((place, snapshot.number));
         if self.source == source {
             return;
         }
         self.source = source;
         self.inspected = inspect(snapshot, place);
+    }
+
+    /// Sums up the laws, unless they are still the same.
+    fn sum_up(&mut self, snapshot: &Snapshot) {
+        let Some(grid) = snapshot.main.grid.as_ref().filter(|grid| grid.laws().len() > 1) else {
+            self.learned = None;
+            return;
+        };
+        if self.learned.as_ref().is_some_and(|(old, _)| Arc::ptr_eq(old, grid)) {
+            return;
+        }
+        let laws = grid.laws();
+        // The first law is the whole map's.
+        let sum = |tile| (1..laws.len()).map(|law| laws.probability(law, tile)).sum();
+        let sums = (0..laws.tile_count()).map(sum).collect();
+        self.learned = Some((Arc::clone(grid), sums));
     }
 
     /// Measures the truth at the inspected point by brute force, beside the window.

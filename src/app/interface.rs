@@ -22,6 +22,8 @@ pub struct Interface {
     pub overlay: Option<Overlay>,
     /// How much of the picture it covers, `[0,1]`.
     pub overlay_opacity: f32,
+    /// What the map of tiles shows.
+    pub tiles: TileView,
     /// The tile chosen on the map.
     pub tile: Option<u32>,
     /// Place of the picture under the pointer, both coordinates in `[0,1]`.
@@ -32,6 +34,8 @@ pub struct Interface {
     pub compared: Option<usize>,
     /// Where the wipe is, `[0,1]` across the picture.
     pub wipe: f32,
+    /// Whether what was learned is kept as it is.
+    pub is_frozen: bool,
     /// Whether rendering is halted.
     pub paused: bool,
     /// Counts restarts by hand.
@@ -49,6 +53,17 @@ pub enum Tab {
     Picture,
     /// Overlays and inspector.
     Inspect,
+}
+
+/// What the map of tiles shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TileView {
+    /// Share of the map's energy.
+    Energy,
+    /// Share of what all cells together have learned to want.
+    Learned,
+    /// Tiles of equal energy, which are not used.
+    EqualEnergy,
 }
 
 /// What is open below the picture.
@@ -82,6 +97,8 @@ pub enum Purpose {
     Picture,
     /// A file for the laws.
     Laws,
+    /// A picture without noise.
+    Reference,
 }
 
 impl Default for Interface {
@@ -94,11 +111,13 @@ impl Default for Interface {
             prompt: None,
             overlay: None,
             overlay_opacity: 0.75,
+            tiles: TileView::Energy,
             tile: None,
             pointed: None,
             pinned: None,
             compared: None,
             wipe: 0.5,
+            is_frozen: false,
             paused: false,
             run: 0,
             viewport_pixels: None,

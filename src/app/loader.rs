@@ -5,10 +5,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use super::Wake;
+use crate::environment::landmarks::{Sun, equal_energy_tiles};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{Error, Notices, Result};
 use crate::image::Image;
 use crate::path::World;
+use crate::render::gpu::KernelFacts;
 use crate::sources;
 
 /// A scene ready for rays.
@@ -18,6 +20,8 @@ pub struct LoadedScene {
     pub name: String,
     /// The scene.
     pub world: Arc<World>,
+    /// What a GPU's kernel for it holds.
+    pub kernel: KernelFacts,
     /// Seconds of reading and of building the BVH.
     pub seconds: [f64; 2],
 }
@@ -31,6 +35,10 @@ pub struct LoadedMap {
     pub environment: Arc<Environment>,
     /// A small copy for the panel.
     pub preview: Arc<Image>,
+    /// Where it is brightest; `None` on a black map.
+    pub sun: Option<Sun>,
+    /// As many tiles of equal energy, in texels of `preview`.
+    pub equal_energy: Arc<[[u32; 4]]>,
     /// What was repaired or assumed.
     pub notices: Notices,
     /// Seconds of reading and of building the table.
@@ -118,7 +126,8 @@ fn load_scene(name: &str) -> Result<LoadedScene> {
     let read = start.elapsed().as_secs_f64();
     let world = Arc::new(World::new(scene));
     let seconds = [read, start.elapsed().as_secs_f64() - read];
-    Ok(LoadedScene { name: name.to_owned(), world, seconds })
+    let kernel = KernelFacts::of_scene(&world);
+    Ok(LoadedScene { name: name.to_owned(), world, kernel, seconds })
 }
 
 fn load_map(name: &str) -> Result<LoadedMap> {
@@ -126,9 +135,13 @@ fn load_map(name: &str) -> Result<LoadedMap> {
     let (map, notices) = sources::map(name)?;
     let read = start.elapsed().as_secs_f64();
     let preview = Arc::new(map.shrunk(256));
+    let sun = Sun::of(&map);
     let environment = Environment::new(map, &EnvironmentOptions::default())
         .map_err(|cause| Error::at(name, cause))?;
     let seconds = [read, start.elapsed().as_secs_f64() - read];
     let environment = Arc::new(environment);
-    Ok(LoadedMap { name: name.to_owned(), environment, preview, notices, seconds })
+    let count = environment.tile_count() as usize;
+    let equal_energy = equal_energy_tiles(&preview, count).into();
+    let name = name.to_owned();
+    Ok(LoadedMap { name, environment, preview, sun, equal_energy, notices, seconds })
 }

@@ -6,8 +6,8 @@
 //! [`presenter`] what to show. Both take the latest value and publish the latest picture: nothing
 //! here waits. [`window`] shows it on a display, [`screenshot`] in a texture without one.
 
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::Vec2;
 
@@ -34,6 +34,7 @@ mod undo;
 pub mod window;
 pub mod worker;
 
+use crate::denoise::Denoiser;
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::path::framing;
@@ -50,7 +51,7 @@ use messages::Messages;
 use presenter::{Order, Presenter, Shown};
 use settings_file::Settings;
 use undo::Undo;
-use worker::{Activity, Request, Snapshot, Worker};
+use worker::{Activity, Reference, Request, Snapshot, Worker};
 
 /// Called from any thread when there is something new to draw.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
@@ -90,6 +91,9 @@ pub struct App {
     snapshot: Option<Arc<Snapshot>>,
     shown: Option<Arc<Shown>>,
     textures: panels::viewport::Textures,
+    /// What errors are measured against, and one that has just been read.
+    reference: Option<Arc<Reference>>,
+    arriving: Arc<Mutex<Option<Arc<Reference>>>>,
     /// Results of files being chosen and written.
     later: (Sender<Later>, Receiver<Later>),
     wake: Wake,
@@ -140,6 +144,8 @@ impl App {
             snapshot: None,
             shown: None,
             textures: panels::viewport::Textures::default(),
+            reference: None,
+            arriving: Arc::default(),
             later: channel(),
             wake,
             is_repeatable: start.is_repeatable,
@@ -231,7 +237,7 @@ impl App {
                 commands,
             );
             self.right(ui, commands);
-            self.dock(ui);
+            self.dock(ui, commands);
         }
         self.viewport(ui, commands);
         panels::prompt::show(ui.ctx(), &mut self.interface, &self.settings, commands);
@@ -261,11 +267,19 @@ impl App {
         });
     }
 
-    fn dock(&mut self, ui: &mut egui::Ui) {
+    fn dock(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
         let scene = self.scene.as_ref();
         panels::dock::show(ui, &mut self.interface, |ui, dock| match dock {
             interface::Dock::Convergence => {
-                panels::convergence::show(ui, &mut self.convergence, self.is_repeatable);
+                let reference = self.reference.as_deref();
+                let hides_clock = self.is_repeatable;
+                panels::convergence::show(
+                    ui,
+                    &mut self.convergence,
+                    hides_clock,
+                    reference,
+                    commands,
+                );
             }
             interface::Dock::Needs => panels::needs::show(ui, scene, self.map.as_ref()),
         });
@@ -324,6 +338,8 @@ impl App {
                 Later::Failed(sentence) => self.messages.error(sentence),
             }
         }
+        let arrived = self.arriving.lock().unwrap_or_else(PoisonError::into_inner).take();
+        self.reference = arrived.or(self.reference.take());
         for sentence in self.worker.take_failures() {
             self.messages.error(sentence);
             // Asked for again, it is tried again.
@@ -339,6 +355,11 @@ impl App {
             self.snapshot = Some(snapshot);
         }
         self.shown = self.presenter.shown();
+        if let Some(failure) = self.shown.as_ref().and_then(|shown| shown.failure.clone()) {
+            self.messages.error(failure);
+            self.document.look.denoiser = Denoiser::default();
+            self.undo.amend(&self.document);
+        }
     }
 
     fn take_scene(&mut self, scene: LoadedScene) {
@@ -425,6 +446,8 @@ impl App {
             previews: !self.is_repeatable,
             device: self.document.light.device,
             rule: self.document.stop,
+            is_frozen: self.interface.is_frozen,
+            reference: self.reference.clone(),
             paused: self.interface.paused,
             run: self.interface.run,
         })

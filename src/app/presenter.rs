@@ -11,7 +11,7 @@ use super::document::Look;
 use super::overlays::{CellFacts, Legend, Overlay, Sources};
 use super::surface_map::SurfaceMap;
 use super::worker::{Activity, Request, Snapshot};
-use crate::denoise::denoise;
+use crate::denoise::Denoiser;
 use crate::error::{Error, Result};
 use crate::image::{Image, Rgb8};
 use crate::light_grid::LightGrid;
@@ -56,6 +56,8 @@ pub struct Shown {
     pub exposure_ev: f32,
     /// What the overlay's colours mean.
     pub legend: Option<Legend>,
+    /// Why the denoiser did not do its work.
+    pub failure: Option<String>,
     /// Facts about the grid's cells, when the overlay asked for them.
     pub facts: Option<Arc<CellFacts>>,
 }
@@ -175,7 +177,8 @@ struct Memory {
 impl Memory {
     fn present(&mut self, order: Order) -> Shown {
         let snapshot = Arc::clone(&order.snapshot);
-        let linear = develop(&snapshot, order.look.denoise);
+        let mut filter = Filter { look: &order.look, failure: None };
+        let linear = develop(&snapshot, &mut filter);
         let balanced = order.look.white_balance.apply(linear);
         let automatic = if order.look.auto_exposure {
             auto_exposure_ev(&balanced.shrunk(EXPOSURE_WIDTH))
@@ -184,23 +187,13 @@ impl Memory {
         };
         let exposure_ev = automatic + order.look.exposure_ev;
         let mut picture = display_rgb8(&balanced, exposure_ev, order.look.curve);
-        let other = self.other(&order, exposure_ev).map(Arc::new);
+        let other = other(&order, exposure_ev, &mut filter).map(Arc::new);
+        let failure = filter.failure;
         let legend = order
             .overlay
             .and_then(|(overlay, opacity)| self.paint(&order, overlay, opacity, &mut picture));
         let facts = self.facts.as_ref().map(|(_, _, facts)| Arc::clone(facts));
-        Shown { order, picture: Arc::new(picture), other, exposure_ev, legend, facts }
-    }
-
-    fn other(&self, order: &Order, exposure_ev: f32) -> Option<Rgb8> {
-        let look = &order.look;
-        let linear = match (&order.past, &order.snapshot.plain) {
-            (Some(past), _) => (**past).clone(),
-            (None, Some(plain)) if look.denoise => denoise(&plain.film),
-            (None, Some(plain)) => plain.film.image(),
-            (None, None) => return None,
-        };
-        Some(display_rgb8(&look.white_balance.apply(linear), exposure_ev, look.curve))
+        Shown { order, picture: Arc::new(picture), other, exposure_ev, legend, failure, facts }
     }
 
     fn paint(
@@ -270,14 +263,49 @@ impl Memory {
 /// Pixels across of the picture that the exposure is taken from: so coarse that noise averages out.
 const EXPOSURE_WIDTH: u32 = 64;
 
+/// The denoiser that is asked for, as long as it works.
+struct Filter<'a> {
+    look: &'a Look,
+    failure: Option<String>,
+}
+
+impl Filter<'_> {
+    /// The film's picture, denoised if that is asked for.
+    fn image(&mut self, film: &Film) -> Image {
+        if !self.look.denoise {
+            return film.image();
+        }
+        self.look.denoiser.denoise(film).unwrap_or_else(|failure| {
+            self.failure = Some(failure.to_string());
+            quick(film)
+        })
+    }
+}
+
+/// The film's picture through the filter that is always there.
+fn quick(film: &Film) -> Image {
+    Denoiser::ATrous.denoise(film).unwrap_or_else(|_| film.image())
+}
+
+/// What the wipe uncovers.
+fn other(order: &Order, exposure_ev: f32, filter: &mut Filter<'_>) -> Option<Rgb8> {
+    let look = &order.look;
+    let linear = match (&order.past, &order.snapshot.plain) {
+        (Some(past), _) => (**past).clone(),
+        (None, Some(plain)) => filter.image(&plain.film),
+        (None, None) => return None,
+    };
+    Some(display_rgb8(&look.white_balance.apply(linear), exposure_ev, look.curve))
+}
+
 /// The linear picture; pixels without samples show the small one.
-fn develop(snapshot: &Snapshot, is_denoised: bool) -> Image {
+fn develop(snapshot: &Snapshot, filter: &mut Filter<'_>) -> Image {
     let film = &snapshot.main.film;
     // A small picture is there to see where one is going, not to judge noise.
     let is_moving = snapshot.activity == Activity::Moving;
-    let mut image = if is_denoised || is_moving { denoise(film) } else { film.image() };
+    let mut image = if is_moving { quick(film) } else { filter.image(film) };
     if let Some(under) = snapshot.under.as_ref().filter(|_| film.min_samples() == 0) {
-        fill_from(&mut image, film, &denoise(under));
+        fill_from(&mut image, film, &quick(under));
     }
     image
 }

@@ -10,13 +10,10 @@ use super::loader::{LoadedMap, LoadedScene};
 use super::presenter::Shown;
 use super::worker::Snapshot;
 use crate::error::{Error, Notices, Result};
-use crate::image::{
-    ExrPicture, Image, Layer, check_writable, write_beside_and_rename, write_exr, write_png,
-};
+use crate::image::{ExrPicture, Image, Layer, check_writable, write_beside_and_rename, write_exr};
 use crate::light_grid::LightGrid;
 use crate::output::record::{Phases, Record};
 use crate::output::{Exposure, LayerName, PictureOptions, write_picture};
-use crate::tone::display_rgb8;
 
 /// What a picture is written from.
 pub(super) struct Picture {
@@ -56,17 +53,10 @@ pub(super) fn picture(path: &Path, picture: &Picture) -> Result<()> {
         notices: &notices,
         options: settings(picture),
     };
-    let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-    if document.look.denoise && !is_exr {
-        crate::output::check_extension(path)?;
-        let linear = crate::denoise::denoise(&snapshot.main.film);
-        let balanced = document.look.white_balance.apply(linear);
-        let rgb = display_rgb8(&balanced, picture.shown.exposure_ev, document.look.curve);
-        return write_png(path, &rgb, &record.metadata());
-    }
     let options = PictureOptions {
         exposure: Exposure::Stops(picture.shown.exposure_ev),
         tone_curve: document.look.curve,
+        denoiser: document.look.denoise.then_some(document.look.denoiser),
         white_balance: document.look.white_balance,
         layers: vec![LayerName::All],
     };
@@ -85,7 +75,6 @@ fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
         ("env_rotation_degrees", json!(document.rotation_degrees)),
         ("env_intensity", json!(document.intensity)),
         ("seed", json!(view.seed)),
-        ("denoised", json!(document.look.denoise)),
         ("white_balance_kelvin", json!(document.look.white_balance.kelvin)),
         ("camera_eye", json!(camera.map(|c| c.eye))),
         ("camera_rotation", json!(camera.map(|c| c.rotation))),

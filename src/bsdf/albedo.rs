@@ -31,21 +31,21 @@ static ROWS: LazyLock<[Row; ROUGHNESSES]> = LazyLock::new(|| array::from_fn(row)
 
 /// The albedo terms of one roughness, interpolated between two rows.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct AlbedoTerms {
+pub(crate) struct AlbedoTerms {
     row: u32,
     fraction: f32,
 }
 
 impl AlbedoTerms {
     /// `roughness` is perceptual, in `[0,1]`.
-    pub(super) fn of(roughness: f32) -> Self {
+    pub(crate) fn of(roughness: f32) -> Self {
         let x = roughness * (ROUGHNESSES - 1) as f32;
         let row = (x as usize).min(ROUGHNESSES - 2);
         Self { row: row as u32, fraction: x - row as f32 }
     }
 
     /// `(A, B)` seen from a direction of this cosine, in `[0,1]`.
-    pub(super) fn at(self, cos: f32) -> Vec2 {
+    pub(crate) fn at(self, cos: f32) -> Vec2 {
         let x = cos.clamp(0.0, 1.0).sqrt() * (COSINES - 1) as f32;
         let column = (x as usize).min(COSINES - 2);
         let fraction = x - column as f32;
@@ -54,7 +54,7 @@ impl AlbedoTerms {
     }
 
     /// Cosine-weighted mean of [`Self::at`] over the hemisphere.
-    pub(super) fn mean(self) -> Vec2 {
+    pub(crate) fn mean(self) -> Vec2 {
         self.between(|row| row.mean)
     }
 

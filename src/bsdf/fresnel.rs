@@ -3,21 +3,21 @@
 use glam::Vec3;
 
 /// Schlick's weight `(1 - cos)^5`: 0 facing, 1 grazing.
-pub(super) fn schlick_weight(cos: f32) -> f32 {
+pub(crate) fn schlick_weight(cos: f32) -> f32 {
     let m = (1.0 - cos).clamp(0.0, 1.0);
     let m2 = m * m;
     m2 * m2 * m
 }
 
 /// Reflectance at normal incidence of an interface of relative index of refraction `ior`.
-pub(super) fn normal_reflectance(ior: f32) -> f32 {
+pub(crate) fn normal_reflectance(ior: f32) -> f32 {
     let r = (ior - 1.0) / (ior + 1.0);
     r * r
 }
 
 /// Unpolarised Fresnel reflectance of a dielectric; `eta` is the index on the far side over the index
 /// on this side. `None` is total internal reflection.
-pub(super) fn dielectric(cos: f32, eta: f32) -> Option<f32> {
+pub(crate) fn dielectric(cos: f32, eta: f32) -> Option<f32> {
     let cos = cos.clamp(0.0, 1.0);
     let sin2_t = (1.0 - cos * cos) / (eta * eta);
     if sin2_t >= 1.0 {
@@ -31,7 +31,7 @@ pub(super) fn dielectric(cos: f32, eta: f32) -> Option<f32> {
 
 /// Direction of the light refracted at the facet `h` for a viewer in direction `wo` (both unit, on
 /// the same side). `None` is total internal reflection.
-pub(super) fn refract(wo: Vec3, h: Vec3, eta: f32) -> Option<Vec3> {
+pub(crate) fn refract(wo: Vec3, h: Vec3, eta: f32) -> Option<Vec3> {
     let cos = wo.dot(h);
     let sin2_t = (1.0 - cos * cos).max(0.0) / (eta * eta);
     if sin2_t >= 1.0 {
@@ -42,7 +42,7 @@ pub(super) fn refract(wo: Vec3, h: Vec3, eta: f32) -> Option<Vec3> {
 }
 
 /// Direction mirrored at the facet `h`.
-pub(super) fn reflect(wo: Vec3, h: Vec3) -> Vec3 {
+pub(crate) fn reflect(wo: Vec3, h: Vec3) -> Vec3 {
     h * (2.0 * wo.dot(h)) - wo
 }
 

@@ -13,23 +13,23 @@ pub(super) const SMOOTH_ALPHA: f32 = 1e-3;
 
 /// GGX of one width.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ggx {
+pub(crate) struct Ggx {
     alpha: f32,
 }
 
 impl Ggx {
     /// From glTF's perceptual roughness: alpha is its square.
-    pub(super) fn from_roughness(roughness: f32) -> Self {
+    pub(crate) fn from_roughness(roughness: f32) -> Self {
         Self { alpha: roughness * roughness }
     }
 
     /// Whether this is a perfect mirror rather than a lobe.
-    pub(super) fn is_smooth(self) -> bool {
+    pub(crate) fn is_smooth(self) -> bool {
         self.alpha < SMOOTH_ALPHA
     }
 
     /// Density of normals `D(h)` per steradian for a unit `h` with `h.z >= 0`.
-    pub(super) fn distribution(self, h: Vec3) -> f32 {
+    pub(crate) fn distribution(self, h: Vec3) -> f32 {
         // Written with the sine so that narrow lobes do not cancel.
         let a2 = self.alpha * self.alpha;
         let t = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z;
@@ -38,14 +38,14 @@ impl Ggx {
 
     /// `G1(v) / (2 cos)`: half of Smith's masking over the cosine, finite at grazing angles.
     /// Two of them multiply to glTF's visibility term `V = G / (4 cos cos)`.
-    pub(super) fn visibility(self, cos: f32) -> f32 {
+    pub(crate) fn visibility(self, cos: f32) -> f32 {
         let a2 = self.alpha * self.alpha;
         1.0 / (cos + (a2 + (1.0 - a2) * cos * cos).sqrt())
     }
 
     /// A normal visible from `wo` (unit, `z > 0`), by spherical caps (Dupuy and Benyoub, *Sampling
     /// Visible GGX Normals with Spherical Caps*, HPG 2023).
-    pub(super) fn sample_visible_normal(self, wo: Vec3, u: Vec2) -> Vec3 {
+    pub(crate) fn sample_visible_normal(self, wo: Vec3, u: Vec2) -> Vec3 {
         let wo_std = Vec3::new(self.alpha * wo.x, self.alpha * wo.y, wo.z).normalize();
         let z = (1.0 - u.y) * (1.0 + wo_std.z) - wo_std.z;
         let r = (1.0 - z * z).max(0.0).sqrt();
@@ -55,7 +55,7 @@ impl Ggx {
     }
 
     /// Density per steradian (of normals) of [`Self::sample_visible_normal`].
-    pub(super) fn visible_normal_pdf_solid_angle(self, wo: Vec3, h: Vec3) -> f32 {
+    pub(crate) fn visible_normal_pdf_solid_angle(self, wo: Vec3, h: Vec3) -> f32 {
         2.0 * self.visibility(wo.z) * self.distribution(h) * wo.dot(h).max(0.0)
     }
 }

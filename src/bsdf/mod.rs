@@ -16,9 +16,9 @@
 
 pub(crate) mod albedo;
 mod coat;
-mod fresnel;
+pub(crate) mod fresnel;
 mod interface;
-mod microfacet;
+pub(crate) mod microfacet;
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -272,7 +272,7 @@ fn delta_sample(wi: Vec3, weight: Vec3) -> Option<BsdfSample> {
 }
 
 /// A direction around +Z with density `cos / pi`.
-fn cosine_hemisphere(u: Vec2) -> Vec3 {
+pub(crate) fn cosine_hemisphere(u: Vec2) -> Vec3 {
     let (sin_phi, cos_phi) = sin_cos_turns(u.x);
     let r = u.y.sqrt();
     Vec3::new(r * cos_phi, r * sin_phi, (1.0 - u.y).max(0.0).sqrt())

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::color::luminance;
+use crate::environment::landmarks::Sun;
 use crate::error::{Notices, Result};
 use crate::image::Image;
 use crate::path::World;
+use crate::render::gpu::KernelFacts;
 use crate::scene::{Projection, Scene, builtin};
 
 /// Arguments of `info`.
@@ -70,39 +71,29 @@ fn scene_facts(name: &str, scene: Scene) -> Value {
             format!("{i}: {} ({view})", camera.name)
         }).collect::<Vec<_>>(),
         "left_out": world.needs.left_out(),
+        "gpu_kernel": KernelFacts::of_scene(&world),
         "notices": scene.notices.iter().collect::<Vec<_>>(),
     })
 }
 
 fn map_facts(name: &str, map: &Image, notices: &Notices) -> Value {
-    let mut sums = (0.0_f64, 0.0_f64);
-    let mut brightest = (0.0_f32, 0_usize);
-    for (i, pixel) in map.pixels.iter().enumerate() {
-        let y = (i / map.width as usize) as u32;
-        let solid_angle = crate::math::texel_solid_angle(map.width, map.height, y);
-        let light = luminance((*pixel).into());
-        sums = (sums.0 + solid_angle * f64::from(light), sums.1 + solid_angle);
-        if light > brightest.0 {
-            brightest = (light, i);
-        }
-    }
-    let (x, y) = (brightest.1 % map.width as usize, brightest.1 / map.width as usize);
-    let left_out = if brightest.0 == 0.0 {
-        vec!["sampling of the map and the Light Grid: the map is black"]
-    } else {
-        Vec::new()
+    let sun = Sun::of(map);
+    let left_out = match sun {
+        None => vec!["sampling of the map and the Light Grid: the map is black"],
+        Some(_) => Vec::new(),
     };
     json!({
         "map": name,
         "size": [map.width, map.height],
         "bytes": map.pixels.len() * 12,
-        "mean_luminance": sums.0 / sums.1,
-        "max_luminance": brightest.0,
-        "brightest_pixel": [x, y],
-        "brightest_direction_degrees": {
-            "azimuth_from_x_towards_z": ((x as f64 + 0.5) / f64::from(map.width) - 0.5) * 360.0,
-            "elevation": 90.0 - (y as f64 + 0.5) / f64::from(map.height) * 180.0,
-        },
+        "mean_luminance": sun.map_or(0.0, |sun| sun.mean_luminance),
+        "max_luminance": sun.map_or(0.0, |sun| sun.max_luminance),
+        "brightest_pixel": sun.map(|sun| sun.texel),
+        "brightest_direction_degrees": sun.map(|sun| json!({
+            "azimuth_from_x_towards_z": sun.azimuth_degrees,
+            "elevation": sun.elevation_degrees,
+        })),
+        "energy_within_2.5_degrees_of_it": sun.map(|sun| sun.energy_share),
         "left_out": left_out,
         "notices": notices.iter().collect::<Vec<_>>(),
     })

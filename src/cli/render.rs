@@ -9,6 +9,7 @@ use glam::Vec3;
 use super::device;
 use super::progress::Progress;
 use super::values;
+use crate::denoise::Denoiser;
 use crate::environment::{Environment, EnvironmentOptions, TableKind};
 use crate::error::{Error, Notices, Result};
 use crate::image::{check_writable, is_same_file};
@@ -94,6 +95,13 @@ pub(super) struct RenderArguments {
     /// Tone curve of .png pictures: agx, aces, neutral, reinhard, none.
     #[arg(long, default_value = "agx", value_name = "CURVE", help_heading = "Picture")]
     tonemap: ToneCurve,
+    /// Takes noise out of .png pictures: a-trous (our own filter) or oidn (Open Image Denoise, if its
+    /// library is installed).
+    #[arg(long, value_enum, value_name = "FILTER", num_args = 0..=1, default_missing_value = "a-trous", help_heading = "Picture")]
+    denoise: Option<Denoiser>,
+    /// The light that looks white in .png pictures: kelvin, and a tint from -1 (green) to 1.
+    #[arg(long, value_parser = parse_white, allow_hyphen_values = true, value_name = "K[,TINT]", help_heading = "Picture")]
+    white: Option<WhiteBalance>,
     /// Extra layers in .exr pictures: albedo, normal, depth, samples, variance, or all.
     #[arg(long, value_delimiter = ',', value_name = "LAYER", help_heading = "Picture")]
     layers: Vec<LayerName>,
@@ -164,10 +172,22 @@ fn parse_exposure(text: &str) -> std::result::Result<Exposure, String> {
         .map_err(|e| format!("{e} of stops, or auto"))
 }
 
+fn parse_white(text: &str) -> std::result::Result<WhiteBalance, String> {
+    let (kelvin, tint) = text.split_once(',').unwrap_or((text, "0"));
+    let (kelvin, tint) = (values::finite(kelvin)? as f32, values::finite(tint)? as f32);
+    if !((2000.0..=12000.0).contains(&kelvin) && (-1.0..=1.0).contains(&tint)) {
+        return Err("expected 2000 to 12000 kelvin and a tint from -1 to 1".to_owned());
+    }
+    Ok(WhiteBalance { kelvin, tint })
+}
+
 /// Refuses outputs before the work rather than after it.
 fn check_outputs(arguments: &RenderArguments) -> Result<()> {
     for picture in &arguments.outputs {
         output::check_extension(picture)?;
+    }
+    if let Some(denoiser) = arguments.denoise {
+        denoiser.check()?;
     }
     let files: Vec<&PathBuf> = arguments.outputs.iter().chain(&arguments.json).collect();
     for (i, file) in files.iter().enumerate() {
@@ -209,6 +229,8 @@ impl RenderArguments {
             filter: PixelFilter::default(),
             exposure: Exposure::Auto,
             tonemap: ToneCurve::default(),
+            denoise: None,
+            white: None,
             layers: Vec::new(),
             spp: samples,
             seconds,
@@ -290,7 +312,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     let options = PictureOptions {
         exposure: arguments.exposure,
         tone_curve: arguments.tonemap,
-        white_balance: WhiteBalance::default(),
+        denoiser: arguments.denoise,
+        white_balance: arguments.white.unwrap_or_default(),
         layers: arguments.layers.clone(),
     };
     for picture in &arguments.outputs {
@@ -356,7 +379,8 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
         layers: arguments
             .layers
             .iter()
-            .any(|l| !matches!(l, LayerName::Samples | LayerName::Variance)),
+            .any(|l| !matches!(l, LayerName::Samples | LayerName::Variance))
+            || arguments.denoise.is_some(),
     })
 }
 

@@ -8,6 +8,7 @@
 //! Rotation turns the map about +Y as [`crate::math::rotate_y`] turns directions: what the map
 //! shows at `u` is seen at lat-long `u + rotation / 2pi`. Tiles turn with the map.
 
+pub mod landmarks;
 mod options;
 mod sat_report;
 pub mod sky;
@@ -77,11 +78,11 @@ pub struct EnvironmentMemory {
 
 /// A place on the map in texels, and the texel it lies in.
 #[derive(Debug, Clone, Copy)]
-struct MapPoint {
-    x: f32,
-    y: f32,
-    column: u32,
-    row: u32,
+pub(crate) struct MapPoint {
+    pub(crate) x: f32,
+    pub(crate) y: f32,
+    pub(crate) column: u32,
+    pub(crate) row: u32,
 }
 
 impl Environment {
@@ -279,7 +280,8 @@ impl Environment {
         Arc::ptr_eq(&self.map, &other.map) && Arc::ptr_eq(&self.table, &other.table)
     }
 
-    fn map_point(&self, direction: Vec3) -> MapPoint {
+    /// Where the map shows a unit world direction.
+    pub(crate) fn map_point(&self, direction: Vec3) -> MapPoint {
         let uv = uv_from_direction(direction);
         let turned = uv.x - self.rotation_turns;
         let u = if turned < 0.0 { turned + 1.0 } else { turned };
@@ -327,7 +329,7 @@ pub const EDGE_MARGIN_TURNS: f64 = 1.0 / (1 << 22) as f64;
 /// A uniform f32 has 24 good bits: entries of less than 2^-24 of a table would be met by chance of
 /// rounding only. So each number gets 24 more, hashed from both, below its last bit: order, hence
 /// stratification, stays.
-fn refine(u: Vec2) -> DVec2 {
+pub(crate) fn refine(u: Vec2) -> DVec2 {
     const STEPS: f32 = (1 << 24) as f32;
     let (x, y) = (lattice(u.x * STEPS), lattice(u.y * STEPS));
     let fine_x = hash(hash(x) ^ y);

@@ -6,6 +6,7 @@ use nv_flip::{DEFAULT_PIXELS_PER_DEGREE, FlipImageRgb8, FlipPool};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::color::luminance;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
@@ -72,6 +73,27 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison> {
         flip: mean_flip(image, reference, flip_exposure_ev),
         flip_exposure_ev,
     })
+}
+
+/// What `Film::noise` estimates: the root of the mean over pixels of
+/// `(a - r)^2 / (r^2 + 0.01 mean(r)^2)` of luminances. `None` if the sizes differ or the reference is
+/// black.
+pub fn relative_rms_error(image: &Image, reference: &Image) -> Option<f64> {
+    if (image.width, image.height) != (reference.width, reference.height) {
+        return None;
+    }
+    let light = |rgb: &[f32; 3]| f64::from(luminance((*rgb).into()));
+    let count = reference.pixels.len() as f64;
+    let mean = reference.pixels.iter().map(light).sum::<f64>() / count;
+    let floor = REL_MSE_EPSILON * mean * mean;
+    let pairs = image.pixels.iter().zip(&reference.pixels);
+    let sum: f64 = pairs
+        .map(|(a, r)| {
+            let (a, r) = (light(a), light(r));
+            (a - r) * (a - r) / (r * r + floor)
+        })
+        .sum();
+    (mean > 0.0).then(|| (sum / count).sqrt())
 }
 
 fn check_finite(image: &Image, which: &str) -> Result<()> {

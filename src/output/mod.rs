@@ -6,6 +6,7 @@ pub mod record;
 
 use self::record::Record;
 use crate::color::luminance;
+use crate::denoise::Denoiser;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::image::{ExrPicture, Layer, write_exr, write_png};
@@ -45,6 +46,8 @@ pub struct PictureOptions {
     pub exposure: Exposure,
     /// Tone curve of `.png` pictures.
     pub tone_curve: ToneCurve,
+    /// What takes the noise out of `.png` pictures.
+    pub denoiser: Option<Denoiser>,
     /// White balance of `.png` pictures.
     pub white_balance: WhiteBalance,
     /// Extra layers of `.exr` pictures.
@@ -96,12 +99,19 @@ pub fn write_picture(path: &Path, options: &PictureOptions, record: &Record<'_>)
         let layers = layers(film, &options.layers);
         return write_exr(path, ExrPicture { image: &image, layers, metadata: &metadata });
     }
+    let image = match options.denoiser {
+        Some(denoiser) => denoiser.denoise(film)?,
+        None => image,
+    };
     let image = options.white_balance.apply(image);
     let stops = match options.exposure {
         Exposure::Stops(stops) => stops,
         Exposure::Auto => auto_exposure_ev(&image),
     };
     metadata.push(("lightgrid.exposure_ev".to_owned(), format!("{stops:.3}")));
+    if let Some(denoiser) = options.denoiser {
+        metadata.push(("lightgrid.denoiser".to_owned(), denoiser.name().to_owned()));
+    }
     metadata.push(("lightgrid.tonemap".to_owned(), options.tone_curve.name().to_owned()));
     write_png(path, &display_rgb8(&image, stops, options.tone_curve), &metadata)
 }

@@ -75,7 +75,7 @@ impl CameraRays {
 }
 
 /// Unit square to unit disk, keeping areas and neighbourhoods (Shirley and Chiu 1997).
-fn disk_from_square(u: Vec2) -> Vec2 {
+pub(crate) fn disk_from_square(u: Vec2) -> Vec2 {
     let p = 2.0 * u - 1.0;
     if p == Vec2::ZERO {
         return Vec2::ZERO;

@@ -81,7 +81,10 @@ impl Axis {
         }
         match self.wrap {
             Wrap::Repeat => t - t.floor(),
-            Wrap::MirroredRepeat => 1.0 - (t - 2.0 * (0.5 * t).floor() - 1.0).abs(),
+            Wrap::MirroredRepeat => {
+                let half = 0.5 * t;
+                1.0 - (2.0 * (half - half.floor()) - 1.0).abs()
+            }
             Wrap::ClampToEdge => t.clamp(0.0, 1.0),
         }
     }

@@ -273,3 +273,44 @@ fn a_cancelled_picture_goes_on_where_it_stopped() {
     let at_once = on_gpu(&world, &environment, view, &gpu);
     assert_eq!(*session.film(), finish(at_once, 4), "the same bits in one piece or several");
 }
+
+/// Runs the binary in a folder of its own.
+fn lightgrid(folder: &std::path::Path, line: &str) -> (bool, String, String) {
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_lightgrid"))
+        .current_dir(folder)
+        .args(line.split_whitespace())
+        .output()
+        .expect("the binary starts");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.success(), text(&output.stdout), text(&output.stderr))
+}
+
+#[test]
+fn the_command_line_lists_and_chooses_devices() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let render = "render open --env sky:overcast@64x32 --size 32x18 --spp 2 --bounces 1 -o a.png";
+    let run = |rest: &str| lightgrid(folder.path(), &format!("{render} {rest}"));
+    let (ok, _, says) = run("--device cpu --adapter x");
+    assert!(!ok && says.contains("exclude each other") && says.lines().count() == 1, "{says}");
+    let (ok, _, says) = run("--device gpu --adapter nonsense");
+    assert!(!ok && says.lines().count() == 1, "{says}");
+    assert!(says.contains("no adapter is called nonsense") || says.contains("no GPU"), "{says}");
+
+    let Some(gpu) = gpu() else { return };
+    let (ok, list, says) = lightgrid(folder.path(), "devices --json");
+    assert!(ok, "{says}");
+    let list: serde_json::Value = serde_json::from_str(&list).expect("JSON");
+    assert_eq!(list[0]["name"], gpu.facts().name.as_str());
+    let (_, text, _) = lightgrid(folder.path(), "devices");
+    assert!(text.contains(&gpu.facts().name), "{text}");
+
+    let (ok, _, says) = run("--device gpu --json a.json");
+    assert!(ok, "{says}");
+    let json = std::fs::read_to_string(folder.path().join("a.json")).expect("written");
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(json["device"], gpu.facts().name.as_str());
+    let kernel = &json["gpu"]["kernel"];
+    assert!(kernel["source_bytes"].as_u64() < kernel["full_source_bytes"].as_u64(), "{json}");
+    assert!(kernel["left_out"].as_array().is_some_and(|names| !names.is_empty()), "{json}");
+    assert!(json["gpu"]["device_bytes"].as_u64() > Some(0), "{json}");
+}

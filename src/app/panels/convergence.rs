@@ -1,22 +1,38 @@
 //! Estimated error against time, both logarithmic.
 
 use egui::{Color32, Ui, Vec2b};
-use egui_plot::{GridMark, Legend, Line, Plot, PlotPoints};
+use egui_plot::{GridMark, Legend, Line, LineStyle, Plot, PlotPoints};
 
+use crate::app::commands::Command;
 use crate::app::convergence::{Convergence, Run};
 use crate::app::theme;
-use crate::app::worker::Point;
+use crate::app::worker::{Point, Reference};
 
 /// Draws the plot of all runs; `by_samples_only` leaves the clock out.
-pub(in crate::app) fn show(ui: &mut Ui, convergence: &mut Convergence, by_samples_only: bool) {
+pub(in crate::app) fn show(
+    ui: &mut Ui,
+    convergence: &mut Convergence,
+    by_samples_only: bool,
+    reference: Option<&Reference>,
+    commands: &mut Vec<Command>,
+) {
     let by_samples = by_samples_only || convergence.by_samples;
-    if !by_samples_only {
-        ui.horizontal(|ui| {
+    ui.horizontal(|ui| {
+        if !by_samples_only {
             ui.selectable_value(&mut convergence.by_samples, false, "Time");
             ui.selectable_value(&mut convergence.by_samples, true, "Samples");
-            ui.label(theme::quiet("Estimated relative RMS error; earlier runs are dim"));
-        });
-    }
+        }
+        ui.label(theme::quiet("Estimated relative RMS error; earlier runs are dim"));
+        let hint = "A picture of this view without noise: the true error is drawn too";
+        if ui.button("Reference…").on_hover_text(hint).clicked() {
+            commands.push(Command::ChooseReference);
+        }
+        if let Some(reference) = reference
+            && ui.button("Forget it").on_hover_text(&reference.name).clicked()
+        {
+            commands.push(Command::ForgetReference);
+        }
+    });
     let formatter = |mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
         if mark.value.fract().abs() < 1e-6 {
             theme::figure(10_f64.powf(mark.value))
@@ -65,10 +81,18 @@ fn lines(convergence: &Convergence, by_samples: bool) -> Vec<Line<'static>> {
     let mut lines: Vec<Line<'static>> = Vec::new();
     let mut add = |run: &Run, number: usize, color: Color32, width: f32| {
         if run.points.len() > 1 {
-            let points: PlotPoints<'static> =
-                run.points.iter().map(|point| place(point, by_samples)).collect();
             let name = format!("{} · run {number}", run.name);
-            lines.push(Line::new(name, points).color(color).width(width));
+            let estimate = run.points.iter().map(|point| place(point, point.noise, by_samples));
+            let estimate: PlotPoints<'static> = estimate.collect();
+            lines.push(Line::new(name.clone(), estimate).color(color).width(width));
+            let measured = run.points.iter().filter(|point| point.error.is_some_and(|e| e > 0.0));
+            let measured: Vec<[f64; 2]> = measured
+                .map(|point| place(point, point.error.unwrap_or(point.noise), by_samples))
+                .collect();
+            if !measured.is_empty() {
+                let line = Line::new(format!("{name}, true"), measured).color(color).width(width);
+                lines.push(line.style(LineStyle::dashed_loose()));
+            }
         }
     };
     for (i, run) in convergence.runs().iter().enumerate() {
@@ -82,9 +106,9 @@ fn lines(convergence: &Convergence, by_samples: bool) -> Vec<Line<'static>> {
     lines
 }
 
-fn place(point: &Point, by_samples: bool) -> [f64; 2] {
+fn place(point: &Point, error: f64, by_samples: bool) -> [f64; 2] {
     let x = if by_samples { point.samples } else { point.seconds };
-    [x.max(1e-6).log10(), point.noise.log10()]
+    [x.max(1e-6).log10(), error.log10()]
 }
 
 fn faded(index: usize) -> Color32 {

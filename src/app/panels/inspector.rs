@@ -1,15 +1,16 @@
 //! The map with its tiles, and what the cell under the pointer knows of them.
 
-use egui::{Color32, Grid, Rect, RichText, Stroke, StrokeKind, Ui};
+use egui::{Color32, Grid, Rect, RichText, Stroke, StrokeKind, Ui, Vec2};
 
 use super::map_view;
 use crate::app::commands::Command;
 use crate::app::inspect::{Inspected, Inspector};
-use crate::app::interface::Interface;
+use crate::app::interface::{Interface, TileView};
 use crate::app::loader::LoadedMap;
 use crate::app::overlays::palette;
 use crate::app::theme;
 use crate::app::worker::Snapshot;
+use crate::environment::landmarks::Sun;
 
 /// Tiles listed in the table.
 const LISTED: usize = 6;
@@ -27,15 +28,32 @@ pub(in crate::app) fn show(
     let size = map.environment.tile_grid();
     ui.add_space(4.0);
     ui.separator();
-    theme::heading(ui, "TILES OF THE MAP, BY ENERGY");
+    theme::heading(ui, "TILES OF THE MAP");
+    tile_views(ui, interface);
     let energies: Vec<f32> =
         map.environment.tile_energies().iter().map(|energy| *energy as f32).collect();
-    tiles(ui, interface, map, size, &shares(&energies));
+    match (interface.tiles, inspector.learned()) {
+        (TileView::EqualEnergy, _) => equal_energy(ui, map),
+        (TileView::Learned, Some(sums)) => tiles(ui, interface, map, size, &shares(sums)),
+        (TileView::Learned, None) => {
+            tiles(ui, interface, map, size, &[]);
+            ui.label(theme::quiet("Nothing has been learned yet."));
+        }
+        (TileView::Energy, _) => tiles(ui, interface, map, size, &shares(&energies)),
+    }
+    let turns = snapshot.map_or(0.0, |s| s.request.environment.rotation_and_intensity().0);
+    if let Some(sun) = &map.sun {
+        ui.label(theme::quiet(sun_sentence(sun, turns)));
+    }
     if let Some(tile) = interface.tile {
         chosen_tile(ui, interface, size, tile, &shares(&energies));
-    } else {
+    } else if interface.tiles != TileView::EqualEnergy {
         ui.label(theme::quiet("Click a tile to see which cells want it."));
     }
+    ui.checkbox(&mut interface.is_frozen, "Freeze learning").on_hover_text(
+        "Go on with the laws there are, around their old centre, when the camera or a setting \
+         changes",
+    );
     ui.add_space(4.0);
     ui.separator();
     theme::heading(ui, "CELL UNDER THE POINTER");
@@ -54,6 +72,51 @@ pub(in crate::app) fn show(
     }
 }
 
+fn tile_views(ui: &mut Ui, interface: &mut Interface) {
+    const VIEWS: [(TileView, &str, &str); 3] = [
+        (TileView::Energy, "Energy", "Share of the map's energy in each tile"),
+        (TileView::Learned, "Learned", "What all cells together have learned to want"),
+        (
+            TileView::EqualEnergy,
+            "Equal energy",
+            "As many tiles of equal energy. They are not used: they crowd around the sun, and large \
+             ones say little about which part of the sky is seen",
+        ),
+    ];
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 3.0;
+        for (view, name, hint) in VIEWS {
+            ui.selectable_value(&mut interface.tiles, view, name).on_hover_text(hint);
+        }
+    });
+}
+
+/// The borders of tiles of equal energy.
+fn equal_energy(ui: &mut Ui, map: &LoadedMap) {
+    let (rect, response) = map_view::ground(ui, map);
+    let scale = rect.size() / Vec2::new(map.preview.width as f32, map.preview.height as f32);
+    let painter = ui.painter_at(rect);
+    let stroke = Stroke::new(0.6, theme::ACCENT);
+    for [left, top, right, bottom] in map.equal_energy.iter() {
+        let corner = |x: u32, y: u32| rect.min + Vec2::new(x as f32, y as f32) * scale;
+        let tile = Rect::from_min_max(corner(*left, *top), corner(*right, *bottom));
+        painter.rect_stroke(tile, 0.0, stroke, StrokeKind::Middle);
+    }
+    let count = map.equal_energy.len();
+    response.on_hover_text(format!("{count} tiles of equal energy, for comparison only"));
+}
+
+fn sun_sentence(sun: &Sun, rotation_turns: f32) -> String {
+    let azimuth =
+        (sun.azimuth_degrees + 360.0 * f64::from(rotation_turns) + 180.0).rem_euclid(360.0) - 180.0;
+    format!(
+        "Brightest at azimuth {azimuth:.0}° (0° is +X), elevation {:.0}°; {:.0} % of the energy \
+         within 2.5° of it",
+        sun.elevation_degrees,
+        100.0 * sun.energy_share
+    )
+}
+
 fn shares(values: &[f32]) -> Vec<f32> {
     let total: f32 = values.iter().sum();
     values.iter().map(|v| if total > 0.0 { v / total } else { 0.0 }).collect()
@@ -69,6 +132,13 @@ fn tiles(
 ) {
     let (rect, response) = map_view::ground(ui, map);
     heatmap(ui, rect, size, shares);
+    if let Some(sun) = &map.sun {
+        let scale = rect.size()
+            / Vec2::new(map.environment.map().width as f32, map.environment.map().height as f32);
+        let at = rect.min
+            + (Vec2::new(sun.texel[0] as f32, sun.texel[1] as f32) + Vec2::splat(0.5)) * scale;
+        ui.painter_at(rect).circle_stroke(at, 4.5, Stroke::new(1.2, Color32::WHITE));
+    }
     if let Some(tile) = interface.tile {
         mark(ui, map_view::tile_rect(rect, size, tile), theme::ACCENT);
     }

@@ -39,6 +39,14 @@ pub(in crate::app) fn show(ui: &mut Ui, scene: Option<&LoadedScene>, map: Option
         for sentence in needs.left_out() {
             right.label(theme::quiet(sentence));
         }
+        let kernel = &scene.kernel;
+        right.label(theme::quiet(format!(
+            "of the GPU's kernel: {} of {} of source; of a vertex: {} of {} bytes",
+            theme::bytes(kernel.full_source_bytes - kernel.source_bytes),
+            theme::bytes(kernel.full_source_bytes),
+            kernel.full_vertex_bytes - kernel.vertex_bytes,
+            kernel.full_vertex_bytes
+        )));
         if map.is_some_and(|map| map.environment.is_black()) {
             right.label(theme::quiet("sampling of the map and the Light Grid: the map is black"));
         }

@@ -6,6 +6,7 @@ use crate::app::commands::Command;
 use crate::app::document::{Document, PictureSize};
 use crate::app::presenter::Shown;
 use crate::app::theme;
+use crate::denoise::Denoiser;
 use crate::tone::{DAYLIGHT_KELVIN, ToneCurve, WhiteBalance};
 
 /// Draws the settings.
@@ -19,8 +20,7 @@ pub(in crate::app) fn show(
     exposure(ui, document, shown);
     curve(ui, document);
     white_balance(ui, &mut document.look.white_balance);
-    ui.checkbox(&mut document.look.denoise, "Denoise")
-        .on_hover_text("Edge-avoiding filter over albedo and normals; not in .exr files (N)");
+    denoiser(ui, document);
     ui.add_space(4.0);
     ui.separator();
     theme::heading(ui, "LIGHT");
@@ -48,6 +48,22 @@ pub(in crate::app) fn show(
     {
         commands.push(Command::KeepPicture);
     }
+}
+
+fn denoiser(ui: &mut Ui, document: &mut Document) {
+    ui.horizontal(|ui| {
+        ui.checkbox(&mut document.look.denoise, "Denoise")
+            .on_hover_text("For display and .png; .exr files keep what was rendered (N)");
+        // The library is looked for once.
+        if !document.look.denoise || Denoiser::Oidn.check().is_err() {
+            return;
+        }
+        let chosen = &mut document.look.denoiser;
+        ui.selectable_value(chosen, Denoiser::ATrous, "À-trous")
+            .on_hover_text("Edge-avoiding filter over albedo, normals and depth: fast");
+        ui.selectable_value(chosen, Denoiser::Oidn, "Open Image Denoise")
+            .on_hover_text("Intel's trained filter, found on this machine: slower, smoother");
+    });
 }
 
 fn exposure(ui: &mut Ui, document: &mut Document, shown: Option<&Shown>) {

@@ -28,6 +28,12 @@ pub(in crate::app) fn show(
             "Save",
             &[],
         ),
+        Purpose::Reference => (
+            "Open a reference",
+            "Path of a linear .exr or .hdr picture of the same view without noise",
+            "Open",
+            &[],
+        ),
         Purpose::Laws => ("Export the laws", "Path of a .csv, .json or .exr file", "Export", &[]),
     };
     let (mut is_done, mut is_closed) = (false, false);

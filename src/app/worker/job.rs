@@ -11,6 +11,7 @@ use super::{Activity, Point, Request, Shared, Snapshot, Take, lock};
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
+use crate::metrics;
 use crate::path::World;
 use crate::render::film::Film;
 use crate::render::{Phase, Sampling, Session, StopRule, View};
@@ -193,7 +194,12 @@ impl<'a> Job<'a> {
     /// The full picture: learning first, with a preview meanwhile, then samples until a rule is met.
     pub(super) fn render(&mut self, world: &World, environment: &Environment) {
         self.glance(world, environment);
-        let mut main = Session::new(world, environment, self.request.view.clone());
+        let keeps_laws = self.request.is_frozen && self.legacy.laws_for(&self.request).is_some();
+        let mut main = if keeps_laws {
+            self.experienced_session(world, environment, self.request.view.clone())
+        } else {
+            Session::new(world, environment, self.request.view.clone())
+        };
         let mut plain = self.request.split.then(|| {
             let view = View { sampling: Sampling::Plain, ..self.request.view.clone() };
             Session::new(world, environment, view)
@@ -417,11 +423,15 @@ impl<'a> Job<'a> {
     /// Adds a point to a curve, unless nothing has happened since the last one.
     fn note(&mut self, curve: usize, session: &Session<'_>) {
         let film = session.film();
-        let point = Point {
-            seconds: session.elapsed_seconds(),
-            samples: film.total_samples() as f64 / film.pixels().len().max(1) as f64,
-            noise: film.noise(),
-        };
+        let point =
+            Point {
+                seconds: session.elapsed_seconds(),
+                samples: film.total_samples() as f64 / film.pixels().len().max(1) as f64,
+                noise: film.noise(),
+                error: self.request.reference.as_ref().and_then(|reference| {
+                    metrics::relative_rms_error(&film.image(), &reference.image)
+                }),
+            };
         let curve = &mut self.curves[curve];
         let is_later = curve.last().is_none_or(|last| point.samples > last.samples);
         if point.noise.is_finite() && point.noise > 0.0 && is_later {

@@ -19,6 +19,7 @@ use job::{Job, Legacy};
 use super::Wake;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
+use crate::image::Image;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::render::film::Film;
@@ -44,6 +45,10 @@ pub struct Request {
     pub device: DeviceChoice,
     /// When to stop.
     pub rule: StopRule,
+    /// Render with what was learned before rather than learn anew.
+    pub is_frozen: bool,
+    /// What errors are measured against.
+    pub reference: Option<Arc<Reference>>,
     /// Do nothing for now.
     pub paused: bool,
     /// Counts restarts asked for by hand.
@@ -64,6 +69,8 @@ impl Request {
     fn is_same(&self, new: &Self) -> bool {
         !self.restarts(new)
             && self.device == new.device
+            && self.is_frozen == new.is_frozen
+            && self.reference.as_ref().map(Arc::as_ptr) == new.reference.as_ref().map(Arc::as_ptr)
             && self.rule == new.rule
             && self.paused == new.paused
     }
@@ -84,6 +91,14 @@ pub enum Activity {
     Done,
 }
 
+/// A picture without noise.
+pub struct Reference {
+    /// Where it came from.
+    pub name: String,
+    /// Linear radiance.
+    pub image: Image,
+}
+
 /// How good a picture was at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
@@ -93,6 +108,8 @@ pub struct Point {
     pub samples: f64,
     /// Estimated relative RMS error.
     pub noise: f64,
+    /// The true one, where there is a reference.
+    pub error: Option<f64>,
 }
 
 /// One picture and what was done for it.

@@ -74,16 +74,17 @@ pub(crate) struct Globals {
     pub(crate) orthographic: u32,
     pub(crate) scene_extent: f32,
     pub(crate) mean_contribution: f32,
+    pub(crate) zero: u32,
     pub(crate) grid_medium: u32,
-    pub(crate) padding: [u32; 2],
+    pub(crate) padding_0: u32,
     pub(crate) fog_low: Vec3,
     pub(crate) fog_mean_cosine: f32,
     pub(crate) fog_high: Vec3,
-    pub(crate) padding_2: u32,
+    pub(crate) padding_1: u32,
     pub(crate) fog_scattering: Vec3,
-    pub(crate) padding_3: u32,
+    pub(crate) padding_2: u32,
     pub(crate) fog_extinction: Vec3,
-    pub(crate) padding_4: u32,
+    pub(crate) padding_3: u32,
 }
 
 /// Twin of `Material` in `surface.wgsl`.
@@ -146,23 +147,23 @@ pub(crate) struct SurfaceSums {
 }
 
 /// Flags of `Material`, as in `surface.wgsl`.
-mod material_flags {
-    pub(super) const ALPHA_MASK: u32 = 1;
-    pub(super) const ALPHA_BLEND: u32 = 2;
-    pub(super) const DOUBLE_SIDED: u32 = 4;
-    pub(super) const UNLIT: u32 = 8;
-    pub(super) const THIN: u32 = 16;
-    pub(super) const PARTIAL: u32 = 32;
-    pub(super) const NORMAL_MAPPED: u32 = 64;
+pub(super) mod material_flags {
+    pub(in super::super) const ALPHA_MASK: u32 = 1;
+    pub(in super::super) const ALPHA_BLEND: u32 = 2;
+    pub(in super::super) const DOUBLE_SIDED: u32 = 4;
+    pub(in super::super) const UNLIT: u32 = 8;
+    pub(in super::super) const THIN: u32 = 16;
+    pub(in super::super) const PARTIAL: u32 = 32;
+    pub(in super::super) const NORMAL_MAPPED: u32 = 64;
 }
 
 /// Flags of `TextureRef`, as in `texture.wgsl`.
-mod texture_flags {
-    pub(super) const SECOND_UV_SET: u32 = 1;
-    pub(super) const NEAREST: u32 = 2;
-    pub(super) const SRGB: u32 = 4;
-    pub(super) const WRAP_U_SHIFT: u32 = 4;
-    pub(super) const WRAP_V_SHIFT: u32 = 6;
+pub(super) mod texture_flags {
+    pub(in super::super) const SECOND_UV_SET: u32 = 1;
+    pub(in super::super) const NEAREST: u32 = 2;
+    pub(in super::super) const SRGB: u32 = 4;
+    pub(in super::super) const WRAP_U_SHIFT: u32 = 4;
+    pub(in super::super) const WRAP_V_SHIFT: u32 = 6;
 }
 
 impl Globals {
@@ -433,7 +434,7 @@ pub(crate) fn pack_radiance(rgb: [f32; 3]) -> [u32; 2] {
 
 /// `pack_radiance` undone, as the shader does it.
 #[cfg(test)]
-fn unpack_radiance(words: [u32; 2]) -> [f32; 3] {
+pub(super) fn unpack_radiance(words: [u32; 2]) -> [f32; 3] {
     let mantissas = [
         words[0] & 0x3_ffff,
         (words[0] >> 18 | words[1] << 14) & 0x3_ffff,

@@ -1,7 +1,7 @@
 //! The GPU's schedule: the same paths in compute shaders, in dispatches too short to be felt.
 //!
-//! [`Renderer`] holds the scene, the map and the laws on a device and brings a [`Film`] forward as
-//! `cpu` does. A pass sums at most [`MAX_PASS_SAMPLES`] samples of a pixel in f32 on the device; the
+//! `Renderer` holds the scene, the map and the laws on a device and brings a [`Film`] forward as
+//! `cpu` does. A pass sums at most `MAX_PASS_SAMPLES` samples of a pixel in f32 on the device; the
 //! f64 film on the host adds up the passes, so that no precision is lost at any number of samples
 //! and the work so far survives the device.
 
@@ -9,6 +9,8 @@ mod buffers;
 mod device;
 pub(crate) mod layout;
 mod pacer;
+#[cfg(test)]
+mod parity;
 mod pipeline;
 pub(crate) mod shader;
 mod stage;
@@ -35,6 +37,7 @@ use shader::{Binding, Constants, Features, Kernel, Program};
 use stage::put_array;
 
 pub use device::{AdapterFacts, DeviceChoice, Gpu, adapters};
+pub use shader::KernelFacts;
 pub use stage::Stage;
 
 /// Most samples of a pixel that one pass sums in f32.
@@ -59,7 +62,7 @@ pub(crate) struct Renderer {
     learn: Option<Arc<Pipeline>>,
     render_pacer: Pacer,
     learn_pacer: Pacer,
-    kernel_source_bytes: [usize; 2],
+    kernel_facts: KernelFacts,
 }
 
 /// What was left out of the kernels and what they take.
@@ -69,10 +72,8 @@ pub struct GpuFigures {
     pub adapter: AdapterFacts,
     /// Bytes of all buffers on it.
     pub device_bytes: u64,
-    /// Features the kernels were built with.
-    pub features: Vec<&'static str>,
-    /// Bytes of the render kernel's source, and what they would be with every feature.
-    pub kernel_source_bytes: [usize; 2],
+    /// What its render kernel holds.
+    pub kernel: KernelFacts,
 }
 
 impl Renderer {
@@ -86,6 +87,20 @@ impl Renderer {
         environment: &Environment,
         view: &View,
         rays: &CameraRays,
+    ) -> Result<Self> {
+        Self::with_kernel(stage, world, environment, view, rays, |gpu, program| {
+            gpu.pipeline(Kernel::Render, program)
+        })
+    }
+
+    /// [`Self::new`] with the kernel that `compile` makes of the program for rendering.
+    fn with_kernel(
+        stage: &Stage,
+        world: &World,
+        environment: &Environment,
+        view: &View,
+        rays: &CameraRays,
+        compile: impl FnOnce(&Gpu, Program) -> Result<Arc<Pipeline>>,
     ) -> Result<Self> {
         let features = Features::of(world, environment, view);
         let mut buffers = stage.buffers.clone();
@@ -103,10 +118,9 @@ impl Renderer {
         buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
         let width_log2 = buffers.width_log2();
         let program = Program::new(Kernel::Render, &features, &constants, width_log2);
-        let full = Program::new(Kernel::Render, &Features::most(), &constants, width_log2);
-        let kernel_source_bytes = [program.source.len(), full.source.len()];
+        let kernel_facts = KernelFacts::of(&features);
         let renderer = Self {
-            render: stage.gpu.pipeline(Kernel::Render, program)?,
+            render: compile(&stage.gpu, program)?,
             learn: None,
             gpu: stage.gpu.clone(),
             buffers,
@@ -115,7 +129,7 @@ impl Renderer {
             constants,
             render_pacer: Pacer::default(),
             learn_pacer: Pacer::default(),
-            kernel_source_bytes,
+            kernel_facts,
         };
         renderer.write_globals();
         Ok(renderer)
@@ -280,8 +294,7 @@ impl Renderer {
         GpuFigures {
             adapter: self.gpu.facts().clone(),
             device_bytes: self.buffers.bytes(),
-            features: self.features.names().collect(),
-            kernel_source_bytes: self.kernel_source_bytes,
+            kernel: self.kernel_facts.clone(),
         }
     }
 

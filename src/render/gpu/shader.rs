@@ -5,6 +5,8 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use serde::Serialize;
+
 use super::super::filter::PixelFilter;
 use super::super::{Sampling, View};
 use crate::environment::{Environment, Lookup, TableKind};
@@ -119,7 +121,7 @@ impl Features {
 
     /// Every feature at once, with the table that is used by default.
     pub(crate) fn most() -> Self {
-        let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_"));
+        let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_") && *n != "learning");
         Self::from_names(names.filter(|n| *n != "summed_area").map(|n| (n, true)))
     }
 
@@ -161,6 +163,54 @@ impl Features {
     /// Names of the features that are on.
     pub(crate) fn names(&self) -> impl Iterator<Item = &'static str> {
         self.0.iter().copied()
+    }
+}
+
+/// What the render kernel of a picture holds and what was left out of it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct KernelFacts {
+    /// Features it was built with.
+    pub features: Vec<&'static str>,
+    /// Features it does without.
+    pub left_out: Vec<&'static str>,
+    /// Bytes of its source.
+    pub source_bytes: usize,
+    /// Bytes of the source with every feature.
+    pub full_source_bytes: usize,
+    /// Bytes of a vertex on the device.
+    pub vertex_bytes: u32,
+    /// Bytes of a vertex with everything a scene can have.
+    pub full_vertex_bytes: u32,
+}
+
+impl KernelFacts {
+    /// Of the kernel for these features.
+    pub(crate) fn of(features: &Features) -> Self {
+        let bytes_of = |features: &Features| {
+            let vertex = VertexTexels::of(features);
+            let constants = Constants { vertex, ..Constants::default() };
+            let program = Program::new(Kernel::Render, features, &constants, 14);
+            (program.source.len(), 16 * vertex.count)
+        };
+        let (source_bytes, vertex_bytes) = bytes_of(features);
+        let (full_source_bytes, full_vertex_bytes) = bytes_of(&Features::most());
+        let most = Features::most();
+        Self {
+            features: features.names().collect(),
+            left_out: most.names().filter(|name| !features.0.contains(name)).collect(),
+            source_bytes,
+            full_source_bytes,
+            vertex_bytes,
+            full_vertex_bytes,
+        }
+    }
+
+    /// Of the kernel for a scene with a map that is not black, with the defaults of `render`.
+    pub fn of_scene(world: &World) -> Self {
+        let defaults =
+            ["faces", "light_grid", "map", "map_sampling", "record_cosine", "wide_filter"];
+        let names = Features::of_world(world).0.into_iter().chain(defaults);
+        Self::of(&Features::from_names(names.map(|name| (name, true))))
     }
 }
 

@@ -16,6 +16,8 @@ use crate::render::film::{Film, Pixel};
 const PASSES: u32 = 5;
 /// Luminance differences are tolerated up to this many standard errors.
 const ERRORS_TOLERATED: f32 = 4.0;
+/// Pixels around one that share its error.
+const REACH: usize = 3;
 /// Weights of a B3 spline.
 const KERNEL: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 /// Power of the cosine between normals.
@@ -39,7 +41,7 @@ struct Light {
 }
 
 /// The film's picture, filtered. Without layers on the film it is the film's picture as it is.
-pub fn denoise(film: &Film) -> Image {
+pub(super) fn denoise(film: &Film) -> Image {
     let Some(layers) = film.surface_layers() else { return film.image() };
     let guides: Vec<Guide> = layers
         .albedo
@@ -53,6 +55,7 @@ pub fn denoise(film: &Film) -> Image {
         })
         .collect();
     let mut light: Vec<Light> = film.pixels().iter().zip(&guides).map(undressed).collect();
+    share_errors(&mut light, &guides, film.width as usize);
     for pass in 0..PASSES {
         light = filtered(&light, &guides, film.width as usize, 1 << pass);
     }
@@ -66,6 +69,30 @@ fn undressed((pixel, guide): (&Pixel, &Guide)) -> Light {
     // One sample says nothing about its error: then anything goes.
     let variance = pixel.variance_of_mean().min(f64::from(luminance(mean)).powi(2) + 1.0) as f32;
     Light { rgb: mean / guide.albedo, variance: variance * scale * scale }
+}
+
+/// Gives each pixel the mean error of its surface around it: a pixel that has met no light yet knows
+/// nothing of its own error.
+fn share_errors(light: &mut [Light], guides: &[Guide], width: usize) {
+    let height = light.len() / width.max(1);
+    let shared = |index: usize| {
+        let (x, y) = (index % width, index / width);
+        let (mut sum, mut total) = (0.0, 0.0);
+        for ny in y.saturating_sub(REACH)..(y + REACH + 1).min(height) {
+            for nx in x.saturating_sub(REACH)..(x + REACH + 1).min(width) {
+                let other = ny * width + nx;
+                let weight = likeness(&guides[index], &guides[other], 1);
+                sum += weight * light[other].variance;
+                total += weight;
+            }
+        }
+        // The pixel itself always counts.
+        sum / total
+    };
+    let variances: Vec<f32> = (0..light.len()).into_par_iter().map(shared).collect();
+    for (light, variance) in light.iter_mut().zip(variances) {
+        light.variance = variance;
+    }
 }
 
 fn filtered(light: &[Light], guides: &[Guide], width: usize, step: i32) -> Vec<Light> {

@@ -1,0 +1,54 @@
+//! Taking out what noise is left, for looking at pictures, not for measuring them.
+
+mod a_trous;
+mod oidn;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::Result;
+use crate::image::Image;
+use crate::render::film::Film;
+
+/// What takes noise out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Denoiser {
+    /// Our edge-avoiding filter over albedo, normal and depth: fast, always there.
+    #[default]
+    ATrous,
+    /// Intel's Open Image Denoise, if its library is installed.
+    Oidn,
+}
+
+impl Denoiser {
+    /// What the command line calls it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ATrous => "a-trous",
+            Self::Oidn => "oidn",
+        }
+    }
+
+    /// Whether it can be used on this machine.
+    ///
+    /// # Errors
+    /// One sentence that says why not.
+    pub fn check(self) -> Result<()> {
+        match self {
+            Self::ATrous => Ok(()),
+            Self::Oidn => oidn::check(),
+        }
+    }
+
+    /// The film's picture without noise. Without layers on the film the à-trous filter leaves it as
+    /// it is.
+    ///
+    /// # Errors
+    /// If the library is missing or fails.
+    pub fn denoise(self, film: &Film) -> Result<Image> {
+        match self {
+            Self::ATrous => Ok(a_trous::denoise(film)),
+            Self::Oidn => oidn::denoise(film),
+        }
+    }
+}

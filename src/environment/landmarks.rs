@@ -1,0 +1,175 @@
+//! What stands out on a map: where it is brightest, and how tiles of equal energy would lie.
+
+use crate::color::luminance;
+use crate::image::Image;
+use crate::math::texel_solid_angle;
+
+/// Radius in degrees of what counts as the sun around the brightest texel.
+const SUN_RADIUS_DEGREES: f64 = 2.5;
+
+/// The brightest place of a map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sun {
+    /// Column and row of the brightest texel.
+    pub texel: [u32; 2],
+    /// Angle from +X towards +Z, `[-180,180)`, map not turned.
+    pub azimuth_degrees: f64,
+    /// Angle above the horizon, `[-90,90]`.
+    pub elevation_degrees: f64,
+    /// Share of the map's energy (luminance times solid angle) within 2.5 degrees of it.
+    pub energy_share: f64,
+    /// Luminance of the brightest texel.
+    pub max_luminance: f32,
+    /// Luminance averaged over the sphere.
+    pub mean_luminance: f64,
+}
+
+impl Sun {
+    /// Finds it; `None` on a black map.
+    pub fn of(map: &Image) -> Option<Self> {
+        let (width, height) = (map.width, map.height);
+        let rows = || map.pixels.chunks_exact(width as usize).zip(0_u32..);
+        let mut brightest = (0.0, [0, 0]);
+        let mut total = 0.0;
+        for (row, y) in rows() {
+            let mut sum = 0.0;
+            for (rgb, x) in row.iter().zip(0_u32..) {
+                let light = luminance((*rgb).into());
+                sum += f64::from(light);
+                if light > brightest.0 {
+                    brightest = (light, [x, y]);
+                }
+            }
+            total += sum * texel_solid_angle(width, height, y);
+        }
+        if total <= 0.0 {
+            return None;
+        }
+        let azimuth = |x: u32| ((f64::from(x) + 0.5) / f64::from(width) - 0.5) * 360.0;
+        let elevation = |y: u32| 90.0 - (f64::from(y) + 0.5) / f64::from(height) * 180.0;
+        let [x, y] = brightest.1;
+        let (azimuth_degrees, elevation_degrees) = (azimuth(x), elevation(y));
+        let (sin, cos) = elevation_degrees.to_radians().sin_cos();
+        let least_cosine = SUN_RADIUS_DEGREES.to_radians().cos();
+        let mut inside = 0.0;
+        for (row, y) in rows() {
+            let (row_sin, row_cos) = elevation(y).to_radians().sin_cos();
+            if sin * row_sin + cos * row_cos < least_cosine {
+                continue;
+            }
+            let near = row.iter().zip(0_u32..).filter(|(_, x)| {
+                let turn = (azimuth(*x) - azimuth_degrees).to_radians().cos();
+                sin * row_sin + cos * row_cos * turn >= least_cosine
+            });
+            inside += near.map(|(rgb, _)| f64::from(luminance((*rgb).into()))).sum::<f64>()
+                * texel_solid_angle(width, height, y);
+        }
+        Some(Self {
+            texel: [x, y],
+            azimuth_degrees,
+            elevation_degrees,
+            energy_share: inside / total,
+            max_luminance: brightest.0,
+            mean_luminance: total / (4.0 * std::f64::consts::PI),
+        })
+    }
+}
+
+/// `count` rectangles of texels, `[left, top, right, bottom)`, of as equal an energy as halving can
+/// make them: what the method does not use, since the smallest lie where the sun is and say nothing
+/// about which part of the sky is seen. Fewer if the map has too few lit texels.
+pub fn equal_energy_tiles(map: &Image, count: usize) -> Vec<[u32; 4]> {
+    let energies: Vec<f64> = map
+        .pixels
+        .iter()
+        .enumerate()
+        .map(|(i, rgb)| {
+            let row = (i / map.width as usize) as u32;
+            f64::from(luminance((*rgb).into())) * texel_solid_angle(map.width, map.height, row)
+        })
+        .collect();
+    let energy = |[left, top, right, bottom]: [u32; 4]| -> f64 {
+        let row = |y: u32| {
+            let start = (y * map.width) as usize;
+            energies[start + left as usize..start + right as usize].iter().sum::<f64>()
+        };
+        (top..bottom).map(row).sum()
+    };
+    let whole = [0, 0, map.width, map.height];
+    let mut tiles = vec![(energy(whole), whole)];
+    while tiles.len() < count {
+        let Some(at) = (0..tiles.len())
+            .filter(|i| tiles[*i].0 > 0.0 && is_divisible(tiles[*i].1))
+            .max_by(|a, b| tiles[*a].0.total_cmp(&tiles[*b].0))
+        else {
+            break;
+        };
+        let (total, tile) = tiles.swap_remove(at);
+        let halves = halved(tile, total, energy);
+        tiles.extend(halves.map(|half| (energy(half), half)));
+    }
+    tiles.into_iter().map(|(_, tile)| tile).collect()
+}
+
+fn is_divisible([left, top, right, bottom]: [u32; 4]) -> bool {
+    right - left > 1 || bottom - top > 1
+}
+
+/// Cuts the longer side where the energy is halved best.
+fn halved(tile: [u32; 4], total: f64, energy: impl Fn([u32; 4]) -> f64) -> [[u32; 4]; 2] {
+    let axis = usize::from(tile[3] - tile[1] > tile[2] - tile[0]);
+    let cut_at = |cut: u32| {
+        let (mut low, mut high) = (tile, tile);
+        (low[axis + 2], high[axis]) = (cut, cut);
+        [low, high]
+    };
+    let (mut sum, mut best) = (0.0, (f64::INFINITY, tile[axis] + 1));
+    for cut in tile[axis] + 1..tile[axis + 2] {
+        let mut slice = tile;
+        (slice[axis], slice[axis + 2]) = (cut - 1, cut);
+        sum += energy(slice);
+        let imbalance = (sum - 0.5 * total).abs();
+        if imbalance < best.0 {
+            best = (imbalance, cut);
+        }
+    }
+    cut_at(best.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map(light: impl Fn(u32, u32) -> f32) -> Image {
+        let pixels = (0..64 * 32).map(|i| [light(i % 64, i / 64); 3]).collect();
+        Image { width: 64, height: 32, pixels }
+    }
+
+    #[test]
+    fn the_sun_is_where_it_was_put() {
+        let sun = Sun::of(&map(|x, y| if (x, y) == (48, 8) { 1e4 } else { 1.0 })).expect("lit");
+        assert_eq!(sun.texel, [48, 8]);
+        assert!((sun.azimuth_degrees - 92.8).abs() < 0.1, "{sun:?}");
+        assert!((sun.elevation_degrees - 42.2).abs() < 0.1, "{sun:?}");
+        // One texel of 1e4 against 4 pi of 1.
+        let solid_angle = texel_solid_angle(64, 32, 8);
+        let expected = 1e4 * solid_angle / (1e4 * solid_angle + 4.0 * std::f64::consts::PI);
+        assert!((sun.energy_share - expected).abs() < 1e-3, "{sun:?}");
+        assert_eq!(Sun::of(&map(|_, _| 0.0)), None);
+    }
+
+    #[test]
+    fn tiles_of_equal_energy_cover_the_map_once_and_are_small_at_the_sun() {
+        let map = map(|x, y| if x.abs_diff(20) < 2 && y.abs_diff(9) < 2 { 500.0 } else { 1.0 });
+        let tiles = equal_energy_tiles(&map, 64);
+        assert_eq!(tiles.len(), 64);
+        let area = |t: &[u32; 4]| (t[2] - t[0]) * (t[3] - t[1]);
+        assert_eq!(tiles.iter().map(area).sum::<u32>(), 64 * 32);
+        let at = |x: u32, y: u32| {
+            let holds = |t: &&[u32; 4]| t[0] <= x && x < t[2] && t[1] <= y && y < t[3];
+            tiles.iter().find(holds).map(area)
+        };
+        assert!(at(20, 9) < at(50, 25));
+        assert_eq!(equal_energy_tiles(&map, 1), [[0, 0, 64, 32]]);
+    }
+}

@@ -1,0 +1,186 @@
+//! What the host writes lies where the shaders read it, as naga lays their structs out.
+
+use std::mem::offset_of;
+
+use naga::{Expression, Literal, Module, ScalarKind, Type, TypeInner};
+
+use super::super::layout::{
+    Globals, Material, PixelSums, SurfaceSums, TextureRef, Work, material_flags, texture_flags,
+};
+use super::super::shader::{Constants, Features, Kernel, Program, VertexTexels};
+
+/// A struct's fields in bytes: name, offset, size.
+type Fields = Vec<(&'static str, usize, usize)>;
+
+fn size_of_field<S, F>(_: fn(&S) -> &F) -> usize {
+    size_of::<F>()
+}
+
+/// Size and fields of a struct of the host.
+macro_rules! fields {
+    ($type:ident: $($field:ident)*) => {(
+        size_of::<$type>(),
+        vec![$((
+            stringify!($field),
+            offset_of!($type, $field),
+            size_of_field(|s: &$type| &s.$field),
+        )),*],
+    )};
+}
+
+fn module() -> Module {
+    let features = Features::most();
+    let vertex = VertexTexels::of(&features);
+    let constants = Constants { stack_size: 20, vertex, ..Constants::default() };
+    let source = Program::new(Kernel::Render, &features, &constants, 12).source;
+    naga::front::wgsl::parse_str(&source)
+        .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&source)))
+}
+
+fn find<'a>(module: &'a Module, name: &str) -> &'a Type {
+    let mut types = module.types.iter().map(|(_, ty)| ty);
+    types.find(|ty| ty.name.as_deref() == Some(name)).expect("the shader has this struct")
+}
+
+/// All fields of both structs, padding apart, have the same names, places and sizes.
+fn assert_same(module: &Module, name: &str, (size, fields): (usize, Fields)) {
+    let TypeInner::Struct { members, span } = &find(module, name).inner else {
+        panic!("{name} is a struct");
+    };
+    let is_padding = |name: &str| name.starts_with("padding");
+    let members: Vec<_> = members
+        .iter()
+        .map(|member| (member.name.as_deref().unwrap_or_default(), member))
+        .filter(|(name, _)| !is_padding(name))
+        .map(|(name, member)| {
+            let size = module.types[member.ty].inner.size(module.to_ctx());
+            (name, member.offset as usize, size as usize)
+        })
+        .collect();
+    // Nothing of the host's struct may be missing in the list of its fields.
+    let mut end = 0;
+    for (field, offset, size) in &fields {
+        assert_eq!(*offset, end, "{name}: the list of fields has all of them up to {field}");
+        end += size;
+    }
+    assert_eq!(end, size, "{name}: the list of fields has all of them");
+    let named: Fields = fields.into_iter().filter(|(field, ..)| !is_padding(field)).collect();
+    assert_eq!(members, named, "{name}");
+    assert_eq!(*span as usize, size, "{name}");
+}
+
+#[test]
+fn structs_are_laid_out_as_the_host_writes_them() {
+    let module = module();
+    let work = fields!(Work: first first_high count first_sample samples resumes padding);
+    assert_same(&module, "Work", work);
+    let globals = fields!(Globals:
+        work camera_position lens_radius camera_right focus_distance camera_up half_width
+        camera_forward half_height grid_center grid_columns law_starts_at law_masks_at law_ranks_at
+        law_tiles_at law_last_at law_of_cell_at words_per_law grid_rows map_width map_height
+        tile_columns tile_rows rotation_turns intensity tile_sums_at light_count
+        light_triangle_count width height seed bounces russian_roulette orthographic scene_extent
+        mean_contribution zero grid_medium padding_0 fog_low fog_mean_cosine fog_high padding_1
+        fog_scattering padding_2 fog_extinction padding_3
+    );
+    assert_same(&module, "Globals", globals);
+    let pixel = fields!(PixelSums: sum luminance_squared rays invalid padding);
+    assert_same(&module, "PixelSums", pixel);
+    assert_same(&module, "FirstHit", fields!(SurfaceSums: albedo depth normal hits));
+}
+
+/// The value of a `u32` constant of the shaders.
+fn constant(module: &Module, name: &str) -> usize {
+    let mut constants = module.constants.iter().map(|(_, constant)| constant);
+    let found = constants.find(|constant| constant.name.as_deref() == Some(name));
+    let found = found.unwrap_or_else(|| panic!("the shaders have a constant {name}"));
+    let is_word = module.types[found.ty].inner.scalar_kind() == Some(ScalarKind::Uint);
+    match module.global_expressions[found.init] {
+        Expression::Literal(Literal::U32(value)) if is_word => value as usize,
+        ref other => panic!("{name} is a number, not {other:?}"),
+    }
+}
+
+/// Materials and references to textures are read texel by texel, by numbers in the shaders.
+#[test]
+fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
+    const TEXEL: usize = 16;
+    let module = module();
+    let at = |name| constant(&module, name) * TEXEL;
+    let (size, fields) = fields!(Material:
+        base_color emissive alpha_cutoff specular_color specular absorption ior metallic roughness
+        transmission clearcoat clearcoat_roughness normal_scale clearcoat_normal_scale flags textures
+        padding scattering scatter_mean_cosine
+    );
+    assert_eq!(at("MATERIAL_TEXELS"), size);
+    assert_eq!(fields.iter().map(|(.., size)| size).sum::<usize>(), size);
+    // Each texel's name says what is in it.
+    for (texel, fields) in [
+        ("BASE_COLOR_ALPHA", &[offset_of!(Material, base_color)][..]),
+        ("EMISSIVE_CUTOFF", &[offset_of!(Material, emissive), offset_of!(Material, alpha_cutoff)]),
+        (
+            "SPECULAR_COLOR_STRENGTH",
+            &[offset_of!(Material, specular_color), offset_of!(Material, specular)],
+        ),
+        (
+            "SCATTERING",
+            &[offset_of!(Material, scattering), offset_of!(Material, scatter_mean_cosine)],
+        ),
+        ("ABSORPTION_IOR", &[offset_of!(Material, absorption), offset_of!(Material, ior)]),
+    ] {
+        let expected = [at(texel), at(texel) + 12];
+        assert_eq!(fields, &expected[..fields.len()], "{texel}");
+    }
+    let four = |texel| [0, 4, 8, 12].map(|component| at(texel) + component);
+    let factors = [
+        offset_of!(Material, metallic),
+        offset_of!(Material, roughness),
+        offset_of!(Material, transmission),
+        offset_of!(Material, clearcoat),
+    ];
+    assert_eq!(factors, four("FACTORS"));
+    let scales = [
+        offset_of!(Material, clearcoat_roughness),
+        offset_of!(Material, normal_scale),
+        offset_of!(Material, clearcoat_normal_scale),
+        offset_of!(Material, flags),
+    ];
+    assert_eq!(scales, four("SCALES_FLAGS"));
+    assert_eq!(offset_of!(Material, textures), at("FIRST_TEXTURES"));
+    assert_eq!(size_of_field(|m: &Material| &m.textures), 4 * constant(&module, "TEXTURES"));
+
+    // `sample_texture` takes three texels apart.
+    let reference = [
+        offset_of!(TextureRef, first_texel),
+        offset_of!(TextureRef, width),
+        offset_of!(TextureRef, height),
+        offset_of!(TextureRef, flags),
+        offset_of!(TextureRef, matrix),
+        offset_of!(TextureRef, translation),
+    ];
+    assert_eq!(reference, [0, 4, 8, 12, 16, 32]);
+    assert_eq!(size_of::<TextureRef>(), 3 * TEXEL);
+}
+
+#[test]
+fn flags_are_the_same_bits() {
+    use material_flags as m;
+    use texture_flags as t;
+    let module = module();
+    for (name, value) in [
+        ("ALPHA_MASK", m::ALPHA_MASK),
+        ("ALPHA_BLEND", m::ALPHA_BLEND),
+        ("DOUBLE_SIDED", m::DOUBLE_SIDED),
+        ("UNLIT", m::UNLIT),
+        ("THIN", m::THIN),
+        ("PARTIAL", m::PARTIAL),
+        ("NORMAL_MAPPED", m::NORMAL_MAPPED),
+        ("SECOND_UV_SET", t::SECOND_UV_SET),
+        ("NEAREST", t::NEAREST),
+        ("SRGB", t::SRGB),
+        ("WRAP_U_SHIFT", t::WRAP_U_SHIFT),
+        ("WRAP_V_SHIFT", t::WRAP_V_SHIFT),
+    ] {
+        assert_eq!(constant(&module, name), value as usize, "{name}");
+    }
+}

@@ -1,0 +1,247 @@
+//! The map, its tables, the grid's cells and laws.
+
+use glam::Vec3;
+
+use super::Probe;
+use super::cases::{case, cases, edge_directions, edge_squares};
+use super::functions::camera;
+use super::stand::Stand;
+use super::twin::{Bound, EXACT, ulps};
+use crate::environment::{Environment, Lookup, TableKind};
+use crate::light_grid::WHOLE_MAP;
+use crate::light_grid::cells::dominant_face;
+use crate::render::gpu::layout::unpack_radiance;
+
+/// The probes that depend on the table, the look-up, the cells or the camera.
+pub(super) fn probes(stand: &Stand) -> Vec<Probe<'_>> {
+    let mut probes = look_ups(&stand.environment);
+    probes.extend(samples(&stand.environment));
+    probes.extend(cells(stand));
+    probes.extend(laws(stand));
+    probes.extend(camera(stand));
+    probes
+}
+
+/// The largest radiance that interpolation around a direction may mix, times the map's larger side:
+/// a place on the map is known to some units in the last place of that.
+fn contrast(environment: &Environment, direction: Vec3) -> f32 {
+    let map = environment.map();
+    let point = environment.map_point(direction);
+    let mut largest = 0.0_f32;
+    for dy in [map.height - 1, 0, 1] {
+        for dx in [map.width - 1, 0, 1] {
+            let pixel = map.at((point.column + dx) % map.width, (point.row + dy) % map.height);
+            largest = largest.max(Vec3::from(pixel).max_element());
+        }
+    }
+    largest * map.width.max(map.height) as f32 * environment.rotation_and_intensity().1
+}
+
+/// A few units in the last place of a density. The f64 table is kept to 2^-48 of its total, which may
+/// be much of a dim tile, and be some density where there is none.
+fn density_bound(environment: &Environment, direction: Vec3, tile: u32) -> Bound {
+    if environment.kind().0 != TableKind::F64 {
+        return ulps(4.0);
+    }
+    let energies = environment.tile_energies();
+    let share = energies[tile as usize] / energies.iter().sum::<f64>();
+    let row = environment.map_point(direction).row as usize;
+    let most = f64::from(environment.inverse_texel_solid_angles()[row]) / share;
+    ulps(4.0).of((most * f64::from(f32::EPSILON)) as f32)
+}
+
+/// How much the last place of a random number within a row turns a sample, in such places: near a
+/// pole by more than one.
+fn polar(environment: &Environment, direction: Vec3) -> f32 {
+    let row = std::f32::consts::PI / environment.map().height as f32;
+    1.0 + row * row / direction.with_y(0.0).length()
+}
+
+fn look_ups(environment: &Environment) -> Vec<Probe<'_>> {
+    let map = environment.map();
+    let directions = || edge_directions().into_iter().map(|d| case(&[&d]));
+    let is_nearest = environment.kind().1 == Lookup::Nearest;
+    let radiance_bound = move |direction| {
+        if is_nearest { ulps(2.0) } else { ulps(4.0).of(contrast(environment, direction)) }
+    };
+    vec![
+        Probe::new(
+            "unpack_radiance",
+            "let low = take_word(); put3(unpack_radiance(vec2u(low, take_word())));",
+            cases([case(&[&0_u32, &0_u32])], |r| {
+                // An exponent of 255 is never stored.
+                case(&[&r.word(), &(r.word() % (255 << 24))])
+            }),
+            |t| {
+                let right = unpack_radiance([t.take_word(), t.take_word()]);
+                t.near(Vec3::from(right), EXACT);
+            },
+        ),
+        Probe::new(
+            "map_point",
+            "let point = map_point(take3()); put2(point.position);
+            put_word(point.texel.x); put_word(point.texel.y);",
+            cases(directions(), |r| case(&[&r.direction()])),
+            |t| {
+                let right = environment.map_point(t.take3());
+                let position = [t.device(), t.device()];
+                // A place at the seam may come out on its other side.
+                let width = map.width as f32;
+                let across = (right.x - position[0]).abs();
+                let off = across.min(width - across).max((right.y - position[1]).abs());
+                t.check(off <= 4.0 * f32::EPSILON * width, || format!("off by {off:e} texels"));
+                t.same((position[0] as u32).min(map.width - 1));
+                t.same((position[1] as u32).min(map.height - 1));
+            },
+        ),
+        Probe::new(
+            "environment_radiance",
+            "put3(environment_radiance(take3()));",
+            cases(directions(), |r| case(&[&r.direction()])),
+            move |t| {
+                let direction = t.take3();
+                t.near(environment.radiance(direction), radiance_bound(direction));
+            },
+        )
+        .flips(500),
+        Probe::new(
+            "radiance_and_tile_pdf",
+            "let seen = radiance_and_tile_pdf(take3()); put_word(seen.tile);
+            put3(seen.radiance); put(seen.pdf_solid_angle);",
+            cases(directions(), |r| case(&[&r.direction()])),
+            move |t| {
+                let direction = t.take3();
+                let (radiance, tile, pdf) = environment.radiance_and_tile_pdf(direction);
+                t.same(tile);
+                t.near(radiance, radiance_bound(direction));
+                t.near(pdf, density_bound(environment, direction, tile));
+            },
+        )
+        .flips(500),
+    ]
+}
+
+/// Drawing from tiles.
+pub(super) fn samples(environment: &Environment) -> Vec<Probe<'_>> {
+    let tiles = environment.tile_count();
+    let edges = (0..tiles).flat_map(|tile| edge_squares().into_iter().map(move |u| (tile, u)));
+    let edges = edges.map(|(tile, u)| case(&[&tile, &u]));
+    let draws = cases(edges, |r| case(&[&r.below(tiles), &r.unit2()]));
+    let sample = Probe::new(
+        "sample_in_tile",
+        "let tile = take_word(); let sample = sample_in_tile(tile, take2());
+        put(sample.pdf_solid_angle); put3(sample.direction); put3(sample.radiance);",
+        draws.clone(),
+        |t| {
+            let (tile, u) = (t.take_word(), t.take2());
+            let Some(sample) = environment.sample_in_tile(tile, u) else {
+                t.near(0.0, EXACT);
+                return t.accept_rest();
+            };
+            let direction = sample.direction;
+            let polar = polar(environment, direction);
+            t.near(sample.pdf_solid_angle, density_bound(environment, direction, tile));
+            t.near(direction, ulps(8.0).of(polar));
+            t.near(sample.radiance, ulps(8.0).of(polar * contrast(environment, direction)));
+        },
+    );
+    let density = Probe::new(
+        "sample_in_tile and its density",
+        "let tile = take_word(); let sample = sample_in_tile(tile, take2());
+        put(sample.pdf_solid_angle);
+        if sample.pdf_solid_angle > 0.0 {
+            let seen = radiance_and_tile_pdf(sample.direction);
+            put_word(seen.tile); put(seen.pdf_solid_angle);
+        }",
+        draws,
+        |t| {
+            let (tile, _) = (t.take_word(), t.take2());
+            let pdf = t.device();
+            if pdf > 0.0 {
+                t.same(tile);
+                t.near(pdf, EXACT);
+            }
+        },
+    );
+    vec![sample.flips(500), density]
+}
+
+fn cells(stand: &Stand) -> Vec<Probe<'_>> {
+    let center = stand.rays.position();
+    let edge_points = move || {
+        let around = edge_directions().into_iter().map(move |d| (center + 3.0 * d, d));
+        around.chain([(center, Vec3::ONE), (Vec3::splat(1e30), Vec3::ZERO)])
+    };
+    let edge_cases = move || edge_points().map(|(position, normal)| case(&[&position, &normal]));
+    let equal = [Vec3::ONE, Vec3::new(1.0, -1.0, 1.0), Vec3::new(0.5, -1.0, -1.0), Vec3::ZERO];
+    let mut probes = vec![
+        Probe::new(
+            "dominant_face",
+            "put_word(dominant_face(take3()));",
+            cases(equal.into_iter().chain(edge_directions()).map(|n| case(&[&n])), |r| {
+                case(&[&r.direction()])
+            }),
+            |t| {
+                let right = dominant_face(t.take3());
+                t.same(right);
+            },
+        ),
+        // Exact, but for points that lie on the border of cells.
+        Probe::new(
+            "law_of",
+            "let position = take3(); put_word(law_of(position, take3()));",
+            cases(edge_cases(), |r| case(&[&(4.0 * r.in_cube()), &r.direction()])),
+            move |t| {
+                let law = stand.grid.law_of(t.take3(), t.take3());
+                t.same(law);
+            },
+        )
+        .flips(500),
+    ];
+    if let Some(grid) = stand.grid.grid() {
+        probes.push(
+            Probe::new(
+                "cell_of",
+                "let position = take3(); put_word(cell_of(position, take3()));",
+                cases(edge_cases(), |r| case(&[&(4.0 * r.in_cube()), &r.direction()])),
+                move |t| {
+                    let cell = grid.cell_of(t.take3(), t.take3());
+                    t.same(cell);
+                },
+            )
+            .flips(500),
+        );
+    }
+    probes
+}
+
+fn laws(stand: &Stand) -> Vec<Probe<'_>> {
+    let laws = stand.grid.laws();
+    let tiles = laws.tile_count();
+    let ends = [0, 1, 0x7fff_ffff, 0x8000_0000, u32::MAX];
+    let edges = (0..laws.len()).flat_map(move |law| ends.map(|bits| case(&[&law, &bits])));
+    let all = (0..laws.len()).flat_map(move |law| (0..tiles).map(move |tile| case(&[&law, &tile])));
+    vec![
+        Probe::new(
+            "sample_tile",
+            "let law = take_word(); let choice = sample_tile(law, take_word());
+            put_word(choice.tile); put(choice.probability); put(choice.remainder);",
+            cases(edges, |r| case(&[&r.below(laws.len()), &r.word()])),
+            move |t| {
+                let choice = laws.sample(t.take_word(), t.take_word());
+                t.same(choice.tile);
+                t.near(choice.probability, ulps(1.0));
+                t.near(choice.remainder, ulps(3.0));
+            },
+        ),
+        Probe::new(
+            "tile_probability",
+            "let law = take_word(); put(tile_probability(law, take_word()));",
+            cases(all, |r| case(&[&WHOLE_MAP, &r.below(tiles)])),
+            move |t| {
+                let right = laws.probability(t.take_word(), t.take_word());
+                t.near(right, ulps(1.0));
+            },
+        ),
+    ]
+}

@@ -1,0 +1,353 @@
+//! Fresnel, microfacets, albedo tables and whole materials.
+
+use glam::Vec3;
+
+use super::Probe;
+use super::cases::{EDGE_UNITS, Part, Random, case, cases, edge_squares};
+use super::twin::{Bound, EXACT, Twin, ulps};
+use crate::bsdf::albedo::AlbedoTerms;
+use crate::bsdf::fresnel::{dielectric, normal_reflectance, reflect, refract, schlick_weight};
+use crate::bsdf::microfacet::Ggx;
+use crate::bsdf::{Bsdf, SurfaceParameters, cosine_hemisphere};
+
+/// Reads the words of [`material`]; writes what [`expect_parameters`] compares.
+pub(super) const PRELUDE: &str = "
+fn take_parameters() -> SurfaceParameters {
+    var p: SurfaceParameters;
+    p.base_color = take3(); p.alpha = take(); p.metallic = take(); p.roughness = take();
+    p.ior = take(); p.specular = take(); p.specular_color = take3(); p.transmission = take();
+    p.thin = take_word() != 0u; p.clearcoat = take(); p.clearcoat_roughness = take();
+    p.clearcoat_normal = take3();
+    return p;
+}
+fn put_parameters(p: SurfaceParameters) {
+    put3(p.base_color); put(p.alpha); put(p.metallic); put(p.roughness); put(p.ior);
+    put(p.specular); put3(p.specular_color); put(p.transmission); put_bool(p.thin);
+    put(p.clearcoat); put(p.clearcoat_roughness); put3(p.clearcoat_normal);
+    put3(p.absorption); put3(p.emissive); put_bool(p.unlit);
+}
+";
+
+/// The probes.
+pub(super) fn probes() -> Vec<Probe<'static>> {
+    let mut probes = fresnel();
+    probes.extend(microfacets());
+    probes.extend(albedos());
+    probes.extend(materials());
+    probes
+}
+
+/// Cosines and relative indices of refraction.
+fn interfaces() -> Vec<Vec<u32>> {
+    let edges = EDGE_UNITS.into_iter().chain([1.0]);
+    let edges = edges.flat_map(|cos| [0.4, 1.0, 1.5].map(|eta| case(&[&cos, &eta])));
+    cases(edges, |r| case(&[&r.unit(), &r.magnitude(0.3, 3.0)]))
+}
+
+/// Where refraction becomes grazing its cosine is a root of nearly nothing: rounding counts over it.
+fn grazing(cos: f32, eta: f32) -> f32 {
+    let cos2_t = 1.0 - (1.0 - cos * cos) / (eta * eta);
+    1.0 / cos2_t.abs().max(f32::EPSILON).sqrt()
+}
+
+fn fresnel() -> Vec<Probe<'static>> {
+    let facing = |r: &mut Random| (r.upper_direction(), r.upper_direction(), r.magnitude(0.3, 3.0));
+    vec![
+        Probe::new(
+            "schlick_weight, normal_reflectance",
+            "put(schlick_weight(take())); put(normal_reflectance(take()));",
+            interfaces(),
+            |t| {
+                let (cos, ior) = (t.take(), t.take());
+                t.near(schlick_weight(cos), ulps(2.0));
+                t.near(normal_reflectance(ior), ulps(5.0));
+            },
+        ),
+        Probe::new(
+            "dielectric",
+            "let cosine = take(); put(dielectric(cosine, take()));",
+            interfaces(),
+            |t| {
+                let (cos, eta) = (t.take(), t.take());
+                let right = dielectric(cos, eta).unwrap_or(-1.0);
+                t.near(right, ulps(4.0).of(grazing(cos, eta)));
+            },
+        )
+        .flips(1000),
+        Probe::new(
+            "reflected, refracted",
+            "let wo = take3(); let h = take3(); put3(reflected(wo, h)); put3(refracted(wo, h, take()));",
+            cases([], |r| {
+                let (wo, h, eta) = facing(r);
+                case(&[&wo, &if wo.dot(h) < 0.0 { -h } else { h }, &eta])
+            }),
+            |t| {
+                let (wo, h, eta) = (t.take3(), t.take3(), t.take());
+                t.near(reflect(wo, h), ulps(3.0).of(1.0));
+                let right = refract(wo, h, eta).unwrap_or(Vec3::ZERO);
+                t.near(right, ulps(4.0).of(grazing(wo.dot(h), eta)));
+            },
+        )
+        .flips(1000),
+    ]
+}
+
+fn microfacets() -> Vec<Probe<'static>> {
+    let roughness = |r: &mut Random| r.magnitude(0.04, 1.0);
+    vec![
+        Probe::new(
+            "ggx_distribution, ggx_visibility, visible normals' density",
+            "let roughness = take(); let alpha = roughness * roughness; let wo = take3(); let h = take3();
+            put_bool(is_smooth(alpha)); put(ggx_distribution(alpha, h));
+            put(ggx_visibility(alpha, wo.z));
+            put(ggx_visible_normal_pdf_solid_angle(alpha, wo, h));",
+            cases([case(&[&0.0316_f32, &Vec3::Z, &Vec3::Z])], |r| {
+                case(&[&roughness(r), &r.upper_direction(), &r.upper_direction()])
+            }),
+            |t| {
+                let (roughness, wo, h) = (t.take(), t.take3(), t.take3());
+                let ggx = Ggx::from_roughness(roughness);
+                t.same(ggx.is_smooth());
+                t.near(ggx.distribution(h), ulps(12.0));
+                t.near(ggx.visibility(wo.z), ulps(4.0));
+                let pdf = ggx.visible_normal_pdf_solid_angle(wo, h);
+                // The cosine between the two may cancel.
+                let whole = 2.0 * ggx.visibility(wo.z) * ggx.distribution(h);
+                t.near(pdf, ulps(12.0).of(whole));
+            },
+        ),
+        Probe::new(
+            "ggx_sample_visible_normal",
+            "let roughness = take(); let wo = take3();
+            put3(ggx_sample_visible_normal(roughness * roughness, wo, take2()));",
+            cases(edge_squares().into_iter().map(|u| case(&[&0.5_f32, &Vec3::Z, &u])), |r| {
+                case(&[&roughness(r), &r.upper_direction(), &r.unit2()])
+            }),
+            |t| {
+                let ggx = Ggx::from_roughness(t.take());
+                let (wo, u) = (t.take3(), t.take2());
+                // The cap's point nearly cancels the viewer where `u.y` is nearly 1.
+                let shortest = (1.0 - u.y).sqrt();
+                t.near(ggx.sample_visible_normal(wo, u), ulps(8.0).of(1.0 / shortest));
+            },
+        ),
+        Probe::new(
+            "cosine_hemisphere",
+            "put3(cosine_hemisphere(take2()));",
+            cases(edge_squares().into_iter().map(|u| case(&[&u])), |r| case(&[&r.unit2()])),
+            |t| {
+                let right = cosine_hemisphere(t.take2());
+                t.near(right, ulps(2.0).of(1.0));
+            },
+        ),
+    ]
+}
+
+fn albedos() -> Vec<Probe<'static>> {
+    let nodes = (0..=31).map(|i| i as f32 / 31.0);
+    let edges = nodes.flat_map(|x| [0.0, 0.5, 1.0].map(|y| [case(&[&x, &y]), case(&[&y, &x])]));
+    vec![Probe::new(
+        "albedo_terms_at, albedo_terms_mean",
+        "let roughness = take(); put2(albedo_terms_at(roughness, take()));
+        put2(albedo_terms_mean(roughness));",
+        cases(edges.flatten(), |r| case(&[&r.unit(), &r.unit()])),
+        |t| {
+            // Between nodes that may be much larger, with fractions of 31.
+            let terms = AlbedoTerms::of(t.take());
+            let at = terms.at(t.take());
+            t.near(at, ulps(16.0).of(1.0));
+            t.near(terms.mean(), ulps(16.0).of(1.0));
+        },
+    )]
+}
+
+/// A material of one of the kinds that the code tells apart.
+fn material(r: &mut Random) -> SurfaceParameters {
+    let kind = r.below(12);
+    let is_glass = (4..=8).contains(&kind);
+    let is_coated = kind >= 10 || r.below(4) == 0;
+    let smooth_or_not = |r: &mut Random| if r.below(3) == 0 { 0.0 } else { r.magnitude(0.04, 1.0) };
+    SurfaceParameters {
+        base_color: r.unit3(),
+        alpha: 1.0,
+        metallic: match kind {
+            2 => 1.0,
+            3 | 9 => r.unit(),
+            _ => 0.0,
+        },
+        roughness: smooth_or_not(r),
+        // 0 is infinitely high.
+        ior: [1.5, 1.0, 0.0, r.between(1.0, 2.5)][r.below(6).min(3) as usize],
+        specular: if kind == 0 { 0.0 } else { r.between(0.5, 1.0) },
+        specular_color: if r.below(4) == 0 { r.unit3() } else { Vec3::ONE },
+        transmission: if is_glass { [1.0, r.unit()][r.below(2) as usize] } else { 0.0 },
+        thin: kind >= 7 || r.below(2) == 0,
+        absorption: Vec3::ZERO,
+        clearcoat: if is_coated { r.unit() } else { 0.0 },
+        clearcoat_roughness: smooth_or_not(r),
+        clearcoat_normal: (Vec3::Z + 0.4 * r.in_cube() * r.below(2) as f32).normalize(),
+        emissive: Vec3::ZERO,
+        unlit: false,
+    }
+}
+
+impl Part for SurfaceParameters {
+    fn push_to(&self, words: &mut Vec<u32>) {
+        words.extend(case(&[
+            &self.base_color,
+            &self.alpha,
+            &self.metallic,
+            &self.roughness,
+            &self.ior,
+            &self.specular,
+            &self.specular_color,
+            &self.transmission,
+            &self.thin,
+            &self.clearcoat,
+            &self.clearcoat_roughness,
+            &self.clearcoat_normal,
+        ]));
+    }
+}
+
+fn take_parameters(t: &mut Twin<'_>) -> SurfaceParameters {
+    SurfaceParameters {
+        base_color: t.take3(),
+        alpha: t.take(),
+        metallic: t.take(),
+        roughness: t.take(),
+        ior: t.take(),
+        specular: t.take(),
+        specular_color: t.take3(),
+        transmission: t.take(),
+        thin: t.take_word() != 0,
+        clearcoat: t.take(),
+        clearcoat_roughness: t.take(),
+        clearcoat_normal: t.take3(),
+        absorption: Vec3::ZERO,
+        emissive: Vec3::ZERO,
+        unlit: false,
+    }
+}
+
+/// The device must have put these parameters.
+pub(super) fn expect_parameters(t: &mut Twin<'_>, p: &SurfaceParameters, bound: Bound) {
+    t.near(p.base_color, bound);
+    for number in [p.alpha, p.metallic, p.roughness, p.ior, p.specular] {
+        t.near(number, bound);
+    }
+    t.near(p.specular_color, bound);
+    t.near(p.transmission, bound);
+    t.same(p.thin);
+    t.near(p.clearcoat, bound);
+    t.near(p.clearcoat_roughness, bound);
+    t.near(p.clearcoat_normal, bound);
+    t.near(p.absorption, bound);
+    t.near(p.emissive, bound);
+    t.same(p.unlit);
+}
+
+/// The narrower a lobe, the more a facet's last bits count.
+fn narrow(p: &SurfaceParameters) -> f32 {
+    let alpha = |roughness: f32| (roughness * roughness).clamp(1e-3, 1.0);
+    let base = 1.0 / alpha(p.roughness);
+    if p.clearcoat > 0.0 { base.max(1.0 / alpha(p.clearcoat_roughness)) } else { base }
+}
+
+/// A direction near the mirrored or the straight one, or any.
+fn incoming(r: &mut Random, wo: Vec3) -> Vec3 {
+    let mirrored = wo * Vec3::new(-1.0, -1.0, 1.0);
+    let wi = match r.below(4) {
+        0 => mirrored + 0.05 * r.in_cube(),
+        1 => -wo + 0.1 * r.in_cube(),
+        _ => r.direction(),
+    };
+    wi.normalize()
+}
+
+fn materials() -> Vec<Probe<'static>> {
+    vec![
+        Probe::new(
+            "bsdf_eval_pdf",
+            "let p = take_parameters(); let bsdf = bsdf_new(p, take_word() != 0u); let wo = take3();
+            let f = bsdf_eval_pdf(bsdf, wo, take3()); put3(f.value); put(f.pdf_solid_angle);",
+            cases([], |r| {
+                let wo = r.upper_direction();
+                case(&[&material(r), &r.below(2), &wo, &incoming(r, wo)])
+            }),
+            |t| {
+                let p = take_parameters(t);
+                let bsdf = Bsdf::new(&p, t.take_word() != 0);
+                let (value, pdf) = bsdf.eval_pdf(t.take3(), t.take3());
+                t.near(value, ulps(8.0).of(value.max_element() * narrow(&p)));
+                t.near(pdf, ulps(8.0).of(pdf * narrow(&p)));
+            },
+        ),
+        Probe::new(
+            "bsdf_sample",
+            "let p = take_parameters(); let bsdf = bsdf_new(p, take_word() != 0u); let wo = take3();
+            let s = bsdf_sample(bsdf, wo, take3());
+            put3(s.weight); put3(s.wi); put(s.pdf_solid_angle); put_bool(s.is_delta);",
+            cases([], |r| case(&[&material(r), &r.below(2), &r.upper_direction(), &r.unit3()])),
+            |t| {
+                let p = take_parameters(t);
+                let bsdf = Bsdf::new(&p, t.take_word() != 0);
+                match bsdf.sample(t.take3(), t.take3()) {
+                    Some(s) => {
+                        let weight = s.weight.max_element();
+                        t.near(s.weight, ulps(64.0).of(weight * narrow(&p)));
+                        t.near(s.wi, ulps(32.0).of(1.0));
+                        t.near(s.pdf_solid_angle, ulps(64.0).of(s.pdf_solid_angle * narrow(&p)));
+                        t.same(s.is_delta);
+                    }
+                    None => {
+                        t.near(Vec3::ZERO, EXACT);
+                        t.accept_rest();
+                    }
+                }
+            },
+        )
+        .flips(500),
+        Probe::new(
+            "bsdf_is_delta_only, bsdf_straight_transmittance, bsdf_albedo",
+            "let p = take_parameters(); let bsdf = bsdf_new(p, take_word() != 0u);
+            put_bool(bsdf_is_delta_only(bsdf)); put3(bsdf_albedo(bsdf));
+            put3(bsdf_straight_transmittance(bsdf, take3()));",
+            cases([], |r| case(&[&material(r), &r.below(2), &r.upper_direction()])),
+            |t| {
+                let p = take_parameters(t);
+                let bsdf = Bsdf::new(&p, t.take_word() != 0);
+                t.same(bsdf.is_delta_only());
+                t.near(bsdf.albedo(), ulps(8.0).of(1.0));
+                let right = bsdf.straight_transmittance(t.take3());
+                t.near(right, ulps(8.0).of(1.0));
+            },
+        ),
+    ]
+}
+
+#[test]
+fn material_cases_have_all_lobes() {
+    let mut random = Random::default();
+    let mut seen = [0; 6];
+    for _ in 0..1000 {
+        let p = material(&mut random);
+        let wo = random.upper_direction();
+        let bsdf = Bsdf::new(&p, true);
+        let sample = bsdf.sample(wo, random.unit3());
+        for (index, is_seen) in [
+            sample.is_none(),
+            sample.is_some_and(|s| s.is_delta && !s.is_transmission),
+            sample.is_some_and(|s| s.is_delta && s.is_transmission),
+            sample.is_some_and(|s| !s.is_delta && !s.is_transmission),
+            sample.is_some_and(|s| !s.is_delta && s.is_transmission),
+            bsdf.straight_transmittance(wo) != Vec3::ZERO,
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            seen[index] += u32::from(is_seen);
+        }
+    }
+    assert!(seen.into_iter().all(|count| count >= 20), "{seen:?}");
+}

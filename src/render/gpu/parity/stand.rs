@@ -1,0 +1,270 @@
+//! What probes run on: a scene with one of everything, and maps with each table and look-up.
+
+use std::f32::consts::PI;
+
+use glam::{Affine2, Quat, UVec2, Vec2, Vec3, Vec4};
+
+use super::cases::Random;
+use crate::bvh::Ray;
+use crate::environment::{Environment, EnvironmentOptions, Lookup, TableKind};
+use crate::image::Image;
+use crate::light_grid::cells::SphericalGrid;
+use crate::light_grid::{LawOptions, LightGrid};
+use crate::path::camera::CameraRays;
+use crate::path::{PathLimits, PathTracer, World};
+use crate::render::filter::PixelFilter;
+use crate::render::gpu::layout::{pack_radiance, unpack_radiance};
+use crate::render::{Sampling, View};
+use crate::sampler::Sampler;
+use crate::scene::{
+    AlphaMode, Camera, Material, Medium, Projection, PunctualKind, PunctualLight, Scene, Texture,
+    TextureImage, TextureRef, Wrap,
+};
+
+/// A scene, a map, a view and laws.
+pub(super) struct Stand {
+    pub(super) world: World,
+    pub(super) environment: Environment,
+    pub(super) view: View,
+    pub(super) rays: CameraRays,
+    pub(super) grid: LightGrid,
+}
+
+/// First the one with everything, whose map has tile-local sums; then one for each other table, with
+/// other look-ups, cameras, filters and cells; then the widest and the tallest map; then the first in fog.
+pub(super) fn all() -> [Stand; 7] {
+    use PixelFilter::{BlackmanHarris, Box, Gauss};
+    use Sampling::{Adaptive, Plain, Talk};
+    use TableKind::{F32, F64, TileLocal, U32};
+    let thin_lens = Camera { lens_radius: 0.1, focus_distance: 5.0, ..camera() };
+    let parallel = Projection::Orthographic { half_height: 3.0 };
+    let stand = |scene, environment: Environment, camera, filter, sampling| {
+        let world = World::new(scene);
+        let view = view(camera, filter, sampling);
+        let rays = CameraRays::new(&view.camera, view.width, view.height);
+        let energies = environment.tile_energies();
+        let faces = sampling == Adaptive;
+        let medium = view.fog(&world).is_some();
+        let cells = SphericalGrid { center: rays.position(), columns: 64, rows: 32, faces, medium };
+        let grid = if sampling == Plain {
+            LightGrid::whole_map(energies)
+        } else {
+            LightGrid::with_garbage_laws(cells, energies, 7)
+        };
+        let grid = grid.expect("the map is not black");
+        Stand { world, environment, view, rays, grid }
+    };
+    let map = |table| environment((61, 37), table, Lookup::Bilinear);
+    let large = |size| environment(size, TileLocal, Lookup::Bilinear);
+    [
+        stand(scene(300), map(TileLocal), thin_lens, BlackmanHarris, Adaptive),
+        stand(scene(1), environment((61, 37), U32, Lookup::Nearest), camera(), Box, Talk),
+        stand(scene(1), map(F32), Camera { projection: parallel, ..camera() }, Gauss, Adaptive),
+        stand(scene(1), map(F64), camera(), Gauss, Plain),
+        stand(scene(1), large((16384, 8)), camera(), Box, Plain),
+        stand(scene(1), large((8, 8192)), camera(), Box, Plain),
+        stand(foggy(scene(300)), map(TileLocal), camera(), Box, Adaptive),
+    ]
+}
+
+impl Stand {
+    /// A sample's camera ray and random numbers, as `render::cpu` starts it.
+    pub(super) fn start_sample(&self, pixel: UVec2, index: u32) -> (Ray, Sampler) {
+        let mut sampler = Sampler::new(self.view.seed, pixel.y * self.view.width + pixel.x, index);
+        let offset = self.view.filter.sample(Vec2::from(sampler.next_pair()));
+        let lens = if self.rays.has_lens() { Vec2::from(sampler.next_pair()) } else { Vec2::ZERO };
+        (self.rays.ray(pixel.as_vec2() + 0.5 + offset, lens), sampler)
+    }
+
+    pub(super) fn tracer(&self) -> PathTracer<'_> {
+        PathTracer {
+            world: &self.world,
+            environment: &self.environment,
+            grid: Some(&self.grid),
+            fog: self.view.fog(&self.world),
+            limits: self.view.limits,
+        }
+    }
+}
+
+fn camera() -> Camera {
+    Camera::look_at(Vec3::new(1.0, 2.0, 7.0), Vec3::new(0.3, 0.1, 0.0), 0.9)
+}
+
+fn view(camera: Camera, filter: PixelFilter, sampling: Sampling) -> View {
+    View {
+        camera,
+        width: 50,
+        height: 40,
+        filter,
+        sampling,
+        limits: PathLimits { bounces: 6, russian_roulette: true },
+        seed: 11,
+        grid_columns: 64,
+        learning_paths: 0,
+        laws: LawOptions::ADAPTIVE,
+        medium: None,
+        layers: true,
+    }
+}
+
+/// Tiles of unequal size, one of them black, dim ones beside a sun. Radiance is what the device can
+/// hold, so that packing (which has a test of its own) is no part of what is compared.
+fn environment((width, height): (u32, u32), table: TableKind, lookup: Lookup) -> Environment {
+    let mut random = Random::default();
+    let map = Image::from_fn(width, height, |x, y| {
+        let radiance = match (x, y) {
+            (40, 12) => Vec3::new(9e3, 8e3, 6e3),
+            (17..=27, 7..=16) => Vec3::ZERO,
+            _ => random.unit3() * random.magnitude(1e-2, 4.0),
+        };
+        unpack_radiance(pack_radiance(radiance.to_array()))
+    });
+    let options = EnvironmentOptions {
+        table,
+        lookup,
+        tile_columns: 7,
+        tile_rows: 5,
+        rotation_radians: 2.0,
+        intensity: 1.7,
+    };
+    Environment::new(map, &options).expect("a sound map")
+}
+
+/// A soup of triangles, a third of them flat, with all materials in turn; the last triangle has no
+/// area.
+fn scene(triangles: u32) -> Scene {
+    let mut random = Random::default();
+    let mut scene = Scene { materials: materials(), ..Scene::default() };
+    add_textures(&mut scene, &mut random);
+    for index in 0..triangles {
+        let middle = 3.5 * random.in_cube();
+        let corners = [(); 3].map(|()| middle + random.in_cube());
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+        let is_flat = random.below(3) == 0;
+        let handedness = if random.below(2) == 0 { 1.0 } else { -1.0 };
+        let first = scene.positions.len() as u32;
+        for corner in corners {
+            let bent = (normal + 0.4 * random.in_cube()).normalize();
+            let tangent = bent.any_orthonormal_vector() + 0.1 * random.in_cube();
+            scene.positions.push(corner);
+            scene.normals.push(if is_flat { Vec3::ZERO } else { bent });
+            scene.tangents.push(tangent.normalize().extend(handedness));
+            scene.uvs.iter_mut().for_each(|uvs| uvs.push(random.unit2() * 4.0 - 1.5));
+            scene.colors.push((random.unit3() * 0.5 + 0.6).extend(random.between(0.4, 1.1)));
+        }
+        scene.triangles.push([first, first + 1, first + 2]);
+        scene.triangle_materials.push(index % scene.materials.len() as u32);
+    }
+    scene.triangles.push([0, 1, 1]);
+    scene.triangle_materials.push(0);
+    scene.lights = lights();
+    scene
+}
+
+/// The scene in fog, its solids filled with milk.
+fn foggy(mut scene: Scene) -> Scene {
+    scene.medium = Some(Medium {
+        scattering: Vec3::new(0.1, 0.2, 0.3),
+        absorption: Vec3::new(0.05, 0.02, 0.0),
+        anisotropy: 0.6,
+        bounds: Some([Vec3::splat(-4.0), Vec3::new(5.0, 3.0, 6.0)]),
+    });
+    for solid in scene.materials.iter_mut().filter(|material| material.thickness > 0.0) {
+        (solid.scattering, solid.scatter_anisotropy) = (Vec3::new(2.0, 1.0, 0.5), -0.4);
+    }
+    scene
+}
+
+fn materials() -> Vec<Material> {
+    let plain = Material { metallic: 0.0, double_sided: true, ..Material::default() };
+    let color = Vec4::new(0.7, 0.5, 0.3, 1.0);
+    let glass = Material { transmission: 1.0, roughness: 0.0, ..plain.clone() };
+    let solid = Material {
+        thickness: 1.0,
+        attenuation_color: Vec3::new(0.3, 0.6, 0.9),
+        attenuation_distance: 0.7,
+        ..glass.clone()
+    };
+    let coated = Material { clearcoat: 0.8, clearcoat_roughness: 0.1, ..plain.clone() };
+    vec![
+        Material { base_color: color, double_sided: false, ..plain.clone() },
+        Material { base_color: color, roughness: 0.3, ..plain.clone() },
+        Material { base_color: color, specular: 0.0, ..plain.clone() },
+        Material { base_color: color, metallic: 1.0, roughness: 0.2, ..plain.clone() },
+        Material { metallic: 0.4, roughness: 0.5, ior: 2.4, ..plain.clone() },
+        Material { metallic: 1.0, roughness: 0.0, ..plain.clone() },
+        Material { clearcoat_normal_scale: 0.5, ..coated.clone() },
+        Material { base_color: color, clearcoat_roughness: 0.0, ..coated },
+        Material { roughness: 0.3, ..solid.clone() },
+        Material { ior: 1.0, ..solid.clone() },
+        solid,
+        Material { roughness: 0.4, base_color: color, ..glass.clone() },
+        Material { base_color: color, ..glass },
+        Material { alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..plain.clone() },
+        Material { alpha_mode: AlphaMode::Blend, roughness: 0.6, ..plain.clone() },
+        Material { emissive: Vec3::new(3.0, 2.0, 1.0), ..plain.clone() },
+        Material { emissive: Vec3::splat(5.0), double_sided: false, ..plain.clone() },
+        Material { unlit: true, base_color: color, ..plain.clone() },
+        Material { specular_color: Vec3::new(1.0, 0.4, 0.2), ior: 0.0, ..plain },
+    ]
+}
+
+/// Images down to none, every wrap mode, and a texture in every other place of every material.
+fn add_textures(scene: &mut Scene, random: &mut Random) {
+    for (width, height) in [(8, 5), (1, 1), (0, 0), (3, 7)] {
+        let texels = (0..width * height).map(|_| random.word().to_le_bytes()).collect();
+        scene.images.push(TextureImage { width, height, texels });
+    }
+    let wraps = [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::ClampToEdge];
+    for index in 0..18_u32 {
+        let wrap = |i: u32| wraps[i as usize % 3];
+        scene.textures.push(Texture {
+            image: if index % 6 == 5 { index / 6 } else { 3 * (index % 2) },
+            wrap_u: wrap(index),
+            wrap_v: wrap(index / 3),
+            nearest: index % 5 == 0,
+            srgb: index % 4 < 2,
+        });
+    }
+    let mut reference = || {
+        let (texture, uv_set) = (random.below(18), random.below(2) as u8);
+        let (scale, angle) = (random.unit2() + 0.5, random.between(-PI, PI));
+        let transform = Affine2::from_scale_angle_translation(scale, angle, random.unit2());
+        random.below(2).eq(&0).then_some(TextureRef { texture, uv_set, transform })
+    };
+    for m in &mut scene.materials {
+        for texture in [
+            &mut m.base_color_texture,
+            &mut m.metallic_roughness_texture,
+            &mut m.normal_texture,
+            &mut m.emissive_texture,
+            &mut m.specular_texture,
+            &mut m.specular_color_texture,
+            &mut m.transmission_texture,
+            &mut m.clearcoat_texture,
+            &mut m.clearcoat_roughness_texture,
+            &mut m.clearcoat_normal_texture,
+        ] {
+            *texture = reference();
+        }
+    }
+}
+
+fn lights() -> Vec<PunctualLight> {
+    let spot = PunctualKind::Spot { inner_radians: 0.3, outer_radians: 0.7 };
+    let light = |kind, place: Vec3, range| PunctualLight {
+        name: String::new(),
+        kind,
+        position: place,
+        direction: Quat::from_rotation_z(0.3) * -place.normalize(),
+        intensity: Vec3::new(30.0, 20.0, 10.0),
+        range,
+    };
+    vec![
+        light(PunctualKind::Point, Vec3::new(2.0, 3.0, 1.0), 6.0),
+        light(PunctualKind::Point, Vec3::new(-4.0, 1.0, 2.0), f32::INFINITY),
+        light(spot, Vec3::new(0.5, 4.0, -3.0), f32::INFINITY),
+        light(PunctualKind::Directional, Vec3::new(1.0, 2.0, 0.5), f32::INFINITY),
+    ]
+}
