@@ -10,9 +10,10 @@ use std::sync::atomic::AtomicBool;
 
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LawOptions;
-use lightgrid::path::{PathLimits, World};
+use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Figures, Phase, Sampling, Session, View};
+use lightgrid::sampler::Points;
 use lightgrid::scene::builtin;
 
 const SIZE: (u32, u32) = (128, 72);
@@ -129,10 +130,13 @@ impl Case<'_> {
             sampling,
             limits: PathLimits { bounces, russian_roulette: true },
             seed,
+            points: Points::Sobol,
             grid_columns: 64,
             learning_paths: LEARNING_PATHS,
             laws: LawOptions::ADAPTIVE,
             medium: None,
+            background: Background::Map,
+            crop: None,
             layers: false,
         };
         let never = AtomicBool::new(false);

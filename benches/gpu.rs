@@ -4,10 +4,11 @@ use std::sync::atomic::AtomicBool;
 
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LawOptions;
-use lightgrid::path::{PathLimits, World};
+use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::gpu::{Gpu, Stage};
 use lightgrid::render::{Sampling, Session, View};
+use lightgrid::sampler::Points;
 use lightgrid::scene::builtin;
 
 /// Rounds in which both devices take their turn; the best round of each counts.
@@ -47,10 +48,13 @@ fn row(gpu: &Gpu, name: &str, world: &World, environment: &Environment, bounces:
         sampling: Sampling::Adaptive,
         limits: PathLimits { bounces, russian_roulette: true },
         seed: 0,
+        points: Points::Sobol,
         grid_columns: 64,
         learning_paths: 1 << 14,
         laws: LawOptions::ADAPTIVE,
         medium: None,
+        background: Background::Map,
+        crop: None,
         layers: false,
     };
     let stage = Stage::new(gpu, world, environment).expect("it fits");

@@ -7,9 +7,10 @@ use criterion::{Criterion, Throughput};
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LawOptions;
 use lightgrid::light_grid::tile_laws::TileLaws;
-use lightgrid::path::{PathLimits, World};
+use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Sampling, Session, View};
+use lightgrid::sampler::Points;
 use lightgrid::scene::builtin;
 
 pub(crate) fn bench(criterion: &mut Criterion) {
@@ -25,10 +26,13 @@ pub(crate) fn bench(criterion: &mut Criterion) {
         sampling,
         limits: PathLimits { bounces: 5, russian_roulette: true },
         seed: 0,
+        points: Points::Sobol,
         grid_columns: 64,
         learning_paths,
         laws: LawOptions::ADAPTIVE,
         medium: None,
+        background: Background::Map,
+        crop: None,
         layers: false,
     };
     let mut group = criterion.benchmark_group("path");

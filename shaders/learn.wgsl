@@ -22,7 +22,7 @@ fn count(cell: u32, tile: u32, weight: f32) {
 
 fn record(path: ptr<function, Path>, vertex: Vertex) {
     var law = WHOLE_MAP;
-//#if record_cosine
+//#if record_ratio
     if (path_pair_bits(path).x >> 31u) == 0u {
         law = vertex.law;
     }
@@ -43,14 +43,20 @@ fn record(path: ptr<function, Path>, vertex: Vertex) {
     let f = scattered(path, vertex, sample.direction);
     if max_element(f.value) > 0.0 {
         let visible = transmittance(path, vertex, sample.direction, F32_MAX);
-//#if record_cosine
+//#if record_ratio
+        weight = luminance(visible);
         var share = abs(dot(vertex.point.shading_frame.z, sample.direction));
 //#if medium
         if vertex.is_in_medium {
             share = 4.0 * PI * f.pdf_solid_angle;
         }
 //#end
-        weight = luminance(visible) * share;
+//#if record_cosine
+        weight *= share;
+//#end
+//#if record_squared_cosine
+        weight *= share * share;
+//#end
 //#else
         let pdf = choice.probability * sample.pdf_solid_angle;
         weight = importance(f.value * sample.radiance * visible)

@@ -392,9 +392,34 @@ fn add_emitted(path: ptr<function, Path>, point: SurfacePoint) {
 }
 //#end
 
-// The ray leaves the scene: adds the map's radiance.
+//#if background_blur
+// Twin of `background::spread`.
+fn spread(direction: vec3f, concentration: f32, u: vec2f) -> vec3f {
+    let share = u.x + (1.0 - u.x) * exp(-2.0 * concentration);
+    let cosine = clamp(1.0 + log(max(share, 1e-30)) / concentration, -1.0, 1.0);
+    let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
+    let phi = sin_cos_turns(u.y);
+    return world_from_local(frame_from_z(direction), vec3f(sine * phi.y, sine * phi.x, cosine));
+}
+//#end
+
+// The ray leaves the scene: adds the map's radiance, or for the camera the background's.
 fn escape(path: ptr<function, Path>) {
     let direction = (*path).ray.direction;
+//#if background_blur
+    if (*path).bounces == 0u {
+        var sampler = (*path).sampler;
+        let blurred = spread(direction, globals.background_concentration, next_pair(&sampler));
+        (*path).radiance += (*path).throughput * environment_radiance(blurred);
+        return;
+    }
+//#end
+//#if background_color
+    if (*path).bounces == 0u {
+        (*path).radiance += (*path).throughput * globals.background;
+        return;
+    }
+//#end
 //#if map_sampling
     if (*path).departure_pdf_solid_angle < F32_MAX {
         let seen = radiance_and_tile_pdf(direction);

@@ -7,7 +7,12 @@ struct Sampler {
 }
 
 fn sampler_new(seed: u32, pixel: u32, index: u32) -> Sampler {
-    return Sampler(reverseBits(index), hash(hash(seed) ^ pixel), 0u);
+    let pixel_seed = hash(hash(seed) ^ pixel);
+//#if independent_points
+    return Sampler(0u, hash(pixel_seed ^ index), 0u);
+//#else
+    return Sampler(reverseBits(index), pixel_seed, 0u);
+//#end
 }
 
 fn next_pair_bits(sampler: ptr<function, Sampler>) -> vec2u {

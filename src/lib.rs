@@ -13,10 +13,10 @@
 //! - [`path`] is the one loop that turns random numbers into radiance; [`render`] runs it over the
 //!   picture, pass by pass, into a film.
 //! - [`app`] is the window, [`cli`] what a person types; both find files by [`sources`], and write by
-//!   [`output`]. [`metrics`] compares pictures, [`denoise`] smooths them, [`tone`] develops them.
+//!   [`output`]. [`report`] measures error against time; [`metrics`] compares pictures, [`denoise`] smooths them, [`tone`] develops them.
 //!
-//! Arrows point down: `cli -> app -> render -> path -> {light_grid, bsdf, medium, bvh} -> {scene, environment} ->
-//! {image, sampler, math, color, error}`.
+//! Arrows point down: `cli -> {app, report} -> render -> path -> {light_grid, bsdf, medium, bvh} ->
+//! {scene, environment} -> {image, sampler, math, color, error}`.
 
 pub mod app;
 pub mod bsdf;
@@ -36,6 +36,7 @@ pub mod noise;
 pub mod output;
 pub mod path;
 pub mod render;
+pub mod report;
 pub mod sampler;
 pub mod scene;
 pub mod sources;

@@ -18,17 +18,40 @@ const MAX_SKY_SIZE: (u32, u32) = (16384, 8192);
 /// # Errors
 /// One sentence: the name is neither, or the file cannot be read.
 pub fn scene(name: &str) -> Result<Scene> {
+    check_scene(name)?;
     if builtin::names().contains(&name) {
-        return builtin::build(name);
+        builtin::build(name)
+    } else {
+        gltf::load(Path::new(name))
     }
-    let path = Path::new(name);
-    if !path.exists() && !name.contains(['.', '/', '\\']) {
-        return Err(Error::new(format!(
+}
+
+/// Whether there is such a scene, without reading it.
+///
+/// # Errors
+/// One sentence: the name is neither a file nor a built-in's.
+pub fn check_scene(name: &str) -> Result<()> {
+    let exists = builtin::names().contains(&name) || Path::new(name).exists();
+    match exists {
+        true => Ok(()),
+        false if name.contains(['.', '/', '\\']) => Err(Error::at(name, "there is no such file")),
+        false => Err(Error::new(format!(
             "{name}: neither a file nor a built-in scene ({})",
             builtin::names().join(", ")
-        )));
+        ))),
     }
-    gltf::load(path)
+}
+
+/// Whether there is such a map, without reading or making it.
+///
+/// # Errors
+/// One sentence: there is no such file or sky, or it is too large.
+pub fn check_map(name: &str) -> Result<()> {
+    match name.strip_prefix("sky:") {
+        Some(rest) => sky_and_size(name, rest).map(|_| ()),
+        None if Path::new(name).exists() => Ok(()),
+        None => Err(Error::at(name, "there is no such file")),
+    }
 }
 
 /// The map a name stands for: `sky:NAME`, `sky:NAME@WIDTHxHEIGHT`, or a file; repaired and ready.
@@ -46,6 +69,12 @@ pub fn map(name: &str) -> Result<(Image, Notices)> {
 }
 
 fn built_in_sky(name: &str, rest: &str) -> Result<Image> {
+    let (sky_name, (width, height)) = sky_and_size(name, rest)?;
+    sky::build(sky_name, width, height)
+}
+
+/// Name and size of the sky that `rest` asks for.
+fn sky_and_size<'a>(name: &str, rest: &'a str) -> Result<(&'a str, (u32, u32))> {
     let (sky_name, (width, height)) = match rest.split_once('@') {
         None => (rest, SKY_SIZE),
         Some((sky_name, size)) => (sky_name, size_pair(size).map_err(|e| Error::at(name, e))?),
@@ -54,7 +83,10 @@ fn built_in_sky(name: &str, rest: &str) -> Result<Image> {
         let (w, h) = MAX_SKY_SIZE;
         return Err(Error::at(name, format!("a sky can be at most {w}x{h}")));
     }
-    sky::build(sky_name, width, height)
+    if !sky::names().contains(&sky_name) {
+        return Err(sky::unknown(sky_name));
+    }
+    Ok((sky_name, (width, height)))
 }
 
 /// Two positive whole numbers joined by `x`.

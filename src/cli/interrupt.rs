@@ -1,25 +1,22 @@
-//! Ctrl-C: once to finish early and keep the picture, twice to leave at once.
+//! Ctrl-C: once to finish early and keep what is done, twice to leave at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A flag that becomes true at the first Ctrl-C (or termination request); the second one ends the
 /// process with status 130.
-pub(super) fn flag() -> Arc<AtomicBool> {
+/// What will happen is said when it does.
+pub(super) fn flag(what: &'static str) -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let handler = Arc::clone(&flag);
     let set = ctrlc::set_handler(move || {
         if handler.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        eprintln!(
-            "\nlightgrid: stopping after this pass and writing the picture (again: leave now)"
-        );
+        eprintln!("\nlightgrid: {what} (again: leave now)");
     });
     if set.is_err() {
-        eprintln!(
-            "lightgrid: Ctrl-C cannot be caught here and will end the process without a picture"
-        );
+        eprintln!("lightgrid: Ctrl-C cannot be caught here and will end the process at once");
     }
     flag
 }

@@ -10,6 +10,7 @@ mod info;
 mod interrupt;
 mod progress;
 mod render;
+mod report;
 mod sat;
 mod screenshot;
 mod values;
@@ -42,6 +43,8 @@ enum Command {
     Info(info::InfoArguments),
     /// List the GPUs and what they allow.
     Devices(device::DevicesArguments),
+    /// Measure error against run time: curves, speed-ups, the talk's table.
+    Report(Box<report::ReportArguments>),
     /// Compare the importance tables' accuracy on maps (the talk's summed-area-table claim).
     Sat(sat::SatArguments),
 }
@@ -57,6 +60,7 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(arguments),
         Command::Info(arguments) => info::run(arguments),
         Command::Devices(arguments) => device::run(arguments),
+        Command::Report(arguments) => report::run(arguments),
         Command::Sat(arguments) => sat::run(arguments),
     };
     match result {

@@ -35,6 +35,11 @@ impl Progress {
         }
     }
 
+    /// Leaves a sentence on stderr, above the line.
+    pub(super) fn tell(&self, sentence: &str) {
+        self.bar.suspend(|| eprintln!("{sentence}"));
+    }
+
     /// Removes the line.
     pub(super) fn finish(&self) {
         self.bar.finish_and_clear();

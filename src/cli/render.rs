@@ -17,10 +17,11 @@ use crate::light_grid::LawOptions;
 use crate::medium::Fog;
 use crate::output::record::{self, Phases, Record};
 use crate::output::{self, Exposure, LayerName, PictureOptions};
-use crate::path::{PathLimits, World, framing};
+use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::DeviceChoice;
-use crate::render::{Sampling, Session, StopRule, View};
+use crate::render::{Crop, Sampling, Session, StopRule, View};
+use crate::sampler::Points;
 use crate::scene::{Camera, Medium, Projection, Scene, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
 
@@ -46,6 +47,9 @@ pub(super) struct RenderArguments {
     /// Turns the map about the vertical, in degrees.
     #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG", help_heading = "Environment")]
     env_rotation: f64,
+    /// What the camera sees of the map: `map`, `blur:DEGREES`, or a colour R,G,B (linear radiance).
+    #[arg(long, value_parser = values::background, value_name = "WHAT", help_heading = "Environment")]
+    background: Option<Background>,
     /// Multiplies the map's radiance.
     #[arg(long, default_value = "1", value_parser = values::not_negative, value_name = "X", help_heading = "Environment")]
     env_intensity: f32,
@@ -86,6 +90,9 @@ pub(super) struct RenderArguments {
     /// Picture size in pixels.
     #[arg(long, default_value = "1280x720", value_parser = values::size, value_name = "WxH", help_heading = "Picture")]
     size: (u32, u32),
+    /// Renders only this part of the picture: its left and top, width and height in pixels.
+    #[arg(long, value_parser = values::region, value_name = "X,Y,W,H", help_heading = "Picture")]
+    region: Option<[u32; 4]>,
     /// Pixel filter.
     #[arg(long, default_value = "blackman-harris", value_enum, help_heading = "Picture")]
     filter: PixelFilter,
@@ -189,6 +196,14 @@ fn check_outputs(arguments: &RenderArguments) -> Result<()> {
     if let Some(denoiser) = arguments.denoise {
         denoiser.check()?;
     }
+    let (width, height) = arguments.size;
+    if let Some([left, top, w, h]) = arguments.region
+        && (left.saturating_add(w) > width || top.saturating_add(h) > height)
+    {
+        return Err(Error::new(format!(
+            "--region {left},{top},{w},{h} is not inside the picture of {width}x{height} pixels"
+        )));
+    }
     let files: Vec<&PathBuf> = arguments.outputs.iter().chain(&arguments.json).collect();
     for (i, file) in files.iter().enumerate() {
         if files[..i].iter().any(|other| is_same_file(other, file)) {
@@ -215,6 +230,8 @@ impl RenderArguments {
             env: map.to_owned(),
             env_rotation: 0.0,
             env_intensity: 1.0,
+            background: None,
+            region: None,
             fog: None,
             fog_absorption: None,
             fog_anisotropy: None,
@@ -255,7 +272,7 @@ impl RenderArguments {
 pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     check_outputs(arguments)?;
     start_threads(arguments.threads)?;
-    let cancel = super::interrupt::flag();
+    let cancel = super::interrupt::flag("stopping after this pass and writing the picture");
     let progress = Progress::start("loading");
     let mut phases = Phases::default();
 
@@ -329,7 +346,7 @@ fn lap(start: Instant) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
-fn start_threads(threads: u16) -> Result<()> {
+pub(super) fn start_threads(threads: u16) -> Result<()> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(usize::from(threads))
         .thread_name(|i| format!("render {i}"))
@@ -358,7 +375,7 @@ fn stop_rule(arguments: &RenderArguments) -> StopRule {
 }
 
 fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Result<View> {
-    let (width, height) = arguments.size;
+    let (width, height) = arguments.region.map_or(arguments.size, |[_, _, w, h]| (w, h));
     Ok(View {
         camera: camera(arguments, world, notices)?,
         width,
@@ -370,12 +387,18 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
             russian_roulette: !arguments.no_russian_roulette,
         },
         seed: arguments.seed,
+        points: Points::Sobol,
         grid_columns: arguments.grid,
         learning_paths: arguments
             .learning_paths
             .unwrap_or_else(|| View::suitable_learning_paths(width, height, arguments.spp)),
         laws: LawOptions::ADAPTIVE,
         medium: medium(arguments, &world.scene),
+        background: arguments.background.unwrap_or_default(),
+        crop: arguments.region.map(|[left, top, ..]| Crop {
+            corner: [left, top],
+            whole: [arguments.size.0, arguments.size.1],
+        }),
         layers: arguments
             .layers
             .iter()
@@ -505,6 +528,8 @@ fn settings(
         ("bounces", serde_json::json!(arguments.bounces)),
         ("russian_roulette", serde_json::json!(!arguments.no_russian_roulette)),
         ("filter", serde_json::json!(arguments.filter)),
+        ("region", serde_json::json!(arguments.region)),
+        ("background", serde_json::json!(arguments.background.unwrap_or_default())),
         ("env_rotation_degrees", serde_json::json!(arguments.env_rotation)),
         ("env_intensity", serde_json::json!(arguments.env_intensity)),
         ("seed", serde_json::json!(arguments.seed)),

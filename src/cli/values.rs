@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::path::Background;
 pub(super) use crate::sources::size_pair as pair;
 
 /// Largest picture in pixels: 40 bytes a pixel stay under 5.4 GB.
@@ -37,6 +38,31 @@ pub(super) fn coefficient(text: &str) -> Result<Vec3, String> {
         [r, g, b] => Ok(Vec3::new(r, g, b)),
         _ => Err("expected one number or three like 0.1,0.2,0.3".to_owned()),
     }
+}
+
+/// `X,Y,WIDTH,HEIGHT` in pixels.
+pub(super) fn region(text: &str) -> Result<[u32; 4], String> {
+    let numbers: Vec<u32> = text.split(',').filter_map(|t| t.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x, y, w, h] if text.split(',').count() == 4 && w > 0 && h > 0 => Ok([x, y, w, h]),
+        _ => Err("expected four numbers like 100,50,320,180, the last two not 0".to_owned()),
+    }
+}
+
+/// `map`, `blur:DEGREES` or a colour.
+pub(super) fn background(text: &str) -> Result<Background, String> {
+    if text == "map" {
+        return Ok(Background::Map);
+    }
+    if let Some(degrees) = text.strip_prefix("blur:") {
+        let degrees = finite(degrees)?;
+        if !(0.0..=90.0).contains(&degrees) {
+            return Err("a blur is from 0 to 90 degrees".to_owned());
+        }
+        return Ok(Background::Blurred(degrees.to_radians() as f32));
+    }
+    let color = coefficient(text).map_err(|e| format!("map, blur:DEGREES or a colour: {e}"))?;
+    Ok(Background::Color(color.to_array()))
 }
 
 /// A number from -1 to 1.

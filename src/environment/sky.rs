@@ -31,6 +31,12 @@ pub fn names() -> &'static [&'static str] {
     &["day", "sunset", "night", "overcast", "hallway"]
 }
 
+/// Says that there is no such sky, and which there are.
+pub(crate) fn unknown(name: &str) -> Error {
+    let names = names().join(", ");
+    Error::new(format!("there is no built-in sky called \"{name}\"; there are {names}"))
+}
+
 /// Builds the sky called `name` as a lat-long map. An error lists the names there are, or the
 /// sizes there can be (1 to 16384).
 pub fn build(name: &str, width: u32, height: u32) -> Result<Image> {
@@ -45,12 +51,7 @@ pub fn build(name: &str, width: u32, height: u32) -> Result<Image> {
         "night" => (night, lamps()),
         "overcast" => (overcast, Vec::new()),
         "hallway" => (hallway, Vec::new()),
-        _ => {
-            return Err(Error::new(format!(
-                "there is no built-in sky called \"{name}\"; there are {}",
-                names().join(", ")
-            )));
-        }
+        _ => return Err(unknown(name)),
     };
     let mut image = smooth_part(smooth, width, height);
     for disc in &discs {

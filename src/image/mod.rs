@@ -19,7 +19,7 @@ pub use exr_write::{ExrPicture, Layer, write_exr};
 pub(crate) use file::read_cause;
 pub use file::{check_writable, is_same_file, write_beside_and_rename};
 pub use map::{LoadedMap, read_map, read_picture, sanitise};
-pub use png::write_png;
+pub use png::{encode_png, write_png};
 
 pub mod ldr;
 

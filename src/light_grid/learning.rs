@@ -2,25 +2,51 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use super::cells::{MEDIUM_FACE, SphericalGrid, face_axis};
 use super::counters::{Counters, Tally};
 use super::tile_laws::TileLaws;
 use super::{Cells, LightGrid, MEMORY_BUDGET_BYTES, WHOLE_MAP};
 use crate::environment::Environment;
 
-/// What one learning record holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What one learning record holds. All but the last, divided by the tries, are visibility ratios
+/// that do not depend on the map's radiance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Recording {
-    /// Visibility times cosine. Divided by the tries it is a visibility ratio that does not depend
-    /// on the map's radiance.
+    /// Visibility times cosine.
     VisibleCosine,
+    /// Visibility alone.
+    Visible,
+    /// Visibility times squared cosine: the root of its mean is a root mean square, the weight of
+    /// least variance where a tile's texels are chosen by energy (Rath et al. 2020).
+    VisibleCosineSquared,
     /// The visible contribution, as in the talk.
     VisibleContribution,
 }
 
+impl Recording {
+    /// Whether records are visibility ratios once they are divided by the tries.
+    pub fn is_ratio(self) -> bool {
+        self != Self::VisibleContribution
+    }
+
+    /// Power of the cosine in a visibility ratio.
+    pub fn cosine_power(self) -> i32 {
+        match self {
+            Self::Visible | Self::VisibleContribution => 0,
+            Self::VisibleCosine => 1,
+            Self::VisibleCosineSquared => 2,
+        }
+    }
+}
+
 /// How counters become laws. *Measured* defaults.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LawOptions {
+    /// Whether cells are split six-fold by the direction a surface faces.
+    pub faces: bool,
     /// What the counters hold.
     pub recording: Recording,
     /// Tries per tile that the pooled ratio of the 4x4 cells around is worth.
@@ -40,6 +66,7 @@ pub struct LawOptions {
 impl LawOptions {
     /// Our own laws.
     pub const ADAPTIVE: Self = Self {
+        faces: true,
         recording: Recording::VisibleCosine,
         pooling_tries: 16.0,
         ratio_exponent: 0.75,
@@ -49,6 +76,7 @@ impl LawOptions {
 
     /// The talk's: proportional to the visible contribution, nothing else.
     pub const TALK: Self = Self {
+        faces: false,
         recording: Recording::VisibleContribution,
         pooling_tries: 0.0,
         ratio_exponent: 1.0,
@@ -163,7 +191,7 @@ impl<'a> LawBuilder<'a> {
             let block = builder.block_of(cell);
             builder.slots_of_block.entry(block).or_default().push(slot);
         }
-        if learning.options.recording == Recording::VisibleCosine {
+        if learning.options.recording.is_ratio() {
             builder.faces = slots_of_face.iter().map(|slots| builder.sum(slots)).collect();
         }
         if learning.options.compensation > 0.0 && learning.grid.faces {
@@ -208,11 +236,10 @@ impl<'a> LawBuilder<'a> {
     fn weights(&mut self, slot: usize, weights: &mut Vec<f64>) {
         let cell = self.learning.counters.cells()[slot];
         weights.clear();
-        match self.learning.options.recording {
-            Recording::VisibleContribution => {
-                weights.extend(self.learning.counters.tallies(slot).map(|t| t.weight));
-            }
-            Recording::VisibleCosine => self.visible_energies(cell, slot, weights),
+        if self.learning.options.recording.is_ratio() {
+            self.visible_energies(cell, slot, weights);
+        } else {
+            weights.extend(self.learning.counters.tallies(slot).map(|t| t.weight));
         }
         self.compensate(self.face_of(cell) as usize, weights);
         let total: f64 = weights.iter().sum();

@@ -32,7 +32,7 @@ pub struct Comparison {
 }
 
 /// Added to the squared reference in relMSE, in units of its squared mean.
-const REL_MSE_EPSILON: f64 = 1e-2;
+pub(crate) const REL_MSE_EPSILON: f64 = 1e-2;
 
 /// Compares a linear picture with its reference.
 ///
@@ -106,13 +106,13 @@ fn check_finite(image: &Image, which: &str) -> Result<()> {
 }
 
 /// Mean over pixels and channels.
-fn mean(image: &Image) -> f64 {
+pub(crate) fn mean(image: &Image) -> f64 {
     let sum: f64 = image.pixels.as_flattened().iter().map(|&v| f64::from(v)).sum();
     sum / (3 * image.pixels.len()) as f64
 }
 
 /// Mean without the largest thousandth, at least one value; of one value that value.
-fn trimmed_mean(values: &mut [f64]) -> f64 {
+pub(crate) fn trimmed_mean(values: &mut [f64]) -> f64 {
     let trimmed = (values.len() / 1000).max(1);
     let kept = (values.len() - trimmed).max(1);
     values.sort_unstable_by(f64::total_cmp);

@@ -5,7 +5,7 @@ use glam::Vec2;
 use super::{Path, PathTracer, Scatterer, Vertex};
 use crate::bvh::Ray;
 use crate::color::{importance, luminance};
-use crate::light_grid::{LearningGrid, Recording, WHOLE_MAP};
+use crate::light_grid::{LearningGrid, WHOLE_MAP};
 use crate::sampler::{Sampler, unit_from_bits};
 
 impl PathTracer<'_> {
@@ -43,10 +43,9 @@ impl Path<'_> {
 
     fn record(&mut self, vertex: &Vertex, learning: &LearningGrid) {
         let Some(grid) = self.tracer.grid else { return };
-        let law = match learning.recording() {
-            Recording::VisibleCosine if self.sampler.next_pair_bits()[0] >> 31 == 0 => vertex.law,
-            _ => WHOLE_MAP,
-        };
+        let recording = learning.recording();
+        let by_learned = recording.is_ratio() && self.sampler.next_pair_bits()[0] >> 31 == 0;
+        let law = if by_learned { vertex.law } else { WHOLE_MAP };
         let [tile_bits, row_bits] = self.sampler.next_pair_bits();
         let choice = grid.laws().sample(law, tile_bits);
         let u = Vec2::new(choice.remainder, unit_from_bits(row_bits));
@@ -61,22 +60,19 @@ impl Path<'_> {
             None => 0.0,
             Some((f, own_pdf)) => {
                 let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
-                match learning.recording() {
-                    Recording::VisibleCosine => {
-                        let share = match &vertex.scatterer {
-                            Scatterer::Surface(surface) => {
-                                surface.point.shading_frame.z.dot(sample.direction).abs()
-                            }
-                            Scatterer::Medium(_) => phase_weight(own_pdf),
-                        };
-                        luminance(transmittance) * share
-                    }
-                    Recording::VisibleContribution => {
-                        let pdf = choice.probability * sample.pdf_solid_angle;
-                        let mean = std::f32::consts::PI
-                            * importance(self.tracer.environment.mean_radiance());
-                        importance(f * sample.radiance * transmittance) / (pdf * mean)
-                    }
+                if recording.is_ratio() {
+                    let share = match &vertex.scatterer {
+                        Scatterer::Surface(surface) => {
+                            surface.point.shading_frame.z.dot(sample.direction).abs()
+                        }
+                        Scatterer::Medium(_) => phase_weight(own_pdf),
+                    };
+                    luminance(transmittance) * share.powi(recording.cosine_power())
+                } else {
+                    let pdf = choice.probability * sample.pdf_solid_angle;
+                    let mean =
+                        std::f32::consts::PI * importance(self.tracer.environment.mean_radiance());
+                    importance(f * sample.radiance * transmittance) / (pdf * mean)
                 }
             }
         };

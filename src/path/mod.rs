@@ -8,12 +8,15 @@
 
 use glam::{Vec2, Vec3};
 
+pub mod background;
 pub mod camera;
 pub mod framing;
 mod learn;
 mod lights;
+mod ray_clock;
 mod world;
 
+pub use background::Background;
 pub use lights::{LightSample, LocalLights};
 pub use world::World;
 
@@ -47,6 +50,8 @@ pub struct PathTracer<'a> {
     pub grid: Option<&'a LightGrid>,
     /// What lies between surfaces; `None` is clear air.
     pub fog: Option<Fog>,
+    /// What the camera sees where it sees no surface.
+    pub background: Background,
     /// When paths end.
     pub limits: PathLimits,
 }
@@ -371,6 +376,13 @@ impl<'a> Path<'a> {
     /// The ray leaves the scene: adds the map's radiance.
     fn escape(&mut self) {
         let environment = self.tracer.environment;
+        if self.bounces == 0 && self.tracer.background != Background::Map {
+            let u = Vec2::from(self.sampler.next_pair());
+            let background = self.tracer.background;
+            self.radiance +=
+                self.throughput * background.radiance(environment, self.ray.direction, u);
+            return;
+        }
         let from = self.departure;
         let Some(grid) = self.tracer.grid.filter(|_| from.pdf_solid_angle.is_finite()) else {
             self.radiance += self.throughput * environment.radiance(self.ray.direction);

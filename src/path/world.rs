@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::lights::LocalLights;
+use super::ray_clock::RayClock;
 use crate::bvh::{Bvh, Hit, Ray};
 use crate::scene::needs::SceneNeeds;
 use crate::scene::surface::{SurfacePoint, alpha_at};
@@ -19,6 +20,7 @@ pub struct World {
     /// Emissive triangles and punctual lights.
     pub lights: LocalLights,
     passing: Vec<Passing>,
+    clock: Option<RayClock>,
 }
 
 /// How rays deal with a material before it scatters them.
@@ -45,11 +47,22 @@ impl World {
             })
             .collect();
         let lights = LocalLights::new(&scene, bvh.bounds());
-        Self { needs: SceneNeeds::of(&scene), scene, bvh, lights, passing }
+        Self { needs: SceneNeeds::of(&scene), scene, bvh, lights, passing, clock: None }
+    }
+
+    /// Times all rays from now on, which slows them down a little.
+    pub fn start_ray_clock(&mut self) {
+        self.clock = Some(RayClock::default());
+    }
+
+    /// Times no more; mean nanoseconds that a ray took of its thread's time. `None` without rays.
+    pub fn stop_ray_clock(&mut self) -> Option<f64> {
+        self.clock.take()?.nanoseconds_per_ray()
     }
 
     /// Nearest surface along a ray. A camera ray passes single-sided surfaces from behind.
     pub fn closest_hit(&self, ray: &Ray, from_camera: bool) -> Option<Hit> {
+        let _running = self.clock.as_ref().map(RayClock::start);
         if from_camera && self.needs.single_sided {
             self.bvh.closest_hit(ray, |hit| self.faces(hit, ray) && self.is_covered(hit))
         } else if self.needs.alpha_mask {
@@ -61,6 +74,7 @@ impl World {
 
     /// Share of light that arrives along a shadow ray: zero if a surface scatters it all.
     pub fn transmittance(&self, ray: &Ray) -> Vec3 {
+        let _running = self.clock.as_ref().map(RayClock::start);
         let mut transmittance = Vec3::ONE;
         let blocked = if self.needs.pass_through() {
             self.bvh.any_hit(ray, |hit| {

@@ -114,7 +114,7 @@ fn render_pixel(
     let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
     let (mut samples, mut ray_count) = (0, 0);
     while pixel.samples() < target {
-        let mut sampler = Sampler::new(view.seed, index, pixel.samples());
+        let mut sampler = view.points.sampler(view.seed, index, pixel.samples());
         let offset = view.filter.sample(Vec2::from(sampler.next_pair()));
         let lens = lens_point(rays, &mut sampler);
         let result = tracer.radiance(rays.ray(centre + offset, lens), sampler);

@@ -24,7 +24,8 @@ use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LawOptions, LearningGrid, LightGrid};
 use crate::medium::Fog;
 use crate::path::camera::CameraRays;
-use crate::path::{PathLimits, PathTracer, World};
+use crate::path::{Background, PathLimits, PathTracer, World};
+use crate::sampler::Points;
 use crate::scene::{Camera, Medium};
 
 /// How the environment map is sampled.
@@ -59,6 +60,8 @@ pub struct View {
     pub limits: PathLimits,
     /// Seed of all random numbers.
     pub seed: u32,
+    /// Which points samples are taken at; learning always takes [`Points::Sobol`].
+    pub points: Points,
     /// Light Grid cells around the horizon; half as many from top to bottom.
     pub grid_columns: u32,
     /// Camera paths to learn from.
@@ -68,16 +71,54 @@ pub struct View {
     /// What fills the space between surfaces, in place of the scene's own medium; `None` keeps that,
     /// and a medium that is all zero is clear air.
     pub medium: Option<Medium>,
+    /// What the camera sees where it sees no surface.
+    pub background: Background,
+    /// The part of a larger picture that this one is; `None` is the whole.
+    pub crop: Option<Crop>,
     /// Whether albedo, normal and depth are kept.
     pub layers: bool,
 }
 
+/// Where a part lies in the whole picture, in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Crop {
+    /// Column and row of the part's first pixel.
+    pub corner: [u32; 2],
+    /// Width and height of the whole.
+    pub whole: [u32; 2],
+}
+
 impl View {
+    /// How counters become laws; `None` if nothing is learned.
+    pub fn law_options(&self) -> Option<LawOptions> {
+        match self.sampling {
+            Sampling::Adaptive => Some(self.laws),
+            Sampling::Talk => Some(LawOptions::TALK),
+            Sampling::Plain | Sampling::Bsdf => None,
+        }
+    }
+
     /// Learning paths that suit a picture of this size and sample count.
     pub fn suitable_learning_paths(width: u32, height: u32, samples: Option<u32>) -> u64 {
         let pixels = u64::from(width) * u64::from(height);
         let work = pixels * u64::from(samples.unwrap_or(256));
         (work / LEARNING_SHARE).clamp(1 << 16, 1 << 20)
+    }
+
+    /// Width and height of the picture that this one is a part of.
+    pub fn whole_size(&self) -> [u32; 2] {
+        self.crop.map_or([self.width, self.height], |crop| crop.whole)
+    }
+
+    /// The camera's rays through this picture.
+    pub fn rays(&self) -> CameraRays {
+        match self.crop {
+            None => CameraRays::new(&self.camera, self.width, self.height),
+            Some(Crop { corner, whole: [width, height] }) => {
+                let whole = CameraRays::new(&self.camera, width, height);
+                whole.cropped(corner, [self.width, self.height])
+            }
+        }
     }
 
     /// The medium that is rendered, in its box; `None` in clear air.
@@ -111,7 +152,7 @@ pub enum Phase {
 }
 
 /// Figures of what has been done.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
     /// Camera paths learned from.
     pub learning_paths: u64,
@@ -119,6 +160,8 @@ pub struct Figures {
     pub learning_rays: u64,
     /// Seconds of learning, laws included.
     pub learning_seconds: f64,
+    /// Seconds of learning that went into making laws.
+    pub law_seconds: f64,
     /// Cells that learning paths visited.
     pub visited_cells: usize,
     /// Cells with a law of their own.
@@ -172,7 +215,7 @@ struct Learning {
 impl<'a> Session<'a> {
     /// Starts a session on the CPU; nothing is traced yet.
     pub fn new(world: &'a World, environment: &'a Environment, view: View) -> Self {
-        let rays = CameraRays::new(&view.camera, view.width, view.height);
+        let rays = view.rays();
         let whole_map = match view.sampling {
             Sampling::Bsdf => None,
             _ => LightGrid::whole_map(environment.tile_energies()),
@@ -334,6 +377,7 @@ impl<'a> Session<'a> {
             environment: self.environment,
             grid,
             fog: self.fog,
+            background: self.view.background,
             limits: self.view.limits,
         }
     }
@@ -375,6 +419,7 @@ impl<'a> Session<'a> {
     /// Makes laws of what all passes so far counted: the next pass draws from them.
     fn update_laws(&mut self) {
         let Some(learning) = &mut self.learning else { return };
+        let start = Instant::now();
         learning.grid.counters.end_pass();
         learning.pass += 1;
         // The old laws go first: both together would not fit the budget.
@@ -385,6 +430,7 @@ impl<'a> Session<'a> {
         self.figures.grid_peak_bytes = self.figures.grid_peak_bytes.max(held);
         self.figures.learned_cells =
             self.learned.as_ref().map_or(0, |grid| grid.laws().len() as usize - 1);
+        self.figures.law_seconds += start.elapsed().as_secs_f64();
     }
 
     fn render(&mut self, target_samples: u32, cancel: &AtomicBool) -> Result<()> {
@@ -412,11 +458,7 @@ fn new_learning(
     view: &View,
     rays: &CameraRays,
 ) -> Option<Learning> {
-    let options = match view.sampling {
-        Sampling::Adaptive => view.laws,
-        Sampling::Talk => LawOptions::TALK,
-        Sampling::Plain | Sampling::Bsdf => return None,
-    };
+    let options = view.law_options()?;
     if environment.is_black() || view.limits.bounces == 0 {
         return None;
     }
@@ -424,7 +466,7 @@ fn new_learning(
         center: rays.position(),
         columns: view.grid_columns,
         rows: (view.grid_columns / 2).max(1),
-        faces: view.sampling == Sampling::Adaptive,
+        faces: options.faces,
         medium: view.fog(world).is_some(),
     };
     Some(Learning { grid: LearningGrid::new(grid, environment.tile_count(), options), pass: 0 })

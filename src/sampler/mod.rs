@@ -4,6 +4,8 @@
 //! its index shuffled by hashing (Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4), 2020).
 //! All arithmetic is on `u32`, so any device gets the same points.
 
+use serde::{Deserialize, Serialize};
+
 /// A stream of low-discrepancy numbers for one sample of one pixel.
 #[derive(Debug, Clone)]
 pub struct Sampler {
@@ -11,6 +13,31 @@ pub struct Sampler {
     reversed_index: u32,
     pixel_seed: u32,
     pair: u32,
+}
+
+/// Which points the samples of a pixel are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Points {
+    /// Owen-scrambled Sobol points: those of all samples together fill the unit square evenly.
+    #[default]
+    Sobol,
+    /// Independent random points, to measure what the even ones gain.
+    Independent,
+}
+
+impl Points {
+    /// The stream of sample `index` of pixel `pixel`.
+    pub fn sampler(self, seed: u32, pixel: u32, index: u32) -> Sampler {
+        let even = Sampler::new(seed, pixel, index);
+        match self {
+            Self::Sobol => even,
+            // The first point of a scrambled sequence of its own is anywhere with equal chance.
+            Self::Independent => {
+                Sampler { reversed_index: 0, pixel_seed: hash(even.pixel_seed ^ index), pair: 0 }
+            }
+        }
+    }
 }
 
 impl Sampler {

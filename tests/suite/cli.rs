@@ -31,12 +31,12 @@ const CORNERS: [[f32; 3]; 9] = [
 ];
 
 /// A folder with `scene.gltf` and `map.exr`, in which commands run.
-struct Bench {
+pub(crate) struct Bench {
     folder: tempfile::TempDir,
 }
 
 impl Bench {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let bytes: Vec<u8> = CORNERS.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
         fs::write(folder.path().join("scene.bin"), bytes).expect("written");
@@ -48,17 +48,17 @@ impl Bench {
         Self { folder }
     }
 
-    fn path(&self, name: &str) -> std::path::PathBuf {
+    pub(crate) fn path(&self, name: &str) -> std::path::PathBuf {
         self.folder.path().join(name)
     }
 
-    fn command(&self, line: &str) -> Command {
+    pub(crate) fn command(&self, line: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_lightgrid"));
         command.current_dir(self.folder.path()).args(line.split_whitespace());
         command
     }
 
-    fn run(&self, line: &str) -> Output {
+    pub(crate) fn run(&self, line: &str) -> Output {
         self.command(line).output().expect("the binary starts")
     }
 
@@ -70,7 +70,7 @@ impl Bench {
     }
 
     /// What a command that must fail says; it must leave no new file behind.
-    fn refusal(&self, line: &str, status: i32) -> String {
+    pub(crate) fn refusal(&self, line: &str, status: i32) -> String {
         let before = self.files();
         let output = self.run(line);
         let message = text(&output.stderr);
@@ -81,7 +81,7 @@ impl Bench {
         message
     }
 
-    fn files(&self) -> Vec<String> {
+    pub(crate) fn files(&self) -> Vec<String> {
         let entries = fs::read_dir(self.folder.path()).expect("readable");
         let mut names: Vec<String> = entries
             .map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned())
@@ -90,7 +90,7 @@ impl Bench {
         names
     }
 
-    fn json(&self, name: &str) -> Value {
+    pub(crate) fn json(&self, name: &str) -> Value {
         serde_json::from_slice(&fs::read(self.path(name)).expect("written")).expect("JSON")
     }
 }
@@ -105,14 +105,14 @@ fn render_line(rest: &str) -> String {
     line
 }
 
-fn text(bytes: &[u8]) -> String {
+pub(crate) fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
 #[test]
 fn help_names_every_command() {
     let help = text(&Bench::new().run("--help").stdout);
-    for word in ["view", "screenshot", "render", "compare", "info", "sat"] {
+    for word in ["view", "screenshot", "render", "compare", "info", "report", "sat"] {
         assert!(help.contains(word), "{help}");
     }
 }
@@ -382,4 +382,31 @@ mod signals {
         assert_eq!(child.wait().expect("it ends").code(), Some(130));
         assert!(!bench.path("a.png").exists());
     }
+}
+
+#[test]
+fn a_region_is_that_part_of_the_picture_and_the_background_is_the_cameras_alone() {
+    let bench = Bench::new();
+    let camera = "--eye 0,0.6,2.5 --target 0,0.6,0 --fov 60 --spp 64 --bounces 1";
+    let render = |rest: &str, file: &str| {
+        let output = bench.render(&format!("-o {file} --size 32x16 {camera} {rest}"));
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        read_picture(&bench.path(file)).expect("a picture")
+    };
+    let whole = render("--background 0.5,1,0.25", "whole.exr");
+    let part = render("--background 0.5,1,0.25 --region 0,0,9,5", "part.exr");
+    assert_eq!((part.width, part.height), (9, 5));
+    assert_eq!(whole.at(0, 0), [0.5, 1.0, 0.25], "a corner sees past the scene");
+    assert_eq!(part.at(0, 0), whole.at(0, 0));
+    let map = render("--background map", "map.exr");
+    assert_ne!(map.at(0, 0), whole.at(0, 0));
+    // What surfaces reflect has not changed.
+    let lit = (0..512).filter(|i| whole.pixels[*i] == map.pixels[*i]).count();
+    assert!(lit > 8, "{lit} pixels see only surfaces");
+
+    let outside = bench.render("-o a.png --size 32x16 --region 30,0,3,3");
+    let says = text(&outside.stderr);
+    assert!(!outside.status.success() && says.contains("not inside the picture"), "{says}");
+    let wrong = bench.render("-o a.png --background pink");
+    assert!(!wrong.status.success() && text(&wrong.stderr).contains("colour"));
 }

@@ -18,10 +18,11 @@ use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions};
 use lightgrid::image::Image;
 use lightgrid::light_grid::LawOptions;
-use lightgrid::path::{PathLimits, World};
+use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Phase, Sampling, Session, View};
+use lightgrid::sampler::Points;
 use lightgrid::scene::Camera;
 
 pub(crate) const MODES: [Sampling; 4] =
@@ -40,10 +41,13 @@ pub(crate) fn view(camera: Camera, sampling: Sampling, bounces: u32) -> View {
         sampling,
         limits: PathLimits { bounces, russian_roulette: false },
         seed: 1,
+        points: Points::Sobol,
         grid_columns: 64,
         learning_paths: 1 << 13,
         laws: LawOptions::ADAPTIVE,
         medium: None,
+        background: Background::Map,
+        crop: None,
         layers: false,
     }
 }

@@ -8,11 +8,12 @@ use std::sync::atomic::AtomicBool;
 use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions, TableKind, sky};
 use lightgrid::metrics::statistics::{Estimate, z_test};
-use lightgrid::path::{PathLimits, World, framing};
+use lightgrid::path::{Background, PathLimits, World, framing};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::gpu::{Gpu, Stage};
-use lightgrid::render::{Phase, Sampling, Session, View};
+use lightgrid::render::{Crop, Phase, Sampling, Session, View};
+use lightgrid::sampler::Points;
 use lightgrid::scene::{Camera, Material, Medium, builtin, gltf};
 
 use crate::estimator::scenes::{self, lambert, lamp, room, smoked_glass};
@@ -209,13 +210,16 @@ fn fog_and_milk_look_the_same() {
 }
 
 #[test]
-fn layers_lens_and_filters_are_the_same() {
+fn layers_lens_filters_background_and_crops_are_the_same() {
     let Some(gpu) = gpu() else { return };
     let world = World::new(builtin::build("open").expect("built in"));
     let environment = sky_map("day");
     {
         let filter = PixelFilter::BlackmanHarris;
-        let mut view = View { filter, layers: true, ..picture(&world, Sampling::Plain) };
+        let background = Background::Blurred(0.1);
+        let crop = Some(Crop { corner: [7, 3], whole: [50, 30] });
+        let picture = picture(&world, Sampling::Plain);
+        let mut view = View { filter, layers: true, background, crop, ..picture };
         view.camera.lens_radius = 0.05;
         let session = on_gpu(&world, &environment, view.clone(), &gpu);
         let gpu_film = finish(session, 8);
@@ -234,6 +238,20 @@ fn layers_lens_and_filters_are_the_same() {
         assert!(depth < 0.02 * pixels, "{depth} of {pixels} depths differ");
         assert!(albedo < 0.06 * pixels && normal < 0.06 * pixels, "{albedo}, {normal}");
     }
+}
+
+#[test]
+fn independent_points_are_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let world = World::new(builtin::build("open").expect("built in"));
+    let environment = sky_map("overcast");
+    let points = Points::Independent;
+    let view = View { points, ..picture(&world, Sampling::Plain) };
+    let gpu_film = finish(on_gpu(&world, &environment, view.clone(), &gpu), 8);
+    let cpu_film = render(&world, &environment, view.clone(), 8);
+    assert!(differing(&cpu_film, &gpu_film) < 0.05);
+    let even = render(&world, &environment, View { points: Points::Sobol, ..view }, 8);
+    assert!(differing(&even, &gpu_film) > 0.5, "they are other points");
 }
 
 #[test]

@@ -12,4 +12,5 @@ mod gpu;
 mod image_files;
 mod metrics;
 mod peers;
+mod report;
 mod shared;

@@ -12,6 +12,7 @@ use crate::light_grid::LightGrid;
 use crate::light_grid::cells::SphericalGrid;
 use crate::medium::{Fog, Phase};
 use crate::path::World;
+use crate::path::background::{Background, concentration};
 use crate::path::camera::CameraRays;
 use crate::scene::surface::absorption;
 use crate::scene::{self, AlphaMode, PunctualKind, Scene, Wrap};
@@ -76,15 +77,17 @@ pub(crate) struct Globals {
     pub(crate) mean_contribution: f32,
     pub(crate) zero: u32,
     pub(crate) grid_medium: u32,
-    pub(crate) padding_0: u32,
+    pub(crate) padding_1: u32,
     pub(crate) fog_low: Vec3,
     pub(crate) fog_mean_cosine: f32,
     pub(crate) fog_high: Vec3,
-    pub(crate) padding_1: u32,
-    pub(crate) fog_scattering: Vec3,
     pub(crate) padding_2: u32,
-    pub(crate) fog_extinction: Vec3,
+    pub(crate) fog_scattering: Vec3,
     pub(crate) padding_3: u32,
+    pub(crate) fog_extinction: Vec3,
+    pub(crate) padding_4: u32,
+    pub(crate) background: Vec3,
+    pub(crate) background_concentration: f32,
 }
 
 /// Twin of `Material` in `surface.wgsl`.
@@ -180,6 +183,13 @@ impl Globals {
         self.orthographic = rays.orthographic.into();
         (self.width, self.height) = (view.width, view.height);
         self.seed = view.seed;
+        match view.background {
+            Background::Map => {}
+            Background::Blurred(radians) => {
+                self.background_concentration = concentration(radians);
+            }
+            Background::Color(rgb) => self.background = rgb.into(),
+        }
         self.bounces = view.limits.bounces;
         self.russian_roulette = view.limits.russian_roulette.into();
     }

@@ -375,10 +375,11 @@ fn upload_tables(
 mod tests {
     use super::*;
     use crate::environment::EnvironmentOptions;
-    use crate::light_grid::LawOptions;
     use crate::light_grid::cells::SphericalGrid;
-    use crate::path::{PathLimits, PathTracer};
+    use crate::light_grid::{LawOptions, Recording};
+    use crate::path::{Background, PathLimits, PathTracer};
     use crate::render::{Sampling, cpu};
+    use crate::sampler::Points;
     use crate::scene::builtin;
 
     /// Visits of each cell and tile counters after two passes, the second with laws of the first.
@@ -396,10 +397,13 @@ mod tests {
             sampling: if talk { Sampling::Talk } else { Sampling::Adaptive },
             limits: PathLimits { bounces: 4, russian_roulette: true },
             seed: 5,
+            points: Points::Sobol,
             grid_columns: 64,
             learning_paths: 1 << 13,
             laws: recording,
             medium: None,
+            background: Background::Map,
+            crop: None,
             layers: false,
         };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
@@ -407,7 +411,7 @@ mod tests {
             center: rays.position,
             columns: 64,
             rows: 32,
-            faces: !talk,
+            faces: recording.faces,
             medium: false,
         };
         let mut learning = LearningGrid::new(grid, environment.tile_count(), recording);
@@ -430,6 +434,7 @@ mod tests {
                         environment: &environment,
                         grid: laws.as_ref(),
                         fog: view.fog(&world),
+                        background: Background::Map,
                         limits: view.limits,
                     };
                     cpu::learn(&tracer, &rays, &view, pass, &learning, &never)
@@ -450,7 +455,12 @@ mod tests {
             Ok(gpu) => gpu,
             Err(reason) => return eprintln!("SKIPPED: {reason}"),
         };
-        for recording in [LawOptions::ADAPTIVE, LawOptions::TALK] {
+        let squared = LawOptions {
+            faces: false,
+            recording: Recording::VisibleCosineSquared,
+            ..LawOptions::ADAPTIVE
+        };
+        for recording in [LawOptions::ADAPTIVE, LawOptions::TALK, squared] {
             let (cpu_visits, cpu_blocks, cpu_rays) = learn(None, recording);
             let (gpu_visits, gpu_blocks, gpu_rays) = learn(Some(&gpu), recording);
             assert_eq!(cpu_blocks.len(), gpu_blocks.len(), "the same cells have counters");

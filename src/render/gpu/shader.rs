@@ -10,7 +10,9 @@ use serde::Serialize;
 use super::super::filter::PixelFilter;
 use super::super::{Sampling, View};
 use crate::environment::{Environment, Lookup, TableKind};
-use crate::path::World;
+use crate::light_grid::Recording;
+use crate::path::{Background, World};
+use crate::sampler::Points;
 
 /// Entry points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,12 +39,15 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 34] = [
+    pub(crate) const ALL: [&'static str; 39] = [
         "alpha_mask",
+        "background_blur",
+        "background_color",
         "clearcoat",
         "emitters",
         "faces",
         "filtered_hits",
+        "independent_points",
         "learning",
         "layers",
         "lens",
@@ -58,6 +63,8 @@ impl Features {
         "pass_through",
         "punctual_lights",
         "record_cosine",
+        "record_ratio",
+        "record_squared_cosine",
         "scene_lights",
         "second_uv_set",
         "shadow_rays",
@@ -99,18 +106,24 @@ impl Features {
     /// What a picture needs: the scene's materials and lights, the map, how it is sampled.
     pub(crate) fn of(world: &World, environment: &Environment, view: &View) -> Self {
         let samples_map = view.sampling != Sampling::Bsdf && !environment.is_black();
-        let learns = matches!(view.sampling, Sampling::Adaptive | Sampling::Talk);
+        let recording = view.law_options().map(|laws| laws.recording);
+        let cosine_power = recording.map_or(0, Recording::cosine_power);
         let options = environment.kind();
         let of_view = [
-            ("faces", view.sampling == Sampling::Adaptive),
+            ("background_blur", matches!(view.background, Background::Blurred(_))),
+            ("background_color", matches!(view.background, Background::Color(_))),
+            ("faces", view.law_options().is_some_and(|laws| laws.faces)),
+            ("independent_points", view.points == Points::Independent),
             ("layers", view.layers),
             ("lens", view.camera.lens_radius > 0.0),
-            ("light_grid", samples_map && learns),
+            ("light_grid", samples_map && recording.is_some()),
             ("map", !environment.is_black()),
             ("map_sampling", samples_map),
             ("medium", world.needs.scattering_solids || view.fog(world).is_some()),
             ("nearest_lookup", options.1 == Lookup::Nearest),
-            ("record_cosine", view.sampling == Sampling::Adaptive),
+            ("record_cosine", cosine_power == 1),
+            ("record_ratio", recording.is_some_and(Recording::is_ratio)),
+            ("record_squared_cosine", cosine_power == 2),
             ("table_f32", options.0 == TableKind::F32),
             ("table_f64", options.0 == TableKind::F64),
             ("table_u32", options.0 == TableKind::U32),
@@ -150,6 +163,7 @@ impl Features {
         if kernel == Kernel::Learn {
             set.insert("learning");
             set.remove("layers");
+            set.remove("independent_points");
         }
         Self(set)
     }
@@ -207,8 +221,15 @@ impl KernelFacts {
 
     /// Of the kernel for a scene with a map that is not black, with the defaults of `render`.
     pub fn of_scene(world: &World) -> Self {
-        let defaults =
-            ["faces", "light_grid", "map", "map_sampling", "record_cosine", "wide_filter"];
+        let defaults = [
+            "faces",
+            "light_grid",
+            "map",
+            "map_sampling",
+            "record_cosine",
+            "record_ratio",
+            "wide_filter",
+        ];
         let names = Features::of_world(world).0.into_iter().chain(defaults);
         Self::of(&Features::from_names(names.map(|name| (name, true))))
     }

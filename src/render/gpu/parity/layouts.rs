@@ -80,8 +80,8 @@ fn structs_are_laid_out_as_the_host_writes_them() {
         law_tiles_at law_last_at law_of_cell_at words_per_law grid_rows map_width map_height
         tile_columns tile_rows rotation_turns intensity tile_sums_at light_count
         light_triangle_count width height seed bounces russian_roulette orthographic scene_extent
-        mean_contribution zero grid_medium padding_0 fog_low fog_mean_cosine fog_high padding_1
-        fog_scattering padding_2 fog_extinction padding_3
+        mean_contribution zero grid_medium padding_1 fog_low fog_mean_cosine fog_high padding_2
+        fog_scattering padding_3 fog_extinction padding_4 background background_concentration
     );
     assert_same(&module, "Globals", globals);
     let pixel = fields!(PixelSums: sum luminance_squared rays invalid padding);
@@ -122,11 +122,11 @@ fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
             "SPECULAR_COLOR_STRENGTH",
             &[offset_of!(Material, specular_color), offset_of!(Material, specular)],
         ),
+        ("ABSORPTION_IOR", &[offset_of!(Material, absorption), offset_of!(Material, ior)]),
         (
             "SCATTERING",
             &[offset_of!(Material, scattering), offset_of!(Material, scatter_mean_cosine)],
         ),
-        ("ABSORPTION_IOR", &[offset_of!(Material, absorption), offset_of!(Material, ior)]),
     ] {
         let expected = [at(texel), at(texel) + 12];
         assert_eq!(fields, &expected[..fields.len()], "{texel}");

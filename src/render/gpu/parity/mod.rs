@@ -16,7 +16,7 @@ mod cases;
 mod functions;
 mod layouts;
 mod map;
-mod medium;
+mod media;
 mod scattering;
 mod stand;
 mod surfaces;
@@ -189,12 +189,11 @@ fn groups(stands: &[Stand]) -> Vec<Group<'_>> {
         (&stands[0], &[scattering::PRELUDE], scattering::probes()),
         (&stands[0], &[scattering::PRELUDE], surfaces::probes(&stands[0])),
         (&stands[0], &[], surfaces::path_probes(&stands[0])),
+        (&stands[0], &[], media::probes(&stands[0])),
     ];
     groups.extend(stands[..4].iter().map(|stand| (stand, &[][..], map::probes(stand))));
-    let large = stands[4..6].iter();
+    let large = stands[4..].iter();
     groups.extend(large.map(|stand| (stand, &[][..], map::samples(&stand.environment))));
-    groups.push((&stands[6], &[], medium::probes(&stands[6])));
-    groups.push((&stands[6], &[], surfaces::path_probes(&stands[6])));
     groups
 }
 
@@ -214,14 +213,13 @@ run_group! {
     scattering_of_materials: 1;
     surfaces_lights_and_hits: 2;
     whole_paths: 3;
-    map_with_a_tile_local_table: 4;
-    map_with_a_table_in_u32: 5;
-    map_with_a_table_in_f32: 6;
-    map_with_a_table_in_f64: 7;
-    widest_map: 8;
-    tallest_map: 9;
-    fog: 10;
-    whole_paths_in_fog: 11;
+    media_between_surfaces: 4;
+    map_with_a_tile_local_table: 5;
+    map_with_a_table_in_u32: 6;
+    map_with_a_table_in_f32: 7;
+    map_with_a_table_in_f64: 8;
+    widest_map: 9;
+    tallest_map: 10;
 }
 
 /// The source of a stand's kernel; the numbers in it do not matter here.

@@ -11,11 +11,11 @@ use crate::image::Image;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LawOptions, LightGrid};
 use crate::path::camera::CameraRays;
-use crate::path::{PathLimits, PathTracer, World};
+use crate::path::{Background, PathLimits, PathTracer, World};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::layout::{pack_radiance, unpack_radiance};
 use crate::render::{Sampling, View};
-use crate::sampler::Sampler;
+use crate::sampler::{Points, Sampler};
 use crate::scene::{
     AlphaMode, Camera, Material, Medium, Projection, PunctualKind, PunctualLight, Scene, Texture,
     TextureImage, TextureRef, Wrap,
@@ -31,21 +31,26 @@ pub(super) struct Stand {
 }
 
 /// First the one with everything, whose map has tile-local sums; then one for each other table, with
-/// other look-ups, cameras, filters and cells; then the widest and the tallest map; then the first in fog.
-pub(super) fn all() -> [Stand; 7] {
+/// other look-ups, cameras, filters and cells; then the widest and the tallest map.
+pub(super) fn all() -> [Stand; 6] {
     use PixelFilter::{BlackmanHarris, Box, Gauss};
     use Sampling::{Adaptive, Plain, Talk};
     use TableKind::{F32, F64, TileLocal, U32};
     let thin_lens = Camera { lens_radius: 0.1, focus_distance: 5.0, ..camera() };
     let parallel = Projection::Orthographic { half_height: 3.0 };
-    let stand = |scene, environment: Environment, camera, filter, sampling| {
+    let stand = |scene: Scene, environment: Environment, camera, filter, sampling| {
         let world = World::new(scene);
         let view = view(camera, filter, sampling);
         let rays = CameraRays::new(&view.camera, view.width, view.height);
         let energies = environment.tile_energies();
         let faces = sampling == Adaptive;
-        let medium = view.fog(&world).is_some();
-        let cells = SphericalGrid { center: rays.position(), columns: 64, rows: 32, faces, medium };
+        let cells = SphericalGrid {
+            center: rays.position(),
+            columns: 64,
+            rows: 32,
+            faces,
+            medium: world.scene.medium.is_some(),
+        };
         let grid = if sampling == Plain {
             LightGrid::whole_map(energies)
         } else {
@@ -57,13 +62,12 @@ pub(super) fn all() -> [Stand; 7] {
     let map = |table| environment((61, 37), table, Lookup::Bilinear);
     let large = |size| environment(size, TileLocal, Lookup::Bilinear);
     [
-        stand(scene(300), map(TileLocal), thin_lens, BlackmanHarris, Adaptive),
+        stand(foggy(scene(300)), map(TileLocal), thin_lens, BlackmanHarris, Adaptive),
         stand(scene(1), environment((61, 37), U32, Lookup::Nearest), camera(), Box, Talk),
         stand(scene(1), map(F32), Camera { projection: parallel, ..camera() }, Gauss, Adaptive),
         stand(scene(1), map(F64), camera(), Gauss, Plain),
         stand(scene(1), large((16384, 8)), camera(), Box, Plain),
         stand(scene(1), large((8, 8192)), camera(), Box, Plain),
-        stand(foggy(scene(300)), map(TileLocal), camera(), Box, Adaptive),
     ]
 }
 
@@ -81,10 +85,22 @@ impl Stand {
             world: &self.world,
             environment: &self.environment,
             grid: Some(&self.grid),
-            fog: self.view.fog(&self.world),
             limits: self.view.limits,
+            fog: self.view.fog(&self.world),
+            background: self.view.background,
         }
     }
+}
+
+/// The scene in a box of coloured fog.
+fn foggy(scene: Scene) -> Scene {
+    let medium = Medium {
+        scattering: Vec3::new(0.05, 0.08, 0.1),
+        absorption: Vec3::new(0.02, 0.0, 0.01),
+        anisotropy: 0.4,
+        bounds: Some([Vec3::new(-3.0, -2.0, -4.0), Vec3::new(4.0, 3.0, 5.0)]),
+    };
+    Scene { medium: Some(medium), ..scene }
 }
 
 fn camera() -> Camera {
@@ -100,10 +116,13 @@ fn view(camera: Camera, filter: PixelFilter, sampling: Sampling) -> View {
         sampling,
         limits: PathLimits { bounces: 6, russian_roulette: true },
         seed: 11,
+        points: Points::Sobol,
         grid_columns: 64,
         learning_paths: 0,
         laws: LawOptions::ADAPTIVE,
         medium: None,
+        background: Background::Map,
+        crop: None,
         layers: true,
     }
 }
@@ -159,20 +178,6 @@ fn scene(triangles: u32) -> Scene {
     scene.triangles.push([0, 1, 1]);
     scene.triangle_materials.push(0);
     scene.lights = lights();
-    scene
-}
-
-/// The scene in fog, its solids filled with milk.
-fn foggy(mut scene: Scene) -> Scene {
-    scene.medium = Some(Medium {
-        scattering: Vec3::new(0.1, 0.2, 0.3),
-        absorption: Vec3::new(0.05, 0.02, 0.0),
-        anisotropy: 0.6,
-        bounds: Some([Vec3::splat(-4.0), Vec3::new(5.0, 3.0, 6.0)]),
-    });
-    for solid in scene.materials.iter_mut().filter(|material| material.thickness > 0.0) {
-        (solid.scattering, solid.scatter_anisotropy) = (Vec3::new(2.0, 1.0, 0.5), -0.4);
-    }
     scene
 }
 

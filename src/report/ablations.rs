@@ -1,0 +1,145 @@
+//! Every default of the code beside what it was chosen over.
+
+use super::plan::{Effort, Method, Plan, Row, Settings};
+use crate::environment::TableKind;
+use crate::light_grid::{LawOptions, Recording};
+use crate::render::Sampling;
+use crate::sampler::Points;
+
+/// Scenes and maps, if none are asked for: one of each kind of occlusion.
+const ROWS: [(&str, &str); 5] = [
+    ("office", "sky:sunset"),
+    ("living-room", "sky:day"),
+    ("living-room", "sky:night"),
+    ("exterior", "sky:sunset"),
+    ("open", "sky:day"),
+];
+
+/// The plan, for these scenes and maps, of the methods whose group or name contains one of `only`;
+/// `plain` and `adaptive` are always there.
+pub fn plan(rows: Vec<Row>, only: &[String], effort: Effort, command: String) -> Plan {
+    let rows =
+        if rows.is_empty() { ROWS.map(|(scene, map)| Row::new(scene, map)).to_vec() } else { rows };
+    let is_asked = |method: &Method| {
+        let group = method.group.unwrap_or_default();
+        let is_in =
+            |word: &String| group.contains(word.as_str()) || method.name.contains(word.as_str());
+        only.is_empty() || only.iter().any(is_in)
+    };
+    let mut methods = [Sampling::Plain, Sampling::Adaptive].map(Method::of).to_vec();
+    methods.extend(variants().into_iter().filter(is_asked));
+    Plan {
+        title: "What every choice is worth".to_owned(),
+        introduction: vec![
+            "Each line changes one thing of adaptive, lightgrid's default, or builds up to it from the \
+             talk's form. A figure above 1 says that the change would be faster, below 1 that the \
+             default is. Choices that the intervals do not tell apart are kept as they are."
+                .to_owned(),
+        ],
+        differences: Vec::new(),
+        rows,
+        methods,
+        baselines: vec![0, 1],
+        effort,
+        reference: None,
+        command,
+    }
+}
+
+/// Groups of the variants, in order.
+pub fn groups() -> Vec<&'static str> {
+    let mut groups: Vec<_> = variants().into_iter().filter_map(|m| m.group).collect();
+    groups.dedup();
+    groups
+}
+
+fn variants() -> Vec<Method> {
+    let mut found = Vec::new();
+    let mut add = |group: &'static str, name: &str, change: &dyn Fn(&mut Settings)| {
+        let mut settings = Settings::of(Sampling::Adaptive);
+        change(&mut settings);
+        found.push(Method { name: name.to_owned(), group: Some(group), settings });
+    };
+    modes(&mut add);
+    steps(&mut add);
+    laws(&mut add);
+    sizes(&mut add);
+    samples_and_tables(&mut add);
+    found
+}
+
+type Add<'a> = dyn FnMut(&'static str, &str, &dyn Fn(&mut Settings)) + 'a;
+
+fn modes(add: &mut Add<'_>) {
+    let group = "sampling modes";
+    add(group, "talk", &|s| s.sampling = Sampling::Talk);
+    add(group, "bsdf", &|s| s.sampling = Sampling::Bsdf);
+}
+
+/// From counted visibility, without anything, to what the design study left unmeasured.
+fn steps(add: &mut Add<'_>) {
+    const VISIBLE: LawOptions = LawOptions { recording: Recording::Visible, ..LawOptions::TALK };
+    const COSINE: LawOptions =
+        LawOptions { recording: Recording::VisibleCosine, ..LawOptions::TALK };
+    let group = "step by step, neither pooling nor powers";
+    add(group, "talk + faces", &|s| s.laws = LawOptions { faces: true, ..LawOptions::TALK });
+    add(group, "visibility", &|s| s.laws = VISIBLE);
+    add(group, "visibility + faces", &|s| s.laws = LawOptions { faces: true, ..VISIBLE });
+    add(group, "visibility + cosine", &|s| s.laws = COSINE);
+    add(group, "visibility + faces + cosine", &|s| {
+        s.laws = LawOptions { faces: true, ..COSINE };
+    });
+    add(group, "visibility + faces + cosine + compensation", &|s| {
+        s.laws = LawOptions { faces: true, compensation: 0.5, ..COSINE };
+    });
+}
+
+fn laws(add: &mut Add<'_>) {
+    let group = "faces and cosine";
+    add(group, "no faces (nor compensation)", &|s| s.laws.faces = false);
+    add(group, "no cosine", &|s| s.laws.recording = Recording::Visible);
+    let group = "weights";
+    add(group, "mean visibility (power 1)", &|s| s.laws.ratio_exponent = 1.0);
+    add(group, "root of mean visibility (power 1/2)", &|s| s.laws.ratio_exponent = 0.5);
+    add(group, "root of second moment", &|s| {
+        s.laws.recording = Recording::VisibleCosineSquared;
+        s.laws.ratio_exponent = 0.5;
+    });
+    let group = "pooling, tries";
+    for tries in [0.0, 4.0, 64.0] {
+        add(group, &format!("pooling {tries}"), &|s| s.laws.pooling_tries = tries);
+    }
+    let group = "MIS compensation";
+    for share in [0.0, 0.25, 1.0] {
+        add(group, &format!("compensation {share}"), &|s| s.laws.compensation = share);
+    }
+    let group = "defensive share of the whole map";
+    for share in [0.02, 0.05, 0.1, 0.3] {
+        add(group, &format!("whole map {share}"), &|s| s.laws.whole_map_share = share);
+    }
+}
+
+fn sizes(add: &mut Add<'_>) {
+    let group = "tiles";
+    for (columns, rows) in [(8, 4), (16, 8), (64, 32)] {
+        add(group, &format!("{columns}x{rows} tiles"), &|s| s.tiles = (columns, rows));
+    }
+    let group = "cells around the horizon";
+    for columns in [16, 32, 128] {
+        add(group, &format!("{columns} cells"), &|s| s.grid_columns = columns);
+    }
+    let group = "learning paths";
+    for paths in [1 << 14, 1 << 16, 1 << 18, 1 << 20] {
+        add(group, &format!("{paths} learning paths"), &|s| s.learning_paths = Some(paths));
+    }
+}
+
+fn samples_and_tables(add: &mut Add<'_>) {
+    let group = "samples";
+    add(group, "independent points instead of Sobol's", &|s| s.points = Points::Independent);
+    add(group, "no Russian roulette", &|s| s.russian_roulette = false);
+    let group = "importance tables";
+    for table in [TableKind::U32, TableKind::F32, TableKind::F64] {
+        add(group, &format!("table {table}"), &|s| s.table = table);
+    }
+}

@@ -1,0 +1,558 @@
+//! Going through a plan: what is on disk is taken, what is missing is measured, pages are kept up to
+//! date.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use super::digest::Digest;
+use super::machine::{Machine, OpenDevice};
+use super::measure::{Run, measure};
+use super::pages::{duration, row_sentence};
+use super::plan::{Device, Method, Plan, Row};
+use super::reference::{LEAST_PICTURES, Noise, Reference, read_reference};
+use super::shares::shares;
+use super::stage::Stage;
+use super::store::Store;
+use super::summary::{
+    DeviceReport, Measure, Pictures, ReferenceReport, Report, RowReport, summarise,
+};
+use crate::error::{Error, Result};
+use crate::image::Image;
+use crate::metrics::compare;
+
+/// How a report is made, beside what it is about.
+pub struct Options<'a> {
+    /// The report's folder.
+    pub folder: &'a Path,
+    /// Folder of references, if it is another one.
+    pub references: Option<&'a Path>,
+    /// The GPU whose name contains this.
+    pub adapter: Option<&'a str>,
+    /// Becomes true when it is to stop.
+    pub cancel: &'a AtomicBool,
+    /// Is told what is being done.
+    pub progress: &'a dyn Fn(String),
+    /// Is told what is done.
+    pub tell: &'a dyn Fn(String),
+}
+
+/// Measures what is missing and writes `report.html`, `report.csv`, `report.json` and `plots/`, as far
+/// as it comes before it is told to stop.
+///
+/// # Errors
+/// If a scene or map cannot be used, a device fails, or something cannot be written; what was measured
+/// is on disk and will be taken when the same plan is made again.
+pub fn make(plan: &Plan, options: &Options<'_>) -> Result<Report> {
+    let size = plan.effort.frame.size;
+    let file_reference =
+        plan.reference.as_deref().map(|path| read_reference(path, size)).transpose()?;
+    let store = Store::open(options.folder, options.references)?;
+    let machine = Machine::here();
+    let devices = plan
+        .effort
+        .devices
+        .iter()
+        .map(|device| OpenDevice::open(*device, options.adapter, &machine))
+        .collect::<Result<Vec<_>>>()?;
+    let mut conductor = Conductor {
+        machine_digest: machine.digest(),
+        report: Report { plan: plan.clone(), machine, rows: Vec::new(), is_finished: false },
+        plan,
+        store,
+        devices,
+        file_reference,
+        options,
+        pages_written: None,
+    };
+    for row in &plan.rows {
+        conductor.row(row)?;
+        if let Some(row) = conductor.report.rows.last() {
+            (options.tell)(row_sentence(&conductor.report, row));
+        }
+        conductor.write_pages()?;
+        if conductor.is_cancelled() {
+            return Ok(conductor.report);
+        }
+    }
+    conductor.report.is_finished = true;
+    conductor.write_pages()?;
+    Ok(conductor.report)
+}
+
+struct Conductor<'a> {
+    plan: &'a Plan,
+    options: &'a Options<'a>,
+    store: Store,
+    devices: Vec<OpenDevice>,
+    machine_digest: Digest,
+    file_reference: Option<Image>,
+    report: Report,
+    pages_written: Option<Instant>,
+}
+
+/// Pages are written anew at most this often while runs go on.
+const PAGES_EVERY: Duration = Duration::from_secs(30);
+
+/// What is known of a row while it is measured.
+struct Work {
+    stage: Stage,
+    reference: Option<Reference>,
+    /// Runs by device and method, with the names they are kept under.
+    runs: Vec<Vec<Vec<(String, Run)>>>,
+    /// Why a device cannot do this row.
+    refusals: Vec<Option<String>>,
+    /// Methods that the GPU is ready for.
+    is_ready: Vec<bool>,
+}
+
+impl Conductor<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.options.cancel.load(Ordering::Relaxed)
+    }
+
+    fn row(&mut self, row: &Row) -> Result<()> {
+        self.say(&format!("{}: loading", row.title), 0.0);
+        let stage = Stage::load(row, self.plan)?;
+        let report = RowReport {
+            row: row.clone(),
+            notices: stage.notices.iter().map(str::to_owned).collect(),
+            triangles: stage.world.scene.triangles.len(),
+            map_size: stage.map_size,
+            reference: None,
+            devices: Vec::new(),
+            shares: Vec::new(),
+            pictures: Pictures::default(),
+        };
+        self.report.rows.push(report);
+        let reference = self.file_reference.is_none().then(|| {
+            Reference::open(self.store.references(), stage.digest, self.plan.effort.frame.size)
+        });
+        let mut work = Work {
+            runs: vec![vec![Vec::new(); self.plan.methods.len()]; self.devices.len()],
+            refusals: vec![None; self.devices.len()],
+            is_ready: vec![false; self.plan.methods.len()],
+            stage,
+            reference,
+        };
+        for device in 0..self.devices.len() {
+            let uploaded = work.stage.upload(&self.devices[device]);
+            self.can(&mut work, device, &uploaded);
+        }
+        if work.refusals.iter().all(Option::is_some) {
+            return self.update(&mut work);
+        }
+        let is_whole = self.grow_reference(&mut work, LEAST_PICTURES)?
+            && self.all_runs(&mut work)?
+            && self.judge_well(&mut work)?;
+        self.update(&mut work)?;
+        if is_whole && self.take_apart(&work)? {
+            self.forget_pictures(&work);
+        }
+        Ok(())
+    }
+
+    /// Every run that is missing, seed by seed, so that what disturbs the machine for a while disturbs
+    /// all methods alike.
+    fn all_runs(&mut self, work: &mut Work) -> Result<bool> {
+        for seed in 0..self.plan.effort.seeds {
+            for device in 0..self.devices.len() {
+                for method in 0..self.plan.methods.len() {
+                    if work.refusals[device].is_some() {
+                        continue;
+                    }
+                    if !self.run(work, device, method, seed)? {
+                        return Ok(false);
+                    }
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// One run, from disk or measured; `false` if it was cancelled.
+    fn run(&mut self, work: &mut Work, device: usize, method: usize, seed: u32) -> Result<bool> {
+        let plan = self.plan;
+        let key = self.key(work, device, &plan.methods[method], seed);
+        if let Some(run) = self.store.read::<Run>(&key) {
+            let has_errors = run.points.iter().all(|p| p.errors.is_some());
+            let films = self.store.read_pictures(&key, plan.effort.frame.size);
+            if has_errors || films.is_some_and(|films| films.len() == run.points.len()) {
+                work.runs[device][method].push((key, run));
+                return Ok(true);
+            }
+        }
+        self.say_run(work, device, method, seed);
+        let name = &plan.methods[method].name;
+        let settings = &plan.methods[method].settings;
+        if !self.make_ready(work, device, method) {
+            return Ok(true);
+        }
+        let place = work.stage.place(plan, &self.devices[device], settings);
+        let seconds = plan.effort.seconds;
+        let cancel = self.options.cancel;
+        let Some(mut done) = measure(&place, (name, settings), seed, seconds, cancel)? else {
+            return Ok(false);
+        };
+        if seed == 0 && self.devices[device].gpu.is_none() {
+            let grid = done.grid.take();
+            done.run.nanoseconds_per_ray = work.stage.time_rays(
+                plan,
+                &self.devices[device],
+                settings,
+                grid,
+                seconds.min(1.0),
+            )?;
+        }
+        if let Some((reference, pictures)) = self.reference(work) {
+            done.run.judge(&done.films, &reference)?;
+            done.run.reference_pictures = pictures;
+        }
+        // Pictures first: a run without them is measured again.
+        self.store.write_pictures(&key, &done.films)?;
+        self.store.write(&key, &done.run)?;
+        work.runs[device][method].push((key, done.run));
+        if self.pages_written.is_none_or(|at| at.elapsed() > PAGES_EVERY) {
+            self.update(work)?;
+            self.write_pages()?;
+        }
+        Ok(!self.is_cancelled())
+    }
+
+    /// Builds what a GPU needs for a method, once; `false` if it cannot do it.
+    fn make_ready(&self, work: &mut Work, device: usize, method: usize) -> bool {
+        if self.devices[device].gpu.is_none() || work.is_ready[method] {
+            return true;
+        }
+        let settings = &self.plan.methods[method].settings;
+        let place = work.stage.place(self.plan, &self.devices[device], settings);
+        let ready = place.warm_up(settings);
+        work.is_ready[method] = ready.is_ok();
+        self.can(work, device, &ready)
+    }
+
+    /// Notes why a device cannot do a row, if it cannot; whether it can.
+    fn can(&self, work: &mut Work, device: usize, outcome: &Result<()>) -> bool {
+        if let Err(reason) = outcome {
+            (self.options.tell)(format!("{}: {reason}", work.stage.title));
+            work.refusals[device] = Some(format!("not measured: {reason}"));
+        }
+        outcome.is_ok()
+    }
+
+    /// The device that references are made on: a real GPU that can do the row, or the first.
+    fn fastest(&self, work: &Work) -> usize {
+        let can = |index: &usize| work.refusals[*index].is_none();
+        let all = || (0..self.devices.len()).filter(can);
+        all().find(|index| self.devices[*index].is_real_gpu()).or_else(|| all().next()).unwrap_or(0)
+    }
+
+    /// The reference so far, if it is worth anything, and its number of pictures.
+    fn reference(&self, work: &Work) -> Option<(Image, Option<u32>)> {
+        if let Some(image) = &self.file_reference {
+            return Some((image.clone(), None));
+        }
+        let reference = work.reference.as_ref()?;
+        let pictures = reference.facts.pictures;
+        (pictures >= LEAST_PICTURES).then(|| (reference.image(), Some(pictures)))
+    }
+
+    /// Adds pictures to the reference until there are so many; `false` if it was cancelled.
+    fn grow_reference(&self, work: &mut Work, pictures: u32) -> Result<bool> {
+        let fastest = self.fastest(work);
+        let settings = &super::plan::Settings::of(crate::render::Sampling::Adaptive);
+        let Some(mut reference) = work.reference.take() else { return Ok(true) };
+        let mut is_whole = true;
+        while is_whole && reference.facts.pictures < pictures {
+            let done = reference.facts.pictures;
+            self.say(
+                &format!("{}: reference, picture {} of {pictures}", work.stage.title, done + 1),
+                f64::from(pictures - done) * self.plan.effort.seconds,
+            );
+            let place = work.stage.place(self.plan, &self.devices[fastest], settings);
+            let (seconds, cancel) = (self.plan.effort.seconds, self.options.cancel);
+            is_whole =
+                reference.add_picture(&place, &self.devices[fastest].name, seconds, cancel)?
+                    && !self.is_cancelled();
+        }
+        work.reference = Some(reference);
+        Ok(is_whole)
+    }
+
+    /// Grows the reference until its noise is small beside the smallest error, and judges all runs
+    /// against it; `false` if it was cancelled.
+    fn judge_well(&mut self, work: &mut Work) -> Result<bool> {
+        loop {
+            self.judge_again(work)?;
+            let Some(reference) = &work.reference else { return Ok(true) };
+            let missing = reference.pictures_missing(
+                self.plan.effort.reference_noise,
+                smallest_error(work).unwrap_or(0.0),
+            );
+            if missing == 0 {
+                return Ok(true);
+            }
+            let pictures = reference.facts.pictures + missing;
+            if !self.grow_reference(work, pictures)? {
+                self.judge_again(work)?;
+                return Ok(false);
+            }
+        }
+    }
+
+    /// Takes the errors of all runs whose pictures are still there, if the reference has changed.
+    fn judge_again(&self, work: &mut Work) -> Result<()> {
+        let Some((reference, pictures)) = self.reference(work) else { return Ok(()) };
+        for (key, run) in work.runs.iter_mut().flatten().flatten() {
+            let is_new = run.points.iter().all(|p| p.errors.is_some())
+                && pictures.is_some()
+                && run.reference_pictures == pictures;
+            if is_new {
+                continue;
+            }
+            let films =
+                self.store.read_pictures(key, self.plan.effort.frame.size).unwrap_or_default();
+            if films.len() == run.points.len() {
+                run.judge(&films, &reference)?;
+                run.reference_pictures = pictures;
+                self.store.write(key, run)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the error of the methods that matter apart; `false` if it was cancelled.
+    fn take_apart(&mut self, work: &Work) -> Result<bool> {
+        let fastest = self.fastest(work);
+        let Some((reference, _)) = self.reference(work) else { return Ok(true) };
+        for method in self.plan.compared() {
+            let runs = self.plan.methods.iter().position(|m| m.name == method.name);
+            let run = runs.and_then(|index| work.runs[fastest][index].first());
+            let Some(samples) = run.and_then(|(_, run)| Some(run.points.last()?.samples)) else {
+                continue;
+            };
+            let key = format!("{}_shares", self.key(work, fastest, method, 0));
+            let found = match self.store.read(&key) {
+                Some(found) => found,
+                None => {
+                    self.say(
+                        &format!("{}: where {}'s error is left", work.stage.title, method.name),
+                        super::plan::SHARE_RUNS * self.plan.effort.seconds,
+                    );
+                    let place =
+                        work.stage.place(self.plan, &self.devices[fastest], &method.settings);
+                    let method = (method.name.as_str(), &method.settings);
+                    let samples = (samples / 8).max(4);
+                    let found = shares(&place, method, samples, &reference, self.options.cancel)?;
+                    let Some(found) = found else { return Ok(false) };
+                    self.store.write(&key, &found)?;
+                    found
+                }
+            };
+            if let Some(row) = self.report.rows.last_mut() {
+                row.shares.push(found);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Keeps the last pictures of first runs only (all of them for a given reference, whose noise is
+    /// judged by them).
+    fn forget_pictures(&self, work: &Work) {
+        for (key, run) in work.runs.iter().flatten().flatten() {
+            if run.seed > 0 && self.file_reference.is_none() {
+                self.store.remove_pictures(key);
+                continue;
+            }
+            let films =
+                self.store.read_pictures(key, self.plan.effort.frame.size).unwrap_or_default();
+            if let [_, .., last] = films.as_slice() {
+                // A run with all its pictures is as good as one with the last of them.
+                let _ = self.store.write_pictures(key, std::slice::from_ref(last));
+            }
+        }
+    }
+
+    /// Brings the row's report up to date.
+    fn update(&mut self, work: &mut Work) -> Result<()> {
+        let plan = self.plan;
+        let reference = self.reference(work);
+        let threads = self.report.machine.threads;
+        let reference_report = self.reference_report(work)?;
+        let last_picture = |runs: &[(String, Run)]| {
+            let (key, _) = runs.first()?;
+            self.store.read_pictures(key, plan.effort.frame.size)?.pop()
+        };
+        let mut pictures =
+            Pictures { reference: reference.map(|(image, _)| image), runs: Vec::new() };
+        let mut devices = Vec::new();
+        for (index, device) in self.devices.iter().enumerate() {
+            for (method, runs) in plan.methods.iter().zip(&work.runs[index]) {
+                if let Some(picture) = last_picture(runs) {
+                    pictures.runs.push((device.device, method.name.clone(), picture));
+                }
+            }
+            let runs = work.runs[index]
+                .iter()
+                .map(|runs| runs.iter().map(|(_, run)| run.clone()).collect())
+                .collect();
+            devices.push(DeviceReport {
+                device: device.device,
+                name: device.name.clone(),
+                not_measured: work.refusals[index].clone(),
+                methods: summarise(plan, threads, runs),
+            });
+        }
+        if let Some(row) = self.report.rows.last_mut() {
+            row.reference = reference_report;
+            row.devices = devices;
+            row.pictures = pictures;
+        }
+        Ok(())
+    }
+
+    fn reference_report(&self, work: &Work) -> Result<Option<ReferenceReport>> {
+        let error = smallest_error(work);
+        let noise = match &work.reference {
+            Some(reference) => {
+                if reference.facts.pictures < LEAST_PICTURES {
+                    return Ok(None);
+                }
+                Some(reference.noise())
+            }
+            None => self.noise_of_file(work)?,
+        };
+        let share = noise.zip(error).map(|(noise, error)| noise.trimmed_rel_mse / error);
+        Ok(Some(ReferenceReport {
+            file: self.plan.reference.as_ref().map(|path| path.display().to_string()),
+            facts: work.reference.as_ref().map(|reference| reference.facts.clone()),
+            noise,
+            share,
+            // A given file is judged by noisy pictures: its share is only known to some digits.
+            is_good: share.is_some_and(|share| share <= 1.0001 * self.plan.effort.reference_noise),
+        }))
+    }
+
+    /// What a given reference errs by: how much farther the mean of all runs of the best method is
+    /// from it than that mean's own spread explains. `None` with a single run.
+    fn noise_of_file(&self, work: &Work) -> Result<Option<Noise>> {
+        let Some(reference) = &self.file_reference else { return Ok(None) };
+        let all = work.runs.iter().flatten().filter(|runs| runs.len() > 1);
+        let best = all.min_by(|a, b| mean_error(a).total_cmp(&mean_error(b)));
+        let Some(runs) = best else { return Ok(None) };
+        let films: Option<Vec<Image>> = runs
+            .iter()
+            .map(|(key, _)| self.store.read_pictures(key, self.plan.effort.frame.size)?.pop())
+            .collect();
+        let Some(films) = films else { return Ok(None) };
+        let count = films.len() as f64;
+        let mut mean = Image::filled(reference.width, reference.height, [0.0; 3]);
+        let mut variances = vec![[0.0; 3]; reference.pixels.len()];
+        for (i, (mean, variance)) in mean.pixels.iter_mut().zip(&mut variances).enumerate() {
+            for c in 0..3 {
+                let values = films.iter().map(|film| f64::from(film.pixels[i][c]));
+                let average = values.clone().sum::<f64>() / count;
+                let squares: f64 = values.map(|v| (v - average).powi(2)).sum();
+                mean[c] = average as f32;
+                variance[c] = squares / (count - 1.0) / count;
+            }
+        }
+        let found = compare(&mean, reference)?;
+        let own = Noise::of(&variances, reference);
+        Ok(Some(Noise {
+            mse: (found.mse - own.mse).max(0.0),
+            rel_mse: (found.rel_mse - own.rel_mse).max(0.0),
+            trimmed_rel_mse: (found.trimmed_rel_mse - own.trimmed_rel_mse).max(0.0),
+        }))
+    }
+
+    fn write_pages(&mut self) -> Result<()> {
+        super::pages::write(&self.report, self.store.root())?;
+        self.pages_written = Some(Instant::now());
+        Ok(())
+    }
+
+    /// Name of a run: readable, and a digest of all that it depends on.
+    fn key(&self, work: &Work, device: usize, method: &Method, seed: u32) -> String {
+        let device = &self.devices[device];
+        let digest = self.machine_digest.debug(&work.stage.digest).debug(&(
+            &method.settings,
+            &device.name,
+            self.plan.effort.seconds,
+            seed,
+        ));
+        let readable = format!("{}-{}-{}", work.stage.title, device.device.title(), method.name);
+        let readable: String = readable
+            .chars()
+            .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' })
+            .collect();
+        let tail = readable.len().saturating_sub(80);
+        format!("{}_{seed}_{digest}", &readable[tail..])
+    }
+
+    fn say_run(&self, work: &Work, device: usize, method: usize, seed: u32) {
+        let plan = self.plan;
+        let done: usize = work.runs.iter().flatten().map(Vec::len).sum();
+        let all = plan.methods.len() * plan.effort.devices.len() * plan.effort.seeds as usize;
+        let reference = work
+            .reference
+            .as_ref()
+            .map_or(0, |reference| reference.pictures_missing(plan.effort.reference_noise, 0.0));
+        let left = (all - done) as f64 + f64::from(reference) + super::plan::SHARE_RUNS;
+        self.say(
+            &format!(
+                "{}: {} on {}, run {} of {}",
+                work.stage.title,
+                plan.methods[method].name,
+                self.devices[device].device.title(),
+                seed + 1,
+                plan.effort.seeds
+            ),
+            left * plan.effort.seconds,
+        );
+    }
+
+    /// Says what is done, with the time left: for this row as given, for later ones as expected.
+    fn say(&self, what: &str, row_seconds: f64) {
+        let later = self.plan.rows.len().saturating_sub(self.report.rows.len().max(1));
+        let left = row_seconds + later as f64 * self.plan.expected_row_seconds();
+        (self.options.progress)(format!("{what}, {} left", duration(left)));
+    }
+}
+
+/// Smallest mean error at the end of all methods and devices.
+fn smallest_error(work: &Work) -> Option<f64> {
+    let errors = work.runs.iter().flatten().filter(|runs| !runs.is_empty());
+    errors.map(|runs| mean_error(runs)).filter(|e| e.is_finite()).min_by(f64::total_cmp)
+}
+
+/// Mean error at the end; not a number before runs are judged.
+fn mean_error(runs: &[(String, Run)]) -> f64 {
+    let error = |(_, run): &(String, Run)| {
+        let last = run.points.last().and_then(|p| p.errors);
+        last.map_or(f64::NAN, |errors| Measure::TrimmedRelMse.of(&errors))
+    };
+    runs.iter().map(error).sum::<f64>() / runs.len() as f64
+}
+
+/// Refuses what can be seen to be wrong before hours of work.
+///
+/// # Errors
+/// If a scene or map is neither built in nor a file, or a reference is given for several rows.
+pub fn check(plan: &Plan) -> Result<()> {
+    for row in &plan.rows {
+        crate::sources::check_scene(&row.scene)?;
+        crate::sources::check_map(&row.map)?;
+    }
+    if plan.reference.is_some() && plan.rows.len() != 1 {
+        return Err(Error::new(
+            "--reference is a picture of one scene under one map: give one of each",
+        ));
+    }
+    Ok(())
+}
+
+/// Which devices a plan measures on, in words.
+pub(super) fn device_names(devices: &[Device]) -> String {
+    devices.iter().map(|d| d.title()).collect::<Vec<_>>().join(" and ")
+}

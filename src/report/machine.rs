@@ -1,0 +1,88 @@
+//! Where measurements were made.
+
+use std::fs;
+
+use serde::{Deserialize, Serialize};
+
+use super::digest::Digest;
+use super::plan::Device;
+use crate::error::Result;
+use crate::render::gpu::Gpu;
+
+/// The machine, in words.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Machine {
+    /// Processor's name.
+    pub processor: String,
+    /// Threads that render.
+    pub threads: usize,
+    /// Operating system and architecture.
+    pub system: String,
+    /// lightgrid's version and how it was built.
+    pub build: String,
+    /// Mean number of other processes that wanted to run during the minute before.
+    pub load: Option<f64>,
+}
+
+impl Machine {
+    /// This one, now.
+    pub fn here() -> Self {
+        let optimised = if cfg!(debug_assertions) { "development build" } else { "release build" };
+        Self {
+            processor: processor(),
+            threads: rayon::current_num_threads(),
+            system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            build: format!("lightgrid {}, {optimised}", env!("CARGO_PKG_VERSION")),
+            load: fs::read_to_string("/proc/loadavg")
+                .ok()
+                .and_then(|text| text.split_whitespace().next()?.parse().ok()),
+        }
+    }
+
+    /// Digest of what timings depend on: this machine and this very executable.
+    pub(super) fn digest(&self) -> Digest {
+        let executable = std::env::current_exe().and_then(fs::read).unwrap_or_default();
+        Digest::new()
+            .debug(&(&self.processor, self.threads, &self.system, &self.build))
+            .bytes(&executable)
+    }
+}
+
+fn processor() -> String {
+    let known = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
+        let line = text.lines().find(|line| line.starts_with("model name"))?;
+        Some(line.split_once(':')?.1.trim().to_owned())
+    });
+    known.unwrap_or_else(|| format!("unnamed {} processor", std::env::consts::ARCH))
+}
+
+/// A device ready to be measured on.
+pub(super) struct OpenDevice {
+    pub(super) device: Device,
+    pub(super) gpu: Option<Gpu>,
+    /// Processor or adapter, in words.
+    pub(super) name: String,
+}
+
+impl OpenDevice {
+    /// Opens a device; `adapter` chooses among GPUs.
+    ///
+    /// # Errors
+    /// If there is no such GPU.
+    pub(super) fn open(device: Device, adapter: Option<&str>, machine: &Machine) -> Result<Self> {
+        if device == Device::Cpu {
+            let name = format!("{}, {} threads", machine.processor, machine.threads);
+            return Ok(Self { device, gpu: None, name });
+        }
+        let gpu = Gpu::open(adapter)?;
+        let facts = gpu.facts();
+        let kind = if facts.is_software() { "software, " } else { "" };
+        let name = format!("{} ({kind}{}, driver {})", facts.name, facts.backend, facts.driver);
+        Ok(Self { device, gpu: Some(gpu), name })
+    }
+
+    /// Whether it is likely to be the fastest: a real GPU.
+    pub(super) fn is_real_gpu(&self) -> bool {
+        self.gpu.as_ref().is_some_and(|gpu| !gpu.facts().is_software())
+    }
+}

@@ -1,0 +1,230 @@
+//! One run: error against time of one method with one seed, on one device.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::{Deserialize, Serialize};
+
+use super::plan::{Frame, Settings};
+use crate::environment::Environment;
+use crate::error::Result;
+use crate::image::Image;
+use crate::light_grid::LightGrid;
+use crate::metrics::compare;
+use crate::path::World;
+use crate::render::{Figures, Phase, Session, StopRule, gpu};
+use crate::scene::Camera;
+
+/// Where runs take place.
+#[derive(Clone, Copy)]
+pub(super) struct Place<'a> {
+    pub(super) world: &'a World,
+    pub(super) camera: &'a Camera,
+    pub(super) frame: &'a Frame,
+    pub(super) environment: &'a Environment,
+    /// Seconds that the map's importance table took.
+    pub(super) table_seconds: f64,
+    /// Scene and map on the GPU, if that is the device.
+    pub(super) upload: Option<&'a gpu::Stage>,
+}
+
+impl<'a> Place<'a> {
+    /// A session of one method.
+    pub(super) fn session(&self, settings: &Settings, seed: u32) -> Result<Session<'a>> {
+        let view = settings.view(self.camera, self.frame, seed);
+        match self.upload {
+            None => Ok(Session::new(self.world, self.environment, view)),
+            Some(upload) => Session::on_gpu(self.world, self.environment, view, upload),
+        }
+    }
+
+    /// Learns and renders a little, so that all kernels are built.
+    pub(super) fn warm_up(&self, settings: &Settings) -> Result<()> {
+        let never = AtomicBool::new(false);
+        let mut session = self.session(settings, 0)?;
+        if session.phase() == Phase::Learning {
+            session.advance(0, &never)?;
+            session.finish_learning();
+        }
+        session.advance(1, &never)
+    }
+
+    /// A session that has learned; `None` if it was cancelled.
+    pub(super) fn learned(
+        &self,
+        settings: &Settings,
+        seed: u32,
+        cancel: &AtomicBool,
+    ) -> Result<Option<Session<'a>>> {
+        let mut session = self.session(settings, seed)?;
+        while session.phase() == Phase::Learning {
+            session.advance(0, cancel)?;
+            if cancel.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
+        }
+        Ok(Some(session))
+    }
+}
+
+/// How far a picture is from the reference; see [`crate::metrics::Comparison`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    /// Mean squared error.
+    pub mse: f64,
+    /// Relative mean squared error.
+    pub rel_mse: f64,
+    /// The same without the worst 0.1 % of the pixels.
+    pub trimmed_rel_mse: f64,
+    /// Mean LDR-FLIP.
+    pub flip: f64,
+    /// Mean over the reference's mean.
+    pub mean_ratio: f64,
+}
+
+/// A moment of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// Seconds of building the importance table, learning and rendering.
+    pub seconds: f64,
+    /// Seconds of rendering alone.
+    pub render_seconds: f64,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Rays of rendering, shadow rays included.
+    pub rays: u64,
+    /// Its errors, once there is a reference.
+    pub errors: Option<Errors>,
+}
+
+/// Bytes of what a run holds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Memory {
+    /// The map's importance table.
+    pub table_bytes: u64,
+    /// The scene's tree.
+    pub bvh_bytes: u64,
+    /// The Light Grid while learning, at most.
+    pub grid_peak_bytes: u64,
+    /// The Light Grid while rendering.
+    pub grid_bytes: u64,
+    /// Everything on the GPU.
+    pub device_bytes: Option<u64>,
+}
+
+/// One run's measurements.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// Name of the method.
+    pub method: String,
+    /// Seed.
+    pub seed: u32,
+    /// Seconds of building the map's importance table.
+    pub table_seconds: f64,
+    /// What the session says.
+    pub figures: Figures,
+    /// What it held.
+    pub memory: Memory,
+    /// Nanoseconds of a thread per ray, measured beside the run.
+    pub nanoseconds_per_ray: Option<f64>,
+    /// In order of time; the last one is at or after the end.
+    pub points: Vec<Point>,
+    /// Pictures of the reference that errors were taken against.
+    pub reference_pictures: Option<u32>,
+}
+
+/// A finished run with its pictures, one a point.
+pub(super) struct Finished {
+    pub(super) run: Run,
+    pub(super) films: Vec<Image>,
+    /// What was learned, for measurements beside the run.
+    pub(super) grid: Option<LightGrid>,
+}
+
+/// Points are this factor in time apart.
+const STEP: f64 = std::f64::consts::SQRT_2;
+
+/// The first point is at most this share of the end: earlier errors interest nobody.
+const FIRST_SHARE: f64 = 1.0 / 256.0;
+
+/// Runs a method for `seconds`; `None` if it was cancelled. Taking pictures aside is not timed.
+pub(super) fn measure(
+    place: &Place<'_>,
+    method: (&str, &Settings),
+    seed: u32,
+    seconds: f64,
+    cancel: &AtomicBool,
+) -> Result<Option<Finished>> {
+    let mut session = place.session(method.1, seed)?;
+    while session.phase() == Phase::Learning {
+        session.advance(0, cancel)?;
+        if cancel.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+    }
+    let (mut points, mut films) = (Vec::new(), Vec::new());
+    let mut next = seconds * FIRST_SHARE;
+    loop {
+        session.advance(session.next_pass(&StopRule::default()), cancel)?;
+        if cancel.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        let figures = session.figures();
+        let elapsed = place.table_seconds + figures.elapsed_seconds();
+        if elapsed < next && elapsed < seconds {
+            continue;
+        }
+        points.push(Point {
+            seconds: elapsed,
+            render_seconds: figures.render_seconds,
+            samples: session.film().min_samples(),
+            rays: figures.rays,
+            errors: None,
+        });
+        films.push(session.film().image());
+        if elapsed >= seconds {
+            break;
+        }
+        next = next.max(elapsed / STEP) * STEP;
+    }
+    let run = Run {
+        method: method.0.to_owned(),
+        seed,
+        table_seconds: place.table_seconds,
+        figures: *session.figures(),
+        memory: memory(place, &session),
+        nanoseconds_per_ray: None,
+        points,
+        reference_pictures: None,
+    };
+    Ok(Some(Finished { run, films, grid: session.grid().cloned() }))
+}
+
+fn memory(place: &Place<'_>, session: &Session<'_>) -> Memory {
+    Memory {
+        table_bytes: place.environment.memory_bytes().table as u64,
+        bvh_bytes: place.world.bvh.memory_bytes() as u64,
+        grid_peak_bytes: session.figures().grid_peak_bytes as u64,
+        grid_bytes: session.figures().grid_bytes as u64,
+        device_bytes: session.gpu_figures().map(|gpu| gpu.device_bytes),
+    }
+}
+
+impl Run {
+    /// Takes the errors of its pictures, one a point.
+    ///
+    /// # Errors
+    /// If the reference is black or a picture is not finite.
+    pub(super) fn judge(&mut self, films: &[Image], reference: &Image) -> Result<()> {
+        for (point, film) in self.points.iter_mut().zip(films) {
+            let found = compare(film, reference)?;
+            point.errors = Some(Errors {
+                mse: found.mse,
+                rel_mse: found.rel_mse,
+                trimmed_rel_mse: found.trimmed_rel_mse,
+                flip: found.flip,
+                mean_ratio: found.mean_ratio,
+            });
+        }
+        Ok(())
+    }
+}

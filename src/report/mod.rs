@@ -1,0 +1,34 @@
+//! Error against run time, measured: tables, plots and pictures of how much sooner one way of
+//! rendering is as good as another.
+//!
+//! A [`Plan`] says what is compared; [`make`] goes through it row by row, takes what is on disk already,
+//! measures what is missing ([`measure`]) against a [`reference`](ReferenceReport) that is good enough
+//! for it, and writes the pages. [`talk`] and [`ablations`] are plans; [`sat`] measures importance
+//! tables alone.
+
+pub mod ablations;
+mod conduct;
+mod digest;
+mod machine;
+mod measure;
+mod pages;
+mod plan;
+mod reference;
+pub mod sat;
+mod shares;
+mod stage;
+pub mod statistics;
+mod store;
+mod summary;
+pub mod talk;
+
+pub use conduct::{Options, check, make};
+pub use machine::Machine;
+pub use measure::{Errors, Memory, Point, Run};
+pub use pages::{duration, markdown_table, row_sentence};
+pub use plan::{Device, Effort, Frame, Method, Plan, Row, Settings};
+pub use reference::{Noise, ReferenceFacts};
+pub use shares::Shares;
+pub use summary::{
+    Costs, DeviceReport, Measure, MethodReport, Pictures, ReferenceReport, Report, RowReport,
+};

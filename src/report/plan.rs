@@ -1,0 +1,232 @@
+//! What is to be measured: rows of scene and map, methods, devices, and how long.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use crate::environment::{EnvironmentOptions, TableKind};
+use crate::light_grid::LawOptions;
+use crate::path::{Background, PathLimits};
+use crate::render::filter::PixelFilter;
+use crate::render::{Sampling, View};
+use crate::sampler::Points;
+use crate::scene::Camera;
+
+/// A device to measure on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Device {
+    /// All threads.
+    Cpu,
+    /// The best adapter, be it a software one.
+    Gpu,
+}
+
+impl Device {
+    /// `CPU` or `GPU`.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Cpu => "CPU",
+            Self::Gpu => "GPU",
+        }
+    }
+}
+
+/// All that a way of rendering may differ in without changing what the picture converges to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Settings {
+    /// How the map is sampled.
+    pub sampling: Sampling,
+    /// How counters become laws in [`Sampling::Adaptive`].
+    pub laws: LawOptions,
+    /// Importance table.
+    pub table: TableKind,
+    /// Columns and rows of tiles.
+    pub tiles: (u32, u32),
+    /// Light Grid cells around the horizon.
+    pub grid_columns: u32,
+    /// Camera paths to learn from; `None` for as many as suit the picture.
+    pub learning_paths: Option<u64>,
+    /// Points samples are taken at.
+    pub points: Points,
+    /// Whether dim paths are ended at random.
+    pub russian_roulette: bool,
+}
+
+impl Settings {
+    /// What `lightgrid render --sampling` does.
+    pub fn of(sampling: Sampling) -> Self {
+        let environment = EnvironmentOptions::default();
+        Self {
+            sampling,
+            laws: LawOptions::ADAPTIVE,
+            table: environment.table,
+            tiles: (environment.tile_columns, environment.tile_rows),
+            grid_columns: 64,
+            learning_paths: None,
+            points: Points::default(),
+            russian_roulette: true,
+        }
+    }
+
+    /// How the map is turned into a light.
+    pub(super) fn environment(&self) -> EnvironmentOptions {
+        EnvironmentOptions {
+            table: self.table,
+            tile_columns: self.tiles.0,
+            tile_rows: self.tiles.1,
+            ..EnvironmentOptions::default()
+        }
+    }
+
+    /// The view of a picture of this size.
+    pub(super) fn view(&self, camera: &Camera, frame: &Frame, seed: u32) -> View {
+        let (width, height) = frame.size;
+        View {
+            camera: camera.clone(),
+            width,
+            height,
+            filter: PixelFilter::Box,
+            sampling: self.sampling,
+            limits: PathLimits { bounces: frame.bounces, russian_roulette: self.russian_roulette },
+            seed,
+            points: self.points,
+            grid_columns: self.grid_columns,
+            learning_paths: self
+                .learning_paths
+                .unwrap_or_else(|| View::suitable_learning_paths(width, height, None)),
+            laws: self.laws,
+            medium: None,
+            background: Background::Map,
+            crop: None,
+            layers: false,
+        }
+    }
+}
+
+/// A named way of rendering.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Method {
+    /// Short, unique within its row.
+    pub name: String,
+    /// What it belongs to in a table of ablations.
+    pub group: Option<&'static str>,
+    /// The settings.
+    pub settings: Settings,
+}
+
+impl Method {
+    /// One of the sampling modes, called as on the command line.
+    pub fn of(sampling: Sampling) -> Self {
+        let name = match sampling {
+            Sampling::Adaptive => "adaptive",
+            Sampling::Talk => "talk",
+            Sampling::Plain => "plain",
+            Sampling::Bsdf => "bsdf",
+        };
+        Self { name: name.to_owned(), group: None, settings: Settings::of(sampling) }
+    }
+}
+
+/// The picture, which is the same for all.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Frame {
+    /// Pixels per row, and rows.
+    pub size: (u32, u32),
+    /// Most surface vertices that scatter light.
+    pub bounces: u32,
+}
+
+/// A scene under a map.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// What to call it.
+    pub title: String,
+    /// A file or a built-in.
+    pub scene: String,
+    /// A file or a built-in sky.
+    pub map: String,
+    /// Speed-up in the talk on CPU and GPU.
+    pub published: Option<[f64; 2]>,
+    /// Speed-up of `adaptive` over `plain` that is asked for.
+    pub target: Option<f64>,
+}
+
+impl Row {
+    /// A row without anything to compare it with.
+    pub fn new(scene: &str, map: &str) -> Self {
+        Self {
+            title: format!("{scene} / {map}"),
+            scene: scene.to_owned(),
+            map: map.to_owned(),
+            published: None,
+            target: None,
+        }
+    }
+}
+
+/// How much work goes into a plan.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Effort {
+    /// Where.
+    pub devices: Vec<Device>,
+    /// The picture.
+    pub frame: Frame,
+    /// Seconds of tables, learning and rendering of one run.
+    pub seconds: f64,
+    /// Independent runs of every combination.
+    pub seeds: u32,
+    /// The reference's noise may be this share of the smallest error.
+    pub reference_noise: f64,
+}
+
+/// A whole report.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Plan {
+    /// Title of the page.
+    pub title: String,
+    /// What it is about, paragraph by paragraph.
+    pub introduction: Vec<String>,
+    /// What must be known to read the published figures beside ours.
+    pub differences: Vec<String>,
+    /// Scenes and maps.
+    pub rows: Vec<Row>,
+    /// What is compared, on every row; the first is the baseline.
+    pub methods: Vec<Method>,
+    /// Methods (by index) that the others are held against, each in a column of its own.
+    pub baselines: Vec<usize>,
+    /// Where, how long, how often.
+    pub effort: Effort,
+    /// A picture to be taken as the reference of the only row.
+    pub reference: Option<PathBuf>,
+    /// How the command is repeated.
+    pub command: String,
+}
+
+impl Plan {
+    /// Seconds that all of it takes, about: runs, references, where error is left, overhead.
+    pub fn expected_seconds(&self) -> f64 {
+        self.rows.len() as f64 * self.expected_row_seconds()
+    }
+
+    /// The same for one row.
+    pub(super) fn expected_row_seconds(&self) -> f64 {
+        let runs = self.methods.len() * self.effort.devices.len() * self.effort.seeds as usize;
+        let reference =
+            if self.reference.is_some() { 0.0 } else { 1.0 / self.effort.reference_noise };
+        let shares = SHARE_RUNS * self.compared().len() as f64;
+        (runs as f64 + reference + shares) * self.effort.seconds * OVERHEAD
+    }
+
+    /// Methods whose error is taken apart: the baseline and `adaptive`.
+    pub(super) fn compared(&self) -> Vec<&Method> {
+        let is_ours = |m: &&Method| m.name == "adaptive";
+        self.methods.iter().take(1).chain(self.methods.iter().skip(1).filter(is_ours)).collect()
+    }
+}
+
+/// Runs' worth of time that taking one method's error apart costs.
+pub(super) const SHARE_RUNS: f64 = 1.5;
+
+/// Loading, building, comparing, writing, and passes that end a little late. *Measured* on two cores.
+const OVERHEAD: f64 = 1.1;

@@ -1,0 +1,241 @@
+//! The reference: the mean of independent pictures, whose spread says how noisy it still is.
+//!
+//! It grows picture by picture, on disk after each, under a name that is a digest of all that it
+//! depends on; so it can be gone on with, and is never taken for another one.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::{Deserialize, Serialize};
+
+use super::digest::Digest;
+use super::measure::Place;
+use super::plan::Settings;
+use crate::error::{Error, Result};
+use crate::image::{Image, read_picture, write_beside_and_rename};
+use crate::metrics::{REL_MSE_EPSILON, trimmed_mean};
+use crate::render::film::Film;
+use crate::render::{Sampling, StopRule};
+
+/// A picture's own expected squared error, in the units of [`crate::metrics::Comparison`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Noise {
+    /// Mean squared error.
+    pub mse: f64,
+    /// Relative mean squared error.
+    pub rel_mse: f64,
+    /// The same without the worst 0.1 % of the pixels.
+    pub trimmed_rel_mse: f64,
+}
+
+impl Noise {
+    /// Of a picture whose pixels have these variances, per channel.
+    pub(super) fn of(variances: &[[f64; 3]], reference: &Image) -> Self {
+        let count = variances.len() as f64;
+        let mean = crate::metrics::mean(reference);
+        let (mut squared, mut relative) = (0.0, Vec::with_capacity(variances.len()));
+        for (variance, pixel) in variances.iter().zip(&reference.pixels) {
+            let mut sum = 0.0;
+            for (v, r) in variance.iter().zip(pixel) {
+                let (v, r) = (v / (mean * mean), f64::from(*r) / mean);
+                squared += v / 3.0;
+                sum += v / (r * r + REL_MSE_EPSILON) / 3.0;
+            }
+            relative.push(sum);
+        }
+        Self {
+            mse: squared / count,
+            rel_mse: relative.iter().sum::<f64>() / count,
+            trimmed_rel_mse: trimmed_mean(&mut relative),
+        }
+    }
+}
+
+/// Facts about a reference, as its file begins.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ReferenceFacts {
+    /// Digest of what it is a picture of.
+    pub digest: String,
+    /// Pixels per row, and rows.
+    pub size: (u32, u32),
+    /// Pictures it is the mean of.
+    pub pictures: u32,
+    /// Samples per pixel of each.
+    pub samples_per_picture: u32,
+    /// Seconds that all of them took.
+    pub seconds: f64,
+    /// What rendered the last of them.
+    pub device: String,
+}
+
+/// Per pixel and channel, sums over pictures of the values and of their squares.
+#[derive(Debug, Clone)]
+pub(super) struct Reference {
+    pub(super) facts: ReferenceFacts,
+    sums: Vec<[f64; 3]>,
+    squares: Vec<[f64; 3]>,
+    path: PathBuf,
+}
+
+/// Seeds of its pictures begin here, far from those of runs.
+const FIRST_SEED: u32 = 0x5265_6600;
+
+/// Fewest pictures: their spread must be worth something.
+pub(super) const LEAST_PICTURES: u32 = 8;
+
+impl Reference {
+    /// The one kept in `folder`, or an empty one that will be.
+    pub(super) fn open(folder: &Path, digest: Digest, size: (u32, u32)) -> Self {
+        let path = folder.join(format!("{digest}.ref"));
+        let pixels = size.0 as usize * size.1 as usize;
+        Self::read(&path, &digest.to_string(), size).unwrap_or_else(|| Self {
+            facts: ReferenceFacts {
+                digest: digest.to_string(),
+                size,
+                pictures: 0,
+                samples_per_picture: 0,
+                seconds: 0.0,
+                device: String::new(),
+            },
+            sums: vec![[0.0; 3]; pixels],
+            squares: vec![[0.0; 3]; pixels],
+            path,
+        })
+    }
+
+    /// `None` if there is no such file, or it is not whole.
+    fn read(path: &Path, digest: &str, size: (u32, u32)) -> Option<Self> {
+        let bytes = fs::read(path).ok()?;
+        let line = bytes.iter().position(|b| *b == b'\n')?;
+        let facts: ReferenceFacts = serde_json::from_slice(&bytes[..line]).ok()?;
+        let pixels = size.0 as usize * size.1 as usize;
+        let numbers: Vec<f64> =
+            bytes[line + 1..].as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        let is_whole = numbers.len() == 6 * pixels && bytes.len() == line + 1 + 48 * pixels;
+        if !is_whole || facts.digest != digest || facts.size != size {
+            return None;
+        }
+        let (sums, squares) = numbers.as_chunks().0.split_at(pixels);
+        Some(Self { facts, sums: sums.to_vec(), squares: squares.to_vec(), path: path.to_owned() })
+    }
+
+    fn write(&self) -> Result<()> {
+        let header = serde_json::to_string(&self.facts).map_err(|e| Error::at(&self.path, e))?;
+        write_beside_and_rename(&self.path, |file| {
+            writeln!(file, "{header}")?;
+            let numbers = self.sums.as_flattened().iter().chain(self.squares.as_flattened());
+            numbers.into_iter().try_for_each(|x| file.write_all(&x.to_le_bytes()))
+        })
+    }
+
+    /// Renders one more picture with the default sampling and keeps it; the first one takes
+    /// `seconds`, the others as many samples as that. `false` if it was cancelled.
+    ///
+    /// # Errors
+    /// If the device fails or the file cannot be written.
+    pub(super) fn add_picture(
+        &mut self,
+        place: &Place<'_>,
+        device: &str,
+        seconds: f64,
+        cancel: &AtomicBool,
+    ) -> Result<bool> {
+        let seed = FIRST_SEED + self.facts.pictures;
+        let settings = Settings::of(Sampling::Adaptive);
+        let Some(mut session) = place.learned(&settings, seed, cancel)? else { return Ok(false) };
+        let limit = self.facts.samples_per_picture;
+        loop {
+            let (samples, elapsed) = (session.film().min_samples(), session.elapsed_seconds());
+            let is_done =
+                if limit > 0 { samples >= limit } else { samples >= 4 && elapsed >= seconds };
+            if is_done {
+                break;
+            }
+            let left = if limit > 0 { limit - samples } else { u32::MAX };
+            session.advance(session.next_pass(&StopRule::default()).min(left), cancel)?;
+            if cancel.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+        }
+        self.add(session.film());
+        self.facts.seconds += session.elapsed_seconds();
+        device.clone_into(&mut self.facts.device);
+        self.write()?;
+        Ok(true)
+    }
+
+    fn add(&mut self, film: &Film) {
+        for ((sum, square), pixel) in self.sums.iter_mut().zip(&mut self.squares).zip(film.pixels())
+        {
+            for (i, value) in pixel.mean().into_iter().enumerate() {
+                sum[i] += value;
+                square[i] += value * value;
+            }
+        }
+        self.facts.pictures += 1;
+        self.facts.samples_per_picture = film.min_samples();
+    }
+
+    /// The mean of all pictures.
+    pub(super) fn image(&self) -> Image {
+        let count = f64::from(self.facts.pictures.max(1));
+        let (width, height) = self.facts.size;
+        let pixels = self.sums.iter().map(|sum| sum.map(|s| (s / count) as f32)).collect();
+        Image { width, height, pixels }
+    }
+
+    /// Its expected squared error, from the spread of the pictures; infinite below two.
+    pub(super) fn noise(&self) -> Noise {
+        if self.facts.pictures < 2 {
+            return Noise {
+                mse: f64::INFINITY,
+                rel_mse: f64::INFINITY,
+                trimmed_rel_mse: f64::INFINITY,
+            };
+        }
+        let count = f64::from(self.facts.pictures);
+        let variances: Vec<[f64; 3]> = self
+            .sums
+            .iter()
+            .zip(&self.squares)
+            .map(|(sum, square)| {
+                [0, 1, 2].map(|i| {
+                    let mean = sum[i] / count;
+                    (square[i] / count - mean * mean).max(0.0) / (count - 1.0)
+                })
+            })
+            .collect();
+        Noise::of(&variances, &self.image())
+    }
+
+    /// Pictures that are missing until the noise is `share` of `error`, about.
+    pub(super) fn pictures_missing(&self, share: f64, error: f64) -> u32 {
+        let (pictures, noise) = (self.facts.pictures, self.noise().trimmed_rel_mse);
+        let enough = if noise.is_finite() && error > 0.0 {
+            (f64::from(pictures) * noise / (share * error)).ceil().min(1e6) as u32
+        } else {
+            (1.0 / share).ceil() as u32
+        };
+        enough.max(LEAST_PICTURES).saturating_sub(pictures)
+    }
+}
+
+/// A picture that somebody else made, of the size of the runs.
+///
+/// # Errors
+/// If it cannot be read, has another size, or is not finite.
+pub(super) fn read_reference(path: &Path, size: (u32, u32)) -> Result<Image> {
+    let image = read_picture(path)?;
+    if (image.width, image.height) != size {
+        return Err(Error::at(
+            path,
+            format!(
+                "the reference is {}x{} pixels, the runs are {}x{}: give --size {}x{}",
+                image.width, image.height, size.0, size.1, image.width, image.height
+            ),
+        ));
+    }
+    Ok(image)
+}

@@ -1,0 +1,193 @@
+//! The talk's table of summed-area tables, and a map that is worse than any of its.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::machine::Machine;
+use super::store::Store;
+use crate::environment::{Lookup, SatReport, TableKind, sat_report};
+use crate::error::Result;
+use crate::image::{Image, write_beside_and_rename};
+use crate::math::direction_from_uv;
+
+/// A map and what the talk published for it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Case {
+    /// What to call it.
+    pub title: &'static str,
+    /// A built-in sky, or `None` for the extreme map.
+    sky: Option<&'static str>,
+    /// Columns and rows.
+    pub size: (u32, u32),
+    /// Mean squared error in the talk's unit, u32 and f32.
+    pub published: Option<[f64; 2]>,
+}
+
+/// The talk's maps, made by our skies, and the extreme one.
+pub const CASES: [Case; 5] = [
+    Case::new("Hallway", Some("hallway"), (10_000, 5000), Some([1.0e-5, 3.8e-1])),
+    Case::new("Day", Some("day"), (15_000, 7500), Some([4.9e-7, 8.6e-3])),
+    Case::new("Night", Some("night"), (3000, 1500), Some([1.4e-8, 4.1e-4])),
+    Case::new("Sunset", Some("sunset"), (3000, 1500), Some([1.1e-8, 3.6e-4])),
+    Case::new("Extreme", None, (10_000, 5000), None),
+];
+
+/// A finished case.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// What it was.
+    pub title: String,
+    /// u32 and f32 in the talk.
+    pub published: Option<[f64; 2]>,
+    /// Every table.
+    pub report: SatReport,
+}
+
+/// Samples drawn to time a table.
+const SAMPLES: u32 = 1 << 20;
+
+impl Case {
+    const fn new(
+        title: &'static str,
+        sky: Option<&'static str>,
+        size: (u32, u32),
+        published: Option<[f64; 2]>,
+    ) -> Self {
+        Self { title, sky, size, published }
+    }
+
+    /// Measures it with sides `scale` times as long.
+    ///
+    /// # Errors
+    /// If the map cannot be made.
+    pub fn measure(&self, scale: f64) -> Result<Measured> {
+        let side = |length: u32| ((f64::from(length) * scale).round() as u32).max(2);
+        let (width, height) = (side(self.size.0), side(self.size.1));
+        let map = match self.sky {
+            Some(sky) => crate::environment::sky::build(sky, width, height)?,
+            None => extreme(width, height),
+        };
+        let report = sat_report(&map, Lookup::Bilinear, SAMPLES)?;
+        Ok(Measured { title: self.title.to_owned(), published: self.published, report })
+    }
+}
+
+/// A dim grainy sky with a sun of 0.27 degrees that is 10^8 times as bright: nearly all the energy is
+/// in a few texels, and what the others have is less than one of 2^32 parts.
+fn extreme(width: u32, height: u32) -> Image {
+    const SUN_RADIUS_RADIANS: f32 = 0.0047;
+    let sun = direction_from_uv(glam::Vec2::new(0.3, 0.25));
+    // A sun smaller than a texel is one texel large.
+    let radius = SUN_RADIUS_RADIANS.max(0.75 * std::f32::consts::PI / height as f32);
+    Image::from_fn(width, height, |x, y| {
+        let uv = glam::Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
+        let is_sun = direction_from_uv(uv).distance(sun) < radius;
+        let grain = 0.5 + crate::noise::unit(y * width + x);
+        [if is_sun { 1e8 } else { grain }; 3]
+    })
+}
+
+/// Measures all cases, each as soon as the one before is told; those that `folder` has are taken from
+/// there. Writes `sat.json` and `sat.csv` there after each.
+///
+/// # Errors
+/// If a map cannot be made or a file cannot be written.
+pub fn measure_all(
+    scale: f64,
+    folder: Option<&Path>,
+    mut is_cancelled: impl FnMut(&Case) -> bool,
+    mut tell: impl FnMut(&Measured),
+) -> Result<Vec<Measured>> {
+    let store = folder.map(|folder| Store::open(folder, None)).transpose()?;
+    let machine = Machine::here().digest();
+    let mut all = Vec::new();
+    for case in &CASES {
+        if is_cancelled(case) {
+            break;
+        }
+        let key = format!("sat-{}_{}", case.title, machine.debug(&(case, scale.to_bits())));
+        let kept = store.as_ref().and_then(|store| store.read(&key));
+        let measured = match kept {
+            Some(measured) => measured,
+            None => case.measure(scale)?,
+        };
+        tell(&measured);
+        all.push(measured);
+        if let (Some(store), Some(folder)) = (&store, folder) {
+            store.write(&key, &all[all.len() - 1])?;
+            let value = crate::output::record::to_value(&all)?;
+            crate::output::record::write_json(&folder.join("sat.json"), &value)?;
+            let text = csv(&all);
+            write_beside_and_rename(&folder.join("sat.csv"), |file| {
+                std::io::Write::write_all(file, text.as_bytes())
+            })?;
+        }
+    }
+    Ok(all)
+}
+
+fn csv(all: &[Measured]) -> String {
+    let mut text = String::from(
+        "map,width,height,table,mse,zero_mass_share,zero_mass_energy,falling_share,build_seconds,\
+         sample_nanoseconds,bytes\n",
+    );
+    for Measured { title, report, .. } in all {
+        for row in &report.rows {
+            let _ = writeln!(
+                text,
+                "{title},{},{},{},{},{},{},{},{},{},{}",
+                report.width,
+                report.height,
+                row.table,
+                row.mean_squared_error,
+                row.missed_share,
+                row.missed_energy_share,
+                row.falling_share,
+                row.build_seconds,
+                row.sample_nanoseconds,
+                row.table_bytes
+            );
+        }
+    }
+    text
+}
+
+/// All cases as one Markdown table, with what the talk published.
+pub fn markdown(all: &[Measured]) -> String {
+    let mut text = String::from(
+        "| map | table | MSE | the talk's | zero mass | falling steps | build | a sample | memory |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
+    );
+    for Measured { title, published, report } in all {
+        for row in &report.rows {
+            let theirs = published.and_then(|[u32s, f32s]| match row.table {
+                TableKind::U32 => Some(u32s),
+                TableKind::F32 => Some(f32s),
+                TableKind::TileLocal | TableKind::F64 => None,
+            });
+            let _ = writeln!(
+                text,
+                "| {title} {}x{} | {} | {:.1e} | {} | {:.2} % | {:.2} % | {:.2} s | {:.0} ns | {:.0} MB |",
+                report.width,
+                report.height,
+                row.table,
+                row.mean_squared_error,
+                theirs.map_or_else(|| "-".to_owned(), |mse| format!("{mse:.1e}")),
+                100.0 * row.missed_share,
+                100.0 * row.falling_share,
+                row.build_seconds,
+                row.sample_nanoseconds,
+                row.table_bytes as f64 / 1e6
+            );
+        }
+    }
+    text
+}
+
+/// What must be known to read the talk's figures beside ours.
+pub const REMARK: &str = "MSE: in units of the mean texel density, exact (the search of each table \
+    followed for all random numbers at once). The talk does not say its unit, nor are its maps public: \
+    compare ratios. Zero mass: share of the lit texels that are never sampled. Falling steps: share of \
+    the steps along a row in which the sums fall.";

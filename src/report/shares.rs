@@ -1,0 +1,146 @@
+//! Which part of the error is left: the pixel filter, the first vertex, or later ones.
+//!
+//! The same samples are rendered three times: with all bounces, with one, with none. As a path draws
+//! its random numbers in order, the pictures differ by later vertices and by the first one exactly;
+//! several seeds give each part's variance.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::{Deserialize, Serialize};
+
+use super::measure::Place;
+use super::plan::{Frame, Settings};
+use crate::error::Result;
+use crate::image::Image;
+use crate::metrics::REL_MSE_EPSILON;
+use crate::render::Session;
+use crate::render::film::Pixel;
+
+/// Variance of the parts of a picture, each as trimmed relMSE (the same pixels left out in all).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Shares {
+    /// Name of the method.
+    pub method: String,
+    /// Pictures compared.
+    pub pictures: u32,
+    /// Samples per pixel of each.
+    pub samples: u32,
+    /// All of it.
+    pub total: f64,
+    /// What the camera sees of the map and of emitters: left by the pixel filter.
+    pub filter: f64,
+    /// Light that the first vertex gets from the map and from lights.
+    pub first_vertex: f64,
+    /// Light that arrives by more than one vertex.
+    pub later_vertices: f64,
+}
+
+impl Shares {
+    /// Part of the total that is not any part's own: positive where they err together.
+    pub fn together(&self) -> f64 {
+        self.total - self.filter - self.first_vertex - self.later_vertices
+    }
+}
+
+/// Pictures that the variances are taken from.
+const PICTURES: u32 = 8;
+
+/// Seeds of these pictures begin here.
+const FIRST_SEED: u32 = 0x5368_6100;
+
+/// Sums over pictures of each part's values and squares.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    value: [[f64; 3]; 4],
+    square: [[f64; 3]; 4],
+}
+
+/// Takes a method's error apart at `samples` samples per pixel; `None` if it was cancelled.
+pub(super) fn shares(
+    place: &Place<'_>,
+    (name, settings): (&str, &Settings),
+    samples: u32,
+    reference: &Image,
+    cancel: &AtomicBool,
+) -> Result<Option<Shares>> {
+    let mut sums = vec![Sums::default(); reference.pixels.len()];
+    for seed in FIRST_SEED..FIRST_SEED + PICTURES {
+        let Some([all, one, none]) = three_depths(place, settings, seed, samples, cancel)? else {
+            return Ok(None);
+        };
+        for (((sums, all), one), none) in sums.iter_mut().zip(&all).zip(&one).zip(&none) {
+            for c in 0..3 {
+                let parts = [all[c], none[c], one[c] - none[c], all[c] - one[c]];
+                for (part, x) in parts.into_iter().enumerate() {
+                    sums.value[part][c] += x;
+                    sums.square[part][c] += x * x;
+                }
+            }
+        }
+    }
+    let [total, filter, first_vertex, later_vertices] = trimmed(&sums, reference);
+    let method = name.to_owned();
+    let pictures = PICTURES;
+    Ok(Some(Shares { method, pictures, samples, total, filter, first_vertex, later_vertices }))
+}
+
+/// Means per pixel with all bounces, with one and with none, from the same random numbers and laws.
+fn three_depths(
+    place: &Place<'_>,
+    settings: &Settings,
+    seed: u32,
+    samples: u32,
+    cancel: &AtomicBool,
+) -> Result<Option<[Vec<[f64; 3]>; 3]>> {
+    let Some(mut session) = place.learned(settings, seed, cancel)? else { return Ok(None) };
+    let Some(all) = finish(&mut session, samples, cancel)? else { return Ok(None) };
+    let grid = session.grid().cloned();
+    let mut shallow = [Vec::new(), Vec::new()];
+    for (picture, bounces) in shallow.iter_mut().zip([1, 0]) {
+        let frame = Frame { bounces: bounces.min(place.frame.bounces), ..place.frame.clone() };
+        let mut session = Place { frame: &frame, ..*place }.session(settings, seed)?;
+        if let Some(grid) = &grid {
+            session.set_grid(grid.clone())?;
+        }
+        let Some(means) = finish(&mut session, samples, cancel)? else { return Ok(None) };
+        *picture = means;
+    }
+    let [one, none] = shallow;
+    Ok(Some([all, one, none]))
+}
+
+fn finish(
+    session: &mut Session<'_>,
+    samples: u32,
+    cancel: &AtomicBool,
+) -> Result<Option<Vec<[f64; 3]>>> {
+    session.advance(samples, cancel)?;
+    let is_whole = !cancel.load(Ordering::Relaxed);
+    Ok(is_whole.then(|| session.film().pixels().iter().map(Pixel::mean).collect()))
+}
+
+/// Variance over pictures of each part, relative, averaged without the worst pixels.
+fn trimmed(sums: &[Sums], reference: &Image) -> [f64; 4] {
+    let count = f64::from(PICTURES);
+    let mean = crate::metrics::mean(reference);
+    let mut pixels: Vec<[f64; 4]> = sums
+        .iter()
+        .zip(&reference.pixels)
+        .map(|(sums, pixel)| {
+            [0, 1, 2, 3].map(|part| {
+                let channel = |c: usize| {
+                    let average = sums.value[part][c] / count;
+                    let spread = sums.square[part][c] / count - average * average;
+                    let r = f64::from(pixel[c]) / mean;
+                    spread.max(0.0) * count
+                        / (count - 1.0)
+                        / (mean * mean * (r * r + REL_MSE_EPSILON))
+                };
+                (channel(0) + channel(1) + channel(2)) / 3.0
+            })
+        })
+        .collect();
+    pixels.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
+    let kept = pixels.len() - (pixels.len() / 1000).max(1).min(pixels.len() - 1);
+    [0, 1, 2, 3].map(|part| pixels[..kept].iter().map(|p| p[part]).sum::<f64>() / kept as f64)
+}

@@ -1,0 +1,143 @@
+//! A row made ready: the scene's tree, the camera, the map as every method wants it.
+
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use super::digest::{self, Digest};
+use super::machine::OpenDevice;
+use super::measure::Place;
+use super::plan::{Plan, Row, Settings};
+use crate::environment::{Environment, EnvironmentOptions};
+use crate::error::{Error, Notices, Result};
+use crate::light_grid::LightGrid;
+use crate::path::{World, framing};
+use crate::render::{Sampling, gpu};
+use crate::scene::Camera;
+
+/// A scene under a map.
+pub(super) struct Stage {
+    pub(super) title: String,
+    pub(super) world: World,
+    camera: Camera,
+    lights: Vec<Light>,
+    pub(super) map_size: (u32, u32),
+    pub(super) notices: Notices,
+    /// Of what its picture converges to.
+    pub(super) digest: Digest,
+}
+
+/// A map with one kind of table, and how long that took.
+struct Light {
+    options: EnvironmentOptions,
+    environment: Environment,
+    seconds: f64,
+    /// The scene under it on the GPU.
+    upload: Option<gpu::Stage>,
+}
+
+impl Stage {
+    /// Loads a row's scene and map and builds all that the plan's methods need.
+    pub(super) fn load(row: &Row, plan: &Plan) -> Result<Self> {
+        let world = World::new(crate::sources::scene(&row.scene)?);
+        let (map, map_notices) = crate::sources::map(&row.map)?;
+        let mut notices = world.scene.notices.clone();
+        notices.extend(&map_notices);
+        let map_size = (map.width, map.height);
+        let mut lights: Vec<Light> = Vec::new();
+        let default = Settings::of(Sampling::Plain);
+        for settings in plan.methods.iter().map(|m| &m.settings).chain([&default]) {
+            let options = settings.environment();
+            if lights.iter().any(|light| light.options == options) {
+                continue;
+            }
+            let map = map.clone();
+            let start = Instant::now();
+            let environment =
+                Environment::new(map, &options).map_err(|e| Error::at(&row.map, e))?;
+            let seconds = start.elapsed().as_secs_f64();
+            lights.push(Light { options, environment, seconds, upload: None });
+        }
+        let aspect = plan.effort.frame.size.0 as f32 / plan.effort.frame.size.1 as f32;
+        let camera = match world.scene.cameras.first() {
+            Some(camera) => camera.clone(),
+            None => framing::frame(&world, aspect),
+        };
+        let digest =
+            digest::of_picture(&world, &lights[0].environment, &camera, &plan.effort.frame)?;
+        Ok(Self { title: row.title.clone(), world, camera, lights, map_size, notices, digest })
+    }
+
+    /// Puts the scene under every map onto a GPU; nothing for the CPU.
+    ///
+    /// # Errors
+    /// If it does not fit.
+    pub(super) fn upload(&mut self, device: &OpenDevice) -> Result<()> {
+        let Some(gpu) = &device.gpu else { return Ok(()) };
+        let mut uploads: Vec<gpu::Stage> = Vec::new();
+        for light in &self.lights {
+            uploads.push(match uploads.first() {
+                Some(first) => first.relit(&light.environment)?,
+                None => gpu::Stage::new(gpu, &self.world, &light.environment)?,
+            });
+        }
+        for (light, upload) in self.lights.iter_mut().zip(uploads) {
+            light.upload = Some(upload);
+        }
+        Ok(())
+    }
+
+    /// Where runs with these settings take place.
+    pub(super) fn place<'a>(
+        &'a self,
+        plan: &'a Plan,
+        device: &OpenDevice,
+        settings: &Settings,
+    ) -> Place<'a> {
+        let options = settings.environment();
+        let light =
+            self.lights.iter().find(|light| light.options == options).unwrap_or(&self.lights[0]);
+        Place {
+            world: &self.world,
+            camera: &self.camera,
+            frame: &plan.effort.frame,
+            environment: &light.environment,
+            table_seconds: light.seconds,
+            upload: light.upload.as_ref().filter(|_| device.gpu.is_some()),
+        }
+    }
+
+    /// Mean nanoseconds of a thread that a ray takes when a picture is rendered with a learned grid,
+    /// taken over at least this long.
+    pub(super) fn time_rays(
+        &mut self,
+        plan: &Plan,
+        device: &OpenDevice,
+        settings: &Settings,
+        grid: Option<LightGrid>,
+        seconds: f64,
+    ) -> Result<Option<f64>> {
+        self.world.start_ray_clock();
+        let rendered = self.render_for(plan, device, settings, grid, seconds);
+        let nanoseconds = self.world.stop_ray_clock();
+        rendered.map(|()| nanoseconds)
+    }
+
+    fn render_for(
+        &self,
+        plan: &Plan,
+        device: &OpenDevice,
+        settings: &Settings,
+        grid: Option<LightGrid>,
+        seconds: f64,
+    ) -> Result<()> {
+        let mut session = self.place(plan, device, settings).session(settings, 0)?;
+        if let Some(grid) = grid {
+            session.set_grid(grid)?;
+        }
+        let never = AtomicBool::new(false);
+        while session.figures().render_seconds < seconds {
+            session.advance(1, &never)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,225 @@
+//! What several independent runs say: means, slopes, time to equal error, and how sure that is.
+
+use serde::{Deserialize, Serialize};
+
+use crate::sampler::hash;
+
+/// A mean over runs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// The mean.
+    pub mean: f64,
+    /// Its standard error; `None` for a single run.
+    pub standard_error: Option<f64>,
+}
+
+impl Estimate {
+    /// Of at least one finite value.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+        let standard_error = (values.len() > 1).then(|| (squares / (count - 1.0) / count).sqrt());
+        mean.is_finite().then_some(Self { mean, standard_error })
+    }
+}
+
+/// An interval of 95 % confidence.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Slope of a power law through positive points, by least squares in logarithms; `None` for fewer
+/// than two different abscissae.
+pub fn power_law_slope(points: &[(f64, f64)]) -> Option<f64> {
+    let logs: Vec<(f64, f64)> = points
+        .iter()
+        .filter(|(x, y)| *x > 0.0 && *y > 0.0)
+        .map(|(x, y)| (x.ln(), y.ln()))
+        .collect();
+    let count = logs.len() as f64;
+    let (mean_x, mean_y) =
+        logs.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
+    let covariance: f64 = logs.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
+    let variance: f64 = logs.iter().map(|(x, _)| (x - mean_x).powi(2)).sum();
+    (variance > 1e-12).then(|| covariance / variance)
+}
+
+/// Error against time of one run, in order of time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// Seconds and error, both positive.
+    pub points: Vec<(f64, f64)>,
+}
+
+impl Curve {
+    /// Error at a time, by a power law between the points around it; `None` outside of them.
+    pub fn at(&self, seconds: f64) -> Option<f64> {
+        let after = self.points.partition_point(|(t, _)| *t < seconds);
+        let &(t1, e1) = self.points.get(after)?;
+        if t1 == seconds {
+            return Some(e1);
+        }
+        let &(t0, e0) = self.points.get(after.checked_sub(1)?)?;
+        Some(power_law(e0, e1, (seconds / t0).ln() / (t1 / t0).ln()))
+    }
+
+    /// When the first error is known.
+    pub fn start(&self) -> f64 {
+        self.points.first().map_or(f64::INFINITY, |(t, _)| *t)
+    }
+}
+
+/// Geometric interpolation, or linear where there is no logarithm.
+fn power_law(a: f64, b: f64, t: f64) -> f64 {
+    if a > 0.0 && b > 0.0 { a * (b / a).powf(t) } else { a + (b - a) * t }
+}
+
+/// Error against time of several runs, at common times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bundle {
+    /// Ascending, the last one is the end.
+    pub seconds: Vec<f64>,
+    /// One row of errors a run.
+    pub errors: Vec<Vec<f64>>,
+}
+
+/// Times of a bundle.
+const STEPS: u32 = 64;
+
+impl Bundle {
+    /// Brings curves that all last until `end` to common times; `None` if there are none, or none
+    /// is known before the end.
+    pub fn new(curves: &[Curve], end: f64) -> Option<Self> {
+        let start = curves.iter().map(Curve::start).fold(0.0, f64::max);
+        if curves.is_empty() || start > end {
+            return None;
+        }
+        let step = |i: u32| start * (end / start).powf(f64::from(i) / f64::from(STEPS - 1));
+        let mut seconds: Vec<f64> = (0..STEPS).map(step).collect();
+        seconds[0] = start;
+        seconds[STEPS as usize - 1] = end;
+        let errors = curves
+            .iter()
+            .map(|curve| seconds.iter().map(|&t| curve.at(t)).collect::<Option<Vec<f64>>>())
+            .collect::<Option<_>>()?;
+        Some(Self { seconds, errors })
+    }
+
+    /// Mean error over runs, each as often as `runs` names it, at every time.
+    fn mean(&self, runs: &[usize]) -> Vec<f64> {
+        let mut mean = vec![0.0; self.seconds.len()];
+        for &run in runs {
+            mean.iter_mut().zip(&self.errors[run]).for_each(|(m, e)| *m += e / runs.len() as f64);
+        }
+        mean
+    }
+
+    /// Mean error and its standard error at every time.
+    pub fn estimates(&self) -> Vec<Option<Estimate>> {
+        (0..self.seconds.len())
+            .map(|i| Estimate::of(&self.errors.iter().map(|run| run[i]).collect::<Vec<_>>()))
+            .collect()
+    }
+}
+
+/// When a falling mean curve is at `error` for good, and whether it was so from its first point on.
+fn time_to(seconds: &[f64], errors: &[f64], error: f64) -> (f64, bool) {
+    let Some(above) = errors.iter().rposition(|e| *e > error) else { return (seconds[0], true) };
+    let Some(&after) = seconds.get(above + 1) else { return (seconds[above], false) };
+    let (e0, e1) = (errors[above], errors[above + 1]);
+    let t = if e1 > 0.0 { (e0 / error).ln() / (e0 / e1).ln() } else { (e0 - error) / (e0 - e1) };
+    (power_law(seconds[above], after, t.clamp(0.0, 1.0)), false)
+}
+
+/// How many times sooner one method is at an error than another.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SpeedUp {
+    /// Time of the baseline over time of the method.
+    pub ratio: f64,
+    /// Where it is with 95 % confidence, by bootstrap over runs; `None` with a single run.
+    pub interval: Option<Interval>,
+    /// The error both are compared at: the larger of what they reach at the end.
+    pub error: f64,
+    /// Whether one was there before its first measured point, so that the ratio is a bound only.
+    pub is_bound: bool,
+}
+
+impl SpeedUp {
+    /// Of `method` over `baseline`, both measured until the same end.
+    pub fn new(baseline: &Bundle, method: &Bundle) -> Option<Self> {
+        let all = |bundle: &Bundle| (0..bundle.errors.len()).collect::<Vec<_>>();
+        let (ratio, error, is_bound) = ratio(baseline, method, &all(baseline), &all(method));
+        let counts = [baseline.errors.len(), method.errors.len()];
+        let interval = bootstrap(counts, |runs| ratio_of(baseline, method, runs));
+        ratio.is_finite().then_some(Self { ratio, interval, error, is_bound })
+    }
+}
+
+fn ratio_of(baseline: &Bundle, method: &Bundle, [a, b]: [&[usize]; 2]) -> f64 {
+    ratio(baseline, method, a, b).0
+}
+
+/// Ratio of the times, the error they are at, and whether it is only a bound.
+fn ratio(baseline: &Bundle, method: &Bundle, a: &[usize], b: &[usize]) -> (f64, f64, bool) {
+    let (plain, ours) = (baseline.mean(a), method.mean(b));
+    let last = |errors: &[f64]| errors.last().copied().unwrap_or(f64::NAN);
+    let error = last(&plain).max(last(&ours));
+    let (plain_time, plain_bound) = time_to(&baseline.seconds, &plain, error);
+    let (our_time, our_bound) = time_to(&method.seconds, &ours, error);
+    (plain_time / our_time, error, plain_bound || our_bound)
+}
+
+/// Resamples of a bootstrap.
+const RESAMPLES: u32 = 2000;
+
+/// Interval of 95 % confidence of a statistic of two groups of runs: the expanded percentile interval
+/// (Hesterberg, *What Teachers Should Know About the Bootstrap*, 2015), whose percentiles are moved
+/// outwards so that it is as wide as Student's for small groups. It is the same for the same runs.
+/// `None` if a group has fewer than two runs, or the statistic is not finite.
+pub fn bootstrap(counts: [usize; 2], statistic: impl Fn([&[usize]; 2]) -> f64) -> Option<Interval> {
+    let smaller = counts[0].min(counts[1]);
+    if smaller < 2 {
+        return None;
+    }
+    let mut state = 0;
+    let mut draw = |count: usize| -> Vec<usize> {
+        (0..count)
+            .map(|_| {
+                state += 1;
+                ((u64::from(hash(state)) * count as u64) >> 32) as usize
+            })
+            .collect()
+    };
+    let mut values: Vec<f64> = (0..RESAMPLES)
+        .map(|_| {
+            let (a, b) = (draw(counts[0]), draw(counts[1]));
+            statistic([&a, &b])
+        })
+        .collect();
+    if !values.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    values.sort_unstable_by(f64::total_cmp);
+    let tail = expanded_tail(smaller);
+    let at = |share: f64| values[(share * f64::from(RESAMPLES - 1)).round() as usize];
+    Some(Interval { low: at(tail), high: at(1.0 - tail) })
+}
+
+/// Chance to leave out at each end, for groups of `count` runs.
+fn expanded_tail(count: usize) -> f64 {
+    let student = STUDENT_975.get(count - 2).copied().unwrap_or(1.96);
+    let z = student * (count as f64 / (count as f64 - 1.0)).sqrt();
+    0.5 * crate::metrics::statistics::two_sided_p(z)
+}
+
+/// 97.5 % quantiles of Student's distribution with 1, 2, ... degrees of freedom (any table).
+const STUDENT_975: [f64; 30] = [
+    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160,
+    2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056,
+    2.052, 2.048, 2.045, 2.042,
+];

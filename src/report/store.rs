@@ -1,0 +1,88 @@
+//! Results on disk: one file a run, written beside and renamed, so that a report can be gone on with.
+
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::error::{Error, Result};
+use crate::image::{Image, write_beside_and_rename};
+use crate::output::record::{to_value, write_json};
+
+/// A report's folder: pages at the top, runs and references below.
+#[derive(Debug, Clone)]
+pub(super) struct Store {
+    root: PathBuf,
+    references: PathBuf,
+}
+
+impl Store {
+    /// Makes the folders.
+    ///
+    /// # Errors
+    /// If they cannot be made or written to.
+    pub(super) fn open(root: &Path, references: Option<&Path>) -> Result<Self> {
+        let references = references.map_or_else(|| root.join("references"), Path::to_owned);
+        for folder in [root, &root.join("runs"), &references] {
+            fs::create_dir_all(folder)
+                .map_err(|e| Error::at(folder, format!("cannot be made: {e}")))?;
+            crate::image::check_writable(&folder.join("test"))?;
+        }
+        Ok(Self { root: root.to_owned(), references })
+    }
+
+    /// Where pages and plots go.
+    pub(super) fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// Where references are kept.
+    pub(super) fn references(&self) -> &Path {
+        &self.references
+    }
+
+    fn path(&self, key: &str, extension: &str) -> PathBuf {
+        self.root.join("runs").join(format!("{key}.{extension}"))
+    }
+
+    /// What was kept under a name; `None` if there is nothing, or it is not whole.
+    pub(super) fn read<T: DeserializeOwned>(&self, key: &str) -> Option<T> {
+        serde_json::from_slice(&fs::read(self.path(key, "json")).ok()?).ok()
+    }
+
+    /// Keeps a value under a name.
+    pub(super) fn write(&self, key: &str, value: &impl Serialize) -> Result<()> {
+        write_json(&self.path(key, "json"), &to_value(value)?)
+    }
+
+    /// The pictures kept under a name, all of one size.
+    pub(super) fn read_pictures(&self, key: &str, size: (u32, u32)) -> Option<Vec<Image>> {
+        let bytes = fs::read(self.path(key, "f32")).ok()?;
+        let floats: Vec<f32> = bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+        let pixels = size.0 as usize * size.1 as usize;
+        if bytes.is_empty() || bytes.len() % (12 * pixels) != 0 {
+            return None;
+        }
+        let (triples, _) = floats.as_chunks::<3>();
+        let picture = |p: &[[f32; 3]]| Image { width: size.0, height: size.1, pixels: p.to_vec() };
+        Some(triples.chunks(pixels).map(picture).collect())
+    }
+
+    /// Keeps pictures of one size under a name, as bare little-endian floats.
+    pub(super) fn write_pictures(&self, key: &str, pictures: &[Image]) -> Result<()> {
+        write_beside_and_rename(&self.path(key, "f32"), |file| {
+            pictures
+                .iter()
+                .flat_map(|p| p.pixels.as_flattened())
+                .try_for_each(|x| file.write_all(&x.to_le_bytes()))
+        })
+    }
+
+    /// Forgets the pictures kept under a name.
+    pub(super) fn remove_pictures(&self, key: &str) {
+        // Nothing depends on it: it only frees the disk.
+        let _ = fs::remove_file(self.path(key, "f32"));
+    }
+}

@@ -1,0 +1,296 @@
+//! What all runs of a row say together.
+
+use serde::Serialize;
+
+use super::measure::{Errors, Memory, Run};
+use super::plan::{Device, Method, Plan, Row};
+use super::reference::{Noise, ReferenceFacts};
+use super::shares::Shares;
+use super::statistics::{Bundle, Curve, Estimate, SpeedUp, power_law_slope};
+use crate::image::Image;
+
+/// A measure of error that falls with time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Measure {
+    /// The one that speed-ups are told by.
+    TrimmedRelMse,
+    /// Relative mean squared error.
+    RelMse,
+    /// Mean squared error.
+    Mse,
+    /// Mean LDR-FLIP.
+    Flip,
+}
+
+impl Measure {
+    /// All of them, the most telling first.
+    pub const ALL: [Self; 4] = [Self::TrimmedRelMse, Self::RelMse, Self::Mse, Self::Flip];
+
+    /// In words.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::TrimmedRelMse => "trimmed relMSE",
+            Self::RelMse => "relMSE",
+            Self::Mse => "MSE",
+            Self::Flip => "FLIP",
+        }
+    }
+
+    /// The value.
+    pub fn of(self, errors: &Errors) -> f64 {
+        match self {
+            Self::TrimmedRelMse => errors.trimmed_rel_mse,
+            Self::RelMse => errors.rel_mse,
+            Self::Mse => errors.mse,
+            Self::Flip => errors.flip,
+        }
+    }
+}
+
+/// A whole report so far.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// What was asked for.
+    pub plan: Plan,
+    /// Where.
+    pub machine: super::machine::Machine,
+    /// Rows in order, as far as they are begun.
+    pub rows: Vec<RowReport>,
+    /// Whether nothing is missing.
+    pub is_finished: bool,
+}
+
+/// One scene under one map.
+#[derive(Debug, Serialize)]
+pub struct RowReport {
+    /// What it is.
+    pub row: Row,
+    /// What was said while loading.
+    pub notices: Vec<String>,
+    /// Triangles of the scene.
+    pub triangles: usize,
+    /// Columns and rows of the map.
+    pub map_size: (u32, u32),
+    /// What errors were taken against.
+    pub reference: Option<ReferenceReport>,
+    /// One entry a device.
+    pub devices: Vec<DeviceReport>,
+    /// Where the error is left.
+    pub shares: Vec<Shares>,
+    /// The reference and, by device and method, pictures of the first seed at the end.
+    #[serde(skip)]
+    pub pictures: Pictures,
+}
+
+/// Pictures of a row.
+#[derive(Debug, Default)]
+pub struct Pictures {
+    /// The reference.
+    pub reference: Option<Image>,
+    /// Device, method, picture.
+    pub runs: Vec<(Device, String, Image)>,
+}
+
+/// How good the reference is.
+#[derive(Debug, Clone, Serialize)]
+pub struct ReferenceReport {
+    /// The file, if it was given.
+    pub file: Option<String>,
+    /// How it was made, if it was made here.
+    pub facts: Option<ReferenceFacts>,
+    /// Its own expected squared error; unknown for a file and a single run.
+    pub noise: Option<Noise>,
+    /// That noise over the smallest mean error, both as trimmed relMSE.
+    pub share: Option<f64>,
+    /// Whether that is as little as was asked for.
+    pub is_good: bool,
+}
+
+/// A row on one device.
+#[derive(Debug, Serialize)]
+pub struct DeviceReport {
+    /// Which.
+    pub device: Device,
+    /// Processor or adapter.
+    pub name: String,
+    /// Why there are no figures.
+    pub not_measured: Option<String>,
+    /// One entry a method.
+    pub methods: Vec<MethodReport>,
+}
+
+/// A method on a row and device.
+#[derive(Debug, Serialize)]
+pub struct MethodReport {
+    /// What it is.
+    pub method: Method,
+    /// At the end, mean over runs with its standard error, by measure.
+    pub errors: Vec<(Measure, Estimate)>,
+    /// Mean of the picture over the reference's.
+    pub mean_ratio: Option<Estimate>,
+    /// Power of the rendering time that the error falls with, by measure; FLIP is no power law.
+    pub slopes: Vec<(Measure, Estimate)>,
+    /// Against each baseline of the plan, by measure.
+    pub speed_ups: Vec<(String, Measure, SpeedUp)>,
+    /// Ratio of error times rendering time against the first baseline: learning and tables for free.
+    pub without_learning: Option<f64>,
+    /// Where the time went.
+    pub costs: Costs,
+    /// What it held, at most.
+    pub memory: Memory,
+    /// Every run.
+    pub runs: Vec<Run>,
+}
+
+/// Means over runs.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Costs {
+    /// Seconds of tracing learning paths.
+    pub learn_seconds: f64,
+    /// Seconds of building the map's table and the laws.
+    pub table_seconds: f64,
+    /// Seconds of rendering that went into rays; unknown on a GPU.
+    pub ray_seconds: Option<f64>,
+    /// Seconds of rendering.
+    pub render_seconds: f64,
+    /// Rays per camera path, shadow rays included.
+    pub rays_per_sample: f64,
+    /// Samples per pixel at the end.
+    pub samples: f64,
+    /// Camera paths learned from.
+    pub learning_paths: u64,
+    /// Cells with a law of their own.
+    pub learned_cells: f64,
+}
+
+impl MethodReport {
+    /// Mean error at the end.
+    pub fn error(&self, measure: Measure) -> Option<Estimate> {
+        self.errors.iter().find(|(m, _)| *m == measure).map(|(_, e)| *e)
+    }
+
+    /// Speed-up over a baseline.
+    pub fn speed_up(&self, baseline: &str, measure: Measure) -> Option<SpeedUp> {
+        let is_it = |(b, m, _): &&(String, Measure, SpeedUp)| b == baseline && *m == measure;
+        self.speed_ups.iter().find(is_it).map(|(.., speed_up)| *speed_up)
+    }
+}
+
+impl DeviceReport {
+    /// A method by its name.
+    pub fn method(&self, name: &str) -> Option<&MethodReport> {
+        self.methods.iter().find(|m| m.method.name == name)
+    }
+}
+
+/// Curves of error against time, of the runs that have been judged.
+pub(super) fn curves(runs: &[Run], measure: Measure) -> Vec<Curve> {
+    let error = |run: &Run| {
+        let point = |p: &super::measure::Point| Some((p.seconds, measure.of(&p.errors?)));
+        run.points.iter().map(point).collect::<Option<Vec<_>>>()
+    };
+    runs.iter().filter_map(error).map(|points| Curve { points }).collect()
+}
+
+/// Summaries of all methods of a row on one device; `runs` holds each method's runs.
+pub(super) fn summarise(plan: &Plan, threads: usize, runs: Vec<Vec<Run>>) -> Vec<MethodReport> {
+    let bundles: Vec<[Option<Bundle>; 4]> = runs
+        .iter()
+        .map(|runs| Measure::ALL.map(|m| Bundle::new(&curves(runs, m), plan.effort.seconds)))
+        .collect();
+    let efficiencies: Vec<Option<f64>> = runs.iter().map(|runs| efficiency(runs)).collect();
+    let speed_ups = |index: usize| {
+        let mut found = Vec::new();
+        for &baseline in plan.baselines.iter().filter(|b| **b != index) {
+            for (m, measure) in Measure::ALL.into_iter().enumerate() {
+                let pair = bundles[baseline][m].as_ref().zip(bundles[index][m].as_ref());
+                if let Some(speed_up) = pair.and_then(|(b, a)| SpeedUp::new(b, a)) {
+                    found.push((plan.methods[baseline].name.clone(), measure, speed_up));
+                }
+            }
+        }
+        found
+    };
+    let all_speed_ups: Vec<_> = (0..runs.len()).map(speed_ups).collect();
+    let rest = all_speed_ups.into_iter().zip(&bundles).zip(efficiencies.clone());
+    runs.into_iter()
+        .zip(&plan.methods)
+        .zip(rest)
+        .map(|((runs, method), ((speed_ups, bundles), efficiency))| MethodReport {
+            method: method.clone(),
+            errors: Measure::ALL
+                .into_iter()
+                .zip(bundles)
+                .filter_map(|(m, b)| Some((m, (*b.as_ref()?.estimates().last()?)?)))
+                .collect(),
+            mean_ratio: estimate(&runs, |run| Some(run.points.last()?.errors?.mean_ratio)),
+            slopes: Measure::ALL[..3]
+                .iter()
+                .filter_map(|m| Some((*m, estimate(&runs, |run| slope(run, *m))?)))
+                .collect(),
+            speed_ups,
+            without_learning: efficiencies[plan.baselines[0]].zip(efficiency).map(|(b, a)| b / a),
+            costs: costs(&runs, threads),
+            memory: most_memory(&runs),
+            runs,
+        })
+        .collect()
+}
+
+fn estimate(runs: &[Run], value: impl Fn(&Run) -> Option<f64>) -> Option<Estimate> {
+    let values: Vec<f64> = runs.iter().filter_map(value).collect();
+    (!values.is_empty()).then(|| Estimate::of(&values)).flatten()
+}
+
+/// Points before the error has settled into a power law do not count: from this share of the
+/// rendering time on, and this many samples.
+const SLOPE_FROM: (f64, u32) = (1.0 / 16.0, 4);
+
+fn slope(run: &Run, measure: Measure) -> Option<f64> {
+    let end = run.points.last()?.render_seconds;
+    let points: Vec<(f64, f64)> = run
+        .points
+        .iter()
+        .filter(|p| p.samples >= SLOPE_FROM.1 && p.render_seconds >= SLOPE_FROM.0 * end)
+        .filter_map(|p| Some((p.render_seconds, measure.of(&p.errors?))))
+        .collect();
+    if points.len() < 3 { None } else { power_law_slope(&points) }
+}
+
+/// Mean of error times rendering time at the end.
+fn efficiency(runs: &[Run]) -> Option<f64> {
+    let product = |run: &Run| {
+        let last = run.points.last()?;
+        Some(last.errors?.trimmed_rel_mse * last.render_seconds)
+    };
+    estimate(runs, product).map(|e| e.mean)
+}
+
+fn costs(runs: &[Run], threads: usize) -> Costs {
+    let count = runs.len().max(1) as f64;
+    let mean = |value: &dyn Fn(&Run) -> f64| runs.iter().map(value).sum::<f64>() / count;
+    let nanoseconds = runs.iter().find_map(|run| run.nanoseconds_per_ray);
+    let render_seconds = mean(&|r| r.figures.render_seconds);
+    let rays = mean(&|r| r.figures.rays as f64);
+    Costs {
+        learn_seconds: mean(&|r| r.figures.learning_seconds - r.figures.law_seconds),
+        table_seconds: mean(&|r| r.table_seconds + r.figures.law_seconds),
+        ray_seconds: nanoseconds.map(|ns| (ns * 1e-9 * rays / threads as f64).min(render_seconds)),
+        render_seconds,
+        rays_per_sample: rays / mean(&|r| r.figures.samples as f64).max(1.0),
+        samples: mean(&|r| r.points.last().map_or(0.0, |p| f64::from(p.samples))),
+        learning_paths: runs.first().map_or(0, |r| r.figures.learning_paths),
+        learned_cells: mean(&|r| r.figures.learned_cells as f64),
+    }
+}
+
+fn most_memory(runs: &[Run]) -> Memory {
+    runs.iter().fold(Memory::default(), |most, run| Memory {
+        table_bytes: most.table_bytes.max(run.memory.table_bytes),
+        bvh_bytes: most.bvh_bytes.max(run.memory.bvh_bytes),
+        grid_peak_bytes: most.grid_peak_bytes.max(run.memory.grid_peak_bytes),
+        grid_bytes: most.grid_bytes.max(run.memory.grid_bytes),
+        device_bytes: most.device_bytes.max(run.memory.device_bytes),
+    })
+}
