@@ -13,9 +13,11 @@
 //! - [`path`] is the one loop that turns random numbers into radiance; [`render`] runs it over the
 //!   picture, pass by pass, into a film.
 //! - [`app`] is the window, [`cli`] what a person types; both find files by [`sources`], and write by
-//!   [`output`]. [`report`] measures error against time; [`metrics`] compares pictures, [`denoise`] smooths them, [`tone`] develops them.
+//!   [`output`]. [`report`] measures error against time; [`metrics`] compares pictures, [`denoise`]
+//!   smooths them, [`tone`] develops them. [`stability`] tries all of it on stiff and extreme cases.
 //!
-//! Arrows point down: `cli -> {app, report} -> render -> path -> {light_grid, bsdf, medium, bvh} ->
+//! Arrows point down: `cli -> {stability -> app, report} -> render -> path ->
+//! {light_grid, bsdf, medium, bvh} ->
 //! {scene, environment} -> {image, sampler, math, color, error}`.
 
 pub mod app;
@@ -40,4 +42,5 @@ pub mod report;
 pub mod sampler;
 pub mod scene;
 pub mod sources;
+pub mod stability;
 pub mod tone;

@@ -11,6 +11,9 @@ use crate::error::{Error, Result};
 use crate::image::write_beside_and_rename;
 use crate::render::StopRule;
 
+/// Largest picture in pixels, as on the command line.
+const MAX_PIXELS: u64 = 1 << 27;
+
 /// Recent files kept.
 const MOST_RECENT: usize = 8;
 
@@ -81,10 +84,40 @@ impl Settings {
     pub fn read(path: &Path) -> Result<Self> {
         match std::fs::read(path) {
             Ok(bytes) => serde_json::from_slice(&bytes)
+                .map(Self::within_bounds)
                 .map_err(|e| Error::at(path, format!("settings not understood: {e}"))),
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Self::default()),
             Err(e) => Err(Error::at(path, e)),
         }
+    }
+
+    /// Values a window can work with: a file that was edited or damaged may hold anything.
+    fn within_bounds(mut self) -> Self {
+        let default = Self::default();
+        self.size = match self.size {
+            PictureSize::Viewport(divisor) => PictureSize::Viewport(divisor.clamp(1, 64)),
+            PictureSize::Fixed(width, height)
+                if (1..=MAX_PIXELS).contains(&(u64::from(width) * u64::from(height))) =>
+            {
+                self.size
+            }
+            PictureSize::Fixed(..) => default.size,
+        };
+        for (side, usual) in self.window_size.iter_mut().zip(default.window_size) {
+            *side = if side.is_finite() { side.clamp(1.0, 16_384.0) } else { usual };
+        }
+        let finite = |x: f32, usual: f32| if x.is_finite() { x } else { usual };
+        let (look, usual) = (&mut self.look, &default.look);
+        look.exposure_ev = finite(look.exposure_ev, usual.exposure_ev).clamp(-64.0, 64.0);
+        let (balance, usual) = (&mut look.white_balance, &usual.white_balance);
+        balance.kelvin = finite(balance.kelvin, usual.kelvin).clamp(2000.0, 12_000.0);
+        balance.tint = finite(balance.tint, usual.tint).clamp(-1.0, 1.0);
+        self.light.bounces = self.light.bounces.min(100_000);
+        let positive = |x: &f64| *x > 0.0 && x.is_finite();
+        self.stop.seconds = self.stop.seconds.filter(positive);
+        self.stop.noise = self.stop.noise.filter(positive);
+        self.stop.samples = self.stop.samples.filter(|samples| *samples > 0);
+        self
     }
 
     /// Writes them, making the folder if need be.

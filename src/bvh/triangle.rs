@@ -1,7 +1,7 @@
 //! Watertight ray/triangle test on eight lanes (Woop, Benthin, Wald, *Watertight Ray/Triangle
 //! Intersection*, JCGT 2(1), 2013).
 
-use glam::Vec2;
+use glam::{DVec3, Vec2};
 
 use super::traverse::{Bits, Lanes};
 use super::wide::{Block, WIDTH};
@@ -16,6 +16,7 @@ pub(super) struct Shear {
     /// Slopes of the ray along the first two axes and inverse of its length along the third.
     factors: [f32; 3],
     origin: [f32; 3],
+    direction: [f32; 3],
 }
 
 impl Shear {
@@ -30,6 +31,7 @@ impl Shear {
             axes,
             factors: [d[0] / d[2], d[1] / d[2], 1.0 / d[2]],
             origin: axes.map(|axis| ray.origin[axis]),
+            direction: d,
         }
     }
 }
@@ -84,7 +86,19 @@ pub(super) fn intersect<L: Lanes>(block: &Block, ray: &Shear, t_min: f32, t_max:
     }
     let determinant = edges[0].add(edges[1]).add(edges[2]);
     let scaled = edges[0].mul(a[2]).add(edges[1].mul(b[2])).add(edges[2].mul(c[2]));
-    let t = scaled.mul(L::splat(ray.factors[2])).div(determinant);
+    let mut t = scaled.mul(L::splat(ray.factors[2])).div(determinant);
+    // The error of `t` is a few 2^-24 of how far the vertices lie along the ray: a lot next to a
+    // triangle that is far larger than `t`. On a ground of 10 km every ray would meet its own start.
+    let farthest = magnitude(a[2]).max(magnitude(b[2])).max(magnitude(c[2]));
+    let reach = farthest.mul(L::splat(ray.factors[2].abs()));
+    let slack = reach.mul(L::splat(DISTANCE_ERROR));
+    mask &= L::splat(t_min).le(t.add(slack)) & t.le(L::splat(t_max).add(slack));
+    let rough = mask & magnitude(t).le(reach.mul(L::splat(ROUGH_DISTANCE)));
+    if rough != 0 {
+        let mut stored = t.store();
+        exact_distances(&mut stored, block, ray, rough);
+        t = L::load(&stored);
+    }
     mask &= L::splat(t_min).le(t) & t.le(L::splat(t_max));
     if mask == 0 {
         return BlockHits::NONE;
@@ -93,6 +107,35 @@ pub(super) fn intersect<L: Lanes>(block: &Block, ray: &Shear, t_min: f32, t_max:
         mask,
         t: t.store(),
         barycentric: [edges[1].div(determinant).store(), edges[2].div(determinant).store()],
+    }
+}
+
+/// Bound on the error of a distance, in units of how far the vertices lie along the ray: 16 * 2^-24.
+const DISTANCE_ERROR: f32 = 1.0 / (1 << 20) as f32;
+
+/// Distances below this, in the same units, have an error of per cents: they are computed anew.
+const ROUGH_DISTANCE: f32 = 1.0 / (1 << 14) as f32;
+
+#[inline(always)]
+fn magnitude<L: Lanes>(x: L) -> L {
+    x.max(L::splat(0.0).sub(x))
+}
+
+/// Puts the distances of the lanes in `lanes` to the triangles' planes, computed in f64.
+#[cold]
+#[inline(never)]
+fn exact_distances(t: &mut [f32; WIDTH], block: &Block, ray: &Shear, lanes: u32) {
+    let of_axes = |values: &[f32; 3]| DVec3::from(values.map(f64::from));
+    let (origin, direction) = (of_axes(&ray.origin), of_axes(&ray.direction));
+    for lane in Bits(lanes) {
+        let [a, b, c] = [0, 1, 2].map(|corner| {
+            of_axes(&ray.axes.map(|axis| block.vertices[corner][axis][lane])) - origin
+        });
+        let normal = (b - a).cross(c - a);
+        let approach = normal.dot(direction);
+        if approach != 0.0 {
+            t[lane] = (normal.dot(a) / approach) as f32;
+        }
     }
 }
 

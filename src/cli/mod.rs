@@ -13,6 +13,7 @@ mod render;
 mod report;
 mod sat;
 mod screenshot;
+mod stability;
 mod values;
 mod view;
 
@@ -47,6 +48,8 @@ enum Command {
     Report(Box<report::ReportArguments>),
     /// Compare the importance tables' accuracy on maps (the talk's summed-area-table claim).
     Sat(sat::SatArguments),
+    /// Try stiff and extreme cases on this machine; fails if one does.
+    Stability(stability::StabilityArguments),
 }
 
 /// Runs the command line; errors become one sentence on stderr and a non-zero exit.
@@ -62,6 +65,7 @@ pub fn main() -> ExitCode {
         Command::Devices(arguments) => device::run(arguments),
         Command::Report(arguments) => report::run(arguments),
         Command::Sat(arguments) => sat::run(arguments),
+        Command::Stability(arguments) => stability::run(arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -70,4 +74,10 @@ pub fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Whether these words after the program's name are a command line that would be run.
+pub fn accepts(words: &[String]) -> bool {
+    let program = "lightgrid".to_owned();
+    Arguments::try_parse_from(std::iter::once(&program).chain(words)).is_ok()
 }

@@ -25,20 +25,25 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<Image> {
             header.height()
         ));
     }
-    let mut image = Image::filled(header.width(), header.height(), [0.0; 3]);
-    let pixels = PixelDecoder::new(&header);
+    let decoder = PixelDecoder::new(&header);
     let mut line = vec![[0u8; 4]; minor.count as usize];
+    let mut pixels = Vec::new();
+    // All at once if the file can hold it in runs, else as it is read: old runs have no bound, and a
+    // small file may claim gigabytes.
+    let total = major.count as usize * minor.count as usize;
+    if total / MAX_PIXELS_PER_BYTE <= cursor.rest.len() {
+        pixels.reserve_exact(total);
+    }
     for row in 0..major.count {
         read_line(&mut cursor, &mut line)
             .map_err(|cause| format!("{cause}: only {row} of {} rows can be read", major.count))?;
-        let start = major.position(row) * if major.is_y { header.width() as usize } else { 1 };
-        let stride = if major.is_y { 1 } else { header.width() as usize };
-        for (i, &rgbe) in line.iter().enumerate() {
-            image.pixels[start + minor.position(i as u32) * stride] = pixels.decode(rgbe);
-        }
+        pixels.extend(line.iter().map(|&rgbe| decoder.decode(rgbe)));
     }
-    Ok(image)
+    Ok(header.upright(pixels))
 }
+
+/// Most pixels that a byte of new run lengths stands for: 127 in two bytes for each of four channels.
+const MAX_PIXELS_PER_BYTE: usize = 16;
 
 /// One of the two axes of the resolution line.
 #[derive(Debug, Clone, Copy)]
@@ -108,6 +113,23 @@ impl Header {
         let line = cursor.line().ok_or("has no resolution line")?;
         let (major, minor) = parse_resolution(&line)?;
         Ok(Self { is_xyz, exposure, major, minor })
+    }
+
+    /// The picture of pixels in file order.
+    fn upright(&self, pixels: Vec<[f32; 3]>) -> Image {
+        let (major, minor, width, height) = (self.major, self.minor, self.width(), self.height());
+        if major.is_y && !major.reversed && !minor.reversed {
+            return Image { width, height, pixels };
+        }
+        let mut image = Image::filled(width, height, [0.0; 3]);
+        let strides = if major.is_y { (width as usize, 1) } else { (1, width as usize) };
+        for (row, line) in (0..).zip(pixels.chunks_exact(minor.count as usize)) {
+            let start = major.position(row) * strides.0;
+            for (i, pixel) in (0..).zip(line) {
+                image.pixels[start + minor.position(i) * strides.1] = *pixel;
+            }
+        }
+        image
     }
 
     fn width(&self) -> u32 {

@@ -10,6 +10,22 @@ const MAX_SIDE: u32 = 32_768;
 /// Most bytes one picture may take while it is decoded: 16384 x 16384 RGBA.
 const MAX_BYTES: u64 = 1 << 30;
 
+/// Most bytes that decoding a picture file of `file_bytes` may take: what deflate, the densest of the
+/// codecs in use on real pictures, could make of it (1032 to 1), and some room for tables.
+pub(crate) fn decoder_bytes(file_bytes: u64) -> u64 {
+    (16 << 20) + file_bytes.saturating_mul(1100)
+}
+
+/// A decoder's complaint on one line.
+pub(crate) fn decoder_cause(cause: &image::ImageError, file_bytes: u64) -> String {
+    match cause {
+        image::ImageError::Limits(_) => {
+            format!("claims more pixels than its {file_bytes} bytes can hold or lightgrid reads")
+        }
+        other => other.to_string().replace('\n', " "),
+    }
+}
+
 /// 8-bit RGBA picture as it is stored (usually sRGB-encoded), row 0 at the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LdrImage {
@@ -39,9 +55,12 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
     limits.max_image_height = Some(MAX_SIDE);
-    limits.max_alloc = Some(MAX_BYTES);
+    let file_bytes = bytes.len() as u64;
+    limits.max_alloc = Some(MAX_BYTES.min(decoder_bytes(file_bytes)));
     reader.limits(limits);
-    let rgba = reader.decode().map_err(|cause| damaged(name, &cause))?.into_rgba8();
+    let decoded = reader.decode();
+    let rgba =
+        decoded.map_err(|cause| Error::at(name, decoder_cause(&cause, file_bytes)))?.into_rgba8();
     let (width, height) = rgba.dimensions();
     let pixels = bytemuck::allocation::try_cast_vec(rgba.into_raw())
         .unwrap_or_else(|(_, raw)| raw.as_chunks::<4>().0.to_vec());

@@ -10,6 +10,7 @@ use super::exr_read::{Exr, read_exr};
 use super::file::read_cause;
 use super::guard::catch_panic;
 use super::hdr::decode_hdr;
+use super::ldr::{decoder_bytes, decoder_cause};
 use super::{Decoded, Image, MAX_PIXELS, MAX_SIDE};
 use crate::color::linear_from_srgb;
 use crate::error::{Error, Notices, Result};
@@ -199,7 +200,8 @@ fn decode_ldr_file(path: &Path) -> Decoded<image::DynamicImage> {
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIDE as u32);
     limits.max_image_height = Some(MAX_SIDE as u32);
-    limits.max_alloc = Some(MAX_PIXELS * 4);
+    let file_bytes = fs::metadata(path).map_err(|e| read_cause(&e))?.len();
+    limits.max_alloc = Some((MAX_PIXELS * 4).min(decoder_bytes(file_bytes)));
     reader.limits(limits);
-    reader.decode().map_err(|e| format!("cannot be decoded: {e}"))
+    reader.decode().map_err(|e| format!("cannot be decoded: {}", decoder_cause(&e, file_bytes)))
 }

@@ -14,3 +14,4 @@ mod metrics;
 mod peers;
 mod report;
 mod shared;
+mod stability;

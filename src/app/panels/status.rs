@@ -108,6 +108,13 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
             "Estimated relative RMS error of the pixels, from the samples' own spread",
         );
     }
+    let invalid = film.invalid_samples();
+    if invalid > 0 {
+        let text = RichText::new(format!("{} not finite", theme::count(invalid)));
+        ui.label(text.color(theme::ALERT)).on_hover_text(
+            "Samples that were NaN or infinite: they are left out of the picture and counted as black",
+        );
+    }
     let grid = take.grid.as_ref().map_or(0, |grid| grid.memory_bytes());
     let map = snapshot.request.environment.memory_bytes();
     number(

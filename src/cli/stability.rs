@@ -1,0 +1,137 @@
+//! `lightgrid stability`.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use crate::error::{Error, Result};
+use crate::image::check_writable;
+use crate::output::record::write_json;
+use crate::render::gpu::Gpu;
+use crate::stability::fuzz::{self, Kind};
+use crate::stability::{Case, Report, Setting, Verdict, cases, run as run_case};
+
+/// Arguments of `stability`.
+#[derive(Debug, clap::Args)]
+pub(super) struct StabilityArguments {
+    /// What renders.
+    #[arg(long, default_value = "cpu", value_enum)]
+    device: Device,
+    /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Only cases whose name contains this, such as `maps` or `grid/crack`; may be given more than once.
+    #[arg(long = "case", value_name = "NAME")]
+    cases: Vec<String>,
+    /// Writes every figure as JSON.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// The long counts: 1e9 rays, maps of a gigabyte, 1e8 learning paths. Hours.
+    #[arg(long)]
+    nightly: bool,
+    /// Prints the names of the cases and runs none.
+    #[arg(long)]
+    list: bool,
+    /// Reads spoilt input of one kind in this process, as the cases under `fuzz` let a process do.
+    #[arg(long, hide = true, value_enum)]
+    fuzz: Option<Kind>,
+    /// First spoilt input.
+    #[arg(long, hide = true, default_value = "0", requires = "fuzz")]
+    first: u64,
+    /// Number of spoilt inputs.
+    #[arg(long, hide = true, default_value = "1", requires = "fuzz")]
+    count: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Device {
+    /// All cases but those about a GPU.
+    Cpu,
+    /// The cases that render, on a GPU.
+    Gpu,
+}
+
+/// Runs the cases, prints a line for each; an error if one fails.
+pub(super) fn run(arguments: &StabilityArguments) -> Result<()> {
+    if let Some(kind) = arguments.fuzz {
+        return fuzz::work(kind, arguments.first, arguments.count, super::accepts);
+    }
+    let chosen = choose(arguments)?;
+    if arguments.list {
+        chosen.iter().for_each(|case| println!("{}", case.title()));
+        return Ok(());
+    }
+    if let Some(file) = &arguments.json {
+        check_writable(file)?;
+    }
+    let binary = std::env::current_exe()
+        .map_err(|e| Error::new(format!("this program's own file cannot be found: {e}")))?;
+    let gpu = match arguments.device {
+        Device::Cpu if arguments.adapter.is_some() => {
+            return Err(Error::new("--adapter and --device cpu exclude each other"));
+        }
+        Device::Cpu => None,
+        Device::Gpu => Some(Gpu::open(arguments.adapter.as_deref())?),
+    };
+    let device = gpu.as_ref().map_or("CPU".to_owned(), |gpu| gpu.facts().name.clone());
+    let setting = Setting { gpu, nightly: arguments.nightly, binary, accepts: super::accepts };
+    let mut reports = Vec::new();
+    for case in chosen {
+        let report = run_case(case, &setting);
+        println!("{}", report.line());
+        reports.push(report);
+    }
+    if let Some(file) = &arguments.json {
+        let all: Vec<_> = reports.iter().map(Report::to_json).collect();
+        let value = json!({
+            "software": concat!("lightgrid ", env!("CARGO_PKG_VERSION")),
+            "device": device,
+            "nightly": arguments.nightly,
+            "cases": all,
+        });
+        write_json(file, &value)?;
+    }
+    conclude(&reports)
+}
+
+fn choose(arguments: &StabilityArguments) -> Result<Vec<&'static Case>> {
+    let with_gpu = arguments.device == Device::Gpu;
+    // A whole name means that case or that group; part of one, all that contain it.
+    let is_named = |case: &Case, name: &str| {
+        if cases().any(|other| other.group == name || other.title() == name) {
+            case.group == name || case.title() == name
+        } else {
+            case.title().contains(name)
+        }
+    };
+    let named = |case: &Case| {
+        arguments.cases.is_empty() || arguments.cases.iter().any(|name| is_named(case, name))
+    };
+    let chosen: Vec<&Case> = cases().filter(|case| case.runs(with_gpu) && named(case)).collect();
+    if chosen.is_empty() {
+        return Err(Error::new(format!(
+            "no case for this device is called {}; lightgrid stability --list names them",
+            arguments.cases.join(" or ")
+        )));
+    }
+    Ok(chosen)
+}
+
+/// The last line, or the error that names what failed.
+fn conclude(reports: &[Report]) -> Result<()> {
+    let of =
+        |verdict: Verdict| reports.iter().filter(move |report| report.outcome.verdict() == verdict);
+    let seconds: f64 = reports.iter().map(|report| report.seconds).sum();
+    println!(
+        "{} passed, {} failed, {} skipped in {seconds:.0} s",
+        of(Verdict::Passed).count(),
+        of(Verdict::Failed).count(),
+        of(Verdict::Skipped).count()
+    );
+    let failed: Vec<&str> = of(Verdict::Failed).map(|report| report.title.as_str()).collect();
+    if failed.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::new(format!("failed: {}", failed.join(", "))))
+    }
+}

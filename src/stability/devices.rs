@@ -1,0 +1,134 @@
+//! Devices against each other, and against f64.
+
+use glam::Vec3;
+
+use super::maps::sun;
+use super::reference::Reference;
+use super::scenes::{Stage, first_texture, glass, lambert, light, mean, render, room, sky, view};
+use super::{Case, On, Outcome, Setting};
+use crate::environment::Environment;
+use crate::error::{Error, Result};
+use crate::path::World;
+use crate::render::film::{Film, Pixel};
+use crate::render::{Sampling, View};
+use crate::scene::{Camera, Material};
+
+const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
+    Case { group: "devices", name, on, run }
+}
+
+pub(super) const CASES: &[Case] = &[
+    case("f32-against-f64", On::Any, against_f64),
+    case("gpu-against-cpu", On::Gpu, |s| against_cpu(s, room(0.7, 1.0, Vec3::ZERO))),
+    case("gpu-against-cpu-glass", On::Gpu, |s| against_cpu(s, glasses())),
+    case("gpu-against-cpu-textured", On::Gpu, |s| against_cpu(s, textured())),
+];
+
+/// How far apart pixels are, relative to the pixel plus a thousandth of the picture's mean.
+struct Deviations {
+    worst: f64,
+    mean: f64,
+    /// Share of pixels that are more than 0.2 % apart.
+    apart: f64,
+}
+
+impl Deviations {
+    fn of(found: impl Iterator<Item = f64>, expected: &[f64]) -> Self {
+        let count = expected.len() as f64;
+        let floor = 1e-3 * expected.iter().sum::<f64>() / count;
+        let all: Vec<f64> = found.zip(expected).map(|(a, b)| (a - b).abs() / (b + floor)).collect();
+        Self {
+            worst: all.iter().copied().fold(0.0, f64::max),
+            mean: all.iter().sum::<f64>() / count,
+            apart: all.iter().filter(|d| **d > 2e-3).count() as f64 / count,
+        }
+    }
+}
+
+fn luminances(film: &Film) -> impl Iterator<Item = f64> {
+    film.pixels().iter().map(Pixel::mean_luminance)
+}
+
+/// One sample a pixel, so that nothing averages out, and then many.
+fn against_f64(setting: &Setting) -> Result<Outcome> {
+    let mut outcome = Outcome::new();
+    for (name, environment) in [("day", sky("day")?), ("sun of 1e5", light(sun(96, 48, 1e5))?)] {
+        let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::new(0.0, 0.4, -1.0), 1.2);
+        let world = Stage::default().floor(&lambert(0.5), Vec3::ZERO, 1e4).build();
+        let reference = Reference::new(&environment, 0.5);
+        let reference = reference.ok_or_else(|| Error::new("the sky is black"))?;
+        for (side, samples) in [(setting.count(96, 512), 1), (16, setting.count(256, 4096))] {
+            // Looking down far enough that no pixel sees the floor's end.
+            let camera = Camera::look_at(
+                camera.world_from_camera.translation.into(),
+                Vec3::new(0.0, 0.0, -0.5),
+                0.6,
+            );
+            let view = View { width: side, height: side, ..view(camera, Sampling::Plain, 1) };
+            let film = render(setting, &world, &environment, view.clone(), samples)?;
+            let found = Deviations::of(luminances(&film), &reference.picture(&view, samples));
+            let what = format!("{name}, {samples} a pixel");
+            // The density jumps from texel to texel, so a sample that rounding sends over an edge
+            // has another weight: such a sample is off by per cents, and there are few.
+            outcome = outcome
+                .sound(&film)
+                .at_most(format!("{what}: mean deviation from f64"), found.mean, 1e-3)
+                .at_most(format!("{what}: pixels off by 0.2 %"), found.apart, 0.02)
+                .told(format!("{what}: worst deviation from f64"), found.worst);
+        }
+    }
+    Ok(outcome)
+}
+
+/// The same seed draws the same paths but for rounding; expectations are the same.
+fn against_cpu(setting: &Setting, (stage, camera): (Stage, Camera)) -> Result<Outcome> {
+    let (world, environment) = (stage.build(), sky("day")?);
+    let view = View { width: 32, height: 32, ..view(camera, Sampling::Plain, 3) };
+    compare(setting, &world, &environment, view)
+}
+
+fn compare(
+    setting: &Setting,
+    world: &World,
+    environment: &Environment,
+    view: View,
+) -> Result<Outcome> {
+    let on_cpu = Setting { gpu: None, binary: setting.binary.clone(), ..*setting };
+    let samples = setting.count(16, 256);
+    let cpu = render(&on_cpu, world, environment, view.clone(), samples)?;
+    let gpu = render(setting, world, environment, view, samples)?;
+    let expected: Vec<f64> = luminances(&cpu).collect();
+    let found = Deviations::of(luminances(&gpu), &expected);
+    let ratio = mean(&gpu).luminance / mean(&cpu).luminance;
+    Ok(Outcome::new()
+        .sound(&gpu)
+        // Paths that rounding sends to another triangle, texel or side of a lobe.
+        .at_most("share of pixels off by 0.2 %", found.apart, 0.05)
+        .at_most("mean of the picture off, relative", (ratio - 1.0).abs(), 5e-3)
+        .told("mean deviation of a pixel", found.mean)
+        .told("worst deviation of a pixel", found.worst))
+}
+
+/// Spheres of smooth and rough glass on the room's floor.
+fn glasses() -> (Stage, Camera) {
+    let (stage, camera) = room(0.7, 1.0, Vec3::ZERO);
+    let smoked = Material {
+        attenuation_color: Vec3::new(0.9, 0.5, 0.2),
+        attenuation_distance: 0.5,
+        ..glass(1.5, 0.0)
+    };
+    let stage = stage.sphere(&smoked, Vec3::new(0.2, 0.5, 0.3), 0.4).sphere(
+        &glass(1.5, 0.3),
+        Vec3::new(-0.3, 0.4, 0.9),
+        0.3,
+    );
+    (stage, camera)
+}
+
+/// A floor with a normal map beside the room's block.
+fn textured() -> (Stage, Camera) {
+    let mapped =
+        Material { normal_texture: first_texture(), metallic: 0.5, roughness: 0.4, ..lambert(0.8) };
+    let stage = Stage::default().floor(&mapped, Vec3::ZERO, 4.0).with_texel([170, 110, 220, 255]);
+    (stage, Camera::look_at(Vec3::new(0.5, 1.5, 1.5), Vec3::ZERO, 0.8))
+}

@@ -1,0 +1,152 @@
+//! Small files that claim to be large. Each must be refused, and before anything of that size is
+//! allocated.
+
+use super::corpus::container;
+
+/// File name (whose extension says what it is) and content.
+pub(super) fn all() -> Vec<(&'static str, Vec<u8>)> {
+    vec![
+        // The issue's own: some hundred bytes, 1e9 pixels.
+        ("pixels-1e9.hdr", hdr("-Y 31623 +X 31623", 40)),
+        ("side-4e9.hdr", hdr("-Y 4294967295 +X 4294967295", 40)),
+        ("row-of-65536.hdr", hdr("-Y 65536 +X 65536", 40)),
+        // Enough bytes for a few in each row: only reading on shows that the pixels are not there.
+        ("64-kb-for-16384x16384.hdr", hdr("-Y 16384 +X 16384", 65_536)),
+        ("64-kb-on-its-side.hdr", hdr("+X 16384 -Y 16384", 65_536)),
+        ("pixels-1e9.png", png(31_623, 31_623, 40)),
+        ("16000x16000.png", png(16_000, 16_000, 64)),
+        ("16000x16000-in-64-kb.png", png(16_000, 16_000, 65_536)),
+        ("pixels-1e9.exr", exr(31_622, 31_622)),
+        ("16000x16000.exr", exr(15_999, 15_999)),
+        ("pixels-1e9.bmp", bmp(31_623)),
+        ("16000x16000.bmp", bmp(16_000)),
+        ("60000x60000.tga", tga(60_000)),
+        ("16000x16000.tga", tga(16_000)),
+        ("vertices-1e9.gltf", gltf(1_000_000_000, "", "")),
+        ("vertices-1e9-of-zeros.gltf", gltf_zeros()),
+        ("buffer-1e18.gltf", gltf(3, "", r#","byteLength":1000000000000000000"#)),
+        ("instances-1e9.gltf", instances()),
+        ("chunk-4e9.glb", chunk()),
+    ]
+}
+
+fn hdr(size: &str, bytes: usize) -> Vec<u8> {
+    let mut file = format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{size}\n").into_bytes();
+    // Runs of the new kind where a row has that width, else plain pixels.
+    file.extend([2, 2, 0x40, 0x00].iter().chain([255_u8, 7].iter().cycle()).take(bytes));
+    file
+}
+
+fn png(width: u32, height: u32, bytes: usize) -> Vec<u8> {
+    let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+    let mut header = width.to_be_bytes().to_vec();
+    header.extend(height.to_be_bytes());
+    header.extend([8, 2, 0, 0, 0]);
+    chunk_of(&mut file, *b"IHDR", &header);
+    // A zlib stream of one stored block, cut short.
+    let mut data = vec![0x78, 0x01, 0x01];
+    data.extend(((bytes.min(65_535)) as u16).to_le_bytes());
+    data.extend((!(bytes.min(65_535)) as u16).to_le_bytes());
+    data.resize(data.len() + bytes, 0);
+    chunk_of(&mut file, *b"IDAT", &data);
+    chunk_of(&mut file, *b"IEND", &[]);
+    file
+}
+
+fn chunk_of(file: &mut Vec<u8>, name: [u8; 4], data: &[u8]) {
+    file.extend((data.len() as u32).to_be_bytes());
+    let start = file.len();
+    file.extend(name);
+    file.extend(data);
+    let sum = crc32(&file[start..]);
+    file.extend(sum.to_be_bytes());
+}
+
+/// PNG's checksum (ISO 3309), bit by bit.
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |sum, byte| {
+        (0..8).fold(sum ^ u32::from(*byte), |sum, _| {
+            if sum & 1 == 1 { (sum >> 1) ^ 0xedb8_8320 } else { sum >> 1 }
+        })
+    })
+}
+
+/// Scan lines of half floats, uncompressed, with no data after the header.
+fn exr(last_x: u32, last_y: u32) -> Vec<u8> {
+    let mut file = vec![0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
+    let mut attribute = |name: &str, kind: &str, value: &[u8]| {
+        file.extend(name.bytes().chain([0]).chain(kind.bytes()).chain([0]));
+        file.extend((value.len() as u32).to_le_bytes());
+        file.extend(value);
+    };
+    let mut channels = Vec::new();
+    for name in [b'B', b'G', b'R'] {
+        channels.extend([name, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
+    }
+    channels.push(0);
+    attribute("channels", "chlist", &channels);
+    attribute("compression", "compression", &[0]);
+    let corner = [last_x.to_le_bytes(), last_y.to_le_bytes()].concat();
+    let window = [&[0; 8][..], &corner].concat();
+    attribute("dataWindow", "box2i", &window);
+    attribute("displayWindow", "box2i", &window);
+    attribute("lineOrder", "lineOrder", &[0]);
+    attribute("pixelAspectRatio", "float", &1.0_f32.to_le_bytes());
+    attribute("screenWindowCenter", "v2f", &[0; 8]);
+    attribute("screenWindowWidth", "float", &1.0_f32.to_le_bytes());
+    file.push(0);
+    file
+}
+
+fn bmp(side: u32) -> Vec<u8> {
+    let mut file = b"BM\x3e\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0".to_vec();
+    file.extend(side.to_le_bytes());
+    file.extend(side.to_le_bytes());
+    file.extend([1, 0, 24, 0]);
+    file.extend([0; 32]);
+    file
+}
+
+fn tga(side: u16) -> Vec<u8> {
+    let mut file = vec![0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+    file.extend(side.to_le_bytes());
+    file.extend(side.to_le_bytes());
+    file.extend([24, 0x20, 1, 2, 3, 4, 5, 6]);
+    file
+}
+
+fn gltf(count: u64, accessor: &str, buffer: &str) -> Vec<u8> {
+    let buffer = if buffer.is_empty() { r#","byteLength":36"# } else { buffer };
+    let corners = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA";
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":
+        [{{"attributes":{{"POSITION":0}}}}]}}],"accessors":[{{"bufferView":0,"componentType":5126,
+        "count":{count},"type":"VEC3"{accessor}}}],"bufferViews":[{{"buffer":0,"byteLength":36}}],
+        "buffers":[{{"uri":"data:application/octet-stream;base64,{corners}"{buffer}}}]}}"#
+    )
+    .into_bytes()
+}
+
+/// Vertices without a buffer view are zeros, which cost no bytes.
+fn gltf_zeros() -> Vec<u8> {
+    br#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":
+    {"POSITION":0}}]}],"accessors":[{"componentType":5126,"count":1000000000,"type":"VEC3"}]}"#
+        .to_vec()
+}
+
+/// One triangle, a billion times.
+fn instances() -> Vec<u8> {
+    let corners: [f32; 9] = [0., 0., 0., 1., 0., 0., 0., 1., 0.];
+    let json = r#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0,"extensions":{"EXT_mesh_gpu_instancing":
+        {"attributes":{"TRANSLATION":1}}}}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+        "extensionsUsed":["EXT_mesh_gpu_instancing"],"accessors":[{"bufferView":0,"componentType":5126,
+        "count":3,"type":"VEC3"},{"componentType":5126,"count":1000000000,"type":"VEC3"}],
+        "bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36}]}"#;
+    container(json.to_owned(), bytemuck::cast_slice(&corners).to_vec())
+}
+
+fn chunk() -> Vec<u8> {
+    let mut file = container("{}".to_owned(), vec![0; 8]);
+    file[12..16].copy_from_slice(&u32::MAX.to_le_bytes());
+    file
+}

@@ -1,0 +1,298 @@
+//! Geometry: no ray leaves a closed room, whatever its triangles and its size.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::random::Random;
+use super::scenes::{
+    Mean, SIGMAS, Stage, constant, deviation, difference, lambert, mean, render, room, sealed, sky,
+    view,
+};
+use super::{Case, On, Outcome, Setting};
+use crate::bvh::{Bvh, Ray, offset_origin};
+use crate::error::Result;
+use crate::path::World;
+use crate::render::{Sampling, View};
+use crate::scene::Camera;
+
+const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
+    Case { group: "geometry", name, on, run }
+}
+
+pub(super) const CASES: &[Case] = &[
+    case("degenerate-and-duplicate", On::Any, degenerate),
+    case("slivers-1e6-to-1", On::Cpu, |s| Ok(slivers(s))),
+    case("coplanar-overlaps", On::Any, coplanar),
+    case("room-of-1e-4-m", On::Any, |s| scaled_room(s, 2.5e-5)),
+    case("room-of-1e6-m", On::Any, |s| scaled_room(s, 2.5e5)),
+    case("rays-along-shared-edges", On::Cpu, |s| Ok(leaks_on_axes(s))),
+    case("rays-anywhere", On::Cpu, |s| Ok(leaks_anywhere(s))),
+    case("paths-in-a-closed-room", On::Cpu, |s| Ok(bouncing_leaks(s))),
+    case("1e-3-m-room-on-1e4-m-ground", On::Any, small_beside_large),
+];
+
+/// A closed box of `2 n^2` triangles a face in `[-size,size]^3`, vertices shared.
+fn cube(n: u32, size: f32) -> Bvh {
+    let mut corners = Vec::new();
+    let at = |i: u32| (i as f32 / n as f32 * 2.0 - 1.0) * size;
+    for axis in 0..3 {
+        for side in [-size, size] {
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                let point = |i: u32, j: u32| {
+                    let mut p = Vec3::splat(side);
+                    p[(axis + 1) % 3] = at(i);
+                    p[(axis + 2) % 3] = at(j);
+                    p
+                };
+                let [a, b, c, d] =
+                    [point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)];
+                corners.extend([a, b, c, a, c, d]);
+            }
+        }
+    }
+    tree(&corners)
+}
+
+fn tree(corners: &[Vec3]) -> Bvh {
+    let triangles: Vec<[u32; 3]> =
+        (0..corners.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    Bvh::build(corners, &triangles)
+}
+
+/// How many of `count` rays meet nothing.
+fn leaks(tree: &Bvh, count: u64, ray: impl Fn(&mut Random) -> (Vec3, Vec3) + Sync) -> f64 {
+    const RUN: u64 = 1 << 16;
+    let missed: u64 = (0..count.div_ceil(RUN))
+        .into_par_iter()
+        .map(|run| {
+            let mut random = Random(run.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            (0..RUN.min(count - run * RUN))
+                .filter(|_| {
+                    let (origin, direction) = ray(&mut random);
+                    let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
+                    !tree.any_hit(&ray, |_| true)
+                })
+                .count() as u64
+        })
+        .sum();
+    missed as f64
+}
+
+/// Rays with one or two zero components, in planes of mesh vertices and along the edges between.
+fn leaks_on_axes(setting: &Setting) -> Outcome {
+    let count = setting.count(10_000_000, 1_000_000_000);
+    let mut outcome = Outcome::new();
+    for n in [8_u32, 33] {
+        let tree = cube(n, 1.0);
+        let missed = leaks(&tree, count / 2, |random| {
+            let grid = |random: &mut Random| {
+                (1 + random.below(n as usize - 1)) as f32 / n as f32 * 2.0 - 1.0
+            };
+            let axis = random.below(3);
+            let mut origin = Vec3::splat(random.unit() * 1.5 - 0.75);
+            let mut direction = Vec3::ZERO;
+            direction[axis] = if random.below(2) == 0 { 1.0 } else { -1.0 };
+            origin[(axis + 1) % 3] = grid(random);
+            match random.below(4) {
+                0 => origin[(axis + 2) % 3] = grid(random),
+                1 => direction[(axis + 2) % 3] = random.unit() - 0.5,
+                2 => direction[(axis + 2) % 3] = 1e-30,
+                _ => direction[(axis + 2) % 3] = -0.0,
+            }
+            (origin, direction)
+        });
+        outcome =
+            outcome.at_most(format!("leaks of {} axis-parallel rays", count / 2), missed, 0.0);
+    }
+    outcome
+}
+
+fn leaks_anywhere(setting: &Setting) -> Outcome {
+    let count = setting.count(1_000_000, 300_000_000);
+    let mut outcome = Outcome::new();
+    for size in [1e-4, 1.0, 1e6] {
+        let tree = cube(17, size);
+        let missed =
+            leaks(&tree, count, |random| (random.cube() * 0.99 * size, random.direction()));
+        outcome =
+            outcome.at_most(format!("leaks of {count} rays in a box of {size} m"), missed, 0.0);
+    }
+    outcome
+}
+
+/// Paths that start anew from where they hit, as the renderer's do, never find a way out.
+fn bouncing_leaks(setting: &Setting) -> Outcome {
+    let mut outcome = Outcome::new();
+    for size in [1e-4_f32, 1.0, 1e4] {
+        let tree = cube(5, size);
+        let missed: u32 = (0..64_u64)
+            .into_par_iter()
+            .map(|seed| bounce(&tree, seed, setting.count(20_000, 2_000_000)))
+            .sum();
+        let what = format!("paths that leave a box of {size} m");
+        outcome = outcome.at_most(what, f64::from(missed), 0.0);
+    }
+    outcome
+}
+
+/// Ways out of the box around the origin that a path of `bounces` diffuse reflections found.
+fn bounce(tree: &Bvh, seed: u64, bounces: u32) -> u32 {
+    let mut random = Random(seed);
+    let (mut origin, mut direction, mut missed) = (Vec3::ZERO, random.direction(), 0);
+    for _ in 0..bounces {
+        let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
+        let Some(hit) = tree.closest_hit(&ray, |_| true) else {
+            missed += 1;
+            origin = Vec3::ZERO;
+            continue;
+        };
+        // The box is centred and its walls face the axes.
+        let point = origin + direction * hit.t;
+        let axis = point.abs().max_position();
+        let mut inward = Vec3::ZERO;
+        inward[axis] = -point[axis].signum();
+        let wall = -inward[axis] * tree.bounds().1[axis];
+        origin = point;
+        origin[axis] = wall;
+        origin = offset_origin(origin, inward);
+        direction = random.direction();
+        direction *= direction.dot(inward).signum();
+    }
+    missed
+}
+
+/// A closed box whose walls are cut into strips a millionth as wide as long.
+fn slivers(setting: &Setting) -> Outcome {
+    let mut random = Random(8);
+    let mut corners = Vec::new();
+    for axis in 0..3 {
+        for side in [-1.0, 1.0] {
+            // Cuts at random places, two millionths apart here and there.
+            let mut cuts = vec![-1.0, 1.0];
+            for _ in 0..100 {
+                let at = random.unit() * 1.9 - 0.95;
+                cuts.extend([at, at + 2e-6]);
+            }
+            cuts.sort_by(f32::total_cmp);
+            for pair in cuts.windows(2) {
+                let point = |i: f32, j: f32| {
+                    let mut p = Vec3::splat(side);
+                    p[(axis + 1) % 3] = i;
+                    p[(axis + 2) % 3] = j;
+                    p
+                };
+                let [a, b] = [pair[0], pair[1]];
+                let (p, q, r, s) = (point(a, -1.0), point(b, -1.0), point(b, 1.0), point(a, 1.0));
+                corners.extend([p, q, r, p, r, s]);
+            }
+        }
+    }
+    let tree = tree(&corners);
+    let count = setting.count(2_000_000, 200_000_000);
+    let missed = leaks(&tree, count, |random| (random.cube() * 0.9, random.direction()));
+    Outcome::new().at_most(format!("leaks of {count} rays between slivers"), missed, 0.0)
+}
+
+/// Triangles without area, twice the same, and with corners that are no numbers change nothing.
+fn degenerate(setting: &Setting) -> Result<Outcome> {
+    let wall = lambert(0.7);
+    let (stage, camera) = room(0.7, 1.0, Vec3::ZERO);
+    let twice: Vec<[Vec3; 3]> = stage.scene.triangles[..4]
+        .iter()
+        .map(|t| t.map(|i| stage.scene.positions[i as usize]))
+        .collect();
+    let p = Vec3::new(0.1, 0.2, 0.3);
+    let odd = [
+        [p, p, p],
+        [p, p, p + Vec3::X],
+        [p, p + Vec3::X, p + 2.0 * Vec3::X],
+        [p, p + Vec3::X, Vec3::splat(f32::NAN)],
+        [p, p + Vec3::Y, Vec3::new(f32::INFINITY, 0.0, 0.0)],
+    ];
+    let (sound, spoilt) = (
+        stage.build(),
+        room(0.7, 1.0, Vec3::ZERO).0.triangles(&wall, &odd).triangles(&wall, &twice).build(),
+    );
+    let environment = sky("day")?;
+    let view = view(camera, Sampling::Plain, 4);
+    let [a, b] = [&sound, &spoilt].map(|w| render(setting, w, &environment, view.clone(), 32));
+    let (a, b) = (a?, b?);
+    let worst = a
+        .pixels()
+        .iter()
+        .zip(b.pixels())
+        .map(|(a, b)| (a.mean_luminance() - b.mean_luminance()).abs());
+    Ok(Outcome::new().sound(&b).at_most(
+        "pixels' largest change by useless triangles",
+        worst.fold(0.0, f64::max),
+        0.0,
+    ))
+}
+
+/// Two walls at one place: either may be seen, nothing else.
+fn coplanar(setting: &Setting) -> Result<Outcome> {
+    let mut outcome = Outcome::new();
+    for tilt in [0.0, 0.3] {
+        let (a, b) = (Vec3::new(4.0, tilt, 0.0), Vec3::new(0.0, 0.2, -4.0));
+        let corner = Vec3::new(-2.0, 0.0, 2.0);
+        let world = Stage::default()
+            .quad(&lambert(0.25), corner, a, b)
+            .quad(&lambert(0.75), corner + 0.25 * a, a, b)
+            .quad(&lambert(0.5), corner, b, a)
+            .build();
+        let camera = Camera::look_at(Vec3::new(0.2, 3.0, 0.1), Vec3::ZERO, 0.5);
+        let film = render(setting, &world, &constant(1.0)?, view(camera, Sampling::Plain, 4), 64)?;
+        // A plane in uniform light shows its albedo.
+        let seen = |p: &crate::render::film::Pixel| p.mean_luminance();
+        let most = film.pixels().iter().map(seen).fold(0.0, f64::max);
+        let least = film.pixels().iter().map(seen).fold(f64::INFINITY, f64::min);
+        outcome = outcome
+            .sound(&film)
+            .at_most("brightest pixel of albedos up to 0.75", most, 0.75 + 1e-3)
+            .at_least("darkest pixel of albedos from 0.25", least, 0.25 - 1e-3);
+    }
+    Ok(outcome)
+}
+
+/// The room looks as the one of 4 m does, and stays dark when it is sealed.
+fn scaled_room(setting: &Setting, scale: f32) -> Result<Outcome> {
+    let environment = sky("day")?;
+    let of = |scale: f32| -> Result<Mean> {
+        let (stage, camera) = room(0.7, scale, Vec3::ZERO);
+        let view = View { learning_paths: 1 << 14, ..view(camera, Sampling::Adaptive, 4) };
+        Ok(mean(&render(setting, &stage.build(), &environment, view, 256)?))
+    };
+    let off = difference(of(1.0)?, of(scale)?);
+    let (world, camera) = sealed(0.8, scale, Vec3::ZERO);
+    let film = render(setting, &world, &environment, view(camera, Sampling::Plain, 8), 64)?;
+    Ok(Outcome::new()
+        .sound(&film)
+        .at_most("against the room of 4 m: standard errors off", off, SIGMAS)
+        .at_most("light in the sealed room", mean(&film).luminance, 0.0))
+}
+
+/// A room of a millimetre stands on a ground of ten kilometres, open and sealed.
+fn small_beside_large(setting: &Setting) -> Result<Outcome> {
+    let environment = constant(1.0)?;
+    let scale = 2.5e-4;
+    let ground = |stage: Stage| stage.floor(&lambert(0.2), Vec3::new(0.0, -scale, 0.0), 1e4);
+    let dark = {
+        let (stage, camera) = room(0.8, scale, Vec3::ZERO);
+        let low = Vec3::new(-2.0, 0.0, -1.5) * scale;
+        let high = Vec3::new(2.0, 2.5, 1.5) * scale;
+        let world = ground(stage.faces(&lambert(0.8), low, high, [0])).build();
+        render(setting, &world, &environment, view(camera, Sampling::Plain, 8), 64)?
+    };
+    // The same room at its usual size on a ground that is as much larger.
+    let lit = |factor: f32| -> Result<Mean> {
+        let (stage, camera) = room(0.8, factor, Vec3::ZERO);
+        let floor = Vec3::new(0.0, -factor, 0.0);
+        let world: World = stage.floor(&lambert(0.2), floor, 4e7 * factor).build();
+        Ok(mean(&render(setting, &world, &environment, view(camera, Sampling::Plain, 4), 256)?))
+    };
+    let (large, small) = (lit(1.0)?, lit(scale)?);
+    Ok(Outcome::new()
+        .sound(&dark)
+        .at_most("light in the sealed millimetre room", mean(&dark).luminance, 0.0)
+        .at_most("open one: standard errors off", deviation(small, large.luminance, 1e-2), SIGMAS))
+}

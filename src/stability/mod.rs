@@ -1,0 +1,158 @@
+//! The stability suite: stiff and extreme cases, each with a figure, a limit and a verdict.
+//!
+//! It is part of the product: an artist with a strange scene or a developer with a new driver runs
+//! `lightgrid stability`. Each group is a file; [`cases`] lists them all, [`run`] runs one. The quick
+//! half takes seconds a case and runs in the tests; [`Setting::nightly`] asks for the counts that
+//! take minutes (1e9 rays, maps of a gigabyte).
+
+mod devices;
+mod faults;
+mod film;
+pub mod fuzz;
+mod geometry;
+mod grid;
+mod maps;
+mod materials;
+mod outcome;
+mod random;
+mod reference;
+mod scenes;
+mod scratch;
+mod tables;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::time::Instant;
+
+use serde_json::{Value, json};
+
+pub use self::outcome::{Figure, Limit, Outcome, Verdict};
+use crate::error::Result;
+use crate::render::gpu::Gpu;
+
+/// How the cases are run.
+pub struct Setting {
+    /// What renders; `None` is the CPU.
+    pub gpu: Option<Gpu>,
+    /// The long counts.
+    pub nightly: bool,
+    /// The `lightgrid` binary, for what needs a process of its own.
+    pub binary: PathBuf,
+    /// Whether a command line (without the program's name) would be accepted: the command line lies
+    /// above this module.
+    pub accepts: fn(&[String]) -> bool,
+}
+
+impl Setting {
+    /// The count for the quick or for the nightly half.
+    fn count<T>(&self, quick: T, nightly: T) -> T {
+        if self.nightly { nightly } else { quick }
+    }
+}
+
+/// Where a case makes sense.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum On {
+    /// The same whatever renders: run with the CPU.
+    Cpu,
+    /// It renders: run with either.
+    Any,
+    /// It is about the GPU.
+    Gpu,
+}
+
+/// One thing to try.
+pub struct Case {
+    /// The group it belongs to.
+    pub group: &'static str,
+    /// Its name in the group.
+    pub name: &'static str,
+    /// Where it makes sense.
+    pub on: On,
+    run: fn(&Setting) -> Result<Outcome>,
+}
+
+impl Case {
+    /// `group/name`.
+    pub fn title(&self) -> String {
+        format!("{}/{}", self.group, self.name)
+    }
+
+    /// Whether it is part of a run with or without a GPU.
+    pub fn runs(&self, with_gpu: bool) -> bool {
+        matches!((self.on, with_gpu), (On::Any, _) | (On::Cpu, false) | (On::Gpu, true))
+    }
+}
+
+/// All cases, group by group.
+pub fn cases() -> impl Iterator<Item = &'static Case> {
+    [
+        maps::CASES,
+        tables::CASES,
+        grid::CASES,
+        geometry::CASES,
+        materials::CASES,
+        film::CASES,
+        devices::CASES,
+        fuzz::CASES,
+        faults::CASES,
+    ]
+    .into_iter()
+    .flatten()
+}
+
+/// A case that was run.
+pub struct Report {
+    /// `group/name`.
+    pub title: String,
+    /// What it found.
+    pub outcome: Outcome,
+    /// How long it took.
+    pub seconds: f64,
+}
+
+/// Runs a case. An error or a panic in it is a failure, not the end.
+pub fn run(case: &Case, setting: &Setting) -> Report {
+    let start = Instant::now();
+    let outcome = if case.on == On::Gpu && setting.gpu.is_none() {
+        Outcome::skipped("needs --device gpu")
+    } else {
+        match catch_unwind(AssertUnwindSafe(|| (case.run)(setting))) {
+            Ok(Ok(outcome)) => outcome,
+            Ok(Err(error)) => Outcome::broken(error.to_string()),
+            Err(_) => Outcome::broken("it panicked"),
+        }
+    };
+    Report { title: case.title(), outcome, seconds: start.elapsed().as_secs_f64() }
+}
+
+impl Report {
+    /// One line: case, what decided, figure, limit, verdict, seconds; then the remarks.
+    pub fn line(&self) -> String {
+        let verdict = self.outcome.verdict();
+        let (what, value, limit) = match self.outcome.decisive() {
+            Some(figure) if verdict != Verdict::Skipped => {
+                (figure.what.as_str(), outcome::number(figure.value), figure.limit.to_string())
+            }
+            _ => ("", String::new(), String::new()),
+        };
+        let mut line = format!(
+            "{:<35} {what:<64} {value:>9}  {limit:<12} {verdict:<7} {:>5.1} s",
+            self.title, self.seconds
+        );
+        let remarks = &self.outcome.remarks;
+        if verdict != Verdict::Passed {
+            remarks.iter().for_each(|remark| line += &format!("\n    {remark}"));
+        }
+        line
+    }
+
+    /// Title, verdict, every figure, remarks, seconds.
+    pub fn to_json(&self) -> Value {
+        let mut value = json!({ "case": self.title, "seconds": self.seconds });
+        if let (Some(all), Value::Object(found)) = (value.as_object_mut(), self.outcome.to_json()) {
+            all.extend(found);
+        }
+        value
+    }
+}

@@ -1,0 +1,128 @@
+//! The same picture in f64: direct light on an endless Lambert floor, from the same random numbers.
+//!
+//! A twin of the path tracer for the one scene in which it stays short. Densities are not read from
+//! the table but follow from the map's own weights; only the choice among integers (tile and texel) is
+//! taken over, for it is exact.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec2, DVec3, Vec2};
+
+use super::maps::bilinear;
+use crate::color::importance;
+use crate::environment::Environment;
+use crate::light_grid::{LightGrid, WHOLE_MAP};
+use crate::math::texel_solid_angle;
+use crate::path::camera::CameraRays;
+use crate::render::View;
+use crate::sampler::{Sampler, unit_from_bits};
+
+/// A floor at height 0 of this reflectance under a map that is neither turned nor scaled.
+pub(super) struct Reference<'a> {
+    pub(super) environment: &'a Environment,
+    pub(super) grid: LightGrid,
+    pub(super) albedo: f64,
+    total_weight: f64,
+}
+
+impl<'a> Reference<'a> {
+    /// `None` for a black map.
+    pub(super) fn new(environment: &'a Environment, albedo: f64) -> Option<Self> {
+        let grid = LightGrid::whole_map(environment.tile_energies())?;
+        let mut reference = Self { environment, grid, albedo, total_weight: 0.0 };
+        let map = environment.map();
+        reference.total_weight = (0..map.height)
+            .flat_map(|y| (0..map.width).map(move |x| (x, y)))
+            .map(|(x, y)| reference.weight(x, y))
+            .sum();
+        Some(reference)
+    }
+
+    /// Mean luminance of each pixel over its first `samples` samples.
+    pub(super) fn picture(&self, view: &View, samples: u32) -> Vec<f64> {
+        let rays = CameraRays::new(&view.camera, view.width, view.height);
+        let pixel = |index: u32| {
+            let sum: f64 = (0..samples)
+                .map(|sample| {
+                    let mut sampler = Sampler::new(view.seed, index, sample);
+                    let [x, y] = sampler.next_pair().map(f64::from);
+                    let at = DVec2::new(
+                        f64::from(index % view.width) + x,
+                        f64::from(index / view.width) + y,
+                    );
+                    self.radiance(direction(&rays, view, at), sampler)
+                })
+                .sum();
+            sum / f64::from(samples)
+        };
+        (0..view.width * view.height).map(pixel).collect()
+    }
+
+    /// Luminance along a camera ray: light sampling and BSDF sampling by the balance heuristic.
+    fn radiance(&self, towards: DVec3, mut sampler: Sampler) -> f64 {
+        if towards.y >= 0.0 {
+            return self.seen(towards);
+        }
+        let [tile_bits, row_bits] = sampler.next_pair_bits();
+        let choice = self.grid.laws().sample(WHOLE_MAP, tile_bits);
+        let u = Vec2::new(choice.remainder, unit_from_bits(row_bits));
+        let mut sum = 0.0;
+        if let Some(sample) = self.environment.sample_in_tile(choice.tile, u) {
+            let light = sample.direction.as_dvec3().normalize();
+            let bsdf_pdf = light.y / PI;
+            if light.y > 0.0 {
+                sum += self.albedo * bsdf_pdf * self.seen(light) / (self.density(light) + bsdf_pdf);
+            }
+        }
+        let _lobe = sampler.next_pair();
+        let [x, y] = sampler.next_pair().map(f64::from);
+        let (sin, cos) = (x * TAU).sin_cos();
+        // The frame around +Y has its second axis along -Z.
+        let bounced = DVec3::new(y.sqrt() * cos, (1.0 - y).sqrt(), -y.sqrt() * sin);
+        let bsdf_pdf = bounced.y / PI;
+        sum + self.albedo * self.seen(bounced) * bsdf_pdf / (bsdf_pdf + self.density(bounced))
+    }
+
+    fn texels(&self, direction: DVec3) -> DVec2 {
+        let map = self.environment.map();
+        let u = 0.5 + direction.z.atan2(direction.x) / TAU;
+        let v = direction.x.hypot(direction.z).atan2(direction.y) / PI;
+        DVec2::new(u * f64::from(map.width), v * f64::from(map.height))
+    }
+
+    fn seen(&self, direction: DVec3) -> f64 {
+        let at = self.texels(direction);
+        let rgb = bilinear(self.environment.map(), at.x - 0.5, at.y - 0.5);
+        rgb.dot(DVec3::new(0.2126, 0.7152, 0.0722))
+    }
+
+    /// Density of light sampling per steradian.
+    fn density(&self, direction: DVec3) -> f64 {
+        let map = self.environment.map();
+        let at = self.texels(direction);
+        let (x, y) = ((at.x as u32).min(map.width - 1), (at.y as u32).min(map.height - 1));
+        self.weight(x, y) / self.total_weight / texel_solid_angle(map.width, map.height, y)
+    }
+
+    /// Integral over a texel of the importance of what is interpolated there.
+    fn weight(&self, x: u32, y: u32) -> f64 {
+        let map = self.environment.map();
+        let mut sum = 0.0;
+        for (dy, down) in [(-1, 1.0), (0, 6.0), (1, 1.0)] {
+            for (dx, across) in [(-1, 1.0), (0, 6.0), (1, 1.0)] {
+                let column = (i64::from(x) + dx).rem_euclid(i64::from(map.width)) as u32;
+                let row = (i64::from(y) + dy).clamp(0, i64::from(map.height) - 1) as u32;
+                sum += down * across * f64::from(importance(map.at(column, row).into()));
+            }
+        }
+        sum / 64.0 * texel_solid_angle(map.width, map.height, y)
+    }
+}
+
+/// Unit direction through a point of the picture in pixels.
+fn direction(rays: &CameraRays, view: &View, at: DVec2) -> DVec3 {
+    let ndc = at / DVec2::new(f64::from(view.width), f64::from(view.height)) * 2.0 - 1.0;
+    let extent = rays.half_extent.as_dvec2();
+    let across = rays.right.as_dvec3() * (ndc.x * extent.x);
+    (rays.forward.as_dvec3() + across - rays.up.as_dvec3() * (ndc.y * extent.y)).normalize()
+}

@@ -1,0 +1,300 @@
+//! Small scenes whose answers are known, and pictures of them on the device under test.
+
+use std::sync::atomic::AtomicBool;
+
+use glam::{Affine2, Vec2, Vec3};
+
+use super::{Outcome, Setting};
+use crate::environment::{Environment, EnvironmentOptions};
+use crate::error::Result;
+use crate::image::Image;
+use crate::light_grid::LawOptions;
+use crate::path::{Background, PathLimits, World};
+use crate::render::film::{Film, Pixel};
+use crate::render::filter::PixelFilter;
+use crate::render::gpu::Stage as GpuStage;
+use crate::render::{Phase, Sampling, Session, View};
+use crate::sampler::Points;
+use crate::scene::{Camera, Material, Scene, Texture, TextureImage, TextureRef, Wrap};
+
+/// Lambert's reflectance alone, both sides alike.
+pub(super) fn lambert(albedo: f32) -> Material {
+    Material {
+        base_color: Vec3::splat(albedo).extend(1.0),
+        metallic: 0.0,
+        specular: 0.0,
+        double_sided: true,
+        ..Material::default()
+    }
+}
+
+/// Clear solid glass.
+pub(super) fn glass(ior: f32, roughness: f32) -> Material {
+    Material { transmission: 1.0, thickness: 1.0, specular: 1.0, ior, roughness, ..lambert(1.0) }
+}
+
+/// A scene being put together; every method returns it.
+#[derive(Default)]
+pub(super) struct Stage {
+    pub(super) scene: Scene,
+}
+
+impl Stage {
+    pub(super) fn build(self) -> World {
+        World::new(self.scene)
+    }
+
+    pub(super) fn material(&mut self, material: &Material) -> u32 {
+        let materials = &mut self.scene.materials;
+        let known = materials.iter().position(|m| m == material);
+        known.unwrap_or_else(|| {
+            materials.push(material.clone());
+            materials.len() - 1
+        }) as u32
+    }
+
+    /// Any triangles.
+    pub(super) fn triangles(mut self, material: &Material, corners: &[[Vec3; 3]]) -> Self {
+        let index = self.material(material);
+        for triangle in corners {
+            let first = self.scene.positions.len() as u32;
+            self.scene.positions.extend(triangle);
+            self.scene.triangles.push([first, first + 1, first + 2]);
+            self.scene.triangle_materials.push(index);
+        }
+        self
+    }
+
+    /// A parallelogram; its front is where `a cross b` points.
+    pub(super) fn quad(self, material: &Material, corner: Vec3, a: Vec3, b: Vec3) -> Self {
+        let corners = [corner, corner + a, corner + a + b, corner + b];
+        let [p, q, r, s] = corners;
+        self.triangles(material, &[[p, q, r], [p, r, s]])
+    }
+
+    /// A horizontal square of side `size` around `center`, front up.
+    pub(super) fn floor(self, material: &Material, center: Vec3, size: f32) -> Self {
+        let corner = center + Vec3::new(-0.5, 0.0, 0.5) * size;
+        self.quad(material, corner, Vec3::X * size, Vec3::NEG_Z * size)
+    }
+
+    /// Faces of a box, fronts outwards: 0 and 1 are +X and -X, then Y, then Z.
+    pub(super) fn faces(
+        self,
+        material: &Material,
+        low: Vec3,
+        high: Vec3,
+        faces: impl IntoIterator<Item = usize>,
+    ) -> Self {
+        let size = high - low;
+        let edge = |axis: usize| Vec3::AXES[axis % 3] * size[axis % 3];
+        faces.into_iter().fold(self, |stage, face| {
+            let axis = face / 2;
+            let (a, b) = (edge(axis + 1), edge(axis + 2));
+            if face.is_multiple_of(2) {
+                stage.quad(material, low + edge(axis), a, b)
+            } else {
+                stage.quad(material, low, b, a)
+            }
+        })
+    }
+
+    /// A closed sphere of flat faces.
+    pub(super) fn sphere(self, material: &Material, center: Vec3, radius: f32) -> Self {
+        const RINGS: u32 = 16;
+        let at = |i: u32, j: u32| {
+            // The same vertices from both sides of the seam: the sphere must be closed.
+            let uv =
+                Vec2::new((i % (2 * RINGS)) as f32 / (2 * RINGS) as f32, j as f32 / RINGS as f32);
+            let pole = if j == 0 { Some(Vec3::Y) } else { (j == RINGS).then_some(Vec3::NEG_Y) };
+            center + radius * pole.unwrap_or_else(|| crate::math::direction_from_uv(uv))
+        };
+        let mut corners = Vec::new();
+        for (i, j) in (0..2 * RINGS).flat_map(|i| (0..RINGS).map(move |j| (i, j))) {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            if j > 0 {
+                corners.push([a, b, c]);
+            }
+            if j + 1 < RINGS {
+                corners.push([a, c, d]);
+            }
+        }
+        self.triangles(material, &corners)
+    }
+
+    /// Gives everything so far tangents and texture coordinates along X, and a texture of one texel.
+    pub(super) fn with_texel(mut self, texel: [u8; 4]) -> Self {
+        let scene = &mut self.scene;
+        let count = scene.positions.len();
+        scene.uvs[0] = scene.positions.iter().map(|p| Vec2::new(p.x, -p.z)).collect();
+        scene.normals = vec![Vec3::Y; count];
+        scene.tangents = vec![Vec3::X.extend(1.0); count];
+        scene.images.push(TextureImage { width: 1, height: 1, texels: vec![texel] });
+        let wrap = Wrap::Repeat;
+        let texture = Texture { image: 0, wrap_u: wrap, wrap_v: wrap, nearest: true, srgb: false };
+        scene.textures.push(texture);
+        self
+    }
+}
+
+/// Texture 0 at the first texture coordinates.
+pub(super) fn first_texture() -> Option<TextureRef> {
+    Some(TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY })
+}
+
+/// A room of 4 x 2.5 x 3 units, `scale` metres each, around `center`, with a window in its +X wall
+/// and a block on the floor; a camera that looks at the block.
+pub(super) fn room(albedo: f32, scale: f32, center: Vec3) -> (Stage, Camera) {
+    let at = |x: f32, y: f32, z: f32| center + Vec3::new(x, y, z) * scale;
+    let walls = lambert(albedo);
+    let (low, high) = (at(-2.0, 0.0, -1.5), at(2.0, 2.5, 1.5));
+    let frame = |stage: Stage, y: [f32; 2], z: [f32; 2]| {
+        let (corner, top, side) = (at(2.0, y[0], z[0]), at(2.0, y[1], z[0]), at(2.0, y[0], z[1]));
+        stage.quad(&walls, corner, top - corner, side - corner)
+    };
+    let mut stage = Stage::default().faces(&walls, low, high, 1..6);
+    for (y, z) in [
+        ([0.0, 0.75], [-1.5, 1.5]),
+        ([2.25, 2.5], [-1.5, 1.5]),
+        ([0.75, 2.25], [-1.5, -1.0]),
+        ([0.75, 2.25], [1.0, 1.5]),
+    ] {
+        stage = frame(stage, y, z);
+    }
+    let block = lambert(0.5 * albedo);
+    let stage = stage.faces(&block, at(-1.25, 0.0, -0.75), at(-0.5, 1.0, 0.25), [0, 1, 2, 4, 5]);
+    (stage, Camera::look_at(at(1.75, 1.5, 1.25), at(-1.0, 0.75, -0.5), 1.0))
+}
+
+/// The room without its window.
+pub(super) fn sealed(albedo: f32, scale: f32, center: Vec3) -> (World, Camera) {
+    let (stage, camera) = room(albedo, scale, center);
+    let low = center + Vec3::new(-2.0, 0.0, -1.5) * scale;
+    let high = center + Vec3::new(2.0, 2.5, 1.5) * scale;
+    (stage.faces(&lambert(albedo), low, high, [0]).build(), camera)
+}
+
+/// A map of one radiance.
+pub(super) fn constant(radiance: f32) -> Result<Environment> {
+    light(Image::filled(16, 8, [radiance; 3]))
+}
+
+/// A map with default options.
+pub(super) fn light(map: Image) -> Result<Environment> {
+    Environment::new(map, &EnvironmentOptions::default())
+}
+
+/// A small built-in sky.
+pub(super) fn sky(name: &str) -> Result<Environment> {
+    light(crate::environment::sky::build(name, 128, 64)?)
+}
+
+/// A small picture without Russian roulette.
+pub(super) fn view(camera: Camera, sampling: Sampling, bounces: u32) -> View {
+    View {
+        camera,
+        width: 16,
+        height: 16,
+        filter: PixelFilter::Box,
+        sampling,
+        limits: PathLimits { bounces, russian_roulette: false },
+        seed: 1,
+        grid_columns: 64,
+        learning_paths: 1 << 13,
+        laws: LawOptions::ADAPTIVE,
+        layers: false,
+        points: Points::Sobol,
+        medium: None,
+        background: Background::default(),
+        crop: None,
+    }
+}
+
+/// A session on the device under test, before its learning.
+pub(super) fn session<'a>(
+    setting: &Setting,
+    world: &'a World,
+    environment: &'a Environment,
+    view: View,
+) -> Result<Session<'a>> {
+    match &setting.gpu {
+        None => Ok(Session::new(world, environment, view)),
+        Some(gpu) => {
+            let stage = GpuStage::new(gpu, world, environment)?;
+            Session::on_gpu(world, environment, view, &stage)
+        }
+    }
+}
+
+/// A session that has done its learning.
+pub(super) fn learned<'a>(
+    setting: &Setting,
+    world: &'a World,
+    environment: &'a Environment,
+    view: View,
+) -> Result<Session<'a>> {
+    let mut session = session(setting, world, environment, view)?;
+    while session.phase() == Phase::Learning {
+        session.advance(0, &AtomicBool::new(false))?;
+    }
+    Ok(session)
+}
+
+/// Learns if the view asks for it, then renders.
+pub(super) fn render(
+    setting: &Setting,
+    world: &World,
+    environment: &Environment,
+    view: View,
+    samples: u32,
+) -> Result<Film> {
+    let mut session = learned(setting, world, environment, view)?;
+    session.advance(samples, &AtomicBool::new(false))?;
+    Ok(session.film().clone())
+}
+
+/// Mean luminance of a picture and its standard error from the samples' own spread.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mean {
+    pub(super) luminance: f64,
+    pub(super) error: f64,
+}
+
+pub(super) fn mean(film: &Film) -> Mean {
+    let count = film.pixels().len() as f64;
+    let average = |f: fn(&Pixel) -> f64| film.pixels().iter().map(f).sum::<f64>() / count;
+    Mean {
+        luminance: average(Pixel::mean_luminance),
+        error: (average(Pixel::variance_of_mean) / count).sqrt(),
+    }
+}
+
+/// How many standard errors a mean is from what it should be; `rounding` of the latter is allowed
+/// for besides.
+pub(super) fn deviation(found: Mean, expected: f64, rounding: f64) -> f64 {
+    let off = (found.luminance - expected).abs();
+    let error = found.error.hypot(rounding * expected.abs());
+    if off == 0.0 { 0.0 } else { off / error }
+}
+
+/// How many joint standard errors two means differ by.
+pub(super) fn difference(a: Mean, b: Mean) -> f64 {
+    let off = (a.luminance - b.luminance).abs();
+    let error = a.error.hypot(b.error).hypot(ROUNDING * a.luminance);
+    if off == 0.0 { 0.0 } else { off / error }
+}
+
+/// Rounding a mean may be off by, relative: ray origins are moved by 2^-16.
+pub(super) const ROUNDING: f64 = 1e-4;
+
+/// Standard errors a sound estimate may be off by: it happens once in 150,000 cases.
+pub(super) const SIGMAS: f64 = 4.5;
+
+impl Outcome {
+    /// Adds that no sample of a film was, and no pixel is, NaN or infinite.
+    pub(super) fn sound(self, film: &Film) -> Self {
+        let odd = film.pixels().iter().filter(|p| !p.mean().iter().all(|c| c.is_finite())).count();
+        let invalid = film.invalid_samples() as f64 + odd as f64;
+        self.at_most("samples and pixels that are NaN or infinite", invalid, 0.0)
+    }
+}

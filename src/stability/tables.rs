@@ -1,0 +1,66 @@
+//! Importance tables side by side: where each fails, and by how much.
+//!
+//! The tile-local table must hold everywhere. The summed-area forms are kept for comparison; what
+//! they lose is told, not judged: it is the talk's finding, and ours.
+
+use super::maps::{scaled, sun};
+use super::random::Random;
+use super::{Case, On, Outcome, Setting};
+use crate::environment::{Lookup, SatReportRow, TableKind, sat_report, sky};
+use crate::error::{Error, Result};
+use crate::image::Image;
+
+const fn case(name: &'static str, run: fn(&Setting) -> Result<Outcome>) -> Case {
+    Case { group: "tables", name, on: On::Cpu, run }
+}
+
+pub(super) const CASES: &[Case] = &[
+    case("tile-local", |s| everywhere(s, TableKind::TileLocal)),
+    case("u32", |s| everywhere(s, TableKind::U32)),
+    case("f32", |s| everywhere(s, TableKind::F32)),
+    case("f64", |s| everywhere(s, TableKind::F64)),
+];
+
+fn maps(setting: &Setting) -> Result<[(&'static str, Image); 4]> {
+    let width = setting.count(512, 8192);
+    let mut random = Random(5);
+    let mut decades = |_, _| [10.0_f32.powf(60.0 * random.unit() - 30.0); 3];
+    Ok([
+        ("day", sky::build("day", width, width / 2)?),
+        ("a sun of 1e9", sun(512, 256, 1e9)),
+        ("subnormal radiance", scaled(sun(512, 256, 1.0), 1e-40)),
+        ("60 decades", Image::from_fn(512, 256, &mut decades)),
+    ])
+}
+
+/// A figure of a row.
+type Measure = fn(&SatReportRow) -> f64;
+
+/// One table on every map; the worst map of each figure is named.
+fn everywhere(setting: &Setting, table: TableKind) -> Result<Outcome> {
+    let mut rows: Vec<(&str, SatReportRow)> = Vec::new();
+    for (name, map) in maps(setting)? {
+        let report = sat_report(&map, Lookup::Bilinear, 0)?;
+        let row = report.rows.into_iter().find(|row| row.table == table);
+        rows.push((name, row.ok_or_else(|| Error::new("a table is missing from the report"))?));
+    }
+    let figures: [(&str, Measure); 4] = [
+        ("lit texels never sampled", |row| row.missed_share),
+        ("falling steps", |row| row.falling_share),
+        ("density off what is sampled", |row| row.misreported_share),
+        ("mean squared error of densities of mean 1", |row| row.mean_squared_error),
+    ];
+    let mut outcome = Outcome::new();
+    for (what, of) in figures {
+        let worst = rows.iter().max_by(|a, b| of(&a.1).total_cmp(&of(&b.1)));
+        let Some((map, row)) = worst else { continue };
+        let (told, value) = (format!("{what}, worst: {map}"), of(row));
+        outcome = match table {
+            // Rounding to integers of 2^-32 of a tile, at most.
+            TableKind::TileLocal if what.contains("error") => outcome.at_most(told, value, 1e-6),
+            TableKind::TileLocal => outcome.at_most(told, value, 0.0),
+            _ => outcome.told(told, value),
+        };
+    }
+    Ok(outcome)
+}
