@@ -92,7 +92,7 @@ pub struct Flight {
 
 /// `-ln(1 - u)` of a 32-bit fraction u: exponentially distributed, at most 22.2. The series keeps
 /// the precision of small u, on which thin media depend.
-fn optical_depth(bits: u32) -> f32 {
+pub(crate) fn optical_depth(bits: u32) -> f32 {
     let u = bits as f32 * (1.0 / 4_294_967_296.0);
     if u < 1.0 / 16.0 {
         u * (1.0 + u * (0.5 + u * (1.0 / 3.0 + u * (0.25 + u * (0.2 + u * (1.0 / 6.0))))))

@@ -1,6 +1,6 @@
 //! Spoilt input: no panic, no hang, no memory that the file's size does not warrant.
 //!
-//! A seeded mutator spoils files made by our own code ([`corpus`]); a worker process reads them one
+//! A seeded mutator spoils files made by our own code (`corpus`); a worker process reads them one
 //! after another and says where it is, so that whatever kills it or holds it up is known by its
 //! number, and `lightgrid stability --fuzz KIND --first NUMBER --count 1` repeats it.
 

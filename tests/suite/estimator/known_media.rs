@@ -144,7 +144,7 @@ fn a_white_solid_in_uniform_light_is_invisible() {
         ..smoked_glass()
     };
     let world = Stage::new().faces(&milk, Vec3::splat(-0.5), Vec3::splat(0.5), 0..6).build();
-    assert!(world.needs.medium);
+    assert!(world.needs.scattering_solids);
     let camera = probe([1.0, 2.0, 3.0], [0.1, 0.2, 0.0]);
     for mode in MODES {
         let film = render(&world, &constant(1.0), view(camera.clone(), mode, 1000), 64);

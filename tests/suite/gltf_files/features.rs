@@ -442,7 +442,7 @@ fn fog_is_read_from_the_scene_a_node_and_a_material() {
     let milk = load("", "", &format!("{glass}{}", fog(r#""scattering":[1,2,3],"anisotropy":0.5"#)));
     assert_eq!(milk.materials[0].scattering, Vec3::new(1.0, 2.0, 3.0));
     assert_eq!(milk.materials[0].scatter_anisotropy, 0.5);
-    assert!(SceneNeeds::of(&milk).medium);
+    assert!(SceneNeeds::of(&milk).scattering_solids && !SceneNeeds::of(&milk).medium);
 
     for bad in
         [r#""scattering":-1"#, r#""anisotropy":2"#, r#""box":[[0,0,0],[0,1,1]]"#, r#""box":3"#]
