@@ -27,7 +27,8 @@ td { text-align: right; padding: .25rem .7rem; border-bottom: 1px solid var(--ru
 th:first-child, td:first-child { text-align: left; padding-left: 0; }
 td.remark { text-align: left; color: var(--soft); white-space: normal; }
 tr.group td { font-weight: 600; padding-top: .8rem; }
-.plots svg { max-width: 100%; height: auto; margin: 0 1rem 1rem 0; }
+.plots { display: flex; flex-wrap: wrap; gap: 1rem; margin: .8rem 0; }
+.plots svg { max-width: 100%; height: auto; }
 .pictures { font-size: 0; margin: .6rem 0; }
 figure { display: inline-block; vertical-align: top; margin: 0 .8rem .8rem 0; font-size: .85rem; }
 figure img { display: block; image-rendering: pixelated; }

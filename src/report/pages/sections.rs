@@ -9,6 +9,7 @@ use super::tables::Table;
 use super::words;
 use super::{escape, words::percent};
 use crate::error::Result;
+use crate::image::Rgb8;
 
 /// With more methods than this a row shows ratios instead of curves and pictures.
 const MANY: usize = 6;
@@ -238,36 +239,51 @@ fn ratios_of_device(report: &Report, device: &DeviceReport, html: &mut String) {
     }
 }
 
-/// The reference, and the same part of all pictures at equal time.
+/// The reference, and the same part of all pictures at equal time, device by device.
 fn pictures(report: &Report, row: &RowReport, html: &mut String) -> Result<()> {
     let Some(reference) = &row.pictures.reference else { return Ok(()) };
     let Some((.., noisiest)) = row.pictures.runs.first() else { return Ok(()) };
     let window = Window::most_telling(noisiest, reference);
-    let mut figure = |picture: &crate::image::Rgb8, width: u32, caption: &str| -> Result<()> {
-        let _ = writeln!(
-            html,
-            "<figure><img src=\"{}\" style=\"width:{width}px\" alt=\"\"><figcaption>{caption}</figcaption>\
-             </figure>",
-            data_uri(picture)?
-        );
-        Ok(())
-    };
     let whole = developed(reference, reference);
-    let seconds = report.plan.effort.seconds;
-    figure(&whole, 480, "the reference")?;
-    figure(&window.of(&whole), 260, "<b>reference</b>, a part of it")?;
-    for (device, name, picture) in &row.pictures.runs {
-        let error = row
-            .devices
-            .iter()
-            .find(|d| d.device == *device)
-            .and_then(|d| d.method(name)?.runs.first()?.points.last()?.errors)
-            .map_or_else(String::new, |e| {
-                format!(", trimmed relMSE {}", words::error(e.trimmed_rel_mse))
+    html.push_str("<div class=\"pictures\">\n");
+    let caption =
+        format!("the reference; below, the part of it where {} is noisiest", baseline(report));
+    figure(html, &whole, WHOLE_WIDTH, &escape(&caption))?;
+    for device in &row.devices {
+        let pictures = row.pictures.runs.iter().filter(|(d, ..)| *d == device.device);
+        let mut pictures = pictures.peekable();
+        if pictures.peek().is_none() {
+            continue;
+        }
+        html.push_str("</div>\n<div class=\"pictures\">\n");
+        for (_, name, picture) in pictures {
+            let last = device.method(name).and_then(|m| m.runs.first()?.points.last().copied());
+            let caption = last.map_or_else(String::new, |point| {
+                let error = point.errors.map_or_else(String::new, |e| {
+                    format!(", trimmed relMSE {}", words::error(e.trimmed_rel_mse))
+                });
+                format!("{:.1} s, {} samples{error}", point.seconds, point.samples)
             });
-        let caption = format!("<b>{}</b>, {}, {seconds} s{error}", escape(name), device.title());
-        figure(&window.of(&developed(picture, reference)), 260, &caption)?;
+            let caption = format!("<b>{}</b>, {}, {caption}", escape(name), device.device.title());
+            figure(html, &window.of(&developed(picture, reference)), PART_WIDTH, &caption)?;
+        }
+        figure(html, &window.of(&whole), PART_WIDTH, "<b>reference</b>")?;
     }
+    html.push_str("</div>\n");
+    Ok(())
+}
+
+/// Widths on the page, in CSS pixels.
+const WHOLE_WIDTH: u32 = 520;
+const PART_WIDTH: u32 = 264;
+
+fn figure(html: &mut String, picture: &Rgb8, width: u32, caption: &str) -> Result<()> {
+    let source = data_uri(picture)?;
+    let _ = writeln!(
+        html,
+        "<figure style=\"width:{width}px\"><img src=\"{source}\" style=\"width:{width}px\" \
+         alt=\"\"><figcaption>{caption}</figcaption></figure>"
+    );
     Ok(())
 }
 
