@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LawOptions;
-use lightgrid::path::{PathLimits, World};
+use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Figures, Phase, Sampling, Session, View};
 use lightgrid::sampler::Points;
@@ -134,6 +134,9 @@ impl Case<'_> {
             grid_columns: 64,
             learning_paths: LEARNING_PATHS,
             laws: LawOptions::ADAPTIVE,
+            medium: None,
+            background: Background::Map,
+            crop: None,
             layers: false,
         };
         let never = AtomicBool::new(false);

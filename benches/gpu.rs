@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LawOptions;
-use lightgrid::path::{PathLimits, World};
+use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::gpu::{Gpu, Stage};
 use lightgrid::render::{Sampling, Session, View};
@@ -52,6 +52,9 @@ fn row(gpu: &Gpu, name: &str, world: &World, environment: &Environment, bounces:
         grid_columns: 64,
         learning_paths: 1 << 14,
         laws: LawOptions::ADAPTIVE,
+        medium: None,
+        background: Background::Map,
+        crop: None,
         layers: false,
     };
     let stage = Stage::new(gpu, world, environment).expect("it fits");

@@ -7,7 +7,7 @@ use criterion::{Criterion, Throughput};
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LawOptions;
 use lightgrid::light_grid::tile_laws::TileLaws;
-use lightgrid::path::{PathLimits, World};
+use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Sampling, Session, View};
 use lightgrid::sampler::Points;
@@ -30,6 +30,9 @@ pub(crate) fn bench(criterion: &mut Criterion) {
         grid_columns: 64,
         learning_paths,
         laws: LawOptions::ADAPTIVE,
+        medium: None,
+        background: Background::Map,
+        crop: None,
         layers: false,
     };
     let mut group = criterion.benchmark_group("path");

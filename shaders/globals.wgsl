@@ -60,6 +60,19 @@ struct Globals {
     mean_contribution: f32,
     // What no compiler can know; see `rounded`.
     zero: u32,
-    padding_0: u32,
+    // Whether points in a medium have a face of their own.
+    grid_medium: u32,
     padding_1: u32,
+    // Corners and coefficients of the fog; without fog the lower corner is above the upper one.
+    fog_low: vec3f,
+    fog_mean_cosine: f32,
+    fog_high: vec3f,
+    padding_2: u32,
+    fog_scattering: vec3f,
+    padding_3: u32,
+    fog_extinction: vec3f,
+    padding_4: u32,
+    // What the camera sees in place of the map: a colour, or how little the map is blurred.
+    background: vec3f,
+    background_concentration: f32,
 }

@@ -33,19 +33,29 @@ fn record(path: ptr<function, Path>, vertex: Vertex) {
     if sample.pdf_solid_angle <= 0.0 {
         return;
     }
-    let cell = cell_of(vertex.point.position, vertex.point.geometric_normal);
+    var cell = cell_of(vertex.point.position, vertex.point.geometric_normal);
+//#if medium
+    if vertex.is_in_medium {
+        cell = cell_in_medium(vertex.point.position);
+    }
+//#end
     var weight = 0.0;
-    let f = scattered(vertex, sample.direction);
+    let f = scattered(path, vertex, sample.direction);
     if max_element(f.value) > 0.0 {
         let visible = transmittance(path, vertex, sample.direction, F32_MAX);
 //#if record_ratio
         weight = luminance(visible);
-        let cosine = abs(dot(vertex.point.shading_frame.z, sample.direction));
+        var share = abs(dot(vertex.point.shading_frame.z, sample.direction));
+//#if medium
+        if vertex.is_in_medium {
+            share = 4.0 * PI * f.pdf_solid_angle;
+        }
+//#end
 //#if record_cosine
-        weight *= cosine;
+        weight *= share;
 //#end
 //#if record_squared_cosine
-        weight *= cosine * cosine;
+        weight *= share * share;
 //#end
 //#else
         let pdf = choice.probability * sample.pdf_solid_angle;

@@ -22,15 +22,37 @@ fn dominant_face(normal: vec3f) -> u32 {
 }
 
 fn cell_of(position: vec3f, normal: vec3f) -> u32 {
+//#if faces
+    return cell_on_face(position, dominant_face(normal));
+//#else
+    return cell_on_face(position, 0u);
+//#end
+}
+
+//#if medium
+const MEDIUM_FACE = 6u;
+
+fn cell_in_medium(position: vec3f) -> u32 {
+//#if faces
+    return cell_on_face(position, select(0u, MEDIUM_FACE, globals.grid_medium != 0u));
+//#else
+    return cell_on_face(position, 0u);
+//#end
+}
+
+fn law_in_medium(position: vec3f) -> u32 {
+    if globals.law_of_cell_at == NO_ARRAY {
+        return WHOLE_MAP;
+    }
+    return law_u16(globals.law_of_cell_at, cell_in_medium(position));
+}
+//#end
+
+fn cell_on_face(position: vec3f, face: u32) -> u32 {
     let direction = normalize_or(position - globals.grid_center, vec3f(0.0, 1.0, 0.0));
     let uv = uv_from_direction(direction);
     let column = min(u32(max(uv.x, 0.0) * f32(globals.grid_columns)), globals.grid_columns - 1u);
     let row = min(u32(max(uv.y, 0.0) * f32(globals.grid_rows)), globals.grid_rows - 1u);
-//#if faces
-    let face = dominant_face(normal);
-//#else
-    let face = 0u;
-//#end
     return (face * globals.grid_rows + row) * globals.grid_columns + column;
 }
 

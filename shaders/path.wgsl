@@ -33,35 +33,64 @@ struct FirstHit {
     hits: f32,
 }
 
+// A place at which light is scattered; in a medium only the point's position means anything.
 struct Vertex {
     point: SurfacePoint,
     bsdf: Bsdf,
+    // Direction to where the path came from, in the shading frame.
     wo: vec3f,
     law: u32,
+//#if medium
+    is_in_medium: bool,
+    mean_cosine: f32,
+//#end
 }
 
 //#if solid_transmission
 struct Body {
+//#if medium
+    interior: Interior,
+    is_solid: bool,
+//#else
     absorption: vec3f,
+//#end
     squared_index: f32,
 }
 
+fn body_air() -> Body {
+    var body: Body;
+    body.squared_index = 1.0;
+    return body;
+}
+
+//#if medium
+//#else
 fn body_transmittance(body: Body, distance: f32) -> vec3f {
     if all(body.absorption == vec3f(0.0)) || distance >= F32_MAX {
         return vec3f(1.0);
     }
     return exp(-body.absorption * distance);
 }
+//#end
 
-fn body_behind(p: SurfaceParameters, front_face: bool, before: Body) -> Body {
-    if p.thin {
+fn body_behind(point: SurfacePoint, before: Body) -> Body {
+    if point.parameters.thin {
         return before;
     }
-    if front_face {
-        let index = max(p.ior, 1.0);
-        return Body(p.absorption, index * index);
+    var body = body_air();
+    if point.front_face {
+        let index = max(point.parameters.ior, 1.0);
+        body.squared_index = index * index;
+//#if medium
+        let inside = material_numbers(point.material, SCATTERING);
+        body.interior =
+            Interior(inside.xyz, inside.w, point.parameters.absorption + inside.xyz);
+        body.is_solid = true;
+//#else
+        body.absorption = point.parameters.absorption;
+//#end
     }
-    return Body(vec3f(0.0), 1.0);
+    return body;
 }
 //#end
 
@@ -74,7 +103,7 @@ fn path_new(ray: Ray, sampler: Sampler) -> Path {
     path.departure_position = ray.origin;
     path.departure_law = WHOLE_MAP;
 //#if solid_transmission
-    path.body = Body(vec3f(0.0), 1.0);
+    path.body = body_air();
 //#end
     return path;
 }
@@ -161,13 +190,36 @@ fn passed(hit: Hit, direction: vec3f) -> vec3f {
 fn path_step(path: ptr<function, Path>) -> bool {
     (*path).rays += 1u;
     let hit = closest_hit((*path).ray, (*path).bounces == 0u);
+//#if medium
+    let stretch = stretch_ahead(path, (*path).ray.origin, (*path).ray.direction, hit.t);
+    if stretch.start < stretch.end {
+        if all(stretch.interior.scattering == vec3f(0.0)) {
+            (*path).throughput *=
+                exp(-stretch.interior.extinction * (stretch.end - stretch.start));
+        } else if !has_faded(path) {
+            let bits = path_pair_bits(path);
+            let flight = fly_through(
+                stretch.interior, (*path).throughput, stretch.end - stretch.start, bits);
+            (*path).throughput *= flight.weight;
+            if flight.scattered_at < F32_MAX {
+                let position =
+                    (*path).ray.origin + (*path).ray.direction * (stretch.start + flight.scattered_at);
+                return visit(path, medium_vertex(path, position, stretch.interior.mean_cosine));
+            }
+        }
+    }
+//#else
+//#if solid_transmission
+    (*path).throughput *= body_transmittance((*path).body, hit.t);
+//#end
+//#end
+    if has_faded(path) {
+        return false;
+    }
     if hit.t >= MISS {
         escape(path);
         return false;
     }
-//#if solid_transmission
-    (*path).throughput *= body_transmittance((*path).body, hit.t);
-//#end
     (*path).travelled += hit.t;
     let direction = (*path).ray.direction;
     let point = surface_at(hit.triangle, hit.barycentric, direction);
@@ -183,6 +235,61 @@ fn path_step(path: ptr<function, Path>) -> bool {
 //#end
     return arrive(path, point);
 }
+
+// Whether nothing is left that f32 can weigh.
+fn has_faded(path: ptr<function, Path>) -> bool {
+    return max_element((*path).throughput) < 1.17549435e-38;
+}
+
+//#if medium
+// What fills the way of a ray from where the path is.
+fn stretch_ahead(
+    path: ptr<function, Path>,
+    origin: vec3f,
+    direction: vec3f,
+    distance: f32,
+) -> Stretch {
+//#if solid_transmission
+    return stretch_in((*path).body, origin, direction, distance);
+//#else
+    return fog_stretch(origin, direction, distance);
+//#end
+}
+
+//#if solid_transmission
+// Twin of `Body::stretch`.
+fn stretch_in(body: Body, origin: vec3f, direction: vec3f, distance: f32) -> Stretch {
+    if !body.is_solid {
+        return fog_stretch(origin, direction, distance);
+    }
+    let fills = distance < F32_MAX && any(body.interior.extinction != vec3f(0.0));
+    return Stretch(body.interior, 0.0, select(0.0, distance, fills));
+}
+//#end
+
+fn is_in_solid(path: ptr<function, Path>) -> bool {
+//#if solid_transmission
+    return (*path).body.is_solid;
+//#else
+    return false;
+//#end
+}
+
+fn medium_vertex(path: ptr<function, Path>, position: vec3f, mean_cosine: f32) -> Vertex {
+    var vertex: Vertex;
+    vertex.point.position = position;
+    vertex.is_in_medium = true;
+    vertex.mean_cosine = mean_cosine;
+    vertex.law = WHOLE_MAP;
+//#if light_grid
+    // From inside of a solid the map is not seen anyway.
+    if !is_in_solid(path) {
+        vertex.law = law_in_medium(position);
+    }
+//#end
+    return vertex;
+}
+//#end
 
 //#if partial
 fn passes(path: ptr<function, Path>, point: SurfacePoint) -> bool {
@@ -204,7 +311,7 @@ fn passes(path: ptr<function, Path>, point: SurfacePoint) -> bool {
 }
 //#end
 
-// Makes the surface a vertex, gathers light there and chooses where the path goes on.
+// Makes the surface a vertex, unless it is unlit: then it is seen as it is.
 fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
     let bsdf = bsdf_new(point.parameters, point.front_face);
 //#if layers
@@ -222,19 +329,33 @@ fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
         return false;
     }
 //#end
+    var vertex: Vertex;
+    vertex.point = point;
+    vertex.bsdf = bsdf;
+    vertex.wo = local_from_world(point.shading_frame, -(*path).ray.direction);
+    vertex.law = WHOLE_MAP;
+//#if light_grid
+    vertex.law = law_of(point.position, point.geometric_normal);
+//#end
+    return visit(path, vertex);
+}
+
+// Gathers light at a vertex, if the path may have one more, and chooses where the path goes on.
+fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
     if (*path).bounces == globals.bounces {
         return false;
     }
     (*path).bounces += 1u;
     (*path).travelled = 0.0;
     (*path).passes = 0u;
-    let wo = local_from_world(point.shading_frame, -(*path).ray.direction);
-    var law = WHOLE_MAP;
-//#if light_grid
-    law = law_of(point.position, point.geometric_normal);
+    var gathers = !bsdf_is_delta_only(vertex.bsdf);
+//#if medium
+    gathers = gathers || vertex.is_in_medium;
+//#if learning
+    gathers = gathers && !(vertex.is_in_medium && is_in_solid(path));
 //#end
-    let vertex = Vertex(point, bsdf, wo, law);
-    if !bsdf_is_delta_only(bsdf) {
+//#end
+    if gathers {
 //#if learning
         record(path, vertex);
 //#else
@@ -271,9 +392,34 @@ fn add_emitted(path: ptr<function, Path>, point: SurfacePoint) {
 }
 //#end
 
-// The ray leaves the scene: adds the map's radiance.
+//#if background_blur
+// Twin of `background::spread`.
+fn spread(direction: vec3f, concentration: f32, u: vec2f) -> vec3f {
+    let share = u.x + (1.0 - u.x) * exp(-2.0 * concentration);
+    let cosine = clamp(1.0 + log(max(share, 1e-30)) / concentration, -1.0, 1.0);
+    let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
+    let phi = sin_cos_turns(u.y);
+    return world_from_local(frame_from_z(direction), vec3f(sine * phi.y, sine * phi.x, cosine));
+}
+//#end
+
+// The ray leaves the scene: adds the map's radiance, or for the camera the background's.
 fn escape(path: ptr<function, Path>) {
     let direction = (*path).ray.direction;
+//#if background_blur
+    if (*path).bounces == 0u {
+        var sampler = (*path).sampler;
+        let blurred = spread(direction, globals.background_concentration, next_pair(&sampler));
+        (*path).radiance += (*path).throughput * environment_radiance(blurred);
+        return;
+    }
+//#end
+//#if background_color
+    if (*path).bounces == 0u {
+        (*path).radiance += (*path).throughput * globals.background;
+        return;
+    }
+//#end
 //#if map_sampling
     if (*path).departure_pdf_solid_angle < F32_MAX {
         let seen = radiance_and_tile_pdf(direction);
@@ -286,9 +432,16 @@ fn escape(path: ptr<function, Path>) {
     (*path).radiance += (*path).throughput * environment_radiance(direction);
 }
 
-// BSDF times cosine and the BSDF's density for light from `direction`; zero where shading and
-// geometric normal disagree about the side.
-fn scattered(vertex: Vertex, direction: vec3f) -> EvalPdf {
+// What share of light from `direction` goes on along the path, and the density with which `scatter`
+// chooses that direction; zero where shading and geometric normal disagree about the side.
+fn scattered(path: ptr<function, Path>, vertex: Vertex, direction: vec3f) -> EvalPdf {
+//#if medium
+    if vertex.is_in_medium {
+        let cosine = dot((*path).ray.direction, direction);
+        let density = phase_pdf_solid_angle(vertex.mean_cosine, cosine);
+        return EvalPdf(vec3f(density), density);
+    }
+//#end
     let wi = local_from_world(vertex.point.shading_frame, direction);
     if (wi.z > 0.0) != (dot(vertex.point.geometric_normal, direction) > 0.0) {
         return EvalPdf(vec3f(0.0), 0.0);
@@ -303,21 +456,45 @@ fn transmittance(
     direction: vec3f,
     distance: f32,
 ) -> vec3f {
-    (*path).rays += 1u;
     let normal = vertex.point.geometric_normal;
     let is_above = dot(normal, direction) > 0.0;
-    let origin = offset_origin(vertex.point.position, select(-normal, normal, is_above));
-    // Stop short of the light's own surface.
-    let ray = Ray(origin, direction, distance * (1.0 - 1e-4));
-    var result = transmittance_along(ray);
+    var origin = offset_origin(vertex.point.position, select(-normal, normal, is_above));
+    var left = vec3f(1.0);
 //#if solid_transmission
     var body = (*path).body;
-    if !is_above {
-        body = body_behind(vertex.point.parameters, vertex.point.front_face, body);
-    }
-    result *= body_transmittance(body, distance);
+//#if medium
+    let goes_behind = !is_above && !vertex.is_in_medium;
+//#else
+    let goes_behind = !is_above;
 //#end
-    return result;
+    if goes_behind {
+        body = body_behind(vertex.point, body);
+    }
+//#end
+//#if medium
+    if vertex.is_in_medium {
+        origin = vertex.point.position;
+    }
+//#if solid_transmission
+    let stretch = stretch_in(body, origin, direction, distance);
+//#else
+    let stretch = fog_stretch(origin, direction, distance);
+//#end
+    if stretch.start < stretch.end {
+        left = exp(-stretch.interior.extinction * (stretch.end - stretch.start));
+    }
+//#else
+//#if solid_transmission
+    left = body_transmittance(body, distance);
+//#end
+//#end
+    if all(left == vec3f(0.0)) {
+        return left;
+    }
+    (*path).rays += 1u;
+    // Stop short of the light's own surface.
+    let ray = Ray(origin, direction, distance * (1.0 - 1e-4));
+    return transmittance_along(ray) * left;
 }
 //#end
 
@@ -332,7 +509,7 @@ fn gather_environment(path: ptr<function, Path>, vertex: Vertex) {
         return;
     }
     let pdf = choice.probability * sample.pdf_solid_angle;
-    let f = scattered(vertex, sample.direction);
+    let f = scattered(path, vertex, sample.direction);
     if max_element(f.value) <= 0.0 {
         return;
     }
@@ -352,7 +529,7 @@ fn gather_local(path: ptr<function, Path>, vertex: Vertex) {
     if max_element(sample.radiance_over_pdf) <= 0.0 {
         return;
     }
-    let f = scattered(vertex, sample.direction);
+    let f = scattered(path, vertex, sample.direction);
     if max_element(f.value) <= 0.0 {
         return;
     }
@@ -367,6 +544,18 @@ fn gather_local(path: ptr<function, Path>, vertex: Vertex) {
 
 // Chooses where the path goes on. `false` if it ends.
 fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
+//#if medium
+    if vertex.is_in_medium {
+        let travel = (*path).ray.direction;
+        let turned_ = normalize(sample_phase(vertex.mean_cosine, travel, path_pair(path)));
+        (*path).departure_pdf_solid_angle =
+            phase_pdf_solid_angle(vertex.mean_cosine, dot(travel, turned_));
+        (*path).departure_position = vertex.point.position;
+        (*path).departure_law = vertex.law;
+        (*path).ray = Ray(vertex.point.position, turned_, F32_MAX);
+        return true;
+    }
+//#end
     let lobe = path_pair(path).x;
     let u = path_pair(path);
     let sample = bsdf_sample(vertex.bsdf, vertex.wo, vec3f(lobe, u));
@@ -386,7 +575,7 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
     }
 //#if solid_transmission
     if is_transmission {
-        (*path).body = body_behind(vertex.point.parameters, vertex.point.front_face, (*path).body);
+        (*path).body = body_behind(vertex.point, (*path).body);
     }
 //#end
     (*path).departure_pdf_solid_angle = select(sample.pdf_solid_angle, F32_MAX, sample.is_delta);

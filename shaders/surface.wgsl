@@ -16,7 +16,7 @@ const NORMAL_MAPPED = 64u;
 const NO_TEXTURE = 0xffffffffu;
 
 // Texels of a material in `materials`, as `layout::Material` has them.
-const MATERIAL_TEXELS = 9u;
+const MATERIAL_TEXELS = 10u;
 const BASE_COLOR_ALPHA = 0u;
 const EMISSIVE_CUTOFF = 1u;
 const SPECULAR_COLOR_STRENGTH = 2u;
@@ -26,6 +26,8 @@ const FACTORS = 4u;
 // Clearcoat roughness, normal scale, clearcoat normal scale, flags.
 const SCALES_FLAGS = 5u;
 const FIRST_TEXTURES = 6u;
+// Scattering inside of a body and its mean cosine.
+const SCATTERING = 9u;
 
 // Textures of a material.
 const BASE_COLOR = 0u;

@@ -7,6 +7,7 @@
 //!   [`environment::Environment`]: equal-size tiles, each with an importance table.
 //! - A [`scene::Scene`] is flat arrays (from a glTF file or built in); a [`bvh::Bvh`] finds what a
 //!   ray hits in it; a [`bsdf::Bsdf`] says how light is scattered there.
+//!   Between surfaces there may be a [`medium`].
 //! - The [`light_grid`] maps a point to a cell (seen from the camera) and a cell to a distribution
 //!   over the map's tiles, learned by tracing paths.
 //! - [`path`] is the one loop that turns random numbers into radiance; [`render`] runs it over the
@@ -14,8 +15,8 @@
 //! - [`app`] is the window, [`cli`] what a person types; both find files by [`sources`], and write by
 //!   [`output`]. [`report`] measures error against time; [`metrics`] compares pictures, [`denoise`] smooths them, [`tone`] develops them.
 //!
-//! Arrows point down: `cli -> {app, report} -> render -> path -> {light_grid, bsdf, bvh} -> {scene,
-//! environment} -> {image, sampler, math, color, error}`.
+//! Arrows point down: `cli -> {app, report} -> render -> path -> {light_grid, bsdf, medium, bvh} ->
+//! {scene, environment} -> {image, sampler, math, color, error}`.
 
 pub mod app;
 pub mod bsdf;
@@ -29,6 +30,7 @@ mod huge_pages;
 pub mod image;
 pub mod light_grid;
 pub mod math;
+pub mod medium;
 pub mod metrics;
 pub mod noise;
 pub mod output;

@@ -40,6 +40,8 @@ pub enum Command {
     TogglePause,
     /// Start the picture again.
     Restart,
+    /// Render a part that is marked next, or the whole again.
+    ToggleRegion,
     /// Take a change back.
     Undo,
     /// Bring it again.
@@ -75,13 +77,14 @@ pub enum Command {
 }
 
 /// Keys, what they do, and the command.
-pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 17] = [
+pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 18] = [
     (plain(Key::Space), "Pause, resume", Command::TogglePause),
     (plain(Key::R), "Restart the picture", Command::Restart),
     (plain(Key::F), "Frame the whole scene", Command::FrameAll),
     (shift(Key::F), "Frame the surface clicked last", Command::FrameSelected),
     (plain(Key::B), "Keep this viewpoint", Command::Bookmark),
     (plain(Key::K), "Keep this picture for comparison", Command::KeepPicture),
+    (plain(Key::X), "Render a region: drag it; again for the whole", Command::ToggleRegion),
     (plain(Key::V), "Split view: plain | adaptive", Command::ToggleSplit),
     (plain(Key::G), "CPU or GPU", Command::ToggleDevice),
     (plain(Key::N), "Denoise, before and after", Command::ToggleDenoise),

@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::denoise::Denoiser;
 use crate::light_grid::LawOptions;
-use crate::path::PathLimits;
+use crate::path::{Background, PathLimits};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::DeviceChoice;
-use crate::render::{Sampling, StopRule, View};
+use crate::render::{Crop, Sampling, StopRule, View};
 use crate::sampler::Points;
-use crate::scene::{Camera, Projection, builtin};
+use crate::scene::{Camera, Medium, Projection, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
 
 /// Everything a person sets about the picture.
@@ -25,6 +25,10 @@ pub struct Document {
     pub rotation_degrees: f32,
     /// Factor on the map's radiance.
     pub intensity: f32,
+    /// What the camera sees of the map.
+    pub background: Background,
+    /// Fog in place of the scene's own; `None` keeps that.
+    pub fog: Option<Medium>,
     /// Where from; `None` until the scene is loaded and says it.
     pub viewpoint: Option<Viewpoint>,
     /// How light is found.
@@ -33,6 +37,8 @@ pub struct Document {
     pub look: Look,
     /// How large it is.
     pub size: PictureSize,
+    /// The part that is rendered: left, top, right, bottom as shares of the picture; `None` is all.
+    pub region: Option<[f32; 4]>,
     /// When it is done.
     pub stop: StopRule,
     /// Kept viewpoints of this scene.
@@ -89,6 +95,8 @@ impl Default for Document {
             map: "sky:day".to_owned(),
             rotation_degrees: 0.0,
             intensity: 1.0,
+            background: Background::default(),
+            fog: None,
             viewpoint: None,
             light: Light {
                 device: DeviceChoice::Auto,
@@ -106,6 +114,7 @@ impl Default for Document {
                 denoiser: Denoiser::default(),
             },
             size: PictureSize::Viewport(1),
+            region: None,
             stop: StopRule::default(),
             bookmarks: Vec::new(),
         }
@@ -115,6 +124,9 @@ impl Default for Document {
 impl Document {
     /// The render settings that follow for a picture of this size; `None` without a viewpoint.
     pub fn view(&self, width: u32, height: u32) -> Option<View> {
+        let whole = [width, height];
+        let crop = self.region.map(|region| pixels_of(region, whole));
+        let [width, height] = crop.map_or(whole, |(_, size)| size);
         Some(View {
             camera: self.viewpoint.as_ref()?.camera(),
             width,
@@ -127,10 +139,27 @@ impl Document {
             grid_columns: 64,
             learning_paths: View::suitable_learning_paths(width, height, self.stop.samples),
             laws: LawOptions::ADAPTIVE,
+            medium: self.fog,
+            background: self.background,
+            crop: crop.map(|(corner, _)| Crop { corner, whole }),
             // The denoiser, focusing and the surface overlays need them.
             layers: true,
         })
     }
+}
+
+/// Corner and size in pixels of a part of a picture; at least one pixel.
+fn pixels_of(
+    [left, top, right, bottom]: [f32; 4],
+    [width, height]: [u32; 2],
+) -> ([u32; 2], [u32; 2]) {
+    let span = |low: f32, high: f32, count: u32| {
+        let at = |share: f32| (share.clamp(0.0, 1.0) * count as f32).round() as u32;
+        let start = at(low).min(count - 1);
+        (start, at(high).clamp(start + 1, count) - start)
+    };
+    let ((x, w), (y, h)) = (span(left, right, width), span(top, bottom, height));
+    ([x, y], [w, h])
 }
 
 /// A camera with the point it turns around.
@@ -218,6 +247,13 @@ impl Viewpoint {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn regions_are_at_least_a_pixel_and_inside() {
+        assert_eq!(pixels_of([0.25, 0.5, 0.75, 1.0], [100, 50]), ([25, 25], [50, 25]));
+        assert_eq!(pixels_of([1.0, 1.0, 1.0, 1.0], [100, 50]), ([99, 49], [1, 1]));
+        assert_eq!(pixels_of([-1.0, 0.0, 2.0, 0.0], [1, 1]), ([0, 0], [1, 1]));
+    }
 
     #[test]
     fn a_viewpoint_is_the_camera_it_came_from() {

@@ -22,6 +22,8 @@ impl App {
                     self.document.scene = name;
                     self.document.viewpoint = None;
                     self.document.bookmarks.clear();
+                    self.document.region = None;
+                    self.document.fog = None;
                     interface.pinned = None;
                 }
             }
@@ -57,6 +59,11 @@ impl App {
             Command::Restart => {
                 interface.run = interface.run.wrapping_add(1);
                 interface.paused = false;
+            }
+            Command::ToggleRegion => {
+                interface.is_marking = self.document.region.is_none() && !interface.is_marking;
+                self.document.region = None;
+                interface.pinned = None;
             }
             Command::Undo => {
                 if let Some(document) = self.undo.undo() {

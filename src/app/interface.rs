@@ -36,6 +36,8 @@ pub struct Interface {
     pub wipe: f32,
     /// Whether what was learned is kept as it is.
     pub is_frozen: bool,
+    /// Whether the next drag marks the part that is to be rendered.
+    pub is_marking: bool,
     /// Whether rendering is halted.
     pub paused: bool,
     /// Counts restarts by hand.
@@ -118,6 +120,7 @@ impl Default for Interface {
             compared: None,
             wipe: 0.5,
             is_frozen: false,
+            is_marking: false,
             paused: false,
             run: 0,
             viewport_pixels: None,

@@ -285,12 +285,18 @@ impl App {
         });
     }
 
+    /// The kept picture that is compared; kept pictures are whole ones.
+    fn past(&self) -> Option<&history::Kept> {
+        let index = self.interface.compared.filter(|_| self.document.region.is_none())?;
+        self.history.get(index)
+    }
+
     fn viewport(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
         let speed_up = self
             .snapshot
             .as_ref()
             .and_then(|s| s.plain.as_ref().and_then(|plain| speed_up::SpeedUp::of(&s.main, plain)));
-        let past = self.interface.compared.and_then(|i| self.history.get(i));
+        let past = self.past().map(|kept| kept.name.clone());
         let mut scope = panels::viewport::Scope {
             document: &mut self.document,
             interface: &mut self.interface,
@@ -298,7 +304,7 @@ impl App {
             shown: self.shown.as_deref(),
             snapshot: self.snapshot.as_deref(),
             speed_up: speed_up.filter(|_| !self.is_repeatable),
-            past: past.map(|kept| kept.name.as_str()),
+            past: past.as_deref(),
             scene: self.scene.as_ref(),
             loading: self.loader.busy_with().next().is_some(),
             commands,
@@ -415,13 +421,13 @@ impl App {
             self.worker.submit(request);
         }
         if let Some(snapshot) = &self.snapshot {
-            let past = self.interface.compared.and_then(|i| self.history.get(i));
+            let past = self.past().map(|kept| Arc::clone(&kept.image));
             self.presenter.order(Order {
                 snapshot: Arc::clone(snapshot),
                 look: self.document.look,
                 overlay: self.interface.overlay.map(|o| (o, self.interface.overlay_opacity)),
                 tile: self.interface.tile,
-                past: past.map(|kept| Arc::clone(&kept.image)),
+                past,
             });
         }
     }

@@ -74,6 +74,8 @@ fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
         ("filter", json!(view.filter)),
         ("env_rotation_degrees", json!(document.rotation_degrees)),
         ("env_intensity", json!(document.intensity)),
+        ("background", json!(view.background)),
+        ("region", json!(view.crop.map(|crop| [crop.corner, [view.width, view.height]].concat()))),
         ("seed", json!(view.seed)),
         ("white_balance_kelvin", json!(document.look.white_balance.kelvin)),
         ("camera_eye", json!(camera.map(|c| c.eye))),

@@ -5,7 +5,6 @@ use rayon::prelude::*;
 
 use crate::bvh::{Ray, offset_origin};
 use crate::path::World;
-use crate::path::camera::CameraRays;
 use crate::render::View;
 use crate::scene::surface::SurfacePoint;
 
@@ -37,7 +36,7 @@ pub struct SurfaceMap {
 impl SurfaceMap {
     /// Looks through the middle of every pixel.
     pub fn of(world: &World, view: &View) -> Self {
-        let rays = CameraRays::new(&view.camera, view.width, view.height);
+        let rays = view.rays();
         let width = view.width.max(1);
         let spots = (0..width * view.height)
             .into_par_iter()
@@ -77,7 +76,7 @@ pub fn look(world: &World, mut ray: Ray) -> Option<Spot> {
 
 /// The surface seen at a place of the picture, both coordinates in `[0,1]`.
 pub fn look_at_place(world: &World, view: &View, place: Vec2) -> Option<Spot> {
-    let rays = CameraRays::new(&view.camera, view.width, view.height);
+    let rays = view.rays();
     let pixel = place * Vec2::new(view.width as f32, view.height as f32);
     look(world, rays.ray(pixel, Vec2::splat(0.5)))
 }

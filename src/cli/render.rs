@@ -14,14 +14,15 @@ use crate::environment::{Environment, EnvironmentOptions, TableKind};
 use crate::error::{Error, Notices, Result};
 use crate::image::{check_writable, is_same_file};
 use crate::light_grid::LawOptions;
+use crate::medium::Fog;
 use crate::output::record::{self, Phases, Record};
 use crate::output::{self, Exposure, LayerName, PictureOptions};
-use crate::path::{PathLimits, World, framing};
+use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::DeviceChoice;
-use crate::render::{Sampling, Session, StopRule, View};
+use crate::render::{Crop, Sampling, Session, StopRule, View};
 use crate::sampler::Points;
-use crate::scene::{Camera, Projection, builtin};
+use crate::scene::{Camera, Medium, Projection, Scene, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
 
 /// Arguments of `render`.
@@ -46,9 +47,26 @@ pub(super) struct RenderArguments {
     /// Turns the map about the vertical, in degrees.
     #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG", help_heading = "Environment")]
     env_rotation: f64,
+    /// What the camera sees of the map: `map`, `blur:DEGREES`, or a colour R,G,B (linear radiance).
+    #[arg(long, value_parser = values::background, value_name = "WHAT", help_heading = "Environment")]
+    background: Option<Background>,
     /// Multiplies the map's radiance.
     #[arg(long, default_value = "1", value_parser = values::not_negative, value_name = "X", help_heading = "Environment")]
     env_intensity: f32,
+
+    /// Fog: scattering per metre, one number or R,G,B; 0.02 halves what is seen over 35 metres. In
+    /// place of the scene's own fog; 0 clears the air.
+    #[arg(long, value_parser = values::coefficient, value_name = "S", help_heading = "Fog")]
+    fog: Option<Vec3>,
+    /// Absorption of the fog per metre, one number or R,G,B.
+    #[arg(long, value_parser = values::coefficient, value_name = "A", help_heading = "Fog")]
+    fog_absorption: Option<Vec3>,
+    /// Mean cosine of scattering, -1 to 1: 0 to all sides alike, mist and haze 0.6 to 0.9.
+    #[arg(long, value_parser = values::mean_cosine, allow_hyphen_values = true, value_name = "G", help_heading = "Fog")]
+    fog_anisotropy: Option<f32>,
+    /// Lower and upper corner of the fog in metres; without it, the fog fills the scene's own box.
+    #[arg(long, value_parser = values::corners, allow_hyphen_values = true, value_name = "X,Y,Z,X,Y,Z", help_heading = "Fog")]
+    fog_box: Option<[Vec3; 2]>,
 
     /// Which of the file's cameras, counted from 0.
     #[arg(long, value_name = "N", help_heading = "Camera")]
@@ -72,6 +90,9 @@ pub(super) struct RenderArguments {
     /// Picture size in pixels.
     #[arg(long, default_value = "1280x720", value_parser = values::size, value_name = "WxH", help_heading = "Picture")]
     size: (u32, u32),
+    /// Renders only this part of the picture: its left and top, width and height in pixels.
+    #[arg(long, value_parser = values::region, value_name = "X,Y,W,H", help_heading = "Picture")]
+    region: Option<[u32; 4]>,
     /// Pixel filter.
     #[arg(long, default_value = "blackman-harris", value_enum, help_heading = "Picture")]
     filter: PixelFilter,
@@ -175,6 +196,14 @@ fn check_outputs(arguments: &RenderArguments) -> Result<()> {
     if let Some(denoiser) = arguments.denoise {
         denoiser.check()?;
     }
+    let (width, height) = arguments.size;
+    if let Some([left, top, w, h]) = arguments.region
+        && (left.saturating_add(w) > width || top.saturating_add(h) > height)
+    {
+        return Err(Error::new(format!(
+            "--region {left},{top},{w},{h} is not inside the picture of {width}x{height} pixels"
+        )));
+    }
     let files: Vec<&PathBuf> = arguments.outputs.iter().chain(&arguments.json).collect();
     for (i, file) in files.iter().enumerate() {
         if files[..i].iter().any(|other| is_same_file(other, file)) {
@@ -201,6 +230,12 @@ impl RenderArguments {
             env: map.to_owned(),
             env_rotation: 0.0,
             env_intensity: 1.0,
+            background: None,
+            region: None,
+            fog: None,
+            fog_absorption: None,
+            fog_anisotropy: None,
+            fog_box: None,
             camera: None,
             eye: None,
             target: None,
@@ -289,7 +324,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         gpu: session.gpu_figures(),
         phases: &phases,
         notices: &notices,
-        options: settings(arguments),
+        options: settings(arguments, session.view().fog(&world)),
     };
     let options = PictureOptions {
         exposure: arguments.exposure,
@@ -340,7 +375,7 @@ fn stop_rule(arguments: &RenderArguments) -> StopRule {
 }
 
 fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Result<View> {
-    let (width, height) = arguments.size;
+    let (width, height) = arguments.region.map_or(arguments.size, |[_, _, w, h]| (w, h));
     Ok(View {
         camera: camera(arguments, world, notices)?,
         width,
@@ -358,11 +393,37 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
             .learning_paths
             .unwrap_or_else(|| View::suitable_learning_paths(width, height, arguments.spp)),
         laws: LawOptions::ADAPTIVE,
+        medium: medium(arguments, &world.scene),
+        background: arguments.background.unwrap_or_default(),
+        crop: arguments.region.map(|[left, top, ..]| Crop {
+            corner: [left, top],
+            whole: [arguments.size.0, arguments.size.1],
+        }),
         layers: arguments
             .layers
             .iter()
             .any(|l| !matches!(l, LayerName::Samples | LayerName::Variance))
             || arguments.denoise.is_some(),
+    })
+}
+
+/// The medium the options ask for: what they leave out is the scene's.
+fn medium(arguments: &RenderArguments, scene: &Scene) -> Option<Medium> {
+    let RenderArguments { fog, fog_absorption, fog_anisotropy, fog_box, .. } = arguments;
+    if fog.is_none() && fog_absorption.is_none() && fog_anisotropy.is_none() && fog_box.is_none() {
+        return None;
+    }
+    let of_scene = scene.medium.unwrap_or_default();
+    let cleared = *fog == Some(Vec3::ZERO) && fog_absorption.is_none();
+    Some(Medium {
+        scattering: fog.unwrap_or(of_scene.scattering),
+        absorption: fog_absorption.unwrap_or(if cleared {
+            Vec3::ZERO
+        } else {
+            of_scene.absorption
+        }),
+        anisotropy: fog_anisotropy.unwrap_or(of_scene.anisotropy),
+        bounds: fog_box.or(of_scene.bounds),
     })
 }
 
@@ -445,8 +506,21 @@ fn work(
 }
 
 /// Settings that belong into metadata and JSON, as typed or as chosen.
-fn settings(arguments: &RenderArguments) -> Vec<(&'static str, serde_json::Value)> {
+fn settings(
+    arguments: &RenderArguments,
+    fog: Option<Fog>,
+) -> Vec<(&'static str, serde_json::Value)> {
+    let fog = fog.map(|fog| {
+        let Fog { interior, bounds: [low, high] } = fog;
+        serde_json::json!({
+            "scattering": interior.scattering.to_array(),
+            "absorption": (interior.extinction - interior.scattering).to_array(),
+            "anisotropy": interior.phase.mean_cosine(),
+            "box": [low.to_array(), high.to_array()],
+        })
+    });
     vec![
+        ("fog", serde_json::json!(fog)),
         ("sampling", serde_json::json!(arguments.sampling)),
         ("table", serde_json::json!(arguments.table.to_string())),
         ("tiles", serde_json::json!(format!("{}x{}", arguments.tiles.0, arguments.tiles.1))),
@@ -454,6 +528,8 @@ fn settings(arguments: &RenderArguments) -> Vec<(&'static str, serde_json::Value
         ("bounces", serde_json::json!(arguments.bounces)),
         ("russian_roulette", serde_json::json!(!arguments.no_russian_roulette)),
         ("filter", serde_json::json!(arguments.filter)),
+        ("region", serde_json::json!(arguments.region)),
+        ("background", serde_json::json!(arguments.background.unwrap_or_default())),
         ("env_rotation_degrees", serde_json::json!(arguments.env_rotation)),
         ("env_intensity", serde_json::json!(arguments.env_intensity)),
         ("seed", serde_json::json!(arguments.seed)),

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::path::Background;
 pub(super) use crate::sources::size_pair as pair;
 
 /// Largest picture in pixels: 40 bytes a pixel stay under 5.4 GB.
@@ -26,6 +27,62 @@ pub(super) fn vector(text: &str) -> Result<Vec3, String> {
     match numbers[..] {
         [x, y, z] if text.split(',').count() == 3 => Ok(Vec3::new(x, y, z)),
         _ => Err("expected three numbers like 1.5,2,-3".to_owned()),
+    }
+}
+
+/// One number of at least zero, or three joined by commas (linear RGB).
+pub(super) fn coefficient(text: &str) -> Result<Vec3, String> {
+    let parts: Result<Vec<f32>, String> = text.split(',').map(not_negative).collect();
+    match parts?[..] {
+        [grey] => Ok(Vec3::splat(grey)),
+        [r, g, b] => Ok(Vec3::new(r, g, b)),
+        _ => Err("expected one number or three like 0.1,0.2,0.3".to_owned()),
+    }
+}
+
+/// `X,Y,WIDTH,HEIGHT` in pixels.
+pub(super) fn region(text: &str) -> Result<[u32; 4], String> {
+    let numbers: Vec<u32> = text.split(',').filter_map(|t| t.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x, y, w, h] if text.split(',').count() == 4 && w > 0 && h > 0 => Ok([x, y, w, h]),
+        _ => Err("expected four numbers like 100,50,320,180, the last two not 0".to_owned()),
+    }
+}
+
+/// `map`, `blur:DEGREES` or a colour.
+pub(super) fn background(text: &str) -> Result<Background, String> {
+    if text == "map" {
+        return Ok(Background::Map);
+    }
+    if let Some(degrees) = text.strip_prefix("blur:") {
+        let degrees = finite(degrees)?;
+        if !(0.0..=90.0).contains(&degrees) {
+            return Err("a blur is from 0 to 90 degrees".to_owned());
+        }
+        return Ok(Background::Blurred(degrees.to_radians() as f32));
+    }
+    let color = coefficient(text).map_err(|e| format!("map, blur:DEGREES or a colour: {e}"))?;
+    Ok(Background::Color(color.to_array()))
+}
+
+/// A number from -1 to 1.
+pub(super) fn mean_cosine(text: &str) -> Result<f32, String> {
+    let x = finite(text)?;
+    if x.abs() <= 1.0 { Ok(x as f32) } else { Err("must be between -1 and 1".to_owned()) }
+}
+
+/// `X,Y,Z,X,Y,Z`: lower and upper corner of a box in metres.
+pub(super) fn corners(text: &str) -> Result<[Vec3; 2], String> {
+    let numbers: Result<Vec<f32>, String> =
+        text.split(',').map(|t| finite(t).map(|x| x as f32)).collect();
+    let [a, b, c, d, e, f] = numbers?[..] else {
+        return Err("expected six numbers: the lower and the upper corner".to_owned());
+    };
+    let (low, high) = (Vec3::new(a, b, c), Vec3::new(d, e, f));
+    if low.cmplt(high).all() {
+        Ok([low, high])
+    } else {
+        Err("the first corner must be the lower one along every axis".to_owned())
     }
 }
 

@@ -4,6 +4,9 @@ use glam::Vec3;
 
 use crate::math::uv_from_direction;
 
+/// The face of points in a medium, after the six of surfaces.
+pub const MEDIUM_FACE: u32 = 6;
+
 /// A uniform spherical grid around the camera, optionally split by the direction a surface faces.
 ///
 /// The talk's grid has no faces. *Measured* (design study): six faces and a cosine weight are nearly
@@ -18,12 +21,14 @@ pub struct SphericalGrid {
     pub rows: u32,
     /// Whether a cell is split six-fold by the normal's dominant axis.
     pub faces: bool,
+    /// Whether points in a medium have a face of their own; without faces they share the only one.
+    pub medium: bool,
 }
 
 impl SphericalGrid {
-    /// Number of faces a cell is split into: 6 or 1.
+    /// Number of faces a cell is split into: 1, 6, or 7 with that of the medium.
     pub fn face_count(&self) -> u32 {
-        if self.faces { 6 } else { 1 }
+        if self.faces { 6 + u32::from(self.medium) } else { 1 }
     }
 
     /// Number of cells, faces included.
@@ -35,12 +40,20 @@ impl SphericalGrid {
     ///
     /// Cells are numbered face by face, then row by row.
     pub fn cell_of(&self, position: Vec3, normal: Vec3) -> u32 {
+        self.cell_on_face(position, if self.faces { dominant_face(normal) } else { 0 })
+    }
+
+    /// Cell of a point in a medium.
+    pub fn cell_in_medium(&self, position: Vec3) -> u32 {
+        self.cell_on_face(position, if self.faces && self.medium { MEDIUM_FACE } else { 0 })
+    }
+
+    fn cell_on_face(&self, position: Vec3, face: u32) -> u32 {
         let direction = (position - self.center).try_normalize().unwrap_or(Vec3::Y);
         let uv = uv_from_direction(direction);
         // `as` saturates, so that rounding (or a NaN position) can never leave the grid.
         let column = ((uv.x * self.columns as f32) as u32).min(self.columns - 1);
         let row = ((uv.y * self.rows as f32) as u32).min(self.rows - 1);
-        let face = if self.faces { dominant_face(normal) } else { 0 };
         (face * self.rows + row) * self.columns + column
     }
 
@@ -72,7 +85,7 @@ pub fn dominant_face(normal: Vec3) -> u32 {
     2 * axis + u32::from(normal[axis as usize] < 0.0)
 }
 
-/// Unit axis of a face; inverse of [`dominant_face`].
+/// Unit axis of a surface's face; inverse of [`dominant_face`].
 pub fn face_axis(face: u32) -> Vec3 {
     let axis = [Vec3::X, Vec3::Y, Vec3::Z][(face / 2) as usize];
     if face.is_multiple_of(2) { axis } else { -axis }
@@ -84,18 +97,28 @@ mod tests {
 
     #[test]
     fn the_middle_of_every_cell_is_in_that_cell() {
-        let grid =
-            SphericalGrid { center: Vec3::new(1.0, -2.0, 3.0), columns: 64, rows: 32, faces: true };
+        let grid = SphericalGrid {
+            center: Vec3::new(1.0, -2.0, 3.0),
+            columns: 64,
+            rows: 32,
+            faces: true,
+            medium: true,
+        };
         for cell in 0..grid.cell_count() {
             let (face, _, _) = grid.coordinates(cell);
             let point = grid.center + 7.5 * grid.direction_of(cell);
-            assert_eq!(grid.cell_of(point, face_axis(face)), cell);
+            let found = match face {
+                MEDIUM_FACE => grid.cell_in_medium(point),
+                _ => grid.cell_of(point, face_axis(face)),
+            };
+            assert_eq!(found, cell);
         }
     }
 
     #[test]
     fn odd_points_stay_inside_the_grid() {
-        let grid = SphericalGrid { center: Vec3::ZERO, columns: 64, rows: 32, faces: true };
+        let grid =
+            SphericalGrid { center: Vec3::ZERO, columns: 64, rows: 32, faces: true, medium: false };
         for position in [
             Vec3::ZERO,
             Vec3::Y,

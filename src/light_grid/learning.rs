@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::cells::{SphericalGrid, face_axis};
+use super::cells::{MEDIUM_FACE, SphericalGrid, face_axis};
 use super::counters::{Counters, Tally};
 use super::tile_laws::TileLaws;
 use super::{Cells, LightGrid, MEMORY_BUDGET_BYTES, WHOLE_MAP};
@@ -287,11 +287,11 @@ impl<'a> LawBuilder<'a> {
     }
 }
 
-/// For each face axis, the share of a Lambertian's density that falls into each tile, by summing a
-/// Fibonacci lattice of directions.
+/// For each face axis, the share of a Lambertian's density that falls into each tile, and at last that
+/// of even scattering in a medium, by summing a Fibonacci lattice of directions.
 fn diffuse_shares(environment: &Environment) -> Vec<Vec<f64>> {
     const DIRECTIONS: u32 = 1 << 15;
-    let mut shares = vec![vec![0.0; environment.tile_count() as usize]; 6];
+    let mut shares = vec![vec![0.0; environment.tile_count() as usize]; MEDIUM_FACE as usize + 1];
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     for i in 0..DIRECTIONS {
         let y = 1.0 - (f64::from(i) + 0.5) * 2.0 / f64::from(DIRECTIONS);
@@ -299,7 +299,8 @@ fn diffuse_shares(environment: &Environment) -> Vec<Vec<f64>> {
         let (sin, cos) = (golden * f64::from(i)).sin_cos();
         let direction = glam::DVec3::new(radius * cos, y, radius * sin).as_vec3();
         let tile = environment.tile_of(direction) as usize;
-        for (face, shares) in shares.iter_mut().enumerate() {
+        shares[MEDIUM_FACE as usize][tile] += 1.0 / f64::from(DIRECTIONS);
+        for (face, shares) in shares.iter_mut().take(6).enumerate() {
             let cosine = f64::from(direction.dot(face_axis(face as u32)).max(0.0));
             shares[tile] += cosine * 4.0 / f64::from(DIRECTIONS);
         }

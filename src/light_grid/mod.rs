@@ -56,6 +56,13 @@ impl LightGrid {
         })
     }
 
+    /// Law of a point in a medium.
+    pub fn law_in_medium(&self, position: Vec3) -> u32 {
+        self.cells.as_ref().map_or(WHOLE_MAP, |cells| {
+            u32::from(cells.law_of_cell[cells.grid.cell_in_medium(position) as usize])
+        })
+    }
+
     /// The laws over the map's tiles; law 0 is [`WHOLE_MAP`].
     pub fn laws(&self) -> &TileLaws {
         &self.laws

@@ -73,7 +73,13 @@ mod tests {
     #[test]
     fn a_turned_map_keeps_what_is_seen_where() {
         let old = environment(3, 0.0);
-        let grid = SphericalGrid { center: glam::Vec3::ZERO, columns: 8, rows: 4, faces: true };
+        let grid = SphericalGrid {
+            center: glam::Vec3::ZERO,
+            columns: 8,
+            rows: 4,
+            faces: true,
+            medium: false,
+        };
         let learned = LightGrid::with_garbage_laws(grid, old.tile_energies(), 1).expect("a grid");
         let turned = environment(3, 5.0);
         let laws = learned.transferred(&old, &turned).expect("a grid");
@@ -94,7 +100,13 @@ mod tests {
     #[test]
     fn the_same_map_keeps_its_laws_and_a_brighter_tile_gets_more() {
         let old = environment(3, 0.0);
-        let grid = SphericalGrid { center: glam::Vec3::ZERO, columns: 8, rows: 4, faces: true };
+        let grid = SphericalGrid {
+            center: glam::Vec3::ZERO,
+            columns: 8,
+            rows: 4,
+            faces: true,
+            medium: false,
+        };
         let learned = LightGrid::with_garbage_laws(grid, old.tile_energies(), 2).expect("a grid");
         let same = learned.transferred(&old, &old).expect("a grid");
         let sun_moved = learned.transferred(&old, &environment(20, 0.0)).expect("a grid");

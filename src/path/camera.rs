@@ -11,6 +11,7 @@ pub struct CameraRays {
     pub(crate) position: Vec3,
     pub(crate) right: Vec3,
     pub(crate) up: Vec3,
+    /// To the middle of the picture at distance 1; not a unit vector where that is off the axis.
     pub(crate) forward: Vec3,
     /// Half extents of the picture at distance 1 (perspective) or in metres (orthographic).
     pub(crate) half_extent: Vec2,
@@ -41,6 +42,24 @@ impl CameraRays {
             lens_radius: camera.lens_radius,
             focus_distance: camera.focus_distance,
         }
+    }
+
+    /// Rays through a part of the picture: `left` and `top` are its corner, `width` and `height` its
+    /// size in pixels.
+    pub fn cropped(mut self, [left, top]: [u32; 2], [width, height]: [u32; 2]) -> Self {
+        let size = Vec2::new(width as f32, height as f32);
+        let corner = Vec2::new(left as f32, top as f32);
+        let middle = (2.0 * corner + size) / self.picture_size - 1.0;
+        let shift = self.right * (middle.x * self.half_extent.x)
+            - self.up * (middle.y * self.half_extent.y);
+        if self.orthographic {
+            self.position += shift;
+        } else {
+            self.forward += shift;
+        }
+        self.half_extent *= size / self.picture_size;
+        self.picture_size = size;
+        self
     }
 
     /// Where the camera is.
@@ -116,6 +135,27 @@ mod tests {
         let middle = at_focus(Vec2::splat(0.5));
         for lens in [Vec2::new(0.1, 0.9), Vec2::new(0.99, 0.5), Vec2::ZERO] {
             assert!((at_focus(lens) - middle).length() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn a_cropped_picture_has_the_same_rays() {
+        let perspective = Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, 0.8);
+        let orthographic = Camera {
+            projection: Projection::Orthographic { half_height: 2.0 },
+            lens_radius: 0.1,
+            ..perspective.clone()
+        };
+        for camera in [perspective, orthographic] {
+            let whole = CameraRays::new(&camera, 120, 80);
+            let part = whole.cropped([70, 10], [30, 40]);
+            for pixel in [Vec2::ZERO, Vec2::new(30.0, 40.0), Vec2::new(7.5, 21.25)] {
+                let lens = Vec2::new(0.3, 0.9);
+                let a = whole.ray(pixel + Vec2::new(70.0, 10.0), lens);
+                let b = part.ray(pixel, lens);
+                assert!(a.origin.abs_diff_eq(b.origin, 1e-5), "{a:?} {b:?}");
+                assert!(a.direction.abs_diff_eq(b.direction, 1e-6), "{a:?} {b:?}");
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::{Path, PathTracer, Vertex};
+use super::{Path, PathTracer, Scatterer, Vertex};
 use crate::bvh::Ray;
 use crate::color::{importance, luminance};
 use crate::light_grid::{LearningGrid, WHOLE_MAP};
@@ -19,7 +19,8 @@ impl PathTracer<'_> {
                 break;
             }
             path.bounces += 1;
-            if !vertex.bsdf.is_delta_only() {
+            // Inside of a solid the map is never seen; its vertices would spoil what fog sees.
+            if !vertex.scatterer.is_delta_only() && !path.is_in_solid(&vertex) {
                 path.record(&vertex, learning);
             }
             if !path.scatter(&vertex) || !path.survives() {
@@ -30,7 +31,16 @@ impl PathTracer<'_> {
     }
 }
 
+/// What the cosine is to a surface: the phase function over that of even scattering.
+fn phase_weight(phase: f32) -> f32 {
+    4.0 * std::f32::consts::PI * phase
+}
+
 impl Path<'_> {
+    fn is_in_solid(&self, vertex: &Vertex) -> bool {
+        matches!(vertex.scatterer, Scatterer::Medium(_)) && self.body.interior.is_some()
+    }
+
     fn record(&mut self, vertex: &Vertex, learning: &LearningGrid) {
         let Some(grid) = self.tracer.grid else { return };
         let recording = learning.recording();
@@ -40,15 +50,24 @@ impl Path<'_> {
         let choice = grid.laws().sample(law, tile_bits);
         let u = Vec2::new(choice.remainder, unit_from_bits(row_bits));
         let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
-        let normal = vertex.point.geometric_normal;
-        let cell = learning.grid.cell_of(vertex.point.position, normal);
+        let cell = match &vertex.scatterer {
+            Scatterer::Surface(surface) => {
+                learning.grid.cell_of(vertex.position, surface.point.geometric_normal)
+            }
+            Scatterer::Medium(_) => learning.grid.cell_in_medium(vertex.position),
+        };
         let weight = match self.scattered(vertex, sample.direction) {
             None => 0.0,
-            Some((f, _)) => {
+            Some((f, own_pdf)) => {
                 let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
                 if recording.is_ratio() {
-                    let cosine = vertex.point.shading_frame.z.dot(sample.direction).abs();
-                    luminance(transmittance) * cosine.powi(recording.cosine_power())
+                    let share = match &vertex.scatterer {
+                        Scatterer::Surface(surface) => {
+                            surface.point.shading_frame.z.dot(sample.direction).abs()
+                        }
+                        Scatterer::Medium(_) => phase_weight(own_pdf),
+                    };
+                    luminance(transmittance) * share.powi(recording.cosine_power())
                 } else {
                     let pdf = choice.probability * sample.pdf_solid_angle;
                     let mean =

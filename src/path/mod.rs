@@ -1,13 +1,14 @@
 //! The path tracing loop: random numbers in, radiance out.
 //!
-//! A path is a chain of surface vertices. At each of at most `bounces` vertices light is gathered
-//! by next event estimation (NEE) from the environment map, and from local lights if there are any,
-//! and the path goes on in a direction the BSDF chooses; what a path then runs into counts with the
-//! balance heuristic. Alpha and smooth thin glass are passed straight through, by paths and shadow
+//! A path is a chain of vertices on surfaces and in media. At each of at most `bounces` vertices
+//! light is gathered by next event estimation (NEE) from the environment map, and from local lights
+//! if there are any, and the path goes on in a direction the BSDF or the phase function chooses; what
+//! a path then runs into counts with the balance heuristic. Alpha and smooth thin glass are passed straight through, by paths and shadow
 //! rays alike, and are no vertices: so NEE and BSDF sampling see the same light behind a pane.
 
 use glam::{Vec2, Vec3};
 
+pub mod background;
 pub mod camera;
 pub mod framing;
 mod learn;
@@ -15,6 +16,7 @@ mod lights;
 mod ray_clock;
 mod world;
 
+pub use background::Background;
 pub use lights::{LightSample, LocalLights};
 pub use world::World;
 
@@ -23,13 +25,14 @@ use crate::bvh::{Hit, Ray, offset_origin};
 use crate::environment::Environment;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
 use crate::math::balance_heuristic;
+use crate::medium::{Fog, Interior, Phase};
 use crate::sampler::{Sampler, unit_from_bits};
 use crate::scene::surface::SurfacePoint;
 
 /// What bounds a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PathLimits {
-    /// Most surface vertices that scatter light; 1 is direct light only, 0 sees emitters and the
+    /// Most vertices, on surfaces or in a medium, that scatter light; 1 is direct light only, 0 sees emitters and the
     /// environment alone.
     pub bounces: u32,
     /// Whether dim paths are ended at random.
@@ -45,6 +48,10 @@ pub struct PathTracer<'a> {
     pub environment: &'a Environment,
     /// How NEE chooses tiles; `None` samples the map by the BSDF alone.
     pub grid: Option<&'a LightGrid>,
+    /// What lies between surfaces; `None` is clear air.
+    pub fog: Option<Fog>,
+    /// What the camera sees where it sees no surface.
+    pub background: Background,
     /// When paths end.
     pub limits: PathLimits,
 }
@@ -103,25 +110,61 @@ impl PathTracer<'_> {
     }
 }
 
-/// A surface at which light is scattered.
+/// A place at which light is scattered.
 struct Vertex {
+    position: Vec3,
+    /// Tile law of NEE here.
+    law: u32,
+    scatterer: Scatterer,
+}
+
+/// What scatters light at a vertex.
+#[allow(clippy::large_enum_variant, reason = "a path has one at a time, on the stack")]
+enum Scatterer {
+    Surface(SurfaceScatterer),
+    Medium(Phase),
+}
+
+struct SurfaceScatterer {
     point: SurfacePoint,
     bsdf: Bsdf,
     /// Direction to where the path came from, in the shading frame.
     wo: Vec3,
-    /// Tile law of NEE here.
-    law: u32,
 }
 
-impl Vertex {
+impl Scatterer {
+    /// Whether no light that NEE may find is scattered towards the path.
+    fn is_delta_only(&self) -> bool {
+        match self {
+            Self::Surface(surface) => surface.bsdf.is_delta_only(),
+            Self::Medium(_) => false,
+        }
+    }
+}
+
+impl SurfaceScatterer {
+    /// BSDF times cosine and the BSDF's density for light from `direction`; `None` where it is
+    /// black, or where shading and geometric normal disagree about the side.
+    fn scattered(&self, direction: Vec3) -> Option<(Vec3, f32)> {
+        let wi = self.point.shading_frame.local_from_world(direction);
+        if (wi.z > 0.0) != (self.point.geometric_normal.dot(direction) > 0.0) {
+            return None;
+        }
+        let (f, pdf_solid_angle) = self.bsdf.eval_pdf(self.wo, wi);
+        (f.max_element() > 0.0).then_some((f, pdf_solid_angle))
+    }
+
     /// What lies behind the surface, given what lies before it.
-    fn body_behind(&self, before: Body) -> Body {
+    fn body_behind(&self, world: &World, before: Body) -> Body {
         let parameters = &self.point.parameters;
         if parameters.thin {
             before
         } else if self.point.front_face {
             let index = parameters.ior.max(1.0);
-            Body { absorption: parameters.absorption, squared_index: index * index }
+            let material = world.scene.triangle_materials[self.point.triangle as usize];
+            let material = &world.scene.materials[material as usize];
+            let interior = Interior::of_body(material, parameters.absorption);
+            Body { interior: Some(interior), squared_index: index * index }
         } else {
             Body::AIR
         }
@@ -131,22 +174,33 @@ impl Vertex {
 /// What a ray is in.
 #[derive(Clone, Copy)]
 struct Body {
-    /// Absorption coefficient per metre.
-    absorption: Vec3,
+    /// What a solid is filled with; `None` outside of solids.
+    interior: Option<Interior>,
     /// Squared index of refraction, by which radiance, hence throughput, is smaller than in air.
     squared_index: f32,
 }
 
 impl Body {
-    const AIR: Self = Self { absorption: Vec3::ZERO, squared_index: 1.0 };
+    const AIR: Self = Self { interior: None, squared_index: 1.0 };
 
-    /// Share of light left after `distance` metres. Rays that leave the scene from inside of a body
-    /// have met a mesh with holes: nothing is absorbed on their infinite way.
-    fn transmittance(&self, distance: f32) -> Vec3 {
-        if self.absorption == Vec3::ZERO || distance.is_infinite() {
-            return Vec3::ONE;
+    /// What fills the first `distance` metres of a ray, and where. Rays that leave the scene from
+    /// inside of a body have met a mesh with holes: nothing is absorbed on their infinite way.
+    fn stretch(
+        &self,
+        fog: Option<&Fog>,
+        origin: Vec3,
+        direction: Vec3,
+        distance: f32,
+    ) -> Option<(Interior, f32, f32)> {
+        match self.interior {
+            Some(interior) => {
+                (!interior.is_clear() && distance.is_finite()).then_some((interior, 0.0, distance))
+            }
+            None => fog.and_then(|fog| {
+                let (from, to) = fog.stretch(origin, direction, distance)?;
+                Some((fog.interior, from, to))
+            }),
         }
-        (-self.absorption * distance).exp()
     }
 }
 
@@ -194,16 +248,22 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// Follows the ray to the next surface that scatters; adds what is emitted on the way.
+    /// Follows the ray to the next place that scatters; adds what is emitted on the way.
     fn next_vertex(&mut self) -> Option<Vertex> {
         self.travelled = 0.0;
         for _ in 0..MAX_PASSES {
             self.rays += 1;
-            let Some(hit) = self.tracer.world.closest_hit(&self.ray, self.bounces == 0) else {
+            let hit = self.tracer.world.closest_hit(&self.ray, self.bounces == 0);
+            if let Some(vertex) = self.fly(hit.map_or(f32::INFINITY, |hit| hit.t)) {
+                return Some(vertex);
+            }
+            if self.has_faded() {
+                return None;
+            }
+            let Some(hit) = hit else {
                 self.escape();
                 return None;
             };
-            self.throughput *= self.body.transmittance(hit.t);
             self.travelled += hit.t;
             let scene = &self.tracer.world.scene;
             let point = SurfacePoint::at(scene, hit.triangle, hit.barycentric, self.ray.direction);
@@ -217,6 +277,34 @@ impl<'a> Path<'a> {
             return self.arrive(point);
         }
         None
+    }
+
+    /// Whether nothing is left that f32 can weigh.
+    fn has_faded(&self) -> bool {
+        self.throughput.max_element() < f32::MIN_POSITIVE
+    }
+
+    /// Takes the ray through what fills the way of `distance` metres to the next surface: a vertex
+    /// if it is scattered there.
+    fn fly(&mut self, distance: f32) -> Option<Vertex> {
+        let fog = self.tracer.fog.as_ref();
+        let (origin, direction) = (self.ray.origin, self.ray.direction);
+        let (interior, from, to) = self.body.stretch(fog, origin, direction, distance)?;
+        if !interior.scatters() {
+            self.throughput *= interior.transmittance(to - from);
+            return None;
+        }
+        if self.has_faded() {
+            return None;
+        }
+        let bits = self.sampler.next_pair_bits();
+        let flight = interior.fly(self.throughput, to - from, bits);
+        self.throughput *= flight.weight;
+        let position = origin + direction * (from + flight.scattered_at?);
+        // From inside of a solid the map is not seen anyway.
+        let grid = self.tracer.grid.filter(|_| self.body.interior.is_none());
+        let law = grid.map_or(WHOLE_MAP, |grid| grid.law_in_medium(position));
+        Some(Vertex { position, law, scatterer: Scatterer::Medium(interior.phase) })
     }
 
     /// Decides whether the ray goes straight through the surface, and weighs the path accordingly.
@@ -254,7 +342,9 @@ impl<'a> Path<'a> {
             .grid
             .map_or(WHOLE_MAP, |grid| grid.law_of(point.position, point.geometric_normal));
         let wo = point.shading_frame.local_from_world(-self.ray.direction);
-        Some(Vertex { point, bsdf, wo, law })
+        let position = point.position;
+        let scatterer = Scatterer::Surface(SurfaceScatterer { point, bsdf, wo });
+        Some(Vertex { position, law, scatterer })
     }
 
     /// Adds what a surface emits, whether the ray then passes it or not.
@@ -286,6 +376,13 @@ impl<'a> Path<'a> {
     /// The ray leaves the scene: adds the map's radiance.
     fn escape(&mut self) {
         let environment = self.tracer.environment;
+        if self.bounces == 0 && self.tracer.background != Background::Map {
+            let u = Vec2::from(self.sampler.next_pair());
+            let background = self.tracer.background;
+            self.radiance +=
+                self.throughput * background.radiance(environment, self.ray.direction, u);
+            return;
+        }
         let from = self.departure;
         let Some(grid) = self.tracer.grid.filter(|_| from.pdf_solid_angle.is_finite()) else {
             self.radiance += self.throughput * environment.radiance(self.ray.direction);
@@ -298,7 +395,7 @@ impl<'a> Path<'a> {
 
     /// Next event estimation from the map and, if there are any, one local light.
     fn gather(&mut self, vertex: &Vertex) {
-        if vertex.bsdf.is_delta_only() {
+        if vertex.scatterer.is_delta_only() {
             return;
         }
         if let Some(grid) = self.tracer.grid {
@@ -315,10 +412,10 @@ impl<'a> Path<'a> {
         let u = Vec2::new(choice.remainder, unit_from_bits(row_bits));
         let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
         let pdf = choice.probability * sample.pdf_solid_angle;
-        let Some((f, bsdf_pdf)) = self.scattered(vertex, sample.direction) else { return };
+        let Some((f, own_pdf)) = self.scattered(vertex, sample.direction) else { return };
         let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
         if transmittance != Vec3::ZERO {
-            let weight = balance_heuristic(pdf, bsdf_pdf) / pdf;
+            let weight = balance_heuristic(pdf, own_pdf) / pdf;
             self.radiance += self.throughput * f * sample.radiance * transmittance * weight;
         }
     }
@@ -326,49 +423,79 @@ impl<'a> Path<'a> {
     fn gather_local(&mut self, vertex: &Vertex) {
         let u = Vec2::from(self.sampler.next_pair());
         let world = self.tracer.world;
-        let Some(sample) = world.lights.sample(&world.scene, vertex.point.position, u) else {
+        let Some(sample) = world.lights.sample(&world.scene, vertex.position, u) else {
             return;
         };
-        let Some((f, bsdf_pdf)) = self.scattered(vertex, sample.direction) else { return };
+        let Some((f, own_pdf)) = self.scattered(vertex, sample.direction) else { return };
         let transmittance = self.transmittance(vertex, sample.direction, sample.distance);
         if transmittance != Vec3::ZERO {
-            let weight = balance_heuristic(sample.pdf_solid_angle, bsdf_pdf);
+            let weight = balance_heuristic(sample.pdf_solid_angle, own_pdf);
             self.radiance +=
                 self.throughput * f * sample.radiance_over_pdf * transmittance * weight;
         }
     }
 
-    /// BSDF times cosine and the BSDF's density for light from `direction`; `None` where it is
-    /// black, or where shading and geometric normal disagree about the side.
+    /// What share of light from `direction` goes on along the path, and the density with which
+    /// [`Self::scatter`] chooses that direction; `None` if it is no light.
     fn scattered(&self, vertex: &Vertex, direction: Vec3) -> Option<(Vec3, f32)> {
-        let wi = vertex.point.shading_frame.local_from_world(direction);
-        if (wi.z > 0.0) != (vertex.point.geometric_normal.dot(direction) > 0.0) {
-            return None;
+        match &vertex.scatterer {
+            Scatterer::Surface(surface) => surface.scattered(direction),
+            Scatterer::Medium(phase) => {
+                let density = phase.pdf_solid_angle(self.ray.direction.dot(direction));
+                Some((Vec3::splat(density), density))
+            }
         }
-        let (f, pdf_solid_angle) = vertex.bsdf.eval_pdf(vertex.wo, wi);
-        (f.max_element() > 0.0).then_some((f, pdf_solid_angle))
     }
 
+    /// Share of light that arrives at a vertex from `distance` metres away.
     fn transmittance(&mut self, vertex: &Vertex, direction: Vec3, distance: f32) -> Vec3 {
+        let (origin, body) = match &vertex.scatterer {
+            Scatterer::Surface(surface) => {
+                let normal = surface.point.geometric_normal;
+                let is_above = normal.dot(direction) > 0.0;
+                let body = if is_above {
+                    self.body
+                } else {
+                    surface.body_behind(self.tracer.world, self.body)
+                };
+                (offset_origin(vertex.position, if is_above { normal } else { -normal }), body)
+            }
+            Scatterer::Medium(_) => (vertex.position, self.body),
+        };
+        let stretch = body.stretch(self.tracer.fog.as_ref(), origin, direction, distance);
+        let left =
+            stretch.map_or(Vec3::ONE, |(interior, from, to)| interior.transmittance(to - from));
+        if left == Vec3::ZERO {
+            return left;
+        }
         self.rays += 1;
-        let normal = vertex.point.geometric_normal;
-        let side = if normal.dot(direction) > 0.0 { normal } else { -normal };
-        let body = if side == normal { self.body } else { vertex.body_behind(self.body) };
-        let origin = offset_origin(vertex.point.position, side);
         // Stop short of the light's own surface.
         let ray = Ray { origin, direction, t_min: 0.0, t_max: distance * (1.0 - 1e-4) };
-        self.tracer.world.transmittance(&ray) * body.transmittance(distance)
+        self.tracer.world.transmittance(&ray) * left
     }
 
     /// Chooses where the path goes on. `false` if it ends.
     fn scatter(&mut self, vertex: &Vertex) -> bool {
+        match &vertex.scatterer {
+            Scatterer::Surface(surface) => self.scatter_at_surface(vertex, surface),
+            Scatterer::Medium(phase) => {
+                let u = Vec2::from(self.sampler.next_pair());
+                let direction = phase.sample(self.ray.direction, u).normalize();
+                let pdf_solid_angle = phase.pdf_solid_angle(self.ray.direction.dot(direction));
+                self.depart(vertex, vertex.position, direction, pdf_solid_angle);
+                true
+            }
+        }
+    }
+
+    fn scatter_at_surface(&mut self, vertex: &Vertex, surface: &SurfaceScatterer) -> bool {
         let [lobe, _] = self.sampler.next_pair();
         let [x, y] = self.sampler.next_pair();
-        let Some(sample) = vertex.bsdf.sample(vertex.wo, Vec3::new(lobe, x, y)) else {
+        let Some(sample) = surface.bsdf.sample(surface.wo, Vec3::new(lobe, x, y)) else {
             return false;
         };
-        let direction = vertex.point.shading_frame.world_from_local(sample.wi).normalize();
-        let normal = vertex.point.geometric_normal;
+        let direction = surface.point.shading_frame.world_from_local(sample.wi).normalize();
+        let normal = surface.point.geometric_normal;
         let above = normal.dot(direction) > 0.0;
         if above == sample.is_transmission {
             return false;
@@ -378,21 +505,17 @@ impl<'a> Path<'a> {
             return false;
         }
         if sample.is_transmission {
-            self.body = vertex.body_behind(self.body);
+            self.body = surface.body_behind(self.tracer.world, self.body);
         }
-        self.departure = Departure {
-            pdf_solid_angle: if sample.is_delta { f32::INFINITY } else { sample.pdf_solid_angle },
-            position: vertex.point.position,
-            law: vertex.law,
-        };
-        let side = if above { normal } else { -normal };
-        self.ray = Ray {
-            origin: offset_origin(vertex.point.position, side),
-            direction,
-            t_min: 0.0,
-            t_max: f32::INFINITY,
-        };
+        let pdf = if sample.is_delta { f32::INFINITY } else { sample.pdf_solid_angle };
+        let origin = offset_origin(vertex.position, if above { normal } else { -normal });
+        self.depart(vertex, origin, direction, pdf);
         true
+    }
+
+    fn depart(&mut self, vertex: &Vertex, origin: Vec3, direction: Vec3, pdf_solid_angle: f32) {
+        self.departure = Departure { pdf_solid_angle, position: vertex.position, law: vertex.law };
+        self.ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
     }
 
     /// Russian roulette by throughput, as it would be in air: refraction into a body is no loss.

@@ -22,10 +22,11 @@ use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LawOptions, LearningGrid, LightGrid};
+use crate::medium::Fog;
 use crate::path::camera::CameraRays;
-use crate::path::{PathLimits, PathTracer, World};
+use crate::path::{Background, PathLimits, PathTracer, World};
 use crate::sampler::Points;
-use crate::scene::Camera;
+use crate::scene::{Camera, Medium};
 
 /// How the environment map is sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
@@ -67,8 +68,24 @@ pub struct View {
     pub learning_paths: u64,
     /// How counters become laws in [`Sampling::Adaptive`].
     pub laws: LawOptions,
+    /// What fills the space between surfaces, in place of the scene's own medium; `None` keeps that,
+    /// and a medium that is all zero is clear air.
+    pub medium: Option<Medium>,
+    /// What the camera sees where it sees no surface.
+    pub background: Background,
+    /// The part of a larger picture that this one is; `None` is the whole.
+    pub crop: Option<Crop>,
     /// Whether albedo, normal and depth are kept.
     pub layers: bool,
+}
+
+/// Where a part lies in the whole picture, in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Crop {
+    /// Column and row of the part's first pixel.
+    pub corner: [u32; 2],
+    /// Width and height of the whole.
+    pub whole: [u32; 2],
 }
 
 impl View {
@@ -86,6 +103,28 @@ impl View {
         let pixels = u64::from(width) * u64::from(height);
         let work = pixels * u64::from(samples.unwrap_or(256));
         (work / LEARNING_SHARE).clamp(1 << 16, 1 << 20)
+    }
+
+    /// Width and height of the picture that this one is a part of.
+    pub fn whole_size(&self) -> [u32; 2] {
+        self.crop.map_or([self.width, self.height], |crop| crop.whole)
+    }
+
+    /// The camera's rays through this picture.
+    pub fn rays(&self) -> CameraRays {
+        match self.crop {
+            None => CameraRays::new(&self.camera, self.width, self.height),
+            Some(Crop { corner, whole: [width, height] }) => {
+                let whole = CameraRays::new(&self.camera, width, height);
+                whole.cropped(corner, [self.width, self.height])
+            }
+        }
+    }
+
+    /// The medium that is rendered, in its box; `None` in clear air.
+    pub fn fog(&self, world: &World) -> Option<Fog> {
+        let medium = self.medium.or(world.scene.medium)?;
+        Fog::new(&medium, world.bvh.bounds())
     }
 }
 
@@ -158,6 +197,7 @@ pub struct Session<'a> {
     environment: &'a Environment,
     view: View,
     rays: CameraRays,
+    fog: Option<Fog>,
     engine: Engine,
     film: Film,
     whole_map: Option<LightGrid>,
@@ -175,16 +215,17 @@ struct Learning {
 impl<'a> Session<'a> {
     /// Starts a session on the CPU; nothing is traced yet.
     pub fn new(world: &'a World, environment: &'a Environment, view: View) -> Self {
-        let rays = CameraRays::new(&view.camera, view.width, view.height);
+        let rays = view.rays();
         let whole_map = match view.sampling {
             Sampling::Bsdf => None,
             _ => LightGrid::whole_map(environment.tile_energies()),
         };
-        let learning = new_learning(environment, &view, &rays);
+        let learning = new_learning(world, environment, &view, &rays);
         Self {
             film: Film::new(view.width, view.height, view.layers),
             world,
             environment,
+            fog: view.fog(world),
             view,
             rays,
             engine: Engine::Cpu,
@@ -335,6 +376,8 @@ impl<'a> Session<'a> {
             world: self.world,
             environment: self.environment,
             grid,
+            fog: self.fog,
+            background: self.view.background,
             limits: self.view.limits,
         }
     }
@@ -352,7 +395,7 @@ impl<'a> Session<'a> {
         if cancel.load(std::sync::atomic::Ordering::Relaxed) {
             // Which paths of the pass were counted depends on the threads: start over.
             self.learned = None;
-            self.learning = new_learning(self.environment, &self.view, &self.rays);
+            self.learning = new_learning(self.world, self.environment, &self.view, &self.rays);
             return self.upload_grid();
         }
         self.figures.learning_rays += rays;
@@ -409,7 +452,12 @@ impl<'a> Session<'a> {
 }
 
 /// An untaught grid, if the view is to learn and the map has anything to learn about.
-fn new_learning(environment: &Environment, view: &View, rays: &CameraRays) -> Option<Learning> {
+fn new_learning(
+    world: &World,
+    environment: &Environment,
+    view: &View,
+    rays: &CameraRays,
+) -> Option<Learning> {
     let options = view.law_options()?;
     if environment.is_black() || view.limits.bounces == 0 {
         return None;
@@ -419,6 +467,7 @@ fn new_learning(environment: &Environment, view: &View, rays: &CameraRays) -> Op
         columns: view.grid_columns,
         rows: (view.grid_columns / 2).max(1),
         faces: options.faces,
+        medium: view.fog(world).is_some(),
     };
     Some(Learning { grid: LearningGrid::new(grid, environment.tile_count(), options), pass: 0 })
 }

@@ -114,9 +114,8 @@ impl Conductor<'_> {
     fn row(&mut self, row: &Row) -> Result<()> {
         self.say(&format!("{}: loading", row.title), 0.0);
         let stage = Stage::load(row, self.plan)?;
-        let mut report = RowReport {
+        let report = RowReport {
             row: row.clone(),
-            not_measured: None,
             notices: stage.notices.iter().map(str::to_owned).collect(),
             triangles: stage.world.scene.triangles.len(),
             map_size: stage.map_size,
@@ -125,11 +124,6 @@ impl Conductor<'_> {
             shares: Vec::new(),
             pictures: Pictures::default(),
         };
-        if row.needs_fog && !stage.has_fog()? {
-            report.not_measured = Some("not measured: this build has no fog".to_owned());
-            self.report.rows.push(report);
-            return Ok(());
-        }
         self.report.rows.push(report);
         let reference = self.file_reference.is_none().then(|| {
             Reference::open(self.store.references(), stage.digest, self.plan.effort.frame.size)

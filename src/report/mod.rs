@@ -2,7 +2,7 @@
 //! rendering is as good as another.
 //!
 //! A [`Plan`] says what is compared; [`make`] goes through it row by row, takes what is on disk already,
-//! measures what is missing ([`measure`]) against a [`reference`](ReferenceReport) that is good enough
+//! measures what is missing (`measure`) against a [reference](ReferenceReport) that is good enough
 //! for it, and writes the pages. [`talk`] and [`ablations`] are plans; [`sat`] measures importance
 //! tables alone.
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::environment::{EnvironmentOptions, TableKind};
 use crate::light_grid::LawOptions;
-use crate::path::PathLimits;
+use crate::path::{Background, PathLimits};
 use crate::render::filter::PixelFilter;
 use crate::render::{Sampling, View};
 use crate::sampler::Points;
@@ -96,6 +96,9 @@ impl Settings {
                 .learning_paths
                 .unwrap_or_else(|| View::suitable_learning_paths(width, height, None)),
             laws: self.laws,
+            medium: None,
+            background: Background::Map,
+            crop: None,
             layers: false,
         }
     }
@@ -143,8 +146,6 @@ pub struct Row {
     pub scene: String,
     /// A file or a built-in sky.
     pub map: String,
-    /// Whether it only makes sense with a participating medium in the scene.
-    pub needs_fog: bool,
     /// Speed-up in the talk on CPU and GPU.
     pub published: Option<[f64; 2]>,
     /// Speed-up of `adaptive` over `plain` that is asked for.
@@ -158,7 +159,6 @@ impl Row {
             title: format!("{scene} / {map}"),
             scene: scene.to_owned(),
             map: map.to_owned(),
-            needs_fog: false,
             published: None,
             target: None,
         }

@@ -10,7 +10,6 @@ use super::plan::{Plan, Row, Settings};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{Error, Notices, Result};
 use crate::light_grid::LightGrid;
-use crate::output::record::to_value;
 use crate::path::{World, framing};
 use crate::render::{Sampling, gpu};
 use crate::scene::Camera;
@@ -66,12 +65,6 @@ impl Stage {
         let digest =
             digest::of_picture(&world, &lights[0].environment, &camera, &plan.effort.frame)?;
         Ok(Self { title: row.title.clone(), world, camera, lights, map_size, notices, digest })
-    }
-
-    /// Whether the scene has a participating medium: asked by name, for builds know it or not.
-    pub(super) fn has_fog(&self) -> Result<bool> {
-        let needs = to_value(&self.world.needs)?;
-        Ok(needs.get("medium").is_some_and(|medium| medium == true))
     }
 
     /// Puts the scene under every map onto a GPU; nothing for the CPU.

@@ -66,8 +66,6 @@ pub struct Report {
 pub struct RowReport {
     /// What it is.
     pub row: Row,
-    /// Why there are no figures.
-    pub not_measured: Option<String>,
     /// What was said while loading.
     pub notices: Vec<String>,
     /// Triangles of the scene.

@@ -13,12 +13,10 @@ const ROWS: [Entry; 9] = [
     ("Living room, sunset", "living-room", "sky:sunset", Some([1.9, 1.6]), Some(1.9)),
     ("Living room, night", "living-room", "sky:night", Some([3.8, 3.0]), Some(3.0)),
     ("Exterior", "exterior", "sky:sunset", Some([2.3, 1.8]), Some(2.0)),
-    (FOG, "fog", "sky:sunset", Some([3.4, 2.6]), Some(1.5)),
+    ("Exterior with fog", "fog", "sky:sunset", Some([3.4, 2.6]), Some(1.5)),
     ("Open", "open", "sky:day", None, Some(1.0)),
     ("Crack", "crack", "sky:day", None, None),
 ];
-
-const FOG: &str = "Exterior with fog";
 
 /// The plan.
 pub fn plan(effort: Effort, command: String) -> Plan {
@@ -26,7 +24,6 @@ pub fn plan(effort: Effort, command: String) -> Plan {
         .into_iter()
         .map(|(title, scene, map, published, target)| Row {
             title: title.to_owned(),
-            needs_fog: title == FOG,
             published,
             target,
             ..Row::new(scene, map)

@@ -41,8 +41,39 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Point, spot and directional lights.
     pub lights: Vec<PunctualLight>,
+    /// What fills the space between surfaces; `None` is clear air.
+    pub medium: Option<Medium>,
     /// What was repaired, skipped or assumed while loading.
     pub notices: Notices,
+}
+
+/// A homogeneous medium, like fog: the same everywhere in its box, and outside of solid bodies.
+/// All zero is clear air.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Medium {
+    /// Scattering coefficient per metre, linear RGB, not negative: one over the mean way of light
+    /// between two scatterings.
+    pub scattering: Vec3,
+    /// Absorption coefficient per metre, linear RGB, not negative.
+    pub absorption: Vec3,
+    /// Mean cosine of Henyey and Greenstein's phase function: 0 scatters to all sides alike, towards
+    /// 1 ever more forward, towards -1 back. Beyond +-0.99 it is clamped.
+    pub anisotropy: f32,
+    /// Lower and upper corner in metres; `None` is the box around the scene. There is no medium
+    /// without end: it would hide the map, which is infinitely far away.
+    pub bounds: Option<[Vec3; 2]>,
+}
+
+impl Medium {
+    /// Whether all numbers are in range and the box, if any, has a volume.
+    pub fn is_sound(&self) -> bool {
+        let coefficients = [self.scattering, self.absorption];
+        coefficients.iter().all(|c| c.is_finite() && c.min_element() >= 0.0)
+            && self.anisotropy.abs() <= 1.0
+            && self.bounds.is_none_or(|[low, high]| {
+                low.is_finite() && high.is_finite() && low.cmplt(high).all()
+            })
+    }
 }
 
 /// How a surface's coverage is used (glTF `alphaMode`).
@@ -121,6 +152,10 @@ pub struct Material {
     pub attenuation_color: Vec3,
     /// Metres; infinite is no absorption.
     pub attenuation_distance: f32,
+    /// Scattering coefficient per metre inside the body.
+    pub scattering: Vec3,
+    /// Mean cosine of scattering inside the body, as [`Medium::anisotropy`].
+    pub scatter_anisotropy: f32,
     /// `KHR_materials_clearcoat` strength in `[0,1]`.
     pub clearcoat: f32,
     /// R multiplies `clearcoat`.
@@ -162,6 +197,8 @@ impl Default for Material {
             thickness: 0.0,
             attenuation_color: Vec3::ONE,
             attenuation_distance: f32::INFINITY,
+            scattering: Vec3::ZERO,
+            scatter_anisotropy: 0.0,
             clearcoat: 0.0,
             clearcoat_texture: None,
             clearcoat_roughness: 0.0,

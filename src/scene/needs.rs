@@ -29,6 +29,10 @@ pub struct SceneNeeds {
     pub solid_transmission: bool,
     /// Absorption inside solid bodies.
     pub absorption: bool,
+    /// A medium between surfaces.
+    pub medium: bool,
+    /// Scattering inside solid bodies.
+    pub scattering_solids: bool,
     /// Clearcoat.
     pub clearcoat: bool,
     /// Unlit surfaces.
@@ -49,6 +53,7 @@ impl SceneNeeds {
         let mut needs = Self {
             vertex_colors: !scene.colors.is_empty(),
             punctual_lights: !scene.lights.is_empty(),
+            medium: scene.medium.is_some(),
             ..Self::default()
         };
         for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
@@ -71,6 +76,8 @@ impl SceneNeeds {
         self.solid_transmission |= m.transmission > 0.0 && m.thickness > 0.0;
         self.absorption |=
             m.transmission > 0.0 && m.thickness > 0.0 && m.attenuation_distance.is_finite();
+        self.scattering_solids |=
+            m.transmission > 0.0 && m.thickness > 0.0 && m.scattering != glam::Vec3::ZERO;
         self.clearcoat |= m.clearcoat > 0.0;
         self.unlit |= m.unlit;
         self.emitters |= is_emitter(m);
@@ -93,6 +100,8 @@ impl SceneNeeds {
             (self.thin_transmission, "thin glass: no material transmits without volume"),
             (self.solid_transmission, "refraction: no material is a transmitting solid"),
             (self.absorption, "absorption: no solid absorbs"),
+            (self.medium, "fog: the scene has none"),
+            (self.scattering_solids, "scattering inside of solids: none is filled"),
             (self.clearcoat, "clearcoat: no material is coated"),
             (self.emitters, "sampling of emissive triangles: nothing emits"),
             (self.punctual_lights, "punctual lights: the scene has none"),

@@ -217,6 +217,8 @@ fn odd_but_sound_settings_render() {
         "--lens-radius 0.1 --focus 2",
         "--seconds 0.05 --spp 1000000",
         "--noise 0.9 --spp 1000000",
+        "--fog 0.1,0.2,0.3 --fog-anisotropy -0.5 --fog-box -1,-1,-1,1,2,3",
+        "--fog 0",
     ] {
         bench.render(&format!("-o a.png {rest}"));
     }
@@ -240,6 +242,10 @@ fn wrong_values_are_refused_with_the_reason() {
         ("--eye 0,0,0", "--target"),
         ("--layers foo", "albedo, normal, depth"),
         ("--table foo", "tile-local"),
+        ("--fog -1", "must not be negative"),
+        ("--fog 1,2", "one number or three"),
+        ("--fog-anisotropy 2", "between -1 and 1"),
+        ("--fog-box 0,0,0,1,0,1", "the lower one"),
     ] {
         let message = bench.refusal(&render_line(&format!("-o a.png {rest}")), 2);
         assert!(message.contains(reason), "{rest}: {message}");
@@ -376,4 +382,31 @@ mod signals {
         assert_eq!(child.wait().expect("it ends").code(), Some(130));
         assert!(!bench.path("a.png").exists());
     }
+}
+
+#[test]
+fn a_region_is_that_part_of_the_picture_and_the_background_is_the_cameras_alone() {
+    let bench = Bench::new();
+    let camera = "--eye 0,0.6,2.5 --target 0,0.6,0 --fov 60 --spp 64 --bounces 1";
+    let render = |rest: &str, file: &str| {
+        let output = bench.render(&format!("-o {file} --size 32x16 {camera} {rest}"));
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        read_picture(&bench.path(file)).expect("a picture")
+    };
+    let whole = render("--background 0.5,1,0.25", "whole.exr");
+    let part = render("--background 0.5,1,0.25 --region 0,0,9,5", "part.exr");
+    assert_eq!((part.width, part.height), (9, 5));
+    assert_eq!(whole.at(0, 0), [0.5, 1.0, 0.25], "a corner sees past the scene");
+    assert_eq!(part.at(0, 0), whole.at(0, 0));
+    let map = render("--background map", "map.exr");
+    assert_ne!(map.at(0, 0), whole.at(0, 0));
+    // What surfaces reflect has not changed.
+    let lit = (0..512).filter(|i| whole.pixels[*i] == map.pixels[*i]).count();
+    assert!(lit > 8, "{lit} pixels see only surfaces");
+
+    let outside = bench.render("-o a.png --size 32x16 --region 30,0,3,3");
+    let says = text(&outside.stderr);
+    assert!(!outside.status.success() && says.contains("not inside the picture"), "{says}");
+    let wrong = bench.render("-o a.png --background pink");
+    assert!(!wrong.status.success() && text(&wrong.stderr).contains("colour"));
 }

@@ -6,9 +6,10 @@
 mod bounds;
 mod known_glass;
 mod known_light;
+mod known_media;
 mod known_paths;
 mod repeatable;
-mod scenes;
+pub(crate) mod scenes;
 mod unbiased;
 
 use std::sync::atomic::AtomicBool;
@@ -17,7 +18,7 @@ use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions};
 use lightgrid::image::Image;
 use lightgrid::light_grid::LawOptions;
-use lightgrid::path::{PathLimits, World};
+use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Phase, Sampling, Session, View};
@@ -44,6 +45,9 @@ pub(crate) fn view(camera: Camera, sampling: Sampling, bounces: u32) -> View {
         grid_columns: 64,
         learning_paths: 1 << 13,
         laws: LawOptions::ADAPTIVE,
+        medium: None,
+        background: Background::Map,
+        crop: None,
         layers: false,
     }
 }

@@ -5,16 +5,18 @@
 
 use std::sync::atomic::AtomicBool;
 
+use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions, TableKind, sky};
 use lightgrid::metrics::statistics::{Estimate, z_test};
-use lightgrid::path::{PathLimits, World, framing};
+use lightgrid::path::{Background, PathLimits, World, framing};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::gpu::{Gpu, Stage};
-use lightgrid::render::{Phase, Sampling, Session, View};
+use lightgrid::render::{Crop, Phase, Sampling, Session, View};
 use lightgrid::sampler::Points;
-use lightgrid::scene::{builtin, gltf};
+use lightgrid::scene::{Camera, Material, Medium, builtin, gltf};
 
+use crate::estimator::scenes::{self, lambert, lamp, room, smoked_glass};
 use crate::estimator::{MODES, mean, render, view};
 use crate::shared::shared;
 
@@ -92,8 +94,12 @@ fn expect_agreement(what: &str, a: &Film, b: &Film) {
 
 /// The same seed draws nearly the same paths, and other seeds the same expectation.
 fn compare(gpu: &Gpu, what: &str, world: &World, environment: &Environment, sampling: Sampling) {
+    compare_views(gpu, what, world, environment, picture(world, sampling));
+}
+
+fn compare_views(gpu: &Gpu, what: &str, world: &World, environment: &Environment, view: View) {
     let samples = 16;
-    let view = picture(world, sampling);
+    let sampling = view.sampling;
     let session = on_gpu(world, environment, view.clone(), gpu);
     let gpu_film = finish(session, samples);
     let same = render(world, environment, view.clone(), samples);
@@ -168,13 +174,52 @@ fn every_kind_of_material_looks_the_same() {
 }
 
 #[test]
-fn layers_lens_and_filters_are_the_same() {
+fn fog_and_milk_look_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let fog = Medium {
+        scattering: Vec3::new(0.1, 0.2, 0.4),
+        absorption: Vec3::new(0.02, 0.01, 0.0),
+        anisotropy: 0.7,
+        bounds: None,
+    };
+    // A room in fog, learned too; then a lump of milky glass in clear air, then in fog with a lamp.
+    let (room, camera) = room(0.7, None);
+    let in_room = View { camera, medium: Some(fog), ..picture(&room, Sampling::Adaptive) };
+    compare_views(&gpu, "foggy room", &room, &sky_map("overcast"), in_room);
+    let milk = Material {
+        scattering: Vec3::new(0.5, 1.0, 4.0),
+        scatter_anisotropy: -0.3,
+        ..smoked_glass()
+    };
+    let lump = || {
+        scenes::Stage::new().floor(&lambert(0.5)).faces(
+            &milk,
+            Vec3::new(-0.5, 0.1, -0.5),
+            Vec3::new(0.5, 1.1, 0.5),
+            0..6,
+        )
+    };
+    let (x, y) = ([0.8, 0.0, 0.0], [0.0, 0.8, 0.0]);
+    let (clear, lit) = (lump().build(), lump().quad(&lamp(4.0), [-0.4, 0.3, -1.5], x, y).build());
+    let camera = Camera::look_at(Vec3::new(1.5, 1.6, 2.5), Vec3::new(0.0, 0.5, 0.0), 0.8);
+    for (what, world, medium) in [("milk", &clear, None), ("milk in fog", &lit, Some(fog))] {
+        let mut view = View { medium, ..picture(world, Sampling::Plain) };
+        (view.camera, view.limits.bounces) = (camera.clone(), 12);
+        compare_views(&gpu, what, world, &sky_map("overcast"), view);
+    }
+}
+
+#[test]
+fn layers_lens_filters_background_and_crops_are_the_same() {
     let Some(gpu) = gpu() else { return };
     let world = World::new(builtin::build("open").expect("built in"));
     let environment = sky_map("day");
     {
         let filter = PixelFilter::BlackmanHarris;
-        let mut view = View { filter, layers: true, ..picture(&world, Sampling::Plain) };
+        let background = Background::Blurred(0.1);
+        let crop = Some(Crop { corner: [7, 3], whole: [50, 30] });
+        let picture = picture(&world, Sampling::Plain);
+        let mut view = View { filter, layers: true, background, crop, ..picture };
         view.camera.lens_radius = 0.05;
         let session = on_gpu(&world, &environment, view.clone(), &gpu);
         let gpu_film = finish(session, 8);

@@ -2,6 +2,8 @@
 
 use egui::{Margin, Panel, RichText, ScrollArea, Slider, Ui};
 
+use glam::Vec3;
+
 use super::map_view;
 use crate::app::commands::Command;
 use crate::app::document::{Document, Viewpoint};
@@ -10,7 +12,8 @@ use crate::app::loader::{LoadedMap, LoadedScene};
 use crate::app::settings_file::Settings;
 use crate::app::theme;
 use crate::environment::sky;
-use crate::scene::builtin;
+use crate::path::Background;
+use crate::scene::{Medium, builtin};
 
 /// What the panel is drawn from.
 #[derive(Clone, Copy)]
@@ -42,6 +45,9 @@ pub(in crate::app) fn show(
             ui.separator();
             theme::heading(ui, "ENVIRONMENT");
             environment(ui, document, interface, sources, commands);
+            ui.add_space(4.0);
+            ui.separator();
+            fog(ui, &mut document.fog, sources.scene);
         });
     });
 }
@@ -215,6 +221,7 @@ fn environment(
             interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
         }
     });
+    background(ui, &mut document.background);
     if document.rotation_degrees != 0.0 || document.intensity != 1.0 {
         let text = RichText::new("Reset rotation and intensity").size(12.0);
         if ui.button(text).clicked() {
@@ -222,3 +229,100 @@ fn environment(
         }
     }
 }
+
+/// What the camera sees of the map; surfaces are lit by it in any case.
+fn background(ui: &mut Ui, background: &mut Background) {
+    let kinds = [
+        (Background::Map, "The map"),
+        (Background::Blurred(0.1), "The map, blurred"),
+        (Background::Color([0.18; 3]), "A colour"),
+    ];
+    let is_same =
+        |a: &Background, b: &Background| std::mem::discriminant(a) == std::mem::discriminant(b);
+    let name = kinds.iter().find(|(kind, _)| is_same(kind, background)).map_or("", |(_, n)| n);
+    theme::row(
+        ui,
+        "Background",
+        "What the camera sees of the map, straight or through panes",
+        |ui| {
+            egui::ComboBox::from_id_salt("background")
+                .width(ui.available_width())
+                .selected_text(name)
+                .show_ui(ui, |ui| {
+                    for (kind, name) in kinds {
+                        if ui.selectable_label(is_same(&kind, background), name).clicked()
+                            && !is_same(&kind, background)
+                        {
+                            *background = kind;
+                        }
+                    }
+                });
+        },
+    );
+    match background {
+        Background::Map => {}
+        Background::Blurred(radians) => {
+            theme::row(ui, "Blur", "How far the map is out of focus", |ui| {
+                let mut degrees = radians.to_degrees();
+                let slider = Slider::new(&mut degrees, 0.1..=90.0).logarithmic(true).suffix("°");
+                if ui.add(slider.fixed_decimals(1)).changed() {
+                    *radians = degrees.to_radians();
+                }
+            });
+        }
+        Background::Color(rgb) => {
+            theme::row(ui, "Colour", "Linear radiance", |ui| {
+                ui.color_edit_button_rgb(rgb);
+            });
+        }
+    }
+}
+
+/// Fog: the scene's own until something is changed.
+fn fog(ui: &mut Ui, fog: &mut Option<Medium>, scene: Option<&LoadedScene>) {
+    let own = scene.and_then(|scene| scene.world.scene.medium);
+    let clear = Medium::default();
+    let now = fog.or(own).unwrap_or(clear);
+    let mut edited = now;
+    let mut is_on = now.scattering != clear.scattering || now.absorption != clear.absorption;
+    ui.horizontal(|ui| {
+        theme::heading(ui, "FOG");
+        if ui.checkbox(&mut is_on, "").changed() {
+            let thick = Medium { scattering: Vec3::splat(FIRST_FOG), ..clear };
+            edited = match (is_on, own) {
+                (false, _) => clear,
+                (true, Some(own)) if own != clear => own,
+                (true, _) => thick,
+            };
+        }
+    });
+    if is_on {
+        let coefficient = |ui: &mut Ui, value: &mut Vec3| {
+            let mut mean = value.element_sum() / 3.0;
+            let slider = Slider::new(&mut mean, 0.0..=10.0).logarithmic(true);
+            let slider = slider.smallest_positive(1e-5).suffix(" /m").max_decimals(5);
+            if ui.add(slider).changed() {
+                // The colour stays, if there is one.
+                let old = value.element_sum() / 3.0;
+                *value = if old > 0.0 { *value * (mean / old) } else { Vec3::splat(mean) };
+            }
+        };
+        let hint = "One over the mean way of light between two scatterings";
+        theme::row(ui, "Scattering", hint, |ui| coefficient(ui, &mut edited.scattering));
+        let hint = "Share of the light that is swallowed per metre";
+        theme::row(ui, "Absorption", hint, |ui| coefficient(ui, &mut edited.absorption));
+        let hint = "-1 scatters back, 0 to all sides alike, 1 straight on";
+        theme::row(ui, "Anisotropy", hint, |ui| {
+            ui.add(Slider::new(&mut edited.anisotropy, -0.95..=0.95).fixed_decimals(2));
+        });
+    }
+    if edited != now {
+        *fog = Some(edited);
+    }
+    if fog.is_some_and(|fog| Some(fog) == own || (own.is_none() && fog == clear)) {
+        *fog = None;
+    }
+}
+
+/// Scattering per metre of fog that is switched on: seen in a room, not hiding it.
+const FIRST_FOG: f32 = 0.05;

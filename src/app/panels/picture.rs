@@ -34,6 +34,7 @@ pub(in crate::app) fn show(
     ui.separator();
     theme::heading(ui, "SIZE");
     size(ui, &mut document.size);
+    region(ui, document.region.is_some(), commands);
     ui.add_space(4.0);
     ui.separator();
     theme::heading(ui, "STOP AT");
@@ -142,6 +143,17 @@ fn size(ui: &mut Ui, size: &mut PictureSize) {
             ui.label("x");
             ui.add(DragValue::new(height).range(1..=8192).speed(4));
         });
+    }
+}
+
+fn region(ui: &mut Ui, has_region: bool, commands: &mut Vec<Command>) {
+    let (text, hint) = if has_region {
+        ("Render the whole again", "The region is given up (X)")
+    } else {
+        ("Render a region…", "Then drag over the part that is to be rendered (X)")
+    };
+    if ui.button(text).on_hover_text(hint).clicked() {
+        commands.push(Command::ToggleRegion);
     }
 }
 

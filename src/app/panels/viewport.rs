@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::{
     Align2, CentralPanel, Color32, ColorImage, CursorIcon, FontId, Key, PointerButton, Pos2, Rect,
-    Response, Sense, Shape, Stroke, TextureHandle, TextureOptions, Ui, Vec2,
+    Response, Sense, Shape, Stroke, StrokeKind, TextureHandle, TextureOptions, Ui, Vec2,
 };
 use glam::Vec3;
 
@@ -19,11 +19,15 @@ use crate::app::theme;
 use crate::app::worker::Snapshot;
 use crate::bvh::Ray;
 use crate::image::Rgb8;
+use crate::render::View;
 
 /// Pictures on the graphics device.
 #[derive(Default)]
 pub(in crate::app) struct Textures {
+    /// The last whole picture.
     main: Slot,
+    /// A part of it that is rendered alone.
+    part: Slot,
     other: Slot,
 }
 
@@ -63,28 +67,76 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
             waiting(ui, area, scope.loading);
             return;
         };
-        let rect = fitted(area, shown, scope.snapshot);
-        let main = scope.textures.main.update(ui, "picture", &shown.picture);
-        let full = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-        ui.painter().image(main, rect, full, Color32::WHITE);
+        let view = scope.snapshot.map_or(&shown.order.snapshot.request.view, |s| &s.request.view);
+        let whole = fitted(area, view);
+        let rect = part_rect(whole, &shown.order.snapshot.request.view);
+        picture(ui, whole, rect, shown, scope.textures);
         let mut is_wiping = false;
         if let Some(other) = &shown.other {
             let texture = scope.textures.other.update(ui, "other picture", other);
             is_wiping = wipe(ui, rect, texture, scope);
         }
-        if !is_wiping {
-            gestures(ui, rect, &response, scope);
+        if scope.interface.is_marking {
+            mark_region(ui, whole, &response, scope);
+        } else if !is_wiping {
+            gestures(ui, (whole, rect), &response, scope);
         }
         pin(ui, rect, scope.interface);
     });
 }
 
 /// The picture as large as fits, in its own shape.
-fn fitted(area: Rect, shown: &Shown, snapshot: Option<&Snapshot>) -> Rect {
-    let view = snapshot.map_or(&shown.order.snapshot.request.view, |s| &s.request.view);
-    let size = Vec2::new(view.width as f32, view.height as f32);
+fn fitted(area: Rect, view: &View) -> Rect {
+    let [width, height] = view.whole_size();
+    let size = Vec2::new(width as f32, height as f32);
     let scale = (area.width() / size.x).min(area.height() / size.y);
     Rect::from_center_size(area.center(), size * scale)
+}
+
+/// Where in the whole picture's rectangle the view's part of it lies.
+fn part_rect(whole: Rect, view: &View) -> Rect {
+    let Some(crop) = view.crop else { return whole };
+    let [width, height] = crop.whole.map(|pixels| pixels as f32);
+    let scale = whole.size() / Vec2::new(width, height);
+    let corner = Vec2::new(crop.corner[0] as f32, crop.corner[1] as f32);
+    let size = Vec2::new(view.width as f32, view.height as f32);
+    Rect::from_min_size(whole.min + corner * scale, size * scale)
+}
+
+/// Draws the picture; a part lies on the last whole one, which steps back.
+fn picture(ui: &Ui, whole: Rect, rect: Rect, shown: &Shown, textures: &mut Textures) {
+    let full = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+    let painter = ui.painter();
+    if shown.order.snapshot.request.view.crop.is_none() {
+        let texture = textures.main.update(ui, "picture", &shown.picture);
+        painter.image(texture, whole, full, Color32::WHITE);
+        return;
+    }
+    if let Some(texture) = &textures.main.texture {
+        painter.image(texture.id(), whole, full, Color32::from_gray(90));
+    }
+    let texture = textures.part.update(ui, "part", &shown.picture);
+    painter.image(texture, rect, full, Color32::WHITE);
+    painter.rect_stroke(rect, 0.0, Stroke::new(1.0, theme::ACCENT), StrokeKind::Outside);
+}
+
+/// Lets a drag mark the part that is to be rendered.
+fn mark_region(ui: &Ui, whole: Rect, response: &Response, scope: &mut Scope<'_>) {
+    ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
+    let hint = "Drag over the part that is to be rendered";
+    let top = Pos2::new(whole.center().x, whole.top() + 14.0);
+    badge(ui, top, Align2::CENTER_TOP, hint, theme::ACCENT);
+    let start = ui.ctx().input(|i| i.pointer.press_origin());
+    let (Some(start), Some(now)) = (start, response.interact_pointer_pos()) else { return };
+    let marked = Rect::from_two_pos(start, now).intersect(whole);
+    ui.painter().rect_stroke(marked, 0.0, Stroke::new(1.5, theme::ACCENT), StrokeKind::Inside);
+    if response.drag_stopped() {
+        scope.interface.is_marking = false;
+        if marked.width() >= 4.0 && marked.height() >= 4.0 {
+            let (low, high) = (place_of(whole, marked.min), place_of(whole, marked.max));
+            scope.document.region = Some([low.x, low.y, high.x, high.y]);
+        }
+    }
 }
 
 fn waiting(ui: &Ui, area: Rect, is_loading: bool) {
@@ -193,7 +245,7 @@ fn place_of(rect: Rect, at: Pos2) -> glam::Vec2 {
     glam::Vec2::new(place.x, place.y)
 }
 
-fn gestures(ui: &Ui, rect: Rect, response: &Response, scope: &mut Scope<'_>) {
+fn gestures(ui: &Ui, (whole, rect): (Rect, Rect), response: &Response, scope: &mut Scope<'_>) {
     let context = ui.ctx();
     scope.interface.pointed =
         response.hover_pos().filter(|at| rect.contains(*at)).map(|at| place_of(rect, at));
@@ -218,7 +270,7 @@ fn gestures(ui: &Ui, rect: Rect, response: &Response, scope: &mut Scope<'_>) {
         if by(PointerButton::Secondary) {
             viewpoint.look_around(-drag);
         } else if by(PointerButton::Middle) || modifiers.shift {
-            viewpoint.pan(drag, rect.height());
+            viewpoint.pan(drag, whole.height());
         } else {
             orbit(viewpoint, drag, scope.scene);
         }

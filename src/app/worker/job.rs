@@ -14,7 +14,7 @@ use crate::light_grid::{LearningGrid, LightGrid};
 use crate::metrics;
 use crate::path::World;
 use crate::render::film::Film;
-use crate::render::{Phase, Sampling, Session, StopRule, View};
+use crate::render::{Crop, Phase, Sampling, Session, StopRule, View};
 use crate::scene::Camera;
 
 /// Longest piece of rendering between two looks at requests and clocks.
@@ -38,7 +38,7 @@ pub(super) struct Legacy {
     seconds_per_path: Option<f64>,
     snapshots: u64,
     /// The last small picture and its camera.
-    under: Option<(Camera, Arc<Film>)>,
+    under: Option<(Camera, Option<Crop>, Arc<Film>)>,
 }
 
 impl Legacy {
@@ -138,6 +138,10 @@ impl<'a> Job<'a> {
         let shrink = self.shrink(&view);
         view.width = (view.width / shrink).max(1);
         view.height = (view.height / shrink).max(1);
+        if let Some(crop) = &mut view.crop {
+            crop.corner = crop.corner.map(|pixel| pixel / shrink);
+            crop.whole = crop.whole.map(|pixels| (pixels / shrink).max(1));
+        }
         self.experienced_session(world, environment, view)
     }
 
@@ -173,14 +177,15 @@ impl<'a> Job<'a> {
 
     /// The small picture of this view, if there is one.
     fn under(&self) -> Option<Arc<Film>> {
-        let (camera, film) = self.legacy.under.as_ref()?;
-        (*camera == self.request.view.camera).then(|| Arc::clone(film))
+        let (camera, crop, film) = self.legacy.under.as_ref()?;
+        let view = &self.request.view;
+        (*camera == view.camera && *crop == view.crop).then(|| Arc::clone(film))
     }
 
     /// Keeps the small picture for the good one's first moments.
     fn keep_under(&mut self, session: &Session<'_>) {
-        let camera = self.request.view.camera.clone();
-        self.legacy.under = Some((camera, Arc::new(session.film().clone())));
+        let View { camera, crop, .. } = &self.request.view;
+        self.legacy.under = Some((camera.clone(), *crop, Arc::new(session.film().clone())));
     }
 
     /// By what the picture's sides are divided while the camera moves.

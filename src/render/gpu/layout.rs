@@ -10,7 +10,9 @@ use crate::color::importance;
 use crate::environment::Environment;
 use crate::light_grid::LightGrid;
 use crate::light_grid::cells::SphericalGrid;
+use crate::medium::{Fog, Phase};
 use crate::path::World;
+use crate::path::background::{Background, concentration};
 use crate::path::camera::CameraRays;
 use crate::scene::surface::absorption;
 use crate::scene::{self, AlphaMode, PunctualKind, Scene, Wrap};
@@ -74,7 +76,18 @@ pub(crate) struct Globals {
     pub(crate) scene_extent: f32,
     pub(crate) mean_contribution: f32,
     pub(crate) zero: u32,
-    pub(crate) padding: [u32; 2],
+    pub(crate) grid_medium: u32,
+    pub(crate) padding_1: u32,
+    pub(crate) fog_low: Vec3,
+    pub(crate) fog_mean_cosine: f32,
+    pub(crate) fog_high: Vec3,
+    pub(crate) padding_2: u32,
+    pub(crate) fog_scattering: Vec3,
+    pub(crate) padding_3: u32,
+    pub(crate) fog_extinction: Vec3,
+    pub(crate) padding_4: u32,
+    pub(crate) background: Vec3,
+    pub(crate) background_concentration: f32,
 }
 
 /// Twin of `Material` in `surface.wgsl`.
@@ -98,6 +111,8 @@ pub(crate) struct Material {
     pub(crate) flags: u32,
     pub(crate) textures: [u32; 10],
     pub(crate) padding: [u32; 2],
+    pub(crate) scattering: Vec3,
+    pub(crate) scatter_mean_cosine: f32,
 }
 
 /// Twin of `TextureRef` in `texture.wgsl`.
@@ -168,6 +183,13 @@ impl Globals {
         self.orthographic = rays.orthographic.into();
         (self.width, self.height) = (view.width, view.height);
         self.seed = view.seed;
+        match view.background {
+            Background::Map => {}
+            Background::Blurred(radians) => {
+                self.background_concentration = concentration(radians);
+            }
+            Background::Color(rgb) => self.background = rgb.into(),
+        }
         self.bounces = view.limits.bounces;
         self.russian_roulette = view.limits.russian_roulette.into();
     }
@@ -180,11 +202,24 @@ impl Globals {
         self.mean_contribution = std::f32::consts::PI * importance(environment.mean_radiance());
     }
 
+    /// Sets what lies between surfaces.
+    pub(crate) fn set_fog(&mut self, fog: Option<&Fog>) {
+        let Some(fog) = fog else {
+            (self.fog_low, self.fog_high) = (Vec3::ONE, Vec3::ZERO);
+            return;
+        };
+        [self.fog_low, self.fog_high] = fog.bounds;
+        self.fog_scattering = fog.interior.scattering;
+        self.fog_extinction = fog.interior.extinction;
+        self.fog_mean_cosine = fog.interior.phase.mean_cosine();
+    }
+
     /// Sets where the cells lie.
     pub(crate) fn set_cells(&mut self, grid: &SphericalGrid) {
         self.grid_center = grid.center;
         self.grid_columns = grid.columns;
         self.grid_rows = grid.rows;
+        self.grid_medium = grid.medium.into();
     }
 }
 
@@ -290,6 +325,8 @@ pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
             flags: flags(m, world.may_pass_light(index)),
             textures: m.textures().map(&mut reference),
             padding: [0; 2],
+            scattering: m.scattering,
+            scatter_mean_cosine: Phase::new(m.scatter_anisotropy).mean_cosine(),
         })
         .collect();
     (materials, refs)

@@ -106,6 +106,7 @@ impl Renderer {
         let mut buffers = stage.buffers.clone();
         let mut globals = stage.globals;
         globals.set_view(view, rays);
+        globals.set_fog(view.fog(world).as_ref());
         let mut constants = stage.constants;
         upload_tables(&mut buffers, view, environment, &mut constants)?;
         let pixels = u64::from(view.width) * u64::from(view.height);
@@ -376,7 +377,7 @@ mod tests {
     use crate::environment::EnvironmentOptions;
     use crate::light_grid::cells::SphericalGrid;
     use crate::light_grid::{LawOptions, Recording};
-    use crate::path::{PathLimits, PathTracer};
+    use crate::path::{Background, PathLimits, PathTracer};
     use crate::render::{Sampling, cpu};
     use crate::sampler::Points;
     use crate::scene::builtin;
@@ -400,11 +401,19 @@ mod tests {
             grid_columns: 64,
             learning_paths: 1 << 13,
             laws: recording,
+            medium: None,
+            background: Background::Map,
+            crop: None,
             layers: false,
         };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
-        let grid =
-            SphericalGrid { center: rays.position, columns: 64, rows: 32, faces: recording.faces };
+        let grid = SphericalGrid {
+            center: rays.position,
+            columns: 64,
+            rows: 32,
+            faces: recording.faces,
+            medium: false,
+        };
         let mut learning = LearningGrid::new(grid, environment.tile_count(), recording);
         let mut laws = LightGrid::whole_map(environment.tile_energies());
         let never = AtomicBool::new(false);
@@ -424,6 +433,8 @@ mod tests {
                         world: &world,
                         environment: &environment,
                         grid: laws.as_ref(),
+                        fog: view.fog(&world),
+                        background: Background::Map,
                         limits: view.limits,
                     };
                     cpu::learn(&tracer, &rays, &view, pass, &learning, &never)

@@ -11,7 +11,7 @@ use super::super::filter::PixelFilter;
 use super::super::{Sampling, View};
 use crate::environment::{Environment, Lookup, TableKind};
 use crate::light_grid::Recording;
-use crate::path::World;
+use crate::path::{Background, World};
 use crate::sampler::Points;
 
 /// Entry points.
@@ -39,8 +39,10 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 36] = [
+    pub(crate) const ALL: [&'static str; 39] = [
         "alpha_mask",
+        "background_blur",
+        "background_color",
         "clearcoat",
         "emitters",
         "faces",
@@ -53,6 +55,7 @@ impl Features {
         "local_lights",
         "map",
         "map_sampling",
+        "medium",
         "metals",
         "nearest_lookup",
         "normal_maps",
@@ -107,6 +110,8 @@ impl Features {
         let cosine_power = recording.map_or(0, Recording::cosine_power);
         let options = environment.kind();
         let of_view = [
+            ("background_blur", matches!(view.background, Background::Blurred(_))),
+            ("background_color", matches!(view.background, Background::Color(_))),
             ("faces", view.law_options().is_some_and(|laws| laws.faces)),
             ("independent_points", view.points == Points::Independent),
             ("layers", view.layers),
@@ -114,6 +119,7 @@ impl Features {
             ("light_grid", samples_map && recording.is_some()),
             ("map", !environment.is_black()),
             ("map_sampling", samples_map),
+            ("medium", world.needs.scattering_solids || view.fog(world).is_some()),
             ("nearest_lookup", options.1 == Lookup::Nearest),
             ("record_cosine", cosine_power == 1),
             ("record_ratio", recording.is_some_and(Recording::is_ratio)),
@@ -215,8 +221,15 @@ impl KernelFacts {
 
     /// Of the kernel for a scene with a map that is not black, with the defaults of `render`.
     pub fn of_scene(world: &World) -> Self {
-        let defaults =
-            ["faces", "light_grid", "map", "map_sampling", "record_cosine", "wide_filter"];
+        let defaults = [
+            "faces",
+            "light_grid",
+            "map",
+            "map_sampling",
+            "record_cosine",
+            "record_ratio",
+            "wide_filter",
+        ];
         let names = Features::of_world(world).0.into_iter().chain(defaults);
         Self::of(&Features::from_names(names.map(|name| (name, true))))
     }
@@ -408,7 +421,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 18] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 19] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -429,6 +442,7 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 18] {
         (wgsl!("tile_local"), samples_map && !features.has("summed_area")),
         (wgsl!("summed_area"), samples_map && features.has("summed_area")),
         (wgsl!("lights"), features.has("scene_lights")),
+        (wgsl!("medium"), features.has("medium")),
         (wgsl!("bvh"), true),
         (wgsl!("camera"), true),
         (wgsl!("path"), true),

@@ -46,10 +46,6 @@ pub(super) fn overview(report: &Report, html: &mut String) {
     head.push("reference noise");
     let mut table = Table::new(&head);
     for row in &report.rows {
-        if let Some(reason) = &row.not_measured {
-            table.remark(&row.row.title, reason);
-            continue;
-        }
         for device in &row.devices {
             if let Some(reason) = &device.not_measured {
                 table.remark(&row.row.title, &format!("{}: {reason}", device.device.title()));
@@ -159,10 +155,6 @@ fn ablation_table(report: &Report, html: &mut String) {
 /// One scene under one map.
 pub(super) fn row(report: &Report, row: &RowReport, html: &mut String) -> Result<()> {
     let _ = writeln!(html, "<h2>{}</h2>", escape(&row.row.title));
-    if let Some(reason) = &row.not_measured {
-        let _ = writeln!(html, "<p>{}.</p>", escape(reason));
-        return Ok(());
-    }
     let _ = writeln!(html, "<p class=\"soft\">{}</p>", escape(&facts(row)));
     if is_long(report) {
         for device in &row.devices {

@@ -156,9 +156,6 @@ pub(super) fn bound_sentence(
 
 /// A finished row in a line, for a terminal.
 pub fn row_sentence(report: &Report, row: &RowReport) -> String {
-    if let Some(reason) = &row.not_measured {
-        return format!("{}: {reason}", row.row.title);
-    }
     let baseline = &report.plan.methods[report.plan.baselines[0]].name;
     let mut parts = Vec::new();
     for device in &row.devices {
@@ -196,11 +193,6 @@ pub fn markdown_table(report: &Report) -> String {
     let _ = writeln!(text, "| {} |", head.join(" | "));
     let _ = writeln!(text, "|{}", "---|".repeat(head.len()));
     for row in &report.rows {
-        if let Some(reason) = &row.not_measured {
-            let rest = " |".repeat(head.len() - 2);
-            let _ = writeln!(text, "| {} | {reason}{rest} |", row.row.title);
-            continue;
-        }
         for device in &row.devices {
             let mut cells = vec![row.row.title.clone(), device.device.title().to_owned()];
             cells.extend(others.iter().map(|name| {

@@ -1,4 +1,4 @@
-//! Lamps, all unlit: their origin is below their middle, or at the ceiling.
+//! Lamps, lit if their bulbs and shades are made of what shines: their origin is below their middle, or at the ceiling.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -7,11 +7,11 @@ use glam::{Affine3A, Vec3};
 use super::furniture::placed;
 use super::mesh::{Builder, Mat};
 
-/// A floor lamp: a curved arm over a heavy foot, and a linen drum shade (unlit).
+/// A floor lamp: a curved arm over a heavy foot, and a linen drum shade.
 pub(super) fn arc_lamp(
     b: &mut Builder,
     metal: Mat,
-    shade: Mat,
+    [shade, bulb]: [Mat; 2],
     stone: Mat,
     height: f32,
     reach: f32,
@@ -32,7 +32,7 @@ pub(super) fn arc_lamp(
     b.part(Affine3A::from_translation(tip - Vec3::Y * 0.09), |b| {
         b.drum(metal, [-0.05, 0.03], [0.022, 0.014], 0.003);
         drum_shade(b, shade, 0.21, 0.17, 0.25);
-        b.ball(shade, Vec3::new(0.0, -0.09, 0.0), 0.05);
+        b.ball(bulb, Vec3::new(0.0, -0.09, 0.0), 0.05);
     });
 }
 
@@ -56,8 +56,14 @@ pub(super) fn drum_shade(b: &mut Builder, cloth: Mat, bottom: f32, top: f32, hei
     }
 }
 
-/// A pendant on a cable from the ceiling at y = 0, its shade `drop` below (unlit).
-pub(super) fn pendant(b: &mut Builder, metal: Mat, inside: Mat, drop: f32, radius: f32) {
+/// A pendant on a cable from the ceiling at y = 0, its shade `drop` below.
+pub(super) fn pendant(
+    b: &mut Builder,
+    metal: Mat,
+    [inside, bulb]: [Mat; 2],
+    drop: f32,
+    radius: f32,
+) {
     b.drum(metal, [-0.03, 0.01], [0.05, 0.055], 0.004);
     b.rod(inside, Vec3::Y * -0.02, Vec3::Y * (0.10 - drop), 0.003);
     let mut outer = Vec::new();
@@ -76,10 +82,10 @@ pub(super) fn pendant(b: &mut Builder, metal: Mat, inside: Mat, drop: f32, radiu
         outer.iter().rev().map(|&(r, y)| (r - 0.002, y - 0.002 * (1.0 - r / radius))).collect();
     b.lathe(inside, 64, &inner);
     b.lathe(metal, 64, &[(radius - 0.002, -drop), (radius, -drop)]);
-    b.ball(inside, Vec3::Y * (0.25 * radius - drop), 0.05);
+    b.ball(bulb, Vec3::Y * (0.25 * radius - drop), 0.05);
 }
 
-/// A jointed desk lamp that bows towards +Z (unlit).
+/// A jointed desk lamp that bows towards +Z.
 pub(super) fn desk_lamp(b: &mut Builder, metal: Mat, inside: Mat) {
     b.drum(metal, [0.0, 0.022], [0.085, 0.080], 0.006);
     let joints = [Vec3::new(0., 0.02, 0.), Vec3::new(0., 0.30, -0.13), Vec3::new(0., 0.50, 0.12)];
@@ -105,7 +111,7 @@ pub(super) fn desk_lamp(b: &mut Builder, metal: Mat, inside: Mat) {
     });
 }
 
-/// A street lamp with a lantern (unlit).
+/// A street lamp with a lantern.
 pub(super) fn street_lamp(b: &mut Builder, metal: Mat, pane: Mat, height: f32) {
     let h = height;
     b.lathe(

@@ -1,5 +1,5 @@
 //! A living room, 6 x 3 x 5 m: a 2.6 m window in the +X wall lets the suns of `sky:day` and
-//! `sky:sunset` in, a round opening in the +Z wall does not.
+//! `sky:sunset` in, a round opening in the +Z wall does not. In the evening its lamps are lit.
 
 use glam::{Vec2, Vec3};
 
@@ -11,7 +11,7 @@ use super::plants;
 use super::room::{self, Hole, Shell};
 use super::textures as paint;
 use super::{fittings, lamps, seating};
-use crate::scene::Scene;
+use crate::scene::{Material, Scene};
 
 const SIZE: [f32; 3] = [6.0, 3.0, 5.0];
 const THICKNESS: f32 = 0.24;
@@ -29,6 +29,8 @@ struct Palette {
     velvet: Mat,
     boucle: Mat,
     linen: Mat,
+    shade: Mat,
+    bulbs: [Mat; 2],
     cotton: Mat,
     curtain: Mat,
     rug: Mat,
@@ -50,7 +52,7 @@ struct Palette {
 }
 
 impl Palette {
-    fn new(b: &mut Builder) -> Self {
+    fn new(b: &mut Builder, lamps: [f32; 3]) -> Self {
         let parquet = b.texture(paint::herringbone([0.46, 0.29, 0.16]), Vec2::splat(1.9));
         let oak = b.texture(paint::timber([0.50, 0.34, 0.19]), Vec2::new(1.4, 0.7));
         let walnut = b.texture(paint::timber([0.23, 0.13, 0.075]), Vec2::new(1.4, 0.7));
@@ -79,6 +81,14 @@ impl Palette {
             velvet: b.material(textured("velvet", velvet, 0.9)),
             boucle: b.material(textured("boucle", boucle, 0.95)),
             linen: b.material(two_sided(textured("linen", linen, 0.9))),
+            shade: b.material(Material {
+                emissive: WARM * lamps[0],
+                ..two_sided(textured("lampshade", linen, 0.9))
+            }),
+            bulbs: [("bulb", lamps[1]), ("bright bulb", lamps[2])].map(|(name, radiance)| {
+                let white = matte(name, [0.78, 0.77, 0.74], 0.35);
+                b.material(Material { emissive: WARM * radiance, ..white })
+            }),
             cotton: b.material(textured("cotton", boucle, 0.9)),
             curtain: b.material(two_sided(textured("ochre linen", ochre, 0.9))),
             rug: b.material(two_sided(textured("rug", rug, 0.95))),
@@ -101,10 +111,24 @@ impl Palette {
     }
 }
 
-/// Builds the scene.
+/// Linear colour of a warm lamp.
+const WARM: Vec3 = Vec3::new(1.0, 0.62, 0.30);
+
+/// Builds the scene `living-room`.
 pub(super) fn build() -> Scene {
-    let b = &mut Builder::new("living-room");
-    let m = &Palette::new(b);
+    furnished("living-room", [0.0; 3])
+}
+
+/// Builds the scene `evening`: radiance of the shades and bulbs beside that of `sky:night`, of which a
+/// wall by the window gets less than a thousandth.
+pub(super) fn evening() -> Scene {
+    furnished("evening", [0.6, 25.0, 40.0])
+}
+
+/// The room, its shades, bulbs and bright bulb shining with this radiance.
+fn furnished(name: &str, lamps: [f32; 3]) -> Scene {
+    let b = &mut Builder::new(name);
+    let m = &Palette::new(b, lamps);
     shell(b, m);
     window(b, m);
     pictures(b, m);
@@ -276,7 +300,7 @@ fn library(b: &mut Builder, m: &Palette) {
 
 fn corners(b: &mut Builder, m: &Palette) {
     b.standing(Vec3::new(-2.45, 0.0, -2.1), -20.0, |b| {
-        lamps::arc_lamp(b, m.brass, m.linen, m.stone, 2.05, 0.85);
+        lamps::arc_lamp(b, m.brass, [m.shade, m.bulbs[0]], m.stone, 2.05, 0.85);
     });
     b.standing(Vec3::new(1.25, 0.0, -2.08), 0.0, |b| {
         let soil = plants::pot(b, m.clay, m.soil, 0.20, 0.36);
@@ -289,7 +313,7 @@ fn corners(b: &mut Builder, m: &Palette) {
         });
     });
     b.part(placed([-0.35, SIZE[1], -0.1], [0.0; 3]), |b| {
-        lamps::pendant(b, m.copper, m.white, 0.95, 0.24);
+        lamps::pendant(b, m.copper, [m.white, m.bulbs[1]], 0.95, 0.24);
     });
     b.standing(Vec3::new(2.42, 0.0, 1.52), 0.0, |b| {
         let soil = plants::pot(b, m.ceramic, m.soil, 0.19, 0.40);
@@ -301,7 +325,7 @@ fn corners(b: &mut Builder, m: &Palette) {
         b.standing(Vec3::new(-0.38, 0.78, 0.0), 0.0, |b| {
             thing::vase(b, m.ceramic, 0.30, &[0.22, 0.34, 0.30, 0.16, 0.06]);
             b.part(placed([0.0, 0.56, 0.0], [0.0; 3]), |b| {
-                lamps::drum_shade(b, m.linen, 0.17, 0.13, 0.22);
+                lamps::drum_shade(b, m.shade, 0.17, 0.13, 0.22);
             });
             b.rod(m.brass, Vec3::Y * 0.28, Vec3::Y * 0.56, 0.006);
         });

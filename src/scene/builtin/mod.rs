@@ -3,9 +3,10 @@
 //! | name | what it is | light |
 //! |---|---|---|
 //! | `living-room` | furnished room | a large window that the sun enters, a round opening |
+//! | `evening` | the same room | its lamps, and the window |
 //! | `office` | closed office | two small windows, 3 % of the walls, no direct sun |
 //! | `exterior` | a street with arcade, trees and a café | the sky, partly occluded |
-//! | `fog` | the same street along its lamps | as `exterior`; the place for a medium |
+//! | `fog` | the same street along its lamps, in mist | as `exterior`, scattered on its way |
 //! | `open` | sculptures on a terrace | the whole sky, nothing occludes |
 //! | `crack` | brick store room | a slit of 1.5 m x 2 cm |
 
@@ -36,13 +37,14 @@ pub const DEFAULT_SCENE: &str = "living-room";
 
 /// Names of the built-in scenes.
 pub fn names() -> &'static [&'static str] {
-    &["living-room", "office", "exterior", "fog", "open", "crack"]
+    &["living-room", "evening", "office", "exterior", "fog", "open", "crack"]
 }
 
 /// Builds the scene called `name`; an error lists the names there are.
 pub fn build(name: &str) -> Result<Scene> {
     match name {
         "living-room" => Ok(living_room::build()),
+        "evening" => Ok(living_room::evening()),
         "office" => Ok(office::build()),
         "exterior" => Ok(street::exterior()),
         "fog" => Ok(street::fog()),

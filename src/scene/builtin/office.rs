@@ -145,7 +145,7 @@ fn shell(b: &mut Builder, m: &Palette) {
     b.part(walls[3].frame(), |b| fittings::door(b, m.white, m.steel, 0.4, [0.9, 2.1]));
     for x in [-1.35, 0.95] {
         b.part(placed([x, SIZE[1], -0.9], [0.0; 3]), |b| {
-            lamps::pendant(b, m.lamp, m.white, 0.85, 0.20);
+            lamps::pendant(b, m.lamp, [m.white; 2], 0.85, 0.20);
         });
     }
 }

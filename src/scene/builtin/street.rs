@@ -1,5 +1,5 @@
 //! A street between houses, with an arcade, a café under an awning, lamps and trees; the sky is
-//! partly occluded. `fog` is the same place seen along its lamps towards the light.
+//! partly occluded. `fog` is the same place in mist, seen along its lamps towards the light.
 
 use std::f32::consts::TAU;
 
@@ -13,7 +13,7 @@ use super::plants;
 use super::room::Wall;
 use super::textures as paint;
 use super::{lamps, seating};
-use crate::scene::Scene;
+use crate::scene::{Medium, Scene};
 
 struct Palette {
     cobbles: Mat,
@@ -102,8 +102,16 @@ pub(super) fn fog() -> Scene {
     let mut b = street("fog");
     b.camera("lamps", [-1.2, 1.55, -27.0], [1.0, 2.9, -8.0], 55.0);
     b.camera("street", [-3.7, 1.62, 6.1], [-0.25, 2.15, -6.0], 55.0);
-    b.finish()
+    Scene { medium: Some(FOG), ..b.finish() }
 }
+
+/// A third of the light along a street is scattered on 20 metres, mostly forward, as by mist.
+const FOG: Medium = Medium {
+    scattering: Vec3::splat(0.02),
+    absorption: Vec3::splat(0.0005),
+    anisotropy: 0.6,
+    bounds: Some([Vec3::new(-60.0, -0.5, -60.0), Vec3::new(60.0, 20.0, 60.0)]),
+};
 
 fn street(name: &str) -> Builder {
     let mut builder = Builder::new(name);

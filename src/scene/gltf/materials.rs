@@ -10,6 +10,7 @@ use serde_json::{Map, Value};
 
 use super::Fallible;
 use super::buffers::{File, find};
+use super::medium;
 use super::textures::Wanted;
 use crate::error::Notices;
 use crate::scene::{AlphaMode, Material, Texture, TextureImage, TextureRef};
@@ -146,6 +147,8 @@ impl<'a> Reader<'a> {
             double_sided: source.double_sided,
             ..Material::default()
         };
+        (material.scattering, material.scatter_anisotropy) =
+            medium::inside(&source.extras, &self.name, self.notices);
         if let Some(extensions) = &source.extensions {
             self.extensions(extensions, &mut material)?;
         }

@@ -6,7 +6,7 @@
 //! meaningless is an error.
 //!
 //! `document` parses, `buffers`, `uri` and `accessor` give access to the data, `pose` places nodes
-//! and joints, `materials` and `textures` read the look, `primitive`, `geometry` and `tangents` read
+//! and joints, `materials`, `textures` and `medium` read the look, `primitive`, `geometry` and `tangents` read
 //! triangles,
 //! `bake` puts them into the world.
 
@@ -17,6 +17,7 @@ mod document;
 mod extensions;
 mod geometry;
 mod materials;
+mod medium;
 mod pose;
 mod primitive;
 mod tangents;
@@ -76,6 +77,7 @@ fn read(bytes: &[u8], base_dir: Option<&Path>) -> Fallible<Scene> {
     let mut scene = Scene {
         cameras: viewpoints::cameras(&file.root, &nodes, &mut notices)?,
         lights: viewpoints::lights(&file.root, &nodes, &mut notices)?,
+        medium: medium::medium(&file.root, &nodes, &mut notices),
         ..Scene::default()
     };
     let placements = placements(&file, &nodes)?;

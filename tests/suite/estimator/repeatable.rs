@@ -7,7 +7,7 @@ use lightgrid::environment::{Environment, sky};
 use lightgrid::light_grid::cells::SphericalGrid;
 use lightgrid::light_grid::{LawOptions, LearningGrid, LightGrid};
 use lightgrid::path::camera::CameraRays;
-use lightgrid::path::{PathLimits, PathTracer, World};
+use lightgrid::path::{Background, PathLimits, PathTracer, World};
 use lightgrid::render::film::Film;
 use lightgrid::render::{Phase, Sampling, Session, View};
 use lightgrid::sampler::Sampler;
@@ -95,10 +95,18 @@ fn counters_do_not_depend_on_the_threads() {
         world: &setting.world,
         environment: &setting.environment,
         grid: Some(&whole_map),
+        fog: None,
+        background: Background::Map,
         limits: view.limits,
     };
     let digest = |threads| {
-        let grid = SphericalGrid { center: rays.position(), columns: 64, rows: 32, faces: true };
+        let grid = SphericalGrid {
+            center: rays.position(),
+            columns: 64,
+            rows: 32,
+            faces: true,
+            medium: false,
+        };
         let mut learning =
             LearningGrid::new(grid, setting.environment.tile_count(), LawOptions::ADAPTIVE);
         for pass in 0..3 {

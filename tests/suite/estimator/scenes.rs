@@ -8,7 +8,7 @@ use lightgrid::scene::{
 };
 
 /// Lambert's reflectance alone, both sides alike.
-pub(super) fn lambert(albedo: f32) -> Material {
+pub(crate) fn lambert(albedo: f32) -> Material {
     Material {
         base_color: Vec3::splat(albedo).extend(1.0),
         metallic: 0.0,
@@ -18,27 +18,27 @@ pub(super) fn lambert(albedo: f32) -> Material {
     }
 }
 
-pub(super) fn black() -> Material {
+pub(crate) fn black() -> Material {
     lambert(0.0)
 }
 
 /// Emits and reflects nothing; both sides.
-pub(super) fn lamp(radiance: f32) -> Material {
+pub(crate) fn lamp(radiance: f32) -> Material {
     Material { emissive: Vec3::splat(radiance), ..black() }
 }
 
 /// Emits without being a light source that is sampled; both sides.
-pub(super) fn unlit(radiance: f32) -> Material {
+pub(crate) fn unlit(radiance: f32) -> Material {
     Material { unlit: true, ..lambert(radiance) }
 }
 
 /// A smooth thin pane of index 1.5.
-pub(super) fn pane() -> Material {
+pub(crate) fn pane() -> Material {
     Material { transmission: 1.0, roughness: 0.0, specular: 1.0, ..lambert(1.0) }
 }
 
 /// A smooth solid of index 1.5 that lets half of the light through one metre.
-pub(super) fn smoked_glass() -> Material {
+pub(crate) fn smoked_glass() -> Material {
     Material {
         thickness: 1.0,
         attenuation_color: Vec3::splat(0.5),
@@ -49,7 +49,7 @@ pub(super) fn smoked_glass() -> Material {
 
 /// Covers the half of its texture coordinates where `u < 1/2`; made for scenes of
 /// [`Stage::with_half_texture`].
-pub(super) fn half_masked(material: Material) -> Material {
+pub(crate) fn half_masked(material: Material) -> Material {
     let texture = TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY };
     Material {
         base_color_texture: Some(texture),
@@ -58,12 +58,12 @@ pub(super) fn half_masked(material: Material) -> Material {
     }
 }
 
-pub(super) fn blended(material: Material, alpha: f32) -> Material {
+pub(crate) fn blended(material: Material, alpha: f32) -> Material {
     let base_color = material.base_color.truncate().extend(alpha);
     Material { base_color, alpha_mode: AlphaMode::Blend, ..material }
 }
 
-pub(super) fn sunlight(direction: Vec3, irradiance: f32) -> PunctualLight {
+pub(crate) fn sunlight(direction: Vec3, irradiance: f32) -> PunctualLight {
     PunctualLight {
         name: String::new(),
         kind: PunctualKind::Directional,
@@ -75,7 +75,7 @@ pub(super) fn sunlight(direction: Vec3, irradiance: f32) -> PunctualLight {
 }
 
 /// Parallel rays from `eye` along -Z, a picture two metres high.
-pub(super) fn orthographic(eye: Vec3) -> Camera {
+pub(crate) fn orthographic(eye: Vec3) -> Camera {
     Camera {
         world_from_camera: Affine3A::from_mat3_translation(Mat3::IDENTITY, eye),
         projection: Projection::Orthographic { half_height: 1.0 },
@@ -85,17 +85,17 @@ pub(super) fn orthographic(eye: Vec3) -> Camera {
 
 /// A scene being put together; every method returns it.
 #[derive(Default)]
-pub(super) struct Stage {
+pub(crate) struct Stage {
     scene: Scene,
 }
 
 impl Stage {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self::default()
     }
 
     /// Texture 0: opaque white where `u < 1/2`, clear elsewhere.
-    pub(super) fn with_half_texture() -> Self {
+    pub(crate) fn with_half_texture() -> Self {
         let mut stage = Self::new();
         let texels = vec![[255; 4], [255, 255, 255, 0]];
         stage.scene.images.push(TextureImage { width: 2, height: 1, texels });
@@ -110,17 +110,17 @@ impl Stage {
         stage
     }
 
-    pub(super) fn build(self) -> World {
+    pub(crate) fn build(self) -> World {
         World::new(self.scene)
     }
 
-    pub(super) fn light(mut self, light: PunctualLight) -> Self {
+    pub(crate) fn light(mut self, light: PunctualLight) -> Self {
         self.scene.lights.push(light);
         self
     }
 
     /// A parallelogram; its front is where `a cross b` points, `u` grows along `a`.
-    pub(super) fn quad(
+    pub(crate) fn quad(
         mut self,
         material: &Material,
         corner: impl Into<Vec3>,
@@ -143,12 +143,12 @@ impl Stage {
     }
 
     /// A horizontal square of side 10 around the origin, front up.
-    pub(super) fn floor(self, material: &Material) -> Self {
+    pub(crate) fn floor(self, material: &Material) -> Self {
         self.quad(material, [-5.0, 0.0, 5.0], [10.0, 0.0, 0.0], [0.0, 0.0, -10.0])
     }
 
     /// A face of a box, front outwards: 0 and 1 are +X and -X, then Y, then Z.
-    pub(super) fn face(self, material: &Material, low: Vec3, high: Vec3, face: usize) -> Self {
+    pub(crate) fn face(self, material: &Material, low: Vec3, high: Vec3, face: usize) -> Self {
         let axis = face / 2;
         let size = high - low;
         let edge = |axis: usize| Vec3::AXES[axis % 3] * size[axis % 3];
@@ -160,7 +160,7 @@ impl Stage {
         }
     }
 
-    pub(super) fn faces(
+    pub(crate) fn faces(
         self,
         material: &Material,
         low: Vec3,
@@ -171,7 +171,7 @@ impl Stage {
     }
 
     /// A sphere of flat faces.
-    pub(super) fn sphere(self, material: &Material, center: Vec3, radius: f32) -> Self {
+    pub(crate) fn sphere(self, material: &Material, center: Vec3, radius: f32) -> Self {
         let rings = 12;
         let at = |i: u32, j: u32| {
             let uv = Vec2::new(i as f32 / (2 * rings) as f32, j as f32 / rings as f32);
@@ -195,7 +195,7 @@ impl Stage {
 
 /// A room of 4 x 2.5 x 3 metres with a large window in its +X wall and a block on the floor; the
 /// camera looks at the block from beside the window.
-pub(super) fn room(albedo: f32, window: Option<&Material>) -> (World, Camera) {
+pub(crate) fn room(albedo: f32, window: Option<&Material>) -> (World, Camera) {
     let (low, high) = (Vec3::new(-2.0, 0.0, -1.5), Vec3::new(2.0, 2.5, 1.5));
     let (sill, head) = (Vec3::new(2.0, 0.8, -1.0), Vec3::new(2.0, 2.2, 1.0));
     let walls = lambert(albedo);

@@ -38,7 +38,7 @@ fn compare(a: &Film, b: &Film) -> ZTest {
 }
 
 /// Asserts that two pictures of different seeds agree in every pixel and in the mean.
-fn expect_agreement(what: &str, a: &Film, b: &Film, precision: f64) {
+pub(super) fn expect_agreement(what: &str, a: &Film, b: &Film, precision: f64) {
     let test = compare(a, b);
     assert!(test.passed(), "{what}: {test:?}");
     expect_same_mean(what, a, b, precision);
@@ -88,7 +88,7 @@ fn a_grid_full_of_garbage_is_noisy_but_right() {
     for (seed, faces) in [(2, true), (3, false)] {
         let view = View { seed, ..view(camera.clone(), Sampling::Plain, 3) };
         let center = camera.world_from_camera.translation.into();
-        let grid = SphericalGrid { center, columns: 32, rows: 16, faces };
+        let grid = SphericalGrid { center, columns: 32, rows: 16, faces, medium: false };
         let garbage = LightGrid::with_garbage_laws(grid, environment.tile_energies(), seed);
         let mut session = Session::new(&world, &environment, view);
         session.set_grid(garbage.expect("a map with light")).expect("the CPU does not fail");

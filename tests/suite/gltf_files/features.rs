@@ -1,7 +1,8 @@
 //! One small file made here for each feature of the format.
 
 use glam::{Vec2, Vec3, Vec4};
-use lightgrid::scene::{AlphaMode, Projection, PunctualKind, Scene, Wrap, gltf};
+use lightgrid::scene::needs::SceneNeeds;
+use lightgrid::scene::{AlphaMode, Medium, Projection, PunctualKind, Scene, Wrap, gltf};
 
 use super::builder::{Builder, ONE_MESH, SQUARE, square, textured_material};
 
@@ -401,4 +402,53 @@ fn huge_claims_are_refused_before_memory_is_taken() {
     let mesh = ONE_MESH.replace(r#""indices":1"#, &format!(r#""indices":{large}"#));
     let error = builder.error(&mesh.replace(r#"{"mesh":0}"#, &node));
     assert!(error.contains("more than 200 million triangles"), "{error}");
+}
+
+#[test]
+fn fog_is_read_from_the_scene_a_node_and_a_material() {
+    let shape =
+        r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}]"#;
+    let load = |scene: &str, node: &str, material: &str| {
+        square().load(&format!(
+            r#"{shape},"nodes":[{{"mesh":0}},{{"translation":[1,2,3],"scale":[1,2,4]{node}}}],
+            "scenes":[{{"nodes":[0,1]{scene}}}],"materials":[{{{material}}}]"#
+        ))
+    };
+    let fog = |keys: &str| format!(r#","extras":{{"other":1,"fog":{{{keys}}}}}"#);
+    let clear = load("", "", "");
+    assert!(clear.medium.is_none() && !SceneNeeds::of(&clear).medium);
+
+    let scene =
+        load(&fog(r#""scattering":0.5,"absorption":[0,0.1,0.2],"anisotropy":-0.3"#), "", "");
+    let expected = Medium {
+        scattering: Vec3::splat(0.5),
+        absorption: Vec3::new(0.0, 0.1, 0.2),
+        anisotropy: -0.3,
+        bounds: None,
+    };
+    assert_eq!(scene.medium, Some(expected));
+    assert!(SceneNeeds::of(&scene).medium);
+
+    let placed = load("", &fog(r#""scattering":2"#), "").medium.expect("a medium");
+    let (low, high) = (Vec3::new(0.0, 0.0, -1.0), Vec3::new(2.0, 4.0, 7.0));
+    assert_eq!(placed.bounds, Some([low, high]));
+
+    let boxed = load(&fog(r#""scattering":1,"box":[[0,0,0],[1,2,3]]"#), &fog(""), "");
+    assert_eq!(boxed.medium.expect("a medium").bounds, Some([Vec3::ZERO, Vec3::new(1., 2., 3.)]));
+    assert!(boxed.notices.iter().any(|n| n.contains("2 media")));
+
+    let glass = r#""extensions":{"KHR_materials_transmission":{"transmissionFactor":1},
+        "KHR_materials_volume":{"thicknessFactor":1}}"#;
+    let milk = load("", "", &format!("{glass}{}", fog(r#""scattering":[1,2,3],"anisotropy":0.5"#)));
+    assert_eq!(milk.materials[0].scattering, Vec3::new(1.0, 2.0, 3.0));
+    assert_eq!(milk.materials[0].scatter_anisotropy, 0.5);
+    assert!(SceneNeeds::of(&milk).scattering_solids && !SceneNeeds::of(&milk).medium);
+
+    for bad in
+        [r#""scattering":-1"#, r#""anisotropy":2"#, r#""box":[[0,0,0],[0,1,1]]"#, r#""box":3"#]
+    {
+        let scene = load(&fog(bad), "", "");
+        assert!(scene.medium.is_none(), "{bad}");
+        assert!(scene.notices.iter().any(|n| n.contains("fog of the scene")), "{bad}");
+    }
 }

@@ -80,7 +80,8 @@ fn structs_are_laid_out_as_the_host_writes_them() {
         law_tiles_at law_last_at law_of_cell_at words_per_law grid_rows map_width map_height
         tile_columns tile_rows rotation_turns intensity tile_sums_at light_count
         light_triangle_count width height seed bounces russian_roulette orthographic scene_extent
-        mean_contribution zero padding
+        mean_contribution zero grid_medium padding_1 fog_low fog_mean_cosine fog_high padding_2
+        fog_scattering padding_3 fog_extinction padding_4 background background_concentration
     );
     assert_same(&module, "Globals", globals);
     let pixel = fields!(PixelSums: sum luminance_squared rays invalid padding);
@@ -109,7 +110,7 @@ fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
     let (size, fields) = fields!(Material:
         base_color emissive alpha_cutoff specular_color specular absorption ior metallic roughness
         transmission clearcoat clearcoat_roughness normal_scale clearcoat_normal_scale flags textures
-        padding
+        padding scattering scatter_mean_cosine
     );
     assert_eq!(at("MATERIAL_TEXELS"), size);
     assert_eq!(fields.iter().map(|(.., size)| size).sum::<usize>(), size);
@@ -122,6 +123,10 @@ fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
             &[offset_of!(Material, specular_color), offset_of!(Material, specular)],
         ),
         ("ABSORPTION_IOR", &[offset_of!(Material, absorption), offset_of!(Material, ior)]),
+        (
+            "SCATTERING",
+            &[offset_of!(Material, scattering), offset_of!(Material, scatter_mean_cosine)],
+        ),
     ] {
         let expected = [at(texel), at(texel) + 12];
         assert_eq!(fields, &expected[..fields.len()], "{texel}");

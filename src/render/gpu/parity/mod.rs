@@ -16,6 +16,7 @@ mod cases;
 mod functions;
 mod layouts;
 mod map;
+mod media;
 mod scattering;
 mod stand;
 mod surfaces;
@@ -188,6 +189,7 @@ fn groups(stands: &[Stand]) -> Vec<Group<'_>> {
         (&stands[0], &[scattering::PRELUDE], scattering::probes()),
         (&stands[0], &[scattering::PRELUDE], surfaces::probes(&stands[0])),
         (&stands[0], &[], surfaces::path_probes(&stands[0])),
+        (&stands[0], &[], media::probes(&stands[0])),
     ];
     groups.extend(stands[..4].iter().map(|stand| (stand, &[][..], map::probes(stand))));
     let large = stands[4..].iter();
@@ -211,12 +213,13 @@ run_group! {
     scattering_of_materials: 1;
     surfaces_lights_and_hits: 2;
     whole_paths: 3;
-    map_with_a_tile_local_table: 4;
-    map_with_a_table_in_u32: 5;
-    map_with_a_table_in_f32: 6;
-    map_with_a_table_in_f64: 7;
-    widest_map: 8;
-    tallest_map: 9;
+    media_between_surfaces: 4;
+    map_with_a_tile_local_table: 5;
+    map_with_a_table_in_u32: 6;
+    map_with_a_table_in_f32: 7;
+    map_with_a_table_in_f64: 8;
+    widest_map: 9;
+    tallest_map: 10;
 }
 
 /// The source of a stand's kernel; the numbers in it do not matter here.

@@ -11,13 +11,13 @@ use crate::image::Image;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LawOptions, LightGrid};
 use crate::path::camera::CameraRays;
-use crate::path::{PathLimits, PathTracer, World};
+use crate::path::{Background, PathLimits, PathTracer, World};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::layout::{pack_radiance, unpack_radiance};
 use crate::render::{Sampling, View};
 use crate::sampler::{Points, Sampler};
 use crate::scene::{
-    AlphaMode, Camera, Material, Projection, PunctualKind, PunctualLight, Scene, Texture,
+    AlphaMode, Camera, Material, Medium, Projection, PunctualKind, PunctualLight, Scene, Texture,
     TextureImage, TextureRef, Wrap,
 };
 
@@ -38,24 +38,31 @@ pub(super) fn all() -> [Stand; 6] {
     use TableKind::{F32, F64, TileLocal, U32};
     let thin_lens = Camera { lens_radius: 0.1, focus_distance: 5.0, ..camera() };
     let parallel = Projection::Orthographic { half_height: 3.0 };
-    let stand = |scene, environment: Environment, camera, filter, sampling| {
+    let stand = |scene: Scene, environment: Environment, camera, filter, sampling| {
+        let world = World::new(scene);
         let view = view(camera, filter, sampling);
         let rays = CameraRays::new(&view.camera, view.width, view.height);
         let energies = environment.tile_energies();
         let faces = sampling == Adaptive;
-        let cells = SphericalGrid { center: rays.position(), columns: 64, rows: 32, faces };
+        let cells = SphericalGrid {
+            center: rays.position(),
+            columns: 64,
+            rows: 32,
+            faces,
+            medium: world.scene.medium.is_some(),
+        };
         let grid = if sampling == Plain {
             LightGrid::whole_map(energies)
         } else {
             LightGrid::with_garbage_laws(cells, energies, 7)
         };
         let grid = grid.expect("the map is not black");
-        Stand { world: World::new(scene), environment, view, rays, grid }
+        Stand { world, environment, view, rays, grid }
     };
     let map = |table| environment((61, 37), table, Lookup::Bilinear);
     let large = |size| environment(size, TileLocal, Lookup::Bilinear);
     [
-        stand(scene(300), map(TileLocal), thin_lens, BlackmanHarris, Adaptive),
+        stand(foggy(scene(300)), map(TileLocal), thin_lens, BlackmanHarris, Adaptive),
         stand(scene(1), environment((61, 37), U32, Lookup::Nearest), camera(), Box, Talk),
         stand(scene(1), map(F32), Camera { projection: parallel, ..camera() }, Gauss, Adaptive),
         stand(scene(1), map(F64), camera(), Gauss, Plain),
@@ -79,8 +86,21 @@ impl Stand {
             environment: &self.environment,
             grid: Some(&self.grid),
             limits: self.view.limits,
+            fog: self.view.fog(&self.world),
+            background: self.view.background,
         }
     }
+}
+
+/// The scene in a box of coloured fog.
+fn foggy(scene: Scene) -> Scene {
+    let medium = Medium {
+        scattering: Vec3::new(0.05, 0.08, 0.1),
+        absorption: Vec3::new(0.02, 0.0, 0.01),
+        anisotropy: 0.4,
+        bounds: Some([Vec3::new(-3.0, -2.0, -4.0), Vec3::new(4.0, 3.0, 5.0)]),
+    };
+    Scene { medium: Some(medium), ..scene }
 }
 
 fn camera() -> Camera {
@@ -100,6 +120,9 @@ fn view(camera: Camera, filter: PixelFilter, sampling: Sampling) -> View {
         grid_columns: 64,
         learning_paths: 0,
         laws: LawOptions::ADAPTIVE,
+        medium: None,
+        background: Background::Map,
+        crop: None,
         layers: true,
     }
 }

@@ -1,0 +1,98 @@
+//! Media from `extras`, for glTF has none: a key `fog` on the shown scene, on a node or on a material.
+//!
+//! ```json
+//! "extras": { "fog": { "scattering": 0.05, "absorption": [0.0, 0.001, 0.002], "anisotropy": 0.6,
+//!                      "box": [[-5, 0, -5], [5, 3, 5]] } }
+//! ```
+//!
+//! Coefficients are per metre, one number or linear RGB. On a scene `box` may be left out: then the
+//! medium fills the scene's own box. On a node the box is the cube of side 2 around the origin as the
+//! node places it (what an empty of cube shape shows in Blender), made axis-aligned. On a material
+//! with `KHR_materials_volume`, `scattering` and `anisotropy` are those inside of the body.
+
+use glam::{DVec3, Vec3};
+use gltf::json;
+use serde_json::{Map, Value};
+
+use super::pose::Nodes;
+use crate::error::Notices;
+use crate::scene::Medium;
+
+/// The medium of the shown scene or, without one, of its first node that has one.
+pub(super) fn medium(root: &json::Root, nodes: &Nodes, notices: &mut Notices) -> Option<Medium> {
+    let scene = root.scene.map_or(0, |index| index.value());
+    let of_scene = root.scenes.get(scene).and_then(|scene| fog(&scene.extras));
+    let mut media = Vec::new();
+    if let Some(keys) = of_scene {
+        media.extend(read(&keys, "the scene", notices));
+    }
+    for &number in &nodes.shown {
+        let Some(keys) = fog(&root.nodes[number].extras) else { continue };
+        let Some(medium) = read(&keys, &format!("node {number}"), notices) else { continue };
+        let world = nodes.world[number];
+        let corners = (0..8).map(|corner| {
+            let sign = |bit: u32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            world.transform_point3(DVec3::new(sign(0), sign(1), sign(2))).as_vec3()
+        });
+        let (low, high) = corners.fold((Vec3::MAX, Vec3::MIN), |(low, high), corner| {
+            (low.min(corner), high.max(corner))
+        });
+        media.push(Medium { bounds: Some([low, high]), ..medium });
+    }
+    if media.len() > 1 {
+        notices.add(format!("the file has {} media; only the first is rendered", media.len()));
+    }
+    media.first().copied()
+}
+
+/// Scattering coefficient and anisotropy inside of a material's body.
+pub(super) fn inside(extras: &json::Extras, name: &str, notices: &mut Notices) -> (Vec3, f32) {
+    let medium = fog(extras).and_then(|keys| read(&keys, &format!("material {name}"), notices));
+    medium.map_or((Vec3::ZERO, 0.0), |medium| (medium.scattering, medium.anisotropy))
+}
+
+/// The object under the key `fog`.
+fn fog(extras: &json::Extras) -> Option<Map<String, Value>> {
+    let text = extras.as_ref()?.get();
+    let Value::Object(mut keys) = serde_json::from_str(text).ok()? else { return None };
+    match keys.remove("fog") {
+        Some(Value::Object(keys)) => Some(keys),
+        _ => None,
+    }
+}
+
+fn read(keys: &Map<String, Value>, place: &str, notices: &mut Notices) -> Option<Medium> {
+    let medium = understood(keys);
+    if medium.is_none() {
+        notices.add(format!("the fog of {place} has values that make no sense; it is left out"));
+    }
+    medium
+}
+
+fn understood(keys: &Map<String, Value>) -> Option<Medium> {
+    let coefficient = |key: &str| match keys.get(key) {
+        None => Some(Vec3::ZERO),
+        Some(Value::Number(number)) => Some(Vec3::splat(number.as_f64()? as f32)),
+        Some(value) => vector(value),
+    };
+    let bounds = match keys.get("box") {
+        None => None,
+        Some(value) => match value.as_array()?.as_slice() {
+            [low, high] => Some([vector(low)?, vector(high)?]),
+            _ => return None,
+        },
+    };
+    let medium = Medium {
+        scattering: coefficient("scattering")?,
+        absorption: coefficient("absorption")?,
+        anisotropy: keys.get("anisotropy").map_or(Some(0.0), Value::as_f64)? as f32,
+        bounds,
+    };
+    medium.is_sound().then_some(medium)
+}
+
+fn vector(value: &Value) -> Option<Vec3> {
+    let numbers: Vec<f32> =
+        value.as_array()?.iter().map(|x| x.as_f64().map(|x| x as f32)).collect::<Option<_>>()?;
+    <[f32; 3]>::try_from(numbers).ok().map(Vec3::from)
+}
