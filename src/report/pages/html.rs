@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::super::conduct::device_names;
 use super::super::summary::Report;
 use super::words::percent;
-use super::{escape, sections};
+use super::{escape, overview, sections};
 use crate::error::Result;
 
 const STYLE: &str = "
@@ -46,7 +46,7 @@ pub(super) fn page(report: &Report) -> Result<String> {
          <title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n"
     );
     introduction(report, &mut html);
-    sections::overview(report, &mut html);
+    overview::overview(report, &mut html);
     method(report, &mut html);
     if !report.plan.differences.is_empty() {
         html.push_str("<h2>Beside the talk's figures</h2>\n<ul>\n");
