@@ -95,7 +95,7 @@ struct EffortArguments {
     /// Seconds of every run, learning included.
     #[arg(long, default_value = "30", value_parser = values::positive, value_name = "S")]
     seconds: f64,
-    /// Independent runs of every combination; intervals need two at least.
+    /// Independent runs of every combination; intervals need two and are worth something from four on.
     #[arg(long, default_value = "6", value_parser = clap::value_parser!(u32).range(1..=10_000), value_name = "N")]
     seeds: u32,
     /// Picture size in pixels.

@@ -42,7 +42,7 @@ impl Recording {
     }
 }
 
-/// How counters become laws. *Measured* defaults.
+/// How counters become laws. The defaults are *measured*: `lightgrid report ablations`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LawOptions {
     /// Whether cells are split six-fold by the direction a surface faces.

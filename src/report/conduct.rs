@@ -1,6 +1,8 @@
 //! Going through a plan: what is on disk is taken, what is missing is measured, pages are kept up to
 //! date.
 
+mod judging;
+
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -10,16 +12,12 @@ use super::machine::{Machine, OpenDevice};
 use super::measure::{Run, measure};
 use super::pages::{duration, row_sentence};
 use super::plan::{Device, Method, Plan, Row};
-use super::reference::{LEAST_PICTURES, Noise, Reference, read_reference};
-use super::shares::shares;
+use super::reference::{LEAST_PICTURES, Reference, read_reference};
 use super::stage::Stage;
 use super::store::Store;
-use super::summary::{
-    DeviceReport, Measure, Pictures, ReferenceReport, Report, RowReport, summarise,
-};
+use super::summary::{DeviceReport, Pictures, Report, RowReport, summarise};
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::metrics::compare;
 
 /// How a report is made, beside what it is about.
 pub struct Options<'a> {
@@ -240,122 +238,6 @@ impl Conductor<'_> {
         outcome.is_ok()
     }
 
-    /// The device that references are made on: a real GPU that can do the row, or the first.
-    fn fastest(&self, work: &Work) -> usize {
-        let can = |index: &usize| work.refusals[*index].is_none();
-        let all = || (0..self.devices.len()).filter(can);
-        all().find(|index| self.devices[*index].is_real_gpu()).or_else(|| all().next()).unwrap_or(0)
-    }
-
-    /// The reference so far, if it is worth anything, and its number of pictures.
-    fn reference(&self, work: &Work) -> Option<(Image, Option<u32>)> {
-        if let Some(image) = &self.file_reference {
-            return Some((image.clone(), None));
-        }
-        let reference = work.reference.as_ref()?;
-        let pictures = reference.facts.pictures;
-        (pictures >= LEAST_PICTURES).then(|| (reference.image(), Some(pictures)))
-    }
-
-    /// Adds pictures to the reference until there are so many; `false` if it was cancelled.
-    fn grow_reference(&self, work: &mut Work, pictures: u32) -> Result<bool> {
-        let fastest = self.fastest(work);
-        let settings = &super::plan::Settings::of(crate::render::Sampling::Adaptive);
-        let Some(mut reference) = work.reference.take() else { return Ok(true) };
-        let mut is_whole = true;
-        while is_whole && reference.facts.pictures < pictures {
-            let done = reference.facts.pictures;
-            self.say(
-                &format!("{}: reference, picture {} of {pictures}", work.stage.title, done + 1),
-                f64::from(pictures - done) * self.plan.effort.seconds,
-            );
-            let place = work.stage.place(self.plan, &self.devices[fastest], settings);
-            let (seconds, cancel) = (self.plan.effort.seconds, self.options.cancel);
-            is_whole =
-                reference.add_picture(&place, &self.devices[fastest].name, seconds, cancel)?
-                    && !self.is_cancelled();
-        }
-        work.reference = Some(reference);
-        Ok(is_whole)
-    }
-
-    /// Grows the reference until its noise is small beside the smallest error, and judges all runs
-    /// against it; `false` if it was cancelled.
-    fn judge_well(&mut self, work: &mut Work) -> Result<bool> {
-        loop {
-            self.judge_again(work)?;
-            let Some(reference) = &work.reference else { return Ok(true) };
-            let missing = reference.pictures_missing(
-                self.plan.effort.reference_noise,
-                smallest_error(work).unwrap_or(0.0),
-            );
-            if missing == 0 {
-                return Ok(true);
-            }
-            let pictures = reference.facts.pictures + missing;
-            if !self.grow_reference(work, pictures)? {
-                self.judge_again(work)?;
-                return Ok(false);
-            }
-        }
-    }
-
-    /// Takes the errors of all runs whose pictures are still there, if the reference has changed.
-    fn judge_again(&self, work: &mut Work) -> Result<()> {
-        let Some((reference, pictures)) = self.reference(work) else { return Ok(()) };
-        for (key, run) in work.runs.iter_mut().flatten().flatten() {
-            let is_new = run.points.iter().all(|p| p.errors.is_some())
-                && pictures.is_some()
-                && run.reference_pictures == pictures;
-            if is_new {
-                continue;
-            }
-            let films =
-                self.store.read_pictures(key, self.plan.effort.frame.size).unwrap_or_default();
-            if films.len() == run.points.len() {
-                run.judge(&films, &reference)?;
-                run.reference_pictures = pictures;
-                self.store.write(key, run)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Takes the error of the methods that matter apart; `false` if it was cancelled.
-    fn take_apart(&mut self, work: &Work) -> Result<bool> {
-        let fastest = self.fastest(work);
-        let Some((reference, _)) = self.reference(work) else { return Ok(true) };
-        for method in self.plan.compared() {
-            let runs = self.plan.methods.iter().position(|m| m.name == method.name);
-            let run = runs.and_then(|index| work.runs[fastest][index].first());
-            let Some(samples) = run.and_then(|(_, run)| Some(run.points.last()?.samples)) else {
-                continue;
-            };
-            let key = format!("{}_shares", self.key(work, fastest, method, 0));
-            let found = match self.store.read(&key) {
-                Some(found) => found,
-                None => {
-                    self.say(
-                        &format!("{}: where {}'s error is left", work.stage.title, method.name),
-                        super::plan::SHARE_RUNS * self.plan.effort.seconds,
-                    );
-                    let place =
-                        work.stage.place(self.plan, &self.devices[fastest], &method.settings);
-                    let method = (method.name.as_str(), &method.settings);
-                    let samples = (samples / 8).max(4);
-                    let found = shares(&place, method, samples, &reference, self.options.cancel)?;
-                    let Some(found) = found else { return Ok(false) };
-                    self.store.write(&key, &found)?;
-                    found
-                }
-            };
-            if let Some(row) = self.report.rows.last_mut() {
-                row.shares.push(found);
-            }
-        }
-        Ok(true)
-    }
-
     /// Keeps the last pictures of first runs only (all of them for a given reference, whose noise is
     /// judged by them).
     fn forget_pictures(&self, work: &Work) {
@@ -411,61 +293,6 @@ impl Conductor<'_> {
         Ok(())
     }
 
-    fn reference_report(&self, work: &Work) -> Result<Option<ReferenceReport>> {
-        let error = smallest_error(work);
-        let noise = match &work.reference {
-            Some(reference) => {
-                if reference.facts.pictures < LEAST_PICTURES {
-                    return Ok(None);
-                }
-                Some(reference.noise())
-            }
-            None => self.noise_of_file(work)?,
-        };
-        let share = noise.zip(error).map(|(noise, error)| noise.trimmed_rel_mse / error);
-        Ok(Some(ReferenceReport {
-            file: self.plan.reference.as_ref().map(|path| path.display().to_string()),
-            facts: work.reference.as_ref().map(|reference| reference.facts.clone()),
-            noise,
-            share,
-            // A given file is judged by noisy pictures: its share is only known to some digits.
-            is_good: share.is_some_and(|share| share <= 1.0001 * self.plan.effort.reference_noise),
-        }))
-    }
-
-    /// What a given reference errs by: how much farther the mean of all runs of the best method is
-    /// from it than that mean's own spread explains. `None` with a single run.
-    fn noise_of_file(&self, work: &Work) -> Result<Option<Noise>> {
-        let Some(reference) = &self.file_reference else { return Ok(None) };
-        let all = work.runs.iter().flatten().filter(|runs| runs.len() > 1);
-        let best = all.min_by(|a, b| mean_error(a).total_cmp(&mean_error(b)));
-        let Some(runs) = best else { return Ok(None) };
-        let films: Option<Vec<Image>> = runs
-            .iter()
-            .map(|(key, _)| self.store.read_pictures(key, self.plan.effort.frame.size)?.pop())
-            .collect();
-        let Some(films) = films else { return Ok(None) };
-        let count = films.len() as f64;
-        let mut mean = Image::filled(reference.width, reference.height, [0.0; 3]);
-        let mut variances = vec![[0.0; 3]; reference.pixels.len()];
-        for (i, (mean, variance)) in mean.pixels.iter_mut().zip(&mut variances).enumerate() {
-            for c in 0..3 {
-                let values = films.iter().map(|film| f64::from(film.pixels[i][c]));
-                let average = values.clone().sum::<f64>() / count;
-                let squares: f64 = values.map(|v| (v - average).powi(2)).sum();
-                mean[c] = average as f32;
-                variance[c] = squares / (count - 1.0) / count;
-            }
-        }
-        let found = compare(&mean, reference)?;
-        let own = Noise::of(&variances, reference);
-        Ok(Some(Noise {
-            mse: (found.mse - own.mse).max(0.0),
-            rel_mse: (found.rel_mse - own.rel_mse).max(0.0),
-            trimmed_rel_mse: (found.trimmed_rel_mse - own.trimmed_rel_mse).max(0.0),
-        }))
-    }
-
     fn write_pages(&mut self) -> Result<()> {
         super::pages::write(&self.report, self.store.root())?;
         self.pages_written = Some(Instant::now());
@@ -518,21 +345,6 @@ impl Conductor<'_> {
         let left = row_seconds + later as f64 * self.plan.expected_row_seconds();
         (self.options.progress)(format!("{what}, {} left", duration(left)));
     }
-}
-
-/// Smallest mean error at the end of all methods and devices.
-fn smallest_error(work: &Work) -> Option<f64> {
-    let errors = work.runs.iter().flatten().filter(|runs| !runs.is_empty());
-    errors.map(|runs| mean_error(runs)).filter(|e| e.is_finite()).min_by(f64::total_cmp)
-}
-
-/// Mean error at the end; not a number before runs are judged.
-fn mean_error(runs: &[(String, Run)]) -> f64 {
-    let error = |(_, run): &(String, Run)| {
-        let last = run.points.last().and_then(|p| p.errors);
-        last.map_or(f64::NAN, |errors| Measure::TrimmedRelMse.of(&errors))
-    };
-    runs.iter().map(error).sum::<f64>() / runs.len() as f64
 }
 
 /// Refuses what can be seen to be wrong before hours of work.

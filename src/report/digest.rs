@@ -72,6 +72,7 @@ pub(super) fn of_picture(
         .debug(&scene.materials)
         .debug(&scene.textures)
         .debug(&scene.lights)
+        .debug(&scene.medium)
         .debug(camera)
         .debug(frame);
     for image in &scene.images {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::reference::LEAST_PICTURES;
 use crate::environment::{EnvironmentOptions, TableKind};
 use crate::light_grid::LawOptions;
 use crate::path::{Background, PathLimits};
@@ -212,8 +213,8 @@ impl Plan {
     /// The same for one row.
     pub(super) fn expected_row_seconds(&self) -> f64 {
         let runs = self.methods.len() * self.effort.devices.len() * self.effort.seeds as usize;
-        let reference =
-            if self.reference.is_some() { 0.0 } else { 1.0 / self.effort.reference_noise };
+        let pictures = (1.0 / self.effort.reference_noise).max(f64::from(LEAST_PICTURES));
+        let reference = if self.reference.is_some() { 0.0 } else { pictures };
         let shares = SHARE_RUNS * self.compared().len() as f64;
         (runs as f64 + reference + shares) * self.effort.seconds * OVERHEAD
     }

@@ -130,8 +130,8 @@ impl Reference {
         })
     }
 
-    /// Renders one more picture with the default sampling and keeps it; the first one takes
-    /// `seconds`, the others as many samples as that. `false` if it was cancelled.
+    /// Renders one more picture with the default sampling and keeps it; the first one
+    /// renders for `seconds` (and at least as long as it learned), the others as many samples. `false` if it was cancelled.
     ///
     /// # Errors
     /// If the device fails or the file cannot be written.
@@ -147,9 +147,13 @@ impl Reference {
         let Some(mut session) = place.learned(&settings, seed, cancel)? else { return Ok(false) };
         let limit = self.facts.samples_per_picture;
         loop {
-            let (samples, elapsed) = (session.film().min_samples(), session.elapsed_seconds());
-            let is_done =
-                if limit > 0 { samples >= limit } else { samples >= 4 && elapsed >= seconds };
+            let samples = session.film().min_samples();
+            let figures = session.figures();
+            let is_done = if limit > 0 {
+                samples >= limit
+            } else {
+                samples >= 4 && figures.render_seconds >= seconds.max(figures.learning_seconds)
+            };
             if is_done {
                 break;
             }

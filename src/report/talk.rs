@@ -62,7 +62,7 @@ const DIFFERENCES: [&str; 7] = [
     "Another measure: the talk says equal noise without a formula. Here it is trimmed relMSE against a \
      reference.",
     "The talk's learning is about 1 % of a production render. Here runs are short and pictures small, \
-     and all of the learning counts, so ratios are smaller than in a long render; the column \"x without \
+     and all of the learning counts, so ratios are smaller than in a long render; the column \"without \
      learning\" says what a long one would come to.",
     "The talk does not give the numbers of tiles and cells it was measured with (its figures show 8x4 \
      tiles). Here both talk and adaptive have 32x16 tiles and 64x32 cells.",

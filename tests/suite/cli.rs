@@ -404,9 +404,8 @@ fn a_region_is_that_part_of_the_picture_and_the_background_is_the_cameras_alone(
     let lit = (0..512).filter(|i| whole.pixels[*i] == map.pixels[*i]).count();
     assert!(lit > 8, "{lit} pixels see only surfaces");
 
-    let outside = bench.render("-o a.png --size 32x16 --region 30,0,3,3");
-    let says = text(&outside.stderr);
-    assert!(!outside.status.success() && says.contains("not inside the picture"), "{says}");
-    let wrong = bench.render("-o a.png --background pink");
-    assert!(!wrong.status.success() && text(&wrong.stderr).contains("colour"));
+    let says = bench.refusal(&render_line("-o a.png --size 32x16 --region 30,0,3,3"), 1);
+    assert!(says.contains("not inside the picture"), "{says}");
+    let says = bench.refusal(&render_line("-o a.png --background pink"), 2);
+    assert!(says.contains("colour"), "{says}");
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::super::conduct::device_names;
 use super::super::summary::Report;
 use super::words::percent;
-use super::{escape, sections};
+use super::{escape, overview, sections};
 use crate::error::Result;
 
 const STYLE: &str = "
@@ -27,7 +27,8 @@ td { text-align: right; padding: .25rem .7rem; border-bottom: 1px solid var(--ru
 th:first-child, td:first-child { text-align: left; padding-left: 0; }
 td.remark { text-align: left; color: var(--soft); white-space: normal; }
 tr.group td { font-weight: 600; padding-top: .8rem; }
-.plots svg { max-width: 100%; height: auto; margin: 0 1rem 1rem 0; }
+.plots { display: flex; flex-wrap: wrap; gap: 1rem; margin: .8rem 0; }
+.plots svg { max-width: 100%; height: auto; }
 .pictures { font-size: 0; margin: .6rem 0; }
 figure { display: inline-block; vertical-align: top; margin: 0 .8rem .8rem 0; font-size: .85rem; }
 figure img { display: block; image-rendering: pixelated; }
@@ -45,7 +46,7 @@ pub(super) fn page(report: &Report) -> Result<String> {
          <title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n"
     );
     introduction(report, &mut html);
-    sections::overview(report, &mut html);
+    overview::overview(report, &mut html);
     method(report, &mut html);
     if !report.plan.differences.is_empty() {
         html.push_str("<h2>Beside the talk's figures</h2>\n<ul>\n");

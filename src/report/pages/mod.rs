@@ -5,7 +5,9 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
+mod devices;
 mod html;
+mod overview;
 mod pictures;
 mod plots;
 mod sections;
@@ -26,7 +28,7 @@ pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
     write_text(&folder.join("report.csv"), &csv(report))?;
     let plots = folder.join("plots");
     fs::create_dir_all(&plots).map_err(|e| Error::at(&plots, format!("cannot be made: {e}")))?;
-    if let Some(plot) = sections::overview_plot(report) {
+    if let Some(plot) = overview::overview_plot(report) {
         write_text(&plots.join("speed-ups.svg"), &plot)?;
     }
     for row in &report.rows {

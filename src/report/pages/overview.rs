@@ -1,0 +1,156 @@
+//! What came out, in one table and one plot.
+
+use std::fmt::Write as _;
+
+use super::super::summary::{DeviceReport, Measure, MethodReport, Report, RowReport};
+use super::plots::{Entry, ratio_plot};
+use super::sections::{baseline, is_long};
+use super::tables::Table;
+use super::words;
+use super::{escape, words::percent};
+
+/// What came out, in one table and one plot.
+pub(super) fn overview(report: &Report, html: &mut String) {
+    html.push_str("<h2>What came out</h2>\n");
+    if is_long(report) {
+        ablation_table(report, html);
+        return;
+    }
+    if let Some(plot) = overview_plot(report) {
+        let _ = writeln!(html, "<div class=\"plots\">{plot}</div>");
+    }
+    let plan = &report.plan;
+    let baseline = baseline(report);
+    let others: Vec<&str> =
+        plan.methods.iter().map(|m| m.name.as_str()).filter(|name| *name != baseline).collect();
+    let mut head = vec!["", "device"];
+    head.extend(&others);
+    let is_beside_talk =
+        plan.rows.iter().any(|row| row.published.is_some() || row.target.is_some());
+    if is_beside_talk {
+        head.extend(["published", "target"]);
+    }
+    head.push("reference noise");
+    let mut table = Table::new(&head);
+    for row in &report.rows {
+        for device in &row.devices {
+            if let Some(reason) = &device.not_measured {
+                table.remark(&row.row.title, &format!("{}: {reason}", device.device.title()));
+                continue;
+            }
+            let mut cells = vec![row.row.title.clone(), device.device.title().to_owned()];
+            cells.extend(others.iter().map(|name| ratio_cell(device, name, baseline)));
+            if is_beside_talk {
+                let published = words::published(row, device.device);
+                cells.push(published.map_or_else(String::new, words::ratio));
+                cells.push(words::target_cell(row, device, baseline).trim_matches('-').to_owned());
+            }
+            let share = row.reference.as_ref().and_then(|r| r.share);
+            cells.push(share.map_or_else(|| "unknown".to_owned(), percent));
+            table.row(&cells);
+        }
+    }
+    let _ = writeln!(
+        html,
+        "<p>Time to equal trimmed relMSE: how many times sooner than <b>{}</b>, with learning and \
+         tables counted.</p>",
+        escape(baseline)
+    );
+    html.push_str(&table.finish());
+}
+
+/// The plot of all rows' speed-ups; `None` before there are any.
+pub(super) fn overview_plot(report: &Report) -> Option<String> {
+    if is_long(report) {
+        return None;
+    }
+    let baseline = baseline(report);
+    let mut entries = Vec::new();
+    for row in &report.rows {
+        for device in &row.devices {
+            let ratios = device.methods.iter().filter_map(|m| {
+                let found = m.speed_up(baseline, Measure::TrimmedRelMse)?;
+                Some((m.method.name.clone(), found.ratio, found.interval))
+            });
+            entries.push(Entry {
+                title: format!("{}, {}", row.row.title, device.device.title()),
+                ratios: ratios.collect(),
+                published: words::published(row, device.device),
+                target: row.row.target,
+            });
+        }
+    }
+    ratio_plot("Time to equal error", baseline, &entries)
+}
+
+fn ratio_cell(device: &DeviceReport, name: &str, baseline: &str) -> String {
+    let method = device.method(name);
+    method.map_or_else(String::new, |m| words::speed_up_cell(m, baseline, Measure::TrimmedRelMse))
+}
+
+/// Methods down, rows across: speed-ups over the last baseline, and their geometric mean.
+fn ablation_table(report: &Report, html: &mut String) {
+    let plan = &report.plan;
+    let Some(last) = plan.baselines.last().map(|b| plan.methods[*b].name.as_str()) else { return };
+    let columns: Vec<(&RowReport, &DeviceReport)> =
+        report.rows.iter().flat_map(|row| row.devices.iter().map(move |d| (row, d))).collect();
+    let titles: Vec<String> =
+        columns.iter().map(|(row, d)| format!("{}, {}", row.row.title, d.device.title())).collect();
+    let mut head = vec!["", "mean"];
+    head.extend(titles.iter().map(String::as_str));
+    let mut table = Table::new(&head);
+    let mut group = None;
+    let mut entries = Vec::new();
+    for method in &plan.methods {
+        if method.group != group {
+            group = method.group;
+            table.group(group.unwrap_or_default());
+        }
+        let found: Vec<_> = columns
+            .iter()
+            .map(|(_, d)| d.method(&method.name)?.speed_up(last, Measure::TrimmedRelMse))
+            .collect();
+        let known: Vec<f64> = found.iter().flatten().map(|s| s.ratio.ln()).collect();
+        let mean =
+            (!known.is_empty()).then(|| (known.iter().sum::<f64>() / known.len() as f64).exp());
+        let mut cells = vec![method.name.clone()];
+        cells.push(mean.map_or_else(String::new, words::ratio));
+        cells.extend(found.into_iter().map(|s| s.map_or_else(String::new, words::speed_up)));
+        table.row(&cells);
+        if let Some(mean) = mean {
+            let ratios = vec![(method.name.clone(), mean, None)];
+            entries.push(Entry {
+                title: method.name.clone(),
+                ratios,
+                published: None,
+                target: None,
+            });
+        }
+    }
+    let _ = writeln!(
+        html,
+        "<p>Time to equal trimmed relMSE against <b>{0}</b> (above 1: faster than {0}), learning and \
+         tables counted; the mean is geometric, over all columns.</p>",
+        escape(last)
+    );
+    if let Some(plot) = ratio_plot("Geometric mean over all rows", last, &entries) {
+        let _ = writeln!(html, "<div class=\"plots\">{plot}</div>");
+    }
+    html.push_str(&table.finish());
+}
+
+/// Ratios of many methods on one device.
+pub(super) fn ratios_of_device(report: &Report, device: &DeviceReport, html: &mut String) {
+    let plan = &report.plan;
+    let Some(last) = plan.baselines.last().map(|b| plan.methods[*b].name.as_str()) else { return };
+    let entry = |m: &MethodReport| {
+        let found = m.speed_up(last, Measure::TrimmedRelMse)?;
+        let name = m.method.name.clone();
+        let ratios = vec![(name.clone(), found.ratio, found.interval)];
+        Some(Entry { title: name, ratios, published: None, target: None })
+    };
+    let entries: Vec<Entry> = device.methods.iter().filter_map(entry).collect();
+    if let Some(plot) = ratio_plot(device.device.title(), last, &entries) {
+        let _ = writeln!(html, "<div class=\"plots\">{plot}</div>");
+    }
+}
