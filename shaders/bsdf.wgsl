@@ -8,7 +8,7 @@ const ALBEDO_NODES = 32u;
 struct Interface {
     f0: vec3f,
     f90: f32,
-    alpha: f32,
+    ggx: Ggx,
 //#if transmission
     glass: f32,
     glass_f90: f32,
@@ -97,9 +97,44 @@ fn albedo_terms_mean(roughness: f32) -> vec2f {
     return mix(terms.xy, terms.zw, y - f32(row));
 }
 
+//#if anisotropy
+fn stretched_terms(ggx: Ggx, diagonal: vec2f, towards: vec2f) -> vec2f {
+    let a = diagonal.x + 0.3 * (1.0 - ggx.alpha / ggx.along) * (1.0 - diagonal.x);
+    return vec2f(min(a, 1.0 - towards.y), towards.y);
+}
+//#end
+
+// `AlbedoTerms::at` and `AlbedoTerms::mean` of a GGX of this roughness across its axis.
+fn terms_towards(ggx: Ggx, roughness: f32, v: vec3f) -> vec2f {
+//#if anisotropy
+    if is_stretched(ggx) {
+        let diagonal = roughness_off_axis(ggx, 0.70710678, 0.70710678);
+        let towards = albedo_terms_at(roughness_towards(ggx, v), v.z);
+        return stretched_terms(ggx, albedo_terms_at(diagonal, v.z), towards);
+    }
+//#end
+    return albedo_terms_at(roughness, v.z);
+}
+
+fn terms_mean(ggx: Ggx, roughness: f32) -> vec2f {
+//#if anisotropy
+    if is_stretched(ggx) {
+        let diagonal = roughness_off_axis(ggx, 0.70710678, 0.70710678);
+        let towards = albedo_terms_mean(roughness_off_axis(ggx, 0.92387953, 0.38268343))
+            + albedo_terms_mean(roughness_off_axis(ggx, 0.38268343, 0.92387953));
+        return stretched_terms(ggx, albedo_terms_mean(diagonal), 0.5 * towards);
+    }
+//#end
+    return albedo_terms_mean(roughness);
+}
+
 fn interface_new(p: SurfaceParameters, f0: vec3f, f90: f32, entering: bool) -> Interface {
     var i: Interface;
-    i.alpha = p.roughness * p.roughness;
+//#if anisotropy
+    i.ggx = ggx_stretched(p.roughness, p.anisotropy, p.anisotropy_axis);
+//#else
+    i.ggx = ggx_from_roughness(p.roughness);
+//#end
     let opaque_share = (1.0 - p.metallic) * (1.0 - p.transmission);
     i.f0 = f0 * opaque_share + p.base_color * p.metallic;
     i.f90 = f90 * opaque_share + p.metallic;
@@ -118,10 +153,6 @@ fn interface_new(p: SurfaceParameters, f0: vec3f, f90: f32, entering: bool) -> I
     return i;
 }
 
-fn is_smooth(alpha: f32) -> bool {
-    return alpha < SMOOTH_ALPHA;
-}
-
 fn interface_is_absent(i: Interface) -> bool {
     var absent = i.f90 == 0.0 && all(i.f0 == vec3f(0.0));
 //#if transmission
@@ -131,7 +162,7 @@ fn interface_is_absent(i: Interface) -> bool {
 }
 
 fn interface_is_delta_or_absent(i: Interface) -> bool {
-    if is_smooth(i.alpha) || interface_is_absent(i) {
+    if is_smooth(i.ggx) || interface_is_absent(i) {
         return true;
     }
 //#if transmission
@@ -175,11 +206,11 @@ fn facet_reflection_probability(facet: Facet) -> f32 {
 
 //#if transmission
 fn passes_straight(i: Interface) -> bool {
-    return i.glass > 0.0 && i.thin && is_smooth(i.alpha);
+    return i.glass > 0.0 && i.thin && is_smooth(i.ggx);
 }
 
 fn transmits_delta(i: Interface) -> bool {
-    return is_smooth(i.alpha) || (!i.thin && i.eta == 1.0);
+    return is_smooth(i.ggx) || (!i.thin && i.eta == 1.0);
 }
 
 fn interface_straight_transmittance(i: Interface, cosine: f32) -> vec3f {
@@ -212,10 +243,10 @@ fn reflection_probability(i: Interface, facet: Facet, wo: vec3f) -> f32 {
 }
 
 fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSample {
-    let smooth_ = is_smooth(i.alpha);
+    let smooth_ = is_smooth(i.ggx);
     var h = vec3f(0.0, 0.0, 1.0);
     if !smooth_ {
-        h = ggx_sample_visible_normal(i.alpha, wo, u);
+        h = ggx_sample_visible_normal(i.ggx, wo, u);
     }
     let facet = scattering_facet(i, dot(wo, h));
     let probability = reflection_probability(i, facet, wo);
@@ -246,7 +277,7 @@ fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSampl
 }
 
 fn interface_eval_pdf(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
-    if is_smooth(i.alpha) {
+    if is_smooth(i.ggx) {
         return EvalPdf(vec3f(0.0), 0.0);
     }
     if wi.z > 0.0 {
@@ -274,9 +305,9 @@ fn eval_pdf_mirrored(i: Interface, wo: vec3f, wi: vec3f, is_reflected: bool) -> 
     let reflects = reflection_probability(i, facet, wo);
     let color = select(facet.transmittance, facet.reflectance, is_reflected);
     let probability = select(1.0 - reflects, reflects, is_reflected);
-    let visible = ggx_distribution(i.alpha, h) * ggx_visibility(i.alpha, wo.z);
+    let visible = ggx_distribution(i.ggx, h) * ggx_visibility(i.ggx, wo);
     return EvalPdf(
-        color * (visible * ggx_visibility(i.alpha, wi.z) * wi.z),
+        color * (visible * ggx_visibility(i.ggx, wi) * wi.z),
         0.5 * visible * probability,
     );
 }
@@ -294,8 +325,8 @@ fn eval_pdf_refracted(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
     let facet = interface_facet(i, cos_o);
     let denominator = cos_o + i.eta * cos_i;
     let jacobian = -cos_i / (denominator * denominator);
-    let visible = ggx_visible_normal_pdf_solid_angle(i.alpha, wo, h) * jacobian;
-    let masking = 2.0 * -wi.z * ggx_visibility(i.alpha, -wi.z);
+    let visible = ggx_visible_normal_pdf_solid_angle(i.ggx, wo, h) * jacobian;
+    let masking = 2.0 * -wi.z * ggx_visibility(i.ggx, -wi);
     let probability = 1.0 - facet_reflection_probability(facet);
     return EvalPdf(
         facet.transmittance * (visible * masking),
@@ -323,7 +354,7 @@ const COAT_F0 = 0.04;
 
 struct Coat {
     strength: f32,
-    alpha: f32,
+    ggx: Ggx,
     frame: Frame,
     thin: bool,
     entering: bool,
@@ -332,7 +363,7 @@ struct Coat {
 fn coat_new(p: SurfaceParameters, entering: bool) -> Coat {
     return Coat(
         p.clearcoat,
-        p.clearcoat_roughness * p.clearcoat_roughness,
+        ggx_from_roughness(p.clearcoat_roughness),
         frame_from_z(p.clearcoat_normal),
         p.thin,
         entering,
@@ -348,7 +379,7 @@ fn coat_fresnel(cosine: f32) -> f32 {
 }
 
 fn coat_is_delta_or_absent(coat: Coat) -> bool {
-    return coat.strength == 0.0 || !coat_is_outside(coat, 1.0) || is_smooth(coat.alpha);
+    return coat.strength == 0.0 || !coat_is_outside(coat, 1.0) || is_smooth(coat.ggx);
 }
 
 fn coat_attenuation(coat: Coat, v: vec3f) -> f32 {
@@ -366,10 +397,10 @@ fn coat_albedo(coat: Coat, wo: vec3f) -> f32 {
 
 fn coat_sample(coat: Coat, wo: vec3f, u: vec2f, probability: f32) -> LobeSample {
     let local = local_from_world(coat.frame, wo);
-    let smooth_ = is_smooth(coat.alpha);
+    let smooth_ = is_smooth(coat.ggx);
     var h = vec3f(0.0, 0.0, 1.0);
     if !smooth_ {
-        h = ggx_sample_visible_normal(coat.alpha, local, u);
+        h = ggx_sample_visible_normal(coat.ggx, local, u);
     }
     let local_wi = reflected(local, h);
     let wi = world_from_local(coat.frame, local_wi);
@@ -386,13 +417,13 @@ fn coat_sample(coat: Coat, wo: vec3f, u: vec2f, probability: f32) -> LobeSample 
 fn coat_eval_pdf(coat: Coat, wo: vec3f, wi: vec3f) -> vec2f {
     let o = local_from_world(coat.frame, wo);
     let i = local_from_world(coat.frame, wi);
-    if is_smooth(coat.alpha) || wi.z <= 0.0 || o.z <= 0.0 || i.z <= 0.0 {
+    if is_smooth(coat.ggx) || wi.z <= 0.0 || o.z <= 0.0 || i.z <= 0.0 {
         return vec2f(0.0);
     }
     let h = normalize(o + i);
-    let visible = ggx_distribution(coat.alpha, h) * ggx_visibility(coat.alpha, o.z);
+    let visible = ggx_distribution(coat.ggx, h) * ggx_visibility(coat.ggx, o);
     let value = coat.strength * coat_fresnel(dot(o, h)) * visible
-        * ggx_visibility(coat.alpha, i.z) * i.z;
+        * ggx_visibility(coat.ggx, i) * i.z;
     return vec2f(value, 0.5 * visible);
 }
 //#end
@@ -403,12 +434,12 @@ fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
     var b: Bsdf;
     b.f0_f90 = vec2f(max_element(f0), f90);
     b.roughness = p.roughness;
+    b.interface_ = interface_new(p, f0, f90, entering);
     b.diffuse_color = p.base_color * ((1.0 - p.metallic) * (1.0 - p.transmission));
     if f90 > 0.0 && any(b.diffuse_color != vec3f(0.0)) {
-        let let_in = 1.0 - dot(b.f0_f90, albedo_terms_mean(p.roughness));
+        let let_in = 1.0 - dot(b.f0_f90, terms_mean(b.interface_.ggx, p.roughness));
         b.diffuse_color = select(vec3f(0.0), b.diffuse_color / let_in, let_in > 1e-4);
     }
-    b.interface_ = interface_new(p, f0, f90, entering);
 //#if clearcoat
     b.coat = coat_new(p, entering);
 //#end
@@ -427,11 +458,11 @@ fn bsdf_diffuse_left(b: Bsdf, terms: vec2f) -> f32 {
     return max(1.0 - dot(b.f0_f90, terms), 0.0);
 }
 
-fn bsdf_diffuse_left_at(b: Bsdf, cosine: f32) -> f32 {
+fn bsdf_diffuse_left_at(b: Bsdf, v: vec3f) -> f32 {
     if all(b.f0_f90 == vec2f(0.0)) {
         return 1.0;
     }
-    return bsdf_diffuse_left(b, albedo_terms_at(b.roughness, cosine));
+    return bsdf_diffuse_left(b, terms_towards(b.interface_.ggx, b.roughness, v));
 }
 
 fn bsdf_outgoing(b: Bsdf, wo: vec3f) -> Outgoing {
@@ -448,7 +479,7 @@ fn bsdf_outgoing(b: Bsdf, wo: vec3f) -> Outgoing {
     if bare && !(has_diffuse && has_interface) {
         return Outgoing(1.0, 0.0, select(0.0, 1.0, has_interface), select(0.0, 1.0, has_diffuse));
     }
-    let terms = albedo_terms_at(b.roughness, wo.z);
+    let terms = terms_towards(b.interface_.ggx, b.roughness, wo);
     let diffuse_left = bsdf_diffuse_left(b, terms);
     var interface_albedo_ = importance(interface_albedo(b.interface_, wo.z, terms));
     var diffuse = diffuse_left * importance(b.diffuse_color);
@@ -470,7 +501,7 @@ fn bsdf_eval_pdf_with(b: Bsdf, wo: vec3f, wi: vec3f, out: Outgoing) -> EvalPdf {
     var result = EvalPdf(vec3f(0.0), 0.0);
     if out.diffuse_probability > 0.0 && wi.z > 0.0 {
         let lambert = wi.z * FRAC_1_PI;
-        let left = out.diffuse_left * bsdf_diffuse_left_at(b, wi.z);
+        let left = out.diffuse_left * bsdf_diffuse_left_at(b, wi);
         result.value += b.diffuse_color * (left * lambert);
         result.pdf_solid_angle += out.diffuse_probability * lambert;
     }
@@ -561,8 +592,8 @@ fn bsdf_straight_transmittance(b: Bsdf, wo: vec3f) -> vec3f {
 //#if layers
 // Share of uniform light that reaches a viewer straight above, for guide layers.
 fn bsdf_albedo(b: Bsdf) -> vec3f {
-    let terms = albedo_terms_at(b.roughness, 1.0);
-    let let_in = 1.0 - dot(b.f0_f90, albedo_terms_mean(b.roughness));
+    let terms = terms_towards(b.interface_.ggx, b.roughness, vec3f(0.0, 0.0, 1.0));
+    let let_in = 1.0 - dot(b.f0_f90, terms_mean(b.interface_.ggx, b.roughness));
     var albedo = b.diffuse_color * (bsdf_diffuse_left(b, terms) * let_in)
         + interface_albedo(b.interface_, 1.0, terms);
     let up = vec3f(0.0, 0.0, 1.0);

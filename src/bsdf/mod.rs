@@ -84,18 +84,14 @@ impl Bsdf {
         let f90 = p.specular;
         let f0 = (normal_reflectance(p.ior) * p.specular_color).min(Vec3::ONE) * p.specular;
         let f0_f90 = Vec2::new(f0.max_element(), f90);
-        let terms = AlbedoTerms::of(p.roughness);
+        let interface = Interface::new(p, f0, f90, entering);
+        let terms = AlbedoTerms::of(interface.ggx(), p.roughness);
         let mut color = p.base_color * ((1.0 - p.metallic) * (1.0 - p.transmission));
         if f90 > 0.0 && color != Vec3::ZERO {
             let let_in = 1.0 - f0_f90.dot(terms.mean());
             color = if let_in > 1e-4 { color / let_in } else { Vec3::ZERO };
         }
-        Self {
-            interface: Interface::new(p, f0, f90, entering),
-            diffuse: Diffuse { color, f0_f90 },
-            coat: Coat::new(p, entering),
-            terms,
-        }
+        Self { interface, diffuse: Diffuse { color, f0_f90 }, coat: Coat::new(p, entering), terms }
     }
 
     /// `f(wo, wi) * |cos wi|` of all lobes that have a density, per steradian.
@@ -158,7 +154,7 @@ impl Bsdf {
     /// Share of uniform light from everywhere that reaches a viewer straight above, in `[0,1]`;
     /// an estimate for guide layers of denoisers.
     pub fn albedo(&self) -> Vec3 {
-        let terms = self.terms.at(1.0);
+        let terms = self.terms.at(Vec3::Z);
         let let_in = 1.0 - self.diffuse.f0_f90.dot(self.terms.mean());
         let diffuse = self.diffuse.color * (self.diffuse_left(terms) * let_in);
         let interface = self.interface.albedo(1.0, terms) + self.straight_transmittance(Vec3::Z);
@@ -183,7 +179,7 @@ impl Bsdf {
         let (mut value, mut pdf) = (Vec3::ZERO, 0.0);
         if out.diffuse_probability > 0.0 && wi.z > 0.0 {
             let lambert = wi.z * FRAC_1_PI;
-            let left = out.diffuse_left * self.diffuse_left_at(wi.z);
+            let left = out.diffuse_left * self.diffuse_left_at(wi);
             value += self.diffuse.color * (left * lambert);
             pdf += out.diffuse_probability * lambert;
         }
@@ -222,7 +218,7 @@ impl Bsdf {
                 });
             }
         }
-        let terms = self.terms.at(wo.z);
+        let terms = self.terms.at(wo);
         let diffuse_left = self.diffuse_left(terms);
         let under = self.coat.attenuation(wo);
         let coat = self.coat.albedo(wo);
@@ -241,11 +237,11 @@ impl Bsdf {
         (1.0 - self.diffuse.f0_f90.dot(terms)).max(0.0)
     }
 
-    fn diffuse_left_at(&self, cos: f32) -> f32 {
+    fn diffuse_left_at(&self, v: Vec3) -> f32 {
         if self.diffuse.f0_f90 == Vec2::ZERO {
             return 1.0;
         }
-        self.diffuse_left(self.terms.at(cos))
+        self.diffuse_left(self.terms.at(v))
     }
 }
 

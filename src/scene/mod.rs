@@ -156,6 +156,14 @@ pub struct Material {
     pub scattering: Vec3,
     /// Mean cosine of scattering inside the body, as [`Medium::anisotropy`].
     pub scatter_anisotropy: f32,
+    /// `KHR_materials_anisotropy` strength in `[0,1]`: how much wider reflections are along the
+    /// direction below than `roughness` says; 1 is as wide as roughness 1.
+    pub anisotropy: f32,
+    /// Direction of that width in radians from the tangent, counter-clockwise.
+    pub anisotropy_rotation: f32,
+    /// RG is the direction before rotation in `[-1,1]`, along tangent and bitangent; B multiplies
+    /// `anisotropy`.
+    pub anisotropy_texture: Option<TextureRef>,
     /// `KHR_materials_clearcoat` strength in `[0,1]`.
     pub clearcoat: f32,
     /// R multiplies `clearcoat`.
@@ -199,6 +207,9 @@ impl Default for Material {
             attenuation_distance: f32::INFINITY,
             scattering: Vec3::ZERO,
             scatter_anisotropy: 0.0,
+            anisotropy: 0.0,
+            anisotropy_rotation: 0.0,
+            anisotropy_texture: None,
             clearcoat: 0.0,
             clearcoat_texture: None,
             clearcoat_roughness: 0.0,
@@ -211,7 +222,7 @@ impl Default for Material {
 
 impl Material {
     /// All textures, in the order in which `shaders/surface.wgsl` numbers them.
-    pub fn textures(&self) -> [&Option<TextureRef>; 10] {
+    pub fn textures(&self) -> [&Option<TextureRef>; 11] {
         [
             &self.base_color_texture,
             &self.metallic_roughness_texture,
@@ -223,6 +234,7 @@ impl Material {
             &self.clearcoat_texture,
             &self.clearcoat_roughness_texture,
             &self.clearcoat_normal_texture,
+            &self.anisotropy_texture,
         ]
     }
 }

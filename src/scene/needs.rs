@@ -33,6 +33,8 @@ pub struct SceneNeeds {
     pub medium: bool,
     /// Scattering inside solid bodies.
     pub scattering_solids: bool,
+    /// Reflections that are wider in one direction.
+    pub anisotropy: bool,
     /// Clearcoat.
     pub clearcoat: bool,
     /// Unlit surfaces.
@@ -78,6 +80,7 @@ impl SceneNeeds {
             m.transmission > 0.0 && m.thickness > 0.0 && m.attenuation_distance.is_finite();
         self.scattering_solids |=
             m.transmission > 0.0 && m.thickness > 0.0 && m.scattering != glam::Vec3::ZERO;
+        self.anisotropy |= m.anisotropy > 0.0;
         self.clearcoat |= m.clearcoat > 0.0;
         self.unlit |= m.unlit;
         self.emitters |= is_emitter(m);
@@ -102,6 +105,7 @@ impl SceneNeeds {
             (self.absorption, "absorption: no solid absorbs"),
             (self.medium, "fog: the scene has none"),
             (self.scattering_solids, "scattering inside of solids: none is filled"),
+            (self.anisotropy, "anisotropy: no material has a direction"),
             (self.clearcoat, "clearcoat: no material is coated"),
             (self.emitters, "sampling of emissive triangles: nothing emits"),
             (self.punctual_lights, "punctual lights: the scene has none"),

@@ -37,6 +37,10 @@ pub struct SurfaceParameters {
     pub thin: bool,
     /// Absorption coefficient of the inside per metre; zero if thin.
     pub absorption: Vec3,
+    /// How much wider than `roughness` reflections are along the axis, in `[0,1]`.
+    pub anisotropy: f32,
+    /// Unit direction of that width in the local shading frame's plane; +X if not anisotropic.
+    pub anisotropy_axis: Vec2,
     /// Strength of the coat in `[0,1]`.
     pub clearcoat: f32,
     /// Perceptual roughness of the coat in `[0,1]`.
@@ -92,6 +96,11 @@ impl SurfacePoint {
         // What is not metal hardly needs its reflection, but its diffuse light needs the slope.
         let normal = normal.lerp(facing.mirroring(normal), parameters.metallic);
         let shading_frame = Frame::from_z(normal.normalize());
+        if parameters.anisotropy > 0.0 {
+            let world = corner.anisotropy_direction(unmapped);
+            let local = shading_frame.local_from_world(world);
+            parameters.anisotropy_axis = Vec2::new(local.x, local.y).normalize_or(Vec2::X);
+        }
         if parameters.clearcoat > 0.0 && has_normal_map(material) {
             let (texture, scale) =
                 (material.clearcoat_normal_texture, material.clearcoat_normal_scale);
@@ -198,6 +207,20 @@ impl<'a> Corner<'a> {
         tangent * (map.x * scale) + bitangent * (map.y * scale) + normal * map.z
     }
 
+    /// World direction in which reflections are wide, not of unit length; zero without tangents.
+    fn anisotropy_direction(&self, normal: Vec3) -> Vec3 {
+        if self.scene.tangents.is_empty() {
+            return Vec3::ZERO;
+        }
+        let m = self.material();
+        let tangent = self.interpolate(&self.scene.tangents).xyz();
+        let bitangent = normal.cross(tangent) * self.scene.tangents[self.vertices[0]].w;
+        let read = |t| self.read(Some(t)).xy() * 2.0 - 1.0;
+        let direction = m.anisotropy_texture.map_or(Vec2::X, read);
+        let direction = Vec2::from_angle(m.anisotropy_rotation).rotate(direction);
+        tangent * direction.x + bitangent * direction.y
+    }
+
     fn parameters(&self) -> SurfaceParameters {
         let m = self.material();
         let base = self.base_color();
@@ -216,6 +239,8 @@ impl<'a> Corner<'a> {
             transmission: unit(m.transmission * self.read(m.transmission_texture).x),
             thin,
             absorption: if thin { Vec3::ZERO } else { absorption(m) },
+            anisotropy: unit(m.anisotropy * self.read(m.anisotropy_texture).z),
+            anisotropy_axis: Vec2::X,
             clearcoat: unit(m.clearcoat * self.read(m.clearcoat_texture).x),
             clearcoat_roughness: unit(
                 m.clearcoat_roughness * self.read(m.clearcoat_roughness_texture).y,

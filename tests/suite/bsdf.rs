@@ -1,5 +1,6 @@
 //! Tests of bsdf, and of the surfaces and textures that feed it.
 
+mod layers;
 mod physics;
 mod sampling;
 mod surfaces;
@@ -48,6 +49,8 @@ const BLACK: SurfaceParameters = SurfaceParameters {
     transmission: 0.0,
     thin: true,
     absorption: Vec3::ZERO,
+    anisotropy: 0.0,
+    anisotropy_axis: Vec2::X,
     clearcoat: 0.0,
     clearcoat_roughness: 0.0,
     clearcoat_normal: Vec3::Z,
@@ -69,6 +72,8 @@ fn colored(p: SurfaceParameters) -> SurfaceParameters {
 fn cases() -> Vec<(&'static str, SurfaceParameters, bool)> {
     let tilted = Vec3::new(0.3, -0.2, 1.0).normalize();
     let coat = |p| SurfaceParameters { clearcoat: 0.7, clearcoat_roughness: 0.5, ..p };
+    let axis = Vec2::from_angle(0.7);
+    let brushed = |anisotropy, p| SurfaceParameters { anisotropy, anisotropy_axis: axis, ..p };
     let mut cases = vec![
         ("lambert", WHITE, true),
         ("plastic", colored(PLASTIC), true),
@@ -82,6 +87,9 @@ fn cases() -> Vec<(&'static str, SurfaceParameters, bool)> {
         ("half pane", SurfaceParameters { transmission: 0.5, ..colored(PANE) }, true),
         ("coated plastic", coat(colored(PLASTIC)), true),
         ("tilted coat", SurfaceParameters { clearcoat_normal: tilted, ..coat(PLASTIC) }, true),
+        ("brushed metal", brushed(0.8, colored(METAL)), true),
+        ("brushed plastic", brushed(0.8, colored(PLASTIC)), true),
+        ("brushed pane", brushed(0.3, PANE), true),
         ("smooth coat", SurfaceParameters { clearcoat_roughness: 0.0, ..coat(PLASTIC) }, true),
     ];
     for entering in [true, false] {
@@ -96,6 +104,7 @@ fn cases() -> Vec<(&'static str, SurfaceParameters, bool)> {
         cases.push(("dense glass", SurfaceParameters { ior: 3.0, ..GLASS }, entering));
         cases.push(("milk", SurfaceParameters { transmission: 0.5, ..GLASS }, entering));
         cases.push(("coated glass", coat(GLASS), entering));
+        cases.push(("brushed glass", brushed(0.4, GLASS), entering));
     }
     cases
 }

@@ -21,6 +21,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scene: Option<&LoadedScene>, map: Option
         (needs.thin_transmission, "Thin glass"),
         (needs.solid_transmission, "Refraction"),
         (needs.absorption, "Absorption"),
+        (needs.anisotropy, "Anisotropy"),
         (needs.clearcoat, "Clearcoat"),
         (needs.unlit, "Unlit surfaces"),
         (needs.emitters, "Emissive triangles"),

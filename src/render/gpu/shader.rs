@@ -39,8 +39,9 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 39] = [
+    pub(crate) const ALL: [&'static str; 42] = [
         "alpha_mask",
+        "anisotropy",
         "background_blur",
         "background_color",
         "clearcoat",
@@ -74,8 +75,10 @@ impl Features {
         "table_f32",
         "table_f64",
         "table_u32",
+        "tangents",
         "textures",
         "transmission",
+        "uncommon_textures",
         "unlit",
         "vertex_colors",
         "wide_filter",
@@ -86,6 +89,7 @@ impl Features {
         let needs = &world.needs;
         Self::from_names([
             ("alpha_mask", needs.alpha_mask),
+            ("anisotropy", needs.anisotropy),
             ("clearcoat", needs.clearcoat),
             ("emitters", needs.emitters),
             ("local_lights", !world.lights.is_empty()),
@@ -142,12 +146,14 @@ impl Features {
     pub(crate) fn from_names(names: impl IntoIterator<Item = (&'static str, bool)>) -> Self {
         let mut set: BTreeSet<_> =
             names.into_iter().filter(|(_, on)| *on).map(|(n, _)| n).collect();
-        let follows: [(&str, &[&str]); 5] = [
+        let follows: [(&str, &[&str]); 7] = [
             ("filtered_hits", &["alpha_mask", "single_sided"]),
             ("pass_through", &["alpha_mask", "partial"]),
             ("scene_lights", &["emitters", "punctual_lights"]),
             ("shadow_rays", &["map_sampling", "local_lights"]),
             ("summed_area", &["table_f32", "table_f64", "table_u32"]),
+            ("tangents", &["anisotropy", "normal_maps"]),
+            ("uncommon_textures", &["anisotropy"]),
         ];
         for (name, causes) in follows {
             if causes.iter().any(|cause| set.contains(cause)) {
@@ -266,7 +272,7 @@ impl VertexTexels {
             at
         };
         let (second_uv, tangent, color) =
-            (next("second_uv_set"), next("normal_maps"), next("vertex_colors"));
+            (next("second_uv_set"), next("tangents"), next("vertex_colors"));
         Self { count, second_uv, tangent, color }
     }
 }
@@ -532,7 +538,15 @@ mod tests {
 
     /// Features that a picture can have or not have on their own; the others follow from them.
     fn independent() -> Vec<&'static str> {
-        let follow = ["filtered_hits", "pass_through", "scene_lights", "shadow_rays", "learning"];
+        let follow = [
+            "filtered_hits",
+            "learning",
+            "pass_through",
+            "scene_lights",
+            "shadow_rays",
+            "tangents",
+            "uncommon_textures",
+        ];
         let names = Features::ALL.into_iter();
         names
             .filter(|n| !follow.contains(n) && !n.starts_with("table_") && *n != "summed_area")
@@ -571,7 +585,8 @@ mod tests {
             sets.push(reachable(|i| i != one, None));
         }
         for seed in 0..60_u32 {
-            let bits = crate::sampler::hash(seed + 1);
+            let half = |at| u64::from(crate::sampler::hash(2 * seed + at));
+            let bits = half(1) << 32 | half(2);
             sets.push(reachable(|i| bits >> i & 1 == 1, tables[seed as usize % 4]));
         }
         for features in &sets {

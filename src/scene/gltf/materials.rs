@@ -60,7 +60,7 @@ impl Materials {
 }
 
 /// Every texture slot of a material.
-pub(super) fn slots(material: &mut Material) -> [&mut Option<TextureRef>; 10] {
+pub(super) fn slots(material: &mut Material) -> [&mut Option<TextureRef>; 11] {
     [
         &mut material.base_color_texture,
         &mut material.metallic_roughness_texture,
@@ -72,6 +72,7 @@ pub(super) fn slots(material: &mut Material) -> [&mut Option<TextureRef>; 10] {
         &mut material.clearcoat_texture,
         &mut material.clearcoat_roughness_texture,
         &mut material.clearcoat_normal_texture,
+        &mut material.anisotropy_texture,
     ]
 }
 
@@ -188,10 +189,18 @@ impl<'a> Reader<'a> {
             // Zero is forbidden and means, in files that have it, that nobody set it.
             material.attenuation_distance = if distance > 0.0 { distance } else { f32::INFINITY };
         }
-        if let Some(Value::Object(coat)) = source.others.get("KHR_materials_clearcoat") {
+        let object = |name: &str| source.others.get(name).and_then(Value::as_object);
+        if let Some(coat) = object("KHR_materials_clearcoat") {
             self.clearcoat(coat, material)?;
         }
-        if let Some(Value::Object(old)) = source.others.get("KHR_materials_pbrSpecularGlossiness") {
+        if let Some(anisotropy) = object("KHR_materials_anisotropy") {
+            material.anisotropy = self.unit(number(anisotropy, "anisotropyStrength", 0.0));
+            material.anisotropy_rotation =
+                self.finite(number(anisotropy, "anisotropyRotation", 0.0));
+            material.anisotropy_texture =
+                self.data(texture(anisotropy, "anisotropyTexture").as_ref())?;
+        }
+        if let Some(old) = object("KHR_materials_pbrSpecularGlossiness") {
             self.specular_glossiness(old, material)?;
         }
         Ok(())

@@ -110,7 +110,7 @@ fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
     let (size, fields) = fields!(Material:
         base_color emissive alpha_cutoff specular_color specular absorption ior metallic roughness
         transmission clearcoat clearcoat_roughness normal_scale clearcoat_normal_scale flags textures
-        padding scattering scatter_mean_cosine
+        padding scattering scatter_mean_cosine anisotropy anisotropy_rotation padding_1
     );
     assert_eq!(at("MATERIAL_TEXELS"), size);
     assert_eq!(fields.iter().map(|(.., size)| size).sum::<usize>(), size);
@@ -139,6 +139,9 @@ fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
         offset_of!(Material, clearcoat),
     ];
     assert_eq!(factors, four("FACTORS"));
+    let rotation = offset_of!(Material, anisotropy_rotation);
+    let anisotropy = [offset_of!(Material, anisotropy), rotation, rotation + 4];
+    assert_eq!(anisotropy, four("ANISOTROPY_ROTATION")[..3]);
     let scales = [
         offset_of!(Material, clearcoat_roughness),
         offset_of!(Material, normal_scale),
