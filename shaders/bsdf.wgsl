@@ -1,5 +1,5 @@
 // How light is scattered at a surface point: twin of src/bsdf/ (mod.rs, interface.rs, coat.rs,
-// albedo.rs). Directions are unit, local to the shading frame, z on the viewer's side.
+// diffuse.rs, albedo.rs). Directions are unit, local to the shading frame, z on the viewer's side.
 
 const STRAIGHT_ETA = 1e-3;
 // Rows and columns of the table of directional albedos.
@@ -23,9 +23,17 @@ struct Bsdf {
     interface_: Interface,
     // Lambert's lobe: base colour times share, over what the interface lets in on average.
     diffuse_color: vec3f,
+//#if diffuse_transmission
+    // The same for light from the far side, and the probability of choosing it.
+    transmitted_color: vec3f,
+    through: f32,
+//#end
     // The dielectric's largest F0 and its F90.
     f0_f90: vec2f,
     roughness: f32,
+//#if sheen
+    sheen: Sheen,
+//#end
 //#if clearcoat
     coat: Coat,
 //#end
@@ -42,6 +50,9 @@ struct Outgoing {
     coat_probability: f32,
     interface_probability: f32,
     diffuse_probability: f32,
+//#if sheen
+    sheen_probability: f32,
+//#end
 }
 
 // Value times cosine, and density per steradian.
@@ -428,6 +439,35 @@ fn coat_eval_pdf(coat: Coat, wo: vec3f, wi: vec3f) -> vec2f {
 }
 //#end
 
+fn has_diffuse(b: Bsdf) -> bool {
+//#if diffuse_transmission
+    return any(b.diffuse_color != vec3f(0.0)) || any(b.transmitted_color != vec3f(0.0));
+//#else
+    return any(b.diffuse_color != vec3f(0.0));
+//#end
+}
+
+// Both of Lambert's lobes.
+fn diffuse_sum(b: Bsdf) -> vec3f {
+//#if diffuse_transmission
+    return b.diffuse_color + b.transmitted_color;
+//#else
+    return b.diffuse_color;
+//#end
+}
+
+//#if diffuse_transmission
+// Twin of `Interface::radiance_scale`.
+fn radiance_scale(i: Interface) -> f32 {
+//#if solid_transmission
+    if !i.thin {
+        return 1.0 / (i.eta * i.eta);
+    }
+//#end
+    return 1.0;
+}
+//#end
+
 fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
     let f90 = p.specular;
     let f0 = min(normal_reflectance(p.ior) * p.specular_color, vec3f(1.0)) * p.specular;
@@ -436,10 +476,28 @@ fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
     b.roughness = p.roughness;
     b.interface_ = interface_new(p, f0, f90, entering);
     b.diffuse_color = p.base_color * ((1.0 - p.metallic) * (1.0 - p.transmission));
-    if f90 > 0.0 && any(b.diffuse_color != vec3f(0.0)) {
+//#if diffuse_transmission
+    if p.diffuse_transmission > 0.0 {
+        let share = (1.0 - p.metallic) * (1.0 - p.transmission);
+        b.diffuse_color = p.base_color * (share * (1.0 - p.diffuse_transmission));
+        b.transmitted_color = p.diffuse_transmission_color * (share * p.diffuse_transmission)
+            * radiance_scale(b.interface_);
+        let through = importance(b.transmitted_color);
+        if through > 0.0 {
+            b.through = through / (importance(b.diffuse_color) + through);
+        }
+    }
+//#end
+    if f90 > 0.0 && has_diffuse(b) {
         let let_in = 1.0 - dot(b.f0_f90, terms_mean(b.interface_.ggx, p.roughness));
         b.diffuse_color = select(vec3f(0.0), b.diffuse_color / let_in, let_in > 1e-4);
+//#if diffuse_transmission
+        b.transmitted_color = select(vec3f(0.0), b.transmitted_color / let_in, let_in > 1e-4);
+//#end
     }
+//#if sheen
+    b.sheen = sheen_new(p, entering);
+//#end
 //#if clearcoat
     b.coat = coat_new(p, entering);
 //#end
@@ -447,7 +505,10 @@ fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
 }
 
 fn bsdf_is_delta_only(b: Bsdf) -> bool {
-    var delta = all(b.diffuse_color == vec3f(0.0)) && interface_is_delta_or_absent(b.interface_);
+    var delta = !has_diffuse(b) && interface_is_delta_or_absent(b.interface_);
+//#if sheen
+    delta = delta && sheen_is_hidden(b.sheen);
+//#end
 //#if clearcoat
     delta = delta && coat_is_delta_or_absent(b.coat);
 //#end
@@ -466,35 +527,60 @@ fn bsdf_diffuse_left_at(b: Bsdf, v: vec3f) -> f32 {
 }
 
 fn bsdf_outgoing(b: Bsdf, wo: vec3f) -> Outgoing {
-    let none = Outgoing(0.0, 0.0, 0.0, 0.0);
+    var out: Outgoing;
     if !(wo.z > 0.0) {
-        return none;
+        return out;
     }
-    let has_diffuse = any(b.diffuse_color != vec3f(0.0));
+    let has_diffuse_ = has_diffuse(b);
     let has_interface = !interface_is_absent(b.interface_);
     var bare = true;
 //#if clearcoat
     bare = b.coat.strength == 0.0;
 //#end
-    if bare && !(has_diffuse && has_interface) {
-        return Outgoing(1.0, 0.0, select(0.0, 1.0, has_interface), select(0.0, 1.0, has_diffuse));
+//#if sheen
+    bare = bare && b.sheen.strength == 0.0;
+//#end
+    if bare && !(has_diffuse_ && has_interface) {
+        out.diffuse_left = 1.0;
+        out.interface_probability = select(0.0, 1.0, has_interface);
+        out.diffuse_probability = select(0.0, 1.0, has_diffuse_);
+        return out;
     }
     let terms = terms_towards(b.interface_.ggx, b.roughness, wo);
     let diffuse_left = bsdf_diffuse_left(b, terms);
     var interface_albedo_ = importance(interface_albedo(b.interface_, wo.z, terms));
-    var diffuse = diffuse_left * importance(b.diffuse_color);
+    var diffuse = diffuse_left * importance(diffuse_sum(b));
     var coat = 0.0;
+//#if sheen
+    let base = sheen_left(b.sheen, wo, wo);
+    interface_albedo_ *= base;
+    diffuse *= base;
+    var sheen = importance(b.sheen.color) * sheen_albedo(b.sheen, wo);
+//#end
 //#if clearcoat
     let under = coat_attenuation(b.coat, wo);
     interface_albedo_ *= under;
     diffuse *= under;
+//#if sheen
+    sheen *= under;
+//#end
     coat = coat_albedo(b.coat, wo);
 //#end
-    let sum = coat + interface_albedo_ + diffuse;
+    var sum = coat + interface_albedo_ + diffuse;
+//#if sheen
+    sum += sheen;
+//#end
     if !(sum > 0.0) {
-        return none;
+        return out;
     }
-    return Outgoing(diffuse_left, coat / sum, interface_albedo_ / sum, diffuse / sum);
+    out.diffuse_left = diffuse_left;
+    out.coat_probability = coat / sum;
+    out.interface_probability = interface_albedo_ / sum;
+    out.diffuse_probability = diffuse / sum;
+//#if sheen
+    out.sheen_probability = sheen / sum;
+//#end
+    return out;
 }
 
 fn bsdf_eval_pdf_with(b: Bsdf, wo: vec3f, wi: vec3f, out: Outgoing) -> EvalPdf {
@@ -503,13 +589,35 @@ fn bsdf_eval_pdf_with(b: Bsdf, wo: vec3f, wi: vec3f, out: Outgoing) -> EvalPdf {
         let lambert = wi.z * FRAC_1_PI;
         let left = out.diffuse_left * bsdf_diffuse_left_at(b, wi);
         result.value += b.diffuse_color * (left * lambert);
+//#if diffuse_transmission
+        result.pdf_solid_angle += out.diffuse_probability * lambert * (1.0 - b.through);
+//#else
         result.pdf_solid_angle += out.diffuse_probability * lambert;
+//#end
     }
+//#if diffuse_transmission
+    if out.diffuse_probability > 0.0 && wi.z <= 0.0 && b.through > 0.0 {
+        let lambert = -wi.z * FRAC_1_PI;
+        let left = out.diffuse_left * bsdf_diffuse_left_at(b, -wi);
+        result.value += b.transmitted_color * (left * lambert);
+        result.pdf_solid_angle += out.diffuse_probability * lambert * b.through;
+    }
+//#end
     if out.interface_probability > 0.0 {
         let lobe = interface_eval_pdf(b.interface_, wo, wi);
         result.value += lobe.value;
         result.pdf_solid_angle += out.interface_probability * lobe.pdf_solid_angle;
     }
+//#if sheen
+    if b.sheen.strength > 0.0 {
+        result.value *= sheen_left(b.sheen, wo, wi);
+        if out.sheen_probability > 0.0 {
+            let lobe = sheen_eval_pdf(b.sheen, wo, wi);
+            result.value += lobe.value;
+            result.pdf_solid_angle += out.sheen_probability * lobe.pdf_solid_angle;
+        }
+    }
+//#end
 //#if clearcoat
     if b.coat.strength > 0.0 {
         result.value *= coat_attenuation(b.coat, wo) * coat_attenuation(b.coat, wi);
@@ -538,7 +646,11 @@ fn cosine_hemisphere(u: vec2f) -> vec3f {
 fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
     let none = BsdfSample(vec3f(0.0), vec3f(0.0), 0.0, false);
     let out = bsdf_outgoing(b, wo);
-    if out.coat_probability + out.interface_probability + out.diffuse_probability <= 0.0 {
+    var any_probability = out.coat_probability + out.interface_probability + out.diffuse_probability;
+//#if sheen
+    any_probability += out.sheen_probability;
+//#end
+    if any_probability <= 0.0 {
         return none;
     }
     var lobe: LobeSample;
@@ -552,6 +664,21 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
         lobe = interface_sample(b.interface_, wo, within, u.yz);
     } else {
         lobe = LobeSample(SPREAD, cosine_hemisphere(u.yz), vec3f(0.0));
+//#if sheen
+        let is_sheen = choice - out.interface_probability < out.sheen_probability;
+        if is_sheen {
+            lobe.wi = sheen_sample(u.yz);
+        }
+//#end
+//#if diffuse_transmission
+        var rest = choice - out.interface_probability;
+//#if sheen
+        rest = select(rest - out.sheen_probability, out.diffuse_probability, is_sheen);
+//#end
+        if rest / out.diffuse_probability < b.through {
+            lobe.wi = -lobe.wi;
+        }
+//#end
     }
     if lobe.kind == ABSORBED {
         return none;
@@ -570,6 +697,9 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
 //#if clearcoat
         weight *= coat_attenuation(b.coat, wo) * coat_attenuation(b.coat, lobe.wi);
 //#end
+//#if sheen
+        weight *= sheen_left(b.sheen, wo, lobe.wi);
+//#end
     }
     if !is_finite3(weight) {
         return none;
@@ -585,6 +715,9 @@ fn bsdf_straight_transmittance(b: Bsdf, wo: vec3f) -> vec3f {
     let coat = coat_attenuation(b.coat, wo);
     through *= coat * coat;
 //#end
+//#if sheen
+    through *= sheen_left(b.sheen, wo, wo);
+//#end
     return through;
 }
 //#end
@@ -594,11 +727,14 @@ fn bsdf_straight_transmittance(b: Bsdf, wo: vec3f) -> vec3f {
 fn bsdf_albedo(b: Bsdf) -> vec3f {
     let terms = terms_towards(b.interface_.ggx, b.roughness, vec3f(0.0, 0.0, 1.0));
     let let_in = 1.0 - dot(b.f0_f90, terms_mean(b.interface_.ggx, b.roughness));
-    var albedo = b.diffuse_color * (bsdf_diffuse_left(b, terms) * let_in)
-        + interface_albedo(b.interface_, 1.0, terms);
     let up = vec3f(0.0, 0.0, 1.0);
+    var albedo = diffuse_sum(b) * (bsdf_diffuse_left(b, terms) * let_in)
+        + interface_albedo(b.interface_, 1.0, terms);
 //#if transmission
-    albedo += bsdf_straight_transmittance(b, up);
+    albedo += interface_straight_transmittance(b.interface_, 1.0);
+//#end
+//#if sheen
+    albedo = albedo * sheen_left(b.sheen, up, up) + b.sheen.color * sheen_albedo(b.sheen, up);
 //#end
 //#if clearcoat
     let under = coat_attenuation(b.coat, up);

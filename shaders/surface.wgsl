@@ -16,7 +16,7 @@ const NORMAL_MAPPED = 64u;
 const NO_TEXTURE = 0xffffffffu;
 
 // Texels of a material in `materials`, as `layout::Material` has them.
-const MATERIAL_TEXELS = 11u;
+const MATERIAL_TEXELS = 14u;
 const BASE_COLOR_ALPHA = 0u;
 const EMISSIVE_CUTOFF = 1u;
 const SPECULAR_COLOR_STRENGTH = 2u;
@@ -27,9 +27,11 @@ const FACTORS = 4u;
 const SCALES_FLAGS = 5u;
 const FIRST_TEXTURES = 6u;
 // Scattering inside of a body and its mean cosine.
-const SCATTERING = 9u;
+const SCATTERING = 10u;
 // Strength, cosine and sine of the rotation.
-const ANISOTROPY_ROTATION = 10u;
+const ANISOTROPY_SHEEN_ROUGHNESS = 11u;
+const SHEEN_COLOR = 12u;
+const DIFFUSE_TRANSMISSION = 13u;
 
 // Textures of a material.
 const BASE_COLOR = 0u;
@@ -43,8 +45,12 @@ const CLEARCOAT = 7u;
 const CLEARCOAT_ROUGHNESS = 8u;
 const CLEARCOAT_NORMAL = 9u;
 //#if uncommon_textures
-const ANISOTROPY = 10u;
-const TEXTURES = 11u;
+const ANISOTROPY_MAP = 10u;
+const SHEEN_COLOR_MAP = 11u;
+const SHEEN_ROUGHNESS_MAP = 12u;
+const DIFFUSE_TRANSMISSION_MAP = 13u;
+const DIFFUSE_TRANSMISSION_COLOR_MAP = 14u;
+const TEXTURES = 15u;
 //#else
 const TEXTURES = 10u;
 //#end
@@ -68,6 +74,14 @@ struct SurfaceParameters {
 //#if anisotropy
     anisotropy: f32,
     anisotropy_axis: vec2f,
+//#end
+//#if sheen
+    sheen_color: vec3f,
+    sheen_roughness: f32,
+//#end
+//#if diffuse_transmission
+    diffuse_transmission: f32,
+    diffuse_transmission_color: vec3f,
 //#end
 }
 
@@ -187,10 +201,10 @@ fn anisotropy_direction(corner: Corner, normal: vec3f, texture: vec4f) -> vec3f 
     let tangent = interpolate(corner, TANGENT_TEXEL).xyz;
     let bitangent = cross(normal, tangent) * first.w;
     var direction = vec2f(1.0, 0.0);
-    if texture_of(corner.material, ANISOTROPY) != NO_TEXTURE {
+    if texture_of(corner.material, ANISOTROPY_MAP) != NO_TEXTURE {
         direction = texture.xy * 2.0 - 1.0;
     }
-    let turn = material_numbers(corner.material, ANISOTROPY_ROTATION).yz;
+    let turn = material_numbers(corner.material, ANISOTROPY_SHEEN_ROUGHNESS).yz;
     return tangent * (turn.x * direction.x - turn.y * direction.y)
         + bitangent * (turn.y * direction.x + turn.x * direction.y);
 }
@@ -245,8 +259,18 @@ fn corner_parameters(corner: Corner, textures: array<vec4f, TEXTURES>) -> Surfac
 //#end
 //#if anisotropy
     p.anisotropy =
-        saturate(material_numbers(m, ANISOTROPY_ROTATION).x * textures[ANISOTROPY].z);
+        saturate(material_numbers(m, ANISOTROPY_SHEEN_ROUGHNESS).x * textures[ANISOTROPY_MAP].z);
     p.anisotropy_axis = vec2f(1.0, 0.0);
+//#end
+//#if sheen
+    p.sheen_color = material_numbers(m, SHEEN_COLOR).xyz * textures[SHEEN_COLOR_MAP].xyz;
+    let sheen_roughness = material_numbers(m, ANISOTROPY_SHEEN_ROUGHNESS).w;
+    p.sheen_roughness = saturate(sheen_roughness * textures[SHEEN_ROUGHNESS_MAP].w);
+//#end
+//#if diffuse_transmission
+    let through = material_numbers(m, DIFFUSE_TRANSMISSION);
+    p.diffuse_transmission = saturate(through.w * textures[DIFFUSE_TRANSMISSION_MAP].w);
+    p.diffuse_transmission_color = through.xyz * textures[DIFFUSE_TRANSMISSION_COLOR_MAP].xyz;
 //#end
     p.unlit = (flags & UNLIT) != 0u;
     if p.unlit {
@@ -295,7 +319,7 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
     point.shading_frame = frame_from_z(normalize(normal));
 //#if anisotropy
     if point.parameters.anisotropy > 0.0 {
-        let wide = anisotropy_direction(corner, unmapped, textures[ANISOTROPY]);
+        let wide = anisotropy_direction(corner, unmapped, textures[ANISOTROPY_MAP]);
         let axis = local_from_world(point.shading_frame, wide).xy;
         point.parameters.anisotropy_axis =
             normalize_or(vec3f(axis, 0.0), vec3f(1.0, 0.0, 0.0)).xy;

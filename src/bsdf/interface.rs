@@ -75,6 +75,11 @@ impl Interface {
         }
     }
 
+    /// By what radiance scales on its way through: the inside of a solid is denser with it.
+    pub(super) fn radiance_scale(&self) -> f32 {
+        if self.thin { 1.0 } else { 1.0 / (self.eta * self.eta) }
+    }
+
     /// Whether nothing is reflected or transmitted.
     pub(super) fn is_absent(&self) -> bool {
         self.glass == 0.0 && self.f90 == 0.0 && self.f0 == Vec3::ZERO

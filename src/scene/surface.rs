@@ -33,6 +33,10 @@ pub struct SurfaceParameters {
     pub specular_color: Vec3,
     /// Share of the dielectric's body that is clear, in `[0,1]`.
     pub transmission: f32,
+    /// Share of the diffuse body's light that comes through instead of back, in `[0,1]`.
+    pub diffuse_transmission: f32,
+    /// Colour of what comes through, each component in `[0,1]`.
+    pub diffuse_transmission_color: Vec3,
     /// A wall without an inside: light is not bent.
     pub thin: bool,
     /// Absorption coefficient of the inside per metre; zero if thin.
@@ -41,6 +45,10 @@ pub struct SurfaceParameters {
     pub anisotropy: f32,
     /// Unit direction of that width in the local shading frame's plane; +X if not anisotropic.
     pub anisotropy_axis: Vec2,
+    /// Colour of the sheen, each component in `[0,1]`; black is none.
+    pub sheen_color: Vec3,
+    /// Perceptual roughness of the sheen in `[0,1]`.
+    pub sheen_roughness: f32,
     /// Strength of the coat in `[0,1]`.
     pub clearcoat: f32,
     /// Perceptual roughness of the coat in `[0,1]`.
@@ -237,10 +245,17 @@ impl<'a> Corner<'a> {
             specular: unit(m.specular * self.read(m.specular_texture).w),
             specular_color: m.specular_color * self.read(m.specular_color_texture).xyz(),
             transmission: unit(m.transmission * self.read(m.transmission_texture).x),
+            diffuse_transmission: unit(
+                m.diffuse_transmission * self.read(m.diffuse_transmission_texture).w,
+            ),
+            diffuse_transmission_color: m.diffuse_transmission_color
+                * self.read(m.diffuse_transmission_color_texture).xyz(),
             thin,
             absorption: if thin { Vec3::ZERO } else { absorption(m) },
             anisotropy: unit(m.anisotropy * self.read(m.anisotropy_texture).z),
             anisotropy_axis: Vec2::X,
+            sheen_color: m.sheen_color * self.read(m.sheen_color_texture).xyz(),
+            sheen_roughness: unit(m.sheen_roughness * self.read(m.sheen_roughness_texture).w),
             clearcoat: unit(m.clearcoat * self.read(m.clearcoat_texture).x),
             clearcoat_roughness: unit(
                 m.clearcoat_roughness * self.read(m.clearcoat_roughness_texture).y,

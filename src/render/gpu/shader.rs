@@ -39,12 +39,13 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 42] = [
+    pub(crate) const ALL: [&'static str; 44] = [
         "alpha_mask",
         "anisotropy",
         "background_blur",
         "background_color",
         "clearcoat",
+        "diffuse_transmission",
         "emitters",
         "faces",
         "filtered_hits",
@@ -69,6 +70,7 @@ impl Features {
         "scene_lights",
         "second_uv_set",
         "shadow_rays",
+        "sheen",
         "single_sided",
         "solid_transmission",
         "summed_area",
@@ -91,6 +93,7 @@ impl Features {
             ("alpha_mask", needs.alpha_mask),
             ("anisotropy", needs.anisotropy),
             ("clearcoat", needs.clearcoat),
+            ("diffuse_transmission", needs.diffuse_transmission),
             ("emitters", needs.emitters),
             ("local_lights", !world.lights.is_empty()),
             ("metals", needs.metals),
@@ -98,6 +101,7 @@ impl Features {
             ("partial", needs.alpha_blend || needs.thin_transmission),
             ("punctual_lights", needs.punctual_lights),
             ("second_uv_set", needs.second_uv_set),
+            ("sheen", needs.sheen),
             ("single_sided", needs.single_sided),
             ("solid_transmission", needs.solid_transmission),
             ("textures", needs.textures),
@@ -153,7 +157,7 @@ impl Features {
             ("shadow_rays", &["map_sampling", "local_lights"]),
             ("summed_area", &["table_f32", "table_f64", "table_u32"]),
             ("tangents", &["anisotropy", "normal_maps"]),
-            ("uncommon_textures", &["anisotropy"]),
+            ("uncommon_textures", &["anisotropy", "diffuse_transmission", "sheen"]),
         ];
         for (name, causes) in follows {
             if causes.iter().any(|cause| set.contains(cause)) {
@@ -250,6 +254,7 @@ pub(crate) struct Constants {
     pub(crate) vertex: VertexTexels,
     /// Texels of `tables` at which each begins.
     pub(crate) albedo_at: u32,
+    pub(crate) sheen_at: u32,
     pub(crate) filter_at: u32,
     pub(crate) rows_at: u32,
 }
@@ -392,7 +397,7 @@ impl Program {
         let features = features.in_kernel(kernel);
         let bindings = bindings(kernel, &features);
         let mut source = String::new();
-        let Constants { stack_size, vertex, albedo_at, filter_at, rows_at } = *constants;
+        let Constants { stack_size, vertex, albedo_at, sheen_at, filter_at, rows_at } = *constants;
         for (name, value) in [
             ("STACK_SIZE", stack_size),
             ("VERTEX_TEXELS", vertex.count),
@@ -400,6 +405,7 @@ impl Program {
             ("TANGENT_TEXEL", vertex.tangent),
             ("COLOR_TEXEL", vertex.color),
             ("ALBEDO_AT", albedo_at),
+            ("SHEEN_AT", sheen_at),
             ("FILTER_AT", filter_at),
             ("ROWS_AT", rows_at),
         ] {
@@ -427,7 +433,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 19] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 20] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -442,6 +448,7 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 19] {
         (wgsl!("surface"), true),
         (wgsl!("fresnel"), true),
         (wgsl!("microfacet"), true),
+        (wgsl!("sheen"), features.has("sheen")),
         (wgsl!("bsdf"), true),
         (wgsl!("light_grid"), true),
         (wgsl!("environment"), true),

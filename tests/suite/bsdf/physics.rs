@@ -92,6 +92,9 @@ fn white_surfaces_never_gain_energy() {
             transmission: pick(&[0.0, 0.0, 0.5, 1.0]),
             thin: pick(&[0.0, 1.0]) == 0.0,
             anisotropy: pick(&[0.0, 0.0, 0.6, 1.0]),
+            sheen_color: Vec3::splat(pick(&[0.0, 0.0, 0.5, 1.0])),
+            sheen_roughness: pick(&[0.0, 0.2, 0.5, 1.0]),
+            diffuse_transmission: pick(&[0.0, 0.0, 0.4, 1.0]),
             clearcoat: pick(&[0.0, 0.0, 1.0]),
             clearcoat_roughness: pick(&[0.0, 0.3, 1.0]),
             ..WHITE
@@ -114,6 +117,13 @@ fn lossless_surfaces_lose_nothing() {
                 ("lambert", WHITE, 1000, 1e-5),
                 ("glass", smooth(GLASS), 1000, 1e-5),
                 ("pane", smooth(PANE), 1000, 1e-5),
+                ("paper", SurfaceParameters { diffuse_transmission: 1.0, ..WHITE }, 1000, 1e-5),
+                (
+                    "tracing paper",
+                    SurfaceParameters { diffuse_transmission: 0.5, ..smooth(PLASTIC) },
+                    40_000,
+                    0.004,
+                ),
                 ("mirror", smooth(METAL), 1000, 1e-5),
                 ("smooth plastic", smooth(PLASTIC), 40_000, 0.004),
             ] {
@@ -258,6 +268,10 @@ fn extremes_stay_finite() {
             thin: pick(&[0.0, 1.0]) == 0.0,
             anisotropy: pick(&[0.0, 1e-10, 0.03, 1.0]),
             anisotropy_axis: Vec2::from_angle(pick(&[0.0, 1.0, 2.0])),
+            sheen_color: Vec3::new(pick(&[0.0, 1e-10, 1.0]), pick(&[0.0, 1.0]), 0.0),
+            sheen_roughness: pick(&[0.0, 0.07, 1.0]),
+            diffuse_transmission: pick(&[0.0, 1e-10, 1.0]),
+            diffuse_transmission_color: Vec3::new(pick(&[0.0, 1e-20, 1.0]), 0.0, 1.0),
             clearcoat: pick(&[0.0, 1e-10, 1.0]),
             clearcoat_roughness: pick(&[0.0, 0.04, 1.0]),
             ..WHITE

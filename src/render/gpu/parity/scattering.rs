@@ -8,6 +8,7 @@ use super::twin::{Bound, EXACT, Twin, ulps};
 use crate::bsdf::albedo::AlbedoTerms;
 use crate::bsdf::fresnel::{dielectric, normal_reflectance, reflect, refract, schlick_weight};
 use crate::bsdf::microfacet::Ggx;
+use crate::bsdf::sheen::Sheen;
 use crate::bsdf::{Bsdf, SurfaceParameters, cosine_hemisphere};
 
 /// Reads the words of [`material`]; writes what [`expect_parameters`] compares.
@@ -18,6 +19,8 @@ fn take_parameters() -> SurfaceParameters {
     p.ior = take(); p.specular = take(); p.specular_color = take3(); p.transmission = take();
     p.thin = take_word() != 0u; p.clearcoat = take(); p.clearcoat_roughness = take();
     p.clearcoat_normal = take3(); p.anisotropy = take(); p.anisotropy_axis = take2();
+    p.sheen_color = take3(); p.sheen_roughness = take(); p.diffuse_transmission = take();
+    p.diffuse_transmission_color = take3();
     return p;
 }
 fn take_ggx() -> Ggx {
@@ -28,7 +31,8 @@ fn put_parameters(p: SurfaceParameters) {
     put3(p.base_color); put(p.alpha); put(p.metallic); put(p.roughness); put(p.ior);
     put(p.specular); put3(p.specular_color); put(p.transmission); put_bool(p.thin);
     put(p.clearcoat); put(p.clearcoat_roughness); put3(p.clearcoat_normal);
-    put(p.anisotropy); put2(p.anisotropy_axis);
+    put(p.anisotropy); put2(p.anisotropy_axis); put3(p.sheen_color); put(p.sheen_roughness);
+    put(p.diffuse_transmission); put3(p.diffuse_transmission_color);
     put3(p.absorption); put3(p.emissive); put_bool(p.unlit);
 }
 ";
@@ -38,6 +42,7 @@ pub(super) fn probes() -> Vec<Probe<'static>> {
     let mut probes = fresnel();
     probes.extend(microfacets());
     probes.extend(albedos());
+    probes.extend(sheens());
     probes.extend(materials());
     probes
 }
@@ -208,6 +213,10 @@ fn material(r: &mut Random) -> SurfaceParameters {
         absorption: Vec3::ZERO,
         anisotropy: [0.0, r.unit()][r.below(2) as usize],
         anisotropy_axis: r.axis(),
+        sheen_color: if r.below(3) == 0 { r.unit3() } else { Vec3::ZERO },
+        sheen_roughness: r.unit(),
+        diffuse_transmission: [0.0, 0.0, 1.0, r.unit()][r.below(4) as usize],
+        diffuse_transmission_color: r.unit3(),
         clearcoat: if is_coated { r.unit() } else { 0.0 },
         clearcoat_roughness: smooth_or_not(r),
         clearcoat_normal: (Vec3::Z + 0.4 * r.in_cube() * r.below(2) as f32).normalize(),
@@ -233,6 +242,10 @@ impl Part for SurfaceParameters {
             &self.clearcoat_normal,
             &self.anisotropy,
             &self.anisotropy_axis,
+            &self.sheen_color,
+            &self.sheen_roughness,
+            &self.diffuse_transmission,
+            &self.diffuse_transmission_color,
         ]));
     }
 }
@@ -253,6 +266,10 @@ fn take_parameters(t: &mut Twin<'_>) -> SurfaceParameters {
         clearcoat_normal: t.take3(),
         anisotropy: t.take(),
         anisotropy_axis: t.take2(),
+        sheen_color: t.take3(),
+        sheen_roughness: t.take(),
+        diffuse_transmission: t.take(),
+        diffuse_transmission_color: t.take3(),
         absorption: Vec3::ZERO,
         emissive: Vec3::ZERO,
         unlit: false,
@@ -273,6 +290,10 @@ pub(super) fn expect_parameters(t: &mut Twin<'_>, p: &SurfaceParameters, bound: 
     t.near(p.clearcoat_normal, bound);
     t.near(p.anisotropy, bound);
     t.near(p.anisotropy_axis, bound);
+    t.near(p.sheen_color, bound);
+    t.near(p.sheen_roughness, bound);
+    t.near(p.diffuse_transmission, bound);
+    t.near(p.diffuse_transmission_color, bound);
     t.near(p.absorption, bound);
     t.near(p.emissive, bound);
     t.same(p.unlit);
@@ -294,6 +315,48 @@ fn incoming(r: &mut Random, wo: Vec3) -> Vec3 {
         _ => r.direction(),
     };
     wi.normalize()
+}
+
+fn sheens() -> Vec<Probe<'static>> {
+    let sheen = |t: &mut Twin<'_>| {
+        let (color, roughness) = (t.take3(), t.take());
+        let p = SurfaceParameters {
+            sheen_color: color,
+            sheen_roughness: roughness,
+            ..material(&mut Random::default())
+        };
+        Sheen::new(&p, true)
+    };
+    vec![
+        Probe::new(
+            "sheen_eval_pdf, sheen_albedo, sheen_left",
+            "var p: SurfaceParameters; p.sheen_color = take3(); p.sheen_roughness = take();
+            let sheen = sheen_new(p, true); let wo = take3(); let wi = take3();
+            let f = sheen_eval_pdf(sheen, wo, wi); put3(f.value); put(f.pdf_solid_angle);
+            put(sheen_albedo(sheen, wo)); put(sheen_left(sheen, wo, wi));",
+            cases([], |r| {
+                case(&[&(r.unit3() + 0.01), &r.unit(), &r.upper_direction(), &r.upper_direction()])
+            }),
+            move |t| {
+                let (sheen, wo, wi) = (sheen(t), t.take3(), t.take3());
+                let (value, pdf) = sheen.eval_pdf(wo, wi);
+                // Powers of up to 100 of numbers below 1, and exponentials of up to 20.
+                t.near(value, ulps(512.0));
+                t.near(pdf, EXACT);
+                t.near(sheen.albedo(wo), ulps(32.0).of(1.0));
+                t.near(sheen.left(wo, wi), ulps(32.0).of(1.0));
+            },
+        ),
+        Probe::new(
+            "sheen_sample",
+            "put3(sheen_sample(take2()));",
+            cases(edge_squares().into_iter().map(|u| case(&[&u])), |r| case(&[&r.unit2()])),
+            |t| {
+                let right = Sheen::sample(t.take2());
+                t.near(right, ulps(4.0).of(1.0));
+            },
+        ),
+    ]
 }
 
 fn materials() -> Vec<Probe<'static>> {
