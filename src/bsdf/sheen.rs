@@ -62,8 +62,8 @@ impl Sheen {
         roughness: 0.0,
     };
 
-    /// A direction of mean cosine.
-    pub(super) const TYPICAL: Vec3 = Vec3::new(0.0, 0.866_025_4, 0.5);
+    /// Where light under a sheen mostly comes from, for estimates.
+    pub(super) const TYPICAL: Vec3 = Vec3::new(0.0, 0.76, 0.65);
 
     pub(crate) fn new(p: &SurfaceParameters, entering: bool) -> Self {
         if p.sheen_color == Vec3::ZERO {
