@@ -154,17 +154,20 @@ impl App {
         folder.join(format!("{stem}.png")).display().to_string()
     }
 
-    fn save(&mut self, path: PathBuf) {
+    /// Writes the picture, or remembers to when there is only a small one as yet.
+    pub(super) fn save(&mut self, path: PathBuf) {
         let Some(picture) = self.picture() else {
             self.messages.error("there is no picture yet to be written");
             return;
         };
         self.settings.save_folder = path.parent().map(Path::to_path_buf);
         let film = &picture.snapshot.main.film;
-        let view = &picture.snapshot.request.view;
-        let kind = if film.width < view.width { ", a small preview" } else { "" };
-        let sentence =
-            format!("Saved {}, {} x {} pixels{kind}", path.display(), film.width, film.height);
+        if picture.snapshot.is_small() {
+            self.messages.notice("The picture will be saved once it has its full size");
+            self.waiting_save = Some(path);
+            return;
+        }
+        let sentence = format!("Saved {}, {} x {} pixels", path.display(), film.width, film.height);
         self.do_later("save", move || {
             save::picture(&path, &picture)?;
             let remarks = save::remarks(&picture);

@@ -97,6 +97,8 @@ pub struct App {
     /// Results of files being chosen and written.
     later: (Sender<Later>, Receiver<Later>),
     wake: Wake,
+    /// Where the picture is to be written once it has its full size.
+    waiting_save: Option<std::path::PathBuf>,
     is_repeatable: bool,
     is_closing: bool,
 }
@@ -148,6 +150,7 @@ impl App {
             arriving: Arc::default(),
             later: channel(),
             wake,
+            waiting_save: None,
             is_repeatable: start.is_repeatable,
             is_closing: false,
         })
@@ -361,6 +364,11 @@ impl App {
             self.snapshot = Some(snapshot);
         }
         self.shown = self.presenter.shown();
+        if self.snapshot.as_ref().is_some_and(|snapshot| !snapshot.is_small())
+            && let Some(path) = self.waiting_save.take()
+        {
+            self.save(path);
+        }
         if let Some(failure) = self.shown.as_ref().and_then(|shown| shown.failure.clone()) {
             self.messages.error(failure);
             self.document.look.denoiser = Denoiser::default();

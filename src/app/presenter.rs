@@ -310,8 +310,7 @@ fn other(order: &Order, exposure_ev: f32, filter: &mut Filter<'_>) -> Option<Rgb
 fn develop(snapshot: &Snapshot, filter: &mut Filter<'_>) -> Image {
     let film = &snapshot.main.film;
     // A small picture is there to see where one is going, not to judge noise.
-    let is_small = film.width < snapshot.request.view.width;
-    let mut image = if is_small { preview(film) } else { filter.image(film) };
+    let mut image = if snapshot.is_small() { preview(film) } else { filter.image(film) };
     if let Some(under) = snapshot.under.as_ref().filter(|_| film.min_samples() == 0) {
         fill_from(&mut image, film, under);
     }

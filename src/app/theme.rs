@@ -117,15 +117,6 @@ pub(super) fn is_narrow(ui: &Ui) -> bool {
     ui.ctx().content_rect().width() < 1260.0
 }
 
-/// Width of a side panel in points; sliders shrink with it.
-pub(super) fn side_width(ui: &mut Ui) -> f32 {
-    if is_narrow(ui) {
-        ui.spacing_mut().slider_width = 58.0;
-        return 258.0;
-    }
-    294.0
-}
-
 /// Text that explains.
 pub(super) fn quiet(text: impl Into<String>) -> RichText {
     RichText::new(text).color(QUIET).size(12.0)

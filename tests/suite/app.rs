@@ -33,8 +33,8 @@ fn start() -> Start {
     Start { document, ..Start::default() }
 }
 
-fn studio(start: Start) -> Option<Studio> {
-    let shot = Shot { start, size: (1000, 640), patience: Duration::from_secs(300) };
+fn studio(start: Start, size: (u32, u32)) -> Option<Studio> {
+    let shot = Shot { start, size, patience: Duration::from_secs(300) };
     match Studio::open(shot) {
         Ok(studio) => Some(studio),
         Err(error) => {
@@ -47,7 +47,7 @@ fn studio(start: Start) -> Option<Studio> {
 /// Every overlay and panel of one picture, and the kept picture it must look like.
 #[test]
 fn overlays_and_panels_look_as_they_did() {
-    let Some(mut studio) = studio(start()) else { return };
+    let Some(mut studio) = studio(start(), (1000, 640)) else { return };
     let base = Interface::default();
     let inspect = Interface { tab: Tab::Inspect, ..base.clone() };
     let mut states = vec![
@@ -76,15 +76,8 @@ fn overlays_and_panels_look_as_they_did() {
     }
     let mut different = Vec::new();
     let mut pictures: Vec<Rgb8> = Vec::new();
-    // Last, for it is done once: what the cell under a point knows, and the truth there.
-    let pinned = Interface { pinned: Some(Vec2::new(0.7, 0.5)), ..inspect };
-    states.push(("panel-inspect-truth".to_owned(), pinned));
     for (name, interface) in states {
-        let is_pinned = interface.pinned.is_some();
         studio.arrange(interface);
-        if is_pinned {
-            studio.measure_truth().expect("measured");
-        }
         let picture = studio.take().expect("drawn");
         if let Err(why) = compare(&name, &picture) {
             different.push(why);
@@ -93,6 +86,19 @@ fn overlays_and_panels_look_as_they_did() {
         pictures.push(picture);
     }
     assert!(different.is_empty(), "{different:#?}");
+}
+
+/// What a cell knows and what is true there, in a window high enough for both.
+#[test]
+fn the_inspector_shows_law_and_truth() {
+    let Some(mut studio) = studio(start(), (1000, 1200)) else { return };
+    let pinned = Some(Vec2::new(0.45, 0.75));
+    studio.arrange(Interface { tab: Tab::Inspect, pinned, ..Interface::default() });
+    let before = studio.take().expect("drawn");
+    studio.measure_truth().expect("measured");
+    let picture = studio.take().expect("drawn");
+    assert_ne!(before, picture, "the truth is shown");
+    compare("panel-inspect-truth", &picture).expect("as it was");
 }
 
 /// Compares with `tests/snapshots/NAME.png`; with UPDATE_SNAPSHOTS set, writes it instead.

@@ -357,6 +357,9 @@ enum Range {
     Logarithmic,
 }
 
+/// What a logarithmic scale spans at most: a few cells that see next to nothing must not take it all.
+const LARGEST_RATIO: f32 = 1e4;
+
 impl Range {
     const WHOLE: Self = Self::Whole;
     const LOGARITHMIC: Self = Self::Logarithmic;
@@ -377,8 +380,9 @@ fn scaled(values: impl Iterator<Item = Option<f32>>, range: Range, unit: &'stati
         Range::Fixed(low, high) => (low, high),
         Range::Whole => (0.0, sorted.last().copied().unwrap_or(1.0).max(1.0)),
         Range::Logarithmic => {
-            let low = percentile(0.02).max(f32::MIN_POSITIVE);
-            (low, percentile(0.98).max(low * 1.01))
+            let high = percentile(0.98).max(f32::MIN_POSITIVE * LARGEST_RATIO);
+            let low = percentile(0.02).max(high / LARGEST_RATIO);
+            (low, high.max(low * 1.01))
         }
     };
     let position = |value: f32| {

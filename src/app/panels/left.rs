@@ -35,8 +35,12 @@ pub(in crate::app) fn show(
     commands: &mut Vec<Command>,
 ) {
     let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 8));
-    let width = theme::side_width(ui);
+    let is_narrow = theme::is_narrow(ui);
+    let width = if is_narrow { 258.0 } else { 286.0 };
     Panel::left("left").frame(frame).exact_size(width).show(ui, |ui| {
+        if is_narrow {
+            ui.spacing_mut().slider_width = 66.0;
+        }
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             theme::heading(ui, "SCENE");
             scene(ui, document, sources, commands);

@@ -21,8 +21,10 @@ use crate::render::{Phase, Sampling, Session, StopRule, View};
 const SLICE: Duration = Duration::from_millis(120);
 /// A moving camera's picture should take about this long.
 const MOVING_SECONDS: f64 = 0.07;
-/// So should the first pass of a preview for which nothing was learned before: many samples of a small
-/// picture, filtered, show more than one sample of a large one.
+/// What a camera path takes, until it has been measured.
+const LIKELY_SECONDS_PER_PATH: f64 = 1e-5;
+/// The first pass of a preview for which nothing was learned before should take about this long: many
+/// samples of a small picture, filtered, show more than one sample of a large one.
 const PREVIEW_SECONDS: f64 = 0.4;
 /// By what a preview's sides are divided at most.
 const PREVIEW_SHRINK: u32 = 4;
@@ -215,7 +217,7 @@ impl<'a> Job<'a> {
     /// By what the picture's sides are divided for a pass to take `seconds`.
     fn shrink(&self, view: &View, seconds: f64, most: u32) -> u32 {
         let pixels = f64::from(view.width) * f64::from(view.height);
-        let Some(seconds_per_path) = self.legacy.seconds_per_path else { return 8.min(most) };
+        let seconds_per_path = self.legacy.seconds_per_path.unwrap_or(LIKELY_SECONDS_PER_PATH);
         let shrink = (pixels * seconds_per_path / seconds).sqrt().ceil();
         (shrink as u32).clamp(1, most)
     }

@@ -165,6 +165,13 @@ pub struct Snapshot {
     pub under: Option<Arc<Image>>,
 }
 
+impl Snapshot {
+    /// Whether the picture is smaller than asked for, as it is at first and while the camera moves.
+    pub fn is_small(&self) -> bool {
+        self.main.film.width < self.request.view.width
+    }
+}
+
 struct Shared {
     slot: Mutex<Slot>,
     changed: Condvar,
