@@ -160,7 +160,11 @@ impl App {
             return;
         };
         self.settings.save_folder = path.parent().map(Path::to_path_buf);
-        let sentence = format!("Saved {}", path.display());
+        let film = &picture.snapshot.main.film;
+        let view = &picture.snapshot.request.view;
+        let kind = if film.width < view.width { ", a small preview" } else { "" };
+        let sentence =
+            format!("Saved {}, {} x {} pixels{kind}", path.display(), film.width, film.height);
         self.do_later("save", move || {
             save::picture(&path, &picture)?;
             let remarks = save::remarks(&picture);
@@ -186,7 +190,9 @@ impl App {
             return;
         };
         let sentence = format!("Exported {} laws to {}", grid.laws().len(), path.display());
-        self.do_later("export", move || save::laws(&path, &grid).map(|()| sentence));
+        self.do_later("export", move || {
+            crate::output::laws::write_laws(&path, &grid).map(|()| sentence)
+        });
     }
 
     /// Reads a reference on a thread; its arrival is a message.

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use glam::Vec2;
 use lightgrid::app::Start;
 use lightgrid::app::document::{Document, Light, Look, PictureSize};
-use lightgrid::app::interface::{Dock, Interface, Tab};
+use lightgrid::app::interface::{Dock, Interface, Tab, TileView};
 use lightgrid::app::overlays::Overlay;
 use lightgrid::app::screenshot::{Shot, Studio};
 use lightgrid::image::{Rgb8, read_picture, write_png};
@@ -53,6 +54,18 @@ fn overlays_and_panels_look_as_they_did() {
         ("panel-picture".to_owned(), base.clone()),
         ("panel-inspect".to_owned(), inspect.clone()),
         ("panel-needs".to_owned(), Interface { dock: Some(Dock::Needs), ..base.clone() }),
+        (
+            "panel-convergence".to_owned(),
+            Interface { dock: Some(Dock::Convergence), ..inspect.clone() },
+        ),
+        (
+            "panel-tiles-learned".to_owned(),
+            Interface { tiles: TileView::Learned, ..inspect.clone() },
+        ),
+        (
+            "panel-tiles-equal-energy".to_owned(),
+            Interface { tiles: TileView::EqualEnergy, ..inspect.clone() },
+        ),
         ("panel-shortcuts".to_owned(), Interface { shortcuts: true, ..base.clone() }),
         ("panel-none".to_owned(), Interface { panels: false, ..base }),
     ];
@@ -63,8 +76,15 @@ fn overlays_and_panels_look_as_they_did() {
     }
     let mut different = Vec::new();
     let mut pictures: Vec<Rgb8> = Vec::new();
+    // Last, for it is done once: what the cell under a point knows, and the truth there.
+    let pinned = Interface { pinned: Some(Vec2::new(0.7, 0.5)), ..inspect };
+    states.push(("panel-inspect-truth".to_owned(), pinned));
     for (name, interface) in states {
+        let is_pinned = interface.pinned.is_some();
         studio.arrange(interface);
+        if is_pinned {
+            studio.measure_truth().expect("measured");
+        }
         let picture = studio.take().expect("drawn");
         if let Err(why) = compare(&name, &picture) {
             different.push(why);
@@ -302,6 +322,12 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     });
     desk.xdotool("key g");
 
+    // A file that is not there changes nothing: the camera can still be turned.
+    desk.answer("ctrl+o", "none.glb");
+    std::thread::sleep(Duration::from_secs(2));
+    let title = |desk: &Desk| desk.xdotool(&format!("getwindowname {window}"));
+    desk.wait_for("old scene", || title(&desk).starts_with("open").then_some(()));
+
     // A drag turns the camera: another picture. Slowly, for software draws some frames a second.
     desk.xdotool("mousemove 560 400 mousedown 1");
     for _ in 0..10 {
@@ -313,11 +339,7 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     let turned = desk.save("turned.exr");
     assert!(first.pixels != turned.pixels, "the camera has turned");
 
-    // A file that is not there changes nothing; another scene does.
-    desk.answer("ctrl+o", "none.glb");
-    std::thread::sleep(Duration::from_secs(2));
-    let title = |desk: &Desk| desk.xdotool(&format!("getwindowname {window}"));
-    desk.wait_for("old scene", || title(&desk).starts_with("open").then_some(()));
+    // Another scene.
     desk.answer("ctrl+o", "crack");
     desk.wait_for("new scene", || title(&desk).starts_with("crack").then_some(()));
     std::thread::sleep(Duration::from_secs(4));

@@ -12,7 +12,12 @@ pub(in crate::app) fn show(
     content: impl FnOnce(&mut Ui, &mut Interface),
 ) {
     let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 8));
-    Panel::right("right").frame(frame).exact_size(300.0).show(ui, |ui| {
+    let width = match interface.tab {
+        Tab::Picture => theme::side_width(ui),
+        // Tables of figures do not get narrower.
+        Tab::Inspect => 300.0,
+    };
+    Panel::right("right").frame(frame).exact_size(width).show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.selectable_value(&mut interface.tab, Tab::Picture, "Picture");
             ui.selectable_value(&mut interface.tab, Tab::Inspect, "Inspect");
