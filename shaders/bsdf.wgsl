@@ -1,5 +1,5 @@
 // How light is scattered at a surface point: twin of src/bsdf/ (mod.rs, interface.rs, coat.rs,
-// albedo.rs). Directions are unit, local to the shading frame, z on the viewer's side.
+// diffuse.rs, albedo.rs). Directions are unit, local to the shading frame, z on the viewer's side.
 
 const STRAIGHT_ETA = 1e-3;
 // Rows and columns of the table of directional albedos.
@@ -8,7 +8,7 @@ const ALBEDO_NODES = 32u;
 struct Interface {
     f0: vec3f,
     f90: f32,
-    alpha: f32,
+    ggx: Ggx,
 //#if transmission
     glass: f32,
     glass_f90: f32,
@@ -23,9 +23,17 @@ struct Bsdf {
     interface_: Interface,
     // Lambert's lobe: base colour times share, over what the interface lets in on average.
     diffuse_color: vec3f,
+//#if diffuse_transmission
+    // The same for light from the far side, and the probability of choosing it.
+    transmitted_color: vec3f,
+    through: f32,
+//#end
     // The dielectric's largest F0 and its F90.
     f0_f90: vec2f,
     roughness: f32,
+//#if sheen
+    sheen: Sheen,
+//#end
 //#if clearcoat
     coat: Coat,
 //#end
@@ -42,6 +50,9 @@ struct Outgoing {
     coat_probability: f32,
     interface_probability: f32,
     diffuse_probability: f32,
+//#if sheen
+    sheen_probability: f32,
+//#end
 }
 
 // Value times cosine, and density per steradian.
@@ -97,9 +108,44 @@ fn albedo_terms_mean(roughness: f32) -> vec2f {
     return mix(terms.xy, terms.zw, y - f32(row));
 }
 
+//#if anisotropy
+fn stretched_terms(ggx: Ggx, diagonal: vec2f, towards: vec2f) -> vec2f {
+    let a = diagonal.x + 0.3 * (1.0 - ggx.alpha / ggx.along) * (1.0 - diagonal.x);
+    return vec2f(min(a, 1.0 - towards.y), towards.y);
+}
+//#end
+
+// `AlbedoTerms::at` and `AlbedoTerms::mean` of a GGX of this roughness across its axis.
+fn terms_towards(ggx: Ggx, roughness: f32, v: vec3f) -> vec2f {
+//#if anisotropy
+    if is_stretched(ggx) {
+        let diagonal = roughness_off_axis(ggx, 0.70710678, 0.70710678);
+        let towards = albedo_terms_at(roughness_towards(ggx, v), v.z);
+        return stretched_terms(ggx, albedo_terms_at(diagonal, v.z), towards);
+    }
+//#end
+    return albedo_terms_at(roughness, v.z);
+}
+
+fn terms_mean(ggx: Ggx, roughness: f32) -> vec2f {
+//#if anisotropy
+    if is_stretched(ggx) {
+        let diagonal = roughness_off_axis(ggx, 0.70710678, 0.70710678);
+        let towards = albedo_terms_mean(roughness_off_axis(ggx, 0.92387953, 0.38268343))
+            + albedo_terms_mean(roughness_off_axis(ggx, 0.38268343, 0.92387953));
+        return stretched_terms(ggx, albedo_terms_mean(diagonal), 0.5 * towards);
+    }
+//#end
+    return albedo_terms_mean(roughness);
+}
+
 fn interface_new(p: SurfaceParameters, f0: vec3f, f90: f32, entering: bool) -> Interface {
     var i: Interface;
-    i.alpha = p.roughness * p.roughness;
+//#if anisotropy
+    i.ggx = ggx_stretched(p.roughness, p.anisotropy, p.anisotropy_axis);
+//#else
+    i.ggx = ggx_from_roughness(p.roughness);
+//#end
     let opaque_share = (1.0 - p.metallic) * (1.0 - p.transmission);
     i.f0 = f0 * opaque_share + p.base_color * p.metallic;
     i.f90 = f90 * opaque_share + p.metallic;
@@ -118,10 +164,6 @@ fn interface_new(p: SurfaceParameters, f0: vec3f, f90: f32, entering: bool) -> I
     return i;
 }
 
-fn is_smooth(alpha: f32) -> bool {
-    return alpha < SMOOTH_ALPHA;
-}
-
 fn interface_is_absent(i: Interface) -> bool {
     var absent = i.f90 == 0.0 && all(i.f0 == vec3f(0.0));
 //#if transmission
@@ -131,7 +173,7 @@ fn interface_is_absent(i: Interface) -> bool {
 }
 
 fn interface_is_delta_or_absent(i: Interface) -> bool {
-    if is_smooth(i.alpha) || interface_is_absent(i) {
+    if is_smooth(i.ggx) || interface_is_absent(i) {
         return true;
     }
 //#if transmission
@@ -175,11 +217,11 @@ fn facet_reflection_probability(facet: Facet) -> f32 {
 
 //#if transmission
 fn passes_straight(i: Interface) -> bool {
-    return i.glass > 0.0 && i.thin && is_smooth(i.alpha);
+    return i.glass > 0.0 && i.thin && is_smooth(i.ggx);
 }
 
 fn transmits_delta(i: Interface) -> bool {
-    return is_smooth(i.alpha) || (!i.thin && i.eta == 1.0);
+    return is_smooth(i.ggx) || (!i.thin && i.eta == 1.0);
 }
 
 fn interface_straight_transmittance(i: Interface, cosine: f32) -> vec3f {
@@ -212,10 +254,10 @@ fn reflection_probability(i: Interface, facet: Facet, wo: vec3f) -> f32 {
 }
 
 fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSample {
-    let smooth_ = is_smooth(i.alpha);
+    let smooth_ = is_smooth(i.ggx);
     var h = vec3f(0.0, 0.0, 1.0);
     if !smooth_ {
-        h = ggx_sample_visible_normal(i.alpha, wo, u);
+        h = ggx_sample_visible_normal(i.ggx, wo, u);
     }
     let facet = scattering_facet(i, dot(wo, h));
     let probability = reflection_probability(i, facet, wo);
@@ -246,7 +288,7 @@ fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSampl
 }
 
 fn interface_eval_pdf(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
-    if is_smooth(i.alpha) {
+    if is_smooth(i.ggx) {
         return EvalPdf(vec3f(0.0), 0.0);
     }
     if wi.z > 0.0 {
@@ -274,9 +316,9 @@ fn eval_pdf_mirrored(i: Interface, wo: vec3f, wi: vec3f, is_reflected: bool) -> 
     let reflects = reflection_probability(i, facet, wo);
     let color = select(facet.transmittance, facet.reflectance, is_reflected);
     let probability = select(1.0 - reflects, reflects, is_reflected);
-    let visible = ggx_distribution(i.alpha, h) * ggx_visibility(i.alpha, wo.z);
+    let visible = ggx_distribution(i.ggx, h) * ggx_visibility(i.ggx, wo);
     return EvalPdf(
-        color * (visible * ggx_visibility(i.alpha, wi.z) * wi.z),
+        color * (visible * ggx_visibility(i.ggx, wi) * wi.z),
         0.5 * visible * probability,
     );
 }
@@ -294,8 +336,8 @@ fn eval_pdf_refracted(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
     let facet = interface_facet(i, cos_o);
     let denominator = cos_o + i.eta * cos_i;
     let jacobian = -cos_i / (denominator * denominator);
-    let visible = ggx_visible_normal_pdf_solid_angle(i.alpha, wo, h) * jacobian;
-    let masking = 2.0 * -wi.z * ggx_visibility(i.alpha, -wi.z);
+    let visible = ggx_visible_normal_pdf_solid_angle(i.ggx, wo, h) * jacobian;
+    let masking = 2.0 * -wi.z * ggx_visibility(i.ggx, -wi);
     let probability = 1.0 - facet_reflection_probability(facet);
     return EvalPdf(
         facet.transmittance * (visible * masking),
@@ -323,7 +365,7 @@ const COAT_F0 = 0.04;
 
 struct Coat {
     strength: f32,
-    alpha: f32,
+    ggx: Ggx,
     frame: Frame,
     thin: bool,
     entering: bool,
@@ -332,7 +374,7 @@ struct Coat {
 fn coat_new(p: SurfaceParameters, entering: bool) -> Coat {
     return Coat(
         p.clearcoat,
-        p.clearcoat_roughness * p.clearcoat_roughness,
+        ggx_from_roughness(p.clearcoat_roughness),
         frame_from_z(p.clearcoat_normal),
         p.thin,
         entering,
@@ -348,7 +390,7 @@ fn coat_fresnel(cosine: f32) -> f32 {
 }
 
 fn coat_is_delta_or_absent(coat: Coat) -> bool {
-    return coat.strength == 0.0 || !coat_is_outside(coat, 1.0) || is_smooth(coat.alpha);
+    return coat.strength == 0.0 || !coat_is_outside(coat, 1.0) || is_smooth(coat.ggx);
 }
 
 fn coat_attenuation(coat: Coat, v: vec3f) -> f32 {
@@ -366,10 +408,10 @@ fn coat_albedo(coat: Coat, wo: vec3f) -> f32 {
 
 fn coat_sample(coat: Coat, wo: vec3f, u: vec2f, probability: f32) -> LobeSample {
     let local = local_from_world(coat.frame, wo);
-    let smooth_ = is_smooth(coat.alpha);
+    let smooth_ = is_smooth(coat.ggx);
     var h = vec3f(0.0, 0.0, 1.0);
     if !smooth_ {
-        h = ggx_sample_visible_normal(coat.alpha, local, u);
+        h = ggx_sample_visible_normal(coat.ggx, local, u);
     }
     let local_wi = reflected(local, h);
     let wi = world_from_local(coat.frame, local_wi);
@@ -386,14 +428,43 @@ fn coat_sample(coat: Coat, wo: vec3f, u: vec2f, probability: f32) -> LobeSample 
 fn coat_eval_pdf(coat: Coat, wo: vec3f, wi: vec3f) -> vec2f {
     let o = local_from_world(coat.frame, wo);
     let i = local_from_world(coat.frame, wi);
-    if is_smooth(coat.alpha) || wi.z <= 0.0 || o.z <= 0.0 || i.z <= 0.0 {
+    if is_smooth(coat.ggx) || wi.z <= 0.0 || o.z <= 0.0 || i.z <= 0.0 {
         return vec2f(0.0);
     }
     let h = normalize(o + i);
-    let visible = ggx_distribution(coat.alpha, h) * ggx_visibility(coat.alpha, o.z);
+    let visible = ggx_distribution(coat.ggx, h) * ggx_visibility(coat.ggx, o);
     let value = coat.strength * coat_fresnel(dot(o, h)) * visible
-        * ggx_visibility(coat.alpha, i.z) * i.z;
+        * ggx_visibility(coat.ggx, i) * i.z;
     return vec2f(value, 0.5 * visible);
+}
+//#end
+
+fn has_diffuse(b: Bsdf) -> bool {
+//#if diffuse_transmission
+    return any(b.diffuse_color != vec3f(0.0)) || any(b.transmitted_color != vec3f(0.0));
+//#else
+    return any(b.diffuse_color != vec3f(0.0));
+//#end
+}
+
+// Both of Lambert's lobes.
+fn diffuse_sum(b: Bsdf) -> vec3f {
+//#if diffuse_transmission
+    return b.diffuse_color + b.transmitted_color;
+//#else
+    return b.diffuse_color;
+//#end
+}
+
+//#if diffuse_transmission
+// Twin of `Interface::radiance_scale`.
+fn radiance_scale(i: Interface) -> f32 {
+//#if solid_transmission
+    if !i.thin {
+        return 1.0 / (i.eta * i.eta);
+    }
+//#end
+    return 1.0;
 }
 //#end
 
@@ -403,12 +474,30 @@ fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
     var b: Bsdf;
     b.f0_f90 = vec2f(max_element(f0), f90);
     b.roughness = p.roughness;
-    b.diffuse_color = p.base_color * ((1.0 - p.metallic) * (1.0 - p.transmission));
-    if f90 > 0.0 && any(b.diffuse_color != vec3f(0.0)) {
-        let let_in = 1.0 - dot(b.f0_f90, albedo_terms_mean(p.roughness));
-        b.diffuse_color = select(vec3f(0.0), b.diffuse_color / let_in, let_in > 1e-4);
-    }
     b.interface_ = interface_new(p, f0, f90, entering);
+    b.diffuse_color = p.base_color * ((1.0 - p.metallic) * (1.0 - p.transmission));
+//#if diffuse_transmission
+    if p.diffuse_transmission > 0.0 {
+        let share = (1.0 - p.metallic) * (1.0 - p.transmission);
+        b.diffuse_color = p.base_color * (share * (1.0 - p.diffuse_transmission));
+        b.transmitted_color = p.diffuse_transmission_color * (share * p.diffuse_transmission)
+            * radiance_scale(b.interface_);
+        let through = importance(b.transmitted_color);
+        if through > 0.0 {
+            b.through = through / (importance(b.diffuse_color) + through);
+        }
+    }
+//#end
+    if f90 > 0.0 && has_diffuse(b) {
+        let let_in = 1.0 - dot(b.f0_f90, terms_mean(b.interface_.ggx, p.roughness));
+        b.diffuse_color = select(vec3f(0.0), b.diffuse_color / let_in, let_in > 1e-4);
+//#if diffuse_transmission
+        b.transmitted_color = select(vec3f(0.0), b.transmitted_color / let_in, let_in > 1e-4);
+//#end
+    }
+//#if sheen
+    b.sheen = sheen_new(p, entering);
+//#end
 //#if clearcoat
     b.coat = coat_new(p, entering);
 //#end
@@ -416,7 +505,10 @@ fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
 }
 
 fn bsdf_is_delta_only(b: Bsdf) -> bool {
-    var delta = all(b.diffuse_color == vec3f(0.0)) && interface_is_delta_or_absent(b.interface_);
+    var delta = !has_diffuse(b) && interface_is_delta_or_absent(b.interface_);
+//#if sheen
+    delta = delta && sheen_is_hidden(b.sheen);
+//#end
 //#if clearcoat
     delta = delta && coat_is_delta_or_absent(b.coat);
 //#end
@@ -427,58 +519,105 @@ fn bsdf_diffuse_left(b: Bsdf, terms: vec2f) -> f32 {
     return max(1.0 - dot(b.f0_f90, terms), 0.0);
 }
 
-fn bsdf_diffuse_left_at(b: Bsdf, cosine: f32) -> f32 {
+fn bsdf_diffuse_left_at(b: Bsdf, v: vec3f) -> f32 {
     if all(b.f0_f90 == vec2f(0.0)) {
         return 1.0;
     }
-    return bsdf_diffuse_left(b, albedo_terms_at(b.roughness, cosine));
+    return bsdf_diffuse_left(b, terms_towards(b.interface_.ggx, b.roughness, v));
 }
 
 fn bsdf_outgoing(b: Bsdf, wo: vec3f) -> Outgoing {
-    let none = Outgoing(0.0, 0.0, 0.0, 0.0);
+    var out: Outgoing;
     if !(wo.z > 0.0) {
-        return none;
+        return out;
     }
-    let has_diffuse = any(b.diffuse_color != vec3f(0.0));
+    let has_diffuse_ = has_diffuse(b);
     let has_interface = !interface_is_absent(b.interface_);
     var bare = true;
 //#if clearcoat
     bare = b.coat.strength == 0.0;
 //#end
-    if bare && !(has_diffuse && has_interface) {
-        return Outgoing(1.0, 0.0, select(0.0, 1.0, has_interface), select(0.0, 1.0, has_diffuse));
+//#if sheen
+    bare = bare && b.sheen.strength == 0.0;
+//#end
+    if bare && !(has_diffuse_ && has_interface) {
+        out.diffuse_left = 1.0;
+        out.interface_probability = select(0.0, 1.0, has_interface);
+        out.diffuse_probability = select(0.0, 1.0, has_diffuse_);
+        return out;
     }
-    let terms = albedo_terms_at(b.roughness, wo.z);
+    let terms = terms_towards(b.interface_.ggx, b.roughness, wo);
     let diffuse_left = bsdf_diffuse_left(b, terms);
     var interface_albedo_ = importance(interface_albedo(b.interface_, wo.z, terms));
-    var diffuse = diffuse_left * importance(b.diffuse_color);
+    var diffuse = diffuse_left * importance(diffuse_sum(b));
     var coat = 0.0;
+//#if sheen
+    let base = sheen_left(b.sheen, wo, wo);
+    interface_albedo_ *= base;
+    diffuse *= base;
+    var sheen = importance(b.sheen.color) * sheen_albedo(b.sheen, wo);
+//#end
 //#if clearcoat
     let under = coat_attenuation(b.coat, wo);
     interface_albedo_ *= under;
     diffuse *= under;
+//#if sheen
+    sheen *= under;
+//#end
     coat = coat_albedo(b.coat, wo);
 //#end
-    let sum = coat + interface_albedo_ + diffuse;
+    var sum = coat + interface_albedo_ + diffuse;
+//#if sheen
+    sum += sheen;
+//#end
     if !(sum > 0.0) {
-        return none;
+        return out;
     }
-    return Outgoing(diffuse_left, coat / sum, interface_albedo_ / sum, diffuse / sum);
+    out.diffuse_left = diffuse_left;
+    out.coat_probability = coat / sum;
+    out.interface_probability = interface_albedo_ / sum;
+    out.diffuse_probability = diffuse / sum;
+//#if sheen
+    out.sheen_probability = sheen / sum;
+//#end
+    return out;
 }
 
 fn bsdf_eval_pdf_with(b: Bsdf, wo: vec3f, wi: vec3f, out: Outgoing) -> EvalPdf {
     var result = EvalPdf(vec3f(0.0), 0.0);
     if out.diffuse_probability > 0.0 && wi.z > 0.0 {
         let lambert = wi.z * FRAC_1_PI;
-        let left = out.diffuse_left * bsdf_diffuse_left_at(b, wi.z);
+        let left = out.diffuse_left * bsdf_diffuse_left_at(b, wi);
         result.value += b.diffuse_color * (left * lambert);
+//#if diffuse_transmission
+        result.pdf_solid_angle += out.diffuse_probability * lambert * (1.0 - b.through);
+//#else
         result.pdf_solid_angle += out.diffuse_probability * lambert;
+//#end
     }
+//#if diffuse_transmission
+    if out.diffuse_probability > 0.0 && wi.z <= 0.0 && b.through > 0.0 {
+        let lambert = -wi.z * FRAC_1_PI;
+        let left = out.diffuse_left * bsdf_diffuse_left_at(b, -wi);
+        result.value += b.transmitted_color * (left * lambert);
+        result.pdf_solid_angle += out.diffuse_probability * lambert * b.through;
+    }
+//#end
     if out.interface_probability > 0.0 {
         let lobe = interface_eval_pdf(b.interface_, wo, wi);
         result.value += lobe.value;
         result.pdf_solid_angle += out.interface_probability * lobe.pdf_solid_angle;
     }
+//#if sheen
+    if b.sheen.strength > 0.0 {
+        result.value *= sheen_left(b.sheen, wo, wi);
+        if out.sheen_probability > 0.0 {
+            let lobe = sheen_eval_pdf(b.sheen, wo, wi);
+            result.value += lobe.value;
+            result.pdf_solid_angle += out.sheen_probability * lobe.pdf_solid_angle;
+        }
+    }
+//#end
 //#if clearcoat
     if b.coat.strength > 0.0 {
         result.value *= coat_attenuation(b.coat, wo) * coat_attenuation(b.coat, wi);
@@ -507,7 +646,11 @@ fn cosine_hemisphere(u: vec2f) -> vec3f {
 fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
     let none = BsdfSample(vec3f(0.0), vec3f(0.0), 0.0, false);
     let out = bsdf_outgoing(b, wo);
-    if out.coat_probability + out.interface_probability + out.diffuse_probability <= 0.0 {
+    var any_probability = out.coat_probability + out.interface_probability + out.diffuse_probability;
+//#if sheen
+    any_probability += out.sheen_probability;
+//#end
+    if any_probability <= 0.0 {
         return none;
     }
     var lobe: LobeSample;
@@ -521,6 +664,21 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
         lobe = interface_sample(b.interface_, wo, within, u.yz);
     } else {
         lobe = LobeSample(SPREAD, cosine_hemisphere(u.yz), vec3f(0.0));
+//#if sheen
+        let is_sheen = choice - out.interface_probability < out.sheen_probability;
+        if is_sheen {
+            lobe.wi = sheen_sample(u.yz);
+        }
+//#end
+//#if diffuse_transmission
+        var rest = choice - out.interface_probability;
+//#if sheen
+        rest = select(rest - out.sheen_probability, out.diffuse_probability, is_sheen);
+//#end
+        if rest / out.diffuse_probability < b.through {
+            lobe.wi = -lobe.wi;
+        }
+//#end
     }
     if lobe.kind == ABSORBED {
         return none;
@@ -539,6 +697,9 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
 //#if clearcoat
         weight *= coat_attenuation(b.coat, wo) * coat_attenuation(b.coat, lobe.wi);
 //#end
+//#if sheen
+        weight *= sheen_left(b.sheen, wo, lobe.wi);
+//#end
     }
     if !is_finite3(weight) {
         return none;
@@ -554,6 +715,9 @@ fn bsdf_straight_transmittance(b: Bsdf, wo: vec3f) -> vec3f {
     let coat = coat_attenuation(b.coat, wo);
     through *= coat * coat;
 //#end
+//#if sheen
+    through *= sheen_left(b.sheen, wo, wo);
+//#end
     return through;
 }
 //#end
@@ -561,13 +725,16 @@ fn bsdf_straight_transmittance(b: Bsdf, wo: vec3f) -> vec3f {
 //#if layers
 // Share of uniform light that reaches a viewer straight above, for guide layers.
 fn bsdf_albedo(b: Bsdf) -> vec3f {
-    let terms = albedo_terms_at(b.roughness, 1.0);
-    let let_in = 1.0 - dot(b.f0_f90, albedo_terms_mean(b.roughness));
-    var albedo = b.diffuse_color * (bsdf_diffuse_left(b, terms) * let_in)
-        + interface_albedo(b.interface_, 1.0, terms);
+    let terms = terms_towards(b.interface_.ggx, b.roughness, vec3f(0.0, 0.0, 1.0));
+    let let_in = 1.0 - dot(b.f0_f90, terms_mean(b.interface_.ggx, b.roughness));
     let up = vec3f(0.0, 0.0, 1.0);
+    var albedo = diffuse_sum(b) * (bsdf_diffuse_left(b, terms) * let_in)
+        + interface_albedo(b.interface_, 1.0, terms);
 //#if transmission
-    albedo += bsdf_straight_transmittance(b, up);
+    albedo += interface_straight_transmittance(b.interface_, 1.0);
+//#end
+//#if sheen
+    albedo = albedo * sheen_left(b.sheen, up, up) + b.sheen.color * sheen_albedo(b.sheen, up);
 //#end
 //#if clearcoat
     let under = coat_attenuation(b.coat, up);

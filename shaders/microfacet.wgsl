@@ -2,26 +2,103 @@
 
 const SMOOTH_ALPHA = 1e-3;
 
-fn ggx_distribution(alpha: f32, h: vec3f) -> f32 {
-    let a2 = alpha * alpha;
+struct Ggx {
+    alpha: f32,
+//#if anisotropy
+    along: f32,
+    axis: vec2f,
+//#end
+}
+
+fn ggx_from_roughness(roughness: f32) -> Ggx {
+    let alpha = roughness * roughness;
+//#if anisotropy
+    return Ggx(alpha, alpha, vec2f(1.0, 0.0));
+//#else
+    return Ggx(alpha);
+//#end
+}
+
+fn is_smooth(ggx: Ggx) -> bool {
+    return ggx.alpha < SMOOTH_ALPHA;
+}
+
+//#if anisotropy
+fn ggx_stretched(roughness: f32, strength: f32, axis: vec2f) -> Ggx {
+    let ggx = ggx_from_roughness(roughness);
+    let along = ggx.alpha + (1.0 - ggx.alpha) * (strength * strength);
+    if strength == 0.0 || along < SMOOTH_ALPHA {
+        return ggx;
+    }
+    return Ggx(max(ggx.alpha, SMOOTH_ALPHA), along, axis);
+}
+
+fn is_stretched(ggx: Ggx) -> bool {
+    return ggx.along != ggx.alpha;
+}
+
+fn along_axis(ggx: Ggx, v: vec3f) -> vec2f {
+    return vec2f(dot(v.xy, ggx.axis), dot(v.xy, vec2f(-ggx.axis.y, ggx.axis.x)));
+}
+
+fn widened(ggx: Ggx, v: vec3f) -> vec3f {
+    return vec3f(along_axis(ggx, v) * vec2f(ggx.along, ggx.alpha), v.z);
+}
+
+fn roughness_off_axis(ggx: Ggx, cosine: f32, sine: f32) -> f32 {
+    return sqrt(length(vec2f(ggx.along * cosine, ggx.alpha * sine)));
+}
+
+fn roughness_towards(ggx: Ggx, v: vec3f) -> f32 {
+    let flat = along_axis(ggx, v);
+    let squared = dot(flat, flat);
+    let unit_flat = select(vec2f(1.0, 0.0), flat / sqrt(squared), squared > 0.0);
+    return roughness_off_axis(ggx, unit_flat.x, unit_flat.y);
+}
+//#end
+
+fn ggx_distribution(ggx: Ggx, h: vec3f) -> f32 {
+//#if anisotropy
+    if is_stretched(ggx) {
+        let slopes = along_axis(ggx, h) / vec2f(ggx.along, ggx.alpha);
+        let t = dot(slopes, slopes) + h.z * h.z;
+        return 1.0 / (PI * ggx.along * ggx.alpha * t * t);
+    }
+//#end
+    let a2 = ggx.alpha * ggx.alpha;
     let t = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z;
     return 1.0 / (PI * a2 * t * t);
 }
 
-fn ggx_visibility(alpha: f32, cosine: f32) -> f32 {
-    let a2 = alpha * alpha;
-    return 1.0 / (cosine + sqrt(a2 + (1.0 - a2) * cosine * cosine));
+fn ggx_visibility(ggx: Ggx, v: vec3f) -> f32 {
+//#if anisotropy
+    if is_stretched(ggx) {
+        return 1.0 / (v.z + length(widened(ggx, v)));
+    }
+//#end
+    let a2 = ggx.alpha * ggx.alpha;
+    return 1.0 / (v.z + sqrt(a2 + (1.0 - a2) * v.z * v.z));
 }
 
-fn ggx_sample_visible_normal(alpha: f32, wo: vec3f, u: vec2f) -> vec3f {
-    let wo_std = normalize(vec3f(alpha * wo.x, alpha * wo.y, wo.z));
+fn ggx_sample_visible_normal(ggx: Ggx, wo: vec3f, u: vec2f) -> vec3f {
+//#if anisotropy
+    let wo_std = normalize(widened(ggx, wo));
+//#else
+    let wo_std = normalize(vec3f(ggx.alpha * wo.xy, wo.z));
+//#end
     let z = (1.0 - u.y) * (1.0 + wo_std.z) - wo_std.z;
     let r = sqrt(max(1.0 - z * z, 0.0));
     let sin_cos = sin_cos_turns(u.x);
     let h_std = vec3f(r * sin_cos.y, r * sin_cos.x, z) + wo_std;
-    return normalize(vec3f(alpha * h_std.x, alpha * h_std.y, max(h_std.z, 1e-7)));
+//#if anisotropy
+    let flat = ggx.axis * (ggx.along * h_std.x)
+        + vec2f(-ggx.axis.y, ggx.axis.x) * (ggx.alpha * h_std.y);
+//#else
+    let flat = ggx.alpha * h_std.xy;
+//#end
+    return normalize(vec3f(flat, max(h_std.z, 1e-7)));
 }
 
-fn ggx_visible_normal_pdf_solid_angle(alpha: f32, wo: vec3f, h: vec3f) -> f32 {
-    return 2.0 * ggx_visibility(alpha, wo.z) * ggx_distribution(alpha, h) * max(dot(wo, h), 0.0);
+fn ggx_visible_normal_pdf_solid_angle(ggx: Ggx, wo: vec3f, h: vec3f) -> f32 {
+    return 2.0 * ggx_visibility(ggx, wo) * ggx_distribution(ggx, h) * max(dot(wo, h), 0.0);
 }

@@ -16,7 +16,7 @@ const NORMAL_MAPPED = 64u;
 const NO_TEXTURE = 0xffffffffu;
 
 // Texels of a material in `materials`, as `layout::Material` has them.
-const MATERIAL_TEXELS = 10u;
+const MATERIAL_TEXELS = 14u;
 const BASE_COLOR_ALPHA = 0u;
 const EMISSIVE_CUTOFF = 1u;
 const SPECULAR_COLOR_STRENGTH = 2u;
@@ -27,7 +27,11 @@ const FACTORS = 4u;
 const SCALES_FLAGS = 5u;
 const FIRST_TEXTURES = 6u;
 // Scattering inside of a body and its mean cosine.
-const SCATTERING = 9u;
+const SCATTERING = 10u;
+// Strength, cosine and sine of the rotation.
+const ANISOTROPY_SHEEN_ROUGHNESS = 11u;
+const SHEEN_COLOR = 12u;
+const DIFFUSE_TRANSMISSION = 13u;
 
 // Textures of a material.
 const BASE_COLOR = 0u;
@@ -40,7 +44,16 @@ const TRANSMISSION = 6u;
 const CLEARCOAT = 7u;
 const CLEARCOAT_ROUGHNESS = 8u;
 const CLEARCOAT_NORMAL = 9u;
+//#if uncommon_textures
+const ANISOTROPY_MAP = 10u;
+const SHEEN_COLOR_MAP = 11u;
+const SHEEN_ROUGHNESS_MAP = 12u;
+const DIFFUSE_TRANSMISSION_MAP = 13u;
+const DIFFUSE_TRANSMISSION_COLOR_MAP = 14u;
+const TEXTURES = 15u;
+//#else
 const TEXTURES = 10u;
+//#end
 
 struct SurfaceParameters {
     base_color: vec3f,
@@ -58,6 +71,18 @@ struct SurfaceParameters {
     emissive: vec3f,
     thin: bool,
     unlit: bool,
+//#if anisotropy
+    anisotropy: f32,
+    anisotropy_axis: vec2f,
+//#end
+//#if sheen
+    sheen_color: vec3f,
+    sheen_roughness: f32,
+//#end
+//#if diffuse_transmission
+    diffuse_transmission: f32,
+    diffuse_transmission_color: vec3f,
+//#end
 }
 
 struct SurfacePoint {
@@ -81,10 +106,6 @@ fn corner_new(triangle: u32, barycentric: vec2f) -> Corner {
     let record = triangles(triangle);
     let weights = vec3f(1.0 - barycentric.x - barycentric.y, barycentric);
     return Corner(record.xyz, weights, record.w);
-}
-
-fn material_of(triangle: u32) -> u32 {
-    return triangles(triangle).w;
 }
 
 fn material_words(material: u32, texel: u32) -> vec4u {
@@ -134,10 +155,17 @@ fn corner_uvs(corner: Corner, first_set: vec2f) -> vec4f {
 //#end
 }
 
-// All textures of the material here. One loop: a shader holds the code of a texture read once.
+// All textures of the material here. One loop, over those that any material of the scene has: a
+// shader holds the code of a texture read once.
 fn read_textures(corner: Corner, uvs: vec4f) -> array<vec4f, TEXTURES> {
     var values: array<vec4f, TEXTURES>;
     for (var i = 0u; i < TEXTURES; i++) {
+        values[i] = vec4f(1.0);
+    }
+    var left = TEXTURES_IN_SCENE;
+    while left != 0u {
+        let i = firstTrailingBit(left);
+        left &= left - 1u;
         values[i] = read_texture(texture_of(corner.material, i), uvs);
     }
     return values;
@@ -168,6 +196,22 @@ fn mapped_normal(corner: Corner, normal: vec3f, slot: u32, texture: vec4f, scale
 //#end
     return normal;
 }
+
+//#if anisotropy
+// Twin of `Corner::anisotropy_direction`.
+fn anisotropy_direction(corner: Corner, normal: vec3f, texture: vec4f) -> vec3f {
+    let first = vertex_texel(corner.vertices.x, TANGENT_TEXEL);
+    let tangent = interpolate(corner, TANGENT_TEXEL).xyz;
+    let bitangent = cross(normal, tangent) * first.w;
+    var direction = vec2f(1.0, 0.0);
+    if texture_of(corner.material, ANISOTROPY_MAP) != NO_TEXTURE {
+        direction = texture.xy * 2.0 - 1.0;
+    }
+    let turn = material_numbers(corner.material, ANISOTROPY_SHEEN_ROUGHNESS).yz;
+    return tangent * (turn.x * direction.x - turn.y * direction.y)
+        + bitangent * (turn.y * direction.x + turn.x * direction.y);
+}
+//#end
 
 fn opacity(flags: u32, cutoff: f32, alpha: f32) -> f32 {
     if (flags & ALPHA_MASK) != 0u {
@@ -216,6 +260,21 @@ fn corner_parameters(corner: Corner, textures: array<vec4f, TEXTURES>) -> Surfac
     p.clearcoat = saturate(factors.w * textures[CLEARCOAT].x);
     p.clearcoat_roughness = saturate(roughness * textures[CLEARCOAT_ROUGHNESS].y);
 //#end
+//#if anisotropy
+    p.anisotropy =
+        saturate(material_numbers(m, ANISOTROPY_SHEEN_ROUGHNESS).x * textures[ANISOTROPY_MAP].z);
+    p.anisotropy_axis = vec2f(1.0, 0.0);
+//#end
+//#if sheen
+    p.sheen_color = material_numbers(m, SHEEN_COLOR).xyz * textures[SHEEN_COLOR_MAP].xyz;
+    let sheen_roughness = material_numbers(m, ANISOTROPY_SHEEN_ROUGHNESS).w;
+    p.sheen_roughness = saturate(sheen_roughness * textures[SHEEN_ROUGHNESS_MAP].w);
+//#end
+//#if diffuse_transmission
+    let through = material_numbers(m, DIFFUSE_TRANSMISSION);
+    p.diffuse_transmission = saturate(through.w * textures[DIFFUSE_TRANSMISSION_MAP].w);
+    p.diffuse_transmission_color = through.xyz * textures[DIFFUSE_TRANSMISSION_COLOR_MAP].xyz;
+//#end
     p.unlit = (flags & UNLIT) != 0u;
     if p.unlit {
         p.emissive = p.base_color;
@@ -261,6 +320,14 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
     }
 //#end
     point.shading_frame = frame_from_z(normalize(normal));
+//#if anisotropy
+    if point.parameters.anisotropy > 0.0 {
+        let wide = anisotropy_direction(corner, unmapped, textures[ANISOTROPY_MAP]);
+        let axis = local_from_world(point.shading_frame, wide).xy;
+        point.parameters.anisotropy_axis =
+            normalize_or(vec3f(axis, 0.0), vec3f(1.0, 0.0, 0.0)).xy;
+    }
+//#end
 //#if clearcoat
     let is_mapped = (bitcast<u32>(scales.w) & NORMAL_MAPPED) != 0u;
     if point.parameters.clearcoat > 0.0 && is_mapped {

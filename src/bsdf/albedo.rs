@@ -8,6 +8,7 @@
 //! energy at grazing angles.
 
 use std::array;
+use std::f32::consts::{FRAC_1_SQRT_2, FRAC_PI_8};
 use std::sync::LazyLock;
 
 use glam::{Vec2, Vec3};
@@ -29,23 +30,70 @@ struct Row {
 
 static ROWS: LazyLock<[Row; ROUGHNESSES]> = LazyLock::new(|| array::from_fn(row));
 
-/// The albedo terms of one roughness, interpolated between two rows.
+/// The albedo terms of a GGX.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AlbedoTerms {
+    ggx: Ggx,
+    rows: RowPair,
+}
+
+impl AlbedoTerms {
+    /// `roughness` is perceptual, in `[0,1]`; that of `ggx` across its axis.
+    pub(crate) fn of(ggx: Ggx, roughness: f32) -> Self {
+        Self { ggx, rows: RowPair::of(roughness) }
+    }
+
+    /// `(A, B)` towards a unit `v` above the surface, each in `[0,1]`.
+    ///
+    /// A stretched GGX is taken from those of one width: `B` of one that masks as much towards `v`,
+    /// `A`, which hardly depends on the azimuth, of one between the two widths. Measured for all
+    /// widths and strengths: `0.04 A + B` is at most 0.01 too small.
+    pub(crate) fn at(self, v: Vec3) -> Vec2 {
+        if !self.ggx.is_stretched() {
+            return self.rows.at(v.z);
+        }
+        let towards = RowPair::of(self.ggx.roughness_towards(v)).at(v.z);
+        self.stretched(self.diagonal().at(v.z), towards)
+    }
+
+    /// Cosine-weighted mean of [`Self::at`] over the hemisphere; of a stretched GGX over two azimuths.
+    pub(crate) fn mean(self) -> Vec2 {
+        if !self.ggx.is_stretched() {
+            return self.rows.mean();
+        }
+        let off_axis = |cos, sin| RowPair::of(self.ggx.roughness_off_axis(cos, sin)).mean();
+        let (sin, cos) = FRAC_PI_8.sin_cos();
+        let towards = 0.5 * (off_axis(cos, sin) + off_axis(sin, cos));
+        self.stretched(self.diagonal().mean(), towards)
+    }
+
+    fn diagonal(self) -> RowPair {
+        RowPair::of(self.ggx.roughness_off_axis(FRAC_1_SQRT_2, FRAC_1_SQRT_2))
+    }
+
+    /// `A` is raised by as much as it may be too small where the interface reflects white.
+    fn stretched(self, diagonal: Vec2, towards: Vec2) -> Vec2 {
+        let a = diagonal.x + 0.3 * self.ggx.stretch() * (1.0 - diagonal.x);
+        Vec2::new(a.min(1.0 - towards.y), towards.y)
+    }
+}
+
+/// One roughness, interpolated between two rows.
+#[derive(Debug, Clone, Copy)]
+struct RowPair {
     row: u32,
     fraction: f32,
 }
 
-impl AlbedoTerms {
-    /// `roughness` is perceptual, in `[0,1]`.
-    pub(crate) fn of(roughness: f32) -> Self {
+impl RowPair {
+    fn of(roughness: f32) -> Self {
         let x = roughness * (ROUGHNESSES - 1) as f32;
         let row = (x as usize).min(ROUGHNESSES - 2);
         Self { row: row as u32, fraction: x - row as f32 }
     }
 
-    /// `(A, B)` seen from a direction of this cosine, in `[0,1]`.
-    pub(crate) fn at(self, cos: f32) -> Vec2 {
+    /// `(A, B)` at a cosine in `[0,1]`.
+    fn at(self, cos: f32) -> Vec2 {
         let x = cos.clamp(0.0, 1.0).sqrt() * (COSINES - 1) as f32;
         let column = (x as usize).min(COSINES - 2);
         let fraction = x - column as f32;
@@ -53,8 +101,7 @@ impl AlbedoTerms {
         self.between(in_row)
     }
 
-    /// Cosine-weighted mean of [`Self::at`] over the hemisphere.
-    pub(crate) fn mean(self) -> Vec2 {
+    fn mean(self) -> Vec2 {
         self.between(|row| row.mean)
     }
 
@@ -107,7 +154,7 @@ fn entry(ggx: Ggx, cos: f32, samples: u32) -> Vec2 {
         let h = ggx.sample_visible_normal(wo, u);
         let wi = reflect(wo, h);
         if wi.z > 0.0 {
-            let masking = 2.0 * wi.z * ggx.visibility(wi.z);
+            let masking = 2.0 * wi.z * ggx.visibility(wi);
             let w = schlick_weight(wo.dot(h));
             sum += masking * Vec2::new(1.0 - w, w);
         }
@@ -126,7 +173,7 @@ mod tests {
             for c in 0..20 {
                 let (roughness, cos) = ((r as f32 + 0.37) / 20.0, (c as f32 + 0.43) / 20.0);
                 let exact = entry(Ggx::from_roughness(roughness), cos, 1 << 16);
-                let error = AlbedoTerms::of(roughness).at(cos) - exact;
+                let error = RowPair::of(roughness).at(cos) - exact;
                 worst = worst.max(error.abs().max_element());
             }
         }

@@ -78,8 +78,8 @@ impl Coat {
             return (0.0, 0.0);
         }
         let h = (o + i).normalize();
-        let common = self.ggx.distribution(h) * self.ggx.visibility(o.z);
-        let value = self.strength * fresnel(o.dot(h)) * common * self.ggx.visibility(i.z) * i.z;
+        let common = self.ggx.distribution(h) * self.ggx.visibility(o);
+        let value = self.strength * fresnel(o.dot(h)) * common * self.ggx.visibility(i) * i.z;
         // Visible normals over the Jacobian 4 (wo . h).
         (value, 0.5 * common)
     }

@@ -63,7 +63,7 @@ impl Interface {
             1.0 / ior
         };
         Self {
-            ggx: Ggx::from_roughness(p.roughness),
+            ggx: Ggx::stretched(p.roughness, p.anisotropy, p.anisotropy_axis),
             f0: f0 * opaque + p.base_color * p.metallic,
             f90: f90 * opaque + p.metallic,
             glass,
@@ -73,6 +73,11 @@ impl Interface {
             eta,
             thin: p.thin,
         }
+    }
+
+    /// By what radiance scales on its way through: the inside of a solid is denser with it.
+    pub(super) fn radiance_scale(&self) -> f32 {
+        if self.thin { 1.0 } else { 1.0 / (self.eta * self.eta) }
     }
 
     /// Whether nothing is reflected or transmitted.
@@ -89,6 +94,11 @@ impl Interface {
 
     fn is_smooth(&self) -> bool {
         self.ggx.is_smooth()
+    }
+
+    /// The microfacets.
+    pub(super) fn ggx(&self) -> Ggx {
+        self.ggx
     }
 
     /// Reflectance and transmittance of a facet seen at this cosine.
@@ -201,9 +211,9 @@ impl Interface {
         } else {
             (facet.transmittance, 1.0 - probability)
         };
-        let common = self.ggx.distribution(h) * self.ggx.visibility(wo.z);
+        let common = self.ggx.distribution(h) * self.ggx.visibility(wo);
         // Visible normals over the Jacobian 4 (wo . h).
-        (color * (common * self.ggx.visibility(wi.z) * wi.z), 0.5 * common * probability)
+        (color * (common * self.ggx.visibility(wi) * wi.z), 0.5 * common * probability)
     }
 
     /// Walter et al., *Microfacet Models for Refraction through Rough Surfaces*, EGSR 2007, eq. 21,
@@ -220,7 +230,7 @@ impl Interface {
         let denominator = cos_o + self.eta * cos_i;
         let jacobian = -cos_i / (denominator * denominator);
         let visible = self.ggx.visible_normal_pdf_solid_angle(wo, h) * jacobian;
-        let masking = 2.0 * -wi.z * self.ggx.visibility(-wi.z);
+        let masking = 2.0 * -wi.z * self.ggx.visibility(-wi);
         let probability = 1.0 - facet.reflection_probability();
         (facet.transmittance * (visible * masking), visible * self.eta * self.eta * probability)
     }

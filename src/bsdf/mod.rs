@@ -1,7 +1,8 @@
 //! How light is scattered at a surface point: glTF 2.0 metallic-roughness with the extensions ior,
-//! specular, transmission, volume and clearcoat.
+//! specular, transmission, volume, anisotropy, sheen, diffuse transmission and clearcoat.
 //!
-//! From the outside in: a clearcoat, the base's GGX interface (`interface`), and a Lambertian body.
+//! From the outside in: a clearcoat, sheen, the base's GGX interface (`interface`), and a Lambertian
+//! body (`diffuse`).
 //! Where glTF's sample formulas gain energy or are not reciprocal, they are replaced (the
 //! specification allows it): the body gets what the interface leaves over in both directions
 //! (`albedo`), and the coat attenuates what is under it on the way in and on the way out. With
@@ -16,11 +17,11 @@
 
 pub(crate) mod albedo;
 mod coat;
+mod diffuse;
 pub(crate) mod fresnel;
 mod interface;
 pub(crate) mod microfacet;
-
-use std::f32::consts::FRAC_1_PI;
+pub(crate) mod sheen;
 
 use glam::{Vec2, Vec3};
 
@@ -29,8 +30,10 @@ use crate::math::sin_cos_turns;
 pub use crate::scene::surface::SurfaceParameters;
 use albedo::AlbedoTerms;
 use coat::Coat;
+use diffuse::Diffuse;
 use fresnel::normal_reflectance;
 use interface::Interface;
+use sheen::Sheen;
 
 /// A direction drawn by [`Bsdf::sample`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,17 +56,8 @@ pub struct BsdfSample {
 pub struct Bsdf {
     interface: Interface,
     diffuse: Diffuse,
+    sheen: Sheen,
     coat: Coat,
-    terms: AlbedoTerms,
-}
-
-/// Lambert's lobe under the opaque dielectric's share of the interface.
-#[derive(Debug, Clone, Copy)]
-struct Diffuse {
-    /// Base colour times share, over what the interface lets in on average.
-    color: Vec3,
-    /// The dielectric's largest F0 and its F90.
-    f0_f90: Vec2,
 }
 
 /// What depends on `wo` alone: what the interface leaves for the body, and the probability of each
@@ -73,6 +67,7 @@ struct Outgoing {
     diffuse_left: f32,
     coat_probability: f32,
     interface_probability: f32,
+    sheen_probability: f32,
     diffuse_probability: f32,
 }
 
@@ -84,17 +79,13 @@ impl Bsdf {
         let f90 = p.specular;
         let f0 = (normal_reflectance(p.ior) * p.specular_color).min(Vec3::ONE) * p.specular;
         let f0_f90 = Vec2::new(f0.max_element(), f90);
-        let terms = AlbedoTerms::of(p.roughness);
-        let mut color = p.base_color * ((1.0 - p.metallic) * (1.0 - p.transmission));
-        if f90 > 0.0 && color != Vec3::ZERO {
-            let let_in = 1.0 - f0_f90.dot(terms.mean());
-            color = if let_in > 1e-4 { color / let_in } else { Vec3::ZERO };
-        }
+        let interface = Interface::new(p, f0, f90, entering);
+        let terms = AlbedoTerms::of(interface.ggx(), p.roughness);
         Self {
-            interface: Interface::new(p, f0, f90, entering),
-            diffuse: Diffuse { color, f0_f90 },
+            interface,
+            diffuse: Diffuse::new(p, f0_f90, terms, &interface),
+            sheen: Sheen::new(p, entering),
             coat: Coat::new(p, entering),
-            terms,
         }
     }
 
@@ -115,14 +106,20 @@ impl Bsdf {
             let choice = (choice / out.interface_probability).min(1.0 - f32::EPSILON);
             self.interface.sample(wo, choice, direction)?
         } else {
-            LobeSample::Spread(cosine_hemisphere(direction))
+            let choice = choice - out.interface_probability;
+            if choice < out.sheen_probability {
+                LobeSample::Spread(Sheen::sample(direction))
+            } else {
+                let choice = (choice - out.sheen_probability) / out.diffuse_probability;
+                LobeSample::Spread(self.diffuse.sample(choice, direction))
+            }
         };
         match lobe {
             LobeSample::Spread(wi) => self.spread_sample(wo, wi, &out),
             LobeSample::Coat(wi, weight) => delta_sample(wi, weight),
             LobeSample::Interface(wi, weight) => {
-                let coat = self.coat.attenuation(wo) * self.coat.attenuation(wi);
-                delta_sample(wi, weight * (coat / out.interface_probability))
+                let left = self.left_by_layers(wo, wi);
+                delta_sample(wi, weight * (left / out.interface_probability))
             }
         }
     }
@@ -143,28 +140,30 @@ impl Bsdf {
     /// No part of it is in `eval` or `sample`: the integrator lets paths and shadow rays through
     /// alike. The wall's reflection is in `sample`, so the two are to be added, not mixed.
     pub fn straight_transmittance(&self, wo: Vec3) -> Vec3 {
-        let coat = self.coat.attenuation(wo);
-        self.interface.straight_transmittance(wo.z.abs()) * (coat * coat)
+        self.interface.straight_transmittance(wo.z.abs()) * self.left_by_layers(wo, wo)
     }
 
     /// Whether all scattering is perfect reflection or refraction (or there is none), so that
     /// sampling lights at this point is useless.
     pub fn is_delta_only(&self) -> bool {
-        self.diffuse.color == Vec3::ZERO
+        self.diffuse.is_absent()
             && self.interface.is_delta_or_absent()
+            && self.sheen.is_hidden()
             && self.coat.is_delta_or_absent()
     }
 
     /// Share of uniform light from everywhere that reaches a viewer straight above, in `[0,1]`;
     /// an estimate for guide layers of denoisers.
     pub fn albedo(&self) -> Vec3 {
-        let terms = self.terms.at(1.0);
-        let let_in = 1.0 - self.diffuse.f0_f90.dot(self.terms.mean());
-        let diffuse = self.diffuse.color * (self.diffuse_left(terms) * let_in);
-        let interface = self.interface.albedo(1.0, terms) + self.straight_transmittance(Vec3::Z);
-        let under = self.coat.attenuation(Vec3::Z);
-        let coat = self.coat.albedo(Vec3::Z);
-        (coat + under * under * (diffuse + interface)).clamp(Vec3::ZERO, Vec3::ONE)
+        let up = Vec3::Z;
+        let terms = self.diffuse.terms_at(up);
+        let diffuse = self.diffuse.albedo(self.diffuse.left_of(terms));
+        let interface =
+            self.interface.albedo(1.0, terms) + self.interface.straight_transmittance(1.0);
+        let base = self.sheen.left(up, up) * (diffuse + interface);
+        let under = self.coat.attenuation(up);
+        let under = under * under * (self.sheen.colored_albedo(up) + base);
+        (self.coat.albedo(up) + under).clamp(Vec3::ZERO, Vec3::ONE)
     }
 
     fn spread_sample(&self, wo: Vec3, wi: Vec3, out: &Outgoing) -> Option<BsdfSample> {
@@ -181,16 +180,23 @@ impl Bsdf {
 
     fn eval_pdf_with(&self, wo: Vec3, wi: Vec3, out: &Outgoing) -> (Vec3, f32) {
         let (mut value, mut pdf) = (Vec3::ZERO, 0.0);
-        if out.diffuse_probability > 0.0 && wi.z > 0.0 {
-            let lambert = wi.z * FRAC_1_PI;
-            let left = out.diffuse_left * self.diffuse_left_at(wi.z);
-            value += self.diffuse.color * (left * lambert);
-            pdf += out.diffuse_probability * lambert;
+        if out.diffuse_probability > 0.0 {
+            let (diffuse, diffuse_pdf) = self.diffuse.eval_pdf(out.diffuse_left, wi);
+            value += diffuse;
+            pdf += out.diffuse_probability * diffuse_pdf;
         }
         if out.interface_probability > 0.0 {
             let (interface, interface_pdf) = self.interface.eval_pdf(wo, wi);
             value += interface;
             pdf += out.interface_probability * interface_pdf;
+        }
+        if !self.sheen.is_absent() {
+            value *= self.sheen.left(wo, wi);
+            if out.sheen_probability > 0.0 {
+                let (sheen, sheen_pdf) = self.sheen.eval_pdf(wo, wi);
+                value += sheen;
+                pdf += out.sheen_probability * sheen_pdf;
+            }
         }
         if self.coat.is_absent() {
             return (value, pdf);
@@ -204,48 +210,49 @@ impl Bsdf {
         (value, pdf)
     }
 
+    /// What coat and sheen leave of the base's light between two directions.
+    fn left_by_layers(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.coat.attenuation(wo) * self.coat.attenuation(wi) * self.sheen.left(wo, wi)
+    }
+
     /// `None` if nothing is scattered towards `wo`.
     fn outgoing(&self, wo: Vec3) -> Option<Outgoing> {
         if wo.z.is_nan() || wo.z <= 0.0 {
             return None;
         }
-        if self.coat.is_absent() {
+        if self.coat.is_absent() && self.sheen.is_absent() {
             // One lobe, or none, needs no albedos.
-            let (diffuse, interface) =
-                (self.diffuse.color != Vec3::ZERO, !self.interface.is_absent());
+            let (diffuse, interface) = (!self.diffuse.is_absent(), !self.interface.is_absent());
             if !(diffuse && interface) {
                 return (diffuse || interface).then(|| Outgoing {
                     diffuse_left: 1.0,
                     coat_probability: 0.0,
                     interface_probability: f32::from(interface),
+                    sheen_probability: 0.0,
                     diffuse_probability: f32::from(diffuse),
                 });
             }
         }
-        let terms = self.terms.at(wo.z);
-        let diffuse_left = self.diffuse_left(terms);
+        let terms = self.diffuse.terms_at(wo);
+        let diffuse_left = self.diffuse.left_of(terms);
         let under = self.coat.attenuation(wo);
+        let base = under * self.sheen.left(wo, wo);
         let coat = self.coat.albedo(wo);
-        let interface = under * importance(self.interface.albedo(wo.z, terms));
-        let diffuse = under * diffuse_left * importance(self.diffuse.color);
-        let sum = coat + interface + diffuse;
+        let interface = base * importance(self.interface.albedo(wo.z, terms));
+        let sheen = if self.sheen.is_absent() {
+            0.0
+        } else {
+            under * importance(self.sheen.colored_albedo(wo))
+        };
+        let diffuse = base * diffuse_left * self.diffuse.importance();
+        let sum = coat + interface + sheen + diffuse;
         (sum > 0.0).then(|| Outgoing {
             diffuse_left,
             coat_probability: coat / sum,
             interface_probability: interface / sum,
+            sheen_probability: sheen / sum,
             diffuse_probability: diffuse / sum,
         })
-    }
-
-    fn diffuse_left(&self, terms: Vec2) -> f32 {
-        (1.0 - self.diffuse.f0_f90.dot(terms)).max(0.0)
-    }
-
-    fn diffuse_left_at(&self, cos: f32) -> f32 {
-        if self.diffuse.f0_f90 == Vec2::ZERO {
-            return 1.0;
-        }
-        self.diffuse_left(self.terms.at(cos))
     }
 }
 

@@ -146,6 +146,15 @@ pub struct Material {
     pub transmission: f32,
     /// R multiplies `transmission`.
     pub transmission_texture: Option<TextureRef>,
+    /// `KHR_materials_diffuse_transmission`: share in `[0,1]` of the body's light that comes through
+    /// instead of back.
+    pub diffuse_transmission: f32,
+    /// A multiplies `diffuse_transmission`.
+    pub diffuse_transmission_texture: Option<TextureRef>,
+    /// Colour of what comes through, linear, in `[0,1]`.
+    pub diffuse_transmission_color: Vec3,
+    /// RGB multiplies `diffuse_transmission_color` (sRGB).
+    pub diffuse_transmission_color_texture: Option<TextureRef>,
     /// `KHR_materials_volume` thickness; 0 is a thin wall, more is a solid body with an inside.
     pub thickness: f32,
     /// Colour that white light becomes after `attenuation_distance` inside the body.
@@ -156,6 +165,22 @@ pub struct Material {
     pub scattering: Vec3,
     /// Mean cosine of scattering inside the body, as [`Medium::anisotropy`].
     pub scatter_anisotropy: f32,
+    /// `KHR_materials_anisotropy` strength in `[0,1]`: how much wider reflections are along the
+    /// direction below than `roughness` says; 1 is as wide as roughness 1.
+    pub anisotropy: f32,
+    /// Direction of that width in radians from the tangent, counter-clockwise.
+    pub anisotropy_rotation: f32,
+    /// RG is the direction before rotation in `[-1,1]`, along tangent and bitangent; B multiplies
+    /// `anisotropy`.
+    pub anisotropy_texture: Option<TextureRef>,
+    /// `KHR_materials_sheen` colour, linear, in `[0,1]`; black is none.
+    pub sheen_color: Vec3,
+    /// RGB multiplies `sheen_color` (sRGB).
+    pub sheen_color_texture: Option<TextureRef>,
+    /// Perceptual roughness of the sheen in `[0,1]`.
+    pub sheen_roughness: f32,
+    /// A multiplies `sheen_roughness`.
+    pub sheen_roughness_texture: Option<TextureRef>,
     /// `KHR_materials_clearcoat` strength in `[0,1]`.
     pub clearcoat: f32,
     /// R multiplies `clearcoat`.
@@ -194,11 +219,22 @@ impl Default for Material {
             specular_color_texture: None,
             transmission: 0.0,
             transmission_texture: None,
+            diffuse_transmission: 0.0,
+            diffuse_transmission_texture: None,
+            diffuse_transmission_color: Vec3::ONE,
+            diffuse_transmission_color_texture: None,
             thickness: 0.0,
             attenuation_color: Vec3::ONE,
             attenuation_distance: f32::INFINITY,
             scattering: Vec3::ZERO,
             scatter_anisotropy: 0.0,
+            anisotropy: 0.0,
+            anisotropy_rotation: 0.0,
+            anisotropy_texture: None,
+            sheen_color: Vec3::ZERO,
+            sheen_color_texture: None,
+            sheen_roughness: 0.0,
+            sheen_roughness_texture: None,
             clearcoat: 0.0,
             clearcoat_texture: None,
             clearcoat_roughness: 0.0,
@@ -211,7 +247,7 @@ impl Default for Material {
 
 impl Material {
     /// All textures, in the order in which `shaders/surface.wgsl` numbers them.
-    pub fn textures(&self) -> [&Option<TextureRef>; 10] {
+    pub fn textures(&self) -> [&Option<TextureRef>; 15] {
         [
             &self.base_color_texture,
             &self.metallic_roughness_texture,
@@ -223,6 +259,11 @@ impl Material {
             &self.clearcoat_texture,
             &self.clearcoat_roughness_texture,
             &self.clearcoat_normal_texture,
+            &self.anisotropy_texture,
+            &self.sheen_color_texture,
+            &self.sheen_roughness_texture,
+            &self.diffuse_transmission_texture,
+            &self.diffuse_transmission_color_texture,
         ]
     }
 }

@@ -1,5 +1,6 @@
 //! What a scene needs of the renderer, asked once.
 
+use glam::Vec3;
 use serde::Serialize;
 
 use super::{AlphaMode, Material, Scene};
@@ -9,6 +10,8 @@ use super::{AlphaMode, Material, Scene};
 pub struct SceneNeeds {
     /// Any texture at all.
     pub textures: bool,
+    /// Bit `i`: some material has the `i`-th of [`Material::textures`].
+    pub texture_slots: u32,
     /// A second set of texture coordinates.
     pub second_uv_set: bool,
     /// Normal maps, hence tangents.
@@ -25,14 +28,20 @@ pub struct SceneNeeds {
     pub metals: bool,
     /// Thin-walled transmission.
     pub thin_transmission: bool,
-    /// Refraction into solid bodies.
+    /// Light that enters solid bodies.
     pub solid_transmission: bool,
+    /// Light that comes through diffusely.
+    pub diffuse_transmission: bool,
     /// Absorption inside solid bodies.
     pub absorption: bool,
     /// A medium between surfaces.
     pub medium: bool,
     /// Scattering inside solid bodies.
     pub scattering_solids: bool,
+    /// Reflections that are wider in one direction.
+    pub anisotropy: bool,
+    /// Sheen.
+    pub sheen: bool,
     /// Clearcoat.
     pub clearcoat: bool,
     /// Unlit surfaces.
@@ -63,9 +72,12 @@ impl SceneNeeds {
     }
 
     fn add(&mut self, m: &Material) {
-        for texture in m.textures().into_iter().flatten() {
-            self.textures = true;
-            self.second_uv_set |= texture.uv_set == 1;
+        for (slot, texture) in m.textures().into_iter().enumerate() {
+            if let Some(texture) = texture {
+                self.textures = true;
+                self.texture_slots |= 1 << slot;
+                self.second_uv_set |= texture.uv_set == 1;
+            }
         }
         self.normal_maps |= m.normal_texture.is_some() || m.clearcoat_normal_texture.is_some();
         self.alpha_mask |= matches!(m.alpha_mode, AlphaMode::Mask { .. });
@@ -73,11 +85,14 @@ impl SceneNeeds {
         self.single_sided |= !m.double_sided;
         self.metals |= m.metallic > 0.0;
         self.thin_transmission |= m.transmission > 0.0 && m.thickness == 0.0;
-        self.solid_transmission |= m.transmission > 0.0 && m.thickness > 0.0;
-        self.absorption |=
-            m.transmission > 0.0 && m.thickness > 0.0 && m.attenuation_distance.is_finite();
-        self.scattering_solids |=
-            m.transmission > 0.0 && m.thickness > 0.0 && m.scattering != glam::Vec3::ZERO;
+        self.diffuse_transmission |= m.diffuse_transmission > 0.0;
+        let has_inside =
+            (m.transmission > 0.0 || m.diffuse_transmission > 0.0) && m.thickness > 0.0;
+        self.solid_transmission |= has_inside;
+        self.absorption |= has_inside && m.attenuation_distance.is_finite();
+        self.scattering_solids |= has_inside && m.scattering != Vec3::ZERO;
+        self.anisotropy |= m.anisotropy > 0.0;
+        self.sheen |= m.sheen_color != Vec3::ZERO;
         self.clearcoat |= m.clearcoat > 0.0;
         self.unlit |= m.unlit;
         self.emitters |= is_emitter(m);
@@ -99,9 +114,12 @@ impl SceneNeeds {
             (self.alpha_blend, "opacity along rays: no material is blended"),
             (self.thin_transmission, "thin glass: no material transmits without volume"),
             (self.solid_transmission, "refraction: no material is a transmitting solid"),
+            (self.diffuse_transmission, "diffuse transmission: no material has it"),
             (self.absorption, "absorption: no solid absorbs"),
             (self.medium, "fog: the scene has none"),
             (self.scattering_solids, "scattering inside of solids: none is filled"),
+            (self.anisotropy, "anisotropy: no material has a direction"),
+            (self.sheen, "sheen: no material has it"),
             (self.clearcoat, "clearcoat: no material is coated"),
             (self.emitters, "sampling of emissive triangles: nothing emits"),
             (self.punctual_lights, "punctual lights: the scene has none"),

@@ -33,10 +33,22 @@ pub struct SurfaceParameters {
     pub specular_color: Vec3,
     /// Share of the dielectric's body that is clear, in `[0,1]`.
     pub transmission: f32,
+    /// Share of the diffuse body's light that comes through instead of back, in `[0,1]`.
+    pub diffuse_transmission: f32,
+    /// Colour of what comes through, each component in `[0,1]`.
+    pub diffuse_transmission_color: Vec3,
     /// A wall without an inside: light is not bent.
     pub thin: bool,
     /// Absorption coefficient of the inside per metre; zero if thin.
     pub absorption: Vec3,
+    /// How much wider than `roughness` reflections are along the axis, in `[0,1]`.
+    pub anisotropy: f32,
+    /// Unit direction of that width in the local shading frame's plane; +X if not anisotropic.
+    pub anisotropy_axis: Vec2,
+    /// Colour of the sheen, each component in `[0,1]`; black is none.
+    pub sheen_color: Vec3,
+    /// Perceptual roughness of the sheen in `[0,1]`.
+    pub sheen_roughness: f32,
     /// Strength of the coat in `[0,1]`.
     pub clearcoat: f32,
     /// Perceptual roughness of the coat in `[0,1]`.
@@ -92,6 +104,11 @@ impl SurfacePoint {
         // What is not metal hardly needs its reflection, but its diffuse light needs the slope.
         let normal = normal.lerp(facing.mirroring(normal), parameters.metallic);
         let shading_frame = Frame::from_z(normal.normalize());
+        if parameters.anisotropy > 0.0 {
+            let world = corner.anisotropy_direction(unmapped);
+            let local = shading_frame.local_from_world(world);
+            parameters.anisotropy_axis = Vec2::new(local.x, local.y).normalize_or(Vec2::X);
+        }
         if parameters.clearcoat > 0.0 && has_normal_map(material) {
             let (texture, scale) =
                 (material.clearcoat_normal_texture, material.clearcoat_normal_scale);
@@ -198,6 +215,20 @@ impl<'a> Corner<'a> {
         tangent * (map.x * scale) + bitangent * (map.y * scale) + normal * map.z
     }
 
+    /// World direction in which reflections are wide, not of unit length; zero without tangents.
+    fn anisotropy_direction(&self, normal: Vec3) -> Vec3 {
+        if self.scene.tangents.is_empty() {
+            return Vec3::ZERO;
+        }
+        let m = self.material();
+        let tangent = self.interpolate(&self.scene.tangents).xyz();
+        let bitangent = normal.cross(tangent) * self.scene.tangents[self.vertices[0]].w;
+        let read = |t| self.read(Some(t)).xy() * 2.0 - 1.0;
+        let direction = m.anisotropy_texture.map_or(Vec2::X, read);
+        let direction = Vec2::from_angle(m.anisotropy_rotation).rotate(direction);
+        tangent * direction.x + bitangent * direction.y
+    }
+
     fn parameters(&self) -> SurfaceParameters {
         let m = self.material();
         let base = self.base_color();
@@ -214,8 +245,17 @@ impl<'a> Corner<'a> {
             specular: unit(m.specular * self.read(m.specular_texture).w),
             specular_color: m.specular_color * self.read(m.specular_color_texture).xyz(),
             transmission: unit(m.transmission * self.read(m.transmission_texture).x),
+            diffuse_transmission: unit(
+                m.diffuse_transmission * self.read(m.diffuse_transmission_texture).w,
+            ),
+            diffuse_transmission_color: m.diffuse_transmission_color
+                * self.read(m.diffuse_transmission_color_texture).xyz(),
             thin,
             absorption: if thin { Vec3::ZERO } else { absorption(m) },
+            anisotropy: unit(m.anisotropy * self.read(m.anisotropy_texture).z),
+            anisotropy_axis: Vec2::X,
+            sheen_color: m.sheen_color * self.read(m.sheen_color_texture).xyz(),
+            sheen_roughness: unit(m.sheen_roughness * self.read(m.sheen_roughness_texture).w),
             clearcoat: unit(m.clearcoat * self.read(m.clearcoat_texture).x),
             clearcoat_roughness: unit(
                 m.clearcoat_roughness * self.read(m.clearcoat_roughness_texture).y,

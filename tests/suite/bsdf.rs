@@ -1,5 +1,6 @@
 //! Tests of bsdf, and of the surfaces and textures that feed it.
 
+mod layers;
 mod physics;
 mod sampling;
 mod surfaces;
@@ -48,6 +49,12 @@ const BLACK: SurfaceParameters = SurfaceParameters {
     transmission: 0.0,
     thin: true,
     absorption: Vec3::ZERO,
+    anisotropy: 0.0,
+    anisotropy_axis: Vec2::X,
+    sheen_color: Vec3::ZERO,
+    sheen_roughness: 0.0,
+    diffuse_transmission: 0.0,
+    diffuse_transmission_color: Vec3::ONE,
     clearcoat: 0.0,
     clearcoat_roughness: 0.0,
     clearcoat_normal: Vec3::Z,
@@ -69,6 +76,18 @@ fn colored(p: SurfaceParameters) -> SurfaceParameters {
 fn cases() -> Vec<(&'static str, SurfaceParameters, bool)> {
     let tilted = Vec3::new(0.3, -0.2, 1.0).normalize();
     let coat = |p| SurfaceParameters { clearcoat: 0.7, clearcoat_roughness: 0.5, ..p };
+    let axis = Vec2::from_angle(0.7);
+    let brushed = |anisotropy, p| SurfaceParameters { anisotropy, anisotropy_axis: axis, ..p };
+    let velvet = |sheen_roughness, p| SurfaceParameters {
+        sheen_color: Vec3::new(0.3, 0.9, 0.5),
+        sheen_roughness,
+        ..p
+    };
+    let leaf = |p| SurfaceParameters {
+        diffuse_transmission: 0.4,
+        diffuse_transmission_color: Vec3::new(0.2, 0.7, 0.1),
+        ..p
+    };
     let mut cases = vec![
         ("lambert", WHITE, true),
         ("plastic", colored(PLASTIC), true),
@@ -82,6 +101,16 @@ fn cases() -> Vec<(&'static str, SurfaceParameters, bool)> {
         ("half pane", SurfaceParameters { transmission: 0.5, ..colored(PANE) }, true),
         ("coated plastic", coat(colored(PLASTIC)), true),
         ("tilted coat", SurfaceParameters { clearcoat_normal: tilted, ..coat(PLASTIC) }, true),
+        ("brushed metal", brushed(0.8, colored(METAL)), true),
+        ("brushed plastic", brushed(0.8, colored(PLASTIC)), true),
+        ("brushed pane", brushed(0.3, PANE), true),
+        ("velvet", velvet(0.5, colored(WHITE)), true),
+        ("fine velvet", velvet(0.1, PLASTIC), true),
+        ("velvet on metal", velvet(0.8, METAL), true),
+        ("coated velvet", coat(velvet(0.5, PLASTIC)), true),
+        ("leaf", leaf(colored(PLASTIC)), true),
+        ("paper", SurfaceParameters { diffuse_transmission: 1.0, ..WHITE }, true),
+        ("curtain", velvet(0.4, leaf(WHITE)), true),
         ("smooth coat", SurfaceParameters { clearcoat_roughness: 0.0, ..coat(PLASTIC) }, true),
     ];
     for entering in [true, false] {
@@ -96,6 +125,13 @@ fn cases() -> Vec<(&'static str, SurfaceParameters, bool)> {
         cases.push(("dense glass", SurfaceParameters { ior: 3.0, ..GLASS }, entering));
         cases.push(("milk", SurfaceParameters { transmission: 0.5, ..GLASS }, entering));
         cases.push(("coated glass", coat(GLASS), entering));
+        cases.push(("wax", SurfaceParameters { thin: false, ..leaf(PLASTIC) }, entering));
+        cases.push((
+            "fibrous milk",
+            velvet(0.5, leaf(SurfaceParameters { transmission: 0.5, ..GLASS })),
+            entering,
+        ));
+        cases.push(("brushed glass", brushed(0.4, GLASS), entering));
     }
     cases
 }

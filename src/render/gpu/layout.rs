@@ -109,10 +109,17 @@ pub(crate) struct Material {
     pub(crate) normal_scale: f32,
     pub(crate) clearcoat_normal_scale: f32,
     pub(crate) flags: u32,
-    pub(crate) textures: [u32; 10],
-    pub(crate) padding: [u32; 2],
+    pub(crate) textures: [u32; 15],
+    pub(crate) padding: u32,
     pub(crate) scattering: Vec3,
     pub(crate) scatter_mean_cosine: f32,
+    pub(crate) anisotropy: f32,
+    pub(crate) anisotropy_rotation: Vec2,
+    pub(crate) sheen_roughness: f32,
+    pub(crate) sheen_color: Vec3,
+    pub(crate) padding_1: u32,
+    pub(crate) diffuse_transmission_color: Vec3,
+    pub(crate) diffuse_transmission: f32,
 }
 
 /// Twin of `TextureRef` in `texture.wgsl`.
@@ -324,9 +331,15 @@ pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
             clearcoat_normal_scale: m.clearcoat_normal_scale,
             flags: flags(m, world.may_pass_light(index)),
             textures: m.textures().map(&mut reference),
-            padding: [0; 2],
             scattering: m.scattering,
             scatter_mean_cosine: Phase::new(m.scatter_anisotropy).mean_cosine(),
+            anisotropy: m.anisotropy,
+            anisotropy_rotation: Vec2::from_angle(m.anisotropy_rotation),
+            sheen_roughness: m.sheen_roughness,
+            sheen_color: m.sheen_color,
+            diffuse_transmission_color: m.diffuse_transmission_color,
+            diffuse_transmission: m.diffuse_transmission,
+            ..Material::zeroed()
         })
         .collect();
     (materials, refs)

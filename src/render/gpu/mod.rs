@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 use super::View;
 use super::film::Film;
-use crate::bsdf::albedo;
+use crate::bsdf::{albedo, sheen};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::light_grid::{LearningGrid, LightGrid};
@@ -108,7 +108,7 @@ impl Renderer {
         globals.set_view(view, rays);
         globals.set_fog(view.fog(world).as_ref());
         let mut constants = stage.constants;
-        upload_tables(&mut buffers, view, environment, &mut constants)?;
+        upload_tables(&mut buffers, view, environment, &features, &mut constants)?;
         let pixels = u64::from(view.width) * u64::from(view.height);
         buffers.make("film", pixels * size_of::<PixelSums>() as u64, "the picture")?;
         if features.has("layers") {
@@ -361,9 +361,14 @@ fn upload_tables(
     buffers: &mut Buffers,
     view: &View,
     environment: &Environment,
+    features: &Features,
     constants: &mut Constants,
 ) -> Result<()> {
     let mut texels = albedo::texels();
+    constants.sheen_at = texels.len() as u32;
+    if features.has("sheen") {
+        texels.extend(sheen::texels());
+    }
     constants.filter_at = texels.len() as u32;
     texels.extend(view.filter.cumulative().iter().map(|&sum| [sum, 0.0, 0.0, 0.0]));
     constants.rows_at = texels.len() as u32;

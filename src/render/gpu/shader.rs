@@ -39,11 +39,13 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 39] = [
+    pub(crate) const ALL: [&'static str; 44] = [
         "alpha_mask",
+        "anisotropy",
         "background_blur",
         "background_color",
         "clearcoat",
+        "diffuse_transmission",
         "emitters",
         "faces",
         "filtered_hits",
@@ -68,14 +70,17 @@ impl Features {
         "scene_lights",
         "second_uv_set",
         "shadow_rays",
+        "sheen",
         "single_sided",
         "solid_transmission",
         "summed_area",
         "table_f32",
         "table_f64",
         "table_u32",
+        "tangents",
         "textures",
         "transmission",
+        "uncommon_textures",
         "unlit",
         "vertex_colors",
         "wide_filter",
@@ -86,7 +91,9 @@ impl Features {
         let needs = &world.needs;
         Self::from_names([
             ("alpha_mask", needs.alpha_mask),
+            ("anisotropy", needs.anisotropy),
             ("clearcoat", needs.clearcoat),
+            ("diffuse_transmission", needs.diffuse_transmission),
             ("emitters", needs.emitters),
             ("local_lights", !world.lights.is_empty()),
             ("metals", needs.metals),
@@ -94,6 +101,7 @@ impl Features {
             ("partial", needs.alpha_blend || needs.thin_transmission),
             ("punctual_lights", needs.punctual_lights),
             ("second_uv_set", needs.second_uv_set),
+            ("sheen", needs.sheen),
             ("single_sided", needs.single_sided),
             ("solid_transmission", needs.solid_transmission),
             ("textures", needs.textures),
@@ -142,12 +150,14 @@ impl Features {
     pub(crate) fn from_names(names: impl IntoIterator<Item = (&'static str, bool)>) -> Self {
         let mut set: BTreeSet<_> =
             names.into_iter().filter(|(_, on)| *on).map(|(n, _)| n).collect();
-        let follows: [(&str, &[&str]); 5] = [
+        let follows: [(&str, &[&str]); 7] = [
             ("filtered_hits", &["alpha_mask", "single_sided"]),
             ("pass_through", &["alpha_mask", "partial"]),
             ("scene_lights", &["emitters", "punctual_lights"]),
             ("shadow_rays", &["map_sampling", "local_lights"]),
             ("summed_area", &["table_f32", "table_f64", "table_u32"]),
+            ("tangents", &["anisotropy", "normal_maps"]),
+            ("uncommon_textures", &["anisotropy", "diffuse_transmission", "sheen"]),
         ];
         for (name, causes) in follows {
             if causes.iter().any(|cause| set.contains(cause)) {
@@ -242,8 +252,11 @@ pub(crate) struct Constants {
     pub(crate) stack_size: u32,
     /// Texels of a vertex, and which of them hold what only some scenes need.
     pub(crate) vertex: VertexTexels,
+    /// Bit `i`: some material has the `i`-th of the textures a material can have.
+    pub(crate) textures_in_scene: u32,
     /// Texels of `tables` at which each begins.
     pub(crate) albedo_at: u32,
+    pub(crate) sheen_at: u32,
     pub(crate) filter_at: u32,
     pub(crate) rows_at: u32,
 }
@@ -266,7 +279,7 @@ impl VertexTexels {
             at
         };
         let (second_uv, tangent, color) =
-            (next("second_uv_set"), next("normal_maps"), next("vertex_colors"));
+            (next("second_uv_set"), next("tangents"), next("vertex_colors"));
         Self { count, second_uv, tangent, color }
     }
 }
@@ -386,14 +399,24 @@ impl Program {
         let features = features.in_kernel(kernel);
         let bindings = bindings(kernel, &features);
         let mut source = String::new();
-        let Constants { stack_size, vertex, albedo_at, filter_at, rows_at } = *constants;
+        let Constants {
+            stack_size,
+            vertex,
+            textures_in_scene,
+            albedo_at,
+            sheen_at,
+            filter_at,
+            rows_at,
+        } = *constants;
         for (name, value) in [
             ("STACK_SIZE", stack_size),
             ("VERTEX_TEXELS", vertex.count),
             ("SECOND_UV_TEXEL", vertex.second_uv),
             ("TANGENT_TEXEL", vertex.tangent),
             ("COLOR_TEXEL", vertex.color),
+            ("TEXTURES_IN_SCENE", textures_in_scene),
             ("ALBEDO_AT", albedo_at),
+            ("SHEEN_AT", sheen_at),
             ("FILTER_AT", filter_at),
             ("ROWS_AT", rows_at),
         ] {
@@ -421,7 +444,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 19] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 20] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -436,6 +459,7 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 19] {
         (wgsl!("surface"), true),
         (wgsl!("fresnel"), true),
         (wgsl!("microfacet"), true),
+        (wgsl!("sheen"), features.has("sheen")),
         (wgsl!("bsdf"), true),
         (wgsl!("light_grid"), true),
         (wgsl!("environment"), true),
@@ -532,7 +556,15 @@ mod tests {
 
     /// Features that a picture can have or not have on their own; the others follow from them.
     fn independent() -> Vec<&'static str> {
-        let follow = ["filtered_hits", "pass_through", "scene_lights", "shadow_rays", "learning"];
+        let follow = [
+            "filtered_hits",
+            "learning",
+            "pass_through",
+            "scene_lights",
+            "shadow_rays",
+            "tangents",
+            "uncommon_textures",
+        ];
         let names = Features::ALL.into_iter();
         names
             .filter(|n| !follow.contains(n) && !n.starts_with("table_") && *n != "summed_area")
@@ -571,7 +603,8 @@ mod tests {
             sets.push(reachable(|i| i != one, None));
         }
         for seed in 0..60_u32 {
-            let bits = crate::sampler::hash(seed + 1);
+            let half = |at| u64::from(crate::sampler::hash(2 * seed + at));
+            let bits = half(1) << 32 | half(2);
             sets.push(reachable(|i| bits >> i & 1 == 1, tables[seed as usize % 4]));
         }
         for features in &sets {

@@ -1,6 +1,6 @@
 //! Parts: triangles in a mesh's own space, with the vertices they use.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Affine2, Vec2, Vec3, Vec4};
 use gltf::json;
 
 use super::buffers::File;
@@ -61,8 +61,11 @@ pub(super) struct Tally {
 /// What a material reads of its vertices.
 pub(super) struct Needs {
     uv_sets: [bool; 2],
-    /// The reference of the normal map, whose texture coordinates make the tangents.
-    normal_map: Option<TextureRef>,
+    /// Whether tangents are read.
+    tangents: bool,
+    /// The reference whose texture coordinates make them where the file has none: that of the normal
+    /// map, of the anisotropy, else the first set.
+    tangent_map: Option<TextureRef>,
 }
 
 impl Needs {
@@ -73,7 +76,11 @@ impl Needs {
         for reference in super::materials::slots(&mut material).into_iter().flatten() {
             uv_sets[usize::from(reference.uv_set)] = true;
         }
-        Self { uv_sets, normal_map: material.normal_texture.or(material.clearcoat_normal_texture) }
+        let normal_map = material.normal_texture.or(material.clearcoat_normal_texture);
+        let tangent_map = normal_map.or(material.anisotropy_texture);
+        let tangents = normal_map.is_some() || material.anisotropy > 0.0;
+        uv_sets[0] |= tangents && tangent_map.is_none();
+        Self { uv_sets, tangents, tangent_map }
     }
 }
 
@@ -111,12 +118,12 @@ pub(super) fn read_part(
     if part.triangles.is_empty() {
         return Ok(None);
     }
-    match needs.normal_map {
-        Some(map) if part.tangents.is_empty() => {
-            tangents::generate(&mut part, usize::from(map.uv_set), map.transform);
-        }
-        Some(_) => {}
-        None => part.tangents = Vec::new(),
+    if !needs.tangents {
+        part.tangents = Vec::new();
+    } else if part.tangents.is_empty() {
+        let map = needs.tangent_map;
+        let (set, transform) = map.map_or((0, Affine2::IDENTITY), |m| (m.uv_set, m.transform));
+        tangents::generate(&mut part, usize::from(set), transform);
     }
     Ok(Some(part))
 }

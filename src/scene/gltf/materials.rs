@@ -60,7 +60,7 @@ impl Materials {
 }
 
 /// Every texture slot of a material.
-pub(super) fn slots(material: &mut Material) -> [&mut Option<TextureRef>; 10] {
+pub(super) fn slots(material: &mut Material) -> [&mut Option<TextureRef>; 15] {
     [
         &mut material.base_color_texture,
         &mut material.metallic_roughness_texture,
@@ -72,6 +72,11 @@ pub(super) fn slots(material: &mut Material) -> [&mut Option<TextureRef>; 10] {
         &mut material.clearcoat_texture,
         &mut material.clearcoat_roughness_texture,
         &mut material.clearcoat_normal_texture,
+        &mut material.anisotropy_texture,
+        &mut material.sheen_color_texture,
+        &mut material.sheen_roughness_texture,
+        &mut material.diffuse_transmission_texture,
+        &mut material.diffuse_transmission_color_texture,
     ]
 }
 
@@ -188,10 +193,36 @@ impl<'a> Reader<'a> {
             // Zero is forbidden and means, in files that have it, that nobody set it.
             material.attenuation_distance = if distance > 0.0 { distance } else { f32::INFINITY };
         }
-        if let Some(Value::Object(coat)) = source.others.get("KHR_materials_clearcoat") {
+        let object = |name: &str| source.others.get(name).and_then(Value::as_object);
+        if let Some(coat) = object("KHR_materials_clearcoat") {
             self.clearcoat(coat, material)?;
         }
-        if let Some(Value::Object(old)) = source.others.get("KHR_materials_pbrSpecularGlossiness") {
+        if let Some(anisotropy) = object("KHR_materials_anisotropy") {
+            material.anisotropy = self.unit(number(anisotropy, "anisotropyStrength", 0.0));
+            material.anisotropy_rotation =
+                self.finite(number(anisotropy, "anisotropyRotation", 0.0));
+            material.anisotropy_texture =
+                self.data(texture(anisotropy, "anisotropyTexture").as_ref())?;
+        }
+        if let Some(sheen) = object("KHR_materials_sheen") {
+            material.sheen_color = self.unit_color(sheen, "sheenColorFactor", Vec3::ZERO);
+            material.sheen_color_texture =
+                self.colour(texture(sheen, "sheenColorTexture").as_ref())?;
+            material.sheen_roughness = self.unit(number(sheen, "sheenRoughnessFactor", 0.0));
+            material.sheen_roughness_texture =
+                self.data(texture(sheen, "sheenRoughnessTexture").as_ref())?;
+        }
+        if let Some(through) = object("KHR_materials_diffuse_transmission") {
+            material.diffuse_transmission =
+                self.unit(number(through, "diffuseTransmissionFactor", 0.0));
+            material.diffuse_transmission_texture =
+                self.data(texture(through, "diffuseTransmissionTexture").as_ref())?;
+            material.diffuse_transmission_color =
+                self.unit_color(through, "diffuseTransmissionColorFactor", Vec3::ONE);
+            material.diffuse_transmission_color_texture =
+                self.colour(texture(through, "diffuseTransmissionColorTexture").as_ref())?;
+        }
+        if let Some(old) = object("KHR_materials_pbrSpecularGlossiness") {
             self.specular_glossiness(old, material)?;
         }
         Ok(())
@@ -273,6 +304,12 @@ impl<'a> Reader<'a> {
 
     fn units<const N: usize>(&mut self, values: [f32; N]) -> [f32; N] {
         values.map(|value| self.unit(value))
+    }
+
+    /// A colour of components clamped to `[0,1]`.
+    fn unit_color(&mut self, object: &Map<String, Value>, key: &str, default: Vec3) -> Vec3 {
+        let color: Option<[f32; 3]> = object.get(key).and_then(parsed);
+        color.map_or(default, |color| Vec3::from_array(self.units(color)))
     }
 
     fn at_least(&mut self, value: f32, least: f32) -> f32 {

@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use lightgrid::bsdf::{Bsdf, SurfaceParameters};
 
 use super::{
@@ -54,7 +54,12 @@ fn refraction_is_reciprocal_up_to_the_squared_index() {
 
 /// Mean radiance that comes back from a furnace of radiance 1 (times the squared index of the medium
 /// it is in), and its standard error.
-fn furnace(parameters: &SurfaceParameters, entering: bool, wo: Vec3, count: usize) -> (f32, f32) {
+pub(super) fn furnace(
+    parameters: &SurfaceParameters,
+    entering: bool,
+    wo: Vec3,
+    count: usize,
+) -> (f32, f32) {
     let bsdf = Bsdf::new(parameters, entering);
     let ior = parameters.ior.max(1.0);
     let eta = if entering { ior } else { 1.0 / ior };
@@ -86,6 +91,10 @@ fn white_surfaces_never_gain_energy() {
             specular: pick(&[0.0, 0.5, 1.0]),
             transmission: pick(&[0.0, 0.0, 0.5, 1.0]),
             thin: pick(&[0.0, 1.0]) == 0.0,
+            anisotropy: pick(&[0.0, 0.0, 0.6, 1.0]),
+            sheen_color: Vec3::splat(pick(&[0.0, 0.0, 0.5, 1.0])),
+            sheen_roughness: pick(&[0.0, 0.2, 0.5, 1.0]),
+            diffuse_transmission: pick(&[0.0, 0.0, 0.4, 1.0]),
             clearcoat: pick(&[0.0, 0.0, 1.0]),
             clearcoat_roughness: pick(&[0.0, 0.3, 1.0]),
             ..WHITE
@@ -108,6 +117,13 @@ fn lossless_surfaces_lose_nothing() {
                 ("lambert", WHITE, 1000, 1e-5),
                 ("glass", smooth(GLASS), 1000, 1e-5),
                 ("pane", smooth(PANE), 1000, 1e-5),
+                ("paper", SurfaceParameters { diffuse_transmission: 1.0, ..WHITE }, 1000, 1e-5),
+                (
+                    "tracing paper",
+                    SurfaceParameters { diffuse_transmission: 0.5, ..smooth(PLASTIC) },
+                    40_000,
+                    0.004,
+                ),
                 ("mirror", smooth(METAL), 1000, 1e-5),
                 ("smooth plastic", smooth(PLASTIC), 40_000, 0.004),
             ] {
@@ -250,6 +266,12 @@ fn extremes_stay_finite() {
             specular_color: Vec3::new(pick(&[0.0, 1.0, 100.0]), 1.0, pick(&[0.0, 1.0])),
             transmission: pick(&[0.0, 1e-6, 0.5, 1.0]),
             thin: pick(&[0.0, 1.0]) == 0.0,
+            anisotropy: pick(&[0.0, 1e-10, 0.03, 1.0]),
+            anisotropy_axis: Vec2::from_angle(pick(&[0.0, 1.0, 2.0])),
+            sheen_color: Vec3::new(pick(&[0.0, 1e-10, 1.0]), pick(&[0.0, 1.0]), 0.0),
+            sheen_roughness: pick(&[0.0, 0.07, 1.0]),
+            diffuse_transmission: pick(&[0.0, 1e-10, 1.0]),
+            diffuse_transmission_color: Vec3::new(pick(&[0.0, 1e-20, 1.0]), 0.0, 1.0),
             clearcoat: pick(&[0.0, 1e-10, 1.0]),
             clearcoat_roughness: pick(&[0.0, 0.04, 1.0]),
             ..WHITE

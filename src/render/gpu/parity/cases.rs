@@ -118,6 +118,11 @@ impl Random {
         }
     }
 
+    /// Unit, in the plane.
+    pub(super) fn axis(&mut self) -> Vec2 {
+        Vec2::from_angle(self.between(-4.0, 4.0))
+    }
+
     /// Unit with `z > 0`; one in four is close to grazing.
     pub(super) fn upper_direction(&mut self) -> Vec3 {
         let mut v = self.direction();

@@ -110,7 +110,8 @@ fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
     let (size, fields) = fields!(Material:
         base_color emissive alpha_cutoff specular_color specular absorption ior metallic roughness
         transmission clearcoat clearcoat_roughness normal_scale clearcoat_normal_scale flags textures
-        padding scattering scatter_mean_cosine
+        padding scattering scatter_mean_cosine anisotropy anisotropy_rotation
+        sheen_roughness sheen_color padding_1 diffuse_transmission_color diffuse_transmission
     );
     assert_eq!(at("MATERIAL_TEXELS"), size);
     assert_eq!(fields.iter().map(|(.., size)| size).sum::<usize>(), size);
@@ -123,6 +124,13 @@ fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
             &[offset_of!(Material, specular_color), offset_of!(Material, specular)],
         ),
         ("ABSORPTION_IOR", &[offset_of!(Material, absorption), offset_of!(Material, ior)]),
+        (
+            "DIFFUSE_TRANSMISSION",
+            &[
+                offset_of!(Material, diffuse_transmission_color),
+                offset_of!(Material, diffuse_transmission),
+            ],
+        ),
         (
             "SCATTERING",
             &[offset_of!(Material, scattering), offset_of!(Material, scatter_mean_cosine)],
@@ -139,6 +147,11 @@ fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
         offset_of!(Material, clearcoat),
     ];
     assert_eq!(factors, four("FACTORS"));
+    let rotation = offset_of!(Material, anisotropy_rotation);
+    let sheen_roughness = offset_of!(Material, sheen_roughness);
+    let anisotropy = [offset_of!(Material, anisotropy), rotation, rotation + 4, sheen_roughness];
+    assert_eq!(anisotropy, four("ANISOTROPY_SHEEN_ROUGHNESS"));
+    assert_eq!(offset_of!(Material, sheen_color), at("SHEEN_COLOR"));
     let scales = [
         offset_of!(Material, clearcoat_roughness),
         offset_of!(Material, normal_scale),

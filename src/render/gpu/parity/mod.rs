@@ -32,7 +32,7 @@ use stand::Stand;
 use twin::Twin;
 
 /// Words of a case, and of its answer.
-const STRIDE: usize = 48;
+const STRIDE: usize = 64;
 /// What an answer is filled with beforehand.
 const UNTOUCHED: u32 = 0xdead_beef;
 

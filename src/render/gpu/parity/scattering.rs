@@ -1,6 +1,6 @@
 //! Fresnel, microfacets, albedo tables and whole materials.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::Probe;
 use super::cases::{EDGE_UNITS, Part, Random, case, cases, edge_squares};
@@ -8,6 +8,7 @@ use super::twin::{Bound, EXACT, Twin, ulps};
 use crate::bsdf::albedo::AlbedoTerms;
 use crate::bsdf::fresnel::{dielectric, normal_reflectance, reflect, refract, schlick_weight};
 use crate::bsdf::microfacet::Ggx;
+use crate::bsdf::sheen::Sheen;
 use crate::bsdf::{Bsdf, SurfaceParameters, cosine_hemisphere};
 
 /// Reads the words of [`material`]; writes what [`expect_parameters`] compares.
@@ -17,13 +18,21 @@ fn take_parameters() -> SurfaceParameters {
     p.base_color = take3(); p.alpha = take(); p.metallic = take(); p.roughness = take();
     p.ior = take(); p.specular = take(); p.specular_color = take3(); p.transmission = take();
     p.thin = take_word() != 0u; p.clearcoat = take(); p.clearcoat_roughness = take();
-    p.clearcoat_normal = take3();
+    p.clearcoat_normal = take3(); p.anisotropy = take(); p.anisotropy_axis = take2();
+    p.sheen_color = take3(); p.sheen_roughness = take(); p.diffuse_transmission = take();
+    p.diffuse_transmission_color = take3();
     return p;
+}
+fn take_ggx() -> Ggx {
+    let roughness = take(); let strength = take();
+    return ggx_stretched(roughness, strength, take2());
 }
 fn put_parameters(p: SurfaceParameters) {
     put3(p.base_color); put(p.alpha); put(p.metallic); put(p.roughness); put(p.ior);
     put(p.specular); put3(p.specular_color); put(p.transmission); put_bool(p.thin);
     put(p.clearcoat); put(p.clearcoat_roughness); put3(p.clearcoat_normal);
+    put(p.anisotropy); put2(p.anisotropy_axis); put3(p.sheen_color); put(p.sheen_roughness);
+    put(p.diffuse_transmission); put3(p.diffuse_transmission_color);
     put3(p.absorption); put3(p.emissive); put_bool(p.unlit);
 }
 ";
@@ -33,6 +42,7 @@ pub(super) fn probes() -> Vec<Probe<'static>> {
     let mut probes = fresnel();
     probes.extend(microfacets());
     probes.extend(albedos());
+    probes.extend(sheens());
     probes.extend(materials());
     probes
 }
@@ -94,37 +104,45 @@ fn fresnel() -> Vec<Probe<'static>> {
 
 fn microfacets() -> Vec<Probe<'static>> {
     let roughness = |r: &mut Random| r.magnitude(0.04, 1.0);
+    let strength = |r: &mut Random| [0.0, r.unit()][r.below(2) as usize];
+    let take_ggx = |t: &mut Twin<'_>| Ggx::stretched(t.take(), t.take(), t.take2());
     vec![
         Probe::new(
             "ggx_distribution, ggx_visibility, visible normals' density",
-            "let roughness = take(); let alpha = roughness * roughness; let wo = take3(); let h = take3();
-            put_bool(is_smooth(alpha)); put(ggx_distribution(alpha, h));
-            put(ggx_visibility(alpha, wo.z));
-            put(ggx_visible_normal_pdf_solid_angle(alpha, wo, h));",
-            cases([case(&[&0.0316_f32, &Vec3::Z, &Vec3::Z])], |r| {
-                case(&[&roughness(r), &r.upper_direction(), &r.upper_direction()])
+            "let ggx = take_ggx(); let wo = take3(); let h = take3();
+            put_bool(is_smooth(ggx)); put(ggx_distribution(ggx, h));
+            put(ggx_visibility(ggx, wo));
+            put(ggx_visible_normal_pdf_solid_angle(ggx, wo, h));",
+            cases([case(&[&0.0316_f32, &0.0_f32, &Vec2::X, &Vec3::Z, &Vec3::Z])], move |r| {
+                let (wo, h) = (r.upper_direction(), r.upper_direction());
+                case(&[&roughness(r), &strength(r), &r.axis(), &wo, &h])
             }),
-            |t| {
-                let (roughness, wo, h) = (t.take(), t.take3(), t.take3());
-                let ggx = Ggx::from_roughness(roughness);
+            move |t| {
+                let (ggx, wo, h) = (take_ggx(t), t.take3(), t.take3());
                 t.same(ggx.is_smooth());
                 t.near(ggx.distribution(h), ulps(12.0));
-                t.near(ggx.visibility(wo.z), ulps(4.0));
+                t.near(ggx.visibility(wo), ulps(4.0));
                 let pdf = ggx.visible_normal_pdf_solid_angle(wo, h);
                 // The cosine between the two may cancel.
-                let whole = 2.0 * ggx.visibility(wo.z) * ggx.distribution(h);
+                let whole = 2.0 * ggx.visibility(wo) * ggx.distribution(h);
                 t.near(pdf, ulps(12.0).of(whole));
             },
         ),
         Probe::new(
             "ggx_sample_visible_normal",
-            "let roughness = take(); let wo = take3();
-            put3(ggx_sample_visible_normal(roughness * roughness, wo, take2()));",
-            cases(edge_squares().into_iter().map(|u| case(&[&0.5_f32, &Vec3::Z, &u])), |r| {
-                case(&[&roughness(r), &r.upper_direction(), &r.unit2()])
-            }),
-            |t| {
-                let ggx = Ggx::from_roughness(t.take());
+            "let ggx = take_ggx(); let wo = take3();
+            put3(ggx_sample_visible_normal(ggx, wo, take2()));",
+            cases(
+                edge_squares()
+                    .into_iter()
+                    .map(|u| case(&[&0.5_f32, &0.0_f32, &Vec2::X, &Vec3::Z, &u])),
+                move |r| {
+                    let (wo, u) = (r.upper_direction(), r.unit2());
+                    case(&[&roughness(r), &strength(r), &r.axis(), &wo, &u])
+                },
+            ),
+            move |t| {
+                let ggx = take_ggx(t);
                 let (wo, u) = (t.take3(), t.take2());
                 // The cap's point nearly cancels the viewer where `u.y` is nearly 1.
                 let shortest = (1.0 - u.y).sqrt();
@@ -145,16 +163,26 @@ fn microfacets() -> Vec<Probe<'static>> {
 
 fn albedos() -> Vec<Probe<'static>> {
     let nodes = (0..=31).map(|i| i as f32 / 31.0);
-    let edges = nodes.flat_map(|x| [0.0, 0.5, 1.0].map(|y| [case(&[&x, &y]), case(&[&y, &x])]));
+    let of = |roughness: f32, cos: f32| {
+        let v = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
+        case(&[&roughness, &0.0_f32, &Vec2::X, &v])
+    };
+    let edges = nodes.flat_map(|x| [0.0, 0.5, 1.0].map(|y| [of(x, y), of(y, x)]));
     vec![Probe::new(
-        "albedo_terms_at, albedo_terms_mean",
-        "let roughness = take(); put2(albedo_terms_at(roughness, take()));
-        put2(albedo_terms_mean(roughness));",
-        cases(edges.flatten(), |r| case(&[&r.unit(), &r.unit()])),
+        "terms_towards, terms_mean",
+        "let roughness = take(); let strength = take();
+        let ggx = ggx_stretched(roughness, strength, take2());
+        put2(terms_towards(ggx, roughness, take3())); put2(terms_mean(ggx, roughness));",
+        cases(edges.flatten(), |r| {
+            let strength = [0.0, r.unit()][r.below(2) as usize];
+            case(&[&r.unit(), &strength, &r.axis(), &r.upper_direction()])
+        }),
         |t| {
             // Between nodes that may be much larger, with fractions of 31.
-            let terms = AlbedoTerms::of(t.take());
-            let at = terms.at(t.take());
+            let roughness = t.take();
+            let ggx = Ggx::stretched(roughness, t.take(), t.take2());
+            let terms = AlbedoTerms::of(ggx, roughness);
+            let at = terms.at(t.take3());
             t.near(at, ulps(16.0).of(1.0));
             t.near(terms.mean(), ulps(16.0).of(1.0));
         },
@@ -183,6 +211,12 @@ fn material(r: &mut Random) -> SurfaceParameters {
         transmission: if is_glass { [1.0, r.unit()][r.below(2) as usize] } else { 0.0 },
         thin: kind >= 7 || r.below(2) == 0,
         absorption: Vec3::ZERO,
+        anisotropy: [0.0, r.unit()][r.below(2) as usize],
+        anisotropy_axis: r.axis(),
+        sheen_color: if r.below(3) == 0 { r.unit3() } else { Vec3::ZERO },
+        sheen_roughness: r.unit(),
+        diffuse_transmission: [0.0, 0.0, 1.0, r.unit()][r.below(4) as usize],
+        diffuse_transmission_color: r.unit3(),
         clearcoat: if is_coated { r.unit() } else { 0.0 },
         clearcoat_roughness: smooth_or_not(r),
         clearcoat_normal: (Vec3::Z + 0.4 * r.in_cube() * r.below(2) as f32).normalize(),
@@ -206,6 +240,12 @@ impl Part for SurfaceParameters {
             &self.clearcoat,
             &self.clearcoat_roughness,
             &self.clearcoat_normal,
+            &self.anisotropy,
+            &self.anisotropy_axis,
+            &self.sheen_color,
+            &self.sheen_roughness,
+            &self.diffuse_transmission,
+            &self.diffuse_transmission_color,
         ]));
     }
 }
@@ -224,6 +264,12 @@ fn take_parameters(t: &mut Twin<'_>) -> SurfaceParameters {
         clearcoat: t.take(),
         clearcoat_roughness: t.take(),
         clearcoat_normal: t.take3(),
+        anisotropy: t.take(),
+        anisotropy_axis: t.take2(),
+        sheen_color: t.take3(),
+        sheen_roughness: t.take(),
+        diffuse_transmission: t.take(),
+        diffuse_transmission_color: t.take3(),
         absorption: Vec3::ZERO,
         emissive: Vec3::ZERO,
         unlit: false,
@@ -242,6 +288,12 @@ pub(super) fn expect_parameters(t: &mut Twin<'_>, p: &SurfaceParameters, bound: 
     t.near(p.clearcoat, bound);
     t.near(p.clearcoat_roughness, bound);
     t.near(p.clearcoat_normal, bound);
+    t.near(p.anisotropy, bound);
+    t.near(p.anisotropy_axis, bound);
+    t.near(p.sheen_color, bound);
+    t.near(p.sheen_roughness, bound);
+    t.near(p.diffuse_transmission, bound);
+    t.near(p.diffuse_transmission_color, bound);
     t.near(p.absorption, bound);
     t.near(p.emissive, bound);
     t.same(p.unlit);
@@ -263,6 +315,48 @@ fn incoming(r: &mut Random, wo: Vec3) -> Vec3 {
         _ => r.direction(),
     };
     wi.normalize()
+}
+
+fn sheens() -> Vec<Probe<'static>> {
+    let sheen = |t: &mut Twin<'_>| {
+        let (color, roughness) = (t.take3(), t.take());
+        let p = SurfaceParameters {
+            sheen_color: color,
+            sheen_roughness: roughness,
+            ..material(&mut Random::default())
+        };
+        Sheen::new(&p, true)
+    };
+    vec![
+        Probe::new(
+            "sheen_eval_pdf, sheen_albedo, sheen_left",
+            "var p: SurfaceParameters; p.sheen_color = take3(); p.sheen_roughness = take();
+            let sheen = sheen_new(p, true); let wo = take3(); let wi = take3();
+            let f = sheen_eval_pdf(sheen, wo, wi); put3(f.value); put(f.pdf_solid_angle);
+            put(sheen_albedo(sheen, wo)); put(sheen_left(sheen, wo, wi));",
+            cases([], |r| {
+                case(&[&(r.unit3() + 0.01), &r.unit(), &r.upper_direction(), &r.upper_direction()])
+            }),
+            move |t| {
+                let (sheen, wo, wi) = (sheen(t), t.take3(), t.take3());
+                let (value, pdf) = sheen.eval_pdf(wo, wi);
+                // Powers of up to 100 of numbers below 1, and exponentials of up to 20.
+                t.near(value, ulps(512.0));
+                t.near(pdf, EXACT);
+                t.near(sheen.albedo(wo), ulps(32.0).of(1.0));
+                t.near(sheen.left(wo, wi), ulps(32.0).of(1.0));
+            },
+        ),
+        Probe::new(
+            "sheen_sample",
+            "put3(sheen_sample(take2()));",
+            cases(edge_squares().into_iter().map(|u| case(&[&u])), |r| case(&[&r.unit2()])),
+            |t| {
+                let right = Sheen::sample(t.take2());
+                t.near(right, ulps(4.0).of(1.0));
+            },
+        ),
+    ]
 }
 
 fn materials() -> Vec<Probe<'static>> {

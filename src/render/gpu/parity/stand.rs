@@ -199,6 +199,27 @@ fn materials() -> Vec<Material> {
         Material { base_color: color, metallic: 1.0, roughness: 0.2, ..plain.clone() },
         Material { metallic: 0.4, roughness: 0.5, ior: 2.4, ..plain.clone() },
         Material { metallic: 1.0, roughness: 0.0, ..plain.clone() },
+        Material {
+            sheen_color: Vec3::new(0.3, 0.9, 0.5),
+            sheen_roughness: 0.6,
+            base_color: color,
+            ..plain.clone()
+        },
+        Material {
+            diffuse_transmission: 0.6,
+            diffuse_transmission_color: Vec3::new(0.9, 0.4, 0.6),
+            sheen_color: Vec3::splat(0.2),
+            ..plain.clone()
+        },
+        Material { diffuse_transmission: 0.7, transmission: 0.2, ..solid.clone() },
+        Material { metallic: 1.0, roughness: 0.3, anisotropy: 0.8, ..plain.clone() },
+        Material {
+            roughness: 0.4,
+            anisotropy: 1.0,
+            anisotropy_rotation: 1.0,
+            base_color: color,
+            ..plain.clone()
+        },
         Material { clearcoat_normal_scale: 0.5, ..coated.clone() },
         Material { base_color: color, clearcoat_roughness: 0.0, ..coated },
         Material { roughness: 0.3, ..solid.clone() },
@@ -250,6 +271,11 @@ fn add_textures(scene: &mut Scene, random: &mut Random) {
             &mut m.clearcoat_texture,
             &mut m.clearcoat_roughness_texture,
             &mut m.clearcoat_normal_texture,
+            &mut m.anisotropy_texture,
+            &mut m.sheen_color_texture,
+            &mut m.sheen_roughness_texture,
+            &mut m.diffuse_transmission_texture,
+            &mut m.diffuse_transmission_color_texture,
         ] {
             *texture = reference();
         }

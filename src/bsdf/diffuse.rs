@@ -1,0 +1,108 @@
+//! Lambert's lobes of the body: light that comes back from it, and light that comes through
+//! (`KHR_materials_diffuse_transmission`). Both get what the interface leaves in both directions
+//! (`albedo`).
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::{Vec2, Vec3};
+
+use super::albedo::AlbedoTerms;
+use super::interface::Interface;
+use super::{SurfaceParameters, cosine_hemisphere};
+use crate::color::importance;
+
+/// The body under the opaque dielectric's share of the interface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Diffuse {
+    /// Base colour times share, over what the interface lets in on average.
+    reflected: Vec3,
+    /// The same for light from the far side; radiance through a solid's surface scales by the squared
+    /// relative index.
+    transmitted: Vec3,
+    /// Probability of choosing the far side.
+    through: f32,
+    /// The dielectric's largest F0 and its F90.
+    f0_f90: Vec2,
+    terms: AlbedoTerms,
+}
+
+impl Diffuse {
+    /// `f0_f90` are the dielectric's; `terms` of its interface.
+    pub(super) fn new(
+        p: &SurfaceParameters,
+        f0_f90: Vec2,
+        terms: AlbedoTerms,
+        interface: &Interface,
+    ) -> Self {
+        let share = (1.0 - p.metallic) * (1.0 - p.transmission);
+        let reflected = p.base_color * (share * (1.0 - p.diffuse_transmission));
+        let mut diffuse = Self { reflected, transmitted: Vec3::ZERO, through: 0.0, f0_f90, terms };
+        if p.diffuse_transmission > 0.0 {
+            let color = p.diffuse_transmission_color * (share * p.diffuse_transmission);
+            diffuse.transmitted = color * interface.radiance_scale();
+            let [back, through] = [reflected, diffuse.transmitted].map(importance);
+            diffuse.through = if through > 0.0 { through / (back + through) } else { 0.0 };
+        }
+        if f0_f90.y > 0.0 && !diffuse.is_absent() {
+            let let_in = diffuse.let_in();
+            let scale = |color| if let_in > 1e-4 { color / let_in } else { Vec3::ZERO };
+            diffuse.reflected = scale(diffuse.reflected);
+            diffuse.transmitted = scale(diffuse.transmitted);
+        }
+        diffuse
+    }
+
+    pub(super) fn is_absent(&self) -> bool {
+        self.reflected == Vec3::ZERO && self.transmitted == Vec3::ZERO
+    }
+
+    /// The interface's albedo terms towards `v`.
+    pub(super) fn terms_at(&self, v: Vec3) -> Vec2 {
+        self.terms.at(v)
+    }
+
+    /// What the interface leaves towards `v`, on either side.
+    pub(super) fn left(&self, v: Vec3) -> f32 {
+        if self.f0_f90 == Vec2::ZERO { 1.0 } else { self.left_of(self.terms.at(v)) }
+    }
+
+    /// The same, given the albedo terms there.
+    pub(super) fn left_of(&self, terms: Vec2) -> f32 {
+        (1.0 - self.f0_f90.dot(terms)).max(0.0)
+    }
+
+    /// Both lobes' albedo towards a viewer to whom the interface leaves `left`.
+    pub(super) fn albedo(&self, left: f32) -> Vec3 {
+        (self.reflected + self.transmitted) * (left * self.let_in())
+    }
+
+    /// What the lobes weigh beside others, not counting what the interface leaves.
+    pub(super) fn importance(&self) -> f32 {
+        importance(self.reflected + self.transmitted)
+    }
+
+    /// A direction with density `cos / pi`, on the side that a uniform number chooses.
+    pub(super) fn sample(&self, choice: f32, u: Vec2) -> Vec3 {
+        let wi = cosine_hemisphere(u);
+        if choice < self.through { -wi } else { wi }
+    }
+
+    /// `f * |cos wi|` for a viewer to whom the interface leaves `left`, and the density of
+    /// [`Self::sample`].
+    pub(super) fn eval_pdf(&self, left: f32, wi: Vec3) -> (Vec3, f32) {
+        let lambert = wi.z.abs() * FRAC_1_PI;
+        if wi.z > 0.0 {
+            let left = left * self.left(wi);
+            (self.reflected * (left * lambert), lambert * (1.0 - self.through))
+        } else if self.through > 0.0 {
+            let left = left * self.left(-wi);
+            (self.transmitted * (left * lambert), lambert * self.through)
+        } else {
+            (Vec3::ZERO, 0.0)
+        }
+    }
+
+    fn let_in(&self) -> f32 {
+        1.0 - self.f0_f90.dot(self.terms.mean())
+    }
+}
