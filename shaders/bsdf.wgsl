@@ -17,6 +17,18 @@ struct Interface {
     thin: bool,
     tint: vec3f,
 //#end
+//#if dispersion
+    etas: vec3f,
+    hero: vec3f,
+//#end
+//#if iridescence
+    film: Film,
+    // What is under the film: F0 and share of the opaque dielectric and of the metal.
+    base_f0: vec3f,
+    dielectric_share: f32,
+    metal_f0: vec3f,
+    metal_share: f32,
+//#end
 }
 
 struct Bsdf {
@@ -155,14 +167,91 @@ fn interface_new(p: SurfaceParameters, f0: vec3f, f90: f32, entering: bool) -> I
     i.glass_f90 = f90;
     i.tint = p.base_color * i.glass;
     i.thin = p.thin;
-    let ior = max(p.ior, 1.0);
-    i.eta = select(1.0 / ior, ior, entering || p.thin);
-    if abs(ior - 1.0) < STRAIGHT_ETA {
-        i.eta = 1.0;
+    i.eta = eta_of(p.ior, entering || p.thin);
+//#end
+//#if dispersion
+    i.etas = vec3f(i.eta);
+    i.hero = vec3f(1.0);
+    if p.dispersion > 0.0 && p.ior > 0.0 {
+        let spread = (p.ior - 1.0) * (0.025 * p.dispersion);
+        i.etas.x = eta_of(p.ior - spread, entering || p.thin);
+        i.etas.z = eta_of(p.ior + spread, entering || p.thin);
     }
+//#end
+//#if iridescence
+    i.film = film_new(p);
+    i.base_f0 = min(normal_reflectance(p.ior) * p.specular_color, vec3f(1.0));
+    i.dielectric_share = p.specular * opaque_share;
+    i.metal_f0 = p.base_color;
+    i.metal_share = p.metallic;
 //#end
     return i;
 }
+
+//#if transmission
+// Index on the far side over this side.
+fn eta_of(index: f32, is_outside: bool) -> f32 {
+    let ior = max(index, 1.0);
+    if abs(ior - 1.0) < STRAIGHT_ETA {
+        return 1.0;
+    }
+    return select(1.0 / ior, ior, is_outside);
+}
+//#end
+
+//#if dispersion
+struct Hero {
+    channel: u32,
+    probability: f32,
+}
+
+// Twin of `Hero::choose`.
+fn hero_choose(throughput: vec3f, u: f32) -> Hero {
+    let scaled = throughput / max_element(throughput);
+    let share = scaled / (scaled.x + scaled.y + scaled.z);
+    if u < share.x || (share.y == 0.0 && share.z == 0.0) {
+        return Hero(0u, share.x);
+    }
+    if u < share.x + share.y || share.z == 0.0 {
+        return Hero(1u, share.y);
+    }
+    return Hero(2u, share.z);
+}
+
+fn is_dispersive(i: Interface) -> bool {
+    return i.etas.x != i.etas.z && i.glass > 0.0;
+}
+
+// Twin of `Interface::of_hero`.
+fn interface_of_hero(i: Interface, hero: Hero) -> Interface {
+    var of_hero = i;
+    if is_dispersive(i) {
+        let channel = vec3u(hero.channel);
+        let is_hero = channel == vec3u(0u, 1u, 2u);
+        of_hero.hero = select(vec3f(0.0), vec3f(1.0 / hero.probability), is_hero);
+        of_hero.eta = dot(i.etas, select(vec3f(0.0), vec3f(1.0), is_hero));
+    }
+    return of_hero;
+}
+//#end
+
+//#if iridescence
+// Reflectance of the opaque share.
+fn interface_opaque(i: Interface, cosine: f32) -> vec3f {
+    let plain = i.f0 + (i.f90 - i.f0) * schlick_weight(cosine);
+    if i.film.share == 0.0 {
+        return plain;
+    }
+    var filmed = vec3f(0.0);
+    if i.dielectric_share > 0.0 {
+        filmed += film_reflectance(i.film, cosine, i.base_f0) * i.dielectric_share;
+    }
+    if i.metal_share > 0.0 {
+        filmed += film_reflectance(i.film, cosine, i.metal_f0) * i.metal_share;
+    }
+    return mix(plain, filmed, i.film.share);
+}
+//#end
 
 fn interface_is_absent(i: Interface) -> bool {
     var absent = i.f90 == 0.0 && all(i.f0 == vec3f(0.0));
@@ -186,28 +275,54 @@ fn interface_is_delta_or_absent(i: Interface) -> bool {
 
 // Reflectance and transmittance of a facet seen at this cosine.
 fn interface_facet(i: Interface, cosine: f32) -> Facet {
+//#if iridescence
+    let opaque_share = interface_opaque(i, cosine);
+//#else
     let opaque_share = i.f0 + (i.f90 - i.f0) * schlick_weight(cosine);
+//#end
 //#if transmission
     if i.glass > 0.0 {
-        let exact = dielectric(cosine, i.eta);
-        if exact == TOTAL_REFLECTION {
-            return Facet(opaque_share + i.glass, vec3f(0.0));
-        }
-        let exact_f0 = normal_reflectance(i.eta);
-        let weight = saturate((exact - exact_f0) / (1.0 - exact_f0));
-        let fresnel = i.glass_f0 + (i.glass_f90 - i.glass_f0) * weight;
-        let most = max_element(fresnel);
-        if i.thin {
-            return Facet(
-                opaque_share + i.glass * (2.0 * fresnel / (1.0 + fresnel)),
-                i.tint * ((1.0 - most) / (1.0 + most)),
+        let glass = glass_at(i, cosine, i.eta);
+        var reflected_share = glass.xyz;
+//#if dispersion
+        if is_dispersive(i) {
+            reflected_share = vec3f(
+                glass_at(i, cosine, i.etas.x).x,
+                glass_at(i, cosine, i.etas.y).y,
+                glass_at(i, cosine, i.etas.z).z,
             );
         }
-        return Facet(opaque_share + i.glass * fresnel, i.tint * (1.0 - most));
+//#end
+        return Facet(opaque_share + i.glass * reflected_share, i.tint * glass.w);
     }
 //#end
     return Facet(opaque_share, vec3f(0.0));
 }
+
+//#if transmission
+// Reflectance of the transmissive share, and what passes it, at a relative index.
+fn glass_at(i: Interface, cosine: f32, eta: f32) -> vec4f {
+    let exact = dielectric(cosine, eta);
+    if exact == TOTAL_REFLECTION {
+        return vec4f(1.0, 1.0, 1.0, 0.0);
+    }
+    let exact_f0 = normal_reflectance(eta);
+    let weight = saturate((exact - exact_f0) / (1.0 - exact_f0));
+    var fresnel = i.glass_f0 + (i.glass_f90 - i.glass_f0) * weight;
+//#if iridescence
+    if i.film.share > 0.0 {
+        let sin2 = (1.0 - cosine * cosine) / select(1.0, eta * eta, eta < 1.0);
+        let filmed = film_reflectance(i.film, sqrt(max(1.0 - sin2, 0.0)), i.base_f0);
+        fresnel = mix(fresnel, filmed * i.glass_f90, i.film.share);
+    }
+//#end
+    let most = max_element(fresnel);
+    if i.thin {
+        return vec4f(2.0 * fresnel / (1.0 + fresnel), (1.0 - most) / (1.0 + most));
+    }
+    return vec4f(fresnel, 1.0 - most);
+}
+//#end
 
 fn facet_reflection_probability(facet: Facet) -> f32 {
     let r = importance(facet.reflectance);
@@ -274,7 +389,10 @@ fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSampl
         if all(wi == vec3f(0.0)) {
             return NO_SAMPLE;
         }
-        let radiance = scattering_facet(i, wo.z).transmittance / (i.eta * i.eta);
+        var radiance = scattering_facet(i, wo.z).transmittance / (i.eta * i.eta);
+//#if dispersion
+        radiance *= i.hero;
+//#end
         return LobeSample(DELTA, wi, radiance / (1.0 - probability));
     }
     var wi = reflected(wo, h) * vec3f(1.0, 1.0, -1.0);
@@ -339,8 +457,12 @@ fn eval_pdf_refracted(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
     let visible = ggx_visible_normal_pdf_solid_angle(i.ggx, wo, h) * jacobian;
     let masking = 2.0 * -wi.z * ggx_visibility(i.ggx, -wi);
     let probability = 1.0 - facet_reflection_probability(facet);
+    var transmitted = facet.transmittance;
+//#if dispersion
+    transmitted *= i.hero;
+//#end
     return EvalPdf(
-        facet.transmittance * (visible * masking),
+        transmitted * (visible * masking),
         visible * i.eta * i.eta * probability,
     );
 }
@@ -348,11 +470,20 @@ fn eval_pdf_refracted(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
 
 fn interface_albedo(i: Interface, cosine: f32, terms: vec2f) -> vec3f {
     var albedo = i.f0 * terms.x + i.f90 * terms.y;
+//#if iridescence
+    if i.film.share > 0.0 {
+        albedo = interface_opaque(i, cosine) * (terms.x + terms.y);
+    }
+//#end
 //#if transmission
     if i.glass > 0.0 {
         var glass = i;
         glass.f0 = vec3f(0.0);
         glass.f90 = 0.0;
+//#if iridescence
+        glass.dielectric_share = 0.0;
+        glass.metal_share = 0.0;
+//#end
         let passing = scattering_facet(glass, cosine);
         albedo += passing.reflectance + passing.transmittance;
     }
@@ -458,13 +589,17 @@ fn diffuse_sum(b: Bsdf) -> vec3f {
 
 //#if diffuse_transmission
 // Twin of `Interface::radiance_scale`.
-fn radiance_scale(i: Interface) -> f32 {
-//#if solid_transmission
+fn radiance_scale(i: Interface) -> vec3f {
+//#if transmission
     if !i.thin {
-        return 1.0 / (i.eta * i.eta);
+//#if dispersion
+        return 1.0 / (i.etas * i.etas);
+//#else
+        return vec3f(1.0 / (i.eta * i.eta));
+//#end
     }
 //#end
-    return 1.0;
+    return vec3f(1.0);
 }
 //#end
 
@@ -475,6 +610,13 @@ fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
     b.f0_f90 = vec2f(max_element(f0), f90);
     b.roughness = p.roughness;
     b.interface_ = interface_new(p, f0, f90, entering);
+//#if iridescence
+    let film = b.interface_.film;
+    if film.share > 0.0 && b.interface_.dielectric_share > 0.0 {
+        let most = film_largest_f0(film, b.interface_.base_f0, p.specular);
+        b.f0_f90.x = max(b.f0_f90.x, most);
+    }
+//#end
     b.diffuse_color = p.base_color * ((1.0 - p.metallic) * (1.0 - p.transmission));
 //#if diffuse_transmission
     if p.diffuse_transmission > 0.0 {

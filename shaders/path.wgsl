@@ -305,7 +305,15 @@ fn passes(path: ptr<function, Path>, point: SurfacePoint) -> bool {
 
 // Makes the surface a vertex, unless it is unlit: then it is seen as it is.
 fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
+//#if dispersion
+    var bsdf = bsdf_new(point.parameters, point.front_face);
+    if point.parameters.dispersion > 0.0 {
+        let hero = hero_choose((*path).throughput, path_pair(path).x);
+        bsdf.interface_ = interface_of_hero(bsdf.interface_, hero);
+    }
+//#else
     let bsdf = bsdf_new(point.parameters, point.front_face);
+//#end
 //#if layers
     if (*path).bounces == 0u {
         var albedo = bsdf_albedo(bsdf);

@@ -16,7 +16,7 @@ const NORMAL_MAPPED = 64u;
 const NO_TEXTURE = 0xffffffffu;
 
 // Texels of a material in `materials`, as `layout::Material` has them.
-const MATERIAL_TEXELS = 14u;
+const MATERIAL_TEXELS = 16u;
 const BASE_COLOR_ALPHA = 0u;
 const EMISSIVE_CUTOFF = 1u;
 const SPECULAR_COLOR_STRENGTH = 2u;
@@ -27,11 +27,13 @@ const FACTORS = 4u;
 const SCALES_FLAGS = 5u;
 const FIRST_TEXTURES = 6u;
 // Scattering inside of a body and its mean cosine.
-const SCATTERING = 10u;
+const SCATTERING = 11u;
 // Strength, cosine and sine of the rotation.
-const ANISOTROPY_SHEEN_ROUGHNESS = 11u;
-const SHEEN_COLOR = 12u;
-const DIFFUSE_TRANSMISSION = 13u;
+const ANISOTROPY_SHEEN_ROUGHNESS = 12u;
+const SHEEN_COLOR_DISPERSION = 13u;
+const DIFFUSE_TRANSMISSION = 14u;
+// Share, index, least and largest thickness.
+const FILM = 15u;
 
 // Textures of a material.
 const BASE_COLOR = 0u;
@@ -50,7 +52,9 @@ const SHEEN_COLOR_MAP = 11u;
 const SHEEN_ROUGHNESS_MAP = 12u;
 const DIFFUSE_TRANSMISSION_MAP = 13u;
 const DIFFUSE_TRANSMISSION_COLOR_MAP = 14u;
-const TEXTURES = 15u;
+const IRIDESCENCE_MAP = 15u;
+const IRIDESCENCE_THICKNESS_MAP = 16u;
+const TEXTURES = 17u;
 //#else
 const TEXTURES = 10u;
 //#end
@@ -82,6 +86,14 @@ struct SurfaceParameters {
 //#if diffuse_transmission
     diffuse_transmission: f32,
     diffuse_transmission_color: vec3f,
+//#end
+//#if iridescence
+    iridescence: f32,
+    iridescence_ior: f32,
+    iridescence_thickness: f32,
+//#end
+//#if dispersion
+    dispersion: f32,
 //#end
 }
 
@@ -266,7 +278,7 @@ fn corner_parameters(corner: Corner, textures: array<vec4f, TEXTURES>) -> Surfac
     p.anisotropy_axis = vec2f(1.0, 0.0);
 //#end
 //#if sheen
-    p.sheen_color = material_numbers(m, SHEEN_COLOR).xyz * textures[SHEEN_COLOR_MAP].xyz;
+    p.sheen_color = material_numbers(m, SHEEN_COLOR_DISPERSION).xyz * textures[SHEEN_COLOR_MAP].xyz;
     let sheen_roughness = material_numbers(m, ANISOTROPY_SHEEN_ROUGHNESS).w;
     p.sheen_roughness = saturate(sheen_roughness * textures[SHEEN_ROUGHNESS_MAP].w);
 //#end
@@ -274,6 +286,17 @@ fn corner_parameters(corner: Corner, textures: array<vec4f, TEXTURES>) -> Surfac
     let through = material_numbers(m, DIFFUSE_TRANSMISSION);
     p.diffuse_transmission = saturate(through.w * textures[DIFFUSE_TRANSMISSION_MAP].w);
     p.diffuse_transmission_color = through.xyz * textures[DIFFUSE_TRANSMISSION_COLOR_MAP].xyz;
+//#end
+//#if iridescence
+    let film = material_numbers(m, FILM);
+    p.iridescence = saturate(film.x * textures[IRIDESCENCE_MAP].x);
+    p.iridescence_ior = film.y;
+    p.iridescence_thickness = film.z + (film.w - film.z) * textures[IRIDESCENCE_THICKNESS_MAP].y;
+//#end
+//#if dispersion
+    if !p.thin && factors.z > 0.0 {
+        p.dispersion = material_numbers(m, SHEEN_COLOR_DISPERSION).w;
+    }
 //#end
     p.unlit = (flags & UNLIT) != 0u;
     if p.unlit {

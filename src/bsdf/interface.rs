@@ -8,8 +8,9 @@
 use glam::{Vec2, Vec3};
 
 use super::fresnel::{dielectric, normal_reflectance, reflect, refract, schlick_weight};
+use super::iridescence::Film;
 use super::microfacet::Ggx;
-use super::{LobeSample, SurfaceParameters};
+use super::{Hero, LobeSample, SurfaceParameters};
 use crate::color::importance;
 
 /// Relative indices closer to 1 than this refract straight on: f32 half vectors vanish.
@@ -44,9 +45,16 @@ pub(super) struct Interface {
     glass_f90: f32,
     /// Colour per crossing times the transmissive share.
     tint: Vec3,
-    /// Index of refraction on the far side over this side.
+    /// Index of refraction on the far side over this side; of the hero channel if there is one.
     eta: f32,
+    /// The same for each channel.
+    etas: Vec3,
+    /// What the hero channel's refraction counts for.
+    hero: Vec3,
     thin: bool,
+    film: Film,
+    /// What is under the film: F0 and share of the opaque dielectric and of the metal.
+    under_film: [(Vec3, f32); 2],
 }
 
 impl Interface {
@@ -54,14 +62,24 @@ impl Interface {
     pub(super) fn new(p: &SurfaceParameters, f0: Vec3, f90: f32, entering: bool) -> Self {
         let glass = (1.0 - p.metallic) * p.transmission;
         let opaque = (1.0 - p.metallic) * (1.0 - p.transmission);
-        let ior = p.ior.max(1.0);
-        let eta = if (ior - 1.0).abs() < STRAIGHT_ETA {
-            1.0
-        } else if entering || p.thin {
-            ior
-        } else {
-            1.0 / ior
+        let eta_of = |ior: f32| {
+            let ior = ior.max(1.0);
+            if (ior - 1.0).abs() < STRAIGHT_ETA {
+                1.0
+            } else if entering || p.thin {
+                ior
+            } else {
+                1.0 / ior
+            }
         };
+        let eta = eta_of(p.ior);
+        let mut etas = Vec3::splat(eta);
+        if p.dispersion > 0.0 && p.ior > 0.0 {
+            let spread = (p.ior - 1.0) * (0.025 * p.dispersion);
+            etas = Vec3::new(eta_of(p.ior - spread), eta, eta_of(p.ior + spread));
+        }
+        let film = Film::new(p);
+        let base_f0 = (normal_reflectance(p.ior) * p.specular_color).min(Vec3::ONE);
         Self {
             ggx: Ggx::stretched(p.roughness, p.anisotropy, p.anisotropy_axis),
             f0: f0 * opaque + p.base_color * p.metallic,
@@ -71,13 +89,40 @@ impl Interface {
             glass_f90: f90,
             tint: p.base_color * glass,
             eta,
+            etas,
+            hero: Vec3::ONE,
             thin: p.thin,
+            film,
+            under_film: [(base_f0, p.specular * opaque), (p.base_color, p.metallic)],
         }
     }
 
     /// By what radiance scales on its way through: the inside of a solid is denser with it.
-    pub(super) fn radiance_scale(&self) -> f32 {
-        if self.thin { 1.0 } else { 1.0 / (self.eta * self.eta) }
+    pub(super) fn radiance_scale(&self) -> Vec3 {
+        if self.thin { Vec3::ONE } else { 1.0 / (self.etas * self.etas) }
+    }
+
+    /// The same for a path that will be of one channel if it is refracted.
+    pub(super) fn of_hero(self, hero: Hero) -> Self {
+        if !self.is_dispersive() {
+            return self;
+        }
+        let mut weights = Vec3::ZERO;
+        weights[hero.channel] = 1.0 / hero.probability;
+        Self { eta: self.etas[hero.channel], hero: weights, ..self }
+    }
+
+    fn is_dispersive(&self) -> bool {
+        self.etas.x != self.etas.z && self.glass > 0.0
+    }
+
+    /// The dielectric's largest F0, that of its film too if there is one.
+    pub(super) fn largest_f0(&self, p: &SurfaceParameters, f0: Vec3) -> f32 {
+        let plain = f0.max_element();
+        if self.film.is_absent() || self.under_film[0].1 == 0.0 {
+            return plain;
+        }
+        self.film.largest_f0(self.under_film[0].0, p.specular).max(plain)
     }
 
     /// Whether nothing is reflected or transmitted.
@@ -107,24 +152,48 @@ impl Interface {
     /// `R = 2F / (1 + F)`, `T = (1 - F) / (1 + F)`. Coloured F0 takes its largest component away
     /// from what passes (`KHR_materials_specular`), so that white light stays white.
     fn facet(&self, cos: f32) -> Facet {
-        let opaque = self.f0 + (self.f90 - self.f0) * schlick_weight(cos);
+        let opaque = self.opaque(cos);
         if self.glass == 0.0 {
             return Facet { reflectance: opaque, transmittance: Vec3::ZERO };
         }
-        let Some(exact) = dielectric(cos, self.eta) else {
-            let reflectance = opaque + self.glass;
-            return Facet { reflectance, transmittance: Vec3::ZERO };
+        let (mut reflected, passed) = self.glass_at(cos, self.eta);
+        if self.is_dispersive() {
+            // Each channel is reflected as its own index says; the hero's passes.
+            reflected = Vec3::from_array([0, 1, 2].map(|c| self.glass_at(cos, self.etas[c]).0[c]));
+        }
+        Facet { reflectance: opaque + self.glass * reflected, transmittance: self.tint * passed }
+    }
+
+    /// Reflectance of the opaque share.
+    fn opaque(&self, cos: f32) -> Vec3 {
+        let plain = self.f0 + (self.f90 - self.f0) * schlick_weight(cos);
+        if self.film.is_absent() {
+            return plain;
+        }
+        let filmed = |(f0, share): (Vec3, f32)| {
+            if share > 0.0 { self.film.reflectance(cos, f0) * share } else { Vec3::ZERO }
         };
-        let exact_f0 = normal_reflectance(self.eta);
+        plain.lerp(filmed(self.under_film[0]) + filmed(self.under_film[1]), self.film.share)
+    }
+
+    /// Reflectance of the transmissive share, and what passes it, at a relative index.
+    fn glass_at(&self, cos: f32, eta: f32) -> (Vec3, f32) {
+        let Some(exact) = dielectric(cos, eta) else { return (Vec3::ONE, 0.0) };
+        let exact_f0 = normal_reflectance(eta);
         let weight = ((exact - exact_f0) / (1.0 - exact_f0)).clamp(0.0, 1.0);
-        let fresnel = self.glass_f0 + (self.glass_f90 - self.glass_f0) * weight;
+        let mut fresnel = self.glass_f0 + (self.glass_f90 - self.glass_f0) * weight;
+        if !self.film.is_absent() {
+            // Both sides see the film alike: by the angle outside.
+            let sin2 = (1.0 - cos * cos) / if eta < 1.0 { eta * eta } else { 1.0 };
+            let filmed = self.film.reflectance((1.0 - sin2).max(0.0).sqrt(), self.under_film[0].0);
+            fresnel = fresnel.lerp(filmed * self.glass_f90, self.film.share);
+        }
         let most = fresnel.max_element();
-        let (reflected, passed) = if self.thin {
+        if self.thin {
             (2.0 * fresnel / (1.0 + fresnel), (1.0 - most) / (1.0 + most))
         } else {
             (fresnel, 1.0 - most)
-        };
-        Facet { reflectance: opaque + self.glass * reflected, transmittance: self.tint * passed }
+        }
     }
 
     /// Light that passes straight through a smooth thin wall.
@@ -174,7 +243,7 @@ impl Interface {
         if self.transmits_delta() {
             let wi = refract(wo, Vec3::Z, self.eta)?;
             let radiance = self.scattering_facet(wo.z).transmittance / (self.eta * self.eta);
-            return Some(LobeSample::Interface(wi, radiance / (1.0 - probability)));
+            return Some(LobeSample::Interface(wi, radiance * self.hero / (1.0 - probability)));
         }
         let wi = if self.thin {
             reflect(wo, h) * Vec3::new(1.0, 1.0, -1.0)
@@ -232,13 +301,24 @@ impl Interface {
         let visible = self.ggx.visible_normal_pdf_solid_angle(wo, h) * jacobian;
         let masking = 2.0 * -wi.z * self.ggx.visibility(-wi);
         let probability = 1.0 - facet.reflection_probability();
-        (facet.transmittance * (visible * masking), visible * self.eta * self.eta * probability)
+        let value = facet.transmittance * self.hero * (visible * masking);
+        (value, visible * self.eta * self.eta * probability)
     }
 
     /// Estimate of all that [`Self::sample`] carries, given the albedo terms at `wo`.
     pub(super) fn albedo(&self, cos: f32, terms: Vec2) -> Vec3 {
-        let glass = Self { f0: Vec3::ZERO, f90: 0.0, ..*self };
+        let glass = Self {
+            f0: Vec3::ZERO,
+            f90: 0.0,
+            under_film: self.under_film.map(|(f0, _)| (f0, 0.0)),
+            ..*self
+        };
         let passing = if self.glass > 0.0 { glass.scattering_facet(cos) } else { Facet::BLACK };
-        self.f0 * terms.x + self.f90 * terms.y + passing.reflectance + passing.transmittance
+        let opaque = if self.film.is_absent() {
+            self.f0 * terms.x + self.f90 * terms.y
+        } else {
+            self.opaque(cos) * (terms.x + terms.y)
+        };
+        opaque + passing.reflectance + passing.transmittance
     }
 }

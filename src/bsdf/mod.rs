@@ -1,5 +1,6 @@
 //! How light is scattered at a surface point: glTF 2.0 metallic-roughness with the extensions ior,
-//! specular, transmission, volume, anisotropy, sheen, diffuse transmission and clearcoat.
+//! specular, transmission, volume, anisotropy, sheen, diffuse transmission,
+//! iridescence, dispersion and clearcoat.
 //!
 //! From the outside in: a clearcoat, sheen, the base's GGX interface (`interface`), and a Lambertian
 //! body (`diffuse`).
@@ -20,6 +21,7 @@ mod coat;
 mod diffuse;
 pub(crate) mod fresnel;
 mod interface;
+pub(crate) mod iridescence;
 pub(crate) mod microfacet;
 pub(crate) mod sheen;
 
@@ -51,6 +53,36 @@ pub struct BsdfSample {
     pub is_transmission: bool,
 }
 
+/// The channel whose index of refraction decides where a dispersive solid sends a path.
+///
+/// What is refracted carries that channel alone, over the probability of having chosen it; what is
+/// reflected carries all of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hero {
+    /// 0 to 2: red, green, blue.
+    pub channel: usize,
+    /// Probability of having chosen it, above 0.
+    pub probability: f32,
+}
+
+impl Hero {
+    /// Chooses among what a path carries, in proportion, by a uniform number. A path of one channel
+    /// keeps it.
+    pub fn choose(throughput: Vec3, u: f32) -> Self {
+        let share = throughput / throughput.max_element();
+        let share = share / share.element_sum();
+        let [red, green] = [u < share.x, u < share.x + share.y];
+        let channel = if red || (share.y == 0.0 && share.z == 0.0) {
+            0
+        } else if green || share.z == 0.0 {
+            1
+        } else {
+            2
+        };
+        Self { channel, probability: share[channel] }
+    }
+}
+
 /// The scattering at one point, for one side.
 #[derive(Debug, Clone, Copy)]
 pub struct Bsdf {
@@ -78,8 +110,8 @@ impl Bsdf {
     pub fn new(p: &SurfaceParameters, entering: bool) -> Self {
         let f90 = p.specular;
         let f0 = (normal_reflectance(p.ior) * p.specular_color).min(Vec3::ONE) * p.specular;
-        let f0_f90 = Vec2::new(f0.max_element(), f90);
         let interface = Interface::new(p, f0, f90, entering);
+        let f0_f90 = Vec2::new(interface.largest_f0(p, f0), f90);
         let terms = AlbedoTerms::of(interface.ggx(), p.roughness);
         Self {
             interface,
@@ -87,6 +119,12 @@ impl Bsdf {
             sheen: Sheen::new(p, entering),
             coat: Coat::new(p, entering),
         }
+    }
+
+    /// The same for a path of which one channel stands for all if a dispersive solid refracts it.
+    /// Without a hero all channels are refracted alike.
+    pub fn of_hero(self, hero: Hero) -> Self {
+        Self { interface: self.interface.of_hero(hero), ..self }
     }
 
     /// `f(wo, wi) * |cos wi|` of all lobes that have a density, per steradian.

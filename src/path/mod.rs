@@ -20,7 +20,7 @@ pub use background::Background;
 pub use lights::{LightSample, LocalLights};
 pub use world::World;
 
-use crate::bsdf::Bsdf;
+use crate::bsdf::{Bsdf, Hero};
 use crate::bvh::{Hit, Ray, offset_origin};
 use crate::environment::Environment;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
@@ -327,7 +327,10 @@ impl<'a> Path<'a> {
     /// Makes the surface a vertex, unless it is unlit: then it is seen as it is.
     fn arrive(&mut self, point: SurfacePoint) -> Option<Vertex> {
         let parameters = &point.parameters;
-        let bsdf = Bsdf::new(parameters, point.front_face);
+        let mut bsdf = Bsdf::new(parameters, point.front_face);
+        if parameters.dispersion > 0.0 {
+            bsdf = bsdf.of_hero(Hero::choose(self.throughput, self.sampler.next_pair()[0]));
+        }
         if self.bounces == 0 {
             let albedo = if parameters.unlit { parameters.base_color } else { bsdf.albedo() };
             self.first_hit =

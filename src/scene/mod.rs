@@ -173,6 +173,20 @@ pub struct Material {
     /// RG is the direction before rotation in `[-1,1]`, along tangent and bitangent; B multiplies
     /// `anisotropy`.
     pub anisotropy_texture: Option<TextureRef>,
+    /// `KHR_materials_iridescence`: share in `[0,1]` of the surface that a thin film covers.
+    pub iridescence: f32,
+    /// R multiplies `iridescence`.
+    pub iridescence_texture: Option<TextureRef>,
+    /// Index of refraction of the film, at least 1.
+    pub iridescence_ior: f32,
+    /// Thickness of the film in nanometres where the texture is 0 and where it is 1; without a
+    /// texture it is the second.
+    pub iridescence_thickness: [f32; 2],
+    /// G says where between the two the thickness lies.
+    pub iridescence_thickness_texture: Option<TextureRef>,
+    /// `KHR_materials_dispersion`: 20 over the Abbe number of a solid body, not negative; 0 bends all
+    /// colours alike.
+    pub dispersion: f32,
     /// `KHR_materials_sheen` colour, linear, in `[0,1]`; black is none.
     pub sheen_color: Vec3,
     /// RGB multiplies `sheen_color` (sRGB).
@@ -231,6 +245,12 @@ impl Default for Material {
             anisotropy: 0.0,
             anisotropy_rotation: 0.0,
             anisotropy_texture: None,
+            iridescence: 0.0,
+            iridescence_texture: None,
+            iridescence_ior: 1.3,
+            iridescence_thickness: [100.0, 400.0],
+            iridescence_thickness_texture: None,
+            dispersion: 0.0,
             sheen_color: Vec3::ZERO,
             sheen_color_texture: None,
             sheen_roughness: 0.0,
@@ -247,7 +267,7 @@ impl Default for Material {
 
 impl Material {
     /// All textures, in the order in which `shaders/surface.wgsl` numbers them.
-    pub fn textures(&self) -> [&Option<TextureRef>; 15] {
+    pub fn textures(&self) -> [&Option<TextureRef>; 17] {
         [
             &self.base_color_texture,
             &self.metallic_roughness_texture,
@@ -264,6 +284,8 @@ impl Material {
             &self.sheen_roughness_texture,
             &self.diffuse_transmission_texture,
             &self.diffuse_transmission_color_texture,
+            &self.iridescence_texture,
+            &self.iridescence_thickness_texture,
         ]
     }
 }

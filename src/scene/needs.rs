@@ -42,6 +42,10 @@ pub struct SceneNeeds {
     pub anisotropy: bool,
     /// Sheen.
     pub sheen: bool,
+    /// Thin films on surfaces.
+    pub iridescence: bool,
+    /// Solids that bend colours differently.
+    pub dispersion: bool,
     /// Clearcoat.
     pub clearcoat: bool,
     /// Unlit surfaces.
@@ -93,6 +97,8 @@ impl SceneNeeds {
         self.scattering_solids |= has_inside && m.scattering != Vec3::ZERO;
         self.anisotropy |= m.anisotropy > 0.0;
         self.sheen |= m.sheen_color != Vec3::ZERO;
+        self.iridescence |= m.iridescence > 0.0;
+        self.dispersion |= m.dispersion > 0.0 && m.transmission > 0.0 && m.thickness > 0.0;
         self.clearcoat |= m.clearcoat > 0.0;
         self.unlit |= m.unlit;
         self.emitters |= is_emitter(m);
@@ -120,6 +126,8 @@ impl SceneNeeds {
             (self.scattering_solids, "scattering inside of solids: none is filled"),
             (self.anisotropy, "anisotropy: no material has a direction"),
             (self.sheen, "sheen: no material has it"),
+            (self.iridescence, "iridescence: no material has a film"),
+            (self.dispersion, "dispersion: no solid bends colours differently"),
             (self.clearcoat, "clearcoat: no material is coated"),
             (self.emitters, "sampling of emissive triangles: nothing emits"),
             (self.punctual_lights, "punctual lights: the scene has none"),

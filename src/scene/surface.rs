@@ -45,6 +45,14 @@ pub struct SurfaceParameters {
     pub anisotropy: f32,
     /// Unit direction of that width in the local shading frame's plane; +X if not anisotropic.
     pub anisotropy_axis: Vec2,
+    /// Share of the surface under a thin film, in `[0,1]`.
+    pub iridescence: f32,
+    /// Index of refraction of the film, at least 1.
+    pub iridescence_ior: f32,
+    /// Thickness of the film in nanometres.
+    pub iridescence_thickness: f32,
+    /// 20 over the Abbe number; zero if thin or nothing is refracted.
+    pub dispersion: f32,
     /// Colour of the sheen, each component in `[0,1]`; black is none.
     pub sheen_color: Vec3,
     /// Perceptual roughness of the sheen in `[0,1]`.
@@ -236,6 +244,8 @@ impl<'a> Corner<'a> {
         let base_color = base.xyz().clamp(Vec3::ZERO, Vec3::ONE);
         let emissive = m.emissive * self.read(m.emissive_texture).xyz();
         let thin = m.thickness <= 0.0;
+        let [thinnest, thickest] = m.iridescence_thickness;
+        let film = self.read(m.iridescence_thickness_texture).y;
         SurfaceParameters {
             base_color,
             alpha: opacity(m.alpha_mode, base.w),
@@ -254,6 +264,10 @@ impl<'a> Corner<'a> {
             absorption: if thin { Vec3::ZERO } else { absorption(m) },
             anisotropy: unit(m.anisotropy * self.read(m.anisotropy_texture).z),
             anisotropy_axis: Vec2::X,
+            iridescence: unit(m.iridescence * self.read(m.iridescence_texture).x),
+            iridescence_ior: m.iridescence_ior,
+            iridescence_thickness: thinnest + (thickest - thinnest) * film,
+            dispersion: if thin || m.transmission == 0.0 { 0.0 } else { m.dispersion },
             sheen_color: m.sheen_color * self.read(m.sheen_color_texture).xyz(),
             sheen_roughness: unit(m.sheen_roughness * self.read(m.sheen_roughness_texture).w),
             clearcoat: unit(m.clearcoat * self.read(m.clearcoat_texture).x),

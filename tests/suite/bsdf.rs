@@ -55,6 +55,10 @@ const BLACK: SurfaceParameters = SurfaceParameters {
     sheen_roughness: 0.0,
     diffuse_transmission: 0.0,
     diffuse_transmission_color: Vec3::ONE,
+    iridescence: 0.0,
+    iridescence_ior: 1.3,
+    iridescence_thickness: 400.0,
+    dispersion: 0.0,
     clearcoat: 0.0,
     clearcoat_roughness: 0.0,
     clearcoat_normal: Vec3::Z,
@@ -83,6 +87,7 @@ fn cases() -> Vec<(&'static str, SurfaceParameters, bool)> {
         sheen_roughness,
         ..p
     };
+    let filmed = |p| SurfaceParameters { iridescence: 0.9, iridescence_ior: 1.7, ..p };
     let leaf = |p| SurfaceParameters {
         diffuse_transmission: 0.4,
         diffuse_transmission_color: Vec3::new(0.2, 0.7, 0.1),
@@ -111,6 +116,9 @@ fn cases() -> Vec<(&'static str, SurfaceParameters, bool)> {
         ("leaf", leaf(colored(PLASTIC)), true),
         ("paper", SurfaceParameters { diffuse_transmission: 1.0, ..WHITE }, true),
         ("curtain", velvet(0.4, leaf(WHITE)), true),
+        ("beetle", filmed(colored(PLASTIC)), true),
+        ("anodised metal", filmed(colored(METAL)), true),
+        ("bubble", filmed(PANE), true),
         ("smooth coat", SurfaceParameters { clearcoat_roughness: 0.0, ..coat(PLASTIC) }, true),
     ];
     for entering in [true, false] {
@@ -125,6 +133,8 @@ fn cases() -> Vec<(&'static str, SurfaceParameters, bool)> {
         cases.push(("dense glass", SurfaceParameters { ior: 3.0, ..GLASS }, entering));
         cases.push(("milk", SurfaceParameters { transmission: 0.5, ..GLASS }, entering));
         cases.push(("coated glass", coat(GLASS), entering));
+        cases.push(("filmed glass", filmed(GLASS), entering));
+        cases.push(("flint glass", SurfaceParameters { dispersion: 4.0, ..GLASS }, entering));
         cases.push(("wax", SurfaceParameters { thin: false, ..leaf(PLASTIC) }, entering));
         cases.push((
             "fibrous milk",

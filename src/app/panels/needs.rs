@@ -24,6 +24,8 @@ pub(in crate::app) fn show(ui: &mut Ui, scene: Option<&LoadedScene>, map: Option
         (needs.absorption, "Absorption"),
         (needs.anisotropy, "Anisotropy"),
         (needs.sheen, "Sheen"),
+        (needs.iridescence, "Iridescence"),
+        (needs.dispersion, "Dispersion"),
         (needs.clearcoat, "Clearcoat"),
         (needs.unlit, "Unlit surfaces"),
         (needs.emitters, "Emissive triangles"),

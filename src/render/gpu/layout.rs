@@ -109,17 +109,20 @@ pub(crate) struct Material {
     pub(crate) normal_scale: f32,
     pub(crate) clearcoat_normal_scale: f32,
     pub(crate) flags: u32,
-    pub(crate) textures: [u32; 15],
-    pub(crate) padding: u32,
+    pub(crate) textures: [u32; 17],
+    pub(crate) padding: [u32; 3],
     pub(crate) scattering: Vec3,
     pub(crate) scatter_mean_cosine: f32,
     pub(crate) anisotropy: f32,
     pub(crate) anisotropy_rotation: Vec2,
     pub(crate) sheen_roughness: f32,
     pub(crate) sheen_color: Vec3,
-    pub(crate) padding_1: u32,
+    pub(crate) dispersion: f32,
     pub(crate) diffuse_transmission_color: Vec3,
     pub(crate) diffuse_transmission: f32,
+    pub(crate) iridescence: f32,
+    pub(crate) iridescence_ior: f32,
+    pub(crate) iridescence_thickness: [f32; 2],
 }
 
 /// Twin of `TextureRef` in `texture.wgsl`.
@@ -339,7 +342,11 @@ pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
             sheen_color: m.sheen_color,
             diffuse_transmission_color: m.diffuse_transmission_color,
             diffuse_transmission: m.diffuse_transmission,
-            ..Material::zeroed()
+            dispersion: m.dispersion,
+            iridescence: m.iridescence,
+            iridescence_ior: m.iridescence_ior,
+            iridescence_thickness: m.iridescence_thickness,
+            padding: [0; 3],
         })
         .collect();
     (materials, refs)

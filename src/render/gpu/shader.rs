@@ -39,17 +39,19 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 44] = [
+    pub(crate) const ALL: [&'static str; 46] = [
         "alpha_mask",
         "anisotropy",
         "background_blur",
         "background_color",
         "clearcoat",
         "diffuse_transmission",
+        "dispersion",
         "emitters",
         "faces",
         "filtered_hits",
         "independent_points",
+        "iridescence",
         "learning",
         "layers",
         "lens",
@@ -94,7 +96,9 @@ impl Features {
             ("anisotropy", needs.anisotropy),
             ("clearcoat", needs.clearcoat),
             ("diffuse_transmission", needs.diffuse_transmission),
+            ("dispersion", needs.dispersion),
             ("emitters", needs.emitters),
+            ("iridescence", needs.iridescence),
             ("local_lights", !world.lights.is_empty()),
             ("metals", needs.metals),
             ("normal_maps", needs.normal_maps && !world.scene.tangents.is_empty()),
@@ -157,7 +161,7 @@ impl Features {
             ("shadow_rays", &["map_sampling", "local_lights"]),
             ("summed_area", &["table_f32", "table_f64", "table_u32"]),
             ("tangents", &["anisotropy", "normal_maps"]),
-            ("uncommon_textures", &["anisotropy", "diffuse_transmission", "sheen"]),
+            ("uncommon_textures", &["anisotropy", "diffuse_transmission", "iridescence", "sheen"]),
         ];
         for (name, causes) in follows {
             if causes.iter().any(|cause| set.contains(cause)) {
@@ -444,7 +448,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 20] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 21] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -459,6 +463,7 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 20] {
         (wgsl!("surface"), true),
         (wgsl!("fresnel"), true),
         (wgsl!("microfacet"), true),
+        (wgsl!("iridescence"), features.has("iridescence")),
         (wgsl!("sheen"), features.has("sheen")),
         (wgsl!("bsdf"), true),
         (wgsl!("light_grid"), true),
@@ -584,6 +589,9 @@ mod tests {
         }
         if !(chosen.contains("emitters") || chosen.contains("punctual_lights")) {
             chosen.remove("local_lights");
+        }
+        if !(chosen.contains("solid_transmission") && chosen.contains("transmission")) {
+            chosen.remove("dispersion");
         }
         if !chosen.contains("textures") {
             chosen.remove("normal_maps");

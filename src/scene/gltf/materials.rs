@@ -60,7 +60,7 @@ impl Materials {
 }
 
 /// Every texture slot of a material.
-pub(super) fn slots(material: &mut Material) -> [&mut Option<TextureRef>; 15] {
+pub(super) fn slots(material: &mut Material) -> [&mut Option<TextureRef>; 17] {
     [
         &mut material.base_color_texture,
         &mut material.metallic_roughness_texture,
@@ -77,11 +77,13 @@ pub(super) fn slots(material: &mut Material) -> [&mut Option<TextureRef>; 15] {
         &mut material.sheen_roughness_texture,
         &mut material.diffuse_transmission_texture,
         &mut material.diffuse_transmission_color_texture,
+        &mut material.iridescence_texture,
+        &mut material.iridescence_thickness_texture,
     ]
 }
 
 /// Where a texture of the file is read.
-struct Info {
+pub(super) struct Info {
     index: json::Index<json::Texture>,
     tex_coord: u32,
     transform: Option<TextureTransform>,
@@ -109,7 +111,7 @@ fn parsed<T: for<'de> serde::Deserialize<'de>>(value: &Value) -> Option<T> {
 }
 
 /// Reads one material.
-struct Reader<'a> {
+pub(super) struct Reader<'a> {
     root: &'a json::Root,
     name: String,
     wanted: &'a mut Wanted,
@@ -198,29 +200,19 @@ impl<'a> Reader<'a> {
             self.clearcoat(coat, material)?;
         }
         if let Some(anisotropy) = object("KHR_materials_anisotropy") {
-            material.anisotropy = self.unit(number(anisotropy, "anisotropyStrength", 0.0));
-            material.anisotropy_rotation =
-                self.finite(number(anisotropy, "anisotropyRotation", 0.0));
-            material.anisotropy_texture =
-                self.data(texture(anisotropy, "anisotropyTexture").as_ref())?;
+            self.anisotropy(anisotropy, material)?;
         }
         if let Some(sheen) = object("KHR_materials_sheen") {
-            material.sheen_color = self.unit_color(sheen, "sheenColorFactor", Vec3::ZERO);
-            material.sheen_color_texture =
-                self.colour(texture(sheen, "sheenColorTexture").as_ref())?;
-            material.sheen_roughness = self.unit(number(sheen, "sheenRoughnessFactor", 0.0));
-            material.sheen_roughness_texture =
-                self.data(texture(sheen, "sheenRoughnessTexture").as_ref())?;
+            self.sheen(sheen, material)?;
         }
         if let Some(through) = object("KHR_materials_diffuse_transmission") {
-            material.diffuse_transmission =
-                self.unit(number(through, "diffuseTransmissionFactor", 0.0));
-            material.diffuse_transmission_texture =
-                self.data(texture(through, "diffuseTransmissionTexture").as_ref())?;
-            material.diffuse_transmission_color =
-                self.unit_color(through, "diffuseTransmissionColorFactor", Vec3::ONE);
-            material.diffuse_transmission_color_texture =
-                self.colour(texture(through, "diffuseTransmissionColorTexture").as_ref())?;
+            self.diffuse_transmission(through, material)?;
+        }
+        if let Some(film) = object("KHR_materials_iridescence") {
+            self.iridescence(film, material)?;
+        }
+        if let Some(dispersion) = object("KHR_materials_dispersion") {
+            material.dispersion = self.at_least(number(dispersion, "dispersion", 0.0), 0.0);
         }
         if let Some(old) = object("KHR_materials_pbrSpecularGlossiness") {
             self.specular_glossiness(old, material)?;
@@ -271,12 +263,12 @@ impl<'a> Reader<'a> {
     }
 
     /// A texture whose RGB is sRGB-encoded.
-    fn colour(&mut self, info: Option<impl Into<Info>>) -> Fallible<Option<TextureRef>> {
+    pub(super) fn colour(&mut self, info: Option<impl Into<Info>>) -> Fallible<Option<TextureRef>> {
         info.map_or(Ok(None), |info| self.texture(&info.into(), true))
     }
 
     /// A texture of plain numbers.
-    fn data(&mut self, info: Option<impl Into<Info>>) -> Fallible<Option<TextureRef>> {
+    pub(super) fn data(&mut self, info: Option<impl Into<Info>>) -> Fallible<Option<TextureRef>> {
         info.map_or(Ok(None), |info| self.texture(&info.into(), false))
     }
 
@@ -298,29 +290,23 @@ impl<'a> Reader<'a> {
     }
 
     /// A factor clamped to `[0,1]`.
-    fn unit(&mut self, value: f32) -> f32 {
+    pub(super) fn unit(&mut self, value: f32) -> f32 {
         self.within(value, 0.0, 1.0)
     }
 
-    fn units<const N: usize>(&mut self, values: [f32; N]) -> [f32; N] {
+    pub(super) fn units<const N: usize>(&mut self, values: [f32; N]) -> [f32; N] {
         values.map(|value| self.unit(value))
     }
 
-    /// A colour of components clamped to `[0,1]`.
-    fn unit_color(&mut self, object: &Map<String, Value>, key: &str, default: Vec3) -> Vec3 {
-        let color: Option<[f32; 3]> = object.get(key).and_then(parsed);
-        color.map_or(default, |color| Vec3::from_array(self.units(color)))
-    }
-
-    fn at_least(&mut self, value: f32, least: f32) -> f32 {
+    pub(super) fn at_least(&mut self, value: f32, least: f32) -> f32 {
         self.within(value, least, f32::MAX)
     }
 
-    fn finite(&mut self, value: f32) -> f32 {
+    pub(super) fn finite(&mut self, value: f32) -> f32 {
         self.within(value, f32::MIN, f32::MAX)
     }
 
-    fn within(&mut self, value: f32, least: f32, most: f32) -> f32 {
+    pub(super) fn within(&mut self, value: f32, least: f32, most: f32) -> f32 {
         if !(least..=most).contains(&value) {
             self.notices.add(format!(
                 "material {} has factors outside their range, which are clamped",
@@ -342,10 +328,10 @@ fn uv_transform(transform: &TextureTransform) -> Affine2 {
     if affine.is_finite() { affine } else { Affine2::IDENTITY }
 }
 
-fn number(object: &Map<String, Value>, key: &str, default: f32) -> f32 {
+pub(super) fn number(object: &Map<String, Value>, key: &str, default: f32) -> f32 {
     object.get(key).and_then(Value::as_f64).map_or(default, |value| value as f32)
 }
 
-fn texture(object: &Map<String, Value>, key: &str) -> Option<json::texture::Info> {
+pub(super) fn texture(object: &Map<String, Value>, key: &str) -> Option<json::texture::Info> {
     object.get(key).and_then(parsed)
 }

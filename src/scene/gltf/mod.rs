@@ -18,6 +18,7 @@ mod extensions;
 mod geometry;
 mod materials;
 mod medium;
+mod newer;
 mod pose;
 mod primitive;
 mod tangents;

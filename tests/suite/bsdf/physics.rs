@@ -95,6 +95,10 @@ fn white_surfaces_never_gain_energy() {
             sheen_color: Vec3::splat(pick(&[0.0, 0.0, 0.5, 1.0])),
             sheen_roughness: pick(&[0.0, 0.2, 0.5, 1.0]),
             diffuse_transmission: pick(&[0.0, 0.0, 0.4, 1.0]),
+            iridescence: pick(&[0.0, 0.0, 0.5, 1.0]),
+            iridescence_ior: pick(&[1.0, 1.3, 2.0]),
+            iridescence_thickness: pick(&[0.0, 150.0, 400.0, 800.0]),
+            dispersion: pick(&[0.0, 0.0, 5.0]),
             clearcoat: pick(&[0.0, 0.0, 1.0]),
             clearcoat_roughness: pick(&[0.0, 0.3, 1.0]),
             ..WHITE
@@ -272,6 +276,10 @@ fn extremes_stay_finite() {
             sheen_roughness: pick(&[0.0, 0.07, 1.0]),
             diffuse_transmission: pick(&[0.0, 1e-10, 1.0]),
             diffuse_transmission_color: Vec3::new(pick(&[0.0, 1e-20, 1.0]), 0.0, 1.0),
+            iridescence: pick(&[0.0, 1e-10, 1.0]),
+            iridescence_ior: pick(&[1.0, 1.001, 3.0]),
+            iridescence_thickness: pick(&[0.0, 1e-3, 400.0, 1e6]),
+            dispersion: pick(&[0.0, 1e-6, 1.0, 100.0]),
             clearcoat: pick(&[0.0, 1e-10, 1.0]),
             clearcoat_roughness: pick(&[0.0, 0.04, 1.0]),
             ..WHITE

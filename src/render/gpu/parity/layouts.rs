@@ -111,7 +111,8 @@ fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
         base_color emissive alpha_cutoff specular_color specular absorption ior metallic roughness
         transmission clearcoat clearcoat_roughness normal_scale clearcoat_normal_scale flags textures
         padding scattering scatter_mean_cosine anisotropy anisotropy_rotation
-        sheen_roughness sheen_color padding_1 diffuse_transmission_color diffuse_transmission
+        sheen_roughness sheen_color dispersion diffuse_transmission_color diffuse_transmission
+        iridescence iridescence_ior iridescence_thickness
     );
     assert_eq!(at("MATERIAL_TEXELS"), size);
     assert_eq!(fields.iter().map(|(.., size)| size).sum::<usize>(), size);
@@ -124,6 +125,10 @@ fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
             &[offset_of!(Material, specular_color), offset_of!(Material, specular)],
         ),
         ("ABSORPTION_IOR", &[offset_of!(Material, absorption), offset_of!(Material, ior)]),
+        (
+            "SHEEN_COLOR_DISPERSION",
+            &[offset_of!(Material, sheen_color), offset_of!(Material, dispersion)],
+        ),
         (
             "DIFFUSE_TRANSMISSION",
             &[
@@ -151,7 +156,14 @@ fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
     let sheen_roughness = offset_of!(Material, sheen_roughness);
     let anisotropy = [offset_of!(Material, anisotropy), rotation, rotation + 4, sheen_roughness];
     assert_eq!(anisotropy, four("ANISOTROPY_SHEEN_ROUGHNESS"));
-    assert_eq!(offset_of!(Material, sheen_color), at("SHEEN_COLOR"));
+    let thickness = offset_of!(Material, iridescence_thickness);
+    let film = [
+        offset_of!(Material, iridescence),
+        offset_of!(Material, iridescence_ior),
+        thickness,
+        thickness + 4,
+    ];
+    assert_eq!(film, four("FILM"));
     let scales = [
         offset_of!(Material, clearcoat_roughness),
         offset_of!(Material, normal_scale),

@@ -7,9 +7,10 @@ use super::cases::{EDGE_UNITS, Part, Random, case, cases, edge_squares};
 use super::twin::{Bound, EXACT, Twin, ulps};
 use crate::bsdf::albedo::AlbedoTerms;
 use crate::bsdf::fresnel::{dielectric, normal_reflectance, reflect, refract, schlick_weight};
+use crate::bsdf::iridescence::Film;
 use crate::bsdf::microfacet::Ggx;
 use crate::bsdf::sheen::Sheen;
-use crate::bsdf::{Bsdf, SurfaceParameters, cosine_hemisphere};
+use crate::bsdf::{Bsdf, Hero, SurfaceParameters, cosine_hemisphere};
 
 /// Reads the words of [`material`]; writes what [`expect_parameters`] compares.
 pub(super) const PRELUDE: &str = "
@@ -20,8 +21,14 @@ fn take_parameters() -> SurfaceParameters {
     p.thin = take_word() != 0u; p.clearcoat = take(); p.clearcoat_roughness = take();
     p.clearcoat_normal = take3(); p.anisotropy = take(); p.anisotropy_axis = take2();
     p.sheen_color = take3(); p.sheen_roughness = take(); p.diffuse_transmission = take();
-    p.diffuse_transmission_color = take3();
+    p.diffuse_transmission_color = take3(); p.iridescence = take(); p.iridescence_ior = take();
+    p.iridescence_thickness = take(); p.dispersion = take();
     return p;
+}
+fn take_bsdf(p: SurfaceParameters) -> Bsdf {
+    var bsdf = bsdf_new(p, take_word() != 0u);
+    bsdf.interface_ = interface_of_hero(bsdf.interface_, Hero(take_word(), 0.25));
+    return bsdf;
 }
 fn take_ggx() -> Ggx {
     let roughness = take(); let strength = take();
@@ -33,6 +40,7 @@ fn put_parameters(p: SurfaceParameters) {
     put(p.clearcoat); put(p.clearcoat_roughness); put3(p.clearcoat_normal);
     put(p.anisotropy); put2(p.anisotropy_axis); put3(p.sheen_color); put(p.sheen_roughness);
     put(p.diffuse_transmission); put3(p.diffuse_transmission_color);
+    put(p.iridescence); put(p.iridescence_ior); put(p.iridescence_thickness); put(p.dispersion);
     put3(p.absorption); put3(p.emissive); put_bool(p.unlit);
 }
 ";
@@ -42,6 +50,7 @@ pub(super) fn probes() -> Vec<Probe<'static>> {
     let mut probes = fresnel();
     probes.extend(microfacets());
     probes.extend(albedos());
+    probes.extend(films());
     probes.extend(sheens());
     probes.extend(materials());
     probes
@@ -215,6 +224,10 @@ fn material(r: &mut Random) -> SurfaceParameters {
         anisotropy_axis: r.axis(),
         sheen_color: if r.below(3) == 0 { r.unit3() } else { Vec3::ZERO },
         sheen_roughness: r.unit(),
+        iridescence: [0.0, 0.0, r.unit()][r.below(3) as usize],
+        iridescence_ior: r.between(1.0, 2.2),
+        iridescence_thickness: r.between(0.0, 900.0),
+        dispersion: if r.below(2) == 0 { 0.0 } else { r.between(0.0, 8.0) },
         diffuse_transmission: [0.0, 0.0, 1.0, r.unit()][r.below(4) as usize],
         diffuse_transmission_color: r.unit3(),
         clearcoat: if is_coated { r.unit() } else { 0.0 },
@@ -246,6 +259,10 @@ impl Part for SurfaceParameters {
             &self.sheen_roughness,
             &self.diffuse_transmission,
             &self.diffuse_transmission_color,
+            &self.iridescence,
+            &self.iridescence_ior,
+            &self.iridescence_thickness,
+            &self.dispersion,
         ]));
     }
 }
@@ -270,6 +287,10 @@ fn take_parameters(t: &mut Twin<'_>) -> SurfaceParameters {
         sheen_roughness: t.take(),
         diffuse_transmission: t.take(),
         diffuse_transmission_color: t.take3(),
+        iridescence: t.take(),
+        iridescence_ior: t.take(),
+        iridescence_thickness: t.take(),
+        dispersion: t.take(),
         absorption: Vec3::ZERO,
         emissive: Vec3::ZERO,
         unlit: false,
@@ -294,9 +315,18 @@ pub(super) fn expect_parameters(t: &mut Twin<'_>, p: &SurfaceParameters, bound: 
     t.near(p.sheen_roughness, bound);
     t.near(p.diffuse_transmission, bound);
     t.near(p.diffuse_transmission_color, bound);
+    for number in [p.iridescence, p.iridescence_ior, p.iridescence_thickness, p.dispersion] {
+        t.near(number, bound);
+    }
     t.near(p.absorption, bound);
     t.near(p.emissive, bound);
     t.same(p.unlit);
+}
+
+/// Which side, and the hero channel.
+fn bsdf(t: &mut Twin<'_>, p: &SurfaceParameters) -> Bsdf {
+    let bsdf = Bsdf::new(p, t.take_word() != 0);
+    bsdf.of_hero(Hero { channel: t.take_word() as usize, probability: 0.25 })
 }
 
 /// The narrower a lobe, the more a facet's last bits count.
@@ -315,6 +345,44 @@ fn incoming(r: &mut Random, wo: Vec3) -> Vec3 {
         _ => r.direction(),
     };
     wi.normalize()
+}
+
+fn films() -> Vec<Probe<'static>> {
+    vec![
+        Probe::new(
+            "film_reflectance",
+            "var p: SurfaceParameters; p.iridescence_ior = take(); p.iridescence_thickness = take();
+            let film = film_new(p); let cosine = take(); put3(film_reflectance(film, cosine, take3()));",
+            cases([], |r| {
+                let (ior, thickness) = (r.between(1.0, 2.5), r.between(0.0, 1200.0));
+                case(&[&ior, &thickness, &r.unit(), &r.unit3()])
+            }),
+            |t| {
+                let p = SurfaceParameters {
+                    iridescence_ior: t.take(),
+                    iridescence_thickness: t.take(),
+                    ..material(&mut Random::default())
+                };
+                let (cos, f0) = (t.take(), t.take3());
+                // Phases of some turns, matrix entries of 3.
+                t.near(Film::new(&p).reflectance(cos, f0), ulps(64.0).of(1.0));
+            },
+        ),
+        Probe::new(
+            "hero_choose",
+            "let throughput = take3(); let hero = hero_choose(throughput, take());
+            put_word(hero.channel); put(hero.probability);",
+            cases([case(&[&Vec3::X, &0.99_f32]), case(&[&Vec3::Z, &0.0_f32])], |r| {
+                case(&[&(r.unit3() * r.magnitude(1e-20, 1e20)), &r.unit()])
+            }),
+            |t| {
+                let hero = Hero::choose(t.take3(), t.take());
+                t.same(hero.channel as u32);
+                t.near(hero.probability, ulps(4.0));
+            },
+        )
+        .flips(1000),
+    ]
 }
 
 fn sheens() -> Vec<Probe<'static>> {
@@ -363,15 +431,15 @@ fn materials() -> Vec<Probe<'static>> {
     vec![
         Probe::new(
             "bsdf_eval_pdf",
-            "let p = take_parameters(); let bsdf = bsdf_new(p, take_word() != 0u); let wo = take3();
+            "let p = take_parameters(); let bsdf = take_bsdf(p); let wo = take3();
             let f = bsdf_eval_pdf(bsdf, wo, take3()); put3(f.value); put(f.pdf_solid_angle);",
             cases([], |r| {
                 let wo = r.upper_direction();
-                case(&[&material(r), &r.below(2), &wo, &incoming(r, wo)])
+                case(&[&material(r), &r.below(2), &r.below(3), &wo, &incoming(r, wo)])
             }),
             |t| {
                 let p = take_parameters(t);
-                let bsdf = Bsdf::new(&p, t.take_word() != 0);
+                let bsdf = bsdf(t, &p);
                 let (value, pdf) = bsdf.eval_pdf(t.take3(), t.take3());
                 t.near(value, ulps(8.0).of(value.max_element() * narrow(&p)));
                 t.near(pdf, ulps(8.0).of(pdf * narrow(&p)));
@@ -379,13 +447,15 @@ fn materials() -> Vec<Probe<'static>> {
         ),
         Probe::new(
             "bsdf_sample",
-            "let p = take_parameters(); let bsdf = bsdf_new(p, take_word() != 0u); let wo = take3();
+            "let p = take_parameters(); let bsdf = take_bsdf(p); let wo = take3();
             let s = bsdf_sample(bsdf, wo, take3());
             put3(s.weight); put3(s.wi); put(s.pdf_solid_angle); put_bool(s.is_delta);",
-            cases([], |r| case(&[&material(r), &r.below(2), &r.upper_direction(), &r.unit3()])),
+            cases([], |r| {
+                case(&[&material(r), &r.below(2), &r.below(3), &r.upper_direction(), &r.unit3()])
+            }),
             |t| {
                 let p = take_parameters(t);
-                let bsdf = Bsdf::new(&p, t.take_word() != 0);
+                let bsdf = bsdf(t, &p);
                 match bsdf.sample(t.take3(), t.take3()) {
                     Some(s) => {
                         let weight = s.weight.max_element();

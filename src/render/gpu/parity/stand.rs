@@ -211,6 +211,10 @@ fn materials() -> Vec<Material> {
             sheen_color: Vec3::splat(0.2),
             ..plain.clone()
         },
+        Material { iridescence: 1.0, ..glass.clone() },
+        Material { iridescence: 0.8, iridescence_ior: 1.8, base_color: color, ..plain.clone() },
+        Material { dispersion: 5.0, ..solid.clone() },
+        Material { dispersion: 2.0, roughness: 0.4, iridescence: 0.5, ..solid.clone() },
         Material { diffuse_transmission: 0.7, transmission: 0.2, ..solid.clone() },
         Material { metallic: 1.0, roughness: 0.3, anisotropy: 0.8, ..plain.clone() },
         Material {
@@ -276,6 +280,8 @@ fn add_textures(scene: &mut Scene, random: &mut Random) {
             &mut m.sheen_roughness_texture,
             &mut m.diffuse_transmission_texture,
             &mut m.diffuse_transmission_color_texture,
+            &mut m.iridescence_texture,
+            &mut m.iridescence_thickness_texture,
         ] {
             *texture = reference();
         }

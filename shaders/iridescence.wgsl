@@ -1,0 +1,71 @@
+// A thin film on the interface: twin of src/bsdf/iridescence.rs.
+
+struct Film {
+    share: f32,
+    ior: f32,
+    // Micrometres.
+    thickness: f32,
+}
+
+fn film_new(p: SurfaceParameters) -> Film {
+    let t = saturate(p.iridescence_thickness / 0.03);
+    let ior = 1.0 + (max(p.iridescence_ior, 1.0) - 1.0) * (t * t * (3.0 - 2.0 * t));
+    return Film(p.iridescence, ior, 1e-3 * p.iridescence_thickness);
+}
+
+fn film_sensitivity(path: f32, signs: vec3f) -> vec3f {
+    let phase = TAU * path;
+    let weight = vec3f(0.846590, 1.0002219, 1.0011225);
+    let position = vec3f(1.6810, 1.7953, 2.2084);
+    let variance = vec3f(4.3278e-3, 9.3046e-3, 6.6121e-3);
+    let square = phase * phase;
+    var xyz = weight * cosines(position * path) * exp(-square * variance);
+    xyz.x += 0.1538683 * sin_cos_turns(2.2399 * path).y * exp(-square * 4.5282e-3);
+    xyz *= signs;
+    return vec3f(
+        dot(vec3f(3.24097, -1.5373832, -0.49861076), xyz),
+        dot(vec3f(-0.9692436, 1.8759675, 0.04155506), xyz),
+        dot(vec3f(0.05563008, -0.20397696, 1.0569715), xyz),
+    );
+}
+
+fn cosines(turns: vec3f) -> vec3f {
+    return vec3f(sin_cos_turns(turns.x).y, sin_cos_turns(turns.y).y, sin_cos_turns(turns.z).y);
+}
+
+fn film_schlick(f0: vec3f, cosine: f32) -> vec3f {
+    return f0 + (1.0 - f0) * schlick_weight(cosine);
+}
+
+fn film_reflectance(film: Film, cosine: f32, f0: vec3f) -> vec3f {
+    let c = saturate(cosine);
+    let cos_inside = sqrt(max(1.0 - (1.0 - c * c) / (film.ior * film.ior), 0.0));
+    let outer = film_schlick(vec3f(normal_reflectance(film.ior)), c).x;
+    let through = 1.0 - outer;
+    let roots = sqrt(clamp(f0, vec3f(0.0), vec3f(0.9999)));
+    let base_ior = (1.0 + roots) / (1.0 - roots);
+    let ratios = (base_ior / film.ior - 1.0) / (base_ior / film.ior + 1.0);
+    let inner = film_schlick(ratios * ratios, cos_inside);
+    let signs = select(vec3f(-1.0), vec3f(1.0), base_ior < vec3f(film.ior));
+    let path = 2.0 * film.ior * film.thickness * cos_inside;
+    let both = min(outer * inner, vec3f(0.9999));
+    let mean = through * through * inner / (1.0 - both);
+    var order = (mean - through) * sqrt(both);
+    var sum = outer + mean + order * 2.0 * film_sensitivity(path, signs);
+    order *= sqrt(both);
+    sum += order * 2.0 * film_sensitivity(2.0 * path, vec3f(1.0));
+    return saturate(sum);
+}
+
+// Twin of `Film::largest_f0`.
+fn film_largest_f0(film: Film, f0: vec3f, specular: f32) -> f32 {
+    var largest = 0.0;
+    for (var i = 1; i <= 12; i++) {
+        let cosine = f32(i) / 12.0;
+        let weight = schlick_weight(cosine);
+        let plain = f0 * specular + (specular - f0 * specular) * weight;
+        let mixed = mix(plain, film_reflectance(film, cosine, f0) * specular, film.share);
+        largest = max(largest, (max_element(mixed) - specular * weight) / (1.0 - weight));
+    }
+    return min(largest, specular);
+}
