@@ -876,7 +876,8 @@ fn bsdf_albedo(b: Bsdf) -> vec3f {
     albedo += interface_straight_transmittance(b.interface_, 1.0);
 //#end
 //#if sheen
-    albedo = albedo * sheen_left(b.sheen, up, up) + b.sheen.color * sheen_albedo(b.sheen, up);
+    albedo = albedo * sheen_left(b.sheen, up, SHEEN_TYPICAL)
+        + b.sheen.color * sheen_albedo(b.sheen, up);
 //#end
 //#if clearcoat
     let under = coat_attenuation(b.coat, up);

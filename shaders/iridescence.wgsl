@@ -40,7 +40,8 @@ fn film_schlick(f0: vec3f, cosine: f32) -> vec3f {
 fn film_reflectance(film: Film, cosine: f32, f0: vec3f) -> vec3f {
     let c = saturate(cosine);
     let cos_inside = sqrt(max(1.0 - (1.0 - c * c) / (film.ior * film.ior), 0.0));
-    let outer = film_schlick(vec3f(normal_reflectance(film.ior)), c).x;
+    let exact = dielectric(c, film.ior);
+    let outer = select(exact, 1.0, exact == TOTAL_REFLECTION);
     let through = 1.0 - outer;
     let roots = sqrt(clamp(f0, vec3f(0.0), vec3f(0.9999)));
     let base_ior = (1.0 + roots) / (1.0 - roots);

@@ -37,12 +37,12 @@ fn is_stretched(ggx: Ggx) -> bool {
     return ggx.along != ggx.alpha;
 }
 
-fn along_axis(ggx: Ggx, v: vec3f) -> vec2f {
+fn ggx_along_axis(ggx: Ggx, v: vec3f) -> vec2f {
     return vec2f(dot(v.xy, ggx.axis), dot(v.xy, vec2f(-ggx.axis.y, ggx.axis.x)));
 }
 
 fn widened(ggx: Ggx, v: vec3f) -> vec3f {
-    return vec3f(along_axis(ggx, v) * vec2f(ggx.along, ggx.alpha), v.z);
+    return vec3f(ggx_along_axis(ggx, v) * vec2f(ggx.along, ggx.alpha), v.z);
 }
 
 fn roughness_off_axis(ggx: Ggx, cosine: f32, sine: f32) -> f32 {
@@ -50,7 +50,7 @@ fn roughness_off_axis(ggx: Ggx, cosine: f32, sine: f32) -> f32 {
 }
 
 fn roughness_towards(ggx: Ggx, v: vec3f) -> f32 {
-    let flat = along_axis(ggx, v);
+    let flat = ggx_along_axis(ggx, v);
     let squared = dot(flat, flat);
     let unit_flat = select(vec2f(1.0, 0.0), flat / sqrt(squared), squared > 0.0);
     return roughness_off_axis(ggx, unit_flat.x, unit_flat.y);
@@ -60,7 +60,7 @@ fn roughness_towards(ggx: Ggx, v: vec3f) -> f32 {
 fn ggx_distribution(ggx: Ggx, h: vec3f) -> f32 {
 //#if anisotropy
     if is_stretched(ggx) {
-        let slopes = along_axis(ggx, h) / vec2f(ggx.along, ggx.alpha);
+        let slopes = ggx_along_axis(ggx, h) / vec2f(ggx.along, ggx.alpha);
         let t = dot(slopes, slopes) + h.z * h.z;
         return 1.0 / (PI * ggx.along * ggx.alpha * t * t);
     }

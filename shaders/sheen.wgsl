@@ -2,6 +2,8 @@
 
 const SHEEN_NODES = 32u;
 const MIN_SHEEN_ROUGHNESS = 0.07;
+// A direction of mean cosine.
+const SHEEN_TYPICAL = vec3f(0.0, 0.8660254, 0.5);
 const UNIFORM_HEMISPHERE = 0.15915494;
 
 struct Sheen {

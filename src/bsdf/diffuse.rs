@@ -1,6 +1,10 @@
 //! Lambert's lobes of the body: light that comes back from it, and light that comes through
 //! (`KHR_materials_diffuse_transmission`). Both get what the interface leaves in both directions
 //! (`albedo`).
+//!
+//! Into a solid as much comes through as out of it, as the extension says: of white light from
+//! everywhere nothing is lost either way. That is not reciprocal by the squared index, as refraction
+//! is; a white body would have to keep light in.
 
 use std::f32::consts::FRAC_1_PI;
 

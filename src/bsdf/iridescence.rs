@@ -1,15 +1,16 @@
 //! `KHR_materials_iridescence`: a thin film on the interface, whose reflections interfere.
 //!
 //! Belcour and Barla, *A Practical Extension to Microfacet Theory for the Modeling of Varying
-//! Iridescence*, SIGGRAPH 2017, in the form of the extension's appendix: two Schlick interfaces, two
-//! orders of interference, Gaussians in the spectrum for the eye's sensitivities.
+//! Iridescence*, SIGGRAPH 2017, in the form of the extension's appendix: two orders of interference,
+//! Gaussians in the spectrum for the eye's sensitivities. The outer interface is Fresnel's instead of
+//! Schlick's, which would be there even with a film of index 1.
 
 use std::f32::consts::TAU;
 
 use glam::Vec3;
 
 use super::SurfaceParameters;
-use super::fresnel::{normal_reflectance, schlick_weight};
+use super::fresnel::{dielectric, normal_reflectance, schlick_weight};
 use crate::color::REC709_FROM_XYZ;
 use crate::math::sin_cos_turns;
 
@@ -44,7 +45,7 @@ impl Film {
         let cos = cos.clamp(0.0, 1.0);
         let cos_inside = (1.0 - (1.0 - cos * cos) / (self.ior * self.ior)).max(0.0).sqrt();
         let schlick = |f0: f32, cos: f32| f0 + (1.0 - f0) * schlick_weight(cos);
-        let outer = schlick(normal_reflectance(self.ior), cos);
+        let outer = dielectric(cos, self.ior).unwrap_or(1.0);
         let through = 1.0 - outer;
         let roots = f0.clamp(Vec3::ZERO, Vec3::splat(0.9999)).map(f32::sqrt);
         let base_ior = (1.0 + roots) / (1.0 - roots);

@@ -198,7 +198,7 @@ impl Bsdf {
         let diffuse = self.diffuse.albedo(self.diffuse.left_of(terms));
         let interface =
             self.interface.albedo(1.0, terms) + self.interface.straight_transmittance(1.0);
-        let base = self.sheen.left(up, up) * (diffuse + interface);
+        let base = self.sheen.left(up, Sheen::TYPICAL) * (diffuse + interface);
         let under = self.coat.attenuation(up);
         let under = under * under * (self.sheen.colored_albedo(up) + base);
         (self.coat.albedo(up) + under).clamp(Vec3::ZERO, Vec3::ONE)

@@ -62,6 +62,9 @@ impl Sheen {
         roughness: 0.0,
     };
 
+    /// A direction of mean cosine.
+    pub(super) const TYPICAL: Vec3 = Vec3::new(0.0, 0.866_025_4, 0.5);
+
     pub(crate) fn new(p: &SurfaceParameters, entering: bool) -> Self {
         if p.sheen_color == Vec3::ZERO {
             return Self::ABSENT;

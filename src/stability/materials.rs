@@ -259,6 +259,13 @@ fn random_materials(setting: &Setting) -> Result<Outcome> {
             specular_color: Vec3::new(pick(&[0.0, 1.0, 100.0]), 1.0, pick(&[0.0, 1.0])),
             transmission: pick(&[0.0, 0.0, 1e-6, 0.5, 1.0]),
             thickness: pick(&[0.0, 1.0]),
+            anisotropy: pick(&[0.0, 0.0, 1e-10, 1.0]),
+            sheen_color: Vec3::splat(pick(&[0.0, 0.0, 1e-10, 1.0])),
+            sheen_roughness: pick(&[0.0, 0.3, 1.0]),
+            diffuse_transmission: pick(&[0.0, 0.0, 1e-10, 1.0]),
+            iridescence: pick(&[0.0, 0.0, 1e-10, 1.0]),
+            iridescence_ior: pick(&[1.0, 1.33, 3.0]),
+            dispersion: pick(&[0.0, 0.0, 1.0, 100.0]),
             clearcoat: pick(&[0.0, 0.0, 1e-10, 1.0]),
             clearcoat_roughness: pick(&[0.0, 0.3, 1.0]),
             ..lambert(1.0)

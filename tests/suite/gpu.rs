@@ -173,6 +173,48 @@ fn every_kind_of_material_looks_the_same() {
     }
 }
 
+/// Veils, panes, rough glass, films, fibres: each feature of a material alone, then all together, so
+/// that kernels with and without it are compared.
+#[test]
+fn every_feature_of_a_material_looks_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let plain = Material { metallic: 0.0, roughness: 0.4, ..lambert(0.6) };
+    let solid = Material { transmission: 1.0, thickness: 1.0, specular: 1.0, ..plain.clone() };
+    let features = [
+        ("veil", scenes::blended(plain.clone(), 0.4)),
+        ("brushed metal", Material { anisotropy: 0.9, metallic: 1.0, ..plain.clone() }),
+        ("velvet", Material { sheen_color: Vec3::ONE, sheen_roughness: 0.4, ..plain.clone() }),
+        (
+            "leaf",
+            Material {
+                diffuse_transmission: 0.6,
+                diffuse_transmission_color: Vec3::new(0.3, 0.9, 0.2),
+                ..plain.clone()
+            },
+        ),
+        ("film", Material { iridescence: 1.0, specular: 1.0, ..plain.clone() }),
+        ("frosted pane", Material { thickness: 0.0, ..solid.clone() }),
+        ("frosted glass", solid.clone()),
+        ("flint glass", Material { dispersion: 5.0, ior: 1.7, roughness: 0.0, ..solid }),
+    ];
+    let camera = Camera::look_at(Vec3::new(1.5, 1.6, 2.5), Vec3::new(0.0, 0.5, 0.0), 0.8);
+    let block = |stage: scenes::Stage, material: &Material, x: f32| {
+        stage.faces(material, Vec3::new(x - 0.4, 0.1, -0.4), Vec3::new(x + 0.4, 0.9, 0.4), 0..6)
+    };
+    let floor = || scenes::Stage::new().floor(&lambert(0.5));
+    let all = features
+        .iter()
+        .zip(-4..)
+        .fold(floor(), |stage, ((_, material), place)| block(stage, material, 0.9 * place as f32));
+    let alone = [&features[2], &features[7]].map(|(what, m)| (*what, block(floor(), m, 0.0)));
+    for (what, stage) in alone.into_iter().chain([("all", all)]) {
+        let world = stage.build();
+        let mut view = picture(&world, Sampling::Plain);
+        (view.camera, view.limits.bounces) = (camera.clone(), 8);
+        compare_views(&gpu, what, &world, &sky_map("overcast"), view);
+    }
+}
+
 #[test]
 fn fog_and_milk_look_the_same() {
     let Some(gpu) = gpu() else { return };

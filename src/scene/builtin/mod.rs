@@ -8,6 +8,7 @@
 //! | `exterior` | a street with arcade, trees and a café | the sky, partly occluded |
 //! | `fog` | the same street along its lamps, in mist | as `exterior`, scattered on its way |
 //! | `open` | sculptures on a terrace | the whole sky, nothing occludes |
+//! | `materials` | spheres of different materials | the whole sky |
 //! | `crack` | brick store room | a slit of 1.5 m x 2 cm |
 
 mod crack;
@@ -25,6 +26,7 @@ mod office;
 mod open;
 mod plants;
 mod room;
+mod samples;
 mod seating;
 mod street;
 mod textures;
@@ -37,7 +39,7 @@ pub const DEFAULT_SCENE: &str = "living-room";
 
 /// Names of the built-in scenes.
 pub fn names() -> &'static [&'static str] {
-    &["living-room", "evening", "office", "exterior", "fog", "open", "crack"]
+    &["living-room", "evening", "office", "exterior", "fog", "open", "materials", "crack"]
 }
 
 /// Builds the scene called `name`; an error lists the names there are.
@@ -49,6 +51,7 @@ pub fn build(name: &str) -> Result<Scene> {
         "exterior" => Ok(street::exterior()),
         "fog" => Ok(street::fog()),
         "open" => Ok(open::build()),
+        "materials" => Ok(samples::build()),
         "crack" => Ok(crack::build()),
         _ => Err(Error::new(format!(
             "there is no built-in scene called \"{name}\"; there are {}",

@@ -110,7 +110,9 @@ fn embedded() -> String {
         "uri":"data:application/octet-stream;base64,{corners}"}}],"materials":[{{"alphaMode":"MASK",
         "alphaCutoff":0.5,"emissiveFactor":[1,0.5,0],"extensions":{{"KHR_materials_transmission":
         {{"transmissionFactor":0.5}},"KHR_materials_volume":{{"thicknessFactor":1,"attenuationDistance":
-        2,"attenuationColor":[0.5,0.5,1]}},"KHR_materials_ior":{{"ior":1.3}}}},"pbrMetallicRoughness":
+        2,"attenuationColor":[0.5,0.5,1]}},"KHR_materials_ior":{{"ior":1.3}},
+        "KHR_materials_dispersion":{{"dispersion":2}},"KHR_materials_diffuse_transmission":
+        {{"diffuseTransmissionFactor":0.5,"diffuseTransmissionColorFactor":[1,0.5,0.5]}}}},"pbrMetallicRoughness":
         {{"metallicFactor":0.5,"roughnessFactor":0.1}}}}]}}"#
     )
 }
@@ -153,7 +155,10 @@ fn featured() -> (String, Vec<u8>) {
         "TEXCOORD_0":2,"TANGENT":3,"WEIGHTS_0":3}},"indices":4,"material":0,"mode":4,"targets":[{{"POSITION":5}}]}}]}}],
         "materials":[{{"normalTexture":{{"index":0,"scale":0.5}},"pbrMetallicRoughness":{{"baseColorTexture":
         {{"index":0,"extensions":{{"KHR_texture_transform":{{"offset":[0.5,0],"scale":[2,2]}}}}}}}},
-        "extensions":{{"KHR_materials_clearcoat":{{"clearcoatFactor":1}}}}}}],
+        "extensions":{{"KHR_materials_clearcoat":{{"clearcoatFactor":1}},
+        "KHR_materials_anisotropy":{{"anisotropyStrength":0.5,"anisotropyRotation":1,"anisotropyTexture":{{"index":0}}}},
+        "KHR_materials_sheen":{{"sheenColorFactor":[1,0.5,0],"sheenRoughnessFactor":0.5}},
+        "KHR_materials_iridescence":{{"iridescenceFactor":1,"iridescenceThicknessMaximum":300}}}}}}],
         "textures":[{{"source":0,"sampler":0}}],"samplers":[{{"wrapS":33071}}],
         "images":[{{"uri":"data:image/png;base64,{PNG}"}}],"buffers":[{{"byteLength":{}}}],
         "bufferViews":[{}],"accessors":[{}]}}"#,

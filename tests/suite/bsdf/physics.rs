@@ -33,7 +33,9 @@ fn reflection_is_reciprocal() {
 fn refraction_is_reciprocal_up_to_the_squared_index() {
     let mut random = Random(SplitMix(4));
     let mut compared = 0;
-    for (name, parameters, _) in cases().into_iter().filter(|c| !c.1.thin && !c.2) {
+    // Diffuse transmission is alike from both sides.
+    let refracts = |p: &SurfaceParameters| !p.thin && p.diffuse_transmission == 0.0;
+    for (name, parameters, _) in cases().into_iter().filter(|c| refracts(&c.1) && !c.2) {
         let [outside, inside] = [true, false].map(|entering| Bsdf::new(&parameters, entering));
         for _ in 0..400 {
             let (o, i) = (random.direction(), random.direction());
@@ -98,7 +100,6 @@ fn white_surfaces_never_gain_energy() {
             iridescence: pick(&[0.0, 0.0, 0.5, 1.0]),
             iridescence_ior: pick(&[1.0, 1.3, 2.0]),
             iridescence_thickness: pick(&[0.0, 150.0, 400.0, 800.0]),
-            dispersion: pick(&[0.0, 0.0, 5.0]),
             clearcoat: pick(&[0.0, 0.0, 1.0]),
             clearcoat_roughness: pick(&[0.0, 0.3, 1.0]),
             ..WHITE

@@ -260,12 +260,12 @@ fn extensions_required_used_and_honoured() {
         "made.glb: it requires the extension KHR_draco_mesh_compression, not supported here"
     );
     let scene = square().load(&format!(
-        r#""extensionsUsed":["KHR_materials_sheen","KHR_materials_ior"],{ONE_MESH}"#
+        r#""extensionsUsed":["KHR_materials_variants","KHR_materials_ior"],{ONE_MESH}"#
     ));
     let notices: Vec<_> = scene.notices.iter().collect();
     assert_eq!(
         notices,
-        ["the extension KHR_materials_sheen is not supported; what it adds is left out"]
+        ["the extension KHR_materials_variants is not supported; what it adds is left out"]
     );
 }
 
@@ -295,6 +295,84 @@ fn material_extensions() {
         scene.notices.iter().collect::<Vec<_>>(),
         ["material all has factors outside their range, which are clamped"]
     );
+}
+
+#[test]
+fn newer_material_extensions() {
+    let mut builder = square();
+    builder.floats("VEC2", &[0., 1., 1., 1., 1., 0., 0., 0.]);
+    let load = |extensions: &str| {
+        let names = extensions.split('"').filter(|name| name.starts_with("KHR_materials"));
+        let used: Vec<String> = names.map(|name| format!("\"{name}\"")).collect();
+        let used = used.join(",");
+        builder.load(&format!(
+            r#""extensionsUsed":[{used}],"extensionsRequired":[{used}],
+            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"TEXCOORD_0":2}},"indices":1,"material":0}}]}}],
+            "nodes":[{{"mesh":0}}],{}"#,
+            textured_material(&format!(r#""extensions":{{{extensions}}}"#), "{}")
+        ))
+    };
+    let map = |name: &str| format!(r#""{name}":{{"index":0}}"#);
+
+    let scene = load(&format!(
+        r#""KHR_materials_anisotropy":{{"anisotropyStrength":0.5,"anisotropyRotation":2,{}}},
+        "KHR_materials_sheen":{{"sheenColorFactor":[1,0.5,0],{},"sheenRoughnessFactor":0.3,{}}}"#,
+        map("anisotropyTexture"),
+        map("sheenColorTexture"),
+        map("sheenRoughnessTexture")
+    ));
+    let material = &scene.materials[0];
+    assert_eq!((material.anisotropy, material.anisotropy_rotation), (0.5, 2.0));
+    assert_eq!(material.sheen_color, Vec3::new(1.0, 0.5, 0.0));
+    assert_eq!(material.sheen_roughness, 0.3);
+    let srgb = |texture: Option<lightgrid::scene::TextureRef>| {
+        scene.textures[texture.expect("it is read").texture as usize].srgb
+    };
+    assert!(srgb(material.sheen_color_texture));
+    assert!(!srgb(material.sheen_roughness_texture) && !srgb(material.anisotropy_texture));
+    // The file has no tangents, and the direction needs them: u grows along +X.
+    assert!(scene.tangents.iter().all(|t| t.truncate().abs_diff_eq(Vec3::X, 1e-5)));
+    let needs = SceneNeeds::of(&scene);
+    assert!(needs.anisotropy && needs.sheen && !needs.iridescence && !needs.dispersion);
+    assert!(scene.notices.is_empty());
+
+    let scene = load(&format!(
+        r#""KHR_materials_iridescence":{{"iridescenceFactor":0.7,{},"iridescenceIor":1.5,
+        "iridescenceThicknessMinimum":50,"iridescenceThicknessMaximum":600,{}}},
+        "KHR_materials_diffuse_transmission":{{"diffuseTransmissionFactor":0.4,{},
+        "diffuseTransmissionColorFactor":[0.1,0.2,0.3],{}}}"#,
+        map("iridescenceTexture"),
+        map("iridescenceThicknessTexture"),
+        map("diffuseTransmissionTexture"),
+        map("diffuseTransmissionColorTexture")
+    ));
+    let material = &scene.materials[0];
+    assert_eq!((material.iridescence, material.iridescence_ior), (0.7, 1.5));
+    assert_eq!(material.iridescence_thickness, [50.0, 600.0]);
+    assert_eq!(material.diffuse_transmission, 0.4);
+    assert_eq!(material.diffuse_transmission_color, Vec3::new(0.1, 0.2, 0.3));
+    assert!(material.iridescence_texture.is_some());
+    assert!(material.iridescence_thickness_texture.is_some());
+    assert!(material.diffuse_transmission_texture.is_some());
+    assert!(material.diffuse_transmission_color_texture.is_some());
+    assert!(scene.tangents.is_empty());
+
+    let glass = r#""KHR_materials_transmission":{"transmissionFactor":1},
+        "KHR_materials_volume":{"thicknessFactor":1},"KHR_materials_dispersion":{"dispersion":0.3}"#;
+    let scene = load(glass);
+    assert_eq!(scene.materials[0].dispersion, 0.3);
+    assert!(SceneNeeds::of(&scene).dispersion);
+    let thin = load(&glass.replace(r#""thicknessFactor":1"#, ""));
+    assert!(!SceneNeeds::of(&thin).dispersion, "a thin wall bends nothing");
+
+    let odd = load(
+        r#""KHR_materials_sheen":{"sheenColorFactor":[2,0,0]},"KHR_materials_iridescence":
+        {"iridescenceIor":0.5,"iridescenceThicknessMaximum":-3},"KHR_materials_dispersion":{"dispersion":-1}"#,
+    );
+    let material = &odd.materials[0];
+    assert_eq!((material.sheen_color, material.iridescence_ior), (Vec3::X, 1.0));
+    assert_eq!((material.iridescence_thickness[1], material.dispersion), (0.0, 0.0));
+    assert_eq!(odd.notices.iter().count(), 1);
 }
 
 #[test]

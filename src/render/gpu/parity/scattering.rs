@@ -329,10 +329,13 @@ fn bsdf(t: &mut Twin<'_>, p: &SurfaceParameters) -> Bsdf {
     bsdf.of_hero(Hero { channel: t.take_word() as usize, probability: 0.25 })
 }
 
-/// The narrower a lobe, the more a facet's last bits count.
+/// The narrower a lobe, the more a facet's last bits count; sheen has powers of up to 100, a film
+/// phases of some turns.
 fn narrow(p: &SurfaceParameters) -> f32 {
     let alpha = |roughness: f32| (roughness * roughness).clamp(1e-3, 1.0);
-    let base = 1.0 / alpha(p.roughness);
+    let layers = [(p.sheen_color != Vec3::ZERO, 64.0), (p.iridescence > 0.0, 32.0)];
+    let layers = layers.into_iter().filter(|(is_there, _)| *is_there).map(|(_, by)| by);
+    let base = layers.fold(1.0 / alpha(p.roughness), f32::max);
     if p.clearcoat > 0.0 { base.max(1.0 / alpha(p.clearcoat_roughness)) } else { base }
 }
 
