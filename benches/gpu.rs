@@ -1,6 +1,7 @@
 //! `cargo bench -- gpu`: what the GPU does in the CPU's time, scene by scene.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LawOptions;
@@ -36,27 +37,45 @@ pub(crate) fn report() {
         for bounces in [0, 1, 5] {
             row(&gpu, name, &world, &environment, bounces);
         }
+        cancel_row(&gpu, name, &world, &environment);
     }
 }
 
+/// Prints how long a render that is told to stop goes on.
+fn cancel_row(gpu: &Gpu, name: &str, world: &World, environment: &Environment) {
+    let stage = Stage::new(gpu, world, environment).expect("it fits");
+    let view = View { width: 1280, height: 720, ..view(world, 5) };
+    let mut session = Session::on_gpu(world, environment, view, &stage).expect("it fits");
+    let never = AtomicBool::new(false);
+    while session.film().min_samples() == 0 {
+        session.advance(1, &never).expect("it runs");
+    }
+    let mut waits: Vec<Duration> = (0..20_u64)
+        .map(|round| {
+            let cancel = AtomicBool::new(false);
+            let mut told = None;
+            std::thread::scope(|scope| {
+                let teller = scope.spawn(|| {
+                    std::thread::sleep(Duration::from_millis(50 + 7 * round));
+                    cancel.store(true, Ordering::Relaxed);
+                    Instant::now()
+                });
+                session.advance(1 << 20, &cancel).expect("it runs");
+                let ended = Instant::now();
+                told = teller.join().ok().map(|told| ended - told);
+            });
+            told.expect("it does not panic")
+        })
+        .collect();
+    waits.sort();
+    println!(
+        "{name:<12} told to stop at 1280x720: median {:?}, longest {:?}",
+        waits[10], waits[19]
+    );
+}
+
 fn row(gpu: &Gpu, name: &str, world: &World, environment: &Environment, bounces: u32) {
-    let view = View {
-        camera: world.scene.cameras[0].clone(),
-        width: 320,
-        height: 180,
-        filter: PixelFilter::Box,
-        sampling: Sampling::Adaptive,
-        limits: PathLimits { bounces, russian_roulette: true },
-        seed: 0,
-        points: Points::Sobol,
-        grid_columns: 64,
-        learning_paths: 1 << 14,
-        laws: LawOptions::ADAPTIVE,
-        medium: None,
-        background: Background::Map,
-        crop: None,
-        layers: false,
-    };
+    let view = view(world, bounces);
     let stage = Stage::new(gpu, world, environment).expect("it fits");
     let mut sessions = [
         Session::new(world, environment, view.clone()),
@@ -87,4 +106,24 @@ fn row(gpu: &Gpu, name: &str, world: &World, environment: &Environment, bounces:
         rays / best[1],
         gpu / cpu
     );
+}
+
+fn view(world: &World, bounces: u32) -> View {
+    View {
+        camera: world.scene.cameras[0].clone(),
+        width: 320,
+        height: 180,
+        filter: PixelFilter::Box,
+        sampling: Sampling::Adaptive,
+        limits: PathLimits { bounces, russian_roulette: true },
+        seed: 0,
+        points: Points::Sobol,
+        grid_columns: 64,
+        learning_paths: 1 << 14,
+        laws: LawOptions::ADAPTIVE,
+        medium: None,
+        background: Background::Map,
+        crop: None,
+        layers: false,
+    }
 }

@@ -17,7 +17,12 @@ struct Hit {
     triangle: u32,
     // Weights of the second and the third vertex.
     barycentric: vec2f,
+    // Flags of its material, and FROM_BEHIND.
+    flags: u32,
 }
+
+// Of a hit: the ray came from behind the triangle.
+const FROM_BEHIND = 0x80000000u;
 
 // A ray as the boxes want it. Boxes are made larger by 16 u (|origin| + extent), u = 2^-24, which
 // covers all rounding here and in the triangle test (see `BoxRay` in src/bvh/traverse.rs).
@@ -101,11 +106,12 @@ fn plane_distance(index: u32, shear: Shear, rough: f32) -> f32 {
 // The hit of one triangle of the tree, MISS if there is none within `t_max`.
 fn intersect_triangle(index: u32, shear: Shear, t_max: f32) -> Hit {
     let v0 = bvh_triangles(3u * index);
+    let v1 = bvh_triangles(3u * index + 1u);
     let a = sheared(bitcast<vec3f>(v0.xyz), shear);
-    let b = sheared(bitcast<vec3f>(bvh_triangles(3u * index + 1u).xyz), shear);
+    let b = sheared(bitcast<vec3f>(v1.xyz), shear);
     let c = sheared(bitcast<vec3f>(bvh_triangles(3u * index + 2u).xyz), shear);
     let edges = vec3f(edge(c, b), edge(a, c), edge(b, a));
-    let none = Hit(MISS, 0u, vec2f(0.0));
+    let none = Hit(MISS, 0u, vec2f(0.0), 0u);
     if any(edges < vec3f(0.0)) && any(edges > vec3f(0.0)) {
         return none;
     }
@@ -121,7 +127,8 @@ fn intersect_triangle(index: u32, shear: Shear, t_max: f32) -> Hit {
     if !(t >= 0.0 && t <= t_max) {
         return none;
     }
-    return Hit(t, v0.w, edges.yz / determinant);
+    let side = select(0u, FROM_BEHIND, determinant * shear.factors.z < 0.0);
+    return Hit(t, v0.w, edges.yz / determinant, v1.w | side);
 }
 
 // Four of a node's eight boxes; bits for the hit mask.
@@ -205,7 +212,7 @@ fn take_child(group: ptr<function, vec2u>, octant: u32) -> u32 {
 fn closest_hit(ray: Ray, from_camera: bool) -> Hit {
     let boxes = box_ray_new(ray);
     let shear = shear_new(ray);
-    var best = Hit(MISS, 0xffffffffu, vec2f(0.0));
+    var best = Hit(MISS, 0xffffffffu, vec2f(0.0), 0u);
     var t_max = ray.t_max;
     var stack: array<vec2u, STACK_SIZE>;
     var height = 0u;
@@ -225,7 +232,7 @@ fn closest_hit(ray: Ray, from_camera: bool) -> Hit {
             let nearer = hit.t < best.t || (hit.t == best.t && hit.triangle < best.triangle);
             if hit.t < MISS && nearer {
 //#if filtered_hits
-                if !accepts(hit, ray.direction, from_camera) {
+                if !accepts(hit, from_camera) {
                     continue;
                 }
 //#end
@@ -245,45 +252,76 @@ fn closest_hit(ray: Ray, from_camera: bool) -> Hit {
     return best;
 }
 
-// Share of light that arrives along a shadow ray: zero if a surface scatters it all.
-fn transmittance_along(ray: Ray) -> vec3f {
-    let boxes = box_ray_new(ray);
-    let shear = shear_new(ray);
-    var transmittance = vec3f(1.0);
-    var stack: array<vec2u, STACK_SIZE>;
-    var height = 0u;
-    var group = vec2u(0u, 0x80000000u);
+// A walk through the tree that can be interrupted at a hit: the group of nodes being entered, how
+// many groups wait, and the triangles left of the last node (the first; which of the following).
+struct Walk {
+    group: vec2u,
+    waiting: u32,
+    triangles: vec2u,
+}
+
+// The next hit of a walk, in no order; MISS at its end.
+fn next_hit(
+    walk: ptr<function, Walk>,
+    stack: ptr<function, array<vec2u, STACK_SIZE>>,
+    boxes: BoxRay,
+    shear: Shear,
+    t_max: f32,
+) -> Hit {
+    var group = (*walk).group;
+    var height = (*walk).waiting;
+    var triangles = (*walk).triangles;
+    var hit = Hit(MISS, 0u, vec2f(0.0), 0u);
     loop {
-        let node = take_child(&group, boxes.octant);
-        if group.y > 0x00ffffffu {
-            stack[height] = group;
-            height += 1u;
+        while triangles.y != 0u && hit.t >= MISS {
+            let bit = firstTrailingBit(triangles.y);
+            triangles.y &= triangles.y - 1u;
+            hit = intersect_triangle(triangles.x + bit, shear, t_max);
         }
-        let entered = enter_node(node, boxes, ray.t_max);
-        var triangles = entered.triangles;
-        while triangles != 0u {
-            let bit = firstTrailingBit(triangles);
-            triangles &= triangles - 1u;
-            let hit = intersect_triangle(entered.triangle_base + bit, shear, ray.t_max);
-            if hit.t < MISS {
-//#if pass_through
-                transmittance *= passed(hit, ray.direction);
-                if max_element(transmittance) <= 0.0 {
-                    return vec3f(0.0);
-                }
-//#else
-                return vec3f(0.0);
-//#end
-            }
+        if hit.t < MISS {
+            break;
         }
-        group = vec2u(entered.child_base, entered.inner);
         if group.y <= 0x00ffffffu {
             if height == 0u {
                 break;
             }
             height -= 1u;
-            group = stack[height];
+            group = (*stack)[height];
         }
+        let node = take_child(&group, boxes.octant);
+        if group.y > 0x00ffffffu {
+            (*stack)[height] = group;
+            height += 1u;
+        }
+        let entered = enter_node(node, boxes, t_max);
+        triangles = vec2u(entered.triangle_base, entered.triangles);
+        group = vec2u(entered.child_base, entered.inner);
+    }
+    *walk = Walk(group, height, triangles);
+    return hit;
+}
+
+// Share of light that arrives along a shadow ray: zero if a surface scatters it all. Materials are
+// looked at outside of the walk, where lanes that have not found any do not wait for them.
+fn transmittance_along(ray: Ray) -> vec3f {
+    let boxes = box_ray_new(ray);
+    let shear = shear_new(ray);
+    var stack: array<vec2u, STACK_SIZE>;
+    var walk = Walk(vec2u(0u, 0x80000000u), 0u, vec2u(0u));
+    var transmittance = vec3f(1.0);
+    loop {
+        let hit = next_hit(&walk, &stack, boxes, shear, ray.t_max);
+        if hit.t >= MISS {
+            break;
+        }
+//#if pass_through
+        transmittance *= passed(hit, ray.direction);
+        if max_element(transmittance) > 0.0 {
+            continue;
+        }
+//#end
+        transmittance = vec3f(0.0);
+        break;
     }
     return transmittance;
 }

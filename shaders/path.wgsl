@@ -148,19 +148,12 @@ fn coverage(point: SurfacePoint) -> f32 {
 
 //#if filtered_hits
 // Whether a path sees a hit: not where a mask cuts it out, nor, for camera rays, a back side.
-fn accepts(hit: Hit, direction: vec3f, from_camera: bool) -> bool {
-    let flags = material_flags(material_of(hit.triangle));
-    if from_camera && (flags & DOUBLE_SIDED) == 0u {
-        let corners = triangles(hit.triangle).xyz;
-        let a = vertex_position(corners.x);
-        let b = vertex_position(corners.y);
-        let c = vertex_position(corners.z);
-        if dot(cross(b - a, c - a), direction) > 0.0 {
-            return false;
-        }
+fn accepts(hit: Hit, from_camera: bool) -> bool {
+    if from_camera && (hit.flags & (DOUBLE_SIDED | FROM_BEHIND)) == FROM_BEHIND {
+        return false;
     }
 //#if alpha_mask
-    if (flags & ALPHA_MASK) != 0u {
+    if (hit.flags & ALPHA_MASK) != 0u {
         return alpha_at(hit.triangle, hit.barycentric) > 0.0;
     }
 //#end
@@ -171,14 +164,13 @@ fn accepts(hit: Hit, direction: vec3f, from_camera: bool) -> bool {
 //#if pass_through
 // Share of light that a surface on a shadow ray's way lets through.
 fn passed(hit: Hit, direction: vec3f) -> vec3f {
-    let flags = material_flags(material_of(hit.triangle));
 //#if partial
-    if (flags & PARTIAL) != 0u {
+    if (hit.flags & PARTIAL) != 0u {
         return straight_through(surface_at(hit.triangle, hit.barycentric, direction), direction);
     }
 //#end
 //#if alpha_mask
-    if (flags & ALPHA_MASK) != 0u {
+    if (hit.flags & ALPHA_MASK) != 0u {
         return vec3f(1.0 - alpha_at(hit.triangle, hit.barycentric));
     }
 //#end

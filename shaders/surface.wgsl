@@ -120,10 +120,6 @@ fn corner_new(triangle: u32, barycentric: vec2f) -> Corner {
     return Corner(record.xyz, weights, record.w);
 }
 
-fn material_of(triangle: u32) -> u32 {
-    return triangles(triangle).w;
-}
-
 fn material_words(material: u32, texel: u32) -> vec4u {
     return materials(MATERIAL_TEXELS * material + texel);
 }
@@ -171,10 +167,17 @@ fn corner_uvs(corner: Corner, first_set: vec2f) -> vec4f {
 //#end
 }
 
-// All textures of the material here. One loop: a shader holds the code of a texture read once.
+// All textures of the material here. One loop, over those that any material of the scene has: a
+// shader holds the code of a texture read once.
 fn read_textures(corner: Corner, uvs: vec4f) -> array<vec4f, TEXTURES> {
     var values: array<vec4f, TEXTURES>;
     for (var i = 0u; i < TEXTURES; i++) {
+        values[i] = vec4f(1.0);
+    }
+    var left = TEXTURES_IN_SCENE;
+    while left != 0u {
+        let i = firstTrailingBit(left);
+        left &= left - 1u;
         values[i] = read_texture(texture_of(corner.material, i), uvs);
     }
     return values;

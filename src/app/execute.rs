@@ -154,13 +154,20 @@ impl App {
         folder.join(format!("{stem}.png")).display().to_string()
     }
 
-    fn save(&mut self, path: PathBuf) {
+    /// Writes the picture, or remembers to when there is only a small one as yet.
+    pub(super) fn save(&mut self, path: PathBuf) {
         let Some(picture) = self.picture() else {
             self.messages.error("there is no picture yet to be written");
             return;
         };
         self.settings.save_folder = path.parent().map(Path::to_path_buf);
-        let sentence = format!("Saved {}", path.display());
+        let film = &picture.snapshot.main.film;
+        if picture.snapshot.is_small() {
+            self.messages.notice("The picture will be saved once it has its full size");
+            self.waiting_save = Some(path);
+            return;
+        }
+        let sentence = format!("Saved {}, {} x {} pixels", path.display(), film.width, film.height);
         self.do_later("save", move || {
             save::picture(&path, &picture)?;
             let remarks = save::remarks(&picture);
@@ -186,7 +193,9 @@ impl App {
             return;
         };
         let sentence = format!("Exported {} laws to {}", grid.laws().len(), path.display());
-        self.do_later("export", move || save::laws(&path, &grid).map(|()| sentence));
+        self.do_later("export", move || {
+            crate::output::laws::write_laws(&path, &grid).map(|()| sentence)
+        });
     }
 
     /// Reads a reference on a thread; its arrival is a message.

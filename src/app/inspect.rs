@@ -13,6 +13,7 @@ use crate::bvh::{Ray, offset_origin};
 use crate::color::importance;
 use crate::environment::Environment;
 use crate::light_grid::counters::Tally;
+use crate::light_grid::tile_laws::TileLaws;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
 use crate::path::World;
 
@@ -32,6 +33,8 @@ pub(super) struct Inspected {
     pub(super) coordinates: [u32; 3],
     /// Index of its law.
     pub(super) law: u32,
+    /// Bytes of its law.
+    pub(super) memory_bytes: Option<usize>,
     /// Probability of each tile.
     pub(super) probabilities: Vec<f32>,
     /// What learning counted for each tile; empty where nothing was.
@@ -167,11 +170,15 @@ fn inspect(snapshot: &Snapshot, place: Vec2) -> Option<Inspected> {
         cell: None,
         coordinates: [0; 3],
         law: WHOLE_MAP,
+        memory_bytes: None,
         probabilities: Vec::new(),
         tallies: Vec::new(),
     };
     let Some(grid) = &snapshot.main.grid else { return Some(inspected) };
     inspected.law = grid.law_of(spot.position, spot.normal);
+    let (laws, law) = (grid.laws(), inspected.law);
+    inspected.memory_bytes =
+        (law != WHOLE_MAP).then(|| TileLaws::law_bytes(laws.tile_count(), laws.support(law)));
     inspected.probabilities = (0..grid.laws().tile_count())
         .map(|tile| grid.laws().probability(inspected.law, tile))
         .collect();

@@ -58,7 +58,7 @@ pub enum Tab {
 }
 
 /// What the map of tiles shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum TileView {
     /// Share of the map's energy.
     Energy,

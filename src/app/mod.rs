@@ -97,6 +97,8 @@ pub struct App {
     /// Results of files being chosen and written.
     later: (Sender<Later>, Receiver<Later>),
     wake: Wake,
+    /// Where the picture is to be written once it has its full size.
+    waiting_save: Option<std::path::PathBuf>,
     is_repeatable: bool,
     is_closing: bool,
 }
@@ -148,6 +150,7 @@ impl App {
             arriving: Arc::default(),
             later: channel(),
             wake,
+            waiting_save: None,
             is_repeatable: start.is_repeatable,
             is_closing: false,
         })
@@ -325,15 +328,15 @@ impl App {
                 // What is shown stays, and the document says so again.
                 Loaded::Scene(_, Err(error)) => {
                     self.messages.error(error.to_string());
-                    if let Some(scene) = &self.scene {
-                        self.document.scene.clone_from(&scene.name);
-                    }
+                    self.stay_in_scene();
                 }
                 Loaded::Map(_, Err(error)) => {
                     self.messages.error(error.to_string());
-                    if let Some(map) = &self.map {
-                        self.document.map.clone_from(&map.name);
-                    }
+                    self.document.map = match &self.map {
+                        Some(map) => map.name.clone(),
+                        // At the start there is none: the built-in one is always there.
+                        None => Document::default().map,
+                    };
                 }
             }
         }
@@ -361,6 +364,11 @@ impl App {
             self.snapshot = Some(snapshot);
         }
         self.shown = self.presenter.shown();
+        if self.snapshot.as_ref().is_some_and(|snapshot| !snapshot.is_small())
+            && let Some(path) = self.waiting_save.take()
+        {
+            self.save(path);
+        }
         if let Some(failure) = self.shown.as_ref().and_then(|shown| shown.failure.clone()) {
             self.messages.error(failure);
             self.document.look.denoiser = Denoiser::default();
@@ -371,36 +379,47 @@ impl App {
     fn take_scene(&mut self, scene: LoadedScene) {
         scene.world.scene.notices.iter().for_each(|sentence| self.messages.notice(sentence));
         self.settings.recent_scene(&scene.name);
+        let is_first = self.scene.is_none();
         if self.document.viewpoint.is_none() {
-            let camera = scene.world.scene.cameras.first().cloned();
-            let camera = camera.unwrap_or_else(|| framing::frame(&scene.world, 16.0 / 9.0));
-            let distance = self.pivot_distance(&scene, &camera);
-            let mut viewpoint = Viewpoint::of(&camera, distance);
-            if !(viewpoint.focus_distance.is_finite() && viewpoint.focus_distance > 0.0) {
-                viewpoint.focus_distance = distance;
-            }
-            self.document.viewpoint = Some(viewpoint);
+            self.document.viewpoint = Some(first_viewpoint(&scene));
+        }
+        if is_first {
+            // An empty window is nothing to go back to.
             self.undo.amend(&self.document);
         }
         self.scene = Some(scene);
         self.inspector.forget();
     }
 
-    /// Metres to what is in the middle of a camera's picture.
-    fn pivot_distance(&self, scene: &LoadedScene, camera: &crate::scene::Camera) -> f32 {
-        let rays = crate::path::camera::CameraRays::new(camera, 16, 9);
-        let ray = rays.ray(Vec2::new(8.0, 4.5), Vec2::splat(0.5));
-        let (low, high) = scene.world.bvh.bounds();
-        surface_map::look(&scene.world, ray)
-            .map_or(0.5 * (high - low).length(), |spot| spot.position.distance(ray.origin))
-            .max(0.05)
+    /// Gives the document what belongs to the scene that is shown, after another could not be read.
+    fn stay_in_scene(&mut self) {
+        let Some(scene) = &self.scene else {
+            // At the start there is none: the built-in one is always there.
+            self.document.scene = Document::default().scene;
+            return;
+        };
+        let before = self.undo.present();
+        if before.scene == scene.name {
+            self.document.scene.clone_from(&before.scene);
+            self.document.viewpoint.clone_from(&before.viewpoint);
+            self.document.bookmarks.clone_from(&before.bookmarks);
+            (self.document.region, self.document.fog) = (before.region, before.fog);
+        } else {
+            // Somebody went back to a file that is no longer there.
+            self.document.scene.clone_from(&scene.name);
+            self.document.viewpoint = Some(first_viewpoint(scene));
+            self.undo.amend(&self.document);
+        }
     }
 
     /// Keeps a step for undo once nobody drags or types any more.
     fn settle(&mut self, context: &egui::Context) {
         let busy = context.input(|i| i.pointer.any_down() || !i.keys_down.is_empty())
             || context.text_edit_focused();
-        if !busy && !self.interface.is_moving(context.time()) && self.scene.is_some() {
+        // A file that is being read may turn out to be damaged: nothing has changed then.
+        let is_there = self.scene.as_ref().is_some_and(|s| s.name == self.document.scene)
+            && self.map.as_ref().is_some_and(|m| m.name == self.document.map);
+        if !busy && is_there && !self.interface.is_moving(context.time()) {
             self.undo.settle(&self.document);
         }
     }
@@ -478,4 +497,26 @@ impl App {
         }
         self.lit.as_ref().map(|lit| Arc::clone(&lit.environment))
     }
+}
+
+/// Through the scene's first camera, or of all of it where there is none.
+fn first_viewpoint(scene: &LoadedScene) -> Viewpoint {
+    let camera = scene.world.scene.cameras.first().cloned();
+    let camera = camera.unwrap_or_else(|| framing::frame(&scene.world, 16.0 / 9.0));
+    let distance = pivot_distance(scene, &camera);
+    let mut viewpoint = Viewpoint::of(&camera, distance);
+    if !(viewpoint.focus_distance.is_finite() && viewpoint.focus_distance > 0.0) {
+        viewpoint.focus_distance = distance;
+    }
+    viewpoint
+}
+
+/// Metres to what is in the middle of a camera's picture.
+fn pivot_distance(scene: &LoadedScene, camera: &crate::scene::Camera) -> f32 {
+    let rays = crate::path::camera::CameraRays::new(camera, 16, 9);
+    let ray = rays.ray(Vec2::new(8.0, 4.5), Vec2::splat(0.5));
+    let (low, high) = scene.world.bvh.bounds();
+    surface_map::look(&scene.world, ray)
+        .map_or(0.5 * (high - low).length(), |spot| spot.position.distance(ray.origin))
+        .max(0.05)
 }

@@ -8,10 +8,10 @@ use glam::{UVec2, Vec2, Vec3};
 
 use super::Wake;
 use super::document::Look;
-use super::overlays::{CellFacts, Legend, Overlay, Sources};
+use super::overlays::{CellFacts, Label, Legend, Overlay, Sources};
 use super::surface_map::SurfaceMap;
-use super::worker::{Activity, Request, Snapshot};
-use crate::denoise::Denoiser;
+use super::worker::{Request, Snapshot};
+use crate::denoise::{preview, quick};
 use crate::error::{Error, Result};
 use crate::image::{Image, Rgb8};
 use crate::light_grid::LightGrid;
@@ -56,6 +56,8 @@ pub struct Shown {
     pub exposure_ev: f32,
     /// What the overlay's colours mean.
     pub legend: Option<Legend>,
+    /// What it writes on the picture.
+    pub labels: Vec<Label>,
     /// Why the denoiser did not do its work.
     pub failure: Option<String>,
     /// Facts about the grid's cells, when the overlay asked for them.
@@ -189,11 +191,22 @@ impl Memory {
         let mut picture = display_rgb8(&balanced, exposure_ev, order.look.curve);
         let other = other(&order, exposure_ev, &mut filter).map(Arc::new);
         let failure = filter.failure;
-        let legend = order
+        let painted = order
             .overlay
             .and_then(|(overlay, opacity)| self.paint(&order, overlay, opacity, &mut picture));
+        let (legend, labels) = painted.unzip();
+        let labels = labels.unwrap_or_default();
         let facts = self.facts.as_ref().map(|(_, _, facts)| Arc::clone(facts));
-        Shown { order, picture: Arc::new(picture), other, exposure_ev, legend, failure, facts }
+        Shown {
+            order,
+            picture: Arc::new(picture),
+            other,
+            exposure_ev,
+            legend,
+            labels,
+            failure,
+            facts,
+        }
     }
 
     fn paint(
@@ -202,7 +215,7 @@ impl Memory {
         overlay: Overlay,
         opacity: f32,
         picture: &mut Rgb8,
-    ) -> Option<Legend> {
+    ) -> Option<(Legend, Vec<Label>)> {
         let snapshot = &order.snapshot;
         let take = &snapshot.main;
         if overlay.needs_surfaces() {
@@ -226,7 +239,7 @@ impl Memory {
                 None => blend(pixel, [24, 25, 28], 0.6 * opacity),
             }
         }
-        Some(painted.legend)
+        Some((painted.legend, painted.labels))
     }
 
     /// Brings surfaces and facts up to date with the snapshot.
@@ -282,11 +295,6 @@ impl Filter<'_> {
     }
 }
 
-/// The film's picture through the filter that is always there.
-fn quick(film: &Film) -> Image {
-    Denoiser::ATrous.denoise(film).unwrap_or_else(|_| film.image())
-}
-
 /// What the wipe uncovers.
 fn other(order: &Order, exposure_ev: f32, filter: &mut Filter<'_>) -> Option<Rgb8> {
     let look = &order.look;
@@ -298,14 +306,13 @@ fn other(order: &Order, exposure_ev: f32, filter: &mut Filter<'_>) -> Option<Rgb
     Some(display_rgb8(&look.white_balance.apply(linear), exposure_ev, look.curve))
 }
 
-/// The linear picture; pixels without samples show the small one.
+/// The linear picture; pixels without samples show what there was before.
 fn develop(snapshot: &Snapshot, filter: &mut Filter<'_>) -> Image {
     let film = &snapshot.main.film;
     // A small picture is there to see where one is going, not to judge noise.
-    let is_moving = snapshot.activity == Activity::Moving;
-    let mut image = if is_moving { quick(film) } else { filter.image(film) };
+    let mut image = if snapshot.is_small() { preview(film) } else { filter.image(film) };
     if let Some(under) = snapshot.under.as_ref().filter(|_| film.min_samples() == 0) {
-        fill_from(&mut image, film, &quick(under));
+        fill_from(&mut image, film, under);
     }
     image
 }
@@ -317,11 +324,13 @@ fn blend(pixel: &mut [u8; 3], color: [u8; 3], opacity: f32) {
     }
 }
 
-/// Gives pixels without samples the radiance at the same place of another picture, bilinear.
+/// Gives pixels without samples the radiance at the same place of another picture, bilinear. The
+/// field of view is vertical: pictures of different shapes share their middle.
 fn fill_from(image: &mut Image, film: &Film, before: &Image) {
     let size = Vec2::new(image.width as f32, image.height as f32);
     let last = UVec2::new(before.width - 1, before.height - 1);
-    let scale = Vec2::new(before.width as f32, before.height as f32) / size;
+    let size_before = Vec2::new(before.width as f32, before.height as f32);
+    let scale = size_before.y / size.y;
     let width = image.width;
     let at = |x: u32, y: u32| Vec3::from(before.at(x.min(last.x), y.min(last.y)));
     for (i, (rgb, pixel)) in image.pixels.iter_mut().zip(film.pixels()).enumerate() {
@@ -329,7 +338,8 @@ fn fill_from(image: &mut Image, film: &Film, before: &Image) {
             continue;
         }
         let place = Vec2::new((i as u32 % width) as f32, (i as u32 / width) as f32) + 0.5;
-        let there = (place * scale - 0.5).max(Vec2::ZERO);
+        let there = (place - 0.5 * size) * scale + 0.5 * size_before;
+        let there = (there - 0.5).max(Vec2::ZERO);
         let (low, t) = (there.as_uvec2(), there.fract());
         let upper = at(low.x, low.y).lerp(at(low.x + 1, low.y), t.x);
         let lower = at(low.x, low.y + 1).lerp(at(low.x + 1, low.y + 1), t.x);

@@ -1,6 +1,5 @@
-//! Writing pictures and laws, on a thread of its own.
+//! Writing pictures, on a thread of its own.
 
-use std::io::Write as _;
 use std::path::Path;
 
 use serde_json::json;
@@ -9,9 +8,8 @@ use super::document::Document;
 use super::loader::{LoadedMap, LoadedScene};
 use super::presenter::Shown;
 use super::worker::Snapshot;
-use crate::error::{Error, Notices, Result};
-use crate::image::{ExrPicture, Image, Layer, check_writable, write_beside_and_rename, write_exr};
-use crate::light_grid::LightGrid;
+use crate::error::{Notices, Result};
+use crate::image::check_writable;
 use crate::output::record::{Phases, Record};
 use crate::output::{Exposure, LayerName, PictureOptions, write_picture};
 
@@ -81,50 +79,6 @@ fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
         ("camera_eye", json!(camera.map(|c| c.eye))),
         ("camera_rotation", json!(camera.map(|c| c.rotation))),
     ]
-}
-
-/// Writes the laws of all cells: `.csv` (law, tile, probability), `.json`, or `.exr` (one row a law,
-/// one column a tile).
-pub(super) fn laws(path: &Path, grid: &LightGrid) -> Result<()> {
-    let laws = grid.laws();
-    let tiles = laws.tile_count();
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let cells: Vec<(u32, u32)> = grid.grid().map_or_else(Vec::new, |cells| {
-        (0..cells.cell_count())
-            .map(|cell| (cell, grid.law_of_cell(cell)))
-            .filter(|(_, law)| *law != crate::light_grid::WHOLE_MAP)
-            .collect()
-    });
-    let row = |law: u32| (0..tiles).map(move |tile| laws.probability(law, tile));
-    match extension.as_deref() {
-        Some("csv") => write_beside_and_rename(path, |file| {
-            writeln!(file, "cell,law,tile,probability")?;
-            for (cell, law) in &cells {
-                for (tile, p) in row(*law).enumerate().filter(|(_, p)| *p > 0.0) {
-                    writeln!(file, "{cell},{law},{tile},{p:e}")?;
-                }
-            }
-            Ok(())
-        }),
-        Some("json") => {
-            let all: Vec<Vec<f32>> = (0..laws.len()).map(|law| row(law).collect()).collect();
-            let cells: serde_json::Map<_, _> =
-                cells.iter().map(|(cell, law)| (cell.to_string(), json!(law))).collect();
-            let value = json!({ "tiles": tiles, "law_of_cell": cells, "laws": all });
-            crate::output::record::write_json(path, &value)
-        }
-        Some("exr") => {
-            let values: Vec<f32> = (0..laws.len()).flat_map(row).collect();
-            let image = Image {
-                width: tiles,
-                height: laws.len(),
-                pixels: values.iter().map(|p| [*p; 3]).collect(),
-            };
-            let layer = Layer { name: "law".to_owned(), channels: vec![("p".to_owned(), values)] };
-            write_exr(path, ExrPicture { image: &image, layers: vec![layer], metadata: &[] })
-        }
-        _ => Err(Error::at(path, "laws are written as .csv, .json or .exr")),
-    }
 }
 
 /// What is remarkable about a picture that was written, for the message.

@@ -101,7 +101,9 @@ pub(super) fn row<R>(ui: &mut Ui, name: &str, hint: &str, add: impl FnOnce(&mut 
             TextStyle::Body.resolve(ui.style()),
             TEXT,
         );
-        response.on_hover_text(hint);
+        if !hint.is_empty() {
+            response.on_hover_text(hint);
+        }
         add(ui)
     })
     .inner
@@ -109,6 +111,11 @@ pub(super) fn row<R>(ui: &mut Ui, name: &str, hint: &str, add: impl FnOnce(&mut 
 
 /// Width of the names of settings, in points.
 const LABEL_WIDTH: f32 = 84.0;
+
+/// Whether the window is too narrow for everything: what can be had elsewhere gives way.
+pub(super) fn is_narrow(ui: &Ui) -> bool {
+    ui.ctx().content_rect().width() < 1260.0
+}
 
 /// Text that explains.
 pub(super) fn quiet(text: impl Into<String>) -> RichText {

@@ -34,6 +34,11 @@ impl<T: Clone + PartialEq> Undo<T> {
         self.present = now.clone();
     }
 
+    /// The state at rest.
+    pub(super) fn present(&self) -> &T {
+        &self.present
+    }
+
     /// The state before, if any.
     pub(super) fn undo(&mut self) -> Option<T> {
         let before = self.past.pop()?;

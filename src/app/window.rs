@@ -28,8 +28,12 @@ struct Repaint {
 /// # Errors
 /// If there is no display, or none that can be drawn on: nothing has been shown then.
 pub fn run(start: Start, notices: Vec<String>, settings_path: Option<PathBuf>) -> Result<()> {
-    let no_display =
-        |e: &dyn std::fmt::Display| Error::new(format!("no window can be opened: {e}"));
+    let no_display = |e: &dyn std::fmt::Display| {
+        let text = e.to_string();
+        // The toolkit puts the place in its own source before the cause.
+        let cause = text.rsplit_once(": ").map_or(&*text, |(_, cause)| cause);
+        Error::new(format!("no window can be opened: {cause}"))
+    };
     let event_loop = EventLoop::<Repaint>::with_user_event().build().map_err(|e| no_display(&e))?;
     let mut runner = Runner {
         proxy: event_loop.create_proxy(),

@@ -13,15 +13,20 @@ pub(crate) struct CompressedTree {
     /// 80 bytes a node; never empty.
     pub(crate) nodes: Vec<[u32; 20]>,
     /// Three vertices a triangle, each with a word more: that of the first is the triangle's index
-    /// in the scene's list. Never empty.
+    /// in the scene's list, that of the second its tag. Never empty.
     pub(crate) triangles: Vec<[[u32; 4]; 3]>,
     /// Most node groups a traversal leaves waiting.
     pub(crate) depth: u32,
 }
 
 impl CompressedTree {
-    /// Builds over the triangles that [`super::Bvh::build`] keeps.
-    pub(crate) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+    /// Builds over the triangles that [`super::Bvh::build`] keeps; `tag` is asked for each of them
+    /// by its index.
+    pub(crate) fn build(
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        tag: impl Fn(u32) -> u32,
+    ) -> Self {
         let Some((kept, binary)) = build::binary(positions, triangles) else {
             return Self {
                 nodes: vec![[0; 20]],
@@ -30,14 +35,18 @@ impl CompressedTree {
             };
         };
         let tree = bvh2_to_cwbvh(&binary, 3, true, false);
-        let corner = |triangle: u32, index: u32| {
-            positions[index as usize].extend(f32::from_bits(triangle)).to_array().map(f32::to_bits)
+        let corner = |index: u32, word: u32| {
+            let [x, y, z] = positions[index as usize].to_array().map(f32::to_bits);
+            [x, y, z, word]
         };
         let packed = tree
             .primitive_indices
             .iter()
             .map(|&primitive| kept[primitive as usize])
-            .map(|triangle| triangles[triangle as usize].map(|index| corner(triangle, index)))
+            .map(|triangle| {
+                let [a, b, c] = triangles[triangle as usize];
+                [corner(a, triangle), corner(b, tag(triangle)), corner(c, 0)]
+            })
             .collect();
         Self {
             depth: depth(&tree),

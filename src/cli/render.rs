@@ -15,6 +15,7 @@ use crate::error::{Error, Notices, Result};
 use crate::image::{check_writable, is_same_file};
 use crate::light_grid::LawOptions;
 use crate::medium::Fog;
+use crate::output::laws::{check_laws_extension, write_laws};
 use crate::output::record::{self, Phases, Record};
 use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::path::{Background, PathLimits, World, framing};
@@ -160,6 +161,9 @@ pub(super) struct RenderArguments {
     /// Writes the run's figures as JSON.
     #[arg(long, value_name = "FILE", help_heading = "Run")]
     json: Option<PathBuf>,
+    /// Writes what was learned, each cell's probability of each tile: .csv, .json or .exr.
+    #[arg(long, value_name = "FILE", help_heading = "Run")]
+    laws: Option<PathBuf>,
 }
 
 fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
@@ -193,6 +197,9 @@ fn check_outputs(arguments: &RenderArguments) -> Result<()> {
     for picture in &arguments.outputs {
         output::check_extension(picture)?;
     }
+    if let Some(laws) = &arguments.laws {
+        check_laws_extension(laws)?;
+    }
     if let Some(denoiser) = arguments.denoise {
         denoiser.check()?;
     }
@@ -204,7 +211,8 @@ fn check_outputs(arguments: &RenderArguments) -> Result<()> {
             "--region {left},{top},{w},{h} is not inside the picture of {width}x{height} pixels"
         )));
     }
-    let files: Vec<&PathBuf> = arguments.outputs.iter().chain(&arguments.json).collect();
+    let files: Vec<&PathBuf> =
+        arguments.outputs.iter().chain(&arguments.json).chain(&arguments.laws).collect();
     for (i, file) in files.iter().enumerate() {
         if files[..i].iter().any(|other| is_same_file(other, file)) {
             return Err(Error::at(file, "two outputs would be written to this one file"));
@@ -264,6 +272,7 @@ impl RenderArguments {
             adapter,
             threads: 0,
             json: None,
+            laws: None,
         }
     }
 }
@@ -338,6 +347,10 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     }
     if let Some(path) = &arguments.json {
         record::write_json(path, &record.to_json())?;
+    }
+    if let Some(path) = &arguments.laws {
+        let none = || Error::at(path, "not written: this map and sampling have no laws");
+        write_laws(path, session.grid().ok_or_else(none)?)?;
     }
     outcome
 }

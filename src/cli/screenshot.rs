@@ -8,7 +8,7 @@ use glam::Vec2;
 use super::values;
 use crate::app::Start;
 use crate::app::document::{Document, Light};
-use crate::app::interface::{Dock, Interface, Tab};
+use crate::app::interface::{Dock, Interface, Tab, TileView};
 use crate::app::overlays::Overlay;
 use crate::app::screenshot::{Shot, Studio};
 use crate::error::{Error, Result};
@@ -76,6 +76,9 @@ pub(super) struct ScreenshotArguments {
     /// The tile chosen on the map, for the overlay `tile`.
     #[arg(long, value_name = "N")]
     tile: Option<u32>,
+    /// What the map of tiles shows.
+    #[arg(long, value_enum, value_name = "WHAT")]
+    tiles: Option<TileView>,
     /// Turns the map about the vertical, in degrees.
     #[arg(long, default_value = "0", value_parser = values::finite, allow_negative_numbers = true, value_name = "DEG")]
     env_rotation: f64,
@@ -137,7 +140,8 @@ fn interface(arguments: &ScreenshotArguments) -> Interface {
     let is_inspecting = has(PanelName::Inspect)
         || arguments.overlay.is_some()
         || arguments.inspect.is_some()
-        || arguments.tile.is_some();
+        || arguments.tile.is_some()
+        || arguments.tiles.is_some();
     Interface {
         panels: !has(PanelName::None),
         tab: if is_inspecting { Tab::Inspect } else { Tab::Picture },
@@ -149,6 +153,7 @@ fn interface(arguments: &ScreenshotArguments) -> Interface {
         shortcuts: has(PanelName::Shortcuts),
         overlay: arguments.overlay,
         tile: arguments.tile,
+        tiles: arguments.tiles.unwrap_or(TileView::Energy),
         pinned: arguments.inspect,
         ..Interface::default()
     }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+pub mod laws;
 pub mod record;
 
 use self::record::Record;

@@ -10,6 +10,8 @@ use super::{AlphaMode, Material, Scene};
 pub struct SceneNeeds {
     /// Any texture at all.
     pub textures: bool,
+    /// Bit `i`: some material has the `i`-th of [`Material::textures`].
+    pub texture_slots: u32,
     /// A second set of texture coordinates.
     pub second_uv_set: bool,
     /// Normal maps, hence tangents.
@@ -74,9 +76,12 @@ impl SceneNeeds {
     }
 
     fn add(&mut self, m: &Material) {
-        for texture in m.textures().into_iter().flatten() {
-            self.textures = true;
-            self.second_uv_set |= texture.uv_set == 1;
+        for (slot, texture) in m.textures().into_iter().enumerate() {
+            if let Some(texture) = texture {
+                self.textures = true;
+                self.texture_slots |= 1 << slot;
+                self.second_uv_set |= texture.uv_set == 1;
+            }
         }
         self.normal_maps |= m.normal_texture.is_some() || m.clearcoat_normal_texture.is_some();
         self.alpha_mask |= matches!(m.alpha_mode, AlphaMode::Mask { .. });

@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use glam::Vec2;
 use lightgrid::app::Start;
 use lightgrid::app::document::{Document, Light, Look, PictureSize};
-use lightgrid::app::interface::{Dock, Interface, Tab};
+use lightgrid::app::interface::{Dock, Interface, Tab, TileView};
 use lightgrid::app::overlays::Overlay;
 use lightgrid::app::screenshot::{Shot, Studio};
 use lightgrid::image::{Rgb8, read_picture, write_png};
@@ -32,8 +33,8 @@ fn start() -> Start {
     Start { document, ..Start::default() }
 }
 
-fn studio(start: Start) -> Option<Studio> {
-    let shot = Shot { start, size: (1000, 640), patience: Duration::from_secs(300) };
+fn studio(start: Start, size: (u32, u32)) -> Option<Studio> {
+    let shot = Shot { start, size, patience: Duration::from_secs(300) };
     match Studio::open(shot) {
         Ok(studio) => Some(studio),
         Err(error) => {
@@ -46,13 +47,25 @@ fn studio(start: Start) -> Option<Studio> {
 /// Every overlay and panel of one picture, and the kept picture it must look like.
 #[test]
 fn overlays_and_panels_look_as_they_did() {
-    let Some(mut studio) = studio(start()) else { return };
+    let Some(mut studio) = studio(start(), (1000, 640)) else { return };
     let base = Interface::default();
     let inspect = Interface { tab: Tab::Inspect, ..base.clone() };
     let mut states = vec![
         ("panel-picture".to_owned(), base.clone()),
         ("panel-inspect".to_owned(), inspect.clone()),
         ("panel-needs".to_owned(), Interface { dock: Some(Dock::Needs), ..base.clone() }),
+        (
+            "panel-convergence".to_owned(),
+            Interface { dock: Some(Dock::Convergence), ..inspect.clone() },
+        ),
+        (
+            "panel-tiles-learned".to_owned(),
+            Interface { tiles: TileView::Learned, ..inspect.clone() },
+        ),
+        (
+            "panel-tiles-equal-energy".to_owned(),
+            Interface { tiles: TileView::EqualEnergy, ..inspect.clone() },
+        ),
         ("panel-shortcuts".to_owned(), Interface { shortcuts: true, ..base.clone() }),
         ("panel-none".to_owned(), Interface { panels: false, ..base }),
     ];
@@ -73,6 +86,19 @@ fn overlays_and_panels_look_as_they_did() {
         pictures.push(picture);
     }
     assert!(different.is_empty(), "{different:#?}");
+}
+
+/// What a cell knows and what is true there, in a window high enough for both.
+#[test]
+fn the_inspector_shows_law_and_truth() {
+    let Some(mut studio) = studio(start(), (1000, 1200)) else { return };
+    let pinned = Some(Vec2::new(0.45, 0.75));
+    studio.arrange(Interface { tab: Tab::Inspect, pinned, ..Interface::default() });
+    let before = studio.take().expect("drawn");
+    studio.measure_truth().expect("measured");
+    let picture = studio.take().expect("drawn");
+    assert_ne!(before, picture, "the truth is shown");
+    compare("panel-inspect-truth", &picture).expect("as it was");
 }
 
 /// Compares with `tests/snapshots/NAME.png`; with UPDATE_SNAPSHOTS set, writes it instead.
@@ -302,6 +328,12 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     });
     desk.xdotool("key g");
 
+    // A file that is not there changes nothing: the camera can still be turned.
+    desk.answer("ctrl+o", "none.glb");
+    std::thread::sleep(Duration::from_secs(2));
+    let title = |desk: &Desk| desk.xdotool(&format!("getwindowname {window}"));
+    desk.wait_for("old scene", || title(&desk).starts_with("open").then_some(()));
+
     // A drag turns the camera: another picture. Slowly, for software draws some frames a second.
     desk.xdotool("mousemove 560 400 mousedown 1");
     for _ in 0..10 {
@@ -313,11 +345,7 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     let turned = desk.save("turned.exr");
     assert!(first.pixels != turned.pixels, "the camera has turned");
 
-    // A file that is not there changes nothing; another scene does.
-    desk.answer("ctrl+o", "none.glb");
-    std::thread::sleep(Duration::from_secs(2));
-    let title = |desk: &Desk| desk.xdotool(&format!("getwindowname {window}"));
-    desk.wait_for("old scene", || title(&desk).starts_with("open").then_some(()));
+    // Another scene.
     desk.answer("ctrl+o", "crack");
     desk.wait_for("new scene", || title(&desk).starts_with("crack").then_some(()));
     std::thread::sleep(Duration::from_secs(4));

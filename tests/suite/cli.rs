@@ -110,6 +110,34 @@ pub(crate) fn text(bytes: &[u8]) -> String {
 }
 
 #[test]
+fn laws_are_exported_as_tables() {
+    let bench = Bench::new();
+    bench.render("-o a.exr --laws laws.csv");
+    let csv = fs::read_to_string(bench.path("laws.csv")).expect("written");
+    let mut lines = csv.lines();
+    assert_eq!(lines.next(), Some("cell,law,tile,probability"));
+    let mut sums = std::collections::BTreeMap::new();
+    for line in lines {
+        let fields: Vec<f64> = line.split(',').map(|f| f.parse().expect("a number")).collect();
+        *sums.entry(fields[0] as u32).or_insert(0.0) += fields[3];
+    }
+    assert!(!sums.is_empty());
+    assert!(sums.values().all(|sum: &f64| (sum - 1.0).abs() < 1e-4), "{sums:?}");
+
+    bench.render("-o a.exr --laws laws.json");
+    let json = bench.json("laws.json");
+    assert_eq!(json["tiles"], 512);
+    assert_eq!(json["law_of_cell"].as_object().expect("a map").len(), sums.len());
+    bench.render("-o a.exr --laws laws.exr");
+    let picture = read_picture(&bench.path("laws.exr")).expect("a picture");
+    assert_eq!(picture.width, 512);
+    assert!(picture.height > 1);
+
+    let message = bench.refusal("render scene.gltf -o b.exr --laws laws.txt", 1);
+    assert!(message.contains("laws.txt: laws are written as .csv, .json or .exr"), "{message}");
+}
+
+#[test]
 fn help_names_every_command() {
     let help = text(&Bench::new().run("--help").stdout);
     for word in ["view", "screenshot", "render", "compare", "info", "report", "sat"] {

@@ -10,9 +10,11 @@ use crate::render::film::{Film, Pixel};
 use super::surface_map::{Spot, SurfaceMap};
 
 mod cell_facts;
+mod labels;
 pub mod palette;
 
 pub use cell_facts::CellFacts;
+pub use labels::Label;
 
 /// What can be drawn over the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
@@ -89,7 +91,9 @@ impl Overlay {
     /// What it shows, in a sentence.
     pub fn description(self) -> &'static str {
         match self {
-            Self::Cells => "Cells of the grid around the camera; borders are bright.",
+            Self::Cells => {
+                "Cells of the grid around the camera, with their numbers; borders are bright."
+            }
             Self::Faces => "Cells are split by the axis that a surface's normal is nearest to.",
             Self::Learned => "Where a cell has its own law; elsewhere the whole map is sampled.",
             Self::Visits => "How often learning paths tried the map from each cell.",
@@ -151,6 +155,14 @@ pub struct Painted {
     pub colors: Vec<Option<[u8; 3]>>,
     /// What they mean.
     pub legend: Legend,
+    /// Words on the picture.
+    pub labels: Vec<Label>,
+}
+
+impl Painted {
+    fn new(colors: Vec<Option<[u8; 3]>>, legend: Legend) -> Self {
+        Self { colors, legend, labels: Vec::new() }
+    }
 }
 
 /// What overlays are drawn from.
@@ -199,13 +211,11 @@ impl Sources<'_> {
             colors.map(|(value, normal)| is_hit(normal).then(|| color(*value).map(srgb))).collect()
         };
         Some(match overlay {
-            Overlay::Albedo => {
-                Painted { colors: of(|albedo| albedo, &layers.albedo), legend: Legend::None }
-            }
+            Overlay::Albedo => Painted::new(of(|albedo| albedo, &layers.albedo), Legend::None),
             Overlay::Normal => {
                 let byte = |v: f32| ((v * 0.5 + 0.5) * 255.0).round() as u8;
                 let colors = layers.normal.iter().map(|n| is_hit(n).then(|| n.map(byte)));
-                Painted { colors: colors.collect(), legend: axes_legend() }
+                Painted::new(colors.collect(), axes_legend())
             }
             _ => {
                 let depths = layers.depth.iter().zip(&layers.normal);
@@ -245,7 +255,7 @@ impl Sources<'_> {
                     palette::of_map_place(u as f32, v as f32)
                 };
                 let colors = surfaces.spots.iter().map(|s| cell_of(s).map(color)).collect();
-                Painted { colors, legend: Legend::Map }
+                Painted::new(colors, Legend::Map)
             }
             Overlay::Entropy => {
                 let most = (self.environment.tile_count() as f32).log2();
@@ -292,7 +302,8 @@ fn with_borders(surfaces: &SurfaceMap, grid: &SphericalGrid) -> Painted {
         [245, 245, 250],
         format!("{shown} of {} cells are in view", grid.cell_count()),
     )]);
-    Painted { colors: colors.collect(), legend }
+    let labels = labels::of_cells(&cells, surfaces.width);
+    Painted { colors: colors.collect(), legend, labels }
 }
 
 const FACE_COLORS: [[u8; 3]; 6] =
@@ -312,7 +323,7 @@ fn faces(surfaces: &SurfaceMap, grid: &SphericalGrid) -> Painted {
     let names = ["+X", "-X", "+Y (up)", "-Y (down)", "+Z", "-Z"];
     let count = grid.face_count() as usize;
     let legend = FACE_COLORS.into_iter().zip(names).take(count);
-    Painted { colors, legend: Legend::Names(legend.map(|(c, n)| (c, n.to_owned())).collect()) }
+    Painted::new(colors, Legend::Names(legend.map(|(c, n)| (c, n.to_owned())).collect()))
 }
 
 fn learned(surfaces: &SurfaceMap, grid: &SphericalGrid, laws: &LightGrid) -> Painted {
@@ -332,7 +343,7 @@ fn learned(surfaces: &SurfaceMap, grid: &SphericalGrid, laws: &LightGrid) -> Pai
         (OWN, format!("a law of its own, {percent:.1} % of the pixels")),
         (NONE, "the whole map's law".to_owned()),
     ]);
-    Painted { colors, legend }
+    Painted::new(colors, legend)
 }
 
 /// What a scale spans.
@@ -345,6 +356,9 @@ enum Range {
     /// Between the 2nd and 98th percentile, by the logarithm.
     Logarithmic,
 }
+
+/// What a logarithmic scale spans at most: a few cells that see next to nothing must not take it all.
+const LARGEST_RATIO: f32 = 1e4;
 
 impl Range {
     const WHOLE: Self = Self::Whole;
@@ -366,8 +380,9 @@ fn scaled(values: impl Iterator<Item = Option<f32>>, range: Range, unit: &'stati
         Range::Fixed(low, high) => (low, high),
         Range::Whole => (0.0, sorted.last().copied().unwrap_or(1.0).max(1.0)),
         Range::Logarithmic => {
-            let low = percentile(0.02).max(f32::MIN_POSITIVE);
-            (low, percentile(0.98).max(low * 1.01))
+            let high = percentile(0.98).max(f32::MIN_POSITIVE * LARGEST_RATIO);
+            let low = percentile(0.02).max(high / LARGEST_RATIO);
+            (low, high.max(low * 1.01))
         }
     };
     let position = |value: f32| {
@@ -378,5 +393,5 @@ fn scaled(values: impl Iterator<Item = Option<f32>>, range: Range, unit: &'stati
         }
     };
     let colors = values.iter().map(|v| v.map(|v| palette::viridis(position(v)))).collect();
-    Painted { colors, legend: Legend::Scale { low, high, logarithmic, unit } }
+    Painted::new(colors, Legend::Scale { low, high, logarithmic, unit })
 }

@@ -1,5 +1,7 @@
 //! Estimated error against time, both logarithmic.
 
+use std::ops::RangeInclusive;
+
 use egui::{Color32, Ui, Vec2b};
 use egui_plot::{GridMark, Legend, Line, LineStyle, Plot, PlotPoints};
 
@@ -17,12 +19,12 @@ pub(in crate::app) fn show(
     commands: &mut Vec<Command>,
 ) {
     let by_samples = by_samples_only || convergence.by_samples;
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         if !by_samples_only {
             ui.selectable_value(&mut convergence.by_samples, false, "Time");
             ui.selectable_value(&mut convergence.by_samples, true, "Samples");
         }
-        ui.label(theme::quiet("Estimated relative RMS error; earlier runs are dim"));
+        ui.label(theme::quiet("Earlier runs are dim"));
         let hint = "A picture of this view without noise: the true error is drawn too";
         if ui.button("Reference…").on_hover_text(hint).clicked() {
             commands.push(Command::ChooseReference);
@@ -33,25 +35,6 @@ pub(in crate::app) fn show(
             commands.push(Command::ForgetReference);
         }
     });
-    let formatter = |mark: GridMark, _: &std::ops::RangeInclusive<f64>| {
-        if mark.value.fract().abs() < 1e-6 {
-            theme::figure(10_f64.powf(mark.value))
-        } else {
-            String::new()
-        }
-    };
-    let decades = |input: egui_plot::GridInput| {
-        let (low, high) = input.bounds;
-        let mut marks = Vec::new();
-        for decade in (low.floor() as i32)..=(high.ceil() as i32) {
-            for step in 1..10 {
-                let value = f64::from(decade) + f64::from(step).log10();
-                let step_size = if step == 1 { 1.0 } else { 0.1 };
-                marks.push(GridMark { value, step_size });
-            }
-        }
-        marks
-    };
     let lines = lines(convergence, by_samples);
     if lines.is_empty() {
         ui.label(theme::quiet("The first two samples of every pixel give the first point."));
@@ -63,17 +46,69 @@ pub(in crate::app) fn show(
         .allow_scroll(false)
         .show_grid(Vec2b::TRUE)
         .x_axis_label(if by_samples { "samples per pixel" } else { "seconds" })
-        .y_axis_label("noise")
-        .x_grid_spacer(decades)
-        .y_grid_spacer(decades)
-        .x_axis_formatter(formatter)
-        .y_axis_formatter(formatter)
+        .y_axis_label("relative RMS error")
+        .x_grid_spacer(grid_lines)
+        .y_grid_spacer(grid_lines)
+        .x_axis_formatter(|mark, range| tick(mark, range, 1.0))
+        .y_axis_formatter(|mark, range| match tick(mark, range, 100.0) {
+            text if text.is_empty() => text,
+            text => format!("{text} %"),
+        })
+        .y_axis_min_width(52.0)
         .show_crosshair(false)
         .show(ui, |plot| {
             for line in lines {
                 plot.line(line);
             }
         });
+}
+
+/// Span in decades below which grid lines are evenly spaced.
+const NARROW: f64 = 0.5;
+
+/// Where grid lines are: at 1, 2, ... 9 of every decade; within half a decade, at round numbers.
+fn grid_lines(input: egui_plot::GridInput) -> Vec<GridMark> {
+    let (low, high) = input.bounds;
+    let mut marks = Vec::new();
+    if high - low < NARROW {
+        let (low, high) = (10_f64.powf(low), 10_f64.powf(high));
+        let power = 10_f64.powf(((high - low) / 3.0).log10().floor());
+        let steps = [1.0, 2.0, 5.0].map(|step| step * power);
+        let step = steps.into_iter().rev().find(|step| 3.0 * step <= high - low).unwrap_or(power);
+        let first = (low / step).ceil();
+        let count = ((high - low) / step) as u32;
+        let values = (0..=count).map(|i| (first + f64::from(i)) * step);
+        marks.extend(values.map(|v| GridMark { value: v.log10(), step_size: 1.0 }));
+        return marks;
+    }
+    for decade in (low.floor() as i32)..=(high.ceil() as i32) {
+        for step in 1..10 {
+            let value = f64::from(decade) + f64::from(step).log10();
+            let step_size = if step == 1 { 1.0 } else { 0.1 };
+            marks.push(GridMark { value, step_size });
+        }
+    }
+    marks
+}
+
+/// What is written at a grid line: at as many as there is room for.
+fn tick(mark: GridMark, range: &RangeInclusive<f64>, factor: f64) -> String {
+    let span = range.end() - range.start();
+    let written: &[i32] = match span {
+        span if span < 0.8 => &[1, 2, 3, 4, 6, 8],
+        span if span < 2.5 => &[1, 2, 5],
+        _ => &[1],
+    };
+    let value = 10_f64.powf(mark.value);
+    let leading = value / 10_f64.powf((mark.value + 1e-6).floor());
+    if span >= NARROW && !written.contains(&(leading.round() as i32)) {
+        return String::new();
+    }
+    let text = theme::figure(value * factor);
+    if text.ends_with('0') && text.contains('.') {
+        return text.trim_end_matches('0').trim_end_matches('.').to_owned();
+    }
+    text
 }
 
 fn lines(convergence: &Convergence, by_samples: bool) -> Vec<Line<'static>> {
@@ -114,4 +149,26 @@ fn place(point: &Point, error: f64, by_samples: bool) -> [f64; 2] {
 fn faded(index: usize) -> Color32 {
     let [r, g, b] = crate::app::overlays::palette::hsv(0.55 + 0.11 * index as f32, 0.25, 0.55);
     Color32::from_rgb(r, g, b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn written(low: f64, high: f64) -> Vec<String> {
+        let bounds = (low.log10(), high.log10());
+        let marks = grid_lines(egui_plot::GridInput { bounds, base_step_size: 0.1 });
+        let range = bounds.0..=bounds.1;
+        let inside = marks.into_iter().filter(|mark| range.contains(&mark.value));
+        inside.map(|mark| tick(mark, &range, 1.0)).filter(|text| !text.is_empty()).collect()
+    }
+
+    #[test]
+    fn some_numbers_are_written_whatever_the_span() {
+        assert_eq!(written(0.9, 1100.0), ["1", "10", "100", "1000"]);
+        assert_eq!(written(0.9, 21.0), ["1", "2", "5", "10", "20"]);
+        assert_eq!(written(1.99, 4.1), ["2", "2.5", "3", "3.5", "4"]);
+        assert_eq!(written(43.9, 49.1), ["44", "45", "46", "47", "48", "49"]);
+        assert_eq!(written(30.99, 31.41).len(), 5);
+    }
 }

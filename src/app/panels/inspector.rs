@@ -2,7 +2,7 @@
 
 use egui::{Color32, Grid, Rect, RichText, Stroke, StrokeKind, Ui, Vec2};
 
-use super::map_view;
+use super::{color_bar, map_view};
 use crate::app::commands::Command;
 use crate::app::inspect::{Inspected, Inspector};
 use crate::app::interface::{Interface, TileView};
@@ -59,6 +59,9 @@ pub(in crate::app) fn show(
     theme::heading(ui, "CELL UNDER THE POINTER");
     match inspector.inspected() {
         Some(inspected) => cell(ui, interface, inspector, inspected, (map, size), commands),
+        None if interface.pinned.is_some() => {
+            ui.label(theme::quiet("There is no surface here, only the map; click elsewhere."));
+        }
         None => {
             ui.label(theme::quiet("Point at a surface; click to stay there."));
         }
@@ -110,7 +113,7 @@ fn sun_sentence(sun: &Sun, rotation_turns: f32) -> String {
     let azimuth =
         (sun.azimuth_degrees + 360.0 * f64::from(rotation_turns) + 180.0).rem_euclid(360.0) - 180.0;
     format!(
-        "Brightest at azimuth {azimuth:.0}° (0° is +X), elevation {:.0}°; {:.0} % of the energy \
+        "Brightest at azimuth {azimuth:.0}° (0° is +X), elevation {:.0}°; {:.0}\u{a0}% of the energy \
          within 2.5° of it",
         sun.elevation_degrees,
         100.0 * sun.energy_share
@@ -131,7 +134,8 @@ fn tiles(
     shares: &[f32],
 ) {
     let (rect, response) = map_view::ground(ui, map);
-    heatmap(ui, rect, size, shares);
+    let most = largest(shares);
+    heatmap(ui, rect, size, shares, most);
     if let Some(sun) = &map.sun {
         let scale = rect.size()
             / Vec2::new(map.environment.map().width as f32, map.environment.map().height as f32);
@@ -156,12 +160,21 @@ fn tiles(
             percent(share)
         ));
     }
+    if !shares.is_empty() {
+        color_bar::show(ui, (LEAST, most), true, percent);
+    }
 }
 
-/// Logarithmic shares over the map: 0.01 % is transparent, the largest opaque.
-fn heatmap(ui: &Ui, rect: Rect, size: (u32, u32), shares: &[f32]) {
-    const LEAST: f32 = 1e-4;
-    let largest = shares.iter().copied().fold(LEAST * 10.0, f32::max);
+/// Shares up to this are not drawn.
+const LEAST: f32 = 1e-4;
+
+/// The largest share, for the upper end of a scale.
+fn largest(shares: &[f32]) -> f32 {
+    shares.iter().copied().fold(LEAST * 10.0, f32::max)
+}
+
+/// Logarithmic shares over the map: 0.01 % is transparent, `largest` opaque.
+fn heatmap(ui: &Ui, rect: Rect, size: (u32, u32), shares: &[f32], largest: f32) {
     let painter = ui.painter_at(rect);
     for (tile, share) in shares.iter().enumerate().filter(|(_, share)| **share > LEAST) {
         let t = (share / LEAST).ln() / (largest / LEAST).ln();
@@ -200,23 +213,28 @@ fn cell(
     commands: &mut Vec<Command>,
 ) {
     facts(ui, inspected);
+    let truth = inspector.truth();
+    // One scale for both, so that they can be compared.
+    let most = truth.map_or(0.0, |truth| largest(&truth.shares));
+    let most = most.max(largest(&inspected.probabilities));
     if !inspected.probabilities.is_empty() {
         let (rect, _) = map_view::ground(ui, map);
-        heatmap(ui, rect, size, &inspected.probabilities);
+        heatmap(ui, rect, size, &inspected.probabilities, most);
+        color_bar::show(ui, (LEAST, most), true, percent);
         ui.label(theme::quiet("Probability of each tile, learned"));
     }
-    if let Some(truth) = inspector.truth() {
+    if let Some(truth) = truth {
         let (rect, _) = map_view::ground(ui, map);
-        heatmap(ui, rect, size, &truth.shares);
-        let distance: f32 = truth
-            .shares
-            .iter()
-            .zip(&inspected.probabilities)
-            .map(|(a, b)| 0.5 * (a - b).abs())
-            .sum();
-        ui.label(theme::quiet(format!(
-            "Visible energy times cosine here, by brute force; total variation {distance:.2}"
-        )));
+        heatmap(ui, rect, size, &truth.shares, most);
+        let pairs = truth.shares.iter().zip(&inspected.probabilities);
+        let distance: f32 = pairs.map(|(a, b)| 0.5 * (a - b).abs()).sum();
+        ui.label(theme::quiet(if truth.shares.iter().all(|share| *share == 0.0) {
+            "Brute force finds that nothing of the map is seen from this very point".to_owned()
+        } else {
+            format!(
+                "Visible energy times cosine here, by brute force; total variation {distance:.2}"
+            )
+        }));
     }
     ui.horizontal(|ui| {
         let label = if inspector.is_busy() { "Measuring…" } else { "Measure the truth" };
@@ -267,6 +285,9 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
         }
         if tries > 0.0 {
             line("Learned from", format!("{} tries", theme::count(tries as u64)));
+        }
+        if let Some(bytes) = inspected.memory_bytes {
+            line("Memory", format!("{} for this law", theme::bytes(bytes)));
         }
     });
 }

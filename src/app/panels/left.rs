@@ -35,7 +35,12 @@ pub(in crate::app) fn show(
     commands: &mut Vec<Command>,
 ) {
     let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 8));
-    Panel::left("left").frame(frame).exact_size(286.0).show(ui, |ui| {
+    let is_narrow = theme::is_narrow(ui);
+    let width = if is_narrow { 258.0 } else { 286.0 };
+    Panel::left("left").frame(frame).exact_size(width).show(ui, |ui| {
+        if is_narrow {
+            ui.spacing_mut().slider_width = 66.0;
+        }
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             theme::heading(ui, "SCENE");
             scene(ui, document, sources, commands);
@@ -285,9 +290,10 @@ fn fog(ui: &mut Ui, fog: &mut Option<Medium>, scene: Option<&LoadedScene>) {
     let now = fog.or(own).unwrap_or(clear);
     let mut edited = now;
     let mut is_on = now.scattering != clear.scattering || now.absorption != clear.absorption;
+    theme::heading(ui, "FOG");
     ui.horizontal(|ui| {
-        theme::heading(ui, "FOG");
-        if ui.checkbox(&mut is_on, "").changed() {
+        let hint = "A medium that scatters and swallows light";
+        if ui.checkbox(&mut is_on, "Fill the air").on_hover_text(hint).changed() {
             let thick = Medium { scattering: Vec3::splat(FIRST_FOG), ..clear };
             edited = match (is_on, own) {
                 (false, _) => clear,

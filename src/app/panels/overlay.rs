@@ -1,7 +1,8 @@
 //! Choosing an overlay, and what its colours mean.
 
-use egui::{Color32, Pos2, Rect, Sense, Shape, Slider, Ui, Vec2};
+use egui::{Color32, Sense, Slider, Ui, Vec2};
 
+use super::color_bar;
 use crate::app::interface::Interface;
 use crate::app::overlays::{Legend, Overlay, palette};
 use crate::app::presenter::Shown;
@@ -43,7 +44,8 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
 fn legend(ui: &mut Ui, legend: &Legend) {
     match legend {
         Legend::Scale { low, high, logarithmic, unit } => {
-            scale(ui, *low, *high, *logarithmic);
+            let text = |value| theme::figure(f64::from(value));
+            color_bar::show(ui, (*low, *high), *logarithmic, text);
             let kind = if *logarithmic { "logarithmic" } else { "linear" };
             ui.label(theme::quiet(format!("{unit}, {kind}")));
         }
@@ -59,7 +61,7 @@ fn legend(ui: &mut Ui, legend: &Legend) {
         Legend::Map => {
             let size = Vec2::new(ui.available_width(), 0.3 * ui.available_width());
             let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
-            patches(ui, rect, (48, 12), palette::of_map_place);
+            color_bar::patches(ui, rect, (48, 12), palette::of_map_place);
             ui.label(theme::quiet("Place on the map"));
         }
         Legend::None => {}
@@ -68,46 +70,4 @@ fn legend(ui: &mut Ui, legend: &Legend) {
 
 fn of([r, g, b]: [u8; 3]) -> Color32 {
     Color32::from_rgb(r, g, b)
-}
-
-/// A colour bar with five numbers.
-fn scale(ui: &mut Ui, low: f32, high: f32, logarithmic: bool) {
-    let (rect, _) = ui.allocate_exact_size(Vec2::new(ui.available_width(), 32.0), Sense::hover());
-    let bar = Rect::from_min_max(rect.min, Pos2::new(rect.right(), rect.top() + 12.0));
-    patches(ui, bar, (64, 1), |t, _| palette::viridis(t));
-    for i in 0..5 {
-        let t = i as f32 / 4.0;
-        let value = if logarithmic { low * (high / low).powf(t) } else { low + (high - low) * t };
-        let x = bar.left() + bar.width() * t;
-        let align = match i {
-            0 => egui::Align2::LEFT_TOP,
-            4 => egui::Align2::RIGHT_TOP,
-            _ => egui::Align2::CENTER_TOP,
-        };
-        ui.painter().text(
-            Pos2::new(x, bar.bottom() + 3.0),
-            align,
-            theme::figure(f64::from(value)),
-            egui::FontId::proportional(11.0),
-            theme::QUIET,
-        );
-    }
-}
-
-/// Fills a rectangle with coloured patches; `color` gets their middles in `[0,1]`.
-fn patches(
-    ui: &Ui,
-    rect: Rect,
-    (columns, rows): (usize, usize),
-    color: impl Fn(f32, f32) -> [u8; 3],
-) {
-    let size = rect.size() / Vec2::new(columns as f32, rows as f32);
-    let shapes = (0..columns * rows).map(|i| {
-        let (x, y) = ((i % columns) as f32, (i / columns) as f32);
-        let corner = rect.min + Vec2::new(x, y) * size;
-        let patch = Rect::from_min_size(corner, size + Vec2::splat(0.5)).intersect(rect);
-        let middle = ((x + 0.5) / columns as f32, (y + 0.5) / rows as f32);
-        Shape::rect_filled(patch, 0.0, of(color(middle.0, middle.1)))
-    });
-    ui.painter().extend(shapes);
 }

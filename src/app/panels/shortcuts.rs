@@ -13,6 +13,8 @@ pub(in crate::app) fn show(context: &Context, interface: &mut Interface) {
         .open(&mut is_open)
         .collapsible(false)
         .resizable(false)
+        // Else the first frame cuts it.
+        .default_width(660.0)
         .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
         .show(context, |ui| {
             ui.add_space(4.0);

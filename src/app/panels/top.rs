@@ -38,18 +38,19 @@ pub(in crate::app) fn show(
 }
 
 fn files(ui: &mut Ui, commands: &mut Vec<Command>) {
+    let is_narrow = theme::is_narrow(ui);
     let mut button = |text: &str, hint: &str, command: Command| {
         if ui.button(text).on_hover_text(hint).clicked() {
             commands.push(command);
         }
     };
     button(
-        "Open scene…",
+        if is_narrow { "Scene…" } else { "Open scene…" },
         "A glTF file (Ctrl O); it can be dropped onto the window too",
         Command::ChooseScene,
     );
     button(
-        "Open map…",
+        if is_narrow { "Map…" } else { "Open map…" },
         "A lat-long HDR map (Ctrl M); it can be dropped onto the window too",
         Command::ChooseMap,
     );
@@ -74,7 +75,7 @@ fn sampling(ui: &mut Ui, document: &mut Document) {
         format!("{}{}", name[..1].to_uppercase(), &name[1..])
     };
     let chosen = &mut document.light.sampling;
-    if ui.ctx().content_rect().width() < NARROW {
+    if theme::is_narrow(ui) {
         egui::ComboBox::from_id_salt("sampling")
             .width(90.0)
             .selected_text(capital(*chosen))
@@ -105,9 +106,6 @@ fn device(ui: &mut Ui, document: &mut Document, is_on_gpu: bool) {
     ui.spacing_mut().item_spacing.x = 8.0;
 }
 
-/// Below this width in points the ways of sampling fold into a list.
-const NARROW: f32 = 1120.0;
-
 /// Ways of sampling the map, and what they do.
 const WAYS: [(Sampling, &str); 4] = [
     (Sampling::Adaptive, "Learned tiles, with faces, cosine weights and pooling"),
@@ -130,10 +128,16 @@ fn running(
     if developer.on_hover_text("Overlays, inspector and plots (F12)").clicked() {
         commands.push(Command::ToggleDeveloper);
     }
-    ui.toggle_value(&mut document.light.split, "Split view")
-        .on_hover_text("Plain on the left, the chosen sampling on the right, at equal time (V)");
-    ui.toggle_value(&mut document.look.denoise, "Denoise")
-        .on_hover_text("Filter what noise is left, for display and .png (N)");
+    ui.toggle_value(
+        &mut document.light.split,
+        if theme::is_narrow(ui) { "Split" } else { "Split view" },
+    )
+    .on_hover_text("Plain on the left, the chosen sampling on the right, at equal time (V)");
+    // The right panel has it too.
+    if !theme::is_narrow(ui) {
+        ui.toggle_value(&mut document.look.denoise, "Denoise")
+            .on_hover_text("Filter what noise is left, for display and .png (N)");
+    }
     ui.separator();
     if ui.button("Restart").on_hover_text("Start the picture again (R)").clicked() {
         commands.push(Command::Restart);

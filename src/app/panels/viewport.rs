@@ -71,6 +71,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
         let whole = fitted(area, view);
         let rect = part_rect(whole, &shown.order.snapshot.request.view);
         picture(ui, whole, rect, shown, scope.textures);
+        labels(ui, rect, shown);
         let mut is_wiping = false;
         if let Some(other) = &shown.other {
             let texture = scope.textures.other.update(ui, "other picture", other);
@@ -118,6 +119,16 @@ fn picture(ui: &Ui, whole: Rect, rect: Rect, shown: &Shown, textures: &mut Textu
     let texture = textures.part.update(ui, "part", &shown.picture);
     painter.image(texture, rect, full, Color32::WHITE);
     painter.rect_stroke(rect, 0.0, Stroke::new(1.0, theme::ACCENT), StrokeKind::Outside);
+}
+
+/// Writes what the overlay has to say.
+fn labels(ui: &Ui, rect: Rect, shown: &Shown) {
+    let painter = ui.painter_at(rect);
+    let font = FontId::proportional((rect.width() / 85.0).clamp(7.0, 12.0));
+    for label in &shown.labels {
+        let at = rect.min + Vec2::new(label.place.x, label.place.y) * rect.size();
+        painter.text(at, Align2::CENTER_CENTER, &label.text, font.clone(), Color32::BLACK);
+    }
 }
 
 /// Lets a drag mark the part that is to be rendered.

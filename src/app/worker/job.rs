@@ -8,19 +8,30 @@ use std::time::{Duration, Instant};
 use super::alarm::Alarm;
 use super::device::Device;
 use super::{Activity, Point, Request, Shared, Snapshot, Take, lock};
+use crate::denoise;
 use crate::environment::Environment;
 use crate::error::Result;
+use crate::image::Image;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::metrics;
 use crate::path::World;
-use crate::render::film::Film;
-use crate::render::{Crop, Phase, Sampling, Session, StopRule, View};
-use crate::scene::Camera;
+use crate::render::{Phase, Sampling, Session, StopRule, View};
 
 /// Longest piece of rendering between two looks at requests and clocks.
 const SLICE: Duration = Duration::from_millis(120);
 /// A moving camera's picture should take about this long.
 const MOVING_SECONDS: f64 = 0.07;
+/// What a camera path takes, until it has been measured.
+const LIKELY_SECONDS_PER_PATH: f64 = 1e-5;
+/// The first pass of a preview for which nothing was learned before should take about this long: many
+/// samples of a small picture, filtered, show more than one sample of a large one.
+const PREVIEW_SECONDS: f64 = 0.4;
+/// By what a preview's sides are divided at most.
+const PREVIEW_SHRINK: u32 = 4;
+/// Samples and seconds that the very first small picture may take.
+const GLANCE: (u32, Duration) = (4, Duration::from_millis(300));
+/// Pixels across of the picture that is kept for the next one's first moments.
+const UNDER_WIDTH: u32 = 640;
 /// Publishing may take at most about one part in this of the time.
 const PUBLISH_SHARE: u32 = 20;
 
@@ -37,8 +48,8 @@ pub(super) struct Legacy {
     /// Seconds one camera path takes, all threads together.
     seconds_per_path: Option<f64>,
     snapshots: u64,
-    /// The last small picture and its camera.
-    under: Option<(Camera, Option<Crop>, Arc<Film>)>,
+    /// The last picture, small, and what it was rendered for.
+    under: Option<(Arc<Request>, Arc<Image>)>,
 }
 
 impl Legacy {
@@ -115,7 +126,7 @@ impl<'a> Job<'a> {
 
     /// Small pictures for as long as the camera rests at this very place.
     pub(super) fn follow(&mut self, world: &World, environment: &Environment) {
-        let mut session = self.small_session(world, environment);
+        let mut session = self.small_session(world, environment, MOVING_SECONDS, 16);
         while !self.is_superseded() {
             // The first pass is never cut short: some picture is better than none.
             let cut = session.film().min_samples() > 0;
@@ -132,10 +143,17 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// A session for a small picture, with what was learned before.
-    fn small_session<'b>(&mut self, world: &'b World, environment: &'b Environment) -> Session<'b> {
+    /// A session for a picture so small that a pass takes `seconds`, with what was learned before;
+    /// its sides are divided by `most` at most.
+    fn small_session<'b>(
+        &mut self,
+        world: &'b World,
+        environment: &'b Environment,
+        seconds: f64,
+        most: u32,
+    ) -> Session<'b> {
         let mut view = self.request.view.clone();
-        let shrink = self.shrink(&view);
+        let shrink = self.shrink(&view, seconds, most);
         view.width = (view.width / shrink).max(1);
         view.height = (view.height / shrink).max(1);
         if let Some(crop) = &mut view.crop {
@@ -166,34 +184,42 @@ impl<'a> Job<'a> {
         if self.under().is_some() || !self.request.previews {
             return;
         }
-        let mut session = self.small_session(world, environment);
-        self.advance(&mut session, None, false);
-        if session.film().min_samples() > 0 && !self.is_superseded() {
+        let start = Instant::now();
+        let mut session = self.small_session(world, environment, MOVING_SECONDS, 16);
+        while session.film().min_samples() < GLANCE.0 && start.elapsed() < GLANCE.1 {
+            self.advance(&mut session, None, false);
+            if session.film().min_samples() == 0 || self.is_superseded() {
+                return;
+            }
             self.measure(&session);
             self.keep_under(&session);
             self.publish(Activity::Moving, &session, None, None);
         }
     }
 
-    /// The small picture of this view, if there is one.
-    fn under(&self) -> Option<Arc<Film>> {
-        let (camera, crop, film) = self.legacy.under.as_ref()?;
-        let view = &self.request.view;
-        (*camera == view.camera && *crop == view.crop).then(|| Arc::clone(film))
+    /// What was shown of this view before, if there is anything.
+    fn under(&self) -> Option<Arc<Image>> {
+        let (request, image) = self.legacy.under.as_ref()?;
+        let aspect = |view: &View| f64::from(view.width) / f64::from(view.height);
+        let is_as_wide = 1.02 * aspect(&request.view) >= aspect(&self.request.view);
+        (is_as_wide && request.looks_like(&self.request)).then(|| Arc::clone(image))
     }
 
-    /// Keeps the small picture for the good one's first moments.
+    /// Keeps the picture for the next one's first moments.
     fn keep_under(&mut self, session: &Session<'_>) {
-        let View { camera, crop, .. } = &self.request.view;
-        self.legacy.under = Some((camera.clone(), *crop, Arc::new(session.film().clone())));
+        let film = session.film();
+        let is_small = film.width < self.request.view.width;
+        let image =
+            if is_small { denoise::preview(film) } else { film.image().shrunk(UNDER_WIDTH) };
+        self.legacy.under = Some((Arc::clone(&self.request), Arc::new(image)));
     }
 
-    /// By what the picture's sides are divided while the camera moves.
-    fn shrink(&self, view: &View) -> u32 {
+    /// By what the picture's sides are divided for a pass to take `seconds`.
+    fn shrink(&self, view: &View, seconds: f64, most: u32) -> u32 {
         let pixels = f64::from(view.width) * f64::from(view.height);
-        let Some(seconds_per_path) = self.legacy.seconds_per_path else { return 8 };
-        let shrink = (pixels * seconds_per_path / MOVING_SECONDS).sqrt().ceil();
-        (shrink as u32).clamp(1, 16)
+        let seconds_per_path = self.legacy.seconds_per_path.unwrap_or(LIKELY_SECONDS_PER_PATH);
+        let shrink = (pixels * seconds_per_path / seconds).sqrt().ceil();
+        (shrink as u32).clamp(1, most)
     }
 
     /// The full picture: learning first, with a preview meanwhile, then samples until a rule is met.
@@ -213,9 +239,17 @@ impl<'a> Job<'a> {
         let mut preview = None;
         if self.request.previews && main.phase() == Phase::Learning {
             let view = self.request.view.clone();
-            preview = Some(self.experienced_session(world, environment, view));
+            preview = Some(if is_experienced {
+                self.experienced_session(world, environment, view)
+            } else {
+                self.small_session(world, environment, PREVIEW_SECONDS, PREVIEW_SHRINK)
+            });
         }
         while let Some(activity) = self.next_activity(&main) {
+            if !self.request.split {
+                plain = None;
+                self.curves[1].clear();
+            }
             self.place(&mut main);
             match activity {
                 Activity::Paused | Activity::Done => {
@@ -261,6 +295,16 @@ impl<'a> Job<'a> {
             if due && self.request.previews && !self.is_superseded() {
                 self.publish(activity, &main, plain.as_ref(), preview.as_ref());
             }
+        }
+        // One sample a pixel is no better than what there was before, unless it can be filtered.
+        let is_better = |session: &&Session<'_>| {
+            let film = session.film();
+            let least = if film.width < self.request.view.width { 1 } else { GLANCE.0 };
+            film.min_samples() >= least
+        };
+        let best = [Some(&main), preview.as_ref()].into_iter().flatten().find(is_better);
+        if let Some(session) = best.filter(|_| self.request.previews) {
+            self.keep_under(session);
         }
     }
 

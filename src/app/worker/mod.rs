@@ -61,13 +61,24 @@ impl Request {
         !Arc::ptr_eq(&self.world, &new.world)
             || !Arc::ptr_eq(&self.environment, &new.environment)
             || self.view != new.view
-            || self.split != new.split
+            // Both halves start together; the plain one can be dropped at any time.
+            || (!self.split && new.split)
             || self.moving != new.moving
             || self.run != new.run
     }
 
+    /// Whether a picture for `self` shows what one for `new` will show, but for its size and noise.
+    fn looks_like(&self, new: &Self) -> bool {
+        let (a, b) = (&self.view, &new.view);
+        Arc::ptr_eq(&self.world, &new.world)
+            && Arc::ptr_eq(&self.environment, &new.environment)
+            && (&a.camera, a.crop, a.medium) == (&b.camera, b.crop, b.medium)
+            && (a.background, a.limits) == (b.background, b.limits)
+    }
+
     fn is_same(&self, new: &Self) -> bool {
         !self.restarts(new)
+            && self.split == new.split
             && self.device == new.device
             && self.is_frozen == new.is_frozen
             && self.reference.as_ref().map(Arc::as_ptr) == new.reference.as_ref().map(Arc::as_ptr)
@@ -150,8 +161,15 @@ pub struct Snapshot {
     pub learning: Figures,
     /// How the error of `main` and of `plain` fell.
     pub curves: [Vec<Point>; 2],
-    /// A small picture of the same view, for pixels that have no samples yet.
-    pub under: Option<Arc<Film>>,
+    /// An earlier picture of the same view, for pixels that have no samples yet.
+    pub under: Option<Arc<Image>>,
+}
+
+impl Snapshot {
+    /// Whether the picture is smaller than asked for, as it is at first and while the camera moves.
+    pub fn is_small(&self) -> bool {
+        self.main.film.width < self.request.view.width
+    }
 }
 
 struct Shared {

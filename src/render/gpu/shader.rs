@@ -256,6 +256,8 @@ pub(crate) struct Constants {
     pub(crate) stack_size: u32,
     /// Texels of a vertex, and which of them hold what only some scenes need.
     pub(crate) vertex: VertexTexels,
+    /// Bit `i`: some material has the `i`-th of the textures a material can have.
+    pub(crate) textures_in_scene: u32,
     /// Texels of `tables` at which each begins.
     pub(crate) albedo_at: u32,
     pub(crate) sheen_at: u32,
@@ -401,13 +403,22 @@ impl Program {
         let features = features.in_kernel(kernel);
         let bindings = bindings(kernel, &features);
         let mut source = String::new();
-        let Constants { stack_size, vertex, albedo_at, sheen_at, filter_at, rows_at } = *constants;
+        let Constants {
+            stack_size,
+            vertex,
+            textures_in_scene,
+            albedo_at,
+            sheen_at,
+            filter_at,
+            rows_at,
+        } = *constants;
         for (name, value) in [
             ("STACK_SIZE", stack_size),
             ("VERTEX_TEXELS", vertex.count),
             ("SECOND_UV_TEXEL", vertex.second_uv),
             ("TANGENT_TEXEL", vertex.tangent),
             ("COLOR_TEXEL", vertex.color),
+            ("TEXTURES_IN_SCENE", textures_in_scene),
             ("ALBEDO_AT", albedo_at),
             ("SHEEN_AT", sheen_at),
             ("FILTER_AT", filter_at),

@@ -70,7 +70,10 @@ impl Stage {
 fn upload_world(buffers: &mut Buffers, globals: &mut Globals, world: &World) -> Result<Constants> {
     let scene = &world.scene;
     let features = Features::of_world(world);
-    let tree = CompressedTree::build(&scene.positions, &scene.triangles);
+    let (materials, texture_refs) = layout::materials(world);
+    let tree = CompressedTree::build(&scene.positions, &scene.triangles, |triangle| {
+        materials[scene.triangle_materials[triangle as usize] as usize].flags
+    });
     if tree.depth > MAX_DEPTH {
         return Err(Error::new(format!(
             "the scene's tree is {} levels deep; a GPU walks at most {MAX_DEPTH}",
@@ -84,7 +87,6 @@ fn upload_world(buffers: &mut Buffers, globals: &mut Globals, world: &World) -> 
     let vertex = VertexTexels::of(&features);
     put_array(buffers, "triangles", "the scene's geometry", &layout::triangles(scene))?;
     put_array(buffers, "vertices", "the scene's geometry", &layout::vertices(scene, &vertex))?;
-    let (materials, texture_refs) = layout::materials(world);
     put_array(buffers, "materials", "the list of materials", &materials)?;
     if features.has("textures") {
         put_array(buffers, "texture_refs", "the list of textures", &texture_refs)?;
@@ -96,7 +98,8 @@ fn upload_world(buffers: &mut Buffers, globals: &mut Globals, world: &World) -> 
         let lights = layout::light_words(world, globals);
         put_array(buffers, "lights", "the list of lights", &lights)?;
     }
-    Ok(Constants { stack_size: tree.depth, vertex, ..Constants::default() })
+    let textures_in_scene = world.needs.texture_slots;
+    Ok(Constants { stack_size: tree.depth, vertex, textures_in_scene, ..Constants::default() })
 }
 
 /// Makes an array of values that take whole texels or parts of one.
