@@ -174,7 +174,7 @@ fn read_textures(corner: Corner, uvs: vec4f) -> array<vec4f, TEXTURES> {
     for (var i = 0u; i < TEXTURES; i++) {
         values[i] = vec4f(1.0);
     }
-    var left = TEXTURES_IN_SCENE;
+    var left = TEXTURES_IN_SCENE & ((1u << TEXTURES) - 1u);
     while left != 0u {
         let i = firstTrailingBit(left);
         left &= left - 1u;
