@@ -47,8 +47,8 @@ pub(in crate::app) fn show(
         .show_grid(Vec2b::TRUE)
         .x_axis_label(if by_samples { "samples per pixel" } else { "seconds" })
         .y_axis_label("relative RMS error")
-        .x_grid_spacer(grid_lines)
-        .y_grid_spacer(grid_lines)
+        .x_grid_spacer(|input| grid_lines(input.bounds))
+        .y_grid_spacer(|input| grid_lines(input.bounds))
         .x_axis_formatter(|mark, range| tick(mark, range, 1.0))
         .y_axis_formatter(|mark, range| match tick(mark, range, 100.0) {
             text if text.is_empty() => text,
@@ -66,9 +66,9 @@ pub(in crate::app) fn show(
 /// Span in decades below which grid lines are evenly spaced.
 const NARROW: f64 = 0.5;
 
-/// Where grid lines are: at 1, 2, ... 9 of every decade; within half a decade, at round numbers.
-fn grid_lines(input: egui_plot::GridInput) -> Vec<GridMark> {
-    let (low, high) = input.bounds;
+/// Where grid lines are between two powers of ten: at 1, 2, ... 9 of every decade; within half a
+/// decade, at round numbers.
+fn grid_lines((low, high): (f64, f64)) -> Vec<GridMark> {
     let mut marks = Vec::new();
     if high - low < NARROW {
         let (low, high) = (10_f64.powf(low), 10_f64.powf(high));
@@ -157,7 +157,7 @@ mod tests {
 
     fn written(low: f64, high: f64) -> Vec<String> {
         let bounds = (low.log10(), high.log10());
-        let marks = grid_lines(egui_plot::GridInput { bounds, base_step_size: 0.1 });
+        let marks = grid_lines(bounds);
         let range = bounds.0..=bounds.1;
         let inside = marks.into_iter().filter(|mark| range.contains(&mark.value));
         inside.map(|mark| tick(mark, &range, 1.0)).filter(|text| !text.is_empty()).collect()
