@@ -66,18 +66,20 @@ pub(super) fn furnace(
     let ior = parameters.ior.max(1.0);
     let eta = if entering { ior } else { 1.0 / ior };
     let mut random = Random(SplitMix(5));
-    let (mut sum, mut square) = (0.0, 0.0);
+    let (mut sum, mut square) = (Vec3::ZERO, 0.0);
     for _ in 0..count {
-        let weight = bsdf.sample(wo, random.next_vec3()).map_or(0.0, |s| {
+        let weight = bsdf.sample(wo, random.next_vec3()).map_or(Vec3::ZERO, |s| {
             let bent = s.is_transmission && !parameters.thin;
-            s.weight.max_element() * if bent { eta * eta } else { 1.0 }
+            s.weight * if bent { eta * eta } else { 1.0 }
         });
         sum += weight;
-        square += weight * weight;
+        square += weight.max_element() * weight.max_element();
     }
+    // Channels are apart: a leaf may reflect red and transmit green.
     let mean = sum / count as f32;
-    let error = ((square / count as f32 - mean * mean).max(0.0) / count as f32).sqrt();
-    (mean + bsdf.straight_transmittance(wo).max_element(), error)
+    let spread = square / count as f32 - mean.max_element() * mean.max_element();
+    let error = (spread.max(0.0) / count as f32).sqrt();
+    ((mean + bsdf.straight_transmittance(wo)).max_element(), error)
 }
 
 #[test]
