@@ -870,7 +870,11 @@ fn bsdf_albedo(b: Bsdf) -> vec3f {
     let terms = terms_towards(b.interface_.ggx, b.roughness, vec3f(0.0, 0.0, 1.0));
     let let_in = 1.0 - dot(b.f0_f90, terms_mean(b.interface_.ggx, b.roughness));
     let up = vec3f(0.0, 0.0, 1.0);
-    var albedo = diffuse_sum(b) * (bsdf_diffuse_left(b, terms) * let_in)
+    var body = b.diffuse_color;
+//#if diffuse_transmission
+    body += b.transmitted_color / radiance_scale(b.interface_);
+//#end
+    var albedo = body * (bsdf_diffuse_left(b, terms) * let_in)
         + interface_albedo(b.interface_, 1.0, terms);
 //#if transmission
     albedo += interface_straight_transmittance(b.interface_, 1.0);

@@ -75,9 +75,10 @@ impl Diffuse {
         (1.0 - self.f0_f90.dot(terms)).max(0.0)
     }
 
-    /// Both lobes' albedo towards a viewer to whom the interface leaves `left`.
-    pub(super) fn albedo(&self, left: f32) -> Vec3 {
-        (self.reflected + self.transmitted) * (left * self.let_in())
+    /// Both lobes' albedo towards a viewer to whom the interface leaves `left`; a share of light, so
+    /// the scale of radiance on its way through a solid's surface is taken back.
+    pub(super) fn albedo(&self, left: f32, radiance_scale: Vec3) -> Vec3 {
+        (self.reflected + self.transmitted / radiance_scale) * (left * self.let_in())
     }
 
     /// What the lobes weigh beside others, not counting what the interface leaves.

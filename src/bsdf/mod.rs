@@ -195,7 +195,8 @@ impl Bsdf {
     pub fn albedo(&self) -> Vec3 {
         let up = Vec3::Z;
         let terms = self.diffuse.terms_at(up);
-        let diffuse = self.diffuse.albedo(self.diffuse.left_of(terms));
+        let scale = self.interface.radiance_scale();
+        let diffuse = self.diffuse.albedo(self.diffuse.left_of(terms), scale);
         let interface =
             self.interface.albedo(1.0, terms) + self.interface.straight_transmittance(1.0);
         let base = self.sheen.left(up, Sheen::TYPICAL) * (diffuse + interface);

@@ -267,14 +267,14 @@ impl Desk {
         std::fs::read_to_string(self.path("says.txt")).unwrap_or_default()
     }
 
-    /// Waits for something for at most a minute.
+    /// Waits for something for at most three minutes.
     fn wait_for<T>(&self, what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
         let start = Instant::now();
         loop {
             if let Some(it) = ready() {
                 return it;
             }
-            assert!(start.elapsed() < Duration::from_secs(90), "no {what}: {}", self.says());
+            assert!(start.elapsed() < Duration::from_secs(180), "no {what}: {}", self.says());
             std::thread::sleep(Duration::from_millis(250));
         }
     }
