@@ -70,17 +70,13 @@ mod tests {
         Environment::new(map, &options).expect("a map")
     }
 
+    const GRID: SphericalGrid =
+        SphericalGrid { center: glam::Vec3::ZERO, columns: 8, rows: 4, faces: true, medium: false };
+
     #[test]
     fn a_turned_map_keeps_what_is_seen_where() {
         let old = environment(3, 0.0);
-        let grid = SphericalGrid {
-            center: glam::Vec3::ZERO,
-            columns: 8,
-            rows: 4,
-            faces: true,
-            medium: false,
-        };
-        let learned = LightGrid::with_garbage_laws(grid, old.tile_energies(), 1).expect("a grid");
+        let learned = LightGrid::with_garbage_laws(GRID, old.tile_energies(), 1).expect("a grid");
         let turned = environment(3, 5.0);
         let laws = learned.transferred(&old, &turned).expect("a grid");
         let mut compared = 0;
@@ -100,17 +96,10 @@ mod tests {
     #[test]
     fn the_same_map_keeps_its_laws_and_a_brighter_tile_gets_more() {
         let old = environment(3, 0.0);
-        let grid = SphericalGrid {
-            center: glam::Vec3::ZERO,
-            columns: 8,
-            rows: 4,
-            faces: true,
-            medium: false,
-        };
-        let learned = LightGrid::with_garbage_laws(grid, old.tile_energies(), 2).expect("a grid");
+        let learned = LightGrid::with_garbage_laws(GRID, old.tile_energies(), 2).expect("a grid");
         let same = learned.transferred(&old, &old).expect("a grid");
         let sun_moved = learned.transferred(&old, &environment(20, 0.0)).expect("a grid");
-        for cell in 0..grid.cell_count() {
+        for cell in 0..GRID.cell_count() {
             let law = learned.law_of_cell(cell);
             assert_eq!(same.law_of_cell(cell), law);
             for tile in 0..512 {
