@@ -111,7 +111,7 @@ impl RowPair {
     }
 }
 
-/// The table as `shaders/bsdf.wgsl` reads it: row by row the terms and their mean, each with those of
+/// The table as `shaders/albedo.wgsl` reads it: row by row the terms and their mean, each with those of
 /// the row after it.
 pub(crate) fn texels() -> Vec<[f32; 4]> {
     let entries = |row: &'static Row| row.terms.iter().chain([&row.mean]);

@@ -448,7 +448,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 21] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 24] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -465,6 +465,9 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 21] {
         (wgsl!("microfacet"), true),
         (wgsl!("iridescence"), features.has("iridescence")),
         (wgsl!("sheen"), features.has("sheen")),
+        (wgsl!("albedo"), true),
+        (wgsl!("interface"), true),
+        (wgsl!("coat"), features.has("clearcoat")),
         (wgsl!("bsdf"), true),
         (wgsl!("light_grid"), true),
         (wgsl!("environment"), true),
