@@ -14,8 +14,9 @@ struct Work {
     samples: u32,
     // Whether to add to the sums that are there.
     resumes: u32,
-    padding_0: u32,
-    padding_1: u32,
+    // Of so many samples one is counted; 0 if none is.
+    stride: u32,
+    padding: u32,
 }
 
 struct Globals {
@@ -62,7 +63,8 @@ struct Globals {
     zero: u32,
     // Whether points in a medium have a face of their own.
     grid_medium: u32,
-    padding_1: u32,
+    // Of 256 samples of the map so many follow the whole map's law.
+    whole_map_share: u32,
     // Corners and coefficients of the fog; without fog the lower corner is above the upper one.
     fog_low: vec3f,
     fog_mean_cosine: f32,

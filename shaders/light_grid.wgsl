@@ -39,13 +39,6 @@ fn cell_in_medium(position: vec3f) -> u32 {
     return cell_on_face(position, 0u);
 //#end
 }
-
-fn law_in_medium(position: vec3f) -> u32 {
-    if globals.law_of_cell_at == NO_ARRAY {
-        return WHOLE_MAP;
-    }
-    return law_u16(globals.law_of_cell_at, cell_in_medium(position));
-}
 //#end
 
 fn cell_on_face(position: vec3f, face: u32) -> u32 {
@@ -61,11 +54,11 @@ fn law_u16(at: u32, index: u32) -> u32 {
     return (laws(at + index / 2u).x >> (16u * (index & 1u))) & 0xffffu;
 }
 
-fn law_of(position: vec3f, normal: vec3f) -> u32 {
+fn law_of_cell(cell: u32) -> u32 {
     if globals.law_of_cell_at == NO_ARRAY {
         return WHOLE_MAP;
     }
-    return law_u16(globals.law_of_cell_at, cell_of(position, normal));
+    return law_u16(globals.law_of_cell_at, cell);
 }
 
 // Probability of the entry with numbers `low..=last`.
@@ -119,5 +112,42 @@ fn tile_probability(law: u32, tile: u32) -> f32 {
         low = laws(entry - 1u).x + 1u;
     }
     return entry_probability(low, laws(entry).x);
+}
+
+//#if light_grid
+// A probability of the whole map's law and one of a learned law, mixed.
+fn mixed(whole_map: f32, learned: f32, whole_map_share: u32) -> f32 {
+    let share = f32(whole_map_share) * (1.0 / 256.0);
+    return share * whole_map + (1.0 - share) * learned;
+}
+//#end
+
+// Twin of `LightGrid::sample_sharing`.
+fn choose_tile(law: u32, bits: vec2u, whole_map_share: u32) -> TileChoice {
+//#if light_grid
+    let by_whole_map = (bits.y & 0xffu) < whole_map_share;
+    var choice = sample_tile(select(law, WHOLE_MAP, by_whole_map), bits.x);
+    if law != WHOLE_MAP && whole_map_share != 0u {
+        let other = tile_probability(select(WHOLE_MAP, law, by_whole_map), choice.tile);
+        let probabilities = select(
+            vec2f(other, choice.probability), vec2f(choice.probability, other), by_whole_map);
+        choice.probability = mixed(probabilities.x, probabilities.y, whole_map_share);
+    }
+    return choice;
+//#else
+    return sample_tile(WHOLE_MAP, bits.x);
+//#end
+}
+
+// Twin of `LightGrid::probability`.
+fn choice_probability(law: u32, tile: u32) -> f32 {
+    let learned = tile_probability(law, tile);
+//#if light_grid
+    if law != WHOLE_MAP && globals.whole_map_share != 0u {
+        let whole_map = tile_probability(WHOLE_MAP, tile);
+        return mixed(whole_map, learned, globals.whole_map_share);
+    }
+//#end
+    return learned;
 }
 //#end

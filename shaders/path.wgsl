@@ -21,6 +21,9 @@ struct Path {
     passes: u32,
     bounces: u32,
     rays: u32,
+//#if counting
+    is_counted: bool,
+//#end
 //#if layers
     first_hit: FirstHit,
 //#end
@@ -40,6 +43,9 @@ struct Vertex {
     // Direction to where the path came from, in the shading frame.
     wo: vec3f,
     law: u32,
+//#if light_grid
+    cell: u32,
+//#end
 //#if medium
     is_in_medium: bool,
     mean_cosine: f32,
@@ -276,7 +282,8 @@ fn medium_vertex(path: ptr<function, Path>, position: vec3f, mean_cosine: f32) -
 //#if light_grid
     // From inside of a solid the map is not seen anyway.
     if !is_in_solid(path) {
-        vertex.law = law_in_medium(position);
+        vertex.cell = cell_in_medium(position);
+        vertex.law = law_of_cell(vertex.cell);
     }
 //#end
     return vertex;
@@ -335,7 +342,8 @@ fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
     vertex.wo = local_from_world(point.shading_frame, -(*path).ray.direction);
     vertex.law = WHOLE_MAP;
 //#if light_grid
-    vertex.law = law_of(point.position, point.geometric_normal);
+    vertex.cell = cell_of(point.position, point.geometric_normal);
+    vertex.law = law_of_cell(vertex.cell);
 //#end
     return visit(path, vertex);
 }
@@ -357,7 +365,7 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
 //#end
     if gathers {
 //#if learning
-        record(path, vertex);
+        look_at_map(path, vertex);
 //#else
 //#if map_sampling
         gather_environment(path, vertex);
@@ -423,7 +431,7 @@ fn escape(path: ptr<function, Path>) {
 //#if map_sampling
     if (*path).departure_pdf_solid_angle < F32_MAX {
         let seen = radiance_and_tile_pdf(direction);
-        let nee = tile_probability((*path).departure_law, seen.tile) * seen.pdf_solid_angle;
+        let nee = choice_probability((*path).departure_law, seen.tile) * seen.pdf_solid_angle;
         let weight = balance_heuristic((*path).departure_pdf_solid_angle, nee);
         (*path).radiance += (*path).throughput * seen.radiance * weight;
         return;
@@ -503,7 +511,7 @@ fn transmittance(
 //#else
 fn gather_environment(path: ptr<function, Path>, vertex: Vertex) {
     let bits = path_pair_bits(path);
-    let choice = sample_tile(vertex.law, bits.x);
+    let choice = choose_tile(vertex.law, bits, globals.whole_map_share);
     let sample = sample_in_tile(choice.tile, vec2f(choice.remainder, unit_from_bits(bits.y)));
     if sample.pdf_solid_angle <= 0.0 {
         return;
@@ -511,9 +519,16 @@ fn gather_environment(path: ptr<function, Path>, vertex: Vertex) {
     let pdf = choice.probability * sample.pdf_solid_angle;
     let f = scattered(path, vertex, sample.direction);
     if max_element(f.value) <= 0.0 {
+//#if counting
+        count(path, vertex, choice.tile, 0.0);
+//#end
         return;
     }
     let visible = transmittance(path, vertex, sample.direction, F32_MAX);
+//#if counting
+    let seen = visibility(vertex, sample.direction, f.pdf_solid_angle, visible);
+    count(path, vertex, choice.tile, seen);
+//#end
     let weight = balance_heuristic(pdf, f.pdf_solid_angle) / pdf;
     if any(visible != vec3f(0.0)) {
         (*path).radiance += (*path).throughput * f.value * sample.radiance * visible * weight;

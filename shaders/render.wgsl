@@ -15,7 +15,12 @@ fn start_sample(x: u32, y: u32, index: u32) -> Path {
     let offset = filter_sample(next_pair(&sampler));
     let lens = lens_point(&sampler);
     let centre = vec2f(f32(x) + 0.5, f32(y) + 0.5);
-    return path_new(camera_ray(centre + offset, lens), sampler);
+    var path = path_new(camera_ray(centre + offset, lens), sampler);
+//#if counting
+    let stride = globals.work.stride;
+    path.is_counted = stride != 0u && (y * globals.width + x + index) % max(stride, 1u) == 0u;
+//#end
+    return path;
 }
 
 @compute @workgroup_size(64)

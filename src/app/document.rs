@@ -137,7 +137,11 @@ impl Document {
             seed: self.light.seed,
             points: Points::Sobol,
             grid_columns: 64,
-            learning_paths: View::suitable_learning_paths(width, height, self.stop.samples),
+            learning_paths: View::suitable_learning_paths(
+                self.light.sampling,
+                [width, height],
+                self.stop.samples,
+            ),
             laws: LawOptions::ADAPTIVE,
             medium: self.fog,
             background: self.background,

@@ -175,15 +175,14 @@ fn inspect(snapshot: &Snapshot, place: Vec2) -> Option<Inspected> {
         tallies: Vec::new(),
     };
     let Some(grid) = &snapshot.main.grid else { return Some(inspected) };
-    inspected.law = grid.law_of(spot.position, spot.normal);
+    let cell = grid.grid().map(|cells| cells.cell_of(spot.position, spot.normal));
+    inspected.law = cell.map_or(WHOLE_MAP, |cell| grid.law_of_cell(cell));
     let (laws, law) = (grid.laws(), inspected.law);
     inspected.memory_bytes =
         (law != WHOLE_MAP).then(|| TileLaws::law_bytes(laws.tile_count(), laws.support(law)));
-    inspected.probabilities = (0..grid.laws().tile_count())
-        .map(|tile| grid.laws().probability(inspected.law, tile))
-        .collect();
-    if let Some(cells) = grid.grid() {
-        let cell = cells.cell_of(spot.position, spot.normal);
+    inspected.probabilities =
+        (0..laws.tile_count()).map(|tile| grid.probability(law, tile)).collect();
+    if let (Some(cells), Some(cell)) = (grid.grid(), cell) {
         inspected.cell = Some(cell);
         inspected.coordinates = cells.coordinates(cell).into();
         if let Some(learning) = snapshot.counters.as_ref().filter(|l| l.grid == *cells)

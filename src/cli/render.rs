@@ -142,7 +142,8 @@ pub(super) struct RenderArguments {
     /// Light Grid cells around the horizon; half as many from top to bottom.
     #[arg(long, default_value = "64", value_parser = clap::value_parser!(u32).range(2..=512), value_name = "N", help_heading = "Light")]
     grid: u32,
-    /// Camera paths to learn from; without it, as many as suit the picture.
+    /// Camera paths to learn from before rendering, which goes on learning; without it, as many as
+    /// suit the picture.
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000), value_name = "N", help_heading = "Light")]
     learning_paths: Option<u64>,
 
@@ -402,9 +403,9 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
         seed: arguments.seed,
         points: Points::Sobol,
         grid_columns: arguments.grid,
-        learning_paths: arguments
-            .learning_paths
-            .unwrap_or_else(|| View::suitable_learning_paths(width, height, arguments.spp)),
+        learning_paths: arguments.learning_paths.unwrap_or_else(|| {
+            View::suitable_learning_paths(arguments.sampling, [width, height], arguments.spp)
+        }),
         laws: LawOptions::ADAPTIVE,
         medium: medium(arguments, &world.scene),
         background: arguments.background.unwrap_or_default(),

@@ -1,6 +1,6 @@
 //! What learning counts: integers only, so that the result depends on no order.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 /// Fixed-point scale of one recorded weight: a weight of 1 adds this much.
 ///
@@ -38,7 +38,7 @@ pub struct Counters {
     slot_of_cell: Vec<u32>,
     cell_of_slot: Vec<u32>,
     /// Two words a tile in each slot: tries, then weight sum.
-    blocks: Vec<Box<[AtomicU32]>>,
+    blocks: Vec<Box<[AtomicU64]>>,
 }
 
 impl Counters {
@@ -59,39 +59,56 @@ impl Counters {
 
     /// Bytes of one cell's tile counters.
     pub fn slot_bytes(tile_count: u32) -> usize {
-        tile_count as usize * 8 + size_of::<Box<[AtomicU32]>>() + 4
+        tile_count as usize * 8 + size_of::<Box<[AtomicU64]>>() + 4
     }
 
     /// Records one try in `cell`: a map sample that fell into `tile` with `weight` in
     /// `[0, MAX_WEIGHT]`, 0 when it was occluded. Safe to call from any thread.
     pub fn record(&self, cell: u32, tile: u32, weight: f32) {
-        self.visits[cell as usize].fetch_add(1, Ordering::Relaxed);
         let slot = self.slot_of_cell[cell as usize];
         if slot == NO_SLOT {
+            self.visits[cell as usize].fetch_add(1, Ordering::Relaxed);
             return;
         }
-        let block = &self.blocks[slot as usize];
-        let counter = 2 * tile as usize;
-        block[counter].fetch_add(1, Ordering::Relaxed);
         let fixed = (weight.clamp(0.0, MAX_WEIGHT) * WEIGHT_ONE).round() as u32;
-        if fixed > 0 {
-            block[counter + 1].fetch_add(fixed, Ordering::Relaxed);
-        }
+        self.blocks[slot as usize][tile as usize].fetch_add(pair(1, fixed), Ordering::Relaxed);
     }
 
     /// Visits of each cell, the slot of each cell (`u32::MAX` without one) and the words of each
     /// slot: what a GPU needs to count on.
     pub(crate) fn words(&self) -> (Vec<u32>, &[u32], Vec<u32>) {
-        let load = |word: &AtomicU32| word.load(Ordering::Relaxed);
-        let blocks = self.blocks.iter().flat_map(|block| block.iter().map(load)).collect();
-        (self.visits.iter().map(load).collect(), &self.slot_of_cell, blocks)
+        let visits = self.visits.iter().map(|word| word.load(Ordering::Relaxed)).collect();
+        let pairs = self.blocks.iter().flat_map(|block| block.iter());
+        (visits, &self.slot_of_cell, pairs.flat_map(|p| parts(p.load(Ordering::Relaxed))).collect())
+    }
+
+    /// How many words of visits and of blocks [`Self::words`] gives.
+    pub(crate) fn word_counts(&self) -> (usize, usize) {
+        (self.visits.len(), self.blocks.len() * 2 * self.tile_count as usize)
     }
 
     /// Takes back what [`Self::words`] gave, counted on.
     pub(crate) fn set_words(&self, visits: &[u32], blocks: &[u32]) {
-        let slots = self.blocks.iter().flat_map(|block| block.iter());
-        for (word, value) in self.visits.iter().zip(visits).chain(slots.zip(blocks)) {
+        for (word, value) in self.visits.iter().zip(visits) {
             word.store(*value, Ordering::Relaxed);
+        }
+        let pairs = self.blocks.iter().flat_map(|block| block.iter());
+        for (word, value) in pairs.zip(blocks.chunks_exact(2)) {
+            word.store(pair(value[0], value[1]), Ordering::Relaxed);
+        }
+    }
+
+    /// A copy as they are now.
+    pub fn snapshot(&self) -> Self {
+        let copy = |word: &AtomicU64| AtomicU64::new(word.load(Ordering::Relaxed));
+        let copy_visits = |word: &AtomicU32| AtomicU32::new(word.load(Ordering::Relaxed));
+        Self {
+            tile_count: self.tile_count,
+            capacity: self.capacity,
+            visits: self.visits.iter().map(copy_visits).collect(),
+            slot_of_cell: self.slot_of_cell.clone(),
+            cell_of_slot: self.cell_of_slot.clone(),
+            blocks: self.blocks.iter().map(|block| block.iter().map(copy).collect()).collect(),
         }
     }
 
@@ -109,15 +126,19 @@ impl Counters {
         for (_, cell) in fresh.into_iter().take(free) {
             self.slot_of_cell[cell as usize] = self.blocks.len() as u32;
             self.cell_of_slot.push(cell);
-            self.blocks.push((0..2 * self.tile_count).map(|_| AtomicU32::new(0)).collect());
+            self.blocks.push((0..self.tile_count).map(|_| AtomicU64::new(0)).collect());
         }
         for visits in &self.visits {
             visits.store(visits.load(Ordering::Relaxed).min(1 << 30), Ordering::Relaxed);
         }
         for block in &self.blocks {
-            if block.iter().any(|c| c.load(Ordering::Relaxed) >= 1 << 31) {
-                for counter in block {
-                    counter.store(counter.load(Ordering::Relaxed) / 2, Ordering::Relaxed);
+            let is_full = |word: &AtomicU64| {
+                parts(word.load(Ordering::Relaxed)).into_iter().any(|counter| counter >= 1 << 31)
+            };
+            if block.iter().any(is_full) {
+                for word in block {
+                    let [tries, weight] = parts(word.load(Ordering::Relaxed));
+                    word.store(pair(tries / 2, weight / 2), Ordering::Relaxed);
                 }
             }
         }
@@ -135,9 +156,9 @@ impl Counters {
 
     /// Tries and weight sums (in units of a weight of 1) of a slot's tiles.
     pub fn tallies(&self, slot: usize) -> impl Iterator<Item = Tally> {
-        self.blocks[slot].chunks_exact(2).map(|pair| Tally {
-            tries: f64::from(pair[0].load(Ordering::Relaxed)),
-            weight: f64::from(pair[1].load(Ordering::Relaxed)) / f64::from(WEIGHT_ONE),
+        self.blocks[slot].iter().map(|word| {
+            let [tries, weight] = parts(word.load(Ordering::Relaxed));
+            Tally { tries: tries.into(), weight: f64::from(weight) / f64::from(WEIGHT_ONE) }
         })
     }
 
@@ -145,8 +166,8 @@ impl Counters {
     pub fn memory_bytes(&self) -> usize {
         self.visits.len() * 8
             + self.cell_of_slot.capacity() * 4
-            + self.blocks.capacity() * size_of::<Box<[AtomicU32]>>()
-            + self.blocks.iter().map(|b| b.len() * 4).sum::<usize>()
+            + self.blocks.capacity() * size_of::<Box<[AtomicU64]>>()
+            + self.blocks.iter().map(|b| b.len() * 8).sum::<usize>()
     }
 
     /// A digest of every counter (FNV-1a over cells in slot order), for tests of repeatability.
@@ -156,12 +177,23 @@ impl Counters {
             |word: u32| digest = (digest ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3);
         for (slot, &cell) in self.cell_of_slot.iter().enumerate() {
             eat(cell);
-            for counter in &self.blocks[slot] {
-                eat(counter.load(Ordering::Relaxed));
+            for word in &self.blocks[slot] {
+                parts(word.load(Ordering::Relaxed)).into_iter().for_each(&mut eat);
             }
         }
         digest
     }
+}
+
+/// Tries and fixed-point weight of a tile in one word, so that one addition counts both: neither
+/// half overflows, see [`Counters`].
+fn pair(tries: u32, weight: u32) -> u64 {
+    u64::from(weight) << 32 | u64::from(tries)
+}
+
+/// Inverse of [`pair`].
+fn parts(word: u64) -> [u32; 2] {
+    [word as u32, (word >> 32) as u32]
 }
 
 #[cfg(test)]
@@ -191,8 +223,7 @@ mod tests {
         let mut counters = Counters::new(1, 2, 1 << 20);
         counters.record(0, 0, 1.0);
         counters.end_pass();
-        counters.blocks[0][3].store(3 << 30, Ordering::Relaxed);
-        counters.blocks[0][2].store(1000, Ordering::Relaxed);
+        counters.blocks[0][1].store(pair(1000, 3 << 30), Ordering::Relaxed);
         counters.end_pass();
         let tally = counters.tallies(0).nth(1).expect("two tiles");
         assert_eq!(tally.tries, 500.0);

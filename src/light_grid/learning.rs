@@ -55,12 +55,14 @@ pub struct LawOptions {
     /// mean square, which is best where each point of a cell sees either all or nothing of it
     /// (Rath et al. 2020).
     pub ratio_exponent: f64,
-    /// Share of samples that follow the whole map's law whatever was learned. It makes every law
-    /// as long as the map has tiles.
-    pub whole_map_share: f64,
+    /// Share of samples, in 256ths, that follow the whole map's law whatever was learned; see
+    /// [`LightGrid::sample`].
+    pub whole_map_share: u32,
     /// How much of the diffuse BSDF's own density is subtracted from a law (MIS compensation,
     /// Karlik et al. 2019, on tiles).
     pub compensation: f64,
+    /// Whether rendered paths count too, until the laws hardly get better.
+    pub while_rendering: bool,
 }
 
 impl LawOptions {
@@ -70,9 +72,16 @@ impl LawOptions {
         recording: Recording::VisibleCosine,
         pooling_tries: 16.0,
         ratio_exponent: 0.75,
-        whole_map_share: 0.0,
+        whole_map_share: 32,
         compensation: 0.5,
+        while_rendering: true,
     };
+
+    /// Whether rendered paths count too. Their samples of the map follow the laws, so only ratios
+    /// can be counted.
+    pub fn goes_on(&self) -> bool {
+        self.while_rendering && self.recording.is_ratio()
+    }
 
     /// The talk's: proportional to the visible contribution, nothing else.
     pub const TALK: Self = Self {
@@ -80,8 +89,9 @@ impl LawOptions {
         recording: Recording::VisibleContribution,
         pooling_tries: 0.0,
         ratio_exponent: 1.0,
-        whole_map_share: 0.0,
+        whole_map_share: 0,
         compensation: 0.0,
+        while_rendering: false,
     };
 }
 
@@ -116,6 +126,16 @@ impl LearningGrid {
         self.options.recording
     }
 
+    /// Whether rendered paths count too.
+    pub fn goes_on(&self) -> bool {
+        self.options.goes_on()
+    }
+
+    /// A copy of the counters as they are now.
+    pub fn snapshot(&self) -> Self {
+        Self { grid: self.grid, counters: self.counters.snapshot(), options: self.options }
+    }
+
     /// The laws that follow from what was counted so far. `None` for a black map.
     pub fn laws(&self, environment: &Environment) -> Option<LightGrid> {
         let energies = environment.tile_energies();
@@ -141,6 +161,7 @@ impl LearningGrid {
                 law_of_cell[self.counters.cells()[slot] as usize] = law as u16;
             }
         }
+        result.whole_map_share = self.options.whole_map_share;
         result.cells = Some(Cells { grid: self.grid, law_of_cell });
         Some(result)
     }
@@ -242,13 +263,6 @@ impl<'a> LawBuilder<'a> {
             weights.extend(self.learning.counters.tallies(slot).map(|t| t.weight));
         }
         self.compensate(self.face_of(cell) as usize, weights);
-        let total: f64 = weights.iter().sum();
-        let share = self.learning.options.whole_map_share;
-        if total > 0.0 && share > 0.0 {
-            for (weight, map) in weights.iter_mut().zip(&self.map_law) {
-                *weight = (1.0 - share) * *weight / total + share * map;
-            }
-        }
     }
 
     /// Energy of each tile times its visibility ratio, which is drawn towards the block's, and that

@@ -6,8 +6,6 @@
 //! was learned, the estimate stays unbiased: the law that chose a sample also gives its pdf, and
 //! BSDF sampling covers what a law cannot choose.
 
-use glam::Vec3;
-
 pub mod cells;
 pub mod counters;
 mod learning;
@@ -15,7 +13,7 @@ pub mod tile_laws;
 mod transfer;
 
 use cells::SphericalGrid;
-use tile_laws::TileLaws;
+use tile_laws::{TileChoice, TileLaws};
 
 pub use learning::{LawOptions, LearningGrid, Recording};
 
@@ -30,6 +28,8 @@ pub const MEMORY_BUDGET_BYTES: usize = 10 << 20;
 pub struct LightGrid {
     laws: TileLaws,
     cells: Option<Cells>,
+    /// Of 256 samples so many follow the whole map's law whatever was learned.
+    whole_map_share: u32,
 }
 
 #[derive(Debug, Clone)]
@@ -46,26 +46,54 @@ impl LightGrid {
         let mut laws = TileLaws::new(energies.len() as u32);
         laws.reserve_exact(1, energies.iter().filter(|e| **e > 0.0).count());
         laws.push(energies)?;
-        Some(Self { laws, cells: None })
+        Some(Self { laws, cells: None, whole_map_share: 0 })
     }
 
-    /// Law of a point whose unit normal on the lit side is `normal`.
-    pub fn law_of(&self, position: Vec3, normal: Vec3) -> u32 {
-        self.cells.as_ref().map_or(WHOLE_MAP, |cells| {
-            u32::from(cells.law_of_cell[cells.grid.cell_of(position, normal) as usize])
-        })
+    /// Chooses a tile at a point of law `law` with two uniform 32-bit numbers, the second of which
+    /// lends its last 8 bits: a share of samples follows the whole map's law (defensive mixture,
+    /// Hesterberg 1995), which bounds the estimate where a law is wrong and finds what it missed.
+    pub fn sample(&self, law: u32, bits: [u32; 2]) -> TileChoice {
+        self.sample_sharing(law, bits, self.whole_map_share)
     }
 
-    /// Law of a point in a medium.
-    pub fn law_in_medium(&self, position: Vec3) -> u32 {
-        self.cells.as_ref().map_or(WHOLE_MAP, |cells| {
-            u32::from(cells.law_of_cell[cells.grid.cell_in_medium(position) as usize])
-        })
+    /// [`Self::sample`] with another share, in 256ths, of the whole map's law.
+    pub fn sample_sharing(
+        &self,
+        law: u32,
+        [tile_bits, share_bits]: [u32; 2],
+        whole_map_share: u32,
+    ) -> TileChoice {
+        let by_whole_map = (share_bits & 0xff) < whole_map_share;
+        let choice = self.laws.sample(if by_whole_map { WHOLE_MAP } else { law }, tile_bits);
+        if law == WHOLE_MAP || whole_map_share == 0 {
+            return choice;
+        }
+        let other = self.laws.probability(if by_whole_map { law } else { WHOLE_MAP }, choice.tile);
+        let probability = if by_whole_map {
+            mixed(choice.probability, other, whole_map_share)
+        } else {
+            mixed(other, choice.probability, whole_map_share)
+        };
+        TileChoice { probability, ..choice }
     }
 
-    /// The laws over the map's tiles; law 0 is [`WHOLE_MAP`].
+    /// Probability that [`Self::sample`] chooses `tile` at a point of law `law`.
+    pub fn probability(&self, law: u32, tile: u32) -> f32 {
+        let learned = self.laws.probability(law, tile);
+        if law == WHOLE_MAP || self.whole_map_share == 0 {
+            return learned;
+        }
+        mixed(self.laws.probability(WHOLE_MAP, tile), learned, self.whole_map_share)
+    }
+
+    /// The laws over the map's tiles; law 0 is [`WHOLE_MAP`]. [`Self::sample`] mixes them.
     pub fn laws(&self) -> &TileLaws {
         &self.laws
+    }
+
+    /// Of 256 samples so many follow the whole map's law whatever was learned.
+    pub(crate) fn whole_map_share(&self) -> u32 {
+        self.whole_map_share
     }
 
     /// The grid, unless every point uses the whole map.
@@ -105,6 +133,55 @@ impl LightGrid {
                 (crate::sampler::hash(seed.wrapping_add(cell as u32)) % result.laws.len()) as u16;
         }
         result.cells = Some(Cells { grid, law_of_cell });
+        result.whole_map_share = 32;
         Some(result)
+    }
+}
+
+/// A probability of the whole map's law and one of a learned law, mixed.
+fn mixed(whole_map: f32, learned: f32, share: u32) -> f32 {
+    let share = share as f32 * (1.0 / 256.0);
+    share * whole_map + (1.0 - share) * learned
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::statistics::chi_square_test;
+    use crate::sampler::hash;
+
+    const GRID: SphericalGrid =
+        SphericalGrid { center: glam::Vec3::ZERO, columns: 4, rows: 2, faces: true, medium: false };
+
+    #[test]
+    fn samples_follow_the_mixture_that_gives_their_probability() {
+        let energies: Vec<f64> = (0..200).map(|tile| f64::from(tile % 7 * tile)).collect();
+        let grid = LightGrid::with_garbage_laws(GRID, &energies, 3).expect("a map with light");
+        assert!(grid.whole_map_share() > 0);
+        const COUNT: u32 = 200_000;
+        for law in [WHOLE_MAP, 1, 2, 3] {
+            let mut found = vec![0.0; energies.len()];
+            for i in 0..COUNT {
+                let choice = grid.sample(law, [hash(i), hash(!i)]);
+                assert_eq!(choice.probability, grid.probability(law, choice.tile));
+                assert!((0.0..1.0).contains(&choice.remainder));
+                found[choice.tile as usize] += 1.0;
+            }
+            let expected: Vec<f64> = (0..energies.len() as u32)
+                .map(|tile| f64::from(grid.probability(law, tile)) * f64::from(COUNT))
+                .collect();
+            assert!((expected.iter().sum::<f64>() / f64::from(COUNT) - 1.0).abs() < 1e-6);
+            let test = chi_square_test(&found, &expected, 1e-3).expect("enough samples");
+            assert!(test.passed, "law {law}: {test:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_missing_in_a_law_is_found_by_the_whole_maps_share() {
+        let grid = LightGrid::with_garbage_laws(GRID, &[1.0; 64], 5).expect("a map with light");
+        let unreachable = |tile: &u32| grid.laws().probability(1, *tile) == 0.0;
+        let tile = (0..64).find(unreachable).expect("garbage has gaps");
+        let share = grid.whole_map_share() as f32 / 256.0;
+        assert!((grid.probability(1, tile) * 64.0 / share - 1.0).abs() < 1e-5);
     }
 }

@@ -34,6 +34,7 @@ impl LightGrid {
             }
             cells
         });
+        result.whole_map_share = self.whole_map_share;
         Some(result)
     }
 }

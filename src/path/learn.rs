@@ -1,27 +1,26 @@
 //! Learning paths: what the map shows to the vertices of camera paths.
 
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 
 use super::{Path, PathTracer, Scatterer, Vertex};
 use crate::bvh::Ray;
 use crate::color::{importance, luminance};
-use crate::light_grid::{LearningGrid, WHOLE_MAP};
 use crate::sampler::{Sampler, unit_from_bits};
 
 impl PathTracer<'_> {
-    /// Traces one camera path and records at each vertex whether a sample of the map is visible,
-    /// drawn half from the whole map and half from what [`PathTracer::grid`] has learned so far: a
-    /// tile's visibility ratio does not depend on how often it is tried. Returns the number of rays.
-    pub fn learn(&self, ray: Ray, sampler: Sampler, learning: &LearningGrid) -> u32 {
+    /// Traces one camera path and counts at each vertex, in [`PathTracer::counts`], whether a sample
+    /// of the map is visible, drawn half from the whole map and half from what [`PathTracer::grid`]
+    /// has learned so far: a tile's visibility ratio does not depend on how often it is tried.
+    /// Returns the number of rays.
+    pub fn learn(&self, ray: Ray, sampler: Sampler) -> u32 {
         let mut path = Path::new(self, ray, sampler);
         while let Some(vertex) = path.next_vertex() {
             if path.bounces == self.limits.bounces {
                 break;
             }
             path.bounces += 1;
-            // Inside of a solid the map is never seen; its vertices would spoil what fog sees.
-            if !vertex.scatterer.is_delta_only() && !path.is_in_solid(&vertex) {
-                path.record(&vertex, learning);
+            if !vertex.scatterer.is_delta_only() && vertex.cell.is_some() {
+                path.look_at_map(&vertex);
             }
             if !path.scatter(&vertex) || !path.survives() {
                 break;
@@ -37,37 +36,45 @@ fn phase_weight(phase: f32) -> f32 {
 }
 
 impl Path<'_> {
-    fn is_in_solid(&self, vertex: &Vertex) -> bool {
-        matches!(vertex.scatterer, Scatterer::Medium(_)) && self.body.interior.is_some()
+    /// Counts a try of a tile of the map, if anything is counted.
+    pub(super) fn count(&self, vertex: &Vertex, tile: u32, weight: f32) {
+        if let (Some(learning), Some(cell)) = (self.tracer.counts, vertex.cell) {
+            learning.counters.record(cell, tile, weight);
+        }
     }
 
-    fn record(&mut self, vertex: &Vertex, learning: &LearningGrid) {
-        let Some(grid) = self.tracer.grid else { return };
-        let recording = learning.recording();
-        let by_learned = recording.is_ratio() && self.sampler.next_pair_bits()[0] >> 31 == 0;
-        let law = if by_learned { vertex.law } else { WHOLE_MAP };
-        let [tile_bits, row_bits] = self.sampler.next_pair_bits();
-        let choice = grid.laws().sample(law, tile_bits);
-        let u = Vec2::new(choice.remainder, unit_from_bits(row_bits));
-        let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
-        let cell = match &vertex.scatterer {
-            Scatterer::Surface(surface) => {
-                learning.grid.cell_of(vertex.position, surface.point.geometric_normal)
-            }
-            Scatterer::Medium(_) => learning.grid.cell_in_medium(vertex.position),
+    /// What a try that met no obstacle but `transmittance` counts: how much of the light is seen,
+    /// times a power of what the surface or the phase function makes of its direction.
+    pub(super) fn visibility(
+        &self,
+        vertex: &Vertex,
+        direction: Vec3,
+        own_pdf: f32,
+        transmittance: Vec3,
+    ) -> f32 {
+        let Some(learning) = self.tracer.counts else { return 0.0 };
+        let share = match &vertex.scatterer {
+            Scatterer::Surface(surface) => surface.point.shading_frame.z.dot(direction).abs(),
+            Scatterer::Medium(_) => phase_weight(own_pdf),
         };
+        luminance(transmittance) * share.powi(learning.recording().cosine_power())
+    }
+
+    /// Samples the map to see what is visible of it.
+    fn look_at_map(&mut self, vertex: &Vertex) {
+        let (Some(grid), Some(learning)) = (self.tracer.grid, self.tracer.counts) else { return };
+        let is_ratio = learning.recording().is_ratio();
+        let bits = self.sampler.next_pair_bits();
+        let whole_map_share = if is_ratio { 128 } else { 256 };
+        let choice = grid.sample_sharing(vertex.law, bits, whole_map_share);
+        let u = Vec2::new(choice.remainder, unit_from_bits(bits[1]));
+        let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
         let weight = match self.scattered(vertex, sample.direction) {
             None => 0.0,
             Some((f, own_pdf)) => {
                 let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
-                if recording.is_ratio() {
-                    let share = match &vertex.scatterer {
-                        Scatterer::Surface(surface) => {
-                            surface.point.shading_frame.z.dot(sample.direction).abs()
-                        }
-                        Scatterer::Medium(_) => phase_weight(own_pdf),
-                    };
-                    luminance(transmittance) * share.powi(recording.cosine_power())
+                if is_ratio {
+                    self.visibility(vertex, sample.direction, own_pdf, transmittance)
                 } else {
                     let pdf = choice.probability * sample.pdf_solid_angle;
                     let mean =
@@ -76,6 +83,6 @@ impl Path<'_> {
                 }
             }
         };
-        learning.counters.record(cell, choice.tile, weight);
+        self.count(vertex, choice.tile, weight);
     }
 }

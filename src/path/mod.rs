@@ -23,7 +23,8 @@ pub use world::World;
 use crate::bsdf::{Bsdf, Hero};
 use crate::bvh::{Hit, Ray, offset_origin};
 use crate::environment::Environment;
-use crate::light_grid::{LightGrid, WHOLE_MAP};
+use crate::light_grid::cells::SphericalGrid;
+use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
 use crate::math::balance_heuristic;
 use crate::medium::{Fog, Interior, Phase};
 use crate::sampler::{Sampler, unit_from_bits};
@@ -48,6 +49,8 @@ pub struct PathTracer<'a> {
     pub environment: &'a Environment,
     /// How NEE chooses tiles; `None` samples the map by the BSDF alone.
     pub grid: Option<&'a LightGrid>,
+    /// Where it is counted what samples of the map see.
+    pub counts: Option<&'a LearningGrid>,
     /// What lies between surfaces; `None` is clear air.
     pub fog: Option<Fog>,
     /// What the camera sees where it sees no surface.
@@ -110,9 +113,23 @@ impl PathTracer<'_> {
     }
 }
 
+impl PathTracer<'_> {
+    /// Where the cells lie: what is counted and what was learned have the same ones.
+    fn cells(&self) -> Option<&SphericalGrid> {
+        self.counts.map(|counts| &counts.grid).or(self.grid.and_then(LightGrid::grid))
+    }
+
+    fn vertex(&self, position: Vec3, cell: Option<u32>, scatterer: Scatterer) -> Vertex {
+        let law = self.grid.zip(cell).map_or(WHOLE_MAP, |(grid, cell)| grid.law_of_cell(cell));
+        Vertex { position, cell, law, scatterer }
+    }
+}
+
 /// A place at which light is scattered.
 struct Vertex {
     position: Vec3,
+    /// Cell of the Light Grid it lies in; `None` without one.
+    cell: Option<u32>,
     /// Tile law of NEE here.
     law: u32,
     scatterer: Scatterer,
@@ -301,10 +318,10 @@ impl<'a> Path<'a> {
         let flight = interior.fly(self.throughput, to - from, bits);
         self.throughput *= flight.weight;
         let position = origin + direction * (from + flight.scattered_at?);
-        // From inside of a solid the map is not seen anyway.
-        let grid = self.tracer.grid.filter(|_| self.body.interior.is_none());
-        let law = grid.map_or(WHOLE_MAP, |grid| grid.law_in_medium(position));
-        Some(Vertex { position, law, scatterer: Scatterer::Medium(interior.phase) })
+        // From inside of a solid the map is not seen: its vertices would spoil what fog learns.
+        let cells = self.tracer.cells().filter(|_| self.body.interior.is_none());
+        let cell = cells.map(|cells| cells.cell_in_medium(position));
+        Some(self.tracer.vertex(position, cell, Scatterer::Medium(interior.phase)))
     }
 
     /// Decides whether the ray goes straight through the surface, and weighs the path accordingly.
@@ -340,14 +357,12 @@ impl<'a> Path<'a> {
             self.radiance += self.throughput * parameters.emissive;
             return None;
         }
-        let law = self
-            .tracer
-            .grid
-            .map_or(WHOLE_MAP, |grid| grid.law_of(point.position, point.geometric_normal));
+        let cells = self.tracer.cells();
+        let cell = cells.map(|cells| cells.cell_of(point.position, point.geometric_normal));
         let wo = point.shading_frame.local_from_world(-self.ray.direction);
         let position = point.position;
         let scatterer = Scatterer::Surface(SurfaceScatterer { point, bsdf, wo });
-        Some(Vertex { position, law, scatterer })
+        Some(self.tracer.vertex(position, cell, scatterer))
     }
 
     /// Adds what a surface emits, whether the ray then passes it or not.
@@ -392,7 +407,7 @@ impl<'a> Path<'a> {
             return;
         };
         let (radiance, tile, in_tile) = environment.radiance_and_tile_pdf(self.ray.direction);
-        let nee = grid.laws().probability(from.law, tile) * in_tile;
+        let nee = grid.probability(from.law, tile) * in_tile;
         self.radiance += self.throughput * radiance * balance_heuristic(from.pdf_solid_angle, nee);
     }
 
@@ -410,13 +425,19 @@ impl<'a> Path<'a> {
     }
 
     fn gather_environment(&mut self, vertex: &Vertex, grid: &LightGrid) {
-        let [tile_bits, row_bits] = self.sampler.next_pair_bits();
-        let choice = grid.laws().sample(vertex.law, tile_bits);
-        let u = Vec2::new(choice.remainder, unit_from_bits(row_bits));
+        let bits = self.sampler.next_pair_bits();
+        let choice = grid.sample(vertex.law, bits);
+        let u = Vec2::new(choice.remainder, unit_from_bits(bits[1]));
         let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
         let pdf = choice.probability * sample.pdf_solid_angle;
-        let Some((f, own_pdf)) = self.scattered(vertex, sample.direction) else { return };
+        let Some((f, own_pdf)) = self.scattered(vertex, sample.direction) else {
+            return self.count(vertex, choice.tile, 0.0);
+        };
         let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
+        if self.tracer.counts.is_some() {
+            let weight = self.visibility(vertex, sample.direction, own_pdf, transmittance);
+            self.count(vertex, choice.tile, weight);
+        }
         if transmittance != Vec3::ZERO {
             let weight = balance_heuristic(pdf, own_pdf) / pdf;
             self.radiance += self.throughput * f * sample.radiance * transmittance * weight;

@@ -6,9 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use glam::Vec2;
 use rayon::prelude::*;
 
-use super::View;
 use super::film::{Film, Pixel, Surface};
-use crate::light_grid::LearningGrid;
+use super::{Pass, View};
 use crate::light_grid::counters::MAX_RECORDS_PER_PASS;
 use crate::path::PathTracer;
 use crate::path::camera::CameraRays;
@@ -24,7 +23,7 @@ const PATHS_PER_TASK: u64 = 512;
 /// what cells there are, then doubling, as far as the counters allow in one pass.
 pub(super) fn learning_range(view: &View, pass: u32) -> Range<u64> {
     let total = view.learning_paths;
-    let longest = (MAX_RECORDS_PER_PASS / u64::from(view.limits.bounces.max(1))).max(1);
+    let longest = most_paths_per_pass(view);
     let mut start = 0;
     let mut length = total.div_ceil(64).min(longest);
     for _ in 0..pass {
@@ -34,13 +33,12 @@ pub(super) fn learning_range(view: &View, pass: u32) -> Range<u64> {
     start.min(total)..(start + length).min(total)
 }
 
-/// Traces the learning paths in `paths`; returns the number of rays.
+/// Traces the learning paths in `paths` and counts what they see; returns the number of rays.
 pub(super) fn learn(
     tracer: &PathTracer<'_>,
     rays: &CameraRays,
     view: &View,
     paths: Range<u64>,
-    learning: &LearningGrid,
     cancel: &AtomicBool,
 ) -> u64 {
     let tasks = (paths.end - paths.start).div_ceil(PATHS_PER_TASK);
@@ -60,19 +58,24 @@ pub(super) fn learn(
                     let lens = lens_point(rays, &mut sampler);
                     let pixel = on_picture * Vec2::new(view.width as f32, view.height as f32);
                     let ray = rays.ray(pixel, lens);
-                    u64::from(tracer.learn(ray, sampler, learning))
+                    u64::from(tracer.learn(ray, sampler))
                 })
                 .sum::<u64>()
         })
         .sum()
 }
 
-/// Brings every pixel of the film to `target` samples; returns the numbers of samples and rays.
+/// Most paths that can be counted in one pass.
+pub(super) fn most_paths_per_pass(view: &View) -> u64 {
+    (MAX_RECORDS_PER_PASS / u64::from(view.limits.bounces.max(1))).max(1)
+}
+
+/// Brings every pixel of the film to a pass's target; returns the numbers of samples and rays.
 pub(super) fn render(
     tracer: &PathTracer<'_>,
     rays: &CameraRays,
     view: &View,
-    target: u32,
+    pass: Pass,
     film: &mut Film,
     cancel: &AtomicBool,
 ) -> (u64, u64) {
@@ -93,7 +96,7 @@ pub(super) fn render(
             for (x, pixel) in pixels.iter_mut().enumerate() {
                 let surface = if layers { surfaces.get_mut(x) } else { None };
                 let (samples, rays) =
-                    render_pixel(tracer, rays, view, (x, y), target, pixel, surface);
+                    render_pixel(tracer, rays, view, (x, y), pass, pixel, surface);
                 done = (done.0 + samples, done.1 + rays);
             }
             done
@@ -106,17 +109,19 @@ fn render_pixel(
     rays: &CameraRays,
     view: &View,
     (x, y): (usize, usize),
-    target: u32,
+    pass: Pass,
     pixel: &mut Pixel,
     mut surface: Option<&mut Surface>,
 ) -> (u64, u64) {
     let index = y as u32 * view.width + x as u32;
     let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
     let (mut samples, mut ray_count) = (0, 0);
-    while pixel.samples() < target {
+    while pixel.samples() < pass.target {
         let mut sampler = view.points.sampler(view.seed, index, pixel.samples());
         let offset = view.filter.sample(Vec2::from(sampler.next_pair()));
         let lens = lens_point(rays, &mut sampler);
+        let counts = tracer.counts.filter(|_| pass.counts(index, pixel.samples()));
+        let tracer = PathTracer { counts, ..*tracer };
         let result = tracer.radiance(rays.ray(centre + offset, lens), sampler);
         pixel.add(&result);
         if let Some(surface) = &mut surface {

@@ -114,9 +114,11 @@ fn laws(add: &mut Add<'_>) {
         add(group, &format!("compensation {share}"), &|s| s.laws.compensation = share);
     }
     let group = "defensive share of the whole map";
-    for share in [0.02, 0.05, 0.1, 0.3] {
-        add(group, &format!("whole map {share}"), &|s| s.laws.whole_map_share = share);
+    for share in [0, 4, 64, 128] {
+        add(group, &format!("whole map {share}/256"), &|s| s.laws.whole_map_share = share);
     }
+    let group = "learning from rendered paths";
+    add(group, "traced paths only", &|s| s.laws.while_rendering = false);
 }
 
 fn sizes(add: &mut Add<'_>) {

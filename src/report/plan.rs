@@ -93,9 +93,9 @@ impl Settings {
             seed,
             points: self.points,
             grid_columns: self.grid_columns,
-            learning_paths: self
-                .learning_paths
-                .unwrap_or_else(|| View::suitable_learning_paths(width, height, None)),
+            learning_paths: self.learning_paths.unwrap_or_else(|| {
+                View::suitable_learning_paths(self.sampling, [width, height], None)
+            }),
             laws: self.laws,
             medium: None,
             background: Background::Map,

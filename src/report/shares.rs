@@ -93,10 +93,13 @@ fn three_depths(
     cancel: &AtomicBool,
 ) -> Result<Option<[Vec<[f64; 3]>; 3]>> {
     let Some(mut session) = place.learned(settings, seed, cancel)? else { return Ok(None) };
-    let Some(all) = finish(&mut session, samples, cancel)? else { return Ok(None) };
+    // Laws as they are after that many samples.
+    if finish(&mut session, samples, cancel)?.is_none() {
+        return Ok(None);
+    }
     let grid = session.grid().cloned();
-    let mut shallow = [Vec::new(), Vec::new()];
-    for (picture, bounces) in shallow.iter_mut().zip([1, 0]) {
+    let mut pictures = [Vec::new(), Vec::new(), Vec::new()];
+    for (picture, bounces) in pictures.iter_mut().zip([u32::MAX, 1, 0]) {
         let frame = Frame { bounces: bounces.min(place.frame.bounces), ..place.frame.clone() };
         let mut session = Place { frame: &frame, ..*place }.session(settings, seed)?;
         if let Some(grid) = &grid {
@@ -105,8 +108,7 @@ fn three_depths(
         let Some(means) = finish(&mut session, samples, cancel)? else { return Ok(None) };
         *picture = means;
     }
-    let [one, none] = shallow;
-    Ok(Some([all, one, none]))
+    Ok(Some(pictures))
 }
 
 fn finish(

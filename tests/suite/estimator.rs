@@ -21,7 +21,7 @@ use lightgrid::light_grid::LawOptions;
 use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::{Phase, Sampling, Session, View};
+use lightgrid::render::{Phase, Sampling, Session, StopRule, View};
 use lightgrid::sampler::Points;
 use lightgrid::scene::Camera;
 
@@ -65,10 +65,15 @@ fn environment(map: Image) -> Environment {
     Environment::new(map, &EnvironmentOptions::default()).expect("a sound map")
 }
 
-/// Learns if the view asks for it, then renders.
+/// Learns if the view asks for it, then renders pass by pass as users do, so that laws change on
+/// the way.
 pub(crate) fn render(world: &World, environment: &Environment, view: View, samples: u32) -> Film {
     let mut session = learned(world, environment, view);
-    session.advance(samples, &AtomicBool::new(false)).expect("the CPU does not fail");
+    let rule = StopRule { samples: Some(samples), ..StopRule::default() };
+    while !session.is_done(&rule) {
+        let pass = session.next_pass(&rule);
+        session.advance(pass, &AtomicBool::new(false)).expect("the CPU does not fail");
+    }
     assert_eq!(session.film().min_samples(), samples);
     session.film().clone()
 }

@@ -275,7 +275,11 @@ impl<'a> Job<'a> {
                             self.advance(plain, None, true);
                         }
                         _ => {
+                            let law_paths = main.figures().law_paths;
                             self.advance(&mut main, Some(self.request.rule), self.request.previews);
+                            if main.figures().law_paths > law_paths {
+                                self.keep_laws(&main, true);
+                            }
                         }
                     }
                 }
@@ -361,19 +365,38 @@ impl<'a> Job<'a> {
         let learned = main.advance(1, &self.shared.cancel);
         self.go_on(main, learned);
         let is_done = main.phase() == Phase::Rendering;
-        if is_done {
-            self.counters = main.take_counters().map(Arc::new);
-        }
         // A little learned is better than nothing, but what was learned to the end is better still.
-        if (is_done
-            || (main.figures().learned_cells > 0 && !self.legacy.has_learned_in(&self.request)))
-            && let Some(laws) = main.grid()
+        if is_done
+            || (main.figures().learned_cells > 0 && !self.legacy.has_learned_in(&self.request))
         {
-            let map = Arc::clone(&self.request.environment);
-            self.legacy.learned = Some((Arc::new(laws.clone()), map));
-            self.legacy.world = Some(Arc::clone(&self.request.world));
-            self.legacy.is_complete = is_done;
+            self.keep_laws(main, is_done);
         }
+    }
+
+    /// Keeps what was learned, for inspection and for the next request.
+    fn keep_laws(&mut self, main: &Session<'_>, is_complete: bool) {
+        if is_complete {
+            self.counters = main.counters().map(|counters| Arc::new(counters.snapshot()));
+        }
+        if let Some(laws) = self.laws_of(main) {
+            self.legacy.learned = Some((laws, Arc::clone(&self.request.environment)));
+            self.legacy.world = Some(Arc::clone(&self.request.world));
+            self.legacy.is_complete = is_complete;
+        }
+    }
+
+    /// The laws in use. They are megabytes and seldom change: they are copied once.
+    fn laws_of(&mut self, session: &Session<'_>) -> Option<Arc<LightGrid>> {
+        let grid = session.grid()?;
+        let key = (std::ptr::from_ref(grid).addr(), session.figures().law_paths);
+        Some(match &self.laws {
+            Some((old, laws)) if *old == key => Arc::clone(laws),
+            _ => {
+                let laws = Arc::new(grid.clone());
+                self.laws = Some((key, Arc::clone(&laws)));
+                laws
+            }
+        })
     }
 
     /// One pass, cut short after a slice if asked for.
@@ -496,18 +519,7 @@ impl<'a> Job<'a> {
             film: Arc::new(film.clone()),
             figures: *session.figures(),
             gpu: session.gpu_figures().map(Arc::new),
-            grid: session.grid().map(|grid| {
-                // Laws are megabytes and seldom change: they are copied once.
-                let key = (std::ptr::from_ref(grid).addr(), session.figures().learning_paths);
-                match &self.laws {
-                    Some((old, laws)) if *old == key => Arc::clone(laws),
-                    _ => {
-                        let laws = Arc::new(grid.clone());
-                        self.laws = Some((key, Arc::clone(&laws)));
-                        laws
-                    }
-                }
-            }),
+            grid: self.laws_of(session),
         }
     }
 }

@@ -32,7 +32,8 @@ pub(crate) struct Work {
     pub(crate) first_sample: u32,
     pub(crate) samples: u32,
     pub(crate) resumes: u32,
-    pub(crate) padding: [u32; 2],
+    pub(crate) stride: u32,
+    pub(crate) padding: u32,
 }
 
 /// Twin of `Globals` in `globals.wgsl`.
@@ -77,7 +78,7 @@ pub(crate) struct Globals {
     pub(crate) mean_contribution: f32,
     pub(crate) zero: u32,
     pub(crate) grid_medium: u32,
-    pub(crate) padding_1: u32,
+    pub(crate) whole_map_share: u32,
     pub(crate) fog_low: Vec3,
     pub(crate) fog_mean_cosine: f32,
     pub(crate) fog_high: Vec3,
@@ -285,6 +286,7 @@ pub(crate) fn laws(grid: &LightGrid, globals: &mut Globals) -> Vec<u32> {
         globals.law_of_cell_at = push(&mut pairs(law_of_cell));
         globals.set_cells(cells);
     }
+    globals.whole_map_share = grid.whole_map_share();
     globals.words_per_law = laws.words_per_law;
     words
 }

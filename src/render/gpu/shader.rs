@@ -39,12 +39,13 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 46] = [
+    pub(crate) const ALL: [&'static str; 47] = [
         "alpha_mask",
         "anisotropy",
         "background_blur",
         "background_color",
         "clearcoat",
+        "counting",
         "diffuse_transmission",
         "dispersion",
         "emitters",
@@ -124,6 +125,7 @@ impl Features {
         let of_view = [
             ("background_blur", matches!(view.background, Background::Blurred(_))),
             ("background_color", matches!(view.background, Background::Color(_))),
+            ("counting", samples_map && view.law_options().is_some_and(|laws| laws.goes_on())),
             ("faces", view.law_options().is_some_and(|laws| laws.faces)),
             ("independent_points", view.points == Points::Independent),
             ("layers", view.layers),
@@ -175,6 +177,7 @@ impl Features {
     fn in_kernel(&self, kernel: Kernel) -> Self {
         let mut set = self.0.clone();
         if kernel == Kernel::Learn {
+            set.insert("counting");
             set.insert("learning");
             set.remove("layers");
             set.remove("independent_points");
@@ -236,6 +239,7 @@ impl KernelFacts {
     /// Of the kernel for a scene with a map that is not black, with the defaults of `render`.
     pub fn of_scene(world: &World) -> Self {
         let defaults = [
+            "counting",
             "faces",
             "light_grid",
             "map",
@@ -448,7 +452,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 24] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 25] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -478,22 +482,23 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 24] {
         (wgsl!("bvh"), true),
         (wgsl!("camera"), true),
         (wgsl!("path"), true),
+        (wgsl!("count"), features.has("counting")),
         (wgsl!("render"), kernel == Kernel::Render),
         (wgsl!("learn"), kernel == Kernel::Learn),
     ]
 }
 
 fn bindings(kernel: Kernel, features: &Features) -> Vec<Binding> {
-    let learns = kernel == Kernel::Learn;
+    let (learns, counts) = (kernel == Kernel::Learn, features.has("counting"));
     let buffers = [
         // Not a uniform: software Vulkan optimises a shader anew, for 40 ms, before each dispatch if
         // it branches on uniforms.
         ("globals", "Globals", false, true),
         ("film", "array<PixelSums>", true, !learns),
         ("surfaces", "array<FirstHit>", true, features.has("layers")),
-        ("visits", "array<atomic<u32>>", true, learns),
-        ("counters", "array<atomic<u32>>", true, learns),
-        ("slot_of_cell", "array<u32>", false, learns),
+        ("visits", "array<atomic<u32>>", true, counts),
+        ("counters", "array<atomic<u32>>", true, counts),
+        ("slot_of_cell", "array<u32>", false, counts),
         ("learning_rays", "atomic<u32>", true, learns),
     ];
     let buffers = buffers
@@ -589,6 +594,9 @@ mod tests {
         }
         if !chosen.contains("map_sampling") {
             chosen.remove("light_grid");
+        }
+        if !(chosen.contains("light_grid") && chosen.contains("record_ratio")) {
+            chosen.remove("counting");
         }
         if !(chosen.contains("emitters") || chosen.contains("punctual_lights")) {
             chosen.remove("local_lights");

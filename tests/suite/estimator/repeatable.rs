@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use glam::Vec2;
 use lightgrid::environment::{Environment, sky};
 use lightgrid::light_grid::cells::SphericalGrid;
-use lightgrid::light_grid::{LawOptions, LearningGrid, LightGrid};
+use lightgrid::light_grid::{LawOptions, LearningGrid, LightGrid, MEMORY_BUDGET_BYTES};
 use lightgrid::path::camera::CameraRays;
 use lightgrid::path::{Background, PathLimits, PathTracer, World};
 use lightgrid::render::film::Film;
@@ -66,7 +66,9 @@ fn film_and_laws_do_not_depend_on_the_threads() {
         let result = |threads| {
             with_threads(threads, || {
                 let mut session = setting.session(setting.view(sampling));
-                session.advance(8, &AtomicBool::new(false)).expect("the CPU does not fail");
+                for _ in 0..20 {
+                    session.advance(1, &AtomicBool::new(false)).expect("the CPU does not fail");
+                }
                 let laws = laws(session.grid().expect("a map with light"));
                 (session.film().clone(), laws, *session.figures())
             })
@@ -74,6 +76,9 @@ fn film_and_laws_do_not_depend_on_the_threads() {
         let (film, laws, figures) = result(1);
         assert!(figures.learned_cells > 50, "{figures:?}");
         assert_eq!(laws.len(), figures.learned_cells);
+        let by_rendered = figures.law_paths > figures.learning_paths;
+        assert_eq!(by_rendered, sampling == Sampling::Adaptive, "{figures:?}");
+        assert!(figures.grid_bytes <= MEMORY_BUDGET_BYTES, "{figures:?}");
         for threads in [2, 5] {
             let other = result(threads);
             assert!(film == other.0, "{sampling:?}: the film differs with {threads} threads");
@@ -91,14 +96,6 @@ fn counters_do_not_depend_on_the_threads() {
     let rays = CameraRays::new(&view.camera, view.width, view.height);
     let energies = setting.environment.tile_energies();
     let whole_map = LightGrid::whole_map(energies).expect("a map with light");
-    let tracer = PathTracer {
-        world: &setting.world,
-        environment: &setting.environment,
-        grid: Some(&whole_map),
-        fog: None,
-        background: Background::Map,
-        limits: view.limits,
-    };
     let digest = |threads| {
         let grid = SphericalGrid {
             center: rays.position(),
@@ -110,12 +107,21 @@ fn counters_do_not_depend_on_the_threads() {
         let mut learning =
             LearningGrid::new(grid, setting.environment.tile_count(), LawOptions::ADAPTIVE);
         for pass in 0..3 {
+            let tracer = PathTracer {
+                world: &setting.world,
+                environment: &setting.environment,
+                grid: Some(&whole_map),
+                counts: Some(&learning),
+                fog: None,
+                background: Background::Map,
+                limits: view.limits,
+            };
             with_threads(threads, || {
                 (0..4096_u32).into_par_iter().for_each(|path| {
                     let mut sampler = Sampler::new(7, pass, path);
                     let [x, y] = sampler.next_pair();
                     let pixel = Vec2::new(x * view.width as f32, y * view.height as f32);
-                    tracer.learn(rays.ray(pixel, Vec2::ZERO), sampler, &learning);
+                    tracer.learn(rays.ray(pixel, Vec2::ZERO), sampler);
                 });
             });
             learning.counters.end_pass();

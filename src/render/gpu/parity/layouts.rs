@@ -72,7 +72,7 @@ fn assert_same(module: &Module, name: &str, (size, fields): (usize, Fields)) {
 #[test]
 fn structs_are_laid_out_as_the_host_writes_them() {
     let module = module();
-    let work = fields!(Work: first first_high count first_sample samples resumes padding);
+    let work = fields!(Work: first first_high count first_sample samples resumes stride padding);
     assert_same(&module, "Work", work);
     let globals = fields!(Globals:
         work camera_position lens_radius camera_right focus_distance camera_up half_width
@@ -80,7 +80,7 @@ fn structs_are_laid_out_as_the_host_writes_them() {
         law_tiles_at law_last_at law_of_cell_at words_per_law grid_rows map_width map_height
         tile_columns tile_rows rotation_turns intensity tile_sums_at light_count
         light_triangle_count width height seed bounces russian_roulette orthographic scene_extent
-        mean_contribution zero grid_medium padding_1 fog_low fog_mean_cosine fog_high padding_2
+        mean_contribution zero grid_medium whole_map_share fog_low fog_mean_cosine fog_high padding_2
         fog_scattering padding_3 fog_extinction padding_4 background background_concentration
     );
     assert_same(&module, "Globals", globals);

@@ -174,31 +174,29 @@ fn cells(stand: &Stand) -> Vec<Probe<'_>> {
     };
     let edge_cases = move || edge_points().map(|(position, normal)| case(&[&position, &normal]));
     let equal = [Vec3::ONE, Vec3::new(1.0, -1.0, 1.0), Vec3::new(0.5, -1.0, -1.0), Vec3::ZERO];
-    let mut probes = vec![
-        Probe::new(
-            "dominant_face",
-            "put_word(dominant_face(take3()));",
-            cases(equal.into_iter().chain(edge_directions()).map(|n| case(&[&n])), |r| {
-                case(&[&r.direction()])
-            }),
+    let mut probes = vec![Probe::new(
+        "dominant_face",
+        "put_word(dominant_face(take3()));",
+        cases(equal.into_iter().chain(edge_directions()).map(|n| case(&[&n])), |r| {
+            case(&[&r.direction()])
+        }),
+        |t| {
+            let right = dominant_face(t.take3());
+            t.same(right);
+        },
+    )];
+    if let Some(grid) = stand.grid.grid() {
+        let cells = grid.cell_count();
+        probes.push(Probe::new(
+            "law_of_cell",
+            "put_word(law_of_cell(take_word()));",
+            cases([case(&[&0_u32]), case(&[&(cells - 1)])], |r| case(&[&r.below(cells)])),
             |t| {
-                let right = dominant_face(t.take3());
-                t.same(right);
-            },
-        ),
-        // Exact, but for points that lie on the border of cells.
-        Probe::new(
-            "law_of",
-            "let position = take3(); put_word(law_of(position, take3()));",
-            cases(edge_cases(), |r| case(&[&(4.0 * r.in_cube()), &r.direction()])),
-            move |t| {
-                let law = stand.grid.law_of(t.take3(), t.take3());
+                let law = stand.grid.law_of_cell(t.take_word());
                 t.same(law);
             },
-        )
-        .flips(500),
-    ];
-    if let Some(grid) = stand.grid.grid() {
+        ));
+        // Exact, but for points that lie on the border of cells.
         probes.push(
             Probe::new(
                 "cell_of",
@@ -221,6 +219,9 @@ fn laws(stand: &Stand) -> Vec<Probe<'_>> {
     let ends = [0, 1, 0x7fff_ffff, 0x8000_0000, u32::MAX];
     let edges = (0..laws.len()).flat_map(move |law| ends.map(|bits| case(&[&law, &bits])));
     let all = (0..laws.len()).flat_map(move |law| (0..tiles).map(move |tile| case(&[&law, &tile])));
+    let edges_of_shares = (0..laws.len()).flat_map(move |law| {
+        [0, 32, 128, 256].map(|share| case(&[&law, &0x8000_0000_u32, &31_u32, &share]))
+    });
     vec![
         Probe::new(
             "sample_tile",
@@ -232,6 +233,31 @@ fn laws(stand: &Stand) -> Vec<Probe<'_>> {
                 t.same(choice.tile);
                 t.near(choice.probability, ulps(1.0));
                 t.near(choice.remainder, ulps(3.0));
+            },
+        ),
+        Probe::new(
+            "choose_tile",
+            "let law = take_word(); let bits = vec2u(take_word(), take_word());
+            let choice = choose_tile(law, bits, take_word());
+            put_word(choice.tile); put(choice.probability); put(choice.remainder);",
+            cases(edges_of_shares, |r| {
+                case(&[&r.below(laws.len()), &r.word(), &r.word(), &r.below(257)])
+            }),
+            move |t| {
+                let (law, bits) = (t.take_word(), [t.take_word(), t.take_word()]);
+                let choice = stand.grid.sample_sharing(law, bits, t.take_word());
+                t.same(choice.tile);
+                t.near(choice.probability, ulps(3.0));
+                t.near(choice.remainder, ulps(3.0));
+            },
+        ),
+        Probe::new(
+            "choice_probability",
+            "let law = take_word(); put(choice_probability(law, take_word()));",
+            cases(all.clone(), |r| case(&[&r.below(laws.len()), &r.below(tiles)])),
+            move |t| {
+                let right = stand.grid.probability(t.take_word(), t.take_word());
+                t.near(right, ulps(3.0));
             },
         ),
         Probe::new(

@@ -100,14 +100,15 @@ pub(super) fn probes(stand: &Stand) -> Vec<Probe<'_>> {
         )
         .flips(200),
         Probe::new(
-            "law_in_medium",
-            "put_word(law_in_medium(take3()));",
+            "cell_in_medium",
+            "put_word(cell_in_medium(take3()));",
             cases(edge_directions().into_iter().map(|d| case(&[&(2.0 * d)])), |r| {
                 case(&[&(4.0 * r.in_cube())])
             }),
             move |t| {
-                let law = stand.grid.law_in_medium(t.take3());
-                t.same(law);
+                let cells = stand.grid.grid().expect("stands in fog have one");
+                let cell = cells.cell_in_medium(t.take3());
+                t.same(cell);
             },
         )
         .flips(500),

@@ -85,6 +85,7 @@ impl Stand {
             world: &self.world,
             environment: &self.environment,
             grid: Some(&self.grid),
+            counts: None,
             limits: self.view.limits,
             fog: self.view.fog(&self.world),
             background: self.view.background,
