@@ -289,11 +289,21 @@ impl Desk {
         self.xdotool("key Return");
     }
 
-    /// Saves a picture and waits until it is there.
+    /// Saves a picture and waits until it is there; on a busy machine keys may come before the
+    /// prompt does, so it asks again.
     fn save(&self, name: &str) -> lightgrid::image::Image {
-        self.answer("ctrl+s", name);
         let path = self.path(name);
-        self.wait_for(name, || path.exists().then(|| read_picture(&path).expect("a picture")))
+        let mut asked: Option<Instant> = None;
+        self.wait_for(name, || {
+            if asked.is_none_or(|asked| asked.elapsed() > Duration::from_secs(30)) {
+                if asked.is_some() {
+                    self.xdotool("key Escape");
+                }
+                self.answer("ctrl+s", name);
+                asked = Some(Instant::now());
+            }
+            path.exists().then(|| read_picture(&path).expect("a picture"))
+        })
     }
 }
 

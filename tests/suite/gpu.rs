@@ -12,7 +12,7 @@ use lightgrid::path::{Background, PathLimits, World, framing};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::gpu::{Gpu, Stage};
-use lightgrid::render::{Crop, Phase, Sampling, Session, View};
+use lightgrid::render::{Crop, Sampling, Session, StopRule, View};
 use lightgrid::sampler::Points;
 use lightgrid::scene::{Camera, Material, Medium, builtin, gltf};
 
@@ -39,12 +39,12 @@ fn on_gpu<'a>(
     Session::on_gpu(world, environment, view, &stage).expect("it fits")
 }
 
+/// Learns and renders pass by pass, as [`render`] does.
 fn finish(mut session: Session<'_>, samples: u32) -> Film {
-    let never = AtomicBool::new(false);
-    while session.phase() == Phase::Learning {
-        session.advance(0, &never).expect("learning");
+    let rule = StopRule { samples: Some(samples), ..StopRule::default() };
+    while !session.is_done(&rule) {
+        session.advance(session.next_pass(&rule), &AtomicBool::new(false)).expect("no failure");
     }
-    session.advance(samples, &never).expect("rendering");
     assert_eq!(session.film().min_samples(), samples);
     session.film().clone()
 }
@@ -330,8 +330,9 @@ fn a_cancelled_picture_goes_on_where_it_stopped() {
     session.advance(4, &AtomicBool::new(true)).expect("cancelled");
     assert_eq!(session.film().min_samples(), 0);
     session.advance(4, &AtomicBool::new(false)).expect("rendering");
-    let at_once = on_gpu(&world, &environment, view, &gpu);
-    assert_eq!(*session.film(), finish(at_once, 4), "the same bits in one piece or several");
+    let mut at_once = on_gpu(&world, &environment, view, &gpu);
+    at_once.advance(4, &AtomicBool::new(false)).expect("rendering");
+    assert_eq!(session.film(), at_once.film(), "the same bits in one piece or several");
 }
 
 /// Runs the binary in a folder of its own.

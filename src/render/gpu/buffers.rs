@@ -19,6 +19,9 @@ pub(super) struct Buffers {
     width_log2: u32,
 }
 
+/// Arrays of at most so many rows have a power of two of them.
+const SMALL_ROWS: u64 = 64;
+
 /// Most bytes written to the device at once: they are copied in host memory first.
 const PIECE_BYTES: usize = 16 << 20;
 
@@ -78,6 +81,9 @@ impl Buffers {
         let Some(kind) = ARRAYS.into_iter().find(|kind| kind.name == name) else { return Ok(()) };
         let (width, most) = (1_u64 << self.width_log2, self.gpu.limits.max_texture_dimension_2d);
         let rows = texels.div_ceil(width).max(1);
+        // Software Vulkan compiles a kernel anew where a texture's height becomes a power of two or
+        // ceases to be one, as that of the laws did while they grew.
+        let rows = if rows <= SMALL_ROWS { rows.next_power_of_two() } else { rows };
         if rows > u64::from(most) {
             return Err(Error::new(format!(
                 "{what} takes {} MiB; {} allows {} MiB for it",
