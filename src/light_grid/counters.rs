@@ -24,8 +24,8 @@ pub struct Tally {
     pub weight: f64,
 }
 
-/// Learning counters of all cells: a dense visit count per cell, and tile counters for the cells
-/// that were visited, up to a memory budget.
+/// Learning counters of all cells: a visit count for those without tile counters, and tile counters
+/// for those that were visited, up to a memory budget.
 ///
 /// A cell gets its tile counters at the end of the pass that first visited it, the most visited
 /// first when the budget runs out: which cells they are depends on integer counts alone, never on
@@ -37,7 +37,7 @@ pub struct Counters {
     visits: Vec<AtomicU32>,
     slot_of_cell: Vec<u32>,
     cell_of_slot: Vec<u32>,
-    /// Two words a tile in each slot: tries, then weight sum.
+    /// Tries and weight sum of each tile in each slot; see [`pair`].
     blocks: Vec<Box<[AtomicU64]>>,
 }
 

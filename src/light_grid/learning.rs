@@ -77,12 +77,6 @@ impl LawOptions {
         while_rendering: true,
     };
 
-    /// Whether rendered paths count too. Their samples of the map follow the laws, so only ratios
-    /// can be counted.
-    pub fn goes_on(&self) -> bool {
-        self.while_rendering && self.recording.is_ratio()
-    }
-
     /// The talk's: proportional to the visible contribution, nothing else.
     pub const TALK: Self = Self {
         faces: false,
@@ -93,6 +87,12 @@ impl LawOptions {
         compensation: 0.0,
         while_rendering: false,
     };
+
+    /// Whether rendered paths count too. Their samples of the map follow the laws, so only ratios
+    /// can be counted.
+    pub fn goes_on(&self) -> bool {
+        self.while_rendering && self.recording.is_ratio()
+    }
 }
 
 /// A grid with its learning counters: records while paths are traced, then becomes a [`LightGrid`].
@@ -124,11 +124,6 @@ impl LearningGrid {
     /// What a record must hold.
     pub fn recording(&self) -> Recording {
         self.options.recording
-    }
-
-    /// Whether rendered paths count too.
-    pub fn goes_on(&self) -> bool {
-        self.options.goes_on()
     }
 
     /// A copy of the counters as they are now.

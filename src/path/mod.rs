@@ -111,9 +111,7 @@ impl PathTracer<'_> {
             first_hit: path.first_hit,
         }
     }
-}
 
-impl PathTracer<'_> {
     /// Where the cells lie: what is counted and what was learned have the same ones.
     fn cells(&self) -> Option<&SphericalGrid> {
         self.counts.map(|counts| &counts.grid).or(self.grid.and_then(LightGrid::grid))

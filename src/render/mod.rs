@@ -178,7 +178,7 @@ pub struct Figures {
     pub learned_cells: usize,
     /// Most bytes the grid held while learning: counters and laws.
     pub grid_peak_bytes: usize,
-    /// Bytes the grid holds now, counters included as long as they count.
+    /// Bytes the grid holds, counters included.
     pub grid_bytes: usize,
     /// Camera paths rendered.
     pub samples: u64,
@@ -352,8 +352,10 @@ impl<'a> Session<'a> {
     /// Goes over to rendering with what was learned so far.
     pub fn finish_learning(&mut self) {
         self.phase = Phase::Rendering;
+        let goes_on = self.view.law_options().is_some_and(|laws| laws.goes_on());
         if let Some(learning) = &mut self.learning {
-            learning.is_over = !learning.grid.goes_on();
+            // What is over stays so, however often it is told.
+            learning.is_over |= !goes_on;
         }
     }
 

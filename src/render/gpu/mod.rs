@@ -433,6 +433,14 @@ mod tests {
     use crate::sampler::Points;
     use crate::scene::builtin;
 
+    fn crack() -> (World, Environment) {
+        let world = World::new(builtin::build("crack").expect("built in"));
+        let map = crate::environment::sky::build("sunset", 128, 64).expect("a sky");
+        let environment =
+            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        (world, environment)
+    }
+
     fn view(world: &World, recording: LawOptions) -> View {
         let talk = recording == LawOptions::TALK;
         View {
@@ -457,10 +465,7 @@ mod tests {
     /// Visits of each cell and tile counters after two learning passes, the second with laws of the
     /// first, and a rendering pass of which a third is counted, if rendered paths count.
     fn learn(gpu: Option<&Gpu>, recording: LawOptions) -> (Vec<u32>, Vec<u32>, u64) {
-        let world = World::new(builtin::build("crack").expect("built in"));
-        let map = crate::environment::sky::build("sunset", 128, 64).expect("a sky");
-        let environment =
-            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let (world, environment) = crack();
         let view = view(&world, recording);
         let rays = CameraRays::new(&view.camera, view.width, view.height);
         let grid = SphericalGrid {
@@ -528,10 +533,7 @@ mod tests {
             Ok(gpu) => gpu,
             Err(reason) => return eprintln!("SKIPPED: {reason}"),
         };
-        let world = World::new(builtin::build("crack").expect("built in"));
-        let map = crate::environment::sky::build("sunset", 128, 64).expect("a sky");
-        let environment =
-            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let (world, environment) = crack();
         let view = View { sampling: Sampling::Plain, ..view(&world, LawOptions::ADAPTIVE) };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
         let stage = Stage::new(&gpu, &world, &environment).expect("it fits");
