@@ -154,25 +154,40 @@ impl App {
         folder.join(format!("{stem}.png")).display().to_string()
     }
 
-    /// Writes the picture, or remembers to when there is only a small one as yet.
+    /// Writes the picture, or remembers to when there is none as yet or only a small one.
     pub(super) fn save(&mut self, path: PathBuf) {
-        let Some(picture) = self.picture() else {
-            self.messages.error("there is no picture yet to be written");
-            return;
-        };
         self.settings.save_folder = path.parent().map(Path::to_path_buf);
-        let film = &picture.snapshot.main.film;
-        if picture.snapshot.is_small() {
+        self.waiting_save = Some(path);
+        self.save_when_whole();
+        if self.waiting_save.is_some() {
             self.messages.notice("The picture will be saved once it has its full size");
+        }
+    }
+
+    /// Writes the picture that was asked for, if it is there now.
+    pub(super) fn save_when_whole(&mut self) {
+        // Without a path to write to, nothing is to be copied either.
+        let Some(path) = self.waiting_save.take() else { return };
+        let Some(picture) = self.picture().filter(|picture| !picture.snapshot.is_small()) else {
             self.waiting_save = Some(path);
             return;
-        }
+        };
+        let film = &picture.snapshot.main.film;
         let sentence = format!("Saved {}, {} x {} pixels", path.display(), film.width, film.height);
         self.do_later("save", move || {
             save::picture(&path, &picture)?;
             let remarks = save::remarks(&picture);
             Ok(remarks.iter().fold(sentence, |all, remark| format!("{all}; {remark}")))
         });
+    }
+
+    /// Gives up saving a picture of which nothing was seen: what it was to show cannot be read.
+    pub(super) fn save_nothing(&mut self) {
+        if self.snapshot.is_none()
+            && let Some(path) = self.waiting_save.take()
+        {
+            self.messages.error(format!("{}: there is no picture to be saved", path.display()));
+        }
     }
 
     fn picture(&self) -> Option<save::Picture> {

@@ -328,10 +328,12 @@ impl App {
                 // What is shown stays, and the document says so again.
                 Loaded::Scene(_, Err(error)) => {
                     self.messages.error(error.to_string());
+                    self.save_nothing();
                     self.stay_in_scene();
                 }
                 Loaded::Map(_, Err(error)) => {
                     self.messages.error(error.to_string());
+                    self.save_nothing();
                     self.document.map = match &self.map {
                         Some(map) => map.name.clone(),
                         // At the start there is none: the built-in one is always there.
@@ -364,11 +366,7 @@ impl App {
             self.snapshot = Some(snapshot);
         }
         self.shown = self.presenter.shown();
-        if self.snapshot.as_ref().is_some_and(|snapshot| !snapshot.is_small())
-            && let Some(path) = self.waiting_save.take()
-        {
-            self.save(path);
-        }
+        self.save_when_whole();
         if let Some(failure) = self.shown.as_ref().and_then(|shown| shown.failure.clone()) {
             self.messages.error(failure);
             self.document.look.denoiser = Denoiser::default();

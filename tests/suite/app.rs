@@ -203,6 +203,8 @@ struct Desk {
     server: Child,
     window: Option<Child>,
     display: String,
+    /// What the window is called by the server.
+    id: String,
     folder: tempfile::TempDir,
 }
 
@@ -217,6 +219,9 @@ impl Drop for Desk {
 }
 
 impl Desk {
+    const WIDTH: usize = 1100;
+    const HEIGHT: usize = 760;
+
     /// `None`, said on stderr, where Xvfb or xdotool is not installed.
     fn open() -> Option<Self> {
         let is_there = |tool: &str| {
@@ -228,8 +233,10 @@ impl Desk {
             return None;
         }
         let folder = tempfile::tempdir().expect("a folder");
+        let screen = format!("{}x{}x24", Self::WIDTH, Self::HEIGHT);
         let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1100x760x24", "-nolisten", "tcp"])
+            .args(["-displayfd", "1", "-screen", "0", &screen, "-nolisten", "tcp", "-fbdir"])
+            .arg(folder.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -239,19 +246,26 @@ impl Desk {
         std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut number)
             .expect("Xvfb says its display");
         let display = format!(":{}", number.trim());
-        Some(Self { server, window: None, display, folder })
+        Some(Self { server, window: None, display, id: String::new(), folder })
     }
 
     fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
+    /// Starts the program and waits until its window shows its buttons and has the keyboard.
     fn start(&mut self, line: &str) {
         let mut command = Command::new(env!("CARGO_BIN_EXE_lightgrid"));
         command.current_dir(self.folder.path()).args(line.split_whitespace());
         command.env("DISPLAY", &self.display).env_remove("WAYLAND_DISPLAY");
         command.stderr(std::fs::File::create(self.path("says.txt")).expect("a file"));
         self.window = Some(command.spawn().expect("the binary starts"));
+        self.id = self.wait_for("window", || {
+            let found = self.xdotool("search --onlyvisible --name lightgrid");
+            found.lines().next().map(str::to_owned).filter(|id| !id.is_empty())
+        });
+        self.xdotool(&format!("windowfocus {}", self.id));
+        self.wait_for("buttons", || (self.brightness() > 8.0).then_some(()));
     }
 
     fn xdotool(&self, line: &str) -> String {
@@ -263,47 +277,61 @@ impl Desk {
         String::from_utf8_lossy(&output.stdout).trim().to_owned()
     }
 
+    fn title(&self) -> String {
+        self.xdotool(&format!("getwindowname {}", self.id))
+    }
+
     fn says(&self) -> String {
         std::fs::read_to_string(self.path("says.txt")).unwrap_or_default()
     }
 
-    /// Waits for something for at most three minutes.
+    /// Mean level, 0 to 255, of the corner with the first buttons, which are always there.
+    fn brightness(&self) -> f64 {
+        let (width, height) = (270, 36);
+        let file = std::fs::read(self.path("Xvfb_screen0")).expect("the server's screen");
+        let screen = &file[file.len() - 4 * Self::WIDTH * Self::HEIGHT..];
+        let rows = screen.chunks_exact(4 * Self::WIDTH).take(height);
+        let pixels = rows.flat_map(|row| row[..4 * width].chunks_exact(4));
+        pixels.map(|p| f64::from(p[0].max(p[1]).max(p[2]))).sum::<f64>() / (width * height) as f64
+    }
+
+    /// Waits for something for at most ten minutes: software draws a frame in seconds when other
+    /// tests keep all cores busy.
     fn wait_for<T>(&self, what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
         let start = Instant::now();
         loop {
             if let Some(it) = ready() {
                 return it;
             }
-            assert!(start.elapsed() < Duration::from_secs(180), "no {what}: {}", self.says());
-            std::thread::sleep(Duration::from_millis(250));
+            assert!(start.elapsed() < Duration::from_secs(600), "no {what}: {}", self.says());
+            std::thread::sleep(Duration::from_millis(100));
         }
     }
 
-    /// Types a path into the prompt that a key opened.
+    /// Types a path into the prompt that a key opens. An open prompt darkens what is behind it;
+    /// what is typed before is not meant for it.
     fn answer(&self, key: &str, path: &str) {
+        let level = self.brightness();
         self.xdotool(&format!("key {key}"));
-        std::thread::sleep(Duration::from_millis(1500));
+        self.wait_for("prompt", || (self.brightness() < 0.8 * level).then_some(()));
         self.xdotool("key ctrl+a");
-        self.xdotool(&format!("type --delay 60 {path}"));
-        std::thread::sleep(Duration::from_millis(1000));
+        self.xdotool(&format!("type --delay 20 {path}"));
         self.xdotool("key Return");
+        self.wait_for("end of the prompt", || (self.brightness() > 0.9 * level).then_some(()));
     }
 
-    /// Saves a picture and waits until it is there; on a busy machine keys may come before the
-    /// prompt does, so it asks again.
+    /// Saves a picture and waits until it is there.
     fn save(&self, name: &str) -> lightgrid::image::Image {
         let path = self.path(name);
-        let mut asked: Option<Instant> = None;
-        self.wait_for(name, || {
-            if asked.is_none_or(|asked| asked.elapsed() > Duration::from_secs(30)) {
-                if asked.is_some() {
-                    self.xdotool("key Escape");
-                }
-                self.answer("ctrl+s", name);
-                asked = Some(Instant::now());
-            }
-            path.exists().then(|| read_picture(&path).expect("a picture"))
-        })
+        self.answer("ctrl+s", name);
+        self.wait_for(name, || path.exists().then(|| read_picture(&path).expect("a picture")))
+    }
+
+    /// What a picture's file says of a key.
+    fn metadata(&self, name: &str, key: &str) -> Option<String> {
+        let metadata = lightgrid::image::read_exr_metadata(&self.path(name)).expect("metadata");
+        let key = format!("lightgrid.{key}");
+        metadata.into_iter().find(|(k, _)| *k == key).map(|(_, value)| value)
     }
 }
 
@@ -311,54 +339,47 @@ impl Desk {
 fn a_real_window_moves_opens_saves_and_remembers() {
     let Some(mut desk) = Desk::open() else { return };
     desk.start("view open --env sky:day@64x32 --size 96x64 --samples 2 --device cpu --settings window.json");
-    let window = desk.wait_for("window", || {
-        let found = desk.xdotool("search --name lightgrid");
-        found.lines().next().map(str::to_owned).filter(|id| !id.is_empty())
-    });
-    desk.xdotool(&format!("windowfocus {window}"));
-    std::thread::sleep(Duration::from_secs(4));
     let first = desk.save("first.exr");
     assert_eq!((first.width, first.height), (96, 64));
-    let metadata = lightgrid::image::read_exr_metadata(&desk.path("first.exr")).expect("metadata");
-    let of = |key: &str| metadata.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
-    assert_eq!(of("lightgrid.scene"), Some("open"));
-    assert_eq!(of("lightgrid.sampling"), Some("adaptive"));
-    assert_eq!(of("lightgrid.device"), Some("CPU"));
+    let of = |key: &str| desk.metadata("first.exr", key);
+    assert_eq!(of("scene").as_deref(), Some("open"));
+    assert_eq!(of("sampling").as_deref(), Some("adaptive"));
+    assert_eq!(of("device").as_deref(), Some("CPU"));
 
     // The other device goes on; software Vulkan takes seconds to compile for it.
     desk.xdotool("key g");
     desk.xdotool("key r");
     desk.wait_for("picture from the GPU", || {
         desk.save("gpu.exr");
-        let path = desk.path("gpu.exr");
-        let metadata = lightgrid::image::read_exr_metadata(&path).expect("metadata");
-        std::fs::remove_file(path).expect("removed");
-        let device = metadata.into_iter().find(|(key, _)| key == "lightgrid.device");
-        device.filter(|(_, name)| name != "CPU")
+        let device = desk.metadata("gpu.exr", "device");
+        std::fs::remove_file(desk.path("gpu.exr")).expect("removed");
+        device.filter(|name| name != "CPU")
     });
     desk.xdotool("key g");
 
     // A file that is not there changes nothing: the camera can still be turned.
     desk.answer("ctrl+o", "none.glb");
-    std::thread::sleep(Duration::from_secs(2));
-    let title = |desk: &Desk| desk.xdotool(&format!("getwindowname {window}"));
-    desk.wait_for("old scene", || title(&desk).starts_with("open").then_some(()));
+    desk.wait_for("old scene", || desk.title().starts_with("open").then_some(()));
 
-    // A drag turns the camera: another picture. Slowly, for software draws some frames a second.
-    desk.xdotool("mousemove 560 400 mousedown 1");
-    for _ in 0..10 {
-        std::thread::sleep(Duration::from_millis(300));
-        desk.xdotool("mousemove_relative -- -12 2");
-    }
-    desk.xdotool("mouseup 1");
-    std::thread::sleep(Duration::from_secs(4));
-    let turned = desk.save("turned.exr");
-    assert!(first.pixels != turned.pixels, "the camera has turned");
+    // A drag turns the camera: another picture. The slower the machine, the longer the drag has to
+    // be: what happens within a frame is a click.
+    let mut pause = Duration::from_millis(150);
+    desk.wait_for("turned picture", || {
+        desk.xdotool("mousemove 560 400 mousedown 1");
+        for _ in 0..10 {
+            std::thread::sleep(pause);
+            desk.xdotool("mousemove_relative -- -12 2");
+        }
+        desk.xdotool("mouseup 1");
+        pause *= 2;
+        let turned = desk.save("turned.exr");
+        std::fs::remove_file(desk.path("turned.exr")).expect("removed");
+        (first.pixels != turned.pixels).then_some(())
+    });
 
     // Another scene.
     desk.answer("ctrl+o", "crack");
-    desk.wait_for("new scene", || title(&desk).starts_with("crack").then_some(()));
-    std::thread::sleep(Duration::from_secs(4));
+    desk.wait_for("new scene", || desk.title().starts_with("crack").then_some(()));
     desk.save("crack.png");
 
     desk.xdotool("key ctrl+q");

@@ -253,6 +253,10 @@ impl<'a> Job<'a> {
             self.place(&mut main);
             match activity {
                 Activity::Paused | Activity::Done => {
+                    if activity == Activity::Done {
+                        // It may have more samples than were asked for, but fewer pixels.
+                        preview = None;
+                    }
                     self.publish(activity, &main, plain.as_ref(), preview.as_ref());
                     self.rest();
                     continue;
