@@ -2,6 +2,8 @@
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
+use super::prefetch::prefetch;
+
 /// Fixed-point scale of one recorded weight: a weight of 1 adds this much.
 ///
 /// A pass may record at most [`MAX_RECORDS_PER_PASS`] weights of at most [`MAX_WEIGHT`] each, so that
@@ -72,6 +74,15 @@ impl Counters {
         }
         let fixed = (weight.clamp(0.0, MAX_WEIGHT) * WEIGHT_ONE).round() as u32;
         self.blocks[slot as usize][tile as usize].fetch_add(pair(1, fixed), Ordering::Relaxed);
+    }
+
+    /// Says that [`Self::record`] will be called for this cell and tile after some other work: counters
+    /// are megabytes, and what is far in memory takes as long as a short ray.
+    pub fn prefetch(&self, cell: u32, tile: u32) {
+        let slot = self.slot_of_cell[cell as usize];
+        if slot != NO_SLOT {
+            prefetch(&self.blocks[slot as usize][tile as usize]);
+        }
     }
 
     /// Visits of each cell, the slot of each cell (`u32::MAX` without one) and the words of each

@@ -8,7 +8,9 @@
 
 pub mod cells;
 pub mod counters;
+mod law_builder;
 mod learning;
+mod prefetch;
 pub mod tile_laws;
 mod transfer;
 

@@ -153,6 +153,18 @@ impl TileLaws {
         Some(self.len() - 1)
     }
 
+    /// Appends all laws of another set over the same tiles; gives the index of the first of them.
+    pub fn append(&mut self, other: &Self) -> u32 {
+        assert_eq!(self.tile_count, other.tile_count, "the same tiles");
+        let (first, entries) = (self.len(), self.tiles.len() as u32);
+        self.starts.extend(other.starts[1..].iter().map(|start| entries + start));
+        self.masks.extend_from_slice(&other.masks);
+        self.ranks.extend_from_slice(&other.ranks);
+        self.tiles.extend_from_slice(&other.tiles);
+        self.last.extend_from_slice(&other.last);
+        first
+    }
+
     /// Chooses a tile of law `law` with a uniform 32-bit number.
     pub fn sample(&self, law: u32, bits: u32) -> TileChoice {
         let (start, end) = self.range(law);
@@ -246,6 +258,18 @@ mod tests {
         let choice = laws.sample(0, u32::MAX);
         assert_eq!((choice.tile, choice.probability), (69, 1.0));
         assert!(choice.remainder < 1.0);
+    }
+
+    #[test]
+    fn appended_laws_are_the_same() {
+        let mut all = laws_of(&[3.0, 0.0, 1.0]);
+        let mut other = laws_of(&[0.0, 2.0, 5.0]);
+        assert_eq!(all.append(&other), 2);
+        other = laws_of(&[3.0, 0.0, 1.0]);
+        for weights in [[1.0; 3], [0.0, 2.0, 5.0]] {
+            other.push(&weights);
+        }
+        assert_eq!(all, other);
     }
 
     #[test]

@@ -36,6 +36,13 @@ fn phase_weight(phase: f32) -> f32 {
 }
 
 impl Path<'_> {
+    /// Says that a try of a tile will be counted once its shadow ray is traced.
+    pub(super) fn expect_count(&self, vertex: &Vertex, tile: u32) {
+        if let (Some(learning), Some(cell)) = (self.tracer.counts, vertex.cell) {
+            learning.counters.prefetch(cell, tile);
+        }
+    }
+
     /// Counts a try of a tile of the map, if anything is counted.
     pub(super) fn count(&self, vertex: &Vertex, tile: u32, weight: f32) {
         if let (Some(learning), Some(cell)) = (self.tracer.counts, vertex.cell) {
@@ -67,6 +74,7 @@ impl Path<'_> {
         let bits = self.sampler.next_pair_bits();
         let whole_map_share = if is_ratio { 128 } else { 256 };
         let choice = grid.sample_sharing(vertex.law, bits, whole_map_share);
+        self.expect_count(vertex, choice.tile);
         let u = Vec2::new(choice.remainder, unit_from_bits(bits[1]));
         let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
         let weight = match self.scattered(vertex, sample.direction) {

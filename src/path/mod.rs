@@ -425,6 +425,7 @@ impl<'a> Path<'a> {
     fn gather_environment(&mut self, vertex: &Vertex, grid: &LightGrid) {
         let bits = self.sampler.next_pair_bits();
         let choice = grid.sample(vertex.law, bits);
+        self.expect_count(vertex, choice.tile);
         let u = Vec2::new(choice.remainder, unit_from_bits(bits[1]));
         let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
         let pdf = choice.probability * sample.pdf_solid_angle;

@@ -1,0 +1,232 @@
+//! Laws of all cells from their counters, on all threads.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::cells::{MEDIUM_FACE, SphericalGrid, face_axis};
+use super::counters::{Counters, Tally};
+use super::learning::LawOptions;
+use super::tile_laws::TileLaws;
+use crate::environment::Environment;
+
+/// Cells per side of the blocks that visibility is pooled over.
+const POOL: u32 = 4;
+
+/// Laws are made of so many bytes at a time before they are appended to the others.
+const BYTES_AT_ONCE: usize = 1 << 19;
+
+/// Law entries left over by MIS compensation must carry at least this much of the law.
+const LEAST_COMPENSATED: f64 = 0.05;
+
+/// How a slot's counters, those around it and the map become weights of tiles.
+pub(super) struct LawBuilder<'a> {
+    grid: SphericalGrid,
+    counters: &'a Counters,
+    options: LawOptions,
+    /// Whole-map probability of each tile.
+    map_law: Vec<f64>,
+    /// Tallies of all cells of each face; empty if nothing is pooled.
+    faces: Vec<Vec<Tally>>,
+    /// Slots of each block of 4x4 cells of a face.
+    blocks: Vec<Vec<usize>>,
+    /// Share of the diffuse density per face and tile; empty without compensation.
+    diffuse: Vec<Vec<f64>>,
+}
+
+impl<'a> LawBuilder<'a> {
+    pub(super) fn new(
+        grid: SphericalGrid,
+        counters: &'a Counters,
+        options: LawOptions,
+        environment: &Environment,
+    ) -> Self {
+        let energies = environment.tile_energies();
+        let total: f64 = energies.iter().sum();
+        let mut builder = Self {
+            grid,
+            counters,
+            options,
+            map_law: energies.iter().map(|e| e / total).collect(),
+            faces: Vec::new(),
+            blocks: Vec::new(),
+            diffuse: Vec::new(),
+        };
+        let mut slots_of_face = vec![Vec::new(); grid.face_count() as usize];
+        let mut slots_of_block = BTreeMap::<_, Vec<_>>::new();
+        for (slot, &cell) in counters.cells().iter().enumerate() {
+            let (face, row, column) = grid.coordinates(cell);
+            slots_of_face[face as usize].push(slot);
+            slots_of_block.entry((face, row / POOL, column / POOL)).or_default().push(slot);
+        }
+        builder.blocks = slots_of_block.into_values().collect();
+        if options.recording.is_ratio() {
+            builder.faces = slots_of_face.par_iter().map(|slots| builder.sum(slots)).collect();
+        }
+        if options.compensation > 0.0 && grid.faces {
+            builder.diffuse = diffuse_shares(environment);
+        }
+        builder
+    }
+
+    /// Appends the laws of the most visited cells, as many as fit into `room` bytes beside what making
+    /// them takes, and notes which law each of these cells uses. Which law is which does not depend on
+    /// the threads.
+    pub(super) fn build(&self, room: usize, laws: &mut TileLaws, law_of_cell: &mut [u16]) {
+        let mut supports = vec![0; self.counters.cells().len()];
+        let by_block = self.blocks.par_iter().flat_map_iter(|slots| {
+            let mut found = Vec::with_capacity(slots.len());
+            self.weigh(slots, usize::MAX, |slot, weights| {
+                found.push((slot, weights.iter().filter(|w| **w > 0.0).count()));
+            });
+            found
+        });
+        for (slot, support) in by_block.collect::<Vec<_>>() {
+            supports[slot] = support;
+        }
+        let tile_count = laws.tile_count();
+        let bytes = |slot: &usize| TileLaws::law_bytes(tile_count, supports[*slot] as u32);
+        let most =
+            BYTES_AT_ONCE / (POOL * POOL) as usize / TileLaws::law_bytes(tile_count, tile_count);
+        let chunks = self.blocks.chunks(most.max(1));
+        let pieces = chunks.clone().map(|blocks| blocks.iter().flatten().map(bytes).sum());
+        let room = room.saturating_sub(self.memory_bytes() + pieces.max().unwrap_or(0));
+        // The most visited cells have the lowest slots.
+        let kept = fitting(&supports, room, tile_count);
+        laws.reserve_exact(kept, supports[..kept].iter().sum());
+        for blocks in chunks {
+            let pieces = blocks.par_iter().map(|slots| {
+                let mut piece = TileLaws::new(tile_count);
+                let mut cells = Vec::with_capacity(slots.len());
+                self.weigh(slots, kept, |slot, weights| {
+                    if piece.push(weights).is_some() {
+                        cells.push(self.counters.cells()[slot]);
+                    }
+                });
+                (piece, cells)
+            });
+            for (piece, cells) in pieces.collect::<Vec<_>>() {
+                let first = laws.append(&piece);
+                for (law, cell) in (first..).zip(cells) {
+                    law_of_cell[cell as usize] = law as u16;
+                }
+            }
+        }
+    }
+
+    /// Bytes held beside the counters and what is made of them.
+    fn memory_bytes(&self) -> usize {
+        let tile_count = self.map_law.len();
+        // As for eight threads, however many there are: laws must not depend on it.
+        let threads = 8;
+        let tallies = (self.faces.len() + threads) * tile_count * size_of::<Tally>();
+        let doubles = (self.diffuse.len() + 1 + threads) * tile_count * size_of::<f64>();
+        tallies + doubles + 4 * self.counters.cells().len() * size_of::<usize>()
+    }
+
+    fn sum(&self, slots: &[usize]) -> Vec<Tally> {
+        let mut sums = vec![Tally::default(); self.map_law.len()];
+        for &slot in slots {
+            for (sum, tally) in sums.iter_mut().zip(self.counters.tallies(slot)) {
+                sum.tries += tally.tries;
+                sum.weight += tally.weight;
+            }
+        }
+        sums
+    }
+
+    /// Unnormalised laws of a block's slots below `end`, one after the other.
+    fn weigh(&self, slots: &[usize], end: usize, mut take: impl FnMut(usize, &[f64])) {
+        let mut weights = Vec::with_capacity(self.map_law.len());
+        let mut block = Vec::new();
+        for &slot in slots.iter().filter(|slot| **slot < end) {
+            let (face, ..) = self.grid.coordinates(self.counters.cells()[slot]);
+            weights.clear();
+            if self.options.recording.is_ratio() {
+                if block.is_empty() {
+                    block = self.sum(slots);
+                }
+                self.visible_energies(slot, &block, &self.faces[face as usize], &mut weights);
+            } else {
+                weights.extend(self.counters.tallies(slot).map(|t| t.weight));
+            }
+            self.compensate(face as usize, &mut weights);
+            take(slot, &weights);
+        }
+    }
+
+    /// Energy of each tile times a power of its visibility ratio, which is drawn towards the block's,
+    /// and that towards the face's, where the tile was tried too seldom.
+    fn visible_energies(
+        &self,
+        slot: usize,
+        block: &[Tally],
+        face: &[Tally],
+        weights: &mut Vec<f64>,
+    ) {
+        let k = self.options.pooling_tries;
+        let shrink = |tally: &Tally, ratio: f64| {
+            let tries = tally.tries + k;
+            if tries > 0.0 { (tally.weight + k * ratio) / tries } else { 0.0 }
+        };
+        let exponent = self.options.ratio_exponent;
+        let own = self.counters.tallies(slot);
+        weights.extend(own.zip(block).zip(face).zip(&self.map_law).map(
+            |(((own, block), face), map)| {
+                let ratio = shrink(&own, shrink(block, shrink(face, 0.0)));
+                // Most tiles of an interior are never seen, and a power takes long.
+                if ratio > 0.0 { map * power(ratio, exponent) } else { 0.0 }
+            },
+        ));
+    }
+
+    fn compensate(&self, face: usize, weights: &mut [f64]) {
+        let Some(diffuse) = self.diffuse.get(face) else { return };
+        let total: f64 = weights.iter().sum();
+        let excess =
+            |weight: f64, share: f64| (weight - self.options.compensation * share * total).max(0.0);
+        let left: f64 = weights.iter().zip(diffuse).map(|(w, d)| excess(*w, *d)).sum();
+        if left >= LEAST_COMPENSATED * total {
+            weights.iter_mut().zip(diffuse).for_each(|(w, d)| *w = excess(*w, *d));
+        }
+    }
+}
+
+/// `base` to the power of `exponent`, by roots where they do.
+fn power(base: f64, exponent: f64) -> f64 {
+    if exponent == 0.75 { (base * base.sqrt()).sqrt() } else { base.powf(exponent) }
+}
+
+/// How many of the first laws fit into `room` bytes (and into 16-bit law indices).
+fn fitting(supports: &[usize], room: usize, tile_count: u32) -> usize {
+    let mut used = 0;
+    supports
+        .iter()
+        .take(usize::from(u16::MAX))
+        .take_while(|support| {
+            used += TileLaws::law_bytes(tile_count, **support as u32);
+            used <= room
+        })
+        .count()
+}
+
+/// For each face axis, the share of a Lambertian's density that falls into each tile, and at last that
+/// of even scattering in a medium, by summing a Fibonacci lattice of directions.
+fn diffuse_shares(environment: &Environment) -> Vec<Vec<f64>> {
+    const DIRECTIONS: u32 = 1 << 15;
+    let mut shares = vec![vec![0.0; environment.tile_count() as usize]; MEDIUM_FACE as usize + 1];
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    for i in 0..DIRECTIONS {
+        let y = 1.0 - (f64::from(i) + 0.5) * 2.0 / f64::from(DIRECTIONS);
+        let radius = (1.0 - y * y).sqrt();
+        let (sin, cos) = (golden * f64::from(i)).sin_cos();
+        let direction = glam::DVec3::new(radius * cos, y, radius * sin).as_vec3();
+        let tile = environment.tile_of(direction) as usize;
+        shares[MEDIUM_FACE as usize][tile] += 1.0 / f64::from(DIRECTIONS);
+        for (face, shares) in shares.iter_mut().take(6).enumerate() {
+            let cosine = f64::from(direction.dot(face_axis(face as u32)).max(0.0));
+            shares[tile] += cosine * 4.0 / f64::from(DIRECTIONS);
+        }
+    }
+    shares
+}
