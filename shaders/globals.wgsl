@@ -69,7 +69,8 @@ struct Globals {
     fog_low: vec3f,
     fog_mean_cosine: f32,
     fog_high: vec3f,
-    padding_2: u32,
+    // Samples of the map that each vertex of a learning path tries.
+    tries_per_vertex: u32,
     fog_scattering: vec3f,
     padding_3: u32,
     fog_extinction: vec3f,

@@ -365,7 +365,9 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
 //#end
     if gathers {
 //#if learning
-        look_at_map(path, vertex);
+        for (var i = 0u; i < globals.tries_per_vertex; i++) {
+            look_at_map(path, vertex);
+        }
 //#else
 //#if map_sampling
         gather_environment(path, vertex);

@@ -137,7 +137,7 @@ pub(super) struct RenderArguments {
     #[arg(long, help_heading = "Light")]
     no_russian_roulette: bool,
     /// Tiles of the map, columns x rows.
-    #[arg(long, default_value = "32x16", value_parser = tile_grid, value_name = "CxR", help_heading = "Light")]
+    #[arg(long, default_value = "16x8", value_parser = tile_grid, value_name = "CxR", help_heading = "Light")]
     tiles: (u32, u32),
     /// Light Grid cells around the horizon; half as many from top to bottom.
     #[arg(long, default_value = "64", value_parser = clap::value_parser!(u32).range(2..=512), value_name = "N", help_heading = "Light")]
@@ -265,7 +265,7 @@ impl RenderArguments {
             table: TableKind::default(),
             bounces: 8,
             no_russian_roulette: false,
-            tiles: (32, 16),
+            tiles: (16, 8),
             grid: 64,
             learning_paths: None,
             seed: 0,

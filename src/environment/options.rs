@@ -102,8 +102,8 @@ impl Default for EnvironmentOptions {
         Self {
             table: TableKind::default(),
             lookup: Lookup::default(),
-            tile_columns: 32,
-            tile_rows: 16,
+            tile_columns: 16,
+            tile_rows: 8,
             rotation_radians: 0.0,
             intensity: 1.0,
         }

@@ -59,6 +59,9 @@ pub struct LawOptions {
     /// How much of the diffuse BSDF's own density is subtracted from a law (MIS compensation,
     /// Karlik et al. 2019, on tiles).
     pub compensation: f64,
+    /// Samples of the map that each vertex of a learning path tries: another shadow ray is cheaper
+    /// than another path. A rendered path tries one.
+    pub tries_per_vertex: u32,
     /// Whether rendered paths count too, until the laws hardly get better.
     pub while_rendering: bool,
 }
@@ -72,6 +75,7 @@ impl LawOptions {
         ratio_exponent: 0.75,
         whole_map_share: 32,
         compensation: 0.5,
+        tries_per_vertex: 8,
         while_rendering: true,
     };
 
@@ -83,6 +87,7 @@ impl LawOptions {
         ratio_exponent: 1.0,
         whole_map_share: 0,
         compensation: 0.0,
+        tries_per_vertex: 1,
         while_rendering: false,
     };
 
@@ -116,6 +121,11 @@ impl LearningGrid {
     /// What a record must hold.
     pub fn recording(&self) -> Recording {
         self.options.recording
+    }
+
+    /// Samples of the map that each vertex of a learning path tries.
+    pub fn tries_per_vertex(&self) -> u32 {
+        self.options.tries_per_vertex
     }
 
     /// A copy of the counters as they are now.

@@ -66,8 +66,12 @@ mod tests {
         let map =
             Image::from_fn(64, 32, |x, _| if x / 2 == bright_column { [9.0; 3] } else { [1.0; 3] });
         let turn = turned_tiles / 32.0 * std::f32::consts::TAU;
-        let options =
-            EnvironmentOptions { rotation_radians: turn, ..EnvironmentOptions::default() };
+        let options = EnvironmentOptions {
+            rotation_radians: turn,
+            tile_columns: 32,
+            tile_rows: 16,
+            ..EnvironmentOptions::default()
+        };
         Environment::new(map, &options).expect("a map")
     }
 

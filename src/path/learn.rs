@@ -5,14 +5,16 @@ use glam::{Vec2, Vec3};
 use super::{Path, PathTracer, Scatterer, Vertex};
 use crate::bvh::Ray;
 use crate::color::{importance, luminance};
+use crate::light_grid::LearningGrid;
 use crate::sampler::{Sampler, unit_from_bits};
 
 impl PathTracer<'_> {
-    /// Traces one camera path and counts at each vertex, in [`PathTracer::counts`], whether a sample
-    /// of the map is visible, drawn half from the whole map and half from what [`PathTracer::grid`]
+    /// Traces one camera path and counts at each vertex, in [`PathTracer::counts`], whether samples
+    /// of the map are visible, drawn half from the whole map and half from what [`PathTracer::grid`]
     /// has learned so far: a tile's visibility ratio does not depend on how often it is tried.
     /// Returns the number of rays.
     pub fn learn(&self, ray: Ray, sampler: Sampler) -> u32 {
+        let tries = self.counts.map_or(0, LearningGrid::tries_per_vertex);
         let mut path = Path::new(self, ray, sampler);
         while let Some(vertex) = path.next_vertex() {
             if path.bounces == self.limits.bounces {
@@ -20,7 +22,9 @@ impl PathTracer<'_> {
             }
             path.bounces += 1;
             if !vertex.scatterer.is_delta_only() && vertex.cell.is_some() {
-                path.look_at_map(&vertex);
+                for _ in 0..tries {
+                    path.look_at_map(&vertex);
+                }
             }
             if !path.scatter(&vertex) || !path.survives() {
                 break;

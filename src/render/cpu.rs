@@ -23,7 +23,8 @@ const PATHS_PER_TASK: u64 = 512;
 /// what cells there are, then doubling, as far as the counters allow in one pass.
 pub(super) fn learning_range(view: &View, pass: u32) -> Range<u64> {
     let total = view.learning_paths;
-    let longest = most_paths_per_pass(view);
+    let tries = view.law_options().map_or(1, |laws| u64::from(laws.tries_per_vertex.max(1)));
+    let longest = (most_paths_per_pass(view) / tries).max(1);
     let mut start = 0;
     let mut length = total.div_ceil(64).min(longest);
     for _ in 0..pass {
@@ -65,7 +66,7 @@ pub(super) fn learn(
         .sum()
 }
 
-/// Most paths that can be counted in one pass.
+/// Most paths that can be counted in one pass, at one try a vertex.
 pub(super) fn most_paths_per_pass(view: &View) -> u64 {
     (MAX_RECORDS_PER_PASS / u64::from(view.limits.bounces.max(1))).max(1)
 }

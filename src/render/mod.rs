@@ -99,7 +99,7 @@ impl View {
     }
 
     /// Learning paths that suit a picture of this size and sample count. Where rendered paths count
-    /// too, few are enough to begin with.
+    /// too, and a vertex tries several samples, few are enough to begin with.
     pub fn suitable_learning_paths(
         sampling: Sampling,
         [width, height]: [u32; 2],
@@ -107,8 +107,9 @@ impl View {
     ) -> u64 {
         let pixels = u64::from(width) * u64::from(height);
         let work = pixels * u64::from(samples.unwrap_or(256));
-        let most = if sampling == Sampling::Adaptive { 1 << 18 } else { 1 << 20 };
-        (work / LEARNING_SHARE).clamp(1 << 16, most)
+        let (least, most) =
+            if sampling == Sampling::Adaptive { (1 << 15, 1 << 16) } else { (1 << 16, 1 << 20) };
+        (work / LEARNING_SHARE).clamp(least, most)
     }
 
     /// Width and height of the picture that this one is a part of.
@@ -135,7 +136,7 @@ impl View {
 }
 
 /// One learning path for this many paths rendered.
-const LEARNING_SHARE: u64 = 32;
+const LEARNING_SHARE: u64 = 64;
 
 /// When to stop; whichever comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

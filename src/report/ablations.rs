@@ -123,7 +123,7 @@ fn laws(add: &mut Add<'_>) {
 
 fn sizes(add: &mut Add<'_>) {
     let group = "tiles";
-    for (columns, rows) in [(8, 4), (16, 8), (64, 32)] {
+    for (columns, rows) in [(8, 4), (32, 16), (64, 32)] {
         add(group, &format!("{columns}x{rows} tiles"), &|s| s.tiles = (columns, rows));
     }
     let group = "cells around the horizon";
@@ -131,8 +131,12 @@ fn sizes(add: &mut Add<'_>) {
         add(group, &format!("{columns} cells"), &|s| s.grid_columns = columns);
     }
     let group = "learning paths";
-    for paths in [1 << 14, 1 << 16, 1 << 18, 1 << 20] {
+    for paths in [1 << 13, 1 << 16, 1 << 18] {
         add(group, &format!("{paths} learning paths"), &|s| s.learning_paths = Some(paths));
+    }
+    let group = "tries per vertex of a learning path";
+    for tries in [1, 4, 16] {
+        add(group, &format!("{tries} tries"), &|s| s.laws.tries_per_vertex = tries);
     }
 }
 

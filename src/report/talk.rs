@@ -65,7 +65,7 @@ const DIFFERENCES: [&str; 7] = [
      and all of the learning counts, so ratios are smaller than in a long render; the column \"without \
      learning\" says what a long one would come to.",
     "The talk does not give the numbers of tiles and cells it was measured with (its figures show 8x4 \
-     tiles). Here both talk and adaptive have 32x16 tiles and 64x32 cells.",
+     tiles). Here both talk and adaptive have 16x8 tiles and 64x32 cells.",
     "Low-discrepancy samples, balance heuristic, bilinear look-up of the map and exact integer tables are \
      the same for all three methods here; how the talk's plain method samples is not known.",
     "The published figures are one number a scene, without uncertainty.",

@@ -71,9 +71,12 @@ fn overlays_and_panels_look_as_they_did() {
     ];
     for overlay in Overlay::ALL {
         let name = format!("overlay-{}", overlay.title().to_lowercase().replace([' ', '\''], "-"));
-        let state = Interface { overlay: Some(overlay), tile: Some(146), ..inspect.clone() };
+        let state = Interface { overlay: Some(overlay), tile: Some(48), ..inspect.clone() };
         states.push((name, state));
     }
+    // The sun's, which no cell sees.
+    let state = Interface { overlay: Some(Overlay::Tile), tile: Some(41), ..inspect };
+    states.push(("overlay-wish-for-a-hidden-tile".to_owned(), state));
     let mut different = Vec::new();
     let mut pictures: Vec<Rgb8> = Vec::new();
     for (name, interface) in states {

@@ -126,11 +126,11 @@ fn laws_are_exported_as_tables() {
 
     bench.render("-o a.exr --laws laws.json");
     let json = bench.json("laws.json");
-    assert_eq!(json["tiles"], 512);
+    assert_eq!(json["tiles"], 128);
     assert_eq!(json["law_of_cell"].as_object().expect("a map").len(), sums.len());
     bench.render("-o a.exr --laws laws.exr");
     let picture = read_picture(&bench.path("laws.exr")).expect("a picture");
-    assert_eq!(picture.width, 512);
+    assert_eq!(picture.width, 128);
     assert!(picture.height > 1);
 
     let message = bench.refusal("render scene.gltf -o b.exr --laws laws.txt", 1);
@@ -164,7 +164,7 @@ fn a_render_writes_picture_figures_and_metadata() {
     assert_eq!(figures["session"]["learning_paths"], 500);
     assert_eq!(figures["triangles"], 3);
     assert_eq!(figures["invalid_samples"], 0);
-    assert_eq!(figures["settings"]["tiles"], "32x16");
+    assert_eq!(figures["settings"]["tiles"], "16x8");
     assert_eq!(figures["settings"]["filter"], "blackman-harris");
     assert!(figures["memory"]["grid_bytes"].as_u64().expect("bytes") < 10 << 20);
 

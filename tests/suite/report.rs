@@ -39,7 +39,7 @@ fn every_ablation_is_a_change_with_a_name_of_its_own() {
     }
     let some = ablations::plan(Vec::new(), &["tiles".to_owned()], effort(), String::new());
     let names: Vec<&str> = some.methods.iter().map(|m| m.name.as_str()).collect();
-    assert_eq!(names, ["plain", "adaptive", "8x4 tiles", "16x8 tiles", "64x32 tiles"]);
+    assert_eq!(names, ["plain", "adaptive", "8x4 tiles", "32x16 tiles", "64x32 tiles"]);
 }
 
 #[test]

@@ -147,6 +147,8 @@ pub enum Legend {
     Map,
     /// Nothing to explain.
     None,
+    /// No pixel has a value.
+    Empty,
 }
 
 /// An overlay's colours, one per pixel (`None` where it has nothing to say), and their meaning.
@@ -373,6 +375,9 @@ fn scaled(values: impl Iterator<Item = Option<f32>>, range: Range, unit: &'stati
     let values: Vec<Option<f32>> = values.collect();
     let mut sorted: Vec<f32> = values.iter().flatten().copied().collect();
     sorted.sort_unstable_by(f32::total_cmp);
+    if sorted.is_empty() {
+        return Painted::new(values.iter().map(|_| None).collect(), Legend::Empty);
+    }
     let percentile =
         |share: f32| sorted.get((sorted.len() as f32 * share) as usize).copied().unwrap_or(1.0);
     let logarithmic = matches!(range, Range::Logarithmic);

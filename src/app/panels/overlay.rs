@@ -65,6 +65,9 @@ fn legend(ui: &mut Ui, legend: &Legend) {
             ui.label(theme::quiet("Place on the map"));
         }
         Legend::None => {}
+        Legend::Empty => {
+            ui.label(theme::quiet("No pixel has a value."));
+        }
     }
 }
 

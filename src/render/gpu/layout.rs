@@ -82,7 +82,7 @@ pub(crate) struct Globals {
     pub(crate) fog_low: Vec3,
     pub(crate) fog_mean_cosine: f32,
     pub(crate) fog_high: Vec3,
-    pub(crate) padding_2: u32,
+    pub(crate) tries_per_vertex: u32,
     pub(crate) fog_scattering: Vec3,
     pub(crate) padding_3: u32,
     pub(crate) fog_extinction: Vec3,

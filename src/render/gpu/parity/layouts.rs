@@ -80,7 +80,7 @@ fn structs_are_laid_out_as_the_host_writes_them() {
         law_tiles_at law_last_at law_of_cell_at words_per_law grid_rows map_width map_height
         tile_columns tile_rows rotation_turns intensity tile_sums_at light_count
         light_triangle_count width height seed bounces russian_roulette orthographic scene_extent
-        mean_contribution zero grid_medium whole_map_share fog_low fog_mean_cosine fog_high padding_2
+        mean_contribution zero grid_medium whole_map_share fog_low fog_mean_cosine fog_high tries_per_vertex
         fog_scattering padding_3 fog_extinction padding_4 background background_concentration
     );
     assert_same(&module, "Globals", globals);
