@@ -136,7 +136,7 @@ fn sizes(add: &mut Add<'_>) {
     }
     let group = "tries per vertex of a learning path";
     for tries in [1, 4, 16] {
-        add(group, &format!("{tries} tries"), &|s| s.laws.tries_per_vertex = tries);
+        add(group, &format!("tries {tries}"), &|s| s.laws.tries_per_vertex = tries);
     }
 }
 
