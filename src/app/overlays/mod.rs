@@ -378,12 +378,11 @@ fn scaled(values: impl Iterator<Item = Option<f32>>, range: Range, unit: &'stati
     if sorted.is_empty() {
         return Painted::new(values.iter().map(|_| None).collect(), Legend::Empty);
     }
-    let percentile =
-        |share: f32| sorted.get((sorted.len() as f32 * share) as usize).copied().unwrap_or(1.0);
+    let percentile = |share: f32| sorted[(sorted.len() as f32 * share) as usize];
     let logarithmic = matches!(range, Range::Logarithmic);
     let (low, high) = match range {
         Range::Fixed(low, high) => (low, high),
-        Range::Whole => (0.0, sorted.last().copied().unwrap_or(1.0).max(1.0)),
+        Range::Whole => (0.0, sorted[sorted.len() - 1].max(1.0)),
         Range::Logarithmic => {
             let high = percentile(0.98).max(f32::MIN_POSITIVE * LARGEST_RATIO);
             let low = percentile(0.02).max(high / LARGEST_RATIO);

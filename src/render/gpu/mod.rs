@@ -463,8 +463,8 @@ mod tests {
         }
     }
 
-    /// Visits of each cell and its tile counters after two learning passes, the second with laws of the
-    /// first, and a rendering pass of which a third is counted, if rendered paths count.
+    /// Visits of each cell and, cell by cell, tile counters after two learning passes, the second with
+    /// laws of the first, and a rendering pass of which a third is counted, if rendered paths count.
     fn learn(gpu: Option<&Gpu>, recording: LawOptions) -> (Vec<u32>, Vec<u32>, u64) {
         let (world, environment) = crack();
         let view = view(&world, recording);
@@ -525,12 +525,9 @@ mod tests {
         }
         let (visits, slots, blocks) = learning.counters.words();
         let words = 2 * environment.tile_count() as usize;
-        let mut of_cells = vec![0; slots.len() * words];
-        for (cell, slot) in slots.iter().enumerate().filter(|(_, slot)| **slot != u32::MAX) {
-            let block = &blocks[*slot as usize * words..][..words];
-            of_cells[cell * words..][..words].copy_from_slice(block);
-        }
-        (visits, of_cells, traced)
+        let counted = slots.iter().filter(|slot| **slot != u32::MAX);
+        let by_cell = counted.flat_map(|slot| &blocks[*slot as usize * words..][..words]);
+        (visits, by_cell.copied().collect(), traced)
     }
 
     /// As a window does that looks for news after each slice of work.
@@ -586,6 +583,7 @@ mod tests {
         for recording in [LawOptions::ADAPTIVE, LawOptions::TALK, squared] {
             let (cpu_visits, cpu_blocks, cpu_rays) = learn(None, recording);
             let (gpu_visits, gpu_blocks, gpu_rays) = learn(Some(&gpu), recording);
+            assert_eq!(cpu_blocks.len(), gpu_blocks.len(), "the same cells have counters");
             for (what, a, b) in
                 [("visits", cpu_visits, gpu_visits), ("counters", cpu_blocks, gpu_blocks)]
             {
