@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use criterion::Criterion;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions, TableKind};
 use lightgrid::image::Image;
 
@@ -18,14 +18,8 @@ fn sky(width: u32, height: u32) -> Image {
 }
 
 /// Points of the R2 sequence (Roberts 2018).
-fn points(count: u32) -> Vec<Vec2> {
-    (0..count)
-        .map(|i| {
-            let (x, y) =
-                (f64::from(i) * 0.754_877_666_246_693, f64::from(i) * 0.569_840_290_998_05);
-            Vec2::new(x.fract() as f32, y.fract() as f32)
-        })
-        .collect()
+fn points(count: u32) -> Vec<[u32; 2]> {
+    (0..count).map(|i| [0xc13f_a9a9_u32, 0x91e1_0da5].map(|step| step.wrapping_mul(i))).collect()
 }
 
 pub(crate) fn bench(criterion: &mut Criterion) {

@@ -77,7 +77,7 @@ fn laws(criterion: &mut Criterion) {
         state
     };
     group.bench_function("sample, one of 1000 laws", |b| {
-        b.iter(|| black_box(laws.sample(next() % 1000, next())));
+        b.iter(|| black_box(laws.sample(next() % 1000, next(), next())));
     });
     group.bench_function("probability, one of 1000 laws", |b| {
         b.iter(|| black_box(laws.probability(next() % 1000, next() % 512)));

@@ -1,8 +1,25 @@
-// The environment map as a light: twin of src/environment/mod.rs.
+// The environment map as a light: twin of src/environment/mod.rs. Patches are the areas within which
+// radiance is read smoothly, see src/environment/patches.rs.
 
+// How far patch edges lie before texel edges, in texels.
+//#if nearest_lookup
+const MAP_SHIFT = 0.0;
+//#else
+const MAP_SHIFT = 0.5;
+//#end
+
+// A patch by column and row, and a place in it, in [0,1]^2 of its extent.
 struct MapPoint {
-    position: vec2f,
-    texel: vec2u,
+    at: vec2u,
+    within: vec2f,
+}
+
+// Radiance of the texels at a patch's corners.
+struct Corners {
+    upper_left: vec3f,
+    upper_right: vec3f,
+    lower_left: vec3f,
+    lower_right: vec3f,
 }
 
 struct EnvironmentSample {
@@ -10,6 +27,8 @@ struct EnvironmentSample {
     // Given the tile; zero if the tile is black.
     pdf_solid_angle: f32,
     radiance: vec3f,
+    // That density over the one of the integers that drew the direction.
+    weight: f32,
 }
 
 struct RadianceAndTilePdf {
@@ -18,45 +37,73 @@ struct RadianceAndTilePdf {
     pdf_solid_angle: f32,
 }
 
-// A texel chosen by a table.
-struct TexelSample {
-    texel: vec2u,
-    // Place in the texel, in [0,1]^2.
+// A patch chosen by a table.
+struct PatchSample {
+    at: vec2u,
+    // What the random numbers have left, in [0,1]^2.
     within: vec2f,
     // Given the tile; zero if the table has no mass there.
     probability: f32,
 }
 
-// Texels of a tile: first, and one past the last.
-struct TileTexels {
+// Patches of a tile: first, and one past the last.
+struct TilePatches {
     first: vec2u,
     end: vec2u,
 }
 
-fn tile_texels(tile: u32) -> TileTexels {
-    let tiles = vec2u(globals.tile_columns, globals.tile_rows);
-    let size = vec2u(globals.map_width, globals.map_height);
-    let at = vec2u(tile % tiles.x, tile / tiles.x);
-    return TileTexels(at * size / tiles, (at + 1u) * size / tiles);
+// Columns and rows of patches.
+fn patch_grid() -> vec2u {
+//#if nearest_lookup
+    return vec2u(globals.map_width, globals.map_height);
+//#else
+    return vec2u(globals.map_width, globals.map_height + 1u);
+//#end
 }
 
-fn tile_of_texel(texel: vec2u) -> u32 {
+fn tile_patches(tile: u32) -> TilePatches {
     let tiles = vec2u(globals.tile_columns, globals.tile_rows);
-    let size = vec2u(globals.map_width, globals.map_height);
-    let at = ((texel + 1u) * tiles - 1u) / size;
-    return at.y * tiles.x + at.x;
+    let size = patch_grid();
+    let at = vec2u(tile % tiles.x, tile / tiles.x);
+    return TilePatches(at * size / tiles, (at + 1u) * size / tiles);
+}
+
+fn tile_of_patch(at: vec2u) -> u32 {
+    let tiles = vec2u(globals.tile_columns, globals.tile_rows);
+    let tile = ((at + 1u) * tiles - 1u) / patch_grid();
+    return tile.y * tiles.x + tile.x;
+}
+
+//#if map
+// Of a row of patches: distance of the cosine at its upper edge from its pole's, which keeps its digits
+// near that, the lower edge's less that, steradians of a patch.
+fn patch_row(row: u32) -> vec3f {
+    return tables(ROWS_AT + row).xyz;
+}
+
+// Whether a row's cosines are told from the upper pole.
+fn is_upper_row(row: u32) -> bool {
+    return 2u * row < patch_grid().y;
 }
 
 fn map_point(direction: vec3f) -> MapPoint {
     let uv = uv_from_direction(direction);
     let turned_u = uv.x - globals.rotation_turns;
     let u = select(turned_u, turned_u + 1.0, turned_u < 0.0);
-    let size = vec2u(globals.map_width, globals.map_height);
-    let position = vec2f(u, uv.y) * vec2f(size);
-    return MapPoint(position, min(vec2u(position), size - 1u));
+    let x = u * f32(globals.map_width) + MAP_SHIFT;
+    let column = u32(x);
+    let y = uv.y * f32(globals.map_height) + MAP_SHIFT;
+    let row = min(u32(y), patch_grid().y - 1u);
+    let edges = patch_row(row);
+    let near = (direction.x * direction.x + direction.z * direction.z) / (1.0 + abs(direction.y));
+    let distance = select(2.0 - near, near, (direction.y >= 0.0) == is_upper_row(row));
+    // The last half texel before the seam belongs to the patch across it.
+    return MapPoint(
+        vec2u(select(column, 0u, column >= globals.map_width), row),
+        vec2f(x - floor(x), saturate((distance - edges.x) / edges.y)),
+    );
 }
 
-//#if map
 fn map_texel(x: u32, y: u32) -> vec3f {
     return unpack_radiance(map_texels(y * globals.map_width + x).xy);
 }
@@ -72,86 +119,132 @@ fn unpack_radiance(words: vec2u) -> vec3f {
     return vec3f(mantissas) * (1.0 / 131072.0) * scale;
 }
 
-fn radiance_at(point: MapPoint) -> vec3f {
+// Wrapped in u, clamped in v.
+fn corners_of(at: vec2u) -> Corners {
 //#if nearest_lookup
-    let radiance = map_texel(point.texel.x, point.texel.y);
+    let texel = map_texel(at.x, at.y);
+    return Corners(texel, texel, texel, texel);
 //#else
-    let size = vec2u(globals.map_width, globals.map_height);
-    let x = point.position.x - 0.5;
-    let y = clamp(point.position.y - 0.5, 0.0, f32(size.y - 1u));
-    let across = x - floor(x);
-    let down = y - floor(y);
-    let left = select(min(u32(max(x, 0.0)), size.x - 1u), size.x - 1u, x < 0.0);
-    let right = select(0u, left + 1u, left + 1u < size.x);
-    let top = u32(y);
-    let bottom = min(top + 1u, size.y - 1u);
-    let upper = mix(map_texel(left, top), map_texel(right, top), across);
-    let lower = mix(map_texel(left, bottom), map_texel(right, bottom), across);
-    let radiance = mix(upper, lower, down);
+    let left = select(at.x, globals.map_width, at.x == 0u) - 1u;
+    let above = max(at.y, 1u) - 1u;
+    let below = min(at.y, globals.map_height - 1u);
+    return Corners(
+        map_texel(left, above),
+        map_texel(at.x, above),
+        map_texel(left, below),
+        map_texel(at.x, below),
+    );
 //#end
-    return min(radiance * globals.intensity, vec3f(F32_MAX));
 }
 
+fn interpolated(corners: Corners, within: vec2f) -> vec3f {
+    let upper = corners.upper_left + within.x * (corners.upper_right - corners.upper_left);
+    let lower = corners.lower_left + within.x * (corners.lower_right - corners.lower_left);
+    return upper + within.y * (lower - upper);
+}
+
+fn scaled_radiance(radiance: vec3f) -> vec3f {
+    return min(radiance * globals.intensity, vec3f(F32_MAX));
+}
 //#end
 
 fn environment_radiance(direction: vec3f) -> vec3f {
 //#if map
-    return radiance_at(map_point(direction));
+    let point = map_point(direction);
+    return scaled_radiance(interpolated(corners_of(point.at), point.within));
 //#else
     return vec3f(0.0);
 //#end
 }
 
 //#if map_sampling
-// Distance of the cosine at a row's upper and lower edge from its pole's, which keeps its digits
-// near it; 1 / steradian of a texel.
-fn map_row(row: u32) -> vec3f {
-    return tables(ROWS_AT + row).xyz;
+// Scaled importance of radiance at intensity 1.
+fn map_importance(radiance: vec3f) -> f32 {
+    return importance(radiance * globals.importance_scale);
+}
+
+// Scaled energy of a patch of row `y` whose corners' importances add up to `sum`.
+fn patch_energy(sum: f32, y: u32) -> f32 {
+    return 0.25 * sum * patch_row(y).z;
+}
+
+// One over a tile's scaled energy.
+fn inverse_energy(tile: u32) -> f32 {
+    return tables(ROWS_AT + patch_grid().y + tile).x;
+}
+
+// Density of `sample_in_tile`, given the tile, where a patch with these corners shows this radiance.
+fn tile_density(tile: u32, at: vec2u, corners: Corners, radiance: vec3f) -> f32 {
+    let here = map_importance(radiance);
+//#if summed_area
+    let sum = map_importance(corners.upper_left) + map_importance(corners.upper_right)
+        + map_importance(corners.lower_left) + map_importance(corners.lower_right);
+    let energy = patch_energy(sum, at.y);
+    return select(0.0, patch_probability(tile, at) * (here / energy), energy > 0.0);
+//#else
+    return here * inverse_energy(tile);
+//#end
 }
 
 fn radiance_and_tile_pdf(direction: vec3f) -> RadianceAndTilePdf {
     let point = map_point(direction);
-    let tile = tile_of_texel(point.texel);
-    let probability = texel_probability(tile, point.texel);
-    return RadianceAndTilePdf(
-        radiance_at(point),
-        tile,
-        probability * map_row(point.texel.y).z,
-    );
+    let tile = tile_of_patch(point.at);
+    let corners = corners_of(point.at);
+    let radiance = interpolated(corners, point.within);
+    let pdf = tile_density(tile, point.at, corners, radiance);
+    return RadianceAndTilePdf(scaled_radiance(radiance), tile, pdf);
 }
 
-// Draws a direction from a tile; `u` in [0,1)^2.
-fn sample_in_tile(tile: u32, u: vec2f) -> EnvironmentSample {
+// Twin of `patches::sample_linear`.
+fn sample_linear(from_: f32, to: f32, u: f32) -> f32 {
+    let sum = from_ + to;
+    if sum <= 0.0 {
+        return u;
+    }
+    let a = from_ / sum;
+    let b = to / sum;
+    let root = sqrt(max(a * a + u * (b - a), 0.0));
+    return min(u / max(a + root, 1.17549435e-38), 1.0);
+}
+
+// Draws a direction from a tile by two 32-bit fractions of one.
+fn sample_in_tile(tile: u32, u: vec2u) -> EnvironmentSample {
     var result: EnvironmentSample;
-    let chosen = sample_texel(tile, u);
+    let chosen = sample_patch(tile, refine(u));
     if chosen.probability <= 0.0 {
         return result;
     }
-    let size = vec2f(f32(globals.map_width), f32(globals.map_height));
-    let margin = min(vec2f(size.x, 4.0 * size.y) * (1.0 / 4194304.0), vec2f(0.25));
-    let within = margin + chosen.within * (1.0 - 2.0 * margin);
+    let corners = corners_of(chosen.at);
+    let a = map_importance(corners.upper_left);
+    let b = map_importance(corners.upper_right);
+    let c = map_importance(corners.lower_left);
+    let d = map_importance(corners.lower_right);
+    let down = sample_linear(a + b, c + d, chosen.within.y);
+    let across = sample_linear(a + down * (c - a), b + down * (d - b), chosen.within.x);
+    let radiance = interpolated(corners, vec2f(across, down));
+    result.radiance = scaled_radiance(radiance);
+    result.pdf_solid_angle = tile_density(tile, chosen.at, corners, radiance);
+    let row = patch_row(chosen.at.y);
+//#if summed_area
+    result.weight = 1.0;
+//#else
+    let energy = patch_energy(a + b + c + d, chosen.at.y);
+    result.weight = energy * inverse_energy(tile) / chosen.probability;
+//#end
 
-    let x = f32(chosen.texel.x) + within.x;
-    let world_turns = x / size.x + globals.rotation_turns - 0.5;
+    let x = f32(chosen.at.x) + across - MAP_SHIFT;
+    let world_turns = x / f32(globals.map_width) + globals.rotation_turns - 0.5;
     let sin_cos_phi = sin_cos_turns(world_turns - round(world_turns));
-    let row = map_row(chosen.texel.y);
-    let z = mix(row.x, row.y, within.y);
-    let is_upper = 2u * chosen.texel.y + 1u <= globals.map_height;
-    let cos_theta = select(z - 1.0, 1.0 - z, is_upper);
-    let sin_theta = sqrt(max(z * (2.0 - z), 0.0));
+    let distance = row.x + down * row.y;
+    let cos_theta = select(distance - 1.0, 1.0 - distance, is_upper_row(chosen.at.y));
+    let sin_theta = sqrt(max(distance * (2.0 - distance), 0.0));
     result.direction = vec3f(sin_theta * sin_cos_phi.y, cos_theta, sin_theta * sin_cos_phi.x);
-
-    let y = uv_from_direction(result.direction).y * size.y;
-    result.radiance = radiance_at(MapPoint(vec2f(x, y), chosen.texel));
-    result.pdf_solid_angle = chosen.probability * row.z;
     return result;
 }
 
-// Twin of `environment::refine`: 24 more bits below each random number's last, as (coarse, fine).
-fn refine(u: vec2f) -> array<vec2u, 2> {
-    let x = min(u32(u.x * 16777216.0), 0xffffffu);
-    let y = min(u32(u.y * 16777216.0), 0xffffffu);
-    let fine_x = hash(hash(x) ^ y);
-    return array<vec2u, 2>(vec2u(x, fine_x >> 8u), vec2u(y, hash(fine_x ^ x) >> 8u));
+// Twin of `environment::refine`: 32 more bits below each number, as (coarse, fine).
+fn refine(u: vec2u) -> array<vec2u, 2> {
+    let fine_x = hash(hash(u.x) ^ u.y);
+    return array<vec2u, 2>(vec2u(u.x, fine_x), vec2u(u.y, hash(fine_x ^ u.x)));
 }
 //#end

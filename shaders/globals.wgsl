@@ -72,7 +72,8 @@ struct Globals {
     // Samples of the map that each vertex of a learning path tries.
     tries_per_vertex: u32,
     fog_scattering: vec3f,
-    padding_3: u32,
+    // Factor on the map's importance that brings its brightest pixel near 1.
+    importance_scale: f32,
     fog_extinction: vec3f,
     padding_4: u32,
     // What the camera sees in place of the map: a colour, or how little the map is blurred.

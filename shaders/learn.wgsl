@@ -11,7 +11,7 @@ const WHOLE_MAP_SHARE = 256u;
 fn look_at_map(path: ptr<function, Path>, vertex: Vertex) {
     let bits = path_pair_bits(path);
     let choice = choose_tile(vertex.law, bits, WHOLE_MAP_SHARE);
-    let sample = sample_in_tile(choice.tile, vec2f(choice.remainder, unit_from_bits(bits.y)));
+    let sample = sample_in_tile(choice.tile, vec2u(choice.remainder, bits.y));
     if sample.pdf_solid_angle <= 0.0 {
         return;
     }
@@ -23,7 +23,7 @@ fn look_at_map(path: ptr<function, Path>, vertex: Vertex) {
         weight = visibility(vertex, sample.direction, f.pdf_solid_angle, visible);
 //#else
         let pdf = choice.probability * sample.pdf_solid_angle;
-        weight = importance(f.value * sample.radiance * visible)
+        weight = sample.weight * importance(f.value * sample.radiance * visible)
             / (pdf * globals.mean_contribution);
 //#end
     }

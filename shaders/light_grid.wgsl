@@ -6,7 +6,8 @@ const WHOLE_MAP = 0u;
 struct TileChoice {
     tile: u32,
     probability: f32,
-    remainder: f32,
+    // A fresh 32-bit fraction of one.
+    remainder: u32,
 }
 
 // Twin of `cells::dominant_face`.
@@ -66,7 +67,8 @@ fn entry_probability(low: u32, last: u32) -> f32 {
     return (f32(last - low) + 1.0) * (1.0 / 4294967296.0);
 }
 
-fn sample_tile(law: u32, bits: u32) -> TileChoice {
+// `finer` is the bits below `bits`.
+fn sample_tile(law: u32, bits: u32, finer: u32) -> TileChoice {
     let start = laws(globals.law_starts_at + law).x;
     let first = globals.law_last_at + start;
     var below = 0u;
@@ -85,10 +87,11 @@ fn sample_tile(law: u32, bits: u32) -> TileChoice {
     }
     let last = laws(first + below).x;
     let count = f32(last - low) + 1.0;
+    let remainder = min((f32(bits - low) + unit_from_bits(finer)) / count, 0.99999994);
     return TileChoice(
         law_u16(globals.law_tiles_at, start + below),
         entry_probability(low, last),
-        min(f32(bits - low) / count, 0.99999994),
+        (u32(remainder * 16777216.0) << 8u) | (finer & 0xffu),
     );
 }
 
@@ -123,19 +126,26 @@ fn mixed(whole_map: f32, learned: f32, whole_map_share: u32) -> f32 {
 //#end
 
 // Twin of `LightGrid::sample_sharing`.
-fn choose_tile(law: u32, bits: vec2u, whole_map_share: u32) -> TileChoice {
+fn choose_tile(law: u32, both_bits: vec2u, whole_map_share: u32) -> TileChoice {
+    var bits = both_bits.x;
+    let finer = hash(bits ^ hash(both_bits.y));
 //#if light_grid
-    let by_whole_map = (bits.y & 0xffu) < whole_map_share;
-    var choice = sample_tile(select(law, WHOLE_MAP, by_whole_map), bits.x);
-    if law != WHOLE_MAP && whole_map_share != 0u {
-        let other = tile_probability(select(WHOLE_MAP, law, by_whole_map), choice.tile);
-        let probabilities = select(
-            vec2f(other, choice.probability), vec2f(choice.probability, other), by_whole_map);
-        choice.probability = mixed(probabilities.x, probabilities.y, whole_map_share);
+    if law == WHOLE_MAP || whole_map_share == 0u {
+        return sample_tile(law, bits, finer);
     }
+    // The number is split at the share; both parts keep its order.
+    let by_whole_map = (bits >> 24u) < whole_map_share;
+    let rest = bits - select(whole_map_share << 24u, 0u, by_whole_map);
+    let width = select(256u - whole_map_share, whole_map_share, by_whole_map);
+    bits = ((rest / width) << 8u) + ((((rest % width) << 8u) | (finer & 0xffu)) / width);
+    var choice = sample_tile(select(law, WHOLE_MAP, by_whole_map), bits, finer);
+    let other = tile_probability(select(WHOLE_MAP, law, by_whole_map), choice.tile);
+    let probabilities = select(
+        vec2f(other, choice.probability), vec2f(choice.probability, other), by_whole_map);
+    choice.probability = mixed(probabilities.x, probabilities.y, whole_map_share);
     return choice;
 //#else
-    return sample_tile(WHOLE_MAP, bits.x);
+    return sample_tile(WHOLE_MAP, bits, finer);
 //#end
 }
 

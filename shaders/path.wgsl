@@ -1,6 +1,7 @@
 // The path tracing loop, one ray a step: twin of src/path/mod.rs, the same random numbers.
 
 const ROULETTE_AFTER = 3u;
+const ROULETTE_MILDNESS = 3.0;
 // Panes and leaves one ray may pass; only a scene that is broken has more.
 const MAX_PASSES = 1000u;
 
@@ -514,7 +515,7 @@ fn transmittance(
 fn gather_environment(path: ptr<function, Path>, vertex: Vertex) {
     let bits = path_pair_bits(path);
     let choice = choose_tile(vertex.law, bits, globals.whole_map_share);
-    let sample = sample_in_tile(choice.tile, vec2f(choice.remainder, unit_from_bits(bits.y)));
+    let sample = sample_in_tile(choice.tile, vec2u(choice.remainder, bits.y));
     if sample.pdf_solid_angle <= 0.0 {
         return;
     }
@@ -531,8 +532,9 @@ fn gather_environment(path: ptr<function, Path>, vertex: Vertex) {
     let seen = visibility(vertex, sample.direction, f.pdf_solid_angle, visible);
     count(path, vertex, choice.tile, seen);
 //#end
-    let weight = balance_heuristic(pdf, f.pdf_solid_angle) / pdf;
-    if any(visible != vec3f(0.0)) {
+    let both_pdfs = pdf + f.pdf_solid_angle;
+    if any(visible != vec3f(0.0)) && both_pdfs > 0.0 {
+        let weight = sample.weight / both_pdfs;
         (*path).radiance += (*path).throughput * f.value * sample.radiance * visible * weight;
     }
 }
@@ -611,7 +613,7 @@ fn survives(path: ptr<function, Path>) -> bool {
 //#if solid_transmission
     in_air *= (*path).body.squared_index;
 //#end
-    let probability = clamp(in_air, 0.05, 1.0);
+    let probability = clamp(ROULETTE_MILDNESS * in_air, 0.05, 1.0);
     if probability < 1.0 {
         let draw = path_pair(path).y;
         if draw >= probability {

@@ -47,19 +47,20 @@ struct Choice {
 }
 
 // Mass of the entries before `end`: rows of the rectangle, or columns of its row.
-fn mass_before(texels: TileTexels, along_y: bool, end: u32) -> vec2f {
+fn mass_before(patches: TilePatches, along_y: bool, end: u32) -> vec2f {
     if along_y {
-        return rectangle_mass(texels.first, vec2u(texels.end.x, end));
+        return rectangle_mass(patches.first, vec2u(patches.end.x, end));
     }
-    return rectangle_mass(texels.first, vec2u(end, texels.end.y));
+    return rectangle_mass(patches.first, vec2u(end, patches.end.y));
 }
 
-fn search(texels: TileTexels, along_y: bool, u: vec2u) -> Choice {
-    let first = select(texels.first.x, texels.first.y, along_y);
-    let end = select(texels.end.x, texels.end.y, along_y);
-    let total = mass_before(texels, along_y, end);
-    let unit = f32(u.x) * (1.0 / 16777216.0);
-    let rest = f32(u.y) * 3.5527137e-15; // 2^-48
+fn search(patches: TilePatches, along_y: bool, u: vec2u) -> Choice {
+    let first = select(patches.first.x, patches.first.y, along_y);
+    let end = select(patches.end.x, patches.end.y, along_y);
+    let total = mass_before(patches, along_y, end);
+    // 24 bits and 24 below, of which f32 loses none.
+    let unit = f32(u.x >> 8u) * (1.0 / 16777216.0);
+    let rest = f32(((u.x & 0xffu) << 16u) | (u.y >> 16u)) * 3.5527137e-15; // 2^-48
     // The product with 24 more bits below: exact as far as the sums are.
     let high = rounded(total.x * unit);
     let error = product_error(total.x, unit, high);
@@ -68,15 +69,15 @@ fn search(texels: TileTexels, along_y: bool, u: vec2u) -> Choice {
     var last = end - 1u;
     while low < last {
         let middle = low + (last - low) / 2u;
-        let above = pair_difference(mass_before(texels, along_y, middle + 1u), sought);
+        let above = pair_difference(mass_before(patches, along_y, middle + 1u), sought);
         if above.x + above.y > 0.0 {
             last = middle;
         } else {
             low = middle + 1u;
         }
     }
-    let before = mass_before(texels, along_y, low);
-    let mass = pair_difference(mass_before(texels, along_y, low + 1u), before);
+    let before = mass_before(patches, along_y, low);
+    let mass = pair_difference(mass_before(patches, along_y, low + 1u), before);
     let into = pair_difference(sought, before);
     return Choice(low, mass.x, saturate(into.x / mass.x));
 }
@@ -90,30 +91,29 @@ fn product_error(a: f32, b: f32, p: f32) -> f32 {
     return ((a_high * b_high - p) + a_high * b_low + a_low * b_high) + a_low * b_low;
 }
 
-fn sample_texel(tile: u32, u: vec2f) -> TexelSample {
-    var result: TexelSample;
-    var texels = tile_texels(tile);
-    let fine = refine(u);
-    let total = rectangle_mass(texels.first, texels.end);
-    let row = search(texels, true, fine[1]);
+fn sample_patch(tile: u32, u: array<vec2u, 2>) -> PatchSample {
+    var result: PatchSample;
+    var patches = tile_patches(tile);
+    let total = rectangle_mass(patches.first, patches.end);
+    let row = search(patches, true, u[1]);
     if !(row.mass > 0.0 && total.x > 0.0) {
         return result;
     }
-    texels.first.y = row.index;
-    texels.end.y = row.index + 1u;
-    let column = search(texels, false, fine[0]);
+    patches.first.y = row.index;
+    patches.end.y = row.index + 1u;
+    let column = search(patches, false, u[0]);
     if !(column.mass > 0.0) {
         return result;
     }
-    result.texel = vec2u(column.index, row.index);
+    result.at = vec2u(column.index, row.index);
     result.within = vec2f(column.fraction, row.fraction);
-    result.probability = texel_probability(tile, result.texel);
+    result.probability = patch_probability(tile, result.at);
     return result;
 }
 
-fn texel_probability(tile: u32, texel: vec2u) -> f32 {
-    let texels = tile_texels(tile);
-    let total = rectangle_mass(texels.first, texels.end);
-    let mass = rectangle_mass(texel, texel + 1u);
+fn patch_probability(tile: u32, at: vec2u) -> f32 {
+    let patches = tile_patches(tile);
+    let total = rectangle_mass(patches.first, patches.end);
+    let mass = rectangle_mass(at, at + 1u);
     return select(0.0, mass.x / total.x, total.x > 0.0 && mass.x > 0.0);
 }

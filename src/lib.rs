@@ -37,6 +37,7 @@ pub mod metrics;
 pub mod noise;
 pub mod output;
 pub mod path;
+mod prefetch;
 pub mod render;
 pub mod report;
 pub mod sampler;

@@ -202,8 +202,7 @@ fn true_shares(world: &World, environment: &Environment, spot: &Spot) -> Vec<f32
             (0..TRUTH_SAMPLES)
                 .map(|i| {
                     // R2 sequence (Roberts 2018).
-                    let n = i as f32 + 0.5;
-                    let u = Vec2::new((n * 0.754_877_7).fract(), (n * 0.569_840_3).fract());
+                    let u = [0xc13f_a9a9_u32, 0x91e1_0da5].map(|step| step.wrapping_mul(i));
                     let Some(sample) = environment.sample_in_tile(tile, u) else { return 0.0 };
                     let cosine = spot.normal.dot(sample.direction);
                     if cosine <= 0.0 {
@@ -212,7 +211,7 @@ fn true_shares(world: &World, environment: &Environment, spot: &Spot) -> Vec<f32
                     let direction = sample.direction;
                     let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
                     let light = importance(sample.radiance * world.transmittance(&ray));
-                    f64::from(light * cosine / sample.pdf_solid_angle)
+                    f64::from(sample.weight * light * cosine / sample.pdf_solid_angle)
                 })
                 .sum()
         })

@@ -1,6 +1,8 @@
 //! The environment map as a light: radiance, equal-size tiles, importance sampling in a tile.
 //!
-//! An [`Environment`] owns the map's pixels and an importance table over them. The map is cut into
+//! An [`Environment`] owns the map's pixels and an importance table over its patches, the areas
+//! between texel centres (`patches`). Directions are drawn with the density that is read there: the
+//! importance of the interpolated radiance over the tile's energy. The map is cut into
 //! equal-size tiles that are fixed to the map; which tile to sample is somebody else's choice (the
 //! light grid learns it, [`Environment::tile_energies`] is the choice without knowledge), so every
 //! density here is conditional on the tile.
@@ -10,6 +12,7 @@
 
 pub mod landmarks;
 mod options;
+mod patches;
 mod sat_report;
 pub mod sky;
 mod summed_area;
@@ -22,17 +25,19 @@ use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use glam::{DVec2, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 pub use self::options::{EnvironmentOptions, Lookup, TableKind};
+use self::patches::{PatchRows, sample_linear};
 pub use self::sat_report::{SatReport, SatReportRow, sat_report};
 use self::table::Table;
 use self::tiles::TileGrid;
 use self::weights::Weights;
+use crate::color::importance;
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::math::{direction_from_uv, sin_cos_turns, texel_solid_angle, uv_from_direction};
+use crate::math::{direction_from_uv, sin_cos_turns, uv_from_direction};
 use crate::sampler::hash;
 
 /// A lat-long map of radiance that can be looked up and sampled. Clones share pixels and table.
@@ -43,10 +48,11 @@ pub struct Environment {
     grid: TileGrid,
     table: Arc<Table>,
     tile_energies: Vec<f64>,
-    /// Cosine of the polar angle at the edges of the rows, `height + 1` of them.
-    row_edge_cosines: Vec<f64>,
-    /// 1 / steradian of a texel, per row.
-    inverse_texel_solid_angles: Vec<f32>,
+    patches: PatchRows,
+    /// Factor on importance that brings the brightest pixel near 1: a power of two.
+    importance_scale: f32,
+    /// One over each tile's energy, so scaled; 0 where f32 cannot hold it.
+    inverse_energies: Vec<f32>,
     /// Solid-angle mean of the map, without intensity.
     map_mean: Vec3,
     map_is_black: bool,
@@ -63,8 +69,12 @@ pub struct EnvironmentSample {
     pub direction: Vec3,
     /// Radiance from there.
     pub radiance: Vec3,
-    /// Density in 1/steradian, given the tile.
+    /// Density in 1/steradian, given the tile: the importance of `radiance` over the tile's energy.
     pub pdf_solid_angle: f32,
+    /// That density over the one with which the integers of the table drew the direction. An estimate
+    /// is multiplied by it, and then exact: it is 1 but for the rounding of patches to 2^-32 of a
+    /// tile.
+    pub weight: f32,
 }
 
 /// Bytes an [`Environment`] keeps.
@@ -76,14 +86,17 @@ pub struct EnvironmentMemory {
     pub table: usize,
 }
 
-/// A place on the map in texels, and the texel it lies in.
+/// A place on the map: a patch and where in it, in `[0,1]` of its extent.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MapPoint {
-    pub(crate) x: f32,
-    pub(crate) y: f32,
     pub(crate) column: u32,
     pub(crate) row: u32,
+    pub(crate) across: f32,
+    pub(crate) down: f32,
 }
+
+/// Radiance at the corners of a patch, at intensity 1: left to right, then down.
+type Corners = [Vec3; 4];
 
 impl Environment {
     /// Takes a map (finite, not negative) and builds its importance table.
@@ -95,24 +108,27 @@ impl Environment {
         options.check()?;
         check_size(&map)?;
         let statistics = Statistics::of(&map, options.lookup)?;
-        let grid = TileGrid::new(map.width, map.height, options.tile_columns, options.tile_rows);
         let weights = Weights::new(&map, options.lookup);
+        let (columns, rows) = weights.size();
+        let grid = TileGrid::new(columns, rows, options.tile_columns, options.tile_rows);
         let (table, tile_energies) = Table::build(options.table, &weights, &grid);
-        let rows = f64::from(map.height);
-        let row_edge_cosines = (0..=map.height)
-            .map(|edge| (std::f64::consts::PI * f64::from(edge) / rows).cos())
-            .collect();
-        let inverse_texel_solid_angles = (0..map.height)
-            .map(|row| (1.0 / texel_solid_angle(map.width, map.height, row)) as f32)
+        let importance_scale = importance_scale(statistics.largest);
+        let inverse = |energy: &f64| (1.0 / (energy * f64::from(importance_scale))) as f32;
+        let inverse_energies = tile_energies
+            .iter()
+            .map(|energy| {
+                Some(inverse(energy)).filter(|inverse| inverse.is_finite()).unwrap_or(0.0)
+            })
             .collect();
         let mut environment = Self {
+            patches: PatchRows::new(map.width, map.height, options.lookup),
             map: Arc::new(map),
             lookup: options.lookup,
             grid,
             table: Arc::new(table),
             tile_energies,
-            row_edge_cosines,
-            inverse_texel_solid_angles,
+            importance_scale,
+            inverse_energies,
             map_mean: statistics.mean,
             map_is_black: statistics.black,
             map_is_constant: statistics.constant,
@@ -136,7 +152,8 @@ impl Environment {
 
     /// Radiance from a unit world direction.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
-        self.radiance_at(self.map_point(direction))
+        let point = self.map_point(direction);
+        self.scaled(interpolated(&self.corners(point.column, point.row), point.across, point.down))
     }
 
     /// Number of tiles.
@@ -151,18 +168,19 @@ impl Environment {
 
     /// Unit world direction of a place in a tile, `within` in `[0,1]`^2 of its extent in u and v.
     pub fn direction_in_tile(&self, tile: u32, within: Vec2) -> Vec3 {
-        let texels = self.grid.texels(tile);
+        let patches = self.grid.patches(tile);
         let size = Vec2::new(self.map.width as f32, self.map.height as f32);
-        let first = Vec2::new(texels.x.start as f32, texels.y.start as f32);
-        let extent = Vec2::new(texels.width() as f32, texels.height() as f32);
-        let uv = (first + within * extent) / size;
+        let first = Vec2::new(patches.x.start as f32, patches.y.start as f32);
+        let extent = Vec2::new(patches.width() as f32, patches.height() as f32);
+        let uv = (first + within * extent - self.patches.shift()) / size;
+        let uv = Vec2::new(uv.x, uv.y.clamp(0.0, 1.0));
         direction_from_uv(Vec2::new(uv.x + self.rotation_turns, uv.y))
     }
 
     /// The tile seen in a unit world direction.
     pub fn tile_of(&self, direction: Vec3) -> u32 {
         let point = self.map_point(direction);
-        self.grid.tile_of_texel(point.column, point.row)
+        self.grid.tile_of_patch(point.column, point.row)
     }
 
     /// Per tile the integral of importance over its solid angle, at intensity 1, as the table has
@@ -171,47 +189,73 @@ impl Environment {
         &self.tile_energies
     }
 
-    /// Draws a direction from a tile: a texel by importance, then a place in it, uniform in solid
-    /// angle. `u` is uniform in `[0,1)`^2. `None` if the tile is black.
-    ///
-    /// Places keep [`EDGE_MARGIN_TURNS`] away from texel edges, so that the direction, rounded to
-    /// f32, is always found in the very texel it was drawn from: the density is then exactly that
-    /// of [`Self::tile_pdf_solid_angle`] for this direction.
-    pub fn sample_in_tile(&self, tile: u32, u: Vec2) -> Option<EnvironmentSample> {
-        let texel = self.table.sample(&self.grid, tile, refine(u))?;
-        let (width, height) = (f64::from(self.map.width), f64::from(self.map.height));
-        let margin = (EDGE_MARGIN_TURNS * DVec2::new(width, 4.0 * height)).min(DVec2::splat(0.25));
-        let within = margin + texel.within * (1.0 - 2.0 * margin);
+    /// Draws a direction from a tile by two uniform 32-bit fractions of one: a patch by importance,
+    /// then a place in it by the importance interpolated there. `None` if the tile is black, or
+    /// darker than f32 can tell from black beside the brightest pixel.
+    pub fn sample_in_tile(&self, tile: u32, u: [u32; 2]) -> Option<EnvironmentSample> {
+        let patch = self.table.sample(&self.grid, tile, refine(u))?;
+        let corners = self.corners(patch.x, patch.y);
+        let [a, b, c, d] = corners.map(|corner| self.importance(corner));
+        let down = sample_linear(a + b, c + d, patch.within.y);
+        let (left, right) = (a + down * (c - a), b + down * (d - b));
+        let across = sample_linear(left, right, patch.within.x);
+        let radiance = interpolated(&corners, across, down);
+        let pdf_solid_angle = self.density(tile, (patch.x, patch.y), &corners, radiance);
+        if pdf_solid_angle <= 0.0 {
+            return None;
+        }
+        let weight = match &*self.table {
+            Table::TileLocal(_) => {
+                let energy = self.patch_energy([a, b, c, d], patch.y);
+                energy * self.inverse_energies[tile as usize] / patch.probability
+            }
+            Table::SummedArea(_) => 1.0,
+        };
 
-        let x = f64::from(texel.x) + within.x;
-        let world_turns = x / width + f64::from(self.rotation_turns) - 0.5;
-        let (sin_phi, cos_phi) = sin_cos_turns((world_turns - world_turns.round()) as f32);
-        let row = texel.y as usize;
-        let (top, bottom) = (self.row_edge_cosines[row], self.row_edge_cosines[row + 1]);
-        let cos_theta = top + within.y * (bottom - top);
-        let sin_theta = ((1.0 - cos_theta) * (1.0 + cos_theta)).max(0.0).sqrt() as f32;
-        let direction = Vec3::new(sin_theta * cos_phi, cos_theta as f32, sin_theta * sin_phi);
-
-        let y = uv_from_direction(direction).y * height as f32;
-        let point = MapPoint { x: x as f32, y, column: texel.x, row: texel.y };
         Some(EnvironmentSample {
-            direction,
-            radiance: self.radiance_at(point),
-            pdf_solid_angle: self.texel_pdf_solid_angle(texel.probability, texel.y),
+            direction: self.direction_in_patch((patch.x, patch.y), Vec2::new(across, down)),
+            radiance: self.scaled(radiance),
+            pdf_solid_angle,
+            weight,
         })
     }
 
-    /// The tile in a unit world direction, and the density of [`Self::sample_in_tile`] there,
-    /// given that tile.
-    pub fn tile_pdf_solid_angle(&self, direction: Vec3) -> (u32, f32) {
-        self.tile_pdf_at(self.map_point(direction))
+    /// Columns and rows of patches.
+    pub fn patch_grid(&self) -> (u32, u32) {
+        (self.map.width, self.patches.rows().len() as u32)
     }
 
-    /// [`Self::radiance`] and [`Self::tile_pdf_solid_angle`] for the price of one mapping.
+    /// Steradians of a patch of a row.
+    pub fn patch_solid_angle(&self, row: u32) -> f32 {
+        self.patches.rows()[row as usize].solid_angle
+    }
+
+    /// Unit world direction of a place in the patch of this column and row, `within` in `[0,1]`^2 of
+    /// its longitudes and of its solid angle.
+    pub fn direction_in_patch(&self, (column, row): (u32, u32), within: Vec2) -> Vec3 {
+        let x = column as f32 + within.x - self.patches.shift();
+        let world_turns = x / self.map.width as f32 + self.rotation_turns - 0.5;
+        let (sin_phi, cos_phi) = sin_cos_turns(world_turns - world_turns.round_ties_even());
+        let (sin_theta, cos_theta) = self.patches.polar_angle(row, within.y);
+        Vec3::new(sin_theta * cos_phi, cos_theta, sin_theta * sin_phi)
+    }
+
+    /// Column and row of the patch seen in a unit world direction.
+    pub fn patch_of(&self, direction: Vec3) -> (u32, u32) {
+        let point = self.map_point(direction);
+        (point.column, point.row)
+    }
+
+    /// Radiance from a unit world direction, the tile seen there, and the density of
+    /// [`Self::sample_in_tile`] there, given that tile. A direction within the rounding of a tile's
+    /// edge (1e-7 radian) may be found in the tile beside the one it was drawn from.
     pub fn radiance_and_tile_pdf(&self, direction: Vec3) -> (Vec3, u32, f32) {
         let point = self.map_point(direction);
-        let (tile, pdf_solid_angle) = self.tile_pdf_at(point);
-        (self.radiance_at(point), tile, pdf_solid_angle)
+        let tile = self.grid.tile_of_patch(point.column, point.row);
+        let corners = self.corners(point.column, point.row);
+        let radiance = interpolated(&corners, point.across, point.down);
+        let pdf = self.density(tile, (point.column, point.row), &corners, radiance);
+        (self.scaled(radiance), tile, pdf)
     }
 
     /// Whether no light comes from anywhere.
@@ -249,15 +293,20 @@ impl Environment {
         (self.rotation_turns, self.intensity)
     }
 
-    /// 1 / steradian of a texel, per row.
-    pub(crate) fn inverse_texel_solid_angles(&self) -> &[f32] {
-        &self.inverse_texel_solid_angles
+    /// Rows of patches.
+    pub(crate) fn patches(&self) -> &PatchRows {
+        &self.patches
+    }
+
+    /// Factor on importance, and one over each tile's energy so scaled.
+    pub(crate) fn importance_scale(&self) -> (f32, &[f32]) {
+        (self.importance_scale, &self.inverse_energies)
     }
 
     /// What the pixels and the table take.
     pub fn memory_bytes(&self) -> EnvironmentMemory {
-        let rows = size_of_val(&self.row_edge_cosines[..])
-            + size_of_val(&self.inverse_texel_solid_angles[..])
+        let rows = self.patches.memory_bytes()
+            + size_of_val(&self.inverse_energies[..])
             + size_of_val(&self.tile_energies[..]);
         EnvironmentMemory {
             pixels: size_of_val(&self.map.pixels[..]),
@@ -265,14 +314,28 @@ impl Environment {
         }
     }
 
-    fn tile_pdf_at(&self, point: MapPoint) -> (u32, f32) {
-        let tile = self.grid.tile_of_texel(point.column, point.row);
-        let probability = self.table.sample_probability(&self.grid, tile, point.column, point.row);
-        (tile, self.texel_pdf_solid_angle(probability, point.row))
+    /// Density of [`Self::sample_in_tile`], given the tile, where a patch with these corners shows this
+    /// radiance. Only a summed-area table asks which patch it is.
+    fn density(&self, tile: u32, (x, y): (u32, u32), corners: &Corners, radiance: Vec3) -> f32 {
+        let here = self.importance(radiance);
+        match &*self.table {
+            Table::TileLocal(_) => here * self.inverse_energies[tile as usize],
+            Table::SummedArea(_) => {
+                let energy = self.patch_energy(corners.map(|c| self.importance(c)), y);
+                let probability = self.table.sample_probability(&self.grid, tile, x, y) as f32;
+                if energy > 0.0 { probability * (here / energy) } else { 0.0 }
+            }
+        }
     }
 
-    fn texel_pdf_solid_angle(&self, probability: f64, row: u32) -> f32 {
-        probability as f32 * self.inverse_texel_solid_angles[row as usize]
+    /// Scaled energy of a patch of row `y` with corners of these importances.
+    fn patch_energy(&self, corners: [f32; 4], y: u32) -> f32 {
+        0.25 * corners.iter().sum::<f32>() * self.patches.rows()[y as usize].solid_angle
+    }
+
+    /// Scaled importance of radiance at intensity 1.
+    fn importance(&self, radiance: Vec3) -> f32 {
+        importance(radiance * self.importance_scale)
     }
 
     /// Whether both are one map with one table, turned or scaled differently.
@@ -285,63 +348,57 @@ impl Environment {
         let uv = uv_from_direction(direction);
         let turned = uv.x - self.rotation_turns;
         let u = if turned < 0.0 { turned + 1.0 } else { turned };
-        let (x, y) = (u * self.map.width as f32, uv.y * self.map.height as f32);
+        let (width, shift) = (self.map.width, self.patches.shift());
+        let x = u * width as f32 + shift;
+        let left = x.floor();
+        let rows = self.patches.rows().len() as u32;
+        let row = ((uv.y * self.map.height as f32 + shift) as u32).min(rows - 1);
+        let squared_sine = direction.x * direction.x + direction.z * direction.z;
         MapPoint {
-            x,
-            y,
-            column: (x as u32).min(self.map.width - 1),
-            row: (y as u32).min(self.map.height - 1),
+            // The last half texel before the seam belongs to the patch across it.
+            column: if left as u32 >= width { 0 } else { left as u32 },
+            row,
+            across: x - left,
+            down: self.patches.down(row, squared_sine, direction.y),
         }
     }
 
-    fn radiance_at(&self, point: MapPoint) -> Vec3 {
-        let radiance = match self.lookup {
-            Lookup::Nearest => Vec3::from(self.map.at(point.column, point.row)),
-            Lookup::Bilinear => self.interpolated(point),
-        };
+    /// Wrapped in u, clamped in v.
+    fn corners(&self, column: u32, row: u32) -> Corners {
+        let at = |x, y| Vec3::from(self.map.at(x, y));
+        match self.lookup {
+            Lookup::Nearest => [at(column, row); 4],
+            Lookup::Bilinear => {
+                let left = if column == 0 { self.map.width - 1 } else { column - 1 };
+                let (above, below) = (row.saturating_sub(1), row.min(self.map.height - 1));
+                [at(left, above), at(column, above), at(left, below), at(column, below)]
+            }
+        }
+    }
+
+    fn scaled(&self, radiance: Vec3) -> Vec3 {
         (radiance * self.intensity).min(Vec3::MAX)
     }
-
-    /// Bilinear between texel centres, wrapped in u, clamped in v.
-    fn interpolated(&self, point: MapPoint) -> Vec3 {
-        let (width, height) = (self.map.width, self.map.height);
-        let (x, y) = (point.x - 0.5, (point.y - 0.5).clamp(0.0, (height - 1) as f32));
-        let left = x.floor();
-        let (across, down) = (x - left, y - y.floor());
-        let left = if left < 0.0 { width - 1 } else { (left as u32).min(width - 1) };
-        let right = if left + 1 < width { left + 1 } else { 0 };
-        let top = y as u32;
-        let bottom = (top + 1).min(height - 1);
-        let at = |x, y| Vec3::from(self.map.at(x, y));
-        let upper = at(left, top).lerp(at(right, top), across);
-        let lower = at(left, bottom).lerp(at(right, bottom), across);
-        upper.lerp(lower, down)
-    }
 }
 
-/// How far samples keep from texel edges, in turns about the map's axis: 1.5e-6 radian, several
-/// times the rounding of an f32 direction and its way back to the map, and under a hundredth of a
-/// texel at a width of 16384.
-pub const EDGE_MARGIN_TURNS: f64 = 1.0 / (1 << 22) as f64;
+fn interpolated([a, b, c, d]: &Corners, across: f32, down: f32) -> Vec3 {
+    let upper = *a + across * (*b - *a);
+    let lower = *c + across * (*d - *c);
+    upper + down * (lower - upper)
+}
 
-/// Gives f32 random numbers the bits that choosing among 2^32 takes.
-///
-/// A uniform f32 has 24 good bits: entries of less than 2^-24 of a table would be met by chance of
-/// rounding only. So each number gets 24 more, hashed from both, below its last bit: order, hence
-/// stratification, stays.
-pub(crate) fn refine(u: Vec2) -> DVec2 {
-    const STEPS: f32 = (1 << 24) as f32;
-    let (x, y) = (lattice(u.x * STEPS), lattice(u.y * STEPS));
+/// A power of two that brings the largest component of a map's pixels to about 1.
+fn importance_scale(largest: f32) -> f32 {
+    let exponent = (largest.max(f32::MIN_POSITIVE).to_bits() >> 23) as i32 - 127;
+    2.0_f32.powi(-exponent.clamp(-126, 126))
+}
+
+/// Gives 32-bit fractions the bits that choosing among 2^32, and a place in what was chosen, take:
+/// 32 more, hashed from both, below the last one. Order, hence stratification, stays.
+pub(crate) fn refine([x, y]: [u32; 2]) -> [u64; 2] {
     let fine_x = hash(hash(x) ^ y);
     let fine_y = hash(fine_x ^ x);
-    let refined = |coarse: u32, fine: u32| {
-        ((u64::from(coarse) << 24) | u64::from(fine >> 8)) as f64 / (1_u64 << 48) as f64
-    };
-    DVec2::new(refined(x, fine_x), refined(y, fine_y))
-}
-
-fn lattice(steps: f32) -> u32 {
-    (steps as u32).min((1 << 24) - 1)
+    [(x, fine_x), (y, fine_y)].map(|(coarse, fine)| u64::from(coarse) << 32 | u64::from(fine))
 }
 
 fn check_size(map: &Image) -> Result<()> {
@@ -360,46 +417,56 @@ fn check_size(map: &Image) -> Result<()> {
 /// What one pass over the pixels tells.
 struct Statistics {
     mean: Vec3,
+    largest: f32,
     black: bool,
     constant: bool,
+}
+
+/// The same of one row.
+struct RowStatistics {
+    sum: glam::DVec3,
+    largest: f32,
+    constant: bool,
+    valid: bool,
 }
 
 impl Statistics {
     fn of(map: &Image, lookup: Lookup) -> Result<Self> {
         let first = map.pixels[0];
-        let solid_angle = |row: u32| texel_solid_angle(map.width, map.height, row);
+        let solid_angle = |row| patches::solid_angle(map.width, map.height, lookup, row);
+        // Each row of patches lends half of itself to the row of texels above and below it.
         let row_weight = |y: u32| match lookup {
             Lookup::Nearest => solid_angle(y),
-            // The rows that interpolate this one, see `Weights::row`.
             Lookup::Bilinear => {
-                let (above, below) = (y.saturating_sub(1), (y + 1).min(map.height - 1));
-                (solid_angle(above) + 6.0 * solid_angle(y) + solid_angle(below)) / 8.0
+                let pole = |is_pole: bool, row| if is_pole { 1.0 } else { 0.5 } * solid_angle(row);
+                pole(y == 0, y) + pole(y + 1 == map.height, y + 1)
             }
         };
-        let (sum, constant, valid) = map
+        let rows: Vec<RowStatistics> = map
             .pixels
             .par_chunks_exact(map.width as usize)
             .zip(0..map.height)
             .map(|(row, y)| {
-                let mut sum = glam::DVec3::ZERO;
-                let (mut constant, mut valid) = (true, true);
-                for pixel in row {
-                    sum += Vec3::from(*pixel).as_dvec3();
-                    constant &= *pixel == first;
-                    valid &= pixel.iter().all(|value| (0.0..=f32::MAX).contains(value));
+                let sum: glam::DVec3 = row.iter().map(|p| Vec3::from(*p).as_dvec3()).sum();
+                let values = row.as_flattened();
+                RowStatistics {
+                    sum: sum * row_weight(y),
+                    largest: values.iter().copied().fold(0.0, f32::max),
+                    constant: row.iter().all(|pixel| *pixel == first),
+                    valid: values.iter().all(|value| (0.0..=f32::MAX).contains(value)),
                 }
-                (sum * row_weight(y), constant, valid)
             })
-            .collect::<Vec<_>>()
-            .into_iter()
-            .fold((glam::DVec3::ZERO, true, true), |a, b| (a.0 + b.0, a.1 && b.1, a.2 && b.2));
-        if !valid {
+            .collect();
+        if !rows.iter().all(|row| row.valid) {
             return Err(Error::new(
                 "the environment map has radiance that is negative or not finite",
             ));
         }
+        let sum: glam::DVec3 = rows.iter().map(|row| row.sum).sum();
+        let constant = rows.iter().all(|row| row.constant);
         let mean = if constant { Vec3::from(first) } else { (sum / (2.0 * TAU)).as_vec3() };
+        let largest = rows.iter().map(|row| row.largest).fold(0.0, f32::max);
         // Decided in f64: the mean of one dim texel may be nothing in f32.
-        Ok(Self { mean, black: sum.max_element() <= 0.0, constant })
+        Ok(Self { mean, largest, black: sum.max_element() <= 0.0, constant })
     }
 }

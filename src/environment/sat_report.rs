@@ -9,14 +9,13 @@ use std::fmt;
 use std::hint::black_box;
 use std::time::Instant;
 
-use glam::DVec2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::summed_area::RectangleTable;
 use super::table::Table;
 use super::tile_local::TileLocal;
-use super::tiles::{TileGrid, TileTexels};
+use super::tiles::{TileGrid, TilePatches};
 use super::weights::Weights;
 use super::{EnvironmentOptions, Lookup, TableKind, check_size};
 use crate::error::Result;
@@ -31,7 +30,7 @@ pub struct SatReport {
     pub height: u32,
     /// The look-up that the weights are for.
     pub lookup: Lookup,
-    /// Share of the texels that have weight.
+    /// Share of the patches that have weight.
     pub lit_share: f64,
     /// One row per kind, in the order of [`TableKind::ALL`].
     pub rows: Vec<SatReportRow>,
@@ -42,21 +41,21 @@ pub struct SatReport {
 pub struct SatReportRow {
     /// The table.
     pub table: TableKind,
-    /// Mean over the texels of the squared difference of the sampled and the true probability,
-    /// each times the number of texels.
+    /// Mean over the patches of the squared difference of the sampled and the true probability,
+    /// each times the number of patches.
     pub mean_squared_error: f64,
-    /// Share of the texels with weight that are never sampled.
+    /// Share of the patches with weight that are never sampled.
     pub missed_share: f64,
-    /// Share of all energy in texels that are never sampled.
+    /// Share of all energy in patches that are never sampled.
     pub missed_energy_share: f64,
-    /// Share of the steps from texel to texel in which the sums along a row fall.
+    /// Share of the steps from patch to patch in which the sums along a row fall.
     pub falling_share: f64,
     /// Total variation between the sampled and the reported probabilities, in `[0,1]`: 0 if
     /// densities are exact, else an estimator that divides by them is biased.
     pub misreported_share: f64,
     /// Seconds to build the table.
     pub build_seconds: f64,
-    /// Nanoseconds to choose a texel of a tile (tiles drawn by energy).
+    /// Nanoseconds to choose a patch of a tile (tiles drawn by energy).
     pub sample_nanoseconds: f64,
     /// Bytes of the table.
     pub table_bytes: u64,
@@ -71,14 +70,16 @@ pub struct SatReportRow {
 pub fn sat_report(map: &Image, lookup: Lookup, timed_samples: u32) -> Result<SatReport> {
     check_size(map)?;
     let options = EnvironmentOptions::default();
-    let grid = TileGrid::new(map.width, map.height, options.tile_columns, options.tile_rows);
     let weights = Weights::new(map, lookup);
+    let (columns, rows) = weights.size();
+    let grid = TileGrid::new(columns, rows, options.tile_columns, options.tile_rows);
+    let patches = f64::from(columns) * f64::from(rows);
     let (mut total, mut lit) = (0.0, 0_u64);
     weights.for_each_row(|row| {
         total += row.iter().sum::<f64>();
         lit += row.iter().filter(|weight| **weight > 0.0).count() as u64;
     });
-    let rows = TableKind::ALL.map(|kind| {
+    let table_rows = TableKind::ALL.map(|kind| {
         let start = Instant::now();
         let (table, energies) = Table::build(kind, &weights, &grid);
         let build_seconds = start.elapsed().as_secs_f64();
@@ -86,10 +87,10 @@ pub fn sat_report(map: &Image, lookup: Lookup, timed_samples: u32) -> Result<Sat
         let deviation = Deviation::of(&law, &weights, total);
         SatReportRow {
             table: kind,
-            mean_squared_error: deviation.squares * map.pixels.len() as f64,
+            mean_squared_error: deviation.squares * patches,
             missed_share: deviation.missed as f64 / lit.max(1) as f64,
             missed_energy_share: deviation.missed_energy,
-            falling_share: deviation.falling as f64 / map.pixels.len() as f64,
+            falling_share: deviation.falling as f64 / patches,
             misreported_share: deviation.misreported / 2.0,
             build_seconds,
             sample_nanoseconds: time_samples(&table, &grid, &energies, timed_samples),
@@ -100,12 +101,12 @@ pub fn sat_report(map: &Image, lookup: Lookup, timed_samples: u32) -> Result<Sat
         width: map.width,
         height: map.height,
         lookup,
-        lit_share: lit as f64 / map.pixels.len() as f64,
-        rows: rows.to_vec(),
+        lit_share: lit as f64 / patches,
+        rows: table_rows.to_vec(),
     })
 }
 
-/// How far a table is from the truth: sums over texels.
+/// How far a table is from the truth: sums over patches.
 #[derive(Default)]
 struct Deviation {
     squares: f64,
@@ -157,7 +158,7 @@ impl Deviation {
 /// How a table samples the whole map, row by row.
 enum Law<'a> {
     TileLocal { table: &'a TileLocal, grid: &'a TileGrid, tile_probabilities: Vec<f64> },
-    SummedArea { table: &'a dyn RectangleTable, whole: TileTexels, row_probabilities: Vec<f64> },
+    SummedArea { table: &'a dyn RectangleTable, whole: TilePatches, row_probabilities: Vec<f64> },
 }
 
 impl<'a> Law<'a> {
@@ -177,7 +178,7 @@ impl<'a> Law<'a> {
         }
     }
 
-    /// Probabilities with which the texels of row `y` are sampled.
+    /// Probabilities with which the patches of row `y` are sampled.
     fn sampled(&self, y: u32) -> Vec<f64> {
         match self {
             // Exact sums: each entry is met as often as reported.
@@ -189,12 +190,12 @@ impl<'a> Law<'a> {
         }
     }
 
-    /// Probabilities that the table reports for the texels of row `y`; negative where sums fall.
+    /// Probabilities that the table reports for the patches of row `y`; negative where sums fall.
     fn reported(&self, y: u32) -> Vec<f64> {
         match self {
             Self::TileLocal { table, grid, tile_probabilities } => (grid.whole().x)
                 .map(|x| {
-                    let tile = grid.tile_of_texel(x, y);
+                    let tile = grid.tile_of_patch(x, y);
                     tile_probabilities[tile as usize] * table.sample_probability(grid, tile, x, y)
                 })
                 .collect(),
@@ -222,10 +223,12 @@ fn time_samples(table: &Table, grid: &TileGrid, energies: &[f64], samples: u32) 
     if tiles.is_empty() || samples == 0 {
         return 0.0;
     }
-    let (step, mut u) = (DVec2::new(0.754_877_666_246_693, 0.569_840_290_998_053), DVec2::ZERO);
+    let steps =
+        [0.754_877_666_246_693, 0.569_840_290_998_053].map(|s| (s * 2.0_f64.powi(64)) as u64);
+    let mut u = [0_u64; 2];
     let start = Instant::now();
     for sample in 0..samples {
-        u = (u + step).fract();
+        u = [u[0].wrapping_add(steps[0]), u[1].wrapping_add(steps[1])];
         // A stride without a common factor with the power of two visits the tiles out of order.
         let tile = tiles[(sample as usize * 1597) % tiles.len()];
         black_box(table.sample(grid, tile, u));
@@ -237,7 +240,7 @@ impl fmt::Display for SatReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{} x {}, {} look-up, {:.1} % of the texels lit",
+            "{} x {}, {} look-up, {:.1} % of the patches lit",
             self.width,
             self.height,
             self.lookup,

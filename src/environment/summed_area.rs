@@ -1,9 +1,9 @@
 //! Summed-area tables over the whole map: the talk's u32 form and the f32 and f64 ones it is
-//! measured against. Any rectangle of texels can be sampled by two binary searches.
+//! measured against. Any rectangle of patches can be sampled by two binary searches.
 //!
 //! They are kept for comparison. The u32 form is an f64 table rounded corner by corner, as in the
 //! talk (Atanasov et al., SIGGRAPH 2018 Talks): the error of every corner is the same half unit,
-//! but a texel is the difference of four corners, so a dim texel can get no mass (it is then never
+//! but a patch is the difference of four corners, so a dim patch can get no mass (it is then never
 //! sampled) or a negative one. The searched sums then fall here and there, and the choice follows
 //! the reported probability only nearly. Negative masses count as zero; nothing panics or loops.
 
@@ -12,8 +12,8 @@ use std::ops::Range;
 use glam::DVec2;
 
 use super::TableKind;
-use super::table::TexelSample;
-use super::tiles::TileTexels;
+use super::table::PatchSample;
+use super::tiles::TilePatches;
 use super::weights::Weights;
 
 /// A corner's storage type; all three convert to f64 exactly.
@@ -52,7 +52,7 @@ impl Corner for f64 {
     }
 }
 
-/// Sums of all texels left of and above each texel corner, `(width + 1) * (height + 1)` of them.
+/// Sums of all patches left of and above each patch corner, `(width + 1) * (height + 1)` of them.
 #[derive(Debug, Clone)]
 pub(crate) struct SummedArea<T> {
     stride: usize,
@@ -124,24 +124,24 @@ impl<T: Corner> SummedArea<T> {
     }
 }
 
-/// A table from which any rectangle of texels can be sampled.
+/// A table from which any rectangle of patches can be sampled.
 pub(crate) trait RectangleTable: std::fmt::Debug + Send + Sync {
     /// Energy of a rectangle, importance x steradian, never negative.
-    fn energy(&self, texels: &TileTexels) -> f64;
+    fn energy(&self, patches: &TilePatches) -> f64;
 
-    /// Chooses a texel of the rectangle: a row by `u.y`, then a column by `u.x`, both in `[0,1)`.
+    /// Chooses a patch of the rectangle: a row by `u.y`, then a column by `u.x`, both in `[0,1)`.
     /// `None` if the table has no mass where the search ends.
-    fn sample(&self, texels: &TileTexels, u: DVec2) -> Option<TexelSample>;
+    fn sample(&self, patches: &TilePatches, u: DVec2) -> Option<PatchSample>;
 
-    /// Probability of [`Self::sample`] to choose this texel of the rectangle, exact as far as the
+    /// Probability of [`Self::sample`] to choose this patch of the rectangle, exact as far as the
     /// table's sums never fall.
-    fn sample_probability(&self, texels: &TileTexels, x: u32, y: u32) -> f64;
+    fn sample_probability(&self, patches: &TilePatches, x: u32, y: u32) -> f64;
 
     /// With what probability [`Self::sample`] really ends in each row of the rectangle.
-    fn row_law(&self, texels: &TileTexels) -> Vec<f64>;
+    fn row_law(&self, patches: &TilePatches) -> Vec<f64>;
 
     /// With what probability [`Self::sample`], once in row `y`, really ends in each column.
-    fn column_law(&self, texels: &TileTexels, y: u32) -> Vec<f64>;
+    fn column_law(&self, patches: &TilePatches, y: u32) -> Vec<f64>;
 
     /// Mass of a rectangle, as the table has it: may be negative through rounding.
     fn mass(&self, x: &Range<u32>, y: &Range<u32>) -> f64;
@@ -157,37 +157,37 @@ pub(crate) trait RectangleTable: std::fmt::Debug + Send + Sync {
 }
 
 impl<T: Corner> RectangleTable for SummedArea<T> {
-    fn energy(&self, texels: &TileTexels) -> f64 {
-        (self.mass(&texels.x, &texels.y) * self.unit).max(0.0)
+    fn energy(&self, patches: &TilePatches) -> f64 {
+        (self.mass(&patches.x, &patches.y) * self.unit).max(0.0)
     }
 
-    fn sample(&self, texels: &TileTexels, u: DVec2) -> Option<TexelSample> {
-        let row = search(&texels.y, u.y, |end| self.mass(&texels.x, &(texels.y.start..end)))?;
+    fn sample(&self, patches: &TilePatches, u: DVec2) -> Option<PatchSample> {
+        let row = search(&patches.y, u.y, |end| self.mass(&patches.x, &(patches.y.start..end)))?;
         let in_row = row.index..row.index + 1;
-        let column = search(&texels.x, u.x, |end| self.mass(&(texels.x.start..end), &in_row))?;
-        let probability = self.sample_probability(texels, column.index, row.index);
-        (probability > 0.0).then_some(TexelSample {
+        let column = search(&patches.x, u.x, |end| self.mass(&(patches.x.start..end), &in_row))?;
+        let probability = self.sample_probability(patches, column.index, row.index);
+        (probability > 0.0).then_some(PatchSample {
             x: column.index,
             y: row.index,
-            within: DVec2::new(column.fraction, row.fraction),
-            probability,
+            within: DVec2::new(column.fraction, row.fraction).as_vec2(),
+            probability: probability as f32,
         })
     }
 
-    fn sample_probability(&self, texels: &TileTexels, x: u32, y: u32) -> f64 {
-        let total = self.mass(&texels.x, &texels.y);
+    fn sample_probability(&self, patches: &TilePatches, x: u32, y: u32) -> f64 {
+        let total = self.mass(&patches.x, &patches.y);
         let mass = self.mass(&(x..x + 1), &(y..y + 1));
         if total > 0.0 && mass > 0.0 { mass / total } else { 0.0 }
     }
 
-    fn row_law(&self, texels: &TileTexels) -> Vec<f64> {
-        let sum = |y| self.mass(&texels.x, &(texels.y.start..y + 1));
-        search_law(&texels.y.clone().map(sum).collect::<Vec<_>>())
+    fn row_law(&self, patches: &TilePatches) -> Vec<f64> {
+        let sum = |y| self.mass(&patches.x, &(patches.y.start..y + 1));
+        search_law(&patches.y.clone().map(sum).collect::<Vec<_>>())
     }
 
-    fn column_law(&self, texels: &TileTexels, y: u32) -> Vec<f64> {
-        let sum = |x| self.mass(&(texels.x.start..x + 1), &(y..y + 1));
-        search_law(&texels.x.clone().map(sum).collect::<Vec<_>>())
+    fn column_law(&self, patches: &TilePatches, y: u32) -> Vec<f64> {
+        let sum = |x| self.mass(&(patches.x.start..x + 1), &(y..y + 1));
+        search_law(&patches.x.clone().map(sum).collect::<Vec<_>>())
     }
 
     fn mass(&self, x: &Range<u32>, y: &Range<u32>) -> f64 {
@@ -263,7 +263,7 @@ fn search_law(sums: &[f64]) -> Vec<f64> {
     law
 }
 
-/// Calls `f` with the f64 sums at the lower corners of each row of texels, top to bottom.
+/// Calls `f` with the f64 sums at the lower corners of each row of patches, top to bottom.
 fn for_each_corner_row(weights: &Weights<'_>, mut f: impl FnMut(&[f64])) {
     let mut corners = vec![0.0; weights.size().0 as usize + 1];
     weights.for_each_row(|row| {
@@ -309,13 +309,13 @@ mod tests {
     }
 
     #[test]
-    fn the_law_of_a_table_is_that_of_its_samples_where_texels_are_about_one_unit() {
+    fn the_law_of_a_table_is_that_of_its_samples_where_patches_are_about_one_unit() {
         let map = Image::from_fn(64, 32, |x, y| {
             let sky = 0.1 + ((x * 7919 + y * 104_729) % 97) as f32 / 97.0;
             if (x, y) == (20, 10) { [6e9; 3] } else { [sky; 3] }
         });
         let table = SummedArea::<u32>::build(&Weights::new(&map, Lookup::Nearest));
-        let sky = TileTexels { x: 10..40, y: 11..20 };
+        let sky = TilePatches { x: 10..40, y: 11..20 };
         let mut expected = Vec::new();
         for (row, y) in table.row_law(&sky).into_iter().zip(sky.y.clone()) {
             expected.extend(table.column_law(&sky, y).into_iter().map(|column| row * column));
@@ -327,8 +327,8 @@ mod tests {
         const SIDE: u32 = 1000;
         for i in 0..SIDE * SIDE {
             let u = DVec2::new(f64::from(i % SIDE) + 0.5, f64::from(i / SIDE) + 0.5);
-            if let Some(texel) = table.sample(&sky, u / f64::from(SIDE)) {
-                let index = (texel.y - sky.y.start) * sky.width() + texel.x - sky.x.start;
+            if let Some(patch) = table.sample(&sky, u / f64::from(SIDE)) {
+                let index = (patch.y - sky.y.start) * sky.width() + patch.x - sky.x.start;
                 observed[index as usize] += 1.0 / f64::from(SIDE * SIDE);
             }
         }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use glam::DVec2;
+use glam::{DVec2, Vec2};
 
 use super::TableKind;
 use super::summed_area::{RectangleTable, SummedArea};
@@ -11,17 +11,17 @@ use super::tile_local::TileLocal;
 use super::tiles::TileGrid;
 use super::weights::Weights;
 
-/// A texel chosen by a table.
+/// A patch chosen by a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct TexelSample {
-    /// Texel column.
+pub(crate) struct PatchSample {
+    /// Column.
     pub(crate) x: u32,
-    /// Texel row.
+    /// Row.
     pub(crate) y: u32,
-    /// Place in the texel that the random numbers have left, uniform in `[0,1]`^2.
-    pub(crate) within: DVec2,
-    /// Probability of the texel given the tile.
-    pub(crate) probability: f64,
+    /// What the random numbers have left, uniform in `[0,1]`^2.
+    pub(crate) within: Vec2,
+    /// Probability of the patch given the tile.
+    pub(crate) probability: f32,
 }
 
 /// An importance table of any kind.
@@ -47,23 +47,27 @@ impl Table {
             TableKind::F32 => Arc::new(SummedArea::<f32>::build(weights)),
             TableKind::F64 => Arc::new(SummedArea::<f64>::build(weights)),
         };
-        let energies = (0..grid.count()).map(|tile| table.energy(&grid.texels(tile))).collect();
+        let energies = (0..grid.count()).map(|tile| table.energy(&grid.patches(tile))).collect();
         (Self::SummedArea(table), energies)
     }
 
-    /// Chooses a texel of a tile with `u` in `[0,1)`^2; `None` where the table has no mass.
-    pub(crate) fn sample(&self, grid: &TileGrid, tile: u32, u: DVec2) -> Option<TexelSample> {
+    /// Chooses a patch of a tile by 64-bit fractions of one; `None` where the table has no mass.
+    pub(crate) fn sample(&self, grid: &TileGrid, tile: u32, u: [u64; 2]) -> Option<PatchSample> {
         match self {
             Self::TileLocal(table) => table.sample(grid, tile, u),
-            Self::SummedArea(table) => table.sample(&grid.texels(tile), u),
+            Self::SummedArea(table) => {
+                // As many bits as a GPU has for it.
+                let [x, y] = u.map(|u| (u >> 16) as f64 * (1.0 / (1_u64 << 48) as f64));
+                table.sample(&grid.patches(tile), DVec2::new(x, y))
+            }
         }
     }
 
-    /// Probability of [`Self::sample`] to choose texel `(x, y)` of the tile it lies in.
+    /// Probability of [`Self::sample`] to choose patch `(x, y)` of the tile it lies in.
     pub(crate) fn sample_probability(&self, grid: &TileGrid, tile: u32, x: u32, y: u32) -> f64 {
         match self {
             Self::TileLocal(table) => table.sample_probability(grid, tile, x, y),
-            Self::SummedArea(table) => table.sample_probability(&grid.texels(tile), x, y),
+            Self::SummedArea(table) => table.sample_probability(&grid.patches(tile), x, y),
         }
     }
 

@@ -1,24 +1,25 @@
 //! The default importance table: one exact integer table per tile.
 //!
-//! A tile's texels get integers that add up to just under 2^32, and their prefix sums are exact.
-//! So the sums never fall, no lit texel is lost, and the probability of a texel is a quotient of
-//! the very integers that are searched. It takes the same 4 bytes per texel as a 32-bit
+//! A tile's patches get integers that add up to just under 2^32, and their prefix sums are exact.
+//! So the sums never fall, no lit patch is lost, and the probability of a patch is a quotient of
+//! the very integers that are searched. It takes the same 4 bytes per patch as a 32-bit
 //! summed-area table, and a map with a sun beside dim sky is as safe as an even one, because the
 //! tiles do not share the 32 bits. The idea to quantise before adding up is our answer to the
 //! rounded summed-area table of the talk, see [`super::summed_area`].
 
-use glam::DVec2;
+use glam::Vec2;
 use rayon::prelude::*;
 
-use super::table::TexelSample;
-use super::tiles::{TileGrid, TileTexels};
+use super::table::PatchSample;
+use super::tiles::{TileGrid, TilePatches};
 use super::weights::Weights;
+use crate::prefetch::prefetch;
 
 /// Exact integer prefix sums, tile by tile.
 #[derive(Debug, Clone)]
 pub(crate) struct TileLocal {
-    /// Tile after tile (see [`TileGrid::first_texel`]), row after row in a tile: sums along the
-    /// row, this texel included. Wrapping cannot happen: a tile's total is below 2^32.
+    /// Tile after tile (see [`TileGrid::first_patch`]), row after row in a tile: sums along the
+    /// row, this patch included. Wrapping cannot happen: a tile's total is below 2^32.
     row_sums: Vec<u32>,
     /// Per tile: sums over whole rows, this row included; [`Self::first_row`] finds a tile's.
     tile_sums: Vec<u32>,
@@ -27,61 +28,63 @@ pub(crate) struct TileLocal {
 impl TileLocal {
     /// Builds the table and the tiles' energies (importance x steradian, f64).
     pub(crate) fn build(weights: &Weights<'_>, grid: &TileGrid) -> (Self, Vec<f64>) {
-        let tiles: Vec<TileTexels> = (0..grid.count()).map(|tile| grid.texels(tile)).collect();
-        let mut row_sums = vec![0; tiles.iter().map(TileTexels::len).sum()];
+        let tiles: Vec<TilePatches> = (0..grid.count()).map(|tile| grid.patches(tile)).collect();
+        let mut row_sums = vec![0; tiles.iter().map(TilePatches::len).sum()];
         let mut tile_sums = vec![0; tiles.iter().map(|t| t.height() as usize).sum()];
         let mut energies = vec![0.0; tiles.len()];
 
         let (mut row_rest, mut tile_rest) = (&mut row_sums[..], &mut tile_sums[..]);
         let mut jobs = Vec::with_capacity(tiles.len());
-        for (texels, energy) in tiles.into_iter().zip(&mut energies) {
-            let (row_part, rest) = row_rest.split_at_mut(texels.len());
+        for (patches, energy) in tiles.into_iter().zip(&mut energies) {
+            let (row_part, rest) = row_rest.split_at_mut(patches.len());
             row_rest = rest;
-            let (tile_part, rest) = tile_rest.split_at_mut(texels.height() as usize);
+            let (tile_part, rest) = tile_rest.split_at_mut(patches.height() as usize);
             tile_rest = rest;
-            jobs.push((texels, row_part, tile_part, energy));
+            jobs.push((patches, row_part, tile_part, energy));
         }
         jobs.into_par_iter().for_each_init(
             || (Vec::new(), Vec::new()),
-            |(tile_weights, scratch), (texels, row_sums, tile_sums, energy)| {
-                fill_weights(weights, &texels, tile_weights, scratch);
+            |(tile_weights, scratch), (patches, row_sums, tile_sums, energy)| {
+                fill_weights(weights, &patches, tile_weights, scratch);
                 *energy = tile_weights.iter().sum();
-                quantise(tile_weights, *energy, texels.width(), row_sums, tile_sums);
+                quantise(tile_weights, *energy, patches.width(), row_sums, tile_sums);
             },
         );
         (Self { row_sums, tile_sums }, energies)
     }
 
-    /// Chooses a texel of the tile: first a row by `u.y`, then a column by `u.x`, both in `[0,1)`.
-    /// Monotone in both. `None` if the tile is black.
-    pub(crate) fn sample(&self, grid: &TileGrid, tile: u32, u: DVec2) -> Option<TexelSample> {
-        let texels = grid.texels(tile);
-        let rows = self.rows_of(grid, &texels);
+    /// Chooses a patch of the tile: first a row by the second number, then a column by the first, both
+    /// 64-bit fractions of one. Monotone in both. `None` if the tile is black.
+    pub(crate) fn sample(&self, grid: &TileGrid, tile: u32, u: [u64; 2]) -> Option<PatchSample> {
+        let patches = grid.patches(tile);
+        let rows = self.rows_of(grid, &patches);
         let total = rows[rows.len() - 1];
         if total == 0 {
             return None;
         }
-        let row = choose(rows, u.y);
-        let columns = self.columns_of(grid, &texels, row.index);
-        let column = choose(columns, u.x);
-        Some(TexelSample {
-            x: texels.x.start + column.index as u32,
-            y: texels.y.start + row.index as u32,
-            within: DVec2::new(column.fraction, row.fraction),
-            probability: f64::from(column.mass) / f64::from(total),
+        let row = choose(rows, total, u[1]);
+        let columns = self.columns_of(grid, &patches, row.index);
+        // A row's total is known without reading its last sum.
+        columns.chunks(16).for_each(|line| prefetch(&line[0]));
+        let column = choose(columns, row.mass, u[0]);
+        Some(PatchSample {
+            x: patches.x.start + column.index as u32,
+            y: patches.y.start + row.index as u32,
+            within: Vec2::new(column.fraction, row.fraction),
+            probability: column.mass as f32 / total as f32,
         })
     }
 
-    /// Probability of [`Self::sample`] to choose this texel of the tile it lies in.
+    /// Probability of [`Self::sample`] to choose this patch of the tile it lies in.
     pub(crate) fn sample_probability(&self, grid: &TileGrid, tile: u32, x: u32, y: u32) -> f64 {
-        let texels = grid.texels(tile);
-        let rows = self.rows_of(grid, &texels);
+        let patches = grid.patches(tile);
+        let rows = self.rows_of(grid, &patches);
         let total = rows[rows.len() - 1];
         if total == 0 {
             return 0.0;
         }
-        let columns = self.columns_of(grid, &texels, (y - texels.y.start) as usize);
-        let column = (x - texels.x.start) as usize;
+        let columns = self.columns_of(grid, &patches, (y - patches.y.start) as usize);
+        let column = (x - patches.x.start) as usize;
         let before = if column == 0 { 0 } else { columns[column - 1] };
         f64::from(columns[column] - before) / f64::from(total)
     }
@@ -97,17 +100,17 @@ impl TileLocal {
     }
 
     /// Rows of tiles lie one after another, and each tile of one has as many rows as the others.
-    fn rows_of(&self, grid: &TileGrid, texels: &TileTexels) -> &[u32] {
+    fn rows_of(&self, grid: &TileGrid, patches: &TilePatches) -> &[u32] {
         let (columns, _) = grid.size();
-        let column = grid.tile_of_texel(texels.x.start, 0);
-        let first =
-            texels.y.start as usize * columns as usize + column as usize * texels.height() as usize;
-        &self.tile_sums[first..][..texels.height() as usize]
+        let column = grid.tile_of_patch(patches.x.start, 0);
+        let first = patches.y.start as usize * columns as usize
+            + column as usize * patches.height() as usize;
+        &self.tile_sums[first..][..patches.height() as usize]
     }
 
-    fn columns_of(&self, grid: &TileGrid, texels: &TileTexels, row: usize) -> &[u32] {
-        let width = texels.width() as usize;
-        &self.row_sums[grid.first_texel(texels) + row * width..][..width]
+    fn columns_of(&self, grid: &TileGrid, patches: &TilePatches, row: usize) -> &[u32] {
+        let width = patches.width() as usize;
+        &self.row_sums[grid.first_patch(patches) + row * width..][..width]
     }
 }
 
@@ -116,30 +119,30 @@ struct Choice {
     index: usize,
     mass: u32,
     /// How far into the entry, in `[0,1]`.
-    fraction: f64,
+    fraction: f32,
 }
 
-/// Finds the entry of inclusive prefix sums that holds `u` in `[0,1)` of the (positive) total.
-fn choose(sums: &[u32], u: f64) -> Choice {
-    // `u` is at most 1 - 2^-48, so the product stays below the total after rounding.
-    let target = u * f64::from(sums[sums.len() - 1]);
-    let whole = target as u32;
+/// Finds the entry of inclusive prefix sums that holds a 64-bit fraction of their (positive) total.
+fn choose(sums: &[u32], total: u32, u: u64) -> Choice {
+    let target = u128::from(u) * u128::from(total);
+    let (whole, part) = ((target >> 64) as u32, (target >> 32) as u32);
     let index = sums.partition_point(|&sum| sum <= whole);
     let before = if index == 0 { 0 } else { sums[index - 1] };
     let mass = sums[index] - before;
-    Choice { index, mass, fraction: (target - f64::from(before)) / f64::from(mass) }
+    let into = (whole - before) as f32 + part as f32 * (1.0 / 4_294_967_296.0);
+    Choice { index, mass, fraction: (into / mass as f32).min(1.0) }
 }
 
 fn fill_weights(
     weights: &Weights<'_>,
-    texels: &TileTexels,
+    patches: &TilePatches,
     out: &mut Vec<f64>,
     scratch: &mut Vec<f64>,
 ) {
     out.clear();
-    out.resize(texels.len(), 0.0);
-    for (row, y) in out.chunks_exact_mut(texels.width() as usize).zip(texels.y.clone()) {
-        weights.row(texels.x.start, y, row, scratch);
+    out.resize(patches.len(), 0.0);
+    for (row, y) in out.chunks_exact_mut(patches.width() as usize).zip(patches.y.clone()) {
+        weights.row(patches.x.start, y, row, scratch);
     }
 }
 
@@ -148,8 +151,8 @@ fn quantise(weights: &[f64], energy: f64, width: u32, row_sums: &mut [u32], tile
     if energy <= 0.0 {
         return; // Black: the sums are zero already.
     }
-    // Raising to 1 adds at most one per texel; a second one covers the rounding of `energy`, which
-    // is below 2^-53 per texel relative to a total below 2^32.
+    // Raising to 1 adds at most one per patch; a second one covers the rounding of `energy`, which
+    // is below 2^-53 per patch relative to a total below 2^32.
     let total_mass = f64::from(u32::MAX) - 2.0 * weights.len() as f64;
     let width = width as usize;
     let mut tile_sum = 0_u32;
@@ -172,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_integers_of_a_tile_never_overflow_and_never_lose_a_lit_texel() {
+    fn the_integers_of_a_tile_never_overflow_and_never_lose_a_lit_patch() {
         for weights in [vec![1.0; 4096], vec![1e-300, 1e300, 0.0, 1e-300], vec![5e-324; 9]] {
             let (mut rows, mut totals) = (vec![0; weights.len()], vec![0]);
             let energy = weights.iter().sum();
@@ -192,7 +195,7 @@ mod tests {
         let mut counts = [0; 5];
         let mut last = (0, 0.0);
         for i in 0..1000 {
-            let choice = choose(&sums, (f64::from(i) + 0.5) / 1000.0);
+            let choice = choose(&sums, 10, (u64::MAX / 1000) * i + u64::MAX / 2000);
             assert!((0.0..=1.0).contains(&choice.fraction));
             assert!((choice.index, choice.fraction) > last);
             last = (choice.index, choice.fraction);

@@ -1,27 +1,28 @@
-//! The map cut into equal-size tiles, fixed to the map: a texel's tile is found in constant time.
+//! The map cut into equal-size tiles, fixed to the map: a patch's tile is found in constant time.
 
 use std::ops::Range;
 
-/// A grid of tiles over a `width` x `height` map. Tile edges lie on texel edges: column `i` begins
-/// at texel `floor(i * width / columns)`, rows likewise, so tiles differ by one texel at most.
+/// A grid of tiles over a map of `width` x `height` patches (see [`super::patches`]). Tile edges lie on
+/// patch edges: column `i` begins at patch `floor(i * width / columns)`, rows likewise, so tiles differ
+/// by one patch at most.
 #[derive(Debug, Clone)]
 pub(crate) struct TileGrid {
     width: u32,
     column_edges: Vec<u32>,
     row_edges: Vec<u32>,
-    column_of_texel: Vec<u32>,
-    row_of_texel: Vec<u32>,
+    column_of_patch: Vec<u32>,
+    row_of_patch: Vec<u32>,
 }
 
 impl TileGrid {
-    /// Cuts the map; there are never more tiles than texels along an axis, and at least one.
+    /// Cuts the map; there are never more tiles than patches along an axis, and at least one.
     pub(crate) fn new(width: u32, height: u32, columns: u32, rows: u32) -> Self {
         let column_edges = edges(width, columns);
         let row_edges = edges(height, rows);
         Self {
             width,
-            column_of_texel: owners(&column_edges),
-            row_of_texel: owners(&row_edges),
+            column_of_patch: owners(&column_edges),
+            row_of_patch: owners(&row_edges),
             column_edges,
             row_edges,
         }
@@ -38,54 +39,54 @@ impl TileGrid {
         columns * rows
     }
 
-    /// The tile that holds texel `(x, y)`.
-    pub(crate) fn tile_of_texel(&self, x: u32, y: u32) -> u32 {
+    /// The tile that holds patch `(x, y)`.
+    pub(crate) fn tile_of_patch(&self, x: u32, y: u32) -> u32 {
         let columns = self.column_edges.len() as u32 - 1;
-        self.row_of_texel[y as usize] * columns + self.column_of_texel[x as usize]
+        self.row_of_patch[y as usize] * columns + self.column_of_patch[x as usize]
     }
 
-    /// Texel columns and rows of a tile.
-    pub(crate) fn texels(&self, tile: u32) -> TileTexels {
+    /// Columns and rows of patches of a tile.
+    pub(crate) fn patches(&self, tile: u32) -> TilePatches {
         let columns = self.column_edges.len() as u32 - 1;
         let (column, row) = ((tile % columns) as usize, (tile / columns) as usize);
-        TileTexels {
+        TilePatches {
             x: self.column_edges[column]..self.column_edges[column + 1],
             y: self.row_edges[row]..self.row_edges[row + 1],
         }
     }
 
-    /// All texels of the map.
-    pub(crate) fn whole(&self) -> TileTexels {
-        TileTexels { x: 0..self.width, y: 0..self.row_of_texel.len() as u32 }
+    /// All patches of the map.
+    pub(crate) fn whole(&self) -> TilePatches {
+        TilePatches { x: 0..self.width, y: 0..self.row_of_patch.len() as u32 }
     }
 
-    /// Where a tile's texels begin when tiles are stored one after another, row of tiles after row.
-    pub(crate) fn first_texel(&self, texels: &TileTexels) -> usize {
-        texels.y.start as usize * self.width as usize
-            + texels.x.start as usize * texels.height() as usize
+    /// Where a tile's patches begin when tiles are stored one after another, row of tiles after row.
+    pub(crate) fn first_patch(&self, patches: &TilePatches) -> usize {
+        patches.y.start as usize * self.width as usize
+            + patches.x.start as usize * patches.height() as usize
     }
 
     /// Bytes the grid's look-up arrays take.
     pub(crate) fn memory_bytes(&self) -> usize {
         let entries = self.column_edges.len()
             + self.row_edges.len()
-            + self.column_of_texel.len()
-            + self.row_of_texel.len();
+            + self.column_of_patch.len()
+            + self.row_of_patch.len();
         entries * size_of::<u32>()
     }
 }
 
-/// The texels of one tile, never empty.
+/// The patches of one tile, never empty.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct TileTexels {
-    /// Texel columns.
+pub(crate) struct TilePatches {
+    /// Columns.
     pub(crate) x: Range<u32>,
-    /// Texel rows.
+    /// Rows.
     pub(crate) y: Range<u32>,
 }
 
-impl TileTexels {
-    /// Texels per row.
+impl TilePatches {
+    /// Patches per row.
     pub(crate) fn width(&self) -> u32 {
         self.x.end - self.x.start
     }
@@ -95,18 +96,18 @@ impl TileTexels {
         self.y.end - self.y.start
     }
 
-    /// Number of texels.
+    /// Number of patches.
     pub(crate) fn len(&self) -> usize {
         self.width() as usize * self.height() as usize
     }
 }
 
-fn edges(texels: u32, tiles: u32) -> Vec<u32> {
-    let tiles = tiles.clamp(1, texels);
-    (0..=tiles).map(|i| (u64::from(i) * u64::from(texels) / u64::from(tiles)) as u32).collect()
+fn edges(patches: u32, tiles: u32) -> Vec<u32> {
+    let tiles = tiles.clamp(1, patches);
+    (0..=tiles).map(|i| (u64::from(i) * u64::from(patches) / u64::from(tiles)) as u32).collect()
 }
 
-/// Which interval each texel lies in.
+/// Which interval each patch lies in.
 fn owners(edges: &[u32]) -> Vec<u32> {
     edges
         .windows(2)
@@ -120,26 +121,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_texel_lies_in_its_own_tile_and_tiles_are_equal_to_a_texel() {
+    fn every_patch_lies_in_its_own_tile_and_tiles_are_equal_to_a_patch() {
         for (width, height, columns, rows) in
             [(1, 1, 32, 16), (2, 1, 32, 16), (3, 2, 32, 16), (100, 50, 32, 16), (65, 33, 7, 1)]
         {
             let grid = TileGrid::new(width, height, columns, rows);
             assert_eq!(grid.size(), (columns.min(width), rows.min(height)));
-            let mut texels = 0;
+            let mut patches = 0;
             for tile in 0..grid.count() {
-                let t = grid.texels(tile);
-                assert_eq!(grid.first_texel(&t), if tile == 0 { 0 } else { texels });
-                texels += t.len();
+                let t = grid.patches(tile);
+                assert_eq!(grid.first_patch(&t), if tile == 0 { 0 } else { patches });
+                patches += t.len();
                 assert!(t.width().abs_diff(width / grid.size().0) <= 1);
                 assert!(t.height().abs_diff(height / grid.size().1) <= 1);
                 for y in t.y.clone() {
                     for x in t.x.clone() {
-                        assert_eq!(grid.tile_of_texel(x, y), tile);
+                        assert_eq!(grid.tile_of_patch(x, y), tile);
                     }
                 }
             }
-            assert_eq!(texels, (width * height) as usize);
+            assert_eq!(patches, (width * height) as usize);
         }
     }
 }

@@ -1,15 +1,13 @@
-//! What a texel is worth to a sampler: the integral of importance over its solid angle, in f64.
+//! What a patch is worth to a sampler: the integral of importance over its solid angle, in f64.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::{Lookup, patches};
 use crate::color::importance;
 use crate::image::Image;
-use crate::math::texel_solid_angle;
 
-use super::Lookup;
-
-/// Computes texel weights row by row from the pixels, so that no full-size copy is needed.
+/// Computes weights of patches row by row from the pixels, so that no full-size copy is needed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Weights<'a> {
     map: &'a Image,
@@ -24,13 +22,12 @@ impl<'a> Weights<'a> {
         Self { map, lookup, coefficients }
     }
 
-    /// Weights of texels `first_x..first_x + out.len()` of row `y`: importance x steradian.
+    /// Weights of patches `first_x..first_x + out.len()` of row `y`: importance x steradian.
     ///
-    /// With bilinear look-up, radiance over a texel is a mean of three texels in each axis: the
-    /// interpolant's integral is the map filtered by `[1 6 1] / 8` in each axis (wrapped in u,
-    /// clamped in v), hence every texel near a lit one has some weight. `scratch` is overwritten.
+    /// With bilinear look-up a patch's integral is its solid angle times the mean of its corners, so
+    /// every patch that touches a lit texel's centre has some weight. `scratch` is overwritten.
     pub(crate) fn row(&self, first_x: u32, y: u32, out: &mut [f64], scratch: &mut Vec<f64>) {
-        let solid_angle = texel_solid_angle(self.map.width, self.map.height, y);
+        let solid_angle = patches::solid_angle(self.map.width, self.map.height, self.lookup, y);
         match self.lookup {
             Lookup::Nearest => {
                 let row = &self.pixel_row(y)[first_x as usize..];
@@ -39,9 +36,9 @@ impl<'a> Weights<'a> {
                 }
             }
             Lookup::Bilinear => {
-                self.filtered_columns(first_x, y, out.len(), scratch);
-                for (weight, near) in out.iter_mut().zip(scratch.windows(3)) {
-                    *weight = solid_angle / 64.0 * (near[0] + 6.0 * near[1] + near[2]);
+                self.columns(first_x, y, out.len(), scratch);
+                for (weight, sides) in out.iter_mut().zip(scratch.windows(2)) {
+                    *weight = solid_angle / 4.0 * (sides[0] + sides[1]);
                 }
             }
         }
@@ -51,10 +48,11 @@ impl<'a> Weights<'a> {
     /// parallel.
     pub(crate) fn for_each_row(&self, mut f: impl FnMut(&[f64])) {
         const BAND: u32 = 32;
-        let width = self.map.width as usize;
+        let (width, height) = self.size();
+        let width = width as usize;
         let mut band = vec![0.0; width * BAND as usize];
-        for first_row in (0..self.map.height).step_by(BAND as usize) {
-            let rows = BAND.min(self.map.height - first_row) as usize;
+        for first_row in (0..height).step_by(BAND as usize) {
+            let rows = BAND.min(height - first_row) as usize;
             band[..rows * width]
                 .par_chunks_mut(width)
                 .zip(first_row..first_row + rows as u32)
@@ -63,26 +61,21 @@ impl<'a> Weights<'a> {
         }
     }
 
-    /// Width and height of the map.
+    /// Columns and rows of patches.
     pub(crate) fn size(&self) -> (u32, u32) {
-        (self.map.width, self.map.height)
+        (self.map.width, patches::row_count(self.map.height, self.lookup))
     }
 
-    /// Importance filtered by `[1 6 1]` along v, for one column more on each side.
-    fn filtered_columns(&self, first_x: u32, y: u32, columns: usize, out: &mut Vec<f64>) {
+    /// Sum of importance above and below, for the left side of each patch and the right one of the
+    /// last.
+    fn columns(&self, first_x: u32, y: u32, columns: usize, out: &mut Vec<f64>) {
         let above = self.pixel_row(y.saturating_sub(1));
-        let here = self.pixel_row(y);
-        let below = self.pixel_row((y + 1).min(self.map.height - 1));
-        let at = |x: usize| {
-            self.importance(&above[x])
-                + 6.0 * self.importance(&here[x])
-                + self.importance(&below[x])
-        };
+        let below = self.pixel_row(y.min(self.map.height - 1));
+        let at = |x: usize| self.importance(&above[x]) + self.importance(&below[x]);
         let (first, width) = (first_x as usize, self.map.width as usize);
         out.clear();
         out.push(at((first + width - 1) % width));
         out.extend((first..first + columns).map(at));
-        out.push(at((first + columns) % width));
     }
 
     fn pixel_row(&self, y: u32) -> &'a [[f32; 3]] {
@@ -101,14 +94,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_lit_texel_lends_weight_to_its_neighbours_across_the_seam() {
+    fn a_lit_texel_lends_weight_to_the_patches_around_it_across_the_seam() {
         let map = Image::from_fn(8, 4, |x, y| if (x, y) == (0, 1) { [1.0; 3] } else { [0.0; 3] });
         let weights = Weights::new(&map, Lookup::Bilinear);
         let mut row = [0.0; 8];
-        for (y, across) in [(0, 1.0), (1, 6.0), (2, 1.0), (3, 0.0)] {
+        for (y, lit) in [(0, 0.0), (1, 1.0), (2, 1.0), (3, 0.0), (4, 0.0)] {
             weights.row(0, y, &mut row, &mut Vec::new());
-            let unit = texel_solid_angle(8, 4, y) / 64.0;
-            let expected = [6.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0].map(|c| c * across * unit);
+            let unit = patches::solid_angle(8, 4, Lookup::Bilinear, y) / 4.0;
+            let expected = [1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0].map(|c| c * lit * unit);
             for (weight, expected) in row.iter().zip(expected) {
                 assert!((weight - expected).abs() <= 1e-6 * expected, "{weight} {expected}");
             }
@@ -119,10 +112,11 @@ mod tests {
     fn the_weights_of_a_constant_map_are_its_solid_angles() {
         let map = Image::filled(5, 3, [2.0; 3]);
         for lookup in [Lookup::Bilinear, Lookup::Nearest] {
+            let weights = Weights::new(&map, lookup);
             let mut sum = 0.0;
-            for y in 0..3 {
+            for y in 0..weights.size().1 {
                 let mut row = [0.0; 3];
-                Weights::new(&map, lookup).row(2, y, &mut row, &mut Vec::new());
+                weights.row(2, y, &mut row, &mut Vec::new());
                 sum += row.iter().sum::<f64>() / 3.0 * 5.0;
             }
             assert!((sum / (8.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6);

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-use super::prefetch::prefetch;
+use crate::prefetch::prefetch;
 
 /// Fixed-point scale of one recorded weight: a weight of 1 adds this much.
 ///

@@ -10,10 +10,10 @@ pub mod cells;
 pub mod counters;
 mod law_builder;
 mod learning;
-mod prefetch;
 pub mod tile_laws;
 mod transfer;
 
+use crate::sampler::hash;
 use cells::SphericalGrid;
 use tile_laws::{TileChoice, TileLaws};
 
@@ -51,9 +51,10 @@ impl LightGrid {
         Some(Self { laws, cells: None, whole_map_share: 0 })
     }
 
-    /// Chooses a tile at a point of law `law` with two uniform 32-bit numbers, the second of which
-    /// lends its last 8 bits: a share of samples follows the whole map's law (defensive mixture,
-    /// Hesterberg 1995), which bounds the estimate where a law is wrong and finds what it missed.
+    /// Chooses a tile at a point of law `law` with the first of two uniform 32-bit numbers; the second
+    /// stays unused but for a hash of it, the bits below the first. A share of samples follows the
+    /// whole map's law (defensive mixture, Hesterberg 1995), which bounds the estimate where a law is
+    /// wrong and finds what it missed.
     pub fn sample(&self, law: u32, bits: [u32; 2]) -> TileChoice {
         self.sample_sharing(law, bits, self.whole_map_share)
     }
@@ -62,14 +63,15 @@ impl LightGrid {
     pub fn sample_sharing(
         &self,
         law: u32,
-        [tile_bits, share_bits]: [u32; 2],
+        [bits, other_bits]: [u32; 2],
         whole_map_share: u32,
     ) -> TileChoice {
-        let by_whole_map = (share_bits & 0xff) < whole_map_share;
-        let choice = self.laws.sample(if by_whole_map { WHOLE_MAP } else { law }, tile_bits);
+        let finer = hash(bits ^ hash(other_bits));
         if law == WHOLE_MAP || whole_map_share == 0 {
-            return choice;
+            return self.laws.sample(law, bits, finer);
         }
+        let (by_whole_map, bits) = split(bits, finer, whole_map_share);
+        let choice = self.laws.sample(if by_whole_map { WHOLE_MAP } else { law }, bits, finer);
         let other = self.laws.probability(if by_whole_map { law } else { WHOLE_MAP }, choice.tile);
         let probability = if by_whole_map {
             mixed(choice.probability, other, whole_map_share)
@@ -125,19 +127,30 @@ impl LightGrid {
         let mut law_of_cell = vec![WHOLE_MAP as u16; grid.cell_count() as usize];
         for law in 1..=64_u32 {
             let weights: Vec<f64> = (0..energies.len() as u32)
-                .map(|tile| crate::sampler::hash(seed ^ crate::sampler::hash(law << 16 | tile)))
+                .map(|tile| hash(seed ^ hash(law << 16 | tile)))
                 .map(|h| if h & 1 == 0 { 0.0 } else { f64::from(h >> 8) })
                 .collect();
             result.laws.push(&weights);
         }
         for (cell, law) in law_of_cell.iter_mut().enumerate() {
-            *law =
-                (crate::sampler::hash(seed.wrapping_add(cell as u32)) % result.laws.len()) as u16;
+            *law = (hash(seed.wrapping_add(cell as u32)) % result.laws.len()) as u16;
         }
         result.cells = Some(Cells { grid, law_of_cell });
         result.whole_map_share = 32;
         Some(result)
     }
+}
+
+/// Splits a uniform number at a share in 256ths: whether it lies below, and where in its part it lies,
+/// as a uniform number. Both parts keep the order, hence the stratification; `finer` is its bits below.
+fn split(bits: u32, finer: u32, share: u32) -> (bool, u32) {
+    let edge = u64::from(share) << 24;
+    let is_below = u64::from(bits) < edge;
+    let (rest, width) =
+        if is_below { (bits, share) } else { ((u64::from(bits) - edge) as u32, 256 - share) };
+    // (256 rest + finer) / width, in 32 bits as a GPU has them.
+    let (whole, left) = (rest / width, rest % width);
+    (is_below, (whole << 8) + ((left << 8) | finer & 0xff) / width)
 }
 
 /// A probability of the whole map's law and one of a learned law, mixed.
@@ -150,7 +163,6 @@ fn mixed(whole_map: f32, learned: f32, share: u32) -> f32 {
 mod tests {
     use super::*;
     use crate::metrics::statistics::chi_square_test;
-    use crate::sampler::hash;
 
     const GRID: SphericalGrid =
         SphericalGrid { center: glam::Vec3::ZERO, columns: 4, rows: 2, faces: true, medium: false };
@@ -166,7 +178,6 @@ mod tests {
             for i in 0..COUNT {
                 let choice = grid.sample(law, [hash(i), hash(!i)]);
                 assert_eq!(choice.probability, grid.probability(law, choice.tile));
-                assert!((0.0..1.0).contains(&choice.remainder));
                 found[choice.tile as usize] += 1.0;
             }
             let expected: Vec<f64> = (0..energies.len() as u32)
@@ -176,6 +187,28 @@ mod tests {
             let test = chi_square_test(&found, &expected, 1e-3).expect("enough samples");
             assert!(test.passed, "law {law}: {test:?}");
         }
+    }
+
+    #[test]
+    fn both_parts_of_a_split_are_uniform_and_in_order() {
+        for share in [1, 32, 128, 200, 255, 256] {
+            for (start, end, is_below) in [(0, share, true), (share, 256, false)] {
+                let (mut last, count) = (0, 1_u64 << 12);
+                for i in 0..count * u64::from(start < end) {
+                    let bits = ((u64::from(start) << 24)
+                        + i * (u64::from(end - start) << 24) / count)
+                        as u32;
+                    let (found, part) = split(bits, hash(i as u32), share);
+                    assert_eq!(found, is_below);
+                    assert!(part >= last, "order is kept");
+                    let expected = i as f64 / count as f64;
+                    assert!((f64::from(part) / 4_294_967_296.0 - expected).abs() < 1e-6);
+                    last = part;
+                }
+            }
+        }
+        assert_eq!(split(u32::MAX, u32::MAX, 32), (false, u32::MAX));
+        assert_eq!(split((32 << 24) - 1, u32::MAX, 32), (true, u32::MAX));
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Probability laws over tiles, sparse and exact.
 
+use crate::sampler::unit_from_bits;
+
 /// The chosen tile, its probability, and what is left of the random number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TileChoice {
@@ -7,8 +9,9 @@ pub struct TileChoice {
     pub tile: u32,
     /// Probability of having chosen it, the very ratio of integers that was sampled.
     pub probability: f32,
-    /// Where in the tile's share the random number fell, in `[0,1)`: a fresh uniform number.
-    pub remainder: f32,
+    /// Where in the tile's share the random number fell: a fresh uniform number, as a 32-bit fraction
+    /// of one.
+    pub remainder: u32,
 }
 
 /// Many discrete laws over the same tiles, in flat arrays (law 0 is the whole map's).
@@ -165,19 +168,21 @@ impl TileLaws {
         first
     }
 
-    /// Chooses a tile of law `law` with a uniform 32-bit number.
-    pub fn sample(&self, law: u32, bits: u32) -> TileChoice {
+    /// Chooses a tile of law `law` with a uniform 32-bit number. `finer` is the bits below it, without
+    /// which there would be no remainder of a tile that has few units of `2^-32`.
+    pub fn sample(&self, law: u32, bits: u32, finer: u32) -> TileChoice {
         let (start, end) = self.range(law);
         let last = &self.last[start..end];
         let entry = last.partition_point(|&l| l < bits);
         let low = if entry == 0 { 0 } else { last[entry - 1] + 1 };
         let count = (last[entry] - low) as f32 + 1.0;
+        let place = (bits - low) as f32 + unit_from_bits(finer);
         // Rounding may carry the quotient to 1, which belongs to the next tile.
-        let remainder = ((bits - low) as f32 / count).min(1.0 - f32::EPSILON / 2.0);
+        let remainder = (place / count).min(1.0 - f32::EPSILON / 2.0);
         TileChoice {
             tile: u32::from(self.tiles[start + entry]),
             probability: count * (1.0 / 4_294_967_296.0),
-            remainder,
+            remainder: ((remainder * 16_777_216.0) as u32) << 8 | finer & 0xff,
         }
     }
 
@@ -236,15 +241,34 @@ mod tests {
         let mut previous = 0;
         for step in 0..4096_u32 {
             for bits in [step << 20, (step << 20) + 0xf_ffff] {
-                let choice = laws.sample(1, bits);
+                let choice = laws.sample(1, bits, 0);
                 assert!(choice.tile >= previous, "order is kept");
                 previous = choice.tile;
                 assert_eq!(choice.probability, laws.probability(1, choice.tile));
-                assert!((0.0..1.0).contains(&choice.remainder));
             }
         }
-        assert_eq!(laws.sample(1, 0).tile, 1);
-        assert_eq!(laws.sample(1, u32::MAX).tile, 98);
+        assert_eq!(laws.sample(1, 0, 0).tile, 1);
+        assert_eq!(laws.sample(1, u32::MAX, 0).tile, 98);
+    }
+
+    /// A tile of a single unit is met by one number only: its remainder comes from the finer bits.
+    #[test]
+    fn remainders_are_uniform_however_small_a_tile_s_share() {
+        for share in [1e-12, 1e-6, 0.1, 1.0] {
+            let laws = laws_of(&[1.0 - share, share]);
+            let range = (laws.probability(1, 1) * 4_294_967_296.0) as u64;
+            let mut counts = [0.0; 16];
+            for i in 0..4096_u64 {
+                let bits = u64::from(u32::MAX) - i * range / 4096;
+                let finer = crate::sampler::hash(i as u32);
+                let choice = laws.sample(1, bits as u32, finer);
+                assert_eq!(choice.tile, 1);
+                counts[(choice.remainder >> 28) as usize] += 1.0;
+            }
+            let test = crate::metrics::statistics::chi_square_test(&counts, &[256.0; 16], 1e-4)
+                .expect("enough");
+            assert!(test.passed, "{share}: {test:?} {counts:?}");
+        }
     }
 
     #[test]
@@ -255,9 +279,9 @@ mod tests {
         weights[69] = 1e-300;
         assert_eq!(laws.push(&weights), Some(0));
         assert_eq!(laws.probability(0, 69), 1.0);
-        let choice = laws.sample(0, u32::MAX);
+        let choice = laws.sample(0, u32::MAX, u32::MAX);
         assert_eq!((choice.tile, choice.probability), (69, 1.0));
-        assert!(choice.remainder < 1.0);
+        assert_eq!(choice.remainder, u32::MAX);
     }
 
     #[test]

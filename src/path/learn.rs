@@ -1,12 +1,12 @@
 //! Learning paths: what the map shows to the vertices of camera paths.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 use super::{Path, PathTracer, Scatterer, Vertex};
 use crate::bvh::Ray;
 use crate::color::{importance, luminance};
 use crate::light_grid::LearningGrid;
-use crate::sampler::{Sampler, unit_from_bits};
+use crate::sampler::Sampler;
 
 impl PathTracer<'_> {
     /// Traces one camera path and counts at each vertex, in [`PathTracer::counts`], whether samples
@@ -79,7 +79,7 @@ impl Path<'_> {
         let whole_map_share = if is_ratio { 128 } else { 256 };
         let choice = grid.sample_sharing(vertex.law, bits, whole_map_share);
         self.expect_count(vertex, choice.tile);
-        let u = Vec2::new(choice.remainder, unit_from_bits(bits[1]));
+        let u = [choice.remainder, bits[1]];
         let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
         let weight = match self.scattered(vertex, sample.direction) {
             None => 0.0,
@@ -91,7 +91,7 @@ impl Path<'_> {
                     let pdf = choice.probability * sample.pdf_solid_angle;
                     let mean =
                         std::f32::consts::PI * importance(self.tracer.environment.mean_radiance());
-                    importance(f * sample.radiance * transmittance) / (pdf * mean)
+                    sample.weight * importance(f * sample.radiance * transmittance) / (pdf * mean)
                 }
             }
         };

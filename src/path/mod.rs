@@ -27,7 +27,7 @@ use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
 use crate::math::balance_heuristic;
 use crate::medium::{Fog, Interior, Phase};
-use crate::sampler::{Sampler, unit_from_bits};
+use crate::sampler::Sampler;
 use crate::scene::surface::SurfacePoint;
 
 /// What bounds a path.
@@ -85,6 +85,9 @@ pub struct FirstHit {
 
 /// Vertices after which Russian roulette may end a path.
 const ROULETTE_AFTER: u32 = 3;
+/// A path that carries less than one over this is ended in proportion: ending it as soon as it carries
+/// less than 1 saves a third of the rays of an office and doubles its error.
+const ROULETTE_MILDNESS: f32 = 3.0;
 
 /// Panes and leaves one ray may pass; only a scene that is broken has more.
 const MAX_PASSES: u32 = 1000;
@@ -426,7 +429,7 @@ impl<'a> Path<'a> {
         let bits = self.sampler.next_pair_bits();
         let choice = grid.sample(vertex.law, bits);
         self.expect_count(vertex, choice.tile);
-        let u = Vec2::new(choice.remainder, unit_from_bits(bits[1]));
+        let u = [choice.remainder, bits[1]];
         let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
         let pdf = choice.probability * sample.pdf_solid_angle;
         let Some((f, own_pdf)) = self.scattered(vertex, sample.direction) else {
@@ -437,8 +440,10 @@ impl<'a> Path<'a> {
             let weight = self.visibility(vertex, sample.direction, own_pdf, transmittance);
             self.count(vertex, choice.tile, weight);
         }
-        if transmittance != Vec3::ZERO {
-            let weight = balance_heuristic(pdf, own_pdf) / pdf;
+        let both_pdfs = pdf + own_pdf;
+        if transmittance != Vec3::ZERO && both_pdfs > 0.0 {
+            // Balance heuristic over the density; `weight` is what integers drew it with.
+            let weight = sample.weight / both_pdfs;
             self.radiance += self.throughput * f * sample.radiance * transmittance * weight;
         }
     }
@@ -547,7 +552,7 @@ impl<'a> Path<'a> {
             return true;
         }
         let in_air = self.throughput.max_element() * self.body.squared_index;
-        let probability = in_air.clamp(0.05, 1.0);
+        let probability = (ROULETTE_MILDNESS * in_air).clamp(0.05, 1.0);
         if probability < 1.0 && self.sampler.next_pair()[1] >= probability {
             return false;
         }

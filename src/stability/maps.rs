@@ -12,7 +12,7 @@ use super::{Case, On, Outcome, Setting};
 use crate::environment::{Environment, EnvironmentOptions, sky};
 use crate::error::{Error, Notices, Result};
 use crate::image::{Image, sanitise};
-use crate::math::{direction_from_uv, rotate_y, texel_solid_angle, uv_from_direction};
+use crate::math::texel_solid_angle;
 use crate::metrics::statistics::chi_square_test;
 use crate::render::{Sampling, View};
 use crate::scene::Camera;
@@ -78,7 +78,7 @@ fn black(setting: &Setting) -> Result<Outcome> {
     let environment = Environment::new(map, &EnvironmentOptions::default())?;
     let mut random = Random(1);
     let drawn = (0..environment.tile_count())
-        .filter(|tile| environment.sample_in_tile(*tile, random.square()).is_some())
+        .filter(|tile| environment.sample_in_tile(*tile, random.words()).is_some())
         .count();
     let outcome =
         Outcome::new().at_most("tiles of a black map that can be sampled", drawn as f64, 0.0);
@@ -163,33 +163,31 @@ fn check(setting: &Setting, map: Image) -> Result<Outcome> {
 
 const LUMINANCE: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
 
-/// World direction of a point of the map in texels.
-fn direction_at(map: &Image, x: f64, y: f64) -> Vec3 {
-    let uv = Vec2::new((x / f64::from(map.width)) as f32, (y / f64::from(map.height)) as f32);
-    rotate_y(direction_from_uv(uv), ROTATION)
-}
-
-/// Worst deviation from 1 of a tile's integral, and lit points without density.
+/// Worst deviation from 1 of a tile's integral, and lit points without density. A density is linear
+/// along a patch both ways, so that its integral is its value in the middle times the solid angle.
 fn densities(environment: &Environment) -> (f64, usize) {
-    const PLACES: [(f64, f64); 5] = [(0.5, 0.5), (0.1, 0.2), (0.9, 0.3), (0.2, 0.8), (0.7, 0.9)];
-    let map = environment.map();
+    const PLACES: [(f32, f32); 5] = [(0.5, 0.5), (0.1, 0.2), (0.9, 0.3), (0.2, 0.8), (0.7, 0.9)];
+    let brightest = environment.map().pixels.as_flattened().iter().copied().fold(0.0, f32::max);
+    // Less than what f32 can weigh beside the brightest is left to other samplers.
+    let least = 1e-30 * brightest;
     let tiles = environment.tile_count() as usize;
-    let (integrals, unreachable) = (0..map.height)
+    let (columns, rows) = environment.patch_grid();
+    let (integrals, unreachable) = (0..rows)
         .into_par_iter()
         .fold(
             || (vec![0.0; tiles], 0),
             |(mut integrals, mut unreachable), y| {
-                let solid_angle = texel_solid_angle(map.width, map.height, y);
-                for x in 0..map.width {
+                let solid_angle = f64::from(environment.patch_solid_angle(y));
+                for x in 0..columns {
                     for (place, (dx, dy)) in PLACES.into_iter().enumerate() {
-                        let at = direction_at(map, f64::from(x) + dx, f64::from(y) + dy);
+                        let at = environment.direction_in_patch((x, y), Vec2::new(dx, dy));
                         let (radiance, tile, pdf) = environment.radiance_and_tile_pdf(at);
                         if place == 0 {
                             integrals[tile as usize] += f64::from(pdf) * solid_angle;
                         }
                         let dark = environment.tile_energies()[tile as usize] <= 0.0;
-                        unreachable +=
-                            usize::from(radiance.max_element() > 0.0 && (pdf <= 0.0 || dark));
+                        let is_lit = radiance.max_element() > least;
+                        unreachable += usize::from(is_lit && (pdf <= 0.0 || dark));
                     }
                 }
                 (integrals, unreachable)
@@ -206,16 +204,16 @@ fn densities(environment: &Environment) -> (f64, usize) {
     (lit.map(|(integral, _)| (integral - 1.0).abs()).fold(0.0, f64::max), unreachable)
 }
 
-/// p-value of samples, as many from each lit tile, against the reported densities. Texels are taken
+/// p-value of samples, as many from each lit tile, against the reported densities. Patches are taken
 /// together where there are more than a test of this size resolves.
 fn chi_square(environment: &Environment) -> Result<f64> {
     const SAMPLES: usize = 200_000;
-    let map = environment.map();
-    let (columns, rows) = (map.width.min(128), map.height.min(64));
-    let bin = |x: u32, y: u32| {
+    let (width, height) = environment.patch_grid();
+    let (columns, rows) = (width.min(128), height.min(64));
+    let bin = |(x, y): (u32, u32)| {
         let of =
             |i: u32, bins: u32, all: u32| (u64::from(i) * u64::from(bins) / u64::from(all)) as u32;
-        (of(y, rows, map.height) * columns + of(x, columns, map.width)) as usize
+        (of(y, rows, height) * columns + of(x, columns, width)) as usize
     };
     let lit: Vec<u32> = (0..environment.tile_count())
         .filter(|tile| environment.tile_energies()[*tile as usize] > 0.0)
@@ -225,20 +223,18 @@ fn chi_square(environment: &Environment) -> Result<f64> {
     let mut random = Random(31);
     for tile in lit {
         for _ in 0..per_tile {
-            let sample = environment.sample_in_tile(tile, random.square());
+            let sample = environment.sample_in_tile(tile, random.words());
             let sample = sample.ok_or_else(|| Error::new("a lit tile gives no sample"))?;
-            let uv = uv_from_direction(rotate_y(sample.direction, -ROTATION));
-            let (x, y) = (uv.x * map.width as f32, uv.y * map.height as f32);
-            observed[bin((x as u32).min(map.width - 1), (y as u32).min(map.height - 1))] += 1.0;
+            observed[bin(environment.patch_of(sample.direction))] += 1.0;
         }
     }
     let mut expected = vec![0.0; observed.len()];
-    for y in 0..map.height {
-        let solid_angle = texel_solid_angle(map.width, map.height, y);
-        for x in 0..map.width {
-            let at = direction_at(map, f64::from(x) + 0.5, f64::from(y) + 0.5);
-            let (_, pdf) = environment.tile_pdf_solid_angle(at);
-            expected[bin(x, y)] += f64::from(pdf) * solid_angle * per_tile as f64;
+    for y in 0..height {
+        let solid_angle = f64::from(environment.patch_solid_angle(y));
+        for x in 0..width {
+            let at = environment.direction_in_patch((x, y), Vec2::splat(0.5));
+            let (_, _, pdf) = environment.radiance_and_tile_pdf(at);
+            expected[bin((x, y))] += f64::from(pdf) * solid_angle * per_tile as f64;
         }
     }
     if expected.iter().filter(|count| **count >= 5.0).count() < 2 {
@@ -266,11 +262,11 @@ fn irradiance_error(environment: &Environment) -> f64 {
     for _ in 0..SAMPLES {
         let target = random.unit_f64() * total;
         let tile = sums.partition_point(|sum| *sum <= target);
-        let u = random.square();
+        let u = random.words();
         let Some(sample) = environment.sample_in_tile(tile as u32, u) else { continue };
         let cosine = sample.direction.as_dvec3().dot(normal).abs();
         let pdf = energies[tile] / total * f64::from(sample.pdf_solid_angle);
-        let value = sample.radiance.as_dvec3() * cosine / pdf;
+        let value = sample.radiance.as_dvec3() * cosine * f64::from(sample.weight) / pdf;
         sum += value;
         squares += value * value;
     }
@@ -323,11 +319,14 @@ fn quadrature(environment: &Environment, normal: DVec3, both_sides: bool) -> DVe
         .sum()
 }
 
-/// Radiance between texel centres, in f64: wrapped in u, clamped in v.
+/// Radiance between texel centres, in f64: linear in longitude (wrapped in u) and in the cosine of the
+/// polar angle (clamped in v).
 pub(super) fn bilinear(map: &Image, x: f64, y: f64) -> DVec3 {
     let y = y.clamp(0.0, f64::from(map.height - 1));
     let (left, top) = (x.floor(), y.floor());
-    let (across, down) = (x - left, y - top);
+    let cosine = |row: f64| (PI * (row + 0.5) / f64::from(map.height)).cos();
+    let down = (cosine(top) - cosine(y)) / (cosine(top) - cosine(top + 1.0));
+    let across = x - left;
     let column = |i: i64| i.rem_euclid(i64::from(map.width)) as u32;
     let (a, b) = (column(left as i64), column(left as i64 + 1));
     let (above, below) = (top as u32, (top as u32 + 1).min(map.height - 1));

@@ -1,6 +1,6 @@
 //! Random numbers that are not the renderer's own.
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// SplitMix64 (Steele, Lea, Flood 2014).
 pub(super) struct Random(pub(super) u64);
@@ -29,9 +29,10 @@ impl Random {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// In `[0,1)`^2.
-    pub(super) fn square(&mut self) -> Vec2 {
-        Vec2::new(self.unit(), self.unit())
+    /// Two 32-bit fractions of one.
+    pub(super) fn words(&mut self) -> [u32; 2] {
+        let bits = self.bits();
+        [bits as u32, (bits >> 32) as u32]
     }
 
     /// In `[-1,1)`^3.

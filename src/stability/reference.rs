@@ -6,36 +6,31 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::{DVec2, DVec3, Vec2};
+use glam::{DVec2, DVec3, Vec3};
 
 use super::maps::bilinear;
 use crate::color::importance;
 use crate::environment::Environment;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
-use crate::math::texel_solid_angle;
 use crate::path::camera::CameraRays;
 use crate::render::View;
-use crate::sampler::{Sampler, unit_from_bits};
+use crate::sampler::Sampler;
 
 /// A floor at height 0 of this reflectance under a map that is neither turned nor scaled.
 pub(super) struct Reference<'a> {
     pub(super) environment: &'a Environment,
     pub(super) grid: LightGrid,
     pub(super) albedo: f64,
-    total_weight: f64,
+    /// Integral of the map's importance.
+    energy: f64,
 }
 
 impl<'a> Reference<'a> {
     /// `None` for a black map.
     pub(super) fn new(environment: &'a Environment, albedo: f64) -> Option<Self> {
         let grid = LightGrid::whole_map(environment.tile_energies())?;
-        let mut reference = Self { environment, grid, albedo, total_weight: 0.0 };
-        let map = environment.map();
-        reference.total_weight = (0..map.height)
-            .flat_map(|y| (0..map.width).map(move |x| (x, y)))
-            .map(|(x, y)| reference.weight(x, y))
-            .sum();
-        Some(reference)
+        let energy = environment.tile_energies().iter().sum();
+        Some(Self { environment, grid, albedo, energy })
     }
 
     /// Mean luminance of each pixel over its first `samples` samples.
@@ -63,9 +58,9 @@ impl<'a> Reference<'a> {
         if towards.y >= 0.0 {
             return self.seen(towards);
         }
-        let [tile_bits, row_bits] = sampler.next_pair_bits();
-        let choice = self.grid.laws().sample(WHOLE_MAP, tile_bits);
-        let u = Vec2::new(choice.remainder, unit_from_bits(row_bits));
+        let bits = sampler.next_pair_bits();
+        let choice = self.grid.sample(WHOLE_MAP, bits);
+        let u = [choice.remainder, bits[1]];
         let mut sum = 0.0;
         if let Some(sample) = self.environment.sample_in_tile(choice.tile, u) {
             let light = sample.direction.as_dvec3().normalize();
@@ -90,32 +85,21 @@ impl<'a> Reference<'a> {
         DVec2::new(u * f64::from(map.width), v * f64::from(map.height))
     }
 
-    fn seen(&self, direction: DVec3) -> f64 {
+    fn rgb(&self, direction: DVec3) -> DVec3 {
         let at = self.texels(direction);
-        let rgb = bilinear(self.environment.map(), at.x - 0.5, at.y - 0.5);
-        rgb.dot(DVec3::new(0.2126, 0.7152, 0.0722))
+        bilinear(self.environment.map(), at.x - 0.5, at.y - 0.5)
+    }
+
+    fn seen(&self, direction: DVec3) -> f64 {
+        self.rgb(direction).dot(DVec3::new(0.2126, 0.7152, 0.0722))
     }
 
     /// Density of light sampling per steradian.
     fn density(&self, direction: DVec3) -> f64 {
-        let map = self.environment.map();
-        let at = self.texels(direction);
-        let (x, y) = ((at.x as u32).min(map.width - 1), (at.y as u32).min(map.height - 1));
-        self.weight(x, y) / self.total_weight / texel_solid_angle(map.width, map.height, y)
-    }
-
-    /// Integral over a texel of the importance of what is interpolated there.
-    fn weight(&self, x: u32, y: u32) -> f64 {
-        let map = self.environment.map();
-        let mut sum = 0.0;
-        for (dy, down) in [(-1, 1.0), (0, 6.0), (1, 1.0)] {
-            for (dx, across) in [(-1, 1.0), (0, 6.0), (1, 1.0)] {
-                let column = (i64::from(x) + dx).rem_euclid(i64::from(map.width)) as u32;
-                let row = (i64::from(y) + dy).clamp(0, i64::from(map.height) - 1) as u32;
-                sum += down * across * f64::from(importance(map.at(column, row).into()));
-            }
-        }
-        sum / 64.0 * texel_solid_angle(map.width, map.height, y)
+        let rgb = self.rgb(direction);
+        let importance_of = |axis: Vec3| f64::from(importance(axis));
+        let importance = rgb.dot(DVec3::from([Vec3::X, Vec3::Y, Vec3::Z].map(importance_of)));
+        importance / self.energy
     }
 }
 

@@ -84,7 +84,7 @@ pub(crate) struct Globals {
     pub(crate) fog_high: Vec3,
     pub(crate) tries_per_vertex: u32,
     pub(crate) fog_scattering: Vec3,
-    pub(crate) padding_3: u32,
+    pub(crate) importance_scale: f32,
     pub(crate) fog_extinction: Vec3,
     pub(crate) padding_4: u32,
     pub(crate) background: Vec3,
@@ -210,6 +210,7 @@ impl Globals {
         (self.map_width, self.map_height) = (environment.map().width, environment.map().height);
         (self.tile_columns, self.tile_rows) = environment.tile_grid();
         (self.rotation_turns, self.intensity) = environment.rotation_and_intensity();
+        self.importance_scale = environment.importance_scale().0;
         self.mean_contribution = std::f32::consts::PI * importance(environment.mean_radiance());
     }
 
@@ -476,19 +477,12 @@ pub(super) fn unpack_radiance(words: [u32; 2]) -> [f32; 3] {
     mantissas.map(|m| m as f32 * (1.0 / 131_072.0) * scale)
 }
 
-/// Per row of the map: distance of the cosine at its upper and lower edge from that of the pole of
-/// its hemisphere, and 1 / steradian of a texel.
+/// Rows of the map's patches, then one over each tile's energy.
 pub(crate) fn map_rows(environment: &Environment) -> impl Iterator<Item = [f32; 4]> {
-    let height = environment.map().height;
-    let pole_distance = move |edge: u32, is_upper: bool| {
-        let turns = f64::from(if is_upper { edge } else { height - edge }) / f64::from(height);
-        // 1 - cos without cancellation.
-        (2.0 * (0.5 * std::f64::consts::PI * turns).sin().powi(2)) as f32
-    };
-    (0..height).zip(environment.inverse_texel_solid_angles()).map(move |(row, inverse)| {
-        let is_upper = 2 * row < height;
-        [pole_distance(row, is_upper), pole_distance(row + 1, is_upper), *inverse, 0.0]
-    })
+    let rows = environment.patches().rows().iter();
+    let energies = environment.importance_scale().1.iter();
+    rows.map(|row| [row.top, row.extent, row.solid_angle, 0.0])
+        .chain(energies.map(|inverse| [*inverse, 0.0, 0.0, 0.0]))
 }
 
 #[cfg(test)]

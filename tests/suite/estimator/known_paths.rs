@@ -115,7 +115,10 @@ fn the_background_is_the_bilinear_map() {
     });
     let lookup = |uv: Vec2| -> [f64; 3] {
         let (x, y) = (f64::from(uv.x) * 7.0 - 0.5, (f64::from(uv.y) * 5.0 - 0.5).clamp(0.0, 4.0));
-        let (fx, fy) = (x - x.floor(), y - y.floor());
+        // Linear in longitude and in the cosine of the polar angle.
+        let cosine = |row: f64| (std::f64::consts::PI * (row + 0.5) / 5.0).cos();
+        let (top, bottom) = (cosine(y.floor()), cosine(y.floor() + 1.0));
+        let (fx, fy) = (x - x.floor(), (top - cosine(y)) / (top - bottom));
         let texel = |dx: i64, dy: i64| {
             let column = (x.floor() as i64 + dx).rem_euclid(7) as u32;
             map.at(column, (y.floor() as i64 + dy).min(4) as u32)

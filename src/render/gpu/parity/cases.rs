@@ -169,3 +169,8 @@ pub(super) fn edge_squares() -> Vec<Vec2> {
     let units = EDGE_UNITS.into_iter();
     units.flat_map(|x| EDGE_UNITS.map(|y| Vec2::new(x, y))).collect()
 }
+
+/// The same as 32-bit fractions of one.
+pub(super) fn edge_words() -> impl Iterator<Item = [u32; 2]> {
+    edge_squares().into_iter().map(|u| u.to_array().map(|x| (x * 4_294_967_296.0) as u32))
+}

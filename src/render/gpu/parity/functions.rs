@@ -3,7 +3,7 @@
 use glam::{UVec2, Vec2, Vec3};
 
 use super::Probe;
-use super::cases::{Random, case, cases, edge_directions, edge_squares};
+use super::cases::{Random, case, cases, edge_directions, edge_squares, edge_words};
 use super::stand::Stand;
 use super::twin::{EXACT, ulps};
 use crate::bvh::offset_origin;
@@ -209,14 +209,13 @@ fn random_points() -> Vec<Probe<'static>> {
         ),
         Probe::new(
             "refine",
-            "let fine = refine(take2());
+            "let fine = refine(vec2u(take_word(), take_word()));
             put_word(fine[0].x); put_word(fine[0].y); put_word(fine[1].x); put_word(fine[1].y);",
-            cases(squares(), |r| case(&[&r.unit2()])),
+            cases(edge_words().map(|[x, y]| case(&[&x, &y])), |r| case(&[&r.word(), &r.word()])),
             |t| {
-                for u in refine(t.take2()).to_array() {
-                    let bits = (u * (1_u64 << 48) as f64) as u64;
-                    t.same((bits >> 24) as u32);
-                    t.same((bits & 0xff_ffff) as u32);
+                for bits in refine([t.take_word(), t.take_word()]) {
+                    t.same((bits >> 32) as u32);
+                    t.same(bits as u32);
                 }
             },
         ),

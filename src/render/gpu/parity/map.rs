@@ -3,10 +3,10 @@
 use glam::Vec3;
 
 use super::Probe;
-use super::cases::{case, cases, edge_directions, edge_squares};
+use super::cases::{case, cases, edge_directions, edge_words};
 use super::functions::camera;
 use super::stand::Stand;
-use super::twin::{Bound, EXACT, ulps};
+use super::twin::{Bound, EXACT, Twin, ulps};
 use crate::environment::{Environment, Lookup, TableKind};
 use crate::light_grid::WHOLE_MAP;
 use crate::light_grid::cells::dominant_face;
@@ -26,28 +26,32 @@ pub(super) fn probes(stand: &Stand) -> Vec<Probe<'_>> {
 /// a place on the map is known to some units in the last place of that.
 fn contrast(environment: &Environment, direction: Vec3) -> f32 {
     let map = environment.map();
-    let point = environment.map_point(direction);
+    let (column, row) = environment.patch_of(direction);
     let mut largest = 0.0_f32;
-    for dy in [map.height - 1, 0, 1] {
-        for dx in [map.width - 1, 0, 1] {
-            let pixel = map.at((point.column + dx) % map.width, (point.row + dy) % map.height);
+    for dy in 0..4 {
+        for dx in [map.width - 2, map.width - 1, 0, 1] {
+            let y = (row + dy).saturating_sub(2).min(map.height - 1);
+            let pixel = map.at((column + dx) % map.width, y);
             largest = largest.max(Vec3::from(pixel).max_element());
         }
     }
     largest * map.width.max(map.height) as f32 * environment.rotation_and_intensity().1
 }
 
-/// A few units in the last place of a density. The f64 table is kept to 2^-48 of its total, which may
-/// be much of a dim tile, and be some density where there is none.
+/// A few units in the last place of a density, which is as well known as the radiance it follows. The
+/// f64 table is kept to 2^-48 of its total, which may be much of a dim tile, and be some density where
+/// there is none.
 fn density_bound(environment: &Environment, direction: Vec3, tile: u32) -> Bound {
-    if environment.kind().0 != TableKind::F64 {
-        return ulps(4.0);
-    }
     let energies = environment.tile_energies();
+    let (_, row) = environment.patch_of(direction);
+    let (_, intensity) = environment.rotation_and_intensity();
+    let brightest = contrast(environment, direction) / intensity / energies[tile as usize] as f32;
+    if environment.kind().0 != TableKind::F64 {
+        return ulps(8.0).of(brightest);
+    }
     let share = energies[tile as usize] / energies.iter().sum::<f64>();
-    let row = environment.map_point(direction).row as usize;
-    let most = f64::from(environment.inverse_texel_solid_angles()[row]) / share;
-    ulps(4.0).of((most * f64::from(f32::EPSILON)) as f32)
+    let most = 1.0 / (f64::from(environment.patch_solid_angle(row)) * share);
+    ulps(8.0).of(brightest + (most * f64::from(f32::EPSILON)) as f32)
 }
 
 /// How much the last place of a random number within a row turns a sample, in such places: near a
@@ -79,19 +83,27 @@ fn look_ups(environment: &Environment) -> Vec<Probe<'_>> {
         ),
         Probe::new(
             "map_point",
-            "let point = map_point(take3()); put2(point.position);
-            put_word(point.texel.x); put_word(point.texel.y);",
+            "let point = map_point(take3()); put_word(point.at.x); put_word(point.at.y);
+            put2(point.within);",
             cases(directions(), |r| case(&[&r.direction()])),
             |t| {
-                let right = environment.map_point(t.take3());
-                let position = [t.device(), t.device()];
-                // A place at the seam may come out on its other side.
-                let width = map.width as f32;
-                let across = (right.x - position[0]).abs();
-                let off = across.min(width - across).max((right.y - position[1]).abs());
-                t.check(off <= 4.0 * f32::EPSILON * width, || format!("off by {off:e} texels"));
-                t.same((position[0] as u32).min(map.width - 1));
-                t.same((position[1] as u32).min(map.height - 1));
+                let direction = t.take3();
+                let right = environment.map_point(direction);
+                let (column, row) = (t.device_word(), t.device_word());
+                let [across, down] = [t.device(), t.device()];
+                // A place on an edge may come out on its other side, also across the seam.
+                let (width, rows) = (map.width as f32, environment.patch_grid().1);
+                let off = |a: u32, within: f32, b: u32, other: f32| {
+                    (a as f32 + within - b as f32 - other).abs()
+                };
+                let off_x = off(right.column, right.across, column, across);
+                let off_y = off(right.row, right.down, row, down);
+                let off = off_x.min(width - off_x).max(off_y);
+                // Down a row, in units of the last place of the distance from its pole.
+                let edges = environment.patches().rows()[right.row as usize];
+                let bound = 4.0 * f32::EPSILON * (width + 1.0 + edges.top / edges.extent.abs());
+                t.check(off <= bound, || format!("off by {off:e} patches"));
+                t.check(column < map.width && row < rows, || "not on the map".to_owned());
             },
         ),
         Probe::new(
@@ -124,16 +136,17 @@ fn look_ups(environment: &Environment) -> Vec<Probe<'_>> {
 /// Drawing from tiles.
 pub(super) fn samples(environment: &Environment) -> Vec<Probe<'_>> {
     let tiles = environment.tile_count();
-    let edges = (0..tiles).flat_map(|tile| edge_squares().into_iter().map(move |u| (tile, u)));
-    let edges = edges.map(|(tile, u)| case(&[&tile, &u]));
-    let draws = cases(edges, |r| case(&[&r.below(tiles), &r.unit2()]));
+    let edges = (0..tiles).flat_map(|tile| edge_words().map(move |u| (tile, u)));
+    let edges = edges.map(|(tile, [x, y])| case(&[&tile, &x, &y]));
+    let draws = cases(edges, |r| case(&[&r.below(tiles), &r.word(), &r.word()]));
     let sample = Probe::new(
         "sample_in_tile",
-        "let tile = take_word(); let sample = sample_in_tile(tile, take2());
-        put(sample.pdf_solid_angle); put3(sample.direction); put3(sample.radiance);",
-        draws.clone(),
+        "let tile = take_word(); let sample = sample_in_tile(tile, vec2u(take_word(), take_word()));
+        put(sample.pdf_solid_angle); put3(sample.direction); put3(sample.radiance);
+        put(sample.weight);",
+        draws,
         |t| {
-            let (tile, u) = (t.take_word(), t.take2());
+            let (tile, u) = (t.take_word(), [t.take_word(), t.take_word()]);
             let Some(sample) = environment.sample_in_tile(tile, u) else {
                 t.near(0.0, EXACT);
                 return t.accept_rest();
@@ -143,27 +156,31 @@ pub(super) fn samples(environment: &Environment) -> Vec<Probe<'_>> {
             t.near(sample.pdf_solid_angle, density_bound(environment, direction, tile));
             t.near(direction, ulps(8.0).of(polar));
             t.near(sample.radiance, ulps(8.0).of(polar * contrast(environment, direction)));
+            t.near(sample.weight, ulps(16.0));
         },
     );
     let density = Probe::new(
         "sample_in_tile and its density",
-        "let tile = take_word(); let sample = sample_in_tile(tile, take2());
-        put(sample.pdf_solid_angle);
+        "let tile = take_word(); let sample = sample_in_tile(tile, vec2u(take_word(), take_word()));
+        put(sample.pdf_solid_angle); put3(sample.direction);
         if sample.pdf_solid_angle > 0.0 {
             let seen = radiance_and_tile_pdf(sample.direction);
             put_word(seen.tile); put(seen.pdf_solid_angle);
         }",
-        draws,
+        // Within tiles: at an edge a direction may be found in the next one.
+        cases([], |r| case(&[&r.below(tiles), &r.word(), &r.word()])),
         |t| {
-            let (tile, _) = (t.take_word(), t.take2());
+            let (tile, _) = (t.take_word(), [t.take_word(), t.take_word()]);
             let pdf = t.device();
+            let direction = Vec3::new(t.device(), t.device(), t.device());
             if pdf > 0.0 {
                 t.same(tile);
-                t.near(pdf, EXACT);
+                let polar = polar(environment, direction);
+                t.near(pdf, density_bound(environment, direction, tile).widened(polar));
             }
         },
     );
-    vec![sample.flips(500), density]
+    vec![sample.flips(500), density.flips(500)]
 }
 
 fn cells(stand: &Stand) -> Vec<Probe<'_>> {
@@ -213,11 +230,18 @@ fn cells(stand: &Stand) -> Vec<Probe<'_>> {
     probes
 }
 
+/// A remainder is a quotient in f32, a few of whose 2^-24 a device may have otherwise.
+fn near_remainder(t: &mut Twin<'_>, right: u32) {
+    let device = t.device_word();
+    let off = device.abs_diff(right);
+    t.check(off <= 3 << 8, || format!("a remainder of {device:#x} instead of {right:#x}"));
+}
+
 fn laws(stand: &Stand) -> Vec<Probe<'_>> {
     let laws = stand.grid.laws();
     let tiles = laws.tile_count();
     let ends = [0, 1, 0x7fff_ffff, 0x8000_0000, u32::MAX];
-    let edges = (0..laws.len()).flat_map(move |law| ends.map(|bits| case(&[&law, &bits])));
+    let edges = (0..laws.len()).flat_map(move |law| ends.map(|bits| case(&[&law, &bits, &!bits])));
     let all = (0..laws.len()).flat_map(move |law| (0..tiles).map(move |tile| case(&[&law, &tile])));
     let edges_of_shares = (0..laws.len()).flat_map(move |law| {
         [0, 32, 128, 256].map(|share| case(&[&law, &0x8000_0000_u32, &31_u32, &share]))
@@ -225,21 +249,22 @@ fn laws(stand: &Stand) -> Vec<Probe<'_>> {
     vec![
         Probe::new(
             "sample_tile",
-            "let law = take_word(); let choice = sample_tile(law, take_word());
-            put_word(choice.tile); put(choice.probability); put(choice.remainder);",
-            cases(edges, |r| case(&[&r.below(laws.len()), &r.word()])),
+            "let law = take_word(); let bits = take_word();
+            let choice = sample_tile(law, bits, take_word());
+            put_word(choice.tile); put(choice.probability); put_word(choice.remainder);",
+            cases(edges, |r| case(&[&r.below(laws.len()), &r.word(), &r.word()])),
             move |t| {
-                let choice = laws.sample(t.take_word(), t.take_word());
+                let choice = laws.sample(t.take_word(), t.take_word(), t.take_word());
                 t.same(choice.tile);
                 t.near(choice.probability, ulps(1.0));
-                t.near(choice.remainder, ulps(3.0));
+                near_remainder(t, choice.remainder);
             },
         ),
         Probe::new(
             "choose_tile",
             "let law = take_word(); let bits = vec2u(take_word(), take_word());
             let choice = choose_tile(law, bits, take_word());
-            put_word(choice.tile); put(choice.probability); put(choice.remainder);",
+            put_word(choice.tile); put(choice.probability); put_word(choice.remainder);",
             cases(edges_of_shares, |r| {
                 case(&[&r.below(laws.len()), &r.word(), &r.word(), &r.below(257)])
             }),
@@ -248,7 +273,7 @@ fn laws(stand: &Stand) -> Vec<Probe<'_>> {
                 let choice = stand.grid.sample_sharing(law, bits, t.take_word());
                 t.same(choice.tile);
                 t.near(choice.probability, ulps(3.0));
-                t.near(choice.remainder, ulps(3.0));
+                near_remainder(t, choice.remainder);
             },
         ),
         Probe::new(

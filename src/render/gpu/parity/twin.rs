@@ -29,6 +29,11 @@ impl Bound {
         Self { scale: scale.abs(), ..self }
     }
 
+    /// So many times as wide.
+    pub(super) fn widened(self, factor: f32) -> Self {
+        Self { ulps: self.ulps * factor, ..self }
+    }
+
     /// The error as a share of what is allowed. Devices may take subnormal numbers for zero.
     fn share(self, right: f32, device: f32) -> f32 {
         let is_tiny = |x: f32| x.abs() < f32::MIN_POSITIVE;

@@ -1,7 +1,7 @@
 //! Asking for memory before it is needed.
 
 /// Has the processor fetch a value while it does something else; nothing where it cannot.
-pub(super) fn prefetch<T>(value: &T) {
+pub(crate) fn prefetch<T>(value: &T) {
     #[cfg(target_arch = "x86_64")]
     // SAFETY: a hint, without effect on what the program does, at the address of a reference.
     unsafe {
