@@ -75,7 +75,8 @@ struct Globals {
     // Factor on the map's importance that brings its brightest pixel near 1.
     importance_scale: f32,
     fog_extinction: vec3f,
-    padding_4: u32,
+    // First sample of a pixel that is a point of the sequence `seed` scrambles.
+    first_of_sequence: u32,
     // What the camera sees in place of the map: a colour, or how little the map is blurred.
     background: vec3f,
     background_concentration: f32,

@@ -20,6 +20,7 @@
 //! {light_grid, bsdf, medium, bvh} ->
 //! {scene, environment} -> {image, sampler, math, color, error}`.
 
+mod alarm;
 pub mod app;
 pub mod bsdf;
 pub mod bvh;

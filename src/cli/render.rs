@@ -1,14 +1,16 @@
 //! `lightgrid render`.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use glam::Vec3;
 
 use super::device;
 use super::progress::Progress;
 use super::values;
+use crate::alarm::Alarm;
 use crate::denoise::Denoiser;
 use crate::environment::{Environment, EnvironmentOptions, TableKind};
 use crate::error::{Error, Notices, Result};
@@ -487,28 +489,32 @@ fn camera(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> 
     Ok(camera)
 }
 
-/// Runs the session until a rule or the user says stop; at least one sample is taken. If a GPU that
-/// was not asked for by name fails, the CPU takes over.
+/// Runs the session until a rule or the user says stop; at least one sample is taken. When the seconds
+/// are over, the pass under way ends with what it has. If a GPU that was not asked for by name fails,
+/// the CPU takes over.
 fn work(
     session: &mut Session<'_>,
     rule: &StopRule,
-    cancel: &AtomicBool,
+    cancel: &Arc<AtomicBool>,
     progress: &Progress,
     arguments: &RenderArguments,
     notices: &mut Notices,
 ) -> Result<()> {
     let never = AtomicBool::new(false);
+    let alarm = Alarm::start(Arc::clone(cancel));
+    let seconds = rule.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    alarm.set(seconds.and_then(|seconds| Instant::now().checked_add(seconds)));
     loop {
         progress.show(session, rule);
         let stopped = cancel.load(Ordering::Relaxed);
-        if stopped {
+        if stopped || session.has_learned_enough(rule) {
             session.finish_learning();
         }
         let samples = session.film().min_samples();
         if samples > 0 && (stopped || session.is_done(rule)) {
             return Ok(());
         }
-        let cancel = if stopped { &never } else { cancel };
+        let cancel = if stopped { &never } else { &**cancel };
         if let Err(failure) = session.advance(session.next_pass(rule), cancel) {
             if arguments.device != DeviceChoice::Auto {
                 return Err(failure);

@@ -106,6 +106,8 @@ pub struct LearningGrid {
     /// What was counted.
     pub counters: Counters,
     options: LawOptions,
+    /// How many times laws were made.
+    generation: u32,
 }
 
 /// Share of the budget for the counters; laws take the rest while both are held.
@@ -115,7 +117,12 @@ impl LearningGrid {
     /// An empty grid over the tiles of a map.
     pub fn new(grid: SphericalGrid, tile_count: u32, options: LawOptions) -> Self {
         let budget = (MEMORY_BUDGET_BYTES as f64 * COUNTER_SHARE) as usize;
-        Self { grid, counters: Counters::new(grid.cell_count(), tile_count, budget), options }
+        Self {
+            grid,
+            counters: Counters::new(grid.cell_count(), tile_count, budget),
+            options,
+            generation: 0,
+        }
     }
 
     /// What a record must hold.
@@ -130,11 +137,12 @@ impl LearningGrid {
 
     /// A copy of the counters as they are now.
     pub fn snapshot(&self) -> Self {
-        Self { grid: self.grid, counters: self.counters.snapshot(), options: self.options }
+        Self { counters: self.counters.snapshot(), ..*self }
     }
 
-    /// The laws that follow from what was counted so far. `None` for a black map.
-    pub fn laws(&self, environment: &Environment) -> Option<LightGrid> {
+    /// The laws that follow from what was counted so far: the next generation. `None` for a black map.
+    pub fn laws(&mut self, environment: &Environment) -> Option<LightGrid> {
+        self.generation += 1;
         let mut result = LightGrid::whole_map(environment.tile_energies())?;
         let builder = LawBuilder::new(self.grid, &self.counters, self.options, environment);
         let mut law_of_cell = vec![WHOLE_MAP as u16; self.grid.cell_count() as usize];
@@ -143,6 +151,7 @@ impl LearningGrid {
             .saturating_sub(result.laws.memory_bytes());
         builder.build(room, &mut result.laws, &mut law_of_cell);
         result.whole_map_share = self.options.whole_map_share;
+        result.generation = self.generation;
         result.cells = Some(Cells { grid: self.grid, law_of_cell });
         Some(result)
     }

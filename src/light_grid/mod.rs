@@ -32,6 +32,8 @@ pub struct LightGrid {
     cells: Option<Cells>,
     /// Of 256 samples so many follow the whole map's law whatever was learned.
     whole_map_share: u32,
+    /// How many times laws were made of what was counted; see [`Self::generation`].
+    generation: u32,
 }
 
 #[derive(Debug, Clone)]
@@ -48,7 +50,7 @@ impl LightGrid {
         let mut laws = TileLaws::new(energies.len() as u32);
         laws.reserve_exact(1, energies.iter().filter(|e| **e > 0.0).count());
         laws.push(energies)?;
-        Some(Self { laws, cells: None, whole_map_share: 0 })
+        Some(Self { laws, cells: None, whole_map_share: 0, generation: 0 })
     }
 
     /// Chooses a tile at a point of law `law` with the first of two uniform 32-bit numbers; the second
@@ -95,6 +97,12 @@ impl LightGrid {
         &self.laws
     }
 
+    /// 0 where nothing was learned; later laws of one learning have a higher one. The samples that laws
+    /// were made of followed laws of lower generations: see [`crate::sampler::Sequence`].
+    pub(crate) fn generation(&self) -> u32 {
+        self.generation
+    }
+
     /// Of 256 samples so many follow the whole map's law whatever was learned.
     pub(crate) fn whole_map_share(&self) -> u32 {
         self.whole_map_share
@@ -137,6 +145,7 @@ impl LightGrid {
         }
         result.cells = Some(Cells { grid, law_of_cell });
         result.whole_map_share = 32;
+        result.generation = 1;
         Some(result)
     }
 }

@@ -35,6 +35,7 @@ impl LightGrid {
             cells
         });
         result.whole_map_share = self.whole_map_share;
+        result.generation = self.generation;
         Some(result)
     }
 }

@@ -118,10 +118,11 @@ fn render_pixel(
     let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
     let (mut samples, mut ray_count) = (0, 0);
     while pixel.samples() < pass.target {
-        let mut sampler = view.points.sampler(view.seed, index, pixel.samples());
+        let sample = pixel.samples();
+        let mut sampler = pass.sequence.sampler(view.points, view.seed, index, sample);
         let offset = view.filter.sample(Vec2::from(sampler.next_pair()));
         let lens = lens_point(rays, &mut sampler);
-        let counts = tracer.counts.filter(|_| pass.counts(index, pixel.samples()));
+        let counts = tracer.counts.filter(|_| pass.counts(index, sample));
         let tracer = PathTracer { counts, ..*tracer };
         let result = tracer.radiance(rays.ray(centre + offset, lens), sampler);
         pixel.add(&result);

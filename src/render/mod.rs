@@ -25,7 +25,7 @@ use crate::light_grid::{LawOptions, LearningGrid, LightGrid};
 use crate::medium::Fog;
 use crate::path::camera::CameraRays;
 use crate::path::{Background, PathLimits, PathTracer, World};
-use crate::sampler::Points;
+use crate::sampler::{Points, Sequence};
 use crate::scene::{Camera, Medium};
 
 /// How the environment map is sampled.
@@ -98,8 +98,9 @@ impl View {
         }
     }
 
-    /// Learning paths that suit a picture of this size and sample count. Where rendered paths count
-    /// too, and a vertex tries several samples, few are enough to begin with.
+    /// Learning paths that suit a picture of this size and sample count: a twentieth of the time that
+    /// rendering takes. Where rendered paths count too, and a vertex tries several samples, few are
+    /// enough to begin with.
     pub fn suitable_learning_paths(
         sampling: Sampling,
         [width, height]: [u32; 2],
@@ -107,9 +108,11 @@ impl View {
     ) -> u64 {
         let pixels = u64::from(width) * u64::from(height);
         let work = pixels * u64::from(samples.unwrap_or(256));
-        let (least, most) =
-            if sampling == Sampling::Adaptive { (1 << 15, 1 << 16) } else { (1 << 16, 1 << 20) };
-        (work / LEARNING_SHARE).clamp(least, most)
+        if sampling == Sampling::Adaptive {
+            (work / ADAPTIVE_LEARNING_SHARE).clamp(1 << 9, 1 << 16)
+        } else {
+            (work / LEARNING_SHARE).clamp(1 << 16, 1 << 20)
+        }
     }
 
     /// Width and height of the picture that this one is a part of.
@@ -137,6 +140,10 @@ impl View {
 
 /// One learning path for this many paths rendered.
 const LEARNING_SHARE: u64 = 64;
+/// The same where each vertex tries several samples of the map: such a path takes four times as long.
+const ADAPTIVE_LEARNING_SHARE: u64 = 96;
+/// Learning takes at most this share of the seconds asked for.
+const LEARNING_TIME_SHARE: f64 = 0.05;
 
 /// When to stop; whichever comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -196,6 +203,8 @@ struct Pass {
     target: u32,
     /// Of so many samples one is counted, lest a counter wrap.
     stride: u32,
+    /// Which points its samples are.
+    sequence: Sequence,
 }
 
 impl Pass {
@@ -229,6 +238,7 @@ pub struct Session<'a> {
     film: Film,
     whole_map: Option<LightGrid>,
     learned: Option<LightGrid>,
+    sequence: Sequence,
     phase: Phase,
     learning: Option<Learning>,
     figures: Figures,
@@ -266,6 +276,7 @@ impl<'a> Session<'a> {
             engine: Engine::Cpu,
             whole_map,
             learned: None,
+            sequence: Sequence::default(),
             phase: if learning.is_some() { Phase::Learning } else { Phase::Rendering },
             learning,
             figures: Figures::default(),
@@ -350,6 +361,13 @@ impl<'a> Session<'a> {
         self.phase
     }
 
+    /// Whether another learning pass, as long as all before it, would take more than its share of the
+    /// seconds asked for.
+    pub fn has_learned_enough(&self, rule: &StopRule) -> bool {
+        let share = |seconds| LEARNING_TIME_SHARE * seconds;
+        rule.seconds.is_some_and(|s| 2.0 * self.figures.learning_seconds >= share(s))
+    }
+
     /// Goes over to rendering with what was learned so far.
     pub fn finish_learning(&mut self) {
         self.phase = Phase::Rendering;
@@ -368,7 +386,7 @@ impl<'a> Session<'a> {
         self.learning = None;
         self.phase = Phase::Rendering;
         self.learned = Some(grid);
-        self.upload_grid()
+        self.take_up_laws()
     }
 
     /// What was counted, for inspection.
@@ -435,7 +453,7 @@ impl<'a> Session<'a> {
             // Which paths of the pass were counted depends on the threads: start over.
             self.learned = None;
             self.learning = new_learning(self.world, self.environment, &self.view, &self.rays);
-            return self.upload_grid();
+            return self.take_up_laws();
         }
         self.figures.learning_rays += rays;
         self.figures.learning_paths = range.end;
@@ -446,12 +464,17 @@ impl<'a> Session<'a> {
         if range.end >= self.view.learning_paths {
             self.finish_learning();
         }
-        self.upload_grid()
+        self.take_up_laws()
     }
 
-    /// Gives the GPU, if one is at work, the laws in use.
-    fn upload_grid(&mut self) -> Result<()> {
+    /// Begins the sequence that goes with the laws in use, and gives them to the GPU, if one is at work.
+    fn take_up_laws(&mut self) -> Result<()> {
         let grid = self.learned.as_ref().or(self.whole_map.as_ref());
+        let generation = grid.map_or(0, LightGrid::generation);
+        if generation != self.sequence.generation && std::env::var("LG_NOSALT").is_err() {
+            // Pixels that are ahead begin later in it.
+            self.sequence = Sequence { generation, first_sample: self.film.min_samples() };
+        }
         match &mut self.engine {
             Engine::Cpu => Ok(()),
             Engine::Gpu(renderer) => renderer.set_grid(grid),
@@ -483,7 +506,7 @@ impl<'a> Session<'a> {
         let mut film = std::mem::replace(&mut self.film, Film::new(0, 0, false));
         let learning = self.learning.as_ref().filter(|learning| !learning.is_over);
         let counts = learning.map(|learning| &learning.grid);
-        let pass = Pass { target, stride };
+        let pass = Pass { target, stride, sequence: self.sequence };
         let done = match &mut self.engine {
             Engine::Cpu => {
                 let tracer = self.tracer(counts);
@@ -515,8 +538,9 @@ impl<'a> Session<'a> {
         u32::try_from(stride).unwrap_or(u32::MAX)
     }
 
-    /// Takes note that so many rendered paths were counted. After a whole pass, and twice as many
-    /// paths as the laws were made of, there are new laws.
+    /// Takes note that so many rendered paths were counted. There are new laws after enough more paths
+    /// than the laws in use were made of, where each pixel has a power of two of samples: the points
+    /// of the sequences that then end and begin are evenly spread.
     fn learn_from_rendered(&mut self, paths: u64, is_whole: bool) -> Result<()> {
         let Some(learning) = self.learning.as_mut().filter(|learning| !learning.is_over) else {
             return Ok(());
@@ -524,12 +548,14 @@ impl<'a> Session<'a> {
         self.figures.counted_paths += paths;
         learning.paths_of_pass += paths;
         let all = self.figures.learning_paths + self.figures.counted_paths;
-        if !is_whole || all < 2 * self.figures.law_paths {
+        let samples = self.film.min_samples();
+        if !is_whole || !samples.is_power_of_two() || all < growth() * self.figures.law_paths {
             return Ok(());
         }
-        learning.is_over = all >= ENOUGH_PATHS;
+        let last: u32 = std::env::var("LG_LAST").ok().and_then(|g| g.parse().ok()).unwrap_or(8);
+        learning.is_over = all >= ENOUGH_PATHS || samples >= last;
         self.update_laws();
-        self.upload_grid()
+        self.take_up_laws()
     }
 }
 
@@ -553,4 +579,8 @@ fn new_learning(
     };
     let grid = LearningGrid::new(grid, environment.tile_count(), options);
     Some(Learning { grid, pass: 0, paths_of_pass: 0, is_over: false })
+}
+
+fn growth() -> u64 {
+    std::env::var("LG_GROWTH").ok().and_then(|g| g.parse().ok()).unwrap_or(2)
 }

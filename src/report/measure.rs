@@ -155,7 +155,12 @@ pub(super) fn measure(
     cancel: &AtomicBool,
 ) -> Result<Option<Finished>> {
     let mut session = place.session(method.1, seed)?;
+    let rule = StopRule { seconds: Some(seconds), ..StopRule::default() };
     while session.phase() == Phase::Learning {
+        if session.has_learned_enough(&rule) {
+            session.finish_learning();
+            continue;
+        }
         session.advance(0, cancel)?;
         if cancel.load(Ordering::Relaxed) {
             return Ok(None);

@@ -15,6 +15,33 @@ pub struct Sampler {
     pair: u32,
 }
 
+/// The random numbers of a picture from one sample on: a scramble of their own for each generation of
+/// tile laws.
+///
+/// Laws are made of what a pixel's own samples have seen, too, and the points of one scrambled sequence
+/// avoid each other: a sample whose law knows its predecessors is not uniform given that law. Laws of
+/// generation `g` are made of samples of earlier generations alone, so with a fresh scramble for each
+/// generation an estimate is independent of the law it is made by, hence unbiased.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Sequence {
+    /// Generation of the laws in use; 0 without any.
+    pub(crate) generation: u32,
+    /// First sample of a pixel that is one of this sequence's points.
+    pub(crate) first_sample: u32,
+}
+
+impl Sequence {
+    /// The seed of all its streams.
+    pub(crate) fn seed(self, seed: u32) -> u32 {
+        seed ^ hash(self.generation)
+    }
+
+    /// The stream of a pixel's sample, which is one of this sequence.
+    pub(crate) fn sampler(self, points: Points, seed: u32, pixel: u32, sample: u32) -> Sampler {
+        points.sampler(self.seed(seed), pixel, sample - self.first_sample)
+    }
+}
+
 /// Which points the samples of a pixel are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -43,7 +70,9 @@ impl Points {
 impl Sampler {
     /// The stream of sample `index` of pixel `pixel`; the same three numbers give the same stream.
     pub fn new(seed: u32, pixel: u32, index: u32) -> Self {
-        Self { reversed_index: index.reverse_bits(), pixel_seed: hash(hash(seed) ^ pixel), pair: 0 }
+        // Were it a bitwise sum, another seed would give all pixels each other's numbers.
+        let pixel_seed = hash(hash(pixel).wrapping_add(hash(seed)));
+        Self { reversed_index: index.reverse_bits(), pixel_seed, pair: 0 }
     }
 
     /// The next pair as 32-bit fractions of one.

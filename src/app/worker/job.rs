@@ -5,9 +5,9 @@ use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use super::alarm::Alarm;
 use super::device::Device;
 use super::{Activity, Point, Request, Shared, Snapshot, Take, lock};
+use crate::alarm::Alarm;
 use crate::denoise;
 use crate::environment::Environment;
 use crate::error::Result;

@@ -9,14 +9,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-mod alarm;
 mod device;
 mod job;
 
-use alarm::Alarm;
 use job::{Job, Legacy};
 
 use super::Wake;
+use crate::alarm::Alarm;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::image::Image;

@@ -86,7 +86,7 @@ pub(crate) struct Globals {
     pub(crate) fog_scattering: Vec3,
     pub(crate) importance_scale: f32,
     pub(crate) fog_extinction: Vec3,
-    pub(crate) padding_4: u32,
+    pub(crate) first_of_sequence: u32,
     pub(crate) background: Vec3,
     pub(crate) background_concentration: f32,
 }

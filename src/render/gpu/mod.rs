@@ -63,6 +63,7 @@ pub(crate) struct Renderer {
     render_pacer: Pacer,
     learn_pacer: Pacer,
     kernel_facts: KernelFacts,
+    seed: u32,
 }
 
 /// What was left out of the kernels and what they take.
@@ -136,6 +137,7 @@ impl Renderer {
             render_pacer: Pacer::default(),
             learn_pacer: Pacer::default(),
             kernel_facts,
+            seed: view.seed,
         };
         renderer.write_globals();
         Ok(renderer)
@@ -158,6 +160,7 @@ impl Renderer {
         learning: &LearningGrid,
         cancel: &AtomicBool,
     ) -> Result<u64> {
+        self.globals.seed = self.seed;
         self.put_counters(learning)?;
         self.buffers.put("learning_rays", &[0; 4], "a count")?;
         let learn = match &self.learn {
@@ -225,6 +228,9 @@ impl Renderer {
         cancel: &AtomicBool,
     ) -> Result<(u64, u64)> {
         let target = pass.target;
+        self.globals.seed = pass.sequence.seed(self.seed);
+        self.globals.first_of_sequence = pass.sequence.first_sample;
+        self.write_globals();
         if let Some(learning) = counts {
             self.put_counters(learning)?;
         }
@@ -431,7 +437,7 @@ mod tests {
     use crate::light_grid::{LawOptions, Recording};
     use crate::path::{Background, PathLimits, PathTracer};
     use crate::render::{Sampling, cpu};
-    use crate::sampler::Points;
+    use crate::sampler::{Points, Sequence};
     use crate::scene::builtin;
 
     fn crack() -> (World, Environment) {
@@ -486,7 +492,7 @@ mod tests {
         let mut traced = 0;
         for paths in [Some(0..4096), Some(4096..16384), None] {
             let mut film = Film::new(view.width, view.height, false);
-            let pass = Pass { target: 4, stride: 3 };
+            let pass = Pass { target: 4, stride: 3, sequence: Sequence::default() };
             let rendered = recording.goes_on().then_some(pass);
             traced += match (&mut renderer, paths) {
                 (Some(renderer), paths) => {
@@ -546,7 +552,7 @@ mod tests {
         let grid = LightGrid::whole_map(environment.tile_energies());
         renderer.set_grid(grid.as_ref()).expect("uploaded");
         let mut films = [true, false].map(|_| Film::new(view.width, view.height, false));
-        let pass = Pass { target: 3, stride: 1 };
+        let pass = Pass { target: 3, stride: 1, sequence: Sequence::default() };
         renderer.render(pass, &mut films[0], None, &AtomicBool::new(false)).expect("rendered");
         let mut calls = 0;
         while films[1].min_samples() < pass.target {

@@ -1,13 +1,11 @@
 //! The clock that cuts passes short.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::lock;
-
 /// Sets the cancel flag after a while, so that a pass ends with what it has.
-pub(super) struct Alarm {
+pub(crate) struct Alarm {
     state: Arc<(Mutex<AlarmState>, Condvar)>,
 }
 
@@ -19,7 +17,7 @@ struct AlarmState {
 
 impl Alarm {
     /// Starts its thread.
-    pub(super) fn start(cancel: Arc<AtomicBool>) -> Self {
+    pub(crate) fn start(cancel: Arc<AtomicBool>) -> Self {
         let state = Arc::new((Mutex::new(AlarmState::default()), Condvar::new()));
         let inside = Arc::clone(&state);
         // Without the thread passes are merely not cut short.
@@ -44,10 +42,14 @@ impl Alarm {
     }
 
     /// Sets the time, or unsets it.
-    pub(super) fn set(&self, at: Option<Instant>) {
+    pub(crate) fn set(&self, at: Option<Instant>) {
         lock(&self.state.0).at = at;
         self.state.1.notify_all();
     }
+}
+
+fn lock(state: &Mutex<AlarmState>) -> MutexGuard<'_, AlarmState> {
+    state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Drop for Alarm {
