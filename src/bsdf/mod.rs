@@ -278,11 +278,7 @@ impl Bsdf {
         let base = under * self.sheen.left(wo, wo);
         let coat = self.coat.albedo(wo);
         let interface = base * importance(self.interface.albedo(wo.z, terms));
-        let sheen = if self.sheen.is_absent() {
-            0.0
-        } else {
-            under * importance(self.sheen.colored_albedo(wo))
-        };
+        let sheen = under * importance(self.sheen.colored_albedo(wo));
         let diffuse = base * diffuse_left * self.diffuse.importance();
         let sum = coat + interface + sheen + diffuse;
         (sum > 0.0).then(|| Outgoing {

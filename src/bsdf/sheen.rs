@@ -93,9 +93,9 @@ impl Sheen {
         if self.is_outside(v.z) { self.gain(v.z.abs()).min(1.0) } else { 0.0 }
     }
 
-    /// The same in colour.
+    /// The same in colour. Without sheen the table, which takes long to make, is not asked.
     pub(super) fn colored_albedo(&self, v: Vec3) -> Vec3 {
-        self.color * self.albedo(v)
+        if self.is_absent() { Vec3::ZERO } else { self.color * self.albedo(v) }
     }
 
     /// What of a base's light is left between two directions.
