@@ -13,7 +13,7 @@ use crate::math::Frame;
 /// F0 of index of refraction 1.5.
 const F0: f32 = 0.04;
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Coat {
     strength: f32,
     ggx: Ggx,

@@ -16,7 +16,7 @@ use super::{SurfaceParameters, cosine_hemisphere};
 use crate::color::importance;
 
 /// The body under the opaque dielectric's share of the interface.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Diffuse {
     /// Base colour times share, over what the interface lets in on average.
     reflected: Vec3,

@@ -13,7 +13,7 @@ use crate::math::sin_cos_turns;
 pub(super) const SMOOTH_ALPHA: f32 = 1e-3;
 
 /// GGX of one width, or of two across each other.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Ggx {
     /// Across `axis`; not above `along`.
     alpha: f32,

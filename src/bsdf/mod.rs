@@ -84,7 +84,7 @@ impl Hero {
 }
 
 /// The scattering at one point, for one side.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bsdf {
     interface: Interface,
     diffuse: Diffuse,

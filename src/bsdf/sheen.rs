@@ -41,7 +41,7 @@ pub(crate) fn texels() -> Vec<[f32; 4]> {
 }
 
 /// The sheen of one point, for one side.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sheen {
     color: Vec3,
     /// Its largest component: what is taken from the base is grey.
@@ -143,7 +143,7 @@ impl Sheen {
 }
 
 /// Estevez and Kulla's microfacets.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Charlie {
     inverse_alpha: f32,
     /// Terms of the fit of Smith's lambda: `a / (1 + b x^c) + d x + e`.
