@@ -24,7 +24,18 @@ pub(super) struct Coat {
 }
 
 impl Coat {
+    const ABSENT: Self = Self {
+        strength: 0.0,
+        ggx: Ggx::SMOOTH,
+        frame: Frame { x: Vec3::X, y: Vec3::Y, z: Vec3::Z },
+        thin: true,
+        entering: true,
+    };
+
     pub(super) fn new(p: &SurfaceParameters, entering: bool) -> Self {
+        if p.clearcoat == 0.0 {
+            return Self::ABSENT;
+        }
         Self {
             strength: p.clearcoat,
             ggx: Ggx::from_roughness(p.clearcoat_roughness),

@@ -23,6 +23,9 @@ pub(crate) struct Ggx {
 }
 
 impl Ggx {
+    /// A perfect mirror.
+    pub(crate) const SMOOTH: Self = Self { alpha: 0.0, along: 0.0, axis: Vec2::X };
+
     /// From glTF's perceptual roughness: alpha is its square.
     pub(crate) fn from_roughness(roughness: f32) -> Self {
         let alpha = roughness * roughness;
