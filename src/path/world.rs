@@ -6,9 +6,10 @@ use super::lights::LocalLights;
 use super::materials::ReadyMaterial;
 use super::ray_clock::RayClock;
 use crate::bvh::{Bvh, Hit, Ray};
+use crate::huge_pages::on_huge_pages;
 use crate::scene::needs::SceneNeeds;
 use crate::scene::surface::{SurfacePoint, alpha_at};
-use crate::scene::{AlphaMode, Scene};
+use crate::scene::{AlphaMode, Scene, TextureImage};
 
 /// Everything about the scene that paths ask for.
 pub struct World {
@@ -27,6 +28,7 @@ pub struct World {
 impl World {
     /// Builds the BVH and the light tables.
     pub fn new(scene: Scene) -> Self {
+        let scene = with_huge_pages(scene);
         let bvh = Bvh::build(&scene.positions, &scene.triangles);
         let materials = scene.materials.iter().map(ReadyMaterial::new).collect();
         let lights = LocalLights::new(&scene, bvh.bounds());
@@ -138,5 +140,22 @@ impl World {
         let [a, b, c] =
             self.scene.triangles[hit.triangle as usize].map(|v| self.scene.positions[v as usize]);
         (b - a).cross(c - a).dot(ray.direction) <= 0.0
+    }
+}
+
+/// The scene with its large arrays where rays, which hit here and there, find them soonest.
+fn with_huge_pages(scene: Scene) -> Scene {
+    let texels_too =
+        |image: TextureImage| TextureImage { texels: on_huge_pages(image.texels), ..image };
+    Scene {
+        positions: on_huge_pages(scene.positions),
+        normals: on_huge_pages(scene.normals),
+        tangents: on_huge_pages(scene.tangents),
+        uvs: scene.uvs.map(on_huge_pages),
+        colors: on_huge_pages(scene.colors),
+        triangles: on_huge_pages(scene.triangles),
+        triangle_materials: on_huge_pages(scene.triangle_materials),
+        images: scene.images.into_iter().map(texels_too).collect(),
+        ..scene
     }
 }
