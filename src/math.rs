@@ -81,7 +81,10 @@ pub fn atan2(y: f32, x: f32) -> f32 {
 /// The polynomials of Cephes' `sinf` and `cosf` (Moshier 1989) after an exact reduction: the same
 /// function runs on a GPU, whose own may be off by 2^-11.
 pub fn sin_cos_turns(turns: f32) -> (f32, f32) {
-    let quarter = (4.0 * turns).round_ties_even();
+    // Rounds ties to even, without the call that `round_ties_even` makes where a machine need not
+    // have the instruction.
+    const WHOLE: f32 = (3 << 22) as f32;
+    let quarter = (4.0 * turns + WHOLE) - WHOLE;
     let x = (turns - 0.25 * quarter) * TAU;
     let z = x * x;
     let sine = ((-1.951_529_6e-4 * z + 8.332_161e-3) * z - 1.666_665_5e-1) * z * x + x;

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 use crate::bvh::{Ray, offset_origin};
 use crate::path::World;
 use crate::render::View;
-use crate::scene::surface::SurfacePoint;
 
 /// Panes and leaves that a look passes at most.
 const MAX_PASSES: u32 = 32;
@@ -61,12 +60,12 @@ impl SurfaceMap {
 pub fn look(world: &World, mut ray: Ray) -> Option<Spot> {
     for _ in 0..MAX_PASSES {
         let hit = world.closest_hit(&ray, true)?;
-        let point = SurfacePoint::at(&world.scene, hit.triangle, hit.barycentric, ray.direction);
+        let point = world.point(&hit, ray.direction);
         if world.straight_through(&point, ray.direction).max_element() < 0.5 {
             return Some(Spot {
                 position: point.position,
                 normal: point.geometric_normal,
-                material: world.scene.triangle_materials[hit.triangle as usize],
+                material: point.material,
             });
         }
         ray.origin = offset_origin(point.position, -point.geometric_normal);

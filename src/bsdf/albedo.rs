@@ -31,7 +31,7 @@ struct Row {
 static ROWS: LazyLock<[Row; ROUGHNESSES]> = LazyLock::new(|| array::from_fn(row));
 
 /// The albedo terms of a GGX.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct AlbedoTerms {
     ggx: Ggx,
     rows: RowPair,
@@ -79,7 +79,7 @@ impl AlbedoTerms {
 }
 
 /// One roughness, interpolated between two rows.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct RowPair {
     row: u32,
     fraction: f32,

@@ -13,7 +13,7 @@ use crate::math::Frame;
 /// F0 of index of refraction 1.5.
 const F0: f32 = 0.04;
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Coat {
     strength: f32,
     ggx: Ggx,
@@ -24,7 +24,18 @@ pub(super) struct Coat {
 }
 
 impl Coat {
+    const ABSENT: Self = Self {
+        strength: 0.0,
+        ggx: Ggx::SMOOTH,
+        frame: Frame { x: Vec3::X, y: Vec3::Y, z: Vec3::Z },
+        thin: true,
+        entering: true,
+    };
+
     pub(super) fn new(p: &SurfaceParameters, entering: bool) -> Self {
+        if p.clearcoat == 0.0 {
+            return Self::ABSENT;
+        }
         Self {
             strength: p.clearcoat,
             ggx: Ggx::from_roughness(p.clearcoat_roughness),

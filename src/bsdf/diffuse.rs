@@ -16,7 +16,7 @@ use super::{SurfaceParameters, cosine_hemisphere};
 use crate::color::importance;
 
 /// The body under the opaque dielectric's share of the interface.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Diffuse {
     /// Base colour times share, over what the interface lets in on average.
     reflected: Vec3,
@@ -54,6 +54,11 @@ impl Diffuse {
             diffuse.transmitted = scale(diffuse.transmitted);
         }
         diffuse
+    }
+
+    /// Whether it is Lambert's reflection, of which no interface takes anything.
+    pub(super) fn is_lambert(&self) -> bool {
+        self.f0_f90 == Vec2::ZERO && self.reflected != Vec3::ZERO && self.transmitted == Vec3::ZERO
     }
 
     pub(super) fn is_absent(&self) -> bool {
@@ -105,6 +110,12 @@ impl Diffuse {
         } else {
             (Vec3::ZERO, 0.0)
         }
+    }
+
+    /// [`Self::eval_pdf`] where [`Self::is_lambert`].
+    pub(super) fn lambert(&self, wi: Vec3) -> (Vec3, f32) {
+        let lambert = wi.z.max(0.0) * FRAC_1_PI;
+        (self.reflected * lambert, lambert)
     }
 
     fn let_in(&self) -> f32 {

@@ -33,7 +33,7 @@ impl Facet {
     }
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Interface {
     ggx: Ggx,
     /// Opaque share: metal and dielectric, weights included.

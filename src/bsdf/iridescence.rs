@@ -15,7 +15,7 @@ use crate::color::REC709_FROM_XYZ;
 use crate::math::sin_cos_turns;
 
 /// The film of one point. Air is outside of it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Film {
     /// Share of the surface that it covers, in `[0,1]`.
     pub(super) share: f32,

@@ -13,7 +13,7 @@ use crate::math::sin_cos_turns;
 pub(super) const SMOOTH_ALPHA: f32 = 1e-3;
 
 /// GGX of one width, or of two across each other.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Ggx {
     /// Across `axis`; not above `along`.
     alpha: f32,
@@ -23,6 +23,9 @@ pub(crate) struct Ggx {
 }
 
 impl Ggx {
+    /// A perfect mirror.
+    pub(crate) const SMOOTH: Self = Self { alpha: 0.0, along: 0.0, axis: Vec2::X };
+
     /// From glTF's perceptual roughness: alpha is its square.
     pub(crate) fn from_roughness(roughness: f32) -> Self {
         let alpha = roughness * roughness;

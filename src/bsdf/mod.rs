@@ -84,12 +84,14 @@ impl Hero {
 }
 
 /// The scattering at one point, for one side.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bsdf {
     interface: Interface,
     diffuse: Diffuse,
     sheen: Sheen,
     coat: Coat,
+    /// There is nothing but Lambert's reflection: what most walls are, and cheap.
+    is_lambert: bool,
 }
 
 /// What depends on `wo` alone: what the interface leaves for the body, and the probability of each
@@ -113,12 +115,11 @@ impl Bsdf {
         let interface = Interface::new(p, f0, f90, entering);
         let f0_f90 = Vec2::new(interface.largest_f0(p, f0), f90);
         let terms = AlbedoTerms::of(interface.ggx(), p.roughness);
-        Self {
-            interface,
-            diffuse: Diffuse::new(p, f0_f90, terms, &interface),
-            sheen: Sheen::new(p, entering),
-            coat: Coat::new(p, entering),
-        }
+        let diffuse = Diffuse::new(p, f0_f90, terms, &interface);
+        let (sheen, coat) = (Sheen::new(p, entering), Coat::new(p, entering));
+        let is_lambert =
+            diffuse.is_lambert() && interface.is_absent() && sheen.is_absent() && coat.is_absent();
+        Self { interface, diffuse, sheen, coat, is_lambert }
     }
 
     /// The same for a path of which one channel stands for all if a dispersive solid refracts it.
@@ -135,8 +136,12 @@ impl Bsdf {
     /// A direction to continue in from three uniform numbers in `[0,1)`: the first chooses the lobe,
     /// the others the direction. `None` is absorption: the sample counts as zero.
     pub fn sample(&self, wo: Vec3, u: Vec3) -> Option<BsdfSample> {
-        let out = self.outgoing(wo)?;
         let direction = Vec2::new(u.y, u.z);
+        if self.is_lambert {
+            let wi = cosine_hemisphere(direction);
+            return spread_sample(wi, self.eval_pdf(wo, wi));
+        }
+        let out = self.outgoing(wo)?;
         let choice = u.x - out.coat_probability;
         let lobe = if choice < 0.0 {
             self.coat.sample(wo, direction, out.coat_probability)?
@@ -153,7 +158,7 @@ impl Bsdf {
             }
         };
         match lobe {
-            LobeSample::Spread(wi) => self.spread_sample(wo, wi, &out),
+            LobeSample::Spread(wi) => spread_sample(wi, self.eval_pdf_with(wo, wi, &out)),
             LobeSample::Coat(wi, weight) => delta_sample(wi, weight),
             LobeSample::Interface(wi, weight) => {
                 let left = self.left_by_layers(wo, wi);
@@ -170,6 +175,9 @@ impl Bsdf {
 
     /// [`Self::eval`] and [`Self::pdf_solid_angle`] at once.
     pub fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
+        if self.is_lambert {
+            return if wo.z > 0.0 { self.diffuse.lambert(wi) } else { (Vec3::ZERO, 0.0) };
+        }
         self.outgoing(wo).map_or((Vec3::ZERO, 0.0), |out| self.eval_pdf_with(wo, wi, &out))
     }
 
@@ -203,18 +211,6 @@ impl Bsdf {
         let under = self.coat.attenuation(up);
         let under = under * under * (self.sheen.colored_albedo(up) + base);
         (self.coat.albedo(up) + under).clamp(Vec3::ZERO, Vec3::ONE)
-    }
-
-    fn spread_sample(&self, wo: Vec3, wi: Vec3, out: &Outgoing) -> Option<BsdfSample> {
-        let (value, pdf_solid_angle) = self.eval_pdf_with(wo, wi, out);
-        let weight = value / pdf_solid_angle;
-        (pdf_solid_angle > 0.0 && weight.is_finite()).then_some(BsdfSample {
-            wi,
-            weight,
-            pdf_solid_angle,
-            is_delta: false,
-            is_transmission: wi.z < 0.0,
-        })
     }
 
     fn eval_pdf_with(&self, wo: Vec3, wi: Vec3, out: &Outgoing) -> (Vec3, f32) {
@@ -278,11 +274,7 @@ impl Bsdf {
         let base = under * self.sheen.left(wo, wo);
         let coat = self.coat.albedo(wo);
         let interface = base * importance(self.interface.albedo(wo.z, terms));
-        let sheen = if self.sheen.is_absent() {
-            0.0
-        } else {
-            under * importance(self.sheen.colored_albedo(wo))
-        };
+        let sheen = under * importance(self.sheen.colored_albedo(wo));
         let diffuse = base * diffuse_left * self.diffuse.importance();
         let sum = coat + interface + sheen + diffuse;
         (sum > 0.0).then(|| Outgoing {
@@ -307,6 +299,18 @@ enum LobeSample {
     Interface(Vec3, Vec3),
 }
 
+/// A direction, given the scattering and the density there.
+fn spread_sample(wi: Vec3, (value, pdf_solid_angle): (Vec3, f32)) -> Option<BsdfSample> {
+    let weight = value / pdf_solid_angle;
+    (pdf_solid_angle > 0.0 && weight.is_finite()).then_some(BsdfSample {
+        wi,
+        weight,
+        pdf_solid_angle,
+        is_delta: false,
+        is_transmission: wi.z < 0.0,
+    })
+}
+
 fn delta_sample(wi: Vec3, weight: Vec3) -> Option<BsdfSample> {
     (weight.is_finite() && weight != Vec3::ZERO).then_some(BsdfSample {
         wi,
@@ -322,4 +326,67 @@ pub(crate) fn cosine_hemisphere(u: Vec2) -> Vec3 {
     let (sin_phi, cos_phi) = sin_cos_turns(u.x);
     let r = u.y.sqrt();
     Vec3::new(r * cos_phi, r * sin_phi, (1.0 - u.y).max(0.0).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// White, and nothing else.
+    fn white() -> SurfaceParameters {
+        SurfaceParameters {
+            base_color: Vec3::ONE,
+            ior: 1.5,
+            specular_color: Vec3::ONE,
+            thin: true,
+            anisotropy_axis: Vec2::X,
+            clearcoat_normal: Vec3::Z,
+            ..SurfaceParameters::default()
+        }
+    }
+
+    #[test]
+    fn the_short_cut_is_taken_by_lambert_alone() {
+        let lambert = |p: SurfaceParameters| Bsdf::new(&p, true).is_lambert;
+        let white = white();
+        assert!(
+            lambert(white) && lambert(SurfaceParameters { roughness: 1.0, thin: false, ..white })
+        );
+        for other in [
+            SurfaceParameters { base_color: Vec3::ZERO, ..white },
+            SurfaceParameters { metallic: 0.5, ..white },
+            SurfaceParameters { specular: 0.1, ..white },
+            SurfaceParameters { transmission: 0.5, ..white },
+            SurfaceParameters {
+                diffuse_transmission: 0.5,
+                diffuse_transmission_color: Vec3::ONE,
+                ..white
+            },
+            SurfaceParameters { sheen_color: Vec3::X, ..white },
+            SurfaceParameters { clearcoat: 0.1, ..white },
+        ] {
+            assert!(!lambert(other), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn the_short_cut_changes_no_bit() {
+        let color = Vec3::new(0.8, 0.3, 0.05);
+        let short = Bsdf::new(&SurfaceParameters { base_color: color, ..white() }, true);
+        let long = Bsdf { is_lambert: false, ..short };
+        let random =
+            |i: u32, n: u32| crate::sampler::unit_from_bits(crate::sampler::hash(8 * i + n));
+        let direction = |i, n| Sheen::sample(Vec2::new(random(i, n), 2.0 * random(i, n + 1) - 1.0));
+        for i in 0..10_000 {
+            let (wo, wi) = (direction(i, 0), direction(i, 2));
+            assert_eq!(short.eval_pdf(wo, wi), long.eval_pdf(wo, wi), "{wo} {wi}");
+            let u = Vec3::new(random(i, 4), random(i, 5), random(i, 6));
+            assert_eq!(short.sample(wo, u), long.sample(wo, u), "{wo} {u}");
+        }
+        let grazing = Vec3::X;
+        assert_eq!(short.eval_pdf(grazing, Vec3::Z), long.eval_pdf(grazing, Vec3::Z));
+        assert_eq!(short.eval_pdf(Vec3::Z, grazing), long.eval_pdf(Vec3::Z, grazing));
+        assert_eq!(short.albedo(), long.albedo());
+        assert_eq!(short.is_delta_only(), long.is_delta_only());
+    }
 }

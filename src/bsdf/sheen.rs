@@ -41,7 +41,7 @@ pub(crate) fn texels() -> Vec<[f32; 4]> {
 }
 
 /// The sheen of one point, for one side.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sheen {
     color: Vec3,
     /// Its largest component: what is taken from the base is grey.
@@ -93,9 +93,9 @@ impl Sheen {
         if self.is_outside(v.z) { self.gain(v.z.abs()).min(1.0) } else { 0.0 }
     }
 
-    /// The same in colour.
+    /// The same in colour. Without sheen the table, which takes long to make, is not asked.
     pub(super) fn colored_albedo(&self, v: Vec3) -> Vec3 {
-        self.color * self.albedo(v)
+        if self.is_absent() { Vec3::ZERO } else { self.color * self.albedo(v) }
     }
 
     /// What of a base's light is left between two directions.
@@ -143,7 +143,7 @@ impl Sheen {
 }
 
 /// Estevez and Kulla's microfacets.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Charlie {
     inverse_alpha: f32,
     /// Terms of the fit of Smith's lambda: `a / (1 + b x^c) + d x + e`.

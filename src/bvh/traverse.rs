@@ -204,6 +204,17 @@ impl Stack {
         nearest as Reference
     }
 
+    /// Pushes the children of `node` in the lanes of `mask`, which is not zero, as they are, save for
+    /// the last, which is returned.
+    #[inline(always)]
+    fn descend_in_order(&mut self, node: &Node, mask: u32) -> Reference {
+        let last = mask.ilog2();
+        for lane in Bits(mask & !(1 << last)) {
+            self.push(entry(0.0, node.children[lane]));
+        }
+        node.children[last as usize % WIDTH]
+    }
+
     /// Inserts so that entries from `base` on fall towards the top.
     #[inline(always)]
     fn insert(&mut self, base: usize, entry: u64) {
@@ -249,13 +260,14 @@ fn distance(entry: u64) -> f32 {
     f32::from_bits((entry >> 32) as u32)
 }
 
-/// Intersects all blocks whose boxes the ray crosses before `t_max`, near ones first.
+/// Intersects all blocks whose boxes the ray crosses before `t_max`: near ones first, or those first
+/// that block most rays.
 ///
 /// `visit` gets the hits of a block and returns how far to go on, or `None` to end the walk. No
 /// lanes may be handled in closures: those are not always inlined, and are not compiled for the
 /// vector instructions of the function around.
 #[inline(always)]
-fn walk<L: Lanes>(
+fn walk<L: Lanes, const NEAREST_FIRST: bool>(
     tree: TreeRef<'_>,
     ray: &Ray,
     mut visit: impl FnMut(&Block, &BlockHits) -> Option<f32>,
@@ -284,7 +296,11 @@ fn walk<L: Lanes>(
             let node = &tree.nodes[current as usize];
             let (mask, near) = box_ray.enter::<L>(node, t_min, t_max);
             if mask != 0 {
-                current = stack.descend(node, mask, &near);
+                current = if NEAREST_FIRST {
+                    stack.descend(node, mask, &near)
+                } else {
+                    stack.descend_in_order(node, mask)
+                };
                 continue;
             }
         }
@@ -306,7 +322,7 @@ pub(super) fn closest_hit<L: Lanes>(
     accept: impl Fn(&Hit) -> bool,
 ) -> Option<Hit> {
     let mut closest = Hit { t: ray.t_max, triangle: u32::MAX, ..Hit::default() };
-    walk::<L>(tree, ray, |block, hits| {
+    walk::<L, true>(tree, ray, |block, hits| {
         for lane in Bits(hits.mask) {
             let hit = hits.hit(block, lane);
             // The lower index wins ties, so that hits do not depend on the shape of the tree.
@@ -329,7 +345,7 @@ pub(super) fn any_hit<L: Lanes>(
     mut blocks: impl FnMut(&Hit) -> bool,
 ) -> bool {
     let mut blocked = false;
-    walk::<L>(tree, ray, |block, hits| {
+    walk::<L, false>(tree, ray, |block, hits| {
         for lane in Bits(hits.mask) {
             let hit = hits.hit(block, lane);
             if blocks(&hit) {

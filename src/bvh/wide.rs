@@ -17,7 +17,8 @@ pub(super) type Reference = u32;
 /// Marks a [`Reference`] to a leaf block.
 pub(super) const LEAF: Reference = 1 << 31;
 
-/// Boxes of up to eight children, one lane each. A lane without child holds an empty box.
+/// Boxes of up to eight children, one lane each, those last that likely block a ray. A lane without
+/// child holds an empty box.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(super) struct Node {

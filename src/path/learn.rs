@@ -16,7 +16,8 @@ impl PathTracer<'_> {
     pub fn learn(&self, ray: Ray, sampler: Sampler) -> u32 {
         let tries = self.counts.map_or(0, LearningGrid::tries_per_vertex);
         let mut path = Path::new(self, ray, sampler);
-        while let Some(vertex) = path.next_vertex() {
+        let mut own_bsdf = None;
+        while let Some(vertex) = path.next_vertex(&mut own_bsdf) {
             if path.bounces == self.limits.bounces {
                 break;
             }
@@ -41,14 +42,14 @@ fn phase_weight(phase: f32) -> f32 {
 
 impl Path<'_> {
     /// Says that a try of a tile will be counted once its shadow ray is traced.
-    pub(super) fn expect_count(&self, vertex: &Vertex, tile: u32) {
+    pub(super) fn expect_count(&self, vertex: &Vertex<'_>, tile: u32) {
         if let (Some(learning), Some(cell)) = (self.tracer.counts, vertex.cell) {
             learning.counters.prefetch(cell, tile);
         }
     }
 
     /// Counts a try of a tile of the map, if anything is counted.
-    pub(super) fn count(&self, vertex: &Vertex, tile: u32, weight: f32) {
+    pub(super) fn count(&self, vertex: &Vertex<'_>, tile: u32, weight: f32) {
         if let (Some(learning), Some(cell)) = (self.tracer.counts, vertex.cell) {
             learning.counters.record(cell, tile, weight);
         }
@@ -58,21 +59,21 @@ impl Path<'_> {
     /// times a power of what the surface or the phase function makes of its direction.
     pub(super) fn visibility(
         &self,
-        vertex: &Vertex,
+        vertex: &Vertex<'_>,
         direction: Vec3,
         own_pdf: f32,
         transmittance: Vec3,
     ) -> f32 {
         let Some(learning) = self.tracer.counts else { return 0.0 };
         let share = match &vertex.scatterer {
-            Scatterer::Surface(surface) => surface.point.shading_frame.z.dot(direction).abs(),
+            Scatterer::Surface(surface) => surface.shading_frame.z.dot(direction).abs(),
             Scatterer::Medium(_) => phase_weight(own_pdf),
         };
         luminance(transmittance) * share.powi(learning.recording().cosine_power())
     }
 
     /// Samples the map to see what is visible of it.
-    fn look_at_map(&mut self, vertex: &Vertex) {
+    fn look_at_map(&mut self, vertex: &Vertex<'_>) {
         let (Some(grid), Some(learning)) = (self.tracer.grid, self.tracer.counts) else { return };
         let is_ratio = learning.recording().is_ratio();
         let bits = self.sampler.next_pair_bits();

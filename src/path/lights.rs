@@ -145,7 +145,7 @@ impl LocalLights {
 }
 
 /// Radiance a surface point sends towards its viewer: as much as alpha covers it.
-pub(super) fn emitted(scene: &Scene, point: &SurfacePoint) -> Vec3 {
+pub(super) fn emitted(scene: &Scene, point: &SurfacePoint<'_>) -> Vec3 {
     let material = scene.triangle_materials[point.triangle as usize];
     if point.front_face || scene.materials[material as usize].double_sided {
         point.parameters.emissive * point.parameters.alpha

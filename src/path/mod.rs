@@ -6,6 +6,8 @@
 //! a path then runs into counts with the balance heuristic. Alpha and smooth thin glass are passed straight through, by paths and shadow
 //! rays alike, and are no vertices: so NEE and BSDF sampling see the same light behind a pane.
 
+use std::borrow::Cow;
+
 use glam::{Vec2, Vec3};
 
 pub mod background;
@@ -13,6 +15,7 @@ pub mod camera;
 pub mod framing;
 mod learn;
 mod lights;
+mod materials;
 mod ray_clock;
 mod world;
 
@@ -25,7 +28,7 @@ use crate::bvh::{Hit, Ray, offset_origin};
 use crate::environment::Environment;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
-use crate::math::balance_heuristic;
+use crate::math::{Frame, balance_heuristic};
 use crate::medium::{Fog, Interior, Phase};
 use crate::sampler::Sampler;
 use crate::scene::surface::SurfacePoint;
@@ -96,7 +99,8 @@ impl PathTracer<'_> {
     /// Radiance along a camera ray.
     pub fn radiance(&self, ray: Ray, sampler: Sampler) -> PathResult {
         let mut path = Path::new(self, ray, sampler);
-        while let Some(vertex) = path.next_vertex() {
+        let mut own_bsdf = None;
+        while let Some(vertex) = path.next_vertex(&mut own_bsdf) {
             if path.bounces == self.limits.bounces {
                 break;
             }
@@ -120,37 +124,44 @@ impl PathTracer<'_> {
         self.counts.map(|counts| &counts.grid).or(self.grid.and_then(LightGrid::grid))
     }
 
-    fn vertex(&self, position: Vec3, cell: Option<u32>, scatterer: Scatterer) -> Vertex {
+    fn vertex<'v>(
+        &self,
+        position: Vec3,
+        cell: Option<u32>,
+        scatterer: Scatterer<'v>,
+    ) -> Vertex<'v> {
         let law = self.grid.zip(cell).map_or(WHOLE_MAP, |(grid, cell)| grid.law_of_cell(cell));
         Vertex { position, cell, law, scatterer }
     }
 }
 
 /// A place at which light is scattered.
-struct Vertex {
+struct Vertex<'v> {
     position: Vec3,
     /// Cell of the Light Grid it lies in; `None` without one.
     cell: Option<u32>,
     /// Tile law of NEE here.
     law: u32,
-    scatterer: Scatterer,
+    scatterer: Scatterer<'v>,
 }
 
 /// What scatters light at a vertex.
-#[allow(clippy::large_enum_variant, reason = "a path has one at a time, on the stack")]
-enum Scatterer {
-    Surface(SurfaceScatterer),
+enum Scatterer<'v> {
+    Surface(SurfaceScatterer<'v>),
     Medium(Phase),
 }
 
-struct SurfaceScatterer {
-    point: SurfacePoint,
-    bsdf: Bsdf,
+struct SurfaceScatterer<'v> {
+    geometric_normal: Vec3,
+    shading_frame: Frame,
+    bsdf: &'v Bsdf,
     /// Direction to where the path came from, in the shading frame.
     wo: Vec3,
+    /// What lies behind the surface; `None` if it is what lies before it.
+    behind: Option<&'v Body>,
 }
 
-impl Scatterer {
+impl Scatterer<'_> {
     /// Whether no light that NEE may find is scattered towards the path.
     fn is_delta_only(&self) -> bool {
         match self {
@@ -160,32 +171,16 @@ impl Scatterer {
     }
 }
 
-impl SurfaceScatterer {
+impl SurfaceScatterer<'_> {
     /// BSDF times cosine and the BSDF's density for light from `direction`; `None` where it is
     /// black, or where shading and geometric normal disagree about the side.
     fn scattered(&self, direction: Vec3) -> Option<(Vec3, f32)> {
-        let wi = self.point.shading_frame.local_from_world(direction);
-        if (wi.z > 0.0) != (self.point.geometric_normal.dot(direction) > 0.0) {
+        let wi = self.shading_frame.local_from_world(direction);
+        if (wi.z > 0.0) != (self.geometric_normal.dot(direction) > 0.0) {
             return None;
         }
         let (f, pdf_solid_angle) = self.bsdf.eval_pdf(self.wo, wi);
         (f.max_element() > 0.0).then_some((f, pdf_solid_angle))
-    }
-
-    /// What lies behind the surface, given what lies before it.
-    fn body_behind(&self, world: &World, before: Body) -> Body {
-        let parameters = &self.point.parameters;
-        if parameters.thin {
-            before
-        } else if self.point.front_face {
-            let index = parameters.ior.max(1.0);
-            let material = world.scene.triangle_materials[self.point.triangle as usize];
-            let material = &world.scene.materials[material as usize];
-            let interior = Interior::of_body(material, parameters.absorption);
-            Body { interior: Some(interior), squared_index: index * index }
-        } else {
-            Body::AIR
-        }
     }
 }
 
@@ -266,8 +261,12 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// Follows the ray to the next place that scatters; adds what is emitted on the way.
-    fn next_vertex(&mut self) -> Option<Vertex> {
+    /// Follows the ray to the next place that scatters; adds what is emitted on the way. A BSDF that
+    /// is of that place alone is put into `own_bsdf`.
+    fn next_vertex<'v>(&mut self, own_bsdf: &'v mut Option<Bsdf>) -> Option<Vertex<'v>>
+    where
+        'a: 'v,
+    {
         self.travelled = 0.0;
         for _ in 0..MAX_PASSES {
             self.rays += 1;
@@ -283,8 +282,7 @@ impl<'a> Path<'a> {
                 return None;
             };
             self.travelled += hit.t;
-            let scene = &self.tracer.world.scene;
-            let point = SurfacePoint::at(scene, hit.triangle, hit.barycentric, self.ray.direction);
+            let point = self.tracer.world.point(&hit, self.ray.direction);
             if self.tracer.world.needs.emitters {
                 self.add_emitted(&hit, &point);
             }
@@ -292,7 +290,7 @@ impl<'a> Path<'a> {
                 self.ray.origin = offset_origin(point.position, -point.geometric_normal);
                 continue;
             }
-            return self.arrive(point);
+            return self.arrive(&point, own_bsdf);
         }
         None
     }
@@ -304,7 +302,7 @@ impl<'a> Path<'a> {
 
     /// Takes the ray through what fills the way of `distance` metres to the next surface: a vertex
     /// if it is scattered there.
-    fn fly(&mut self, distance: f32) -> Option<Vertex> {
+    fn fly(&mut self, distance: f32) -> Option<Vertex<'static>> {
         let fog = self.tracer.fog.as_ref();
         let (origin, direction) = (self.ray.origin, self.ray.direction);
         let (interior, from, to) = self.body.stretch(fog, origin, direction, distance)?;
@@ -326,7 +324,7 @@ impl<'a> Path<'a> {
     }
 
     /// Decides whether the ray goes straight through the surface, and weighs the path accordingly.
-    fn passes(&mut self, point: &SurfacePoint) -> bool {
+    fn passes(&mut self, point: &SurfacePoint<'_>) -> bool {
         let world = self.tracer.world;
         let through = world.straight_through(point, self.ray.direction);
         let probability = through.max_element().min(1.0);
@@ -343,12 +341,25 @@ impl<'a> Path<'a> {
     }
 
     /// Makes the surface a vertex, unless it is unlit: then it is seen as it is.
-    fn arrive(&mut self, point: SurfacePoint) -> Option<Vertex> {
-        let parameters = &point.parameters;
-        let mut bsdf = Bsdf::new(parameters, point.front_face);
+    fn arrive<'v>(
+        &mut self,
+        point: &SurfacePoint<'_>,
+        own_bsdf: &'v mut Option<Bsdf>,
+    ) -> Option<Vertex<'v>>
+    where
+        'a: 'v,
+    {
+        let (world, parameters) = (self.tracer.world, &point.parameters);
+        let material = world.material(point.material);
+        let mut bsdf = material.bsdf(point);
         if parameters.dispersion > 0.0 {
-            bsdf = bsdf.of_hero(Hero::choose(self.throughput, self.sampler.next_pair()[0]));
+            let hero = Hero::choose(self.throughput, self.sampler.next_pair()[0]);
+            bsdf = Cow::Owned(bsdf.of_hero(hero));
         }
+        let bsdf = match bsdf {
+            Cow::Borrowed(ready) => ready,
+            Cow::Owned(own) => own_bsdf.insert(own),
+        };
         if self.bounces == 0 {
             let albedo = if parameters.unlit { parameters.base_color } else { bsdf.albedo() };
             self.first_hit =
@@ -361,13 +372,18 @@ impl<'a> Path<'a> {
         let cells = self.tracer.cells();
         let cell = cells.map(|cells| cells.cell_of(point.position, point.geometric_normal));
         let wo = point.shading_frame.local_from_world(-self.ray.direction);
-        let position = point.position;
-        let scatterer = Scatterer::Surface(SurfaceScatterer { point, bsdf, wo });
-        Some(self.tracer.vertex(position, cell, scatterer))
+        let scatterer = Scatterer::Surface(SurfaceScatterer {
+            geometric_normal: point.geometric_normal,
+            shading_frame: point.shading_frame,
+            bsdf,
+            wo,
+            behind: material.behind(point),
+        });
+        Some(self.tracer.vertex(point.position, cell, scatterer))
     }
 
     /// Adds what a surface emits, whether the ray then passes it or not.
-    fn add_emitted(&mut self, hit: &Hit, point: &SurfacePoint) {
+    fn add_emitted(&mut self, hit: &Hit, point: &SurfacePoint<'_>) {
         if point.parameters.unlit {
             return;
         }
@@ -413,7 +429,7 @@ impl<'a> Path<'a> {
     }
 
     /// Next event estimation from the map and, if there are any, one local light.
-    fn gather(&mut self, vertex: &Vertex) {
+    fn gather(&mut self, vertex: &Vertex<'_>) {
         if vertex.scatterer.is_delta_only() {
             return;
         }
@@ -425,7 +441,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    fn gather_environment(&mut self, vertex: &Vertex, grid: &LightGrid) {
+    fn gather_environment(&mut self, vertex: &Vertex<'_>, grid: &LightGrid) {
         let bits = self.sampler.next_pair_bits();
         let choice = grid.sample(vertex.law, bits);
         self.expect_count(vertex, choice.tile);
@@ -448,7 +464,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    fn gather_local(&mut self, vertex: &Vertex) {
+    fn gather_local(&mut self, vertex: &Vertex<'_>) {
         let u = Vec2::from(self.sampler.next_pair());
         let world = self.tracer.world;
         let Some(sample) = world.lights.sample(&world.scene, vertex.position, u) else {
@@ -465,7 +481,7 @@ impl<'a> Path<'a> {
 
     /// What share of light from `direction` goes on along the path, and the density with which
     /// [`Self::scatter`] chooses that direction; `None` if it is no light.
-    fn scattered(&self, vertex: &Vertex, direction: Vec3) -> Option<(Vec3, f32)> {
+    fn scattered(&self, vertex: &Vertex<'_>, direction: Vec3) -> Option<(Vec3, f32)> {
         match &vertex.scatterer {
             Scatterer::Surface(surface) => surface.scattered(direction),
             Scatterer::Medium(phase) => {
@@ -476,16 +492,13 @@ impl<'a> Path<'a> {
     }
 
     /// Share of light that arrives at a vertex from `distance` metres away.
-    fn transmittance(&mut self, vertex: &Vertex, direction: Vec3, distance: f32) -> Vec3 {
+    fn transmittance(&mut self, vertex: &Vertex<'_>, direction: Vec3, distance: f32) -> Vec3 {
         let (origin, body) = match &vertex.scatterer {
             Scatterer::Surface(surface) => {
-                let normal = surface.point.geometric_normal;
+                let normal = surface.geometric_normal;
                 let is_above = normal.dot(direction) > 0.0;
-                let body = if is_above {
-                    self.body
-                } else {
-                    surface.body_behind(self.tracer.world, self.body)
-                };
+                let behind = surface.behind.filter(|_| !is_above);
+                let body = behind.copied().unwrap_or(self.body);
                 (offset_origin(vertex.position, if is_above { normal } else { -normal }), body)
             }
             Scatterer::Medium(_) => (vertex.position, self.body),
@@ -503,7 +516,7 @@ impl<'a> Path<'a> {
     }
 
     /// Chooses where the path goes on. `false` if it ends.
-    fn scatter(&mut self, vertex: &Vertex) -> bool {
+    fn scatter(&mut self, vertex: &Vertex<'_>) -> bool {
         match &vertex.scatterer {
             Scatterer::Surface(surface) => self.scatter_at_surface(vertex, surface),
             Scatterer::Medium(phase) => {
@@ -516,14 +529,14 @@ impl<'a> Path<'a> {
         }
     }
 
-    fn scatter_at_surface(&mut self, vertex: &Vertex, surface: &SurfaceScatterer) -> bool {
+    fn scatter_at_surface(&mut self, vertex: &Vertex<'_>, surface: &SurfaceScatterer<'_>) -> bool {
         let [lobe, _] = self.sampler.next_pair();
         let [x, y] = self.sampler.next_pair();
         let Some(sample) = surface.bsdf.sample(surface.wo, Vec3::new(lobe, x, y)) else {
             return false;
         };
-        let direction = surface.point.shading_frame.world_from_local(sample.wi).normalize();
-        let normal = surface.point.geometric_normal;
+        let direction = surface.shading_frame.world_from_local(sample.wi).normalize();
+        let normal = surface.geometric_normal;
         let above = normal.dot(direction) > 0.0;
         if above == sample.is_transmission {
             return false;
@@ -533,7 +546,7 @@ impl<'a> Path<'a> {
             return false;
         }
         if sample.is_transmission {
-            self.body = surface.body_behind(self.tracer.world, self.body);
+            self.body = surface.behind.copied().unwrap_or(self.body);
         }
         let pdf = if sample.is_delta { f32::INFINITY } else { sample.pdf_solid_angle };
         let origin = offset_origin(vertex.position, if above { normal } else { -normal });
@@ -541,7 +554,7 @@ impl<'a> Path<'a> {
         true
     }
 
-    fn depart(&mut self, vertex: &Vertex, origin: Vec3, direction: Vec3, pdf_solid_angle: f32) {
+    fn depart(&mut self, vertex: &Vertex<'_>, origin: Vec3, direction: Vec3, pdf_solid_angle: f32) {
         self.departure = Departure { pdf_solid_angle, position: vertex.position, law: vertex.law };
         self.ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
     }

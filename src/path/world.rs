@@ -3,11 +3,13 @@
 use glam::Vec3;
 
 use super::lights::LocalLights;
+use super::materials::ReadyMaterial;
 use super::ray_clock::RayClock;
 use crate::bvh::{Bvh, Hit, Ray};
+use crate::huge_pages::on_huge_pages;
 use crate::scene::needs::SceneNeeds;
 use crate::scene::surface::{SurfacePoint, alpha_at};
-use crate::scene::{AlphaMode, Scene};
+use crate::scene::{AlphaMode, Scene, TextureImage};
 
 /// Everything about the scene that paths ask for.
 pub struct World {
@@ -19,35 +21,18 @@ pub struct World {
     pub bvh: Bvh,
     /// Emissive triangles and punctual lights.
     pub lights: LocalLights,
-    passing: Vec<Passing>,
+    materials: Vec<ReadyMaterial>,
     clock: Option<RayClock>,
-}
-
-/// How rays deal with a material before it scatters them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Passing {
-    single_sided: bool,
-    masked: bool,
-    /// Part of the light may go straight through: blended, or thin and transmissive.
-    partial: bool,
 }
 
 impl World {
     /// Builds the BVH and the light tables.
     pub fn new(scene: Scene) -> Self {
+        let scene = with_huge_pages(scene);
         let bvh = Bvh::build(&scene.positions, &scene.triangles);
-        let passing = scene
-            .materials
-            .iter()
-            .map(|m| Passing {
-                single_sided: !m.double_sided,
-                masked: matches!(m.alpha_mode, AlphaMode::Mask { .. }),
-                partial: m.alpha_mode == AlphaMode::Blend
-                    || (m.transmission > 0.0 && m.thickness == 0.0 && !m.unlit),
-            })
-            .collect();
+        let materials = scene.materials.iter().map(ReadyMaterial::new).collect();
         let lights = LocalLights::new(&scene, bvh.bounds());
-        Self { needs: SceneNeeds::of(&scene), scene, bvh, lights, passing, clock: None }
+        Self { needs: SceneNeeds::of(&scene), scene, bvh, lights, materials, clock: None }
     }
 
     /// Times all rays from now on, which slows them down a little.
@@ -78,12 +63,10 @@ impl World {
         let mut transmittance = Vec3::ONE;
         let blocked = if self.needs.pass_through() {
             self.bvh.any_hit(ray, |hit| {
-                let passing = self.passing_of(hit.triangle);
-                if !passing.partial {
+                if !self.material_of(hit).passing.partial {
                     return self.is_covered(hit);
                 }
-                let point =
-                    SurfacePoint::at(&self.scene, hit.triangle, hit.barycentric, ray.direction);
+                let point = self.point(hit, ray.direction);
                 transmittance *= self.straight_through(&point, ray.direction);
                 transmittance.max_element() <= 0.0
             })
@@ -93,15 +76,22 @@ impl World {
         if blocked { Vec3::ZERO } else { transmittance }
     }
 
+    /// The surface that a ray along `direction` has hit.
+    pub fn point(&self, hit: &Hit, direction: Vec3) -> SurfacePoint<'_> {
+        let shared = &self.material_of(hit).shared;
+        SurfacePoint::with_shared(&self.scene, shared, hit.triangle, hit.barycentric, direction)
+    }
+
     /// Share of light that goes straight through a surface: what alpha does not cover, and what
     /// smooth thin glass transmits.
-    pub fn straight_through(&self, point: &SurfacePoint, direction: Vec3) -> Vec3 {
-        if !self.passing_of(point.triangle).partial {
+    pub fn straight_through(&self, point: &SurfacePoint<'_>, direction: Vec3) -> Vec3 {
+        let material = self.material(point.material);
+        if !material.passing.partial {
             return Vec3::ZERO;
         }
         let glass = if point.parameters.transmission > 0.0 {
-            let bsdf = crate::bsdf::Bsdf::new(&point.parameters, point.front_face);
-            bsdf.straight_transmittance(point.shading_frame.local_from_world(-direction))
+            let wo = point.shading_frame.local_from_world(-direction);
+            material.bsdf(point).straight_transmittance(wo)
         } else {
             Vec3::ZERO
         };
@@ -110,9 +100,8 @@ impl World {
     }
 
     /// Opacity of a surface point in `[0,1]`; 1 unless its material is blended.
-    pub fn coverage(&self, point: &SurfacePoint) -> f32 {
-        let material = self.scene.triangle_materials[point.triangle as usize];
-        match self.scene.materials[material as usize].alpha_mode {
+    pub fn coverage(&self, point: &SurfacePoint<'_>) -> f32 {
+        match self.scene.materials[point.material as usize].alpha_mode {
             AlphaMode::Blend => point.parameters.alpha.clamp(0.0, 1.0),
             AlphaMode::Opaque | AlphaMode::Mask { .. } => 1.0,
         }
@@ -120,15 +109,19 @@ impl World {
 
     /// Whether part of the light may go straight through surfaces of a material.
     pub(crate) fn may_pass_light(&self, material: usize) -> bool {
-        self.passing[material].partial
+        self.materials[material].passing.partial
     }
 
-    fn passing_of(&self, triangle: u32) -> Passing {
-        self.passing[self.scene.triangle_materials[triangle as usize] as usize]
+    pub(super) fn material(&self, index: u32) -> &ReadyMaterial {
+        &self.materials[index as usize]
+    }
+
+    fn material_of(&self, hit: &Hit) -> &ReadyMaterial {
+        self.material(self.scene.triangle_materials[hit.triangle as usize])
     }
 
     fn is_covered(&self, hit: &Hit) -> bool {
-        if !self.passing_of(hit.triangle).masked {
+        if !self.material_of(hit).passing.masked {
             return true;
         }
         let material = self.scene.triangle_materials[hit.triangle as usize];
@@ -141,11 +134,28 @@ impl World {
     }
 
     fn faces(&self, hit: &Hit, ray: &Ray) -> bool {
-        if !self.passing_of(hit.triangle).single_sided {
+        if !self.material_of(hit).passing.single_sided {
             return true;
         }
         let [a, b, c] =
             self.scene.triangles[hit.triangle as usize].map(|v| self.scene.positions[v as usize]);
         (b - a).cross(c - a).dot(ray.direction) <= 0.0
+    }
+}
+
+/// The scene with its large arrays where rays, which hit here and there, find them soonest.
+fn with_huge_pages(scene: Scene) -> Scene {
+    let texels_too =
+        |image: TextureImage| TextureImage { texels: on_huge_pages(image.texels), ..image };
+    Scene {
+        positions: on_huge_pages(scene.positions),
+        normals: on_huge_pages(scene.normals),
+        tangents: on_huge_pages(scene.tangents),
+        uvs: scene.uvs.map(on_huge_pages),
+        colors: on_huge_pages(scene.colors),
+        triangles: on_huge_pages(scene.triangles),
+        triangle_materials: on_huge_pages(scene.triangle_materials),
+        images: scene.images.into_iter().map(texels_too).collect(),
+        ..scene
     }
 }

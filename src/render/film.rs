@@ -1,6 +1,6 @@
 //! What the samples add up to.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::color::luminance;
 use crate::image::Image;
@@ -15,12 +15,12 @@ pub struct Pixel {
     invalid: u32,
 }
 
-/// Sums of what the first surface looks like, when layers are asked for.
+/// Sums of what the first surface looks like, when layers are asked for; in f64 for the same reason.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Surface {
-    albedo: Vec3,
-    normal: Vec3,
-    depth: f32,
+    albedo: DVec3,
+    normal: DVec3,
+    depth: f64,
     hits: u32,
 }
 
@@ -93,21 +93,16 @@ impl Surface {
     /// Adds the first hit of one sample, or that there was none.
     pub fn add(&mut self, result: &PathResult) {
         if let Some(hit) = result.first_hit {
-            self.albedo += hit.albedo;
-            self.normal += hit.normal;
-            self.depth += hit.depth;
-            self.hits += 1;
+            self.add_sums(hit.albedo, hit.normal, hit.depth, 1);
         }
     }
-}
 
-impl Surface {
     /// Adds what a device has summed up over `hits` first hits.
-    pub(super) fn add_sums(&mut self, albedo: Vec3, normal: Vec3, depth: f32, hits: f32) {
-        self.albedo += albedo;
-        self.normal += normal;
-        self.depth += depth;
-        self.hits += hits as u32;
+    pub(super) fn add_sums(&mut self, albedo: Vec3, normal: Vec3, depth: f32, hits: u32) {
+        self.albedo += albedo.as_dvec3();
+        self.normal += normal.as_dvec3();
+        self.depth += f64::from(depth);
+        self.hits += hits;
     }
 }
 
@@ -182,9 +177,10 @@ impl Film {
         }
         let mut layers = SurfaceLayers::default();
         for (surface, pixel) in self.surfaces.iter().zip(&self.pixels) {
-            layers.albedo.push((surface.albedo / pixel.samples.max(1) as f32).to_array());
-            layers.normal.push(surface.normal.normalize_or_zero().to_array());
-            layers.depth.push(surface.depth / surface.hits.max(1) as f32);
+            let albedo = surface.albedo / f64::from(pixel.samples.max(1));
+            layers.albedo.push(albedo.as_vec3().to_array());
+            layers.normal.push(surface.normal.normalize_or_zero().as_vec3().to_array());
+            layers.depth.push((surface.depth / f64::from(surface.hits.max(1))) as f32);
         }
         Some(layers)
     }

@@ -1,5 +1,7 @@
 //! What a ray finds at a point of a triangle: where it is, how it faces, what it is made of.
 
+use std::borrow::Cow;
+
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
 
 use super::texture::sample_texture;
@@ -15,7 +17,7 @@ const MIN_COSINE_SHARE: f32 = 0.05;
 const MIN_MIRROR_COSINE: f32 = 0.01;
 
 /// Material at one point, textures already read. Colours are linear Rec.709.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SurfaceParameters {
     /// Base colour, each component in `[0,1]`.
     pub base_color: Vec3,
@@ -69,11 +71,116 @@ pub struct SurfaceParameters {
     pub unlit: bool,
 }
 
+/// Sets the parameters that a texture varies to what the value read makes of the material's factors.
+type Variation = fn(&mut SurfaceParameters, &Material, Vec4);
+
+/// A texture that a material may have, and what it varies.
+type Slot = (fn(&Material) -> Option<TextureRef>, Variation);
+
+/// The textures that vary parameters; base colour, which vertices have too, apart. A texture that is
+/// not there reads as ones.
+const SLOTS: [Slot; 14] = [
+    (
+        |m| m.metallic_roughness_texture,
+        |p, m, value| {
+            p.metallic = unit(m.metallic * value.z);
+            p.roughness = unit(m.roughness * value.y);
+        },
+    ),
+    (
+        |m| m.emissive_texture,
+        |p, m, value| {
+            // What is unlit shows its base colour.
+            if !m.unlit {
+                p.emissive = m.emissive * value.xyz();
+            }
+        },
+    ),
+    (|m| m.specular_texture, |p, m, value| p.specular = unit(m.specular * value.w)),
+    (|m| m.specular_color_texture, |p, m, value| p.specular_color = m.specular_color * value.xyz()),
+    (|m| m.transmission_texture, |p, m, value| p.transmission = unit(m.transmission * value.x)),
+    (
+        |m| m.diffuse_transmission_texture,
+        |p, m, value| p.diffuse_transmission = unit(m.diffuse_transmission * value.w),
+    ),
+    (
+        |m| m.diffuse_transmission_color_texture,
+        |p, m, value| {
+            p.diffuse_transmission_color = m.diffuse_transmission_color * value.xyz();
+        },
+    ),
+    (|m| m.anisotropy_texture, |p, m, value| p.anisotropy = unit(m.anisotropy * value.z)),
+    (|m| m.iridescence_texture, |p, m, value| p.iridescence = unit(m.iridescence * value.x)),
+    (
+        |m| m.iridescence_thickness_texture,
+        |p, m, value| {
+            let [thinnest, thickest] = m.iridescence_thickness;
+            p.iridescence_thickness = thinnest + (thickest - thinnest) * value.y;
+        },
+    ),
+    (|m| m.sheen_color_texture, |p, m, value| p.sheen_color = m.sheen_color * value.xyz()),
+    (
+        |m| m.sheen_roughness_texture,
+        |p, m, value| p.sheen_roughness = unit(m.sheen_roughness * value.w),
+    ),
+    (|m| m.clearcoat_texture, |p, m, value| p.clearcoat = unit(m.clearcoat * value.x)),
+    (
+        |m| m.clearcoat_roughness_texture,
+        |p, m, value| p.clearcoat_roughness = unit(m.clearcoat_roughness * value.y),
+    ),
+];
+
+/// What the points of a material have in common, and what tells them apart.
+#[derive(Debug, Clone)]
+pub struct SharedParameters {
+    /// Those of a point where every texture reads as ones: of all points if nothing varies.
+    pub parameters: SurfaceParameters,
+    /// Textures that the material has, and what they vary.
+    variations: Vec<(TextureRef, Variation)>,
+}
+
+impl SharedParameters {
+    /// Those of a material.
+    pub fn of(material: &Material) -> Self {
+        let thin = material.thickness <= 0.0;
+        let refracts = !thin && material.transmission != 0.0;
+        let mut parameters = SurfaceParameters {
+            ior: material.ior,
+            thin,
+            absorption: if thin { Vec3::ZERO } else { absorption(material) },
+            anisotropy_axis: Vec2::X,
+            iridescence_ior: material.iridescence_ior,
+            dispersion: if refracts { material.dispersion } else { 0.0 },
+            clearcoat_normal: Vec3::Z,
+            unlit: material.unlit,
+            ..SurfaceParameters::default()
+        };
+        parameters.set_base_color(material, material.base_color);
+        for (_, vary) in SLOTS {
+            vary(&mut parameters, material, Vec4::ONE);
+        }
+        let present = |(texture, vary): Slot| Some((texture(material)?, vary));
+        Self { parameters, variations: SLOTS.into_iter().filter_map(present).collect() }
+    }
+}
+
+impl SurfaceParameters {
+    fn set_base_color(&mut self, material: &Material, color: Vec4) {
+        self.base_color = color.xyz().clamp(Vec3::ZERO, Vec3::ONE);
+        self.alpha = opacity(material.alpha_mode, color.w);
+        if material.unlit {
+            self.emissive = self.base_color;
+        }
+    }
+}
+
 /// A point on a triangle as a ray sees it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SurfacePoint {
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfacePoint<'a> {
     /// Index of the triangle.
     pub triangle: u32,
+    /// Index of its material.
+    pub material: u32,
     /// World position in metres, from the triangle's corners (more exact than from the ray).
     pub position: Vec3,
     /// Unit normal of the triangle on the viewer's side.
@@ -83,13 +190,11 @@ pub struct SurfacePoint {
     pub shading_frame: Frame,
     /// Whether the viewer sees the front (counter-clockwise) side.
     pub front_face: bool,
-    /// Texture coordinates of the first set; zero if there are none.
-    pub uv: Vec2,
-    /// The material, textures read.
-    pub parameters: SurfaceParameters,
+    /// The material, textures read; borrowed where it is that of any point.
+    pub parameters: Cow<'a, SurfaceParameters>,
 }
 
-impl SurfacePoint {
+impl<'a> SurfacePoint<'a> {
     /// The point of `triangle` at `barycentric` (weights of its second and third corner), met by a
     /// ray that travels along `ray_direction`.
     ///
@@ -97,7 +202,29 @@ impl SurfacePoint {
     /// tell the difference.
     pub fn at(scene: &Scene, triangle: u32, barycentric: Vec2, ray_direction: Vec3) -> Self {
         let corner = Corner::new(scene, triangle, barycentric);
-        let material = corner.material();
+        let shared = SharedParameters::of(corner.material());
+        Self::new(&corner, &shared.variations, Cow::Owned(shared.parameters), ray_direction)
+    }
+
+    /// The same, given what all points of the triangle's material have in common.
+    pub fn with_shared(
+        scene: &Scene,
+        shared: &'a SharedParameters,
+        triangle: u32,
+        barycentric: Vec2,
+        ray_direction: Vec3,
+    ) -> Self {
+        let corner = Corner::new(scene, triangle, barycentric);
+        Self::new(&corner, &shared.variations, Cow::Borrowed(&shared.parameters), ray_direction)
+    }
+
+    fn new(
+        corner: &Corner<'_>,
+        variations: &[(TextureRef, Variation)],
+        mut parameters: Cow<'a, SurfaceParameters>,
+        ray_direction: Vec3,
+    ) -> Self {
+        let (scene, material) = (corner.scene, corner.material());
         let [a, b, c] = corner.vertices.map(|i| scene.positions[i]);
         let position = corner.interpolate(&scene.positions);
         let front_normal = (b - a).cross(c - a).try_normalize().unwrap_or(-ray_direction);
@@ -106,7 +233,7 @@ impl SurfacePoint {
 
         let facing = Facing { geometric_normal, to_viewer: -ray_direction };
         let unmapped = corner.smooth_normal().unwrap_or(front_normal);
-        let mut parameters = corner.parameters();
+        corner.vary(variations, &mut parameters);
         let normal = corner.mapped(unmapped, material.normal_texture, material.normal_scale);
         let normal = facing.turned(normal, unmapped);
         // What is not metal hardly needs its reflection, but its diffuse light needs the slope.
@@ -115,28 +242,33 @@ impl SurfacePoint {
         if parameters.anisotropy > 0.0 {
             let world = corner.anisotropy_direction(unmapped);
             let local = shading_frame.local_from_world(world);
-            parameters.anisotropy_axis = Vec2::new(local.x, local.y).normalize_or(Vec2::X);
+            parameters.to_mut().anisotropy_axis = Vec2::new(local.x, local.y).normalize_or(Vec2::X);
         }
         if parameters.clearcoat > 0.0 && has_normal_map(material) {
             let (texture, scale) =
                 (material.clearcoat_normal_texture, material.clearcoat_normal_scale);
             let coat = facing.turned(corner.mapped(unmapped, texture, scale), unmapped);
-            parameters.clearcoat_normal = shading_frame.local_from_world(facing.mirroring(coat));
+            let local = shading_frame.local_from_world(facing.mirroring(coat));
+            parameters.to_mut().clearcoat_normal = local;
         }
-        let uv = corner.uv(0);
-        Self { triangle, position, geometric_normal, shading_frame, front_face, uv, parameters }
+        Self {
+            triangle: corner.triangle as u32,
+            material: corner.material,
+            position,
+            geometric_normal,
+            shading_frame,
+            front_face,
+            parameters,
+        }
     }
 }
 
 /// Opacity in `[0,1]` of a point: 1 if the material is opaque, 0 or 1 if it is masked, its alpha if
 /// it is blended. Cheap enough for every surface a shadow ray meets.
 pub fn alpha_at(scene: &Scene, triangle: u32, barycentric: Vec2) -> f32 {
-    let material = &scene.materials[scene.triangle_materials[triangle as usize] as usize];
-    if material.alpha_mode == AlphaMode::Opaque {
-        return 1.0;
-    }
     let corner = Corner::new(scene, triangle, barycentric);
-    opacity(material.alpha_mode, corner.base_color().w)
+    let mode = corner.material().alpha_mode;
+    if mode == AlphaMode::Opaque { 1.0 } else { opacity(mode, corner.base_color().w) }
 }
 
 fn opacity(mode: AlphaMode, alpha: f32) -> f32 {
@@ -155,6 +287,7 @@ fn has_normal_map(material: &Material) -> bool {
 struct Corner<'a> {
     scene: &'a Scene,
     triangle: usize,
+    material: u32,
     vertices: [usize; 3],
     weights: Vec3,
 }
@@ -164,11 +297,12 @@ impl<'a> Corner<'a> {
         let triangle = triangle as usize;
         let weights = Vec3::new(1.0 - barycentric.x - barycentric.y, barycentric.x, barycentric.y);
         let vertices = scene.triangles[triangle].map(|i| i as usize);
-        Self { scene, triangle, vertices, weights }
+        let material = scene.triangle_materials[triangle];
+        Self { scene, triangle, material, vertices, weights }
     }
 
     fn material(&self) -> &'a Material {
-        &self.scene.materials[self.scene.triangle_materials[self.triangle] as usize]
+        &self.scene.materials[self.material as usize]
     }
 
     fn interpolate<T>(&self, values: &[T]) -> T
@@ -237,46 +371,18 @@ impl<'a> Corner<'a> {
         tangent * direction.x + bitangent * direction.y
     }
 
-    fn parameters(&self) -> SurfaceParameters {
+    /// Makes the parameters those of this point, if they differ from those that all points share.
+    fn vary(
+        &self,
+        variations: &[(TextureRef, Variation)],
+        parameters: &mut Cow<'_, SurfaceParameters>,
+    ) {
         let m = self.material();
-        let base = self.base_color();
-        let metallic_roughness = self.read(m.metallic_roughness_texture);
-        let base_color = base.xyz().clamp(Vec3::ZERO, Vec3::ONE);
-        let emissive = m.emissive * self.read(m.emissive_texture).xyz();
-        let thin = m.thickness <= 0.0;
-        let [thinnest, thickest] = m.iridescence_thickness;
-        let film = self.read(m.iridescence_thickness_texture).y;
-        SurfaceParameters {
-            base_color,
-            alpha: opacity(m.alpha_mode, base.w),
-            metallic: unit(m.metallic * metallic_roughness.z),
-            roughness: unit(m.roughness * metallic_roughness.y),
-            ior: m.ior,
-            specular: unit(m.specular * self.read(m.specular_texture).w),
-            specular_color: m.specular_color * self.read(m.specular_color_texture).xyz(),
-            transmission: unit(m.transmission * self.read(m.transmission_texture).x),
-            diffuse_transmission: unit(
-                m.diffuse_transmission * self.read(m.diffuse_transmission_texture).w,
-            ),
-            diffuse_transmission_color: m.diffuse_transmission_color
-                * self.read(m.diffuse_transmission_color_texture).xyz(),
-            thin,
-            absorption: if thin { Vec3::ZERO } else { absorption(m) },
-            anisotropy: unit(m.anisotropy * self.read(m.anisotropy_texture).z),
-            anisotropy_axis: Vec2::X,
-            iridescence: unit(m.iridescence * self.read(m.iridescence_texture).x),
-            iridescence_ior: m.iridescence_ior,
-            iridescence_thickness: thinnest + (thickest - thinnest) * film,
-            dispersion: if thin || m.transmission == 0.0 { 0.0 } else { m.dispersion },
-            sheen_color: m.sheen_color * self.read(m.sheen_color_texture).xyz(),
-            sheen_roughness: unit(m.sheen_roughness * self.read(m.sheen_roughness_texture).w),
-            clearcoat: unit(m.clearcoat * self.read(m.clearcoat_texture).x),
-            clearcoat_roughness: unit(
-                m.clearcoat_roughness * self.read(m.clearcoat_roughness_texture).y,
-            ),
-            clearcoat_normal: Vec3::Z,
-            emissive: if m.unlit { base_color } else { emissive },
-            unlit: m.unlit,
+        if m.base_color_texture.is_some() || !self.scene.colors.is_empty() {
+            parameters.to_mut().set_base_color(m, self.base_color());
+        }
+        for (texture, vary) in variations {
+            vary(parameters.to_mut(), m, self.read(Some(*texture)));
         }
     }
 }

@@ -9,7 +9,10 @@ use super::{Scene, TextureImage, TextureRef, Wrap};
 use crate::color::linear_from_srgb;
 
 static LINEAR_FROM_SRGB_BYTE: LazyLock<[f32; 256]> =
-    LazyLock::new(|| array::from_fn(|i| linear_from_srgb(i as f32 / 255.0)));
+    LazyLock::new(|| UNIT_FROM_BYTE.map(linear_from_srgb));
+
+static UNIT_FROM_BYTE: LazyLock<[f32; 256]> =
+    LazyLock::new(|| array::from_fn(|byte| byte as f32 / 255.0));
 
 /// The linear RGBA value of a texture at mesh coordinates `uv` (of the reference's set).
 ///
@@ -25,7 +28,12 @@ pub fn sample_texture(scene: &Scene, texture_ref: &TextureRef, uv: Vec2) -> Vec4
     let uv = texture_ref.transform.transform_point2(uv);
     let x = Axis { size: image.width, wrap: texture.wrap_u }.footprint(uv.x);
     let y = Axis { size: image.height, wrap: texture.wrap_v }.footprint(uv.y);
-    let read = |x, y| texel(image, texture.srgb, x, y);
+    let unit = &*UNIT_FROM_BYTE;
+    let color = if texture.srgb { &*LINEAR_FROM_SRGB_BYTE } else { unit };
+    let read = |x, y| {
+        let [r, g, b, a] = texel(image, x, y).map(usize::from);
+        Vec4::new(color[r], color[g], color[b], unit[a])
+    };
     if texture.nearest {
         return read(x.nearest, y.nearest);
     }
@@ -34,15 +42,8 @@ pub fn sample_texture(scene: &Scene, texture_ref: &TextureRef, uv: Vec2) -> Vec4
     top.lerp(bottom, y.fraction)
 }
 
-fn texel(image: &TextureImage, srgb: bool, x: u32, y: u32) -> Vec4 {
-    let [r, g, b, a] = image.texels[y as usize * image.width as usize + x as usize];
-    let unit = |byte: u8| f32::from(byte) / 255.0;
-    if srgb {
-        let linear = |byte: u8| LINEAR_FROM_SRGB_BYTE[usize::from(byte)];
-        Vec4::new(linear(r), linear(g), linear(b), unit(a))
-    } else {
-        Vec4::new(unit(r), unit(g), unit(b), unit(a))
-    }
+fn texel(image: &TextureImage, x: u32, y: u32) -> [u8; 4] {
+    image.texels[y as usize * image.width as usize + x as usize]
 }
 
 /// One axis of an image.
@@ -65,10 +66,10 @@ impl Axis {
     fn footprint(self, t: f32) -> Footprint {
         let last = self.size - 1;
         let position = self.into_unit(t) * self.size as f32;
-        let floor = (position - 0.5).floor();
+        let floor = floor(position - 0.5);
         Footprint {
-            low: self.neighbour(floor as i64),
-            high: self.neighbour(floor as i64 + 1),
+            low: self.neighbour(floor as i32),
+            high: self.neighbour(floor as i32 + 1),
             fraction: position - 0.5 - floor,
             nearest: (position as u32).min(last),
         }
@@ -80,23 +81,56 @@ impl Axis {
             return 0.0;
         }
         match self.wrap {
-            Wrap::Repeat => t - t.floor(),
+            Wrap::Repeat => t - floor(t),
             Wrap::MirroredRepeat => {
                 let half = 0.5 * t;
-                1.0 - (2.0 * (half - half.floor()) - 1.0).abs()
+                1.0 - (2.0 * (half - floor(half)) - 1.0).abs()
             }
             Wrap::ClampToEdge => t.clamp(0.0, 1.0),
         }
     }
 
-    /// The texel an index just outside of the image stands for: tiled, or the edge (which is its own
+    /// The texel that an index from -1 to the size stands for: tiled, or the edge (which is its own
     /// mirror image).
-    fn neighbour(self, index: i64) -> u32 {
-        let size = i64::from(self.size);
-        let wrapped = match self.wrap {
-            Wrap::Repeat => index.rem_euclid(size),
-            Wrap::MirroredRepeat | Wrap::ClampToEdge => index.clamp(0, size - 1),
+    fn neighbour(self, index: i32) -> u32 {
+        let last = self.size - 1;
+        let [before, after] = match self.wrap {
+            Wrap::Repeat => [last, 0],
+            Wrap::MirroredRepeat | Wrap::ClampToEdge => [0, last],
         };
-        wrapped as u32
+        match u32::try_from(index) {
+            Err(_) => before,
+            Ok(index) => {
+                if index > last {
+                    after
+                } else {
+                    index
+                }
+            }
+        }
+    }
+}
+
+/// The largest whole number that is not above a finite `x`, without the call that the standard
+/// library's makes where a machine need not have the instruction.
+fn floor(x: f32) -> f32 {
+    const WHOLE: f32 = (1 << 23) as f32;
+    if x.abs() >= WHOLE {
+        return x;
+    }
+    let toward_zero = x as i32 as f32;
+    toward_zero - f32::from(toward_zero > x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn floor_is_the_standard_librarys() {
+        for bits in (0..=u32::MAX).step_by(997) {
+            let x = f32::from_bits(bits);
+            assert!(!x.is_finite() || floor(x) == x.floor(), "{x}");
+        }
     }
 }

@@ -311,7 +311,8 @@ impl Renderer {
             let surfaces: Vec<SurfaceSums> = bytemuck::pod_collect_to_vec(&bytes);
             for (index, sums) in surfaces.iter().enumerate() {
                 if is_new(film, index) {
-                    film.surfaces[index].add_sums(sums.albedo, sums.normal, sums.depth, sums.hits);
+                    let hits = sums.hits as u32;
+                    film.surfaces[index].add_sums(sums.albedo, sums.normal, sums.depth, hits);
                 }
             }
         }

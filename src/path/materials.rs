@@ -1,0 +1,227 @@
+//! Materials made ready for paths: what all their points share is made once, and only referred to.
+
+use std::borrow::Cow;
+
+use super::Body;
+use crate::bsdf::Bsdf;
+use crate::medium::Interior;
+use crate::scene::surface::{SharedParameters, SurfacePoint};
+use crate::scene::{AlphaMode, Material};
+
+/// A material as paths meet it.
+pub(super) struct ReadyMaterial {
+    /// What the parameters of its points have in common.
+    pub(super) shared: SharedParameters,
+    /// The scattering of points that have the shared parameters, seen from the back and from the
+    /// front.
+    bsdfs: [Bsdf; 2],
+    /// What lies behind the front of a solid; `None` for thin walls.
+    inside: Option<Body>,
+    pub(super) passing: Passing,
+}
+
+/// How rays deal with a material before it scatters them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Passing {
+    pub(super) single_sided: bool,
+    pub(super) masked: bool,
+    /// Part of the light may go straight through: blended, or thin and transmissive.
+    pub(super) partial: bool,
+}
+
+impl ReadyMaterial {
+    pub(super) fn new(material: &Material) -> Self {
+        let shared = SharedParameters::of(material);
+        let parameters = &shared.parameters;
+        let inside = (!parameters.thin).then(|| {
+            let index = parameters.ior.max(1.0);
+            let interior = Interior::of_body(material, parameters.absorption);
+            Body { interior: Some(interior), squared_index: index * index }
+        });
+        Self {
+            bsdfs: [false, true].map(|front| Bsdf::new(parameters, front)),
+            inside,
+            passing: Passing {
+                single_sided: !material.double_sided,
+                masked: matches!(material.alpha_mode, AlphaMode::Mask { .. }),
+                partial: material.alpha_mode == AlphaMode::Blend
+                    || (material.transmission > 0.0
+                        && material.thickness == 0.0
+                        && !material.unlit),
+            },
+            shared,
+        }
+    }
+
+    /// The scattering at a point of this material: the one that is ready, unless the point has
+    /// parameters of its own.
+    pub(super) fn bsdf(&self, point: &SurfacePoint<'_>) -> Cow<'_, Bsdf> {
+        match &point.parameters {
+            Cow::Borrowed(_) => Cow::Borrowed(&self.bsdfs[usize::from(point.front_face)]),
+            Cow::Owned(own) => Cow::Owned(Bsdf::new(own, point.front_face)),
+        }
+    }
+
+    /// What lies behind a point of the surface; `None` if it is what lies before it.
+    pub(super) fn behind(&self, point: &SurfacePoint<'_>) -> Option<&Body> {
+        let inside = self.inside.as_ref()?;
+        Some(if point.front_face { inside } else { &Body::AIR })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Affine2, Vec2, Vec3, Vec4};
+
+    use super::*;
+    use crate::bvh::Hit;
+    use crate::path::World;
+    use crate::sampler::Sampler;
+    use crate::scene::surface::SurfaceParameters;
+    use crate::scene::{Scene, Texture, TextureImage, TextureRef, Wrap, builtin};
+
+    /// Asserts that points of triangles, seen from both sides, are those that know nothing of what is
+    /// ready; returns how many of them have parameters of their own.
+    fn own_points(world: &World) -> usize {
+        let scene = &world.scene;
+        let mut own = 0;
+        for triangle in (0..scene.triangles.len() as u32).step_by(37) {
+            let mut sampler = Sampler::new(1, triangle, 0);
+            let barycentric = 0.5 * Vec2::from(sampler.next_pair());
+            let [x, y] = sampler.next_pair();
+            let along = Vec3::new(x - 0.5, y - 0.5, sampler.next_pair()[0] - 0.5).normalize();
+            for direction in [along, -along] {
+                let hit = Hit { t: 1.0, triangle, barycentric };
+                let ready = world.point(&hit, direction);
+                let anew = SurfacePoint::at(scene, triangle, barycentric, direction);
+                assert_eq!(ready, anew);
+                let bsdf = Bsdf::new(&anew.parameters, anew.front_face);
+                assert_eq!(*world.material(ready.material).bsdf(&ready), bsdf);
+                own += usize::from(matches!(ready.parameters, Cow::Owned(_)));
+            }
+        }
+        own
+    }
+
+    #[test]
+    fn what_is_ready_is_what_a_point_would_make() {
+        for name in builtin::names() {
+            own_points(&World::new(builtin::build(name).expect("built in")));
+        }
+    }
+
+    /// A triangle of which everything may vary.
+    fn triangle(material: Material) -> Scene {
+        let (wrap_u, wrap_v) = (Wrap::Repeat, Wrap::Repeat);
+        Scene {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            normals: vec![Vec3::Z, Vec3::new(0.6, 0.0, 0.8), Vec3::Z],
+            tangents: vec![Vec4::new(1.0, 0.0, 0.0, 1.0); 3],
+            uvs: [vec![Vec2::ZERO, Vec2::X, Vec2::Y], Vec::new()],
+            triangles: vec![[0, 1, 2]],
+            triangle_materials: vec![0],
+            materials: vec![material],
+            textures: vec![Texture { image: 0, wrap_u, wrap_v, nearest: false, srgb: false }],
+            images: vec![TextureImage { width: 1, height: 1, texels: vec![[51, 102, 153, 204]] }],
+            ..Scene::default()
+        }
+    }
+
+    /// Has some of everything.
+    fn rich() -> Material {
+        Material {
+            base_color: Vec4::new(0.8, 0.4, 0.2, 0.5),
+            alpha_mode: AlphaMode::Blend,
+            metallic: 0.25,
+            roughness: 0.5,
+            emissive: Vec3::splat(3.0),
+            specular: 0.5,
+            specular_color: Vec3::new(0.5, 0.75, 1.0),
+            transmission: 0.5,
+            thickness: 1.0,
+            attenuation_color: Vec3::new(0.25, 0.5, 1.0),
+            attenuation_distance: 2.0,
+            diffuse_transmission: 0.25,
+            iridescence: 0.5,
+            dispersion: 0.5,
+            sheen_color: Vec3::new(0.25, 0.0, 0.5),
+            sheen_roughness: 0.5,
+            ..Material::default()
+        }
+    }
+
+    #[test]
+    fn only_what_varies_is_of_a_point_alone() {
+        let own = |scene| own_points(&World::new(scene));
+        assert_eq!(own(triangle(rich())), 0);
+        assert_eq!(own(triangle(Material { clearcoat: 0.5, ..rich() })), 0);
+        let texture = Some(TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY });
+        // A normal map turns the frame, but no parameter unless there is a coat.
+        assert_eq!(own(triangle(Material { normal_texture: texture, ..rich() })), 0);
+        let coat = Material { normal_texture: texture, clearcoat: 0.5, ..rich() };
+        assert_eq!(own(triangle(coat)), 2);
+        assert_eq!(own(triangle(Material { anisotropy: 0.5, ..rich() })), 2);
+        assert_eq!(own(Scene { colors: vec![Vec4::ONE; 3], ..triangle(rich()) }), 2);
+        assert_eq!(own(triangle(Material { base_color_texture: texture, ..rich() })), 2);
+        assert_eq!(own(triangle(Material { emissive_texture: texture, ..rich() })), 2);
+    }
+
+    #[test]
+    fn a_texture_of_one_colour_is_a_factor() {
+        let texture = Some(TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY });
+        let textured = Material {
+            base_color_texture: texture,
+            metallic_roughness_texture: texture,
+            emissive_texture: texture,
+            specular_texture: texture,
+            specular_color_texture: texture,
+            transmission_texture: texture,
+            diffuse_transmission_texture: texture,
+            diffuse_transmission_color_texture: texture,
+            anisotropy_texture: texture,
+            anisotropy: 0.5,
+            iridescence_texture: texture,
+            iridescence_thickness_texture: texture,
+            sheen_color_texture: texture,
+            sheen_roughness_texture: texture,
+            clearcoat_texture: texture,
+            clearcoat: 0.5,
+            clearcoat_roughness_texture: texture,
+            clearcoat_roughness: 0.5,
+            ..rich()
+        };
+        let [x, y, z, w] = [51.0, 102.0, 153.0, 204.0].map(|byte: f32| byte / 255.0);
+        let color = Vec3::new(x, y, z);
+        let rich = rich();
+        let [thinnest, thickest] = rich.iridescence_thickness;
+        let plain = Material {
+            base_color: rich.base_color * color.extend(w),
+            metallic: rich.metallic * z,
+            roughness: rich.roughness * y,
+            emissive: rich.emissive * color,
+            specular: rich.specular * w,
+            specular_color: rich.specular_color * color,
+            transmission: rich.transmission * x,
+            diffuse_transmission: rich.diffuse_transmission * w,
+            diffuse_transmission_color: rich.diffuse_transmission_color * color,
+            anisotropy: 0.5 * z,
+            iridescence: rich.iridescence * x,
+            iridescence_thickness: [0.0, thinnest + (thickest - thinnest) * y],
+            sheen_color: rich.sheen_color * color,
+            sheen_roughness: rich.sheen_roughness * w,
+            clearcoat: 0.5 * x,
+            clearcoat_roughness: 0.5 * y,
+            ..rich
+        };
+        let [textured, plain] = [textured, plain].map(|material| {
+            let shared = SharedParameters::of(&material);
+            let scene = triangle(material);
+            let at = Vec2::splat(0.25);
+            let point = SurfacePoint::with_shared(&scene, &shared, 0, at, Vec3::NEG_Z);
+            // Which way reflections are wide is read from the texture alone.
+            let anisotropy_axis = Vec2::X;
+            SurfaceParameters { anisotropy_axis, ..*point.parameters }
+        });
+        assert_eq!(textured, plain);
+    }
+}
