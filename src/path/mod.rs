@@ -10,13 +10,16 @@ use glam::{Vec2, Vec3};
 
 pub mod background;
 pub mod camera;
+mod draw;
 pub mod framing;
 mod learn;
+mod light_tree;
 mod lights;
 mod ray_clock;
 mod world;
 
 pub use background::Background;
+pub use light_tree::Receiver;
 pub use lights::{LightSample, LocalLights};
 pub use world::World;
 
@@ -28,7 +31,7 @@ use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
 use crate::math::balance_heuristic;
 use crate::medium::{Fog, Interior, Phase};
 use crate::sampler::{Sampler, unit_from_bits};
-use crate::scene::surface::SurfacePoint;
+use crate::scene::surface::{SurfaceParameters, SurfacePoint};
 
 /// What bounds a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -133,6 +136,24 @@ struct Vertex {
     scatterer: Scatterer,
 }
 
+impl Vertex {
+    /// What lights are chosen for. What lets light through is lit from behind as well.
+    fn receiver(&self) -> Receiver {
+        let normal = match &self.scatterer {
+            Scatterer::Surface(SurfaceScatterer { point, .. }) if !transmits(&point.parameters) => {
+                point.shading_frame.z
+            }
+            _ => Vec3::ZERO,
+        };
+        Receiver { position: self.position, normal }
+    }
+}
+
+/// Whether light comes through a surface.
+fn transmits(parameters: &SurfaceParameters) -> bool {
+    parameters.transmission > 0.0 || parameters.diffuse_transmission > 0.0
+}
+
 /// What scatters light at a vertex.
 #[allow(clippy::large_enum_variant, reason = "a path has one at a time, on the stack")]
 enum Scatterer {
@@ -224,7 +245,7 @@ impl Body {
 struct Departure {
     /// Density in solid angle of the ray's direction; infinite if no NEE competes with it.
     pdf_solid_angle: f32,
-    position: Vec3,
+    receiver: Receiver,
     law: u32,
 }
 
@@ -246,8 +267,8 @@ struct Path<'a> {
 
 impl<'a> Path<'a> {
     fn new(tracer: &'a PathTracer<'a>, ray: Ray, sampler: Sampler) -> Self {
-        let departure =
-            Departure { pdf_solid_angle: f32::INFINITY, position: ray.origin, law: WHOLE_MAP };
+        let receiver = Receiver { position: ray.origin, normal: Vec3::ZERO };
+        let departure = Departure { pdf_solid_angle: f32::INFINITY, receiver, law: WHOLE_MAP };
         Self {
             tracer,
             sampler,
@@ -377,10 +398,11 @@ impl<'a> Path<'a> {
         let weight = if from.pdf_solid_angle.is_infinite() {
             1.0
         } else {
-            let distance = from.position.distance(point.position);
+            let distance = from.receiver.position.distance(point.position);
             let nee = world.lights.sample_pdf_solid_angle(
                 &world.scene,
                 hit.triangle,
+                &from.receiver,
                 self.ray.direction,
                 distance,
             );
@@ -444,9 +466,9 @@ impl<'a> Path<'a> {
     }
 
     fn gather_local(&mut self, vertex: &Vertex) {
-        let u = Vec2::from(self.sampler.next_pair());
+        let bits = self.sampler.next_pair_bits();
         let world = self.tracer.world;
-        let Some(sample) = world.lights.sample(&world.scene, vertex.position, u) else {
+        let Some(sample) = world.lights.sample(&world.scene, &vertex.receiver(), bits) else {
             return;
         };
         let Some((f, own_pdf)) = self.scattered(vertex, sample.direction) else { return };
@@ -537,7 +559,8 @@ impl<'a> Path<'a> {
     }
 
     fn depart(&mut self, vertex: &Vertex, origin: Vec3, direction: Vec3, pdf_solid_angle: f32) {
-        self.departure = Departure { pdf_solid_angle, position: vertex.position, law: vertex.law };
+        self.departure =
+            Departure { pdf_solid_angle, receiver: vertex.receiver(), law: vertex.law };
         self.ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
     }
 
