@@ -3,8 +3,9 @@
 //! A binary tree over the lights, descended from its root: at each node one of two children is
 //! chosen in proportion to what may arrive from it (Conty Estevez and Kulla, *Importance Sampling of
 //! Many Lights with Adaptive Tree Splitting*, 2018). Theirs is an upper bound from boxes and cones;
-//! here it is an estimate from means and variances, with which errors were half as large. Lights
-//! without a place, which shine everywhere alike, have a share of their own beforehand.
+//! here it is an estimate from means and variances, with which errors in a hall of lamps were about
+//! half as large. Lights without a place, which shine everywhere alike, have a share of their own
+//! beforehand.
 
 mod build;
 
