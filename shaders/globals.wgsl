@@ -48,7 +48,7 @@ struct Globals {
     intensity: f32,
     // Word of `sums` at which the rows' sums begin.
     tile_sums_at: u32,
-    light_count: u32,
+    distant_light_count: u32,
     light_triangle_count: u32,
     width: u32,
     height: u32,

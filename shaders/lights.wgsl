@@ -1,5 +1,4 @@
-// Light sources inside the scene: twin of src/path/lights.rs. `lights` holds the cumulative
-// probabilities, the probabilities, the emissive triangles (ascending) and the punctual lights.
+// Light sources inside the scene: twin of src/path/lights.rs.
 
 // Words of a punctual light; packed by `layout::light_words`.
 const PUNCTUAL_WORDS = 16u;
@@ -24,49 +23,25 @@ fn light_vec3(at: u32) -> vec3f {
     return vec3f(light_f32(at), light_f32(at + 1u), light_f32(at + 2u));
 }
 
-fn light_probability(index: u32) -> f32 {
-    return light_f32(globals.light_count + index);
-}
-
-fn light_triangle(index: u32) -> u32 {
-    return lights(2u * globals.light_count + index).x;
-}
-
-fn sample_local_light(position: vec3f, u: vec2f) -> LightSample {
-    var none: LightSample;
-    var low = 0u;
-    var high = globals.light_count - 1u;
-    while low < high {
-        let middle = (low + high) / 2u;
-        if light_f32(middle) <= u.x {
-            low = middle + 1u;
-        } else {
-            high = middle;
-        }
-    }
-    let index = low;
-    let probability = light_probability(index);
-    if probability <= 0.0 {
-        return none;
-    }
+fn sample_local_light(receiver: Receiver, bits: vec2u) -> LightSample {
+    let choice = choose_light(receiver, bits.x);
+    let probability = choice.probability;
 //#if punctual_lights
-    if index >= globals.light_triangle_count {
-        return sample_punctual(index - globals.light_triangle_count, position, probability);
+    if choice.light >= globals.light_triangle_count {
+        let index = choice.light - globals.light_triangle_count;
+        return sample_punctual(index, receiver.position, probability);
     }
 //#end
+    var none: LightSample;
 //#if emitters
-    var below = 0.0;
-    if index > 0u {
-        below = light_f32(index - 1u);
-    }
-    let remainder = saturate((u.x - below) / probability);
-    let root = sqrt(remainder);
+    let u = vec2f(choice.remainder, unit_from_bits(bits.y));
+    let root = sqrt(u.x);
     let barycentric = vec2f(root * (1.0 - u.y), root * u.y);
-    let triangle = light_triangle(index);
+    let triangle = lights(choice.light).x;
     let corners = light_corners(triangle);
     let target_ = corners[0] + (corners[1] - corners[0]) * barycentric.x
         + (corners[2] - corners[0]) * barycentric.y;
-    let to_light = target_ - position;
+    let to_light = target_ - receiver.position;
     let distance = length(to_light);
     let direction = to_light / distance;
     let pdf = probability * area_to_solid_angle(corners, direction, distance * distance);
@@ -99,7 +74,12 @@ fn area_to_solid_angle(corners: array<vec3f, 3>, direction: vec3f, squared: f32)
 }
 
 // Density with which a triangle's point along `direction` is chosen; zero if it is no light.
-fn local_light_pdf_solid_angle(triangle: u32, direction: vec3f, distance: f32) -> f32 {
+fn local_light_pdf_solid_angle(
+    triangle: u32,
+    receiver: Receiver,
+    direction: vec3f,
+    distance: f32,
+) -> f32 {
     if globals.light_triangle_count == 0u {
         return 0.0;
     }
@@ -107,17 +87,17 @@ fn local_light_pdf_solid_angle(triangle: u32, direction: vec3f, distance: f32) -
     var high = globals.light_triangle_count - 1u;
     while low < high {
         let middle = (low + high) / 2u;
-        if light_triangle(middle) < triangle {
+        if lights(middle).x < triangle {
             low = middle + 1u;
         } else {
             high = middle;
         }
     }
-    if light_triangle(low) != triangle {
+    if lights(low).x != triangle {
         return 0.0;
     }
     let density = area_to_solid_angle(light_corners(triangle), direction, distance * distance);
-    return light_probability(low) * density;
+    return light_probability(receiver, low) * density;
 }
 
 // Radiance a surface point sends towards its viewer: as much as alpha covers it.
@@ -133,7 +113,7 @@ fn emitted(point: SurfacePoint) -> vec3f {
 //#if punctual_lights
 fn sample_punctual(index: u32, position: vec3f, probability: f32) -> LightSample {
     var none: LightSample;
-    let at = 2u * globals.light_count + globals.light_triangle_count + PUNCTUAL_WORDS * index;
+    let at = distant_light_at(globals.distant_light_count) + PUNCTUAL_WORDS * index;
     let kind = lights(at).x;
     let light_position = light_vec3(at + 1u);
     let light_direction = light_vec3(at + 4u);

@@ -11,10 +11,12 @@ struct Path {
     throughput: vec3f,
     radiance: vec3f,
     // The vertex the ray left from: density of its direction (F32_MAX if no NEE competes with
-    // it), place, tile law.
+    // it), tile law, and what lights are chosen for.
     departure_pdf_solid_angle: f32,
-    departure_position: vec3f,
     departure_law: u32,
+//#if emitters
+    departure_receiver: Receiver,
+//#end
 //#if solid_transmission
     body: Body,
 //#end
@@ -107,7 +109,6 @@ fn path_new(ray: Ray, sampler: Sampler) -> Path {
     path.ray = ray;
     path.throughput = vec3f(1.0);
     path.departure_pdf_solid_angle = F32_MAX;
-    path.departure_position = ray.origin;
     path.departure_law = WHOLE_MAP;
 //#if solid_transmission
     path.body = body_air();
@@ -384,6 +385,18 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
     return survives(path);
 }
 
+//#if scene_lights
+// Twin of `Vertex::receiver`. In a medium the frame is zero.
+fn receiver_of(vertex: Vertex) -> Receiver {
+    var transmits = vertex.point.parameters.transmission > 0.0;
+//#if diffuse_transmission
+    transmits = transmits || vertex.point.parameters.diffuse_transmission > 0.0;
+//#end
+    let normal = select(vertex.point.shading_frame.z, vec3f(0.0), transmits);
+    return Receiver(vertex.point.position, normal);
+}
+//#end
+
 //#if emitters
 fn add_emitted(path: ptr<function, Path>, point: SurfacePoint) {
     if point.parameters.unlit {
@@ -395,8 +408,10 @@ fn add_emitted(path: ptr<function, Path>, point: SurfacePoint) {
     }
     var weight = 1.0;
     if (*path).departure_pdf_solid_angle < F32_MAX {
-        let distance = length((*path).departure_position - point.position);
-        let nee = local_light_pdf_solid_angle(point.triangle, (*path).ray.direction, distance);
+        let receiver = (*path).departure_receiver;
+        let distance = length(receiver.position - point.position);
+        let nee =
+            local_light_pdf_solid_angle(point.triangle, receiver, (*path).ray.direction, distance);
         weight = balance_heuristic((*path).departure_pdf_solid_angle, nee);
     }
     (*path).radiance += (*path).throughput * radiance * weight;
@@ -543,8 +558,8 @@ fn gather_environment(path: ptr<function, Path>, vertex: Vertex) {
 
 //#if local_lights
 fn gather_local(path: ptr<function, Path>, vertex: Vertex) {
-    let u = path_pair(path);
-    let sample = sample_local_light(vertex.point.position, u);
+    let bits = path_pair_bits(path);
+    let sample = sample_local_light(receiver_of(vertex), bits);
     if max_element(sample.radiance_over_pdf) <= 0.0 {
         return;
     }
@@ -569,8 +584,10 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
         let turned_ = normalize(sample_phase(vertex.mean_cosine, travel, path_pair(path)));
         (*path).departure_pdf_solid_angle =
             phase_pdf_solid_angle(vertex.mean_cosine, dot(travel, turned_));
-        (*path).departure_position = vertex.point.position;
         (*path).departure_law = vertex.law;
+//#if emitters
+        (*path).departure_receiver = receiver_of(vertex);
+//#end
         (*path).ray = Ray(vertex.point.position, turned_, F32_MAX);
         return true;
     }
@@ -598,8 +615,10 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
     }
 //#end
     (*path).departure_pdf_solid_angle = select(sample.pdf_solid_angle, F32_MAX, sample.is_delta);
-    (*path).departure_position = vertex.point.position;
     (*path).departure_law = vertex.law;
+//#if emitters
+    (*path).departure_receiver = receiver_of(vertex);
+//#end
     let origin = offset_origin(vertex.point.position, select(-normal, normal, is_above));
     (*path).ray = Ray(origin, direction, F32_MAX);
     return true;

@@ -4,10 +4,15 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
+use super::light_tree::{Light, LightTree, Moments, Receiver, TreeArrays};
 use crate::color::importance;
+use crate::sampler::unit_from_bits;
 use crate::scene::needs::is_emitter;
 use crate::scene::surface::SurfacePoint;
 use crate::scene::{PunctualKind, PunctualLight, Scene};
+
+/// Least intensity of a light relative to that of all.
+const LEAST_INTENSITY: f32 = 1e-30;
 
 /// A sampled point on a light, seen from a shading point.
 #[derive(Debug, Clone, Copy)]
@@ -23,70 +28,62 @@ pub struct LightSample {
     pub pdf_solid_angle: f32,
 }
 
-/// All local lights, chosen by power.
+/// All local lights. Which of them is sampled depends on the place that is lit: on the lights'
+/// intensities, distances and directions.
 #[derive(Debug, Clone, Default)]
 pub struct LocalLights {
-    /// Emissive triangles, ascending.
+    /// Emissive triangles, ascending: the first lights. Punctual ones follow in the scene's order.
     triangles: Vec<u32>,
-    /// Probability of each triangle, then of each punctual light.
-    probabilities: Vec<f32>,
-    /// Running sums of `probabilities`, ending at 1.
-    cumulative: Vec<f32>,
-}
-
-/// The arrays of [`LocalLights`], for a GPU.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct LightArrays<'a> {
-    pub(crate) triangles: &'a [u32],
-    pub(crate) probabilities: &'a [f32],
-    pub(crate) cumulative: &'a [f32],
+    tree: LightTree,
 }
 
 impl LocalLights {
-    /// The arrays.
-    pub(crate) fn arrays(&self) -> LightArrays<'_> {
-        LightArrays {
-            triangles: &self.triangles,
-            probabilities: &self.probabilities,
-            cumulative: &self.cumulative,
-        }
+    /// Emissive triangles, and how lights are chosen.
+    pub(crate) fn arrays(&self) -> (&[u32], TreeArrays<'_>) {
+        (&self.triangles, self.tree.arrays())
     }
 
     /// Collects the lights of a scene with bounds `(min, max)`.
     pub fn new(scene: &Scene, bounds: (Vec3, Vec3)) -> Self {
         let emits: Vec<bool> = scene.materials.iter().map(is_emitter).collect();
         let mut triangles = Vec::new();
-        let mut powers = Vec::new();
+        let mut lights = Vec::new();
+        let mut distant = Vec::new();
+        let mut total = 0.0;
         for (triangle, &material) in scene.triangle_materials.iter().enumerate() {
-            if emits[material as usize] {
-                let power = triangle_power(scene, triangle as u32);
-                if power > 0.0 {
-                    triangles.push(triangle as u32);
-                    powers.push(f64::from(power));
-                }
+            if emits[material as usize]
+                && let Some((moments, power)) = triangle_moments(scene, triangle as u32)
+            {
+                lights.push(Light { index: triangles.len() as u32, moments });
+                triangles.push(triangle as u32);
+                total += f64::from(power);
             }
         }
         let radius = 0.5 * (bounds.1 - bounds.0).length();
-        powers.extend(scene.lights.iter().map(|light| f64::from(punctual_power(light, radius))));
-        let total: f64 = powers.iter().sum();
-        if !(total > 0.0 && total.is_finite()) {
+        for (index, light) in (triangles.len() as u32..).zip(&scene.lights) {
+            let power = f64::from(punctual_power(light, radius));
+            if power <= 0.0 {
+                continue;
+            }
+            if light.kind == PunctualKind::Directional {
+                distant.push((index, power));
+            } else {
+                lights.push(Light { index, moments: punctual_moments(light) });
+                total += power;
+            }
+        }
+        let everything = total + distant.iter().map(|(_, power)| power).sum::<f64>();
+        if !(everything > 0.0 && everything.is_finite()) {
             return Self::default();
         }
-        let probabilities: Vec<f32> = powers.iter().map(|p| (p / total) as f32).collect();
-        let mut sum = 0.0;
-        let cumulative = powers
-            .iter()
-            .map(|p| {
-                sum += p / total;
-                sum as f32
-            })
-            .collect();
-        Self { triangles, probabilities, cumulative }
+        relate(&mut lights);
+        let tree = LightTree::new(lights, total, &distant, triangles.len());
+        Self { triangles, tree }
     }
 
     /// Whether there is nothing to sample.
     pub fn is_empty(&self) -> bool {
-        self.probabilities.is_empty()
+        self.tree.is_empty()
     }
 
     /// Number of emissive triangles.
@@ -94,26 +91,26 @@ impl LocalLights {
         self.triangles.len()
     }
 
-    /// Samples a light as seen from `position`. `None` where it does not shine that way.
-    pub fn sample(&self, scene: &Scene, position: Vec3, u: Vec2) -> Option<LightSample> {
-        let index = self.cumulative.partition_point(|&c| c <= u.x).min(self.cumulative.len() - 1);
-        let probability = self.probabilities[index];
-        if probability <= 0.0 {
-            return None;
-        }
-        if index >= self.triangles.len() {
-            let light = &scene.lights[index - self.triangles.len()];
-            return sample_punctual(light, position, probability);
-        }
-        let low = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
-        let remainder = ((u.x - low) / probability).clamp(0.0, 1.0);
-        let triangle = self.triangles[index];
-        let barycentric = sample_triangle(Vec2::new(remainder, u.y));
+    /// Samples a light as seen from a place. `None` where it does not shine that way.
+    pub fn sample(
+        &self,
+        scene: &Scene,
+        receiver: &Receiver,
+        bits: [u32; 2],
+    ) -> Option<LightSample> {
+        let choice = self.tree.sample(receiver, bits[0]);
+        let probability = choice.probability;
+        let Some(&triangle) = self.triangles.get(choice.light as usize) else {
+            let light = &scene.lights[choice.light as usize - self.triangles.len()];
+            return sample_punctual(light, receiver.position, probability);
+        };
         let corners = corners(scene, triangle);
+        let u = Vec2::new(choice.remainder, unit_from_bits(bits[1]));
+        let barycentric = sample_triangle(u);
         let target = corners[0]
             + (corners[1] - corners[0]) * barycentric.x
             + (corners[2] - corners[0]) * barycentric.y;
-        let to_light = target - position;
+        let to_light = target - receiver.position;
         let distance = to_light.length();
         let direction = to_light / distance;
         let pdf_solid_angle =
@@ -134,13 +131,23 @@ impl LocalLights {
         &self,
         scene: &Scene,
         triangle: u32,
+        receiver: &Receiver,
         direction: Vec3,
         distance: f32,
     ) -> f32 {
         let Ok(index) = self.triangles.binary_search(&triangle) else { return 0.0 };
         let corners = corners(scene, triangle);
         area_to_solid_angle(&corners, direction, distance * distance)
-            .map_or(0.0, |density| self.probabilities[index] * density)
+            .map_or(0.0, |density| self.tree.probability(receiver, index as u32) * density)
+    }
+}
+
+/// Divides the lights' intensities by their sum, which need not be what f32 can hold.
+fn relate(lights: &mut [Light]) {
+    let total: f64 = lights.iter().map(|light| f64::from(light.moments.intensity)).sum();
+    for light in lights {
+        let share = f64::from(light.moments.intensity) / total;
+        light.moments.intensity = (share as f32).max(LEAST_INTENSITY);
     }
 }
 
@@ -173,7 +180,8 @@ fn corners(scene: &Scene, triangle: u32) -> [Vec3; 3] {
     scene.triangles[triangle as usize].map(|v| scene.positions[v as usize])
 }
 
-fn triangle_power(scene: &Scene, triangle: u32) -> f32 {
+/// Moments and power of an emissive triangle; `None` if nothing comes from it.
+fn triangle_moments(scene: &Scene, triangle: u32) -> Option<(Moments, f32)> {
     let corners = corners(scene, triangle);
     let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
     let area = 0.5 * normal.length();
@@ -187,8 +195,36 @@ fn triangle_power(scene: &Scene, triangle: u32) -> f32 {
         .map(|point| importance(point.parameters.emissive))
         .sum::<f32>()
         / probes.len() as f32;
-    let sides = if material.double_sided { 2.0 } else { 1.0 };
-    area * PI * sides * (probed + 0.02 * importance(material.emissive))
+    let intensity = area * (probed + 0.02 * importance(material.emissive));
+    let center = (corners[0] + corners[1] + corners[2]) / 3.0;
+    let variance = corners.iter().map(|c| c.distance_squared(center)).sum::<f32>() / 12.0;
+    let place = Moments {
+        intensity,
+        center,
+        variance,
+        axis: normal.normalize_or_zero(),
+        aimed: 1.0,
+        around: 0.0,
+    };
+    // What shines on both sides shines half as much in a mean direction as along its normal.
+    let (moments, sides) = if material.double_sided {
+        (Moments { axis: Vec3::ZERO, aimed: 0.0, around: 0.5, ..place }, 2.0)
+    } else {
+        (place, 1.0)
+    };
+    let power = PI * sides * intensity;
+    (power > 0.0).then_some((moments, power))
+}
+
+/// Moments of a point or spot light. A spot counts as a surface that faces its way, which shines
+/// about there.
+fn punctual_moments(light: &PunctualLight) -> Moments {
+    let (axis, aimed, around) = match light.kind {
+        PunctualKind::Spot { .. } => (light.direction, 1.0, 0.0),
+        PunctualKind::Point | PunctualKind::Directional => (Vec3::ZERO, 0.0, 1.0),
+    };
+    let intensity = importance(light.intensity);
+    Moments { intensity, center: light.position, variance: 0.0, axis, aimed, around }
 }
 
 fn punctual_power(light: &PunctualLight, scene_radius: f32) -> f32 {

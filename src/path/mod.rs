@@ -12,14 +12,17 @@ use glam::{Vec2, Vec3};
 
 pub mod background;
 pub mod camera;
+mod draw;
 pub mod framing;
 mod learn;
+mod light_tree;
 mod lights;
 mod materials;
 mod ray_clock;
 mod world;
 
 pub use background::Background;
+pub use light_tree::Receiver;
 pub use lights::{LightSample, LocalLights};
 pub use world::World;
 
@@ -145,6 +148,17 @@ struct Vertex<'v> {
     scatterer: Scatterer<'v>,
 }
 
+impl Vertex<'_> {
+    /// What lights are chosen for. What lets light through is lit from behind as well.
+    fn receiver(&self) -> Receiver {
+        let normal = match &self.scatterer {
+            Scatterer::Surface(surface) if !surface.transmits => surface.shading_frame.z,
+            _ => Vec3::ZERO,
+        };
+        Receiver { position: self.position, normal }
+    }
+}
+
 /// What scatters light at a vertex.
 enum Scatterer<'v> {
     Surface(SurfaceScatterer<'v>),
@@ -159,6 +173,8 @@ struct SurfaceScatterer<'v> {
     wo: Vec3,
     /// What lies behind the surface; `None` if it is what lies before it.
     behind: Option<&'v Body>,
+    /// Whether light comes through the surface.
+    transmits: bool,
 }
 
 impl Scatterer<'_> {
@@ -222,7 +238,7 @@ impl Body {
 struct Departure {
     /// Density in solid angle of the ray's direction; infinite if no NEE competes with it.
     pdf_solid_angle: f32,
-    position: Vec3,
+    receiver: Receiver,
     law: u32,
 }
 
@@ -244,8 +260,8 @@ struct Path<'a> {
 
 impl<'a> Path<'a> {
     fn new(tracer: &'a PathTracer<'a>, ray: Ray, sampler: Sampler) -> Self {
-        let departure =
-            Departure { pdf_solid_angle: f32::INFINITY, position: ray.origin, law: WHOLE_MAP };
+        let receiver = Receiver { position: ray.origin, normal: Vec3::ZERO };
+        let departure = Departure { pdf_solid_angle: f32::INFINITY, receiver, law: WHOLE_MAP };
         Self {
             tracer,
             sampler,
@@ -378,6 +394,7 @@ impl<'a> Path<'a> {
             bsdf,
             wo,
             behind: material.behind(point),
+            transmits: parameters.transmission > 0.0 || parameters.diffuse_transmission > 0.0,
         });
         Some(self.tracer.vertex(point.position, cell, scatterer))
     }
@@ -396,10 +413,11 @@ impl<'a> Path<'a> {
         let weight = if from.pdf_solid_angle.is_infinite() {
             1.0
         } else {
-            let distance = from.position.distance(point.position);
+            let distance = from.receiver.position.distance(point.position);
             let nee = world.lights.sample_pdf_solid_angle(
                 &world.scene,
                 hit.triangle,
+                &from.receiver,
                 self.ray.direction,
                 distance,
             );
@@ -465,9 +483,9 @@ impl<'a> Path<'a> {
     }
 
     fn gather_local(&mut self, vertex: &Vertex<'_>) {
-        let u = Vec2::from(self.sampler.next_pair());
+        let bits = self.sampler.next_pair_bits();
         let world = self.tracer.world;
-        let Some(sample) = world.lights.sample(&world.scene, vertex.position, u) else {
+        let Some(sample) = world.lights.sample(&world.scene, &vertex.receiver(), bits) else {
             return;
         };
         let Some((f, own_pdf)) = self.scattered(vertex, sample.direction) else { return };
@@ -555,7 +573,8 @@ impl<'a> Path<'a> {
     }
 
     fn depart(&mut self, vertex: &Vertex<'_>, origin: Vec3, direction: Vec3, pdf_solid_angle: f32) {
-        self.departure = Departure { pdf_solid_angle, position: vertex.position, law: vertex.law };
+        self.departure =
+            Departure { pdf_solid_angle, receiver: vertex.receiver(), law: vertex.law };
         self.ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
     }
 

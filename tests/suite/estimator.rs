@@ -8,6 +8,7 @@ mod known_glass;
 mod known_light;
 mod known_media;
 mod known_paths;
+mod many_lights;
 mod repeatable;
 pub(crate) mod scenes;
 mod unbiased;

@@ -66,7 +66,7 @@ pub(crate) struct Globals {
     pub(crate) rotation_turns: f32,
     pub(crate) intensity: f32,
     pub(crate) tile_sums_at: u32,
-    pub(crate) light_count: u32,
+    pub(crate) distant_light_count: u32,
     pub(crate) light_triangle_count: u32,
     pub(crate) width: u32,
     pub(crate) height: u32,
@@ -408,15 +408,14 @@ fn wrap_code(wrap: Wrap) -> u32 {
     }
 }
 
-/// Local lights as `lights.wgsl` reads them; sets their numbers.
+/// Local lights as `light_tree.wgsl` and `lights.wgsl` read them; sets their numbers.
 pub(crate) fn light_words(world: &World, globals: &mut Globals) -> Vec<u32> {
     const PUNCTUAL_WORDS: usize = 16;
-    let lights = world.lights.arrays();
-    globals.light_count = lights.probabilities.len() as u32;
-    globals.light_triangle_count = lights.triangles.len() as u32;
-    let mut words: Vec<u32> =
-        lights.cumulative.iter().chain(lights.probabilities).map(|p| p.to_bits()).collect();
-    words.extend(lights.triangles);
+    let (triangles, tree) = world.lights.arrays();
+    globals.light_triangle_count = triangles.len() as u32;
+    globals.distant_light_count = tree.distant.len() as u32;
+    let mut words = [triangles, tree.leaves].concat();
+    words.extend(tree.distant.iter().flat_map(|distant| [distant.share, distant.light]));
     for light in &world.scene.lights {
         let (kind, cosines) = match light.kind {
             PunctualKind::Point => (0, [0.0; 2]),

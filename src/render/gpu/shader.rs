@@ -330,7 +330,7 @@ impl TexelFormat {
 }
 
 /// All arrays.
-pub(crate) const ARRAYS: [ArrayKind; 12] = {
+pub(crate) const ARRAYS: [ArrayKind; 13] = {
     use TexelFormat::{Bytes4, Floats4, Words1, Words2, Words4};
     const fn array(
         name: &'static str,
@@ -352,6 +352,7 @@ pub(crate) const ARRAYS: [ArrayKind; 12] = {
         array("sums", Words1, Some("map_sampling")),
         array("laws", Words1, Some("map_sampling")),
         array("lights", Words1, Some("scene_lights")),
+        array("light_nodes", Words4, Some("scene_lights")),
     ]
 };
 
@@ -452,7 +453,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 25] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 27] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -477,6 +478,8 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 25] {
         (wgsl!("environment"), true),
         (wgsl!("tile_local"), samples_map && !features.has("summed_area")),
         (wgsl!("summed_area"), samples_map && features.has("summed_area")),
+        (wgsl!("draw"), features.has("scene_lights")),
+        (wgsl!("light_tree"), features.has("scene_lights")),
         (wgsl!("lights"), features.has("scene_lights")),
         (wgsl!("medium"), features.has("medium")),
         (wgsl!("bvh"), true),

@@ -97,6 +97,7 @@ fn upload_world(buffers: &mut Buffers, globals: &mut Globals, world: &World) -> 
     if features.has("scene_lights") {
         let lights = layout::light_words(world, globals);
         put_array(buffers, "lights", "the list of lights", &lights)?;
+        put_array(buffers, "light_nodes", "the tree of lights", world.lights.arrays().1.nodes)?;
     }
     let textures_in_scene = world.needs.texture_slots;
     Ok(Constants { stack_size: tree.depth, vertex, textures_in_scene, ..Constants::default() })

@@ -78,8 +78,8 @@ fn structs_are_laid_out_as_the_host_writes_them() {
         work camera_position lens_radius camera_right focus_distance camera_up half_width
         camera_forward half_height grid_center grid_columns law_starts_at law_masks_at law_ranks_at
         law_tiles_at law_last_at law_of_cell_at words_per_law grid_rows map_width map_height
-        tile_columns tile_rows rotation_turns intensity tile_sums_at light_count
-        light_triangle_count width height seed bounces russian_roulette orthographic scene_extent
+        tile_columns tile_rows rotation_turns intensity tile_sums_at
+        distant_light_count light_triangle_count width height seed bounces russian_roulette orthographic scene_extent
         mean_contribution zero grid_medium whole_map_share fog_low fog_mean_cosine fog_high tries_per_vertex
         fog_scattering importance_scale fog_extinction first_of_sequence background background_concentration
     );

@@ -6,8 +6,9 @@ use super::Probe;
 use super::cases::{Random, case, cases};
 use super::scattering::expect_parameters;
 use super::stand::Stand;
-use super::twin::{EXACT, ulps};
+use super::twin::{EXACT, Twin, ulps};
 use crate::bvh::Ray;
+use crate::path::Receiver;
 use crate::scene::surface::{SurfacePoint, alpha_at};
 use crate::scene::texture::sample_texture;
 use crate::scene::{Scene, TextureRef};
@@ -115,43 +116,73 @@ fn points(stand: &Stand) -> Vec<Probe<'_>> {
     ]
 }
 
+/// A place to be lit: anywhere, on a light's corner or far away; a third of them from all sides.
+fn receiver(r: &mut Random, scene: &Scene) -> (Vec3, Vec3) {
+    let position = match r.below(16) {
+        0 => scene.positions[r.below(scene.positions.len() as u32) as usize],
+        1 => scene.lights[r.below(scene.lights.len() as u32) as usize].position,
+        2 => 1e4 * r.in_cube(),
+        _ => 4.0 * r.in_cube(),
+    };
+    (position, if r.below(3) == 0 { Vec3::ZERO } else { r.direction() })
+}
+
+fn take_receiver(t: &mut Twin<'_>) -> Receiver {
+    Receiver { position: t.take3(), normal: t.take3() }
+}
+
+// Cosines that are differences of angles have lost some bits, more on each level of the tree.
 fn lights(stand: &Stand) -> Vec<Probe<'_>> {
     let world = &stand.world;
-    let triangles = world.scene.triangles.len() as u32;
-    let position = |r: &mut Random| 4.0 * r.in_cube();
+    let scene = &world.scene;
+    let triangles = scene.triangles.len() as u32;
+    let edges = [0, 1, u32::MAX / 2, u32::MAX].map(|x| case(&[&Vec3::ONE, &Vec3::ZERO, &x, &x]));
     vec![
         Probe::new(
             "sample_local_light",
-            "let position = take3(); let sample = sample_local_light(position, take2());
+            "let position = take3(); let receiver = Receiver(position, take3());
+            let x = take_word(); let sample = sample_local_light(receiver, vec2u(x, take_word()));
             put3(sample.radiance_over_pdf); put3(sample.direction); put(sample.distance);
             put(sample.pdf_solid_angle);",
-            cases([case(&[&Vec3::ONE, &Vec2::ZERO])], |r| case(&[&position(r), &r.unit2()])),
-            move |t| match world.lights.sample(&world.scene, t.take3(), t.take2()) {
-                Some(light) => {
-                    let largest = light.radiance_over_pdf.max_element();
-                    t.near(light.radiance_over_pdf, ulps(128.0).of(largest));
-                    t.near(light.direction, ulps(32.0).of(1.0));
-                    t.near(light.distance.min(f32::MAX), ulps(16.0));
-                    t.near(light.pdf_solid_angle.min(f32::MAX), ulps(128.0));
-                }
-                None => {
-                    t.near(Vec3::ZERO, EXACT);
-                    t.accept_rest();
+            cases(edges, |r| {
+                let (position, normal) = receiver(r, scene);
+                case(&[&position, &normal, &r.word(), &r.word()])
+            }),
+            move |t| {
+                let receiver = take_receiver(t);
+                match world.lights.sample(scene, &receiver, [t.take_word(), t.take_word()]) {
+                    Some(light) => {
+                        let largest = light.radiance_over_pdf.max_element();
+                        t.near(light.radiance_over_pdf, ulps(512.0).of(largest));
+                        t.near(light.direction, ulps(64.0).of(1.0));
+                        t.near(light.distance.min(f32::MAX), ulps(64.0));
+                        t.near(light.pdf_solid_angle.min(f32::MAX), ulps(512.0));
+                    }
+                    None => {
+                        t.near(Vec3::ZERO, EXACT);
+                        t.accept_rest();
+                    }
                 }
             },
         )
         .flips(500),
         Probe::new(
             "local_light_pdf_solid_angle",
-            "let triangle = take_word(); let direction = take3();
-            put(local_light_pdf_solid_angle(triangle, direction, take()));",
-            cases([], |r| case(&[&r.below(triangles), &r.direction(), &r.magnitude(0.1, 20.0)])),
+            "let triangle = take_word(); let position = take3();
+            let receiver = Receiver(position, take3()); let direction = take3();
+            put(local_light_pdf_solid_angle(triangle, receiver, direction, take()));",
+            cases([], |r| {
+                let (position, normal) = receiver(r, scene);
+                let distance = r.magnitude(0.1, 20.0);
+                case(&[&r.below(triangles), &position, &normal, &r.direction(), &distance])
+            }),
             move |t| {
-                let (triangle, direction, distance) = (t.take_word(), t.take3(), t.take());
+                let (triangle, receiver) = (t.take_word(), take_receiver(t));
+                let (direction, distance) = (t.take3(), t.take());
                 let lights = &world.lights;
                 let right =
-                    lights.sample_pdf_solid_angle(&world.scene, triangle, direction, distance);
-                t.near(right, ulps(64.0));
+                    lights.sample_pdf_solid_angle(scene, triangle, &receiver, direction, distance);
+                t.near(right, ulps(256.0));
             },
         ),
     ]

@@ -1,0 +1,108 @@
+// Chooses a light by how much of its light may reach a place: twin of src/path/light_tree/mod.rs.
+// `light_nodes` holds its nodes, three texels each; `lights` holds the emissive triangles
+// (ascending), the node of each, the distant lights (share and light) and the punctual lights.
+
+const LIGHT_NODE_TEXELS = 3u;
+// Marks the link of a leaf.
+const LEAF = 0x80000000u;
+const LEAST_COSINE = 1.0 / 64.0;
+const NEAREST_SQUARED = 1e-20;
+
+// A place at which light is gathered; the normal is zero where light from all around is scattered.
+struct Receiver {
+    position: vec3f,
+    normal: vec3f,
+}
+
+struct LightChoice {
+    light: u32,
+    probability: f32,
+    remainder: f32,
+}
+
+// About the mean of cosines, negative ones counted as zero, that scatter around this one.
+fn clamped_mean(cosine: f32, scatter: f32) -> f32 {
+    return 0.5 * (cosine + sqrt(cosine * cosine + 0.25 * max(scatter, 0.0)));
+}
+
+// Twin of `Node::importance`.
+fn light_importance(node: u32, receiver: Receiver) -> f32 {
+    let at = LIGHT_NODE_TEXELS * node;
+    let center_variance = bitcast<vec4f>(light_nodes(at));
+    let axis_intensity = bitcast<vec4f>(light_nodes(at + 1u));
+    let squares_around = bitcast<vec3f>(light_nodes(at + 2u).xyz);
+    let to_lights = center_variance.xyz - receiver.position;
+    let squared = max(dot(to_lights, to_lights) + center_variance.w, NEAREST_SQUARED);
+    let inverse = 1.0 / sqrt(squared);
+    let direction = to_lights * inverse;
+    let inverse_squared = inverse * inverse;
+    let scatter = center_variance.w * inverse_squared;
+    let known = squares_around.y * (1.0 - scatter);
+    let aimed = clamped_mean(-dot(axis_intensity.xyz, direction), squares_around.x - known);
+    let emitted = max(squares_around.z + aimed, LEAST_COSINE);
+    var received = 1.0;
+    if any(receiver.normal != vec3f(0.0)) {
+        received = max(clamped_mean(dot(receiver.normal, direction), scatter), LEAST_COSINE);
+    }
+    return axis_intensity.w * emitted * received * inverse_squared;
+}
+
+// The second child of a node (the first one is the next node), or `LEAF` and a light.
+fn light_link(node: u32) -> u32 {
+    return light_nodes(LIGHT_NODE_TEXELS * node + 2u).w;
+}
+
+// Share of a node's first child.
+fn share_of_first(node: u32, second: u32, receiver: Receiver) -> u32 {
+    let first = light_importance(node + 1u, receiver);
+    let sum = first + light_importance(second, receiver);
+    return share_of(select(0.5, first / sum, sum > 0.0));
+}
+
+// Word of `lights` at which a distant light begins: its share and itself.
+fn distant_light_at(index: u32) -> u32 {
+    return 2u * globals.light_triangle_count + 2u * index;
+}
+
+// Chooses a light with a uniform 32-bit number.
+fn choose_light(receiver: Receiver, bits: u32) -> LightChoice {
+    var draw = draw_new(bits);
+//#if punctual_lights
+    for (var i = 0u; i < globals.distant_light_count; i++) {
+        let at = distant_light_at(i);
+        if draw_chooses_first(&draw, lights(at).x) {
+            let light = lights(at + 1u).x;
+            return LightChoice(light, interval_probability(draw.left), draw_remainder(draw));
+        }
+    }
+//#end
+    var node = 0u;
+    var link = light_link(node);
+    while (link & LEAF) == 0u {
+        let share = share_of_first(node, link, receiver);
+        node = select(link, node + 1u, draw_chooses_first(&draw, share));
+        link = light_link(node);
+    }
+    return LightChoice(link & ~LEAF, interval_probability(draw.left), draw_remainder(draw));
+}
+
+//#if emitters
+// Probability with which `choose_light` chooses an emissive triangle, counted among such.
+fn light_probability(receiver: Receiver, light: u32) -> f32 {
+    let leaf = lights(globals.light_triangle_count + light).x;
+    var chosen = whole_interval();
+//#if punctual_lights
+    for (var i = 0u; i < globals.distant_light_count; i++) {
+        chosen = interval_choose(chosen, lights(distant_light_at(i)).x, false);
+    }
+//#end
+    var node = 0u;
+    while node != leaf {
+        let second = light_link(node);
+        let first = leaf < second;
+        chosen = interval_choose(chosen, share_of_first(node, second, receiver), first);
+        node = select(second, node + 1u, first);
+    }
+    return interval_probability(chosen);
+}
+//#end
