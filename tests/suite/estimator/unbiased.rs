@@ -149,16 +149,17 @@ fn over_seeds(seeds: u32, picture: impl Fn(u32) -> f64 + Send + Sync) -> (f64, f
 
 /// One pixel, or sixteen, see a cell of their own of which nothing was learned before: all that its
 /// laws know they know from these pixels' earlier samples. With one scramble for all samples this is
-/// 2.0 +- 0.3 % too bright for one pixel, and as wrong where it is rendered again with the laws it made.
+/// 1 % too bright here for one pixel (9 % after 64 samples in a study), and 7 % too dark where it is
+/// rendered again from the same seed with the laws it made.
 #[test]
 fn laws_made_of_a_pixel_s_own_samples_do_not_bias_it() {
-    const SAMPLES: u32 = 64;
+    const SAMPLES: u32 = 8;
     let environment = environment(soft_map());
     let (world, room_camera) = room(0.7, None);
     let eye: glam::Vec3 = room_camera.world_from_camera.translation.into();
     let ahead = room_camera.world_from_camera.matrix3.z_axis * -3.0;
     let camera = probe(eye, eye + glam::Vec3::from(ahead));
-    for (side, seeds) in [(1, 4000), (4, 400)] {
+    for (side, seeds) in [(1, 40_000), (4, 4000)] {
         let view = View {
             width: side,
             height: side,
