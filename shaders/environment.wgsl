@@ -158,9 +158,10 @@ fn environment_radiance(direction: vec3f) -> vec3f {
 }
 
 //#if map_sampling
-// Scaled importance of radiance at intensity 1.
+// Scaled importance of radiance at intensity 1. Drivers take a common factor out of a sum, which then
+// overflows where radiance nearly does: so that is cut off.
 fn map_importance(radiance: vec3f) -> f32 {
-    return importance(radiance * globals.importance_scale);
+    return importance(min(radiance, vec3f(1e37)) * globals.importance_scale);
 }
 
 // Scaled energy of a patch of row `y` whose corners' importances add up to `sum`.
@@ -201,10 +202,11 @@ fn sample_linear(from_: f32, to: f32, u: f32) -> f32 {
     if sum <= 0.0 {
         return u;
     }
-    let a = from_ / sum;
-    let b = to / sum;
-    let root = sqrt(max(a * a + u * (b - a), 0.0));
-    return min(u / max(a + root, 1.17549435e-38), 1.0);
+    let scale = select(1.0 / sum, 1.0, sum > 1e-15);
+    let a = from_ * scale;
+    let b = to * scale;
+    let root = sqrt(max(a * a + u * ((b - a) * (sum * scale)), 0.0));
+    return min(u * (sum * scale) / max(a + root, 1.17549435e-38), 1.0);
 }
 
 // Draws a direction from a tile by two 32-bit fractions of one.

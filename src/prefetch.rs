@@ -11,3 +11,13 @@ pub(crate) fn prefetch<T>(value: &T) {
     #[cfg(not(target_arch = "x86_64"))]
     let _ = value;
 }
+
+/// The same for a few cache lines of numbers; what is longer is better left to the search.
+pub(crate) fn prefetch_all<T>(values: &[T]) {
+    const LINE: usize = 64;
+    const MOST_LINES: usize = 6;
+    let per_line = (LINE / size_of::<T>().max(1)).max(1);
+    if values.len() <= MOST_LINES * per_line {
+        values.chunks(per_line).for_each(|line| prefetch(&line[0]));
+    }
+}

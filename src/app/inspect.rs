@@ -210,7 +210,9 @@ fn true_shares(world: &World, environment: &Environment, spot: &Spot) -> Vec<f32
                     }
                     let direction = sample.direction;
                     let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
-                    let light = importance(sample.radiance * world.transmittance(&ray));
+                    let light = importance(
+                        environment.sampled_radiance(&sample) * world.transmittance(&ray),
+                    );
                     f64::from(sample.weight * light * cosine / sample.pdf_solid_angle)
                 })
                 .sum()

@@ -36,8 +36,10 @@ use self::tiles::TileGrid;
 use self::weights::Weights;
 use crate::color::importance;
 use crate::error::{Error, Result};
+use crate::huge_pages::on_huge_pages;
 use crate::image::Image;
 use crate::math::{direction_from_uv, sin_cos_turns, uv_from_direction};
+use crate::prefetch::prefetch_all;
 use crate::sampler::hash;
 
 /// A lat-long map of radiance that can be looked up and sampled. Clones share pixels and table.
@@ -51,6 +53,9 @@ pub struct Environment {
     patches: PatchRows,
     /// Factor on importance that brings the brightest pixel near 1: a power of two.
     importance_scale: f32,
+    /// The pixels' importance, so scaled. Most samples are hidden: these are enough to place them, and a
+    /// third as large.
+    importances: Arc<Vec<f32>>,
     /// One over each tile's energy, so scaled; 0 where f32 cannot hold it.
     inverse_energies: Vec<f32>,
     /// Solid-angle mean of the map, without intensity.
@@ -62,19 +67,18 @@ pub struct Environment {
     intensity: f32,
 }
 
-/// A direction drawn from one tile of the map.
+/// A direction drawn from one tile of the map; [`Environment::sampled_radiance`] is what comes from there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnvironmentSample {
     /// Unit world direction towards the map.
     pub direction: Vec3,
-    /// Radiance from there.
-    pub radiance: Vec3,
-    /// Density in 1/steradian, given the tile: the importance of `radiance` over the tile's energy.
+    /// Density in 1/steradian, given the tile: the importance of the radiance over the tile's energy.
     pub pdf_solid_angle: f32,
     /// That density over the one with which the integers of the table drew the direction. An estimate
     /// is multiplied by it, and then exact: it is 1 but for the rounding of patches to 2^-32 of a
     /// tile.
     pub weight: f32,
+    point: MapPoint,
 }
 
 /// Bytes an [`Environment`] keeps.
@@ -87,7 +91,7 @@ pub struct EnvironmentMemory {
 }
 
 /// A place on the map: a patch and where in it, in `[0,1]` of its extent.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct MapPoint {
     pub(crate) column: u32,
     pub(crate) row: u32,
@@ -95,8 +99,8 @@ pub(crate) struct MapPoint {
     pub(crate) down: f32,
 }
 
-/// Radiance at the corners of a patch, at intensity 1: left to right, then down.
-type Corners = [Vec3; 4];
+/// What there is at the corners of a patch: left to right, then down.
+type Corners<T> = [T; 4];
 
 impl Environment {
     /// Takes a map (finite, not negative) and builds its importance table.
@@ -113,6 +117,8 @@ impl Environment {
         let grid = TileGrid::new(columns, rows, options.tile_columns, options.tile_rows);
         let (table, tile_energies) = Table::build(options.table, &weights, &grid);
         let importance_scale = importance_scale(statistics.largest);
+        let importance_of = |rgb: &[f32; 3]| importance(Vec3::from(*rgb) * importance_scale);
+        let importances = map.pixels.par_iter().map(importance_of).collect();
         let inverse = |energy: &f64| (1.0 / (energy * f64::from(importance_scale))) as f32;
         let inverse_energies = tile_energies
             .iter()
@@ -122,12 +128,13 @@ impl Environment {
             .collect();
         let mut environment = Self {
             patches: PatchRows::new(map.width, map.height, options.lookup),
-            map: Arc::new(map),
+            map: Arc::new(Image { pixels: on_huge_pages(map.pixels), ..map }),
             lookup: options.lookup,
             grid,
             table: Arc::new(table),
             tile_energies,
             importance_scale,
+            importances: Arc::new(on_huge_pages(importances)),
             inverse_energies,
             map_mean: statistics.mean,
             map_is_black: statistics.black,
@@ -152,8 +159,12 @@ impl Environment {
 
     /// Radiance from a unit world direction.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
-        let point = self.map_point(direction);
-        self.scaled(interpolated(&self.corners(point.column, point.row), point.across, point.down))
+        self.radiance_at(&self.map_point(direction))
+    }
+
+    /// Radiance from where a sample was drawn.
+    pub fn sampled_radiance(&self, sample: &EnvironmentSample) -> Vec3 {
+        self.radiance_at(&sample.point)
     }
 
     /// Number of tiles.
@@ -193,31 +204,27 @@ impl Environment {
     /// then a place in it by the importance interpolated there. `None` if the tile is black, or
     /// darker than f32 can tell from black beside the brightest pixel.
     pub fn sample_in_tile(&self, tile: u32, u: [u32; 2]) -> Option<EnvironmentSample> {
-        let patch = self.table.sample(&self.grid, tile, refine(u))?;
-        let corners = self.corners(patch.x, patch.y);
-        let [a, b, c, d] = corners.map(|corner| self.importance(corner));
+        let expect_row = |row| self.prefetch_importances(tile, row);
+        let patch = self.table.sample(&self.grid, tile, refine(u), expect_row)?;
+        let corners @ [a, b, c, d] = self.importances(patch.x, patch.y);
         let down = sample_linear(a + b, c + d, patch.within.y);
         let (left, right) = (a + down * (c - a), b + down * (d - b));
         let across = sample_linear(left, right, patch.within.x);
-        let radiance = interpolated(&corners, across, down);
-        let pdf_solid_angle = self.density(tile, (patch.x, patch.y), &corners, radiance);
+        let point = MapPoint { column: patch.x, row: patch.y, across, down };
+        let here = left + across * (right - left);
+        let pdf_solid_angle = self.density(tile, &point, here, || corners);
         if pdf_solid_angle <= 0.0 {
             return None;
         }
         let weight = match &*self.table {
             Table::TileLocal(_) => {
-                let energy = self.patch_energy([a, b, c, d], patch.y);
+                let energy = self.patch_energy(corners, patch.y);
                 energy * self.inverse_energies[tile as usize] / patch.probability
             }
             Table::SummedArea(_) => 1.0,
         };
-
-        Some(EnvironmentSample {
-            direction: self.direction_in_patch((patch.x, patch.y), Vec2::new(across, down)),
-            radiance: self.scaled(radiance),
-            pdf_solid_angle,
-            weight,
-        })
+        let direction = self.direction_in_patch((patch.x, patch.y), Vec2::new(across, down));
+        Some(EnvironmentSample { direction, pdf_solid_angle, weight, point })
     }
 
     /// Columns and rows of patches.
@@ -253,8 +260,9 @@ impl Environment {
         let point = self.map_point(direction);
         let tile = self.grid.tile_of_patch(point.column, point.row);
         let corners = self.corners(point.column, point.row);
-        let radiance = interpolated(&corners, point.across, point.down);
-        let pdf = self.density(tile, (point.column, point.row), &corners, radiance);
+        let radiance = interpolated(corners, point.across, point.down);
+        let here = importance(radiance * self.importance_scale);
+        let pdf = self.density(tile, &point, here, || self.importances(point.column, point.row));
         (self.scaled(radiance), tile, pdf)
     }
 
@@ -306,6 +314,7 @@ impl Environment {
     /// What the pixels and the table take.
     pub fn memory_bytes(&self) -> EnvironmentMemory {
         let rows = self.patches.memory_bytes()
+            + size_of_val(&self.importances[..])
             + size_of_val(&self.inverse_energies[..])
             + size_of_val(&self.tile_energies[..]);
         EnvironmentMemory {
@@ -314,28 +323,29 @@ impl Environment {
         }
     }
 
-    /// Density of [`Self::sample_in_tile`], given the tile, where a patch with these corners shows this
-    /// radiance. Only a summed-area table asks which patch it is.
-    fn density(&self, tile: u32, (x, y): (u32, u32), corners: &Corners, radiance: Vec3) -> f32 {
-        let here = self.importance(radiance);
+    /// Density of [`Self::sample_in_tile`], given the tile, at a point of this scaled importance. Only
+    /// summed-area tables ask for those at the patch's corners.
+    fn density(
+        &self,
+        tile: u32,
+        point: &MapPoint,
+        here: f32,
+        corners: impl Fn() -> Corners<f32>,
+    ) -> f32 {
         match &*self.table {
             Table::TileLocal(_) => here * self.inverse_energies[tile as usize],
-            Table::SummedArea(_) => {
-                let energy = self.patch_energy(corners.map(|c| self.importance(c)), y);
-                let probability = self.table.sample_probability(&self.grid, tile, x, y) as f32;
+            table @ Table::SummedArea(_) => {
+                let (x, y) = (point.column, point.row);
+                let energy = self.patch_energy(corners(), y);
+                let probability = table.sample_probability(&self.grid, tile, x, y) as f32;
                 if energy > 0.0 { probability * (here / energy) } else { 0.0 }
             }
         }
     }
 
     /// Scaled energy of a patch of row `y` with corners of these importances.
-    fn patch_energy(&self, corners: [f32; 4], y: u32) -> f32 {
+    fn patch_energy(&self, corners: Corners<f32>, y: u32) -> f32 {
         0.25 * corners.iter().sum::<f32>() * self.patches.rows()[y as usize].solid_angle
-    }
-
-    /// Scaled importance of radiance at intensity 1.
-    fn importance(&self, radiance: Vec3) -> f32 {
-        importance(radiance * self.importance_scale)
     }
 
     /// Whether both are one map with one table, turned or scaled differently.
@@ -363,17 +373,43 @@ impl Environment {
         }
     }
 
-    /// Wrapped in u, clamped in v.
-    fn corners(&self, column: u32, row: u32) -> Corners {
-        let at = |x, y| Vec3::from(self.map.at(x, y));
-        match self.lookup {
-            Lookup::Nearest => [at(column, row); 4],
-            Lookup::Bilinear => {
-                let left = if column == 0 { self.map.width - 1 } else { column - 1 };
-                let (above, below) = (row.saturating_sub(1), row.min(self.map.height - 1));
-                [at(left, above), at(column, above), at(left, below), at(column, below)]
-            }
+    fn radiance_at(&self, point: &MapPoint) -> Vec3 {
+        let corners = self.corners(point.column, point.row);
+        self.scaled(interpolated(corners, point.across, point.down))
+    }
+
+    /// Radiance at the corners of a patch, at intensity 1.
+    fn corners(&self, column: u32, row: u32) -> Corners<Vec3> {
+        self.corner_pixels(column, row).map(|pixel| Vec3::from(self.map.pixels[pixel]))
+    }
+
+    /// Scaled importance at the corners of a patch.
+    fn importances(&self, column: u32, row: u32) -> Corners<f32> {
+        self.corner_pixels(column, row).map(|pixel| self.importances[pixel])
+    }
+
+    /// Has the importance along a row of a tile's patches fetched.
+    fn prefetch_importances(&self, tile: u32, row: u32) {
+        let columns = self.grid.patches(tile).x.clone();
+        let [_, above, _, below] = self.corner_pixels(columns.start, row);
+        for first in [above, below] {
+            prefetch_all(&self.importances[first..][..columns.len()]);
         }
+    }
+
+    /// Indices of the pixels at the corners of a patch: wrapped in u, clamped in v.
+    fn corner_pixels(&self, column: u32, row: u32) -> Corners<usize> {
+        let (width, height) = (self.map.width, self.map.height);
+        let (left, above, below) = match self.lookup {
+            Lookup::Nearest => (column, row, row),
+            Lookup::Bilinear => (
+                if column == 0 { width - 1 } else { column - 1 },
+                row.saturating_sub(1),
+                row.min(height - 1),
+            ),
+        };
+        let at = |x: u32, y: u32| y as usize * width as usize + x as usize;
+        [at(left, above), at(column, above), at(left, below), at(column, below)]
     }
 
     fn scaled(&self, radiance: Vec3) -> Vec3 {
@@ -381,16 +417,17 @@ impl Environment {
     }
 }
 
-fn interpolated([a, b, c, d]: &Corners, across: f32, down: f32) -> Vec3 {
-    let upper = *a + across * (*b - *a);
-    let lower = *c + across * (*d - *c);
+fn interpolated([a, b, c, d]: Corners<Vec3>, across: f32, down: f32) -> Vec3 {
+    let upper = a + across * (b - a);
+    let lower = c + across * (d - c);
     upper + down * (lower - upper)
 }
 
-/// A power of two that brings the largest component of a map's pixels to about 1.
+/// A power of two that brings the largest component of a map's pixels to about 1, as far as neither it
+/// nor its products with the weights of colours leave the normal range.
 fn importance_scale(largest: f32) -> f32 {
     let exponent = (largest.max(f32::MIN_POSITIVE).to_bits() >> 23) as i32 - 127;
-    2.0_f32.powi(-exponent.clamp(-126, 126))
+    2.0_f32.powi(-exponent.clamp(-100, 100))
 }
 
 /// Gives 32-bit fractions the bits that choosing among 2^32, and a place in what was chosen, take:

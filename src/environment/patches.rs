@@ -124,11 +124,13 @@ pub(crate) fn sample_linear(a: f32, b: f32, u: f32) -> f32 {
     if sum <= 0.0 {
         return u;
     }
-    // Shares of the sum: squares of small numbers would be lost.
-    let (a, b) = (a / sum, b / sum);
-    let root = (a * a + u * (b - a)).max(0.0).sqrt();
-    (u / (a + root).max(f32::MIN_POSITIVE)).min(1.0)
+    // Shares of the sum where squares would be lost.
+    let (a, b, sum) = if sum > SAFE_TO_SQUARE { (a, b, sum) } else { (a / sum, b / sum, 1.0) };
+    let root = (a * a + u * ((b - a) * sum)).max(0.0).sqrt();
+    (u * sum / (a + root).max(f32::MIN_POSITIVE)).min(1.0)
 }
+
+const SAFE_TO_SQUARE: f32 = 1e-15;
 
 #[cfg(test)]
 mod tests {

@@ -47,18 +47,25 @@ impl Table {
             TableKind::F32 => Arc::new(SummedArea::<f32>::build(weights)),
             TableKind::F64 => Arc::new(SummedArea::<f64>::build(weights)),
         };
-        let energies = (0..grid.count()).map(|tile| table.energy(&grid.patches(tile))).collect();
+        let energies = (0..grid.count()).map(|tile| table.energy(grid.patches(tile))).collect();
         (Self::SummedArea(table), energies)
     }
 
-    /// Chooses a patch of a tile by 64-bit fractions of one; `None` where the table has no mass.
-    pub(crate) fn sample(&self, grid: &TileGrid, tile: u32, u: [u64; 2]) -> Option<PatchSample> {
+    /// Chooses a patch of a tile by 64-bit fractions of one; `None` where the table has no mass. The
+    /// row may be told before the column is searched.
+    pub(crate) fn sample(
+        &self,
+        grid: &TileGrid,
+        tile: u32,
+        u: [u64; 2],
+        expect_row: impl Fn(u32),
+    ) -> Option<PatchSample> {
         match self {
-            Self::TileLocal(table) => table.sample(grid, tile, u),
+            Self::TileLocal(table) => table.sample(grid, tile, u, expect_row),
             Self::SummedArea(table) => {
                 // As many bits as a GPU has for it.
                 let [x, y] = u.map(|u| (u >> 16) as f64 * (1.0 / (1_u64 << 48) as f64));
-                table.sample(&grid.patches(tile), DVec2::new(x, y))
+                table.sample(grid.patches(tile), DVec2::new(x, y))
             }
         }
     }
@@ -67,7 +74,7 @@ impl Table {
     pub(crate) fn sample_probability(&self, grid: &TileGrid, tile: u32, x: u32, y: u32) -> f64 {
         match self {
             Self::TileLocal(table) => table.sample_probability(grid, tile, x, y),
-            Self::SummedArea(table) => table.sample_probability(&grid.patches(tile), x, y),
+            Self::SummedArea(table) => table.sample_probability(grid.patches(tile), x, y),
         }
     }
 

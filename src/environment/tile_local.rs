@@ -13,7 +13,8 @@ use rayon::prelude::*;
 use super::table::PatchSample;
 use super::tiles::{TileGrid, TilePatches};
 use super::weights::Weights;
-use crate::prefetch::prefetch;
+use crate::huge_pages::on_huge_pages;
+use crate::prefetch::prefetch_all;
 
 /// Exact integer prefix sums, tile by tile.
 #[derive(Debug, Clone)]
@@ -28,7 +29,8 @@ pub(crate) struct TileLocal {
 impl TileLocal {
     /// Builds the table and the tiles' energies (importance x steradian, f64).
     pub(crate) fn build(weights: &Weights<'_>, grid: &TileGrid) -> (Self, Vec<f64>) {
-        let tiles: Vec<TilePatches> = (0..grid.count()).map(|tile| grid.patches(tile)).collect();
+        let tiles: Vec<TilePatches> =
+            (0..grid.count()).map(|tile| grid.patches(tile).clone()).collect();
         let mut row_sums = vec![0; tiles.iter().map(TilePatches::len).sum()];
         let mut tile_sums = vec![0; tiles.iter().map(|t| t.height() as usize).sum()];
         let mut energies = vec![0.0; tiles.len()];
@@ -50,22 +52,30 @@ impl TileLocal {
                 quantise(tile_weights, *energy, patches.width(), row_sums, tile_sums);
             },
         );
-        (Self { row_sums, tile_sums }, energies)
+        (Self { row_sums: on_huge_pages(row_sums), tile_sums }, energies)
     }
 
     /// Chooses a patch of the tile: first a row by the second number, then a column by the first, both
-    /// 64-bit fractions of one. Monotone in both. `None` if the tile is black.
-    pub(crate) fn sample(&self, grid: &TileGrid, tile: u32, u: [u64; 2]) -> Option<PatchSample> {
+    /// 64-bit fractions of one. Monotone in both. `None` if the tile is black. The row is told as soon
+    /// as it is known, for memory to be fetched while the column is searched.
+    pub(crate) fn sample(
+        &self,
+        grid: &TileGrid,
+        tile: u32,
+        u: [u64; 2],
+        expect_row: impl Fn(u32),
+    ) -> Option<PatchSample> {
         let patches = grid.patches(tile);
-        let rows = self.rows_of(grid, &patches);
+        let rows = self.rows_of(grid, tile);
         let total = rows[rows.len() - 1];
         if total == 0 {
             return None;
         }
         let row = choose(rows, total, u[1]);
-        let columns = self.columns_of(grid, &patches, row.index);
+        let columns = self.columns_of(grid, patches, row.index);
         // A row's total is known without reading its last sum.
-        columns.chunks(16).for_each(|line| prefetch(&line[0]));
+        prefetch_all(columns);
+        expect_row(patches.y.start + row.index as u32);
         let column = choose(columns, row.mass, u[0]);
         Some(PatchSample {
             x: patches.x.start + column.index as u32,
@@ -78,12 +88,12 @@ impl TileLocal {
     /// Probability of [`Self::sample`] to choose this patch of the tile it lies in.
     pub(crate) fn sample_probability(&self, grid: &TileGrid, tile: u32, x: u32, y: u32) -> f64 {
         let patches = grid.patches(tile);
-        let rows = self.rows_of(grid, &patches);
+        let rows = self.rows_of(grid, tile);
         let total = rows[rows.len() - 1];
         if total == 0 {
             return 0.0;
         }
-        let columns = self.columns_of(grid, &patches, (y - patches.y.start) as usize);
+        let columns = self.columns_of(grid, patches, (y - patches.y.start) as usize);
         let column = (x - patches.x.start) as usize;
         let before = if column == 0 { 0 } else { columns[column - 1] };
         f64::from(columns[column] - before) / f64::from(total)
@@ -100,12 +110,11 @@ impl TileLocal {
     }
 
     /// Rows of tiles lie one after another, and each tile of one has as many rows as the others.
-    fn rows_of(&self, grid: &TileGrid, patches: &TilePatches) -> &[u32] {
-        let (columns, _) = grid.size();
-        let column = grid.tile_of_patch(patches.x.start, 0);
-        let first = patches.y.start as usize * columns as usize
-            + column as usize * patches.height() as usize;
-        &self.tile_sums[first..][..patches.height() as usize]
+    fn rows_of(&self, grid: &TileGrid, tile: u32) -> &[u32] {
+        let (patches, (columns, _)) = (grid.patches(tile), grid.size());
+        let (before, height) = (patches.y.start as usize, patches.height() as usize);
+        let first = before * columns as usize + grid.column_of(tile) as usize * height;
+        &self.tile_sums[first..][..height]
     }
 
     fn columns_of(&self, grid: &TileGrid, patches: &TilePatches, row: usize) -> &[u32] {

@@ -8,8 +8,10 @@ use std::ops::Range;
 #[derive(Debug, Clone)]
 pub(crate) struct TileGrid {
     width: u32,
-    column_edges: Vec<u32>,
-    row_edges: Vec<u32>,
+    columns: u32,
+    rows: u32,
+    /// Made once: finding them takes divisions.
+    tiles: Vec<TilePatches>,
     column_of_patch: Vec<u32>,
     row_of_patch: Vec<u32>,
 }
@@ -19,40 +21,45 @@ impl TileGrid {
     pub(crate) fn new(width: u32, height: u32, columns: u32, rows: u32) -> Self {
         let column_edges = edges(width, columns);
         let row_edges = edges(height, rows);
+        let mut tiles = Vec::with_capacity((column_edges.len() - 1) * (row_edges.len() - 1));
+        for y in row_edges.windows(2) {
+            tiles.extend(
+                column_edges.windows(2).map(|x| TilePatches { x: x[0]..x[1], y: y[0]..y[1] }),
+            );
+        }
         Self {
             width,
+            columns: column_edges.len() as u32 - 1,
+            rows: row_edges.len() as u32 - 1,
+            tiles,
             column_of_patch: owners(&column_edges),
             row_of_patch: owners(&row_edges),
-            column_edges,
-            row_edges,
         }
     }
 
     /// Columns and rows.
     pub(crate) fn size(&self) -> (u32, u32) {
-        (self.column_edges.len() as u32 - 1, self.row_edges.len() as u32 - 1)
+        (self.columns, self.rows)
     }
 
     /// Number of tiles; tile `t` is in row `t / columns`, column `t % columns`.
     pub(crate) fn count(&self) -> u32 {
-        let (columns, rows) = self.size();
-        columns * rows
+        self.columns * self.rows
     }
 
     /// The tile that holds patch `(x, y)`.
     pub(crate) fn tile_of_patch(&self, x: u32, y: u32) -> u32 {
-        let columns = self.column_edges.len() as u32 - 1;
-        self.row_of_patch[y as usize] * columns + self.column_of_patch[x as usize]
+        self.row_of_patch[y as usize] * self.columns + self.column_of_patch[x as usize]
     }
 
     /// Columns and rows of patches of a tile.
-    pub(crate) fn patches(&self, tile: u32) -> TilePatches {
-        let columns = self.column_edges.len() as u32 - 1;
-        let (column, row) = ((tile % columns) as usize, (tile / columns) as usize);
-        TilePatches {
-            x: self.column_edges[column]..self.column_edges[column + 1],
-            y: self.row_edges[row]..self.row_edges[row + 1],
-        }
+    pub(crate) fn patches(&self, tile: u32) -> &TilePatches {
+        &self.tiles[tile as usize]
+    }
+
+    /// Column of tiles that a tile is in.
+    pub(crate) fn column_of(&self, tile: u32) -> u32 {
+        self.column_of_patch[self.patches(tile).x.start as usize]
     }
 
     /// All patches of the map.
@@ -68,11 +75,9 @@ impl TileGrid {
 
     /// Bytes the grid's look-up arrays take.
     pub(crate) fn memory_bytes(&self) -> usize {
-        let entries = self.column_edges.len()
-            + self.row_edges.len()
-            + self.column_of_patch.len()
-            + self.row_of_patch.len();
-        entries * size_of::<u32>()
+        size_of_val(&self.tiles[..])
+            + size_of_val(&self.column_of_patch[..])
+            + size_of_val(&self.row_of_patch[..])
     }
 }
 
@@ -130,7 +135,7 @@ mod tests {
             let mut patches = 0;
             for tile in 0..grid.count() {
                 let t = grid.patches(tile);
-                assert_eq!(grid.first_patch(&t), if tile == 0 { 0 } else { patches });
+                assert_eq!(grid.first_patch(t), if tile == 0 { 0 } else { patches });
                 patches += t.len();
                 assert!(t.width().abs_diff(width / grid.size().0) <= 1);
                 assert!(t.height().abs_diff(height / grid.size().1) <= 1);

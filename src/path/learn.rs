@@ -92,7 +92,8 @@ impl Path<'_> {
                     let pdf = choice.probability * sample.pdf_solid_angle;
                     let mean =
                         std::f32::consts::PI * importance(self.tracer.environment.mean_radiance());
-                    sample.weight * importance(f * sample.radiance * transmittance) / (pdf * mean)
+                    let radiance = self.tracer.environment.sampled_radiance(&sample);
+                    sample.weight * importance(f * radiance * transmittance) / (pdf * mean)
                 }
             }
         };

@@ -477,8 +477,9 @@ impl<'a> Path<'a> {
         let both_pdfs = pdf + own_pdf;
         if transmittance != Vec3::ZERO && both_pdfs > 0.0 {
             // Balance heuristic over the density; `weight` is what integers drew it with.
+            let radiance = self.tracer.environment.sampled_radiance(&sample);
             let weight = sample.weight / both_pdfs;
-            self.radiance += self.throughput * f * sample.radiance * transmittance * weight;
+            self.radiance += self.throughput * f * radiance * transmittance * weight;
         }
     }
 

@@ -266,7 +266,9 @@ fn irradiance_error(environment: &Environment) -> f64 {
         let Some(sample) = environment.sample_in_tile(tile as u32, u) else { continue };
         let cosine = sample.direction.as_dvec3().dot(normal).abs();
         let pdf = energies[tile] / total * f64::from(sample.pdf_solid_angle);
-        let value = sample.radiance.as_dvec3() * cosine * f64::from(sample.weight) / pdf;
+        let value =
+            environment.sampled_radiance(&sample).as_dvec3() * cosine * f64::from(sample.weight)
+                / pdf;
         sum += value;
         squares += value * value;
     }

@@ -34,6 +34,8 @@ impl Setting {
             width: 33,
             height: 17,
             limits: PathLimits { bounces: 5, russian_roulette: true },
+            // Few, so that rendered paths make new laws.
+            learning_paths: 1 << 10,
             ..view(self.camera.clone(), sampling, 5)
         }
     }

@@ -155,7 +155,7 @@ pub(super) fn samples(environment: &Environment) -> Vec<Probe<'_>> {
             let polar = polar(environment, direction);
             t.near(sample.pdf_solid_angle, density_bound(environment, direction, tile));
             t.near(direction, ulps(8.0).of(polar));
-            t.near(sample.radiance, ulps(8.0).of(polar * contrast(environment, direction)));
+            t.near(environment.sampled_radiance(&sample), ulps(8.0).of(polar * contrast(environment, direction)));
             t.near(sample.weight, ulps(16.0));
         },
     );
@@ -180,7 +180,9 @@ pub(super) fn samples(environment: &Environment) -> Vec<Probe<'_>> {
             }
         },
     );
-    vec![sample.flips(500), density.flips(500)]
+    // Places at the edges of a dim tile are known to 2^-48 of all energy.
+    let flips = if environment.kind().0 == TableKind::F64 { 300 } else { 500 };
+    vec![sample.flips(flips), density.flips(500)]
 }
 
 fn cells(stand: &Stand) -> Vec<Probe<'_>> {
