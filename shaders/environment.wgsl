@@ -202,7 +202,7 @@ fn sample_linear(from_: f32, to: f32, u: f32) -> f32 {
     if sum <= 0.0 {
         return u;
     }
-    let scale = select(1.0 / sum, 1.0, sum > 1e-15);
+    let scale = select(1.0 / sum, 1.0, sum > 1e-15 && sum < 1e15);
     let a = from_ * scale;
     let b = to * scale;
     let root = sqrt(max(a * a + u * ((b - a) * (sum * scale)), 0.0));

@@ -285,25 +285,13 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     check_outputs(arguments)?;
     start_threads(arguments.threads)?;
     let cancel = super::interrupt::flag("stopping after this pass and writing the picture");
-    let progress = Progress::start("loading");
-    let mut phases = Phases::default();
-
-    let start = Instant::now();
-    let scene = crate::sources::scene(&arguments.scene)?;
-    phases.load_scene_seconds = lap(start);
-    progress.say("building the BVH");
-    let start = Instant::now();
-    let world = World::new(scene);
-    phases.build_bvh_seconds = lap(start);
-
-    progress.say("loading the map");
-    let start = Instant::now();
-    let (map, map_notices) = crate::sources::map(&arguments.env)?;
-    phases.load_map_seconds = lap(start);
-    let start = Instant::now();
-    let environment = Environment::new(map, &environment_options(arguments))
-        .map_err(|e| Error::at(&arguments.env, e))?;
-    phases.build_table_seconds = lap(start);
+    let progress = Progress::start("loading the scene and the map");
+    // Side by side: a large scene and a large map take seconds each.
+    let (world, light) = rayon::join(|| load_world(arguments), || load_environment(arguments));
+    let (world, load_scene_seconds, build_bvh_seconds) = world?;
+    let (environment, map_notices, load_map_seconds, build_table_seconds) = light?;
+    let phases =
+        Phases { load_scene_seconds, build_bvh_seconds, load_map_seconds, build_table_seconds };
 
     let mut notices = world.scene.notices.clone();
     notices.extend(&map_notices);
@@ -356,6 +344,28 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         write_laws(path, session.grid().ok_or_else(none)?)?;
     }
     outcome
+}
+
+/// The scene made ready for rays, and the seconds of loading and of building.
+fn load_world(arguments: &RenderArguments) -> Result<(World, f64, f64)> {
+    let start = Instant::now();
+    let scene = crate::sources::scene(&arguments.scene)?;
+    let load_seconds = lap(start);
+    let start = Instant::now();
+    let world = World::new(scene);
+    Ok((world, load_seconds, lap(start)))
+}
+
+/// The map made ready to be sampled, what was repaired in it, and the seconds of loading and of
+/// building.
+fn load_environment(arguments: &RenderArguments) -> Result<(Environment, Notices, f64, f64)> {
+    let start = Instant::now();
+    let (map, notices) = crate::sources::map(&arguments.env)?;
+    let load_seconds = lap(start);
+    let start = Instant::now();
+    let environment = Environment::new(map, &environment_options(arguments))
+        .map_err(|e| Error::at(&arguments.env, e))?;
+    Ok((environment, notices, load_seconds, lap(start)))
 }
 
 fn lap(start: Instant) -> f64 {

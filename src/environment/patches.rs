@@ -125,12 +125,13 @@ pub(crate) fn sample_linear(a: f32, b: f32, u: f32) -> f32 {
         return u;
     }
     // Shares of the sum where squares would be lost.
-    let (a, b, sum) = if sum > SAFE_TO_SQUARE { (a, b, sum) } else { (a / sum, b / sum, 1.0) };
+    let is_safe = sum > 1.0 / SAFE_TO_SQUARE && sum < SAFE_TO_SQUARE;
+    let (a, b, sum) = if is_safe { (a, b, sum) } else { (a / sum, b / sum, 1.0) };
     let root = (a * a + u * ((b - a) * sum)).max(0.0).sqrt();
     (u * sum / (a + root).max(f32::MIN_POSITIVE)).min(1.0)
 }
 
-const SAFE_TO_SQUARE: f32 = 1e-15;
+const SAFE_TO_SQUARE: f32 = 1e15;
 
 #[cfg(test)]
 mod tests {
