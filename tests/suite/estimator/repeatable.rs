@@ -34,8 +34,6 @@ impl Setting {
             width: 33,
             height: 17,
             limits: PathLimits { bounces: 5, russian_roulette: true },
-            // Few, so that rendered paths make new laws.
-            learning_paths: 1 << 10,
             ..view(self.camera.clone(), sampling, 5)
         }
     }
@@ -67,7 +65,9 @@ fn film_and_laws_do_not_depend_on_the_threads() {
     for sampling in [Sampling::Adaptive, Sampling::Talk] {
         let result = |threads| {
             with_threads(threads, || {
-                let mut session = setting.session(setting.view(sampling));
+                // Few learning paths, so that rendered ones make new laws.
+                let view = View { learning_paths: 1 << 10, ..setting.view(sampling) };
+                let mut session = setting.session(view);
                 for _ in 0..20 {
                     session.advance(1, &AtomicBool::new(false)).expect("the CPU does not fail");
                 }
