@@ -13,6 +13,16 @@ pub(crate) fn on_huge_pages<T>(values: Vec<T>) -> Vec<T> {
     moved
 }
 
+/// `count` zeros in such memory, to be filled: nothing is held twice on the way.
+pub(crate) fn zeros_on_huge_pages<T: bytemuck::Zeroable + Clone>(count: usize) -> Vec<T> {
+    let mut zeros = Vec::with_capacity(count);
+    if count * size_of::<T>() >= WORTHWHILE_BYTES {
+        advise(&mut zeros);
+    }
+    zeros.resize(count, T::zeroed());
+    zeros
+}
+
 /// Two huge pages of x86-64.
 const WORTHWHILE_BYTES: usize = 4 << 20;
 
@@ -40,6 +50,7 @@ mod tests {
         for count in [0, 10, (5 << 20) / 8 + 3] {
             let values: Vec<u64> = (0..count).map(|i| i * 7).collect();
             assert_eq!(super::on_huge_pages(values.clone()), values);
+            assert_eq!(super::zeros_on_huge_pages::<u64>(values.len()), vec![0; values.len()]);
         }
     }
 }

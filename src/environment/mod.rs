@@ -36,7 +36,7 @@ use self::tiles::TileGrid;
 use self::weights::Weights;
 use crate::color::importance;
 use crate::error::{Error, Result};
-use crate::huge_pages::on_huge_pages;
+use crate::huge_pages::zeros_on_huge_pages;
 use crate::image::Image;
 use crate::math::{direction_from_uv, sin_cos_turns, uv_from_direction};
 use crate::prefetch::prefetch_all;
@@ -117,8 +117,10 @@ impl Environment {
         let grid = TileGrid::new(columns, rows, options.tile_columns, options.tile_rows);
         let (table, tile_energies) = Table::build(options.table, &weights, &grid);
         let importance_scale = importance_scale(statistics.largest);
-        let importance_of = |rgb: &[f32; 3]| importance(Vec3::from(*rgb) * importance_scale);
-        let importances = map.pixels.par_iter().map(importance_of).collect();
+        let mut importances = zeros_on_huge_pages(map.pixels.len());
+        importances.par_iter_mut().zip(&map.pixels).for_each(|(scaled, rgb)| {
+            *scaled = importance(Vec3::from(*rgb) * importance_scale);
+        });
         let inverse = |energy: &f64| (1.0 / (energy * f64::from(importance_scale))) as f32;
         let inverse_energies = tile_energies
             .iter()
@@ -128,13 +130,13 @@ impl Environment {
             .collect();
         let mut environment = Self {
             patches: PatchRows::new(map.width, map.height, options.lookup),
-            map: Arc::new(Image { pixels: on_huge_pages(map.pixels), ..map }),
+            map: Arc::new(map),
             lookup: options.lookup,
             grid,
             table: Arc::new(table),
             tile_energies,
             importance_scale,
-            importances: Arc::new(on_huge_pages(importances)),
+            importances: Arc::new(importances),
             inverse_energies,
             map_mean: statistics.mean,
             map_is_black: statistics.black,

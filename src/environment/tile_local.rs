@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::table::PatchSample;
 use super::tiles::{TileGrid, TilePatches};
 use super::weights::Weights;
-use crate::huge_pages::on_huge_pages;
+use crate::huge_pages::zeros_on_huge_pages;
 use crate::prefetch::prefetch_all;
 
 /// Exact integer prefix sums, tile by tile.
@@ -31,7 +31,7 @@ impl TileLocal {
     pub(crate) fn build(weights: &Weights<'_>, grid: &TileGrid) -> (Self, Vec<f64>) {
         let tiles: Vec<TilePatches> =
             (0..grid.count()).map(|tile| grid.patches(tile).clone()).collect();
-        let mut row_sums = vec![0; tiles.iter().map(TilePatches::len).sum()];
+        let mut row_sums = zeros_on_huge_pages(tiles.iter().map(TilePatches::len).sum());
         let mut tile_sums = vec![0; tiles.iter().map(|t| t.height() as usize).sum()];
         let mut energies = vec![0.0; tiles.len()];
 
@@ -52,7 +52,7 @@ impl TileLocal {
                 quantise(tile_weights, *energy, patches.width(), row_sums, tile_sums);
             },
         );
-        (Self { row_sums: on_huge_pages(row_sums), tile_sums }, energies)
+        (Self { row_sums, tile_sums }, energies)
     }
 
     /// Chooses a patch of the tile: first a row by the second number, then a column by the first, both
