@@ -10,13 +10,13 @@ struct Work {
     first_high: u32,
     // Tiles or paths.
     count: u32,
-    first_sample: u32,
+    // Each pixel is brought so many samples further, but not beyond `end_sample` of them.
     samples: u32,
-    // Whether to add to the sums that are there.
-    resumes: u32,
+    end_sample: u32,
     // Of so many samples one is counted; 0 if none is.
     stride: u32,
-    padding: u32,
+    padding_0: u32,
+    padding_1: u32,
 }
 
 struct Globals {

@@ -129,15 +129,15 @@ impl<'a> Job<'a> {
         let mut session = self.small_session(world, environment, MOVING_SECONDS, 16);
         while !self.is_superseded() {
             // The first pass is never cut short: some picture is better than none.
-            let cut = session.film().min_samples() > 0;
+            let cut = session.samples() > 0;
             self.advance(&mut session, None, cut);
-            if session.film().min_samples() == 0 || self.is_superseded() {
+            if session.samples() == 0 || self.is_superseded() {
                 return;
             }
             self.measure(&session);
             self.keep_under(&session);
             self.publish(Activity::Moving, &session, None, None);
-            if session.film().min_samples() >= 64 {
+            if session.samples() >= 64 {
                 self.rest();
             }
         }
@@ -186,9 +186,9 @@ impl<'a> Job<'a> {
         }
         let start = Instant::now();
         let mut session = self.small_session(world, environment, MOVING_SECONDS, 16);
-        while session.film().min_samples() < GLANCE.0 && start.elapsed() < GLANCE.1 {
+        while session.samples() < GLANCE.0 && start.elapsed() < GLANCE.1 {
             self.advance(&mut session, None, false);
-            if session.film().min_samples() == 0 || self.is_superseded() {
+            if session.samples() == 0 || self.is_superseded() {
                 return;
             }
             self.measure(&session);
@@ -254,6 +254,12 @@ impl<'a> Job<'a> {
             match activity {
                 Activity::Paused | Activity::Done => {
                     if activity == Activity::Done {
+                        let settled = main.settle();
+                        let has_failed = settled.is_err();
+                        self.go_on(&mut main, settled);
+                        if has_failed {
+                            continue;
+                        }
                         // It may have more samples than were asked for, but fewer pixels.
                         preview = None;
                     }
@@ -289,9 +295,9 @@ impl<'a> Job<'a> {
                 }
             }
             if let Some(session) = &preview
-                && main.film().min_samples() >= session.film().min_samples().min(4)
+                && main.samples() >= session.samples().min(4)
                 && main.phase() == Phase::Rendering
-                && main.film().min_samples() > 0
+                && main.samples() > 0
             {
                 preview = None;
             }
@@ -335,7 +341,7 @@ impl<'a> Job<'a> {
             Activity::Paused
         } else if main.phase() == Phase::Learning {
             Activity::Learning(learned_share(main))
-        } else if main.film().min_samples() > 0 && main.is_done(&self.request.rule) {
+        } else if main.samples() > 0 && main.is_done(&self.request.rule) {
             Activity::Done
         } else {
             Activity::Rendering
@@ -349,12 +355,12 @@ impl<'a> Job<'a> {
             let start = Instant::now();
             let owed = main.figures().learning_seconds - preview.figures().render_seconds;
             while !self.is_superseded()
-                && (preview.film().min_samples() == 0
+                && (preview.samples() == 0
                     || start.elapsed().as_secs_f64() < owed.min(1.0))
             {
                 self.advance(preview, None, true);
                 self.measure(preview);
-                if preview.film().total_samples() > 0
+                if preview.figures().samples > 0
                     && self.published.elapsed() >= self.publish_gap
                     && !self.is_superseded()
                 {
@@ -485,7 +491,7 @@ impl<'a> Job<'a> {
             plain: plain.map(|session| self.take(session)),
             is_preview: preview.is_some(),
             counters: self.counters.clone(),
-            learning: *main.figures(),
+            learning: main.figures(),
             under: self.under(),
             curves: self.curves.clone(),
         };
@@ -521,7 +527,7 @@ impl<'a> Job<'a> {
             sampling: session.view().sampling,
             noise: film.noise(),
             film: Arc::new(film.clone()),
-            figures: *session.figures(),
+            figures: session.figures(),
             gpu: session.gpu_figures().map(Arc::new),
             grid: self.laws_of(session),
         }

@@ -2,7 +2,7 @@
 
 /// Longest time one dispatch should take: a desktop stays smooth, no driver resets, and a cancelled
 /// render ends at once.
-const TARGET_SECONDS: f64 = 0.012;
+pub(super) const TARGET_SECONDS: f64 = 0.012;
 
 /// Adapts the size of dispatches (in workgroup samples) to what the device manages.
 #[derive(Debug, Clone)]
