@@ -25,9 +25,9 @@ fn add_to_sum(sum: Sum, x: vec4f) -> Sum {
 // Adds a finished path to its pixel; one that is not finite, or with which the sum would not be, is
 // left out and counted.
 fn add_to_film(pixel: u32, path: ptr<function, Path>) {
-    let light = luminance((*path).radiance);
-    let squared = min(light * light, F32_MAX);
-    let sample = vec4f((*path).radiance, squared);
+    let radiance = (*path).radiance * globals.film_scale;
+    let light = luminance(radiance);
+    let sample = vec4f(radiance, min(light * light, F32_MAX));
     let before = Sum(film_sum[pixel], film_rest[pixel]);
     var after = add_to_sum(before, sample);
     if !is_finite(after.high.w) {

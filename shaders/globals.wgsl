@@ -80,4 +80,9 @@ struct Globals {
     // What the camera sees in place of the map: a colour, or how little the map is blurred.
     background: vec3f,
     background_concentration: f32,
+    // Factor on what is added to the film, a power of two: squares of the brightest do not overflow.
+    film_scale: f32,
+    padding_2: u32,
+    padding_3: u32,
+    padding_4: u32,
 }

@@ -3,6 +3,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use rayon::prelude::*;
+
 use super::super::film::{Film, Pixel, Surface};
 use super::buffers::Buffers;
 use crate::error::Result;
@@ -34,6 +36,16 @@ pub(crate) struct DeviceFilm {
     pub(crate) width: u32,
     /// Rows.
     pub(crate) height: u32,
+    /// Factor that radiance was multiplied by, a power of two: 1 unless the scene's is extreme.
+    pub(crate) scale: f32,
+}
+
+/// A power of two that brings radiance of this size to where neither sums nor squares leave the range
+/// of f32; 1 for anything between 2^-40 and 2^40.
+pub(super) fn scale_for(brightest: f32) -> f32 {
+    const REACH: i32 = 40;
+    let exponent = (brightest.clamp(f32::MIN_POSITIVE, f32::MAX).to_bits() >> 23) as i32 - 127;
+    2.0_f32.powi(exponent.clamp(-REACH, REACH) - exponent)
 }
 
 /// The film of a renderer, in its buffers.
@@ -41,6 +53,7 @@ pub(super) struct Sums {
     width: u32,
     height: u32,
     layers: bool,
+    scale: f32,
     /// Rays of all pixels when they were read last.
     rays: AtomicU64,
 }
@@ -51,6 +64,7 @@ impl Sums {
         buffers: &mut Buffers,
         [width, height]: [u32; 2],
         layers: bool,
+        scale: f32,
         film: Option<&Film>,
     ) -> Result<Self> {
         let pixels = u64::from(width) * u64::from(height);
@@ -62,7 +76,7 @@ impl Sums {
                 buffers.make(name, pixels * SURFACE_BYTES, "the picture's layers")?;
             }
         }
-        let sums = Self { width, height, layers, rays: AtomicU64::new(0) };
+        let sums = Self { width, height, layers, scale, rays: AtomicU64::new(0) };
         if let Some(film) = film {
             sums.write(buffers, film);
         }
@@ -78,6 +92,7 @@ impl Sums {
             surfaces: buffers.get(SURFACES[0]).filter(|_| self.layers).cloned(),
             width: self.width,
             height: self.height,
+            scale: self.scale,
         })
     }
 
@@ -99,7 +114,7 @@ impl Sums {
             let pixels = &mut film.pixels[first..first + count];
             let mut surfaces = film.surfaces.get_mut(first..first + count);
             rays += buffers.read(&parts, |read| {
-                let rays = take_pixels(pixels, read[0], read[1], read[2]);
+                let rays = take_pixels(pixels, &read[..3], self.factors().map(f64::recip));
                 if let (Some(surfaces), [_, _, _, high, low]) = (&mut surfaces, read) {
                     take_surfaces(surfaces, high, low);
                 }
@@ -111,10 +126,16 @@ impl Sums {
         Ok(())
     }
 
+    /// What each of a pixel's sums is multiplied by on the device.
+    fn factors(&self) -> [f64; 4] {
+        let scale = f64::from(self.scale);
+        [scale, scale, scale, scale * scale]
+    }
+
     fn write(&self, buffers: &Buffers, film: &Film) {
         for (piece, pixels) in film.pixels.chunks(PIECE_PIXELS).enumerate() {
             let at = (piece * PIECE_PIXELS) as u64 * PIXEL_BYTES;
-            let sums = pixels.iter().map(|pixel| pixel.sums().map(split));
+            let sums = pixels.iter().map(|pixel| times(pixel.sums(), self.factors()).map(split));
             let (high, low): (Vec<_>, Vec<_>) =
                 sums.map(|sums| (sums.map(|sum| sum.0), sums.map(|sum| sum.1))).unzip();
             let counts: Vec<[u32; 4]> =
@@ -145,11 +166,14 @@ fn joined<const N: usize>(high: [f32; N], low: [f32; N]) -> [f64; N] {
     std::array::from_fn(|i| f64::from(high[i]) + f64::from(low[i]))
 }
 
-/// Returns the number of rays.
-fn take_pixels(pixels: &mut [Pixel], high: &[u8], low: &[u8], counts: &[u8]) -> u64 {
-    use rayon::prelude::*;
-    let (high, low) = (bytemuck::cast_slice(high), bytemuck::cast_slice(low));
-    let counts: &[[u32; 4]] = bytemuck::cast_slice(counts);
+fn times(sums: [f64; 4], factors: [f64; 4]) -> [f64; 4] {
+    std::array::from_fn(|i| sums[i] * factors[i])
+}
+
+/// Takes pixels from the bytes of [`PIXELS`]; returns the number of rays.
+fn take_pixels(pixels: &mut [Pixel], read: &[&[u8]], factors: [f64; 4]) -> u64 {
+    let (high, low) = (bytemuck::cast_slice(read[0]), bytemuck::cast_slice(read[1]));
+    let counts: &[[u32; 4]] = bytemuck::cast_slice(read[2]);
     pixels
         .par_iter_mut()
         .zip(high)
@@ -157,7 +181,7 @@ fn take_pixels(pixels: &mut [Pixel], high: &[u8], low: &[u8], counts: &[u8]) -> 
         .zip(counts)
         .with_min_len(4096)
         .map(|(((pixel, high), low), [samples, invalid, rays, _])| {
-            *pixel = Pixel::of_sums(joined::<4>(*high, *low), *samples, *invalid);
+            *pixel = Pixel::of_sums(times(joined(*high, *low), factors), *samples, *invalid);
             u64::from(*rays)
         })
         .sum()
@@ -181,6 +205,17 @@ mod tests {
             let (high, low) = split(sum);
             let [back] = joined([high], [low]);
             assert!((back - sum).abs() <= sum.abs() * 2.0_f64.powi(-48), "{sum}: {back}");
+        }
+    }
+
+    #[test]
+    fn radiance_of_any_size_is_scaled_into_range() {
+        for brightest in [0.0, 1e-38, 1e-30, 1e-12, 1e-3, 1.0, 1e6, 1e12, 1e13, 1e30, f32::MAX] {
+            let scale = scale_for(brightest);
+            assert_eq!(scale.to_bits() & 0x7f_ffff, 0, "a power of two");
+            let scaled = f64::from(brightest) * f64::from(scale);
+            assert!(scaled < 2.3e12 && (scaled > 9e-13 || brightest == 0.0), "{brightest}");
+            assert!(!(1e-12..=1e12).contains(&brightest) || scale == 1.0, "{brightest}");
         }
     }
 

@@ -88,6 +88,8 @@ pub(crate) struct Globals {
     pub(crate) first_of_sequence: u32,
     pub(crate) background: Vec3,
     pub(crate) background_concentration: f32,
+    pub(crate) film_scale: f32,
+    pub(crate) padding: [u32; 3],
 }
 
 /// Twin of `Material` in `surface.wgsl`.

@@ -145,7 +145,9 @@ impl Renderer {
         globals.set_fog(view.fog(world).as_ref());
         let mut constants = stage.constants;
         upload_tables(&mut buffers, view, environment, &features, &mut constants)?;
-        let sums = Sums::new(&mut buffers, [view.width, view.height], view.layers, film)?;
+        let size = [view.width, view.height];
+        globals.film_scale = film::scale_for(brightest(world, environment));
+        let sums = Sums::new(&mut buffers, size, view.layers, globals.film_scale, film)?;
         let progress = film.map(Progress::of).unwrap_or_default();
         if features.has("counting") {
             // Until there is something to count.
@@ -456,6 +458,16 @@ impl Bound {
             entries: &entries,
         }))
     }
+}
+
+/// About the largest radiance of the map and of lamps.
+fn brightest(world: &World, environment: &Environment) -> f32 {
+    let scene = &world.scene;
+    let map = environment.rotation_and_intensity().1 / environment.importance_scale().0;
+    let emissive = scene.materials.iter().map(|material| material.emissive.max_element());
+    let lights = scene.lights.iter().map(|light| light.intensity.max_element());
+    let map = if environment.is_black() { 0.0 } else { map };
+    emissive.chain(lights).fold(map, f32::max)
 }
 
 /// Uploads the small tables of numbers; says where each begins.
