@@ -21,7 +21,7 @@ const SLOT_BYTES: u64 = wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT;
 /// The dispatches under way, oldest first, and how long those before them took.
 pub(super) struct Flights {
     under_way: VecDeque<Flight>,
-    pacers: [Pacer; 2],
+    pacers: [Pacer; Kernel::COUNT],
     last_landing: Instant,
     clock: Option<Clock>,
     started: usize,
@@ -51,7 +51,7 @@ impl Flights {
     pub(super) fn new(gpu: &Gpu) -> Self {
         Self {
             under_way: VecDeque::new(),
-            pacers: [Pacer::default(), Pacer::default()],
+            pacers: Default::default(),
             last_landing: Instant::now(),
             clock: Clock::new(gpu),
             started: 0,
@@ -138,7 +138,7 @@ impl Flights {
     /// Lets dispatches begin as small as at first, so that tests can cut work short.
     #[cfg(test)]
     pub(super) fn forget_speed(&mut self) {
-        self.pacers = [Pacer::default(), Pacer::default()];
+        self.pacers = Default::default();
     }
 }
 

@@ -15,12 +15,16 @@ use crate::path::{Background, World};
 use crate::sampler::Points;
 
 /// Entry points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kernel {
     /// Adds samples to pixels.
     Render,
     /// Traces learning paths.
     Learn,
+    /// Finds the nearest hits of rays, for measurements.
+    ClosestHits,
+    /// Finds how much light comes along rays, for measurements.
+    ShadowRays,
 }
 
 impl Kernel {
@@ -29,7 +33,17 @@ impl Kernel {
         match self {
             Self::Render => "render",
             Self::Learn => "learn",
+            Self::ClosestHits => "closest_hits",
+            Self::ShadowRays => "shadow_rays",
         }
+    }
+
+    /// Number of kernels.
+    pub(crate) const COUNT: usize = 4;
+
+    /// Whether it traces rays that the host made, not paths.
+    fn casts(self) -> bool {
+        matches!(self, Self::ClosestHits | Self::ShadowRays)
     }
 }
 
@@ -181,6 +195,9 @@ impl Features {
             set.insert("learning");
             set.remove("layers");
             set.remove("independent_points");
+        } else if kernel.casts() {
+            set.remove("counting");
+            set.remove("layers");
         }
         Self(set)
     }
@@ -453,7 +470,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 28] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 31] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -489,24 +506,30 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 28] {
         (wgsl!("film"), kernel == Kernel::Render),
         (wgsl!("render"), kernel == Kernel::Render),
         (wgsl!("learn"), kernel == Kernel::Learn),
+        (wgsl!("cast"), kernel.casts()),
+        (wgsl!("closest_hits"), kernel == Kernel::ClosestHits),
+        (wgsl!("shadow_rays"), kernel == Kernel::ShadowRays),
     ]
 }
 
 fn bindings(kernel: Kernel, features: &Features) -> Vec<Binding> {
     let (learns, counts) = (kernel == Kernel::Learn, features.has("counting"));
+    let renders = kernel == Kernel::Render;
     let buffers = [
         // Not a uniform: software Vulkan optimises a shader anew, for 40 ms, before each dispatch if
         // it branches on uniforms.
         ("globals", "Globals", false, true),
-        ("film_sum", "array<vec4f>", true, !learns),
-        ("film_rest", "array<vec4f>", true, !learns),
-        ("film_counts", "array<vec4u>", true, !learns),
+        ("film_sum", "array<vec4f>", true, renders),
+        ("film_rest", "array<vec4f>", true, renders),
+        ("film_counts", "array<vec4u>", true, renders),
         ("surfaces", "array<vec4f>", true, features.has("layers")),
         ("surfaces_rest", "array<vec4f>", true, features.has("layers")),
         ("visits", "array<atomic<u32>>", true, counts),
         ("counters", "array<atomic<u32>>", true, counts),
         ("slot_of_cell", "array<u32>", false, counts),
         ("learning_rays", "atomic<u32>", true, learns),
+        ("cast_rays", "array<CastRay>", false, kernel.casts()),
+        ("cast_results", "array<vec2u>", true, kernel.casts()),
     ];
     let buffers = buffers
         .into_iter()
@@ -638,6 +661,8 @@ mod tests {
             if features.has("light_grid") {
                 validate(Kernel::Learn, features);
             }
+            validate(Kernel::ClosestHits, features);
+            validate(Kernel::ShadowRays, features);
         }
     }
 }
