@@ -17,7 +17,7 @@ use crate::light_grid::LawOptions;
 use crate::metrics;
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
-use crate::render::gpu::{AdapterFacts, KernelFacts, Stage};
+use crate::render::gpu::{AdapterFacts, Gpu, KernelFacts, RayChoice, Stage};
 use crate::render::{Phase, Sampling, Session, StopRule, View};
 use crate::report::{Device, Machine, OpenDevice};
 use crate::sampler::Points;
@@ -31,6 +31,8 @@ pub struct Options {
     pub devices: Vec<Device>,
     /// Part of the name of the GPU to take.
     pub adapter: Option<String>,
+    /// What finds the surfaces that rays hit on it.
+    pub rays: RayChoice,
     /// Width and height of the pictures.
     pub size: (u32, u32),
     /// Seconds of rendering a scene on a device.
@@ -67,6 +69,8 @@ pub struct DeviceFigures {
     pub name: String,
     /// What it is and allows; `None` for the CPU.
     pub adapter: Option<AdapterFacts>,
+    /// Whether its own ray queries find what rays hit.
+    pub has_hardware_rays: bool,
     /// Scene by scene.
     pub scenes: Vec<SceneFigures>,
 }
@@ -144,13 +148,18 @@ pub fn run(
     progress: &dyn Fn(String),
 ) -> Result<Bench> {
     let machine = Machine::here();
-    let open = |device| OpenDevice::open(device, options.adapter.as_deref(), &machine);
+    let open = |device| {
+        let mut open = OpenDevice::open(device, options.adapter.as_deref(), &machine)?;
+        open.gpu = open.gpu.map(|gpu| gpu.with_rays(options.rays)).transpose()?;
+        Ok(open)
+    };
     let opened: Vec<_> = options.devices.iter().map(|d| open(*d)).collect::<Result<_>>()?;
     let mut devices: Vec<_> = opened
         .iter()
         .map(|open| DeviceFigures {
             name: open.name.clone(),
             adapter: open.gpu.as_ref().map(|gpu| gpu.facts().clone()),
+            has_hardware_rays: open.gpu.as_ref().is_some_and(Gpu::has_hardware_rays),
             scenes: Vec::new(),
         })
         .collect();

@@ -15,6 +15,7 @@ use crate::math::Frame;
 use crate::path::World;
 use crate::path::camera::{CameraRays, disk_from_square};
 use crate::render::gpu::{Question, Renderer, Stage};
+use crate::render::{Sampling, View};
 use crate::sampler::Sampler;
 
 /// Which rays.
@@ -76,7 +77,8 @@ pub(super) fn measure(
     let world = &place.subject.world;
     let mut caster = match stage {
         Some(stage) => {
-            let view = place.view((TILE, TILE));
+            // Whose kernels know nothing of the map.
+            let view = View { sampling: Sampling::Bsdf, ..place.view((TILE, TILE)) };
             let environment = &place.subject.environment;
             let rays = view.rays();
             Some(Renderer::new(stage, world, environment, &view, &rays, None)?)

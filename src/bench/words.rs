@@ -28,8 +28,9 @@ impl fmt::Display for DeviceFigures {
         if let Some(adapter) = &self.adapter {
             writeln!(
                 f,
-                "  {}, {} storage buffers of {} MiB, buffers of {} MiB",
+                "  {}, rays by {}, {} storage buffers of {} MiB, buffers of {} MiB",
                 adapter.kind,
+                if self.has_hardware_rays { "its own ray queries" } else { "our kernels" },
                 adapter.storage_buffers,
                 adapter.storage_binding_bytes >> 20,
                 adapter.buffer_bytes >> 20

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::image::check_writable;
 use crate::output::record::write_json;
 use crate::path::World;
-use crate::render::gpu::adapters;
+use crate::render::gpu::{RayChoice, adapters};
 use crate::report::Device;
 use crate::scene::builtin;
 
@@ -32,6 +32,9 @@ pub(super) struct BenchArguments {
     /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
+    /// What finds the surfaces that rays hit on a GPU.
+    #[arg(long, default_value = "auto", value_enum)]
+    rays: RayChoice,
     /// Picture size in pixels.
     #[arg(long, default_value = "1920x1080", value_parser = values::size, value_name = "WxH")]
     size: (u32, u32),
@@ -81,6 +84,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     let options = Options {
         devices,
         adapter: arguments.adapter.clone(),
+        rays: arguments.rays,
         size: arguments.size,
         seconds: arguments.seconds,
     };

@@ -4,6 +4,7 @@
 //! as `cpu` does. Nothing waits in between: a few dispatches are always under way, and the host reads
 //! the film, whose sums lose nothing at any number of samples, only when somebody asks for it.
 
+mod acceleration;
 mod buffers;
 mod cast;
 mod device;
@@ -40,7 +41,7 @@ use shader::{Binding, Constants, Features, Kernel, Program};
 use stage::put_array;
 
 pub(crate) use cast::Question;
-pub use device::{AdapterFacts, DeviceChoice, Gpu, adapters};
+pub use device::{AdapterFacts, DeviceChoice, Gpu, RayChoice, adapters};
 pub(crate) use film::DeviceFilm;
 pub use flight::FlightFigures;
 pub use shader::KernelFacts;
@@ -143,7 +144,10 @@ impl Renderer {
         film: Option<&Film>,
         compile: impl FnOnce(&Gpu, Program) -> Result<Arc<Pipeline>>,
     ) -> Result<Self> {
-        let features = Features::of(world, environment, view);
+        let mut features = Features::of(world, environment, view);
+        if stage.gpu.has_hardware_rays() {
+            features = features.with_hardware_rays();
+        }
         let mut buffers = stage.buffers.for_renderer();
         let mut globals = stage.globals;
         globals.set_view(view, rays);
@@ -452,6 +456,9 @@ impl Bound {
                 }
                 Binding::Array(array) => wgpu::BindingResource::TextureView(
                     next_view.next().ok_or_else(|| missing(array.name))?,
+                ),
+                Binding::Tree => wgpu::BindingResource::AccelerationStructure(
+                    buffers.tree.as_ref().ok_or_else(|| missing("tree"))?,
                 ),
             };
             entries.push(wgpu::BindGroupEntry { binding: index, resource });

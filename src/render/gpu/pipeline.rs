@@ -87,6 +87,7 @@ fn binding_type(binding: &Binding) -> wgpu::BindingType {
             has_dynamic_offset: false,
             min_binding_size: None,
         },
+        Binding::Tree => wgpu::BindingType::AccelerationStructure { vertex_return: false },
         Binding::Array(array) => wgpu::BindingType::Texture {
             sample_type: if array.format.is_float() {
                 wgpu::TextureSampleType::Float { filterable: false }

@@ -53,7 +53,7 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 47] = [
+    pub(crate) const ALL: [&'static str; 50] = [
         "alpha_mask",
         "anisotropy",
         "background_blur",
@@ -65,6 +65,8 @@ impl Features {
         "emitters",
         "faces",
         "filtered_hits",
+        "filtered_or_passed",
+        "hardware_rays",
         "independent_points",
         "iridescence",
         "learning",
@@ -89,6 +91,7 @@ impl Features {
         "shadow_rays",
         "sheen",
         "single_sided",
+        "software_walk",
         "solid_transmission",
         "summed_area",
         "table_f32",
@@ -163,6 +166,7 @@ impl Features {
     /// Every feature at once, with the table that is used by default.
     pub(crate) fn most() -> Self {
         let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_") && *n != "learning");
+        let names = names.filter(|n| *n != "hardware_rays");
         Self::from_names(names.filter(|n| *n != "summed_area").map(|n| (n, true)))
     }
 
@@ -170,8 +174,9 @@ impl Features {
     pub(crate) fn from_names(names: impl IntoIterator<Item = (&'static str, bool)>) -> Self {
         let mut set: BTreeSet<_> =
             names.into_iter().filter(|(_, on)| *on).map(|(n, _)| n).collect();
-        let follows: [(&str, &[&str]); 7] = [
+        let follows: [(&str, &[&str]); 8] = [
             ("filtered_hits", &["alpha_mask", "single_sided"]),
+            ("filtered_or_passed", &["alpha_mask", "partial", "single_sided"]),
             ("pass_through", &["alpha_mask", "partial"]),
             ("scene_lights", &["emitters", "punctual_lights"]),
             ("shadow_rays", &["map_sampling", "local_lights"]),
@@ -184,7 +189,17 @@ impl Features {
                 set.insert(name);
             }
         }
+        if !set.contains("hardware_rays") {
+            set.insert("software_walk");
+        }
         Self(set)
+    }
+
+    /// The same for a device whose own ray queries find what rays hit.
+    pub(crate) fn with_hardware_rays(mut self) -> Self {
+        self.0.remove("software_walk");
+        self.0.insert("hardware_rays");
+        self
     }
 
     /// The same for a kernel.
@@ -347,7 +362,7 @@ impl TexelFormat {
 }
 
 /// All arrays.
-pub(crate) const ARRAYS: [ArrayKind; 13] = {
+pub(crate) const ARRAYS: [ArrayKind; 14] = {
     use TexelFormat::{Bytes4, Floats4, Words1, Words2, Words4};
     const fn array(
         name: &'static str,
@@ -357,8 +372,9 @@ pub(crate) const ARRAYS: [ArrayKind; 13] = {
         ArrayKind { name, format, feature }
     }
     [
-        array("bvh_nodes", Words4, None),
-        array("bvh_triangles", Words4, None),
+        array("bvh_nodes", Words4, Some("software_walk")),
+        array("bvh_triangles", Words4, Some("software_walk")),
+        array("query_triangles", Words1, Some("hardware_rays")),
         array("triangles", Words4, None),
         array("vertices", Words4, None),
         array("materials", Words4, None),
@@ -405,6 +421,8 @@ pub(crate) enum Binding {
     },
     /// One of [`ARRAYS`].
     Array(ArrayKind),
+    /// The driver's tree.
+    Tree,
 }
 
 /// A kernel's source and what it binds.
@@ -425,6 +443,9 @@ impl Program {
         let features = features.in_kernel(kernel);
         let bindings = bindings(kernel, &features);
         let mut source = String::new();
+        if features.has("hardware_rays") {
+            source.push_str("enable wgpu_ray_query;\n");
+        }
         let Constants {
             stack_size,
             vertex,
@@ -458,6 +479,12 @@ impl Program {
                     );
                 }
                 Binding::Array(array) => source.push_str(&array.accessor(index, width_log2)),
+                Binding::Tree => {
+                    let _ = writeln!(
+                        source,
+                        "@group(0) @binding({index}) var tree: acceleration_structure;"
+                    );
+                }
             }
         }
         for (text, is_needed) in files(kernel, &features) {
@@ -470,7 +497,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 31] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 32] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -500,6 +527,7 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 31] {
         (wgsl!("lights"), features.has("scene_lights")),
         (wgsl!("medium"), features.has("medium")),
         (wgsl!("bvh"), true),
+        (wgsl!("ray_query"), features.has("hardware_rays")),
         (wgsl!("camera"), true),
         (wgsl!("path"), true),
         (wgsl!("count"), features.has("counting")),
@@ -536,7 +564,8 @@ fn bindings(kernel: Kernel, features: &Features) -> Vec<Binding> {
         .filter(|(.., is_needed)| *is_needed)
         .map(|(name, store, is_written, _)| Binding::Buffer { name, store, is_written });
     let arrays = ARRAYS.into_iter().filter(|array| array.is_needed(features)).map(Binding::Array);
-    buffers.chain(arrays).collect()
+    let tree = features.has("hardware_rays").then_some(Binding::Tree);
+    buffers.chain(arrays).chain(tree).collect()
 }
 
 /// Appends the lines of `text` whose conditions hold.
@@ -584,7 +613,7 @@ mod tests {
             .unwrap_or_else(|e| panic!("{names:?}: {}", e.emit_to_string(&program.source)));
         let mut validator = naga::valid::Validator::new(
             naga::valid::ValidationFlags::all(),
-            naga::valid::Capabilities::empty(),
+            naga::valid::Capabilities::RAY_QUERY,
         );
         let info = validator
             .validate(&module)
@@ -601,10 +630,13 @@ mod tests {
     fn independent() -> Vec<&'static str> {
         let follow = [
             "filtered_hits",
+            "filtered_or_passed",
+            "hardware_rays",
             "learning",
             "pass_through",
             "scene_lights",
             "shadow_rays",
+            "software_walk",
             "tangents",
             "uncommon_textures",
         ];
@@ -663,6 +695,7 @@ mod tests {
             }
             validate(Kernel::ClosestHits, features);
             validate(Kernel::ShadowRays, features);
+            validate(Kernel::Render, &features.clone().with_hardware_rays());
         }
     }
 }
