@@ -132,7 +132,7 @@ pub struct Parity {
     pub mean_ratio: f64,
     /// Share of pixels that are more than 1 % apart.
     pub share_apart: f64,
-    /// Share of rays that hit another triangle, both hitting one.
+    /// Share of rays that hit another triangle, or on one device alone none.
     pub other_triangles: f64,
 }
 
@@ -337,7 +337,7 @@ fn compare(scene: &str, a: &Result<Compared>, b: &Result<Compared>) -> Parity {
         Ok((
             mean_ratio,
             apart as f64 / a.picture.pixels.len() as f64,
-            f64::from(other) / f64::from(hits.max(1)),
+            other as f64 / a.hits.len().max(1) as f64,
         ))
     });
     let failure = judged.as_ref().err().map(ToString::to_string);

@@ -77,3 +77,79 @@ impl Renderer {
         Ok(words.as_chunks().0.iter().map(|&[x, i]| (f32::from_bits(x), i)).collect())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Gpu, RayChoice, Stage};
+    use super::*;
+    use crate::environment::{Environment, EnvironmentOptions};
+    use crate::path::World;
+    use crate::render::Sampling;
+    use crate::render::gpu::parity::stand;
+    use crate::sampler::Sampler;
+    use crate::scene::builtin;
+
+    /// Rays from anywhere in a scene to anywhere.
+    fn rays(world: &World, count: u32) -> Vec<Ray> {
+        let (low, high) = world.bvh.bounds();
+        let ray = |index| {
+            let mut sampler = Sampler::new(3, 1, index);
+            let [[x, y], [z, a], [b, _]] = std::array::from_fn(|_| sampler.next_pair());
+            let direction = Vec3::new((6.3 * a).cos(), 2.0 * b - 1.0, (6.3 * a).sin());
+            let origin = low + (high - low) * Vec3::new(x, y, z);
+            Ray { origin, direction: direction.normalize(), t_min: 0.0, t_max: f32::INFINITY }
+        };
+        (0..count).map(ray).collect()
+    }
+
+    /// The share of rays of which the device finds another nearest triangle, and of those that it lets
+    /// another share of light through.
+    fn apart(gpu: &Gpu, world: &World, rays: &[Ray]) -> [f64; 2] {
+        let map = crate::environment::sky::build("overcast", 64, 32).expect("a sky");
+        let environment = Environment::new(map, &EnvironmentOptions::default()).expect("sound");
+        let view = stand::view_of(world, Sampling::Bsdf);
+        let stage = Stage::new(gpu, world, &environment).expect("it fits");
+        let camera = view.rays();
+        let renderer = Renderer::new(&stage, world, &environment, &view, &camera, None);
+        let mut renderer = renderer.expect("it fits");
+        renderer.put_rays(rays).expect("they fit");
+        [Question::ClosestHit, Question::Transmittance].map(|question| {
+            renderer.cast(question, rays.len() as u32).expect("it runs");
+            let found = renderer.cast_results(rays.len()).expect("they can be read");
+            let differs = |(ray, (number, triangle)): (&Ray, (f32, u32))| match question {
+                Question::ClosestHit => {
+                    let hit = world.closest_hit(ray, false);
+                    hit.map_or(u32::MAX, |hit| hit.triangle) != triangle
+                }
+                Question::Transmittance => {
+                    (world.transmittance(ray).max_element() - number).abs() > 1e-3
+                }
+            };
+            rays.iter().zip(found).filter(|pair| differs(*pair)).count() as f64 / rays.len() as f64
+        })
+    }
+
+    /// Panes, leaves cut out of textures and ten thousands of triangles.
+    #[test]
+    fn a_device_hits_what_the_cpu_hits() {
+        let gpu = match Gpu::open(None) {
+            Ok(gpu) => gpu,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        for choice in [RayChoice::Software, RayChoice::Hardware] {
+            let gpu = match gpu.clone().with_rays(choice) {
+                Ok(gpu) => gpu,
+                Err(reason) => {
+                    eprintln!("SKIPPED: {reason}");
+                    continue;
+                }
+            };
+            for name in ["living-room", "exterior", "crack"] {
+                let world = World::new(builtin::build(name).expect("built in"));
+                let [hits, shares] = apart(&gpu, &world, &rays(&world, 50_000));
+                eprintln!("{name}, {choice:?}: {hits:e} of hits and {shares:e} of shares differ");
+                assert!(hits < 1e-4 && shares < 2e-4, "{name}, {choice:?}: {hits} {shares}");
+            }
+        }
+    }
+}
