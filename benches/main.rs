@@ -1,14 +1,13 @@
 //! Criterion benches, one module a subject: `cargo bench -- bvh`.
 //!
-//! `cargo bench -- efficiency` prints the table of speed-ups instead, `cargo bench -- gpu` how the GPU
-//! compares with the CPU.
+//! `cargo bench -- efficiency` prints the table of speed-ups instead. What a machine's devices do,
+//! `lightgrid bench` tells.
 
 use criterion::{Criterion, criterion_group};
 
 mod bvh;
 mod efficiency;
 mod environment;
-mod gpu;
 mod path;
 
 criterion_group!(benches, bvh::bench, environment::bench, path::bench);
@@ -16,10 +15,6 @@ criterion_group!(benches, bvh::bench, environment::bench, path::bench);
 fn main() {
     if std::env::args().any(|argument| argument == "efficiency") {
         efficiency::report();
-        return;
-    }
-    if std::env::args().any(|argument| argument == "gpu") {
-        gpu::report();
         return;
     }
     benches();

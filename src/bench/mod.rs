@@ -5,8 +5,8 @@
 mod rays;
 mod words;
 
-use std::sync::atomic::AtomicBool;
-use std::time::Instant;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
@@ -115,6 +115,8 @@ pub struct PathFigures {
     pub has_timestamps: bool,
     /// Bytes read back from the device a pass.
     pub bytes_read_per_pass: f64,
+    /// Milliseconds that it goes on when told to stop, at most.
+    pub stop_milliseconds: f64,
     /// Bytes on the device.
     pub device_bytes: u64,
     /// What the kernel holds.
@@ -184,7 +186,7 @@ pub fn run(
 }
 
 fn is_set(cancel: &AtomicBool) -> bool {
-    cancel.load(std::sync::atomic::Ordering::Relaxed)
+    cancel.load(Ordering::Relaxed)
 }
 
 /// A scene on a device.
@@ -301,6 +303,7 @@ impl Place<'_> {
         session.settle()?;
         let after = session.figures();
         let elapsed = after.render_seconds - before.render_seconds;
+        let stop_milliseconds = 1e3 * slowest_stop(&mut session)?;
         let per_pass = |total: f64| total / f64::from(passes);
         let difference = |of: fn(&crate::render::gpu::GpuFigures) -> f64| {
             Some(of(gpu.as_ref()?) - of(gpu_before.as_ref()?))
@@ -318,10 +321,33 @@ impl Place<'_> {
             device_milliseconds: busy.map(|seconds| 1e3 * per_pass(seconds)),
             has_timestamps: gpu.as_ref().is_some_and(|gpu| gpu.flights.has_timestamps),
             bytes_read_per_pass: per_pass(difference(|gpu| gpu.bytes_read as f64).unwrap_or(0.0)),
+            stop_milliseconds,
             device_bytes: gpu.as_ref().map_or(0, |gpu| gpu.device_bytes),
             kernel: gpu.map(|gpu| gpu.kernel),
         })
     }
+}
+
+/// Seconds that a session goes on when told to stop, the longest of a few.
+fn slowest_stop(session: &mut Session<'_>) -> Result<f64> {
+    let mut slowest = 0.0_f64;
+    for round in 0..5_u64 {
+        let cancel = AtomicBool::new(false);
+        let told = std::thread::scope(|scope| {
+            let teller = scope.spawn(|| {
+                std::thread::sleep(Duration::from_millis(30 + 7 * round));
+                cancel.store(true, Ordering::Relaxed);
+                Instant::now()
+            });
+            while !is_set(&cancel) {
+                session.advance(session.next_pass(&StopRule::default()), &cancel)?;
+            }
+            session.settle()?;
+            teller.join().map_err(|_| Error::new("the thread that says stop panicked"))
+        })?;
+        slowest = slowest.max(told.elapsed().as_secs_f64());
+    }
+    Ok(slowest)
 }
 
 fn compare(scene: &str, a: &Result<Compared>, b: &Result<Compared>) -> Parity {

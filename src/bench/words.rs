@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Bench, DeviceFigures, Parity, PathFigures, RayKind, SceneFigures};
+use super::{Bench, DeviceFigures, Parity, RayKind, SceneFigures};
 
 impl fmt::Display for Bench {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -38,59 +38,64 @@ impl fmt::Display for DeviceFigures {
         }
         writeln!(
             f,
-            "{:<14} {:>10} | {:>8} {:>8} {:>8} {:>8} | {:>11} {:>8} {:>8} {:>8} | {:>8} {:>8} {:>9} {:>9}",
-            "scene",
-            "triangles",
-            "primary",
-            "shadow",
-            "diffuse",
-            "paths",
-            "samples/s",
+            "  {:<14} {:>9} {:>9} {:>9} {:>9} {:>9} {:>10}",
+            "scene", "triangles", "primary", "shadow", "diffuse", "paths", "samples"
+        )?;
+        writeln!(f, "  {:<24} {:>39} {:>10}", "", "millions of rays a second", "millions/s")?;
+        self.scenes.iter().try_for_each(|scene| scene.write_rates(f))?;
+        writeln!(
+            f,
+            "  {:<14} {:>9} {:>9} {:>9} {:>9} {:>10} {:>9} {:>9} {:>9}",
+            "",
             "pass",
-            "device",
+            "of device",
             "read",
-            "compile",
-            "laws",
+            "to stop",
+            "compiling",
+            "to laws",
             "picture",
             "on device"
         )?;
         writeln!(
             f,
-            "{:<14} {:>10} | {:>35} | {:>11} {:>8} {:>8} {:>8} | {:>8} {:>8} {:>9} {:>9}",
-            "", "", "millions of rays a second", "millions", "ms", "ms", "kB", "s", "s", "s", "MB"
+            "  {:<14} {:>9} {:>9} {:>9} {:>9} {:>10} {:>9} {:>9} {:>9}",
+            "", "ms", "ms", "kB/pass", "ms", "s", "s", "s", "MB"
         )?;
-        self.scenes.iter().try_for_each(|scene| writeln!(f, "{scene}"))
+        self.scenes.iter().try_for_each(|scene| scene.write_waits(f))
     }
 }
 
-impl fmt::Display for SceneFigures {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:<14} {:>10} |", self.scene, self.triangles)?;
+impl SceneFigures {
+    fn write_rates(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "  {:<14} {:>9}", self.scene, self.triangles)?;
         for kind in RayKind::ALL {
             let found = self.rays.iter().find(|rays| rays.kind == kind);
-            write!(f, " {:>8}", found.map_or("-".to_owned(), |rays| millions(rays.per_second)))?;
+            write!(f, " {:>9}", found.map_or("-".to_owned(), |rays| millions(rays.per_second)))?;
         }
         if let Some(paths) = &self.paths {
-            write!(f, " {paths}")?;
+            let (rays, samples) = (paths.rays_per_second, paths.samples_per_second);
+            write!(f, " {:>9} {:>10}", millions(rays), millions(samples))?;
         }
-        self.failure.as_ref().map_or(Ok(()), |failure| write!(f, "  {failure}"))
+        if let Some(failure) = &self.failure {
+            write!(f, "  {failure}")?;
+        }
+        writeln!(f)
     }
-}
 
-impl fmt::Display for PathFigures {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let device = self.device_milliseconds.map_or("-".to_owned(), |ms| format!("{ms:.2}"));
-        write!(
+    fn write_waits(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(paths) = &self.paths else { return Ok(()) };
+        let device = paths.device_milliseconds.map_or("-".to_owned(), |ms| format!("{ms:.2}"));
+        writeln!(
             f,
-            "{:>8} | {:>11} {:>8.2} {device:>8} {:>8.1} | {:>8.2} {:>8.2} {:>9.2} {:>9.1}",
-            millions(self.rays_per_second),
-            millions(self.samples_per_second),
-            self.pass_milliseconds,
-            self.bytes_read_per_pass * 1e-3,
-            self.compile_seconds,
-            self.first_laws_seconds,
-            self.first_picture_seconds,
-            self.device_bytes as f64 * 1e-6
+            "  {:<14} {:>9.2} {device:>9} {:>9.1} {:>9.0} {:>10.2} {:>9.2} {:>9.2} {:>9.1}",
+            self.scene,
+            paths.pass_milliseconds,
+            paths.bytes_read_per_pass * 1e-3,
+            paths.stop_milliseconds,
+            paths.compile_seconds,
+            paths.first_laws_seconds,
+            paths.first_picture_seconds,
+            paths.device_bytes as f64 * 1e-6
         )
     }
 }
