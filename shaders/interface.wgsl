@@ -258,33 +258,33 @@ fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSampl
     }
     let facet = scattering_facet(i, dot(wo, h));
     let probability = reflection_probability(i, facet, wo);
+    var result = NO_SAMPLE;
     if choice < probability {
         let wi = reflected(wo, h);
         if smooth_ {
-            return LobeSample(DELTA, wi, facet.reflectance / probability);
+            result = LobeSample(DELTA, wi, facet.reflectance / probability);
+        } else {
+            result = LobeSample(select(ABSORBED, SPREAD, wi.z > 0.0), wi, vec3f(0.0));
         }
-        return LobeSample(select(ABSORBED, SPREAD, wi.z > 0.0), wi, vec3f(0.0));
-    }
 //#if transmission
-    if transmits_delta(i) {
+    } else if transmits_delta(i) {
         let wi = refracted(wo, vec3f(0.0, 0.0, 1.0), i.eta);
-        if all(wi == vec3f(0.0)) {
-            return NO_SAMPLE;
-        }
-        var radiance = scattering_facet(i, wo.z).transmittance / (i.eta * i.eta);
+        if any(wi != vec3f(0.0)) {
+            var radiance = scattering_facet(i, wo.z).transmittance / (i.eta * i.eta);
 //#if dispersion
-        radiance *= i.hero;
+            radiance *= i.hero;
 //#end
-        return LobeSample(DELTA, wi, radiance / (1.0 - probability));
-    }
-    var wi = reflected(wo, h) * vec3f(1.0, 1.0, -1.0);
-    if !i.thin {
-        wi = refracted(wo, h, i.eta);
-    }
-    return LobeSample(select(ABSORBED, SPREAD, wi.z < 0.0), wi, vec3f(0.0));
-//#else
-    return NO_SAMPLE;
+            result = LobeSample(DELTA, wi, radiance / (1.0 - probability));
+        }
+    } else {
+        var wi = reflected(wo, h) * vec3f(1.0, 1.0, -1.0);
+        if !i.thin {
+            wi = refracted(wo, h, i.eta);
+        }
+        result = LobeSample(select(ABSORBED, SPREAD, wi.z < 0.0), wi, vec3f(0.0));
 //#end
+    }
+    return result;
 }
 
 fn interface_eval_pdf(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {

@@ -29,6 +29,7 @@ fn render(
     @builtin(workgroup_id) group: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
+    own_lane = lane;
     let tiles_across = (globals.width + 7u) / 8u;
     let tile = globals.work.first + group.x;
     let x = (tile % tiles_across) * 8u + (lane & 7u);

@@ -123,8 +123,7 @@ impl Renderer {
             }
         }
         buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
-        let width_log2 = buffers.width_log2();
-        let program = Program::new(Kernel::Render, &features, &constants, width_log2);
+        let program = Program::new(Kernel::Render, &features, &constants, &buffers.array_places());
         let kernel_facts = KernelFacts::of(&features);
         let renderer = Self {
             render: compile(&stage.gpu, program)?,
@@ -166,9 +165,8 @@ impl Renderer {
         let learn = match &self.learn {
             Some(learn) => Arc::clone(learn),
             None => {
-                let width_log2 = self.buffers.width_log2();
-                let program =
-                    Program::new(Kernel::Learn, &self.features, &self.constants, width_log2);
+                let places = self.buffers.array_places();
+                let program = Program::new(Kernel::Learn, &self.features, &self.constants, &places);
                 self.gpu.pipeline(Kernel::Learn, program)?
             }
         };

@@ -39,13 +39,14 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 47] = [
+    pub(crate) const ALL: [&'static str; 49] = [
         "alpha_mask",
         "anisotropy",
         "background_blur",
         "background_color",
         "clearcoat",
         "counting",
+        "deep_tree",
         "diffuse_transmission",
         "dispersion",
         "emitters",
@@ -72,6 +73,7 @@ impl Features {
         "record_squared_cosine",
         "scene_lights",
         "second_uv_set",
+        "shadow_media",
         "shadow_rays",
         "sheen",
         "single_sided",
@@ -146,20 +148,23 @@ impl Features {
         Self::from_names(Self::of_world(world).0.into_iter().map(|n| (n, true)).chain(of_view))
     }
 
-    /// Every feature at once, with the table that is used by default.
+    /// Every feature at once, with the table that is used by default. How deep the tree is, its
+    /// stack's size says.
     pub(crate) fn most() -> Self {
-        let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_") && *n != "learning");
-        Self::from_names(names.filter(|n| *n != "summed_area").map(|n| (n, true)))
+        let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_"));
+        let others = ["deep_tree", "learning", "summed_area"];
+        Self::from_names(names.filter(|n| !others.contains(n)).map(|n| (n, true)))
     }
 
     /// Features by name, and those that follow from them.
     pub(crate) fn from_names(names: impl IntoIterator<Item = (&'static str, bool)>) -> Self {
         let mut set: BTreeSet<_> =
             names.into_iter().filter(|(_, on)| *on).map(|(n, _)| n).collect();
-        let follows: [(&str, &[&str]); 7] = [
+        let follows: [(&str, &[&str]); 8] = [
             ("filtered_hits", &["alpha_mask", "single_sided"]),
             ("pass_through", &["alpha_mask", "partial"]),
             ("scene_lights", &["emitters", "punctual_lights"]),
+            ("shadow_media", &["medium", "solid_transmission"]),
             ("shadow_rays", &["map_sampling", "local_lights"]),
             ("summed_area", &["table_f32", "table_f64", "table_u32"]),
             ("tangents", &["anisotropy", "normal_maps"]),
@@ -173,9 +178,12 @@ impl Features {
         Self(set)
     }
 
-    /// The same for a kernel.
-    fn in_kernel(&self, kernel: Kernel) -> Self {
+    /// The same for a kernel whose walks through the tree may have to remember so many groups.
+    fn in_kernel(&self, kernel: Kernel, stack_size: u32) -> Self {
         let mut set = self.0.clone();
+        if stack_size > SHARED_STACK_SIZE {
+            set.insert("deep_tree");
+        }
         if kernel == Kernel::Learn {
             set.insert("counting");
             set.insert("learning");
@@ -220,7 +228,8 @@ impl KernelFacts {
         let bytes_of = |features: &Features| {
             let vertex = VertexTexels::of(features);
             let constants = Constants { vertex, ..Constants::default() };
-            let program = Program::new(Kernel::Render, features, &constants, 14);
+            let places = ArrayPlaces::default();
+            let program = Program::new(Kernel::Render, features, &constants, &places);
             (program.source.len(), 16 * vertex.count)
         };
         let (source_bytes, vertex_bytes) = bytes_of(features);
@@ -292,8 +301,28 @@ impl VertexTexels {
     }
 }
 
-/// A read-only array, kept in a texture: it may be larger than a storage binding, and software
-/// Vulkan reads texels several times faster than storage buffers.
+/// Most entries of a walk's stack in workgroup memory: 6 KiB a workgroup. Hardly any walk needs more,
+/// and no more workgroups would run side by side if it were smaller.
+const SHARED_STACK_SIZE: u32 = 12;
+
+/// Where read-only arrays lie: in storage buffers those that are named, all others in textures.
+///
+/// GPUs read buffers faster; textures may hold more bytes than a storage binding, and software Vulkan
+/// reads texels several times faster than buffers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct ArrayPlaces {
+    /// Texels of a row of every texture, as a power of two.
+    pub(crate) width_log2: u32,
+    pub(crate) in_buffers: BTreeSet<&'static str>,
+}
+
+impl Default for ArrayPlaces {
+    fn default() -> Self {
+        Self { width_log2: 14, in_buffers: BTreeSet::new() }
+    }
+}
+
+/// A read-only array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ArrayKind {
     /// Name of the function that reads an element.
@@ -320,6 +349,17 @@ impl TexelFormat {
             Self::Words1 | Self::Bytes4 => 4,
             Self::Words2 => 8,
             Self::Words4 | Self::Floats4 => 16,
+        }
+    }
+
+    /// Type of an element in a storage buffer, and what makes a vector of an element `e`.
+    fn in_buffer(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Words1 => ("array<u32>", "vec4u(e, 0u, 0u, 0u)"),
+            Self::Words2 => ("array<vec2u>", "vec4u(e, 0u, 0u)"),
+            Self::Words4 => ("array<vec4u>", "e"),
+            Self::Floats4 => ("array<vec4f>", "e"),
+            Self::Bytes4 => ("array<u32>", "unpack4x8unorm(e)"),
         }
     }
 
@@ -362,16 +402,24 @@ impl ArrayKind {
         self.feature.is_none_or(|feature| features.has(feature))
     }
 
-    /// The declaration and the function that reads an element. Rows of the texture hold
-    /// `2^width_log2` texels.
-    fn accessor(&self, binding: usize, width_log2: u32) -> String {
+    /// The declaration and the function that reads an element.
+    fn accessor(&self, binding: usize, places: &ArrayPlaces) -> String {
         let Self { name, format, .. } = self;
         let scalar = if format.is_float() { "f32" } else { "u32" };
-        let last = (1_u32 << width_log2) - 1;
+        let (declaration, reading) = if places.in_buffers.contains(name) {
+            let (store, element) = format.in_buffer();
+            let reading = format!("let e = {name}_buffer[index];\n    return {element};");
+            (format!("var<storage, read> {name}_buffer: {store}"), reading)
+        } else {
+            let width_log2 = places.width_log2;
+            let last = (1_u32 << width_log2) - 1;
+            let texel = format!("vec2u(index & {last}u, index >> {width_log2}u)");
+            let reading = format!("return textureLoad({name}_texture, {texel}, 0);");
+            (format!("var {name}_texture: texture_2d<{scalar}>"), reading)
+        };
         format!(
-            "@group(0) @binding({binding}) var {name}_texture: texture_2d<{scalar}>;\n\
-             fn {name}(index: u32) -> vec4<{scalar}> {{\n    return textureLoad({name}_texture, \
-             vec2u(index & {last}u, index >> {width_log2}u), 0);\n}}\n"
+            "@group(0) @binding({binding}) {declaration};\n\
+             fn {name}(index: u32) -> vec4<{scalar}> {{\n    {reading}\n}}\n"
         )
     }
 }
@@ -386,7 +434,7 @@ pub(crate) enum Binding {
         store: &'static str,
         is_written: bool,
     },
-    /// One of [`ARRAYS`].
+    /// One of [`ARRAYS`] that lies in a texture.
     Array(ArrayKind),
 }
 
@@ -398,15 +446,15 @@ pub(crate) struct Program {
 }
 
 impl Program {
-    /// Puts a kernel together. Arrays are `2^width_log2` texels wide.
+    /// Puts a kernel together.
     pub(crate) fn new(
         kernel: Kernel,
         features: &Features,
         constants: &Constants,
-        width_log2: u32,
+        places: &ArrayPlaces,
     ) -> Self {
-        let features = features.in_kernel(kernel);
-        let bindings = bindings(kernel, &features);
+        let features = features.in_kernel(kernel, constants.stack_size);
+        let bindings = bindings(kernel, &features, places);
         let mut source = String::new();
         let Constants {
             stack_size,
@@ -419,6 +467,7 @@ impl Program {
         } = *constants;
         for (name, value) in [
             ("STACK_SIZE", stack_size),
+            ("SHARED_STACK_SIZE", stack_size.min(SHARED_STACK_SIZE)),
             ("VERTEX_TEXELS", vertex.count),
             ("SECOND_UV_TEXEL", vertex.second_uv),
             ("TANGENT_TEXEL", vertex.tangent),
@@ -432,15 +481,20 @@ impl Program {
             let _ = writeln!(source, "const {name} = {value}u;");
         }
         for (index, binding) in bindings.iter().enumerate() {
-            match binding {
-                Binding::Buffer { name, store, is_written } => {
+            let array = match binding {
+                Binding::Buffer { name, .. } => ARRAYS.into_iter().find(|kind| kind.name == *name),
+                Binding::Array(array) => Some(*array),
+            };
+            match (array, binding) {
+                (Some(array), _) => source.push_str(&array.accessor(index, places)),
+                (None, Binding::Buffer { name, store, is_written }) => {
                     let access = if *is_written { "read_write" } else { "read" };
                     let _ = writeln!(
                         source,
                         "@group(0) @binding({index}) var<storage, {access}> {name}: {store};"
                     );
                 }
-                Binding::Array(array) => source.push_str(&array.accessor(index, width_log2)),
+                (None, Binding::Array(_)) => {}
             }
         }
         for (text, is_needed) in files(kernel, &features) {
@@ -491,7 +545,7 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 27] {
     ]
 }
 
-fn bindings(kernel: Kernel, features: &Features) -> Vec<Binding> {
+fn bindings(kernel: Kernel, features: &Features, places: &ArrayPlaces) -> Vec<Binding> {
     let (learns, counts) = (kernel == Kernel::Learn, features.has("counting"));
     let buffers = [
         // Not a uniform: software Vulkan optimises a shader anew, for 40 ms, before each dispatch if
@@ -508,7 +562,14 @@ fn bindings(kernel: Kernel, features: &Features) -> Vec<Binding> {
         .into_iter()
         .filter(|(.., is_needed)| *is_needed)
         .map(|(name, store, is_written, _)| Binding::Buffer { name, store, is_written });
-    let arrays = ARRAYS.into_iter().filter(|array| array.is_needed(features)).map(Binding::Array);
+    let arrays = ARRAYS.into_iter().filter(|array| array.is_needed(features)).map(|array| {
+        if places.in_buffers.contains(array.name) {
+            let (store, _) = array.format.in_buffer();
+            Binding::Buffer { name: array.name, store, is_written: false }
+        } else {
+            Binding::Array(array)
+        }
+    });
     buffers.chain(arrays).collect()
 }
 
@@ -545,13 +606,13 @@ mod tests {
         assert_eq!(kept, "a\nb\nd\nf\n");
     }
 
-    fn validate(kernel: Kernel, features: &Features) {
+    fn validate(kernel: Kernel, features: &Features, places: &ArrayPlaces) {
         let constants = Constants {
-            stack_size: 20,
+            stack_size: if places.in_buffers.is_empty() { 20 } else { 10 },
             vertex: VertexTexels::of(features),
             ..Constants::default()
         };
-        let program = Program::new(kernel, features, &constants, 12);
+        let program = Program::new(kernel, features, &constants, places);
         let names: Vec<_> = features.names().collect();
         let module = naga::front::wgsl::parse_str(&program.source)
             .unwrap_or_else(|e| panic!("{names:?}: {}", e.emit_to_string(&program.source)));
@@ -576,7 +637,9 @@ mod tests {
             "filtered_hits",
             "learning",
             "pass_through",
+            "deep_tree",
             "scene_lights",
+            "shadow_media",
             "shadow_rays",
             "tangents",
             "uncommon_textures",
@@ -629,10 +692,14 @@ mod tests {
             let bits = half(1) << 32 | half(2);
             sets.push(reachable(|i| bits >> i & 1 == 1, tables[seed as usize % 4]));
         }
-        for features in &sets {
-            validate(Kernel::Render, features);
+        let in_textures = ArrayPlaces { width_log2: 12, ..ArrayPlaces::default() };
+        let in_buffers = ARRAYS.map(|array| array.name).into();
+        let in_buffers = ArrayPlaces { in_buffers, ..in_textures.clone() };
+        for (features, number) in sets.iter().zip(0..) {
+            let places = if number % 2 == 0 { &in_textures } else { &in_buffers };
+            validate(Kernel::Render, features, places);
             if features.has("light_grid") {
-                validate(Kernel::Learn, features);
+                validate(Kernel::Learn, features, places);
             }
         }
     }

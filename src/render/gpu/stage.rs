@@ -100,7 +100,9 @@ fn upload_world(buffers: &mut Buffers, globals: &mut Globals, world: &World) -> 
         put_array(buffers, "light_nodes", "the tree of lights", world.lights.arrays().1.nodes)?;
     }
     let textures_in_scene = world.needs.texture_slots;
-    Ok(Constants { stack_size: tree.depth, vertex, textures_in_scene, ..Constants::default() })
+    // A walk may remember a group of nodes of each level but the root's.
+    let stack_size = tree.depth.max(2) - 1;
+    Ok(Constants { stack_size, vertex, textures_in_scene, ..Constants::default() })
 }
 
 /// Makes an array of values that take whole texels or parts of one.

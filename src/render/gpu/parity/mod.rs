@@ -26,7 +26,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::pipeline::Pipeline;
-use super::shader::{Binding, Constants, Features, Kernel, Program, VertexTexels};
+use super::shader::{ArrayPlaces, Binding, Constants, Features, Kernel, Program, VertexTexels};
 use super::{Gpu, Renderer, Stage, Work};
 use stand::Stand;
 use twin::Twin;
@@ -121,7 +121,11 @@ fn with_probes(mut program: Program, preludes: &[&str], probes: &[Probe<'_>]) ->
     }
     program.source += &format!(
         "@compute @workgroup_size(64)
-fn probe(@builtin(global_invocation_id) id: vec3u) {{
+fn probe(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {{
+    own_lane = lane;
     if id.x >= globals.work.count {{
         return;
     }}
@@ -136,9 +140,11 @@ fn probe(@builtin(global_invocation_id) id: vec3u) {{
     program
 }
 
-/// Runs probes on a stand's scene and map and compares; prints a line a probe.
-fn run(stand: &Stand, preludes: &[&str], probes: &[Probe<'_>]) {
+/// Runs probes on a stand's scene and map and compares; prints a line a probe. Where arrays lie is
+/// up to the device, unless they must lie in storage buffers.
+fn run(stand: &Stand, preludes: &[&str], probes: &[Probe<'_>], needs_buffers: bool) {
     let gpu = match Gpu::open(None) {
+        Ok(gpu) if needs_buffers => gpu.with_arrays_in_buffers(),
         Ok(gpu) => gpu,
         Err(reason) => return eprintln!("SKIPPED: {reason}"),
     };
@@ -198,12 +204,12 @@ fn groups(stands: &[Stand]) -> Vec<Group<'_>> {
 }
 
 macro_rules! run_group {
-    ($($test:ident: $group:literal;)*) => {$(
+    ($($test:ident: $group:literal $(, $buffers:ident)?;)*) => {$(
         #[test]
         fn $test() {
             let stands = stand::all();
             let (stand, preludes, probes) = groups(&stands).swap_remove($group);
-            run(stand, preludes, &probes);
+            run(stand, preludes, &probes, stringify!($($buffers)?) == "in_buffers");
         }
     )*};
 }
@@ -220,6 +226,10 @@ run_group! {
     map_with_a_table_in_f64: 8;
     widest_map: 9;
     tallest_map: 10;
+    // These read all arrays.
+    surfaces_lights_and_hits_with_arrays_in_buffers: 2, in_buffers;
+    whole_paths_with_arrays_in_buffers: 3, in_buffers;
+    map_with_arrays_in_buffers: 5, in_buffers;
 }
 
 /// The source of a stand's kernel; the numbers in it do not matter here.
@@ -227,7 +237,7 @@ fn program_of(stand: &Stand, kernel: Kernel) -> Program {
     let features = Features::of(&stand.world, &stand.environment, &stand.view);
     let vertex = VertexTexels::of(&features);
     let constants = Constants { stack_size: 20, vertex, ..Constants::default() };
-    Program::new(kernel, &features, &constants, 12)
+    Program::new(kernel, &features, &constants, &ArrayPlaces::default())
 }
 
 /// Functions whose effect is no return value: entry points, and what looks at the map to count,
