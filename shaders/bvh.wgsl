@@ -290,13 +290,11 @@ struct Walk {
     triangles: vec2u,
 }
 
-// The next hit of a walk, in no order; MISS at its end.
-fn next_hit(
-    walk: ptr<function, Walk>,
-    boxes: BoxRay,
-    shear: Shear,
-    t_max: f32,
-) -> Hit {
+// The next hit of a walk, in no order; MISS at its end. What boxes and triangles want of the ray is
+// made anew: kept, it would take registers while materials are looked at.
+fn next_hit(walk: ptr<function, Walk>, ray: Ray) -> Hit {
+    let boxes = box_ray_new(ray);
+    let shear = shear_new(ray);
     var group = (*walk).group;
     var height = (*walk).waiting;
     var triangles = (*walk).triangles;
@@ -305,7 +303,7 @@ fn next_hit(
         while triangles.y != 0u && hit.t >= MISS {
             let bit = firstTrailingBit(triangles.y);
             triangles.y &= triangles.y - 1u;
-            hit = intersect_triangle(triangles.x + bit, shear, t_max);
+            hit = intersect_triangle(triangles.x + bit, shear, ray.t_max);
         }
         if hit.t < MISS {
             break;
@@ -322,7 +320,7 @@ fn next_hit(
             stack_put(height, group);
             height += 1u;
         }
-        let entered = enter_node(node, boxes, t_max);
+        let entered = enter_node(node, boxes, ray.t_max);
         triangles = vec2u(entered.triangle_base, entered.triangles);
         group = vec2u(entered.child_base, entered.inner);
     }
@@ -333,12 +331,10 @@ fn next_hit(
 // Share of light that arrives along a shadow ray: zero if a surface scatters it all. Materials are
 // looked at outside of the walk, where lanes that have not found any do not wait for them.
 fn transmittance_along(ray: Ray) -> vec3f {
-    let boxes = box_ray_new(ray);
-    let shear = shear_new(ray);
     var walk = Walk(vec2u(0u, 0x80000000u), 0u, vec2u(0u));
     var transmittance = vec3f(1.0);
     loop {
-        let hit = next_hit(&walk, boxes, shear, ray.t_max);
+        let hit = next_hit(&walk, ray);
         if hit.t >= MISS {
             break;
         }

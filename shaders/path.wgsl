@@ -222,15 +222,8 @@ fn path_step(path: ptr<function, Path>) -> bool {
     let goes_on = follow(path, hit);
 //#if learning
 //#else
-//#if map_sampling
-    let map_shadow = (*path).map_shadow;
-    (*path).map_shadow = Shadow();
-    add_light(path, map_shadow);
-//#end
-//#if local_lights
-    let lamp_shadow = (*path).lamp_shadow;
-    (*path).lamp_shadow = Shadow();
-    add_light(path, lamp_shadow);
+//#if shadow_rays
+    add_lights(path);
 //#end
 //#end
     return goes_on;
@@ -404,6 +397,7 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
         return false;
     }
     (*path).bounces += 1u;
+    forget_arrival(path);
     (*path).travelled = 0.0;
     (*path).passes = 0u;
     var gathers = !bsdf_is_delta_only(vertex.bsdf);
@@ -431,6 +425,20 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
         return false;
     }
     return survives(path);
+}
+
+// What nobody asks for any more, for it comes anew or the path ends: else it would take registers.
+fn forget_arrival(path: ptr<function, Path>) {
+    (*path).ray.origin = vec3f(0.0);
+//#if medium
+//#else
+    (*path).ray.direction = vec3f(0.0);
+//#end
+    (*path).departure_pdf_solid_angle = 0.0;
+    (*path).departure_law = 0u;
+//#if emitters
+    (*path).departure_receiver = Receiver();
+//#end
 }
 
 //#if scene_lights
@@ -598,6 +606,28 @@ fn add_light(path: ptr<function, Path>, shadow: Shadow) {
 //#end
         (*path).radiance += shadow.light * visible * shadow.weight;
     }
+}
+
+// Follows the path's shadow rays, the map's first. They share the code, which is long where panes and
+// leaves let light through.
+fn add_lights(path: ptr<function, Path>) {
+//#if map_sampling
+    var shadow = (*path).map_shadow;
+    (*path).map_shadow = Shadow();
+//#if local_lights
+    for (var i = 0u; i < 2u; i++) {
+        add_light(path, shadow);
+        shadow = (*path).lamp_shadow;
+        (*path).lamp_shadow = Shadow();
+    }
+//#else
+    add_light(path, shadow);
+//#end
+//#else
+    let shadow = (*path).lamp_shadow;
+    (*path).lamp_shadow = Shadow();
+    add_light(path, shadow);
+//#end
 }
 //#end
 //#end

@@ -50,9 +50,15 @@ fn render(
     }
     var index = globals.work.first_sample;
     let end = globals.work.first_sample + globals.work.samples;
-    var path = start_sample(x, y, index);
+    var path: Path;
+    var is_over = true;
     loop {
-        if path_step(&path) {
+        // At one place: what a second one has in common with the first would stay in registers.
+        if is_over {
+            path = start_sample(x, y, index);
+        }
+        is_over = !path_step(&path);
+        if !is_over {
             continue;
         }
         if is_finite3(path.radiance) {
@@ -73,7 +79,6 @@ fn render(
         if index == end {
             break;
         }
-        path = start_sample(x, y, index);
     }
     film[pixel] = sums;
 //#if layers
