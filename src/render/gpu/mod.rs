@@ -12,6 +12,8 @@ mod pacer;
 #[cfg(test)]
 mod parity;
 mod pipeline;
+#[cfg(test)]
+mod registers;
 pub(crate) mod shader;
 mod stage;
 

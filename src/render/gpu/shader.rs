@@ -178,10 +178,10 @@ impl Features {
         Self(set)
     }
 
-    /// The same for a kernel whose walks through the tree may have to remember so many groups.
-    fn in_kernel(&self, kernel: Kernel, stack_size: u32) -> Self {
+    /// The same for a kernel with these constants.
+    fn in_kernel(&self, kernel: Kernel, constants: &Constants) -> Self {
         let mut set = self.0.clone();
-        if stack_size > SHARED_STACK_SIZE {
+        if constants.stack_size > constants.shared_stack_size {
             set.insert("deep_tree");
         }
         if kernel == Kernel::Learn {
@@ -265,8 +265,9 @@ impl KernelFacts {
 /// Numbers of a shader that are known when it is built.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Constants {
-    /// Groups of nodes the traversal may have to remember.
+    /// Groups of nodes the traversal may have to remember, and how many of them in workgroup memory.
     pub(crate) stack_size: u32,
+    pub(crate) shared_stack_size: u32,
     /// Texels of a vertex, and which of them hold what only some scenes need.
     pub(crate) vertex: VertexTexels,
     /// Bit `i`: some material has the `i`-th of the textures a material can have.
@@ -303,7 +304,7 @@ impl VertexTexels {
 
 /// Most entries of a walk's stack in workgroup memory: 6 KiB a workgroup. Hardly any walk needs more,
 /// and no more workgroups would run side by side if it were smaller.
-const SHARED_STACK_SIZE: u32 = 12;
+pub(crate) const SHARED_STACK_SIZE: u32 = 12;
 
 /// Where read-only arrays lie: in storage buffers those that are named, all others in textures.
 ///
@@ -453,11 +454,12 @@ impl Program {
         constants: &Constants,
         places: &ArrayPlaces,
     ) -> Self {
-        let features = features.in_kernel(kernel, constants.stack_size);
+        let features = features.in_kernel(kernel, constants);
         let bindings = bindings(kernel, &features, places);
         let mut source = String::new();
         let Constants {
             stack_size,
+            shared_stack_size,
             vertex,
             textures_in_scene,
             albedo_at,
@@ -467,7 +469,7 @@ impl Program {
         } = *constants;
         for (name, value) in [
             ("STACK_SIZE", stack_size),
-            ("SHARED_STACK_SIZE", stack_size.min(SHARED_STACK_SIZE)),
+            ("SHARED_STACK_SIZE", shared_stack_size),
             ("VERTEX_TEXELS", vertex.count),
             ("SECOND_UV_TEXEL", vertex.second_uv),
             ("TANGENT_TEXEL", vertex.tangent),
@@ -609,6 +611,7 @@ mod tests {
     fn validate(kernel: Kernel, features: &Features, places: &ArrayPlaces) {
         let constants = Constants {
             stack_size: if places.in_buffers.is_empty() { 20 } else { 10 },
+            shared_stack_size: 10,
             vertex: VertexTexels::of(features),
             ..Constants::default()
         };
@@ -629,6 +632,77 @@ mod tests {
             .unwrap_or_else(|e| panic!("{names:?}: {e}"));
         let entries: Vec<_> = module.entry_points.iter().map(|e| e.name.as_str()).collect();
         assert_eq!(entries, [kernel.name()]);
+    }
+
+    /// Divisions and remainders of integers by what is no constant. naga does not guard them (see
+    /// `RUNTIME_CHECKS`), so here is why each divisor is at least 1.
+    const DIVISIONS: [&str; 12] = [
+        // The share of the whole map's law is 1 to 256, and with 256 no number lies beyond it.
+        "choose_tile: (((rest % width) << 8u) | (finer & 0xffu)) / width",
+        "choose_tile: rest % width",
+        "choose_tile: rest / width",
+        // The map has tiles, and as many patches or more.
+        "first_row_sum: tile % globals.tile_columns",
+        // Tiles across a picture of at least one pixel.
+        "render: tile % tiles_across",
+        "render: tile / tiles_across",
+        "start_sample: (y * globals.width + x + index) % max(stride, 1u)",
+        "tile_of_patch: ((at + 1u) * tiles - 1u) / patch_grid()",
+        "tile_patches: (at + 1u) * size / tiles",
+        "tile_patches: at * size / tiles",
+        "tile_patches: tile % tiles.x",
+        "tile_patches: tile / tiles.x",
+    ];
+
+    #[test]
+    fn no_integer_is_divided_by_zero() {
+        let mut found = BTreeSet::new();
+        for kernel in [Kernel::Render, Kernel::Learn] {
+            for table in [None, Some("table_u32")] {
+                let features = reachable(|_| true, table);
+                let constants =
+                    Constants { stack_size: 20, shared_stack_size: 10, ..Constants::default() };
+                let source =
+                    Program::new(kernel, &features, &constants, &ArrayPlaces::default()).source;
+                let module = naga::front::wgsl::parse_str(&source).expect("it is valid");
+                let entries = module.entry_points.iter().map(|entry| &entry.function);
+                for function in module.functions.iter().map(|(_, f)| f).chain(entries) {
+                    found.extend(integer_divisions(&module, function, &source));
+                }
+            }
+        }
+        assert_eq!(found.iter().map(String::as_str).collect::<Vec<_>>(), DIVISIONS);
+    }
+
+    /// Those of a function whose divisor is no constant.
+    fn integer_divisions(
+        module: &naga::Module,
+        function: &naga::Function,
+        source: &str,
+    ) -> Vec<String> {
+        use naga::{BinaryOperator, Expression, ScalarKind};
+        let mut typifier = naga::front::Typifier::new();
+        let context = naga::proc::ResolveContext::with_locals(
+            module,
+            &function.local_variables,
+            &function.arguments,
+        );
+        let mut found = Vec::new();
+        for (handle, expression) in function.expressions.iter() {
+            typifier.grow(handle, &function.expressions, &context).expect("it has a type");
+            let Expression::Binary { op, right, .. } = *expression else { continue };
+            let kind = typifier.get(right, &module.types).scalar_kind();
+            let is_integer = kind != Some(ScalarKind::Float);
+            let divides = matches!(op, BinaryOperator::Divide | BinaryOperator::Modulo);
+            let by_constant = matches!(function.expressions[right], Expression::Literal(_));
+            if divides && is_integer && !by_constant {
+                let text =
+                    &source[function.expressions.get_span(handle).to_range().unwrap_or(0..0)];
+                let name = function.name.as_deref().unwrap_or("an entry point");
+                found.push(format!("{name}: {text}"));
+            }
+        }
+        found
     }
 
     /// Features that a picture can have or not have on their own; the others follow from them.

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::buffers::Buffers;
 use super::device::Gpu;
 use super::layout::{self, Globals};
-use super::shader::{self, Constants, Features, VertexTexels};
+use super::shader::{self, Constants, Features, SHARED_STACK_SIZE, VertexTexels};
 use crate::bvh::compressed::CompressedTree;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
@@ -102,7 +102,13 @@ fn upload_world(buffers: &mut Buffers, globals: &mut Globals, world: &World) -> 
     let textures_in_scene = world.needs.texture_slots;
     // A walk may remember a group of nodes of each level but the root's.
     let stack_size = tree.depth.max(2) - 1;
-    Ok(Constants { stack_size, vertex, textures_in_scene, ..Constants::default() })
+    Ok(Constants {
+        stack_size,
+        shared_stack_size: stack_size.min(SHARED_STACK_SIZE),
+        vertex,
+        textures_in_scene,
+        ..Constants::default()
+    })
 }
 
 /// Makes an array of values that take whole texels or parts of one.

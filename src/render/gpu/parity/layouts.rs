@@ -31,7 +31,8 @@ macro_rules! fields {
 fn module() -> Module {
     let features = Features::most();
     let vertex = VertexTexels::of(&features);
-    let constants = Constants { stack_size: 20, vertex, ..Constants::default() };
+    let constants =
+        Constants { stack_size: 20, shared_stack_size: 10, vertex, ..Constants::default() };
     let source =
         Program::new(Kernel::Render, &features, &constants, &ArrayPlaces::default()).source;
     naga::front::wgsl::parse_str(&source)

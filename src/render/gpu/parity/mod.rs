@@ -140,16 +140,28 @@ fn probe(
     program
 }
 
-/// Runs probes on a stand's scene and map and compares; prints a line a probe. Where arrays lie is
-/// up to the device, unless they must lie in storage buffers.
-fn run(stand: &Stand, preludes: &[&str], probes: &[Probe<'_>], needs_buffers: bool) {
+/// Where arrays and stacks lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Places {
+    /// Where the device wants them.
+    Usual,
+    /// Arrays in storage buffers, and most of a walk's stack in a lane's own memory.
+    Other,
+}
+
+/// Runs probes on a stand's scene and map and compares; prints a line a probe.
+fn run(stand: &Stand, preludes: &[&str], probes: &[Probe<'_>], places: Places) {
     let gpu = match Gpu::open(None) {
-        Ok(gpu) if needs_buffers => gpu.with_arrays_in_buffers(),
+        Ok(gpu) if places == Places::Other => gpu.with_arrays_in_buffers(),
         Ok(gpu) => gpu,
         Err(reason) => return eprintln!("SKIPPED: {reason}"),
     };
     let Stand { world, environment, view, rays, grid } = stand;
-    let stage = Stage::new(&gpu, world, environment).expect("it fits");
+    let mut stage = Stage::new(&gpu, world, environment).expect("it fits");
+    if places == Places::Other {
+        stage.constants.shared_stack_size = 1;
+        assert!(stage.constants.stack_size > 1, "the tree is deep enough");
+    }
     let mut renderer =
         Renderer::with_kernel(&stage, world, environment, view, rays, |gpu, program| {
             Pipeline::new(gpu, "probe", with_probes(program, preludes, probes))
@@ -204,39 +216,39 @@ fn groups(stands: &[Stand]) -> Vec<Group<'_>> {
 }
 
 macro_rules! run_group {
-    ($($test:ident: $group:literal $(, $buffers:ident)?;)*) => {$(
+    ($($test:ident: $group:literal, $places:ident;)*) => {$(
         #[test]
         fn $test() {
             let stands = stand::all();
             let (stand, preludes, probes) = groups(&stands).swap_remove($group);
-            run(stand, preludes, &probes, stringify!($($buffers)?) == "in_buffers");
+            run(stand, preludes, &probes, Places::$places);
         }
     )*};
 }
 
 run_group! {
-    numbers_cameras_and_samplers: 0;
-    scattering_of_materials: 1;
-    surfaces_lights_and_hits: 2;
-    whole_paths: 3;
-    media_between_surfaces: 4;
-    map_with_a_tile_local_table: 5;
-    map_with_a_table_in_u32: 6;
-    map_with_a_table_in_f32: 7;
-    map_with_a_table_in_f64: 8;
-    widest_map: 9;
-    tallest_map: 10;
-    // These read all arrays.
-    surfaces_lights_and_hits_with_arrays_in_buffers: 2, in_buffers;
-    whole_paths_with_arrays_in_buffers: 3, in_buffers;
-    map_with_arrays_in_buffers: 5, in_buffers;
+    numbers_cameras_and_samplers: 0, Usual;
+    scattering_of_materials: 1, Usual;
+    surfaces_lights_and_hits: 2, Usual;
+    whole_paths: 3, Usual;
+    media_between_surfaces: 4, Usual;
+    map_with_a_tile_local_table: 5, Usual;
+    map_with_a_table_in_u32: 6, Usual;
+    map_with_a_table_in_f32: 7, Usual;
+    map_with_a_table_in_f64: 8, Usual;
+    widest_map: 9, Usual;
+    tallest_map: 10, Usual;
+    // These two read all arrays.
+    surfaces_lights_and_hits_in_other_places: 2, Other;
+    map_in_other_places: 5, Other;
 }
 
 /// The source of a stand's kernel; the numbers in it do not matter here.
 fn program_of(stand: &Stand, kernel: Kernel) -> Program {
     let features = Features::of(&stand.world, &stand.environment, &stand.view);
     let vertex = VertexTexels::of(&features);
-    let constants = Constants { stack_size: 20, vertex, ..Constants::default() };
+    let constants =
+        Constants { stack_size: 20, shared_stack_size: 10, vertex, ..Constants::default() };
     Program::new(kernel, &features, &constants, &ArrayPlaces::default())
 }
 
