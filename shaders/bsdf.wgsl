@@ -260,20 +260,20 @@ fn cosine_hemisphere(u: vec2f) -> vec3f {
     return vec3f(r * sin_cos.y, r * sin_cos.x, sqrt(max(1.0 - u.y, 0.0)));
 }
 
-// A direction to continue in; weight zero is absorption.
+// A direction to continue in; weight zero is absorption. (This function and those that sample a lobe
+// return at one place: with several, drivers keep a result in registers from one ray to the next.)
 fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
-    let none = BsdfSample(vec3f(0.0), vec3f(0.0), 0.0, false);
+    var result = BsdfSample(vec3f(0.0), vec3f(0.0), 0.0, false);
     let out = bsdf_outgoing(b, wo);
     var any_probability = out.coat_probability + out.interface_probability + out.diffuse_probability;
 //#if sheen
     any_probability += out.sheen_probability;
 //#end
-    if any_probability <= 0.0 {
-        return none;
-    }
-    var lobe: LobeSample;
+    var lobe = NO_SAMPLE;
     let choice = u.x - out.coat_probability;
-    if choice < 0.0 {
+    if any_probability <= 0.0 {
+        lobe.kind = ABSORBED;
+    } else if choice < 0.0 {
 //#if clearcoat
         lobe = coat_sample(b.coat, wo, u.yz, out.coat_probability);
 //#end
@@ -298,31 +298,28 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
         }
 //#end
     }
-    if lobe.kind == ABSORBED {
-        return none;
-    }
     if lobe.kind == SPREAD {
         let f = bsdf_eval_pdf_with(b, wo, lobe.wi, out);
         let weight = f.value / f.pdf_solid_angle;
-        if !(f.pdf_solid_angle > 0.0) || !is_finite3(weight) {
-            return none;
+        if f.pdf_solid_angle > 0.0 && is_finite3(weight) {
+            result = BsdfSample(lobe.wi, weight, f.pdf_solid_angle, false);
         }
-        return BsdfSample(lobe.wi, weight, f.pdf_solid_angle, false);
-    }
-    var weight = lobe.weight;
-    if lobe.kind == DELTA {
-        weight /= out.interface_probability;
+    } else if lobe.kind != ABSORBED {
+        var weight = lobe.weight;
+        if lobe.kind == DELTA {
+            weight /= out.interface_probability;
 //#if clearcoat
-        weight *= coat_attenuation(b.coat, wo) * coat_attenuation(b.coat, lobe.wi);
+            weight *= coat_attenuation(b.coat, wo) * coat_attenuation(b.coat, lobe.wi);
 //#end
 //#if sheen
-        weight *= sheen_left(b.sheen, wo, lobe.wi);
+            weight *= sheen_left(b.sheen, wo, lobe.wi);
 //#end
+        }
+        if is_finite3(weight) {
+            result = BsdfSample(lobe.wi, weight, 1.0, true);
+        }
     }
-    if !is_finite3(weight) {
-        return none;
-    }
-    return BsdfSample(lobe.wi, weight, 1.0, true);
+    return result;
 }
 
 //#if transmission

@@ -24,7 +24,39 @@ struct Hit {
 // Of a hit: the ray came from behind the triangle.
 const FROM_BEHIND = 0x80000000u;
 
+// Which invocation of its workgroup this is.
+var<private> own_lane: u32;
+
 //#if software_walk
+// Invocations of a workgroup.
+const LANES = 64u;
+// The lower entries of a walk's stack; at most SHARED_STACK_SIZE of them. In registers or a lane's own
+// memory they would cost far more.
+var<workgroup> shared_stack: array<vec2u, LANES * SHARED_STACK_SIZE>;
+//#if deep_tree
+// The others, seldom reached.
+var<private> far_stack: array<vec2u, STACK_SIZE - SHARED_STACK_SIZE>;
+//#end
+
+fn stack_put(height: u32, group: vec2u) {
+//#if deep_tree
+    if height >= SHARED_STACK_SIZE {
+        far_stack[height - SHARED_STACK_SIZE] = group;
+        return;
+    }
+//#end
+    shared_stack[LANES * height + own_lane] = group;
+}
+
+fn stack_at(height: u32) -> vec2u {
+//#if deep_tree
+    if height >= SHARED_STACK_SIZE {
+        return far_stack[height - SHARED_STACK_SIZE];
+    }
+//#end
+    return shared_stack[LANES * height + own_lane];
+}
+
 // A ray as the boxes want it. Boxes are made larger by 16 u (|origin| + extent), u = 2^-24, which
 // covers all rounding here and in the triangle test (see `BoxRay` in src/bvh/traverse.rs).
 struct BoxRay {
@@ -215,13 +247,12 @@ fn closest_hit(ray: Ray, from_camera: bool) -> Hit {
     let shear = shear_new(ray);
     var best = Hit(MISS, 0xffffffffu, vec2f(0.0), 0u);
     var t_max = ray.t_max;
-    var stack: array<vec2u, STACK_SIZE>;
     var height = 0u;
     var group = vec2u(0u, 0x80000000u);
     loop {
         let node = take_child(&group, boxes.octant);
         if group.y > 0x00ffffffu {
-            stack[height] = group;
+            stack_put(height, group);
             height += 1u;
         }
         let entered = enter_node(node, boxes, t_max);
@@ -247,7 +278,7 @@ fn closest_hit(ray: Ray, from_camera: bool) -> Hit {
                 break;
             }
             height -= 1u;
-            group = stack[height];
+            group = stack_at(height);
         }
     }
     return best;
@@ -261,14 +292,11 @@ struct Walk {
     triangles: vec2u,
 }
 
-// The next hit of a walk, in no order; MISS at its end.
-fn next_hit(
-    walk: ptr<function, Walk>,
-    stack: ptr<function, array<vec2u, STACK_SIZE>>,
-    boxes: BoxRay,
-    shear: Shear,
-    t_max: f32,
-) -> Hit {
+// The next hit of a walk, in no order; MISS at its end. What boxes and triangles want of the ray is
+// made anew: kept, it would take registers while materials are looked at.
+fn next_hit(walk: ptr<function, Walk>, ray: Ray) -> Hit {
+    let boxes = box_ray_new(ray);
+    let shear = shear_new(ray);
     var group = (*walk).group;
     var height = (*walk).waiting;
     var triangles = (*walk).triangles;
@@ -277,7 +305,7 @@ fn next_hit(
         while triangles.y != 0u && hit.t >= MISS {
             let bit = firstTrailingBit(triangles.y);
             triangles.y &= triangles.y - 1u;
-            hit = intersect_triangle(triangles.x + bit, shear, t_max);
+            hit = intersect_triangle(triangles.x + bit, shear, ray.t_max);
         }
         if hit.t < MISS {
             break;
@@ -287,14 +315,14 @@ fn next_hit(
                 break;
             }
             height -= 1u;
-            group = (*stack)[height];
+            group = stack_at(height);
         }
         let node = take_child(&group, boxes.octant);
         if group.y > 0x00ffffffu {
-            (*stack)[height] = group;
+            stack_put(height, group);
             height += 1u;
         }
-        let entered = enter_node(node, boxes, t_max);
+        let entered = enter_node(node, boxes, ray.t_max);
         triangles = vec2u(entered.triangle_base, entered.triangles);
         group = vec2u(entered.child_base, entered.inner);
     }
@@ -305,13 +333,10 @@ fn next_hit(
 // Share of light that arrives along a shadow ray: zero if a surface scatters it all. Materials are
 // looked at outside of the walk, where lanes that have not found any do not wait for them.
 fn transmittance_along(ray: Ray) -> vec3f {
-    let boxes = box_ray_new(ray);
-    let shear = shear_new(ray);
-    var stack: array<vec2u, STACK_SIZE>;
     var walk = Walk(vec2u(0u, 0x80000000u), 0u, vec2u(0u));
     var transmittance = vec3f(1.0);
     loop {
-        let hit = next_hit(&walk, &stack, boxes, shear, ray.t_max);
+        let hit = next_hit(&walk, ray);
         if hit.t >= MISS {
             break;
         }

@@ -1,7 +1,11 @@
 // Nearest hits of rays, for measurements of the walk alone: distance and triangle of each.
 
 @compute @workgroup_size(64)
-fn closest_hits(@builtin(global_invocation_id) id: vec3u) {
+fn closest_hits(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    own_lane = lane;
     let index = globals.work.first + id.x;
     if index >= globals.work.count {
         return;

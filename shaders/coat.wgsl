@@ -54,14 +54,16 @@ fn coat_sample(coat: Coat, wo: vec3f, u: vec2f, probability: f32) -> LobeSample 
     }
     let local_wi = reflected(local, h);
     let wi = world_from_local(coat.frame, local_wi);
-    if local_wi.z <= 0.0 || wi.z <= 0.0 {
-        return NO_SAMPLE;
+    var result = NO_SAMPLE;
+    if local_wi.z > 0.0 && wi.z > 0.0 {
+        if smooth_ {
+            let weight = vec3f(coat.strength * coat_fresnel(local.z) / probability);
+            result = LobeSample(COAT_DELTA, wi, weight);
+        } else {
+            result = LobeSample(SPREAD, wi, vec3f(0.0));
+        }
     }
-    if smooth_ {
-        let weight = vec3f(coat.strength * coat_fresnel(local.z) / probability);
-        return LobeSample(COAT_DELTA, wi, weight);
-    }
-    return LobeSample(SPREAD, wi, vec3f(0.0));
+    return result;
 }
 
 fn coat_eval_pdf(coat: Coat, wo: vec3f, wi: vec3f) -> vec2f {

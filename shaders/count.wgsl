@@ -4,50 +4,69 @@ const WEIGHT_ONE = 256.0;
 const MAX_WEIGHT = 4.0;
 const NO_SLOT = 0xffffffffu;
 
-fn count_in_cell(cell: u32, tile: u32, weight: f32) {
-    let slot = slot_of_cell[cell];
-    if slot == NO_SLOT {
-        atomicAdd(&visits[cell], 1u);
-        return;
-    }
-    let counter = 2u * (slot * globals.tile_columns * globals.tile_rows + tile);
-    atomicAdd(&counters[counter], 1u);
-    let scaled = u32(floor(clamp(weight, 0.0, MAX_WEIGHT) * WEIGHT_ONE + 0.5));
-    if scaled > 0u {
-        atomicAdd(&counters[counter + 1u], scaled);
-    }
+// A try's counter of what is seen, 0 if it has none, and what its share of light is multiplied by.
+struct Visibility {
+    counter: u32,
+    share: f32,
 }
 
-// Counts a try of a tile of the map, if this path's are counted.
-fn count(path: ptr<function, Path>, vertex: Vertex, tile: u32, weight: f32) {
+// Counts a try of a tile of the map, if this path's are counted; returns the counter of its weight, 0
+// if there is none.
+fn count_try(path: ptr<function, Path>, vertex: Vertex, tile: u32) -> u32 {
     if !(*path).is_counted {
-        return;
+        return 0u;
     }
 //#if medium
     // Inside of a solid the map is never seen; its vertices would spoil what fog sees.
     if vertex.is_in_medium && is_in_solid(path) {
-        return;
+        return 0u;
     }
 //#end
-    count_in_cell(vertex.cell, tile, weight);
+    return count_try_in_cell(vertex.cell, tile);
+}
+
+fn count_try_in_cell(cell: u32, tile: u32) -> u32 {
+    let slot = slot_of_cell[cell];
+    if slot == NO_SLOT {
+        atomicAdd(&visits[cell], 1u);
+        return 0u;
+    }
+    let counter = 2u * (slot * globals.tile_columns * globals.tile_rows + tile);
+    atomicAdd(&counters[counter], 1u);
+    return counter + 1u;
+}
+
+// Adds the weight of a try to its counter.
+fn count_weight(counter: u32, weight: f32) {
+    let scaled = u32(floor(clamp(weight, 0.0, MAX_WEIGHT) * WEIGHT_ONE + 0.5));
+    if counter != 0u && scaled > 0u {
+        atomicAdd(&counters[counter], scaled);
+    }
 }
 
 //#if record_ratio
-// What a try that met no obstacle but `transmittance` counts.
-fn visibility(vertex: Vertex, direction: vec3f, own_pdf: f32, transmittance: vec3f) -> f32 {
+// What a try counts whose light is not held up: a power of what the surface or the phase function
+// makes of its direction.
+fn visibility_share(vertex: Vertex, direction: vec3f, own_pdf: f32) -> f32 {
     var share = abs(dot(vertex.point.shading_frame.z, direction));
 //#if medium
     if vertex.is_in_medium {
         share = 4.0 * PI * own_pdf;
     }
 //#end
-    var weight = luminance(transmittance);
 //#if record_cosine
-    weight *= share;
-//#end
+    return share;
+//#else
 //#if record_squared_cosine
-    weight *= share * share;
+    return share * share;
+//#else
+    return 1.0;
 //#end
-    return weight;
+//#end
+}
+
+// Counts what a try has seen of the light.
+fn count_visible(visibility: Visibility, transmittance: vec3f) {
+    count_weight(visibility.counter, luminance(transmittance) * visibility.share);
 }
 //#end

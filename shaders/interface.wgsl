@@ -168,11 +168,13 @@ fn interface_facet(i: Interface, cosine: f32) -> Facet {
         var reflected_share = glass.xyz;
 //#if dispersion
         if is_dispersive(i) {
-            reflected_share = vec3f(
-                glass_at(i, cosine, i.etas.x).x,
-                glass_at(i, cosine, i.etas.y).y,
-                glass_at(i, cosine, i.etas.z).z,
-            );
+            // A loop, for what it calls is long.
+            var etas = i.etas;
+            for (var channel = 0u; channel < 3u; channel++) {
+                let share = glass_at(i, cosine, etas.x).xyz;
+                reflected_share = select(reflected_share, share, vec3u(channel) == vec3u(0u, 1u, 2u));
+                etas = etas.yzx;
+            }
         }
 //#end
         return Facet(opaque_share + i.glass * reflected_share, i.tint * glass.w);
@@ -258,51 +260,53 @@ fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSampl
     }
     let facet = scattering_facet(i, dot(wo, h));
     let probability = reflection_probability(i, facet, wo);
+    var result = NO_SAMPLE;
     if choice < probability {
         let wi = reflected(wo, h);
         if smooth_ {
-            return LobeSample(DELTA, wi, facet.reflectance / probability);
+            result = LobeSample(DELTA, wi, facet.reflectance / probability);
+        } else {
+            result = LobeSample(select(ABSORBED, SPREAD, wi.z > 0.0), wi, vec3f(0.0));
         }
-        return LobeSample(select(ABSORBED, SPREAD, wi.z > 0.0), wi, vec3f(0.0));
-    }
 //#if transmission
-    if transmits_delta(i) {
+    } else if transmits_delta(i) {
         let wi = refracted(wo, vec3f(0.0, 0.0, 1.0), i.eta);
-        if all(wi == vec3f(0.0)) {
-            return NO_SAMPLE;
-        }
-        var radiance = scattering_facet(i, wo.z).transmittance / (i.eta * i.eta);
+        if any(wi != vec3f(0.0)) {
+            var radiance = scattering_facet(i, wo.z).transmittance / (i.eta * i.eta);
 //#if dispersion
-        radiance *= i.hero;
+            radiance *= i.hero;
 //#end
-        return LobeSample(DELTA, wi, radiance / (1.0 - probability));
-    }
-    var wi = reflected(wo, h) * vec3f(1.0, 1.0, -1.0);
-    if !i.thin {
-        wi = refracted(wo, h, i.eta);
-    }
-    return LobeSample(select(ABSORBED, SPREAD, wi.z < 0.0), wi, vec3f(0.0));
-//#else
-    return NO_SAMPLE;
+            result = LobeSample(DELTA, wi, radiance / (1.0 - probability));
+        }
+    } else {
+        var wi = reflected(wo, h) * vec3f(1.0, 1.0, -1.0);
+        if !i.thin {
+            wi = refracted(wo, h, i.eta);
+        }
+        result = LobeSample(select(ABSORBED, SPREAD, wi.z < 0.0), wi, vec3f(0.0));
 //#end
+    }
+    return result;
 }
 
 fn interface_eval_pdf(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
     if is_smooth(i.ggx) {
         return EvalPdf(vec3f(0.0), 0.0);
     }
-    if wi.z > 0.0 {
-        return eval_pdf_mirrored(i, wo, wi, true);
-    }
+    let is_reflected = wi.z > 0.0;
 //#if transmission
-    if i.glass == 0.0 || transmits_delta(i) {
+    if !is_reflected && (i.glass == 0.0 || transmits_delta(i)) {
         return EvalPdf(vec3f(0.0), 0.0);
     }
-    if i.thin {
-        return eval_pdf_mirrored(i, wo, wi * vec3f(1.0, 1.0, -1.0), false);
+    if is_reflected || i.thin {
+        let above = select(wi * vec3f(1.0, 1.0, -1.0), wi, is_reflected);
+        return eval_pdf_mirrored(i, wo, above, is_reflected);
     }
     return eval_pdf_refracted(i, wo, wi);
 //#else
+    if is_reflected {
+        return eval_pdf_mirrored(i, wo, wi, true);
+    }
     return EvalPdf(vec3f(0.0), 0.0);
 //#end
 }

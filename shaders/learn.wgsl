@@ -15,19 +15,22 @@ fn look_at_map(path: ptr<function, Path>, vertex: Vertex) {
     if sample.pdf_solid_angle <= 0.0 {
         return;
     }
-    var weight = 0.0;
+    let counter = count_try(path, vertex, choice.tile);
     let f = scattered(path, vertex, sample.direction);
-    if max_element(f.value) > 0.0 {
-        let visible = transmittance(path, vertex, sample.direction, F32_MAX);
-//#if record_ratio
-        weight = visibility(vertex, sample.direction, f.pdf_solid_angle, visible);
-//#else
-        let pdf = choice.probability * sample.pdf_solid_angle;
-        weight = sample.weight * importance(f.value * sample.radiance * visible)
-            / (pdf * globals.mean_contribution);
-//#end
+    if max_element(f.value) <= 0.0 {
+        return;
     }
-    count(path, vertex, choice.tile, weight);
+    let shadow = shadow_towards(path, vertex, sample.direction, F32_MAX);
+    let visible = follow_shadow(path, shadow);
+//#if record_ratio
+    let share = visibility_share(vertex, sample.direction, f.pdf_solid_angle);
+    count_visible(Visibility(counter, share), visible);
+//#else
+    let pdf = choice.probability * sample.pdf_solid_angle;
+    let weight = sample.weight * importance(f.value * sample.radiance * visible)
+        / (pdf * globals.mean_contribution);
+    count_weight(counter, weight);
+//#end
 }
 
 @compute @workgroup_size(64)
@@ -35,6 +38,7 @@ fn learn(
     @builtin(workgroup_id) group: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
+    own_lane = lane;
     let offset = group.x * 64u + lane;
     if offset >= globals.work.count {
         return;

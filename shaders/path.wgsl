@@ -30,7 +30,35 @@ struct Path {
 //#if layers
     first_hit: FirstHit,
 //#end
+//#if learning
+//#else
+//#if map_sampling
+    map_shadow: Shadow,
+//#end
+//#if local_lights
+    lamp_shadow: Shadow,
+//#end
+//#end
 }
+
+//#if shadow_rays
+// A ray towards a light. It waits until the path has chosen where to go on: so nothing of the vertex
+// takes registers while it is followed.
+struct Shadow {
+    // Its reach is 0 if there is none.
+    ray: Ray,
+    // What arrives if nothing is in the way, before its weight.
+    light: vec3f,
+    weight: f32,
+//#if shadow_media
+    // What media let through of it.
+    left: vec3f,
+//#end
+//#if counting
+    visibility: Visibility,
+//#end
+}
+//#end
 
 struct FirstHit {
     albedo: vec3f,
@@ -186,10 +214,23 @@ fn passed(hit: Hit, direction: vec3f) -> vec3f {
 }
 //#end
 
-// Follows the path along one ray. `false` when it has ended.
+// Follows the path along one ray, and the rays towards lights from where it arrives. `false` when it
+// has ended.
 fn path_step(path: ptr<function, Path>) -> bool {
     (*path).rays += 1u;
     let hit = closest_hit((*path).ray, (*path).bounces == 0u);
+    let goes_on = follow(path, hit);
+//#if learning
+//#else
+//#if shadow_rays
+    add_lights(path);
+//#end
+//#end
+    return goes_on;
+}
+
+// What becomes of the path at the end of its ray. `false` if it ends.
+fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
 //#if medium
     let stretch = stretch_ahead(path, (*path).ray.origin, (*path).ray.direction, hit.t);
     if stretch.start < stretch.end {
@@ -356,6 +397,7 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
         return false;
     }
     (*path).bounces += 1u;
+    forget_arrival(path);
     (*path).travelled = 0.0;
     (*path).passes = 0u;
     var gathers = !bsdf_is_delta_only(vertex.bsdf);
@@ -383,6 +425,20 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
         return false;
     }
     return survives(path);
+}
+
+// What nobody asks for any more, for it comes anew or the path ends: else it would take registers.
+fn forget_arrival(path: ptr<function, Path>) {
+    (*path).ray.origin = vec3f(0.0);
+//#if medium
+//#else
+    (*path).ray.direction = vec3f(0.0);
+//#end
+    (*path).departure_pdf_solid_angle = 0.0;
+    (*path).departure_law = 0u;
+//#if emitters
+    (*path).departure_receiver = Receiver();
+//#end
 }
 
 //#if scene_lights
@@ -476,16 +532,20 @@ fn scattered(path: ptr<function, Path>, vertex: Vertex, direction: vec3f) -> Eva
 }
 
 //#if shadow_rays
-fn transmittance(
+// A ray from the vertex towards a light so far away; its light is zero. There is none if media let
+// nothing through.
+fn shadow_towards(
     path: ptr<function, Path>,
     vertex: Vertex,
     direction: vec3f,
     distance: f32,
-) -> vec3f {
+) -> Shadow {
     let normal = vertex.point.geometric_normal;
     let is_above = dot(normal, direction) > 0.0;
+    var shadow: Shadow;
     var origin = offset_origin(vertex.point.position, select(-normal, normal, is_above));
-    var left = vec3f(1.0);
+//#if shadow_media
+    shadow.left = vec3f(1.0);
 //#if solid_transmission
     var body = (*path).body;
 //#if medium
@@ -507,26 +567,74 @@ fn transmittance(
     let stretch = fog_stretch(origin, direction, distance);
 //#end
     if stretch.start < stretch.end {
-        left = exp(-stretch.interior.extinction * (stretch.end - stretch.start));
+        shadow.left = exp(-stretch.interior.extinction * (stretch.end - stretch.start));
     }
 //#else
-//#if solid_transmission
-    left = body_transmittance(body, distance);
+    shadow.left = body_transmittance(body, distance);
 //#end
+    if all(shadow.left == vec3f(0.0)) {
+        return shadow;
+    }
 //#end
-    if all(left == vec3f(0.0)) {
-        return left;
+    // Stop short of the light's own surface.
+    shadow.ray = Ray(origin, direction, distance * (1.0 - 1e-4));
+    return shadow;
+}
+
+// Share of light that comes along a shadow ray, if there is one.
+fn follow_shadow(path: ptr<function, Path>, shadow: Shadow) -> vec3f {
+    if shadow.ray.t_max <= 0.0 {
+        return vec3f(0.0);
     }
     (*path).rays += 1u;
-    // Stop short of the light's own surface.
-    let ray = Ray(origin, direction, distance * (1.0 - 1e-4));
-    return transmittance_along(ray) * left;
-}
+    let visible = transmittance_along(shadow.ray);
+//#if shadow_media
+    return visible * shadow.left;
+//#else
+    return visible;
 //#end
+}
 
-//#if map_sampling
 //#if learning
 //#else
+// Follows a shadow ray and adds what comes along it.
+fn add_light(path: ptr<function, Path>, shadow: Shadow) {
+    let visible = follow_shadow(path, shadow);
+    if any(visible != vec3f(0.0)) {
+//#if counting
+        count_visible(shadow.visibility, visible);
+//#end
+        (*path).radiance += shadow.light * visible * shadow.weight;
+    }
+}
+
+// Follows the path's shadow rays, the map's first. They share the code, which is long where panes and
+// leaves let light through.
+fn add_lights(path: ptr<function, Path>) {
+//#if map_sampling
+    var shadow = (*path).map_shadow;
+    (*path).map_shadow = Shadow();
+//#if local_lights
+    for (var i = 0u; i < 2u; i++) {
+        add_light(path, shadow);
+        shadow = (*path).lamp_shadow;
+        (*path).lamp_shadow = Shadow();
+    }
+//#else
+    add_light(path, shadow);
+//#end
+//#else
+    let shadow = (*path).lamp_shadow;
+    (*path).lamp_shadow = Shadow();
+    add_light(path, shadow);
+//#end
+}
+//#end
+//#end
+
+//#if learning
+//#else
+//#if map_sampling
 fn gather_environment(path: ptr<function, Path>, vertex: Vertex) {
     let bits = path_pair_bits(path);
     let choice = choose_tile(vertex.law, bits, globals.whole_map_share);
@@ -536,24 +644,22 @@ fn gather_environment(path: ptr<function, Path>, vertex: Vertex) {
     }
     let pdf = choice.probability * sample.pdf_solid_angle;
     let f = scattered(path, vertex, sample.direction);
-    if max_element(f.value) <= 0.0 {
 //#if counting
-        count(path, vertex, choice.tile, 0.0);
+    let counter = count_try(path, vertex, choice.tile);
 //#end
+    if max_element(f.value) <= 0.0 {
         return;
     }
-    let visible = transmittance(path, vertex, sample.direction, F32_MAX);
-//#if counting
-    let seen = visibility(vertex, sample.direction, f.pdf_solid_angle, visible);
-    count(path, vertex, choice.tile, seen);
-//#end
+    var shadow = shadow_towards(path, vertex, sample.direction, F32_MAX);
+    shadow.light = (*path).throughput * f.value * sample.radiance;
     let both_pdfs = pdf + f.pdf_solid_angle;
-    if any(visible != vec3f(0.0)) && both_pdfs > 0.0 {
-        let weight = sample.weight / both_pdfs;
-        (*path).radiance += (*path).throughput * f.value * sample.radiance * visible * weight;
-    }
-}
+    shadow.weight = select(0.0, sample.weight / both_pdfs, both_pdfs > 0.0);
+//#if counting
+    shadow.visibility =
+        Visibility(counter, visibility_share(vertex, sample.direction, f.pdf_solid_angle));
 //#end
+    (*path).map_shadow = shadow;
+}
 //#end
 
 //#if local_lights
@@ -567,13 +673,12 @@ fn gather_local(path: ptr<function, Path>, vertex: Vertex) {
     if max_element(f.value) <= 0.0 {
         return;
     }
-    let visible = transmittance(path, vertex, sample.direction, sample.distance);
-    let weight = balance_heuristic(sample.pdf_solid_angle, f.pdf_solid_angle);
-    if any(visible != vec3f(0.0)) {
-        (*path).radiance +=
-            (*path).throughput * f.value * sample.radiance_over_pdf * visible * weight;
-    }
+    var shadow = shadow_towards(path, vertex, sample.direction, sample.distance);
+    shadow.light = (*path).throughput * f.value * sample.radiance_over_pdf;
+    shadow.weight = balance_heuristic(sample.pdf_solid_angle, f.pdf_solid_angle);
+    (*path).lamp_shadow = shadow;
 }
+//#end
 //#end
 
 // Chooses where the path goes on. `false` if it ends.

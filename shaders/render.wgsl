@@ -20,6 +20,7 @@ fn render(
     @builtin(workgroup_id) group: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
+    own_lane = lane;
     let tiles_across = (globals.width + 7u) / 8u;
     let tile = globals.work.first + group.x;
     let x = (tile % tiles_across) * 8u + (lane & 7u);
@@ -33,9 +34,15 @@ fn render(
     if index >= end {
         return;
     }
-    var path = start_sample(x, y, index);
+    var path: Path;
+    var is_over = true;
     loop {
-        if path_step(&path) {
+        // At one place: what a second one has in common with the first would stay in registers.
+        if is_over {
+            path = start_sample(x, y, index);
+        }
+        is_over = !path_step(&path);
+        if !is_over {
             continue;
         }
         add_to_film(pixel, &path);
@@ -43,6 +50,5 @@ fn render(
         if index == end {
             break;
         }
-        path = start_sample(x, y, index);
     }
 }

@@ -178,9 +178,44 @@ fn read_textures(corner: Corner, uvs: vec4f) -> array<vec4f, TEXTURES> {
     while left != 0u {
         let i = firstTrailingBit(left);
         left &= left - 1u;
-        values[i] = read_texture(texture_of(corner.material, i), uvs);
+        let value = read_texture(texture_of(corner.material, i), uvs);
+        values[BASE_COLOR] = put_texture(BASE_COLOR, i, value, values[BASE_COLOR]);
+        values[METALLIC_ROUGHNESS] =
+            put_texture(METALLIC_ROUGHNESS, i, value, values[METALLIC_ROUGHNESS]);
+        values[NORMAL] = put_texture(NORMAL, i, value, values[NORMAL]);
+        values[EMISSIVE] = put_texture(EMISSIVE, i, value, values[EMISSIVE]);
+        values[SPECULAR] = put_texture(SPECULAR, i, value, values[SPECULAR]);
+        values[SPECULAR_COLOR] = put_texture(SPECULAR_COLOR, i, value, values[SPECULAR_COLOR]);
+        values[TRANSMISSION] = put_texture(TRANSMISSION, i, value, values[TRANSMISSION]);
+        values[CLEARCOAT] = put_texture(CLEARCOAT, i, value, values[CLEARCOAT]);
+        values[CLEARCOAT_ROUGHNESS] =
+            put_texture(CLEARCOAT_ROUGHNESS, i, value, values[CLEARCOAT_ROUGHNESS]);
+        values[CLEARCOAT_NORMAL] =
+            put_texture(CLEARCOAT_NORMAL, i, value, values[CLEARCOAT_NORMAL]);
+//#if uncommon_textures
+        values[ANISOTROPY_MAP] = put_texture(ANISOTROPY_MAP, i, value, values[ANISOTROPY_MAP]);
+        values[SHEEN_COLOR_MAP] = put_texture(SHEEN_COLOR_MAP, i, value, values[SHEEN_COLOR_MAP]);
+        values[SHEEN_ROUGHNESS_MAP] =
+            put_texture(SHEEN_ROUGHNESS_MAP, i, value, values[SHEEN_ROUGHNESS_MAP]);
+        values[DIFFUSE_TRANSMISSION_MAP] =
+            put_texture(DIFFUSE_TRANSMISSION_MAP, i, value, values[DIFFUSE_TRANSMISSION_MAP]);
+        values[DIFFUSE_TRANSMISSION_COLOR_MAP] = put_texture(
+            DIFFUSE_TRANSMISSION_COLOR_MAP, i, value, values[DIFFUSE_TRANSMISSION_COLOR_MAP]);
+        values[IRIDESCENCE_MAP] = put_texture(IRIDESCENCE_MAP, i, value, values[IRIDESCENCE_MAP]);
+        values[IRIDESCENCE_THICKNESS_MAP] =
+            put_texture(IRIDESCENCE_THICKNESS_MAP, i, value, values[IRIDESCENCE_THICKNESS_MAP]);
+//#end
     }
     return values;
+}
+
+// The `value` read for texture `read` if it is `texture`, else what was there. With these, no index
+// into the values is computed, which would keep all of them in registers or in memory.
+fn put_texture(texture: u32, read: u32, value: vec4f, before: vec4f) -> vec4f {
+    if (TEXTURES_IN_SCENE & (1u << texture)) == 0u {
+        return before;
+    }
+    return select(before, value, read == texture);
 }
 
 fn texture_of(material: u32, texture: u32) -> u32 {
@@ -352,7 +387,8 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
     }
 //#end
 //#if clearcoat
-    let is_mapped = (bitcast<u32>(scales.w) & NORMAL_MAPPED) != 0u;
+    let maps = TEXTURES_IN_SCENE & ((1u << NORMAL) | (1u << CLEARCOAT_NORMAL));
+    let is_mapped = maps != 0u && (bitcast<u32>(scales.w) & NORMAL_MAPPED) != 0u;
     if point.parameters.clearcoat > 0.0 && is_mapped {
         let mapped = mapped_normal(corner, unmapped, CLEARCOAT_NORMAL, textures[CLEARCOAT_NORMAL],
             scales.z);

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 use super::device::Gpu;
-use super::shader::{ARRAYS, ArrayKind, TexelFormat};
+use super::shader::{ARRAYS, ArrayKind, ArrayPlaces, TexelFormat};
 use crate::error::{Error, Result};
 
 /// Everything the kernels bind, by the name of its variable. Clones share what was made before.
@@ -16,6 +16,8 @@ use crate::error::{Error, Result};
 pub(super) struct Buffers {
     gpu: Gpu,
     by_name: BTreeMap<&'static str, Buffer>,
+    /// Whether arrays lie in buffers, where they fit into one.
+    prefers_buffers: bool,
     arrays: BTreeMap<&'static str, (wgpu::Texture, u64)>,
     /// The driver's tree of the scene, if rays are traced by the device's own queries.
     pub(super) tree: Option<wgpu::Tlas>,
@@ -38,6 +40,7 @@ impl Buffers {
         Self {
             gpu: gpu.clone(),
             by_name: BTreeMap::new(),
+            prefers_buffers: gpu.prefers_buffers(),
             arrays: BTreeMap::new(),
             tree: None,
             width_log2,
@@ -52,9 +55,11 @@ impl Buffers {
         Self { bytes_read: Arc::default(), ..self.clone() }
     }
 
-    /// Texels of a row of every array, as a power of two.
-    pub(super) fn width_log2(&self) -> u32 {
-        self.width_log2
+    /// Where each array lies that is there, and where those will that are not.
+    pub(super) fn array_places(&self) -> ArrayPlaces {
+        let names = ARRAYS.into_iter().map(|kind| kind.name);
+        let in_buffers = names.filter(|name| self.prefers_buffers && self.array(name).is_none());
+        ArrayPlaces { width_log2: self.width_log2, in_buffers: in_buffers.collect() }
     }
 
     /// The buffer of a binding.
@@ -101,6 +106,12 @@ impl Buffers {
         parts: impl Iterator<Item = Cow<'b, [u8]>>,
     ) -> Result<()> {
         let Some(kind) = ARRAYS.into_iter().find(|kind| kind.name == name) else { return Ok(()) };
+        let bytes = texels * kind.format.bytes();
+        // A kernel may have been made for laws in a buffer.
+        if self.prefers_buffers && (bytes <= self.most_bytes() || name == "laws") {
+            self.arrays.remove(name);
+            return self.put_parts(name, what, bytes, parts);
+        }
         let (width, most) = (1_u64 << self.width_log2, self.gpu.limits.max_texture_dimension_2d);
         let rows = texels.div_ceil(width).max(1);
         // Software Vulkan compiles a kernel anew where a texture's height becomes a power of two or
@@ -120,8 +131,31 @@ impl Buffers {
             Error::new(format!("{e} ({what} takes {mebibytes} MiB)"))
         })?;
         self.upload(&texture, kind.format.bytes(), parts)?;
+        self.by_name.remove(name);
         self.arrays.insert(name, (texture, rows * width * kind.format.bytes()));
         self.version += 1;
+        Ok(())
+    }
+
+    /// Makes a buffer of bytes that come in parts; never in place, for others may share the old one.
+    fn put_parts<'b>(
+        &mut self,
+        name: &'static str,
+        what: &str,
+        bytes: u64,
+        parts: impl Iterator<Item = Cow<'b, [u8]>>,
+    ) -> Result<()> {
+        self.make(name, bytes, what)?;
+        let mut offset = 0;
+        for piece in parts {
+            for piece in piece.chunks(PIECE_BYTES) {
+                self.write(name, offset, piece);
+                offset += piece.len() as u64;
+                // So that staging memory is given back.
+                self.gpu.queue.submit([]);
+                self.gpu.wait_for(None)?;
+            }
+        }
         Ok(())
     }
 

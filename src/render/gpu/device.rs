@@ -162,7 +162,12 @@ pub struct Gpu {
     hardware_rays: bool,
     /// Kernels compiled so far, by their source.
     pub(super) pipelines: Arc<Mutex<HashMap<String, Arc<Pipeline>>>>,
+    /// Whether read-only arrays lie in storage buffers.
+    prefers_buffers: bool,
 }
+
+/// Storage buffers that a kernel has at most, arrays among them.
+const MOST_STORAGE_BUFFERS: u32 = 32;
 
 impl Gpu {
     /// Opens the best adapter, or the best of those whose name or backend contains `name` (in any
@@ -224,6 +229,7 @@ impl Gpu {
                 },
             );
         }));
+        let prefers_buffers = !facts.is_software() && facts.storage_buffers >= MOST_STORAGE_BUFFERS;
         let gpu = Self {
             facts,
             limits,
@@ -232,8 +238,22 @@ impl Gpu {
             trouble,
             hardware_rays: false,
             pipelines: Arc::default(),
+            prefers_buffers,
         };
         gpu.with_rays(RayChoice::Auto)
+    }
+
+    /// Whether read-only arrays are to lie in storage buffers, which GPUs read faster than textures;
+    /// software Vulkan reads texels faster.
+    pub(super) fn prefers_buffers(&self) -> bool {
+        self.prefers_buffers
+    }
+
+    /// The same device with read-only arrays in storage buffers, whatever it prefers.
+    #[cfg(test)]
+    pub(super) fn with_arrays_in_buffers(mut self) -> Self {
+        self.prefers_buffers = true;
+        self
     }
 
     /// What it is.

@@ -15,6 +15,8 @@ mod pacer;
 #[cfg(test)]
 mod parity;
 mod pipeline;
+#[cfg(test)]
+mod registers;
 pub(crate) mod shader;
 mod stage;
 
@@ -165,8 +167,7 @@ impl Renderer {
             }
         }
         buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
-        let width_log2 = buffers.width_log2();
-        let program = Program::new(Kernel::Render, &features, &constants, width_log2);
+        let program = Program::new(Kernel::Render, &features, &constants, &buffers.array_places());
         let kernel_facts = KernelFacts::of(&features);
         let renderer = Self {
             kernels: BTreeMap::from([(Kernel::Render, Bound::new(compile(&stage.gpu, program)?))]),
@@ -396,8 +397,8 @@ impl Renderer {
         let bound = match self.kernels.entry(kernel) {
             Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(vacant) => {
-                let width_log2 = self.buffers.width_log2();
-                let program = Program::new(kernel, &self.features, &self.constants, width_log2);
+                let places = self.buffers.array_places();
+                let program = Program::new(kernel, &self.features, &self.constants, &places);
                 vacant.insert(Bound::new(self.gpu.pipeline(kernel, program)?))
             }
         };

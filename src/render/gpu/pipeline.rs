@@ -8,6 +8,15 @@ use super::device::Gpu;
 use super::shader::{Binding, Kernel, Program};
 use crate::error::Result;
 
+/// What naga adds to the kernels so that they cannot do harm, whatever they read. Counters that end
+/// loops and guards of divisions, of which there are many, cost registers and up to a third of the
+/// instructions.
+const RUNTIME_CHECKS: wgpu::ShaderRuntimeChecks = wgpu::ShaderRuntimeChecks {
+    force_loop_bounding: false,
+    int_div_checks: false,
+    ..wgpu::ShaderRuntimeChecks::checked()
+};
+
 /// A kernel ready to run.
 pub(super) struct Pipeline {
     pub(super) pipeline: wgpu::ComputePipeline,
@@ -40,10 +49,14 @@ impl Pipeline {
             label: Some(entry),
             entries: &entries,
         });
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        let source = wgpu::ShaderModuleDescriptor {
             label: Some(entry),
             source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(&program.source)),
-        });
+        };
+        // SAFETY: indices are checked as ever. All loops end: walks take each group of a finite tree
+        // once, searches halve what is left, paths are bounded by bounces and passes, all others
+        // count or clear bits. No divisor is zero: see `no_integer_is_divided_by_zero`.
+        let module = unsafe { device.create_shader_module_trusted(source, RUNTIME_CHECKS) };
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(entry),
             bind_group_layouts: &[Some(&layout)],
@@ -54,7 +67,11 @@ impl Pipeline {
             layout: Some(&pipeline_layout),
             module: &module,
             entry_point: Some(entry),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                // No walk reads of its stack what it has not written.
+                zero_initialize_workgroup_memory: false,
+                ..wgpu::PipelineCompilationOptions::default()
+            },
             cache: None,
         });
         gpu.check()?;

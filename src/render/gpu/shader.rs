@@ -53,13 +53,14 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 50] = [
+    pub(crate) const ALL: [&'static str; 52] = [
         "alpha_mask",
         "anisotropy",
         "background_blur",
         "background_color",
         "clearcoat",
         "counting",
+        "deep_tree",
         "diffuse_transmission",
         "dispersion",
         "emitters",
@@ -88,6 +89,7 @@ impl Features {
         "record_squared_cosine",
         "scene_lights",
         "second_uv_set",
+        "shadow_media",
         "shadow_rays",
         "sheen",
         "single_sided",
@@ -163,22 +165,24 @@ impl Features {
         Self::from_names(Self::of_world(world).0.into_iter().map(|n| (n, true)).chain(of_view))
     }
 
-    /// Every feature at once, with the table that is used by default.
+    /// Every feature at once, with the table that is used by default. How deep the tree is, its
+    /// stack's size says.
     pub(crate) fn most() -> Self {
-        let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_") && *n != "learning");
-        let names = names.filter(|n| *n != "hardware_rays");
-        Self::from_names(names.filter(|n| *n != "summed_area").map(|n| (n, true)))
+        let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_"));
+        let others = ["deep_tree", "hardware_rays", "learning", "summed_area"];
+        Self::from_names(names.filter(|n| !others.contains(n)).map(|n| (n, true)))
     }
 
     /// Features by name, and those that follow from them.
     pub(crate) fn from_names(names: impl IntoIterator<Item = (&'static str, bool)>) -> Self {
         let mut set: BTreeSet<_> =
             names.into_iter().filter(|(_, on)| *on).map(|(n, _)| n).collect();
-        let follows: [(&str, &[&str]); 8] = [
+        let follows: [(&str, &[&str]); 9] = [
             ("filtered_hits", &["alpha_mask", "single_sided"]),
             ("filtered_or_passed", &["alpha_mask", "partial", "single_sided"]),
             ("pass_through", &["alpha_mask", "partial"]),
             ("scene_lights", &["emitters", "punctual_lights"]),
+            ("shadow_media", &["medium", "solid_transmission"]),
             ("shadow_rays", &["map_sampling", "local_lights"]),
             ("summed_area", &["table_f32", "table_f64", "table_u32"]),
             ("tangents", &["anisotropy", "normal_maps"]),
@@ -202,9 +206,12 @@ impl Features {
         self
     }
 
-    /// The same for a kernel.
-    fn in_kernel(&self, kernel: Kernel) -> Self {
+    /// The same for a kernel with these constants.
+    fn in_kernel(&self, kernel: Kernel, constants: &Constants) -> Self {
         let mut set = self.0.clone();
+        if constants.stack_size > constants.shared_stack_size {
+            set.insert("deep_tree");
+        }
         if kernel == Kernel::Learn {
             set.insert("counting");
             set.insert("learning");
@@ -252,7 +259,8 @@ impl KernelFacts {
         let bytes_of = |features: &Features| {
             let vertex = VertexTexels::of(features);
             let constants = Constants { vertex, ..Constants::default() };
-            let program = Program::new(Kernel::Render, features, &constants, 14);
+            let places = ArrayPlaces::default();
+            let program = Program::new(Kernel::Render, features, &constants, &places);
             (program.source.len(), 16 * vertex.count)
         };
         let (source_bytes, vertex_bytes) = bytes_of(features);
@@ -288,8 +296,9 @@ impl KernelFacts {
 /// Numbers of a shader that are known when it is built.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Constants {
-    /// Groups of nodes the traversal may have to remember.
+    /// Groups of nodes the traversal may have to remember, and how many of them in workgroup memory.
     pub(crate) stack_size: u32,
+    pub(crate) shared_stack_size: u32,
     /// Texels of a vertex, and which of them hold what only some scenes need.
     pub(crate) vertex: VertexTexels,
     /// Bit `i`: some material has the `i`-th of the textures a material can have.
@@ -324,8 +333,28 @@ impl VertexTexels {
     }
 }
 
-/// A read-only array, kept in a texture: it may be larger than a storage binding, and software
-/// Vulkan reads texels several times faster than storage buffers.
+/// Most entries of a walk's stack in workgroup memory: 6 KiB a workgroup. Hardly any walk needs more,
+/// and no more workgroups would run side by side if it were smaller.
+pub(crate) const SHARED_STACK_SIZE: u32 = 12;
+
+/// Where read-only arrays lie: in storage buffers those that are named, all others in textures.
+///
+/// GPUs read buffers faster; textures may hold more bytes than a storage binding, and software Vulkan
+/// reads texels several times faster than buffers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct ArrayPlaces {
+    /// Texels of a row of every texture, as a power of two.
+    pub(crate) width_log2: u32,
+    pub(crate) in_buffers: BTreeSet<&'static str>,
+}
+
+impl Default for ArrayPlaces {
+    fn default() -> Self {
+        Self { width_log2: 14, in_buffers: BTreeSet::new() }
+    }
+}
+
+/// A read-only array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ArrayKind {
     /// Name of the function that reads an element.
@@ -352,6 +381,17 @@ impl TexelFormat {
             Self::Words1 | Self::Bytes4 => 4,
             Self::Words2 => 8,
             Self::Words4 | Self::Floats4 => 16,
+        }
+    }
+
+    /// Type of an element in a storage buffer, and what makes a vector of an element `e`.
+    fn in_buffer(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Words1 => ("array<u32>", "vec4u(e, 0u, 0u, 0u)"),
+            Self::Words2 => ("array<vec2u>", "vec4u(e, 0u, 0u)"),
+            Self::Words4 => ("array<vec4u>", "e"),
+            Self::Floats4 => ("array<vec4f>", "e"),
+            Self::Bytes4 => ("array<u32>", "unpack4x8unorm(e)"),
         }
     }
 
@@ -395,16 +435,24 @@ impl ArrayKind {
         self.feature.is_none_or(|feature| features.has(feature))
     }
 
-    /// The declaration and the function that reads an element. Rows of the texture hold
-    /// `2^width_log2` texels.
-    fn accessor(&self, binding: usize, width_log2: u32) -> String {
+    /// The declaration and the function that reads an element.
+    fn accessor(&self, binding: usize, places: &ArrayPlaces) -> String {
         let Self { name, format, .. } = self;
         let scalar = if format.is_float() { "f32" } else { "u32" };
-        let last = (1_u32 << width_log2) - 1;
+        let (declaration, reading) = if places.in_buffers.contains(name) {
+            let (store, element) = format.in_buffer();
+            let reading = format!("let e = {name}_buffer[index];\n    return {element};");
+            (format!("var<storage, read> {name}_buffer: {store}"), reading)
+        } else {
+            let width_log2 = places.width_log2;
+            let last = (1_u32 << width_log2) - 1;
+            let texel = format!("vec2u(index & {last}u, index >> {width_log2}u)");
+            let reading = format!("return textureLoad({name}_texture, {texel}, 0);");
+            (format!("var {name}_texture: texture_2d<{scalar}>"), reading)
+        };
         format!(
-            "@group(0) @binding({binding}) var {name}_texture: texture_2d<{scalar}>;\n\
-             fn {name}(index: u32) -> vec4<{scalar}> {{\n    return textureLoad({name}_texture, \
-             vec2u(index & {last}u, index >> {width_log2}u), 0);\n}}\n"
+            "@group(0) @binding({binding}) {declaration};\n\
+             fn {name}(index: u32) -> vec4<{scalar}> {{\n    {reading}\n}}\n"
         )
     }
 }
@@ -419,7 +467,7 @@ pub(crate) enum Binding {
         store: &'static str,
         is_written: bool,
     },
-    /// One of [`ARRAYS`].
+    /// One of [`ARRAYS`] that lies in a texture.
     Array(ArrayKind),
     /// The driver's tree.
     Tree,
@@ -433,21 +481,22 @@ pub(crate) struct Program {
 }
 
 impl Program {
-    /// Puts a kernel together. Arrays are `2^width_log2` texels wide.
+    /// Puts a kernel together.
     pub(crate) fn new(
         kernel: Kernel,
         features: &Features,
         constants: &Constants,
-        width_log2: u32,
+        places: &ArrayPlaces,
     ) -> Self {
-        let features = features.in_kernel(kernel);
-        let bindings = bindings(kernel, &features);
+        let features = features.in_kernel(kernel, constants);
+        let bindings = bindings(kernel, &features, places);
         let mut source = String::new();
         if features.has("hardware_rays") {
             source.push_str("enable wgpu_ray_query;\n");
         }
         let Constants {
             stack_size,
+            shared_stack_size,
             vertex,
             textures_in_scene,
             albedo_at,
@@ -457,6 +506,7 @@ impl Program {
         } = *constants;
         for (name, value) in [
             ("STACK_SIZE", stack_size),
+            ("SHARED_STACK_SIZE", shared_stack_size),
             ("VERTEX_TEXELS", vertex.count),
             ("SECOND_UV_TEXEL", vertex.second_uv),
             ("TANGENT_TEXEL", vertex.tangent),
@@ -470,16 +520,22 @@ impl Program {
             let _ = writeln!(source, "const {name} = {value}u;");
         }
         for (index, binding) in bindings.iter().enumerate() {
-            match binding {
-                Binding::Buffer { name, store, is_written } => {
+            let array = match binding {
+                Binding::Buffer { name, .. } => ARRAYS.into_iter().find(|kind| kind.name == *name),
+                Binding::Array(array) => Some(*array),
+                Binding::Tree => None,
+            };
+            match (array, binding) {
+                (Some(array), _) => source.push_str(&array.accessor(index, places)),
+                (None, Binding::Buffer { name, store, is_written }) => {
                     let access = if *is_written { "read_write" } else { "read" };
                     let _ = writeln!(
                         source,
                         "@group(0) @binding({index}) var<storage, {access}> {name}: {store};"
                     );
                 }
-                Binding::Array(array) => source.push_str(&array.accessor(index, width_log2)),
-                Binding::Tree => {
+                (None, Binding::Array(_)) => {}
+                (None, Binding::Tree) => {
                     let _ = writeln!(
                         source,
                         "@group(0) @binding({index}) var tree: acceleration_structure;"
@@ -540,7 +596,7 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 32] {
     ]
 }
 
-fn bindings(kernel: Kernel, features: &Features) -> Vec<Binding> {
+fn bindings(kernel: Kernel, features: &Features, places: &ArrayPlaces) -> Vec<Binding> {
     let (learns, counts) = (kernel == Kernel::Learn, features.has("counting"));
     let renders = kernel == Kernel::Render;
     let buffers = [
@@ -563,7 +619,14 @@ fn bindings(kernel: Kernel, features: &Features) -> Vec<Binding> {
         .into_iter()
         .filter(|(.., is_needed)| *is_needed)
         .map(|(name, store, is_written, _)| Binding::Buffer { name, store, is_written });
-    let arrays = ARRAYS.into_iter().filter(|array| array.is_needed(features)).map(Binding::Array);
+    let arrays = ARRAYS.into_iter().filter(|array| array.is_needed(features)).map(|array| {
+        if places.in_buffers.contains(array.name) {
+            let (store, _) = array.format.in_buffer();
+            Binding::Buffer { name: array.name, store, is_written: false }
+        } else {
+            Binding::Array(array)
+        }
+    });
     let tree = features.has("hardware_rays").then_some(Binding::Tree);
     buffers.chain(arrays).chain(tree).collect()
 }
@@ -601,13 +664,14 @@ mod tests {
         assert_eq!(kept, "a\nb\nd\nf\n");
     }
 
-    fn validate(kernel: Kernel, features: &Features) {
+    fn validate(kernel: Kernel, features: &Features, places: &ArrayPlaces) {
         let constants = Constants {
-            stack_size: 20,
+            stack_size: if places.in_buffers.is_empty() { 20 } else { 10 },
+            shared_stack_size: 10,
             vertex: VertexTexels::of(features),
             ..Constants::default()
         };
-        let program = Program::new(kernel, features, &constants, 12);
+        let program = Program::new(kernel, features, &constants, places);
         let names: Vec<_> = features.names().collect();
         let module = naga::front::wgsl::parse_str(&program.source)
             .unwrap_or_else(|e| panic!("{names:?}: {}", e.emit_to_string(&program.source)));
@@ -626,6 +690,77 @@ mod tests {
         assert_eq!(entries, [kernel.name()]);
     }
 
+    /// Divisions and remainders of integers by what is no constant. naga does not guard them (see
+    /// `RUNTIME_CHECKS`), so here is why each divisor is at least 1.
+    const DIVISIONS: [&str; 12] = [
+        // The share of the whole map's law is 1 to 256, and with 256 no number lies beyond it.
+        "choose_tile: (((rest % width) << 8u) | (finer & 0xffu)) / width",
+        "choose_tile: rest % width",
+        "choose_tile: rest / width",
+        // The map has tiles, and as many patches or more.
+        "first_row_sum: tile % globals.tile_columns",
+        // Tiles across a picture of at least one pixel.
+        "render: tile % tiles_across",
+        "render: tile / tiles_across",
+        "start_sample: (y * globals.width + x + index) % max(stride, 1u)",
+        "tile_of_patch: ((at + 1u) * tiles - 1u) / patch_grid()",
+        "tile_patches: (at + 1u) * size / tiles",
+        "tile_patches: at * size / tiles",
+        "tile_patches: tile % tiles.x",
+        "tile_patches: tile / tiles.x",
+    ];
+
+    #[test]
+    fn no_integer_is_divided_by_zero() {
+        let mut found = BTreeSet::new();
+        for kernel in [Kernel::Render, Kernel::Learn] {
+            for table in [None, Some("table_u32")] {
+                let features = reachable(|_| true, table);
+                let constants =
+                    Constants { stack_size: 20, shared_stack_size: 10, ..Constants::default() };
+                let source =
+                    Program::new(kernel, &features, &constants, &ArrayPlaces::default()).source;
+                let module = naga::front::wgsl::parse_str(&source).expect("it is valid");
+                let entries = module.entry_points.iter().map(|entry| &entry.function);
+                for function in module.functions.iter().map(|(_, f)| f).chain(entries) {
+                    found.extend(integer_divisions(&module, function, &source));
+                }
+            }
+        }
+        assert_eq!(found.iter().map(String::as_str).collect::<Vec<_>>(), DIVISIONS);
+    }
+
+    /// Those of a function whose divisor is no constant.
+    fn integer_divisions(
+        module: &naga::Module,
+        function: &naga::Function,
+        source: &str,
+    ) -> Vec<String> {
+        use naga::{BinaryOperator, Expression, ScalarKind};
+        let mut typifier = naga::front::Typifier::new();
+        let context = naga::proc::ResolveContext::with_locals(
+            module,
+            &function.local_variables,
+            &function.arguments,
+        );
+        let mut found = Vec::new();
+        for (handle, expression) in function.expressions.iter() {
+            typifier.grow(handle, &function.expressions, &context).expect("it has a type");
+            let Expression::Binary { op, right, .. } = *expression else { continue };
+            let kind = typifier.get(right, &module.types).scalar_kind();
+            let is_integer = kind != Some(ScalarKind::Float);
+            let divides = matches!(op, BinaryOperator::Divide | BinaryOperator::Modulo);
+            let by_constant = matches!(function.expressions[right], Expression::Literal(_));
+            if divides && is_integer && !by_constant {
+                let text =
+                    &source[function.expressions.get_span(handle).to_range().unwrap_or(0..0)];
+                let name = function.name.as_deref().unwrap_or("an entry point");
+                found.push(format!("{name}: {text}"));
+            }
+        }
+        found
+    }
+
     /// Features that a picture can have or not have on their own; the others follow from them.
     fn independent() -> Vec<&'static str> {
         let follow = [
@@ -634,7 +769,9 @@ mod tests {
             "hardware_rays",
             "learning",
             "pass_through",
+            "deep_tree",
             "scene_lights",
+            "shadow_media",
             "shadow_rays",
             "software_walk",
             "tangents",
@@ -688,14 +825,18 @@ mod tests {
             let bits = half(1) << 32 | half(2);
             sets.push(reachable(|i| bits >> i & 1 == 1, tables[seed as usize % 4]));
         }
-        for features in &sets {
-            validate(Kernel::Render, features);
+        let in_textures = ArrayPlaces { width_log2: 12, ..ArrayPlaces::default() };
+        let in_buffers = ARRAYS.map(|array| array.name).into();
+        let in_buffers = ArrayPlaces { in_buffers, ..in_textures.clone() };
+        for (features, number) in sets.iter().zip(0..) {
+            let places = if number % 2 == 0 { &in_textures } else { &in_buffers };
+            validate(Kernel::Render, features, places);
             if features.has("light_grid") {
-                validate(Kernel::Learn, features);
+                validate(Kernel::Learn, features, places);
             }
-            validate(Kernel::ClosestHits, features);
-            validate(Kernel::ShadowRays, features);
-            validate(Kernel::Render, &features.clone().with_hardware_rays());
+            validate(Kernel::ClosestHits, features, places);
+            validate(Kernel::ShadowRays, features, places);
+            validate(Kernel::Render, &features.clone().with_hardware_rays(), places);
         }
     }
 }

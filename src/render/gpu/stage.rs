@@ -8,7 +8,7 @@ use super::acceleration::Acceleration;
 use super::buffers::Buffers;
 use super::device::Gpu;
 use super::layout::{self, Globals};
-use super::shader::{self, Constants, Features, VertexTexels};
+use super::shader::{self, Constants, Features, SHARED_STACK_SIZE, VertexTexels};
 use crate::bvh::compressed::CompressedTree;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
@@ -107,10 +107,16 @@ fn upload_world(
         put_array(buffers, "light_nodes", "the tree of lights", world.lights.arrays().1.nodes)?;
     }
     let textures_in_scene = world.needs.texture_slots;
-    Ok(Constants { stack_size, vertex, textures_in_scene, ..Constants::default() })
+    Ok(Constants {
+        stack_size,
+        shared_stack_size: stack_size.min(SHARED_STACK_SIZE),
+        vertex,
+        textures_in_scene,
+        ..Constants::default()
+    })
 }
 
-/// Uploads the tree that kernels walk; returns its depth.
+/// Uploads the tree that kernels walk; returns how many groups of nodes a walk has to remember.
 fn upload_tree(buffers: &mut Buffers, scene: &Scene, flags_of: impl Fn(u32) -> u32) -> Result<u32> {
     let tree = CompressedTree::build(&scene.positions, &scene.triangles, flags_of);
     if tree.depth > MAX_DEPTH {
@@ -121,7 +127,8 @@ fn upload_tree(buffers: &mut Buffers, scene: &Scene, flags_of: impl Fn(u32) -> u
     }
     put_array(buffers, "bvh_nodes", "the scene's tree", tree.nodes.as_flattened())?;
     put_array(buffers, "bvh_triangles", "the scene's geometry", tree.triangles.as_flattened())?;
-    Ok(tree.depth)
+    // One of each level but the root's.
+    Ok(tree.depth.max(2) - 1)
 }
 
 /// Makes an array of values that take whole texels or parts of one.

@@ -6,7 +6,7 @@ use naga::{Expression, Literal, Module, ScalarKind, Type, TypeInner};
 
 use super::super::cast::CastRay;
 use super::super::layout::{Globals, Material, TextureRef, Work, material_flags, texture_flags};
-use super::super::shader::{Constants, Features, Kernel, Program, VertexTexels};
+use super::super::shader::{ArrayPlaces, Constants, Features, Kernel, Program, VertexTexels};
 
 /// A struct's fields in bytes: name, offset, size.
 type Fields = Vec<(&'static str, usize, usize)>;
@@ -34,8 +34,9 @@ fn module() -> Module {
 fn module_of(kernel: Kernel) -> Module {
     let features = Features::most();
     let vertex = VertexTexels::of(&features);
-    let constants = Constants { stack_size: 20, vertex, ..Constants::default() };
-    let source = Program::new(kernel, &features, &constants, 12).source;
+    let constants =
+        Constants { stack_size: 20, shared_stack_size: 10, vertex, ..Constants::default() };
+    let source = Program::new(kernel, &features, &constants, &ArrayPlaces::default()).source;
     naga::front::wgsl::parse_str(&source)
         .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&source)))
 }

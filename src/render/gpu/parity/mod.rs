@@ -25,7 +25,7 @@ mod twin;
 use std::collections::BTreeSet;
 
 use super::pipeline::Pipeline;
-use super::shader::{Binding, Constants, Features, Kernel, Program, VertexTexels};
+use super::shader::{ArrayPlaces, Binding, Constants, Features, Kernel, Program, VertexTexels};
 use super::{Gpu, Renderer, Stage, Work};
 use stand::Stand;
 use twin::Twin;
@@ -120,7 +120,11 @@ fn with_probes(mut program: Program, preludes: &[&str], probes: &[Probe<'_>]) ->
     }
     program.source += &format!(
         "@compute @workgroup_size(64)
-fn probe(@builtin(global_invocation_id) id: vec3u) {{
+fn probe(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {{
+    own_lane = lane;
     if id.x >= globals.work.count {{
         return;
     }}
@@ -135,14 +139,28 @@ fn probe(@builtin(global_invocation_id) id: vec3u) {{
     program
 }
 
+/// Where arrays and stacks lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Places {
+    /// Where the device wants them.
+    Usual,
+    /// Arrays in storage buffers, and most of a walk's stack in a lane's own memory.
+    Other,
+}
+
 /// Runs probes on a stand's scene and map and compares; prints a line a probe.
-fn run(stand: &Stand, preludes: &[&str], probes: &[Probe<'_>]) {
+fn run(stand: &Stand, preludes: &[&str], probes: &[Probe<'_>], places: Places) {
     let gpu = match Gpu::open(None) {
+        Ok(gpu) if places == Places::Other => gpu.with_arrays_in_buffers(),
         Ok(gpu) => gpu,
         Err(reason) => return eprintln!("SKIPPED: {reason}"),
     };
     let Stand { world, environment, view, rays, grid } = stand;
-    let stage = Stage::new(&gpu, world, environment).expect("it fits");
+    let mut stage = Stage::new(&gpu, world, environment).expect("it fits");
+    if places == Places::Other {
+        stage.constants.shared_stack_size = 1;
+        assert!(stage.constants.stack_size > 1, "the tree is deep enough");
+    }
     let mut renderer =
         Renderer::with_kernel(&stage, (world, environment), view, rays, None, |gpu, program| {
             Pipeline::new(gpu, "probe", with_probes(program, preludes, probes))
@@ -196,36 +214,40 @@ fn groups(stands: &[Stand]) -> Vec<Group<'_>> {
 }
 
 macro_rules! run_group {
-    ($($test:ident: $group:literal;)*) => {$(
+    ($($test:ident: $group:literal, $places:ident;)*) => {$(
         #[test]
         fn $test() {
             let stands = stand::all();
             let (stand, preludes, probes) = groups(&stands).swap_remove($group);
-            run(stand, preludes, &probes);
+            run(stand, preludes, &probes, Places::$places);
         }
     )*};
 }
 
 run_group! {
-    numbers_cameras_and_samplers: 0;
-    scattering_of_materials: 1;
-    surfaces_lights_and_hits: 2;
-    whole_paths: 3;
-    media_between_surfaces: 4;
-    map_with_a_tile_local_table: 5;
-    map_with_a_table_in_u32: 6;
-    map_with_a_table_in_f32: 7;
-    map_with_a_table_in_f64: 8;
-    widest_map: 9;
-    tallest_map: 10;
+    numbers_cameras_and_samplers: 0, Usual;
+    scattering_of_materials: 1, Usual;
+    surfaces_lights_and_hits: 2, Usual;
+    whole_paths: 3, Usual;
+    media_between_surfaces: 4, Usual;
+    map_with_a_tile_local_table: 5, Usual;
+    map_with_a_table_in_u32: 6, Usual;
+    map_with_a_table_in_f32: 7, Usual;
+    map_with_a_table_in_f64: 8, Usual;
+    widest_map: 9, Usual;
+    tallest_map: 10, Usual;
+    // These two read all arrays.
+    surfaces_lights_and_hits_in_other_places: 2, Other;
+    map_in_other_places: 5, Other;
 }
 
 /// The source of a stand's kernel; the numbers in it do not matter here.
 fn program_of(stand: &Stand, kernel: Kernel) -> Program {
     let features = Features::of(&stand.world, &stand.environment, &stand.view);
     let vertex = VertexTexels::of(&features);
-    let constants = Constants { stack_size: 20, vertex, ..Constants::default() };
-    Program::new(kernel, &features, &constants, 12)
+    let constants =
+        Constants { stack_size: 20, shared_stack_size: 10, vertex, ..Constants::default() };
+    Program::new(kernel, &features, &constants, &ArrayPlaces::default())
 }
 
 /// Functions whose effect is no return value: entry points, and what looks at the map to count,
