@@ -210,7 +210,9 @@ mod tests {
 
     #[test]
     fn radiance_of_any_size_is_scaled_into_range() {
-        for brightest in [0.0, 1e-38, 1e-30, 1e-12, 1e-3, 1.0, 1e6, 1e12, 1e13, 1e30, f32::MAX] {
+        for brightest in
+            [0.0, f32::MIN_POSITIVE, 1e-30, 1e-12, 1e-3, 1.0, 1e6, 1e12, 1e13, 1e30, f32::MAX]
+        {
             let scale = scale_for(brightest);
             assert_eq!(scale.to_bits() & 0x7f_ffff, 0, "a power of two");
             let scaled = f64::from(brightest) * f64::from(scale);

@@ -89,6 +89,9 @@ struct Progress {
     least: u32,
     ahead: u32,
     tile: u64,
+    /// How many tiles from there on are under way, and by how many samples they are further.
+    group: u64,
+    group_samples: u32,
     /// Samples that pixels have beyond that.
     surplus: u64,
 }
@@ -268,12 +271,12 @@ impl Renderer {
         }
         let stride = counts.map_or(0, |_| pass.stride);
         let before = self.total_samples();
-        let Progress { least, ahead, tile, surplus } = self.progress;
-        if ahead != pass.target {
+        if self.progress.ahead != pass.target {
             // Tiles that are ahead of the others take less than those.
-            let already = u64::from(ahead.saturating_sub(least)) * self.pixels_before(tile);
-            let surplus = surplus + already;
-            self.progress = Progress { least, ahead: pass.target, tile: 0, surplus };
+            let Progress { least, .. } = self.progress;
+            let even = u64::from(least) * self.pixels_before(self.tiles());
+            let surplus = before.saturating_sub(even);
+            self.progress = Progress { least, ahead: pass.target, surplus, ..Progress::default() };
         }
         self.render_tiles(pass, stride, cancel)?;
         if let Some(learning) = counts {
@@ -291,19 +294,20 @@ impl Renderer {
         let missing = pass.target.saturating_sub(self.progress.least);
         while self.progress.tile < tiles && missing > 0 {
             let first = self.progress.tile;
-            let units = self.flights.units(Kernel::Render);
-            let affordable = units / u64::from(missing.min(MOST_SAMPLES));
-            let count = affordable.clamp(least_tiles, MAX_GROUPS).min(tiles - first);
-            let mut left = missing;
-            while left > 0 {
+            if self.progress.group == 0 {
+                let units = self.flights.units(Kernel::Render);
+                let affordable = units / u64::from(missing.min(MOST_SAMPLES));
+                let count = affordable.clamp(least_tiles, MAX_GROUPS).min(tiles - first);
+                self.progress.group = count;
+            }
+            let count = self.progress.group;
+            while self.progress.group_samples < missing {
                 if cancel.load(Ordering::Relaxed) {
-                    let pixels = self.pixels_before(first + count) - self.pixels_before(first);
-                    self.progress.surplus += pixels * u64::from(missing - left);
                     return Ok(());
                 }
                 let affordable = (self.flights.units(Kernel::Render) / count)
                     .clamp(1, u64::from(MOST_SAMPLES)) as u32;
-                let samples = affordable.min(left);
+                let samples = affordable.min(missing - self.progress.group_samples);
                 let work = Work {
                     first: first as u32,
                     count: count as u32,
@@ -314,9 +318,10 @@ impl Renderer {
                 };
                 let units = count * u64::from(samples);
                 self.dispatch(Kernel::Render, &work, count as u32, units)?;
-                left -= samples;
+                self.progress.group_samples += samples;
             }
-            self.progress.tile += count;
+            let tile = first + count;
+            self.progress = Progress { tile, group: 0, group_samples: 0, ..self.progress };
         }
         if self.progress.tile >= tiles {
             self.progress = Progress { least: pass.target, ..Progress::default() };
@@ -362,9 +367,13 @@ impl Renderer {
 
     /// Samples of all pixels together, dispatches under way included.
     fn total_samples(&self) -> u64 {
-        let Progress { least, ahead, tile, surplus } = self.progress;
+        let Progress { least, ahead, tile, group, group_samples, surplus } = self.progress;
         let (before, all) = (self.pixels_before(tile), self.pixels_before(self.tiles()));
-        before * u64::from(ahead) + (all - before) * u64::from(least) + surplus
+        let under_way = self.pixels_before(tile + group) - before;
+        before * u64::from(ahead)
+            + (all - before) * u64::from(least)
+            + under_way * u64::from(group_samples)
+            + surplus
     }
 
     /// Figures of the device and of what the kernels leave out.
