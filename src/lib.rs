@@ -14,7 +14,7 @@
 //!   picture, pass by pass, into a film.
 //! - [`app`] is the window, [`cli`] what a person types; both find files by [`sources`], and write by
 //!   [`output`]. [`report`] measures error against time; [`metrics`] compares pictures, [`denoise`]
-//!   smooths them, [`tone`] develops them. [`stability`] tries all of it on stiff and extreme cases.
+//!   smooths them, [`tone`] develops them, and `develop` does so on a GPU. [`stability`] tries all of it on stiff and extreme cases.
 //!
 //! Arrows point down: `cli -> {stability -> app, report} -> render -> path ->
 //! {light_grid, bsdf, medium, bvh} ->
@@ -27,6 +27,7 @@ pub mod bvh;
 pub mod cli;
 pub mod color;
 pub mod denoise;
+mod develop;
 pub mod environment;
 pub mod error;
 mod huge_pages;

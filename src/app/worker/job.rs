@@ -1,8 +1,7 @@
 //! One request being worked on.
 
-use std::sync::Arc;
-use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::device::Device;
@@ -15,6 +14,7 @@ use crate::image::Image;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::metrics;
 use crate::path::World;
+use crate::render::gpu::Gpu;
 use crate::render::{Phase, Sampling, Session, StopRule, View};
 
 /// Longest piece of rendering between two looks at requests and clocks.
@@ -36,7 +36,6 @@ const UNDER_WIDTH: u32 = 640;
 const PUBLISH_SHARE: u32 = 20;
 
 /// What one job leaves for the next.
-#[derive(Default)]
 pub(super) struct Legacy {
     device: Device,
     /// The last laws that learning ended with, and the map they are for.
@@ -54,8 +53,16 @@ pub(super) struct Legacy {
 
 impl Legacy {
     /// Of a worker that has done nothing yet.
-    pub(super) fn new(adapter: Option<String>) -> Self {
-        Self { device: Device::new(adapter), ..Self::default() }
+    pub(super) fn new(adapter: Option<String>, screen: Arc<Mutex<Gpu>>) -> Self {
+        Self {
+            device: Device::new(adapter, screen),
+            learned: None,
+            is_complete: false,
+            world: None,
+            seconds_per_path: None,
+            snapshots: 0,
+            under: None,
+        }
     }
 
     /// Whether learning has come to its end in this scene.
@@ -523,6 +530,7 @@ impl<'a> Job<'a> {
             film: Arc::new(film.clone()),
             figures: *session.figures(),
             gpu: session.gpu_figures().map(Arc::new),
+            on_device: None,
             grid: self.laws_of(session),
         }
     }

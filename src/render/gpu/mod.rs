@@ -7,6 +7,7 @@
 
 mod buffers;
 mod device;
+mod film;
 pub(crate) mod layout;
 mod pacer;
 #[cfg(test)]
@@ -37,6 +38,7 @@ use shader::{Binding, Constants, Features, Kernel, Program};
 use stage::put_array;
 
 pub use device::{AdapterFacts, DeviceChoice, Gpu, adapters};
+pub(crate) use film::DeviceFilm;
 pub use shader::KernelFacts;
 pub use stage::Stage;
 
