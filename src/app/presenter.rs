@@ -13,6 +13,7 @@ use crate::develop::{Developer, LinearPicture, OverlayTexture};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::light_grid::LightGrid;
+use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::tone::WhiteBalance;
 
 /// What is to be shown.
@@ -365,8 +366,9 @@ fn picture(developer: &Developer, snapshot: &Snapshot, denoiser: Option<Denoiser
 /// The film's picture, denoised if that is asked for.
 fn without_noise(developer: &Developer, take: &Take, denoiser: Option<Denoiser>) -> Prepared {
     let film = &take.film;
-    let noisy = |layers| match &take.on_device {
-        Some(on_device) => LinearPicture::live(on_device.clone()),
+    let is_here = |(gpu, _): &&(Gpu, DeviceFilm)| gpu.is_same(developer.gpu());
+    let noisy = |layers| match take.on_device.as_ref().filter(is_here) {
+        Some((_, on_device)) => LinearPicture::live(on_device.clone()),
         None => developer.upload_film(film, layers),
     };
     match denoiser {
@@ -381,5 +383,40 @@ fn without_noise(developer: &Developer, take: &Take, denoiser: Option<Denoiser>)
             };
             (developer.upload_filtered(&image, film), failure)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::render::film::Film;
+    use crate::render::{Figures, Sampling};
+
+    #[test]
+    fn a_film_on_the_same_device_is_shown_as_it_is_and_others_are_uploaded() {
+        let opened = || Gpu::open(None).and_then(|gpu| Developer::new(&gpu));
+        let (developer, other) = match opened().and_then(|one| Ok((one, opened()?))) {
+            Ok(both) => both,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let film = Film::new(6, 4, true);
+        let mut take = Take {
+            sampling: Sampling::Plain,
+            film: Arc::new(film),
+            figures: Figures::default(),
+            noise: 0.0,
+            grid: None,
+            gpu: None,
+            on_device: None,
+        };
+        assert!(!without_noise(&developer, &take, None).0.is_live());
+        let uploaded = developer.upload_film(&take.film, true);
+        take.on_device = Some((developer.gpu().clone(), uploaded.film().clone()));
+        assert!(without_noise(&developer, &take, None).0.is_live());
+        assert!(!without_noise(&other, &take, None).0.is_live());
+        assert!(!without_noise(&developer, &take, Some(Denoiser::ATrous)).0.is_live());
+        developer.gpu().check().and(other.gpu().check()).expect("no buffer is used elsewhere");
     }
 }

@@ -14,7 +14,7 @@ use super::screen::{Screen, TextureCopies};
 use super::{App, Start};
 use crate::error::{Error, Result};
 use crate::image::Rgb8;
-use crate::render::gpu::Gpu;
+use crate::render::gpu::{DeviceChoice, Gpu};
 
 /// Frames drawn after everything is settled: layout and tooltips need a few.
 const SETTLING_FRAMES: u32 = 4;
@@ -88,6 +88,11 @@ impl Studio {
         // Opening a panel may have changed the viewport.
         self.settle()?;
         self.canvas.read()
+    }
+
+    /// Whether the CPU is to render.
+    pub fn is_on_cpu(&self) -> bool {
+        self.app.document.light.device == DeviceChoice::Cpu
     }
 
     /// Loses the device, as a driver reset would; for tests of what happens then.

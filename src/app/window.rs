@@ -28,8 +28,10 @@ struct Repaint {
     at: Instant,
 }
 
-/// Device losses this soon after one another are not worth another device.
+/// Losses of a device sooner after one another than this belong together.
 const LOSS_GAP: Duration = Duration::from_secs(10);
+/// After so many of them, another device is not worth trying.
+const MOST_LOSSES: u32 = 5;
 
 /// Opens the window and stays until it is closed; then settings are written to `settings_path`.
 /// Returns what closed it, if it was not a person.
@@ -85,7 +87,8 @@ struct Running {
     /// There is none only while one is exchanged for another.
     painter: Option<Painter>,
     copies: TextureCopies,
-    lost: Option<Instant>,
+    /// When a device was lost last, and how many were in a row.
+    lost: Option<(Instant, u32)>,
     app: App,
     title: String,
 }
@@ -232,10 +235,11 @@ impl Running {
         let closes = |why: &dyn std::fmt::Display| {
             Error::new(format!("{loss}, and the window cannot be drawn otherwise: {why}"))
         };
-        let now = Instant::now();
-        if self.lost.replace(now).is_some_and(|before| now - before < LOSS_GAP) {
-            return Err(closes(&"it was lost again at once"));
+        let before = self.lost.filter(|(at, _)| at.elapsed() < LOSS_GAP).map_or(0, |(_, n)| n);
+        if before == MOST_LOSSES {
+            return Err(closes(&"it is lost again and again"));
         }
+        self.lost = Some((Instant::now(), before + 1));
         // Two surfaces of one window exclude each other.
         self.painter = None;
         let adapter = self.adapter.as_deref();

@@ -48,6 +48,12 @@ impl LinearPicture {
         self.is_live
     }
 
+    /// Its sums.
+    #[cfg(test)]
+    pub(crate) fn film(&self) -> &DeviceFilm {
+        &self.film
+    }
+
     /// Pixels across and down.
     pub(crate) fn size(&self) -> [u32; 2] {
         [self.film.width, self.film.height]
@@ -182,9 +188,10 @@ impl Developer {
         film.map_or_else(|| picture.clone(), LinearPicture::fixed)
     }
 
-    /// Whether [`Self::denoised`] can filter a film of so many pixels.
+    /// Whether [`Self::denoised`] can filter a film of so many pixels without keeping the device from
+    /// drawing: software would for seconds.
     pub(crate) fn can_denoise(&self, width: u32, height: u32) -> bool {
-        self.a_trous.fits(&self.gpu, width, height)
+        !self.gpu.facts().is_software() && self.a_trous.fits(&self.gpu, width, height)
     }
 
     /// [`auto_exposure_ev`] of the balanced picture; waits for the device.

@@ -137,8 +137,8 @@ pub struct Take {
     pub grid: Option<Arc<LightGrid>>,
     /// The GPU at work; `None` is the CPU.
     pub gpu: Option<Arc<GpuFigures>>,
-    /// The sums of `film` or later ones, where they are on the window's own device.
-    pub(crate) on_device: Option<DeviceFilm>,
+    /// The sums of `film` or later ones where a GPU has them, and that GPU.
+    pub(crate) on_device: Option<(Gpu, DeviceFilm)>,
 }
 
 /// The latest picture.

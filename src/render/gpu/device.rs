@@ -1,13 +1,14 @@
 //! Adapters: what there is, which one to take, and a connection to it.
 
 use std::collections::HashMap;
+use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use wgpu::wgt::WgpuHasDisplayHandle;
 use wgpu::{Adapter, Backends, DeviceType, Features, Instance, InstanceDescriptor, Limits};
-use wgpu::{PollError, PollType, SubmissionIndex, Surface};
+use wgpu::{PollType, SubmissionIndex, Surface};
 
 use super::pipeline::Pipeline;
 use crate::error::{Error, Result};
@@ -168,9 +169,8 @@ impl DeviceChoice {
     }
 }
 
-/// Longest wait for the device in one piece. Meanwhile nobody else who shares it can present a frame:
-/// wgpu 30 holds a lock while it waits, which presenting takes too.
-const LONGEST_WAIT: Duration = Duration::from_millis(1);
+/// Time between two looks at whether the device has done its work.
+const LOOK_GAP: Duration = Duration::from_micros(100);
 
 /// A connection to an adapter; clones share it.
 #[derive(Clone)]
@@ -182,6 +182,8 @@ pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     trouble: Arc<Mutex<Option<String>>>,
+    /// Whether it presents frames on another thread than this.
+    has_window: bool,
     /// Kernels compiled so far, by their source.
     pub(super) pipelines: Arc<Mutex<HashMap<String, Arc<Pipeline>>>>,
 }
@@ -244,7 +246,8 @@ impl Gpu {
             let mut found = enumerate(&instance, Some(&surface));
             found.sort_by_key(|(facts, _)| !facts.is_called(name));
             if let Some((facts, adapter)) = found.into_iter().next() {
-                return Self::connect(facts, instance, adapter);
+                let gpu = Self::connect(facts, instance, adapter)?;
+                return Ok(Self { has_window: true, ..gpu });
             }
         }
         Err(Error::new(reason))
@@ -286,6 +289,7 @@ impl Gpu {
             device,
             queue,
             trouble,
+            has_window: false,
             pipelines: Arc::default(),
         })
     }
@@ -293,6 +297,11 @@ impl Gpu {
     /// What it is.
     pub fn facts(&self) -> &AdapterFacts {
         &self.facts
+    }
+
+    /// Whether both are clones of one connection: only then may they use each other's buffers.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        self.device == other.device
     }
 
     /// The first thing that went wrong on the device, if any did; it is of no use afterwards.
@@ -313,18 +322,28 @@ impl Gpu {
     /// # Errors
     /// As [`Self::check`].
     pub(crate) fn wait_for(&self, submission: Option<SubmissionIndex>) -> Result<()> {
-        let waited = loop {
-            let wait = PollType::Wait {
-                submission_index: submission.clone(),
-                timeout: Some(LONGEST_WAIT),
-            };
-            match self.device.poll(wait) {
-                Err(PollError::Timeout) => self.check()?,
-                waited => break waited,
-            }
-        };
+        if self.has_window {
+            return self.wait_without_lock();
+        }
+        let waited =
+            self.device.poll(PollType::Wait { submission_index: submission, timeout: None });
         self.check()?;
         waited.map(|_| ()).map_err(|e| Error::new(format!("{}: {e}", self.facts.name)))
+    }
+
+    /// While wgpu 30 waits it holds a lock that presenting a frame takes too, and waiting in short
+    /// pieces on several threads makes it panic. So this only looks now and then.
+    fn wait_without_lock(&self) -> Result<()> {
+        let (sender, done) = channel();
+        self.queue.on_submitted_work_done(move || {
+            // Nobody waits any more if the device has failed.
+            let _ = sender.send(());
+        });
+        while done.recv_timeout(LOOK_GAP) == Err(RecvTimeoutError::Timeout) {
+            let _ = self.device.poll(PollType::Poll);
+            self.check()?;
+        }
+        self.check()
     }
 
     /// Reads the first `bytes` bytes of a buffer back, once what was submitted has been done.
@@ -388,7 +407,7 @@ impl Gpu {
             Error::new(format!("{}: results cannot be read back: {e}", self.facts.name))
         };
         let submission = self.queue.submit([commands.finish()]);
-        let (sender, receiver) = std::sync::mpsc::channel();
+        let (sender, receiver) = channel();
         staging.map_async(wgpu::MapMode::Read, .., move |result| {
             // The receiver waits below, unless the wait has failed.
             let _ = sender.send(result);
