@@ -145,7 +145,7 @@ impl Case<'_> {
             session.advance(1, &never).expect("the CPU does not fail");
         }
         session.advance(samples, &never).expect("the CPU does not fail");
-        (session.film().pixels().iter().map(|p| p.mean()).collect(), *session.figures())
+        (session.film().pixels().iter().map(|p| p.mean()).collect(), session.figures())
     }
 }
 

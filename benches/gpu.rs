@@ -47,7 +47,7 @@ fn cancel_row(gpu: &Gpu, name: &str, world: &World, environment: &Environment) {
     let view = View { width: 1280, height: 720, ..view(world, 5) };
     let mut session = Session::on_gpu(world, environment, view, &stage).expect("it fits");
     let never = AtomicBool::new(false);
-    while session.film().min_samples() == 0 {
+    while session.samples() == 0 {
         session.advance(1, &never).expect("it runs");
     }
     let mut waits: Vec<Duration> = (0..20_u64)
@@ -84,7 +84,7 @@ fn row(gpu: &Gpu, name: &str, world: &World, environment: &Environment, bounces:
     let never = AtomicBool::new(false);
     // Learning and the first pass, with which kernels are compiled, do not count.
     for session in &mut sessions {
-        while session.film().min_samples() == 0 {
+        while session.samples() == 0 {
             session.advance(1, &never).expect("it runs");
         }
     }
@@ -92,8 +92,9 @@ fn row(gpu: &Gpu, name: &str, world: &World, environment: &Environment, bounces:
     let mut rays = 0.0;
     for _ in 0..ROUNDS {
         for (session, best) in sessions.iter_mut().zip(&mut best) {
-            let before = *session.figures();
+            let before = session.figures();
             session.advance(SAMPLES, &never).expect("it runs");
+            session.settle().expect("it runs");
             let after = session.figures();
             rays = (after.rays - before.rays) as f64;
             *best = best.min(after.render_seconds - before.render_seconds);

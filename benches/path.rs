@@ -39,7 +39,7 @@ pub(crate) fn bench(criterion: &mut Criterion) {
     group.sample_size(10);
     for sampling in [Sampling::Plain, Sampling::Adaptive] {
         let mut session = Session::new(&world, &environment, view(sampling, 1 << 16));
-        while session.film().min_samples() == 0 {
+        while session.samples() == 0 {
             session.advance(1, &never).expect("the CPU does not fail");
         }
         let figures = session.figures();

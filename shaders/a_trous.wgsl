@@ -4,7 +4,8 @@ struct Pass {
     size: vec2u,
     // Pixels between two taps.
     step: u32,
-    padding: u32,
+    // Factor from the film's sums to those of radiance.
+    unscale: f32,
 }
 
 // As in `path.wgsl`: sums over hits.
@@ -80,12 +81,13 @@ fn undress(@builtin(global_invocation_id) id: vec3u) {
     guide.albedo = max(seen, vec3f(LEAST_ALBEDO));
     guides[index] = guide;
 
-    let mean = sum[index].xyz / samples;
+    let mean = sum[index].xyz / samples * settings.unscale;
     let brightness = luminance(mean);
     // One sample says nothing about its error: then anything goes.
     var variance = brightness * brightness + 1.0;
     if counts[index].x > 1u {
-        let spread = max(sum[index].w / samples - brightness * brightness, 0.0);
+        let squared = sum[index].w / samples * settings.unscale * settings.unscale;
+        let spread = max(squared - brightness * brightness, 0.0);
         variance = min(variance, spread / (samples - 1.0));
     }
     let scale = 1.0 / luminance(guide.albedo);

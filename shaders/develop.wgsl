@@ -17,6 +17,8 @@ struct Develop {
     opacity: vec2f,
     is_balanced: u32,
     has_overlay: u32,
+    // Factor from the film's sums to those of radiance.
+    unscale: f32,
 }
 
 @group(0) @binding(0) var<uniform> settings: Develop;
@@ -66,7 +68,7 @@ fn radiance(pixel: vec2u) -> vec3f {
     if samples == 0u && settings.under_size.x > 0u {
         return before(pixel);
     }
-    return sum[index].xyz / f32(max(samples, 1u));
+    return sum[index].xyz / f32(max(samples, 1u)) * settings.unscale;
 }
 
 fn finite(x: f32) -> f32 {

@@ -10,13 +10,13 @@ struct Work {
     first_high: u32,
     // Tiles or paths.
     count: u32,
-    first_sample: u32,
+    // Each pixel is brought so many samples further, but not beyond `end_sample` of them.
     samples: u32,
-    // Whether to add to the sums that are there.
-    resumes: u32,
+    end_sample: u32,
     // Of so many samples one is counted; 0 if none is.
     stride: u32,
-    padding: u32,
+    padding_0: u32,
+    padding_1: u32,
 }
 
 struct Globals {
@@ -80,4 +80,9 @@ struct Globals {
     // What the camera sees in place of the map: a colour, or how little the map is blurred.
     background: vec3f,
     background_concentration: f32,
+    // Factor on what is added to the film, a power of two: squares of the brightest do not overflow.
+    film_scale: f32,
+    padding_2: u32,
+    padding_3: u32,
+    padding_4: u32,
 }

@@ -1,15 +1,6 @@
 // Adds samples to pixels: one invocation a pixel, which starts its next sample as soon as the last
 // path has ended, so that no lane waits for the longest path of each sample.
 
-struct PixelSums {
-    sum: vec3f,
-    luminance_squared: f32,
-    rays: u32,
-    invalid: u32,
-    padding_0: u32,
-    padding_1: u32,
-}
-
 fn start_sample(x: u32, y: u32, index: u32) -> Path {
     var sampler =
         sampler_new(globals.seed, y * globals.width + x, index - globals.first_of_sequence);
@@ -37,45 +28,21 @@ fn render(
         return;
     }
     let pixel = y * globals.width + x;
-    var sums: PixelSums;
-//#if layers
-    var surface = FirstHit(vec3f(0.0), 0.0, vec3f(0.0), 0.0);
-//#end
-    if globals.work.resumes != 0u {
-        sums = film[pixel];
-//#if layers
-        surface = surfaces[pixel];
-//#end
+    var index = film_counts[pixel].x;
+    let end = min(index + globals.work.samples, globals.work.end_sample);
+    if index >= end {
+        return;
     }
-    var index = globals.work.first_sample;
-    let end = globals.work.first_sample + globals.work.samples;
     var path = start_sample(x, y, index);
     loop {
         if path_step(&path) {
             continue;
         }
-        if is_finite3(path.radiance) {
-            sums.sum += path.radiance;
-            let light = luminance(path.radiance);
-            sums.luminance_squared = min(sums.luminance_squared + light * light, F32_MAX);
-        } else {
-            sums.invalid += 1u;
-        }
-        sums.rays += path.rays;
-//#if layers
-        surface.albedo += path.first_hit.albedo;
-        surface.depth += path.first_hit.depth;
-        surface.normal += path.first_hit.normal;
-        surface.hits += path.first_hit.hits;
-//#end
+        add_to_film(pixel, &path);
         index += 1u;
         if index == end {
             break;
         }
         path = start_sample(x, y, index);
     }
-    film[pixel] = sums;
-//#if layers
-    surfaces[pixel] = surface;
-//#end
 }

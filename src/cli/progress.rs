@@ -1,6 +1,7 @@
 //! The line that says how far it is; nothing when stderr is not a terminal.
 
-use std::time::Duration;
+use std::cell::Cell;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -9,7 +10,12 @@ use crate::render::{Phase, Session, StopRule};
 /// A live line on the terminal.
 pub(super) struct Progress {
     bar: ProgressBar,
+    /// The noise shown, and when it was found.
+    noise: Cell<Option<(Instant, f64)>>,
 }
+
+/// The noise is looked at so often: that takes a look at every pixel, wherever it is.
+const NOISE_EVERY: Duration = Duration::from_secs(2);
 
 impl Progress {
     /// Starts with a message; stays invisible unless stderr is a terminal (indicatif looks).
@@ -20,7 +26,7 @@ impl Progress {
         }
         bar.set_message(message.to_owned());
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self { bar }
+        Self { bar, noise: Cell::default() }
     }
 
     /// Shows another message.
@@ -31,8 +37,19 @@ impl Progress {
     /// Shows where a session is.
     pub(super) fn show(&self, session: &Session<'_>, rule: &StopRule) {
         if !self.bar.is_hidden() {
-            self.say(line(session, rule));
+            self.say(line(session, rule, self.noise(session)));
         }
+    }
+
+    /// Noise of the film, a moment old; infinite before there is any.
+    fn noise(&self, session: &Session<'_>) -> f64 {
+        let known = self.noise.get().filter(|(at, _)| at.elapsed() < NOISE_EVERY);
+        let (at, noise) = known.unwrap_or_else(|| {
+            let is_there = session.samples() > 1;
+            (Instant::now(), if is_there { session.film().noise() } else { f64::INFINITY })
+        });
+        self.noise.set(noise.is_finite().then_some((at, noise)));
+        noise
     }
 
     /// Leaves a sentence on stderr, above the line.
@@ -46,14 +63,13 @@ impl Progress {
     }
 }
 
-fn line(session: &Session<'_>, rule: &StopRule) -> String {
+fn line(session: &Session<'_>, rule: &StopRule, noise: f64) -> String {
     let figures = session.figures();
     if session.phase() == Phase::Learning {
         let (done, total) = (figures.learning_paths, session.view().learning_paths);
         return format!("learning {}%", 100 * done / total.max(1));
     }
-    let samples = session.film().min_samples();
-    let noise = session.film().noise();
+    let samples = session.samples();
     let mut text = rule.samples.map_or_else(
         || format!("rendering, {samples} samples"),
         |limit| format!("rendering, {samples}/{limit} samples"),
@@ -71,7 +87,7 @@ fn line(session: &Session<'_>, rule: &StopRule) -> String {
 /// falling with the root of the samples.
 fn seconds_left(session: &Session<'_>, rule: &StopRule, noise: f64) -> Option<f64> {
     let rendered = session.figures().render_seconds;
-    let samples = f64::from(session.film().min_samples());
+    let samples = f64::from(session.samples());
     let by_samples = rule.samples.map(|limit| rendered * (f64::from(limit) / samples - 1.0));
     let by_clock = rule.seconds.map(|limit| limit - session.elapsed_seconds());
     let by_noise = rule.noise.map(|limit| rendered * ((noise / limit).powi(2) - 1.0));

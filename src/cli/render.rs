@@ -305,7 +305,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         device::start(arguments.device, gpu.as_ref(), &world, &environment, view, &mut notices)?;
     let outcome = work(&mut session, &rule, &cancel, &progress, arguments, &mut notices);
     progress.finish();
-    if session.film().min_samples() == 0 {
+    if session.samples() == 0 {
         outcome?;
         return Ok(());
     }
@@ -320,7 +320,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         world: &world,
         environment: &environment,
         film: session.film(),
-        figures: session.figures(),
+        figures: &session.figures(),
         gpu: session.gpu_figures(),
         phases: &phases,
         notices: &notices,
@@ -520,12 +520,17 @@ fn work(
         if stopped || session.has_learned_enough(rule) {
             session.finish_learning();
         }
-        let samples = session.film().min_samples();
-        if samples > 0 && (stopped || session.is_done(rule)) {
+        let is_last = session.samples() > 0 && (stopped || session.is_done(rule));
+        let outcome = if is_last {
+            session.settle()
+        } else {
+            let cancel = if stopped { &never } else { &**cancel };
+            session.advance(session.next_pass(rule), cancel)
+        };
+        if is_last && outcome.is_ok() {
             return Ok(());
         }
-        let cancel = if stopped { &never } else { &**cancel };
-        if let Err(failure) = session.advance(session.next_pass(rule), cancel) {
+        if let Err(failure) = outcome {
             if arguments.device != DeviceChoice::Auto {
                 return Err(failure);
             }

@@ -58,7 +58,7 @@ impl Passes {
         // The film's own may have gone on when the result is looked at.
         let counts = make("counts", LIGHT_BYTES);
         let settings = |step: u32| {
-            let words = [film.width, film.height, step, 0];
+            let words = [film.width, film.height, step, film.scale.recip().to_bits()];
             filled(gpu, wgpu::BufferUsages::UNIFORM, bytemuck::cast_slice(&words))
         };
         let mut commands = gpu.device.create_command_encoder(&Default::default());
@@ -93,6 +93,6 @@ impl Passes {
         dispatch(gpu, &mut commands, &self.dress, &entries, size);
         gpu.queue.submit([commands.finish()]);
         let [width, height] = size;
-        Some(DeviceFilm { sum: result, counts, surfaces: None, width, height })
+        Some(DeviceFilm { sum: result, counts, surfaces: None, width, height, scale: 1.0 })
     }
 }

@@ -117,6 +117,8 @@ struct Uniforms {
     opacity: [f32; 2],
     is_balanced: u32,
     has_overlay: u32,
+    unscale: f32,
+    padding: [u32; 3],
 }
 
 impl Uniforms {
@@ -132,6 +134,8 @@ impl Uniforms {
             opacity: settings.opacity,
             is_balanced: (matrix != Mat3::IDENTITY).into(),
             has_overlay: 0,
+            unscale: picture.film.scale.recip(),
+            padding: [0; 3],
         }
     }
 }

@@ -45,6 +45,7 @@ impl Developer {
             surfaces,
             width: film.width,
             height: film.height,
+            scale: 1.0,
         })
     }
 
@@ -74,6 +75,7 @@ impl Developer {
             surfaces: None,
             width: image.width,
             height: image.height,
+            scale: 1.0,
         })
     }
 

@@ -1,6 +1,6 @@
 //! What the samples add up to.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use crate::color::luminance;
 use crate::image::Image;
@@ -25,7 +25,7 @@ pub struct Surface {
 }
 
 /// The picture so far.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Film {
     /// Pixels per row.
     pub width: u32,
@@ -46,18 +46,20 @@ impl Pixel {
         self.invalid += u32::from(result.was_invalid);
     }
 
-    /// Adds what a device has summed up over `samples` samples.
-    pub(super) fn add_sums(
-        &mut self,
-        sum: Vec3,
-        luminance_squared: f32,
-        samples: u32,
-        invalid: u32,
-    ) {
-        self.sum.iter_mut().zip(sum.to_array()).for_each(|(s, r)| *s += f64::from(r));
-        self.luminance_squared += f64::from(luminance_squared);
-        self.samples += samples;
-        self.invalid += invalid;
+    /// Of sums over `samples` samples: red, green, blue and squared luminance.
+    pub(super) fn of_sums([r, g, b, luminance_squared]: [f64; 4], samples: u32, invalid: u32) -> Self {
+        Self { sum: [r, g, b], luminance_squared, samples, invalid }
+    }
+
+    /// What [`Self::of_sums`] takes.
+    pub(super) fn sums(&self) -> [f64; 4] {
+        let [r, g, b] = self.sum;
+        [r, g, b, self.luminance_squared]
+    }
+
+    /// Number of samples that were left out because they were not finite.
+    pub(super) fn invalid(&self) -> u32 {
+        self.invalid
     }
 
     /// Number of samples taken.
@@ -98,16 +100,27 @@ impl Surface {
     /// Adds the first hit of one sample, or that there was none.
     pub fn add(&mut self, result: &PathResult) {
         if let Some(hit) = result.first_hit {
-            self.add_sums(hit.albedo, hit.normal, hit.depth, 1);
+            self.albedo += hit.albedo.as_dvec3();
+            self.normal += hit.normal.as_dvec3();
+            self.depth += f64::from(hit.depth);
+            self.hits += 1;
         }
     }
 
-    /// Adds what a device has summed up over `hits` first hits.
-    pub(super) fn add_sums(&mut self, albedo: Vec3, normal: Vec3, depth: f32, hits: u32) {
-        self.albedo += albedo.as_dvec3();
-        self.normal += normal.as_dvec3();
-        self.depth += f64::from(depth);
-        self.hits += hits;
+    /// Of sums over first hits: albedo, depth, normal and their number.
+    pub(super) fn of_sums([r, g, b, depth, x, y, z, hits]: [f64; 8]) -> Self {
+        Self {
+            albedo: DVec3::new(r, g, b),
+            normal: DVec3::new(x, y, z),
+            depth,
+            hits: hits as u32,
+        }
+    }
+
+    /// What [`Self::of_sums`] takes.
+    pub(super) fn sums(&self) -> [f64; 8] {
+        let ([r, g, b], [x, y, z]) = (self.albedo.to_array(), self.normal.to_array());
+        [r, g, b, self.depth, x, y, z, f64::from(self.hits)]
     }
 }
 

@@ -6,7 +6,8 @@
 //! order, and learning counts integers.
 
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
@@ -142,6 +143,10 @@ impl View {
 const LEARNING_SHARE: u64 = 64;
 /// The same where each vertex tries several samples of the map: such a path takes four times as long.
 const ADAPTIVE_LEARNING_SHARE: u64 = 96;
+/// Seconds a pass on a GPU should take: what is told to the user between two is this old at most.
+const GPU_PASS_SECONDS: f64 = 0.1;
+/// A GPU's film is read at least this often: so much work is lost with a device.
+const KEPT_SECONDS: Duration = Duration::from_secs(5);
 /// Learning takes at most this share of the seconds asked for.
 const LEARNING_TIME_SHARE: f64 = 0.05;
 
@@ -235,7 +240,14 @@ pub struct Session<'a> {
     rays: CameraRays,
     fog: Option<Fog>,
     engine: Engine,
-    film: Film,
+    /// The film as it is; made when somebody asks.
+    film: OnceLock<Film>,
+    /// The film as it was when somebody asked last, to be brought up to date; it survives a GPU.
+    film_before: Mutex<Film>,
+    /// Fewest samples of any pixel.
+    samples: u32,
+    /// When a GPU's film was read last.
+    last_read: Instant,
     whole_map: Option<LightGrid>,
     learned: Option<LightGrid>,
     sequence: Sequence,
@@ -273,7 +285,10 @@ impl<'a> Session<'a> {
         };
         let learning = new_learning(world, environment, &view, &rays);
         Self {
-            film: Film::new(view.width, view.height, view.layers),
+            film: OnceLock::new(),
+            film_before: Mutex::default(),
+            samples: 0,
+            last_read: Instant::now(),
             world,
             environment,
             fog: view.fog(world),
@@ -305,10 +320,12 @@ impl<'a> Session<'a> {
     }
 
     /// Does one piece of work: a learning pass, or one that brings every pixel `samples` further.
-    /// Returns early, with what is done so far kept, when `cancel` becomes true.
+    /// Returns early, with what is done so far kept, when `cancel` becomes true. A GPU may still be at
+    /// work on the last hundredths of a second of it; see [`Self::settle`].
     ///
     /// # Errors
-    /// If the GPU fails; the film so far is kept, and [`Self::continue_on_cpu`] goes on from there.
+    /// If the GPU fails; the film as it was read last is kept, and [`Self::continue_on_cpu`] goes on
+    /// from there.
     pub fn advance(&mut self, samples: u32, cancel: &AtomicBool) -> Result<()> {
         let (start, law_seconds) = (Instant::now(), self.figures.law_seconds);
         match self.phase {
@@ -318,7 +335,7 @@ impl<'a> Session<'a> {
                 result
             }
             Phase::Rendering => {
-                let result = self.render(self.film.min_samples() + samples, cancel);
+                let result = self.render(self.samples.saturating_add(samples), cancel);
                 let laws = self.figures.law_seconds - law_seconds;
                 self.figures.learning_seconds += laws;
                 self.figures.render_seconds += start.elapsed().as_secs_f64() - laws;
@@ -327,9 +344,44 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Lets the CPU take over from a GPU, with everything learned and rendered so far.
+    /// Waits for what a GPU is still at work on and reads its film, so that film and figures are those
+    /// of now.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub fn settle(&mut self) -> Result<()> {
+        let start = Instant::now();
+        if let Engine::Gpu(renderer) = &mut self.engine {
+            renderer.settle()?;
+            if self.film.get().is_none() {
+                let film = self.film_before.get_mut().unwrap_or_else(PoisonError::into_inner);
+                prepare_film(film, &self.view);
+                renderer.read_film(film)?;
+                self.last_read = Instant::now();
+                self.film = OnceLock::from(std::mem::take(film));
+            }
+            self.figures.render_seconds += start.elapsed().as_secs_f64();
+        }
+        Ok(())
+    }
+
+    /// Lets the CPU take over from a GPU, with everything learned and rendered so far, as far as it can
+    /// still be read.
     pub fn continue_on_cpu(&mut self) {
+        if matches!(self.engine, Engine::Cpu) {
+            return;
+        }
+        self.leave_gpu();
         self.engine = Engine::Cpu;
+    }
+
+    /// Reads what there is on a GPU that is to be left.
+    fn leave_gpu(&mut self) {
+        let film = self.film();
+        (self.samples, self.figures.samples) = (film.min_samples(), film.total_samples());
+        self.figures.rays = self.figures().rays;
+        // With a device goes what was done since its film was read.
+        self.sequence.first_sample = self.sequence.first_sample.min(self.samples);
     }
 
     /// Lets a GPU take over, on whose stage are this session's world and environment, with
@@ -338,8 +390,13 @@ impl<'a> Session<'a> {
     /// # Errors
     /// If it does not fit on the device; the session stays where it is.
     pub fn continue_on_gpu(&mut self, stage: &gpu::Stage) -> Result<()> {
+        if matches!(self.engine, Engine::Gpu(_)) {
+            self.leave_gpu();
+        }
         let (world, environment) = (self.world, self.environment);
-        let mut renderer = gpu::Renderer::new(stage, world, environment, &self.view, &self.rays)?;
+        let film = (self.figures.samples > 0).then(|| self.film());
+        let mut renderer =
+            gpu::Renderer::new(stage, world, environment, &self.view, &self.rays, film)?;
         renderer.set_grid(self.learned.as_ref().or(self.whole_map.as_ref()))?;
         self.engine = Engine::Gpu(Box::new(renderer));
         Ok(())
@@ -354,12 +411,27 @@ impl<'a> Session<'a> {
     }
 
     /// Samples per pixel that the next pass should take: growing with what is there, so that few
-    /// passes are needed and none is much longer than those before it. It depends on counts alone:
-    /// a picture that stops by noise is repeatable.
+    /// passes are needed and none is much longer than those before it. Where noise is asked for it
+    /// depends on counts alone, so that the picture is repeatable; else a GPU takes as many as it can in
+    /// a moment.
     pub fn next_pass(&self, rule: &StopRule) -> u32 {
-        let samples = self.film.min_samples();
-        let pass = (samples / 16).clamp(1, 64);
+        let samples = self.samples;
+        let pass = match &self.engine {
+            Engine::Cpu => (samples / 16).clamp(1, 64),
+            // Each look at the noise reads the film.
+            Engine::Gpu(_) if rule.noise.is_some() => (samples / 8).clamp(1, 64),
+            Engine::Gpu(_) => {
+                let each = self.figures.render_seconds / f64::from(samples.max(1));
+                let affordable = (GPU_PASS_SECONDS / each.max(1e-9)) as u32;
+                affordable.max(samples / 16).min(samples).clamp(1, 64)
+            }
+        };
         rule.samples.map_or(pass, |limit| pass.min(limit.saturating_sub(samples)).max(1))
+    }
+
+    /// Fewest samples any pixel has: [`Film::min_samples`] without a film.
+    pub fn samples(&self) -> u32 {
+        self.samples
     }
 
     /// What the next [`Self::advance`] will do.
@@ -400,9 +472,27 @@ impl<'a> Session<'a> {
         self.learning.as_ref().map(|learning| &learning.grid)
     }
 
-    /// The film so far.
+    /// The film so far. A GPU's is read back at the first call after an [`Self::advance`], which takes
+    /// its time; should the GPU fail meanwhile, it is the film as it was read last, and the next call of
+    /// [`Self::advance`] or [`Self::settle`] says why.
     pub fn film(&self) -> &Film {
-        &self.film
+        self.film.get_or_init(|| {
+            let mut before = self.film_before.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut film = std::mem::take(&mut *before);
+            prepare_film(&mut film, &self.view);
+            if let Engine::Gpu(renderer) = &self.engine {
+                let _ = renderer.read_film(&mut film);
+            }
+            film
+        })
+    }
+
+    /// The film where a GPU keeps it, and that GPU; `None` on the CPU.
+    pub(crate) fn film_on_device(&self) -> Option<(gpu::Gpu, gpu::DeviceFilm)> {
+        match &self.engine {
+            Engine::Cpu => None,
+            Engine::Gpu(renderer) => renderer.film_on_device(),
+        }
     }
 
     /// What is rendered.
@@ -415,9 +505,13 @@ impl<'a> Session<'a> {
         self.learned.as_ref().or(self.whole_map.as_ref())
     }
 
-    /// What has been done so far.
-    pub fn figures(&self) -> &Figures {
-        &self.figures
+    /// What has been done so far. A GPU's rays are those up to the last reading of its film.
+    pub fn figures(&self) -> Figures {
+        let rays = match &self.engine {
+            Engine::Cpu => 0,
+            Engine::Gpu(renderer) => renderer.rays(),
+        };
+        Figures { rays: self.figures.rays + rays, ..self.figures }
     }
 
     /// Seconds of learning and rendering so far.
@@ -427,10 +521,10 @@ impl<'a> Session<'a> {
 
     /// Whether a rule says to stop. Noise is only asked for from 16 samples on.
     pub fn is_done(&self, rule: &StopRule) -> bool {
-        let samples = self.film.min_samples();
+        let samples = self.samples;
         rule.samples.is_some_and(|limit| samples >= limit)
             || (samples > 0 && rule.seconds.is_some_and(|limit| self.elapsed_seconds() >= limit))
-            || (samples >= 16 && rule.noise.is_some_and(|limit| self.film.noise() <= limit))
+            || (samples >= 16 && rule.noise.is_some_and(|limit| self.film().noise() <= limit))
     }
 
     fn tracer<'b>(&'b self, counts: Option<&'b LearningGrid>) -> PathTracer<'b> {
@@ -479,7 +573,7 @@ impl<'a> Session<'a> {
         let generation = grid.map_or(0, LightGrid::generation);
         if generation != self.sequence.generation {
             // Pixels that are ahead begin later in it.
-            self.sequence = Sequence { generation, first_sample: self.film.min_samples() };
+            self.sequence = Sequence { generation, first_sample: self.samples };
         }
         match &mut self.engine {
             Engine::Cpu => Ok(()),
@@ -508,23 +602,42 @@ impl<'a> Session<'a> {
     }
 
     fn render(&mut self, target: u32, cancel: &AtomicBool) -> Result<()> {
-        let stride = self.prepare_counting(target - self.film.min_samples());
-        let mut film = std::mem::replace(&mut self.film, Film::new(0, 0, false));
+        let stride = self.prepare_counting(target - self.samples);
+        let pass = Pass { target, stride, sequence: self.sequence };
+        let film_before = self.film_before.get_mut().unwrap_or_else(PoisonError::into_inner);
+        if let Some(film) = self.film.take() {
+            *film_before = film;
+        }
+        let mut film = match &self.engine {
+            Engine::Cpu => std::mem::take(film_before),
+            Engine::Gpu(_) => Film::default(),
+        };
         let learning = self.learning.as_ref().filter(|learning| !learning.is_over);
         let counts = learning.map(|learning| &learning.grid);
-        let pass = Pass { target, stride, sequence: self.sequence };
-        let done = match &mut self.engine {
+        let samples = match &mut self.engine {
             Engine::Cpu => {
+                prepare_film(&mut film, &self.view);
                 let tracer = self.tracer(counts);
-                Ok(cpu::render(&tracer, &self.rays, &self.view, pass, &mut film, cancel))
+                let (samples, rays) =
+                    cpu::render(&tracer, &self.rays, &self.view, pass, &mut film, cancel);
+                self.samples = film.min_samples();
+                self.film = OnceLock::from(film);
+                self.figures.rays += rays;
+                samples
             }
-            Engine::Gpu(renderer) => renderer.render(pass, &mut film, counts, cancel),
+            Engine::Gpu(renderer) => {
+                let done = renderer.render(pass, counts, cancel)?;
+                self.samples = done.least;
+                if self.last_read.elapsed() > KEPT_SECONDS {
+                    // What is on the host outlives the device.
+                    let _ = self.film();
+                    self.last_read = Instant::now();
+                }
+                done.samples
+            }
         };
-        let is_whole = film.min_samples() >= target;
-        self.film = film;
-        let (samples, rays) = done?;
         self.figures.samples += samples;
-        self.figures.rays += rays;
+        let is_whole = self.samples >= target;
         self.learn_from_rendered(samples.div_ceil(u64::from(stride)), is_whole)
     }
 
@@ -554,7 +667,7 @@ impl<'a> Session<'a> {
         self.figures.counted_paths += paths;
         learning.paths_of_pass += paths;
         let all = self.figures.learning_paths + self.figures.counted_paths;
-        let samples = self.film.min_samples();
+        let samples = self.samples;
         if !is_whole || !samples.is_power_of_two() {
             return Ok(());
         }
@@ -564,6 +677,13 @@ impl<'a> Session<'a> {
         }
         self.update_laws();
         self.take_up_laws()
+    }
+}
+
+/// Makes a black film of one that has no pixels yet.
+fn prepare_film(film: &mut Film, view: &View) {
+    if film.pixels().is_empty() {
+        *film = Film::new(view.width, view.height, view.layers);
     }
 }
 

@@ -84,6 +84,7 @@ pub(super) fn of_picture(
     let view = settings.view(camera, &Frame { size, ..frame.clone() }, 0);
     let mut session = Session::new(world, environment, view);
     session.advance(PROBE_SAMPLES, &AtomicBool::new(false))?;
+    session.settle()?;
     let probe = session.film().image();
     Ok(digest.bytes(bytemuck::cast_slice(probe.pixels.as_flattened())))
 }

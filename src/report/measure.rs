@@ -173,15 +173,16 @@ pub(super) fn measure(
         if cancel.load(Ordering::Relaxed) {
             return Ok(None);
         }
-        let figures = session.figures();
-        let elapsed = place.table_seconds + figures.elapsed_seconds();
-        if elapsed < next && elapsed < seconds {
+        if place.table_seconds + session.elapsed_seconds() < next.min(seconds) {
             continue;
         }
+        session.settle()?;
+        let figures = session.figures();
+        let elapsed = place.table_seconds + figures.elapsed_seconds();
         points.push(Point {
             seconds: elapsed,
             render_seconds: figures.render_seconds,
-            samples: session.film().min_samples(),
+            samples: session.samples(),
             rays: figures.rays,
             errors: None,
         });
@@ -195,7 +196,7 @@ pub(super) fn measure(
         method: method.0.to_owned(),
         seed,
         table_seconds: place.table_seconds,
-        figures: *session.figures(),
+        figures: session.figures(),
         memory: memory(place, &session),
         nanoseconds_per_ray: None,
         points,

@@ -147,7 +147,7 @@ impl Reference {
         let Some(mut session) = place.learned(&settings, seed, cancel)? else { return Ok(false) };
         let limit = self.facts.samples_per_picture;
         loop {
-            let samples = session.film().min_samples();
+            let samples = session.samples();
             let figures = session.figures();
             let is_done = if limit > 0 {
                 samples >= limit
@@ -163,6 +163,7 @@ impl Reference {
                 return Ok(false);
             }
         }
+        session.settle()?;
         self.add(session.film());
         self.facts.seconds += session.elapsed_seconds();
         device.clone_into(&mut self.facts.device);

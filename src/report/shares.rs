@@ -117,6 +117,7 @@ fn finish(
     cancel: &AtomicBool,
 ) -> Result<Option<Vec<[f64; 3]>>> {
     session.advance(samples, cancel)?;
+    session.settle()?;
     let is_whole = !cancel.load(Ordering::Relaxed);
     Ok(is_whole.then(|| session.film().pixels().iter().map(Pixel::mean).collect()))
 }

@@ -289,7 +289,7 @@ fn device_lost(setting: &Setting) -> Result<Outcome> {
     session.advance(4, &never)?;
     let named = failure.contains(&gpu.facts().name) && !failure.contains('\n');
     let yes = |condition: bool| f64::from(u8::from(condition));
-    let goes_on = session.film().min_samples() == 8 && mean(session.film()).luminance > 0.0;
+    let goes_on = session.samples() == 8 && mean(session.film()).luminance > 0.0;
     Ok(Outcome::new()
         .sound(session.film())
         .at_least("the loss is one sentence with the device's name", yes(named), 1.0)
@@ -301,8 +301,8 @@ fn device_lost(setting: &Setting) -> Result<Outcome> {
 fn out_of_gpu_memory(setting: &Setting) -> Result<Outcome> {
     let Some(gpu) = &setting.gpu else { return Ok(Outcome::skipped("needs --device gpu")) };
     let allowed = gpu.facts().storage_binding_bytes.min(gpu.facts().buffer_bytes);
-    // 32 bytes of a pixel on the device, 48 in the film.
-    let side = ((allowed / 32 + 1) as f64).sqrt().ceil() as u32 + 1;
+    // 16 bytes of a pixel in each of its buffers on the device, 48 in the film.
+    let side = ((allowed / 16 + 1) as f64).sqrt().ceil() as u32 + 1;
     if side > 8192 {
         let gibibytes = allowed >> 30;
         return Ok(Outcome::skipped(format!(

@@ -250,6 +250,7 @@ pub(super) fn render(
 ) -> Result<Film> {
     let mut session = learned(setting, world, environment, view)?;
     session.advance(samples, &AtomicBool::new(false))?;
+    session.settle()?;
     Ok(session.film().clone())
 }
 

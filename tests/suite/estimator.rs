@@ -75,7 +75,7 @@ pub(crate) fn render(world: &World, environment: &Environment, view: View, sampl
         let pass = session.next_pass(&rule);
         session.advance(pass, &AtomicBool::new(false)).expect("the CPU does not fail");
     }
-    assert_eq!(session.film().min_samples(), samples);
+    assert_eq!(session.samples(), samples);
     session.film().clone()
 }
 

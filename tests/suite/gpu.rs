@@ -45,7 +45,7 @@ fn finish(mut session: Session<'_>, samples: u32) -> Film {
     while !session.is_done(&rule) {
         session.advance(session.next_pass(&rule), &AtomicBool::new(false)).expect("no failure");
     }
-    assert_eq!(session.film().min_samples(), samples);
+    assert_eq!(session.samples(), samples);
     session.film().clone()
 }
 
@@ -312,7 +312,7 @@ fn the_cpu_takes_over_when_the_device_is_lost() {
     assert_eq!(*session.film(), before, "what was rendered is kept");
     session.continue_on_cpu();
     session.advance(2, &never).expect("the CPU does not fail");
-    assert_eq!(session.film().min_samples(), 5);
+    assert_eq!(session.samples(), 5);
     let whole = render(&world, &environment, view, 5);
     assert!(differing(&whole, session.film()) < 0.1);
 }
@@ -328,7 +328,7 @@ fn a_cancelled_picture_goes_on_where_it_stopped() {
     };
     let mut session = on_gpu(&world, &environment, view.clone(), &gpu);
     session.advance(4, &AtomicBool::new(true)).expect("cancelled");
-    assert_eq!(session.film().min_samples(), 0);
+    assert_eq!(session.samples(), 0);
     session.advance(4, &AtomicBool::new(false)).expect("rendering");
     let mut at_once = on_gpu(&world, &environment, view, &gpu);
     at_once.advance(4, &AtomicBool::new(false)).expect("rendering");

@@ -14,7 +14,8 @@ use crate::image::Image;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::metrics;
 use crate::path::World;
-use crate::render::gpu::Gpu;
+use crate::render::film::Film;
+use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::render::{Phase, Sampling, Session, StopRule, View};
 
 /// Longest piece of rendering between two looks at requests and clocks.
@@ -87,6 +88,16 @@ impl Legacy {
     }
 }
 
+/// A film read back from the window's device, where it is shown in place meanwhile.
+struct Reading {
+    of: DeviceFilm,
+    film: Arc<Film>,
+    noise: f64,
+    at: Instant,
+    /// Age at which it is too old.
+    gap: Duration,
+}
+
 pub(super) struct Job<'a> {
     shared: &'a Shared,
     alarm: &'a Alarm,
@@ -95,6 +106,8 @@ pub(super) struct Job<'a> {
     counters: Option<Arc<LearningGrid>>,
     published: Instant,
     publish_gap: Duration,
+    /// Films that the window shows in place, as they were read last.
+    readings: Vec<Reading>,
     /// The laws published last, with what tells whether they are still those in use.
     laws: Option<((usize, u64), Arc<LightGrid>)>,
     /// How the error of the main and of the plain picture fell.
@@ -116,6 +129,7 @@ impl<'a> Job<'a> {
             counters: None,
             published: Instant::now(),
             publish_gap: Duration::ZERO,
+            readings: Vec::new(),
             laws: None,
             curves: [Vec::new(), Vec::new()],
         }
@@ -136,15 +150,15 @@ impl<'a> Job<'a> {
         let mut session = self.small_session(world, environment, MOVING_SECONDS, 16);
         while !self.is_superseded() {
             // The first pass is never cut short: some picture is better than none.
-            let cut = session.film().min_samples() > 0;
+            let cut = session.samples() > 0;
             self.advance(&mut session, None, cut);
-            if session.film().min_samples() == 0 || self.is_superseded() {
+            if session.samples() == 0 || self.is_superseded() {
                 return;
             }
             self.measure(&session);
             self.keep_under(&session);
             self.publish(Activity::Moving, &session, None, None);
-            if session.film().min_samples() >= 64 {
+            if session.samples() >= 64 {
                 self.rest();
             }
         }
@@ -193,9 +207,9 @@ impl<'a> Job<'a> {
         }
         let start = Instant::now();
         let mut session = self.small_session(world, environment, MOVING_SECONDS, 16);
-        while session.film().min_samples() < GLANCE.0 && start.elapsed() < GLANCE.1 {
+        while session.samples() < GLANCE.0 && start.elapsed() < GLANCE.1 {
             self.advance(&mut session, None, false);
-            if session.film().min_samples() == 0 || self.is_superseded() {
+            if session.samples() == 0 || self.is_superseded() {
                 return;
             }
             self.measure(&session);
@@ -261,6 +275,12 @@ impl<'a> Job<'a> {
             match activity {
                 Activity::Paused | Activity::Done => {
                     if activity == Activity::Done {
+                        let settled = main.settle();
+                        let has_failed = settled.is_err();
+                        self.go_on(&mut main, settled);
+                        if has_failed {
+                            continue;
+                        }
                         // It may have more samples than were asked for, but fewer pixels.
                         preview = None;
                     }
@@ -296,19 +316,21 @@ impl<'a> Job<'a> {
                 }
             }
             if let Some(session) = &preview
-                && main.film().min_samples() >= session.film().min_samples().min(4)
+                && main.samples() >= session.samples().min(4)
                 && main.phase() == Phase::Rendering
-                && main.film().min_samples() > 0
+                && main.samples() > 0
             {
                 preview = None;
             }
             let due = self.published.elapsed() >= self.publish_gap;
-            if due || !self.request.previews {
-                self.note(0, &main);
-                plain.iter().for_each(|plain| self.note(1, plain));
-            }
+            let is_reading_due = due && self.is_reading_due(&main);
             if due && self.request.previews && !self.is_superseded() {
                 self.publish(activity, &main, plain.as_ref(), preview.as_ref());
+            }
+            // After publishing, which has read the film.
+            if is_reading_due || !self.request.previews {
+                self.note(0, &main);
+                plain.iter().for_each(|plain| self.note(1, plain));
             }
         }
         // One sample a pixel is no better than what there was before, unless it can be filtered.
@@ -342,7 +364,7 @@ impl<'a> Job<'a> {
             Activity::Paused
         } else if main.phase() == Phase::Learning {
             Activity::Learning(learned_share(main))
-        } else if main.film().min_samples() > 0 && main.is_done(&self.request.rule) {
+        } else if main.samples() > 0 && main.is_done(&self.request.rule) {
             Activity::Done
         } else {
             Activity::Rendering
@@ -356,12 +378,12 @@ impl<'a> Job<'a> {
             let start = Instant::now();
             let owed = main.figures().learning_seconds - preview.figures().render_seconds;
             while !self.is_superseded()
-                && (preview.film().min_samples() == 0
+                && (preview.samples() == 0
                     || start.elapsed().as_secs_f64() < owed.min(1.0))
             {
                 self.advance(preview, None, true);
                 self.measure(preview);
-                if preview.film().total_samples() > 0
+                if preview.figures().samples > 0
                     && self.published.elapsed() >= self.publish_gap
                     && !self.is_superseded()
                 {
@@ -484,23 +506,27 @@ impl<'a> Job<'a> {
         let start = Instant::now();
         self.legacy.snapshots += 1;
         let shown = preview.unwrap_or(main);
+        let is_final = matches!(activity, Activity::Paused | Activity::Done);
+        let (main_take, main_cost) = self.take(shown, is_final);
+        let plain_take = plain.map(|session| self.take(session, is_final));
+        let reading = main_cost + plain_take.as_ref().map_or(Duration::ZERO, |(_, cost)| *cost);
         let snapshot = Snapshot {
             number: self.legacy.snapshots,
             request: Arc::clone(&self.request),
             activity,
-            main: self.take(shown),
-            plain: plain.map(|session| self.take(session)),
+            main: main_take,
+            plain: plain_take.map(|(take, _)| take),
             is_preview: preview.is_some(),
             counters: self.counters.clone(),
-            learning: *main.figures(),
+            learning: main.figures(),
             under: self.under(),
             curves: self.curves.clone(),
         };
         *lock(&self.shared.snapshot) = Some(Arc::new(snapshot));
         (self.shared.wake)();
         self.published = Instant::now();
-        let cost = self.published - start;
-        self.publish_gap = (cost * PUBLISH_SHARE).clamp(SLICE, Duration::from_secs(3));
+        let cost = (self.published - start).saturating_sub(reading);
+        self.publish_gap = gap_after(cost);
     }
 
     /// Adds a point to a curve, unless nothing has happened since the last one.
@@ -522,18 +548,61 @@ impl<'a> Job<'a> {
         }
     }
 
-    fn take(&mut self, session: &Session<'_>) -> Take {
-        let film = session.film();
-        Take {
+    /// The session's picture, and what reading a film that is shown in place took of the time.
+    fn take(&mut self, session: &Session<'_>, is_final: bool) -> (Take, Duration) {
+        let on_device = session.film_on_device();
+        let in_place = self.in_place(session);
+        let kept = self.reading(in_place.as_ref()).filter(|_| !is_final);
+        let (film, noise, cost) = match kept {
+            Some(reading) => (Arc::clone(&reading.film), reading.noise, Duration::ZERO),
+            None => {
+                let start = Instant::now();
+                let film = Arc::new(session.film().clone());
+                let noise = film.noise();
+                let cost = in_place.as_ref().map_or(Duration::ZERO, |_| start.elapsed());
+                if let Some(of) = in_place {
+                    let (at, gap) = (Instant::now(), gap_after(cost));
+                    // Those of sessions that have ended go with the next request.
+                    self.readings.retain(|reading| reading.of != of);
+                    self.readings.push(Reading { of, film: Arc::clone(&film), noise, at, gap });
+                }
+                (film, noise, cost)
+            }
+        };
+        let take = Take {
             sampling: session.view().sampling,
-            noise: film.noise(),
-            film: Arc::new(film.clone()),
-            figures: *session.figures(),
+            noise,
+            film,
+            figures: session.figures(),
             gpu: session.gpu_figures().map(Arc::new),
-            on_device: None,
+            on_device,
             grid: self.laws_of(session),
-        }
+        };
+        (take, cost)
     }
+
+    /// The session's film if the window shows it without its being read; small ones are filtered on the
+    /// CPU.
+    fn in_place(&self, session: &Session<'_>) -> Option<DeviceFilm> {
+        let (gpu, film) = session.film_on_device()?;
+        let is_small = film.width < self.request.view.width;
+        (!is_small && gpu.is_same(&lock(&self.shared.screen))).then_some(film)
+    }
+
+    /// The last reading of a film, unless it is too old.
+    fn reading(&self, of: Option<&DeviceFilm>) -> Option<&Reading> {
+        self.readings.iter().find(|r| Some(&r.of) == of && r.at.elapsed() < r.gap)
+    }
+
+    /// Whether figures that need the film are to be taken anew.
+    fn is_reading_due(&self, session: &Session<'_>) -> bool {
+        session.samples() > 0 && self.reading(self.in_place(session).as_ref()).is_none()
+    }
+}
+
+/// Time until something that took `cost` may be done again.
+fn gap_after(cost: Duration) -> Duration {
+    (cost * PUBLISH_SHARE).clamp(SLICE, Duration::from_secs(3))
 }
 
 fn learned_share(session: &Session<'_>) -> f32 {

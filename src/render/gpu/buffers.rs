@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
@@ -17,6 +19,9 @@ pub(super) struct Buffers {
     arrays: BTreeMap<&'static str, (wgpu::Texture, u64)>,
     /// Texels of a row of every array, as a power of two.
     width_log2: u32,
+    version: u64,
+    staging: Arc<Mutex<Option<Buffer>>>,
+    bytes_read: Arc<AtomicU64>,
 }
 
 /// Arrays of at most so many rows have a power of two of them.
@@ -28,7 +33,20 @@ const PIECE_BYTES: usize = 16 << 20;
 impl Buffers {
     pub(super) fn new(gpu: &Gpu) -> Self {
         let width_log2 = gpu.limits.max_texture_dimension_2d.ilog2().min(14);
-        Self { gpu: gpu.clone(), by_name: BTreeMap::new(), arrays: BTreeMap::new(), width_log2 }
+        Self {
+            gpu: gpu.clone(),
+            by_name: BTreeMap::new(),
+            arrays: BTreeMap::new(),
+            width_log2,
+            version: 0,
+            staging: Arc::default(),
+            bytes_read: Arc::default(),
+        }
+    }
+
+    /// The same, with figures of its own.
+    pub(super) fn for_renderer(&self) -> Self {
+        Self { bytes_read: Arc::default(), ..self.clone() }
     }
 
     /// Texels of a row of every array, as a power of two.
@@ -58,6 +76,7 @@ impl Buffers {
         self.fits(bytes, what)?;
         let buffer = self.create(name, bytes);
         self.by_name.insert(name, buffer);
+        self.version += 1;
         self.gpu.check()
     }
 
@@ -99,6 +118,7 @@ impl Buffers {
         })?;
         self.upload(&texture, kind.format.bytes(), parts)?;
         self.arrays.insert(name, (texture, rows * width * kind.format.bytes()));
+        self.version += 1;
         Ok(())
     }
 
@@ -188,24 +208,30 @@ impl Buffers {
         }
     }
 
-    /// Reads the first `bytes` bytes of a buffer back.
-    pub(super) fn read(&self, name: &str, bytes: u64) -> Result<Vec<u8>> {
+    /// Waits for the device, reads parts of buffers back (name, offset, bytes; all in fours) and hands
+    /// them to `take`.
+    pub(super) fn read<R>(
+        &self,
+        parts: &[(&str, u64, u64)],
+        take: impl FnOnce(&[&[u8]]) -> R,
+    ) -> Result<R> {
         let failed = |e: &dyn std::fmt::Display| {
             Error::new(format!("{}: results cannot be read back: {e}", self.gpu.facts().name))
         };
-        let Some(source) = self.get(name) else { return Err(failed(&"no such buffer")) };
-        let device = &self.gpu.device;
-        let staging = device.create_buffer(&BufferDescriptor {
-            label: Some("staging"),
-            size: bytes,
-            usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let mut commands = device.create_command_encoder(&Default::default());
-        commands.copy_buffer_to_buffer(source, 0, &staging, 0, bytes);
+        self.gpu.check()?;
+        let bytes = parts.iter().map(|(.., bytes)| bytes).sum();
+        let staging = self.staging(bytes);
+        let mut commands = self.gpu.device.create_command_encoder(&Default::default());
+        let mut at = 0;
+        for &(name, offset, bytes) in parts {
+            let source = self.get(name).ok_or_else(|| failed(&"no such buffer"))?;
+            commands.copy_buffer_to_buffer(source, offset, &staging, at, bytes);
+            at += bytes;
+        }
         let submission = self.gpu.queue.submit([commands.finish()]);
         let (sender, receiver) = std::sync::mpsc::channel();
-        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+        staging.map_async(wgpu::MapMode::Read, ..bytes, move |result| {
+            // Nobody listens any more if waiting has failed.
             let _ = sender.send(result);
         });
         self.gpu.wait_for(Some(submission))?;
@@ -214,8 +240,46 @@ impl Buffers {
             Ok(Err(e)) => return Err(failed(&e)),
             Err(e) => return Err(failed(&e)),
         }
-        let view = staging.get_mapped_range(..).map_err(|e| failed(&e))?;
-        Ok(view.to_vec())
+        let taken = {
+            let view = staging.get_mapped_range(..bytes).map_err(|e| failed(&e))?;
+            let mut rest = &view[..];
+            let slices: Vec<&[u8]> = parts
+                .iter()
+                .map(|(.., bytes)| {
+                    let (part, others) = rest.split_at(*bytes as usize);
+                    rest = others;
+                    part
+                })
+                .collect();
+            take(&slices)
+        };
+        staging.unmap();
+        self.bytes_read.fetch_add(bytes, Ordering::Relaxed);
+        *self.staging.lock().unwrap_or_else(PoisonError::into_inner) = Some(staging);
+        Ok(taken)
+    }
+
+    /// A buffer the host can read, kept from one reading to the next. It is made anew after a failure.
+    fn staging(&self, bytes: u64) -> Buffer {
+        let kept = self.staging.lock().unwrap_or_else(PoisonError::into_inner).take();
+        kept.filter(|staging| staging.size() >= bytes).unwrap_or_else(|| {
+            self.gpu.device.create_buffer(&BufferDescriptor {
+                label: Some("staging"),
+                size: bytes,
+                usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        })
+    }
+
+    /// Bytes read back so far.
+    pub(super) fn bytes_read(&self) -> u64 {
+        self.bytes_read.load(Ordering::Relaxed)
+    }
+
+    /// Changes whenever another buffer or array takes the place of one.
+    pub(super) fn version(&self) -> u64 {
+        self.version
     }
 
     fn most_bytes(&self) -> u64 {

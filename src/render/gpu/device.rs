@@ -182,8 +182,8 @@ pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     trouble: Arc<Mutex<Option<String>>>,
-    /// Whether it presents frames on another thread than this.
-    has_window: bool,
+    /// Whether frames of a window are drawn on it too.
+    pub(super) has_window: bool,
     /// Kernels compiled so far, by their source.
     pub(super) pipelines: Arc<Mutex<HashMap<String, Arc<Pipeline>>>>,
 }
@@ -257,7 +257,7 @@ impl Gpu {
         let limits = adapter.limits();
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("lightgrid"),
-            required_features: Features::empty(),
+            required_features: adapter.features() & Features::TIMESTAMP_QUERY,
             required_limits: limits.clone(),
             ..wgpu::DeviceDescriptor::default()
         }))
@@ -322,28 +322,11 @@ impl Gpu {
     /// # Errors
     /// As [`Self::check`].
     pub(crate) fn wait_for(&self, submission: Option<SubmissionIndex>) -> Result<()> {
-        if self.has_window {
-            return self.wait_without_lock();
-        }
+        // Never with a timeout: then wgpu 30 panics if another thread sees the queue empty first.
         let waited =
             self.device.poll(PollType::Wait { submission_index: submission, timeout: None });
         self.check()?;
         waited.map(|_| ()).map_err(|e| Error::new(format!("{}: {e}", self.facts.name)))
-    }
-
-    /// While wgpu 30 waits it holds a lock that presenting a frame takes too, and waiting in short
-    /// pieces on several threads makes it panic. So this only looks now and then.
-    fn wait_without_lock(&self) -> Result<()> {
-        let (sender, done) = channel();
-        self.queue.on_submitted_work_done(move || {
-            // Nobody waits any more if the device has failed.
-            let _ = sender.send(());
-        });
-        while done.recv_timeout(LOOK_GAP) == Err(RecvTimeoutError::Timeout) {
-            let _ = self.device.poll(PollType::Poll);
-            self.check()?;
-        }
-        self.check()
     }
 
     /// Reads the first `bytes` bytes of a buffer back, once what was submitted has been done.
@@ -406,14 +389,24 @@ impl Gpu {
         let failed = |e: &dyn std::fmt::Display| {
             Error::new(format!("{}: results cannot be read back: {e}", self.facts.name))
         };
-        let submission = self.queue.submit([commands.finish()]);
+        self.queue.submit([commands.finish()]);
         let (sender, receiver) = channel();
         staging.map_async(wgpu::MapMode::Read, .., move |result| {
-            // The receiver waits below, unless the wait has failed.
+            // The receiver waits below, unless the device has failed.
             let _ = sender.send(result);
         });
-        self.wait_for(Some(submission))?;
-        receiver.recv().map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
+        // While wgpu 30 waits, it holds a lock that presenting a frame takes too: so this looks now and
+        // then, for others may have long work under way.
+        let mapped = loop {
+            match receiver.recv_timeout(LOOK_GAP) {
+                Err(RecvTimeoutError::Timeout) => {
+                    let _ = self.device.poll(PollType::Poll);
+                    self.check()?;
+                }
+                other => break other,
+            }
+        };
+        mapped.map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
         Ok(staging.get_mapped_range(..).map_err(|e| failed(&e))?.to_vec())
     }
 

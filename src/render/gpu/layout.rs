@@ -29,11 +29,10 @@ pub(crate) struct Work {
     pub(crate) first: u32,
     pub(crate) first_high: u32,
     pub(crate) count: u32,
-    pub(crate) first_sample: u32,
     pub(crate) samples: u32,
-    pub(crate) resumes: u32,
+    pub(crate) end_sample: u32,
     pub(crate) stride: u32,
-    pub(crate) padding: u32,
+    pub(crate) padding: [u32; 2],
 }
 
 /// Twin of `Globals` in `globals.wgsl`.
@@ -89,6 +88,8 @@ pub(crate) struct Globals {
     pub(crate) first_of_sequence: u32,
     pub(crate) background: Vec3,
     pub(crate) background_concentration: f32,
+    pub(crate) film_scale: f32,
+    pub(crate) padding: [u32; 3],
 }
 
 /// Twin of `Material` in `surface.wgsl`.
@@ -137,27 +138,6 @@ pub(crate) struct TextureRef {
     pub(crate) matrix: Vec4,
     pub(crate) translation: Vec2,
     pub(crate) padding: Vec2,
-}
-
-/// Twin of `PixelSums` in `render.wgsl`: one pixel's share of a pass.
-#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct PixelSums {
-    pub(crate) sum: Vec3,
-    pub(crate) luminance_squared: f32,
-    pub(crate) rays: u32,
-    pub(crate) invalid: u32,
-    pub(crate) padding: [u32; 2],
-}
-
-/// Twin of `FirstHit` in `path.wgsl`: sums over a pass.
-#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct SurfaceSums {
-    pub(crate) albedo: Vec3,
-    pub(crate) depth: f32,
-    pub(crate) normal: Vec3,
-    pub(crate) hits: f32,
 }
 
 /// Flags of `Material`, as in `surface.wgsl`.

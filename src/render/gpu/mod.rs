@@ -1,13 +1,13 @@
 //! The GPU's schedule: the same paths in compute shaders, in dispatches too short to be felt.
 //!
-//! `Renderer` holds the scene, the map and the laws on a device and brings a [`Film`] forward as
-//! `cpu` does. A pass sums at most `MAX_PASS_SAMPLES` samples of a pixel in f32 on the device; the
-//! f64 film on the host adds up the passes, so that no precision is lost at any number of samples
-//! and the work so far survives the device.
+//! `Renderer` holds the scene, the map, the laws and the film on a device and brings that film forward
+//! as `cpu` does. Nothing waits in between: a few dispatches are always under way, and the host reads
+//! the film, whose sums lose nothing at any number of samples, only when somebody asks for it.
 
 mod buffers;
 mod device;
 mod film;
+mod flight;
 pub(crate) mod layout;
 mod pacer;
 #[cfg(test)]
@@ -20,9 +20,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use rayon::prelude::*;
-
-use super::film::{Film, Pixel};
+use super::film::Film;
 use super::{Pass, View};
 use crate::bsdf::{albedo, sheen};
 use crate::environment::Environment;
@@ -31,27 +29,29 @@ use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::path::camera::CameraRays;
 use buffers::Buffers;
-use layout::{Globals, PixelSums, SurfaceSums, Work};
-use pacer::Pacer;
+use film::Sums;
+use flight::Flights;
+use layout::{Globals, Work};
 use pipeline::Pipeline;
 use shader::{Binding, Constants, Features, Kernel, Program};
 use stage::put_array;
 
 pub use device::{AdapterFacts, DeviceChoice, Gpu, adapters};
 pub(crate) use film::DeviceFilm;
+pub use flight::FlightFigures;
 pub use shader::KernelFacts;
 pub use stage::Stage;
 
-/// Most samples of a pixel that one pass sums in f32.
-const MAX_PASS_SAMPLES: u32 = 64;
 /// Pixels along a side of a workgroup's tile.
 const TILE: u32 = 8;
 /// Paths of a workgroup.
 const GROUP: u64 = 64;
 /// Most workgroups of one dispatch (WebGPU's limit along an axis).
 const MAX_GROUPS: u64 = 65_535;
-/// Tiles of a dispatch that keep a device with few cores busy.
-const LEAST_TILES: u64 = 4;
+/// Tiles of a dispatch that keep a device busy: the cores of a software one, and all of a real one.
+const LEAST_TILES: [u64; 2] = [4, 1024];
+/// Most samples of a pixel in one dispatch.
+const MOST_SAMPLES: u32 = 64;
 
 /// What the device holds of a picture in the making.
 pub(crate) struct Renderer {
@@ -60,27 +60,59 @@ pub(crate) struct Renderer {
     globals: Globals,
     features: Features,
     constants: Constants,
-    render: Arc<Pipeline>,
-    learn: Option<Arc<Pipeline>>,
-    render_pacer: Pacer,
-    learn_pacer: Pacer,
+    render: Bound,
+    learn: Option<Bound>,
+    flights: Flights,
+    film: Sums,
+    progress: Progress,
     kernel_facts: KernelFacts,
     seed: u32,
 }
 
+/// A kernel and what it is bound to.
+struct Bound {
+    pipeline: Arc<Pipeline>,
+    /// With the version of the buffers that it binds.
+    bind_group: Option<(u64, wgpu::BindGroup)>,
+}
+
+/// How far the film is, dispatches under way included: tiles before `tile` have `ahead` samples a
+/// pixel, the others at least `least`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Progress {
+    least: u32,
+    ahead: u32,
+    tile: u64,
+    /// Samples that pixels have beyond that.
+    surplus: u64,
+}
+
+/// What a call of [`Renderer::render`] has set going.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Advance {
+    /// Samples of all pixels together.
+    pub(super) samples: u64,
+    /// Fewest samples of any pixel from now on.
+    pub(super) least: u32,
+}
+
 /// What was left out of the kernels and what they take.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct GpuFigures {
     /// The device.
     pub adapter: AdapterFacts,
     /// Bytes of all buffers on it.
     pub device_bytes: u64,
+    /// Bytes read back from it for this picture.
+    pub bytes_read: u64,
+    /// What its dispatches took.
+    pub flights: FlightFigures,
     /// What its render kernel holds.
     pub kernel: KernelFacts,
 }
 
 impl Renderer {
-    /// Builds the kernel for a view of what is on the stage.
+    /// Builds the kernel for a view of what is on the stage; goes on from `film` if there is one.
     ///
     /// # Errors
     /// If something does not fit on the device, with the numbers.
@@ -90,8 +122,9 @@ impl Renderer {
         environment: &Environment,
         view: &View,
         rays: &CameraRays,
+        film: Option<&Film>,
     ) -> Result<Self> {
-        Self::with_kernel(stage, world, environment, view, rays, |gpu, program| {
+        Self::with_kernel(stage, (world, environment), view, rays, film, |gpu, program| {
             gpu.pipeline(Kernel::Render, program)
         })
     }
@@ -99,25 +132,23 @@ impl Renderer {
     /// [`Self::new`] with the kernel that `compile` makes of the program for rendering.
     fn with_kernel(
         stage: &Stage,
-        world: &World,
-        environment: &Environment,
+        (world, environment): (&World, &Environment),
         view: &View,
         rays: &CameraRays,
+        film: Option<&Film>,
         compile: impl FnOnce(&Gpu, Program) -> Result<Arc<Pipeline>>,
     ) -> Result<Self> {
         let features = Features::of(world, environment, view);
-        let mut buffers = stage.buffers.clone();
+        let mut buffers = stage.buffers.for_renderer();
         let mut globals = stage.globals;
         globals.set_view(view, rays);
         globals.set_fog(view.fog(world).as_ref());
         let mut constants = stage.constants;
         upload_tables(&mut buffers, view, environment, &features, &mut constants)?;
-        let pixels = u64::from(view.width) * u64::from(view.height);
-        buffers.make("film", pixels * size_of::<PixelSums>() as u64, "the picture")?;
-        if features.has("layers") {
-            let bytes = pixels * size_of::<SurfaceSums>() as u64;
-            buffers.make("surfaces", bytes, "the picture's layers")?;
-        }
+        let size = [view.width, view.height];
+        globals.film_scale = film::scale_for(brightest(world, environment));
+        let sums = Sums::new(&mut buffers, size, view.layers, globals.film_scale, film)?;
+        let progress = film.map(Progress::of).unwrap_or_default();
         if features.has("counting") {
             // Until there is something to count.
             for name in ["visits", "slot_of_cell", "counters"] {
@@ -129,15 +160,16 @@ impl Renderer {
         let program = Program::new(Kernel::Render, &features, &constants, width_log2);
         let kernel_facts = KernelFacts::of(&features);
         let renderer = Self {
-            render: compile(&stage.gpu, program)?,
+            render: Bound::new(compile(&stage.gpu, program)?),
             learn: None,
+            flights: Flights::new(&stage.gpu),
+            film: sums,
+            progress,
             gpu: stage.gpu.clone(),
             buffers,
             globals,
             features,
             constants,
-            render_pacer: Pacer::default(),
-            learn_pacer: Pacer::default(),
             kernel_facts,
             seed: view.seed,
         };
@@ -165,22 +197,12 @@ impl Renderer {
         self.globals.seed = self.seed;
         self.put_counters(learning)?;
         self.buffers.put("learning_rays", &[0; 4], "a count")?;
-        let learn = match &self.learn {
-            Some(learn) => Arc::clone(learn),
-            None => {
-                let width_log2 = self.buffers.width_log2();
-                let program =
-                    Program::new(Kernel::Learn, &self.features, &self.constants, width_log2);
-                self.gpu.pipeline(Kernel::Learn, program)?
-            }
-        };
-        self.learn = Some(Arc::clone(&learn));
         let mut first = paths.start;
         while first < paths.end {
             if cancel.load(Ordering::Relaxed) {
                 return Ok(0);
             }
-            let groups = self.learn_pacer.units().min(MAX_GROUPS);
+            let groups = self.flights.units(Kernel::Learn).min(MAX_GROUPS);
             let count = (groups * GROUP).min(paths.end - first);
             let work = Work {
                 first: first as u32,
@@ -189,10 +211,10 @@ impl Renderer {
                 ..Work::default()
             };
             let groups = count.div_ceil(GROUP);
-            let seconds = self.dispatch(&learn, &work, groups as u32)?;
-            self.learn_pacer.record(groups, seconds);
+            self.dispatch(Kernel::Learn, &work, groups as u32, groups)?;
             first += count;
         }
+        self.settle()?;
         self.take_counters(learning)?;
         Ok(self.read_words("learning_rays", 1)?.first().copied().map_or(0, u64::from))
     }
@@ -219,17 +241,16 @@ impl Renderer {
         Ok(())
     }
 
-    /// Brings every pixel of the film to a pass's target, counting in `counts` what its samples of
-    /// the map see; returns the numbers of samples and rays. A pass that was cut short goes on where
-    /// it was; what then was in work is counted twice.
+    /// Sets going what brings every pixel of the film to a pass's target, counting in `counts` what its
+    /// samples of the map see. A pass that was cut short goes on where it was; what then was in work is
+    /// counted twice. The device may still be at work afterwards, unless there are counts.
     pub(super) fn render(
         &mut self,
         pass: Pass,
-        film: &mut Film,
         counts: Option<&LearningGrid>,
         cancel: &AtomicBool,
-    ) -> Result<(u64, u64)> {
-        let target = pass.target;
+    ) -> Result<Advance> {
+        self.gpu.check()?;
         self.globals.seed = pass.sequence.seed(self.seed);
         self.globals.first_of_sequence = pass.sequence.first_sample;
         self.write_globals();
@@ -237,101 +258,104 @@ impl Renderer {
             self.put_counters(learning)?;
         }
         let stride = counts.map_or(0, |_| pass.stride);
-        let tiles = u64::from(film.width.div_ceil(TILE)) * u64::from(film.height.div_ceil(TILE));
-        let mut done = (0, 0);
-        while film.min_samples() < target && !cancel.load(Ordering::Relaxed) {
-            let first = film.min_samples();
-            let samples = first..target.min(first + MAX_PASS_SAMPLES);
-            let undone = first_undone(film, first)..tiles;
-            let finished = self.render_pass(samples.clone(), stride, undone, cancel)?;
-            let (samples, rays) = self.add_to(film, samples, finished)?;
-            done = (done.0 + samples, done.1 + rays);
+        let before = self.total_samples();
+        let Progress { least, ahead, tile, surplus } = self.progress;
+        if ahead != pass.target {
+            // Tiles that are ahead of the others take less than those.
+            let already = u64::from(ahead.saturating_sub(least)) * self.pixels_before(tile);
+            let surplus = surplus + already;
+            self.progress = Progress { least, ahead: pass.target, tile: 0, surplus };
         }
+        self.render_tiles(pass, stride, cancel)?;
         if let Some(learning) = counts {
             self.take_counters(learning)?;
         }
-        Ok(done)
+        let samples = self.total_samples().saturating_sub(before);
+        Ok(Advance { samples, least: self.progress.least })
     }
 
-    /// Takes these samples of each pixel, summed up in order, so that the sums do not depend on how
-    /// the work is cut into dispatches; returns the first tile that is not done.
-    fn render_pass(
-        &mut self,
-        pass: Range<u32>,
-        stride: u32,
-        tiles: Range<u64>,
-        cancel: &AtomicBool,
-    ) -> Result<u64> {
-        let length = u64::from(pass.end - pass.start);
-        let mut first = tiles.start;
-        while first < tiles.end {
-            let affordable = self.render_pacer.units() / length;
-            let count = affordable.clamp(LEAST_TILES, MAX_GROUPS).min(tiles.end - first);
-            let mut sample = pass.start;
-            while sample < pass.end {
+    /// Dispatches until all tiles are ahead. Each pixel takes its samples in order, so that its sums do
+    /// not depend on how the work is cut.
+    fn render_tiles(&mut self, pass: Pass, stride: u32, cancel: &AtomicBool) -> Result<()> {
+        let tiles = self.tiles();
+        let least_tiles = LEAST_TILES[usize::from(!self.gpu.facts().is_software())];
+        let missing = pass.target.saturating_sub(self.progress.least);
+        while self.progress.tile < tiles && missing > 0 {
+            let first = self.progress.tile;
+            let units = self.flights.units(Kernel::Render);
+            let affordable = units / u64::from(missing.min(MOST_SAMPLES));
+            let count = affordable.clamp(least_tiles, MAX_GROUPS).min(tiles - first);
+            let mut left = missing;
+            while left > 0 {
                 if cancel.load(Ordering::Relaxed) {
-                    return Ok(first);
+                    let pixels = self.pixels_before(first + count) - self.pixels_before(first);
+                    self.progress.surplus += pixels * u64::from(missing - left);
+                    return Ok(());
                 }
-                let affordable = (self.render_pacer.units() / count).clamp(1, length) as u32;
+                let affordable = (self.flights.units(Kernel::Render) / count)
+                    .clamp(1, u64::from(MOST_SAMPLES)) as u32;
+                let samples = affordable.min(left);
                 let work = Work {
                     first: first as u32,
                     count: count as u32,
-                    first_sample: sample,
-                    samples: affordable.min(pass.end - sample),
-                    resumes: (sample > pass.start).into(),
+                    samples,
+                    end_sample: pass.target,
                     stride,
                     ..Work::default()
                 };
-                let seconds = self.dispatch(&self.render, &work, count as u32)?;
-                self.render_pacer.record(count * u64::from(work.samples), seconds);
-                sample += work.samples;
+                let units = count * u64::from(samples);
+                self.dispatch(Kernel::Render, &work, count as u32, units)?;
+                left -= samples;
             }
-            first += count;
+            self.progress.tile += count;
         }
-        Ok(first)
+        if self.progress.tile >= tiles {
+            self.progress = Progress { least: pass.target, ..Progress::default() };
+        }
+        Ok(())
     }
 
-    /// Adds what a pass has summed up in its first `tiles` tiles.
-    fn add_to(&self, film: &mut Film, pass: Range<u32>, tiles: u64) -> Result<(u64, u64)> {
-        let (first_sample, samples) = (pass.start, pass.end - pass.start);
-        let width = film.width as usize;
-        let pixels = film.pixels.len();
-        let bytes = self.buffers.read("film", (pixels * size_of::<PixelSums>()) as u64)?;
-        let sums: Vec<PixelSums> = bytemuck::pod_collect_to_vec(&bytes);
-        let tiles_across = u64::from(film.width.div_ceil(TILE));
-        let is_done = |index: usize| {
-            let (x, y) = ((index % width) as u32 / TILE, (index / width) as u32 / TILE);
-            u64::from(y) * tiles_across + u64::from(x) < tiles
-        };
-        // A pixel that an interrupted pass has brought further keeps what it has.
-        let is_new = |film: &Film, index: usize| {
-            is_done(index) && film.pixels[index].samples() == first_sample
-        };
-        if film.has_layers() {
-            let bytes =
-                self.buffers.read("surfaces", (pixels * size_of::<SurfaceSums>()) as u64)?;
-            let surfaces: Vec<SurfaceSums> = bytemuck::pod_collect_to_vec(&bytes);
-            for (index, sums) in surfaces.iter().enumerate() {
-                if is_new(film, index) {
-                    let hits = sums.hits as u32;
-                    film.surfaces[index].add_sums(sums.albedo, sums.normal, sums.depth, hits);
-                }
-            }
-        }
-        let done = film
-            .pixels
-            .par_iter_mut()
-            .zip(&sums)
-            .enumerate()
-            .map(|(index, (pixel, sums))| {
-                if !is_done(index) || pixel.samples() != first_sample {
-                    return (0, 0);
-                }
-                pixel.add_sums(sums.sum, sums.luminance_squared, samples, sums.invalid);
-                (u64::from(samples), u64::from(sums.rays))
-            })
-            .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-        Ok(done)
+    /// Waits until the device has nothing more to do.
+    pub(super) fn settle(&mut self) -> Result<()> {
+        self.flights.land_all(&self.gpu)
+    }
+
+    /// Reads the film back, dispatches under way included.
+    pub(super) fn read_film(&self, film: &mut Film) -> Result<()> {
+        self.film.read(&self.buffers, film)
+    }
+
+    /// Rays traced on this device for the film, when it was read last.
+    pub(super) fn rays(&self) -> u64 {
+        self.film.rays()
+    }
+
+    /// The film where it is.
+    pub(crate) fn film_on_device(&self) -> Option<(Gpu, DeviceFilm)> {
+        self.film.on_device(&self.buffers).map(|film| (self.gpu.clone(), film))
+    }
+
+    fn tiles(&self) -> u64 {
+        let Globals { width, height, .. } = self.globals;
+        u64::from(width.div_ceil(TILE)) * u64::from(height.div_ceil(TILE))
+    }
+
+    /// Pixels of the first `tiles` tiles.
+    fn pixels_before(&self, tiles: u64) -> u64 {
+        let (width, height) = (u64::from(self.globals.width), u64::from(self.globals.height));
+        let tile = u64::from(TILE);
+        let across = width.div_ceil(tile);
+        let (row, column) = (tiles / across, tiles % across);
+        let rows_before = (row * tile).min(height);
+        let rows = ((row + 1) * tile).min(height) - rows_before;
+        rows_before * width + rows * (column * tile).min(width)
+    }
+
+    /// Samples of all pixels together, dispatches under way included.
+    fn total_samples(&self) -> u64 {
+        let Progress { least, ahead, tile, surplus } = self.progress;
+        let (before, all) = (self.pixels_before(tile), self.pixels_before(self.tiles()));
+        before * u64::from(ahead) + (all - before) * u64::from(least) + surplus
     }
 
     /// Figures of the device and of what the kernels leave out.
@@ -339,6 +363,8 @@ impl Renderer {
         GpuFigures {
             adapter: self.gpu.facts().clone(),
             device_bytes: self.buffers.bytes(),
+            bytes_read: self.buffers.bytes_read(),
+            flights: self.flights.figures(),
             kernel: self.kernel_facts.clone(),
         }
     }
@@ -351,41 +377,74 @@ impl Renderer {
         if count == 0 {
             return Ok(Vec::new());
         }
-        Ok(bytemuck::pod_collect_to_vec(&self.buffers.read(name, 4 * count as u64)?))
+        self.buffers.read(&[(name, 0, 4 * count as u64)], |read| {
+            bytemuck::cast_slice::<u8, u32>(read[0]).to_vec()
+        })
     }
 
-    /// Runs a kernel to its end; returns the seconds it took.
-    fn dispatch(&self, pipeline: &Pipeline, work: &Work, groups: u32) -> Result<f64> {
-        let bind_group = self.bind_group(pipeline)?;
+    /// Sets a kernel going.
+    fn dispatch(&mut self, kernel: Kernel, work: &Work, groups: u32, units: u64) -> Result<()> {
+        let bound = match (kernel, &mut self.learn) {
+            (Kernel::Render, _) => &mut self.render,
+            (Kernel::Learn, Some(learn)) => learn,
+            (Kernel::Learn, unmade) => {
+                let width_log2 = self.buffers.width_log2();
+                let program = Program::new(kernel, &self.features, &self.constants, width_log2);
+                unmade.insert(Bound::new(self.gpu.pipeline(kernel, program)?))
+            }
+        };
+        let bound = bound.current(&self.gpu, &self.buffers)?;
         self.buffers.write("globals", 0, bytemuck::bytes_of(work));
-        let mut commands = self.gpu.device.create_command_encoder(&Default::default());
-        {
-            let mut pass = commands.begin_compute_pass(&Default::default());
-            pass.set_pipeline(&pipeline.pipeline);
-            pass.set_bind_group(0, &bind_group, &[]);
-            pass.dispatch_workgroups(groups, 1, 1);
-        }
-        let start = std::time::Instant::now();
-        let submission = self.gpu.queue.submit([commands.finish()]);
-        self.gpu.wait_for(Some(submission))?;
-        Ok(start.elapsed().as_secs_f64())
+        self.flights.start(&self.gpu, kernel, bound, groups, units)
+    }
+}
+
+impl Progress {
+    /// Of a film that somebody else has brought forward.
+    fn of(film: &Film) -> Self {
+        let least = film.min_samples();
+        let even = u64::from(least) * film.pixels().len() as u64;
+        Self { least, surplus: film.total_samples() - even, ..Self::default() }
+    }
+}
+
+impl Bound {
+    fn new(pipeline: Arc<Pipeline>) -> Self {
+        Self { pipeline, bind_group: None }
     }
 
-    fn bind_group(&self, pipeline: &Pipeline) -> Result<wgpu::BindGroup> {
+    /// The kernel and what binds the buffers as they are now; that is made anew when others have taken
+    /// their place.
+    fn current(
+        &mut self,
+        gpu: &Gpu,
+        buffers: &Buffers,
+    ) -> Result<(&wgpu::ComputePipeline, &wgpu::BindGroup)> {
+        let version = buffers.version();
+        let kept = self.bind_group.take().filter(|(of, _)| *of == version);
+        let current = match kept {
+            Some(kept) => kept,
+            None => (version, self.bind(gpu, buffers)?),
+        };
+        Ok((&self.pipeline.pipeline, &self.bind_group.insert(current).1))
+    }
+
+    fn bind(&self, gpu: &Gpu, buffers: &Buffers) -> Result<wgpu::BindGroup> {
         let missing = |name| Error::new(format!("the shader's {name} was not uploaded"));
+        let bindings = &self.pipeline.program.bindings;
         let mut views = Vec::new();
-        for binding in &pipeline.program.bindings {
+        for binding in bindings {
             if let Binding::Array(array) = binding {
-                let texture = self.buffers.array(array.name).ok_or_else(|| missing(array.name))?;
+                let texture = buffers.array(array.name).ok_or_else(|| missing(array.name))?;
                 views.push(texture.create_view(&wgpu::TextureViewDescriptor::default()));
             }
         }
         let mut next_view = views.iter();
         let mut entries = Vec::new();
-        for (binding, index) in pipeline.program.bindings.iter().zip(0..) {
+        for (binding, index) in bindings.iter().zip(0..) {
             let resource = match binding {
                 Binding::Buffer { name, .. } => {
-                    self.buffers.get(name).ok_or_else(|| missing(name))?.as_entire_binding()
+                    buffers.get(name).ok_or_else(|| missing(name))?.as_entire_binding()
                 }
                 Binding::Array(array) => wgpu::BindingResource::TextureView(
                     next_view.next().ok_or_else(|| missing(array.name))?,
@@ -393,23 +452,22 @@ impl Renderer {
             };
             entries.push(wgpu::BindGroupEntry { binding: index, resource });
         }
-        Ok(self.gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        Ok(gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
-            layout: &pipeline.layout,
+            layout: &self.pipeline.layout,
             entries: &entries,
         }))
     }
 }
 
-/// The first tile with a pixel that has no more than these samples.
-fn first_undone(film: &Film, samples: u32) -> u64 {
-    let tiles_across = film.width.div_ceil(TILE);
-    let tile_of = |(y, row): (usize, &[Pixel])| {
-        let x = row.iter().position(|pixel| pixel.samples() <= samples)?;
-        Some(y as u32 / TILE * tiles_across + x as u32 / TILE)
-    };
-    let rows = film.pixels.chunks(film.width as usize).enumerate();
-    rows.filter_map(tile_of).min().map_or(0, u64::from)
+/// About the largest radiance of the map and of lamps.
+fn brightest(world: &World, environment: &Environment) -> f32 {
+    let scene = &world.scene;
+    let map = environment.rotation_and_intensity().1 / environment.importance_scale().0;
+    let emissive = scene.materials.iter().map(|material| material.emissive.max_element());
+    let lights = scene.lights.iter().map(|light| light.intensity.max_element());
+    let map = if environment.is_black() { 0.0 } else { map };
+    emissive.chain(lights).fold(map, f32::max)
 }
 
 /// Uploads the small tables of numbers; says where each begins.
@@ -490,7 +548,7 @@ mod tests {
         let never = AtomicBool::new(false);
         let mut renderer = gpu.map(|gpu| {
             let stage = Stage::new(gpu, &world, &environment).expect("it fits");
-            Renderer::new(&stage, &world, &environment, &view, &rays).expect("it fits")
+            Renderer::new(&stage, &world, &environment, &view, &rays, None).expect("it fits")
         });
         let mut traced = 0;
         for paths in [Some(0..4096), Some(4096..16384), None] {
@@ -504,7 +562,10 @@ mod tests {
                     match (paths, rendered) {
                         (Some(paths), _) => renderer.learn(paths, &learning, &never),
                         (None, Some(pass)) => {
-                            renderer.render(pass, &mut film, counts, &never).map(|done| done.1)
+                            renderer.render(pass, counts, &never).and_then(|_| {
+                                renderer.read_film(&mut film)?;
+                                Ok(renderer.rays())
+                            })
                         }
                         (None, None) => Ok(0),
                     }
@@ -550,29 +611,43 @@ mod tests {
         let view = View { sampling: Sampling::Plain, ..view(&world, LawOptions::ADAPTIVE) };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
         let stage = Stage::new(&gpu, &world, &environment).expect("it fits");
-        let mut renderer =
-            Renderer::new(&stage, &world, &environment, &view, &rays).expect("it fits");
         let grid = LightGrid::whole_map(environment.tile_energies());
-        renderer.set_grid(grid.as_ref()).expect("uploaded");
+        let begin = || {
+            let renderer = Renderer::new(&stage, &world, &environment, &view, &rays, None);
+            let mut renderer = renderer.expect("it fits");
+            renderer.set_grid(grid.as_ref()).expect("uploaded");
+            renderer
+        };
         let mut films = [true, false].map(|_| Film::new(view.width, view.height, false));
         let pass = Pass { target: 3, stride: 1, sequence: Sequence::default() };
-        renderer.render(pass, &mut films[0], None, &AtomicBool::new(false)).expect("rendered");
-        let mut calls = 0;
-        while films[1].min_samples() < pass.target {
-            assert!(calls < 1000, "{} of the samples are there", films[1].total_samples());
+        let mut at_once = begin();
+        let done = at_once.render(pass, None, &AtomicBool::new(false)).expect("rendered");
+        at_once.read_film(&mut films[0]).expect("read");
+        let all = 3 * u64::from(view.width * view.height);
+        assert_eq!(done, Advance { samples: all, least: 3 });
+        let (mut renderer, mut calls, mut samples) = (begin(), 0, 0);
+        loop {
+            assert!(calls < 1000, "{samples} of the samples are there");
             let cancel = Arc::new(AtomicBool::new(false));
             let cut = Arc::clone(&cancel);
             // One group of tiles at a time, or none: the pacer starts small.
-            renderer.render_pacer = Pacer::default();
+            renderer.settle().expect("it runs");
+            renderer.flights.forget_speed();
             let cutter = std::thread::Builder::new().name("cutter".to_owned()).spawn(move || {
                 std::thread::sleep(std::time::Duration::from_millis(2));
                 cut.store(true, Ordering::Relaxed);
             });
-            renderer.render(pass, &mut films[1], None, &cancel).expect("rendered");
+            let done = renderer.render(pass, None, &cancel).expect("rendered");
             cutter.expect("a thread").join().expect("it only sleeps");
             calls += 1;
+            samples += done.samples;
+            if done.least == pass.target {
+                break;
+            }
         }
+        renderer.read_film(&mut films[1]).expect("read");
         assert!(calls > 1, "it was cut");
+        assert_eq!(samples, all);
         assert!(films[0] == films[1], "the same samples, each once");
     }
 

@@ -453,7 +453,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 27] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 28] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -486,6 +486,7 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 27] {
         (wgsl!("camera"), true),
         (wgsl!("path"), true),
         (wgsl!("count"), features.has("counting")),
+        (wgsl!("film"), kernel == Kernel::Render),
         (wgsl!("render"), kernel == Kernel::Render),
         (wgsl!("learn"), kernel == Kernel::Learn),
     ]
@@ -497,8 +498,11 @@ fn bindings(kernel: Kernel, features: &Features) -> Vec<Binding> {
         // Not a uniform: software Vulkan optimises a shader anew, for 40 ms, before each dispatch if
         // it branches on uniforms.
         ("globals", "Globals", false, true),
-        ("film", "array<PixelSums>", true, !learns),
-        ("surfaces", "array<FirstHit>", true, features.has("layers")),
+        ("film_sum", "array<vec4f>", true, !learns),
+        ("film_rest", "array<vec4f>", true, !learns),
+        ("film_counts", "array<vec4u>", true, !learns),
+        ("surfaces", "array<vec4f>", true, features.has("layers")),
+        ("surfaces_rest", "array<vec4f>", true, features.has("layers")),
         ("visits", "array<atomic<u32>>", true, counts),
         ("counters", "array<atomic<u32>>", true, counts),
         ("slot_of_cell", "array<u32>", false, counts),

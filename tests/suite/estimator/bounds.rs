@@ -69,7 +69,7 @@ fn a_sealed_room_learns_nothing_and_is_black() {
     let environment = environment(sky::build("day", 128, 64).expect("a sky"));
     for sampling in [Sampling::Talk, Sampling::Adaptive] {
         let view = view(camera.clone(), sampling, 4);
-        let figures = *learned(&world, &environment, view.clone()).figures();
+        let figures = learned(&world, &environment, view.clone()).figures();
         assert!(figures.visited_cells > 0);
         assert_eq!(figures.learned_cells, 0, "{sampling:?}");
         assert!(is_black(&render(&world, &environment, view, 8)), "{sampling:?}");

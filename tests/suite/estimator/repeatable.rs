@@ -72,7 +72,7 @@ fn film_and_laws_do_not_depend_on_the_threads() {
                     session.advance(1, &AtomicBool::new(false)).expect("the CPU does not fail");
                 }
                 let laws = laws(session.grid().expect("a map with light"));
-                (session.film().clone(), laws, *session.figures())
+                (session.film().clone(), laws, session.figures())
             })
         };
         let (film, laws, figures) = result(1);
@@ -174,10 +174,10 @@ fn a_cancelled_pass_resumes_to_the_same_picture() {
         session.advance(200, &cancel).expect("the CPU does not fail");
     });
     assert!(session.film().total_samples() < 203 * 33 * 17, "it was too fast to be cancelled");
-    assert!(session.film().min_samples() >= 3, "what was done is kept");
+    assert!(session.samples() >= 3, "what was done is kept");
     let mut reference = setting.session(setting.view(Sampling::Adaptive));
-    while session.film().min_samples() < 203 {
-        let missing = 203 - session.film().min_samples();
+    while session.samples() < 203 {
+        let missing = 203 - session.samples();
         session.advance(missing, &AtomicBool::new(false)).expect("the CPU does not fail");
     }
     reference.advance(203, &AtomicBool::new(false)).expect("the CPU does not fail");

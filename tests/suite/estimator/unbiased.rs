@@ -172,7 +172,7 @@ fn laws_made_of_a_pixel_s_own_samples_do_not_bias_it() {
         let view_of = |sampling, seed| View { sampling, seed, ..view.clone() };
         let finish = |session: &mut Session<'_>| {
             let rule = StopRule { samples: Some(SAMPLES), ..StopRule::default() };
-            while session.film().min_samples() < SAMPLES {
+            while session.samples() < SAMPLES {
                 let pass = session.next_pass(&rule);
                 session.advance(pass, &AtomicBool::new(false)).expect("the CPU does not fail");
             }

@@ -1,6 +1,6 @@
 //! Numbers, directions and random points: `math`, `sampler` and what needs no scene.
 
-use glam::{UVec2, Vec2, Vec3};
+use glam::{UVec2, Vec2, Vec3, Vec4};
 
 use super::Probe;
 use super::cases::{Random, case, cases, edge_directions, edge_squares, edge_words};
@@ -19,7 +19,36 @@ pub(super) fn probes(stand: &Stand) -> Vec<Probe<'_>> {
     probes.extend(directions());
     probes.extend(random_points());
     probes.extend(camera(stand));
+    probes.push(long_sums());
     probes
+}
+
+/// Small numbers added to a large one, which alone would swallow all or most of them.
+fn long_sums() -> Probe<'static> {
+    const ADDED: u32 = 1000;
+    Probe::new(
+        "add_to_sum",
+        "var sum = Sum(take4(), vec4f(0.0)); let x = take4();
+        for (var i = 0u; i < 1000u; i++) { sum = add_to_sum(sum, x); }
+        put4(sum.high); put4(sum.low);",
+        cases([case(&[&Vec4::splat(1e6), &Vec4::splat(0.1)])], |r| {
+            let size = r.magnitude(1e-10, 1e10);
+            let x = r.unit3().extend(0.3) * size;
+            case(&[&(r.unit3().extend(1.0) * (r.magnitude(1.0, 1e7) * size)), &x])
+        }),
+        |t| {
+            let (start, x) = (t.take4().to_array(), t.take4().to_array());
+            let high = [(); 4].map(|()| f64::from(t.device()));
+            let low = [(); 4].map(|()| f64::from(t.device()));
+            for i in 0..4 {
+                // A thousand f64 additions lose 1e-13 of the sum at most.
+                let sum = (0..ADDED).fold(f64::from(start[i]), |sum, _| sum + f64::from(x[i]));
+                let off = (high[i] + low[i] - sum).abs();
+                t.check(off <= 1e-12 * sum, || format!("{sum:e} is off by {off:e}"));
+                t.check(low[i].abs() <= 1e-7 * high[i], || "the low part is low".to_owned());
+            }
+        },
+    )
 }
 
 /// Of all magnitudes, both signs, at zero, subnormal and huge.

@@ -23,7 +23,6 @@ mod surfaces;
 mod twin;
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 use super::pipeline::Pipeline;
 use super::shader::{Binding, Constants, Features, Kernel, Program, VertexTexels};
@@ -145,7 +144,7 @@ fn run(stand: &Stand, preludes: &[&str], probes: &[Probe<'_>]) {
     let Stand { world, environment, view, rays, grid } = stand;
     let stage = Stage::new(&gpu, world, environment).expect("it fits");
     let mut renderer =
-        Renderer::with_kernel(&stage, world, environment, view, rays, |gpu, program| {
+        Renderer::with_kernel(&stage, (world, environment), view, rays, None, |gpu, program| {
             Pipeline::new(gpu, "probe", with_probes(program, preludes, probes))
         })
         .expect("it compiles");
@@ -174,8 +173,7 @@ fn ask(renderer: &mut Renderer, index: usize, probe: &Probe<'_>) -> Vec<u32> {
         .expect("it fits");
     let count = probe.cases.len() as u32;
     let work = Work { first: index as u32, count, ..Work::default() };
-    let pipeline = Arc::clone(&renderer.render);
-    renderer.dispatch(&pipeline, &work, count.div_ceil(64)).expect("it runs");
+    renderer.dispatch(Kernel::Render, &work, count.div_ceil(64), 1).expect("it runs");
     renderer.read_words("probe_answers", words.len()).expect("it can be read")
 }
 
@@ -232,7 +230,7 @@ fn program_of(stand: &Stand, kernel: Kernel) -> Program {
 
 /// Functions whose effect is no return value: entry points, and what looks at the map to count,
 /// which `both_devices_learn_the_same_counters` and the tests of pictures compare.
-const COMPARED_ELSEWHERE: [&str; 3] = ["learn", "look_at_map", "render"];
+const COMPARED_ELSEWHERE: [&str; 4] = ["add_to_film", "learn", "look_at_map", "render"];
 
 /// Whatever the shaders define runs in some probe.
 #[test]

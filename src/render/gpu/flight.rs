@@ -1,0 +1,222 @@
+//! Work on its way: a few dispatches are queued, so that the device never waits for the host, and no
+//! more, so that a cancelled render ends soon.
+
+use std::collections::VecDeque;
+use std::time::Instant;
+
+use wgpu::{Buffer, BufferDescriptor, BufferUsages};
+
+use super::device::Gpu;
+use super::pacer::{Pacer, TARGET_SECONDS, WINDOW_TARGET_SECONDS};
+use super::shader::Kernel;
+use crate::error::Result;
+
+/// Dispatches under way at a time: one runs, one waits, one is being made.
+const MOST: usize = 3;
+/// Waiting for something that has ended takes less.
+const HAD_ENDED_SECONDS: f64 = 5e-5;
+/// Bytes between a slot's timestamps on the device, as resolving them asks for.
+const SLOT_BYTES: u64 = wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT;
+
+/// The dispatches under way, oldest first, and how long those before them took.
+pub(super) struct Flights {
+    under_way: VecDeque<Flight>,
+    target_seconds: f64,
+    pacers: [Pacer; 2],
+    last_landing: Instant,
+    clock: Option<Clock>,
+    started: usize,
+    figures: FlightFigures,
+}
+
+struct Flight {
+    submission: wgpu::SubmissionIndex,
+    kernel: Kernel,
+    units: u64,
+    submitted: Instant,
+    slot: usize,
+}
+
+/// What dispatches took.
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+pub struct FlightFigures {
+    /// Dispatches that have ended.
+    pub dispatches: u64,
+    /// Seconds they took on the device: its own timestamps, or what the host saw.
+    pub device_seconds: f64,
+    /// Whether these are the device's timestamps.
+    pub has_timestamps: bool,
+}
+
+impl Flights {
+    pub(super) fn new(gpu: &Gpu) -> Self {
+        let target_seconds = if gpu.has_window { WINDOW_TARGET_SECONDS } else { TARGET_SECONDS };
+        Self {
+            under_way: VecDeque::new(),
+            target_seconds,
+            pacers: [Pacer::new(target_seconds); 2],
+            last_landing: Instant::now(),
+            clock: Clock::new(gpu),
+            started: 0,
+            figures: FlightFigures::default(),
+        }
+    }
+
+    /// Units (workgroup samples) that the next dispatch of a kernel may hold.
+    pub(super) fn units(&self, kernel: Kernel) -> u64 {
+        self.pacers[kernel as usize].units()
+    }
+
+    /// What the dispatches so far took.
+    pub(super) fn figures(&self) -> FlightFigures {
+        self.figures
+    }
+
+    /// Submits `groups` workgroups of a kernel, once there is room for them.
+    pub(super) fn start(
+        &mut self,
+        gpu: &Gpu,
+        kernel: Kernel,
+        (pipeline, bind_group): (&wgpu::ComputePipeline, &wgpu::BindGroup),
+        groups: u32,
+        units: u64,
+    ) -> Result<()> {
+        while self.under_way.len() >= MOST {
+            self.land(gpu)?;
+        }
+        let slot = self.started % MOST;
+        self.started += 1;
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some(kernel.name()),
+                timestamp_writes: self.clock.as_ref().map(|clock| clock.writes(slot)),
+            });
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, bind_group, &[]);
+            pass.dispatch_workgroups(groups, 1, 1);
+        }
+        if let Some(clock) = &self.clock {
+            clock.resolve(&mut commands, slot);
+        }
+        let submitted = Instant::now();
+        let submission = gpu.queue.submit([commands.finish()]);
+        if let Some(clock) = &self.clock {
+            clock.ask(slot);
+        }
+        self.under_way.push_back(Flight { submission, kernel, units, submitted, slot });
+        Ok(())
+    }
+
+    /// Waits for all of them.
+    pub(super) fn land_all(&mut self, gpu: &Gpu) -> Result<()> {
+        while !self.under_way.is_empty() {
+            self.land(gpu)?;
+        }
+        Ok(())
+    }
+
+    /// Waits for the oldest one.
+    fn land(&mut self, gpu: &Gpu) -> Result<()> {
+        let Some(flight) = self.under_way.pop_front() else { return Ok(()) };
+        let asked = Instant::now();
+        gpu.wait_for(Some(flight.submission))?;
+        let now = Instant::now();
+        // What had ended before the host asked took less than the host saw.
+        let had_ended = (now - asked).as_secs_f64() < HAD_ENDED_SECONDS;
+        // It began when the one before it had ended.
+        let seen = (now - flight.submitted.max(self.last_landing)).as_secs_f64();
+        self.last_landing = now;
+        let told = self.clock.as_mut().and_then(|clock| clock.seconds(flight.slot));
+        let seconds = told.unwrap_or(seen);
+        self.figures.dispatches += 1;
+        self.figures.device_seconds += seconds;
+        self.figures.has_timestamps = told.is_some();
+        if told.is_some() || !had_ended || seconds < self.target_seconds {
+            self.pacers[flight.kernel as usize].record(flight.units, seconds);
+        }
+        Ok(())
+    }
+
+    /// Lets dispatches begin as small as at first, so that tests can cut work short.
+    #[cfg(test)]
+    pub(super) fn forget_speed(&mut self) {
+        self.pacers = [Pacer::new(self.target_seconds); 2];
+    }
+}
+
+/// The device's own clock: when each dispatch began and ended.
+struct Clock {
+    queries: wgpu::QuerySet,
+    resolved: Buffer,
+    staging: [Buffer; MOST],
+    seconds_per_tick: f64,
+}
+
+impl Clock {
+    /// `None` where the device has none.
+    fn new(gpu: &Gpu) -> Option<Self> {
+        if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
+            return None;
+        }
+        let seconds_per_tick = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
+        let buffer = |label, size, usage| {
+            let mapped_at_creation = false;
+            gpu.device.create_buffer(&BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation,
+            })
+        };
+        Some(Self {
+            queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("timestamps"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2 * MOST as u32,
+            }),
+            resolved: buffer(
+                "timestamps",
+                SLOT_BYTES * MOST as u64,
+                BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC,
+            ),
+            staging: std::array::from_fn(|_| {
+                buffer("timestamps read", 16, BufferUsages::MAP_READ | BufferUsages::COPY_DST)
+            }),
+            seconds_per_tick,
+        })
+    }
+
+    fn writes(&self, slot: usize) -> wgpu::ComputePassTimestampWrites<'_> {
+        let first = 2 * slot as u32;
+        wgpu::ComputePassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(first),
+            end_of_pass_write_index: Some(first + 1),
+        }
+    }
+
+    fn resolve(&self, commands: &mut wgpu::CommandEncoder, slot: usize) {
+        let (first, at) = (2 * slot as u32, slot as u64 * SLOT_BYTES);
+        commands.resolve_query_set(&self.queries, first..first + 2, &self.resolved, at);
+        commands.copy_buffer_to_buffer(&self.resolved, at, &self.staging[slot], 0, 16);
+    }
+
+    /// Asks for a slot's times; they are there once its dispatch has landed.
+    fn ask(&self, slot: usize) {
+        // Whether it worked shows when they are read.
+        self.staging[slot].map_async(wgpu::MapMode::Read, .., |_| {});
+    }
+
+    /// Seconds between a slot's timestamps; `None` where they make no sense.
+    fn seconds(&mut self, slot: usize) -> Option<f64> {
+        let staging = &self.staging[slot];
+        let ticks = staging.get_mapped_range(..).ok().and_then(|view| {
+            let times: &[u64] = bytemuck::try_cast_slice(&view).ok()?;
+            times[1].checked_sub(times[0])
+        });
+        // Even where another thread that shares the device is about to map it.
+        staging.unmap();
+        ticks.filter(|ticks| *ticks > 0).map(|ticks| ticks as f64 * self.seconds_per_tick)
+    }
+}
