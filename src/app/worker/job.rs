@@ -378,8 +378,7 @@ impl<'a> Job<'a> {
             let start = Instant::now();
             let owed = main.figures().learning_seconds - preview.figures().render_seconds;
             while !self.is_superseded()
-                && (preview.samples() == 0
-                    || start.elapsed().as_secs_f64() < owed.min(1.0))
+                && (preview.samples() == 0 || start.elapsed().as_secs_f64() < owed.min(1.0))
             {
                 self.advance(preview, None, true);
                 self.measure(preview);
