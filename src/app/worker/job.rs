@@ -90,7 +90,7 @@ impl Legacy {
 
 /// A film read back from the window's device, where it is shown in place meanwhile.
 struct Reading {
-    of: DeviceFilm,
+    of: (Gpu, DeviceFilm),
     film: Arc<Film>,
     noise: f64,
     at: Instant,
@@ -106,7 +106,7 @@ pub(super) struct Job<'a> {
     counters: Option<Arc<LearningGrid>>,
     published: Instant,
     publish_gap: Duration,
-    /// Films that the window shows in place, as they were read last.
+    /// Films that the window shows in place, as they were read last; they go with the request.
     readings: Vec<Reading>,
     /// The laws published last, with what tells whether they are still those in use.
     laws: Option<((usize, u64), Arc<LightGrid>)>,
@@ -561,8 +561,7 @@ impl<'a> Job<'a> {
                 let cost = in_place.as_ref().map_or(Duration::ZERO, |_| start.elapsed());
                 if let Some(of) = in_place {
                     let (at, gap) = (Instant::now(), gap_after(cost));
-                    // Those of sessions that have ended go with the next request.
-                    self.readings.retain(|reading| reading.of != of);
+                    self.readings.retain(|reading| !is_same(&reading.of, &of));
                     self.readings.push(Reading { of, film: Arc::clone(&film), noise, at, gap });
                 }
                 (film, noise, cost)
@@ -582,21 +581,26 @@ impl<'a> Job<'a> {
 
     /// The session's film if the window shows it without its being read; small ones are filtered on the
     /// CPU.
-    fn in_place(&self, session: &Session<'_>) -> Option<DeviceFilm> {
+    fn in_place(&self, session: &Session<'_>) -> Option<(Gpu, DeviceFilm)> {
         let (gpu, film) = session.film_on_device()?;
         let is_small = film.width < self.request.view.width;
-        (!is_small && gpu.is_same(&lock(&self.shared.screen))).then_some(film)
+        (!is_small && gpu.is_same(&lock(&self.shared.screen))).then_some((gpu, film))
     }
 
     /// The last reading of a film, unless it is too old.
-    fn reading(&self, of: Option<&DeviceFilm>) -> Option<&Reading> {
-        self.readings.iter().find(|r| Some(&r.of) == of && r.at.elapsed() < r.gap)
+    fn reading(&self, of: Option<&(Gpu, DeviceFilm)>) -> Option<&Reading> {
+        let of = of?;
+        self.readings.iter().find(|r| is_same(&r.of, of) && r.at.elapsed() < r.gap)
     }
 
     /// Whether figures that need the film are to be taken anew.
     fn is_reading_due(&self, session: &Session<'_>) -> bool {
         session.samples() > 0 && self.reading(self.in_place(session).as_ref()).is_none()
     }
+}
+
+fn is_same((gpu, film): &(Gpu, DeviceFilm), other: &(Gpu, DeviceFilm)) -> bool {
+    gpu.is_same(&other.0) && *film == other.1
 }
 
 /// Time until something that took `cost` may be done again.

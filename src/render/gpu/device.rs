@@ -301,7 +301,8 @@ impl Gpu {
 
     /// Whether both are clones of one connection: only then may they use each other's buffers.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
-        self.device == other.device
+        // wgpu 30 takes devices of two instances for equal.
+        Arc::ptr_eq(&self.trouble, &other.trouble)
     }
 
     /// The first thing that went wrong on the device, if any did; it is of no use afterwards.
