@@ -1,7 +1,5 @@
 //! The picture, and moving about in it.
 
-use std::time::Duration;
-
 use egui::{
     Align2, CentralPanel, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Response,
     Sense, Shape, Stroke, StrokeKind, TextureId, Ui, Vec2,
@@ -147,21 +145,19 @@ fn picture(
     painter.rect_stroke(rect, 0.0, Stroke::new(1.0, theme::ACCENT), StrokeKind::Outside);
 }
 
-/// Whether a picture is another one in every frame; then there is a next frame.
+/// Whether a picture is another one in every frame; then there is a next frame. Software would do
+/// nothing else than draw: there it changes with the snapshots.
 fn changes(ui: &Ui, picture: &LinearPicture, scope: &Scope<'_>) -> bool {
     let is_idle =
         |snapshot: &Snapshot| matches!(snapshot.activity, Activity::Paused | Activity::Done);
-    let changes = picture.is_live() && !scope.snapshot.is_none_or(is_idle);
+    let changes = picture.is_live()
+        && !scope.screen.gpu().facts().is_software()
+        && !scope.snapshot.is_none_or(is_idle);
     if changes {
-        // Software would do nothing else.
-        let is_slow = scope.screen.gpu().facts().is_software();
-        ui.ctx().request_repaint_after(if is_slow { SLOW_FRAME } else { Duration::ZERO });
+        ui.ctx().request_repaint();
     }
     changes
 }
-
-/// Time between two frames where drawing one takes as long as rendering.
-const SLOW_FRAME: Duration = Duration::from_millis(250);
 
 /// Writes what the overlay has to say.
 fn labels(ui: &Ui, rect: Rect, shown: &Shown) {

@@ -579,12 +579,13 @@ impl<'a> Job<'a> {
         (take, cost)
     }
 
-    /// The session's film if the window shows it without its being read; small ones are filtered on the
-    /// CPU.
+    /// The session's film if the window shows it in every frame without its being read. Small ones are
+    /// filtered on the CPU, and software does not draw so often.
     fn in_place(&self, session: &Session<'_>) -> Option<(Gpu, DeviceFilm)> {
         let (gpu, film) = session.film_on_device()?;
         let is_small = film.width < self.request.view.width;
-        (!is_small && gpu.is_same(&lock(&self.shared.screen))).then_some((gpu, film))
+        let is_live = !gpu.facts().is_software() && gpu.is_same(&lock(&self.shared.screen));
+        (is_live && !is_small).then_some((gpu, film))
     }
 
     /// The last reading of a film, unless it is too old.
