@@ -24,6 +24,7 @@ struct Hit {
 // Of a hit: the ray came from behind the triangle.
 const FROM_BEHIND = 0x80000000u;
 
+//#if software_walk
 // A ray as the boxes want it. Boxes are made larger by 16 u (|origin| + extent), u = 2^-24, which
 // covers all rounding here and in the triangle test (see `BoxRay` in src/bvh/traverse.rs).
 struct BoxRay {
@@ -326,6 +327,7 @@ fn transmittance_along(ray: Ray) -> vec3f {
     return transmittance;
 }
 
+//#end
 // Twin of `bvh::offset_origin`.
 fn offset_origin(position: vec3f, geometric_normal: vec3f) -> vec3f {
     let steps = vec3i(geometric_normal * 256.0);

@@ -82,7 +82,8 @@ struct Globals {
     background_concentration: f32,
     // Factor on what is added to the film, a power of two: squares of the brightest do not overflow.
     film_scale: f32,
+    // Triangles in the driver's tree that end every ray; those after them are asked.
+    opaque_triangles: u32,
     padding_2: u32,
     padding_3: u32,
-    padding_4: u32,
 }

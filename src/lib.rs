@@ -14,14 +14,16 @@
 //!   picture, pass by pass, into a film.
 //! - [`app`] is the window, [`cli`] what a person types; both find files by [`sources`], and write by
 //!   [`output`]. [`report`] measures error against time; [`metrics`] compares pictures, [`denoise`]
-//!   smooths them, [`tone`] develops them, and `develop` does so on a GPU. [`stability`] tries all of it on stiff and extreme cases.
+//!   smooths them, [`tone`] develops them, and `develop` does so on a GPU. [`stability`] tries all of it
+//!   on stiff and extreme cases, [`bench`] measures a machine.
 //!
-//! Arrows point down: `cli -> {stability -> app, report} -> render -> path ->
+//! Arrows point down: `cli -> {stability -> app, bench -> report} -> render -> path ->
 //! {light_grid, bsdf, medium, bvh} ->
 //! {scene, environment} -> {image, sampler, math, color, error}`.
 
 mod alarm;
 pub mod app;
+pub mod bench;
 pub mod bsdf;
 pub mod bvh;
 pub mod cli;

@@ -3,9 +3,9 @@
 use serde_json::json;
 
 use crate::environment::Environment;
-use crate::error::{Notices, Result};
+use crate::error::{Error, Notices, Result};
 use crate::path::World;
-use crate::render::gpu::{DeviceChoice, Gpu, Stage, adapters};
+use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, Stage, adapters};
 use crate::render::{Session, View};
 
 /// Arguments of `devices`.
@@ -30,9 +30,10 @@ pub(super) fn run(arguments: &DevicesArguments) -> Result<()> {
         println!("{}", adapter.name);
         println!("  {}, {}, driver {}", adapter.backend, adapter.kind, adapter.driver);
         println!(
-            "  up to {} storage buffers of {} MiB",
+            "  up to {} storage buffers of {} MiB, {} ray queries",
             adapter.storage_buffers,
-            adapter.storage_binding_bytes >> 20
+            adapter.storage_binding_bytes >> 20,
+            if adapter.has_ray_queries { "with" } else { "without" }
         );
     }
     Ok(())
@@ -48,14 +49,22 @@ pub(super) fn say(notices: &mut Notices, sentence: String) {
 pub(super) fn open(
     choice: DeviceChoice,
     adapter: Option<&str>,
+    rays: RayChoice,
     notices: &mut Notices,
 ) -> Result<Option<Gpu>> {
-    match choice.open(adapter) {
+    let opened = match choice.open(adapter) {
         Err(failure) if choice == DeviceChoice::Auto && adapter.is_none() => {
             say(notices, format!("{failure}; the CPU renders"));
-            Ok(None)
+            None
         }
-        opened => opened,
+        opened => opened?,
+    };
+    match opened {
+        Some(gpu) => gpu.with_rays(rays).map(Some),
+        None if rays == RayChoice::Hardware => {
+            Err(Error::new("--rays hardware: the CPU has no ray queries; --device gpu takes a GPU"))
+        }
+        None => Ok(None),
     }
 }
 

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod bench;
 mod compare;
 mod device;
 mod info;
@@ -44,6 +45,8 @@ enum Command {
     Info(info::InfoArguments),
     /// List the GPUs and what they allow.
     Devices(device::DevicesArguments),
+    /// Measure what this machine can do: rays and samples a second, waits, what the host costs.
+    Bench(bench::BenchArguments),
     /// Measure error against run time: curves, speed-ups, the talk's table.
     Report(Box<report::ReportArguments>),
     /// Compare the importance tables' accuracy on maps (the talk's summed-area-table claim).
@@ -63,6 +66,7 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(arguments),
         Command::Info(arguments) => info::run(arguments),
         Command::Devices(arguments) => device::run(arguments),
+        Command::Bench(arguments) => bench::run(arguments),
         Command::Report(arguments) => report::run(arguments),
         Command::Sat(arguments) => sat::run(arguments),
         Command::Stability(arguments) => stability::run(arguments),

@@ -22,7 +22,7 @@ use crate::output::record::{self, Phases, Record};
 use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
-use crate::render::gpu::DeviceChoice;
+use crate::render::gpu::{DeviceChoice, RayChoice};
 use crate::render::{Crop, Sampling, Session, StopRule, View};
 use crate::sampler::Points;
 use crate::scene::{Camera, Medium, Projection, Scene, builtin};
@@ -158,6 +158,9 @@ pub(super) struct RenderArguments {
     /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
     #[arg(long, value_name = "NAME", help_heading = "Run")]
     adapter: Option<String>,
+    /// What finds the surfaces that rays hit on a GPU.
+    #[arg(long, default_value = "auto", value_enum, help_heading = "Run")]
+    rays: RayChoice,
     /// Threads; 0 uses every core.
     #[arg(long, default_value = "0", value_parser = clap::value_parser!(u16).range(0..=1024), value_name = "N", help_heading = "Run")]
     threads: u16,
@@ -273,6 +276,7 @@ impl RenderArguments {
             seed: 0,
             device,
             adapter,
+            rays: RayChoice::Auto,
             threads: 0,
             json: None,
             laws: None,
@@ -300,7 +304,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         eprintln!("notice: {sentence}");
     }
     let rule = stop_rule(arguments);
-    let gpu = device::open(arguments.device, arguments.adapter.as_deref(), &mut notices)?;
+    let gpu =
+        device::open(arguments.device, arguments.adapter.as_deref(), arguments.rays, &mut notices)?;
     let mut session =
         device::start(arguments.device, gpu.as_ref(), &world, &environment, view, &mut notices)?;
     let outcome = work(&mut session, &rule, &cancel, &progress, arguments, &mut notices);

@@ -47,7 +47,11 @@ impl Pixel {
     }
 
     /// Of sums over `samples` samples: red, green, blue and squared luminance.
-    pub(super) fn of_sums([r, g, b, luminance_squared]: [f64; 4], samples: u32, invalid: u32) -> Self {
+    pub(super) fn of_sums(
+        [r, g, b, luminance_squared]: [f64; 4],
+        samples: u32,
+        invalid: u32,
+    ) -> Self {
         Self { sum: [r, g, b], luminance_squared, samples, invalid }
     }
 
@@ -109,12 +113,7 @@ impl Surface {
 
     /// Of sums over first hits: albedo, depth, normal and their number.
     pub(super) fn of_sums([r, g, b, depth, x, y, z, hits]: [f64; 8]) -> Self {
-        Self {
-            albedo: DVec3::new(r, g, b),
-            normal: DVec3::new(x, y, z),
-            depth,
-            hits: hits as u32,
-        }
+        Self { albedo: DVec3::new(r, g, b), normal: DVec3::new(x, y, z), depth, hits: hits as u32 }
     }
 
     /// What [`Self::of_sums`] takes.

@@ -57,11 +57,11 @@ fn processor() -> String {
 }
 
 /// A device ready to be measured on.
-pub(super) struct OpenDevice {
-    pub(super) device: Device,
-    pub(super) gpu: Option<Gpu>,
+pub(crate) struct OpenDevice {
+    pub(crate) device: Device,
+    pub(crate) gpu: Option<Gpu>,
     /// Processor or adapter, in words.
-    pub(super) name: String,
+    pub(crate) name: String,
 }
 
 impl OpenDevice {
@@ -69,7 +69,7 @@ impl OpenDevice {
     ///
     /// # Errors
     /// If there is no such GPU.
-    pub(super) fn open(device: Device, adapter: Option<&str>, machine: &Machine) -> Result<Self> {
+    pub(crate) fn open(device: Device, adapter: Option<&str>, machine: &Machine) -> Result<Self> {
         if device == Device::Cpu {
             let name = format!("{}, {} threads", machine.processor, machine.threads);
             return Ok(Self { device, gpu: None, name });

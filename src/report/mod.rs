@@ -24,6 +24,7 @@ pub mod talk;
 
 pub use conduct::{Options, check, make};
 pub use machine::Machine;
+pub(crate) use machine::OpenDevice;
 pub use measure::{Errors, Memory, Point, Run};
 pub use pages::{duration, markdown_table, row_sentence};
 pub use plan::{Device, Effort, Frame, Method, Plan, Row, Settings};

@@ -1,6 +1,7 @@
 //! The one integration-test binary.
 
 mod app;
+mod bench;
 mod bsdf;
 mod builtin;
 mod bvh;

@@ -17,6 +17,8 @@ pub(super) struct Buffers {
     gpu: Gpu,
     by_name: BTreeMap<&'static str, Buffer>,
     arrays: BTreeMap<&'static str, (wgpu::Texture, u64)>,
+    /// The driver's tree of the scene, if rays are traced by the device's own queries.
+    pub(super) tree: Option<wgpu::Tlas>,
     /// Texels of a row of every array, as a power of two.
     width_log2: u32,
     version: u64,
@@ -37,6 +39,7 @@ impl Buffers {
             gpu: gpu.clone(),
             by_name: BTreeMap::new(),
             arrays: BTreeMap::new(),
+            tree: None,
             width_log2,
             version: 0,
             staging: Arc::default(),

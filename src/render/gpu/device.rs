@@ -33,6 +33,8 @@ pub struct AdapterFacts {
     pub storage_buffers: u32,
     /// Whether path tracing shaders can run at all.
     pub can_compute: bool,
+    /// Whether it finds what rays hit by itself.
+    pub has_ray_queries: bool,
 }
 
 impl AdapterFacts {
@@ -57,6 +59,8 @@ impl AdapterFacts {
             buffer_bytes: limits.max_buffer_size,
             storage_buffers: limits.max_storage_buffers_per_shader_stage,
             can_compute: limits.max_compute_invocations_per_workgroup >= 64,
+            has_ray_queries: adapter.features().contains(Features::EXPERIMENTAL_RAY_QUERY)
+                && limits.max_acceleration_structures_per_shader_stage > 0,
         }
     }
 
@@ -172,6 +176,20 @@ impl DeviceChoice {
 /// Time between two looks at whether the device has done its work.
 const LOOK_GAP: Duration = Duration::from_micros(100);
 
+/// What finds the surfaces that rays hit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum RayChoice {
+    /// A real GPU's own ray queries where it has them, else our kernels.
+    #[default]
+    Auto,
+    /// The GPU's ray queries, or an error. They are not watertight to the last bit: a ray along an edge
+    /// may hit another triangle or, seldom, none.
+    Hardware,
+    /// Our kernels.
+    Software,
+}
+
 /// A connection to an adapter; clones share it.
 #[derive(Clone)]
 pub struct Gpu {
@@ -184,6 +202,7 @@ pub struct Gpu {
     trouble: Arc<Mutex<Option<String>>>,
     /// Whether frames of a window are drawn on it too.
     pub(super) has_window: bool,
+    hardware_rays: bool,
     /// Kernels compiled so far, by their source.
     pub(super) pipelines: Arc<Mutex<HashMap<String, Arc<Pipeline>>>>,
 }
@@ -255,9 +274,14 @@ impl Gpu {
 
     fn connect(facts: AdapterFacts, instance: Instance, adapter: Adapter) -> Result<Self> {
         let limits = adapter.limits();
+        let wanted = Features::TIMESTAMP_QUERY | Features::EXPERIMENTAL_RAY_QUERY;
+        // SAFETY: asks to accept that ray queries of wgpu may have bugs; kernels ask about finite rays
+        // only, and read what a query found once it has ended.
+        let experimental_features = unsafe { wgpu::ExperimentalFeatures::enabled() };
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("lightgrid"),
-            required_features: adapter.features() & Features::TIMESTAMP_QUERY,
+            required_features: adapter.features() & wanted,
+            experimental_features,
             required_limits: limits.clone(),
             ..wgpu::DeviceDescriptor::default()
         }))
@@ -270,7 +294,9 @@ impl Gpu {
         };
         let (lost, failed) = (Arc::clone(&trouble), Arc::clone(&trouble));
         device.set_device_lost_callback(move |_, message| {
-            note(&lost, format!("the device was lost: {}", one_line(&message)));
+            let cause = one_line(&message);
+            let cause = if cause.is_empty() { cause } else { format!(": {cause}") };
+            note(&lost, format!("the device was lost{cause}"));
         });
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             note(
@@ -281,7 +307,7 @@ impl Gpu {
                 },
             );
         }));
-        Ok(Self {
+        let gpu = Self {
             facts,
             instance,
             adapter,
@@ -290,8 +316,10 @@ impl Gpu {
             queue,
             trouble,
             has_window: false,
+            hardware_rays: false,
             pipelines: Arc::default(),
-        })
+        };
+        gpu.with_rays(RayChoice::Auto)
     }
 
     /// What it is.
@@ -303,6 +331,27 @@ impl Gpu {
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         // wgpu 30 takes devices of two instances for equal.
         Arc::ptr_eq(&self.trouble, &other.trouble)
+    }
+
+    /// The same connection with rays traced as is asked for.
+    ///
+    /// # Errors
+    /// If it has no ray queries but they are asked for.
+    pub fn with_rays(mut self, choice: RayChoice) -> Result<Self> {
+        self.hardware_rays = match choice {
+            RayChoice::Auto => self.facts.has_ray_queries && !self.facts.is_software(),
+            RayChoice::Hardware if !self.facts.has_ray_queries => {
+                return Err(Error::new(format!("{} has no ray queries", self.facts.name)));
+            }
+            RayChoice::Hardware => true,
+            RayChoice::Software => false,
+        };
+        Ok(self)
+    }
+
+    /// Whether its own ray queries find what rays hit.
+    pub fn has_hardware_rays(&self) -> bool {
+        self.hardware_rays
     }
 
     /// The first thing that went wrong on the device, if any did; it is of no use afterwards.

@@ -22,7 +22,7 @@ const SLOT_BYTES: u64 = wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT;
 pub(super) struct Flights {
     under_way: VecDeque<Flight>,
     target_seconds: f64,
-    pacers: [Pacer; 2],
+    pacers: [Pacer; Kernel::COUNT],
     last_landing: Instant,
     clock: Option<Clock>,
     started: usize,
@@ -54,7 +54,7 @@ impl Flights {
         Self {
             under_way: VecDeque::new(),
             target_seconds,
-            pacers: [Pacer::new(target_seconds); 2],
+            pacers: [Pacer::new(target_seconds); Kernel::COUNT],
             last_landing: Instant::now(),
             clock: Clock::new(gpu),
             started: 0,
@@ -141,7 +141,7 @@ impl Flights {
     /// Lets dispatches begin as small as at first, so that tests can cut work short.
     #[cfg(test)]
     pub(super) fn forget_speed(&mut self) {
-        self.pacers = [Pacer::new(self.target_seconds); 2];
+        self.pacers = [Pacer::new(self.target_seconds); Kernel::COUNT];
     }
 }
 

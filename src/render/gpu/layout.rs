@@ -89,7 +89,8 @@ pub(crate) struct Globals {
     pub(crate) background: Vec3,
     pub(crate) background_concentration: f32,
     pub(crate) film_scale: f32,
-    pub(crate) padding: [u32; 3],
+    pub(crate) opaque_triangles: u32,
+    pub(crate) padding: [u32; 2],
 }
 
 /// Twin of `Material` in `surface.wgsl`.

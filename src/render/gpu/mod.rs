@@ -4,7 +4,9 @@
 //! as `cpu` does. Nothing waits in between: a few dispatches are always under way, and the host reads
 //! the film, whose sums lose nothing at any number of samples, only when somebody asks for it.
 
+mod acceleration;
 mod buffers;
+mod cast;
 mod device;
 mod film;
 mod flight;
@@ -16,6 +18,8 @@ mod pipeline;
 pub(crate) mod shader;
 mod stage;
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -36,7 +40,8 @@ use pipeline::Pipeline;
 use shader::{Binding, Constants, Features, Kernel, Program};
 use stage::put_array;
 
-pub use device::{AdapterFacts, DeviceChoice, Gpu, adapters};
+pub(crate) use cast::Question;
+pub use device::{AdapterFacts, DeviceChoice, Gpu, RayChoice, adapters};
 pub(crate) use film::DeviceFilm;
 pub use flight::FlightFigures;
 pub use shader::KernelFacts;
@@ -60,8 +65,7 @@ pub(crate) struct Renderer {
     globals: Globals,
     features: Features,
     constants: Constants,
-    render: Bound,
-    learn: Option<Bound>,
+    kernels: BTreeMap<Kernel, Bound>,
     flights: Flights,
     film: Sums,
     progress: Progress,
@@ -107,6 +111,8 @@ pub struct GpuFigures {
     pub bytes_read: u64,
     /// What its dispatches took.
     pub flights: FlightFigures,
+    /// Seconds in which the driver compiled its kernels, when it did.
+    pub compile_seconds: f64,
     /// What its render kernel holds.
     pub kernel: KernelFacts,
 }
@@ -138,7 +144,10 @@ impl Renderer {
         film: Option<&Film>,
         compile: impl FnOnce(&Gpu, Program) -> Result<Arc<Pipeline>>,
     ) -> Result<Self> {
-        let features = Features::of(world, environment, view);
+        let mut features = Features::of(world, environment, view);
+        if stage.gpu.has_hardware_rays() {
+            features = features.with_hardware_rays();
+        }
         let mut buffers = stage.buffers.for_renderer();
         let mut globals = stage.globals;
         globals.set_view(view, rays);
@@ -160,8 +169,7 @@ impl Renderer {
         let program = Program::new(Kernel::Render, &features, &constants, width_log2);
         let kernel_facts = KernelFacts::of(&features);
         let renderer = Self {
-            render: Bound::new(compile(&stage.gpu, program)?),
-            learn: None,
+            kernels: BTreeMap::from([(Kernel::Render, Bound::new(compile(&stage.gpu, program)?))]),
             flights: Flights::new(&stage.gpu),
             film: sums,
             progress,
@@ -365,6 +373,7 @@ impl Renderer {
             device_bytes: self.buffers.bytes(),
             bytes_read: self.buffers.bytes_read(),
             flights: self.flights.figures(),
+            compile_seconds: self.kernels.values().map(|k| k.pipeline.compile_seconds).sum(),
             kernel: self.kernel_facts.clone(),
         }
     }
@@ -384,13 +393,12 @@ impl Renderer {
 
     /// Sets a kernel going.
     fn dispatch(&mut self, kernel: Kernel, work: &Work, groups: u32, units: u64) -> Result<()> {
-        let bound = match (kernel, &mut self.learn) {
-            (Kernel::Render, _) => &mut self.render,
-            (Kernel::Learn, Some(learn)) => learn,
-            (Kernel::Learn, unmade) => {
+        let bound = match self.kernels.entry(kernel) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(vacant) => {
                 let width_log2 = self.buffers.width_log2();
                 let program = Program::new(kernel, &self.features, &self.constants, width_log2);
-                unmade.insert(Bound::new(self.gpu.pipeline(kernel, program)?))
+                vacant.insert(Bound::new(self.gpu.pipeline(kernel, program)?))
             }
         };
         let bound = bound.current(&self.gpu, &self.buffers)?;
@@ -448,6 +456,9 @@ impl Bound {
                 }
                 Binding::Array(array) => wgpu::BindingResource::TextureView(
                     next_view.next().ok_or_else(|| missing(array.name))?,
+                ),
+                Binding::Tree => wgpu::BindingResource::AccelerationStructure(
+                    buffers.tree.as_ref().ok_or_else(|| missing("tree"))?,
                 ),
             };
             entries.push(wgpu::BindGroupEntry { binding: index, resource });

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::sync::{Arc, PoisonError};
+use std::time::Instant;
 
 use super::device::Gpu;
 use super::shader::{Binding, Kernel, Program};
@@ -12,6 +13,8 @@ pub(super) struct Pipeline {
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) layout: wgpu::BindGroupLayout,
     pub(super) program: Program,
+    /// Seconds of compiling.
+    pub(super) compile_seconds: f64,
 }
 
 impl Pipeline {
@@ -20,6 +23,7 @@ impl Pipeline {
     /// # Errors
     /// If the driver refuses it.
     pub(super) fn new(gpu: &Gpu, entry: &str, program: Program) -> Result<Arc<Self>> {
+        let start = Instant::now();
         let device = &gpu.device;
         let entries: Vec<_> = program
             .bindings
@@ -54,7 +58,8 @@ impl Pipeline {
             cache: None,
         });
         gpu.check()?;
-        Ok(Arc::new(Self { pipeline, layout, program }))
+        let compile_seconds = start.elapsed().as_secs_f64();
+        Ok(Arc::new(Self { pipeline, layout, program, compile_seconds }))
     }
 }
 
@@ -82,6 +87,7 @@ fn binding_type(binding: &Binding) -> wgpu::BindingType {
             has_dynamic_offset: false,
             min_binding_size: None,
         },
+        Binding::Tree => wgpu::BindingType::AccelerationStructure { vertex_return: false },
         Binding::Array(array) => wgpu::BindingType::Texture {
             sample_type: if array.format.is_float() {
                 wgpu::TextureSampleType::Float { filterable: false }

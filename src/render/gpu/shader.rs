@@ -15,12 +15,16 @@ use crate::path::{Background, World};
 use crate::sampler::Points;
 
 /// Entry points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kernel {
     /// Adds samples to pixels.
     Render,
     /// Traces learning paths.
     Learn,
+    /// Finds the nearest hits of rays, for measurements.
+    ClosestHits,
+    /// Finds how much light comes along rays, for measurements.
+    ShadowRays,
 }
 
 impl Kernel {
@@ -29,7 +33,17 @@ impl Kernel {
         match self {
             Self::Render => "render",
             Self::Learn => "learn",
+            Self::ClosestHits => "closest_hits",
+            Self::ShadowRays => "shadow_rays",
         }
+    }
+
+    /// Number of kernels.
+    pub(crate) const COUNT: usize = 4;
+
+    /// Whether it traces rays that the host made, not paths.
+    fn casts(self) -> bool {
+        matches!(self, Self::ClosestHits | Self::ShadowRays)
     }
 }
 
@@ -39,7 +53,7 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 47] = [
+    pub(crate) const ALL: [&'static str; 50] = [
         "alpha_mask",
         "anisotropy",
         "background_blur",
@@ -51,6 +65,8 @@ impl Features {
         "emitters",
         "faces",
         "filtered_hits",
+        "filtered_or_passed",
+        "hardware_rays",
         "independent_points",
         "iridescence",
         "learning",
@@ -75,6 +91,7 @@ impl Features {
         "shadow_rays",
         "sheen",
         "single_sided",
+        "software_walk",
         "solid_transmission",
         "summed_area",
         "table_f32",
@@ -149,6 +166,7 @@ impl Features {
     /// Every feature at once, with the table that is used by default.
     pub(crate) fn most() -> Self {
         let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_") && *n != "learning");
+        let names = names.filter(|n| *n != "hardware_rays");
         Self::from_names(names.filter(|n| *n != "summed_area").map(|n| (n, true)))
     }
 
@@ -156,8 +174,9 @@ impl Features {
     pub(crate) fn from_names(names: impl IntoIterator<Item = (&'static str, bool)>) -> Self {
         let mut set: BTreeSet<_> =
             names.into_iter().filter(|(_, on)| *on).map(|(n, _)| n).collect();
-        let follows: [(&str, &[&str]); 7] = [
+        let follows: [(&str, &[&str]); 8] = [
             ("filtered_hits", &["alpha_mask", "single_sided"]),
+            ("filtered_or_passed", &["alpha_mask", "partial", "single_sided"]),
             ("pass_through", &["alpha_mask", "partial"]),
             ("scene_lights", &["emitters", "punctual_lights"]),
             ("shadow_rays", &["map_sampling", "local_lights"]),
@@ -170,7 +189,17 @@ impl Features {
                 set.insert(name);
             }
         }
+        if !set.contains("hardware_rays") {
+            set.insert("software_walk");
+        }
         Self(set)
+    }
+
+    /// The same for a device whose own ray queries find what rays hit.
+    pub(crate) fn with_hardware_rays(mut self) -> Self {
+        self.0.remove("software_walk");
+        self.0.insert("hardware_rays");
+        self
     }
 
     /// The same for a kernel.
@@ -181,6 +210,9 @@ impl Features {
             set.insert("learning");
             set.remove("layers");
             set.remove("independent_points");
+        } else if kernel.casts() {
+            set.remove("counting");
+            set.remove("layers");
         }
         Self(set)
     }
@@ -330,7 +362,7 @@ impl TexelFormat {
 }
 
 /// All arrays.
-pub(crate) const ARRAYS: [ArrayKind; 13] = {
+pub(crate) const ARRAYS: [ArrayKind; 14] = {
     use TexelFormat::{Bytes4, Floats4, Words1, Words2, Words4};
     const fn array(
         name: &'static str,
@@ -340,8 +372,9 @@ pub(crate) const ARRAYS: [ArrayKind; 13] = {
         ArrayKind { name, format, feature }
     }
     [
-        array("bvh_nodes", Words4, None),
-        array("bvh_triangles", Words4, None),
+        array("bvh_nodes", Words4, Some("software_walk")),
+        array("bvh_triangles", Words4, Some("software_walk")),
+        array("query_triangles", Words1, Some("hardware_rays")),
         array("triangles", Words4, None),
         array("vertices", Words4, None),
         array("materials", Words4, None),
@@ -388,6 +421,8 @@ pub(crate) enum Binding {
     },
     /// One of [`ARRAYS`].
     Array(ArrayKind),
+    /// The driver's tree.
+    Tree,
 }
 
 /// A kernel's source and what it binds.
@@ -408,6 +443,9 @@ impl Program {
         let features = features.in_kernel(kernel);
         let bindings = bindings(kernel, &features);
         let mut source = String::new();
+        if features.has("hardware_rays") {
+            source.push_str("enable wgpu_ray_query;\n");
+        }
         let Constants {
             stack_size,
             vertex,
@@ -441,6 +479,12 @@ impl Program {
                     );
                 }
                 Binding::Array(array) => source.push_str(&array.accessor(index, width_log2)),
+                Binding::Tree => {
+                    let _ = writeln!(
+                        source,
+                        "@group(0) @binding({index}) var tree: acceleration_structure;"
+                    );
+                }
             }
         }
         for (text, is_needed) in files(kernel, &features) {
@@ -453,7 +497,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 28] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 32] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -483,37 +527,45 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 28] {
         (wgsl!("lights"), features.has("scene_lights")),
         (wgsl!("medium"), features.has("medium")),
         (wgsl!("bvh"), true),
+        (wgsl!("ray_query"), features.has("hardware_rays")),
         (wgsl!("camera"), true),
         (wgsl!("path"), true),
         (wgsl!("count"), features.has("counting")),
         (wgsl!("film"), kernel == Kernel::Render),
         (wgsl!("render"), kernel == Kernel::Render),
         (wgsl!("learn"), kernel == Kernel::Learn),
+        (wgsl!("cast"), kernel.casts()),
+        (wgsl!("closest_hits"), kernel == Kernel::ClosestHits),
+        (wgsl!("shadow_rays"), kernel == Kernel::ShadowRays),
     ]
 }
 
 fn bindings(kernel: Kernel, features: &Features) -> Vec<Binding> {
     let (learns, counts) = (kernel == Kernel::Learn, features.has("counting"));
+    let renders = kernel == Kernel::Render;
     let buffers = [
         // Not a uniform: software Vulkan optimises a shader anew, for 40 ms, before each dispatch if
         // it branches on uniforms.
         ("globals", "Globals", false, true),
-        ("film_sum", "array<vec4f>", true, !learns),
-        ("film_rest", "array<vec4f>", true, !learns),
-        ("film_counts", "array<vec4u>", true, !learns),
+        ("film_sum", "array<vec4f>", true, renders),
+        ("film_rest", "array<vec4f>", true, renders),
+        ("film_counts", "array<vec4u>", true, renders),
         ("surfaces", "array<vec4f>", true, features.has("layers")),
         ("surfaces_rest", "array<vec4f>", true, features.has("layers")),
         ("visits", "array<atomic<u32>>", true, counts),
         ("counters", "array<atomic<u32>>", true, counts),
         ("slot_of_cell", "array<u32>", false, counts),
         ("learning_rays", "atomic<u32>", true, learns),
+        ("cast_rays", "array<CastRay>", false, kernel.casts()),
+        ("cast_results", "array<vec2u>", true, kernel.casts()),
     ];
     let buffers = buffers
         .into_iter()
         .filter(|(.., is_needed)| *is_needed)
         .map(|(name, store, is_written, _)| Binding::Buffer { name, store, is_written });
     let arrays = ARRAYS.into_iter().filter(|array| array.is_needed(features)).map(Binding::Array);
-    buffers.chain(arrays).collect()
+    let tree = features.has("hardware_rays").then_some(Binding::Tree);
+    buffers.chain(arrays).chain(tree).collect()
 }
 
 /// Appends the lines of `text` whose conditions hold.
@@ -561,7 +613,7 @@ mod tests {
             .unwrap_or_else(|e| panic!("{names:?}: {}", e.emit_to_string(&program.source)));
         let mut validator = naga::valid::Validator::new(
             naga::valid::ValidationFlags::all(),
-            naga::valid::Capabilities::empty(),
+            naga::valid::Capabilities::RAY_QUERY,
         );
         let info = validator
             .validate(&module)
@@ -578,10 +630,13 @@ mod tests {
     fn independent() -> Vec<&'static str> {
         let follow = [
             "filtered_hits",
+            "filtered_or_passed",
+            "hardware_rays",
             "learning",
             "pass_through",
             "scene_lights",
             "shadow_rays",
+            "software_walk",
             "tangents",
             "uncommon_textures",
         ];
@@ -638,6 +693,9 @@ mod tests {
             if features.has("light_grid") {
                 validate(Kernel::Learn, features);
             }
+            validate(Kernel::ClosestHits, features);
+            validate(Kernel::ShadowRays, features);
+            validate(Kernel::Render, &features.clone().with_hardware_rays());
         }
     }
 }

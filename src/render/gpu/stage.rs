@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 
+use super::acceleration::Acceleration;
 use super::buffers::Buffers;
 use super::device::Gpu;
 use super::layout::{self, Globals};
@@ -12,6 +13,7 @@ use crate::bvh::compressed::CompressedTree;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::World;
+use crate::scene::Scene;
 
 /// Deepest tree a traversal's stack is made for.
 const MAX_DEPTH: u32 = 96;
@@ -34,7 +36,7 @@ impl Stage {
     pub fn new(gpu: &Gpu, world: &World, environment: &Environment) -> Result<Self> {
         let mut buffers = Buffers::new(gpu);
         let mut globals = Globals::default();
-        let constants = upload_world(&mut buffers, &mut globals, world)?;
+        let constants = upload_world(gpu, &mut buffers, &mut globals, world)?;
         upload_map(&mut buffers, &mut globals, environment)?;
         let environment = environment.clone();
         Ok(Self { gpu: gpu.clone(), buffers, globals, constants, environment })
@@ -67,23 +69,28 @@ impl Stage {
 }
 
 /// Uploads geometry, materials, textures and lights; returns what kernels are told of them.
-fn upload_world(buffers: &mut Buffers, globals: &mut Globals, world: &World) -> Result<Constants> {
+fn upload_world(
+    gpu: &Gpu,
+    buffers: &mut Buffers,
+    globals: &mut Globals,
+    world: &World,
+) -> Result<Constants> {
     let scene = &world.scene;
     let features = Features::of_world(world);
     let (materials, texture_refs) = layout::materials(world);
-    let tree = CompressedTree::build(&scene.positions, &scene.triangles, |triangle| {
-        materials[scene.triangle_materials[triangle as usize] as usize].flags
-    });
-    if tree.depth > MAX_DEPTH {
-        return Err(Error::new(format!(
-            "the scene's tree is {} levels deep; a GPU walks at most {MAX_DEPTH}",
-            tree.depth
-        )));
-    }
     let bounds = world.bvh.bounds();
     globals.scene_extent = bounds.0.abs().max(bounds.1.abs()).max_element();
-    put_array(buffers, "bvh_nodes", "the scene's tree", tree.nodes.as_flattened())?;
-    put_array(buffers, "bvh_triangles", "the scene's geometry", tree.triangles.as_flattened())?;
+    let flags_of =
+        |triangle: u32| materials[scene.triangle_materials[triangle as usize] as usize].flags;
+    let stack_size = if gpu.has_hardware_rays() {
+        let tree = Acceleration::build(gpu, scene, flags_of)?;
+        globals.opaque_triangles = tree.opaque;
+        put_array(buffers, "query_triangles", "the scene's geometry", &tree.triangles)?;
+        buffers.tree = Some(tree.tlas);
+        0
+    } else {
+        upload_tree(buffers, scene, flags_of)?
+    };
     let vertex = VertexTexels::of(&features);
     put_array(buffers, "triangles", "the scene's geometry", &layout::triangles(scene))?;
     put_array(buffers, "vertices", "the scene's geometry", &layout::vertices(scene, &vertex))?;
@@ -100,7 +107,21 @@ fn upload_world(buffers: &mut Buffers, globals: &mut Globals, world: &World) -> 
         put_array(buffers, "light_nodes", "the tree of lights", world.lights.arrays().1.nodes)?;
     }
     let textures_in_scene = world.needs.texture_slots;
-    Ok(Constants { stack_size: tree.depth, vertex, textures_in_scene, ..Constants::default() })
+    Ok(Constants { stack_size, vertex, textures_in_scene, ..Constants::default() })
+}
+
+/// Uploads the tree that kernels walk; returns its depth.
+fn upload_tree(buffers: &mut Buffers, scene: &Scene, flags_of: impl Fn(u32) -> u32) -> Result<u32> {
+    let tree = CompressedTree::build(&scene.positions, &scene.triangles, flags_of);
+    if tree.depth > MAX_DEPTH {
+        return Err(Error::new(format!(
+            "the scene's tree is {} levels deep; a GPU walks at most {MAX_DEPTH}",
+            tree.depth
+        )));
+    }
+    put_array(buffers, "bvh_nodes", "the scene's tree", tree.nodes.as_flattened())?;
+    put_array(buffers, "bvh_triangles", "the scene's geometry", tree.triangles.as_flattened())?;
+    Ok(tree.depth)
 }
 
 /// Makes an array of values that take whole texels or parts of one.

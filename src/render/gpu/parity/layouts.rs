@@ -4,9 +4,8 @@ use std::mem::offset_of;
 
 use naga::{Expression, Literal, Module, ScalarKind, Type, TypeInner};
 
-use super::super::layout::{
-    Globals, Material, TextureRef, Work, material_flags, texture_flags,
-};
+use super::super::cast::CastRay;
+use super::super::layout::{Globals, Material, TextureRef, Work, material_flags, texture_flags};
 use super::super::shader::{Constants, Features, Kernel, Program, VertexTexels};
 
 /// A struct's fields in bytes: name, offset, size.
@@ -29,10 +28,14 @@ macro_rules! fields {
 }
 
 fn module() -> Module {
+    module_of(Kernel::Render)
+}
+
+fn module_of(kernel: Kernel) -> Module {
     let features = Features::most();
     let vertex = VertexTexels::of(&features);
     let constants = Constants { stack_size: 20, vertex, ..Constants::default() };
-    let source = Program::new(Kernel::Render, &features, &constants, 12).source;
+    let source = Program::new(kernel, &features, &constants, 12).source;
     naga::front::wgsl::parse_str(&source)
         .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&source)))
 }
@@ -81,9 +84,11 @@ fn structs_are_laid_out_as_the_host_writes_them() {
         tile_columns tile_rows rotation_turns intensity tile_sums_at
         distant_light_count light_triangle_count width height seed bounces russian_roulette orthographic scene_extent
         mean_contribution zero grid_medium whole_map_share fog_low fog_mean_cosine fog_high tries_per_vertex
-        fog_scattering importance_scale fog_extinction first_of_sequence background background_concentration film_scale padding
+        fog_scattering importance_scale fog_extinction first_of_sequence background background_concentration film_scale opaque_triangles padding
     );
     assert_same(&module, "Globals", globals);
+    let ray = fields!(CastRay: origin t_max direction padding);
+    assert_same(&module_of(Kernel::ClosestHits), "CastRay", ray);
 }
 
 /// The value of a `u32` constant of the shaders.

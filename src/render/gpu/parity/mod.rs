@@ -18,7 +18,7 @@ mod layouts;
 mod map;
 mod media;
 mod scattering;
-mod stand;
+pub(super) mod stand;
 mod surfaces;
 mod twin;
 

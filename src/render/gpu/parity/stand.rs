@@ -128,6 +128,12 @@ fn view(camera: Camera, filter: PixelFilter, sampling: Sampling) -> View {
     }
 }
 
+/// A view of a scene, of which only what it asks of the kernels matters.
+pub(in super::super) fn view_of(world: &World, sampling: Sampling) -> View {
+    let camera = world.scene.cameras.first().cloned().unwrap_or_else(camera);
+    view(camera, PixelFilter::Box, sampling)
+}
+
 /// Tiles of unequal size, one of them black, dim ones beside a sun. Radiance is what the device can
 /// hold, so that packing (which has a test of its own) is no part of what is compared.
 fn environment((width, height): (u32, u32), table: TableKind, lookup: Lookup) -> Environment {

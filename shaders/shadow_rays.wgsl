@@ -1,0 +1,11 @@
+// Shadow rays, for measurements of the walk alone: the largest share of light that arrives along each.
+
+@compute @workgroup_size(64)
+fn shadow_rays(@builtin(global_invocation_id) id: vec3u) {
+    let index = globals.work.first + id.x;
+    if index >= globals.work.count {
+        return;
+    }
+    let share = max_element(transmittance_along(cast_ray(index)));
+    cast_results[index] = vec2u(bitcast<u32>(share), 0u);
+}

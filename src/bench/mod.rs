@@ -1,0 +1,347 @@
+//! What a machine can do, in a few minutes: rays and samples a second, waits, what the host costs.
+//!
+//! For users who choose a device, for bug reports, and for us on machines that we never see.
+
+mod rays;
+mod words;
+
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use crate::environment::Environment;
+use crate::error::{Error, Result};
+use crate::image::Image;
+use crate::light_grid::LawOptions;
+use crate::metrics;
+use crate::path::{Background, PathLimits, World, framing};
+use crate::render::filter::PixelFilter;
+use crate::render::gpu::{AdapterFacts, Gpu, KernelFacts, RayChoice, Stage};
+use crate::render::{Phase, Sampling, Session, StopRule, View};
+use crate::report::{Device, Machine, OpenDevice};
+use crate::sampler::Points;
+
+pub use rays::{RayFigures, RayKind};
+
+/// What is to be measured.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// In this order; parity is judged between the first two.
+    pub devices: Vec<Device>,
+    /// Part of the name of the GPU to take.
+    pub adapter: Option<String>,
+    /// What finds the surfaces that rays hit on it.
+    pub rays: RayChoice,
+    /// Width and height of the pictures.
+    pub size: (u32, u32),
+    /// Seconds of rendering a scene on a device.
+    pub seconds: f64,
+}
+
+/// A scene and its map, ready to be measured.
+pub struct Subject {
+    /// What the scene is called.
+    pub name: String,
+    /// The scene.
+    pub world: World,
+    /// The map.
+    pub environment: Environment,
+}
+
+/// What a machine did.
+#[derive(Debug, Clone, Serialize)]
+pub struct Bench {
+    /// The machine.
+    pub machine: Machine,
+    /// Width and height of the pictures.
+    pub size: (u32, u32),
+    /// Its devices.
+    pub devices: Vec<DeviceFigures>,
+    /// Scene by scene, how alike the pictures of the first two devices are.
+    pub parity: Vec<Parity>,
+}
+
+/// What a device did.
+#[derive(Debug, Clone, Serialize)]
+pub struct DeviceFigures {
+    /// Its name.
+    pub name: String,
+    /// What it is and allows; `None` for the CPU.
+    pub adapter: Option<AdapterFacts>,
+    /// Whether its own ray queries find what rays hit.
+    pub has_hardware_rays: bool,
+    /// Scene by scene.
+    pub scenes: Vec<SceneFigures>,
+}
+
+/// What a device did with a scene.
+#[derive(Debug, Clone, Serialize)]
+pub struct SceneFigures {
+    /// What the scene is called.
+    pub scene: String,
+    /// Its triangles.
+    pub triangles: usize,
+    /// Why nothing else is known; `None` if it went well.
+    pub failure: Option<String>,
+    /// Rays a second, kind by kind.
+    pub rays: Vec<RayFigures>,
+    /// Figures of whole paths.
+    pub paths: Option<PathFigures>,
+}
+
+/// What whole paths took: the defaults of `lightgrid render`.
+#[derive(Debug, Clone, Serialize)]
+pub struct PathFigures {
+    /// Seconds until scene and map were on the device.
+    pub upload_seconds: f64,
+    /// Seconds in which the driver compiled; some compile when a kernel first runs instead.
+    pub compile_seconds: f64,
+    /// Seconds from then to the first laws, kernels included.
+    pub first_laws_seconds: f64,
+    /// Seconds from the same moment to the first sample of every pixel.
+    pub first_picture_seconds: f64,
+    /// Camera paths a second, all pixels together, without learning and the first pass.
+    pub samples_per_second: f64,
+    /// Rays a second, of all kinds.
+    pub rays_per_second: f64,
+    /// Passes that these figures are of.
+    pub passes: u32,
+    /// Milliseconds of a pass.
+    pub pass_milliseconds: f64,
+    /// Milliseconds a pass kept the device busy; `None` on the CPU.
+    pub device_milliseconds: Option<f64>,
+    /// Whether these are the device's own timestamps.
+    pub has_timestamps: bool,
+    /// Bytes read back from the device a pass.
+    pub bytes_read_per_pass: f64,
+    /// Bytes on the device.
+    pub device_bytes: u64,
+    /// What the kernel holds.
+    pub kernel: Option<KernelFacts>,
+}
+
+/// How alike the pictures of two devices are: the same seed, few samples, no learning.
+#[derive(Debug, Clone, Serialize)]
+pub struct Parity {
+    /// What the scene is called.
+    pub scene: String,
+    /// Why it could not be judged.
+    pub failure: Option<String>,
+    /// Mean of the one by that of the other.
+    pub mean_ratio: f64,
+    /// Share of pixels that are more than 1 % apart.
+    pub share_apart: f64,
+    /// Share of rays that hit another triangle, or on one device alone none.
+    pub other_triangles: f64,
+}
+
+/// Measures; `progress` is told what is being done. Stops early, with what there is, when `cancel`
+/// becomes true.
+///
+/// # Errors
+/// If a device cannot be opened.
+pub fn run(
+    options: &Options,
+    subjects: &[Subject],
+    cancel: &AtomicBool,
+    progress: &dyn Fn(String),
+) -> Result<Bench> {
+    let machine = Machine::here();
+    let open = |device| {
+        let mut open = OpenDevice::open(device, options.adapter.as_deref(), &machine)?;
+        open.gpu = open.gpu.map(|gpu| gpu.with_rays(options.rays)).transpose()?;
+        Ok(open)
+    };
+    let opened: Vec<_> = options.devices.iter().map(|d| open(*d)).collect::<Result<_>>()?;
+    let mut devices: Vec<_> = opened
+        .iter()
+        .map(|open| DeviceFigures {
+            name: open.name.clone(),
+            adapter: open.gpu.as_ref().map(|gpu| gpu.facts().clone()),
+            has_hardware_rays: open.gpu.as_ref().is_some_and(Gpu::has_hardware_rays),
+            scenes: Vec::new(),
+        })
+        .collect();
+    let mut parity = Vec::new();
+    for subject in subjects {
+        let mut results = Vec::new();
+        for (open, figures) in opened.iter().zip(&mut devices) {
+            if is_set(cancel) {
+                break;
+            }
+            let place = Place { subject, open, options, cancel };
+            progress(format!("{} on the {}", subject.name, open.device.title()));
+            let (scene, result) = place.measure();
+            figures.scenes.push(scene);
+            results.push(result);
+        }
+        if let [a, b, ..] = &results[..] {
+            parity.push(compare(&subject.name, a, b));
+        }
+    }
+    Ok(Bench { machine, size: options.size, devices, parity })
+}
+
+fn is_set(cancel: &AtomicBool) -> bool {
+    cancel.load(std::sync::atomic::Ordering::Relaxed)
+}
+
+/// A scene on a device.
+struct Place<'a> {
+    subject: &'a Subject,
+    open: &'a OpenDevice,
+    options: &'a Options,
+    cancel: &'a AtomicBool,
+}
+
+/// What is compared between devices: a picture, and what rays hit.
+struct Compared {
+    picture: Image,
+    hits: Vec<(f32, u32)>,
+}
+
+/// Pixels and samples of the pictures that are compared.
+const COMPARED: ((u32, u32), u32) = ((96, 54), 16);
+
+impl Place<'_> {
+    fn measure(&self) -> (SceneFigures, Result<Compared>) {
+        let mut figures = SceneFigures {
+            scene: self.subject.name.clone(),
+            triangles: self.subject.world.scene.triangles.len(),
+            failure: None,
+            rays: Vec::new(),
+            paths: None,
+        };
+        let compared = self.fill(&mut figures);
+        figures.failure = compared.as_ref().err().map(ToString::to_string);
+        (figures, compared)
+    }
+
+    fn fill(&self, figures: &mut SceneFigures) -> Result<Compared> {
+        let Subject { world, environment, .. } = self.subject;
+        let start = Instant::now();
+        let stage = match &self.open.gpu {
+            Some(gpu) => Some(Stage::new(gpu, world, environment)?),
+            None => None,
+        };
+        let upload_seconds = start.elapsed().as_secs_f64();
+        figures.paths = Some(self.paths(stage.as_ref(), upload_seconds)?);
+        let (rays, hits) = rays::measure(self, stage.as_ref())?;
+        figures.rays = rays;
+        let view = View { sampling: Sampling::Plain, ..self.view(COMPARED.0) };
+        let mut session = self.session(stage.as_ref(), view)?;
+        session.advance(COMPARED.1, self.cancel)?;
+        session.settle()?;
+        Ok(Compared { picture: session.film().image(), hits })
+    }
+
+    fn session(&self, stage: Option<&Stage>, view: View) -> Result<Session<'_>> {
+        let Subject { world, environment, .. } = self.subject;
+        match stage {
+            Some(stage) => Session::on_gpu(world, environment, view, stage),
+            None => Ok(Session::new(world, environment, view)),
+        }
+    }
+
+    /// The defaults of `lightgrid render`.
+    fn view(&self, (width, height): (u32, u32)) -> View {
+        let world = &self.subject.world;
+        let camera = world.scene.cameras.first().cloned();
+        View {
+            camera: camera.unwrap_or_else(|| framing::frame(world, width as f32 / height as f32)),
+            width,
+            height,
+            filter: PixelFilter::default(),
+            sampling: Sampling::Adaptive,
+            limits: PathLimits { bounces: 8, russian_roulette: true },
+            seed: 0,
+            points: Points::Sobol,
+            grid_columns: 64,
+            learning_paths: View::suitable_learning_paths(
+                Sampling::Adaptive,
+                [width, height],
+                None,
+            ),
+            laws: LawOptions::ADAPTIVE,
+            medium: None,
+            background: Background::Map,
+            crop: None,
+            layers: false,
+        }
+    }
+
+    fn paths(&self, stage: Option<&Stage>, upload_seconds: f64) -> Result<PathFigures> {
+        let start = Instant::now();
+        let seconds = || start.elapsed().as_secs_f64();
+        let mut session = self.session(stage, self.view(self.options.size))?;
+        let mut first_laws = None;
+        while session.samples() == 0 {
+            session.advance(1, self.cancel)?;
+            if is_set(self.cancel) {
+                return Err(Error::new("cancelled"));
+            }
+            if session.phase() == Phase::Rendering || session.figures().learned_cells > 0 {
+                first_laws.get_or_insert_with(seconds);
+            }
+        }
+        session.settle()?;
+        let first_picture_seconds = seconds();
+        let (before, gpu_before) = (session.figures(), session.gpu_figures());
+        let rule = StopRule::default();
+        let mut passes = 0;
+        while session.figures().render_seconds - before.render_seconds < self.options.seconds {
+            session.advance(session.next_pass(&rule), self.cancel)?;
+            passes += 1;
+            if is_set(self.cancel) {
+                return Err(Error::new("cancelled"));
+            }
+        }
+        let gpu = session.gpu_figures();
+        session.settle()?;
+        let after = session.figures();
+        let elapsed = after.render_seconds - before.render_seconds;
+        let per_pass = |total: f64| total / f64::from(passes);
+        let difference = |of: fn(&crate::render::gpu::GpuFigures) -> f64| {
+            Some(of(gpu.as_ref()?) - of(gpu_before.as_ref()?))
+        };
+        let busy = difference(|gpu| gpu.flights.device_seconds);
+        Ok(PathFigures {
+            upload_seconds,
+            compile_seconds: gpu.as_ref().map_or(0.0, |gpu| gpu.compile_seconds),
+            first_laws_seconds: first_laws.unwrap_or(first_picture_seconds),
+            first_picture_seconds,
+            samples_per_second: (after.samples - before.samples) as f64 / elapsed,
+            rays_per_second: (after.rays - before.rays) as f64 / elapsed,
+            passes,
+            pass_milliseconds: 1e3 * per_pass(elapsed),
+            device_milliseconds: busy.map(|seconds| 1e3 * per_pass(seconds)),
+            has_timestamps: gpu.as_ref().is_some_and(|gpu| gpu.flights.has_timestamps),
+            bytes_read_per_pass: per_pass(difference(|gpu| gpu.bytes_read as f64).unwrap_or(0.0)),
+            device_bytes: gpu.as_ref().map_or(0, |gpu| gpu.device_bytes),
+            kernel: gpu.map(|gpu| gpu.kernel),
+        })
+    }
+}
+
+fn compare(scene: &str, a: &Result<Compared>, b: &Result<Compared>) -> Parity {
+    let found = a.as_ref().and_then(|a| Ok((a, b.as_ref()?))).map_err(Clone::clone);
+    let judged = found.and_then(|(a, b)| {
+        let mean_ratio = metrics::compare(&b.picture, &a.picture)?.mean_ratio;
+        let luminance = |rgb: &[f32; 3]| crate::color::luminance((*rgb).into());
+        let pairs = a.picture.pixels.iter().zip(&b.picture.pixels);
+        let pairs = pairs.map(|(a, b)| (luminance(a), luminance(b)));
+        let apart = pairs.filter(|(a, b)| (a - b).abs() > 0.01 * a.max(*b)).count();
+        let both = a.hits.iter().zip(&b.hits).filter(|(a, b)| a.0.max(b.0) < f32::MAX);
+        let (hits, other) = both.fold((0, 0), |(n, k), (a, b)| (n + 1, k + u32::from(a.1 != b.1)));
+        Ok((
+            mean_ratio,
+            apart as f64 / a.picture.pixels.len() as f64,
+            other as f64 / a.hits.len().max(1) as f64,
+        ))
+    });
+    let failure = judged.as_ref().err().map(ToString::to_string);
+    let (mean_ratio, share_apart, other_triangles) =
+        judged.unwrap_or((f64::NAN, f64::NAN, f64::NAN));
+    Parity { scene: scene.to_owned(), failure, mean_ratio, share_apart, other_triangles }
+}

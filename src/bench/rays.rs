@@ -1,0 +1,191 @@
+//! Rays alone, the same ones on every device: those of the camera, and from where they end those to the
+//! map and those of a diffuse bounce.
+
+use std::time::Instant;
+
+use glam::{UVec2, Vec2, Vec3};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{Place, is_set};
+use crate::bvh::{Ray, offset_origin};
+use crate::error::{Error, Result};
+use crate::light_grid::LightGrid;
+use crate::math::Frame;
+use crate::path::World;
+use crate::path::camera::{CameraRays, disk_from_square};
+use crate::render::gpu::{Question, Renderer, Stage};
+use crate::render::{Sampling, View};
+use crate::sampler::Sampler;
+
+/// Which rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RayKind {
+    /// From the camera, neighbours beside one another.
+    Primary,
+    /// From their ends towards the map, chosen as it shines.
+    Shadow,
+    /// From their ends, spread as a matte surface spreads light.
+    Diffuse,
+}
+
+impl RayKind {
+    /// In the order of measurement.
+    pub const ALL: [Self; 3] = [Self::Primary, Self::Shadow, Self::Diffuse];
+
+    /// One word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Primary => "primary",
+            Self::Shadow => "shadow",
+            Self::Diffuse => "diffuse",
+        }
+    }
+
+    fn question(self) -> Question {
+        match self {
+            Self::Shadow => Question::Transmittance,
+            Self::Primary | Self::Diffuse => Question::ClosestHit,
+        }
+    }
+}
+
+/// How fast rays of a kind are.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RayFigures {
+    /// Which rays.
+    pub kind: RayKind,
+    /// How many different ones.
+    pub count: usize,
+    /// Rays a second.
+    pub per_second: f64,
+}
+
+/// Rays of a kind are traced again and again for so many seconds.
+const SECONDS: f64 = 0.3;
+/// Most rays of a kind: enough to fill any device.
+const MOST_RAYS: u32 = 1 << 21;
+/// Pixels along a side of the squares that primary rays come in, as kernels take them.
+const TILE: u32 = 8;
+
+/// Measures each kind; returns with it what the diffuse ones hit.
+pub(super) fn measure(
+    place: &Place<'_>,
+    stage: Option<&Stage>,
+) -> Result<(Vec<RayFigures>, Vec<(f32, u32)>)> {
+    let world = &place.subject.world;
+    let mut caster = match stage {
+        Some(stage) => {
+            // Whose kernels know nothing of the map.
+            let view = View { sampling: Sampling::Bsdf, ..place.view((TILE, TILE)) };
+            let environment = &place.subject.environment;
+            let rays = view.rays();
+            Some(Renderer::new(stage, world, environment, &view, &rays, None)?)
+        }
+        None => None,
+    };
+    let mut figures = Vec::new();
+    let mut hits = Vec::new();
+    let primary = primary(place);
+    for kind in RayKind::ALL {
+        let rays = match kind {
+            RayKind::Primary => primary.clone(),
+            RayKind::Shadow => towards_map(place, &primary),
+            RayKind::Diffuse => onward(world, &primary, |_, frame, u| Some(spread(frame, u))),
+        };
+        if rays.is_empty() {
+            continue;
+        }
+        let (mut seconds, mut rounds, mut found) = (0.0, 0, Vec::new());
+        if let Some(renderer) = &mut caster {
+            renderer.put_rays(&rays)?;
+            // Compiles, and finds out how much a dispatch may hold.
+            renderer.cast(kind.question(), rays.len() as u32)?;
+            found = renderer.cast_results(rays.len())?;
+        }
+        while seconds < SECONDS {
+            if is_set(place.cancel) {
+                return Err(Error::new("cancelled"));
+            }
+            if let Some(renderer) = &mut caster {
+                seconds += renderer.cast(kind.question(), rays.len() as u32)?;
+            } else {
+                let start = Instant::now();
+                found = on_cpu(world, kind.question(), &rays);
+                seconds += start.elapsed().as_secs_f64();
+            }
+            rounds += 1;
+        }
+        let per_second = rays.len() as f64 * f64::from(rounds) / seconds;
+        figures.push(RayFigures { kind, count: rays.len(), per_second });
+        if kind == RayKind::Diffuse {
+            hits = found;
+        }
+    }
+    Ok((figures, hits))
+}
+
+fn on_cpu(world: &World, question: Question, rays: &[Ray]) -> Vec<(f32, u32)> {
+    let answer = |ray: &Ray| match question {
+        Question::ClosestHit => {
+            world.closest_hit(ray, false).map_or((f32::MAX, u32::MAX), |hit| (hit.t, hit.triangle))
+        }
+        Question::Transmittance => (world.transmittance(ray).max_element(), 0),
+    };
+    rays.par_iter().map(answer).collect()
+}
+
+/// A ray through the middle of each pixel, square after square.
+fn primary(place: &Place<'_>) -> Vec<Ray> {
+    let view = place.view(place.options.size);
+    let camera = CameraRays::new(&view.camera, view.width, view.height);
+    let across = view.width.div_ceil(TILE);
+    let tiles = across * view.height.div_ceil(TILE);
+    let pixels = (0..tiles * TILE * TILE).map(|i| {
+        let (tile, lane) = (i / (TILE * TILE), i % (TILE * TILE));
+        UVec2::new(tile % across * TILE + lane % TILE, tile / across * TILE + lane / TILE)
+    });
+    let inside = pixels.filter(|pixel| pixel.x < view.width && pixel.y < view.height);
+    let rays = inside.take(MOST_RAYS as usize);
+    rays.map(|pixel| camera.ray(pixel.as_vec2() + 0.5, Vec2::ZERO)).collect()
+}
+
+/// From the end of each ray one more, where `direct` finds a direction from random bits, the shading
+/// frame there, turned to the side the ray came from, and two random numbers.
+fn onward(
+    world: &World,
+    rays: &[Ray],
+    direct: impl Fn([u32; 2], Frame, [f32; 2]) -> Option<Vec3> + Sync,
+) -> Vec<Ray> {
+    let continued = |(index, ray): (usize, &Ray)| {
+        let hit = world.closest_hit(ray, true)?;
+        let point = world.point(&hit, ray.direction);
+        let mut sampler = Sampler::new(1, 0, index as u32);
+        let bits = sampler.next_pair_bits();
+        let direction = direct(bits, point.shading_frame, sampler.next_pair())?;
+        let normal = point.geometric_normal;
+        let is_above = normal.dot(direction) > 0.0;
+        let origin = offset_origin(point.position, if is_above { normal } else { -normal });
+        Some(Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY })
+    };
+    rays.par_iter().enumerate().filter_map(continued).collect()
+}
+
+/// A direction with the density of the cosine.
+fn spread(frame: Frame, u: [f32; 2]) -> Vec3 {
+    let disk = disk_from_square(u.into());
+    let height = (1.0 - disk.length_squared()).max(0.0).sqrt();
+    frame.world_from_local(disk.extend(height)).normalize()
+}
+
+/// Rays to where the map is bright, above the surface.
+fn towards_map(place: &Place<'_>, rays: &[Ray]) -> Vec<Ray> {
+    let environment = &place.subject.environment;
+    let Some(laws) = LightGrid::whole_map(environment.tile_energies()) else { return Vec::new() };
+    onward(&place.subject.world, rays, |bits, frame, _| {
+        let choice = laws.sample(0, bits);
+        let sample = environment.sample_in_tile(choice.tile, [choice.remainder, bits[1]])?;
+        (frame.z.dot(sample.direction) > 0.0).then_some(sample.direction)
+    })
+}

@@ -1,0 +1,98 @@
+//! `lightgrid bench`.
+
+use std::path::PathBuf;
+
+use super::progress::Progress;
+use super::{interrupt, render, values};
+use crate::bench::{Options, Subject, run as measure};
+use crate::environment::{Environment, EnvironmentOptions};
+use crate::error::{Error, Result};
+use crate::image::check_writable;
+use crate::output::record::write_json;
+use crate::path::World;
+use crate::render::gpu::{RayChoice, adapters};
+use crate::report::Device;
+use crate::scene::builtin;
+
+/// Arguments of `bench`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Rays are traced alone, the same ones on every device: through each pixel \
+(primary), from where they end to the map (shadow), and as a matte surface spreads light (diffuse). \
+Paths are what `render` does. `pass` is a pass on the clock, `device` what of it the device was at \
+work; `laws` and `picture` are the seconds until there are any, compiling included.")]
+pub(super) struct BenchArguments {
+    /// Scenes: glTF files or built-in ones; without any, all that are built in.
+    scenes: Vec<String>,
+    /// The map.
+    #[arg(long, default_value = "sky:day", value_name = "MAP")]
+    env: String,
+    /// Devices; without it, the CPU and, if there is one, the best GPU.
+    #[arg(long, value_enum, value_delimiter = ',')]
+    device: Vec<Device>,
+    /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// What finds the surfaces that rays hit on a GPU.
+    #[arg(long, default_value = "auto", value_enum)]
+    rays: RayChoice,
+    /// Picture size in pixels.
+    #[arg(long, default_value = "1920x1080", value_parser = values::size, value_name = "WxH")]
+    size: (u32, u32),
+    /// Seconds of rendering a scene on a device.
+    #[arg(long, default_value = "3", value_parser = values::positive, value_name = "S")]
+    seconds: f64,
+    /// Threads; 0 uses every core.
+    #[arg(long, default_value = "0", value_parser = clap::value_parser!(u16).range(0..=1024), value_name = "N")]
+    threads: u16,
+    /// Writes every figure as JSON.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Measures and prints.
+pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
+    if let Some(file) = &arguments.json {
+        check_writable(file)?;
+    }
+    if arguments.adapter.is_some() && arguments.device == [Device::Cpu] {
+        return Err(Error::new("--adapter and --device cpu exclude each other"));
+    }
+    render::start_threads(arguments.threads)?;
+    let mut devices = arguments.device.clone();
+    if devices.is_empty() {
+        devices.push(Device::Cpu);
+        if arguments.adapter.is_some() || !adapters().is_empty() {
+            devices.push(Device::Gpu);
+        }
+    }
+    let cancel = interrupt::flag("stopping after this scene");
+    let progress = Progress::start("loading");
+    let names: Vec<&str> = if arguments.scenes.is_empty() {
+        builtin::names().to_vec()
+    } else {
+        arguments.scenes.iter().map(String::as_str).collect()
+    };
+    let (map, notices) = crate::sources::map(&arguments.env)?;
+    notices.iter().for_each(|sentence| progress.tell(&format!("notice: {sentence}")));
+    let environment = Environment::new(map, &EnvironmentOptions::default())
+        .map_err(|e| Error::at(&arguments.env, e))?;
+    let subject = |name: &&str| {
+        let world = World::new(crate::sources::scene(name)?);
+        Ok(Subject { name: (*name).to_owned(), world, environment: environment.clone() })
+    };
+    let subjects = names.iter().map(subject).collect::<Result<Vec<_>>>()?;
+    let options = Options {
+        devices,
+        adapter: arguments.adapter.clone(),
+        rays: arguments.rays,
+        size: arguments.size,
+        seconds: arguments.seconds,
+    };
+    let bench = measure(&options, &subjects, &cancel, &|doing| progress.say(doing))?;
+    progress.finish();
+    print!("{bench}");
+    match &arguments.json {
+        Some(file) => write_json(file, &crate::output::record::to_value(&bench)?),
+        None => Ok(()),
+    }
+}

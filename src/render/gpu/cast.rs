@@ -1,0 +1,155 @@
+//! Rays alone on the device, without paths: what one walk of the tree takes.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::layout::Work;
+use super::shader::Kernel;
+use super::{GROUP, MAX_GROUPS, Renderer};
+use crate::bvh::Ray;
+use crate::error::Result;
+
+/// Twin of `CastRay` in `cast.wgsl`.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct CastRay {
+    pub(super) origin: Vec3,
+    pub(super) t_max: f32,
+    pub(super) direction: Vec3,
+    pub(super) padding: u32,
+}
+
+/// What is asked of rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Question {
+    /// Where they end.
+    ClosestHit,
+    /// How much light comes along them.
+    Transmittance,
+}
+
+impl Question {
+    fn kernel(self) -> Kernel {
+        match self {
+            Self::ClosestHit => Kernel::ClosestHits,
+            Self::Transmittance => Kernel::ShadowRays,
+        }
+    }
+}
+
+impl Renderer {
+    /// Uploads rays to be traced; they begin where they say, whatever their `t_min`.
+    pub(crate) fn put_rays(&mut self, rays: &[Ray]) -> Result<()> {
+        let rays: Vec<CastRay> = rays
+            .iter()
+            .map(|ray| CastRay {
+                origin: ray.origin,
+                t_max: ray.t_max.min(f32::MAX),
+                direction: ray.direction,
+                padding: 0,
+            })
+            .collect();
+        self.buffers.put("cast_rays", bytemuck::cast_slice(&rays), "the list of rays")?;
+        self.buffers.make("cast_results", 8 * rays.len() as u64, "the list of hits")
+    }
+
+    /// Traces the first `count` of the uploaded rays; returns the seconds that took on the device.
+    pub(crate) fn cast(&mut self, question: Question, count: u32) -> Result<f64> {
+        let kernel = question.kernel();
+        self.settle()?;
+        let before = self.flights.figures().device_seconds;
+        let mut first = 0;
+        while first < count {
+            let groups = self.flights.units(kernel).min(MAX_GROUPS);
+            let groups = groups.min(u64::from(count - first).div_ceil(GROUP)) as u32;
+            let work = Work { first, count, ..Work::default() };
+            self.dispatch(kernel, &work, groups, u64::from(groups))?;
+            first += groups * GROUP as u32;
+        }
+        self.settle()?;
+        Ok(self.flights.figures().device_seconds - before)
+    }
+
+    /// What came of each of the first `count` rays: the distance (`f32::MAX` without a hit) and the
+    /// triangle, or the share of light in `[0,1]` and nothing.
+    pub(crate) fn cast_results(&self, count: usize) -> Result<Vec<(f32, u32)>> {
+        let words = self.read_words("cast_results", 2 * count)?;
+        Ok(words.as_chunks().0.iter().map(|&[x, i]| (f32::from_bits(x), i)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Gpu, RayChoice, Stage};
+    use super::*;
+    use crate::environment::{Environment, EnvironmentOptions};
+    use crate::path::World;
+    use crate::render::Sampling;
+    use crate::render::gpu::parity::stand;
+    use crate::sampler::Sampler;
+    use crate::scene::builtin;
+
+    /// Rays from anywhere in a scene to anywhere.
+    fn rays(world: &World, count: u32) -> Vec<Ray> {
+        let (low, high) = world.bvh.bounds();
+        let ray = |index| {
+            let mut sampler = Sampler::new(3, 1, index);
+            let [[x, y], [z, a], [b, _]] = std::array::from_fn(|_| sampler.next_pair());
+            let direction = Vec3::new((6.3 * a).cos(), 2.0 * b - 1.0, (6.3 * a).sin());
+            let origin = low + (high - low) * Vec3::new(x, y, z);
+            Ray { origin, direction: direction.normalize(), t_min: 0.0, t_max: f32::INFINITY }
+        };
+        (0..count).map(ray).collect()
+    }
+
+    /// The share of rays of which the device finds another nearest triangle, and of those that it lets
+    /// another share of light through.
+    fn apart(gpu: &Gpu, world: &World, rays: &[Ray]) -> [f64; 2] {
+        let map = crate::environment::sky::build("overcast", 64, 32).expect("a sky");
+        let environment = Environment::new(map, &EnvironmentOptions::default()).expect("sound");
+        let view = stand::view_of(world, Sampling::Bsdf);
+        let stage = Stage::new(gpu, world, &environment).expect("it fits");
+        let camera = view.rays();
+        let renderer = Renderer::new(&stage, world, &environment, &view, &camera, None);
+        let mut renderer = renderer.expect("it fits");
+        renderer.put_rays(rays).expect("they fit");
+        [Question::ClosestHit, Question::Transmittance].map(|question| {
+            renderer.cast(question, rays.len() as u32).expect("it runs");
+            let found = renderer.cast_results(rays.len()).expect("they can be read");
+            let differs = |(ray, (number, triangle)): (&Ray, (f32, u32))| match question {
+                Question::ClosestHit => {
+                    let hit = world.closest_hit(ray, false);
+                    hit.map_or(u32::MAX, |hit| hit.triangle) != triangle
+                }
+                Question::Transmittance => {
+                    (world.transmittance(ray).max_element() - number).abs() > 1e-3
+                }
+            };
+            rays.iter().zip(found).filter(|pair| differs(*pair)).count() as f64 / rays.len() as f64
+        })
+    }
+
+    /// Panes, leaves cut out of textures and ten thousands of triangles.
+    #[test]
+    fn a_device_hits_what_the_cpu_hits() {
+        let gpu = match Gpu::open(None) {
+            Ok(gpu) => gpu,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        for choice in [RayChoice::Software, RayChoice::Hardware] {
+            let gpu = match gpu.clone().with_rays(choice) {
+                Ok(gpu) => gpu,
+                Err(reason) => {
+                    eprintln!("SKIPPED: {reason}");
+                    continue;
+                }
+            };
+            for name in ["living-room", "exterior", "crack"] {
+                let world = World::new(builtin::build(name).expect("built in"));
+                let [hits, shares] = apart(&gpu, &world, &rays(&world, 50_000));
+                eprintln!("{name}, {choice:?}: {hits:e} of hits and {shares:e} of shares differ");
+                assert!(hits < 1e-4 && shares < 2e-4, "{name}, {choice:?}: {hits} {shares}");
+            }
+        }
+    }
+}
