@@ -288,12 +288,11 @@ impl ApplicationHandler<Repaint> for Runner {
                 return;
             }
             WindowEvent::Resized(size) => {
-                if let (Some(width), Some(height)) =
-                    (NonZeroU32::new(size.width), NonZeroU32::new(size.height))
+                let size = (NonZeroU32::new(size.width), NonZeroU32::new(size.height));
+                if let (Some(width), Some(height)) = size
+                    && let Some(painter) = &mut running.painter
                 {
-                    if let Some(painter) = &mut running.painter {
-                        painter.on_window_resized(ViewportId::ROOT, width, height);
-                    }
+                    painter.on_window_resized(ViewportId::ROOT, width, height);
                 }
             }
             _ => {}
