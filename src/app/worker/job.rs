@@ -16,7 +16,7 @@ use crate::metrics;
 use crate::path::World;
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
-use crate::render::{Phase, Sampling, Session, StopRule, View};
+use crate::render::{Figures, Phase, Sampling, Session, StopRule, View};
 
 /// Longest piece of rendering between two looks at requests and clocks.
 const SLICE: Duration = Duration::from_millis(120);
@@ -92,6 +92,8 @@ impl Legacy {
 struct Reading {
     of: (Gpu, DeviceFilm),
     film: Arc<Film>,
+    /// Of the moment it was read, so that both belong together.
+    figures: Figures,
     noise: f64,
     at: Instant,
     /// Age at which it is too old.
@@ -552,26 +554,29 @@ impl<'a> Job<'a> {
         let on_device = session.film_on_device();
         let in_place = self.in_place(session);
         let kept = self.reading(in_place.as_ref()).filter(|_| !is_final);
-        let (film, noise, cost) = match kept {
-            Some(reading) => (Arc::clone(&reading.film), reading.noise, Duration::ZERO),
+        let (film, figures, noise, cost) = match kept {
+            Some(reading) => {
+                (Arc::clone(&reading.film), reading.figures, reading.noise, Duration::ZERO)
+            }
             None => {
                 let start = Instant::now();
                 let film = Arc::new(session.film().clone());
-                let noise = film.noise();
+                let (noise, figures) = (film.noise(), session.figures());
                 let cost = in_place.as_ref().map_or(Duration::ZERO, |_| start.elapsed());
                 if let Some(of) = in_place {
                     let (at, gap) = (Instant::now(), gap_after(cost));
                     self.readings.retain(|reading| !is_same(&reading.of, &of));
-                    self.readings.push(Reading { of, film: Arc::clone(&film), noise, at, gap });
+                    let film = Arc::clone(&film);
+                    self.readings.push(Reading { of, film, figures, noise, at, gap });
                 }
-                (film, noise, cost)
+                (film, figures, noise, cost)
             }
         };
         let take = Take {
             sampling: session.view().sampling,
             noise,
             film,
-            figures: session.figures(),
+            figures,
             gpu: session.gpu_figures().map(Arc::new),
             on_device,
             grid: self.laws_of(session),

@@ -127,9 +127,10 @@ pub struct Point {
 pub struct Take {
     /// How the map was sampled.
     pub sampling: Sampling,
-    /// The sums.
+    /// The sums. Where the window shows those on its own device in every frame, they are as they were
+    /// read last: at most a few seconds ago, and the last ones when nothing is rendered.
     pub film: Arc<Film>,
-    /// What was done.
+    /// What was done for them.
     pub figures: Figures,
     /// [`Film::noise`].
     pub noise: f64,
