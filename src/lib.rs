@@ -14,8 +14,8 @@
 //!   picture, pass by pass, into a film.
 //! - [`app`] is the window, [`cli`] what a person types; both find files by [`sources`], and write by
 //!   [`output`]. [`report`] measures error against time; [`metrics`] compares pictures, [`denoise`]
-//!   smooths them, [`tone`] develops them. [`stability`] tries all of it on stiff and extreme cases,
-//!   [`bench`] measures a machine.
+//!   smooths them, [`tone`] develops them, and `develop` does so on a GPU. [`stability`] tries all of it
+//!   on stiff and extreme cases, [`bench`] measures a machine.
 //!
 //! Arrows point down: `cli -> {stability -> app, bench -> report} -> render -> path ->
 //! {light_grid, bsdf, medium, bvh} ->
@@ -29,6 +29,7 @@ pub mod bvh;
 pub mod cli;
 pub mod color;
 pub mod denoise;
+mod develop;
 pub mod environment;
 pub mod error;
 mod huge_pages;

@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
 
+use egui::{Color32, ColorImage};
+
 use super::commands::Command;
 use super::document::Viewpoint;
 use super::interface::{Dock, Interface, Prompt, Purpose, Tab};
 use super::worker::Reference;
 use super::{App, Later, convergence, save, surface_map, theme};
 use crate::error::{Error, Result};
-use crate::image::read_picture;
+use crate::image::{Rgb8, read_picture};
 use crate::render::gpu::DeviceChoice;
 
 impl App {
@@ -193,7 +195,7 @@ impl App {
     fn picture(&self) -> Option<save::Picture> {
         Some(save::Picture {
             snapshot: Arc::clone(self.snapshot.as_ref()?),
-            shown: Arc::clone(self.shown.as_ref()?),
+            exposure_ev: self.exposure_ev()?,
             document: self.document.clone(),
             scene: self.scene.clone()?,
             map: self.map.clone()?,
@@ -280,12 +282,24 @@ impl App {
         }
     }
 
+    /// Copies the picture as it is on the screen, overlay included.
     fn copy(&mut self, context: &egui::Context) {
-        let Some(shown) = &self.shown else { return };
-        context.copy_image(super::panels::viewport::color_image(&shown.picture));
-        let (width, height) = (shown.picture.width, shown.picture.height);
-        self.messages.notice(format!("Copied the picture, {width} x {height} pixels"));
+        let Some(developed) = self.textures.picture(self.shown.as_deref()) else { return };
+        match self.screen.developer.read(&developed.display) {
+            Ok(picture) => {
+                context.copy_image(color_image(&picture));
+                let (width, height) = (picture.width, picture.height);
+                self.messages.notice(format!("Copied the picture, {width} x {height} pixels"));
+            }
+            Err(error) => self.messages.notice(format!("The picture cannot be copied: {error}")),
+        }
     }
+}
+
+/// The picture as egui wants it.
+fn color_image(picture: &Rgb8) -> ColorImage {
+    let pixels = picture.pixels.iter().map(|[r, g, b]| Color32::from_rgb(*r, *g, *b)).collect();
+    ColorImage::new([picture.width as usize, picture.height as usize], pixels)
 }
 
 /// What maps' files are called.

@@ -3,8 +3,9 @@
 //! [`App`] holds a [`document::Document`] (what the picture is, undone by comparing snapshots) and an
 //! [`interface::Interface`] (what is open and pointed at). Every frame panels draw from them and
 //! change them or ask for a [`commands::Command`]; then the [`worker`] is told what to render and the
-//! [`presenter`] what to show. Both take the latest value and publish the latest picture: nothing
-//! here waits. [`window`] shows it on a display, [`screenshot`] in a texture without one.
+//! [`presenter`] what to make ready on the device. Both take the latest value and publish the latest
+//! picture: nothing here waits. The viewport develops it on the device of the [`screen`] in the frame
+//! that draws it. [`window`] shows it on a display, [`screenshot`] in a texture without one.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -25,6 +26,7 @@ pub mod overlays;
 mod panels;
 pub mod presenter;
 mod save;
+pub mod screen;
 pub mod screenshot;
 pub mod settings_file;
 mod speed_up;
@@ -35,8 +37,9 @@ pub mod window;
 pub mod worker;
 
 use crate::denoise::Denoiser;
+use crate::develop::DevelopSettings;
 use crate::environment::Environment;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::path::framing;
 use crate::render::gpu::DeviceChoice;
 
@@ -49,6 +52,7 @@ use interface::Interface;
 use loader::{Loaded, LoadedMap, LoadedScene, Loader};
 use messages::Messages;
 use presenter::{Order, Presenter, Shown};
+use screen::Screen;
 use settings_file::Settings;
 use undo::Undo;
 use worker::{Activity, Reference, Request, Snapshot, Worker};
@@ -90,6 +94,7 @@ pub struct App {
     lit: Option<Lit>,
     snapshot: Option<Arc<Snapshot>>,
     shown: Option<Arc<Shown>>,
+    screen: Screen,
     textures: panels::viewport::Textures,
     /// What errors are measured against, and one that has just been read.
     reference: Option<Arc<Reference>>,
@@ -126,7 +131,7 @@ impl App {
     ///
     /// # Errors
     /// If the system gives no threads.
-    pub fn new(start: Start, context: &egui::Context, wake: Wake) -> Result<Self> {
+    pub fn new(start: Start, screen: Screen, context: &egui::Context, wake: Wake) -> Result<Self> {
         theme::apply(context);
         Ok(Self {
             undo: Undo::new(start.document.clone()),
@@ -138,13 +143,14 @@ impl App {
             convergence: Convergence::default(),
             inspector: Inspector::new(wake.clone()),
             loader: Loader::new(wake.clone()),
-            worker: Worker::start(wake.clone(), start.adapter)?,
+            worker: Worker::start(wake.clone(), start.adapter, screen.gpu().clone())?,
             presenter: Presenter::start(wake.clone())?,
             scene: None,
             map: None,
             lit: None,
             snapshot: None,
             shown: None,
+            screen,
             textures: panels::viewport::Textures::default(),
             reference: None,
             arriving: Arc::default(),
@@ -171,6 +177,22 @@ impl App {
         }
         self.settle(&context);
         self.send_down(&context);
+    }
+
+    /// The screen that is drawn on.
+    pub fn screen(&self) -> &Screen {
+        &self.screen
+    }
+
+    /// Goes on with another screen: the device of the one before was lost, and `why` says how.
+    pub fn move_to(&mut self, screen: Screen, why: &Error) {
+        let name = screen.gpu().facts().short_name();
+        self.messages.notice(format!("{why}; the window goes on with {name}"));
+        self.worker.move_to(screen.gpu().clone());
+        self.textures = panels::viewport::Textures::default();
+        // It is on the device that was lost.
+        self.shown = None;
+        self.screen = screen;
     }
 
     /// Adds a message from outside, such as what the settings file had wrong.
@@ -248,12 +270,33 @@ impl App {
         panels::messages::show(ui.ctx(), &mut self.messages);
     }
 
+    /// Stops in all, once it is known what the automatic ones are.
+    fn exposure_ev(&self) -> Option<f32> {
+        let look = &self.document.look;
+        let automatic_ev = self.shown.as_ref()?.automatic_ev;
+        Some(look.exposure_ev + if look.auto_exposure { automatic_ev } else { 0.0 })
+    }
+
+    fn develop_settings(&self) -> Option<DevelopSettings> {
+        let look = &self.document.look;
+        let is_opaque = self.interface.overlay.is_some_and(overlays::Overlay::is_opaque);
+        let opacity = if is_opaque { 1.0 } else { self.interface.overlay_opacity };
+        Some(DevelopSettings {
+            white_balance: look.white_balance,
+            exposure_ev: self.exposure_ev()?,
+            curve: look.curve,
+            // What the overlay does not speak of steps back.
+            opacity: [opacity, 0.6 * opacity],
+        })
+    }
+
     fn right(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
+        let exposure_ev = self.exposure_ev();
         let shown = self.shown.as_deref();
         let snapshot = self.snapshot.as_deref();
         panels::right::show(ui, &mut self.interface, |ui, interface| match interface.tab {
             interface::Tab::Picture => {
-                panels::picture::show(ui, &mut self.document, shown, commands);
+                panels::picture::show(ui, &mut self.document, exposure_ev, commands);
                 panels::history::show(ui, &mut self.history, interface, commands);
             }
             interface::Tab::Inspect => {
@@ -300,11 +343,14 @@ impl App {
             .as_ref()
             .and_then(|s| s.plain.as_ref().and_then(|plain| speed_up::SpeedUp::of(&s.main, plain)));
         let past = self.past().map(|kept| kept.name.clone());
+        let settings = self.develop_settings();
         let mut scope = panels::viewport::Scope {
             document: &mut self.document,
             interface: &mut self.interface,
             textures: &mut self.textures,
+            screen: &self.screen,
             shown: self.shown.as_deref(),
+            settings,
             snapshot: self.snapshot.as_deref(),
             speed_up: speed_up.filter(|_| !self.is_repeatable),
             past: past.as_deref(),
@@ -365,7 +411,10 @@ impl App {
             self.convergence.add(&snapshot);
             self.snapshot = Some(snapshot);
         }
-        self.shown = self.presenter.shown();
+        // What is on a device that was lost cannot be drawn.
+        let is_here =
+            |shown: &Arc<Shown>| Arc::ptr_eq(&shown.order.developer, &self.screen.developer);
+        self.shown = self.presenter.shown().filter(is_here);
         self.save_when_whole();
         if let Some(failure) = self.shown.as_ref().and_then(|shown| shown.failure.clone()) {
             self.messages.error(failure);
@@ -439,10 +488,13 @@ impl App {
         }
         if let Some(snapshot) = &self.snapshot {
             let past = self.past().map(|kept| Arc::clone(&kept.image));
+            let look = &self.document.look;
             self.presenter.order(Order {
+                developer: Arc::clone(&self.screen.developer),
                 snapshot: Arc::clone(snapshot),
-                look: self.document.look,
-                overlay: self.interface.overlay.map(|o| (o, self.interface.overlay_opacity)),
+                denoiser: look.denoise.then_some(look.denoiser),
+                metered: look.auto_exposure.then_some(look.white_balance),
+                overlay: self.interface.overlay,
                 tile: self.interface.tile,
                 past,
             });

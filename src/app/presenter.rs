@@ -1,32 +1,34 @@
-//! Turns the latest film into what is on the screen, on its own threads: the window never waits for
-//! a tone curve, a filter or an overlay.
+//! Makes ready what the screen is developed from, on its own threads: pictures on the device, their
+//! exposure, overlays. The window never waits for a filter or an overlay, and develops by itself.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-use glam::{UVec2, Vec2, Vec3};
-
 use super::Wake;
-use super::document::Look;
 use super::overlays::{CellFacts, Label, Legend, Overlay, Sources};
 use super::surface_map::SurfaceMap;
-use super::worker::{Request, Snapshot};
-use crate::denoise::{preview, quick};
+use super::worker::{Request, Snapshot, Take};
+use crate::denoise::{Denoiser, preview, quick};
+use crate::develop::{Developer, LinearPicture, OverlayTexture};
 use crate::error::{Error, Result};
-use crate::image::{Image, Rgb8};
+use crate::image::Image;
 use crate::light_grid::LightGrid;
-use crate::render::film::Film;
-use crate::tone::{auto_exposure_ev, display_rgb8};
+use crate::render::gpu::{DeviceFilm, Gpu};
+use crate::tone::WhiteBalance;
 
 /// What is to be shown.
 #[derive(Clone)]
 pub struct Order {
+    /// What pictures are developed by, hence the device they are to be on.
+    pub(super) developer: Arc<Developer>,
     /// The film.
     pub snapshot: Arc<Snapshot>,
-    /// How it is developed.
-    pub look: Look,
-    /// What is drawn over it, with its opacity.
-    pub overlay: Option<(Overlay, f32)>,
+    /// What takes noise out, if anything shall.
+    pub denoiser: Option<Denoiser>,
+    /// The white balance the exposure is to be measured under, if it shall be.
+    pub metered: Option<WhiteBalance>,
+    /// What is drawn over it.
+    pub overlay: Option<Overlay>,
     /// The tile chosen on the map.
     pub tile: Option<u32>,
     /// A picture of the history to wipe against.
@@ -35,28 +37,35 @@ pub struct Order {
 
 impl PartialEq for Order {
     fn eq(&self, other: &Self) -> bool {
-        let past = |order: &Self| order.past.as_ref().map(|image| Arc::as_ptr(image).addr());
-        self.snapshot.number == other.snapshot.number
-            && self.look == other.look
+        Arc::ptr_eq(&self.developer, &other.developer)
+            && self.snapshot.number == other.snapshot.number
+            && self.denoiser == other.denoiser
+            && self.metered == other.metered
             && self.overlay == other.overlay
             && self.tile == other.tile
-            && past(self) == past(other)
+            && address(self.past.as_ref()) == address(other.past.as_ref())
     }
 }
 
-/// What is on the screen.
+fn address(image: Option<&Arc<Image>>) -> Option<usize> {
+    image.map(|image| Arc::as_ptr(image).addr())
+}
+
+/// What the screen is developed from.
 pub struct Shown {
     /// What was ordered.
     pub order: Order,
     /// The picture.
-    pub picture: Arc<Rgb8>,
+    pub(super) picture: LinearPicture,
     /// What the wipe uncovers: the plain picture or one of the history.
-    pub other: Option<Arc<Rgb8>>,
-    /// Stops, automatic ones included.
-    pub exposure_ev: f32,
-    /// What the overlay's colours mean.
+    pub(super) other: Option<LinearPicture>,
+    /// Stops that bring the picture to middle grey; 0 unless measured.
+    pub automatic_ev: f32,
+    /// The overlay's colours, one a pixel of `picture`.
+    pub(super) overlay: Option<OverlayTexture>,
+    /// What they mean.
     pub legend: Option<Legend>,
-    /// What it writes on the picture.
+    /// What the overlay writes on the picture.
     pub labels: Vec<Label>,
     /// Why the denoiser did not do its work.
     pub failure: Option<String>,
@@ -163,59 +172,132 @@ fn run(shared: &Shared) {
                 slot = shared.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
             }
         };
-        let shown = Arc::new(memory.present(order));
-        *lock(&shared.shown) = Some(shown);
+        // Where the device is lost, the window orders again on another.
+        if let Ok(shown) = memory.present(order) {
+            *lock(&shared.shown) = Some(Arc::new(shown));
+        }
         (shared.wake)();
     }
 }
+
+/// The last result and what it was made for.
+struct Last<K, V>(Option<(K, V)>);
+
+impl<K, V> Default for Last<K, V> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+impl<K: PartialEq, V: Clone> Last<K, V> {
+    fn or_make(&mut self, key: K, make: impl FnOnce() -> Result<V>) -> Result<V> {
+        if let Some((_, value)) = self.0.as_ref().filter(|(last, _)| *last == key) {
+            return Ok(value.clone());
+        }
+        let value = make()?;
+        self.0 = Some((key, value.clone()));
+        Ok(value)
+    }
+}
+
+/// A picture on the device, and why its noise was not taken out as was wished.
+type Prepared = (LinearPicture, Option<String>);
 
 /// What can be used again for the next order.
 #[derive(Default)]
 struct Memory {
     surfaces: Option<(Arc<Request>, SurfaceMap)>,
     facts: Option<(Arc<LightGrid>, bool, Arc<CellFacts>)>,
+    uploads: Uploads,
+}
+
+/// What is on one device.
+#[derive(Default)]
+struct Uploads {
+    developer: Option<Arc<Developer>>,
+    /// By snapshot and filter.
+    picture: Last<(u64, Option<Denoiser>), Prepared>,
+    plain: Last<(u64, Option<Denoiser>), Prepared>,
+    /// By the picture's address, which stays its own for as long as it is kept.
+    past: Last<Option<usize>, (LinearPicture, Arc<Image>)>,
+    metered: Last<(u64, Option<Denoiser>, WhiteBalance), f32>,
+    /// By snapshot, overlay and tile.
+    overlay: Last<(u64, Overlay, Option<u32>), Option<Painted>>,
+}
+
+/// An overlay on the device.
+#[derive(Clone)]
+struct Painted {
+    colors: OverlayTexture,
+    legend: Legend,
+    labels: Vec<Label>,
 }
 
 impl Memory {
-    fn present(&mut self, order: Order) -> Shown {
-        let snapshot = Arc::clone(&order.snapshot);
-        let mut filter = Filter { look: &order.look, failure: None };
-        let linear = develop(&snapshot, &mut filter);
-        let balanced = order.look.white_balance.apply(linear);
-        let automatic = if order.look.auto_exposure {
-            auto_exposure_ev(&balanced.shrunk(EXPOSURE_WIDTH))
-        } else {
-            0.0
-        };
-        let exposure_ev = automatic + order.look.exposure_ev;
-        let mut picture = display_rgb8(&balanced, exposure_ev, order.look.curve);
-        let other = other(&order, exposure_ev, &mut filter).map(Arc::new);
-        let failure = filter.failure;
-        let painted = order
-            .overlay
-            .and_then(|(overlay, opacity)| self.paint(&order, overlay, opacity, &mut picture));
-        let (legend, labels) = painted.unzip();
-        let labels = labels.unwrap_or_default();
-        let facts = self.facts.as_ref().map(|(_, _, facts)| Arc::clone(facts));
-        Shown {
-            order,
-            picture: Arc::new(picture),
-            other,
-            exposure_ev,
-            legend,
-            labels,
-            failure,
-            facts,
+    /// Fails only if the device does.
+    fn present(&mut self, order: Order) -> Result<Shown> {
+        let developer = Arc::clone(&order.developer);
+        if self.uploads.developer.as_ref().is_none_or(|old| !Arc::ptr_eq(old, &developer)) {
+            let developer = Some(Arc::clone(&developer));
+            self.uploads = Uploads { developer, ..Uploads::default() };
         }
+        let snapshot = Arc::clone(&order.snapshot);
+        let key = (snapshot.number, order.denoiser);
+        let (picture, failure) = self
+            .uploads
+            .picture
+            .or_make(key, || Ok(picture(&developer, &snapshot, order.denoiser)))?;
+        let (other, other_failure) = self.other(&order)?.unzip();
+        let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
+            let key = (snapshot.number, order.denoiser, white_balance);
+            let meter = || developer.auto_exposure_ev(&picture, white_balance);
+            self.uploads.metered.or_make(key, meter)
+        })?;
+        let painted = order.overlay.map_or(Ok(None), |overlay| {
+            let mut last = std::mem::take(&mut self.uploads.overlay);
+            let key = (snapshot.number, overlay, order.tile);
+            let painted = last.or_make(key, || Ok(self.paint(&order, overlay, &picture)));
+            self.uploads.overlay = last;
+            painted
+        })?;
+        developer.gpu().check()?;
+        let facts = self.facts.as_ref().map(|(_, _, facts)| Arc::clone(facts));
+        let (overlay, words) =
+            painted.map(|painted| (painted.colors, (painted.legend, painted.labels))).unzip();
+        let (legend, labels) = words.unzip();
+        Ok(Shown {
+            order,
+            picture,
+            other,
+            automatic_ev,
+            overlay,
+            legend,
+            labels: labels.unwrap_or_default(),
+            failure: failure.or(other_failure.flatten()),
+            facts,
+        })
+    }
+
+    /// What the wipe uncovers.
+    fn other(&mut self, order: &Order) -> Result<Option<Prepared>> {
+        let developer = &order.developer;
+        if let Some(past) = &order.past {
+            let upload = || Ok((developer.upload_image(past), Arc::clone(past)));
+            let (picture, _) = self.uploads.past.or_make(address(Some(past)), upload)?;
+            return Ok(Some((picture, None)));
+        }
+        let Some(plain) = &order.snapshot.plain else { return Ok(None) };
+        let key = (order.snapshot.number, order.denoiser);
+        let prepare = || Ok(without_noise(developer, plain, order.denoiser));
+        self.uploads.plain.or_make(key, prepare).map(Some)
     }
 
     fn paint(
         &mut self,
         order: &Order,
         overlay: Overlay,
-        opacity: f32,
-        picture: &mut Rgb8,
-    ) -> Option<(Legend, Vec<Label>)> {
+        picture: &LinearPicture,
+    ) -> Option<Painted> {
         let snapshot = &order.snapshot;
         let take = &snapshot.main;
         if overlay.needs_surfaces() {
@@ -231,15 +313,8 @@ impl Memory {
             tile: order.tile,
         };
         let painted = sources.paint(overlay)?;
-        let opacity = if overlay.is_opaque() { 1.0 } else { opacity };
-        for (pixel, color) in picture.pixels.iter_mut().zip(&painted.colors) {
-            match color {
-                Some(color) => blend(pixel, *color, opacity),
-                // What the overlay does not speak of steps back.
-                None => blend(pixel, [24, 25, 28], 0.6 * opacity),
-            }
-        }
-        Some((painted.legend, painted.labels))
+        let colors = order.developer.upload_overlay(&painted.colors, take.film.width, picture);
+        Some(Painted { colors, legend: painted.legend, labels: painted.labels })
     }
 
     /// Brings surfaces and facts up to date with the snapshot.
@@ -273,76 +348,75 @@ impl Memory {
     }
 }
 
-/// Pixels across of the picture that the exposure is taken from: so coarse that noise averages out.
-const EXPOSURE_WIDTH: u32 = 64;
-
-/// The denoiser that is asked for, as long as it works.
-struct Filter<'a> {
-    look: &'a Look,
-    failure: Option<String>,
-}
-
-impl Filter<'_> {
-    /// The film's picture, denoised if that is asked for.
-    fn image(&mut self, film: &Film) -> Image {
-        if !self.look.denoise {
-            return film.image();
-        }
-        self.look.denoiser.denoise(film).unwrap_or_else(|failure| {
-            self.failure = Some(failure.to_string());
-            quick(film)
-        })
-    }
-}
-
-/// What the wipe uncovers.
-fn other(order: &Order, exposure_ev: f32, filter: &mut Filter<'_>) -> Option<Rgb8> {
-    let look = &order.look;
-    let linear = match (&order.past, &order.snapshot.plain) {
-        (Some(past), _) => (**past).clone(),
-        (None, Some(plain)) => filter.image(&plain.film),
-        (None, None) => return None,
-    };
-    Some(display_rgb8(&look.white_balance.apply(linear), exposure_ev, look.curve))
-}
-
 /// The linear picture; pixels without samples show what there was before.
-fn develop(snapshot: &Snapshot, filter: &mut Filter<'_>) -> Image {
+fn picture(developer: &Developer, snapshot: &Snapshot, denoiser: Option<Denoiser>) -> Prepared {
     let film = &snapshot.main.film;
     // A small picture is there to see where one is going, not to judge noise.
-    let mut image = if snapshot.is_small() { preview(film) } else { filter.image(film) };
-    if let Some(under) = snapshot.under.as_ref().filter(|_| film.min_samples() == 0) {
-        fill_from(&mut image, film, under);
-    }
-    image
-}
-
-fn blend(pixel: &mut [u8; 3], color: [u8; 3], opacity: f32) {
-    for (under, over) in pixel.iter_mut().zip(color) {
-        *under =
-            (f32::from(*under) + (f32::from(over) - f32::from(*under)) * opacity).round() as u8;
+    let (picture, failure) = if snapshot.is_small() {
+        (developer.upload_filtered(&preview(film), film), None)
+    } else {
+        without_noise(developer, &snapshot.main, denoiser)
+    };
+    match snapshot.under.as_ref().filter(|_| film.min_samples() == 0) {
+        Some(under) => (developer.with_under(picture, under), failure),
+        None => (picture, failure),
     }
 }
 
-/// Gives pixels without samples the radiance at the same place of another picture, bilinear. The
-/// field of view is vertical: pictures of different shapes share their middle.
-fn fill_from(image: &mut Image, film: &Film, before: &Image) {
-    let size = Vec2::new(image.width as f32, image.height as f32);
-    let last = UVec2::new(before.width - 1, before.height - 1);
-    let size_before = Vec2::new(before.width as f32, before.height as f32);
-    let scale = size_before.y / size.y;
-    let width = image.width;
-    let at = |x: u32, y: u32| Vec3::from(before.at(x.min(last.x), y.min(last.y)));
-    for (i, (rgb, pixel)) in image.pixels.iter_mut().zip(film.pixels()).enumerate() {
-        if pixel.samples() > 0 {
-            continue;
+/// The film's picture, denoised if that is asked for.
+fn without_noise(developer: &Developer, take: &Take, denoiser: Option<Denoiser>) -> Prepared {
+    let film = &take.film;
+    let is_here = |(gpu, _): &&(Gpu, DeviceFilm)| gpu.is_same(developer.gpu());
+    let noisy = |layers| match take.on_device.as_ref().filter(is_here) {
+        Some((_, on_device)) => LinearPicture::live(on_device.clone()),
+        None => developer.upload_film(film, layers),
+    };
+    match denoiser {
+        None => (noisy(false), None),
+        Some(Denoiser::ATrous) if developer.can_denoise(film.width, film.height) => {
+            (developer.denoised(&noisy(true)), None)
         }
-        let place = Vec2::new((i as u32 % width) as f32, (i as u32 / width) as f32) + 0.5;
-        let there = (place - 0.5 * size) * scale + 0.5 * size_before;
-        let there = (there - 0.5).max(Vec2::ZERO);
-        let (low, t) = (there.as_uvec2(), there.fract());
-        let upper = at(low.x, low.y).lerp(at(low.x + 1, low.y), t.x);
-        let lower = at(low.x, low.y + 1).lerp(at(low.x + 1, low.y + 1), t.x);
-        *rgb = upper.lerp(lower, t.y).to_array();
+        Some(denoiser) => {
+            let (image, failure) = match denoiser.denoise(film) {
+                Ok(image) => (image, None),
+                Err(failure) => (quick(film), Some(failure.to_string())),
+            };
+            (developer.upload_filtered(&image, film), failure)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::render::film::Film;
+    use crate::render::{Figures, Sampling};
+
+    #[test]
+    fn a_film_on_the_same_device_is_shown_as_it_is_and_others_are_uploaded() {
+        let opened = || Gpu::open(None).and_then(|gpu| Developer::new(&gpu));
+        let (developer, other) = match opened().and_then(|one| Ok((one, opened()?))) {
+            Ok(both) => both,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let film = Film::new(6, 4, true);
+        let mut take = Take {
+            sampling: Sampling::Plain,
+            film: Arc::new(film),
+            figures: Figures::default(),
+            noise: 0.0,
+            grid: None,
+            gpu: None,
+            on_device: None,
+        };
+        assert!(!without_noise(&developer, &take, None).0.is_live());
+        let uploaded = developer.upload_film(&take.film, true);
+        take.on_device = Some((developer.gpu().clone(), uploaded.film().clone()));
+        assert!(without_noise(&developer, &take, None).0.is_live());
+        assert!(!without_noise(&other, &take, None).0.is_live());
+        assert!(!without_noise(&developer, &take, Some(Denoiser::ATrous)).0.is_live());
+        developer.gpu().check().and(other.gpu().check()).expect("no buffer is used elsewhere");
     }
 }

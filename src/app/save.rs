@@ -6,7 +6,6 @@ use serde_json::json;
 
 use super::document::Document;
 use super::loader::{LoadedMap, LoadedScene};
-use super::presenter::Shown;
 use super::worker::Snapshot;
 use crate::error::{Notices, Result};
 use crate::image::check_writable;
@@ -17,8 +16,8 @@ use crate::output::{Exposure, LayerName, PictureOptions, write_picture};
 pub(super) struct Picture {
     /// The film and what was done for it.
     pub(super) snapshot: std::sync::Arc<Snapshot>,
-    /// How it is shown.
-    pub(super) shown: std::sync::Arc<Shown>,
+    /// Stops, automatic ones included.
+    pub(super) exposure_ev: f32,
     /// The settings.
     pub(super) document: Document,
     /// The scene.
@@ -52,7 +51,7 @@ pub(super) fn picture(path: &Path, picture: &Picture) -> Result<()> {
         options: settings(picture),
     };
     let options = PictureOptions {
-        exposure: Exposure::Stops(picture.shown.exposure_ev),
+        exposure: Exposure::Stops(picture.exposure_ev),
         tone_curve: document.look.curve,
         denoiser: document.look.denoise.then_some(document.look.denoiser),
         white_balance: document.look.white_balance,

@@ -5,13 +5,16 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
+use egui::mutex::RwLock;
 use egui_wgpu::{Renderer, RendererOptions, ScreenDescriptor};
 use wgpu::{Extent3d, TextureFormat, TextureUsages};
 
 use super::interface::Interface;
+use super::screen::{Screen, TextureCopies};
 use super::{App, Start};
 use crate::error::{Error, Result};
 use crate::image::Rgb8;
+use crate::render::gpu::{DeviceChoice, Gpu};
 
 /// Frames drawn after everything is settled: layout and tooltips need a few.
 const SETTLING_FRAMES: u32 = 4;
@@ -45,7 +48,9 @@ impl Studio {
     /// # Errors
     /// If there is no graphics device; software Vulkan suffices.
     pub fn open(shot: Shot) -> Result<Self> {
-        let canvas = Canvas::new(Device::open()?, shot.size);
+        let gpu = open(shot.start.adapter.as_deref())?;
+        let canvas = Canvas::new(gpu, shot.size, TextureCopies::default());
+        let screen = Screen::new(&canvas.gpu, Arc::clone(&canvas.renderer))?;
         let context = egui::Context::default();
         let (sender, news) = channel();
         let wake = Arc::new(move || {
@@ -53,7 +58,7 @@ impl Studio {
             let _ = sender.send(());
         });
         let start = Start { is_repeatable: true, ..shot.start };
-        let app = App::new(start, &context, wake)?;
+        let app = App::new(start, screen, &context, wake)?;
         let deadline = Instant::now() + shot.patience;
         Ok(Self { app, context, canvas, news, deadline, patience: shot.patience, time: 0.0 })
     }
@@ -78,21 +83,40 @@ impl Studio {
     pub fn take(&mut self) -> Result<Rgb8> {
         self.settle()?;
         for _ in 0..SETTLING_FRAMES {
-            self.frame();
+            self.frame()?;
         }
         // Opening a panel may have changed the viewport.
         self.settle()?;
         self.canvas.read()
     }
 
-    fn frame(&mut self) {
+    /// Whether the CPU is to render.
+    pub fn is_on_cpu(&self) -> bool {
+        self.app.document.light.device == DeviceChoice::Cpu
+    }
+
+    /// Loses the device, as a driver reset would; for tests of what happens then.
+    pub fn lose_device(&self) {
+        self.canvas.gpu.lose();
+    }
+
+    fn frame(&mut self) -> Result<()> {
+        if let Err(loss) = self.canvas.gpu.check() {
+            let gpu = Gpu::open(Some(&self.canvas.gpu.facts().name))?;
+            let size = (self.canvas.target.width(), self.canvas.target.height());
+            let copies = std::mem::take(&mut self.canvas.copies);
+            self.canvas = Canvas::new(gpu, size, copies);
+            let screen = Screen::new(&self.canvas.gpu, Arc::clone(&self.canvas.renderer))?;
+            self.app.move_to(screen, &loss);
+        }
         self.canvas.draw(&self.context, &mut self.app, self.time);
         self.time += FRAME_SECONDS;
+        Ok(())
     }
 
     fn settle(&mut self) -> Result<()> {
-        self.frame();
-        self.frame();
+        self.frame()?;
+        self.frame()?;
         while !self.app.is_settled() {
             if let Some(failure) = self.app.failure() {
                 return Err(Error::new(failure));
@@ -107,51 +131,30 @@ impl Studio {
             // Woken for news; looking now and then anyway does no harm.
             let _ = self.news.recv_timeout(left.min(Duration::from_millis(200)));
             while self.news.try_recv().is_ok() {}
-            self.frame();
+            self.frame()?;
         }
         Ok(())
     }
 }
 
-/// A graphics device without a display.
-struct Device {
-    device: wgpu::Device,
-    queue: wgpu::Queue,
-}
-
-impl Device {
-    fn open() -> Result<Self> {
-        let none = |e: &dyn std::fmt::Display| {
-            Error::new(format!("there is no graphics device to draw the window with: {e}"))
-        };
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-        let adapter =
-            pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))
-                .map_err(|e| none(&e))?;
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
-            label: Some("screenshot"),
-            required_limits: wgpu::Limits {
-                max_texture_dimension_2d: adapter.limits().max_texture_dimension_2d,
-                ..wgpu::Limits::default().using_resolution(adapter.limits())
-            },
-            ..wgpu::DeviceDescriptor::default()
-        }))
-        .map_err(|e| none(&e))?;
-        Ok(Self { device, queue })
-    }
+fn open(adapter: Option<&str>) -> Result<Gpu> {
+    Gpu::open(adapter).map_err(|e| {
+        Error::new(format!("there is no graphics device to draw the window with: {e}"))
+    })
 }
 
 /// The texture that stands for the window.
 struct Canvas {
-    device: Device,
-    renderer: Renderer,
+    gpu: Gpu,
+    renderer: Arc<RwLock<Renderer>>,
     target: wgpu::Texture,
+    copies: TextureCopies,
 }
 
 impl Canvas {
-    fn new(device: Device, (width, height): (u32, u32)) -> Self {
+    fn new(gpu: Gpu, (width, height): (u32, u32), copies: TextureCopies) -> Self {
         let format = TextureFormat::Rgba8Unorm;
-        let target = device.device.create_texture(&wgpu::TextureDescriptor {
+        let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("window"),
             size: Extent3d { width, height, depth_or_array_layers: 1 },
             mip_level_count: 1,
@@ -162,8 +165,9 @@ impl Canvas {
             view_formats: &[],
         });
         let options = RendererOptions { dithering: false, ..RendererOptions::default() };
-        let renderer = Renderer::new(&device.device, format, options);
-        Self { device, renderer, target }
+        let mut renderer = Renderer::new(&gpu.device, format, options);
+        copies.upload(&gpu, &mut renderer);
+        Self { gpu, renderer: Arc::new(RwLock::new(renderer)), target, copies }
     }
 
     /// One frame of the application.
@@ -172,23 +176,25 @@ impl Canvas {
         let size = egui::Vec2::new(width as f32, height as f32);
         let input = egui::RawInput {
             screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size)),
-            max_texture_side: Some(self.device.device.limits().max_texture_dimension_2d as usize),
+            max_texture_side: Some(self.gpu.limits.max_texture_dimension_2d as usize),
             time: Some(time),
             focused: true,
             ..egui::RawInput::default()
         };
         let mut output = context.run_ui(input, |ui| app.show(ui));
         let primitives = context.tessellate(output.shapes, output.pixels_per_point);
-        let Device { device, queue } = &self.device;
+        self.copies.follow(&output.textures_delta);
+        let Gpu { device, queue, .. } = &self.gpu;
+        let mut renderer = self.renderer.write();
         for (id, deltas) in output.textures_delta.set.drain() {
             for delta in deltas {
-                self.renderer.update_texture(device, queue, id, &delta);
+                renderer.update_texture(device, queue, id, &delta);
             }
         }
         let screen = ScreenDescriptor { size_in_pixels: [width, height], pixels_per_point: 1.0 };
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut commands =
-            self.renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);
+            renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);
         let view = self.target.create_view(&wgpu::TextureViewDescriptor::default());
         {
             let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -204,56 +210,20 @@ impl Canvas {
                 })],
                 ..wgpu::RenderPassDescriptor::default()
             });
-            self.renderer.render(&mut pass.forget_lifetime(), &primitives, &screen);
+            renderer.render(&mut pass.forget_lifetime(), &primitives, &screen);
         }
         commands.push(encoder.finish());
         queue.submit(commands);
         for id in &output.textures_delta.free {
-            self.renderer.free_texture(id);
+            renderer.free_texture(id);
         }
         output.textures_delta.clear();
     }
 
     /// What was drawn last.
     fn read(&self) -> Result<Rgb8> {
-        let lost = |e: &dyn std::fmt::Display| {
-            Error::new(format!("the drawn window cannot be read back: {e}"))
-        };
-        let Device { device, queue } = &self.device;
-        let (width, height) = (self.target.width(), self.target.height());
-        let bytes_per_row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("read back"),
-            size: u64::from(bytes_per_row) * u64::from(height),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_texture_to_buffer(
-            self.target.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &buffer,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(bytes_per_row),
-                    rows_per_image: None,
-                },
-            },
-            self.target.size(),
-        );
-        queue.submit([encoder.finish()]);
-        let (sender, receiver) = channel();
-        buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-            // The receiver waits below.
-            let _ = sender.send(result);
-        });
-        device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
-        receiver.recv().map_err(|e| lost(&e))?.map_err(|e| lost(&e))?;
-        let mapped = buffer.slice(..).get_mapped_range().map_err(|e| lost(&e))?;
-        let pixels = mapped
-            .chunks_exact(bytes_per_row as usize)
-            .flat_map(|row| row[..4 * width as usize].chunks_exact(4).map(|p| [p[0], p[1], p[2]]))
-            .collect();
-        Ok(Rgb8 { width, height, pixels })
+        self.gpu
+            .read_texture(&self.target)
+            .map_err(|e| Error::new(format!("the drawn window cannot be read back: {e}")))
     }
 }

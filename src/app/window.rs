@@ -1,21 +1,26 @@
 //! The application on a display: winit gives events, egui-wgpu draws.
 
 use std::num::NonZeroU32;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::ViewportId;
 use egui_wgpu::winit::Painter;
-use egui_wgpu::{RendererOptions, WgpuConfiguration, WgpuSetup};
+use egui_wgpu::{RendererOptions, WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
 use winit::event::WindowEvent;
-use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
+use winit::event_loop::{
+    ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy, OwnedDisplayHandle,
+};
 use winit::window::{Window, WindowId};
 
+use super::screen::{Screen, TextureCopies};
 use super::{App, Start, theme};
 use crate::error::{Error, Result};
+use crate::render::gpu::Gpu;
 
 /// Asks for a frame, at once or later.
 #[derive(Debug, Clone, Copy)]
@@ -23,11 +28,21 @@ struct Repaint {
     at: Instant,
 }
 
+/// Losses of a device sooner after one another than this belong together.
+const LOSS_GAP: Duration = Duration::from_secs(10);
+/// After so many of them, another device is not worth trying.
+const MOST_LOSSES: u32 = 5;
+
 /// Opens the window and stays until it is closed; then settings are written to `settings_path`.
+/// Returns what closed it, if it was not a person.
 ///
 /// # Errors
 /// If there is no display, or none that can be drawn on: nothing has been shown then.
-pub fn run(start: Start, notices: Vec<String>, settings_path: Option<PathBuf>) -> Result<()> {
+pub fn run(
+    start: Start,
+    notices: Vec<String>,
+    settings_path: Option<PathBuf>,
+) -> Result<Option<Error>> {
     let no_display = |e: &dyn std::fmt::Display| {
         let text = e.to_string();
         // The toolkit puts the place in its own source before the cause.
@@ -42,10 +57,11 @@ pub fn run(start: Start, notices: Vec<String>, settings_path: Option<PathBuf>) -
         settings_path,
         running: None,
         failure: None,
+        loss: None,
         repaint_at: None,
     };
     event_loop.run_app(&mut runner).map_err(|e| no_display(&e))?;
-    runner.failure.map_or(Ok(()), Err)
+    runner.failure.map_or(Ok(runner.loss), Err)
 }
 
 struct Runner {
@@ -54,7 +70,10 @@ struct Runner {
     notices: Vec<String>,
     settings_path: Option<PathBuf>,
     running: Option<Running>,
+    /// Why no window was opened.
     failure: Option<Error>,
+    /// Why it was closed.
+    loss: Option<Error>,
     repaint_at: Option<Instant>,
 }
 
@@ -63,9 +82,43 @@ struct Running {
     window: Arc<Window>,
     context: egui::Context,
     input: egui_winit::State,
-    painter: Painter,
+    display: OwnedDisplayHandle,
+    adapter: Option<String>,
+    /// There is none only while one is exchanged for another.
+    painter: Option<Painter>,
+    copies: TextureCopies,
+    /// When a device was lost last, and how many were in a row.
+    lost: Option<(Instant, u32)>,
     app: App,
     title: String,
+}
+
+/// Draws on the window by the best device that can, which is opened with all that rendering needs.
+fn paint_on(
+    window: &Arc<Window>,
+    context: &egui::Context,
+    display: &OwnedDisplayHandle,
+    adapter: Option<&str>,
+    copies: &TextureCopies,
+) -> Result<(Painter, Screen)> {
+    let gpu = Gpu::open_for_window(adapter, display, window)?;
+    let config = WgpuConfiguration {
+        wgpu_setup: WgpuSetup::Existing(WgpuSetupExisting {
+            instance: gpu.instance.clone(),
+            adapter: gpu.adapter.clone(),
+            device: gpu.device.clone(),
+            queue: gpu.queue.clone(),
+        }),
+        ..WgpuConfiguration::default()
+    };
+    let options = RendererOptions::default();
+    let mut painter = pollster::block_on(Painter::new(context.clone(), config, false, options));
+    pollster::block_on(painter.set_window(ViewportId::ROOT, Some(Arc::clone(window))))
+        .map_err(|e| Error::new(e.to_string()))?;
+    let state = painter.render_state().ok_or_else(|| Error::new("nothing can be drawn"))?;
+    copies.upload(&gpu, &mut state.renderer.write());
+    let screen = Screen::new(&gpu, state.renderer)?;
+    Ok((painter, screen))
 }
 
 impl Runner {
@@ -89,13 +142,10 @@ impl Runner {
             // The event loop may have ended meanwhile.
             let _ = proxy.send_event(Repaint { at: Instant::now() + info.delay });
         });
-        let config = WgpuConfiguration {
-            wgpu_setup: WgpuSetup::from_display_handle(event_loop.owned_display_handle()),
-            ..WgpuConfiguration::default()
-        };
-        let options = RendererOptions::default();
-        let mut painter = pollster::block_on(Painter::new(context.clone(), config, false, options));
-        pollster::block_on(painter.set_window(ViewportId::ROOT, Some(Arc::clone(&window))))
+        let display = event_loop.owned_display_handle();
+        let adapter = start.adapter.clone();
+        let copies = TextureCopies::default();
+        let (painter, screen) = paint_on(&window, &context, &display, adapter.as_deref(), &copies)
             .map_err(|e| cannot(&e))?;
         let input = egui_winit::State::new(
             context.clone(),
@@ -103,12 +153,24 @@ impl Runner {
             event_loop,
             Some(window.scale_factor() as f32),
             None,
-            painter.max_texture_side(),
+            Some(screen.gpu().limits.max_texture_dimension_2d as usize),
         );
         let waking = context.clone();
-        let mut app = App::new(start, &context, Arc::new(move || waking.request_repaint()))?;
+        let wake = Arc::new(move || waking.request_repaint());
+        let mut app = App::new(start, screen, &context, wake)?;
         self.notices.drain(..).for_each(|sentence| app.say(sentence));
-        Ok(Running { window, context, input, painter, app, title: String::new() })
+        Ok(Running {
+            window,
+            context,
+            input,
+            display,
+            adapter,
+            painter: Some(painter),
+            copies,
+            lost: None,
+            app,
+            title: String::new(),
+        })
     }
 
     fn close(&mut self, event_loop: &ActiveEventLoop) {
@@ -126,26 +188,67 @@ impl Runner {
 }
 
 impl Running {
-    fn draw(&mut self) {
+    /// One frame, on another device if that of the last one was lost.
+    ///
+    /// # Errors
+    /// If there is no other.
+    fn draw(&mut self) -> Result<()> {
+        if let Err(loss) = self.app.screen().gpu().check() {
+            self.replace_device(&loss)?;
+        }
         let input = self.input.take_egui_input(&self.window);
         let mut output = self.context.run_ui(input, |ui| self.app.show(ui));
         self.input.handle_platform_output(&self.window, output.platform_output);
         let points = output.pixels_per_point;
         let primitives = self.context.tessellate(output.shapes, points);
-        self.painter.paint_and_update_textures(
-            ViewportId::ROOT,
-            points,
-            theme::BACKGROUND.to_normalized_gamma_f32(),
-            &primitives,
-            &mut output.textures_delta,
-            Vec::new(),
-            &self.window,
-        );
+        self.copies.follow(&output.textures_delta);
+        // egui's renderer panics if the device is lost while it draws.
+        let drawn = catch_unwind(AssertUnwindSafe(|| {
+            if let Some(painter) = &mut self.painter {
+                painter.paint_and_update_textures(
+                    ViewportId::ROOT,
+                    points,
+                    theme::BACKGROUND.to_normalized_gamma_f32(),
+                    &primitives,
+                    &mut output.textures_delta,
+                    Vec::new(),
+                    &self.window,
+                );
+            }
+        }));
+        output.textures_delta.clear();
+        if self.app.screen().gpu().check().is_err() {
+            self.context.request_repaint();
+        } else if let Err(panic) = drawn {
+            resume_unwind(panic);
+        }
         let title = self.app.title();
         if title != self.title {
             self.window.set_title(&title);
             self.title = title;
         }
+        Ok(())
+    }
+
+    /// Opens a device anew; the application and what it shows stay as they are.
+    fn replace_device(&mut self, loss: &Error) -> Result<()> {
+        let closes = |why: &dyn std::fmt::Display| {
+            Error::new(format!("{loss}, and the window cannot be drawn otherwise: {why}"))
+        };
+        let before = self.lost.filter(|(at, _)| at.elapsed() < LOSS_GAP).map_or(0, |(_, n)| n);
+        if before == MOST_LOSSES {
+            return Err(closes(&"it is lost again and again"));
+        }
+        self.lost = Some((Instant::now(), before + 1));
+        // Two surfaces of one window exclude each other.
+        self.painter = None;
+        let adapter = self.adapter.as_deref();
+        let (painter, screen) =
+            paint_on(&self.window, &self.context, &self.display, adapter, &self.copies)
+                .map_err(|e| closes(&e))?;
+        self.painter = Some(painter);
+        self.app.move_to(screen, loss);
+        Ok(())
     }
 }
 
@@ -177,17 +280,19 @@ impl ApplicationHandler<Repaint> for Runner {
                 return;
             }
             WindowEvent::RedrawRequested => {
-                running.draw();
-                if running.app.is_closing() {
+                let drawn = running.draw();
+                if drawn.is_err() || running.app.is_closing() {
+                    self.loss = drawn.err();
                     self.close(event_loop);
                 }
                 return;
             }
             WindowEvent::Resized(size) => {
-                if let (Some(width), Some(height)) =
-                    (NonZeroU32::new(size.width), NonZeroU32::new(size.height))
+                let size = (NonZeroU32::new(size.width), NonZeroU32::new(size.height));
+                if let (Some(width), Some(height)) = size
+                    && let Some(painter) = &mut running.painter
                 {
-                    running.painter.on_window_resized(ViewportId::ROOT, width, height);
+                    painter.on_window_resized(ViewportId::ROOT, width, height);
                 }
             }
             _ => {}

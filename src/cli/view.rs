@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
         is_repeatable: false,
     };
     match window::run(start, notices, path) {
-        Ok(()) => Ok(()),
+        Ok(closed_by) => closed_by.map_or(Ok(()), Err),
         Err(error) => {
             let picture = arguments.output.display();
             eprintln!("lightgrid: {error}; rendering into {picture} instead");

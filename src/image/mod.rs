@@ -51,11 +51,16 @@ impl Image {
         Self { width, height, pixels }
     }
 
+    /// Size of a picture of `all_width` x `all_height` pixels made at most `width` pixels wide.
+    pub(crate) fn shrunk_size(all_width: u32, all_height: u32, width: u32) -> (u32, u32) {
+        let width = width.clamp(1, all_width);
+        let height = (u64::from(width) * u64::from(all_height) / u64::from(all_width)) as u32;
+        (width, height.clamp(1, all_height))
+    }
+
     /// The picture at most `width` pixels wide, each the mean of those it covers.
     pub fn shrunk(&self, width: u32) -> Self {
-        let width = width.clamp(1, self.width);
-        let height = (u64::from(width) * u64::from(self.height) / u64::from(self.width)) as u32;
-        let height = height.clamp(1, self.height);
+        let (width, height) = Self::shrunk_size(self.width, self.height, width);
         let covered = |i: u32, count: u32, all: u32| {
             let edge = |i: u32| (u64::from(i) * u64::from(all) / u64::from(count)) as u32;
             edge(i)..edge(i + 1).max(edge(i) + 1)

@@ -83,6 +83,11 @@ impl Pixel {
         0.2126 * r + 0.7152 * g + 0.0722 * b
     }
 
+    /// Sum of the samples' squared luminances.
+    pub(crate) fn luminance_squared(&self) -> f64 {
+        self.luminance_squared
+    }
+
     /// Estimated variance of the mean luminance, from the spread of the samples. Low-discrepancy
     /// samples do better than this says. Infinite below two samples.
     pub fn variance_of_mean(&self) -> f64 {
@@ -127,6 +132,16 @@ impl Film {
             height,
             pixels: vec![Pixel::default(); count],
             surfaces: vec![Surface::default(); if layers { count } else { 0 }],
+        }
+    }
+
+    /// Adds one sample to the pixel in column `x` of row `y`.
+    #[cfg(test)]
+    pub(crate) fn add(&mut self, x: u32, y: u32, result: &PathResult) {
+        let index = (y * self.width + x) as usize;
+        self.pixels[index].add(result);
+        if let Some(surface) = self.surfaces.get_mut(index) {
+            surface.add(result);
         }
     }
 

@@ -487,8 +487,8 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// The film where a GPU keeps it; `None` on the CPU.
-    pub(crate) fn film_on_device(&self) -> Option<gpu::DeviceFilm> {
+    /// The film where a GPU keeps it, and that GPU; `None` on the CPU.
+    pub(crate) fn film_on_device(&self) -> Option<(gpu::Gpu, gpu::DeviceFilm)> {
         match &self.engine {
             Engine::Cpu => None,
             Engine::Gpu(renderer) => renderer.film_on_device(),

@@ -38,17 +38,22 @@ impl WhiteBalance {
         REC709_FROM_XYZ * adapt * REC709_FROM_XYZ.inverse()
     }
 
-    /// The balanced picture.
+    /// The balanced picture. If colours are changed at all, NaN counts as 0 and what is beyond
+    /// `1e30` as that: no channel that is not finite spreads to the others.
     pub fn apply(&self, mut image: Image) -> Image {
         let matrix = self.matrix();
         if matrix != Mat3::IDENTITY {
+            let finite = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(-LARGEST, LARGEST) };
             image.pixels.par_iter_mut().for_each(|rgb| {
-                *rgb = (matrix * Vec3::from(*rgb)).max(Vec3::ZERO).to_array();
+                *rgb = (matrix * Vec3::from(rgb.map(finite))).max(Vec3::ZERO).to_array();
             });
         }
         image
     }
 }
+
+/// Sums of so large values are finite.
+const LARGEST: f32 = 1e30;
 
 /// Cone responses from XYZ (Lam 1985, the Bradford transform).
 const BRADFORD: Mat3 = Mat3::from_cols_array(&[

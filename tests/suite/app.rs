@@ -104,6 +104,38 @@ fn the_inspector_shows_law_and_truth() {
     compare("panel-inspect-truth", &picture).expect("as it was");
 }
 
+/// A driver that resets takes the device with it; the window goes on with another, and nothing of
+/// the picture is lost.
+#[test]
+fn a_lost_device_is_replaced_and_shows_the_same() {
+    let Some(mut studio) = studio(start(), (800, 500)) else { return };
+    let before = studio.take().expect("drawn");
+    studio.lose_device();
+    let after = studio.take().expect("drawn on another device");
+    assert_ne!(before, after, "the loss is said");
+    // Until the notice has gone.
+    for _ in 0..8 {
+        studio.take().expect("drawn");
+    }
+    assert!(before == studio.take().expect("drawn"), "the same again");
+}
+
+/// The renderer loses the device that it shares with the window: the CPU goes on.
+#[test]
+fn a_device_lost_while_it_renders_is_said_and_the_cpu_goes_on() {
+    let mut start = start();
+    start.document.light.device = DeviceChoice::Gpu;
+    start.document.scene = "open".to_owned();
+    start.document.size = PictureSize::Fixed(48, 32);
+    let Some(mut studio) = studio(start, (800, 500)) else { return };
+    studio.take().expect("drawn");
+    studio.lose_device();
+    studio.arrange(Interface { run: 1, ..Interface::default() });
+    let said = studio.take().expect_err("a screenshot is of no use then").to_string();
+    assert!(said.ends_with("the CPU renders"), "{said}");
+    assert!(studio.is_on_cpu(), "the settings say so too");
+}
+
 /// Compares with `tests/snapshots/NAME.png`; with UPDATE_SNAPSHOTS set, writes it instead.
 fn compare(name: &str, picture: &Rgb8) -> Result<(), String> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/snapshots");

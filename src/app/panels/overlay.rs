@@ -29,7 +29,7 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
             ui.add(Slider::new(&mut interface.overlay_opacity, 0.0..=1.0).fixed_decimals(2));
         });
     }
-    let is_shown = shown.is_some_and(|s| s.order.overlay.is_some_and(|(o, _)| o == overlay));
+    let is_shown = shown.is_some_and(|s| s.order.overlay == Some(overlay));
     match shown.filter(|_| is_shown).and_then(|s| s.legend.as_ref()) {
         Some(shown) => legend(ui, shown),
         None if overlay == Overlay::Tile && interface.tile.is_none() => {

@@ -4,7 +4,6 @@ use egui::{DragValue, Slider, Ui};
 
 use crate::app::commands::Command;
 use crate::app::document::{Document, PictureSize};
-use crate::app::presenter::Shown;
 use crate::app::theme;
 use crate::denoise::Denoiser;
 use crate::tone::{DAYLIGHT_KELVIN, ToneCurve, WhiteBalance};
@@ -13,11 +12,11 @@ use crate::tone::{DAYLIGHT_KELVIN, ToneCurve, WhiteBalance};
 pub(in crate::app) fn show(
     ui: &mut Ui,
     document: &mut Document,
-    shown: Option<&Shown>,
+    exposure_ev: Option<f32>,
     commands: &mut Vec<Command>,
 ) {
     theme::heading(ui, "DEVELOP");
-    exposure(ui, document, shown);
+    exposure(ui, document, exposure_ev);
     curve(ui, document);
     white_balance(ui, &mut document.look.white_balance);
     denoiser(ui, document);
@@ -67,7 +66,7 @@ fn denoiser(ui: &mut Ui, document: &mut Document) {
     });
 }
 
-fn exposure(ui: &mut Ui, document: &mut Document, shown: Option<&Shown>) {
+fn exposure(ui: &mut Ui, document: &mut Document, exposure_ev: Option<f32>) {
     let look = &mut document.look;
     theme::row(ui, "Exposure", "Stops; double the light is one more", |ui| {
         ui.add(Slider::new(&mut look.exposure_ev, -8.0..=8.0).suffix(" EV").fixed_decimals(1));
@@ -75,8 +74,8 @@ fn exposure(ui: &mut Ui, document: &mut Document, shown: Option<&Shown>) {
     theme::row(ui, "", "", |ui| {
         ui.checkbox(&mut look.auto_exposure, "Automatic")
             .on_hover_text("Bring the picture to middle grey, then add the stops above");
-        if let Some(shown) = shown.filter(|_| look.auto_exposure) {
-            ui.label(theme::quiet(format!("{:+.1} EV in all", shown.exposure_ev)));
+        if let Some(exposure_ev) = exposure_ev.filter(|_| look.auto_exposure) {
+            ui.label(theme::quiet(format!("{exposure_ev:+.1} EV in all")));
         }
     });
 }

@@ -1,10 +1,8 @@
 //! The picture, and moving about in it.
 
-use std::sync::Arc;
-
 use egui::{
-    Align2, CentralPanel, Color32, ColorImage, CursorIcon, FontId, Key, PointerButton, Pos2, Rect,
-    Response, Sense, Shape, Stroke, StrokeKind, TextureHandle, TextureOptions, Ui, Vec2,
+    Align2, CentralPanel, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Response,
+    Sense, Shape, Stroke, StrokeKind, TextureId, Ui, Vec2,
 };
 use glam::Vec3;
 
@@ -13,29 +11,31 @@ use crate::app::document::{Document, Viewpoint};
 use crate::app::interface::{Interface, Tab};
 use crate::app::loader::LoadedScene;
 use crate::app::presenter::Shown;
+use crate::app::screen::{Developed, Recipe, Screen};
 use crate::app::speed_up::SpeedUp;
 use crate::app::surface_map::look_at_place;
 use crate::app::theme;
-use crate::app::worker::Snapshot;
+use crate::app::worker::{Activity, Snapshot};
 use crate::bvh::Ray;
-use crate::image::Rgb8;
+use crate::develop::{DevelopSettings, LinearPicture};
 use crate::render::View;
 
-/// Pictures on the graphics device.
+/// Developed pictures.
 #[derive(Default)]
 pub(in crate::app) struct Textures {
     /// The last whole picture.
-    main: Slot,
+    main: Option<Developed>,
     /// A part of it that is rendered alone.
-    part: Slot,
-    other: Slot,
+    part: Option<Developed>,
+    other: Option<Developed>,
 }
 
-/// A texture and the picture that is in it.
-#[derive(Default)]
-struct Slot {
-    texture: Option<TextureHandle>,
-    holds: Option<Arc<Rgb8>>,
+impl Textures {
+    /// The picture that is shown, if one was drawn as yet.
+    pub(in crate::app) fn picture(&self, shown: Option<&Shown>) -> Option<&Developed> {
+        let is_part = shown?.order.snapshot.request.view.crop.is_some();
+        if is_part { self.part.as_ref() } else { self.main.as_ref() }
+    }
 }
 
 /// What the viewport is drawn from.
@@ -43,7 +43,10 @@ pub(in crate::app) struct Scope<'a> {
     pub(in crate::app) document: &'a mut Document,
     pub(in crate::app) interface: &'a mut Interface,
     pub(in crate::app) textures: &'a mut Textures,
+    pub(in crate::app) screen: &'a Screen,
     pub(in crate::app) shown: Option<&'a Shown>,
+    /// How what is shown is developed.
+    pub(in crate::app) settings: Option<DevelopSettings>,
     pub(in crate::app) snapshot: Option<&'a Snapshot>,
     pub(in crate::app) speed_up: Option<SpeedUp>,
     /// Name of the kept picture that is compared.
@@ -63,18 +66,26 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
         scope.interface.viewport_pixels =
             Some([pixels.x.max(1.0) as u32, pixels.y.max(1.0) as u32]);
         let response = ui.interact(area, ui.scope_id().with("picture"), Sense::click_and_drag());
-        let Some(shown) = scope.shown else {
+        let Some((shown, settings)) = scope.shown.zip(scope.settings) else {
             waiting(ui, area, scope.loading);
             return;
         };
         let view = scope.snapshot.map_or(&shown.order.snapshot.request.view, |s| &s.request.view);
         let whole = fitted(area, view);
         let rect = part_rect(whole, &shown.order.snapshot.request.view);
-        picture(ui, whole, rect, shown, scope.textures);
+        picture(ui, (whole, rect), shown, settings, scope);
         labels(ui, rect, shown);
         let mut is_wiping = false;
         if let Some(other) = &shown.other {
-            let texture = scope.textures.other.update(ui, "other picture", other);
+            let recipe = Recipe {
+                picture: other.clone(),
+                overlay: None,
+                settings,
+                number: shown.order.snapshot.number,
+            };
+            let changes = changes(ui, other, scope);
+            let texture =
+                Developed::update(&mut scope.textures.other, scope.screen, recipe, changes);
             is_wiping = wipe(ui, rect, texture, scope);
         }
         if scope.interface.is_marking {
@@ -105,20 +116,47 @@ fn part_rect(whole: Rect, view: &View) -> Rect {
 }
 
 /// Draws the picture; a part lies on the last whole one, which steps back.
-fn picture(ui: &Ui, whole: Rect, rect: Rect, shown: &Shown, textures: &mut Textures) {
+fn picture(
+    ui: &Ui,
+    (whole, rect): (Rect, Rect),
+    shown: &Shown,
+    settings: DevelopSettings,
+    scope: &mut Scope<'_>,
+) {
     let full = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
     let painter = ui.painter();
+    let recipe = Recipe {
+        picture: shown.picture.clone(),
+        overlay: shown.overlay.clone(),
+        settings,
+        number: shown.order.snapshot.number,
+    };
+    let changes = changes(ui, &shown.picture, scope);
     if shown.order.snapshot.request.view.crop.is_none() {
-        let texture = textures.main.update(ui, "picture", &shown.picture);
+        let texture = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);
         painter.image(texture, whole, full, Color32::WHITE);
         return;
     }
-    if let Some(texture) = &textures.main.texture {
-        painter.image(texture.id(), whole, full, Color32::from_gray(90));
+    if let Some(main) = &scope.textures.main {
+        painter.image(main.id, whole, full, Color32::from_gray(90));
     }
-    let texture = textures.part.update(ui, "part", &shown.picture);
+    let texture = Developed::update(&mut scope.textures.part, scope.screen, recipe, changes);
     painter.image(texture, rect, full, Color32::WHITE);
     painter.rect_stroke(rect, 0.0, Stroke::new(1.0, theme::ACCENT), StrokeKind::Outside);
+}
+
+/// Whether a picture is another one in every frame; then there is a next frame. Software would do
+/// nothing else than draw: there it changes with the snapshots.
+fn changes(ui: &Ui, picture: &LinearPicture, scope: &Scope<'_>) -> bool {
+    let is_idle =
+        |snapshot: &Snapshot| matches!(snapshot.activity, Activity::Paused | Activity::Done);
+    let changes = picture.is_live()
+        && !scope.screen.gpu().facts().is_software()
+        && !scope.snapshot.is_none_or(is_idle);
+    if changes {
+        ui.ctx().request_repaint();
+    }
+    changes
 }
 
 /// Writes what the overlay has to say.
@@ -161,34 +199,8 @@ fn waiting(ui: &Ui, area: Rect, is_loading: bool) {
     );
 }
 
-impl Slot {
-    fn update(&mut self, ui: &Ui, name: &str, picture: &Arc<Rgb8>) -> egui::TextureId {
-        let is_current = self.holds.as_ref().is_some_and(|held| Arc::ptr_eq(held, picture));
-        let texture = match &mut self.texture {
-            Some(texture) if is_current => texture,
-            Some(texture) => {
-                texture.set(color_image(picture), TextureOptions::LINEAR);
-                texture
-            }
-            None => self.texture.insert(ui.ctx().load_texture(
-                name,
-                color_image(picture),
-                TextureOptions::LINEAR,
-            )),
-        };
-        self.holds = Some(Arc::clone(picture));
-        texture.id()
-    }
-}
-
-/// The picture as egui wants it.
-pub(in crate::app) fn color_image(picture: &Rgb8) -> ColorImage {
-    let pixels = picture.pixels.iter().map(|[r, g, b]| Color32::from_rgb(*r, *g, *b)).collect();
-    ColorImage::new([picture.width as usize, picture.height as usize], pixels)
-}
-
 /// The other picture left of a line that can be dragged; whether it is being dragged.
-fn wipe(ui: &Ui, rect: Rect, texture: egui::TextureId, scope: &mut Scope<'_>) -> bool {
+fn wipe(ui: &Ui, rect: Rect, texture: TextureId, scope: &mut Scope<'_>) -> bool {
     let x = rect.left() + rect.width() * scope.interface.wipe;
     let left = Rect::from_min_max(rect.min, Pos2::new(x, rect.bottom()));
     let uv = Rect::from_min_max(Pos2::ZERO, Pos2::new(scope.interface.wipe, 1.0));

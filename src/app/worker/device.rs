@@ -1,8 +1,8 @@
 //! Where sessions run: the GPU that was asked for, as long as it does what it should, else the CPU.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
-use super::Request;
+use super::{Request, lock};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::World;
@@ -10,10 +10,11 @@ use crate::render::Session;
 use crate::render::gpu::{DeviceChoice, Gpu, Stage};
 
 /// The device in use and what is on it.
-#[derive(Default)]
 pub(super) struct Device {
     /// Name of the adapter to take, if one was asked for.
     adapter: Option<String>,
+    /// The device the window is drawn on, to be shared if it is of that adapter.
+    screen: Arc<Mutex<Gpu>>,
     choice: Option<DeviceChoice>,
     gpu: Option<Gpu>,
     staged: Option<Staged>,
@@ -28,8 +29,8 @@ struct Staged {
 }
 
 impl Device {
-    pub(super) fn new(adapter: Option<String>) -> Self {
-        Self { adapter, ..Self::default() }
+    pub(super) fn new(adapter: Option<String>, screen: Arc<Mutex<Gpu>>) -> Self {
+        Self { adapter, screen, choice: None, gpu: None, staged: None, failure: None }
     }
 
     /// Whether [`Self::place`] may take long.
@@ -73,7 +74,8 @@ impl Device {
         (self.gpu, self.staged) = (None, None);
         // The name only says which GPU is meant.
         let adapter = self.adapter.as_deref().filter(|_| choice != DeviceChoice::Cpu);
-        match choice.open(adapter) {
+        let screen = lock(&self.screen).clone();
+        match choice.open_or_share(adapter, Some(&screen)) {
             Ok(gpu) => self.gpu = gpu,
             Err(failure) => self.give_up(&failure),
         }

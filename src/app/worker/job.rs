@@ -1,8 +1,7 @@
 //! One request being worked on.
 
-use std::sync::Arc;
-use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::device::Device;
@@ -15,7 +14,9 @@ use crate::image::Image;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::metrics;
 use crate::path::World;
-use crate::render::{Phase, Sampling, Session, StopRule, View};
+use crate::render::film::Film;
+use crate::render::gpu::{DeviceFilm, Gpu};
+use crate::render::{Figures, Phase, Sampling, Session, StopRule, View};
 
 /// Longest piece of rendering between two looks at requests and clocks.
 const SLICE: Duration = Duration::from_millis(120);
@@ -36,7 +37,6 @@ const UNDER_WIDTH: u32 = 640;
 const PUBLISH_SHARE: u32 = 20;
 
 /// What one job leaves for the next.
-#[derive(Default)]
 pub(super) struct Legacy {
     device: Device,
     /// The last laws that learning ended with, and the map they are for.
@@ -54,8 +54,16 @@ pub(super) struct Legacy {
 
 impl Legacy {
     /// Of a worker that has done nothing yet.
-    pub(super) fn new(adapter: Option<String>) -> Self {
-        Self { device: Device::new(adapter), ..Self::default() }
+    pub(super) fn new(adapter: Option<String>, screen: Arc<Mutex<Gpu>>) -> Self {
+        Self {
+            device: Device::new(adapter, screen),
+            learned: None,
+            is_complete: false,
+            world: None,
+            seconds_per_path: None,
+            snapshots: 0,
+            under: None,
+        }
     }
 
     /// Whether learning has come to its end in this scene.
@@ -80,6 +88,18 @@ impl Legacy {
     }
 }
 
+/// A film read back from the window's device, where it is shown in place meanwhile.
+struct Reading {
+    of: (Gpu, DeviceFilm),
+    film: Arc<Film>,
+    /// Of the moment it was read, so that both belong together.
+    figures: Figures,
+    noise: f64,
+    at: Instant,
+    /// Age at which it is too old.
+    gap: Duration,
+}
+
 pub(super) struct Job<'a> {
     shared: &'a Shared,
     alarm: &'a Alarm,
@@ -88,6 +108,8 @@ pub(super) struct Job<'a> {
     counters: Option<Arc<LearningGrid>>,
     published: Instant,
     publish_gap: Duration,
+    /// Films that the window shows in place, as they were read last; they go with the request.
+    readings: Vec<Reading>,
     /// The laws published last, with what tells whether they are still those in use.
     laws: Option<((usize, u64), Arc<LightGrid>)>,
     /// How the error of the main and of the plain picture fell.
@@ -109,6 +131,7 @@ impl<'a> Job<'a> {
             counters: None,
             published: Instant::now(),
             publish_gap: Duration::ZERO,
+            readings: Vec::new(),
             laws: None,
             curves: [Vec::new(), Vec::new()],
         }
@@ -302,12 +325,14 @@ impl<'a> Job<'a> {
                 preview = None;
             }
             let due = self.published.elapsed() >= self.publish_gap;
-            if due || !self.request.previews {
-                self.note(0, &main);
-                plain.iter().for_each(|plain| self.note(1, plain));
-            }
+            let is_reading_due = due && self.is_reading_due(&main);
             if due && self.request.previews && !self.is_superseded() {
                 self.publish(activity, &main, plain.as_ref(), preview.as_ref());
+            }
+            // After publishing, which has read the film.
+            if is_reading_due || !self.request.previews {
+                self.note(0, &main);
+                plain.iter().for_each(|plain| self.note(1, plain));
             }
         }
         // One sample a pixel is no better than what there was before, unless it can be filtered.
@@ -482,12 +507,16 @@ impl<'a> Job<'a> {
         let start = Instant::now();
         self.legacy.snapshots += 1;
         let shown = preview.unwrap_or(main);
+        let is_final = matches!(activity, Activity::Paused | Activity::Done);
+        let (main_take, main_cost) = self.take(shown, is_final);
+        let plain_take = plain.map(|session| self.take(session, is_final));
+        let reading = main_cost + plain_take.as_ref().map_or(Duration::ZERO, |(_, cost)| *cost);
         let snapshot = Snapshot {
             number: self.legacy.snapshots,
             request: Arc::clone(&self.request),
             activity,
-            main: self.take(shown),
-            plain: plain.map(|session| self.take(session)),
+            main: main_take,
+            plain: plain_take.map(|(take, _)| take),
             is_preview: preview.is_some(),
             counters: self.counters.clone(),
             learning: main.figures(),
@@ -497,8 +526,8 @@ impl<'a> Job<'a> {
         *lock(&self.shared.snapshot) = Some(Arc::new(snapshot));
         (self.shared.wake)();
         self.published = Instant::now();
-        let cost = self.published - start;
-        self.publish_gap = (cost * PUBLISH_SHARE).clamp(SLICE, Duration::from_secs(3));
+        let cost = (self.published - start).saturating_sub(reading);
+        self.publish_gap = gap_after(cost);
     }
 
     /// Adds a point to a curve, unless nothing has happened since the last one.
@@ -520,17 +549,69 @@ impl<'a> Job<'a> {
         }
     }
 
-    fn take(&mut self, session: &Session<'_>) -> Take {
-        let film = session.film();
-        Take {
+    /// The session's picture, and what reading a film that is shown in place took of the time.
+    fn take(&mut self, session: &Session<'_>, is_final: bool) -> (Take, Duration) {
+        let on_device = session.film_on_device();
+        let in_place = self.in_place(session);
+        let kept = self.reading(in_place.as_ref()).filter(|_| !is_final);
+        let (film, figures, noise, cost) = match kept {
+            Some(reading) => {
+                (Arc::clone(&reading.film), reading.figures, reading.noise, Duration::ZERO)
+            }
+            None => {
+                let start = Instant::now();
+                let film = Arc::new(session.film().clone());
+                let (noise, figures) = (film.noise(), session.figures());
+                let cost = in_place.as_ref().map_or(Duration::ZERO, |_| start.elapsed());
+                if let Some(of) = in_place {
+                    let (at, gap) = (Instant::now(), gap_after(cost));
+                    self.readings.retain(|reading| !is_same(&reading.of, &of));
+                    let film = Arc::clone(&film);
+                    self.readings.push(Reading { of, film, figures, noise, at, gap });
+                }
+                (film, figures, noise, cost)
+            }
+        };
+        let take = Take {
             sampling: session.view().sampling,
-            noise: film.noise(),
-            film: Arc::new(film.clone()),
-            figures: session.figures(),
+            noise,
+            film,
+            figures,
             gpu: session.gpu_figures().map(Arc::new),
+            on_device,
             grid: self.laws_of(session),
-        }
+        };
+        (take, cost)
     }
+
+    /// The session's film if the window shows it in every frame without its being read. Small ones are
+    /// filtered on the CPU, and software does not draw so often.
+    fn in_place(&self, session: &Session<'_>) -> Option<(Gpu, DeviceFilm)> {
+        let (gpu, film) = session.film_on_device()?;
+        let is_small = film.width < self.request.view.width;
+        let is_live = !gpu.facts().is_software() && gpu.is_same(&lock(&self.shared.screen));
+        (is_live && !is_small).then_some((gpu, film))
+    }
+
+    /// The last reading of a film, unless it is too old.
+    fn reading(&self, of: Option<&(Gpu, DeviceFilm)>) -> Option<&Reading> {
+        let of = of?;
+        self.readings.iter().find(|r| is_same(&r.of, of) && r.at.elapsed() < r.gap)
+    }
+
+    /// Whether figures that need the film are to be taken anew.
+    fn is_reading_due(&self, session: &Session<'_>) -> bool {
+        session.samples() > 0 && self.reading(self.in_place(session).as_ref()).is_none()
+    }
+}
+
+fn is_same((gpu, film): &(Gpu, DeviceFilm), other: &(Gpu, DeviceFilm)) -> bool {
+    gpu.is_same(&other.0) && *film == other.1
+}
+
+/// Time until something that took `cost` may be done again.
+fn gap_after(cost: Duration) -> Duration {
+    (cost * PUBLISH_SHARE).clamp(SLICE, Duration::from_secs(3))
 }
 
 fn learned_share(session: &Session<'_>) -> f32 {

@@ -22,7 +22,7 @@ use crate::image::Image;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::render::film::Film;
-use crate::render::gpu::{DeviceChoice, GpuFigures};
+use crate::render::gpu::{DeviceChoice, DeviceFilm, Gpu, GpuFigures};
 use crate::render::{Figures, Sampling, StopRule, View};
 
 /// What is to be rendered.
@@ -127,9 +127,10 @@ pub struct Point {
 pub struct Take {
     /// How the map was sampled.
     pub sampling: Sampling,
-    /// The sums.
+    /// The sums. Where the window shows those on its own device in every frame, they are as they were
+    /// read last: at most a few seconds ago, and the last ones when nothing is rendered.
     pub film: Arc<Film>,
-    /// What was done.
+    /// What was done for them.
     pub figures: Figures,
     /// [`Film::noise`].
     pub noise: f64,
@@ -137,6 +138,8 @@ pub struct Take {
     pub grid: Option<Arc<LightGrid>>,
     /// The GPU at work; `None` is the CPU.
     pub gpu: Option<Arc<GpuFigures>>,
+    /// The sums of `film` or later ones where a GPU has them, and that GPU.
+    pub(crate) on_device: Option<(Gpu, DeviceFilm)>,
 }
 
 /// The latest picture.
@@ -178,6 +181,8 @@ struct Shared {
     snapshot: Mutex<Option<Arc<Snapshot>>>,
     is_preparing: AtomicBool,
     failures: Mutex<Vec<String>>,
+    /// The device the window is drawn on.
+    screen: Arc<Mutex<Gpu>>,
     wake: Wake,
 }
 
@@ -200,11 +205,11 @@ pub struct Worker {
 
 impl Worker {
     /// Starts the thread; `wake` is called at every new snapshot, `adapter` names the GPU to take
-    /// where one is wanted.
+    /// where one is wanted, and `screen` is the one to share if it is that.
     ///
     /// # Errors
     /// If the system gives no thread.
-    pub fn start(wake: Wake, adapter: Option<String>) -> Result<Self> {
+    pub fn start(wake: Wake, adapter: Option<String>, screen: Gpu) -> Result<Self> {
         let no_thread = |e: &dyn std::fmt::Display| {
             Error::new(format!("the render threads cannot be started: {e}"))
         };
@@ -221,6 +226,7 @@ impl Worker {
             snapshot: Mutex::default(),
             is_preparing: AtomicBool::default(),
             failures: Mutex::default(),
+            screen: Arc::new(Mutex::new(screen)),
             wake,
         });
         let (inside, render_pool) = (Arc::clone(&shared), Arc::clone(&pool));
@@ -229,6 +235,11 @@ impl Worker {
             .spawn(move || run(&inside, &render_pool, adapter))
             .map_err(|e| no_thread(&e))?;
         Ok(Self { shared, thread: Some(thread), pool })
+    }
+
+    /// Says which device the window is drawn on now.
+    pub fn move_to(&self, screen: Gpu) {
+        *lock(&self.shared.screen) = screen;
     }
 
     /// Asks for a picture; the latest request counts.
@@ -287,7 +298,7 @@ fn lower_priority() {
 }
 
 fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, adapter: Option<String>) {
-    let mut legacy = Legacy::new(adapter);
+    let mut legacy = Legacy::new(adapter, Arc::clone(&shared.screen));
     let alarm = Alarm::start(Arc::clone(&shared.cancel));
     let mut done: Option<Arc<Request>> = None;
     loop {

@@ -1,13 +1,18 @@
 //! Adapters: what there is, which one to take, and a connection to it.
 
 use std::collections::HashMap;
+use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use wgpu::{Adapter, Backends, DeviceType, Features, Limits};
+use wgpu::wgt::WgpuHasDisplayHandle;
+use wgpu::{Adapter, Backends, DeviceType, Features, Instance, InstanceDescriptor, Limits};
+use wgpu::{PollType, SubmissionIndex, Surface};
 
 use super::pipeline::Pipeline;
 use crate::error::{Error, Result};
+use crate::image::Rgb8;
 
 /// What an adapter is and how much it allows.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -64,6 +69,16 @@ impl AdapterFacts {
         self.name.split(" (").next().unwrap_or(&self.name)
     }
 
+    fn title(&self) -> String {
+        format!("{} ({})", self.name, self.backend)
+    }
+
+    /// Whether name or backend contain `name` (in any case); everything is called nothing.
+    fn is_called(&self, name: Option<&str>) -> bool {
+        let title = self.title().to_lowercase();
+        name.is_none_or(|name| title.contains(&name.to_lowercase()))
+    }
+
     /// Whether it only pretends to be a GPU.
     pub fn is_software(&self) -> bool {
         self.kind == "software"
@@ -84,19 +99,28 @@ impl AdapterFacts {
 
 /// All adapters of this machine, the best one first.
 pub fn adapters() -> Vec<AdapterFacts> {
-    enumerate(PRIMARY | Backends::GL).into_iter().map(|(facts, _)| facts).collect()
+    enumerate(&instance(PRIMARY | Backends::GL, None), None)
+        .into_iter()
+        .map(|(facts, _)| facts)
+        .collect()
 }
 
 /// What is asked first: OpenGL is only the fallback.
 const PRIMARY: Backends = Backends::VULKAN.union(Backends::METAL).union(Backends::DX12);
 
-fn enumerate(backends: Backends) -> Vec<(AdapterFacts, Adapter)> {
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+fn instance(backends: Backends, display: Option<Box<dyn WgpuHasDisplayHandle>>) -> Instance {
+    Instance::new(InstanceDescriptor {
         backends,
-        ..wgpu::InstanceDescriptor::new_without_display_handle()
-    });
+        display,
+        ..InstanceDescriptor::new_without_display_handle()
+    })
+}
+
+/// The adapters that can compute, and draw on the surface if there is one; the best one first.
+fn enumerate(instance: &Instance, surface: Option<&Surface<'_>>) -> Vec<(AdapterFacts, Adapter)> {
     let mut found: Vec<_> = pollster::block_on(instance.enumerate_adapters(Backends::all()))
         .into_iter()
+        .filter(|adapter| surface.is_none_or(|surface| adapter.is_surface_supported(surface)))
         .map(|adapter| (AdapterFacts::of(&adapter), adapter))
         .filter(|(facts, _)| facts.can_compute)
         .collect();
@@ -124,6 +148,18 @@ impl DeviceChoice {
     /// # Errors
     /// If it cannot be opened; with [`Self::Auto`] and no name this is no reason to stop.
     pub fn open(self, adapter: Option<&str>) -> Result<Option<Gpu>> {
+        self.open_or_share(adapter, None)
+    }
+
+    /// [`Self::open`], but a clone of `shared` if that is the GPU chosen and still of use.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub(crate) fn open_or_share(
+        self,
+        adapter: Option<&str>,
+        shared: Option<&Gpu>,
+    ) -> Result<Option<Gpu>> {
         match (self, adapter) {
             (Self::Cpu, Some(name)) => {
                 Err(Error::new(format!("--adapter {name} and --device cpu exclude each other")))
@@ -132,10 +168,13 @@ impl DeviceChoice {
             (Self::Auto, None) if adapters().first().is_none_or(AdapterFacts::is_software) => {
                 Ok(None)
             }
-            (_, name) => Gpu::open(name).map(Some),
+            (_, name) => Gpu::open_or_share(name, shared).map(Some),
         }
     }
 }
+
+/// Time between two looks at whether the device has done its work.
+const LOOK_GAP: Duration = Duration::from_micros(100);
 
 /// What finds the surfaces that rays hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
@@ -155,10 +194,14 @@ pub enum RayChoice {
 #[derive(Clone)]
 pub struct Gpu {
     facts: AdapterFacts,
+    pub(crate) instance: Instance,
+    pub(crate) adapter: Adapter,
     pub(crate) limits: Limits,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     trouble: Arc<Mutex<Option<String>>>,
+    /// Whether frames of a window are drawn on it too.
+    pub(super) has_window: bool,
     hardware_rays: bool,
     /// Kernels compiled so far, by their source.
     pub(super) pipelines: Arc<Mutex<HashMap<String, Arc<Pipeline>>>>,
@@ -176,27 +219,65 @@ impl Gpu {
     /// # Errors
     /// If there is none, or it cannot be opened.
     pub fn open(name: Option<&str>) -> Result<Self> {
-        let wanted = name.map(str::to_lowercase);
-        let title = |facts: &AdapterFacts| format!("{} ({})", facts.name, facts.backend);
-        let mut all = Vec::new();
+        Self::open_or_share(name, None)
+    }
+
+    fn open_or_share(name: Option<&str>, shared: Option<&Self>) -> Result<Self> {
+        let mut others = Vec::new();
         for backends in [PRIMARY, Backends::GL] {
-            for (facts, adapter) in enumerate(backends) {
-                let text = title(&facts).to_lowercase();
-                if wanted.as_ref().is_none_or(|wanted| text.contains(wanted)) {
-                    return Self::connect(facts, &adapter);
+            let instance = instance(backends, None);
+            for (facts, adapter) in enumerate(&instance, None) {
+                if facts.is_called(name) {
+                    return match shared.filter(|gpu| gpu.facts == facts && gpu.check().is_ok()) {
+                        Some(shared) => Ok(shared.clone()),
+                        None => Self::connect(facts, instance, adapter),
+                    };
                 }
-                all.push(title(&facts));
+                others.push(facts.title());
             }
         }
         Err(Error::new(match name {
-            Some(name) if !all.is_empty() => {
-                format!("no adapter is called {name}; there are {}", all.join(", "))
+            Some(name) if !others.is_empty() => {
+                format!("no adapter is called {name}; there are {}", others.join(", "))
             }
             _ => "no GPU: neither Vulkan, Metal, DX12 nor OpenGL has an adapter".to_owned(),
         }))
     }
 
-    fn connect(facts: AdapterFacts, adapter: &Adapter) -> Result<Self> {
+    /// Opens the best adapter that can draw on a window, be it called `name` or, if none of those
+    /// can, otherwise.
+    ///
+    /// # Errors
+    /// If none that can compute can draw there, or it cannot be opened.
+    pub(crate) fn open_for_window<W>(
+        name: Option<&str>,
+        display: &(impl WgpuHasDisplayHandle + Clone),
+        window: &Arc<W>,
+    ) -> Result<Self>
+    where
+        W: wgpu::DisplayAndWindowHandle + 'static,
+    {
+        let mut reason = "no Vulkan, Metal, DX12 or OpenGL can compute and draw here".to_owned();
+        for backends in [PRIMARY, Backends::GL] {
+            let instance = instance(backends, Some(Box::new(display.clone())));
+            let surface = match instance.create_surface(Arc::clone(window)) {
+                Ok(surface) => surface,
+                Err(error) => {
+                    reason = one_line(&error.to_string());
+                    continue;
+                }
+            };
+            let mut found = enumerate(&instance, Some(&surface));
+            found.sort_by_key(|(facts, _)| !facts.is_called(name));
+            if let Some((facts, adapter)) = found.into_iter().next() {
+                let gpu = Self::connect(facts, instance, adapter)?;
+                return Ok(Self { has_window: true, ..gpu });
+            }
+        }
+        Err(Error::new(reason))
+    }
+
+    fn connect(facts: AdapterFacts, instance: Instance, adapter: Adapter) -> Result<Self> {
         let limits = adapter.limits();
         let wanted = Features::TIMESTAMP_QUERY | Features::EXPERIMENTAL_RAY_QUERY;
         // SAFETY: asks to accept that ray queries of wgpu may have bugs; kernels ask about finite rays
@@ -218,7 +299,9 @@ impl Gpu {
         };
         let (lost, failed) = (Arc::clone(&trouble), Arc::clone(&trouble));
         device.set_device_lost_callback(move |_, message| {
-            note(&lost, format!("the device was lost: {}", one_line(&message)));
+            let cause = one_line(&message);
+            let cause = if cause.is_empty() { cause } else { format!(": {cause}") };
+            note(&lost, format!("the device was lost{cause}"));
         });
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             note(
@@ -232,10 +315,13 @@ impl Gpu {
         let prefers_buffers = !facts.is_software() && facts.storage_buffers >= MOST_STORAGE_BUFFERS;
         let gpu = Self {
             facts,
+            instance,
+            adapter,
             limits,
             device,
             queue,
             trouble,
+            has_window: false,
             hardware_rays: false,
             pipelines: Arc::default(),
             prefers_buffers,
@@ -259,6 +345,12 @@ impl Gpu {
     /// What it is.
     pub fn facts(&self) -> &AdapterFacts {
         &self.facts
+    }
+
+    /// Whether both are clones of one connection: only then may they use each other's buffers.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        // wgpu 30 takes devices of two instances for equal.
+        Arc::ptr_eq(&self.trouble, &other.trouble)
     }
 
     /// The same connection with rays traced as is asked for.
@@ -299,17 +391,99 @@ impl Gpu {
     ///
     /// # Errors
     /// As [`Self::check`].
-    pub(crate) fn wait_for(&self, submission: Option<wgpu::SubmissionIndex>) -> Result<()> {
+    pub(crate) fn wait_for(&self, submission: Option<SubmissionIndex>) -> Result<()> {
+        // Never with a timeout: then wgpu 30 panics if another thread sees the queue empty first.
         let waited =
-            self.device.poll(wgpu::PollType::Wait { submission_index: submission, timeout: None });
+            self.device.poll(PollType::Wait { submission_index: submission, timeout: None });
         self.check()?;
         waited.map(|_| ()).map_err(|e| Error::new(format!("{}: {e}", self.facts.name)))
+    }
+
+    /// Reads the first `bytes` bytes of a buffer back, once what was submitted has been done.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub(crate) fn read_back(&self, source: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>> {
+        let mut commands = self.device.create_command_encoder(&Default::default());
+        let staging = self.staging(bytes);
+        commands.copy_buffer_to_buffer(source, 0, &staging, 0, bytes);
+        self.read_staged(&staging, commands)
+    }
+
+    /// Reads a texture of 8-bit levels back, without its opacity.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub(crate) fn read_texture(&self, texture: &wgpu::Texture) -> Result<Rgb8> {
+        let (width, height) = (texture.width(), texture.height());
+        let bytes_per_row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let staging = self.staging(u64::from(bytes_per_row) * u64::from(height));
+        let mut commands = self.device.create_command_encoder(&Default::default());
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(bytes_per_row),
+            rows_per_image: None,
+        };
+        commands.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo { buffer: &staging, layout },
+            texture.size(),
+        );
+        let pixels = self
+            .read_staged(&staging, commands)?
+            .chunks_exact(bytes_per_row as usize)
+            .flat_map(|row| row[..4 * width as usize].chunks_exact(4).map(|p| [p[0], p[1], p[2]]))
+            .collect();
+        Ok(Rgb8 { width, height, pixels })
+    }
+
+    /// A buffer of so many bytes for [`Self::read_staged`].
+    pub(crate) fn staging(&self, bytes: u64) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("staging"),
+            size: bytes,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// What is in a staging buffer after `commands`, which are submitted.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub(crate) fn read_staged(
+        &self,
+        staging: &wgpu::Buffer,
+        commands: wgpu::CommandEncoder,
+    ) -> Result<Vec<u8>> {
+        let failed = |e: &dyn std::fmt::Display| {
+            Error::new(format!("{}: results cannot be read back: {e}", self.facts.name))
+        };
+        self.queue.submit([commands.finish()]);
+        let (sender, receiver) = channel();
+        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+            // The receiver waits below, unless the device has failed.
+            let _ = sender.send(result);
+        });
+        // While wgpu 30 waits, it holds a lock that presenting a frame takes too: so this looks now and
+        // then, for others may have long work under way.
+        let mapped = loop {
+            match receiver.recv_timeout(LOOK_GAP) {
+                Err(RecvTimeoutError::Timeout) => {
+                    let _ = self.device.poll(PollType::Poll);
+                    self.check()?;
+                }
+                other => break other,
+            }
+        };
+        mapped.map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
+        Ok(staging.get_mapped_range(..).map_err(|e| failed(&e))?.to_vec())
     }
 
     /// Gives the device up, as a driver reset would; for tests of what happens then.
     pub fn lose(&self) {
         self.device.destroy();
-        let _ = self.device.poll(wgpu::PollType::Poll);
+        let _ = self.device.poll(PollType::Poll);
     }
 }
 

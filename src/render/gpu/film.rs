@@ -23,8 +23,9 @@ const SURFACE_BYTES: u64 = 32;
 const PIECE_PIXELS: usize = 1 << 19;
 
 /// Where the sums of a picture lie, for shaders that draw it on the same device. They are added to
-/// between submissions; at any moment a pixel's radiance is `sum / samples`.
-#[derive(Clone)]
+/// between submissions; at any moment a pixel's radiance is `sum / samples`. Clones are the same film,
+/// and only those are equal.
+#[derive(Clone, PartialEq)]
 pub(crate) struct DeviceFilm {
     /// Sums of red, green, blue and squared luminance, an f32 each; row after row.
     pub(crate) sum: wgpu::Buffer,

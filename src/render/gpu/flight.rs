@@ -7,7 +7,7 @@ use std::time::Instant;
 use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 use super::device::Gpu;
-use super::pacer::{Pacer, TARGET_SECONDS};
+use super::pacer::{Pacer, TARGET_SECONDS, WINDOW_TARGET_SECONDS};
 use super::shader::Kernel;
 use crate::error::Result;
 
@@ -21,6 +21,7 @@ const SLOT_BYTES: u64 = wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT;
 /// The dispatches under way, oldest first, and how long those before them took.
 pub(super) struct Flights {
     under_way: VecDeque<Flight>,
+    target_seconds: f64,
     pacers: [Pacer; Kernel::COUNT],
     last_landing: Instant,
     clock: Option<Clock>,
@@ -49,9 +50,11 @@ pub struct FlightFigures {
 
 impl Flights {
     pub(super) fn new(gpu: &Gpu) -> Self {
+        let target_seconds = if gpu.has_window { WINDOW_TARGET_SECONDS } else { TARGET_SECONDS };
         Self {
             under_way: VecDeque::new(),
-            pacers: Default::default(),
+            target_seconds,
+            pacers: [Pacer::new(target_seconds); Kernel::COUNT],
             last_landing: Instant::now(),
             clock: Clock::new(gpu),
             started: 0,
@@ -129,7 +132,7 @@ impl Flights {
         self.figures.dispatches += 1;
         self.figures.device_seconds += seconds;
         self.figures.has_timestamps = told.is_some();
-        if told.is_some() || !had_ended || seconds < TARGET_SECONDS {
+        if told.is_some() || !had_ended || seconds < self.target_seconds {
             self.pacers[flight.kernel as usize].record(flight.units, seconds);
         }
         Ok(())
@@ -138,7 +141,7 @@ impl Flights {
     /// Lets dispatches begin as small as at first, so that tests can cut work short.
     #[cfg(test)]
     pub(super) fn forget_speed(&mut self) {
-        self.pacers = Default::default();
+        self.pacers = [Pacer::new(self.target_seconds); Kernel::COUNT];
     }
 }
 
@@ -151,8 +154,12 @@ struct Clock {
 }
 
 impl Clock {
-    /// `None` where the device has none.
+    /// `None` where the device has none that can be trusted: once it has drawn, llvmpipe stamps the
+    /// beginning and the end of a dispatch alike.
     fn new(gpu: &Gpu) -> Option<Self> {
+        if gpu.has_window && gpu.facts().is_software() {
+            return None;
+        }
         if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return None;
         }
@@ -208,11 +215,11 @@ impl Clock {
     /// Seconds between a slot's timestamps; `None` where they make no sense.
     fn seconds(&mut self, slot: usize) -> Option<f64> {
         let staging = &self.staging[slot];
-        let ticks = {
-            let view = staging.get_mapped_range(..).ok()?;
+        let ticks = staging.get_mapped_range(..).ok().and_then(|view| {
             let times: &[u64] = bytemuck::try_cast_slice(&view).ok()?;
             times[1].checked_sub(times[0])
-        };
+        });
+        // Even where another thread that shares the device is about to map it.
         staging.unmap();
         ticks.filter(|ticks| *ticks > 0).map(|ticks| ticks as f64 * self.seconds_per_tick)
     }

@@ -345,8 +345,8 @@ impl Renderer {
     }
 
     /// The film where it is.
-    pub(crate) fn film_on_device(&self) -> Option<DeviceFilm> {
-        self.film.on_device(&self.buffers)
+    pub(crate) fn film_on_device(&self) -> Option<(Gpu, DeviceFilm)> {
+        self.film.on_device(&self.buffers).map(|film| (self.gpu.clone(), film))
     }
 
     fn tiles(&self) -> u64 {

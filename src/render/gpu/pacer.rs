@@ -3,20 +3,22 @@
 /// Longest time one dispatch should take: a desktop stays smooth, no driver resets, and a cancelled
 /// render ends at once.
 pub(super) const TARGET_SECONDS: f64 = 0.012;
+/// The same where frames of a window wait in the same queue, behind all dispatches under way.
+pub(super) const WINDOW_TARGET_SECONDS: f64 = 0.004;
 
 /// Adapts the size of dispatches (in workgroup samples) to what the device manages.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Pacer {
     units: f64,
-}
-
-impl Default for Pacer {
-    fn default() -> Self {
-        Self { units: 4.0 }
-    }
+    target_seconds: f64,
 }
 
 impl Pacer {
+    /// Small dispatches at first, in the end of about so many seconds.
+    pub(super) fn new(target_seconds: f64) -> Self {
+        Self { units: 4.0, target_seconds }
+    }
+
     /// Units the next dispatch may hold, at least one.
     pub(super) fn units(&self) -> u64 {
         self.units as u64
@@ -24,7 +26,7 @@ impl Pacer {
 
     /// Notes that `units` took `seconds`: shrinks at once, grows at most twofold.
     pub(super) fn record(&mut self, units: u64, seconds: f64) {
-        let affordable = units as f64 * TARGET_SECONDS / seconds.max(1e-6);
+        let affordable = units as f64 * self.target_seconds / seconds.max(1e-6);
         // A dispatch much smaller than allowed says little about larger ones.
         let says_more = units as f64 >= 0.5 * self.units;
         let most = if says_more { 2.0 * self.units } else { self.units };
@@ -38,7 +40,7 @@ mod tests {
 
     /// A device that does `rate` units a second after a fixed cost.
     fn settled(rate: f64) -> f64 {
-        let mut pacer = Pacer::default();
+        let mut pacer = Pacer::new(TARGET_SECONDS);
         for _ in 0..200 {
             let units = pacer.units();
             pacer.record(units, 5e-5 + units as f64 / rate);
@@ -58,7 +60,7 @@ mod tests {
 
     #[test]
     fn a_sudden_slow_part_is_answered_at_once() {
-        let mut pacer = Pacer { units: 1000.0 };
+        let mut pacer = Pacer { units: 1000.0, ..Pacer::new(TARGET_SECONDS) };
         pacer.record(1000, 0.12);
         assert!(pacer.units() < 400);
     }

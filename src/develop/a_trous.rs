@@ -1,0 +1,98 @@
+//! The à-trous filter of [`crate::denoise`] as compute passes.
+
+use super::{dispatch, entry, filled, pipeline};
+use crate::render::gpu::{DeviceFilm, Gpu};
+
+/// Filter passes; the last one reaches 2^5 pixels.
+const PASSES: u32 = 5;
+/// Bytes of a pixel's `Guide` and of its `FirstHit`.
+const GUIDE_BYTES: u64 = 32;
+/// Bytes of a pixel's light.
+const LIGHT_BYTES: u64 = 16;
+
+pub(super) struct Passes {
+    undress: wgpu::ComputePipeline,
+    share_errors: wgpu::ComputePipeline,
+    smooth_light: wgpu::ComputePipeline,
+    dress: wgpu::ComputePipeline,
+}
+
+impl Passes {
+    pub(super) fn new(gpu: &Gpu) -> Self {
+        let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("a-trous"),
+            source: wgpu::ShaderSource::Wgsl(include_str!("../../shaders/a_trous.wgsl").into()),
+        });
+        Self {
+            undress: pipeline(gpu, &shader, "undress"),
+            share_errors: pipeline(gpu, &shader, "share_errors"),
+            smooth_light: pipeline(gpu, &shader, "smooth_light"),
+            dress: pipeline(gpu, &shader, "dress"),
+        }
+    }
+
+    /// Whether the guides of so many pixels fit into one binding.
+    pub(super) fn fits(&self, gpu: &Gpu, width: u32, height: u32) -> bool {
+        let most = gpu.limits.max_storage_buffer_binding_size.min(gpu.limits.max_buffer_size);
+        u64::from(width) * u64::from(height) * GUIDE_BYTES <= most
+    }
+
+    /// The film filtered, with one sample a pixel that has any; `None` without layers or where they
+    /// do not fit.
+    pub(super) fn run(&self, gpu: &Gpu, film: &DeviceFilm) -> Option<DeviceFilm> {
+        let surfaces = film.surfaces.as_ref()?;
+        if !self.fits(gpu, film.width, film.height) {
+            return None;
+        }
+        let size = [film.width, film.height];
+        let make = |label: &str, bytes: u64| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: u64::from(film.width) * u64::from(film.height) * bytes,
+                usage: wgpu::BufferUsages::STORAGE,
+                mapped_at_creation: false,
+            })
+        };
+        let guides = make("guides", GUIDE_BYTES);
+        let (mut light, mut result) = (make("light", LIGHT_BYTES), make("light", LIGHT_BYTES));
+        // The film's own may have gone on when the result is looked at.
+        let counts = make("counts", LIGHT_BYTES);
+        let settings = |step: u32| {
+            let words = [film.width, film.height, step, film.scale.recip().to_bits()];
+            filled(gpu, wgpu::BufferUsages::UNIFORM, bytemuck::cast_slice(&words))
+        };
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
+        let one = settings(1);
+        let entries = [
+            entry(0, &one),
+            entry(1, &film.sum),
+            entry(2, &film.counts),
+            entry(3, surfaces),
+            entry(4, &guides),
+            entry(5, &light),
+        ];
+        dispatch(gpu, &mut commands, &self.undress, &entries, size);
+        let mut pass = |pipeline, settings: &wgpu::Buffer| {
+            let entries =
+                [entry(0, settings), entry(4, &guides), entry(5, &light), entry(6, &result)];
+            dispatch(gpu, &mut commands, pipeline, &entries, size);
+            std::mem::swap(&mut light, &mut result);
+        };
+        pass(&self.share_errors, &one);
+        for number in 0..PASSES {
+            pass(&self.smooth_light, &settings(1 << number));
+        }
+        let entries = [
+            entry(0, &one),
+            entry(2, &film.counts),
+            entry(4, &guides),
+            entry(5, &light),
+            entry(6, &result),
+            entry(7, &counts),
+        ];
+        dispatch(gpu, &mut commands, &self.dress, &entries, size);
+        gpu.queue.submit([commands.finish()]);
+        let [width, height] = size;
+        Some(DeviceFilm { sum: result, counts, surfaces: None, width, height, scale: 1.0 })
+    }
+}

@@ -1,0 +1,159 @@
+//! Pictures from main memory on the device.
+
+use rayon::prelude::*;
+
+use super::{Developer, LinearPicture, OverlayTexture, Under, filled};
+use crate::image::Image;
+use crate::render::film::Film;
+use crate::render::gpu::{DeviceFilm, Gpu};
+
+/// Bytes of a pixel's sums, and of its counts.
+const PIXEL_BYTES: u64 = 16;
+
+impl Developer {
+    /// A film's sums; `layers` asks for its layers too, where it has them. A film that does not fit
+    /// on the device becomes a smaller picture.
+    pub(crate) fn upload_film(&self, film: &Film, layers: bool) -> LinearPicture {
+        if self.most_width(film.width, film.height) < film.width {
+            return self.upload_image(&film.image());
+        }
+        let pixels = film.pixels();
+        let sums: Vec<[f32; 4]> = pixels
+            .par_iter()
+            .map(|pixel| {
+                let [r, g, b] = pixel.mean().map(|c| (c * f64::from(pixel.samples())) as f32);
+                [r, g, b, pixel.luminance_squared() as f32]
+            })
+            .collect();
+        let counts: Vec<[u32; 4]> = pixels.par_iter().map(|p| [p.samples(), 0, 0, 0]).collect();
+        let layers = film.surface_layers().filter(|_| layers);
+        let surfaces = layers.map(|layers| {
+            let surfaces: Vec<[f32; 8]> = (0..pixels.len())
+                .into_par_iter()
+                .map(|i| {
+                    let samples = pixels[i].samples() as f32;
+                    let [r, g, b] = layers.albedo[i].map(|albedo| albedo * samples);
+                    let [x, y, z] = layers.normal[i];
+                    [r, g, b, layers.depth[i], x, y, z, 1.0]
+                })
+                .collect();
+            self.buffer(bytemuck::cast_slice(&surfaces))
+        });
+        LinearPicture::fixed(DeviceFilm {
+            sum: self.buffer(bytemuck::cast_slice(&sums)),
+            counts: self.buffer(bytemuck::cast_slice(&counts)),
+            surfaces,
+            width: film.width,
+            height: film.height,
+            scale: 1.0,
+        })
+    }
+
+    /// A picture, smaller if it does not fit on the device.
+    pub(crate) fn upload_image(&self, image: &Image) -> LinearPicture {
+        let most = self.most_width(image.width, image.height);
+        if most < image.width {
+            return self.upload_image(&image.shrunk(most));
+        }
+        self.upload(image, &vec![[1, 0, 0, 0]; image.pixels.len()])
+    }
+
+    /// What a filter has made of a film.
+    pub(crate) fn upload_filtered(&self, image: &Image, film: &Film) -> LinearPicture {
+        if self.most_width(image.width, image.height) < image.width {
+            return self.upload_image(image);
+        }
+        let counts: Vec<[u32; 4]> =
+            film.pixels().par_iter().map(|pixel| [pixel.samples().min(1), 0, 0, 0]).collect();
+        self.upload(image, &counts)
+    }
+
+    fn upload(&self, image: &Image, counts: &[[u32; 4]]) -> LinearPicture {
+        LinearPicture::fixed(DeviceFilm {
+            sum: self.pixels(image),
+            counts: self.buffer(bytemuck::cast_slice(counts)),
+            surfaces: None,
+            width: image.width,
+            height: image.height,
+            scale: 1.0,
+        })
+    }
+
+    /// The picture with another one of the same view under pixels without samples.
+    pub(crate) fn with_under(&self, picture: LinearPicture, under: &Image) -> LinearPicture {
+        let most = self.most_width(under.width, under.height);
+        if most < under.width {
+            return self.with_under(picture, &under.shrunk(most));
+        }
+        let under = Under { pixels: self.pixels(under), size: [under.width, under.height] };
+        LinearPicture { under: Some(under), ..picture }
+    }
+
+    /// An overlay for a picture: colours of an sRGB display, row after row of `width` pixels, `None`
+    /// where it has nothing to say.
+    pub(crate) fn upload_overlay(
+        &self,
+        colors: &[Option<[u8; 3]>],
+        width: u32,
+        picture: &LinearPicture,
+    ) -> OverlayTexture {
+        let [to_width, to_height] = picture.size();
+        let height = colors.len() as u64 / u64::from(width).max(1);
+        // A picture that was too large is smaller than its overlay.
+        let from = |to: u32, count: u32, all: u64| u64::from(to) * all / u64::from(count);
+        let texels: Vec<[u8; 4]> = (0..to_height)
+            .into_par_iter()
+            .flat_map_iter(|y| {
+                let row = from(y, to_height, height) * u64::from(width);
+                (0..to_width).map(move |x| {
+                    let [r, g, b] = colors[(row + from(x, to_width, width.into())) as usize]?;
+                    Some([r, g, b, 255])
+                })
+            })
+            .map(Option::unwrap_or_default)
+            .collect();
+        texture(&self.gpu, picture.size(), &texels)
+    }
+
+    /// Most pixels across for a picture of this shape to fit on the device.
+    fn most_width(&self, width: u32, height: u32) -> u32 {
+        let limits = &self.gpu.limits;
+        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let side = f64::from(limits.max_texture_dimension_2d);
+        let (width, height) = (f64::from(width), f64::from(height));
+        let pixels = bytes as f64 / PIXEL_BYTES as f64;
+        let scale = (side / width).min(side / height).min((pixels / (width * height)).sqrt());
+        if scale >= 1.0 { width as u32 } else { (width * scale).max(1.0) as u32 }
+    }
+
+    fn pixels(&self, image: &Image) -> wgpu::Buffer {
+        let pixels: Vec<[f32; 4]> =
+            image.pixels.par_iter().map(|[r, g, b]| [*r, *g, *b, 0.0]).collect();
+        self.buffer(bytemuck::cast_slice(&pixels))
+    }
+
+    fn buffer(&self, bytes: &[u8]) -> wgpu::Buffer {
+        filled(&self.gpu, wgpu::BufferUsages::STORAGE, bytes)
+    }
+}
+
+pub(super) fn texture(gpu: &Gpu, [width, height]: [u32; 2], texels: &[[u8; 4]]) -> OverlayTexture {
+    let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("overlay"),
+        size,
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba8Unorm,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(4 * width),
+        rows_per_image: None,
+    };
+    gpu.queue.write_texture(texture.as_image_copy(), bytemuck::cast_slice(texels), layout, size);
+    OverlayTexture(texture.create_view(&Default::default()))
+}
