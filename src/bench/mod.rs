@@ -14,7 +14,7 @@ use serde::Serialize;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::light_grid::LawOptions;
+use crate::light_grid::{LawOptions, LightGrid};
 use crate::metrics;
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
@@ -277,8 +277,8 @@ impl Place<'_> {
         }
     }
 
-    /// Seconds to the first picture of another view, the median of a few.
-    fn turn(&self, stage: Option<&Stage>) -> Result<f64> {
+    /// Seconds to the first picture of another view with laws learned before, the median of a few.
+    fn turn(&self, stage: Option<&Stage>, laws: Option<&LightGrid>) -> Result<f64> {
         let mut seconds = Vec::new();
         for round in 0..6_u8 {
             let start = Instant::now();
@@ -287,6 +287,9 @@ impl Place<'_> {
             view.camera.world_from_camera *= turn;
             let mut session = self.session(stage, view)?;
             session.finish_learning();
+            if let Some(laws) = laws {
+                session.set_grid(laws.clone())?;
+            }
             session.advance(1, self.cancel)?;
             session.settle()?;
             // The first one may compile.
@@ -347,7 +350,7 @@ impl Place<'_> {
             has_timestamps: gpu.as_ref().is_some_and(|gpu| gpu.flights.has_timestamps),
             bytes_read_per_pass: per_pass(difference(|gpu| gpu.bytes_read as f64).unwrap_or(0.0)),
             stop_milliseconds,
-            turn_milliseconds: 1e3 * self.turn(stage)?,
+            turn_milliseconds: 1e3 * self.turn(stage, session.grid())?,
             device_bytes: gpu.as_ref().map_or(0, |gpu| gpu.device_bytes),
             kernel: gpu.map(|gpu| gpu.kernel),
         })
