@@ -90,11 +90,12 @@ pub(super) fn render(
         .zip(surfaces.par_chunks_mut(surfaces_per_row))
         .enumerate()
         .map(|(y, (pixels, surfaces))| {
-            if cancel.load(Ordering::Relaxed) {
-                return (0, 0);
-            }
             let mut done = (0, 0);
             for (x, pixel) in pixels.iter_mut().enumerate() {
+                // A row of a long pass takes too long for somebody who waits.
+                if cancel.load(Ordering::Relaxed) {
+                    break;
+                }
                 let surface = if layers { surfaces.get_mut(x) } else { None };
                 let (samples, rays) =
                     render_pixel(tracer, rays, view, (x, y), pass, pixel, surface);
