@@ -217,7 +217,6 @@ fn passed(hit: Hit, direction: vec3f) -> vec3f {
 // Follows the path along one ray, and the rays towards lights from where it arrives. `false` when it
 // has ended.
 fn path_step(path: ptr<function, Path>) -> bool {
-    (*path).rays += 1u;
     let hit = closest_hit((*path).ray, (*path).bounces == 0u);
     let goes_on = follow(path, hit);
 //#if learning
@@ -231,6 +230,7 @@ fn path_step(path: ptr<function, Path>) -> bool {
 
 // What becomes of the path at the end of its ray. `false` if it ends.
 fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
+    (*path).rays += 1u;
 //#if medium
     let stretch = stretch_ahead(path, (*path).ray.origin, (*path).ray.direction, hit.t);
     if stretch.start < stretch.end {

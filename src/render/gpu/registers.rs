@@ -121,9 +121,9 @@ fn compile() {
             continue;
         }
         let world = World::new(builtin::build(name).expect("built in"));
-        for kernel in [Kernel::Render, Kernel::Learn] {
+        for kernel in [Kernel::Render, Kernel::Learn].into_iter().chain(Kernel::OF_QUEUE) {
             let found = driver.statistics(kernel, &program_of(&world, kernel));
-            let mut line = format!("{name:12} {:6}", kernel.name());
+            let mut line = format!("{name:12} {:14}", kernel.name());
             for column in COLUMNS {
                 let _ = write!(line, " {:6}", found.get(column).copied().unwrap_or(u64::MAX));
             }
