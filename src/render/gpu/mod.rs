@@ -40,7 +40,7 @@ use film::Sums;
 use flight::{Flights, Job};
 use layout::{Globals, Work};
 use pipeline::Pipeline;
-use queue::{Queue, Schedule};
+use queue::Queue;
 use shader::{Binding, Constants, Features, Kernel, Program};
 use stage::put_array;
 
@@ -48,6 +48,7 @@ pub(crate) use cast::Question;
 pub use device::{AdapterFacts, DeviceChoice, Gpu, RayChoice, adapters};
 pub(crate) use film::DeviceFilm;
 pub use flight::FlightFigures;
+pub use queue::Schedule;
 pub use shader::KernelFacts;
 pub use stage::Stage;
 
@@ -124,6 +125,8 @@ pub struct GpuFigures {
     pub flights: FlightFigures,
     /// Seconds in which the driver compiled its kernels, when it did.
     pub compile_seconds: f64,
+    /// How its kernels share the work.
+    pub schedule: Schedule,
     /// What its render kernel holds.
     pub kernel: KernelFacts,
 }
@@ -424,6 +427,7 @@ impl Renderer {
             bytes_read: self.buffers.bytes_read(),
             flights: self.flights.figures(),
             compile_seconds: self.kernels.values().map(|k| k.pipeline.compile_seconds).sum(),
+            schedule: if self.queue.is_some() { Schedule::Queue } else { Schedule::Whole },
             kernel: self.kernel_facts.clone(),
         }
     }

@@ -20,9 +20,10 @@ const MOST_STEPS: u64 = 64;
 /// Words that the host reads of the work: pixels taken, slots that hold a path, samples, nothing.
 pub(super) const REPORT_BYTES: u64 = 16;
 
-/// How kernels share the work.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Schedule {
+/// How kernels share the work of rendering.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Schedule {
     /// One does all.
     Whole,
     /// Three take turns.
@@ -35,7 +36,7 @@ impl Schedule {
         if let Some(asked) = gpu.schedule {
             return asked;
         }
-        // Software has no registers to spare, and memory between kernels costs it time.
+        // Software has no waves to gain.
         if gpu.prefers_buffers() && features.shading_is_large() { Self::Queue } else { Self::Whole }
     }
 }

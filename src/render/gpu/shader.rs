@@ -252,10 +252,23 @@ impl Features {
         self.0.contains(name)
     }
 
-    /// Whether shading takes so many registers that no more than half of the waves are left for walks
-    /// in the same kernel; see `tests/gpu/registers.txt`.
+    /// Whether shading takes so many registers that walks in the same kernel run in half of the waves
+    /// that would otherwise fit, or in less.
     pub(crate) fn shading_is_large(&self) -> bool {
-        ["clearcoat", "sheen", "iridescence"].iter().any(|name| self.has(name))
+        // What features add to the registers, roughly, in steps of 8 to 12. Compiled by RADV for RDNA2,
+        // kernels of 6 steps or more took over 168 and ran in 4 waves, others in 6 or 8.
+        let weights = [
+            ("diffuse_transmission", 1),
+            ("dispersion", 1),
+            ("iridescence", 2),
+            ("layers", 1),
+            ("partial", 1),
+            ("sheen", 1),
+        ];
+        let pairs = [("local_lights", "map_sampling", 1), ("medium", "solid_transmission", 2)];
+        let alone = weights.iter().filter(|(name, _)| self.has(name)).map(|(_, weight)| weight);
+        let both = pairs.iter().filter(|(a, b, _)| self.has(a) && self.has(b));
+        alone.sum::<u32>() + both.map(|(.., weight)| weight).sum::<u32>() >= 6
     }
 
     /// Names of the features that are on.
