@@ -125,11 +125,13 @@ fn interface_opaque(i: Interface, cosine: f32) -> vec3f {
         return plain;
     }
     var filmed = vec3f(0.0);
-    if i.dielectric_share > 0.0 {
-        filmed += film_reflectance(i.film, cosine, i.base_f0) * i.dielectric_share;
-    }
-    if i.metal_share > 0.0 {
-        filmed += film_reflectance(i.film, cosine, i.metal_f0) * i.metal_share;
+    // A loop, for what it calls is long.
+    for (var part = 0u; part < 2u; part++) {
+        let share = select(i.dielectric_share, i.metal_share, part == 1u);
+        if share > 0.0 {
+            let f0 = select(i.base_f0, i.metal_f0, part == 1u);
+            filmed += film_reflectance(i.film, cosine, f0) * share;
+        }
     }
     return mix(plain, filmed, i.film.share);
 }
@@ -164,20 +166,24 @@ fn interface_facet(i: Interface, cosine: f32) -> Facet {
 //#end
 //#if transmission
     if i.glass > 0.0 {
-        let glass = glass_at(i, cosine, i.eta);
-        var reflected_share = glass.xyz;
 //#if dispersion
-        if is_dispersive(i) {
-            // A loop, for what it calls is long.
-            var etas = i.etas;
-            for (var channel = 0u; channel < 3u; channel++) {
-                let share = glass_at(i, cosine, etas.x).xyz;
-                reflected_share = select(reflected_share, share, vec3u(channel) == vec3u(0u, 1u, 2u));
-                etas = etas.yzx;
-            }
+        // A loop, for what it calls is long: first the hero's index, then that of each channel.
+        let turns = select(1u, 4u, is_dispersive(i));
+        var reflected_share = vec3f(0.0);
+        var passing = 0.0;
+        var etas = vec4f(i.eta, i.etas);
+        for (var turn = 0u; turn < turns; turn++) {
+            let glass = glass_at(i, cosine, etas.x);
+            let is_told = vec3<bool>(turn == 0u) | (vec3u(turn) == vec3u(1u, 2u, 3u));
+            reflected_share = select(reflected_share, glass.xyz, is_told);
+            passing = select(passing, glass.w, turn == 0u);
+            etas = etas.yzwx;
         }
+        return Facet(opaque_share + i.glass * reflected_share, i.tint * passing);
+//#else
+        let glass = glass_at(i, cosine, i.eta);
+        return Facet(opaque_share + i.glass * glass.xyz, i.tint * glass.w);
 //#end
-        return Facet(opaque_share + i.glass * reflected_share, i.tint * glass.w);
     }
 //#end
     return Facet(opaque_share, vec3f(0.0));
