@@ -248,14 +248,29 @@ fn scattering_facet(i: Interface, cosine: f32) -> Facet {
     return facet;
 }
 
-// Probability of reflecting at a facet; delta refraction is chosen before the facet is.
-fn reflection_probability(i: Interface, facet: Facet, wo: vec3f) -> f32 {
+// A facet, and the one whose reflectance says how likely reflection is: delta refraction is chosen
+// before the facet is.
+struct Facets {
+    seen: Facet,
+    deciding: Facet,
+}
+
+fn scattering_facets(i: Interface, cosine: f32, wo: vec3f) -> Facets {
+    var facets: Facets;
 //#if transmission
-    if i.glass > 0.0 && transmits_delta(i) {
-        return facet_reflection_probability(scattering_facet(i, wo.z));
+    // A loop, for what it calls is long.
+    let turns = select(1u, 2u, i.glass > 0.0 && transmits_delta(i));
+    for (var turn = 0u; turn < turns; turn++) {
+        facets.deciding = scattering_facet(i, select(wo.z, cosine, turn == 0u));
+        if turn == 0u {
+            facets.seen = facets.deciding;
+        }
     }
+//#else
+    facets.seen = scattering_facet(i, cosine);
+    facets.deciding = facets.seen;
 //#end
-    return facet_reflection_probability(facet);
+    return facets;
 }
 
 fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSample {
@@ -264,13 +279,13 @@ fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSampl
     if !smooth_ {
         h = ggx_sample_visible_normal(i.ggx, wo, u);
     }
-    let facet = scattering_facet(i, dot(wo, h));
-    let probability = reflection_probability(i, facet, wo);
+    let facets = scattering_facets(i, dot(wo, h), wo);
+    let probability = facet_reflection_probability(facets.deciding);
     var result = NO_SAMPLE;
     if choice < probability {
         let wi = reflected(wo, h);
         if smooth_ {
-            result = LobeSample(DELTA, wi, facet.reflectance / probability);
+            result = LobeSample(DELTA, wi, facets.seen.reflectance / probability);
         } else {
             result = LobeSample(select(ABSORBED, SPREAD, wi.z > 0.0), wi, vec3f(0.0));
         }
@@ -278,7 +293,7 @@ fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSampl
     } else if transmits_delta(i) {
         let wi = refracted(wo, vec3f(0.0, 0.0, 1.0), i.eta);
         if any(wi != vec3f(0.0)) {
-            var radiance = scattering_facet(i, wo.z).transmittance / (i.eta * i.eta);
+            var radiance = facets.deciding.transmittance / (i.eta * i.eta);
 //#if dispersion
             radiance *= i.hero;
 //#end
@@ -322,9 +337,9 @@ fn eval_pdf_mirrored(i: Interface, wo: vec3f, wi: vec3f, is_reflected: bool) -> 
     if all(h == vec3f(0.0)) {
         return EvalPdf(vec3f(0.0), 0.0);
     }
-    let facet = interface_facet(i, dot(wo, h));
-    let reflects = reflection_probability(i, facet, wo);
-    let color = select(facet.transmittance, facet.reflectance, is_reflected);
+    let facets = scattering_facets(i, dot(wo, h), wo);
+    let reflects = facet_reflection_probability(facets.deciding);
+    let color = select(facets.seen.transmittance, facets.seen.reflectance, is_reflected);
     let probability = select(1.0 - reflects, reflects, is_reflected);
     let visible = ggx_distribution(i.ggx, h) * ggx_visibility(i.ggx, wo);
     return EvalPdf(
