@@ -15,7 +15,7 @@
 //! - [`app`] is the window, [`cli`] what a person types; both find files by [`sources`], and write by
 //!   [`output`]. [`report`] measures error against time; [`metrics`] compares pictures, [`denoise`]
 //!   smooths them, [`tone`] develops them, and `develop` does so on a GPU. [`stability`] tries all of it
-//!   on stiff and extreme cases, [`bench`] measures a machine.
+//!   on stiff and extreme cases, [`mod@bench`] measures a machine.
 //!
 //! Arrows point down: `cli -> {stability -> app, bench -> report} -> render -> path ->
 //! {light_grid, bsdf, medium, bvh} ->

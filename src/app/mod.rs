@@ -41,7 +41,7 @@ use crate::develop::DevelopSettings;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::framing;
-use crate::render::gpu::DeviceChoice;
+use crate::render::gpu::{DeviceChoice, RayChoice};
 
 use commands::Command;
 use convergence::Convergence;
@@ -71,6 +71,8 @@ pub struct Start {
     pub settings: Settings,
     /// The GPU to take where one is wanted: part of its name or backend.
     pub adapter: Option<String>,
+    /// What finds the surfaces that rays hit on it.
+    pub rays: RayChoice,
     /// For screenshots: no previews on the way, and no figures that depend on the clock.
     pub is_repeatable: bool,
 }
@@ -143,7 +145,7 @@ impl App {
             convergence: Convergence::default(),
             inspector: Inspector::new(wake.clone()),
             loader: Loader::new(wake.clone()),
-            worker: Worker::start(wake.clone(), start.adapter, screen.gpu().clone())?,
+            worker: Worker::start(wake.clone(), (start.adapter, start.rays), screen.gpu().clone())?,
             presenter: Presenter::start(wake.clone())?,
             scene: None,
             map: None,

@@ -8,12 +8,13 @@ mod words;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use glam::Affine3A;
 use serde::Serialize;
 
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::light_grid::LawOptions;
+use crate::light_grid::{LawOptions, LightGrid};
 use crate::metrics;
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
@@ -117,6 +118,9 @@ pub struct PathFigures {
     pub bytes_read_per_pass: f64,
     /// Milliseconds that it goes on when told to stop, at most.
     pub stop_milliseconds: f64,
+    /// Milliseconds from turning the camera to the first sample of every pixel of a small picture, with
+    /// scene, map and kernels ready; the median of a few.
+    pub turn_milliseconds: f64,
     /// Bytes on the device.
     pub device_bytes: u64,
     /// What the kernel holds.
@@ -200,7 +204,7 @@ struct Place<'a> {
 /// What is compared between devices: a picture, and what rays hit.
 struct Compared {
     picture: Image,
-    hits: Vec<(f32, u32)>,
+    hits: rays::Answers,
 }
 
 /// Pixels and samples of the pictures that are compared.
@@ -273,6 +277,30 @@ impl Place<'_> {
         }
     }
 
+    /// Seconds to the first picture of another view with laws learned before, the median of a few.
+    fn turn(&self, stage: Option<&Stage>, laws: Option<&LightGrid>) -> Result<f64> {
+        let mut seconds = Vec::new();
+        for round in 0..6_u8 {
+            let start = Instant::now();
+            let mut view = self.view(TURNING);
+            let turn = Affine3A::from_rotation_y(0.02 * f32::from(round));
+            view.camera.world_from_camera *= turn;
+            let mut session = self.session(stage, view)?;
+            session.finish_learning();
+            if let Some(laws) = laws {
+                session.set_grid(laws.clone())?;
+            }
+            session.advance(1, self.cancel)?;
+            session.settle()?;
+            // The first one may compile.
+            if round > 0 {
+                seconds.push(start.elapsed().as_secs_f64());
+            }
+        }
+        seconds.sort_by(f64::total_cmp);
+        Ok(seconds[seconds.len() / 2])
+    }
+
     fn paths(&self, stage: Option<&Stage>, upload_seconds: f64) -> Result<PathFigures> {
         let start = Instant::now();
         let seconds = || start.elapsed().as_secs_f64();
@@ -322,11 +350,15 @@ impl Place<'_> {
             has_timestamps: gpu.as_ref().is_some_and(|gpu| gpu.flights.has_timestamps),
             bytes_read_per_pass: per_pass(difference(|gpu| gpu.bytes_read as f64).unwrap_or(0.0)),
             stop_milliseconds,
+            turn_milliseconds: 1e3 * self.turn(stage, session.grid())?,
             device_bytes: gpu.as_ref().map_or(0, |gpu| gpu.device_bytes),
             kernel: gpu.map(|gpu| gpu.kernel),
         })
     }
 }
+
+/// Size of the pictures that a turning camera shows.
+const TURNING: (u32, u32) = (480, 270);
 
 /// Seconds that a session goes on when told to stop, the longest of a few.
 fn slowest_stop(session: &mut Session<'_>) -> Result<f64> {

@@ -62,6 +62,9 @@ pub struct RayFigures {
     pub per_second: f64,
 }
 
+/// What comes of each ray: the distance and the triangle, or the share of light and nothing.
+pub(super) type Answers = Vec<(f32, u32)>;
+
 /// Rays of a kind are traced again and again for so many seconds.
 const SECONDS: f64 = 0.3;
 /// Most rays of a kind: enough to fill any device.
@@ -73,7 +76,7 @@ const TILE: u32 = 8;
 pub(super) fn measure(
     place: &Place<'_>,
     stage: Option<&Stage>,
-) -> Result<(Vec<RayFigures>, Vec<(f32, u32)>)> {
+) -> Result<(Vec<RayFigures>, Answers)> {
     let world = &place.subject.world;
     let mut caster = match stage {
         Some(stage) => {
@@ -126,7 +129,7 @@ pub(super) fn measure(
     Ok((figures, hits))
 }
 
-fn on_cpu(world: &World, question: Question, rays: &[Ray]) -> Vec<(f32, u32)> {
+fn on_cpu(world: &World, question: Question, rays: &[Ray]) -> Answers {
     let answer = |ray: &Ray| match question {
         Question::ClosestHit => {
             world.closest_hit(ray, false).map_or((f32::MAX, u32::MAX), |hit| (hit.t, hit.triangle))

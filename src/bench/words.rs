@@ -36,67 +36,68 @@ impl fmt::Display for DeviceFigures {
                 adapter.buffer_bytes >> 20
             )?;
         }
-        writeln!(
-            f,
-            "  {:<14} {:>9} {:>9} {:>9} {:>9} {:>9} {:>10}",
-            "scene", "triangles", "primary", "shadow", "diffuse", "paths", "samples"
-        )?;
-        writeln!(f, "  {:<24} {:>39} {:>10}", "", "millions of rays a second", "millions/s")?;
+        row(f, "", ["triangles", "primary", "shadow", "diffuse", "paths", "samples"])?;
+        row(f, "", ["", "M rays/s", "M rays/s", "M rays/s", "M rays/s", "M/s"])?;
         self.scenes.iter().try_for_each(|scene| scene.write_rates(f))?;
-        writeln!(
+        row(
             f,
-            "  {:<14} {:>9} {:>9} {:>9} {:>9} {:>10} {:>9} {:>9} {:>9}",
             "",
-            "pass",
-            "of device",
-            "read",
-            "to stop",
-            "compiling",
-            "to laws",
-            "picture",
-            "on device"
+            [
+                "pass",
+                "of device",
+                "read",
+                "to stop",
+                "to turn",
+                "compiling",
+                "to laws",
+                "picture",
+                "on device",
+            ],
         )?;
-        writeln!(
-            f,
-            "  {:<14} {:>9} {:>9} {:>9} {:>9} {:>10} {:>9} {:>9} {:>9}",
-            "", "ms", "ms", "kB/pass", "ms", "s", "s", "s", "MB"
-        )?;
+        row(f, "", ["ms", "ms", "kB/pass", "ms", "ms", "s", "s", "s", "MB"])?;
         self.scenes.iter().try_for_each(|scene| scene.write_waits(f))
     }
 }
 
+/// A line of a table: a name and its cells.
+fn row<T: fmt::Display>(
+    f: &mut fmt::Formatter<'_>,
+    name: &str,
+    cells: impl IntoIterator<Item = T>,
+) -> fmt::Result {
+    write!(f, "  {name:<14}")?;
+    cells.into_iter().try_for_each(|cell| write!(f, " {cell:>9}"))?;
+    writeln!(f)
+}
+
 impl SceneFigures {
     fn write_rates(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "  {:<14} {:>9}", self.scene, self.triangles)?;
-        for kind in RayKind::ALL {
+        let mut cells = vec![self.triangles.to_string()];
+        cells.extend(RayKind::ALL.map(|kind| {
             let found = self.rays.iter().find(|rays| rays.kind == kind);
-            write!(f, " {:>9}", found.map_or("-".to_owned(), |rays| millions(rays.per_second)))?;
-        }
+            found.map_or("-".to_owned(), |rays| millions(rays.per_second))
+        }));
         if let Some(paths) = &self.paths {
-            let (rays, samples) = (paths.rays_per_second, paths.samples_per_second);
-            write!(f, " {:>9} {:>10}", millions(rays), millions(samples))?;
+            cells.extend([paths.rays_per_second, paths.samples_per_second].map(millions));
         }
-        if let Some(failure) = &self.failure {
-            write!(f, "  {failure}")?;
-        }
-        writeln!(f)
+        cells.extend(self.failure.clone());
+        row(f, &self.scene, cells)
     }
 
     fn write_waits(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(paths) = &self.paths else { return Ok(()) };
-        let device = paths.device_milliseconds.map_or("-".to_owned(), |ms| format!("{ms:.2}"));
-        writeln!(
-            f,
-            "  {:<14} {:>9.2} {device:>9} {:>9.1} {:>9.0} {:>10.2} {:>9.2} {:>9.2} {:>9.1}",
-            self.scene,
-            paths.pass_milliseconds,
-            paths.bytes_read_per_pass * 1e-3,
-            paths.stop_milliseconds,
-            paths.compile_seconds,
-            paths.first_laws_seconds,
-            paths.first_picture_seconds,
-            paths.device_bytes as f64 * 1e-6
-        )
+        let cells = [
+            format!("{:.2}", paths.pass_milliseconds),
+            paths.device_milliseconds.map_or("-".to_owned(), |ms| format!("{ms:.2}")),
+            format!("{:.1}", paths.bytes_read_per_pass * 1e-3),
+            format!("{:.0}", paths.stop_milliseconds),
+            format!("{:.1}", paths.turn_milliseconds),
+            format!("{:.2}", paths.compile_seconds),
+            format!("{:.2}", paths.first_laws_seconds),
+            format!("{:.2}", paths.first_picture_seconds),
+            format!("{:.1}", paths.device_bytes as f64 * 1e-6),
+        ];
+        row(f, &self.scene, cells)
     }
 }
 

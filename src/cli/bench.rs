@@ -35,9 +35,9 @@ pub(super) struct BenchArguments {
     /// What finds the surfaces that rays hit on a GPU.
     #[arg(long, default_value = "auto", value_enum)]
     rays: RayChoice,
-    /// Picture size in pixels.
-    #[arg(long, default_value = "1920x1080", value_parser = values::size, value_name = "WxH")]
-    size: (u32, u32),
+    /// Picture size in pixels; without it, 1920x1080 with a real GPU, else 640x360.
+    #[arg(long, value_parser = values::size, value_name = "WxH")]
+    size: Option<(u32, u32)>,
     /// Seconds of rendering a scene on a device.
     #[arg(long, default_value = "3", value_parser = values::positive, value_name = "S")]
     seconds: f64,
@@ -59,12 +59,16 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     }
     render::start_threads(arguments.threads)?;
     let mut devices = arguments.device.clone();
+    let adapters = adapters();
     if devices.is_empty() {
         devices.push(Device::Cpu);
-        if arguments.adapter.is_some() || !adapters().is_empty() {
+        if arguments.adapter.is_some() || !adapters.is_empty() {
             devices.push(Device::Gpu);
         }
     }
+    let has_real_gpu =
+        devices.contains(&Device::Gpu) && adapters.iter().any(|adapter| !adapter.is_software());
+    let suitable_size = if has_real_gpu { (1920, 1080) } else { (640, 360) };
     let cancel = interrupt::flag("stopping after this scene");
     let progress = Progress::start("loading");
     let names: Vec<&str> = if arguments.scenes.is_empty() {
@@ -85,7 +89,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         devices,
         adapter: arguments.adapter.clone(),
         rays: arguments.rays,
-        size: arguments.size,
+        size: arguments.size.unwrap_or(suitable_size),
         seconds: arguments.seconds,
     };
     let bench = measure(&options, &subjects, &cancel, &|doing| progress.say(doing))?;

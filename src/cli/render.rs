@@ -229,14 +229,15 @@ fn check_outputs(arguments: &RenderArguments) -> Result<()> {
 }
 
 impl RenderArguments {
-    /// Defaults but for scene, map, picture, sampling, (size, samples, seconds) and (device, adapter).
+    /// Defaults but for scene, map, picture, sampling, (size, samples, seconds) and (device,
+    /// adapter, rays).
     pub(super) fn for_picture(
         scene: &str,
         map: &str,
         picture: &Path,
         sampling: Sampling,
         (size, samples, seconds): (Option<(u32, u32)>, Option<u32>, Option<f64>),
-        (device, adapter): (DeviceChoice, Option<String>),
+        (device, adapter, rays): (DeviceChoice, Option<String>, RayChoice),
     ) -> Self {
         Self {
             scene: scene.to_owned(),
@@ -276,7 +277,7 @@ impl RenderArguments {
             seed: 0,
             device,
             adapter,
-            rays: RayChoice::Auto,
+            rays,
             threads: 0,
             json: None,
             laws: None,

@@ -8,7 +8,7 @@ use crate::app::document::{Document, PictureSize};
 use crate::app::settings_file::Settings;
 use crate::app::window;
 use crate::error::{Error, Result};
-use crate::render::gpu::DeviceChoice;
+use crate::render::gpu::{DeviceChoice, RayChoice};
 use crate::render::{Sampling, StopRule};
 use crate::scene::builtin;
 
@@ -33,6 +33,9 @@ pub(super) struct ViewArguments {
     /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
+    /// What finds the surfaces that rays hit on a GPU.
+    #[arg(long, default_value = "auto", value_enum)]
+    rays: RayChoice,
     /// Picture size in pixels; without it, that of the viewport.
     #[arg(long, value_parser = values::size, value_name = "WxH")]
     size: Option<(u32, u32)>,
@@ -56,6 +59,7 @@ impl ViewArguments {
             sampling: None,
             device: None,
             adapter: None,
+            rays: RayChoice::Auto,
             size: None,
             samples: None,
             settings: None,
@@ -78,6 +82,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
         interface: settings.interface(),
         settings,
         adapter: arguments.adapter.clone(),
+        rays: arguments.rays,
         is_repeatable: false,
     };
     match window::run(start, notices, path) {
@@ -119,6 +124,6 @@ fn headless(arguments: &ViewArguments) -> super::render::RenderArguments {
         &arguments.output,
         arguments.sampling.unwrap_or_default(),
         (arguments.size, arguments.samples, seconds),
-        (arguments.device.unwrap_or_default(), arguments.adapter.clone()),
+        (arguments.device.unwrap_or_default(), arguments.adapter.clone(), arguments.rays),
     )
 }

@@ -7,12 +7,13 @@ use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::World;
 use crate::render::Session;
-use crate::render::gpu::{DeviceChoice, Gpu, Stage};
+use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, Stage};
 
 /// The device in use and what is on it.
 pub(super) struct Device {
     /// Name of the adapter to take, if one was asked for.
     adapter: Option<String>,
+    rays: RayChoice,
     /// The device the window is drawn on, to be shared if it is of that adapter.
     screen: Arc<Mutex<Gpu>>,
     choice: Option<DeviceChoice>,
@@ -29,8 +30,11 @@ struct Staged {
 }
 
 impl Device {
-    pub(super) fn new(adapter: Option<String>, screen: Arc<Mutex<Gpu>>) -> Self {
-        Self { adapter, screen, choice: None, gpu: None, staged: None, failure: None }
+    pub(super) fn new(
+        (adapter, rays): (Option<String>, RayChoice),
+        screen: Arc<Mutex<Gpu>>,
+    ) -> Self {
+        Self { adapter, rays, screen, choice: None, gpu: None, staged: None, failure: None }
     }
 
     /// Whether [`Self::place`] may take long.
@@ -75,7 +79,8 @@ impl Device {
         // The name only says which GPU is meant.
         let adapter = self.adapter.as_deref().filter(|_| choice != DeviceChoice::Cpu);
         let screen = lock(&self.screen).clone();
-        match choice.open_or_share(adapter, Some(&screen)) {
+        let opened = choice.open_or_share(adapter, Some(&screen));
+        match opened.and_then(|gpu| gpu.map(|gpu| gpu.with_rays(self.rays)).transpose()) {
             Ok(gpu) => self.gpu = gpu,
             Err(failure) => self.give_up(&failure),
         }

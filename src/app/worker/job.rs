@@ -15,7 +15,7 @@ use crate::light_grid::{LearningGrid, LightGrid};
 use crate::metrics;
 use crate::path::World;
 use crate::render::film::Film;
-use crate::render::gpu::{DeviceFilm, Gpu};
+use crate::render::gpu::{DeviceFilm, Gpu, RayChoice};
 use crate::render::{Figures, Phase, Sampling, Session, StopRule, View};
 
 /// Longest piece of rendering between two looks at requests and clocks.
@@ -33,6 +33,8 @@ const PREVIEW_SHRINK: u32 = 4;
 const GLANCE: (u32, Duration) = (4, Duration::from_millis(300));
 /// Pixels across of the picture that is kept for the next one's first moments.
 const UNDER_WIDTH: u32 = 640;
+/// A film that is shown in place is read back this seldom.
+const READING_GAP: Duration = Duration::from_millis(250);
 /// Publishing may take at most about one part in this of the time.
 const PUBLISH_SHARE: u32 = 20;
 
@@ -54,9 +56,9 @@ pub(super) struct Legacy {
 
 impl Legacy {
     /// Of a worker that has done nothing yet.
-    pub(super) fn new(adapter: Option<String>, screen: Arc<Mutex<Gpu>>) -> Self {
+    pub(super) fn new(gpu: (Option<String>, RayChoice), screen: Arc<Mutex<Gpu>>) -> Self {
         Self {
-            device: Device::new(adapter, screen),
+            device: Device::new(gpu, screen),
             learned: None,
             is_complete: false,
             world: None,
@@ -564,7 +566,7 @@ impl<'a> Job<'a> {
                 let (noise, figures) = (film.noise(), session.figures());
                 let cost = in_place.as_ref().map_or(Duration::ZERO, |_| start.elapsed());
                 if let Some(of) = in_place {
-                    let (at, gap) = (Instant::now(), gap_after(cost));
+                    let (at, gap) = (Instant::now(), gap_after(cost).max(READING_GAP));
                     self.readings.retain(|reading| !is_same(&reading.of, &of));
                     let film = Arc::clone(&film);
                     self.readings.push(Reading { of, film, figures, noise, at, gap });

@@ -22,7 +22,7 @@ use crate::image::Image;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::render::film::Film;
-use crate::render::gpu::{DeviceChoice, DeviceFilm, Gpu, GpuFigures};
+use crate::render::gpu::{DeviceChoice, DeviceFilm, Gpu, GpuFigures, RayChoice};
 use crate::render::{Figures, Sampling, StopRule, View};
 
 /// What is to be rendered.
@@ -204,12 +204,12 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts the thread; `wake` is called at every new snapshot, `adapter` names the GPU to take
-    /// where one is wanted, and `screen` is the one to share if it is that.
+    /// Starts the thread; `wake` is called at every new snapshot, `gpu` names the GPU to take
+    /// where one is wanted and what finds surfaces there, and `screen` is the one to share if it is that.
     ///
     /// # Errors
     /// If the system gives no thread.
-    pub fn start(wake: Wake, adapter: Option<String>, screen: Gpu) -> Result<Self> {
+    pub fn start(wake: Wake, gpu: (Option<String>, RayChoice), screen: Gpu) -> Result<Self> {
         let no_thread = |e: &dyn std::fmt::Display| {
             Error::new(format!("the render threads cannot be started: {e}"))
         };
@@ -232,7 +232,7 @@ impl Worker {
         let (inside, render_pool) = (Arc::clone(&shared), Arc::clone(&pool));
         let thread = std::thread::Builder::new()
             .name("worker".to_owned())
-            .spawn(move || run(&inside, &render_pool, adapter))
+            .spawn(move || run(&inside, &render_pool, gpu))
             .map_err(|e| no_thread(&e))?;
         Ok(Self { shared, thread: Some(thread), pool })
     }
@@ -297,8 +297,8 @@ fn lower_priority() {
     }
 }
 
-fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, adapter: Option<String>) {
-    let mut legacy = Legacy::new(adapter, Arc::clone(&shared.screen));
+fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: (Option<String>, RayChoice)) {
+    let mut legacy = Legacy::new(gpu, Arc::clone(&shared.screen));
     let alarm = Alarm::start(Arc::clone(&shared.cancel));
     let mut done: Option<Arc<Request>> = None;
     loop {

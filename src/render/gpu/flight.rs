@@ -14,6 +14,8 @@ use crate::error::{Error, Result};
 
 /// Dispatches under way at a time: one runs, one waits, one is being made.
 const MOST: usize = 3;
+/// So many times the time a dispatch should take on the host's clock, and the device's is not believed.
+const FAR_TOO_LONG: f64 = 10.0;
 /// Waiting for something that has ended takes less.
 const HAD_ENDED_SECONDS: f64 = 5e-5;
 /// Bytes between a slot's timestamps on the device, as resolving them asks for.
@@ -187,8 +189,11 @@ impl Flights {
             }
             None => flight.units,
         };
-        if told.is_some() || !had_ended || seconds < self.target_seconds {
-            self.pacers[flight.kernel as usize].record(units, seconds);
+        // A clock that stands still must not let dispatches grow for ever.
+        let is_far_too_long = !had_ended && seen > FAR_TOO_LONG * self.target_seconds;
+        let paced = if is_far_too_long { seen } else { seconds };
+        if told.is_some() || !had_ended || paced < self.target_seconds {
+            self.pacers[flight.kernel as usize].record(units, paced);
         }
         Ok(())
     }
