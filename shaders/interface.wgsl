@@ -125,11 +125,13 @@ fn interface_opaque(i: Interface, cosine: f32) -> vec3f {
         return plain;
     }
     var filmed = vec3f(0.0);
-    if i.dielectric_share > 0.0 {
-        filmed += film_reflectance(i.film, cosine, i.base_f0) * i.dielectric_share;
-    }
-    if i.metal_share > 0.0 {
-        filmed += film_reflectance(i.film, cosine, i.metal_f0) * i.metal_share;
+    // A loop, for what it calls is long.
+    for (var part = 0u; part < 2u; part++) {
+        let share = select(i.dielectric_share, i.metal_share, part == 1u);
+        if share > 0.0 {
+            let f0 = select(i.base_f0, i.metal_f0, part == 1u);
+            filmed += film_reflectance(i.film, cosine, f0) * share;
+        }
     }
     return mix(plain, filmed, i.film.share);
 }
@@ -164,20 +166,24 @@ fn interface_facet(i: Interface, cosine: f32) -> Facet {
 //#end
 //#if transmission
     if i.glass > 0.0 {
-        let glass = glass_at(i, cosine, i.eta);
-        var reflected_share = glass.xyz;
 //#if dispersion
-        if is_dispersive(i) {
-            // A loop, for what it calls is long.
-            var etas = i.etas;
-            for (var channel = 0u; channel < 3u; channel++) {
-                let share = glass_at(i, cosine, etas.x).xyz;
-                reflected_share = select(reflected_share, share, vec3u(channel) == vec3u(0u, 1u, 2u));
-                etas = etas.yzx;
-            }
+        // A loop, for what it calls is long: first the hero's index, then that of each channel.
+        let turns = select(1u, 4u, is_dispersive(i));
+        var reflected_share = vec3f(0.0);
+        var passing = 0.0;
+        var etas = vec4f(i.eta, i.etas);
+        for (var turn = 0u; turn < turns; turn++) {
+            let glass = glass_at(i, cosine, etas.x);
+            let is_told = vec3<bool>(turn == 0u) | (vec3u(turn) == vec3u(1u, 2u, 3u));
+            reflected_share = select(reflected_share, glass.xyz, is_told);
+            passing = select(passing, glass.w, turn == 0u);
+            etas = etas.yzwx;
         }
+        return Facet(opaque_share + i.glass * reflected_share, i.tint * passing);
+//#else
+        let glass = glass_at(i, cosine, i.eta);
+        return Facet(opaque_share + i.glass * glass.xyz, i.tint * glass.w);
 //#end
-        return Facet(opaque_share + i.glass * reflected_share, i.tint * glass.w);
     }
 //#end
     return Facet(opaque_share, vec3f(0.0));
@@ -242,14 +248,29 @@ fn scattering_facet(i: Interface, cosine: f32) -> Facet {
     return facet;
 }
 
-// Probability of reflecting at a facet; delta refraction is chosen before the facet is.
-fn reflection_probability(i: Interface, facet: Facet, wo: vec3f) -> f32 {
+// A facet, and the one whose reflectance says how likely reflection is: delta refraction is chosen
+// before the facet is.
+struct Facets {
+    seen: Facet,
+    deciding: Facet,
+}
+
+fn scattering_facets(i: Interface, cosine: f32, wo: vec3f) -> Facets {
+    var facets: Facets;
 //#if transmission
-    if i.glass > 0.0 && transmits_delta(i) {
-        return facet_reflection_probability(scattering_facet(i, wo.z));
+    // A loop, for what it calls is long.
+    let turns = select(1u, 2u, i.glass > 0.0 && transmits_delta(i));
+    for (var turn = 0u; turn < turns; turn++) {
+        facets.deciding = scattering_facet(i, select(wo.z, cosine, turn == 0u));
+        if turn == 0u {
+            facets.seen = facets.deciding;
+        }
     }
+//#else
+    facets.seen = scattering_facet(i, cosine);
+    facets.deciding = facets.seen;
 //#end
-    return facet_reflection_probability(facet);
+    return facets;
 }
 
 fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSample {
@@ -258,13 +279,13 @@ fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSampl
     if !smooth_ {
         h = ggx_sample_visible_normal(i.ggx, wo, u);
     }
-    let facet = scattering_facet(i, dot(wo, h));
-    let probability = reflection_probability(i, facet, wo);
+    let facets = scattering_facets(i, dot(wo, h), wo);
+    let probability = facet_reflection_probability(facets.deciding);
     var result = NO_SAMPLE;
     if choice < probability {
         let wi = reflected(wo, h);
         if smooth_ {
-            result = LobeSample(DELTA, wi, facet.reflectance / probability);
+            result = LobeSample(DELTA, wi, facets.seen.reflectance / probability);
         } else {
             result = LobeSample(select(ABSORBED, SPREAD, wi.z > 0.0), wi, vec3f(0.0));
         }
@@ -272,7 +293,7 @@ fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSampl
     } else if transmits_delta(i) {
         let wi = refracted(wo, vec3f(0.0, 0.0, 1.0), i.eta);
         if any(wi != vec3f(0.0)) {
-            var radiance = scattering_facet(i, wo.z).transmittance / (i.eta * i.eta);
+            var radiance = facets.deciding.transmittance / (i.eta * i.eta);
 //#if dispersion
             radiance *= i.hero;
 //#end
@@ -316,9 +337,9 @@ fn eval_pdf_mirrored(i: Interface, wo: vec3f, wi: vec3f, is_reflected: bool) -> 
     if all(h == vec3f(0.0)) {
         return EvalPdf(vec3f(0.0), 0.0);
     }
-    let facet = interface_facet(i, dot(wo, h));
-    let reflects = reflection_probability(i, facet, wo);
-    let color = select(facet.transmittance, facet.reflectance, is_reflected);
+    let facets = scattering_facets(i, dot(wo, h), wo);
+    let reflects = facet_reflection_probability(facets.deciding);
+    let color = select(facets.seen.transmittance, facets.seen.reflectance, is_reflected);
     let probability = select(1.0 - reflects, reflects, is_reflected);
     let visible = ggx_distribution(i.ggx, h) * ggx_visibility(i.ggx, wo);
     return EvalPdf(

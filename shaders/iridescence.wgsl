@@ -51,10 +51,13 @@ fn film_reflectance(film: Film, cosine: f32, f0: vec3f) -> vec3f {
     let path = 2.0 * film.ior * film.thickness * cos_inside;
     let both = min(outer * inner, vec3f(0.9999));
     let mean = through * through * inner / (1.0 - both);
-    var order = (mean - through) * sqrt(both);
-    var sum = outer + mean + order * 2.0 * film_sensitivity(path, signs);
-    order *= sqrt(both);
-    sum += order * 2.0 * film_sensitivity(2.0 * path, vec3f(1.0));
+    var order = mean - through;
+    var sum = outer + mean;
+    for (var n = 1u; n <= 2u; n++) {
+        order *= sqrt(both);
+        sum += order * 2.0
+            * film_sensitivity(f32(n) * path, select(vec3f(1.0), signs, n == 1u));
+    }
     return saturate(sum);
 }
 

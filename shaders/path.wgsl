@@ -217,7 +217,6 @@ fn passed(hit: Hit, direction: vec3f) -> vec3f {
 // Follows the path along one ray, and the rays towards lights from where it arrives. `false` when it
 // has ended.
 fn path_step(path: ptr<function, Path>) -> bool {
-    (*path).rays += 1u;
     let hit = closest_hit((*path).ray, (*path).bounces == 0u);
     let goes_on = follow(path, hit);
 //#if learning
@@ -231,6 +230,7 @@ fn path_step(path: ptr<function, Path>) -> bool {
 
 // What becomes of the path at the end of its ray. `false` if it ends.
 fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
+    (*path).rays += 1u;
 //#if medium
     let stretch = stretch_ahead(path, (*path).ray.origin, (*path).ray.direction, hit.t);
     if stretch.start < stretch.end {
@@ -413,11 +413,8 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
             look_at_map(path, vertex);
         }
 //#else
-//#if map_sampling
-        gather_environment(path, vertex);
-//#end
-//#if local_lights
-        gather_local(path, vertex);
+//#if shadow_rays
+        gather(path, vertex);
 //#end
 //#end
     }
@@ -634,49 +631,114 @@ fn add_lights(path: ptr<function, Path>) {
 
 //#if learning
 //#else
+//#if shadow_rays
+// Light that may reach a vertex from a direction.
+struct Arriving {
+    is_some: bool,
+    direction: vec3f,
+    distance: f32,
+    // Its radiance, or for lamps that over the density of the direction.
+    light: vec3f,
+    pdf_solid_angle: f32,
+    // For the map: what is divided by the sum of all densities.
+    weight: f32,
+//#if counting
+    // Of the try; 0 if it has none.
+    counter: u32,
+//#end
+}
+
+// The ray towards it.
+fn shadow_of(
+    path: ptr<function, Path>,
+    vertex: Vertex,
+    arriving: Arriving,
+    is_of_map: bool,
+) -> Shadow {
+    if !arriving.is_some {
+        return Shadow();
+    }
+    let f = scattered(path, vertex, arriving.direction);
+    if max_element(f.value) <= 0.0 {
+        return Shadow();
+    }
+    var shadow = shadow_towards(path, vertex, arriving.direction, arriving.distance);
+    shadow.light = (*path).throughput * f.value * arriving.light;
+    if is_of_map {
+        let both_pdfs = arriving.pdf_solid_angle + f.pdf_solid_angle;
+        shadow.weight = select(0.0, arriving.weight / both_pdfs, both_pdfs > 0.0);
+    } else {
+        shadow.weight = balance_heuristic(arriving.pdf_solid_angle, f.pdf_solid_angle);
+    }
+//#if counting
+    shadow.visibility = Visibility(
+        arriving.counter, visibility_share(vertex, arriving.direction, f.pdf_solid_angle));
+//#end
+    return shadow;
+}
+
 //#if map_sampling
-fn gather_environment(path: ptr<function, Path>, vertex: Vertex) {
+fn light_of_map(path: ptr<function, Path>, vertex: Vertex) -> Arriving {
+    var arriving: Arriving;
     let bits = path_pair_bits(path);
     let choice = choose_tile(vertex.law, bits, globals.whole_map_share);
     let sample = sample_in_tile(choice.tile, vec2u(choice.remainder, bits.y));
-    if sample.pdf_solid_angle <= 0.0 {
-        return;
-    }
-    let pdf = choice.probability * sample.pdf_solid_angle;
-    let f = scattered(path, vertex, sample.direction);
+    if sample.pdf_solid_angle > 0.0 {
+        arriving.is_some = true;
+        arriving.direction = sample.direction;
+        arriving.distance = F32_MAX;
+        arriving.light = sample.radiance;
+        arriving.pdf_solid_angle = choice.probability * sample.pdf_solid_angle;
+        arriving.weight = sample.weight;
 //#if counting
-    let counter = count_try(path, vertex, choice.tile);
+        arriving.counter = count_try(path, vertex, choice.tile);
 //#end
-    if max_element(f.value) <= 0.0 {
-        return;
     }
-    var shadow = shadow_towards(path, vertex, sample.direction, F32_MAX);
-    shadow.light = (*path).throughput * f.value * sample.radiance;
-    let both_pdfs = pdf + f.pdf_solid_angle;
-    shadow.weight = select(0.0, sample.weight / both_pdfs, both_pdfs > 0.0);
-//#if counting
-    shadow.visibility =
-        Visibility(counter, visibility_share(vertex, sample.direction, f.pdf_solid_angle));
-//#end
-    (*path).map_shadow = shadow;
+    return arriving;
 }
 //#end
 
 //#if local_lights
-fn gather_local(path: ptr<function, Path>, vertex: Vertex) {
+fn light_of_lamps(path: ptr<function, Path>, vertex: Vertex) -> Arriving {
+    var arriving: Arriving;
     let bits = path_pair_bits(path);
     let sample = sample_local_light(receiver_of(vertex), bits);
-    if max_element(sample.radiance_over_pdf) <= 0.0 {
-        return;
+    if max_element(sample.radiance_over_pdf) > 0.0 {
+        arriving.is_some = true;
+        arriving.direction = sample.direction;
+        arriving.distance = sample.distance;
+        arriving.light = sample.radiance_over_pdf;
+        arriving.pdf_solid_angle = sample.pdf_solid_angle;
     }
-    let f = scattered(path, vertex, sample.direction);
-    if max_element(f.value) <= 0.0 {
-        return;
+    return arriving;
+}
+//#end
+
+// Chooses light that may reach a vertex, the map's first. Both share the code for what the vertex makes
+// of it, which is long.
+fn gather(path: ptr<function, Path>, vertex: Vertex) {
+//#if map_sampling
+//#if local_lights
+    for (var i = 0u; i < 2u; i++) {
+        var arriving: Arriving;
+        if i == 0u {
+            arriving = light_of_map(path, vertex);
+        } else {
+            arriving = light_of_lamps(path, vertex);
+        }
+        let shadow = shadow_of(path, vertex, arriving, i == 0u);
+        if i == 0u {
+            (*path).map_shadow = shadow;
+        } else {
+            (*path).lamp_shadow = shadow;
+        }
     }
-    var shadow = shadow_towards(path, vertex, sample.direction, sample.distance);
-    shadow.light = (*path).throughput * f.value * sample.radiance_over_pdf;
-    shadow.weight = balance_heuristic(sample.pdf_solid_angle, f.pdf_solid_angle);
-    (*path).lamp_shadow = shadow;
+//#else
+    (*path).map_shadow = shadow_of(path, vertex, light_of_map(path, vertex), true);
+//#end
+//#else
+    (*path).lamp_shadow = shadow_of(path, vertex, light_of_lamps(path, vertex), false);
+//#end
 }
 //#end
 //#end

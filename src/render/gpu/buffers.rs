@@ -238,6 +238,15 @@ impl Buffers {
         })
     }
 
+    /// Fills a buffer that exists with zeros.
+    pub(super) fn clear(&self, name: &str) {
+        if let Some(buffer) = self.get(name) {
+            let mut commands = self.gpu.device.create_command_encoder(&Default::default());
+            commands.clear_buffer(buffer, 0, None);
+            self.gpu.queue.submit([commands.finish()]);
+        }
+    }
+
     /// Writes into a buffer that exists.
     pub(super) fn write(&self, name: &str, offset: u64, bytes: &[u8]) {
         if let Some(buffer) = self.get(name).filter(|_| !bytes.is_empty()) {

@@ -11,6 +11,7 @@ use wgpu::{Adapter, Backends, DeviceType, Features, Instance, InstanceDescriptor
 use wgpu::{PollType, SubmissionIndex, Surface};
 
 use super::pipeline::Pipeline;
+use super::queue::Schedule;
 use crate::error::{Error, Result};
 use crate::image::Rgb8;
 
@@ -207,6 +208,8 @@ pub struct Gpu {
     pub(super) pipelines: Arc<Mutex<HashMap<String, Arc<Pipeline>>>>,
     /// Whether read-only arrays lie in storage buffers.
     prefers_buffers: bool,
+    /// How kernels share the work, whatever suits it.
+    pub(super) schedule: Option<Schedule>,
 }
 
 /// Storage buffers that a kernel has at most, arrays among them.
@@ -325,6 +328,7 @@ impl Gpu {
             hardware_rays: false,
             pipelines: Arc::default(),
             prefers_buffers,
+            schedule: None,
         };
         gpu.with_rays(RayChoice::Auto)
     }
@@ -339,6 +343,13 @@ impl Gpu {
     #[cfg(test)]
     pub(super) fn with_arrays_in_buffers(mut self) -> Self {
         self.prefers_buffers = true;
+        self
+    }
+
+    /// The same device with another schedule.
+    #[cfg(test)]
+    pub(super) fn with_schedule(mut self, schedule: Schedule) -> Self {
+        self.schedule = Some(schedule);
         self
     }
 

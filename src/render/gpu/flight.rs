@@ -8,8 +8,9 @@ use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 use super::device::Gpu;
 use super::pacer::{Pacer, TARGET_SECONDS, WINDOW_TARGET_SECONDS};
+use super::queue::REPORT_BYTES;
 use super::shader::Kernel;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// Dispatches under way at a time: one runs, one waits, one is being made.
 const MOST: usize = 3;
@@ -27,8 +28,25 @@ pub(super) struct Flights {
     pacers: [Pacer; Kernel::COUNT],
     last_landing: Instant,
     clock: Option<Clock>,
+    /// For words of a buffer that a job reports.
+    staging: Option<[Buffer; MOST]>,
+    report: Option<[u32; 4]>,
     started: usize,
     figures: FlightFigures,
+}
+
+/// What a submission does.
+pub(super) struct Job<'a> {
+    /// By this one's speed it was sized.
+    pub(super) kernel: Kernel,
+    /// Kernels that run one after another, so many times.
+    pub(super) kernels: &'a [(wgpu::ComputePipeline, wgpu::BindGroup)],
+    pub(super) steps: u32,
+    /// Workgroups of each.
+    pub(super) groups: u32,
+    pub(super) units: u64,
+    /// A buffer whose first words are read afterwards; the second says how many lanes had work.
+    pub(super) report: Option<&'a Buffer>,
 }
 
 struct Flight {
@@ -37,6 +55,8 @@ struct Flight {
     units: u64,
     submitted: Instant,
     slot: usize,
+    /// Lanes of a job that reports.
+    lanes: Option<u32>,
 }
 
 /// What dispatches took.
@@ -59,6 +79,8 @@ impl Flights {
             pacers: [Pacer::new(target_seconds); Kernel::COUNT],
             last_landing: Instant::now(),
             clock: Clock::new(gpu),
+            staging: None,
+            report: None,
             started: 0,
             figures: FlightFigures::default(),
         }
@@ -74,15 +96,17 @@ impl Flights {
         self.figures
     }
 
-    /// Submits `groups` workgroups of a kernel, once there is room for them.
-    pub(super) fn start(
-        &mut self,
-        gpu: &Gpu,
-        kernel: Kernel,
-        (pipeline, bind_group): (&wgpu::ComputePipeline, &wgpu::BindGroup),
-        groups: u32,
-        units: u64,
-    ) -> Result<()> {
+    /// What the last job to land that reports has reported.
+    pub(super) fn report(&self) -> Option<[u32; 4]> {
+        self.report
+    }
+
+    pub(super) fn forget_report(&mut self) {
+        self.report = None;
+    }
+
+    /// Submits a job, once there is room for it.
+    pub(super) fn start(&mut self, gpu: &Gpu, job: &Job<'_>) -> Result<()> {
         while self.under_way.len() >= MOST {
             self.land(gpu)?;
         }
@@ -91,22 +115,42 @@ impl Flights {
         let mut commands = gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = commands.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some(kernel.name()),
+                label: Some(job.kernel.name()),
                 timestamp_writes: self.clock.as_ref().map(|clock| clock.writes(slot)),
             });
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, bind_group, &[]);
-            pass.dispatch_workgroups(groups, 1, 1);
+            for (pipeline, bind_group) in (0..job.steps).flat_map(|_| job.kernels) {
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, bind_group, &[]);
+                pass.dispatch_workgroups(job.groups, 1, 1);
+            }
         }
         if let Some(clock) = &self.clock {
             clock.resolve(&mut commands, slot);
         }
+        let staging = job.report.map(|source| {
+            let all = self
+                .staging
+                .get_or_insert_with(|| std::array::from_fn(|_| gpu.staging(REPORT_BYTES)));
+            commands.copy_buffer_to_buffer(source, 0, &all[slot], 0, REPORT_BYTES);
+            &all[slot]
+        });
         let submitted = Instant::now();
         let submission = gpu.queue.submit([commands.finish()]);
         if let Some(clock) = &self.clock {
             clock.ask(slot);
         }
-        self.under_way.push_back(Flight { submission, kernel, units, submitted, slot });
+        if let Some(staging) = staging {
+            // Whether it worked shows when it is read.
+            staging.map_async(wgpu::MapMode::Read, .., |_| {});
+        }
+        self.under_way.push_back(Flight {
+            submission,
+            kernel: job.kernel,
+            units: job.units,
+            submitted,
+            slot,
+            lanes: staging.map(|_| job.groups * 64),
+        });
         Ok(())
     }
 
@@ -134,13 +178,39 @@ impl Flights {
         self.figures.dispatches += 1;
         self.figures.device_seconds += seconds;
         self.figures.has_timestamps = told.is_some();
+        let units = match flight.lanes {
+            Some(lanes) => {
+                let left = self.read_report(gpu, flight.slot)?;
+                // Lanes without work take no time. How long they had some is not known.
+                if 2 * u64::from(left) < u64::from(lanes) {
+                    return Ok(());
+                }
+                flight.units * u64::from(left) / u64::from(lanes)
+            }
+            None => flight.units,
+        };
         // A clock that stands still must not let dispatches grow for ever.
         let is_far_too_long = !had_ended && seen > FAR_TOO_LONG * self.target_seconds;
         let paced = if is_far_too_long { seen } else { seconds };
         if told.is_some() || !had_ended || paced < self.target_seconds {
-            self.pacers[flight.kernel as usize].record(flight.units, paced);
+            self.pacers[flight.kernel as usize].record(units, paced);
         }
         Ok(())
+    }
+
+    /// Reads what a job in `slot` that has landed reports; returns how many lanes had work.
+    fn read_report(&mut self, gpu: &Gpu, slot: usize) -> Result<u32> {
+        let failed = |e: &dyn std::fmt::Display| {
+            Error::new(format!("{}: a count cannot be read back: {e}", gpu.facts().name))
+        };
+        let staging = &self.staging.as_ref().ok_or_else(|| failed(&"no buffer"))?[slot];
+        let report: [u32; 4] = {
+            let view = staging.get_mapped_range(..).map_err(|e| failed(&e))?;
+            bytemuck::pod_read_unaligned(&view)
+        };
+        staging.unmap();
+        self.report = Some(report);
+        Ok(report[1])
     }
 
     /// Lets dispatches begin as small as at first, so that tests can cut work short.

@@ -15,6 +15,7 @@ mod pacer;
 #[cfg(test)]
 mod parity;
 mod pipeline;
+mod queue;
 #[cfg(test)]
 mod registers;
 pub(crate) mod shader;
@@ -36,9 +37,10 @@ use crate::path::World;
 use crate::path::camera::CameraRays;
 use buffers::Buffers;
 use film::Sums;
-use flight::Flights;
+use flight::{Flights, Job};
 use layout::{Globals, Work};
 use pipeline::Pipeline;
+use queue::Queue;
 use shader::{Binding, Constants, Features, Kernel, Program};
 use stage::put_array;
 
@@ -46,6 +48,7 @@ pub(crate) use cast::Question;
 pub use device::{AdapterFacts, DeviceChoice, Gpu, RayChoice, adapters};
 pub(crate) use film::DeviceFilm;
 pub use flight::FlightFigures;
+pub use queue::Schedule;
 pub use shader::KernelFacts;
 pub use stage::Stage;
 
@@ -69,8 +72,12 @@ pub(crate) struct Renderer {
     constants: Constants,
     kernels: BTreeMap<Kernel, Bound>,
     flights: Flights,
+    /// If kernels take turns.
+    queue: Option<Queue>,
     film: Sums,
     progress: Progress,
+    /// Samples that the film began with and those that [`Advance`] has told of.
+    told: u64,
     kernel_facts: KernelFacts,
     seed: u32,
 }
@@ -118,6 +125,8 @@ pub struct GpuFigures {
     pub flights: FlightFigures,
     /// Seconds in which the driver compiled its kernels, when it did.
     pub compile_seconds: f64,
+    /// How its kernels share the work.
+    pub schedule: Schedule,
     /// What its render kernel holds.
     pub kernel: KernelFacts,
 }
@@ -135,19 +144,42 @@ impl Renderer {
         rays: &CameraRays,
         film: Option<&Film>,
     ) -> Result<Self> {
-        Self::with_kernel(stage, (world, environment), view, rays, film, |gpu, program| {
-            gpu.pipeline(Kernel::Render, program)
-        })
+        let mut renderer = Self::without_kernels(stage, (world, environment), view, rays, film)?;
+        if Schedule::of(&stage.gpu, &renderer.features) == Schedule::Queue {
+            let tiles = renderer.tiles();
+            let queue = Queue::new(&mut renderer.buffers, &renderer.features, tiles)?;
+            renderer.queue = Some(queue);
+        }
+        for kernel in renderer.render_kernels() {
+            renderer.compiled(*kernel)?;
+        }
+        Ok(renderer)
     }
 
     /// [`Self::new`] with the kernel that `compile` makes of the program for rendering.
+    #[cfg(test)]
     fn with_kernel(
         stage: &Stage,
         (world, environment): (&World, &Environment),
         view: &View,
         rays: &CameraRays,
-        film: Option<&Film>,
         compile: impl FnOnce(&Gpu, Program) -> Result<Arc<Pipeline>>,
+    ) -> Result<Self> {
+        let mut renderer = Self::without_kernels(stage, (world, environment), view, rays, None)?;
+        let Self { features, constants, buffers, .. } = &renderer;
+        let places = buffers.array_places();
+        let program = Program::new(Kernel::Render, features, constants, &places);
+        let pipeline = compile(&renderer.gpu, program)?;
+        renderer.kernels.insert(Kernel::Render, Bound::new(pipeline));
+        Ok(renderer)
+    }
+
+    fn without_kernels(
+        stage: &Stage,
+        (world, environment): (&World, &Environment),
+        view: &View,
+        rays: &CameraRays,
+        film: Option<&Film>,
     ) -> Result<Self> {
         let mut features = Features::of(world, environment, view);
         if stage.gpu.has_hardware_rays() {
@@ -170,13 +202,14 @@ impl Renderer {
             }
         }
         buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
-        let program = Program::new(Kernel::Render, &features, &constants, &buffers.array_places());
         let kernel_facts = KernelFacts::of(&features);
-        let renderer = Self {
-            kernels: BTreeMap::from([(Kernel::Render, Bound::new(compile(&stage.gpu, program)?))]),
+        let mut renderer = Self {
+            kernels: BTreeMap::new(),
             flights: Flights::new(&stage.gpu),
+            queue: None,
             film: sums,
             progress,
+            told: 0,
             gpu: stage.gpu.clone(),
             buffers,
             globals,
@@ -186,12 +219,15 @@ impl Renderer {
             seed: view.seed,
         };
         renderer.write_globals();
+        renderer.told = renderer.total_samples();
         Ok(renderer)
     }
 
     /// Uploads the laws paths choose tiles by.
     pub(crate) fn set_grid(&mut self, grid: Option<&LightGrid>) -> Result<()> {
         let Some(grid) = grid.filter(|_| self.features.has("map_sampling")) else { return Ok(()) };
+        // Paths remember which law they come from.
+        self.forget_paths()?;
         let words = layout::laws(grid, &mut self.globals);
         put_array(&mut self.buffers, "laws", "the light grid", &words)?;
         self.write_globals();
@@ -270,19 +306,26 @@ impl Renderer {
             self.put_counters(learning)?;
         }
         let stride = counts.map_or(0, |_| pass.stride);
-        let before = self.total_samples();
+        if self.progress.ahead != pass.target {
+            self.forget_paths()?;
+        }
         if self.progress.ahead != pass.target {
             // Tiles that are ahead of the others take less than those.
             let Progress { least, .. } = self.progress;
             let even = u64::from(least) * self.pixels_before(self.tiles());
-            let surplus = before.saturating_sub(even);
+            let surplus = self.total_samples().saturating_sub(even);
             self.progress = Progress { least, ahead: pass.target, surplus, ..Progress::default() };
         }
-        self.render_tiles(pass, stride, cancel)?;
+        if self.queue.is_some() {
+            self.render_queue(pass, stride, cancel)?;
+        } else {
+            self.render_tiles(pass, stride, cancel)?;
+        }
         if let Some(learning) = counts {
             self.take_counters(learning)?;
         }
-        let samples = self.total_samples().saturating_sub(before);
+        let samples = self.total_samples().saturating_sub(self.told);
+        self.told += samples;
         Ok(Advance { samples, least: self.progress.least })
     }
 
@@ -384,6 +427,7 @@ impl Renderer {
             bytes_read: self.buffers.bytes_read(),
             flights: self.flights.figures(),
             compile_seconds: self.kernels.values().map(|k| k.pipeline.compile_seconds).sum(),
+            schedule: if self.queue.is_some() { Schedule::Queue } else { Schedule::Whole },
             kernel: self.kernel_facts.clone(),
         }
     }
@@ -401,19 +445,40 @@ impl Renderer {
         })
     }
 
-    /// Sets a kernel going.
-    fn dispatch(&mut self, kernel: Kernel, work: &Work, groups: u32, units: u64) -> Result<()> {
-        let bound = match self.kernels.entry(kernel) {
+    /// The kernels that add samples to pixels, in order.
+    fn render_kernels(&self) -> &'static [Kernel] {
+        match (&self.queue, self.features.has("shadow_rays")) {
+            (None, _) => &[Kernel::Render],
+            (Some(_), true) => &Kernel::OF_QUEUE,
+            (Some(_), false) => &Kernel::OF_QUEUE[..2],
+        }
+    }
+
+    /// A kernel, compiled if this is the first time, and what it is to be bound with.
+    fn compiled(&mut self, kernel: Kernel) -> Result<(&mut Bound, &Gpu, &Buffers)> {
+        let Self { gpu, buffers, features, constants, kernels, .. } = self;
+        let bound = match kernels.entry(kernel) {
             Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(vacant) => {
-                let places = self.buffers.array_places();
-                let program = Program::new(kernel, &self.features, &self.constants, &places);
-                vacant.insert(Bound::new(self.gpu.pipeline(kernel, program)?))
+                let program = Program::new(kernel, features, constants, &buffers.array_places());
+                vacant.insert(Bound::new(gpu.pipeline(kernel, program)?))
             }
         };
-        let bound = bound.current(&self.gpu, &self.buffers)?;
+        Ok((bound, gpu, buffers))
+    }
+
+    /// A kernel and what binds the buffers as they are now.
+    fn bound(&mut self, kernel: Kernel) -> Result<(wgpu::ComputePipeline, wgpu::BindGroup)> {
+        let (bound, gpu, buffers) = self.compiled(kernel)?;
+        bound.current(gpu, buffers)
+    }
+
+    /// Sets a kernel going.
+    fn dispatch(&mut self, kernel: Kernel, work: &Work, groups: u32, units: u64) -> Result<()> {
+        let kernels = [self.bound(kernel)?];
         self.buffers.write("globals", 0, bytemuck::bytes_of(work));
-        self.flights.start(&self.gpu, kernel, bound, groups, units)
+        let job = Job { kernel, kernels: &kernels, steps: 1, groups, units, report: None };
+        self.flights.start(&self.gpu, &job)
     }
 }
 
@@ -437,14 +502,15 @@ impl Bound {
         &mut self,
         gpu: &Gpu,
         buffers: &Buffers,
-    ) -> Result<(&wgpu::ComputePipeline, &wgpu::BindGroup)> {
+    ) -> Result<(wgpu::ComputePipeline, wgpu::BindGroup)> {
         let version = buffers.version();
         let kept = self.bind_group.take().filter(|(of, _)| *of == version);
         let current = match kept {
             Some(kept) => kept,
             None => (version, self.bind(gpu, buffers)?),
         };
-        Ok((&self.pipeline.pipeline, &self.bind_group.insert(current).1))
+        let bind_group = self.bind_group.insert(current).1.clone();
+        Ok((self.pipeline.pipeline.clone(), bind_group))
     }
 
     fn bind(&self, gpu: &Gpu, buffers: &Buffers) -> Result<wgpu::BindGroup> {
@@ -553,7 +619,7 @@ mod tests {
 
     /// Visits of each cell and, cell by cell, tile counters after two learning passes, the second with
     /// laws of the first, and a rendering pass of which a third is counted, if rendered paths count.
-    fn learn(gpu: Option<&Gpu>, recording: LawOptions) -> (Vec<u32>, Vec<u32>, u64) {
+    pub(super) fn learn(gpu: Option<&Gpu>, recording: LawOptions) -> (Vec<u32>, Vec<u32>, u64) {
         let (world, environment) = crack();
         let view = view(&world, recording);
         let rays = CameraRays::new(&view.camera, view.width, view.height);
@@ -624,14 +690,20 @@ mod tests {
     /// As a window does that looks for news after each slice of work.
     #[test]
     fn a_pass_that_is_cut_short_again_and_again_comes_to_its_end() {
-        let gpu = match Gpu::open(None) {
-            Ok(gpu) => gpu,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
+        match Gpu::open(None) {
+            Ok(gpu) => {
+                cut_short(&gpu);
+                cut_short(&gpu.with_schedule(Schedule::Queue));
+            }
+            Err(reason) => eprintln!("SKIPPED: {reason}"),
+        }
+    }
+
+    fn cut_short(gpu: &Gpu) {
         let (world, environment) = crack();
         let view = View { sampling: Sampling::Plain, ..view(&world, LawOptions::ADAPTIVE) };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
-        let stage = Stage::new(&gpu, &world, &environment).expect("it fits");
+        let stage = Stage::new(gpu, &world, &environment).expect("it fits");
         let grid = LightGrid::whole_map(environment.tile_energies());
         let begin = || {
             let renderer = Renderer::new(&stage, &world, &environment, &view, &rays, None);

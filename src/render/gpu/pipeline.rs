@@ -54,8 +54,8 @@ impl Pipeline {
             source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(&program.source)),
         };
         // SAFETY: indices are checked as ever. All loops end: walks take each group of a finite tree
-        // once, searches halve what is left, paths are bounded by bounces and passes, all others
-        // count or clear bits. No divisor is zero: see `no_integer_is_divided_by_zero`.
+        // once, searches halve what is left, paths are bounded by bounces and passes, slots take
+        // each pixel once, all others count or clear bits. No divisor is zero: see `no_integer_is_divided_by_zero`.
         let module = unsafe { device.create_shader_module_trusted(source, RUNTIME_CHECKS) };
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(entry),

@@ -121,9 +121,9 @@ fn compile() {
             continue;
         }
         let world = World::new(builtin::build(name).expect("built in"));
-        for kernel in [Kernel::Render, Kernel::Learn] {
+        for kernel in [Kernel::Render, Kernel::Learn].into_iter().chain(Kernel::OF_QUEUE) {
             let found = driver.statistics(kernel, &program_of(&world, kernel));
-            let mut line = format!("{name:12} {:6}", kernel.name());
+            let mut line = format!("{name:12} {:14}", kernel.name());
             for column in COLUMNS {
                 let _ = write!(line, " {:6}", found.get(column).copied().unwrap_or(u64::MAX));
             }
@@ -132,8 +132,22 @@ fn compile() {
     }
 }
 
-/// A scene's kernel with the defaults of `render`, and arrays where GPUs have them.
-fn program_of(world: &World, kernel: Kernel) -> Program {
+/// Half of the waves of a small kernel, or less.
+const FEW_WAVES: u64 = 4;
+
+#[test]
+fn a_queue_is_for_kernels_of_few_waves() {
+    let table = parse(include_str!("../../../tests/gpu/registers.txt"));
+    for name in builtin::names() {
+        let world = World::new(builtin::build(name).expect("built in"));
+        let waves = table[&((*name).to_owned(), Kernel::Render.name().to_owned())][WAVES];
+        let is_large = features_of(&world).shading_is_large();
+        assert_eq!(is_large, waves <= FEW_WAVES, "{name}: {waves} waves");
+    }
+}
+
+/// What a scene's kernels hold with the defaults of `render`.
+fn features_of(world: &World) -> Features {
     let medium = world.needs.scattering_solids || world.scene.medium.is_some();
     let defaults = [
         ("counting", true),
@@ -148,7 +162,12 @@ fn program_of(world: &World, kernel: Kernel) -> Program {
     ];
     let of_world = Features::of_world(world);
     let names = of_world.names().map(|name| (name, true));
-    let features = Features::from_names(names.chain(defaults));
+    Features::from_names(names.chain(defaults))
+}
+
+/// A scene's kernel, with arrays where GPUs have them.
+fn program_of(world: &World, kernel: Kernel) -> Program {
+    let features = features_of(world);
     // Where the tables begin is of no account, nor is how deep the tree is: none here is deeper.
     let constants = Constants {
         stack_size: SHARED_STACK_SIZE,

@@ -25,6 +25,12 @@ pub(crate) enum Kernel {
     ClosestHits,
     /// Finds how much light comes along rays, for measurements.
     ShadowRays,
+    /// Adds samples to pixels, with the two that follow: finds what rays of paths hit.
+    Trace,
+    /// Finds what becomes of paths there.
+    Shade,
+    /// Follows their rays towards lights.
+    FollowShadows,
 }
 
 impl Kernel {
@@ -35,15 +41,31 @@ impl Kernel {
             Self::Learn => "learn",
             Self::ClosestHits => "closest_hits",
             Self::ShadowRays => "shadow_rays",
+            Self::Trace => "trace",
+            Self::Shade => "shade",
+            Self::FollowShadows => "follow_shadows",
         }
     }
 
     /// Number of kernels.
-    pub(crate) const COUNT: usize = 4;
+    pub(crate) const COUNT: usize = 7;
+
+    /// Those that bring all paths one ray further, in order.
+    pub(crate) const OF_QUEUE: [Self; 3] = [Self::Trace, Self::Shade, Self::FollowShadows];
 
     /// Whether it traces rays that the host made, not paths.
     fn casts(self) -> bool {
         matches!(self, Self::ClosestHits | Self::ShadowRays)
+    }
+
+    /// Whether it adds finished paths to the film.
+    fn adds_samples(self) -> bool {
+        matches!(self, Self::Render | Self::Trace)
+    }
+
+    /// Whether its paths lie in slots.
+    fn is_of_queue(self) -> bool {
+        Self::OF_QUEUE.contains(&self)
     }
 }
 
@@ -230,6 +252,25 @@ impl Features {
         self.0.contains(name)
     }
 
+    /// Whether shading takes so many registers that walks in the same kernel run in half of the waves
+    /// that would otherwise fit, or in less.
+    pub(crate) fn shading_is_large(&self) -> bool {
+        // What features add to the registers, roughly, in steps of 8 to 12. Compiled by RADV for RDNA2,
+        // kernels of 6 steps or more took over 168 and ran in 4 waves, others in 6 or 8.
+        let weights = [
+            ("diffuse_transmission", 1),
+            ("dispersion", 1),
+            ("iridescence", 2),
+            ("layers", 1),
+            ("partial", 1),
+            ("sheen", 1),
+        ];
+        let pairs = [("local_lights", "map_sampling", 1), ("medium", "solid_transmission", 2)];
+        let alone = weights.iter().filter(|(name, _)| self.has(name)).map(|(_, weight)| weight);
+        let both = pairs.iter().filter(|(a, b, _)| self.has(a) && self.has(b));
+        alone.sum::<u32>() + both.map(|(.., weight)| weight).sum::<u32>() >= 6
+    }
+
     /// Names of the features that are on.
     pub(crate) fn names(&self) -> impl Iterator<Item = &'static str> {
         self.0.iter().copied()
@@ -330,6 +371,33 @@ impl VertexTexels {
         let (second_uv, tangent, color) =
             (next("second_uv_set"), next("tangents"), next("vertex_colors"));
         Self { count, second_uv, tangent, color }
+    }
+}
+
+/// Texels of a slot: what every path has, and what only some pictures need.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct SlotTexels {
+    pub(crate) count: u32,
+    receiver: u32,
+    body: u32,
+    first_hit: u32,
+    map_shadow: u32,
+    lamp_shadow: u32,
+}
+
+impl SlotTexels {
+    pub(crate) fn of(features: &Features) -> Self {
+        let mut count = 7;
+        let mut next = |name: &str, texels| {
+            let at = count;
+            count += if features.has(name) { texels } else { 0 };
+            at
+        };
+        let receiver = next("emitters", 2);
+        let body = next("solid_transmission", if features.has("medium") { 2 } else { 1 });
+        let first_hit = next("layers", 2);
+        let (map_shadow, lamp_shadow) = (next("map_sampling", 4), next("local_lights", 4));
+        Self { count, receiver, body, first_hit, map_shadow, lamp_shadow }
     }
 }
 
@@ -519,6 +587,20 @@ impl Program {
         ] {
             let _ = writeln!(source, "const {name} = {value}u;");
         }
+        if kernel.is_of_queue() {
+            let SlotTexels { count, receiver, body, first_hit, map_shadow, lamp_shadow } =
+                SlotTexels::of(&features);
+            for (name, value) in [
+                ("SLOT_TEXELS", count),
+                ("RECEIVER_TEXEL", receiver),
+                ("BODY_TEXEL", body),
+                ("FIRST_HIT_TEXEL", first_hit),
+                ("MAP_SHADOW_TEXEL", map_shadow),
+                ("LAMP_SHADOW_TEXEL", lamp_shadow),
+            ] {
+                let _ = writeln!(source, "const {name} = {value}u;");
+            }
+        }
         for (index, binding) in bindings.iter().enumerate() {
             let array = match binding {
                 Binding::Buffer { name, .. } => ARRAYS.into_iter().find(|kind| kind.name == *name),
@@ -553,7 +635,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 32] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 37] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -587,18 +669,24 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 32] {
         (wgsl!("camera"), true),
         (wgsl!("path"), true),
         (wgsl!("count"), features.has("counting")),
-        (wgsl!("film"), kernel == Kernel::Render),
+        (wgsl!("film"), kernel.adds_samples()),
+        (wgsl!("sample"), kernel.adds_samples()),
         (wgsl!("render"), kernel == Kernel::Render),
         (wgsl!("learn"), kernel == Kernel::Learn),
         (wgsl!("cast"), kernel.casts()),
         (wgsl!("closest_hits"), kernel == Kernel::ClosestHits),
         (wgsl!("shadow_rays"), kernel == Kernel::ShadowRays),
+        (wgsl!("slots"), kernel.is_of_queue()),
+        (wgsl!("trace"), kernel == Kernel::Trace),
+        (wgsl!("shade"), kernel == Kernel::Shade),
+        (wgsl!("follow_shadows"), kernel == Kernel::FollowShadows),
     ]
 }
 
 fn bindings(kernel: Kernel, features: &Features, places: &ArrayPlaces) -> Vec<Binding> {
     let (learns, counts) = (kernel == Kernel::Learn, features.has("counting"));
-    let renders = kernel == Kernel::Render;
+    let (renders, is_of_queue) = (kernel.adds_samples(), kernel.is_of_queue());
+    let has_layers = renders && features.has("layers");
     let buffers = [
         // Not a uniform: software Vulkan optimises a shader anew, for 40 ms, before each dispatch if
         // it branches on uniforms.
@@ -606,12 +694,14 @@ fn bindings(kernel: Kernel, features: &Features, places: &ArrayPlaces) -> Vec<Bi
         ("film_sum", "array<vec4f>", true, renders),
         ("film_rest", "array<vec4f>", true, renders),
         ("film_counts", "array<vec4u>", true, renders),
-        ("surfaces", "array<vec4f>", true, features.has("layers")),
-        ("surfaces_rest", "array<vec4f>", true, features.has("layers")),
+        ("surfaces", "array<vec4f>", true, has_layers),
+        ("surfaces_rest", "array<vec4f>", true, has_layers),
         ("visits", "array<atomic<u32>>", true, counts),
         ("counters", "array<atomic<u32>>", true, counts),
         ("slot_of_cell", "array<u32>", false, counts),
         ("learning_rays", "atomic<u32>", true, learns),
+        ("slots", "array<vec4u>", true, is_of_queue),
+        ("queue", "Queue", true, is_of_queue),
         ("cast_rays", "array<CastRay>", false, kernel.casts()),
         ("cast_results", "array<vec2u>", true, kernel.casts()),
     ];
@@ -700,8 +790,8 @@ mod tests {
         // The map has tiles, and as many patches or more.
         "first_row_sum: tile % globals.tile_columns",
         // Tiles across a picture of at least one pixel.
-        "render: tile % tiles_across",
-        "render: tile / tiles_across",
+        "pixel_in_tile: tile % tiles_across",
+        "pixel_in_tile: tile / tiles_across",
         "start_sample: (y * globals.width + x + index) % max(stride, 1u)",
         "tile_of_patch: ((at + 1u) * tiles - 1u) / patch_grid()",
         "tile_patches: (at + 1u) * size / tiles",
@@ -713,7 +803,7 @@ mod tests {
     #[test]
     fn no_integer_is_divided_by_zero() {
         let mut found = BTreeSet::new();
-        for kernel in [Kernel::Render, Kernel::Learn] {
+        for kernel in [Kernel::Render, Kernel::Learn, Kernel::Trace] {
             for table in [None, Some("table_u32")] {
                 let features = reachable(|_| true, table);
                 let constants =
@@ -833,6 +923,11 @@ mod tests {
             validate(Kernel::Render, features, places);
             if features.has("light_grid") {
                 validate(Kernel::Learn, features, places);
+            }
+            for kernel in Kernel::OF_QUEUE {
+                if kernel != Kernel::FollowShadows || features.has("shadow_rays") {
+                    validate(kernel, features, places);
+                }
             }
             validate(Kernel::ClosestHits, features, places);
             validate(Kernel::ShadowRays, features, places);

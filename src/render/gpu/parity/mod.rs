@@ -162,7 +162,7 @@ fn run(stand: &Stand, preludes: &[&str], probes: &[Probe<'_>], places: Places) {
         assert!(stage.constants.stack_size > 1, "the tree is deep enough");
     }
     let mut renderer =
-        Renderer::with_kernel(&stage, (world, environment), view, rays, None, |gpu, program| {
+        Renderer::with_kernel(&stage, (world, environment), view, rays, |gpu, program| {
             Pipeline::new(gpu, "probe", with_probes(program, preludes, probes))
         })
         .expect("it compiles");
@@ -252,7 +252,8 @@ fn program_of(stand: &Stand, kernel: Kernel) -> Program {
 
 /// Functions whose effect is no return value: entry points, and what looks at the map to count,
 /// which `both_devices_learn_the_same_counters` and the tests of pictures compare.
-const COMPARED_ELSEWHERE: [&str; 4] = ["add_to_film", "learn", "look_at_map", "render"];
+const COMPARED_ELSEWHERE: [&str; 5] =
+    ["add_to_film", "learn", "look_at_map", "pixel_in_tile", "render"];
 
 /// Whatever the shaders define runs in some probe.
 #[test]

@@ -22,12 +22,18 @@ use crate::scene::{
 };
 
 /// A scene, a map, a view and laws.
-pub(super) struct Stand {
-    pub(super) world: World,
-    pub(super) environment: Environment,
-    pub(super) view: View,
+pub(in super::super) struct Stand {
+    pub(in super::super) world: World,
+    pub(in super::super) environment: Environment,
+    pub(in super::super) view: View,
     pub(super) rays: CameraRays,
     pub(super) grid: LightGrid,
+}
+
+/// The one with everything.
+pub(in super::super) fn foggy_one() -> Stand {
+    let [stand, ..] = all();
+    stand
 }
 
 /// First the one with everything, whose map has tile-local sums; then one for each other table, with

@@ -1,0 +1,218 @@
+// Paths between the kernels that bring them one ray further in turn: `trace` finds what their rays
+// hit, `shade` what becomes of them there, `follow_shadows` what lights add. Each kernel has registers
+// for its own part alone, and so more waves for the walks.
+//
+// A slot holds a path. Slots outnumber neither pixels nor what keeps a device busy: one whose pixel
+// has all its samples takes the next pixel. See src/render/gpu/queue.rs.
+
+// What the host reads of the work; see src/render/gpu/queue.rs.
+struct Queue {
+    // The next pixel to be taken.
+    next: atomic<u32>,
+    // Slots that hold a path.
+    left: atomic<u32>,
+    // Paths that were added to the film.
+    samples: atomic<u32>,
+    padding: u32,
+}
+
+// What a slot's path is.
+const IS_NONE = 0u;
+// There are no more pixels.
+const IS_IDLE = 1u;
+const HAS_ENDED = 2u;
+const GOES_ON = 3u;
+// Added if it is counted.
+const IS_COUNTED = 4u;
+
+// Texels of a slot that all have.
+const ORIGIN = 0u;
+const DIRECTION = 1u;
+const THROUGHPUT = 2u;
+const RADIANCE = 3u;
+const SAMPLER = 4u;
+const STATE = 5u;
+const HIT = 6u;
+
+struct State {
+    // Which pixel, tile after tile.
+    pixel: u32,
+    what: u32,
+}
+
+// A lane's slot: where its first texel is. Texels of a workgroup's slots lie side by side.
+fn slot_of(group: u32, lane: u32) -> u32 {
+    return group * SLOT_TEXELS * 64u + lane;
+}
+
+fn slot_read(slot: u32, texel: u32) -> vec4u {
+    return slots[slot + 64u * texel];
+}
+
+fn slot_write(slot: u32, texel: u32, xyz: vec3f, w: u32) {
+    slots[slot + 64u * texel] = vec4u(bitcast<vec3u>(xyz), w);
+}
+
+fn float3(texel: vec4u) -> vec3f {
+    return bitcast<vec3f>(texel.xyz);
+}
+
+fn slot_state(slot: u32) -> State {
+    let texel = slot_read(slot, STATE);
+    return State(texel.x, texel.y & 3u);
+}
+
+// The light of a slot's path so far.
+fn read_radiance(slot: u32, path: ptr<function, Path>) {
+    let texel = slot_read(slot, RADIANCE);
+    (*path).radiance = float3(texel);
+    (*path).rays = texel.w;
+}
+
+fn write_radiance(slot: u32, path: ptr<function, Path>) {
+    slot_write(slot, RADIANCE, (*path).radiance, (*path).rays);
+}
+
+//#if layers
+fn read_first_hit(slot: u32, path: ptr<function, Path>) {
+    let albedo = slot_read(slot, FIRST_HIT_TEXEL);
+    let normal = slot_read(slot, FIRST_HIT_TEXEL + 1u);
+    (*path).first_hit = FirstHit(
+        float3(albedo), bitcast<f32>(albedo.w), float3(normal), bitcast<f32>(normal.w));
+}
+
+fn write_first_hit(slot: u32, path: ptr<function, Path>) {
+    let hit = (*path).first_hit;
+    slot_write(slot, FIRST_HIT_TEXEL, hit.albedo, bitcast<u32>(hit.depth));
+    slot_write(slot, FIRST_HIT_TEXEL + 1u, hit.normal, bitcast<u32>(hit.hits));
+}
+//#end
+
+// A slot's path, without rays towards lights.
+fn read_path(slot: u32) -> Path {
+    var path: Path;
+    let origin = slot_read(slot, ORIGIN);
+    let direction = slot_read(slot, DIRECTION);
+    let throughput = slot_read(slot, THROUGHPUT);
+    let sampler = slot_read(slot, SAMPLER);
+    let state = slot_read(slot, STATE);
+    path.ray = Ray(float3(origin), float3(direction), F32_MAX);
+    path.departure_pdf_solid_angle = bitcast<f32>(origin.w);
+    path.departure_law = direction.w;
+    path.throughput = float3(throughput);
+    path.travelled = bitcast<f32>(throughput.w);
+    path.sampler = Sampler(sampler.x, sampler.y, sampler.z);
+    path.bounces = sampler.w;
+    path.passes = state.z;
+//#if counting
+    path.is_counted = (state.y & IS_COUNTED) != 0u;
+//#end
+    read_radiance(slot, &path);
+//#if emitters
+    let position = slot_read(slot, RECEIVER_TEXEL);
+    let normal = slot_read(slot, RECEIVER_TEXEL + 1u);
+    path.departure_receiver = Receiver(float3(position), float3(normal));
+//#end
+//#if solid_transmission
+    path.body.squared_index = bitcast<f32>(state.w);
+    let inside = slot_read(slot, BODY_TEXEL);
+//#if medium
+    let extinction = slot_read(slot, BODY_TEXEL + 1u);
+    path.body.interior =
+        Interior(float3(inside), bitcast<f32>(inside.w), float3(extinction));
+    path.body.is_solid = extinction.w != 0u;
+//#else
+    path.body.absorption = float3(inside);
+//#end
+//#end
+//#if layers
+    read_first_hit(slot, &path);
+//#end
+    return path;
+}
+
+// Keeps a path of pixel `pixel` that goes on.
+fn write_path(slot: u32, pixel: u32, path: ptr<function, Path>) {
+    slot_write(slot, ORIGIN, (*path).ray.origin, bitcast<u32>((*path).departure_pdf_solid_angle));
+    slot_write(slot, DIRECTION, (*path).ray.direction, (*path).departure_law);
+    slot_write(slot, THROUGHPUT, (*path).throughput, bitcast<u32>((*path).travelled));
+    let sampler = (*path).sampler;
+    slots[slot + 64u * SAMPLER] =
+        vec4u(sampler.reversed_index, sampler.pixel_seed, sampler.pair, (*path).bounces);
+    var what = GOES_ON;
+//#if counting
+    what |= select(0u, IS_COUNTED, (*path).is_counted);
+//#end
+    var squared_index = 1.0;
+//#if solid_transmission
+    squared_index = (*path).body.squared_index;
+//#end
+    slots[slot + 64u * STATE] =
+        vec4u(pixel, what, (*path).passes, bitcast<u32>(squared_index));
+    write_radiance(slot, path);
+//#if emitters
+    let receiver = (*path).departure_receiver;
+    slot_write(slot, RECEIVER_TEXEL, receiver.position, 0u);
+    slot_write(slot, RECEIVER_TEXEL + 1u, receiver.normal, 0u);
+//#end
+//#if solid_transmission
+//#if medium
+    let inside = (*path).body.interior;
+    slot_write(slot, BODY_TEXEL, inside.scattering, bitcast<u32>(inside.mean_cosine));
+    slot_write(slot, BODY_TEXEL + 1u, inside.extinction, select(0u, 1u, (*path).body.is_solid));
+//#else
+    slot_write(slot, BODY_TEXEL, (*path).body.absorption, 0u);
+//#end
+//#end
+//#if layers
+    write_first_hit(slot, path);
+//#end
+}
+
+//#if shadow_rays
+// Texels of a ray towards a light.
+const SHADOW_TEXELS = 4u;
+
+fn read_shadow(slot: u32, texel: u32) -> Shadow {
+    var shadow: Shadow;
+    let origin = slot_read(slot, texel);
+    shadow.ray.t_max = bitcast<f32>(origin.w);
+    if shadow.ray.t_max <= 0.0 {
+        return shadow;
+    }
+    let direction = slot_read(slot, texel + 1u);
+    let light = slot_read(slot, texel + 2u);
+    shadow.ray.origin = float3(origin);
+    shadow.ray.direction = float3(direction);
+    shadow.weight = bitcast<f32>(direction.w);
+    shadow.light = float3(light);
+//#if shadow_media
+    shadow.left = float3(slot_read(slot, texel + 3u));
+//#end
+//#if counting
+    shadow.visibility =
+        Visibility(light.w, bitcast<f32>(slot_read(slot, texel + 3u).w));
+//#end
+    return shadow;
+}
+
+fn write_shadow(slot: u32, texel: u32, shadow: Shadow) {
+    slot_write(slot, texel, shadow.ray.origin, bitcast<u32>(shadow.ray.t_max));
+    if shadow.ray.t_max <= 0.0 {
+        return;
+    }
+    var left = vec3f(1.0);
+    var counter = 0u;
+    var share = 0.0;
+//#if shadow_media
+    left = shadow.left;
+//#end
+//#if counting
+    counter = shadow.visibility.counter;
+    share = shadow.visibility.share;
+//#end
+    slot_write(slot, texel + 1u, shadow.ray.direction, bitcast<u32>(shadow.weight));
+    slot_write(slot, texel + 2u, shadow.light, counter);
+    slot_write(slot, texel + 3u, left, bitcast<u32>(share));
+}
+//#end

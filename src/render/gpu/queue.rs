@@ -1,0 +1,224 @@
+//! Paths in slots, which three small kernels bring one ray further in turn: for scenes whose materials
+//! leave the walks of one kernel for everything too few registers. The same samples, in the same order
+//! at each pixel, so that pictures are the same bit by bit; see `shaders/slots.wgsl`.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::super::Pass;
+use super::buffers::Buffers;
+use super::device::Gpu;
+use super::flight::Job;
+use super::layout::Work;
+use super::shader::{Features, Kernel, SlotTexels};
+use super::{GROUP, Progress, Renderer};
+use crate::error::Result;
+
+/// Most workgroups of slots: they keep the largest devices busy and fit their caches.
+const MOST_GROUPS: u64 = 4096;
+/// Most steps of all slots in one submission.
+const MOST_STEPS: u64 = 64;
+/// Words that the host reads of the work: pixels taken, slots that hold a path, samples, nothing.
+pub(super) const REPORT_BYTES: u64 = 16;
+
+/// How kernels share the work of rendering.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Schedule {
+    /// One does all.
+    Whole,
+    /// Three take turns.
+    Queue,
+}
+
+impl Schedule {
+    /// What suits a picture on a device.
+    pub(super) fn of(gpu: &Gpu, features: &Features) -> Self {
+        if let Some(asked) = gpu.schedule {
+            return asked;
+        }
+        // Software has no waves to gain.
+        if gpu.prefers_buffers() && features.shading_is_large() { Self::Queue } else { Self::Whole }
+    }
+}
+
+/// The slots of a renderer.
+pub(super) struct Queue {
+    groups: u64,
+    /// Whether they hold paths of the pass in work.
+    is_filled: bool,
+    /// Samples of that pass which are known to be in the film.
+    samples: u32,
+}
+
+impl Queue {
+    /// Makes the buffers for a picture of so many tiles.
+    pub(super) fn new(buffers: &mut Buffers, features: &Features, tiles: u64) -> Result<Self> {
+        let groups = tiles.min(MOST_GROUPS);
+        let slot_bytes = 16 * u64::from(SlotTexels::of(features).count);
+        buffers.make("slots", groups * GROUP * slot_bytes, "the set of paths")?;
+        buffers.make("queue", REPORT_BYTES, "a count")?;
+        Ok(Self { groups, is_filled: false, samples: 0 })
+    }
+}
+
+impl Renderer {
+    /// As [`Self::render_tiles`].
+    pub(super) fn render_queue(
+        &mut self,
+        pass: Pass,
+        stride: u32,
+        cancel: &AtomicBool,
+    ) -> Result<()> {
+        let Some(groups) = self.queue.as_ref().map(|queue| queue.groups) else { return Ok(()) };
+        if self.progress.least >= pass.target {
+            return Ok(());
+        }
+        let work =
+            Work { count: self.tiles() as u32, end_sample: pass.target, stride, ..Work::default() };
+        self.fill_queue()?;
+        while self.take_report() != Some(0) {
+            if cancel.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            let steps = (self.flights.units(Kernel::Trace) / groups).clamp(1, MOST_STEPS);
+            let kernels = self.render_kernels().iter().map(|kernel| self.bound(*kernel));
+            let kernels = kernels.collect::<Result<Vec<_>>>()?;
+            self.buffers.write("globals", 0, bytemuck::bytes_of(&work));
+            let job = Job {
+                kernel: Kernel::Trace,
+                kernels: &kernels,
+                steps: steps as u32,
+                groups: groups as u32,
+                units: groups * steps,
+                report: self.buffers.get("queue"),
+            };
+            self.flights.start(&self.gpu, &job)?;
+        }
+        self.forget_paths()?;
+        self.progress = Progress { least: pass.target, ..Progress::default() };
+        Ok(())
+    }
+
+    /// Lets slots take pixels from the first one on, unless they go on where they were.
+    fn fill_queue(&mut self) -> Result<()> {
+        let Some(queue) = self.queue.as_mut().filter(|queue| !queue.is_filled) else {
+            return Ok(());
+        };
+        queue.is_filled = true;
+        queue.samples = 0;
+        let slots = (queue.groups * GROUP) as u32;
+        self.buffers.clear("slots");
+        self.buffers.write("queue", 0, bytemuck::cast_slice(&[0, slots, 0, 0]));
+        self.gpu.check()
+    }
+
+    /// Takes note of the samples that the device has told of; returns how many slots still held a path.
+    fn take_report(&mut self) -> Option<u32> {
+        let queue = self.queue.as_mut().filter(|queue| queue.is_filled)?;
+        let [_, left, samples, _] = self.flights.report()?;
+        self.progress.surplus += u64::from(samples.wrapping_sub(queue.samples));
+        queue.samples = samples;
+        Some(left)
+    }
+
+    /// Leaves paths in work, if there are any: their samples begin anew.
+    pub(super) fn forget_paths(&mut self) -> Result<()> {
+        if self.queue.as_ref().is_some_and(|queue| queue.is_filled) {
+            self.settle()?;
+            self.take_report();
+            self.flights.forget_report();
+            if let Some(queue) = &mut self.queue {
+                queue.is_filled = false;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parity::stand;
+    use super::super::{Advance, Stage, tests};
+    use super::*;
+    use crate::environment::{Environment, EnvironmentOptions};
+    use crate::light_grid::{LawOptions, LightGrid};
+    use crate::path::World;
+    use crate::render::film::Film;
+    use crate::render::{Sampling, View};
+    use crate::sampler::Sequence;
+    use crate::scene::builtin;
+
+    /// Schedules on the device at hand.
+    fn devices() -> Option<[Gpu; 2]> {
+        match Gpu::open(None) {
+            Ok(gpu) => {
+                Some([Schedule::Whole, Schedule::Queue].map(|s| gpu.clone().with_schedule(s)))
+            }
+            Err(reason) => {
+                eprintln!("SKIPPED: {reason}");
+                None
+            }
+        }
+    }
+
+    /// Four samples, then two more. Fewer slots than pixels.
+    fn film(
+        gpu: &Gpu,
+        (world, environment, view): (&World, &Environment, &View),
+        grid: Option<&LightGrid>,
+    ) -> Film {
+        let stage = Stage::new(gpu, world, environment).expect("it fits");
+        let rays = view.rays();
+        let renderer = Renderer::new(&stage, world, environment, view, &rays, None);
+        let mut renderer = renderer.expect("it fits");
+        if let Some(queue) = &mut renderer.queue {
+            queue.groups = 7;
+        }
+        renderer.set_grid(grid).expect("uploaded");
+        let mut film = Film::new(view.width, view.height, view.layers);
+        let pixels = u64::from(view.width * view.height);
+        for (target, samples) in [(4, 4), (6, 2)] {
+            let pass = Pass { target, stride: 1, sequence: Sequence::default() };
+            let done = renderer.render(pass, None, &AtomicBool::new(false)).expect("it runs");
+            assert_eq!(done, Advance { samples: samples * pixels, least: target });
+        }
+        renderer.read_film(&mut film).expect("read");
+        film
+    }
+
+    fn assert_same(name: &str, gpus: &[Gpu; 2], of: (&World, &Environment, &View)) {
+        let grid = LightGrid::whole_map(of.1.tile_energies());
+        let [whole, queue] = gpus.each_ref().map(|gpu| film(gpu, of, grid.as_ref()));
+        let differ = whole.pixels().iter().zip(queue.pixels()).filter(|(a, b)| a != b).count();
+        eprintln!("{name}: {differ} of {} pixels differ", whole.pixels().len());
+        assert!(whole.min_samples() == 6 && whole == queue, "{name}: {differ} pixels differ");
+    }
+
+    /// Lamps, panes, fog, solids, layers, unlit and masked surfaces, dispersion; a sky, and none.
+    #[test]
+    fn both_schedules_render_the_same_picture() {
+        let Some(gpus) = devices() else { return };
+        let stand = stand::foggy_one();
+        assert_same("everything", &gpus, (&stand.world, &stand.environment, &stand.view));
+        let sky = crate::environment::sky::build("sunset", 128, 64).expect("a sky");
+        let sky = Environment::new(sky, &EnvironmentOptions::default()).expect("sound");
+        for (name, sampling) in [
+            ("living-room", Sampling::Plain),
+            ("evening", Sampling::Plain),
+            ("crack", Sampling::Plain),
+            ("crack", Sampling::Bsdf),
+        ] {
+            let world = World::new(builtin::build(name).expect("built in"));
+            let view = View { layers: false, ..stand::view_of(&world, sampling) };
+            assert_same(name, &gpus, (&world, &sky, &view));
+        }
+    }
+
+    #[test]
+    fn both_schedules_count_the_same() {
+        let Some(gpus) = devices() else { return };
+        let [whole, queue] =
+            gpus.each_ref().map(|gpu| tests::learn(Some(gpu), LawOptions::ADAPTIVE));
+        assert!(whole == queue, "the same visits, counters and rays");
+    }
+}
