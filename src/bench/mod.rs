@@ -18,7 +18,7 @@ use crate::light_grid::{LawOptions, LightGrid};
 use crate::metrics;
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
-use crate::render::gpu::{AdapterFacts, Gpu, KernelFacts, RayChoice, Stage};
+use crate::render::gpu::{AdapterFacts, Gpu, KernelFacts, RayChoice, Schedule, Stage};
 use crate::render::{Phase, Sampling, Session, StopRule, View};
 use crate::report::{Device, Machine, OpenDevice};
 use crate::sampler::Points;
@@ -34,6 +34,8 @@ pub struct Options {
     pub adapter: Option<String>,
     /// What finds the surfaces that rays hit on it.
     pub rays: RayChoice,
+    /// How its kernels share the work; `None` is what suits a scene.
+    pub schedule: Option<Schedule>,
     /// Width and height of the pictures.
     pub size: (u32, u32),
     /// Seconds of rendering a scene on a device.
@@ -123,6 +125,8 @@ pub struct PathFigures {
     pub turn_milliseconds: f64,
     /// Bytes on the device.
     pub device_bytes: u64,
+    /// How the kernels share the work.
+    pub schedule: Option<Schedule>,
     /// What the kernel holds.
     pub kernel: Option<KernelFacts>,
 }
@@ -157,6 +161,7 @@ pub fn run(
     let open = |device| {
         let mut open = OpenDevice::open(device, options.adapter.as_deref(), &machine)?;
         open.gpu = open.gpu.map(|gpu| gpu.with_rays(options.rays)).transpose()?;
+        open.gpu = open.gpu.map(|gpu| gpu.with_schedule(options.schedule));
         Ok(open)
     };
     let opened: Vec<_> = options.devices.iter().map(|d| open(*d)).collect::<Result<_>>()?;
@@ -352,6 +357,7 @@ impl Place<'_> {
             stop_milliseconds,
             turn_milliseconds: 1e3 * self.turn(stage, session.grid())?,
             device_bytes: gpu.as_ref().map_or(0, |gpu| gpu.device_bytes),
+            schedule: gpu.as_ref().map(|gpu| gpu.schedule),
             kernel: gpu.map(|gpu| gpu.kernel),
         })
     }

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::image::check_writable;
 use crate::output::record::write_json;
 use crate::path::World;
-use crate::render::gpu::{RayChoice, adapters};
+use crate::render::gpu::{RayChoice, Schedule, adapters};
 use crate::report::Device;
 use crate::scene::builtin;
 
@@ -35,6 +35,10 @@ pub(super) struct BenchArguments {
     /// What finds the surfaces that rays hit on a GPU.
     #[arg(long, default_value = "auto", value_enum)]
     rays: RayChoice,
+    /// How a GPU's kernels share the work: one does all, or three take turns; without it, what suits the
+    /// scene. The picture is the same.
+    #[arg(long, value_enum)]
+    schedule: Option<Schedule>,
     /// Picture size in pixels; without it, 1920x1080 with a real GPU, else 640x360.
     #[arg(long, value_parser = values::size, value_name = "WxH")]
     size: Option<(u32, u32)>,
@@ -89,6 +93,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         devices,
         adapter: arguments.adapter.clone(),
         rays: arguments.rays,
+        schedule: arguments.schedule,
         size: arguments.size.unwrap_or(suitable_size),
         seconds: arguments.seconds,
     };

@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
 use crate::path::World;
-use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, Stage, adapters};
+use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, Schedule, Stage, adapters};
 use crate::render::{Session, View};
 
 /// Arguments of `devices`.
@@ -49,7 +49,7 @@ pub(super) fn say(notices: &mut Notices, sentence: String) {
 pub(super) fn open(
     choice: DeviceChoice,
     adapter: Option<&str>,
-    rays: RayChoice,
+    (rays, schedule): (RayChoice, Option<Schedule>),
     notices: &mut Notices,
 ) -> Result<Option<Gpu>> {
     let opened = match choice.open(adapter) {
@@ -60,7 +60,7 @@ pub(super) fn open(
         opened => opened?,
     };
     match opened {
-        Some(gpu) => gpu.with_rays(rays).map(Some),
+        Some(gpu) => gpu.with_rays(rays).map(|gpu| Some(gpu.with_schedule(schedule))),
         None if rays == RayChoice::Hardware => {
             Err(Error::new("--rays hardware: the CPU has no ray queries; --device gpu takes a GPU"))
         }

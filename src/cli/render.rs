@@ -22,7 +22,7 @@ use crate::output::record::{self, Phases, Record};
 use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
-use crate::render::gpu::{DeviceChoice, RayChoice};
+use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
 use crate::render::{Crop, Sampling, Session, StopRule, View};
 use crate::sampler::Points;
 use crate::scene::{Camera, Medium, Projection, Scene, builtin};
@@ -161,6 +161,10 @@ pub(super) struct RenderArguments {
     /// What finds the surfaces that rays hit on a GPU.
     #[arg(long, default_value = "auto", value_enum, help_heading = "Run")]
     rays: RayChoice,
+    /// How a GPU's kernels share the work: one does all, or three take turns; without it, what suits the
+    /// scene. The picture is the same.
+    #[arg(long, value_enum, help_heading = "Run")]
+    schedule: Option<Schedule>,
     /// Threads; 0 uses every core.
     #[arg(long, default_value = "0", value_parser = clap::value_parser!(u16).range(0..=1024), value_name = "N", help_heading = "Run")]
     threads: u16,
@@ -278,6 +282,7 @@ impl RenderArguments {
             device,
             adapter,
             rays,
+            schedule: None,
             threads: 0,
             json: None,
             laws: None,
@@ -305,8 +310,12 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         eprintln!("notice: {sentence}");
     }
     let rule = stop_rule(arguments);
-    let gpu =
-        device::open(arguments.device, arguments.adapter.as_deref(), arguments.rays, &mut notices)?;
+    let gpu = device::open(
+        arguments.device,
+        arguments.adapter.as_deref(),
+        (arguments.rays, arguments.schedule),
+        &mut notices,
+    )?;
     let mut session =
         device::start(arguments.device, gpu.as_ref(), &world, &environment, view, &mut notices)?;
     let outcome = work(&mut session, &rule, &cancel, &progress, arguments, &mut notices);

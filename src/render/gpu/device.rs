@@ -346,10 +346,11 @@ impl Gpu {
         self
     }
 
-    /// The same device with another schedule.
-    #[cfg(test)]
-    pub(super) fn with_schedule(mut self, schedule: Schedule) -> Self {
-        self.schedule = Some(schedule);
+    /// The same connection with kernels that share the work so, whatever suits the picture; `None` is
+    /// what suits it.
+    #[must_use]
+    pub fn with_schedule(mut self, schedule: Option<Schedule>) -> Self {
+        self.schedule = schedule;
         self
     }
 

@@ -693,7 +693,7 @@ mod tests {
         match Gpu::open(None) {
             Ok(gpu) => {
                 cut_short(&gpu);
-                cut_short(&gpu.with_schedule(Schedule::Queue));
+                cut_short(&gpu.with_schedule(Some(Schedule::Queue)));
             }
             Err(reason) => eprintln!("SKIPPED: {reason}"),
         }

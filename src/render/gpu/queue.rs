@@ -21,7 +21,7 @@ const MOST_STEPS: u64 = 64;
 pub(super) const REPORT_BYTES: u64 = 16;
 
 /// How kernels share the work of rendering.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Schedule {
     /// One does all.
@@ -152,7 +152,7 @@ mod tests {
     fn devices() -> Option<[Gpu; 2]> {
         match Gpu::open(None) {
             Ok(gpu) => {
-                Some([Schedule::Whole, Schedule::Queue].map(|s| gpu.clone().with_schedule(s)))
+                Some([Schedule::Whole, Schedule::Queue].map(|s| gpu.clone().with_schedule(Some(s))))
             }
             Err(reason) => {
                 eprintln!("SKIPPED: {reason}");
