@@ -204,7 +204,9 @@ impl App {
 
     /// Whether the picture asked for is done and on the screen.
     pub fn is_settled(&self) -> bool {
-        self.snapshot.as_ref().is_some_and(|s| s.activity == Activity::Done)
+        let is_done =
+            |s: &Arc<Snapshot>| s.activity == Activity::Done && self.worker.has_answered(s);
+        self.snapshot.as_ref().is_some_and(is_done)
             && self.shown.is_some()
             && self.presenter.is_settled()
             && !self.inspector.is_busy()

@@ -117,9 +117,12 @@ impl Studio {
     fn settle(&mut self) -> Result<()> {
         self.frame()?;
         self.frame()?;
-        while !self.app.is_settled() {
+        loop {
             if let Some(failure) = self.app.failure() {
                 return Err(Error::new(failure));
+            }
+            if self.app.is_settled() {
+                return Ok(());
             }
             let left = self.deadline.saturating_duration_since(Instant::now());
             if left.is_zero() {
@@ -133,7 +136,6 @@ impl Studio {
             while self.news.try_recv().is_ok() {}
             self.frame()?;
         }
-        Ok(())
     }
 }
 

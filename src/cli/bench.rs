@@ -99,9 +99,9 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     };
     let bench = measure(&options, &subjects, &cancel, &|doing| progress.say(doing))?;
     progress.finish();
-    print!("{bench}");
-    match &arguments.json {
-        Some(file) => write_json(file, &crate::output::record::to_value(&bench)?),
-        None => Ok(()),
+    if let Some(file) = &arguments.json {
+        write_json(file, &crate::output::record::to_value(&bench)?)?;
     }
+    print!("{bench}");
+    Ok(())
 }

@@ -437,3 +437,18 @@ fn a_region_is_that_part_of_the_picture_and_the_background_is_the_cameras_alone(
     let says = bench.refusal(&render_line("-o a.png --background pink"), 2);
     assert!(says.contains("colour"), "{says}");
 }
+
+/// As `| head` does.
+#[test]
+fn a_reader_who_has_seen_enough_is_no_reason_to_panic() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lightgrid"))
+        .args(["stability", "--list"])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("the binary starts");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("it ends");
+    let says = String::from_utf8_lossy(&output.stderr);
+    assert!(!says.contains("panicked"), "{says}");
+}

@@ -260,6 +260,12 @@ impl Worker {
         lock(&self.shared.snapshot).clone()
     }
 
+    /// Whether a picture is what was asked for last.
+    pub(super) fn has_answered(&self, snapshot: &Snapshot) -> bool {
+        let slot = lock(&self.shared.slot);
+        slot.request.as_ref().is_some_and(|latest| snapshot.request.is_same(latest))
+    }
+
     /// Whether a GPU is being opened, filled or programmed.
     pub fn is_preparing(&self) -> bool {
         self.shared.is_preparing.load(Ordering::Relaxed)
