@@ -3,11 +3,12 @@
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use super::Wake;
 use super::overlays::{CellFacts, Label, Legend, Overlay, Sources};
 use super::surface_map::SurfaceMap;
-use super::worker::{Request, Snapshot, Take};
+use super::worker::{Activity, Request, Snapshot, Take};
 use crate::denoise::{Denoiser, preview, quick};
 use crate::develop::{Developer, LinearPicture, OverlayTexture};
 use crate::error::{Error, Result};
@@ -46,6 +47,19 @@ impl PartialEq for Order {
             && address(self.past.as_ref()) == address(other.past.as_ref())
     }
 }
+
+impl Order {
+    /// Whether it asks for the same of a later picture of the same work, which may wait.
+    fn only_follows(&self, before: &Self) -> bool {
+        let is_over = matches!(self.snapshot.activity, Activity::Done | Activity::Paused);
+        let snapshot = Arc::clone(&before.snapshot);
+        !is_over && Self { snapshot, ..self.clone() } == *before
+    }
+}
+
+/// After a picture of work that goes on it rests so many times as long as that took: where the CPU draws,
+/// pictures would take all of it.
+const REST: u32 = 4;
 
 fn address(image: Option<&Arc<Image>>) -> Option<usize> {
     image.map(|image| Arc::as_ptr(image).addr())
@@ -159,6 +173,8 @@ impl Drop for Presenter {
 
 fn run(shared: &Shared) {
     let mut memory = Memory::default();
+    // The last order, and until when one that only follows it waits.
+    let mut last: Option<(Order, Instant)> = None;
     loop {
         let order = {
             let mut slot = lock(&shared.slot);
@@ -166,16 +182,32 @@ fn run(shared: &Shared) {
                 if slot.quit {
                     return;
                 }
-                if let Some(order) = slot.order.take() {
+                let rest = match (&slot.order, &last) {
+                    (Some(order), Some((before, until))) if order.only_follows(before) => {
+                        until.saturating_duration_since(Instant::now())
+                    }
+                    (Some(_), _) => Duration::ZERO,
+                    (None, _) => Duration::MAX,
+                };
+                if rest.is_zero()
+                    && let Some(order) = slot.order.take()
+                {
                     break order;
                 }
-                slot = shared.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
+                slot = if rest == Duration::MAX {
+                    shared.changed.wait(slot).unwrap_or_else(PoisonError::into_inner)
+                } else {
+                    let waited = shared.changed.wait_timeout(slot, rest);
+                    waited.unwrap_or_else(PoisonError::into_inner).0
+                };
             }
         };
+        let (start, kept) = (Instant::now(), order.clone());
         // Where the device is lost, the window orders again on another.
         if let Ok(shown) = memory.present(order) {
             *lock(&shared.shown) = Some(Arc::new(shown));
         }
+        last = Some((kept, Instant::now() + REST * start.elapsed()));
         (shared.wake)();
     }
 }
