@@ -46,7 +46,7 @@ impl Progress {
         let known = self.noise.get().filter(|(at, _)| at.elapsed() < NOISE_EVERY);
         let (at, noise) = known.unwrap_or_else(|| {
             let is_there = session.samples() > 1;
-            (Instant::now(), if is_there { session.film().noise() } else { f64::INFINITY })
+            (Instant::now(), if is_there { session.noise() } else { f64::INFINITY })
         });
         self.noise.set(noise.is_finite().then_some((at, noise)));
         noise

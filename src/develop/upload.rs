@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{Developer, LinearPicture, OverlayTexture, Under, filled};
 use crate::image::Image;
-use crate::render::film::Film;
+use crate::render::film::{Film, Surface};
 use crate::render::gpu::{DeviceFilm, Gpu};
 
 /// Bytes of a pixel's sums, and of its counts.
@@ -18,25 +18,12 @@ impl Developer {
             return self.upload_image(&film.image());
         }
         let pixels = film.pixels();
-        let sums: Vec<[f32; 4]> = pixels
-            .par_iter()
-            .map(|pixel| {
-                let [r, g, b] = pixel.mean().map(|c| (c * f64::from(pixel.samples())) as f32);
-                [r, g, b, pixel.luminance_squared() as f32]
-            })
-            .collect();
+        let sums: Vec<[f32; 4]> =
+            pixels.par_iter().map(|pixel| pixel.sums().map(|sum| sum as f32)).collect();
         let counts: Vec<[u32; 4]> = pixels.par_iter().map(|p| [p.samples(), 0, 0, 0]).collect();
-        let layers = film.surface_layers().filter(|_| layers);
-        let surfaces = layers.map(|layers| {
-            let surfaces: Vec<[f32; 8]> = (0..pixels.len())
-                .into_par_iter()
-                .map(|i| {
-                    let samples = pixels[i].samples() as f32;
-                    let [r, g, b] = layers.albedo[i].map(|albedo| albedo * samples);
-                    let [x, y, z] = layers.normal[i];
-                    [r, g, b, layers.depth[i], x, y, z, 1.0]
-                })
-                .collect();
+        let surfaces = (layers && film.has_layers()).then(|| {
+            let sums = |surface: &Surface| surface.sums().map(|sum| sum as f32);
+            let surfaces: Vec<[f32; 8]> = film.surfaces().par_iter().map(sums).collect();
             self.buffer(bytemuck::cast_slice(&surfaces))
         });
         LinearPicture::fixed(DeviceFilm {

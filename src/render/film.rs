@@ -56,7 +56,7 @@ impl Pixel {
     }
 
     /// What [`Self::of_sums`] takes.
-    pub(super) fn sums(&self) -> [f64; 4] {
+    pub(crate) fn sums(&self) -> [f64; 4] {
         let [r, g, b] = self.sum;
         [r, g, b, self.luminance_squared]
     }
@@ -81,11 +81,6 @@ impl Pixel {
     pub fn mean_luminance(&self) -> f64 {
         let [r, g, b] = self.mean();
         0.2126 * r + 0.7152 * g + 0.0722 * b
-    }
-
-    /// Sum of the samples' squared luminances.
-    pub(crate) fn luminance_squared(&self) -> f64 {
-        self.luminance_squared
     }
 
     /// Estimated variance of the mean luminance, from the spread of the samples. Low-discrepancy
@@ -117,7 +112,7 @@ impl Surface {
     }
 
     /// What [`Self::of_sums`] takes.
-    pub(super) fn sums(&self) -> [f64; 8] {
+    pub(crate) fn sums(&self) -> [f64; 8] {
         let ([r, g, b], [x, y, z]) = (self.albedo.to_array(), self.normal.to_array());
         [r, g, b, self.depth, x, y, z, f64::from(self.hits)]
     }
@@ -148,6 +143,11 @@ impl Film {
     /// Whether albedo, normal and depth are kept.
     pub fn has_layers(&self) -> bool {
         !self.surfaces.is_empty()
+    }
+
+    /// Sums of first hits, row after row; empty unless layers are kept.
+    pub(crate) fn surfaces(&self) -> &[Surface] {
+        &self.surfaces
     }
 
     /// The pixels, row after row.

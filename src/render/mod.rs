@@ -242,6 +242,8 @@ pub struct Session<'a> {
     engine: Engine,
     /// The film as it is; made when somebody asks.
     film: OnceLock<Film>,
+    /// Its noise, once somebody has asked.
+    noise: OnceLock<f64>,
     /// The film as it was when somebody asked last, to be brought up to date; it survives a GPU.
     film_before: Mutex<Film>,
     /// Fewest samples of any pixel.
@@ -286,6 +288,7 @@ impl<'a> Session<'a> {
         let learning = new_learning(world, environment, &view, &rays);
         Self {
             film: OnceLock::new(),
+            noise: OnceLock::new(),
             film_before: Mutex::default(),
             samples: 0,
             last_read: Instant::now(),
@@ -354,11 +357,10 @@ impl<'a> Session<'a> {
         if let Engine::Gpu(renderer) = &mut self.engine {
             renderer.settle()?;
             if self.film.get().is_none() {
-                let film = self.film_before.get_mut().unwrap_or_else(PoisonError::into_inner);
-                prepare_film(film, &self.view);
-                renderer.read_film(film)?;
+                let (film, read) = self.newest_film();
+                self.film = OnceLock::from(film);
+                read?;
                 self.last_read = Instant::now();
-                self.film = OnceLock::from(std::mem::take(film));
             }
             self.figures.render_seconds += start.elapsed().as_secs_f64();
         }
@@ -368,11 +370,10 @@ impl<'a> Session<'a> {
     /// Lets the CPU take over from a GPU, with everything learned and rendered so far, as far as it can
     /// still be read.
     pub fn continue_on_cpu(&mut self) {
-        if matches!(self.engine, Engine::Cpu) {
-            return;
+        if self.is_on_gpu() {
+            self.leave_gpu();
+            self.engine = Engine::Cpu;
         }
-        self.leave_gpu();
-        self.engine = Engine::Cpu;
     }
 
     /// Reads what there is on a GPU that is to be left.
@@ -390,7 +391,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// If it does not fit on the device; the session stays where it is.
     pub fn continue_on_gpu(&mut self, stage: &gpu::Stage) -> Result<()> {
-        if matches!(self.engine, Engine::Gpu(_)) {
+        if self.is_on_gpu() {
             self.leave_gpu();
         }
         let (world, environment) = (self.world, self.environment);
@@ -476,15 +477,29 @@ impl<'a> Session<'a> {
     /// its time; should the GPU fail meanwhile, it is the film as it was read last, and the next call of
     /// [`Self::advance`] or [`Self::settle`] says why.
     pub fn film(&self) -> &Film {
-        self.film.get_or_init(|| {
-            let mut before = self.film_before.lock().unwrap_or_else(PoisonError::into_inner);
-            let mut film = std::mem::take(&mut *before);
-            prepare_film(&mut film, &self.view);
-            if let Engine::Gpu(renderer) = &self.engine {
-                let _ = renderer.read_film(&mut film);
-            }
-            film
-        })
+        self.film.get_or_init(|| self.newest_film().0)
+    }
+
+    /// [`Film::noise`] of [`Self::film`], which looks at every pixel once.
+    pub fn noise(&self) -> f64 {
+        *self.noise.get_or_init(|| self.film().noise())
+    }
+
+    /// The last film brought up to date, as far as that worked.
+    fn newest_film(&self) -> (Film, Result<()>) {
+        let mut before = self.film_before.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut film = std::mem::take(&mut *before);
+        prepare_film(&mut film, &self.view);
+        let read = match &self.engine {
+            Engine::Cpu => Ok(()),
+            Engine::Gpu(renderer) => renderer.read_film(&mut film),
+        };
+        (film, read)
+    }
+
+    /// Whether a GPU is at work.
+    pub fn is_on_gpu(&self) -> bool {
+        matches!(self.engine, Engine::Gpu(_))
     }
 
     /// The film where a GPU keeps it, and that GPU; `None` on the CPU.
@@ -524,7 +539,7 @@ impl<'a> Session<'a> {
         let samples = self.samples;
         rule.samples.is_some_and(|limit| samples >= limit)
             || (samples > 0 && rule.seconds.is_some_and(|limit| self.elapsed_seconds() >= limit))
-            || (samples >= 16 && rule.noise.is_some_and(|limit| self.film().noise() <= limit))
+            || (samples >= 16 && rule.noise.is_some_and(|limit| self.noise() <= limit))
     }
 
     fn tracer<'b>(&'b self, counts: Option<&'b LearningGrid>) -> PathTracer<'b> {
@@ -608,14 +623,12 @@ impl<'a> Session<'a> {
         if let Some(film) = self.film.take() {
             *film_before = film;
         }
-        let mut film = match &self.engine {
-            Engine::Cpu => std::mem::take(film_before),
-            Engine::Gpu(_) => Film::default(),
-        };
+        self.noise = OnceLock::new();
         let learning = self.learning.as_ref().filter(|learning| !learning.is_over);
         let counts = learning.map(|learning| &learning.grid);
         let samples = match &mut self.engine {
             Engine::Cpu => {
+                let mut film = std::mem::take(film_before);
                 prepare_film(&mut film, &self.view);
                 let tracer = self.tracer(counts);
                 let (samples, rays) =

@@ -53,7 +53,7 @@ impl Device {
             session.continue_on_cpu();
             return;
         };
-        if session.gpu_figures().is_some() {
+        if session.is_on_gpu() {
             return;
         }
         let placed = self.stage(&gpu, request).and_then(|stage| session.continue_on_gpu(stage));

@@ -539,7 +539,7 @@ impl<'a> Job<'a> {
             Point {
                 seconds: session.elapsed_seconds(),
                 samples: film.total_samples() as f64 / film.pixels().len().max(1) as f64,
-                noise: film.noise(),
+                noise: session.noise(),
                 error: self.request.reference.as_ref().and_then(|reference| {
                     metrics::relative_rms_error(&film.image(), &reference.image)
                 }),
@@ -563,7 +563,7 @@ impl<'a> Job<'a> {
             None => {
                 let start = Instant::now();
                 let film = Arc::new(session.film().clone());
-                let (noise, figures) = (film.noise(), session.figures());
+                let (noise, figures) = (session.noise(), session.figures());
                 let cost = in_place.as_ref().map_or(Duration::ZERO, |_| start.elapsed());
                 if let Some(of) = in_place {
                     let (at, gap) = (Instant::now(), gap_after(cost).max(READING_GAP));

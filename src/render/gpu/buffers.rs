@@ -151,9 +151,7 @@ impl Buffers {
             for piece in piece.chunks(PIECE_BYTES) {
                 self.write(name, offset, piece);
                 offset += piece.len() as u64;
-                // So that staging memory is given back.
-                self.gpu.queue.submit([]);
-                self.gpu.wait_for(None)?;
+                self.finish_copies()?;
             }
         }
         Ok(())
@@ -185,8 +183,7 @@ impl Buffers {
         self.write_rows(texture, row, row_bytes, &waiting).map(|_| ())
     }
 
-    /// Writes whole rows and waits for the copy, so that staging memory is given back; returns how
-    /// many rows they were.
+    /// Writes whole rows and waits for the copy; returns how many they were.
     fn write_rows(
         &self,
         texture: &wgpu::Texture,
@@ -210,9 +207,14 @@ impl Buffers {
             },
             wgpu::Extent3d { width: 1 << self.width_log2, height: rows, depth_or_array_layers: 1 },
         );
-        self.gpu.queue.submit([]);
-        self.gpu.wait_for(None)?;
+        self.finish_copies()?;
         Ok(rows)
+    }
+
+    /// Waits for what was written, so that staging memory is given back.
+    fn finish_copies(&self) -> Result<()> {
+        self.gpu.queue.submit([]);
+        self.gpu.wait_for(None)
     }
 
     fn create_array(&self, kind: ArrayKind, rows: u32) -> wgpu::Texture {
@@ -261,34 +263,18 @@ impl Buffers {
         parts: &[(&str, u64, u64)],
         take: impl FnOnce(&[&[u8]]) -> R,
     ) -> Result<R> {
-        let failed = |e: &dyn std::fmt::Display| {
-            Error::new(format!("{}: results cannot be read back: {e}", self.gpu.facts().name))
-        };
         self.gpu.check()?;
         let bytes = parts.iter().map(|(.., bytes)| bytes).sum();
         let staging = self.staging(bytes);
         let mut commands = self.gpu.device.create_command_encoder(&Default::default());
         let mut at = 0;
         for &(name, offset, bytes) in parts {
-            let source = self.get(name).ok_or_else(|| failed(&"no such buffer"))?;
+            let missing = || Error::new(format!("there is no buffer {name} to be read back"));
+            let source = self.get(name).ok_or_else(missing)?;
             commands.copy_buffer_to_buffer(source, offset, &staging, at, bytes);
             at += bytes;
         }
-        let submission = self.gpu.queue.submit([commands.finish()]);
-        let (sender, receiver) = std::sync::mpsc::channel();
-        staging.map_async(wgpu::MapMode::Read, ..bytes, move |result| {
-            // Nobody listens any more if waiting has failed.
-            let _ = sender.send(result);
-        });
-        self.gpu.wait_for(Some(submission))?;
-        match receiver.recv() {
-            Ok(Ok(())) => {}
-            Ok(Err(e)) => return Err(failed(&e)),
-            Err(e) => return Err(failed(&e)),
-        }
-        let taken = {
-            let view = staging.get_mapped_range(..bytes).map_err(|e| failed(&e))?;
-            let mut rest = &view[..];
+        let taken = self.gpu.read_staged(&staging, bytes, commands, |mut rest| {
             let slices: Vec<&[u8]> = parts
                 .iter()
                 .map(|(.., bytes)| {
@@ -298,8 +284,7 @@ impl Buffers {
                 })
                 .collect();
             take(&slices)
-        };
-        staging.unmap();
+        })?;
         self.bytes_read.fetch_add(bytes, Ordering::Relaxed);
         *self.staging.lock().unwrap_or_else(PoisonError::into_inner) = Some(staging);
         Ok(taken)
@@ -308,14 +293,7 @@ impl Buffers {
     /// A buffer the host can read, kept from one reading to the next. It is made anew after a failure.
     fn staging(&self, bytes: u64) -> Buffer {
         let kept = self.staging.lock().unwrap_or_else(PoisonError::into_inner).take();
-        kept.filter(|staging| staging.size() >= bytes).unwrap_or_else(|| {
-            self.gpu.device.create_buffer(&BufferDescriptor {
-                label: Some("staging"),
-                size: bytes,
-                usage: BufferUsages::MAP_READ | BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        })
+        kept.filter(|kept| kept.size() >= bytes).unwrap_or_else(|| self.gpu.staging(bytes))
     }
 
     /// Bytes read back so far.

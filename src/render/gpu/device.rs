@@ -1,9 +1,7 @@
 //! Adapters: what there is, which one to take, and a connection to it.
 
 use std::collections::HashMap;
-use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use wgpu::wgt::WgpuHasDisplayHandle;
@@ -13,7 +11,6 @@ use wgpu::{PollType, SubmissionIndex, Surface};
 use super::pipeline::Pipeline;
 use super::queue::Schedule;
 use crate::error::{Error, Result};
-use crate::image::Rgb8;
 
 /// What an adapter is and how much it allows.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -173,9 +170,6 @@ impl DeviceChoice {
         }
     }
 }
-
-/// Time between two looks at whether the device has done its work.
-const LOOK_GAP: Duration = Duration::from_micros(100);
 
 /// What finds the surfaces that rays hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
@@ -409,87 +403,6 @@ impl Gpu {
             self.device.poll(PollType::Wait { submission_index: submission, timeout: None });
         self.check()?;
         waited.map(|_| ()).map_err(|e| Error::new(format!("{}: {e}", self.facts.name)))
-    }
-
-    /// Reads the first `bytes` bytes of a buffer back, once what was submitted has been done.
-    ///
-    /// # Errors
-    /// As [`Self::check`].
-    pub(crate) fn read_back(&self, source: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>> {
-        let mut commands = self.device.create_command_encoder(&Default::default());
-        let staging = self.staging(bytes);
-        commands.copy_buffer_to_buffer(source, 0, &staging, 0, bytes);
-        self.read_staged(&staging, commands)
-    }
-
-    /// Reads a texture of 8-bit levels back, without its opacity.
-    ///
-    /// # Errors
-    /// As [`Self::check`].
-    pub(crate) fn read_texture(&self, texture: &wgpu::Texture) -> Result<Rgb8> {
-        let (width, height) = (texture.width(), texture.height());
-        let bytes_per_row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let staging = self.staging(u64::from(bytes_per_row) * u64::from(height));
-        let mut commands = self.device.create_command_encoder(&Default::default());
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(bytes_per_row),
-            rows_per_image: None,
-        };
-        commands.copy_texture_to_buffer(
-            texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo { buffer: &staging, layout },
-            texture.size(),
-        );
-        let pixels = self
-            .read_staged(&staging, commands)?
-            .chunks_exact(bytes_per_row as usize)
-            .flat_map(|row| row[..4 * width as usize].chunks_exact(4).map(|p| [p[0], p[1], p[2]]))
-            .collect();
-        Ok(Rgb8 { width, height, pixels })
-    }
-
-    /// A buffer of so many bytes for [`Self::read_staged`].
-    pub(crate) fn staging(&self, bytes: u64) -> wgpu::Buffer {
-        self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("staging"),
-            size: bytes,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        })
-    }
-
-    /// What is in a staging buffer after `commands`, which are submitted.
-    ///
-    /// # Errors
-    /// As [`Self::check`].
-    pub(crate) fn read_staged(
-        &self,
-        staging: &wgpu::Buffer,
-        commands: wgpu::CommandEncoder,
-    ) -> Result<Vec<u8>> {
-        let failed = |e: &dyn std::fmt::Display| {
-            Error::new(format!("{}: results cannot be read back: {e}", self.facts.name))
-        };
-        self.queue.submit([commands.finish()]);
-        let (sender, receiver) = channel();
-        staging.map_async(wgpu::MapMode::Read, .., move |result| {
-            // The receiver waits below, unless the device has failed.
-            let _ = sender.send(result);
-        });
-        // While wgpu 30 waits, it holds a lock that presenting a frame takes too: so this looks now and
-        // then, for others may have long work under way.
-        let mapped = loop {
-            match receiver.recv_timeout(LOOK_GAP) {
-                Err(RecvTimeoutError::Timeout) => {
-                    let _ = self.device.poll(PollType::Poll);
-                    self.check()?;
-                }
-                other => break other,
-            }
-        };
-        mapped.map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
-        Ok(staging.get_mapped_range(..).map_err(|e| failed(&e))?.to_vec())
     }
 
     /// Gives the device up, as a driver reset would; for tests of what happens then.

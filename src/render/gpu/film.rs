@@ -136,9 +136,7 @@ impl Sums {
     fn write(&self, buffers: &Buffers, film: &Film) {
         for (piece, pixels) in film.pixels.chunks(PIECE_PIXELS).enumerate() {
             let at = (piece * PIECE_PIXELS) as u64 * PIXEL_BYTES;
-            let sums = pixels.iter().map(|pixel| times(pixel.sums(), self.factors()).map(split));
-            let (high, low): (Vec<_>, Vec<_>) =
-                sums.map(|sums| (sums.map(|sum| sum.0), sums.map(|sum| sum.1))).unzip();
+            let (high, low) = split(pixels.iter().map(|p| times(p.sums(), self.factors())));
             let counts: Vec<[u32; 4]> =
                 pixels.iter().map(|pixel| [pixel.samples(), pixel.invalid(), 0, 0]).collect();
             buffers.write(PIXELS[0], at, bytemuck::cast_slice(&high));
@@ -147,19 +145,17 @@ impl Sums {
         }
         for (piece, surfaces) in film.surfaces.chunks(PIECE_PIXELS).enumerate() {
             let at = (piece * PIECE_PIXELS) as u64 * SURFACE_BYTES;
-            let sums = surfaces.iter().map(|surface| surface.sums().map(split));
-            let (high, low): (Vec<_>, Vec<_>) =
-                sums.map(|sums| (sums.map(|sum| sum.0), sums.map(|sum| sum.1))).unzip();
+            let (high, low) = split(surfaces.iter().map(Surface::sums));
             buffers.write(SURFACES[0], at, bytemuck::cast_slice(&high));
             buffers.write(SURFACES[1], at, bytemuck::cast_slice(&low));
         }
     }
 }
 
-/// A sum as the device keeps it: rounded to f32, and what that leaves out.
-fn split(sum: f64) -> (f32, f32) {
-    let high = sum as f32;
-    (high, (sum - f64::from(high)) as f32)
+/// Sums as the device keeps them: rounded to f32, and what that leaves out.
+fn split<const N: usize>(sums: impl Iterator<Item = [f64; N]>) -> (Vec<[f32; N]>, Vec<[f32; N]>) {
+    let rest = |sum: f64| (sum - f64::from(sum as f32)) as f32;
+    sums.map(|sums| (sums.map(|sum| sum as f32), sums.map(rest))).unzip()
 }
 
 /// The two parts of a sum together; both f32 fit into an f64 with room to spare.
@@ -203,8 +199,8 @@ mod tests {
     #[test]
     fn a_sum_survives_being_split_to_2_to_the_minus_48() {
         for sum in [0.0, 1.0, 1e-30, 1e30, 0.1, 12_345.678_901_234, -3.3e7] {
-            let (high, low) = split(sum);
-            let [back] = joined([high], [low]);
+            let (high, low) = split(std::iter::once([sum]));
+            let [back] = joined(high[0], low[0]);
             assert!((back - sum).abs() <= sum.abs() * 2.0_f64.powi(-48), "{sum}: {back}");
         }
     }

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
+use super::GROUP;
 use super::device::Gpu;
 use super::pacer::{Pacer, TARGET_SECONDS, WINDOW_TARGET_SECONDS};
 use super::queue::REPORT_BYTES;
@@ -149,7 +150,7 @@ impl Flights {
             units: job.units,
             submitted,
             slot,
-            lanes: staging.map(|_| job.groups * 64),
+            lanes: staging.map(|_| job.groups * GROUP as u32),
         });
         Ok(())
     }
@@ -239,29 +240,19 @@ impl Clock {
             return None;
         }
         let seconds_per_tick = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
-        let buffer = |label, size, usage| {
-            let mapped_at_creation = false;
-            gpu.device.create_buffer(&BufferDescriptor {
-                label: Some(label),
-                size,
-                usage,
-                mapped_at_creation,
-            })
-        };
         Some(Self {
             queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("timestamps"),
                 ty: wgpu::QueryType::Timestamp,
                 count: 2 * MOST as u32,
             }),
-            resolved: buffer(
-                "timestamps",
-                SLOT_BYTES * MOST as u64,
-                BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC,
-            ),
-            staging: std::array::from_fn(|_| {
-                buffer("timestamps read", 16, BufferUsages::MAP_READ | BufferUsages::COPY_DST)
+            resolved: gpu.device.create_buffer(&BufferDescriptor {
+                label: Some("timestamps"),
+                size: SLOT_BYTES * MOST as u64,
+                usage: BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
             }),
+            staging: std::array::from_fn(|_| gpu.staging(16)),
             seconds_per_tick,
         })
     }

@@ -16,6 +16,7 @@ mod pacer;
 mod parity;
 mod pipeline;
 mod queue;
+mod read;
 #[cfg(test)]
 mod registers;
 pub(crate) mod shader;
@@ -308,8 +309,6 @@ impl Renderer {
         let stride = counts.map_or(0, |_| pass.stride);
         if self.progress.ahead != pass.target {
             self.forget_paths()?;
-        }
-        if self.progress.ahead != pass.target {
             // Tiles that are ahead of the others take less than those.
             let Progress { least, .. } = self.progress;
             let even = u64::from(least) * self.pixels_before(self.tiles());
