@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use glam::Vec3;
 
 use super::device;
+use super::interrupt::Interrupt;
 use super::progress::Progress;
 use super::values;
 use crate::alarm::Alarm;
@@ -17,6 +18,7 @@ use crate::error::{Error, Notices, Result};
 use crate::image::{check_writable, is_same_file};
 use crate::light_grid::LawOptions;
 use crate::medium::Fog;
+use crate::memory;
 use crate::output::laws::{check_laws_extension, write_laws};
 use crate::output::record::{self, Phases, Record};
 use crate::output::{self, Exposure, LayerName, PictureOptions};
@@ -25,7 +27,8 @@ use crate::render::filter::PixelFilter;
 use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
 use crate::render::{Crop, Sampling, Session, StopRule, View};
 use crate::sampler::Points;
-use crate::scene::{Camera, Medium, Projection, Scene, builtin};
+use crate::scene::{Camera, Medium, Projection, Scene, SceneOptions, builtin};
+use crate::terminal::notice;
 use crate::tone::{ToneCurve, WhiteBalance};
 
 /// Arguments of `render`.
@@ -33,12 +36,14 @@ use crate::tone::{ToneCurve, WhiteBalance};
 #[command(
     allow_negative_numbers = true,
     after_help = "Ctrl-C ends the work early, writes the pictures and counts as success; a second \
-                  one leaves at once with status 130."
+                  one, or one before there is a picture, leaves at once with status 130."
 )]
 pub(super) struct RenderArguments {
     /// A glTF file (.gltf, .glb) or a built-in scene.
     #[arg(default_value = builtin::DEFAULT_SCENE)]
     scene: String,
+    #[command(flatten)]
+    pub(super) of_scene: SceneOptions,
     /// The picture to write: .png or .exr; may be given twice.
     #[arg(short, long = "output", required = true, value_name = "FILE")]
     outputs: Vec<PathBuf>,
@@ -51,7 +56,7 @@ pub(super) struct RenderArguments {
     #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG", help_heading = "Environment")]
     env_rotation: f64,
     /// What the camera sees of the map: `map`, `blur:DEGREES`, or a colour R,G,B (linear radiance).
-    #[arg(long, value_parser = values::background, value_name = "WHAT", help_heading = "Environment")]
+    #[arg(long, value_parser = values::background, allow_hyphen_values = true, value_name = "WHAT", help_heading = "Environment")]
     background: Option<Background>,
     /// Multiplies the map's radiance.
     #[arg(long, default_value = "1", value_parser = values::not_negative, value_name = "X", help_heading = "Environment")]
@@ -59,10 +64,10 @@ pub(super) struct RenderArguments {
 
     /// Fog: scattering per metre, one number or R,G,B; 0.02 halves what is seen over 35 metres. In
     /// place of the scene's own fog; 0 clears the air.
-    #[arg(long, value_parser = values::coefficient, value_name = "S", help_heading = "Fog")]
+    #[arg(long, value_parser = values::coefficient, allow_hyphen_values = true, value_name = "S", help_heading = "Fog")]
     fog: Option<Vec3>,
     /// Absorption of the fog per metre, one number or R,G,B.
-    #[arg(long, value_parser = values::coefficient, value_name = "A", help_heading = "Fog")]
+    #[arg(long, value_parser = values::coefficient, allow_hyphen_values = true, value_name = "A", help_heading = "Fog")]
     fog_absorption: Option<Vec3>,
     /// Mean cosine of scattering, -1 to 1: 0 to all sides alike, mist and haze 0.6 to 0.9.
     #[arg(long, value_parser = values::mean_cosine, allow_hyphen_values = true, value_name = "G", help_heading = "Fog")]
@@ -91,10 +96,10 @@ pub(super) struct RenderArguments {
     focus: Option<f64>,
 
     /// Picture size in pixels.
-    #[arg(long, default_value = "1280x720", value_parser = values::size, value_name = "WxH", help_heading = "Picture")]
+    #[arg(long, default_value = "1280x720", value_parser = values::size, allow_hyphen_values = true, value_name = "WxH", help_heading = "Picture")]
     size: (u32, u32),
     /// Renders only this part of the picture: its left and top, width and height in pixels.
-    #[arg(long, value_parser = values::region, value_name = "X,Y,W,H", help_heading = "Picture")]
+    #[arg(long, value_parser = values::region, allow_hyphen_values = true, value_name = "X,Y,W,H", help_heading = "Picture")]
     region: Option<[u32; 4]>,
     /// Pixel filter.
     #[arg(long, default_value = "blackman-harris", value_enum, help_heading = "Picture")]
@@ -139,7 +144,7 @@ pub(super) struct RenderArguments {
     #[arg(long, help_heading = "Light")]
     no_russian_roulette: bool,
     /// Tiles of the map, columns x rows.
-    #[arg(long, default_value = "16x8", value_parser = tile_grid, value_name = "CxR", help_heading = "Light")]
+    #[arg(long, default_value = "16x8", value_parser = tile_grid, allow_hyphen_values = true, value_name = "CxR", help_heading = "Light")]
     tiles: (u32, u32),
     /// Light Grid cells around the horizon; half as many from top to bottom.
     #[arg(long, default_value = "64", value_parser = clap::value_parser!(u32).range(2..=512), value_name = "N", help_heading = "Light")]
@@ -168,6 +173,9 @@ pub(super) struct RenderArguments {
     /// Threads; 0 uses every core.
     #[arg(long, default_value = "0", value_parser = clap::value_parser!(u16).range(0..=1024), value_name = "N", help_heading = "Run")]
     threads: u16,
+    /// Leaves times out of what pictures say about themselves: equal pictures are equal files.
+    #[arg(long, help_heading = "Run")]
+    reproducible: bool,
     /// Writes the run's figures as JSON.
     #[arg(long, value_name = "FILE", help_heading = "Run")]
     json: Option<PathBuf>,
@@ -245,6 +253,7 @@ impl RenderArguments {
     ) -> Self {
         Self {
             scene: scene.to_owned(),
+            of_scene: SceneOptions::default(),
             outputs: vec![picture.to_owned()],
             env: map.to_owned(),
             env_rotation: 0.0,
@@ -284,17 +293,22 @@ impl RenderArguments {
             rays,
             schedule: None,
             threads: 0,
+            reproducible: false,
             json: None,
             laws: None,
         }
     }
 }
 
+/// Bytes of a pixel in the film and in what is made of it to be written; and with layers.
+const BYTES_OF_PIXEL: u64 = 72;
+const BYTES_WITH_LAYERS: u64 = 140;
+
 /// Loads, learns, renders, writes.
 pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     check_outputs(arguments)?;
     start_threads(arguments.threads)?;
-    let cancel = super::interrupt::flag("stopping after this pass and writing the picture");
+    let interrupt = Interrupt::watch("stopping after this pass and writing the picture");
     let progress = Progress::start("loading the scene and the map");
     // Side by side: a large scene and a large map take seconds each.
     let (world, light) = rayon::join(|| load_world(arguments), || load_environment(arguments));
@@ -306,9 +320,10 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     let mut notices = world.scene.notices.clone();
     notices.extend(&map_notices);
     let view = view(arguments, &world, &mut notices)?;
-    for sentence in notices.iter() {
-        eprintln!("notice: {sentence}");
-    }
+    let bytes = if view.layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
+    memory::check(u64::from(view.width) * u64::from(view.height) * bytes)
+        .map_err(|cause| Error::new(format!("a picture of this size {cause}")))?;
+    notices.iter().for_each(notice);
     let rule = stop_rule(arguments);
     let gpu = device::open(
         arguments.device,
@@ -318,16 +333,14 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     )?;
     let mut session =
         device::start(arguments.device, gpu.as_ref(), &world, &environment, view, &mut notices)?;
-    let outcome = work(&mut session, &rule, &cancel, &progress, arguments, &mut notices);
+    let outcome = work(&mut session, &rule, &interrupt, &progress, arguments, &mut notices);
     progress.finish();
     if session.samples() == 0 {
         outcome?;
         return Ok(());
     }
-    for sentence in output::remarks(session.film(), &environment) {
-        eprintln!("notice: {sentence}");
-        notices.add(sentence);
-    }
+    let remarks = output::remarks(session.film(), &environment);
+    remarks.iter().for_each(|sentence| notices.add(sentence));
 
     let record = Record {
         scene: &arguments.scene,
@@ -339,6 +352,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         gpu: session.gpu_figures(),
         phases: &phases,
         notices: &notices,
+        with_times: !arguments.reproducible,
         options: settings(arguments, session.view().fog(&world)),
     };
     let options = PictureOptions {
@@ -348,23 +362,40 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         white_balance: arguments.white.unwrap_or_default(),
         layers: arguments.layers.clone(),
     };
-    for picture in &arguments.outputs {
-        output::write_picture(picture, &options, &record)?;
-    }
+    // One that cannot be written must not take the others with it.
+    let mut failures: Vec<Error> = arguments
+        .outputs
+        .iter()
+        .filter_map(|path| write_or_rescue(path, &options, &record).err())
+        .collect();
     if let Some(path) = &arguments.json {
-        record::write_json(path, &record.to_json())?;
+        failures.extend(record::write_json(path, &record.to_json()).err());
     }
     if let Some(path) = &arguments.laws {
         let none = || Error::at(path, "not written: this map and sampling have no laws");
-        write_laws(path, session.grid().ok_or_else(none)?)?;
+        let written = session.grid().ok_or_else(none).and_then(|grid| write_laws(path, grid));
+        failures.extend(written.err());
     }
-    outcome
+    remarks.iter().for_each(notice);
+    failures.extend(outcome.err());
+    Error::all(failures)
+}
+
+/// Writes a picture where it was asked to be or, if that fails, into the temporary folder.
+fn write_or_rescue(path: &Path, options: &PictureOptions, record: &Record<'_>) -> Result<()> {
+    let Err(failure) = output::write_picture(path, options, record) else { return Ok(()) };
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let rescued = std::env::temp_dir().join(format!("lightgrid-{}-{name}", std::process::id()));
+    Err(match output::write_picture(&rescued, options, record) {
+        Ok(()) => Error::new(format!("{failure}; the picture is kept as {}", rescued.display())),
+        Err(_) => failure,
+    })
 }
 
 /// The scene made ready for rays, and the seconds of loading and of building.
 fn load_world(arguments: &RenderArguments) -> Result<(World, f64, f64)> {
     let start = Instant::now();
-    let scene = crate::sources::scene(&arguments.scene)?;
+    let scene = crate::sources::scene_with(&arguments.scene, &arguments.of_scene)?;
     let load_seconds = lap(start);
     let start = Instant::now();
     let world = World::new(scene);
@@ -520,17 +551,21 @@ fn camera(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> 
 fn work(
     session: &mut Session<'_>,
     rule: &StopRule,
-    cancel: &Arc<AtomicBool>,
+    interrupt: &Interrupt,
     progress: &Progress,
     arguments: &RenderArguments,
     notices: &mut Notices,
 ) -> Result<()> {
     let never = AtomicBool::new(false);
+    let cancel = interrupt.asked();
     let alarm = Alarm::start(Arc::clone(cancel));
     let seconds = rule.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
     alarm.set(seconds.and_then(|seconds| Instant::now().checked_add(seconds)));
     loop {
         progress.show(session, rule);
+        if session.samples() > 0 {
+            interrupt.keep();
+        }
         let stopped = cancel.load(Ordering::Relaxed);
         if stopped || session.has_learned_enough(rule) {
             session.finish_learning();
