@@ -4,11 +4,14 @@ use std::num::NonZeroU32;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use egui::ViewportId;
 use egui_wgpu::winit::Painter;
 use egui_wgpu::{RendererOptions, WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
 use winit::event::WindowEvent;
@@ -59,6 +62,7 @@ pub fn run(
         failure: None,
         loss: None,
         repaint_at: None,
+        asked: Arc::default(),
     };
     event_loop.run_app(&mut runner).map_err(|e| no_display(&e))?;
     runner.failure.map_or(Ok(runner.loss), Err)
@@ -75,6 +79,24 @@ struct Runner {
     /// Why it was closed.
     loss: Option<Error>,
     repaint_at: Option<Instant>,
+    /// Whether a signal asked for the end.
+    asked: Arc<AtomicBool>,
+}
+
+/// Lets Ctrl-C and requests to end close the window as a person would; a second one leaves at once.
+fn close_on_signals(asked: &Arc<AtomicBool>, proxy: EventLoopProxy<Repaint>) {
+    for signal in [SIGINT, SIGTERM] {
+        // Where signals cannot be caught they end the process, as ever.
+        let _ = flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(asked));
+        let _ = flag::register(signal, Arc::clone(asked));
+    }
+    let asked = Arc::clone(asked);
+    let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+        while !asked.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        let _ = proxy.send_event(Repaint { at: Instant::now() });
+    });
 }
 
 /// What there is once a window is open.
@@ -179,7 +201,7 @@ impl Runner {
             let size = running.window.inner_size().to_logical(running.window.scale_factor());
             settings.window_size = [size.width, size.height];
             if let Err(error) = settings.write(path) {
-                eprintln!("notice: {error}");
+                crate::terminal::notice(error);
             }
         }
         self.running = None;
@@ -257,6 +279,7 @@ impl ApplicationHandler<Repaint> for Runner {
         let Some(start) = self.start.take() else { return };
         match self.open(event_loop, start) {
             Ok(running) => {
+                close_on_signals(&self.asked, self.proxy.clone());
                 running.window.request_redraw();
                 self.running = Some(running);
             }
@@ -267,7 +290,10 @@ impl ApplicationHandler<Repaint> for Runner {
         }
     }
 
-    fn user_event(&mut self, _: &ActiveEventLoop, repaint: Repaint) {
+    fn user_event(&mut self, event_loop: &ActiveEventLoop, repaint: Repaint) {
+        if self.asked.load(Ordering::Relaxed) {
+            return self.close(event_loop);
+        }
         let at = self.repaint_at.map_or(repaint.at, |at| at.min(repaint.at));
         self.repaint_at = Some(at);
     }
