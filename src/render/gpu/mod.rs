@@ -583,7 +583,7 @@ mod tests {
     use crate::light_grid::cells::SphericalGrid;
     use crate::light_grid::{LawOptions, Recording};
     use crate::path::{Background, PathLimits, PathTracer};
-    use crate::render::{Sampling, cpu};
+    use crate::render::{Sampling, Sharing, cpu};
     use crate::sampler::{Points, Sequence};
     use crate::scene::builtin;
 
@@ -607,6 +607,7 @@ mod tests {
             seed: 5,
             points: Points::Sobol,
             grid_columns: 64,
+            sharing: Sharing::Off,
             learning_paths: 1 << 13,
             laws: recording,
             medium: None,
