@@ -137,7 +137,8 @@ impl Document {
             seed: self.light.seed,
             points: Points::Sobol,
             grid_columns: 64,
-            sharing: Sharing::Auto,
+            // What neighbours share, denoising cannot tell from light.
+            sharing: Sharing::Off,
             learning_paths: View::suitable_learning_paths(
                 self.light.sampling,
                 [width, height],

@@ -129,8 +129,9 @@ pub(super) struct RenderArguments {
     /// How the map is sampled.
     #[arg(long, default_value = "adaptive", value_enum, help_heading = "Light")]
     sampling: Sampling,
-    /// Whether neighbouring pixels share what their paths find behind the second vertex, and in what
-    /// tiles. `auto` is for adaptive sampling in clear air and pictures from 64x64.
+    /// Whether the pixels of a tile share what their paths find behind the second vertex: less noise at
+    /// each pixel, but coarser. `auto` is 8x8 for adaptive sampling in clear air from 64x64 pixels on
+    /// that are not denoised.
     #[arg(
         long,
         default_value = "auto",
@@ -426,6 +427,14 @@ fn stop_rule(arguments: &RenderArguments) -> StopRule {
     }
 }
 
+/// A picture to be denoised gains nothing from noise that neighbours share, which filters keep.
+fn sharing(arguments: &RenderArguments) -> Sharing {
+    match arguments.sharing {
+        Sharing::Auto if arguments.denoise.is_some() => Sharing::Off,
+        asked => asked,
+    }
+}
+
 fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Result<View> {
     let (width, height) = arguments.region.map_or(arguments.size, |[_, _, w, h]| (w, h));
     Ok(View {
@@ -441,7 +450,7 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
         seed: arguments.seed,
         points: Points::Sobol,
         grid_columns: arguments.grid,
-        sharing: arguments.sharing,
+        sharing: sharing(arguments),
         learning_paths: arguments.learning_paths.unwrap_or_else(|| {
             View::suitable_learning_paths(arguments.sampling, [width, height], arguments.spp)
         }),
@@ -584,7 +593,7 @@ fn settings(
     vec![
         ("fog", serde_json::json!(fog)),
         ("sampling", serde_json::json!(arguments.sampling)),
-        ("sharing", serde_json::json!(arguments.sharing)),
+        ("sharing", serde_json::json!(sharing(arguments))),
         ("table", serde_json::json!(arguments.table.to_string())),
         ("tiles", serde_json::json!(format!("{}x{}", arguments.tiles.0, arguments.tiles.1))),
         ("grid_columns", serde_json::json!(arguments.grid)),

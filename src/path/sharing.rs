@@ -11,6 +11,8 @@
 //! holds if it depends on x_k, the lobe, the segment and y alone whether a pair takes part, the same for
 //! all pixels; whatever does not goes on as a path of its own.
 
+use std::ops::Range;
+
 use glam::Vec3;
 
 use super::{Path, PathResult, PathTracer, Scatterer, SurfaceScatterer, Vertex};
@@ -32,8 +34,8 @@ pub struct SharedTile {
 }
 
 impl SharedTile {
-    /// One pixel in four keeps its own, which gets two estimates: most for the time.
-    pub const LARGE: Self = Self { side: 8, owner_side: 2, continuations: 2, map_samples: 3 };
+    /// One pixel in four keeps its own, which gets four estimates: most for the time.
+    pub const LARGE: Self = Self { side: 8, owner_side: 2, continuations: 4, map_samples: 3 };
     /// All keep their own: less noise is shared.
     pub const SMALL: Self = Self { side: 4, owner_side: 1, continuations: 1, map_samples: 3 };
 
@@ -55,19 +57,19 @@ pub struct Start<'a> {
     pub tracer: &'a PathTracer<'a>,
 }
 
-/// Least GGX alpha of a second vertex that is shared: narrower reflections are not seen alike from two
-/// pixels.
+/// Least GGX alpha of a vertex that takes part: narrower reflections are not seen alike from two pixels.
 const LEAST_ALPHA: f32 = 0.01;
-/// Below this GGX alpha a first vertex looks elsewhere than its neighbours, and its pixel keeps its own
-/// second vertex always.
-const OWN_ALPHA: f32 = 0.09;
+
+/// Keeps the places of tiles apart from other random numbers.
+const TILE_SEED: u32 = 0x7469_6c65;
+/// Pairs of random numbers between those of two estimates behind one vertex: more than any takes.
+const PAIRS_OF_ESTIMATE: u32 = 1 << 24;
 
 /// A first vertex that other pixels' second vertices are connected with.
 struct First<'v> {
     position: Vec3,
     surface: SurfaceScatterer<'v>,
     throughput: Vec3,
-    keeps_own: f32,
 }
 
 /// A second vertex that is shared.
@@ -102,27 +104,25 @@ pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Ve
     let mut results = Vec::with_capacity(starts.len());
     for (owner, (start, [first_bsdf, second_bsdf])) in starts.iter().zip(&mut bsdfs).enumerate() {
         let mut path = Path::new(start.tracer, start.ray, start.sampler.clone());
-        path.map_samples = tile.map_samples;
         let mut first = None;
         if let Some(vertex) = path.next_vertex(first_bsdf) {
+            let shares = path.body.interior.is_none() && vertex.scatterer.is_alike_nearby();
+            if shares {
+                path.map_samples = tile.map_samples;
+            }
             let throughput = path.throughput;
-            let is_in_air = path.body.interior.is_none();
-            let goes_on = path.visit(&vertex);
-            first = First::new(vertex, throughput, &tile).filter(|_| is_in_air);
-            if goes_on && let Some(vertex) = path.next_vertex(second_bsdf) {
-                match &first {
-                    Some(first) if path.shares(&vertex) => {
-                        if first.keeps_own >= 1.0 || tile.is_owner(start.place, seed) {
-                            seconds.push(Second { owner, vertex, path: path.clone() });
-                        }
+            if path.visit(&vertex)
+                && let Some(second) = path.next_vertex(second_bsdf)
+            {
+                if !(shares && path.is_found_alike(&second)) {
+                    if path.visit(&second) {
+                        path.run();
                     }
-                    _ => {
-                        if path.visit(&vertex) {
-                            path.run();
-                        }
-                    }
+                } else if tile.is_owner(start.place, seed) {
+                    seconds.push(Second { owner, vertex: second, path: path.clone() });
                 }
             }
+            first = First::new(vertex, throughput).filter(|_| shares);
         }
         results.push(path.result());
         firsts.push(first);
@@ -134,7 +134,55 @@ pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Ve
     results
 }
 
+/// How a picture is cut into tiles for one sample of its pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tiling {
+    /// Pixels along an edge of a tile.
+    pub side: u32,
+    /// Size of the picture.
+    pub size: [u32; 2],
+    /// Columns and rows of the first tile that are left of and above the picture.
+    pub before: [u32; 2],
+    seed: u32,
+}
+
+impl Tiling {
+    /// Number of tiles.
+    pub(crate) fn count(&self) -> u64 {
+        let [columns, rows] = self.tiles();
+        u64::from(columns) * u64::from(rows)
+    }
+
+    /// Seed of the choices in a tile; they are numbered row after row.
+    pub(crate) fn seed_of(&self, tile: u32) -> u32 {
+        hash(self.seed.wrapping_add(tile))
+    }
+
+    /// Pixels of the picture in these tiles.
+    pub(crate) fn pixels(&self, tiles: Range<u64>) -> u64 {
+        let [columns, rows] = self.tiles().map(u64::from);
+        let length = |axis: usize, index: u64| {
+            let (side, before) = (u64::from(self.side), u64::from(self.before[axis]));
+            let end = ((index + 1) * side - before).min(u64::from(self.size[axis]));
+            end - (index * side).saturating_sub(before)
+        };
+        let tiles = tiles.start..tiles.end.min(columns * rows);
+        tiles.map(|tile| length(0, tile % columns) * length(1, tile / columns)).sum()
+    }
+
+    fn tiles(&self) -> [u32; 2] {
+        [0, 1].map(|axis| (self.size[axis] + self.before[axis]).div_ceil(self.side))
+    }
+}
+
 impl SharedTile {
+    /// The tiles of sample `sample` of each pixel: elsewhere for each, so that no edge of a tile shows.
+    pub(crate) fn tiling(&self, size: [u32; 2], seed: u32, sample: u32) -> Tiling {
+        let seed = hash(seed ^ hash(sample ^ TILE_SEED));
+        let before = [seed, seed >> 16].map(|bits| bits % self.side);
+        Tiling { side: self.side, size, before, seed }
+    }
+
     /// Whether a pixel keeps its second vertex.
     fn is_owner(&self, [x, y]: [u32; 2], seed: u32) -> bool {
         let side = self.owner_side;
@@ -150,28 +198,29 @@ impl SharedTile {
 }
 
 impl<'v> First<'v> {
-    /// `None` if it cannot be connected.
-    fn new(vertex: Vertex<'v>, throughput: Vec3, tile: &SharedTile) -> Option<Self> {
+    /// `None` of a vertex in a medium.
+    fn new(vertex: Vertex<'v>, throughput: Vec3) -> Option<Self> {
         let Scatterer::Surface(surface) = vertex.scatterer else { return None };
-        if surface.transmits || surface.bsdf.is_delta_only() {
-            return None;
-        }
-        let broad = surface.bsdf.is_broad(OWN_ALPHA);
-        let keeps_own = if broad { tile.owner_probability() } else { 1.0 };
-        Some(Self { position: vertex.position, surface, throughput, keeps_own })
+        Some(Self { position: vertex.position, surface, throughput })
+    }
+}
+
+impl Scatterer<'_> {
+    /// Whether it scatters much the same to and from places side by side, all on one side.
+    fn is_alike_nearby(&self) -> bool {
+        let Self::Surface(surface) = self else { return false };
+        !surface.transmits && !surface.bsdf.is_delta_only() && surface.bsdf.is_broad(LEAST_ALPHA)
     }
 }
 
 impl Path<'_> {
     /// Whether the vertex that the path has arrived at is found by other pixels in the same way.
-    fn shares(&self, vertex: &Vertex<'_>) -> bool {
+    fn is_found_alike(&self, vertex: &Vertex<'_>) -> bool {
         let Scatterer::Surface(surface) = &vertex.scatterer else { return false };
         self.is_clear
             && self.departure.pdf_solid_angle.is_finite()
             && self.bounces < self.tracer.limits.bounces
-            && !surface.transmits
-            && !surface.bsdf.is_delta_only()
-            && surface.bsdf.is_broad(LEAST_ALPHA)
+            && vertex.scatterer.is_alike_nearby()
             && surface.is_true_from(-self.ray.direction)
     }
 }
@@ -210,12 +259,8 @@ impl Second<'_, '_> {
         results: &mut [PathResult],
     ) {
         let Scatterer::Surface(surface) = &self.vertex.scatterer else { return };
-        let keeps_own = firsts[self.owner].as_ref().map_or(1.0, |first| first.keeps_own);
-        let continuations = tile.continuations;
-        let (incident, delta) = self.path.incident(&self.vertex, surface, continuations);
-        let result = &mut results[self.owner];
-        result.rays += self.path.rays;
-        result.add(delta / keeps_own);
+        let incident = self.path.incident(&self.vertex, surface, tile.continuations);
+        results[self.owner].rays += self.path.rays;
         let outgoing = Outgoing::new(surface, incident);
 
         connections.clear();
@@ -242,7 +287,7 @@ impl Second<'_, '_> {
                 }
             }
             let area = cosine / squared;
-            density += first.keeps_own * pdf_solid_angle * area;
+            density += tile.owner_probability() * pdf_solid_angle * area;
             connections.push(Connection {
                 pixel,
                 direction: -direction,
@@ -296,16 +341,15 @@ impl<'v> Outgoing<'v> {
 }
 
 impl Path<'_> {
-    /// Estimates what arrives at the vertex, `times` times over; and what perfect reflections send back
-    /// along the path alone.
+    /// Estimates what arrives at the vertex, `times` times over. Its perfect reflections, which no other
+    /// pixel sees, are none.
     fn incident(
         &mut self,
         vertex: &Vertex<'_>,
         surface: &SurfaceScatterer<'_>,
         times: u32,
-    ) -> (Vec<Incident>, Vec3) {
+    ) -> Vec<Incident> {
         let share = 1.0 / times as f32;
-        let carried = self.throughput;
         let mut incident = Vec::with_capacity(3 * times as usize);
         let mut add = |direction: Vec3, light: Vec3| {
             let wi = surface.shading_frame.local_from_world(direction);
@@ -314,20 +358,19 @@ impl Path<'_> {
                 incident.push(Incident { wi, light });
             }
         };
-        let mut delta = Vec3::ZERO;
         self.bounces += 1;
         self.rays = 0;
+        self.throughput_before *= self.throughput.max_element();
+        self.throughput = Vec3::ONE;
         let arrived = self.clone();
-        for _ in 0..times {
-            let (sampler, rays) = (self.sampler.clone(), self.rays);
-            *self = Self { sampler, rays, ..arrived.clone() };
-            self.throughput = Vec3::ONE;
-            self.throughput_before *= carried.max_element();
+        for time in 0..times {
+            *self = Self { rays: self.rays, ..arrived.clone() };
+            self.sampler.skip(time * PAIRS_OF_ESTIMATE);
             self.for_arriving(vertex, |arriving| add(arriving.direction, arriving.light * share));
             if !self.scatter(vertex) {
                 continue;
             }
-            let pdf_solid_angle = self.departure.pdf_solid_angle;
+            let density = self.departure.pdf_solid_angle;
             let direction = self.ray.direction;
             let weight = self.throughput;
             let Some(survival) = self.survival() else { continue };
@@ -335,14 +378,9 @@ impl Path<'_> {
             self.throughput_before *= weight.max_element() / survival;
             self.radiance = Vec3::ZERO;
             self.run();
-            let light = self.radiance * (share / survival);
-            if pdf_solid_angle.is_finite() {
-                add(direction, light / pdf_solid_angle);
-            } else {
-                delta += carried * weight * light;
-            }
+            add(direction, self.radiance * (share / (survival * density)));
         }
-        (incident, delta)
+        incident
     }
 }
 

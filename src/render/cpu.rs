@@ -13,13 +13,10 @@ use crate::light_grid::counters::MAX_RECORDS_PER_PASS;
 use crate::path::PathTracer;
 use crate::path::camera::CameraRays;
 use crate::path::sharing::{SharedTile, Start, radiance_of_tile};
-use crate::sampler::{Sampler, hash};
+use crate::sampler::Sampler;
 
 /// Seed offset that keeps learning's random numbers apart from rendering's.
 const LEARNING_SEED: u32 = 0x6c65_6172;
-
-/// Keeps the places of tiles apart from other random numbers.
-const TILE_SEED: u32 = 0x7469_6c65;
 
 /// Learning paths one task traces between two looks at `cancel`.
 const PATHS_PER_TASK: u64 = 512;
@@ -100,14 +97,11 @@ pub(super) fn render(
     };
     let mut done = (0, 0);
     for sample in film.min_samples()..pass.target {
-        // Elsewhere for each sample, so that no edge of a tile shows.
-        let seed = hash(pass.sequence.seed(view.seed) ^ hash(sample ^ TILE_SEED));
-        let origin = [seed, seed >> 16].map(|bits| bits % tile.side);
-        let tiles = film.tiles(tile.side, tile.side, origin).into_par_iter();
-        let render = |(index, pixels)| {
-            let seed = hash(seed.wrapping_add(index as u32));
-            task.render_tile(tile, seed, sample, pixels)
-        };
+        let seed = pass.sequence.seed(view.seed);
+        let tiling = tile.tiling([film.width, film.height], seed, sample);
+        let tiles = film.tiles(tile.side, tile.side, tiling.before).into_par_iter();
+        let render =
+            |(index, pixels)| task.render_tile(tile, tiling.seed_of(index as u32), sample, pixels);
         done = add(done, tiles.enumerate().map(render).reduce(|| (0, 0), add));
     }
     done
