@@ -41,32 +41,57 @@ pub(super) fn patch(mut bytes: Vec<u8>) -> Option<Patched> {
     Some(Patched { bytes, sampling: sampling? })
 }
 
+/// Sorts the attributes of the first part, which the crate writes in an order of chance, so that equal
+/// pictures are equal files. `start` is the file up to some byte after the header.
+pub(super) fn sort_attributes(start: &mut [u8]) -> Option<()> {
+    let attributes = attributes(start)?.into_iter().next()?;
+    let (first, last) = (attributes.first()?.whole.start, attributes.last()?.whole.end);
+    let mut sorted: Vec<&[u8]> = attributes.iter().map(|it| &start[it.whole.clone()]).collect();
+    sorted.sort_unstable();
+    let sorted = sorted.concat();
+    start[first..last].copy_from_slice(&sorted);
+    Some(())
+}
+
 /// Where the lists of channels of all parts are.
 fn channel_lists(bytes: &[u8]) -> Option<Vec<Range<usize>>> {
+    let all = attributes(bytes)?.into_iter().flatten();
+    Some(all.filter(|it| it.is_channel_list).map(|it| it.value).collect())
+}
+
+/// Where an attribute of a header is.
+struct Attribute {
+    whole: Range<usize>,
+    value: Range<usize>,
+    is_channel_list: bool,
+}
+
+/// The attributes of all parts.
+fn attributes(bytes: &[u8]) -> Option<Vec<Vec<Attribute>>> {
     let is_multipart = bytes.get(5)? & 0x10 != 0;
     let text = |at: usize| {
         let length = bytes.get(at..)?.iter().take(256).position(|&byte| byte == 0)?;
         Some(&bytes[at..at + length])
     };
-    let (mut at, mut lists) = (8, Vec::new());
+    let (mut at, mut parts) = (8, Vec::new());
     loop {
-        let mut is_empty = true;
-        // The attributes of a part, up to an empty name.
+        let mut part = Vec::new();
+        // Up to an empty name.
         while !text(at)?.is_empty() {
-            is_empty = false;
+            let start = at;
             at += text(at)?.len() + 1;
-            let is_list = text(at)? == b"chlist";
+            let is_channel_list = text(at)? == b"chlist";
             at += text(at)?.len() + 1;
             let size = u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?) as usize;
-            at += 4;
-            if is_list {
-                lists.push(at..at.checked_add(size).filter(|end| *end <= bytes.len())?);
-            }
-            at = at.checked_add(size)?;
+            let value = at + 4..at.checked_add(4 + size).filter(|end| *end <= bytes.len())?;
+            at = value.end;
+            part.push(Attribute { whole: start..at, value, is_channel_list });
         }
         at += 1;
-        if is_empty || !is_multipart {
-            return Some(lists);
+        let is_last = part.is_empty() || !is_multipart;
+        parts.push(part);
+        if is_last {
+            return Some(parts);
         }
     }
 }

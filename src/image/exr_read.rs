@@ -135,6 +135,9 @@ fn decode<R: Read + Seek>(
             .collect::<Decoded<_>>()?;
         blocks.iter().for_each(|block| placement.copy(block, &mut image));
     }
+    if block_decoder.sampling.is_some() {
+        block_decoder.hold(&mut image);
+    }
     Ok(Exr { image, notices, is_cube_map: is_cube_map(&header) })
 }
 
@@ -322,12 +325,14 @@ impl BlockDecoder {
                 }
             }
             let Vec2(x, y) = block.index.pixel_position;
-            Ok(self.finish([x, y], width, pixels))
+            self.convert(&mut pixels);
+            Ok(Block { x, y, width, pixels })
         })
         .unwrap_or_else(|| Err("is damaged: its decoder failed".into()))
     }
 
-    /// Lines hold only the channels that have samples in them; each sample is held until the next.
+    /// Pixels as they are stored, NaN where there is no sample: lines hold only the channels that have some
+    /// in them.
     fn decode_subsampled(
         &self,
         chunk: Chunk,
@@ -388,14 +393,9 @@ impl BlockDecoder {
             let block = UncompressedBlock::decompress_chunk(chunk, &meta, false);
             block.map_err(|e| decode_cause(&e))?.data
         };
-        let mut pixels = vec![[0.0; 3]; width * height];
+        let mut pixels = vec![[f32::NAN; 3]; width * height];
         let mut rest = data.as_slice();
-        for row in 0..height {
-            let (done, todo) = pixels.split_at_mut(row * width);
-            let line = &mut todo[..width];
-            if row > 0 {
-                line.copy_from_slice(&done[(row - 1) * width..]);
-            }
+        for (row, line) in pixels.chunks_exact_mut(width).enumerate() {
             for &(channel, step, bytes) in
                 lines.iter().filter(|(_, step, _)| has_samples(row, *step))
             {
@@ -411,11 +411,26 @@ impl BlockDecoder {
         let at = |axis: fn(Vec2<i32>) -> i32| {
             usize::try_from(axis(place.position)).map_err(|_| damaged())
         };
-        Ok(self.finish([at(|v| v.0)?, at(|v| v.1)?], width, pixels))
+        Ok(Block { x: at(|v| v.0)?, y: at(|v| v.1)?, width, pixels })
+    }
+
+    /// Makes a picture of blocks with channels of lower resolution: samples are held from line to line,
+    /// across blocks.
+    fn hold(&self, image: &mut Image) {
+        let width = image.width as usize;
+        for at in width..image.pixels.len() {
+            let above = image.pixels[at - width];
+            for (value, above) in image.pixels[at].iter_mut().zip(above) {
+                if value.is_nan() {
+                    *value = above;
+                }
+            }
+        }
+        self.convert(&mut image.pixels);
     }
 
     /// Makes linear Rec.709 of what was stored.
-    fn finish(&self, [x, y]: [usize; 2], width: usize, mut pixels: Vec<[f32; 3]>) -> Block {
+    fn convert(&self, pixels: &mut [[f32; 3]]) {
         match self.channels {
             Channels::Rgb(_) => {}
             Channels::Grey(_) => pixels.iter_mut().for_each(|p| *p = [p[0]; 3]),
@@ -424,7 +439,6 @@ impl BlockDecoder {
         if let Some(matrix) = self.to_rec709 {
             pixels.iter_mut().for_each(|p| *p = (matrix * Vec3::from(*p)).to_array());
         }
-        Block { x, y, width, pixels }
     }
 }
 

@@ -289,7 +289,13 @@ mod signals {
 
     fn send(child: &std::process::Child, signal: &str) {
         let id = child.id().to_string();
-        assert!(std::process::Command::new("kill").args([signal, &id]).status().unwrap().success());
+        assert!(
+            std::process::Command::new("kill")
+                .args([signal, &id])
+                .status()
+                .expect("kill is there")
+                .success()
+        );
     }
 
     #[test]

@@ -56,7 +56,7 @@ const MALFORMED: &[(&str, &str)] = &[
     ("gltf/glb/truncated_chunk_data.glb", "promises 48 bytes and there are 47"),
     ("gltf/glb/zero_length.glb", "0 bytes, too few"),
     ("gltf/image/invalid_image_data.gltf", "no triangles"),
-    ("gltf/mesh_data/index_buffer_oob.gltf", "`index_buffer_oob.bin`: there is no such file"),
+    ("gltf/mesh_data/index_buffer_oob.gltf", "no triangles"),
     ("gltf/node/node_loop.gltf", "form a loop"),
     ("gltf-assimp/IndexOutOfRange/IndexOutOfRange.gltf", "index 255 is beyond its 24 vertices"),
     ("gltf-assimp/MissingBin/BoxTextured.gltf", "`BoxTextured0.bin`: there is no such file"),

@@ -3,9 +3,7 @@
 use std::borrow::Cow;
 use std::fmt;
 
-use serde::de::{
-    DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor,
-};
+use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::Value;
 
 use super::Fallible;
@@ -40,7 +38,7 @@ const INDICES: &[&str] = &[
 /// Nothing is kept of the text.
 pub(super) fn check_indices(text: &[u8]) -> Fallible<()> {
     let mut reader = serde_json::Deserializer::from_slice(text);
-    Check { is_index: false }
+    Check { is_index: false, of_objects: false }
         .deserialize(&mut reader)
         .and_then(|()| reader.end())
         .map_err(|cause| format!("it is neither GLB nor valid glTF JSON ({cause})"))
@@ -50,6 +48,8 @@ pub(super) fn check_indices(text: &[u8]) -> Fallible<()> {
 #[derive(Clone, Copy)]
 struct Check {
     is_index: bool,
+    /// The same for the values of objects in it, whatever their keys.
+    of_objects: bool,
 }
 
 impl<'de> DeserializeSeed<'de> for Check {
@@ -107,9 +107,9 @@ impl<'de> Visitor<'de> for Check {
             if key == "extras" {
                 object.next_value::<IgnoredAny>()?;
             } else {
-                // Of attributes and morph targets, whatever they are called.
-                let is_index = self.is_index || INDICES.contains(&&*key);
-                object.next_value_seed(Self { is_index }).map_err(A::Error::custom)?;
+                let is_index = self.of_objects || INDICES.contains(&&*key);
+                let of_objects = matches!(&*key, "attributes" | "targets");
+                object.next_value_seed(Self { is_index, of_objects })?;
             }
         }
         Ok(())

@@ -64,7 +64,7 @@ impl Packed {
     /// Unpacks the bytes.
     pub(super) fn unpacked(&self, bytes: &[u8]) -> Fallible<Vec<u8>> {
         let (count, stride) = (self.count, self.byte_stride);
-        let total = count.checked_mul(stride as u64).unwrap_or(u64::MAX);
+        let total = count.saturating_mul(stride as u64);
         let is_sound = match self.mode {
             Mode::Attributes => stride.is_multiple_of(4) && (4..=256).contains(&stride),
             Mode::Triangles => matches!(stride, 2 | 4) && count.is_multiple_of(3),

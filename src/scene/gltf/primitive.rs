@@ -51,9 +51,9 @@ impl<'a> Source<'a> {
     }
 
     /// An attribute, which must be as long as the positions.
-    fn attribute(&self, semantic: Semantic, types: &[Type]) -> Fallible<Option<Elements<'a>>> {
+    fn attribute(&self, semantic: &Semantic, types: &[Type]) -> Fallible<Option<Elements<'a>>> {
         match self.primitive.attributes.get(&Checked::Valid(semantic.clone())) {
-            Some(&accessor) => open(self.file, self.draco.as_ref(), &semantic, accessor, types)
+            Some(&accessor) => open(self.file, self.draco.as_ref(), semantic, accessor, types)
                 .and_then(|elements| self.per_vertex(accessor, elements))
                 .map(Some),
             None => Ok(None),
@@ -128,7 +128,7 @@ impl<'a> Source<'a> {
         part: &mut Part,
         tally: &mut Tally,
     ) -> Fallible<()> {
-        let Some(elements) = self.attribute(Semantic::Normals, &[Type::Vec3])? else {
+        let Some(elements) = self.attribute(&Semantic::Normals, &[Type::Vec3])? else {
             return Ok(());
         };
         for &vertex in vertices {
@@ -141,7 +141,7 @@ impl<'a> Source<'a> {
 
     /// A set of texture coordinates; empty if there is none.
     pub(super) fn uvs(&self, vertices: &[u32], set: u32, tally: &mut Tally) -> Fallible<Vec<Vec2>> {
-        let Some(elements) = self.attribute(Semantic::TexCoords(set), &[Type::Vec2])? else {
+        let Some(elements) = self.attribute(&Semantic::TexCoords(set), &[Type::Vec2])? else {
             return Ok(Vec::new());
         };
         let read = |&vertex: &u32| {
@@ -155,7 +155,7 @@ impl<'a> Source<'a> {
     /// Linear colours with alpha; empty if there are none.
     pub(super) fn colors(&self, vertices: &[u32], tally: &mut Tally) -> Fallible<Vec<Vec4>> {
         let types = [Type::Vec3, Type::Vec4];
-        let Some(elements) = self.attribute(Semantic::Colors(0), &types)? else {
+        let Some(elements) = self.attribute(&Semantic::Colors(0), &types)? else {
             return Ok(Vec::new());
         };
         let elements = elements.with_fractions();
@@ -172,7 +172,7 @@ impl<'a> Source<'a> {
 
     /// Tangents of the file; without normals they mean nothing (section 3.7.2.1).
     pub(super) fn tangents(&self, vertices: &[u32], part: &mut Part) -> Fallible<()> {
-        let elements = self.attribute(Semantic::Tangents, &[Type::Vec4])?;
+        let elements = self.attribute(&Semantic::Tangents, &[Type::Vec4])?;
         if let Some(elements) = elements.filter(|_| !part.normals.is_empty()) {
             let tangents = vertices.iter().map(|&vertex| {
                 let tangent = Vec4::from_array(elements.floats(vertex as usize));
@@ -190,8 +190,8 @@ impl<'a> Source<'a> {
     pub(super) fn influences(&self, vertices: &[u32], part: &mut Part) -> Fallible<()> {
         let mut sets = Vec::new();
         for set in 0.. {
-            let joints = self.attribute(Semantic::Joints(set), &[Type::Vec4])?;
-            let weights = self.attribute(Semantic::Weights(set), &[Type::Vec4])?;
+            let joints = self.attribute(&Semantic::Joints(set), &[Type::Vec4])?;
+            let weights = self.attribute(&Semantic::Weights(set), &[Type::Vec4])?;
             let (Some(joints), Some(weights)) = (joints, weights) else { break };
             if !joints.is_unsigned() {
                 return Err("its joints are not unsigned integers".into());
