@@ -263,3 +263,43 @@ fn dark_pixels_of_a_flat_hdr_are_no_runs() {
     assert_eq!(picture.at(1, 1), [2.0_f32.powi(130 - 136); 3]);
     assert_eq!(picture.at(3, 0)[0], 200.0 * 2.0_f32.powi(129 - 136));
 }
+
+/// Two triangles of four points, packed plainly: the sequential method, indices and values uncompressed.
+#[test]
+fn meshes_packed_by_draco_are_unpacked() {
+    let corners: [[f32; 3]; 4] = [[0.0; 3], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [0.0, 1.0, 0.5]];
+    let mut bytes = b"DRACO\x02\x02\x01\x00\x00\x00".to_vec();
+    // Faces, points, that indices are plain, and they.
+    bytes.extend([2, 4, 1, 0, 1, 2, 0, 2, 3]);
+    // One decoder of one attribute: positions of three floats, its number, and that values are plain.
+    bytes.extend([1, 1, 0, 9, 3, 0, 7, 0]);
+    bytes.extend(corners.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+    let file = |bytes: &[u8], number: u32| {
+        let data: String = bytes.iter().map(|byte| format!("%{byte:02x}")).collect();
+        let length = bytes.len();
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"extensionsRequired":["KHR_draco_mesh_compression"],
+            "nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,
+            "extensions":{{"KHR_draco_mesh_compression":{{"bufferView":0,
+            "attributes":{{"POSITION":{number}}}}}}}}}]}}],"accessors":[{{"componentType":5126,"count":4,
+            "type":"VEC3"}},{{"componentType":5121,"count":6,"type":"SCALAR"}}],
+            "bufferViews":[{{"buffer":0,"byteLength":{length}}}],
+            "buffers":[{{"uri":"data:,{data}","byteLength":{length}}}]}}"#
+        )
+    };
+    let plain = SceneOptions::default();
+    let scene = load(&file(&bytes, 7), &plain).expect("a scene");
+    let found: Vec<[[f32; 3]; 3]> =
+        scene.triangles.iter().map(|t| t.map(|v| scene.positions[v as usize].to_array())).collect();
+    let expected = [[0, 1, 2], [0, 2, 3]].map(|t: [usize; 3]| t.map(|v| corners[v]));
+    assert_eq!(found, expected);
+    let says = load(&file(&bytes, 8), &plain).unwrap_err();
+    assert!(says.contains("POSITION is not among its Draco data"), "{says}");
+    // Damage is a sentence or another mesh, never a crash.
+    for at in 0..bytes.len() {
+        assert!(load(&file(&bytes[..at], 7), &plain).is_err(), "cut at {at}");
+        let mut spoilt = bytes.clone();
+        spoilt[at] ^= 0x3c;
+        let _ = load(&file(&spoilt, 7), &plain);
+    }
+}
