@@ -41,7 +41,10 @@ pub(super) fn check_indices(text: &[u8]) -> Fallible<()> {
     Check { is_index: false, of_objects: false }
         .deserialize(&mut reader)
         .and_then(|()| reader.end())
-        .map_err(|cause| format!("it is neither GLB nor valid glTF JSON ({cause})"))
+        .map_err(|cause| match cause.is_data() {
+            true => cause.to_string(),
+            false => format!("it is neither GLB nor valid glTF JSON ({cause})"),
+        })
 }
 
 /// Looks at a value: are the numbers in it indices?
