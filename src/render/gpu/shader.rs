@@ -899,7 +899,8 @@ mod tests {
             let kind = typifier.get(right, &module.types).scalar_kind();
             let is_integer = kind != Some(ScalarKind::Float);
             let divides = matches!(op, BinaryOperator::Divide | BinaryOperator::Modulo);
-            let by_constant = matches!(function.expressions[right], Expression::Literal(_));
+            let divisor = &function.expressions[right];
+            let by_constant = matches!(divisor, Expression::Literal(_) | Expression::Constant(_));
             if divides && is_integer && !by_constant {
                 let text =
                     &source[function.expressions.get_span(handle).to_range().unwrap_or(0..0)];
