@@ -121,10 +121,12 @@ const fn control(key: Key) -> KeyboardShortcut {
     KeyboardShortcut::new(Modifiers::COMMAND, key)
 }
 
-/// Takes the shortcuts pressed in this frame, unless somebody is typing.
-pub fn pressed(context: &egui::Context) -> Vec<Command> {
-    if context.text_edit_focused() {
-        return Vec::new();
+/// Takes the shortcuts pressed in this frame; while somebody types or answers a question, it is only the
+/// one that leaves.
+pub fn pressed(context: &egui::Context, is_modal: bool) -> Vec<Command> {
+    if is_modal || context.text_edit_focused() {
+        let leaves = context.input_mut(|input| input.consume_shortcut(&control(Key::Q)));
+        return if leaves { vec![Command::Quit] } else { Vec::new() };
     }
     context.input_mut(|input| {
         let mut commands: Vec<Command> = SHORTCUTS

@@ -3,6 +3,7 @@
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
 
+use super::drag::Drag;
 use super::overlays::Overlay;
 
 /// State of the window that is not the picture's.
@@ -38,6 +39,8 @@ pub struct Interface {
     pub is_frozen: bool,
     /// Whether the next drag marks the part that is to be rendered.
     pub is_marking: bool,
+    /// The drag over the picture under way.
+    pub drag: Option<Drag>,
     /// Whether rendering is halted.
     pub paused: bool,
     /// Counts restarts by hand.
@@ -121,6 +124,7 @@ impl Default for Interface {
             wipe: 0.5,
             is_frozen: false,
             is_marking: false,
+            drag: None,
             paused: false,
             run: 0,
             viewport_pixels: None,

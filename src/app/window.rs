@@ -18,15 +18,26 @@ use winit::event_loop::{
 use winit::window::{Window, WindowId};
 
 use super::screen::{Screen, TextureCopies};
-use super::{App, Start, theme};
+use super::{App, Start, Wake, Wakes, theme};
 use crate::error::{Error, Result};
 use crate::render::gpu::Gpu;
 
-/// Asks for a frame, at once or later.
+/// What other threads ask the event loop for.
 #[derive(Debug, Clone, Copy)]
-struct Repaint {
-    at: Instant,
+enum Call {
+    /// A frame, at once or later.
+    Repaint(Instant),
+    /// A frame with what is new, when it can be afforded.
+    Draw,
+    /// To hand on what the worker has.
+    Relay,
 }
+
+/// Where software draws, it rests so many times as long as a frame took before it draws again what is
+/// new: frames take the renderer's time.
+const REST: u32 = 19;
+/// But it rests no longer than this.
+const LONGEST_REST: Duration = Duration::from_millis(900);
 
 /// Losses of a device sooner after one another than this belong together.
 const LOSS_GAP: Duration = Duration::from_secs(10);
@@ -49,7 +60,7 @@ pub fn run(
         let cause = text.rsplit_once(": ").map_or(&*text, |(_, cause)| cause);
         Error::new(format!("no window can be opened: {cause}"))
     };
-    let event_loop = EventLoop::<Repaint>::with_user_event().build().map_err(|e| no_display(&e))?;
+    let event_loop = EventLoop::<Call>::with_user_event().build().map_err(|e| no_display(&e))?;
     let mut runner = Runner {
         proxy: event_loop.create_proxy(),
         start: Some(start),
@@ -65,7 +76,7 @@ pub fn run(
 }
 
 struct Runner {
-    proxy: EventLoopProxy<Repaint>,
+    proxy: EventLoopProxy<Call>,
     start: Option<Start>,
     notices: Vec<String>,
     settings_path: Option<PathBuf>,
@@ -89,6 +100,8 @@ struct Running {
     copies: TextureCopies,
     /// When a device was lost last, and how many were in a row.
     lost: Option<(Instant, u32)>,
+    /// When the next frame of what is new can be afforded.
+    rested_at: Instant,
     app: App,
     title: String,
 }
@@ -140,7 +153,7 @@ impl Runner {
         let proxy = self.proxy.clone();
         context.set_request_repaint_callback(move |info| {
             // The event loop may have ended meanwhile.
-            let _ = proxy.send_event(Repaint { at: Instant::now() + info.delay });
+            let _ = proxy.send_event(Call::Repaint(Instant::now() + info.delay));
         });
         let display = event_loop.owned_display_handle();
         let adapter = start.adapter.clone();
@@ -155,9 +168,15 @@ impl Runner {
             None,
             Some(screen.gpu().limits.max_texture_dimension_2d as usize),
         );
-        let waking = context.clone();
-        let wake = Arc::new(move || waking.request_repaint());
-        let mut app = App::new(start, screen, &context, wake)?;
+        let wake = |call: Call| -> Wake {
+            let proxy = self.proxy.clone();
+            Arc::new(move || {
+                // The event loop may have ended meanwhile.
+                let _ = proxy.send_event(call);
+            })
+        };
+        let wakes = Wakes { draw: wake(Call::Draw), relay: wake(Call::Relay) };
+        let mut app = App::new(start, screen, &context, wakes)?;
         self.notices.drain(..).for_each(|sentence| app.say(sentence));
         Ok(Running {
             window,
@@ -168,12 +187,17 @@ impl Runner {
             painter: Some(painter),
             copies,
             lost: None,
+            rested_at: Instant::now(),
             app,
             title: String::new(),
         })
     }
 
     fn close(&mut self, event_loop: &ActiveEventLoop) {
+        if let Some(running) = &self.running {
+            // A GPU that is being made ready cannot be stopped; nobody has to look at that.
+            running.window.set_visible(false);
+        }
         if let (Some(running), Some(path)) = (&self.running, &self.settings_path) {
             let mut settings = running.app.settings();
             let size = running.window.inner_size().to_logical(running.window.scale_factor());
@@ -193,6 +217,7 @@ impl Running {
     /// # Errors
     /// If there is no other.
     fn draw(&mut self) -> Result<()> {
+        let start = Instant::now();
         if let Err(loss) = self.app.screen().gpu().check() {
             self.replace_device(&loss)?;
         }
@@ -227,6 +252,10 @@ impl Running {
             self.window.set_title(&title);
             self.title = title;
         }
+        self.rested_at = Instant::now();
+        if self.app.screen().gpu().facts().is_software() {
+            self.rested_at += (REST * start.elapsed()).min(LONGEST_REST);
+        }
         Ok(())
     }
 
@@ -252,7 +281,7 @@ impl Running {
     }
 }
 
-impl ApplicationHandler<Repaint> for Runner {
+impl ApplicationHandler<Call> for Runner {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
         let Some(start) = self.start.take() else { return };
         match self.open(event_loop, start) {
@@ -267,9 +296,15 @@ impl ApplicationHandler<Repaint> for Runner {
         }
     }
 
-    fn user_event(&mut self, _: &ActiveEventLoop, repaint: Repaint) {
-        let at = self.repaint_at.map_or(repaint.at, |at| at.min(repaint.at));
-        self.repaint_at = Some(at);
+    fn user_event(&mut self, _: &ActiveEventLoop, call: Call) {
+        let Some(running) = &mut self.running else { return };
+        let at = match call {
+            Call::Repaint(at) => at,
+            Call::Draw => running.rested_at,
+            Call::Relay if running.app.relay(&running.context) => running.rested_at,
+            Call::Relay => return,
+        };
+        self.repaint_at = Some(self.repaint_at.map_or(at, |before| before.min(at)));
     }
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {

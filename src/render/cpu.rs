@@ -71,7 +71,8 @@ pub(super) fn most_paths_per_pass(view: &View) -> u64 {
     (MAX_RECORDS_PER_PASS / u64::from(view.limits.bounces.max(1))).max(1)
 }
 
-/// Brings every pixel of the film to a pass's target; returns the numbers of samples and rays.
+/// Brings every pixel that a pass is about to its target; returns the numbers of samples and rays. Rows
+/// come in an order that leaves none far from those that are done, should the pass be cut short.
 pub(super) fn render(
     tracer: &PathTracer<'_>,
     rays: &CameraRays,
@@ -85,13 +86,15 @@ pub(super) fn render(
     let mut no_surfaces = vec![Surface::default(); if layers { 0 } else { film.height as usize }];
     let (surfaces, surfaces_per_row) =
         if layers { (&mut film.surfaces, width) } else { (&mut no_surfaces, 1) };
-    film.pixels
-        .par_chunks_mut(width)
-        .zip(surfaces.par_chunks_mut(surfaces_per_row))
-        .enumerate()
+    let surfaces = surfaces.chunks_mut(surfaces_per_row);
+    let rows = film.pixels.chunks_mut(width).zip(surfaces).enumerate();
+    let mut rows: Vec<_> = rows.step_by(pass.every as usize).collect();
+    // Multiples of the golden ratio lie evenly.
+    rows.sort_unstable_by_key(|(y, _)| (*y as u32).wrapping_mul(0x9e37_79b9));
+    rows.into_par_iter()
         .map(|(y, (pixels, surfaces))| {
             let mut done = (0, 0);
-            for (x, pixel) in pixels.iter_mut().enumerate() {
+            for (x, pixel) in pixels.iter_mut().enumerate().step_by(pass.every as usize) {
                 // A row of a long pass takes too long for somebody who waits.
                 if cancel.load(Ordering::Relaxed) {
                     break;

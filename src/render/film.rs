@@ -1,6 +1,7 @@
 //! What the samples add up to.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::color::luminance;
 use crate::image::Image;
@@ -155,6 +156,29 @@ impl Film {
         &self.pixels
     }
 
+    /// All samples in pixels twice as wide and high.
+    pub fn halved(&self) -> Self {
+        let mut half =
+            Self::new(self.width.div_ceil(2), self.height.div_ceil(2), self.has_layers());
+        let (width, half_width) = (self.width as usize, half.width as usize);
+        let index = |i: usize| i / width / 2 * half_width + i % width / 2;
+        for (i, pixel) in self.pixels.iter().enumerate() {
+            let sum = &mut half.pixels[index(i)];
+            sum.sum.iter_mut().zip(pixel.sum).for_each(|(sum, own)| *sum += own);
+            sum.luminance_squared += pixel.luminance_squared;
+            sum.samples += pixel.samples;
+            sum.invalid += pixel.invalid;
+        }
+        for (i, surface) in self.surfaces.iter().enumerate() {
+            let sum = &mut half.surfaces[index(i)];
+            sum.albedo += surface.albedo;
+            sum.normal += surface.normal;
+            sum.depth += surface.depth;
+            sum.hits += surface.hits;
+        }
+        half
+    }
+
     /// Mean radiance of every pixel.
     pub fn image(&self) -> Image {
         let pixels = self.pixels.iter().map(|p| p.mean().map(|c| c as f32)).collect();
@@ -176,8 +200,26 @@ impl Film {
         self.pixels.iter().map(|p| u64::from(p.invalid)).sum()
     }
 
+    /// Mean luminance of every pixel and those around it. What a pixel's error is measured against must
+    /// not be its own mean: a lone bright sample raises both, and would hide.
+    pub(crate) fn luminance_around(&self) -> Vec<f64> {
+        let (width, height) = (self.width as usize, self.height as usize);
+        let mean = |index: usize| {
+            let (x, y) = (index % width, index / width);
+            let rows = y.saturating_sub(1)..(y + 2).min(height);
+            let columns = x.saturating_sub(1)..(x + 2).min(width);
+            let count = (rows.len() * columns.len()) as f64;
+            rows.flat_map(|row| &self.pixels[row * width..][columns.clone()])
+                .map(Pixel::mean_luminance)
+                .sum::<f64>()
+                / count
+        };
+        (0..self.pixels.len()).into_par_iter().map(mean).collect()
+    }
+
     /// Estimated root of the relative mean squared error of the picture: the root of the mean over
-    /// pixels of `variance_of_mean / (luminance^2 + 0.01 mean_luminance^2)`.
+    /// pixels of `variance_of_mean / (luminance^2 + 0.01 mean_luminance^2)`, with the luminance of the
+    /// pixel and those around it.
     ///
     /// It is an estimate from the samples' own spread: conservative for low-discrepancy samples,
     /// blind to light no sample has met yet. Infinite below two samples a pixel.
@@ -188,9 +230,10 @@ impl Film {
         let sum: f64 = self
             .pixels
             .iter()
-            .map(|p| {
-                let variance = p.variance_of_mean();
-                if variance == 0.0 { 0.0 } else { variance / (p.mean_luminance().powi(2) + floor) }
+            .zip(self.luminance_around())
+            .map(|(pixel, light)| {
+                let variance = pixel.variance_of_mean();
+                if variance == 0.0 { 0.0 } else { variance / (light.powi(2) + floor) }
             })
             .sum();
         (sum / count).sqrt()

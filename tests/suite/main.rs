@@ -16,3 +16,4 @@ mod peers;
 mod report;
 mod shared;
 mod stability;
+mod window;
