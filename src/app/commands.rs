@@ -58,6 +58,8 @@ pub enum Command {
     ToggleDeveloper,
     /// Show or hide the list of keys.
     ToggleShortcuts,
+    /// Close what lies over the picture, and mark no region.
+    CloseSheets,
     /// Keep the present picture for comparison.
     KeepPicture,
     /// Compute the true visible energy at the inspected point.
@@ -138,6 +140,10 @@ pub fn pressed(context: &egui::Context, is_modal: bool) -> Vec<Command> {
         let asks = input.events.iter().any(|e| matches!(e, egui::Event::Text(t) if t == "?"));
         if asks || input.consume_key(Modifiers::NONE, Key::F1) {
             commands.push(Command::ToggleShortcuts);
+        }
+        // After what opens a sheet: both may come in one frame.
+        if input.key_pressed(Key::Escape) {
+            commands.push(Command::CloseSheets);
         }
         let copies = input.events.iter().any(|e| matches!(e, egui::Event::Copy));
         if copies {

@@ -88,6 +88,7 @@ impl App {
             Command::TogglePanels => interface.panels = !interface.panels,
             Command::ToggleDeveloper => interface.toggle_developer(),
             Command::ToggleShortcuts => interface.shortcuts = !interface.shortcuts,
+            Command::CloseSheets => (interface.shortcuts, interface.is_marking) = (false, false),
             Command::KeepPicture => self.keep(),
             Command::Quit => self.is_closing = true,
             Command::MeasureTruth => {

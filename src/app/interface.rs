@@ -47,6 +47,8 @@ pub struct Interface {
     pub run: u32,
     /// Size of the viewport in pixels, once it was drawn.
     pub viewport_pixels: Option<[u32; 2]>,
+    /// Size of the window in pixels that this was for, and whether panels were shown.
+    pub viewport_of: Option<([u32; 2], bool)>,
     /// Until when the camera counts as moving, in the window's seconds.
     pub moving_until: f64,
 }
@@ -128,6 +130,7 @@ impl Default for Interface {
             paused: false,
             run: 0,
             viewport_pixels: None,
+            viewport_of: None,
             moving_until: f64::NEG_INFINITY,
         }
     }

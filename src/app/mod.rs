@@ -279,6 +279,7 @@ impl App {
                 loading: self.loader.busy_with().collect(),
                 threads: self.worker.threads(),
                 is_preparing: self.worker.is_preparing(),
+                pointed: self.interface.pointed.filter(|_| !self.is_repeatable),
                 hides_clock: self.is_repeatable,
             };
             panels::status::show(ui, &status);

@@ -66,8 +66,8 @@ impl Studio {
 
     /// Opens and chooses what `interface` says; the picture is not rendered again.
     pub fn arrange(&mut self, interface: Interface) {
-        let viewport_pixels = self.app.interface.viewport_pixels;
-        self.app.interface = Interface { viewport_pixels, ..interface };
+        let Interface { viewport_pixels, viewport_of, .. } = self.app.interface;
+        self.app.interface = Interface { viewport_pixels, viewport_of, ..interface };
     }
 
     /// Measures the truth at the pinned place.

@@ -23,7 +23,7 @@ const LEAST_LIKENESS: f32 = 1e-3;
 const LEAST_ALBEDO: f32 = 0.02;
 /// Relative difference of depths at which two neighbouring pixels are half alike.
 const DEPTH_TOLERANCE: f32 = 0.02;
-/// A cell's own spread counts as much as the one around it from so many samples on.
+/// The spread around a cell counts as much as so many samples of its own, at least.
 const SPREAD_SAMPLES: f32 = 2.0;
 /// Neighbours that are no more alike than this say nothing of each other's spread.
 const ALIKE: f32 = 0.3;
@@ -275,8 +275,13 @@ fn refined(
         if cell.samples > 0.0 {
             let mean = cell.light / cell.samples;
             estimate.albedo = cell.albedo / cell.samples;
-            // One sample says nothing about its own spread.
-            let around = if coarser.is_some() { SPREAD_SAMPLES } else { 0.0 };
+            // One sample says nothing about its own spread, and where few have met no light they agree:
+            // the fewer there are, the more counts what is around.
+            let per_pixel = (cell.samples / (pixels * pixels)).max(1.0);
+            let around = match coarser {
+                Some(_) => SPREAD_SAMPLES + cell.freedom / (per_pixel * per_pixel),
+                None => 0.0,
+            };
             estimate.spread =
                 (cell.deviation + around * estimate.spread) / (cell.freedom + around).max(1.0);
             estimate.variance = estimate.spread / cell.samples;

@@ -156,29 +156,6 @@ impl Film {
         &self.pixels
     }
 
-    /// All samples in pixels twice as wide and high.
-    pub fn halved(&self) -> Self {
-        let mut half =
-            Self::new(self.width.div_ceil(2), self.height.div_ceil(2), self.has_layers());
-        let (width, half_width) = (self.width as usize, half.width as usize);
-        let index = |i: usize| i / width / 2 * half_width + i % width / 2;
-        for (i, pixel) in self.pixels.iter().enumerate() {
-            let sum = &mut half.pixels[index(i)];
-            sum.sum.iter_mut().zip(pixel.sum).for_each(|(sum, own)| *sum += own);
-            sum.luminance_squared += pixel.luminance_squared;
-            sum.samples += pixel.samples;
-            sum.invalid += pixel.invalid;
-        }
-        for (i, surface) in self.surfaces.iter().enumerate() {
-            let sum = &mut half.surfaces[index(i)];
-            sum.albedo += surface.albedo;
-            sum.normal += surface.normal;
-            sum.depth += surface.depth;
-            sum.hits += surface.hits;
-        }
-        half
-    }
-
     /// Mean radiance of every pixel.
     pub fn image(&self) -> Image {
         let pixels = self.pixels.iter().map(|p| p.mean().map(|c| c as f32)).collect();

@@ -1,6 +1,6 @@
 //! The sheet of keys and gestures.
 
-use egui::{Align2, Color32, Context, Frame, Grid, Key, Margin, RichText, Ui, Window};
+use egui::{Align2, Color32, Context, Frame, Grid, Margin, RichText, Ui, Window};
 
 use crate::app::commands::{GESTURES, SHORTCUTS};
 use crate::app::interface::Interface;
@@ -8,8 +8,7 @@ use crate::app::theme;
 
 /// Draws the sheet while it is open.
 pub(in crate::app) fn show(context: &Context, interface: &mut Interface) {
-    let is_closed = context.input(|i| i.key_pressed(Key::Escape));
-    let mut is_open = interface.shortcuts && !is_closed;
+    let mut is_open = interface.shortcuts;
     Window::new("Keys and gestures")
         .open(&mut is_open)
         .collapsible(false)

@@ -13,6 +13,8 @@ pub(in crate::app) struct Status<'a> {
     pub(in crate::app) loading: Vec<&'a str>,
     /// Whether a GPU is being made ready.
     pub(in crate::app) is_preparing: bool,
+    /// Place of the picture under the pointer, both coordinates in `[0,1]`.
+    pub(in crate::app) pointed: Option<glam::Vec2>,
     /// Render threads.
     pub(in crate::app) threads: usize,
     /// Figures that depend on the clock are left out.
@@ -30,6 +32,9 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
                 figures(ui, snapshot, status.hides_clock);
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     device(ui, snapshot, status.threads);
+                    if let Some(place) = status.pointed.filter(|_| !theme::is_narrow(ui)) {
+                        pixel(ui, snapshot, place);
+                    }
                 });
             }
         });
@@ -121,6 +126,17 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
         "grid",
         &crate::app::execute::memory_sentence(grid, map.table, map.pixels),
     );
+}
+
+/// What the film holds under the pointer.
+fn pixel(ui: &mut Ui, snapshot: &Snapshot, place: glam::Vec2) {
+    let film = &snapshot.main.film;
+    let index = |share: f32, count: u32| ((share * count as f32) as u32).min(count.max(1) - 1);
+    let (x, y) = (index(place.x, film.width), index(place.y, film.height));
+    let Some(pixel) = film.pixels().get((y * film.width + x) as usize) else { return };
+    let [r, g, b] = pixel.mean();
+    let text = format!("{x}, {y}:  {r:.3}  {g:.3}  {b:.3}  ·  {} samples", pixel.samples());
+    ui.label(theme::quiet(text)).on_hover_text("Linear radiance of the pixel, unfiltered");
 }
 
 fn number(ui: &mut Ui, value: &str, unit: &str, hint: &str) {

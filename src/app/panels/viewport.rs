@@ -59,10 +59,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     let frame = egui::Frame::new().fill(theme::BACKGROUND);
     CentralPanel::default().frame(frame).show(ui, |ui| {
         let area = ui.max_rect();
-        let points = ui.ctx().pixels_per_point();
-        let pixels = (area.size() * points).round();
-        scope.interface.viewport_pixels =
-            Some([pixels.x.max(1.0) as u32, pixels.y.max(1.0) as u32]);
+        measure(ui, area, scope);
         let response = ui.interact(area, ui.scope_id().with("picture"), Sense::click_and_drag());
         let Some((shown, settings)) = scope.shown.zip(scope.settings) else {
             waiting(ui, area, scope.loading);
@@ -84,6 +81,18 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
         gestures::show(ui, (whole, rect), &response, handle, scope);
         pin(ui, rect, scope.interface);
     });
+}
+
+/// Notes how large a picture may be. A panel that opens leaves it as it is: it would begin anew, and
+/// what one wants to look at would be gone.
+fn measure(ui: &Ui, area: Rect, scope: &mut Scope<'_>) {
+    let points = ui.ctx().pixels_per_point();
+    let pixels = |size: Vec2| [size.x, size.y].map(|side| (side * points).round().max(1.0) as u32);
+    let window = Some((pixels(ui.ctx().content_rect().size()), scope.interface.panels));
+    if scope.interface.viewport_of != window || scope.shown.is_none() {
+        scope.interface.viewport_of = window;
+        scope.interface.viewport_pixels = Some(pixels(area.size()));
+    }
 }
 
 /// The picture as large as fits, in its own shape.

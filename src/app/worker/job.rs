@@ -43,7 +43,7 @@ pub(super) struct Legacy {
     /// Seconds one camera path takes, all threads together.
     seconds_per_path: Option<f64>,
     snapshots: u64,
-    /// A film of what was seen last, small, and what it was rendered for.
+    /// A film of what was seen last, and what it was rendered for.
     under: Option<(Arc<Request>, Arc<Film>)>,
 }
 
@@ -206,9 +206,7 @@ impl<'a> Job<'a> {
         let known = self.under().map_or(0, |film| film.total_samples());
         let film = session.film();
         if film.min_samples() > 0 && film.total_samples() > known {
-            let is_small = film.width < self.request.view.width;
-            let film = if is_small { film.clone() } else { film.halved() };
-            self.legacy.under = Some((Arc::clone(&self.request), Arc::new(film)));
+            self.legacy.under = Some((Arc::clone(&self.request), Arc::new(film.clone())));
         }
     }
 

@@ -73,6 +73,8 @@ impl Request {
             && Arc::ptr_eq(&self.environment, &new.environment)
             && (&a.camera, a.crop, a.medium) == (&b.camera, b.crop, b.medium)
             && (a.background, a.limits) == (b.background, b.limits)
+            // Whoever asks for other samples wants to see those.
+            && (a.sampling, a.seed, self.run) == (b.sampling, b.seed, new.run)
     }
 
     fn is_same(&self, new: &Self) -> bool {
@@ -161,7 +163,7 @@ pub struct Snapshot {
     pub counters: Option<Arc<LearningGrid>>,
     /// How the error of `main` and of `plain` fell.
     pub curves: [Vec<Point>; 2],
-    /// An earlier film of the same view, small; its samples help where `main` has few.
+    /// An earlier film of the same view; its samples help where `main` has few.
     pub under: Option<Arc<Film>>,
 }
 
