@@ -12,7 +12,7 @@ use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LawOptions;
 use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::{Figures, Phase, Sampling, Session, View};
+use lightgrid::render::{Figures, Phase, Sampling, Session, Sharing, View};
 use lightgrid::sampler::Points;
 use lightgrid::scene::builtin;
 
@@ -132,6 +132,7 @@ impl Case<'_> {
             seed,
             points: Points::Sobol,
             grid_columns: 64,
+            sharing: Sharing::Auto,
             learning_paths: LEARNING_PATHS,
             laws: LawOptions::ADAPTIVE,
             medium: None,

@@ -9,7 +9,7 @@ use lightgrid::light_grid::LawOptions;
 use lightgrid::light_grid::tile_laws::TileLaws;
 use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::{Sampling, Session, View};
+use lightgrid::render::{Sampling, Session, Sharing, View};
 use lightgrid::sampler::Points;
 use lightgrid::scene::builtin;
 
@@ -28,6 +28,7 @@ pub(crate) fn bench(criterion: &mut Criterion) {
         seed: 0,
         points: Points::Sobol,
         grid_columns: 64,
+        sharing: Sharing::Auto,
         learning_paths,
         laws: LawOptions::ADAPTIVE,
         medium: None,

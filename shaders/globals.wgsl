@@ -15,8 +15,9 @@ struct Work {
     end_sample: u32,
     // Of so many samples one is counted; 0 if none is.
     stride: u32,
+    // The sample that pixels which share take; then `first` and `count` are workgroups.
+    sample: u32,
     padding_0: u32,
-    padding_1: u32,
 }
 
 struct Globals {

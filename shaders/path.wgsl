@@ -24,6 +24,15 @@ struct Path {
     passes: u32,
     bounces: u32,
     rays: u32,
+//#if sharing
+    // What the path carried where its throughput was set to one.
+    throughput_before: f32,
+    // Whether nothing on the way since the last vertex has taken any light.
+    is_clear: bool,
+    // Samples of the map that the next vertex takes, and that the last one took.
+    map_samples: f32,
+    departure_map_samples: f32,
+//#end
 //#if counting
     is_counted: bool,
 //#end
@@ -140,6 +149,12 @@ fn path_new(ray: Ray, sampler: Sampler) -> Path {
     path.departure_law = WHOLE_MAP;
 //#if solid_transmission
     path.body = body_air();
+//#end
+//#if sharing
+    path.throughput_before = 1.0;
+    path.is_clear = true;
+    path.map_samples = 1.0;
+    path.departure_map_samples = 1.0;
 //#end
     return path;
 }
@@ -262,6 +277,9 @@ fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
         return false;
     }
     (*path).travelled += hit.t;
+//#if finding
+    arrival = hit;
+//#end
     let direction = (*path).ray.direction;
     let point = surface_at(hit.triangle, hit.barycentric, direction);
 //#if emitters
@@ -344,6 +362,9 @@ fn passes(path: ptr<function, Path>, point: SurfacePoint) -> bool {
     if !goes_on {
         goes_on = path_pair(path).x < probability;
     }
+//#if sharing
+    (*path).is_clear = (*path).is_clear && (!goes_on || all(through == vec3f(1.0)));
+//#end
     if goes_on {
         (*path).throughput *= through / probability;
     } else {
@@ -396,16 +417,28 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
     if (*path).bounces == globals.bounces {
         return false;
     }
+//#if finding
+    if (*path).bounces == 1u && meet_second(path, vertex) {
+        return false;
+    }
+    let waits = (*path).bounces == 0u && meet_first(path, vertex);
+//#end
     (*path).bounces += 1u;
     forget_arrival(path);
     (*path).travelled = 0.0;
     (*path).passes = 0u;
     var gathers = !bsdf_is_delta_only(vertex.bsdf);
+//#if sharing
+    (*path).is_clear = true;
+//#end
 //#if medium
     gathers = gathers || vertex.is_in_medium;
 //#if learning
     gathers = gathers && !(vertex.is_in_medium && is_in_solid(path));
 //#end
+//#end
+//#if finding
+    gathers = gathers && !waits;
 //#end
     if gathers {
 //#if learning
@@ -502,7 +535,10 @@ fn escape(path: ptr<function, Path>) {
 //#if map_sampling
     if (*path).departure_pdf_solid_angle < F32_MAX {
         let seen = radiance_and_tile_pdf(direction);
-        let nee = choice_probability((*path).departure_law, seen.tile) * seen.pdf_solid_angle;
+        var nee = choice_probability((*path).departure_law, seen.tile) * seen.pdf_solid_angle;
+//#if sharing
+        nee *= (*path).departure_map_samples;
+//#end
         let weight = balance_heuristic((*path).departure_pdf_solid_angle, nee);
         (*path).radiance += (*path).throughput * seen.radiance * weight;
         return;
@@ -689,6 +725,9 @@ fn light_of_map(path: ptr<function, Path>, vertex: Vertex) -> Arriving {
         arriving.distance = F32_MAX;
         arriving.light = sample.radiance;
         arriving.pdf_solid_angle = choice.probability * sample.pdf_solid_angle;
+//#if sharing
+        arriving.pdf_solid_angle *= (*path).map_samples;
+//#end
         arriving.weight = sample.weight;
 //#if counting
         arriving.counter = count_try(path, vertex, choice.tile);
@@ -786,26 +825,39 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
 //#if emitters
     (*path).departure_receiver = receiver_of(vertex);
 //#end
+//#if sharing
+    (*path).departure_map_samples = (*path).map_samples;
+    (*path).map_samples = 1.0;
+//#end
     let origin = offset_origin(vertex.point.position, select(-normal, normal, is_above));
     (*path).ray = Ray(origin, direction, F32_MAX);
     return true;
 }
 
 fn survives(path: ptr<function, Path>) -> bool {
+    let probability = survival(path);
+    (*path).throughput /= max(probability, 0.05);
+    return probability > 0.0;
+}
+
+// With which probability the path has survived; 0 if it has not.
+fn survival(path: ptr<function, Path>) -> f32 {
     if globals.russian_roulette == 0u || (*path).bounces < ROULETTE_AFTER {
-        return true;
+        return 1.0;
     }
     var in_air = max_element((*path).throughput);
 //#if solid_transmission
     in_air *= (*path).body.squared_index;
 //#end
+//#if sharing
+    in_air *= (*path).throughput_before;
+//#end
     let probability = clamp(ROULETTE_MILDNESS * in_air, 0.05, 1.0);
     if probability < 1.0 {
         let draw = path_pair(path).y;
         if draw >= probability {
-            return false;
+            return 0.0;
         }
     }
-    (*path).throughput /= probability;
-    return true;
+    return probability;
 }

@@ -9,7 +9,7 @@ use crate::light_grid::LawOptions;
 use crate::path::{Background, PathLimits};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::DeviceChoice;
-use crate::render::{Crop, Sampling, StopRule, View};
+use crate::render::{Crop, Sampling, Sharing, StopRule, View};
 use crate::sampler::Points;
 use crate::scene::{Camera, Medium, Projection, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
@@ -149,6 +149,8 @@ impl Document {
             seed: self.light.seed,
             points: Points::Sobol,
             grid_columns: 64,
+            // What neighbours share, denoising cannot tell from light.
+            sharing: Sharing::Off,
             learning_paths: self.learning_paths([width, height]),
             laws: LawOptions::ADAPTIVE,
             medium: self.fog,

@@ -66,6 +66,7 @@ fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
     let camera = document.viewpoint.as_ref();
     vec![
         ("sampling", json!(view.sampling)),
+        ("sharing", json!(view.sharing)),
         ("grid_columns", json!(view.grid_columns)),
         ("bounces", json!(view.limits.bounces)),
         ("filter", json!(view.filter)),

@@ -42,6 +42,11 @@ impl Ggx {
         Self { alpha: ggx.alpha.max(SMOOTH_ALPHA), along, axis }
     }
 
+    /// Width across the direction in which it is stretched.
+    pub(crate) fn alpha(self) -> f32 {
+        self.alpha
+    }
+
     /// Whether this is a perfect mirror rather than a lobe.
     pub(crate) fn is_smooth(self) -> bool {
         self.alpha < SMOOTH_ALPHA

@@ -181,6 +181,17 @@ impl Bsdf {
         self.outgoing(wo).map_or((Vec3::ZERO, 0.0), |out| self.eval_pdf_with(wo, wi, &out))
     }
 
+    /// Whether what is scattered looks the same from everywhere in front.
+    pub(crate) fn is_lambert(&self) -> bool {
+        self.is_lambert
+    }
+
+    /// Whether there is no coat, and reflections are no narrower than GGX makes them with this alpha.
+    pub(crate) fn is_broad(&self, least_alpha: f32) -> bool {
+        self.coat.is_absent()
+            && (self.interface.is_absent() || self.interface.ggx().alpha() >= least_alpha)
+    }
+
     /// Light that goes straight through: smooth thin-walled transmission, tinted by the base colour.
     ///
     /// No part of it is in `eval` or `sample`: the integrator lets paths and shadow rays through

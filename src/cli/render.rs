@@ -23,7 +23,7 @@ use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
-use crate::render::{Crop, Sampling, Session, StopRule, View};
+use crate::render::{Crop, Sampling, Session, Sharing, StopRule, View};
 use crate::sampler::Points;
 use crate::scene::{Camera, Medium, Projection, Scene, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
@@ -129,6 +129,17 @@ pub(super) struct RenderArguments {
     /// How the map is sampled.
     #[arg(long, default_value = "adaptive", value_enum, help_heading = "Light")]
     sampling: Sampling,
+    /// Whether the pixels of a tile share what their paths find behind the second vertex: less noise at
+    /// each pixel, but coarser. `auto` is 8x8 for adaptive sampling in clear air from 64x64 pixels on
+    /// that are not denoised.
+    #[arg(
+        long,
+        default_value = "auto",
+        value_enum,
+        value_name = "off|4x4|8x8|auto",
+        help_heading = "Light"
+    )]
+    sharing: Sharing,
     /// Importance table of the map: tile-local, u32, f32, f64.
     #[arg(long, default_value = "tile-local", value_name = "KIND", help_heading = "Light")]
     table: TableKind,
@@ -272,6 +283,7 @@ impl RenderArguments {
             seconds,
             noise: None,
             sampling,
+            sharing: Sharing::Auto,
             table: TableKind::default(),
             bounces: 8,
             no_russian_roulette: false,
@@ -415,6 +427,14 @@ fn stop_rule(arguments: &RenderArguments) -> StopRule {
     }
 }
 
+/// A picture to be denoised gains nothing from noise that neighbours share, which filters keep.
+fn sharing(arguments: &RenderArguments) -> Sharing {
+    match arguments.sharing {
+        Sharing::Auto if arguments.denoise.is_some() => Sharing::Off,
+        asked => asked,
+    }
+}
+
 fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Result<View> {
     let (width, height) = arguments.region.map_or(arguments.size, |[_, _, w, h]| (w, h));
     Ok(View {
@@ -430,6 +450,7 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
         seed: arguments.seed,
         points: Points::Sobol,
         grid_columns: arguments.grid,
+        sharing: sharing(arguments),
         learning_paths: arguments.learning_paths.unwrap_or_else(|| {
             View::suitable_learning_paths(arguments.sampling, [width, height], arguments.spp)
         }),
@@ -572,6 +593,7 @@ fn settings(
     vec![
         ("fog", serde_json::json!(fog)),
         ("sampling", serde_json::json!(arguments.sampling)),
+        ("sharing", serde_json::json!(sharing(arguments))),
         ("table", serde_json::json!(arguments.table.to_string())),
         ("tiles", serde_json::json!(format!("{}x{}", arguments.tiles.0, arguments.tiles.1))),
         ("grid_columns", serde_json::json!(arguments.grid)),

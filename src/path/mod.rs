@@ -19,6 +19,7 @@ mod light_tree;
 mod lights;
 mod materials;
 mod ray_clock;
+pub mod sharing;
 mod world;
 
 pub use background::Background;
@@ -102,24 +103,8 @@ impl PathTracer<'_> {
     /// Radiance along a camera ray.
     pub fn radiance(&self, ray: Ray, sampler: Sampler) -> PathResult {
         let mut path = Path::new(self, ray, sampler);
-        let mut own_bsdf = None;
-        while let Some(vertex) = path.next_vertex(&mut own_bsdf) {
-            if path.bounces == self.limits.bounces {
-                break;
-            }
-            path.bounces += 1;
-            path.gather(&vertex);
-            if !path.scatter(&vertex) || !path.survives() {
-                break;
-            }
-        }
-        let was_invalid = !path.radiance.is_finite();
-        PathResult {
-            radiance: if was_invalid { Vec3::ZERO } else { path.radiance },
-            rays: path.rays,
-            was_invalid,
-            first_hit: path.first_hit,
-        }
+        path.run();
+        path.result()
     }
 
     /// Where the cells lie: what is counted and what was learned have the same ones.
@@ -233,6 +218,16 @@ impl Body {
     }
 }
 
+/// Light that next event estimation has found.
+struct Arriving {
+    /// Unit, to where it comes from.
+    direction: Vec3,
+    /// What of it goes on along the path: BSDF times cosine, or phase function.
+    f: Vec3,
+    /// Its radiance over the sum of all densities that it may be found with.
+    light: Vec3,
+}
+
 /// The vertex a ray left from, as far as MIS asks.
 #[derive(Clone, Copy)]
 struct Departure {
@@ -240,20 +235,29 @@ struct Departure {
     pdf_solid_angle: f32,
     receiver: Receiver,
     law: u32,
+    /// Samples of the map that compete with it.
+    map_samples: u32,
 }
 
 /// A path under construction.
+#[derive(Clone)]
 struct Path<'a> {
     tracer: &'a PathTracer<'a>,
     sampler: Sampler,
     ray: Ray,
     departure: Departure,
     throughput: Vec3,
+    /// What the path carried where `throughput` was set to one; 1 if it was not.
+    throughput_before: f32,
     radiance: Vec3,
     body: Body,
     /// Metres gone since the last vertex, passes included.
     travelled: f32,
+    /// Whether nothing on the way since the last vertex has taken any light.
+    is_clear: bool,
     bounces: u32,
+    /// Samples of the map that the next vertex takes.
+    map_samples: u32,
     rays: u32,
     first_hit: Option<FirstHit>,
 }
@@ -261,19 +265,55 @@ struct Path<'a> {
 impl<'a> Path<'a> {
     fn new(tracer: &'a PathTracer<'a>, ray: Ray, sampler: Sampler) -> Self {
         let receiver = Receiver { position: ray.origin, normal: Vec3::ZERO };
-        let departure = Departure { pdf_solid_angle: f32::INFINITY, receiver, law: WHOLE_MAP };
+        let departure =
+            Departure { pdf_solid_angle: f32::INFINITY, receiver, law: WHOLE_MAP, map_samples: 1 };
         Self {
             tracer,
             sampler,
             ray,
             departure,
             throughput: Vec3::ONE,
+            throughput_before: 1.0,
             radiance: Vec3::ZERO,
             body: Body::AIR,
             travelled: 0.0,
+            is_clear: true,
             bounces: 0,
+            map_samples: 1,
             rays: 0,
             first_hit: None,
+        }
+    }
+
+    /// Follows the path to its end.
+    fn run(&mut self) {
+        let mut own_bsdf = None;
+        while let Some(vertex) = self.next_vertex(&mut own_bsdf) {
+            if !self.visit(&vertex) {
+                break;
+            }
+        }
+    }
+
+    /// Gathers light at a vertex, if the path may have one more, and chooses where the path goes on.
+    /// `false` if it ends.
+    fn visit(&mut self, vertex: &Vertex<'_>) -> bool {
+        if self.bounces == self.tracer.limits.bounces {
+            return false;
+        }
+        self.bounces += 1;
+        self.gather(vertex);
+        self.scatter(vertex) && self.survives()
+    }
+
+    /// What it brought back.
+    fn result(&self) -> PathResult {
+        let was_invalid = !self.radiance.is_finite();
+        PathResult {
+            radiance: if was_invalid { Vec3::ZERO } else { self.radiance },
+            rays: self.rays,
+            was_invalid,
+            first_hit: self.first_hit,
         }
     }
 
@@ -284,6 +324,7 @@ impl<'a> Path<'a> {
         'a: 'v,
     {
         self.travelled = 0.0;
+        self.is_clear = true;
         for _ in 0..MAX_PASSES {
             self.rays += 1;
             let hit = self.tracer.world.closest_hit(&self.ray, self.bounces == 0);
@@ -348,6 +389,7 @@ impl<'a> Path<'a> {
             return false;
         }
         let passes = probability >= 1.0 || self.sampler.next_pair()[0] < probability;
+        self.is_clear &= !passes || through == Vec3::ONE;
         self.throughput *= if passes {
             through / probability
         } else {
@@ -442,60 +484,70 @@ impl<'a> Path<'a> {
             return;
         };
         let (radiance, tile, in_tile) = environment.radiance_and_tile_pdf(self.ray.direction);
-        let nee = grid.probability(from.law, tile) * in_tile;
+        let nee = from.map_samples as f32 * grid.probability(from.law, tile) * in_tile;
         self.radiance += self.throughput * radiance * balance_heuristic(from.pdf_solid_angle, nee);
     }
 
     /// Next event estimation from the map and, if there are any, one local light.
     fn gather(&mut self, vertex: &Vertex<'_>) {
+        let mut sum = Vec3::ZERO;
+        self.for_arriving(vertex, |arriving| sum += arriving.f * arriving.light);
+        self.radiance += self.throughput * sum;
+    }
+
+    /// Calls `take` with the light that next event estimation finds.
+    fn for_arriving(&mut self, vertex: &Vertex<'_>, mut take: impl FnMut(Arriving)) {
         if vertex.scatterer.is_delta_only() {
             return;
         }
         if let Some(grid) = self.tracer.grid {
-            self.gather_environment(vertex, grid);
+            for _ in 0..self.map_samples {
+                self.light_of_map(vertex, grid).map(&mut take);
+            }
         }
         if !self.tracer.world.lights.is_empty() {
-            self.gather_local(vertex);
+            self.light_of_lamps(vertex).map(&mut take);
         }
     }
 
-    fn gather_environment(&mut self, vertex: &Vertex<'_>, grid: &LightGrid) {
+    fn light_of_map(&mut self, vertex: &Vertex<'_>, grid: &LightGrid) -> Option<Arriving> {
         let bits = self.sampler.next_pair_bits();
         let choice = grid.sample(vertex.law, bits);
         self.expect_count(vertex, choice.tile);
         let u = [choice.remainder, bits[1]];
-        let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
+        let sample = self.tracer.environment.sample_in_tile(choice.tile, u)?;
         let pdf = choice.probability * sample.pdf_solid_angle;
         let Some((f, own_pdf)) = self.scattered(vertex, sample.direction) else {
-            return self.count(vertex, choice.tile, 0.0);
+            self.count(vertex, choice.tile, 0.0);
+            return None;
         };
         let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
         if self.tracer.counts.is_some() {
             let weight = self.visibility(vertex, sample.direction, own_pdf, transmittance);
             self.count(vertex, choice.tile, weight);
         }
-        let both_pdfs = pdf + own_pdf;
-        if transmittance != Vec3::ZERO && both_pdfs > 0.0 {
-            // Balance heuristic over the density; `weight` is what integers drew it with.
-            let radiance = self.tracer.environment.sampled_radiance(&sample);
-            let weight = sample.weight / both_pdfs;
-            self.radiance += self.throughput * f * radiance * transmittance * weight;
+        let all_pdfs = self.map_samples as f32 * pdf + own_pdf;
+        if transmittance == Vec3::ZERO || all_pdfs <= 0.0 {
+            return None;
         }
+        // Balance heuristic over the density; `weight` is what integers drew it with.
+        let radiance = self.tracer.environment.sampled_radiance(&sample);
+        let light = radiance * transmittance * (sample.weight / all_pdfs);
+        Some(Arriving { direction: sample.direction, f, light })
     }
 
-    fn gather_local(&mut self, vertex: &Vertex<'_>) {
+    fn light_of_lamps(&mut self, vertex: &Vertex<'_>) -> Option<Arriving> {
         let bits = self.sampler.next_pair_bits();
         let world = self.tracer.world;
-        let Some(sample) = world.lights.sample(&world.scene, &vertex.receiver(), bits) else {
-            return;
-        };
-        let Some((f, own_pdf)) = self.scattered(vertex, sample.direction) else { return };
+        let sample = world.lights.sample(&world.scene, &vertex.receiver(), bits)?;
+        let (f, own_pdf) = self.scattered(vertex, sample.direction)?;
         let transmittance = self.transmittance(vertex, sample.direction, sample.distance);
-        if transmittance != Vec3::ZERO {
-            let weight = balance_heuristic(sample.pdf_solid_angle, own_pdf);
-            self.radiance +=
-                self.throughput * f * sample.radiance_over_pdf * transmittance * weight;
+        if transmittance == Vec3::ZERO {
+            return None;
         }
+        let weight = balance_heuristic(sample.pdf_solid_angle, own_pdf);
+        let light = sample.radiance_over_pdf * transmittance * weight;
+        Some(Arriving { direction: sample.direction, f, light })
     }
 
     /// What share of light from `direction` goes on along the path, and the density with which
@@ -574,22 +626,33 @@ impl<'a> Path<'a> {
     }
 
     fn depart(&mut self, vertex: &Vertex<'_>, origin: Vec3, direction: Vec3, pdf_solid_angle: f32) {
-        self.departure =
-            Departure { pdf_solid_angle, receiver: vertex.receiver(), law: vertex.law };
+        self.departure = Departure {
+            pdf_solid_angle,
+            receiver: vertex.receiver(),
+            law: vertex.law,
+            map_samples: self.map_samples,
+        };
+        self.map_samples = 1;
         self.ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
     }
 
-    /// Russian roulette by throughput, as it would be in air: refraction into a body is no loss.
+    /// Russian roulette.
     fn survives(&mut self) -> bool {
-        if !self.tracer.limits.russian_roulette || self.bounces < ROULETTE_AFTER {
-            return true;
-        }
-        let in_air = self.throughput.max_element() * self.body.squared_index;
-        let probability = (ROULETTE_MILDNESS * in_air).clamp(0.05, 1.0);
-        if probability < 1.0 && self.sampler.next_pair()[1] >= probability {
-            return false;
-        }
+        let Some(probability) = self.survival() else { return false };
         self.throughput /= probability;
         true
+    }
+
+    /// With which probability the path has survived; `None` if it has not. By throughput, as it would
+    /// be in air: refraction into a body is no loss.
+    fn survival(&mut self) -> Option<f32> {
+        if !self.tracer.limits.russian_roulette || self.bounces < ROULETTE_AFTER {
+            return Some(1.0);
+        }
+        let in_air = self.throughput.max_element() * self.body.squared_index;
+        let carried = self.throughput_before * in_air;
+        let probability = (ROULETTE_MILDNESS * carried).clamp(0.05, 1.0);
+        let survives = probability >= 1.0 || self.sampler.next_pair()[1] < probability;
+        survives.then_some(probability)
     }
 }

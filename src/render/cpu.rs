@@ -6,11 +6,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use glam::Vec2;
 use rayon::prelude::*;
 
-use super::film::{Film, Pixel, Surface};
+use super::film::{Film, FilmTile};
 use super::{Pass, View};
+use crate::bvh::Ray;
 use crate::light_grid::counters::MAX_RECORDS_PER_PASS;
 use crate::path::PathTracer;
 use crate::path::camera::CameraRays;
+use crate::path::sharing::{SharedTile, Start, radiance_of_tile};
 use crate::sampler::Sampler;
 
 /// Seed offset that keeps learning's random numbers apart from rendering's.
@@ -66,9 +68,12 @@ pub(super) fn learn(
         .sum()
 }
 
-/// Most paths that can be counted in one pass, at one try a vertex.
+/// Most paths that can be counted in one pass, at one try a vertex where second vertices are not
+/// shared.
 pub(super) fn most_paths_per_pass(view: &View) -> u64 {
-    (MAX_RECORDS_PER_PASS / u64::from(view.limits.bounces.max(1))).max(1)
+    let bounces = view.limits.bounces.max(1);
+    let tries = view.shared_tile().map_or(bounces, |tile| tile.most_map_samples(bounces));
+    (MAX_RECORDS_PER_PASS / u64::from(tries)).max(1)
 }
 
 /// Brings every pixel that a pass is about to its target; returns the numbers of samples and rays. Rows
@@ -81,62 +86,104 @@ pub(super) fn render(
     film: &mut Film,
     cancel: &AtomicBool,
 ) -> (u64, u64) {
-    let width = film.width as usize;
-    let layers = !film.surfaces.is_empty();
-    let mut no_surfaces = vec![Surface::default(); if layers { 0 } else { film.height as usize }];
-    let (surfaces, surfaces_per_row) =
-        if layers { (&mut film.surfaces, width) } else { (&mut no_surfaces, 1) };
-    let surfaces = surfaces.chunks_mut(surfaces_per_row);
-    let rows = film.pixels.chunks_mut(width).zip(surfaces).enumerate();
-    let mut rows: Vec<_> = rows.step_by(pass.every as usize).collect();
-    // Multiples of the golden ratio lie evenly.
-    rows.sort_unstable_by_key(|(y, _)| (*y as u32).wrapping_mul(0x9e37_79b9));
-    rows.into_par_iter()
-        .map(|(y, (pixels, surfaces))| {
-            let mut done = (0, 0);
-            for (x, pixel) in pixels.iter_mut().enumerate().step_by(pass.every as usize) {
-                // A row of a long pass takes too long for somebody who waits.
-                if cancel.load(Ordering::Relaxed) {
-                    break;
-                }
-                let surface = if layers { surfaces.get_mut(x) } else { None };
-                let (samples, rays) =
-                    render_pixel(tracer, rays, view, (x, y), pass, pixel, surface);
-                done = (done.0 + samples, done.1 + rays);
-            }
-            done
-        })
-        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
+    let without_counts = PathTracer { counts: None, ..*tracer };
+    let task = Task { tracers: [&without_counts, tracer], rays, view, pass, cancel };
+    let add = |a: (u64, u64), b: (u64, u64)| (a.0 + b.0, a.1 + b.1);
+    let is_whole = pass.every == 1;
+    let Some(tile) = view.shared_tile().filter(|_| tracer.fog.is_none() && is_whole) else {
+        let rows = film.tiles(film.width, 1, [0, 0]).into_iter().enumerate();
+        let mut rows: Vec<_> = rows.step_by(pass.every as usize).collect();
+        // Multiples of the golden ratio lie evenly.
+        rows.sort_unstable_by_key(|(y, _)| (*y as u32).wrapping_mul(0x9e37_79b9));
+        let rows = rows.into_par_iter();
+        return rows.map(|(_, row)| task.render_pixels(row)).reduce(|| (0, 0), add);
+    };
+    let mut done = (0, 0);
+    for sample in film.min_samples()..pass.target {
+        let seed = pass.sequence.seed(view.seed);
+        let tiling = tile.tiling([film.width, film.height], seed, sample);
+        let tiles = film.tiles(tile.side, tile.side, tiling.before).into_par_iter();
+        let render =
+            |(index, pixels)| task.render_tile(tile, tiling.seed_of(index as u32), sample, pixels);
+        done = add(done, tiles.enumerate().map(render).reduce(|| (0, 0), add));
+    }
+    done
 }
 
-fn render_pixel(
-    tracer: &PathTracer<'_>,
-    rays: &CameraRays,
-    view: &View,
-    (x, y): (usize, usize),
+/// What all threads of a pass know.
+struct Task<'a> {
+    /// The one that counts nothing and the one that may.
+    tracers: [&'a PathTracer<'a>; 2],
+    rays: &'a CameraRays,
+    view: &'a View,
     pass: Pass,
-    pixel: &mut Pixel,
-    mut surface: Option<&mut Surface>,
-) -> (u64, u64) {
-    let index = y as u32 * view.width + x as u32;
-    let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-    let (mut samples, mut ray_count) = (0, 0);
-    while pixel.samples() < pass.target {
-        let sample = pixel.samples();
-        let mut sampler = pass.sequence.sampler(view.points, view.seed, index, sample);
+    cancel: &'a AtomicBool,
+}
+
+impl Task<'_> {
+    /// Where sample `sample` of a pixel begins.
+    fn start(&self, [x, y]: [u32; 2], sample: u32) -> (Ray, Sampler, &PathTracer<'_>) {
+        let view = self.view;
+        let index = y * view.width + x;
+        let mut sampler = self.pass.sequence.sampler(view.points, view.seed, index, sample);
         let offset = view.filter.sample(Vec2::from(sampler.next_pair()));
-        let lens = lens_point(rays, &mut sampler);
-        let counts = tracer.counts.filter(|_| pass.counts(index, sample));
-        let tracer = PathTracer { counts, ..*tracer };
-        let result = tracer.radiance(rays.ray(centre + offset, lens), sampler);
-        pixel.add(&result);
-        if let Some(surface) = &mut surface {
-            surface.add(&result);
-        }
-        samples += 1;
-        ray_count += u64::from(result.rays);
+        let lens = lens_point(self.rays, &mut sampler);
+        let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+        let tracer = self.tracers[usize::from(self.pass.counts(index, sample))];
+        (self.rays.ray(centre + offset, lens), sampler, tracer)
     }
-    (samples, ray_count)
+
+    /// Brings pixel after pixel to the target; returns the numbers of samples and rays.
+    fn render_pixels(&self, mut tile: FilmTile<'_>) -> (u64, u64) {
+        let (mut samples, mut ray_count) = (0, 0);
+        for (at, mut pixel) in tile.pixels().step_by(self.pass.every as usize) {
+            // A row of a long pass takes too long for somebody who waits.
+            if self.cancel.load(Ordering::Relaxed) {
+                break;
+            }
+            while pixel.samples() < self.pass.target {
+                let (ray, sampler, tracer) = self.start(at, pixel.samples());
+                let result = tracer.radiance(ray, sampler);
+                pixel.add(&result);
+                samples += 1;
+                ray_count += u64::from(result.rays);
+            }
+        }
+        (samples, ray_count)
+    }
+
+    /// Adds one sample to every pixel of a tile that has not got it yet.
+    fn render_tile(
+        &self,
+        tile: SharedTile,
+        seed: u32,
+        sample: u32,
+        mut film: FilmTile<'_>,
+    ) -> (u64, u64) {
+        if self.cancel.load(Ordering::Relaxed) || film.pixels().all(|(_, p)| p.samples() > sample) {
+            return (0, 0);
+        }
+        let corner = film.corner();
+        let starts: Vec<Start<'_>> = film
+            .pixels()
+            .map(|(at, _)| {
+                let (ray, sampler, tracer) = self.start(at, sample);
+                let place = [0, 1].map(|axis| (at[axis] as i32 - corner[axis]) as u32);
+                Start { place, ray, sampler, tracer }
+            })
+            .collect();
+        let results = radiance_of_tile(tile, seed, &starts);
+        let (mut samples, mut ray_count) = (0, 0);
+        for ((_, mut pixel), result) in film.pixels().zip(&results) {
+            ray_count += u64::from(result.rays);
+            // A device that was left may have been ahead in parts.
+            if pixel.samples() == sample {
+                pixel.add(result);
+                samples += 1;
+            }
+        }
+        (samples, ray_count)
+    }
 }
 
 fn lens_point(rays: &CameraRays, sampler: &mut Sampler) -> Vec2 {

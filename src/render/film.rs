@@ -233,6 +233,89 @@ impl Film {
     }
 }
 
+/// A part of the film for one thread.
+pub(super) struct FilmTile<'a> {
+    /// Column and row of its first pixel, were none of it outside of the picture.
+    corner: [i32; 2],
+    /// Column and row of the first pixel that is there.
+    first: [u32; 2],
+    rows: Vec<(&'a mut [Pixel], &'a mut [Surface])>,
+}
+
+/// A pixel of the film and what is seen in it, if that is asked for.
+pub(super) struct FilmPixel<'a> {
+    pixel: &'a mut Pixel,
+    surface: Option<&'a mut Surface>,
+}
+
+impl Film {
+    /// Cuts the film into tiles of this size, row after row of tiles; the first begins `before` columns
+    /// and rows before the picture, which is less than a tile.
+    pub(super) fn tiles(&mut self, width: u32, height: u32, before: [u32; 2]) -> Vec<FilmTile<'_>> {
+        let columns = (self.width + before[0]).div_ceil(width) as usize;
+        let rows = (self.height + before[1]).div_ceil(height) as usize;
+        let mut tiles = Vec::with_capacity(columns * rows);
+        for tile in 0..columns * rows {
+            let corner = [
+                (tile % columns) as i64 * i64::from(width),
+                (tile / columns) as i64 * i64::from(height),
+            ];
+            let corner = [0, 1].map(|axis| (corner[axis] - i64::from(before[axis])) as i32);
+            let first = corner.map(|c| c.max(0) as u32);
+            tiles.push(FilmTile { corner, first, rows: Vec::with_capacity(height as usize) });
+        }
+        let row_length = self.width as usize;
+        let mut surfaces = self.surfaces.chunks_mut(row_length);
+        for (y, mut pixels) in self.pixels.chunks_mut(row_length).enumerate() {
+            let mut surfaces = surfaces.next().unwrap_or_default();
+            let tile_row = (y + before[1] as usize) / height as usize;
+            for tile in &mut tiles[tile_row * columns..(tile_row + 1) * columns] {
+                let end = (i64::from(tile.corner[0]) + i64::from(width)) as usize;
+                let length = end.min(row_length) - tile.first[0] as usize;
+                let (own, rest) = pixels.split_at_mut(length);
+                let (own_surfaces, rest_surfaces) =
+                    surfaces.split_at_mut(if surfaces.is_empty() { 0 } else { length });
+                tile.rows.push((own, own_surfaces));
+                (pixels, surfaces) = (rest, rest_surfaces);
+            }
+        }
+        tiles
+    }
+}
+
+impl FilmTile<'_> {
+    /// Column and row where it begins; it may be outside of the picture.
+    pub(super) fn corner(&self) -> [i32; 2] {
+        self.corner
+    }
+
+    /// Its pixels that are in the picture with their column and row, row after row.
+    pub(super) fn pixels(&mut self) -> impl Iterator<Item = ([u32; 2], FilmPixel<'_>)> {
+        let [left, top] = self.first;
+        (top..).zip(&mut self.rows).flat_map(move |(y, (pixels, surfaces))| {
+            let mut surfaces = surfaces.iter_mut();
+            (left..)
+                .zip(pixels.iter_mut())
+                .map(move |(x, pixel)| ([x, y], FilmPixel { pixel, surface: surfaces.next() }))
+        })
+    }
+}
+
+impl FilmPixel<'_> {
+    /// Number of samples taken.
+    pub(super) fn samples(&self) -> u32 {
+        self.pixel.samples
+    }
+
+    /// Adds one sample.
+    pub(super) fn add(&mut self, result: &PathResult) {
+        self.pixel.add(result);
+        if let Some(surface) = &mut self.surface {
+            surface.add(result);
+        }
+    }
+}
+
 /// What the first surface of each pixel looks like.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SurfaceLayers {

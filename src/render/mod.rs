@@ -25,6 +25,7 @@ use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LawOptions, LearningGrid, LightGrid};
 use crate::medium::Fog;
 use crate::path::camera::CameraRays;
+use crate::path::sharing::SharedTile;
 use crate::path::{Background, PathLimits, PathTracer, World};
 use crate::sampler::{Points, Sequence};
 use crate::scene::{Camera, Medium};
@@ -44,6 +45,25 @@ pub enum Sampling {
     Bsdf,
 }
 
+/// Whether neighbouring pixels share their second vertices ([`crate::path::sharing`]).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sharing {
+    /// As it suits the way the map is sampled and the size of the picture.
+    #[default]
+    Auto,
+    /// Each path is one pixel's.
+    Off,
+    /// In tiles of 4x4 pixels, all of which keep their own: less of the noise is shared.
+    #[value(name = "4x4")]
+    #[serde(rename = "4x4")]
+    Small,
+    /// In tiles of 8x8 pixels, of which every fourth keeps its own.
+    #[value(name = "8x8")]
+    #[serde(rename = "8x8")]
+    Large,
+}
+
 /// What is to be rendered and how. Equal views give equal pictures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
@@ -61,6 +81,8 @@ pub struct View {
     pub limits: PathLimits,
     /// Seed of all random numbers.
     pub seed: u32,
+    /// Whether pixels share their second vertices.
+    pub sharing: Sharing,
     /// Which points samples are taken at; learning always takes [`Points::Sobol`].
     pub points: Points,
     /// Light Grid cells around the horizon; half as many from top to bottom.
@@ -114,6 +136,21 @@ impl View {
         } else {
             (work / LEARNING_SHARE).clamp(1 << 16, 1 << 20)
         }
+    }
+
+    /// How pixels share second vertices where there is no fog; `None` if they do not.
+    pub fn shared_tile(&self) -> Option<SharedTile> {
+        let [width, height] = self.whole_size();
+        let tile = match self.sharing {
+            Sharing::Off => None,
+            Sharing::Small => Some(SharedTile::SMALL),
+            Sharing::Large => Some(SharedTile::LARGE),
+            Sharing::Auto => {
+                let suits = self.sampling == Sampling::Adaptive && width.min(height) >= 64;
+                suits.then_some(SharedTile::LARGE)
+            }
+        };
+        tile.filter(|_| self.limits.bounces >= 2)
     }
 
     /// Width and height of the picture that this one is a part of.

@@ -9,7 +9,7 @@ use crate::environment::{EnvironmentOptions, TableKind};
 use crate::light_grid::LawOptions;
 use crate::path::{Background, PathLimits};
 use crate::render::filter::PixelFilter;
-use crate::render::{Sampling, View};
+use crate::render::{Sampling, Sharing, View};
 use crate::sampler::Points;
 use crate::scene::Camera;
 
@@ -46,6 +46,8 @@ pub struct Settings {
     pub tiles: (u32, u32),
     /// Light Grid cells around the horizon.
     pub grid_columns: u32,
+    /// Whether pixels share their second vertices.
+    pub sharing: Sharing,
     /// Camera paths to learn from; `None` for as many as suit the picture.
     pub learning_paths: Option<u64>,
     /// Points samples are taken at.
@@ -64,6 +66,7 @@ impl Settings {
             table: environment.table,
             tiles: (environment.tile_columns, environment.tile_rows),
             grid_columns: 64,
+            sharing: Sharing::Auto,
             learning_paths: None,
             points: Points::default(),
             russian_roulette: true,
@@ -93,6 +96,7 @@ impl Settings {
             seed,
             points: self.points,
             grid_columns: self.grid_columns,
+            sharing: self.sharing,
             learning_paths: self.learning_paths.unwrap_or_else(|| {
                 View::suitable_learning_paths(self.sampling, [width, height], None)
             }),

@@ -87,6 +87,11 @@ impl Sampler {
         ]
     }
 
+    /// Leaves out so many pairs.
+    pub(crate) fn skip(&mut self, pairs: u32) {
+        self.pair = self.pair.wrapping_add(pairs);
+    }
+
     /// The next pair in `[0,1)`.
     pub fn next_pair(&mut self) -> [f32; 2] {
         self.next_pair_bits().map(unit_from_bits)

@@ -13,7 +13,7 @@ use crate::path::{Background, PathLimits, World};
 use crate::render::film::{Film, Pixel};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::Stage as GpuStage;
-use crate::render::{Phase, Sampling, Session, View};
+use crate::render::{Phase, Sampling, Session, Sharing, View};
 use crate::sampler::Points;
 use crate::scene::{Camera, Material, Scene, Texture, TextureImage, TextureRef, Wrap};
 
@@ -200,6 +200,7 @@ pub(super) fn view(camera: Camera, sampling: Sampling, bounces: u32) -> View {
         limits: PathLimits { bounces, russian_roulette: false },
         seed: 1,
         grid_columns: 64,
+        sharing: Sharing::Auto,
         learning_paths: 1 << 13,
         laws: LawOptions::ADAPTIVE,
         layers: false,

@@ -11,6 +11,7 @@ mod known_paths;
 mod many_lights;
 mod repeatable;
 pub(crate) mod scenes;
+mod sharing;
 mod unbiased;
 
 use std::sync::atomic::AtomicBool;
@@ -22,7 +23,7 @@ use lightgrid::light_grid::LawOptions;
 use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::{Phase, Sampling, Session, StopRule, View};
+use lightgrid::render::{Phase, Sampling, Session, Sharing, StopRule, View};
 use lightgrid::sampler::Points;
 use lightgrid::scene::Camera;
 
@@ -44,6 +45,7 @@ pub(crate) fn view(camera: Camera, sampling: Sampling, bounces: u32) -> View {
         seed: 1,
         points: Points::Sobol,
         grid_columns: 64,
+        sharing: Sharing::Auto,
         learning_paths: 1 << 13,
         laws: LawOptions::ADAPTIVE,
         medium: None,

@@ -12,7 +12,7 @@ use lightgrid::path::{Background, PathLimits, World, framing};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::gpu::{Gpu, Stage};
-use lightgrid::render::{Crop, Sampling, Session, StopRule, View};
+use lightgrid::render::{Crop, Sampling, Session, Sharing, StopRule, View};
 use lightgrid::sampler::Points;
 use lightgrid::scene::{Camera, Material, Medium, builtin, gltf};
 
@@ -279,6 +279,60 @@ fn layers_lens_filters_background_and_crops_are_the_same() {
         let pixels = a.depth.len() as f64;
         assert!(depth < 0.02 * pixels, "{depth} of {pixels} depths differ");
         assert!(albedo < 0.06 * pixels && normal < 0.06 * pixels, "{albedo}, {normal}");
+    }
+}
+
+/// The mean squared difference of two films in units of their own noise.
+fn difference_over_noise(a: &Film, b: &Film) -> f64 {
+    let pairs = a.pixels().iter().zip(b.pixels());
+    let (mut difference, mut noise) = (0.0, 0.0);
+    for (a, b) in pairs {
+        let floor = mean_of(a, b).powi(2);
+        difference += (a.mean_luminance() - b.mean_luminance()).powi(2) / floor;
+        noise += (a.variance_of_mean() + b.variance_of_mean()) / floor;
+    }
+    difference / noise
+}
+
+fn mean_of(a: &Pixel, b: &Pixel) -> f64 {
+    (0.5 * (a.mean_luminance() + b.mean_luminance())).max(1e-6)
+}
+
+#[test]
+fn pixels_share_the_same_vertices() {
+    let Some(gpu) = gpu() else { return };
+    for (name, map, sampling, sharing) in [
+        ("evening", "sunset", Sampling::Adaptive, Sharing::Large),
+        ("exterior", "overcast", Sampling::Plain, Sharing::Small),
+    ] {
+        let world = World::new(builtin::build(name).expect("built in"));
+        let environment = sky_map(map);
+        let camera = world.scene.cameras[0].clone();
+        let limits = PathLimits { bounces: 4, russian_roulette: true };
+        let (width, height, layers) = (44, 27, true);
+        let view = View { width, height, layers, sharing, limits, ..view(camera, sampling, 4) };
+        let gpu_film = finish(on_gpu(&world, &environment, view.clone(), &gpu), 16);
+        let same = render(&world, &environment, view.clone(), 16);
+        let share = difference_over_noise(&gpu_film, &same);
+        eprintln!("{name}, {sharing:?}: differences are {share:.4} of the noise");
+        assert!(share < 0.1, "{name}, {sharing:?}: {share}");
+        let alone = View { seed: 77, sharing: Sharing::Off, ..view.clone() };
+        expect_agreement(name, &render(&world, &environment, alone, 128), &gpu_film);
+
+        // In pieces, and begun by the CPU.
+        let never = AtomicBool::new(false);
+        let view = View { sampling: Sampling::Plain, ..view };
+        let mut session = on_gpu(&world, &environment, view.clone(), &gpu);
+        session.advance(2, &AtomicBool::new(true)).expect("cancelled");
+        session.advance(1, &never).expect("rendering");
+        session.advance(2, &never).expect("rendering");
+        let mut at_once = on_gpu(&world, &environment, view.clone(), &gpu);
+        at_once.advance(3, &never).expect("rendering");
+        assert_eq!(session.film(), at_once.film(), "the same bits in one piece or several");
+        session.continue_on_cpu();
+        session.advance(1, &never).expect("rendering");
+        let whole = render(&world, &environment, view, 4);
+        assert!(difference_over_noise(session.film(), &whole) < 0.1);
     }
 }
 

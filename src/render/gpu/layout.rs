@@ -32,7 +32,8 @@ pub(crate) struct Work {
     pub(crate) samples: u32,
     pub(crate) end_sample: u32,
     pub(crate) stride: u32,
-    pub(crate) padding: [u32; 2],
+    pub(crate) sample: u32,
+    pub(crate) padding: u32,
 }
 
 /// Twin of `Globals` in `globals.wgsl`.

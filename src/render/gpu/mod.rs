@@ -20,6 +20,7 @@ mod read;
 #[cfg(test)]
 mod registers;
 pub(crate) mod shader;
+mod sharing;
 mod stage;
 
 use std::collections::BTreeMap;
@@ -43,6 +44,7 @@ use layout::{Globals, Work};
 use pipeline::Pipeline;
 use queue::Queue;
 use shader::{Binding, Constants, Features, Kernel, Program};
+use sharing::Sharing;
 use stage::put_array;
 
 pub(crate) use cast::Question;
@@ -75,6 +77,8 @@ pub(crate) struct Renderer {
     flights: Flights,
     /// If kernels take turns.
     queue: Option<Queue>,
+    /// If pixels share second vertices.
+    sharing: Option<Sharing>,
     film: Sums,
     progress: Progress,
     /// Samples that the film began with and those that [`Advance`] has told of.
@@ -146,7 +150,8 @@ impl Renderer {
         film: Option<&Film>,
     ) -> Result<Self> {
         let mut renderer = Self::without_kernels(stage, (world, environment), view, rays, film)?;
-        if Schedule::of(&stage.gpu, &renderer.features) == Schedule::Queue {
+        let is_queue = Schedule::of(&stage.gpu, &renderer.features) == Schedule::Queue;
+        if is_queue && renderer.sharing.is_none() {
             let tiles = renderer.tiles();
             let queue = Queue::new(&mut renderer.buffers, &renderer.features, tiles)?;
             renderer.queue = Some(queue);
@@ -204,10 +209,16 @@ impl Renderer {
         }
         buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
         let kernel_facts = KernelFacts::of(&features);
+        constants.shared_tile = view.shared_tile().filter(|_| view.fog(world).is_none());
+        let sharing = constants
+            .shared_tile
+            .map(|tile| Sharing::new(&mut buffers, &features, tile, size))
+            .transpose()?;
         let mut renderer = Self {
             kernels: BTreeMap::new(),
             flights: Flights::new(&stage.gpu),
             queue: None,
+            sharing,
             film: sums,
             progress,
             told: 0,
@@ -307,7 +318,7 @@ impl Renderer {
             self.put_counters(learning)?;
         }
         let stride = counts.map_or(0, |_| pass.stride);
-        if self.progress.ahead != pass.target {
+        if self.sharing.is_none() && self.progress.ahead != pass.target {
             self.forget_paths()?;
             // Tiles that are ahead of the others take less than those.
             let Progress { least, .. } = self.progress;
@@ -315,7 +326,9 @@ impl Renderer {
             let surplus = self.total_samples().saturating_sub(even);
             self.progress = Progress { least, ahead: pass.target, surplus, ..Progress::default() };
         }
-        if self.queue.is_some() {
+        if self.sharing.is_some() {
+            self.render_shared(pass, stride, cancel)?;
+        } else if self.queue.is_some() {
             self.render_queue(pass, stride, cancel)?;
         } else {
             self.render_tiles(pass, stride, cancel)?;
@@ -446,6 +459,9 @@ impl Renderer {
 
     /// The kernels that add samples to pixels, in order.
     fn render_kernels(&self) -> &'static [Kernel] {
+        if self.sharing.is_some() {
+            return &Kernel::OF_SHARING;
+        }
         match (&self.queue, self.features.has("shadow_rays")) {
             (None, _) => &[Kernel::Render],
             (Some(_), true) => &Kernel::OF_QUEUE,
@@ -583,7 +599,7 @@ mod tests {
     use crate::light_grid::cells::SphericalGrid;
     use crate::light_grid::{LawOptions, Recording};
     use crate::path::{Background, PathLimits, PathTracer};
-    use crate::render::{Sampling, cpu};
+    use crate::render::{Sampling, Sharing, cpu};
     use crate::sampler::{Points, Sequence};
     use crate::scene::builtin;
 
@@ -607,6 +623,7 @@ mod tests {
             seed: 5,
             points: Points::Sobol,
             grid_columns: 64,
+            sharing: Sharing::Off,
             learning_paths: 1 << 13,
             laws: recording,
             medium: None,

@@ -178,6 +178,7 @@ fn program_of(world: &World, kernel: Kernel) -> Program {
         sheen_at: 4096,
         filter_at: 8192,
         rows_at: 12288,
+        shared_tile: None,
     };
     let in_buffers = ARRAYS.map(|array| array.name).into();
     Program::new(kernel, &features, &constants, &ArrayPlaces { in_buffers, ..Default::default() })

@@ -11,6 +11,7 @@ use super::super::filter::PixelFilter;
 use super::super::{Sampling, View};
 use crate::environment::{Environment, Lookup, TableKind};
 use crate::light_grid::Recording;
+use crate::path::sharing::SharedTile;
 use crate::path::{Background, World};
 use crate::sampler::Points;
 
@@ -31,6 +32,12 @@ pub(crate) enum Kernel {
     Shade,
     /// Follows their rays towards lights.
     FollowShadows,
+    /// Adds samples to pixels that share, with the two that follow: finds second vertices.
+    FindSeconds,
+    /// Estimates what arrives there.
+    LightSeconds,
+    /// Gathers light at the first vertices.
+    ConnectSeconds,
 }
 
 impl Kernel {
@@ -44,14 +51,21 @@ impl Kernel {
             Self::Trace => "trace",
             Self::Shade => "shade",
             Self::FollowShadows => "follow_shadows",
+            Self::FindSeconds => "find_seconds",
+            Self::LightSeconds => "light_seconds",
+            Self::ConnectSeconds => "connect_seconds",
         }
     }
 
     /// Number of kernels.
-    pub(crate) const COUNT: usize = 7;
+    pub(crate) const COUNT: usize = 10;
 
     /// Those that bring all paths one ray further, in order.
     pub(crate) const OF_QUEUE: [Self; 3] = [Self::Trace, Self::Shade, Self::FollowShadows];
+
+    /// Those that add one sample to every pixel, in order.
+    pub(crate) const OF_SHARING: [Self; 3] =
+        [Self::FindSeconds, Self::LightSeconds, Self::ConnectSeconds];
 
     /// Whether it traces rays that the host made, not paths.
     fn casts(self) -> bool {
@@ -60,7 +74,17 @@ impl Kernel {
 
     /// Whether it adds finished paths to the film.
     fn adds_samples(self) -> bool {
-        matches!(self, Self::Render | Self::Trace)
+        matches!(self, Self::Render | Self::Trace | Self::ConnectSeconds)
+    }
+
+    /// Whether it begins samples.
+    fn begins_samples(self) -> bool {
+        self.adds_samples() || self == Self::FindSeconds
+    }
+
+    /// Whether its pixels share second vertices.
+    fn shares(self) -> bool {
+        Self::OF_SHARING.contains(&self)
     }
 
     /// Whether its paths lie in slots.
@@ -75,7 +99,7 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 52] = [
+    pub(crate) const ALL: [&'static str; 54] = [
         "alpha_mask",
         "anisotropy",
         "background_blur",
@@ -89,6 +113,7 @@ impl Features {
         "faces",
         "filtered_hits",
         "filtered_or_passed",
+        "finding",
         "hardware_rays",
         "independent_points",
         "iridescence",
@@ -113,6 +138,7 @@ impl Features {
         "second_uv_set",
         "shadow_media",
         "shadow_rays",
+        "sharing",
         "sheen",
         "single_sided",
         "software_walk",
@@ -191,7 +217,8 @@ impl Features {
     /// stack's size says.
     pub(crate) fn most() -> Self {
         let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_"));
-        let others = ["deep_tree", "hardware_rays", "learning", "summed_area"];
+        let others =
+            ["deep_tree", "finding", "hardware_rays", "learning", "sharing", "summed_area"];
         Self::from_names(names.filter(|n| !others.contains(n)).map(|n| (n, true)))
     }
 
@@ -242,7 +269,15 @@ impl Features {
         } else if kernel.casts() {
             set.remove("counting");
             set.remove("layers");
+        } else if kernel.shares() {
+            set.insert("sharing");
         }
+        match kernel {
+            Kernel::FindSeconds => set.insert("finding"),
+            // Only first vertices are shown.
+            Kernel::LightSeconds => set.remove("layers"),
+            _ => false,
+        };
         Self(set)
     }
 
@@ -349,6 +384,8 @@ pub(crate) struct Constants {
     pub(crate) sheen_at: u32,
     pub(crate) filter_at: u32,
     pub(crate) rows_at: u32,
+    /// How pixels share, if they do.
+    pub(crate) shared_tile: Option<SharedTile>,
 }
 
 /// Texels of a vertex: two, and one for each of these that the scene needs.
@@ -571,6 +608,7 @@ impl Program {
             sheen_at,
             filter_at,
             rows_at,
+            shared_tile,
         } = *constants;
         for (name, value) in [
             ("STACK_SIZE", stack_size),
@@ -597,6 +635,18 @@ impl Program {
                 ("FIRST_HIT_TEXEL", first_hit),
                 ("MAP_SHADOW_TEXEL", map_shadow),
                 ("LAMP_SHADOW_TEXEL", lamp_shadow),
+            ] {
+                let _ = writeln!(source, "const {name} = {value}u;");
+            }
+        }
+        if kernel.shares() {
+            let SharedTile { side, owner_side, continuations, map_samples } =
+                shared_tile.unwrap_or(SharedTile::LARGE);
+            for (name, value) in [
+                ("TILE_SIDE", side),
+                ("OWNER_SIDE", owner_side),
+                ("CONTINUATIONS", continuations),
+                ("MAP_SAMPLES", map_samples),
             ] {
                 let _ = writeln!(source, "const {name} = {value}u;");
             }
@@ -635,7 +685,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 37] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 41] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -670,7 +720,7 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 37] {
         (wgsl!("path"), true),
         (wgsl!("count"), features.has("counting")),
         (wgsl!("film"), kernel.adds_samples()),
-        (wgsl!("sample"), kernel.adds_samples()),
+        (wgsl!("sample"), kernel.begins_samples()),
         (wgsl!("render"), kernel == Kernel::Render),
         (wgsl!("learn"), kernel == Kernel::Learn),
         (wgsl!("cast"), kernel.casts()),
@@ -680,6 +730,10 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 37] {
         (wgsl!("trace"), kernel == Kernel::Trace),
         (wgsl!("shade"), kernel == Kernel::Shade),
         (wgsl!("follow_shadows"), kernel == Kernel::FollowShadows),
+        (wgsl!("sharing"), kernel.shares()),
+        (wgsl!("find_seconds"), kernel == Kernel::FindSeconds),
+        (wgsl!("light_seconds"), kernel == Kernel::LightSeconds),
+        (wgsl!("connect_seconds"), kernel == Kernel::ConnectSeconds),
     ]
 }
 
@@ -702,6 +756,8 @@ fn bindings(kernel: Kernel, features: &Features, places: &ArrayPlaces) -> Vec<Bi
         ("learning_rays", "atomic<u32>", true, learns),
         ("slots", "array<vec4u>", true, is_of_queue),
         ("queue", "Queue", true, is_of_queue),
+        ("firsts", "array<vec4u>", true, kernel.shares() && kernel != Kernel::LightSeconds),
+        ("seconds", "array<vec4u>", true, kernel.shares()),
         ("cast_rays", "array<CastRay>", false, kernel.casts()),
         ("cast_results", "array<vec2u>", true, kernel.casts()),
     ];
@@ -782,13 +838,15 @@ mod tests {
 
     /// Divisions and remainders of integers by what is no constant. naga does not guard them (see
     /// `RUNTIME_CHECKS`), so here is why each divisor is at least 1.
-    const DIVISIONS: [&str; 12] = [
+    const DIVISIONS: [&str; 14] = [
         // The share of the whole map's law is 1 to 256, and with 256 no number lies beyond it.
         "choose_tile: (((rest % width) << 8u) | (finer & 0xffu)) / width",
         "choose_tile: rest % width",
         "choose_tile: rest / width",
         // The map has tiles, and as many patches or more.
         "first_row_sum: tile % globals.tile_columns",
+        "member_of: tile % max(across, 1u)",
+        "member_of: tile / max(across, 1u)",
         // Tiles across a picture of at least one pixel.
         "pixel_in_tile: tile % tiles_across",
         "pixel_in_tile: tile / tiles_across",
@@ -803,7 +861,8 @@ mod tests {
     #[test]
     fn no_integer_is_divided_by_zero() {
         let mut found = BTreeSet::new();
-        for kernel in [Kernel::Render, Kernel::Learn, Kernel::Trace] {
+        let all = [Kernel::Render, Kernel::Learn, Kernel::Trace].into_iter();
+        for kernel in all.chain(Kernel::OF_SHARING) {
             for table in [None, Some("table_u32")] {
                 let features = reachable(|_| true, table);
                 let constants =
@@ -856,6 +915,7 @@ mod tests {
         let follow = [
             "filtered_hits",
             "filtered_or_passed",
+            "finding",
             "hardware_rays",
             "learning",
             "pass_through",
@@ -863,6 +923,7 @@ mod tests {
             "scene_lights",
             "shadow_media",
             "shadow_rays",
+            "sharing",
             "software_walk",
             "tangents",
             "uncommon_textures",
@@ -923,6 +984,9 @@ mod tests {
             validate(Kernel::Render, features, places);
             if features.has("light_grid") {
                 validate(Kernel::Learn, features, places);
+            }
+            for kernel in Kernel::OF_SHARING {
+                validate(kernel, features, places);
             }
             for kernel in Kernel::OF_QUEUE {
                 if kernel != Kernel::FollowShadows || features.has("shadow_rays") {

@@ -14,7 +14,7 @@ use crate::path::camera::CameraRays;
 use crate::path::{Background, PathLimits, PathTracer, World};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::layout::{pack_radiance, unpack_radiance};
-use crate::render::{Sampling, View};
+use crate::render::{Sampling, Sharing, View};
 use crate::sampler::{Points, Sampler};
 use crate::scene::{
     AlphaMode, Camera, Material, Medium, Projection, PunctualKind, PunctualLight, Scene, Texture,
@@ -125,6 +125,7 @@ fn view(camera: Camera, filter: PixelFilter, sampling: Sampling) -> View {
         seed: 11,
         points: Points::Sobol,
         grid_columns: 64,
+        sharing: Sharing::Off,
         learning_paths: 0,
         laws: LawOptions::ADAPTIVE,
         medium: None,

@@ -1,0 +1,179 @@
+// Gathers light at the first vertices: from the map and from lamps, and from the second vertices that
+// their tile has kept. Then the samples are added to the film.
+
+// Second vertices of a tile that are looked at together.
+const BATCH = 4u;
+
+struct Second {
+    // 0 if there is none, else as in `seconds`.
+    what: u32,
+    position: vec3f,
+    geometric_normal: vec3f,
+    shading_frame: Frame,
+    bsdf: Bsdf,
+}
+
+var<workgroup> batch: array<Second, TILES_OF_GROUP * BATCH>;
+// What of a second vertex's radiance reaches a lane's pixel, and the density with which it would have
+// found that vertex.
+var<workgroup> connections: array<vec4f, 64u * BATCH>;
+
+// What connects a lane's first vertex with second vertex `index` of the batch.
+fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32) -> vec4f {
+    let what = batch[index].what;
+    let normal = batch[index].geometric_normal;
+    let position = batch[index].position;
+    let to_second = position - vertex.point.position;
+    let squared = dot(to_second, to_second);
+    let direction = to_second / sqrt(squared);
+    let cosine = -dot(normal, direction);
+    if what == 0u || !(cosine > 0.0 && squared > 0.0) {
+        return vec4f(0.0);
+    }
+    let f = scattered(path, vertex, direction);
+    if max_element(f.value) <= 0.0 {
+        return vec4f(0.0);
+    }
+    if (what & 63u) != member {
+        if !is_true_from(batch[index].shading_frame.z, normal, -direction) {
+            return vec4f(0.0);
+        }
+        let own_normal = vertex.point.geometric_normal;
+        let side = select(-own_normal, own_normal, dot(own_normal, direction) > 0.0);
+        let origin = offset_origin(vertex.point.position, side);
+        let way = offset_origin(position, normal) - origin;
+        let distance = length(way);
+        (*path).rays += 1u;
+        let visible = transmittance_along(Ray(origin, way / distance, distance * (1.0 - 1e-4)));
+        if any(visible != vec3f(1.0)) {
+            return vec4f(0.0);
+        }
+    }
+    let area = cosine / squared;
+    let density = f.pdf_solid_angle * area / f32(OWNER_SIDE * OWNER_SIDE);
+    return vec4f((*path).throughput * f.value * area, density);
+}
+
+// Radiance of second vertex `index` of the batch towards a first one.
+fn radiance_from(index: u32, at: u32, position: vec3f) -> vec3f {
+    let direction = normalize(position - batch[index].position);
+    let frame = batch[index].shading_frame;
+    let bsdf = batch[index].bsdf;
+    let wo = local_from_world(frame, direction);
+    let out = bsdf_outgoing(bsdf, wo);
+    var radiance = vec3f(0.0);
+    for (var i = 0u; i < CONTINUATIONS * INCIDENTS; i++) {
+        let light = float3(seconds[at + 2u * i + 3u]);
+        if any(light != vec3f(0.0)) {
+            let from_ = float3(seconds[at + 2u * i + 2u]);
+            let wi = local_from_world(frame, from_);
+            if (wi.z > 0.0) == (dot(batch[index].geometric_normal, from_) > 0.0) {
+                radiance += bsdf_eval_pdf_with(bsdf, wo, wi, out).value * light;
+            }
+        }
+    }
+    return radiance;
+}
+
+@compute @workgroup_size(64)
+fn connect_seconds(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    own_lane = lane;
+    let member = lane_member(group.x, lane);
+    let at = first_at(group.x, lane);
+    let hit = firsts[at];
+    let shares = (hit.w & IS_SHARED) != 0u;
+    var path: Path;
+    var vertex: Vertex;
+    if member.is_inside {
+        path = start_sample(member.place.x, member.place.y, globals.work.sample);
+        let carried = firsts[at + 64u];
+        path.throughput = float3(carried);
+        path.rays = carried.w;
+        path.radiance = float3(firsts[at + 128u]);
+        path.bounces = 1u;
+    }
+    if shares {
+        vertex = vertex_at(hit, path.ray.direction);
+        path.sampler.pair = hit.w >> 2u;
+        path.map_samples = f32(MAP_SAMPLES);
+//#if counting
+        path.is_counted = (hit.w & IS_COUNTED_FIRST) != 0u;
+//#end
+//#if map_sampling
+        for (var i = 0u; i < MAP_SAMPLES; i++) {
+            add_light(&path, shadow_of(&path, vertex, light_of_map(&path, vertex), true));
+        }
+//#end
+//#if local_lights
+        add_light(&path, shadow_of(&path, vertex, light_of_lamps(&path, vertex), false));
+//#end
+    }
+    let tile_in_group = lane / MEMBERS;
+    for (var first_of_batch = 0u; first_of_batch < OWNERS; first_of_batch += BATCH) {
+        workgroupBarrier();
+        if lane < TILES_OF_GROUP * BATCH {
+            let second_at_ =
+                second_at(group.x, lane / BATCH * MEMBERS, first_of_batch + lane % BATCH);
+            let found = seconds[second_at_];
+            batch[lane].what = 0u;
+            if (found.w & IS_FOUND) != 0u {
+                let point =
+                    surface_at(found.x, bitcast<vec2f>(found.yz), float3(seconds[second_at_ + 1u]));
+                batch[lane].what = found.w;
+                batch[lane].position = point.position;
+                batch[lane].geometric_normal = point.geometric_normal;
+                batch[lane].shading_frame = point.shading_frame;
+                batch[lane].bsdf = bsdf_new(point.parameters, point.front_face);
+            }
+        }
+        workgroupBarrier();
+        for (var i = 0u; i < BATCH; i++) {
+            var found = vec4f(0.0);
+            if shares {
+                found = connection(&path, vertex, tile_in_group * BATCH + i, lane % MEMBERS);
+            }
+            connections[64u * i + lane] = found;
+        }
+        workgroupBarrier();
+        for (var i = 0u; i < BATCH; i++) {
+            let own = connections[64u * i + lane];
+            if all(own.xyz == vec3f(0.0)) {
+                continue;
+            }
+            var density = 0.0;
+            for (var m = 0u; m < MEMBERS; m++) {
+                density += connections[64u * i + tile_in_group * MEMBERS + m].w;
+            }
+            let index = tile_in_group * BATCH + i;
+            let second_at_ = second_at(group.x, lane, first_of_batch + i);
+            let radiance = radiance_from(index, second_at_, vertex.point.position);
+            let added = path.radiance + own.xyz * radiance / density;
+            path.radiance = select(path.radiance, added, is_finite3(added));
+        }
+    }
+    if !member.is_inside {
+        return;
+    }
+    if member.is_owner {
+        let second_at_ = second_at(group.x, lane, member.square);
+        if (seconds[second_at_].w & IS_FOUND) != 0u {
+            for (var i = 1u; i <= CONTINUATIONS; i++) {
+                path.rays += seconds[second_at_ + 1u + 2u * INCIDENTS * i].w;
+            }
+        }
+    }
+//#if layers
+    let albedo = firsts[at + 192u];
+    let normal = firsts[at + 256u];
+    path.first_hit = FirstHit(
+        float3(albedo), bitcast<f32>(albedo.w), float3(normal), bitcast<f32>(normal.w));
+//#end
+    let pixel = member.place.y * globals.width + member.place.x;
+    // Another device may have been ahead in parts.
+    if film_counts[pixel].x == globals.work.sample {
+        add_to_film(pixel, &path);
+    }
+}

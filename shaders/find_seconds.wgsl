@@ -1,0 +1,97 @@
+// Follows each pixel's path to its second vertex, or to its end if that cannot be shared.
+
+// Where the last ray ended.
+var<private> arrival: Hit;
+// The first vertex of the path, as `firsts` keeps it.
+var<private> first: array<vec4u, 2>;
+// The second one, as `seconds` keeps it; there is none if the last word of the first texel is 0.
+var<private> second: array<vec4u, 2>;
+
+// At the first vertex: whether its light is gathered later, by `connect_seconds`.
+fn meet_first(path: ptr<function, Path>, vertex: Vertex) -> bool {
+    var shares = is_alike_nearby(vertex);
+//#if solid_transmission
+//#if medium
+    shares = shares && !(*path).body.is_solid;
+//#else
+    let body = (*path).body;
+    shares = shares && body.squared_index == 1.0 && all(body.absorption == vec3f(0.0));
+//#end
+//#end
+    if !shares {
+        return false;
+    }
+    let pair = (*path).sampler.pair;
+    var what = IS_SHARED | (pair << 2u);
+//#if counting
+    what |= select(0u, IS_COUNTED_FIRST, (*path).is_counted);
+//#end
+    first[0] = packed_hit(arrival.triangle, arrival.barycentric, what);
+    first[1] = packed((*path).throughput, 0u);
+    var pairs = 0u;
+//#if map_sampling
+    pairs += MAP_SAMPLES;
+//#end
+//#if local_lights
+    pairs += 1u;
+//#end
+    (*path).sampler.pair = pair + pairs;
+    (*path).map_samples = f32(MAP_SAMPLES);
+    return true;
+}
+
+// At the second vertex: whether it is shared, and the path ends.
+fn meet_second(path: ptr<function, Path>, vertex: Vertex) -> bool {
+    let shares = (first[0].w & IS_SHARED) != 0u
+        && (*path).is_clear
+        && (*path).departure_pdf_solid_angle < F32_MAX
+        && is_alike_nearby(vertex)
+        && is_true_from(
+            vertex.point.shading_frame.z, vertex.point.geometric_normal, -(*path).ray.direction);
+    if shares {
+        var what = IS_FOUND | ((*path).sampler.pair << 8u);
+//#if counting
+        what |= select(0u, IS_COUNTED_SECOND, (*path).is_counted);
+//#end
+        second[0] = packed_hit(arrival.triangle, arrival.barycentric, what);
+        let carried = max_element((*path).throughput);
+        second[1] = packed((*path).ray.direction, bitcast<u32>(carried));
+    }
+    return shares;
+}
+
+@compute @workgroup_size(64)
+fn find_seconds(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    own_lane = lane;
+    let member = lane_member(group.x, lane);
+    let at = first_at(group.x, lane);
+    let kept_at = second_at(group.x, lane, member.square);
+    if !member.is_inside {
+        firsts[at] = vec4u(0u);
+        if member.is_owner {
+            seconds[kept_at] = vec4u(0u);
+        }
+        return;
+    }
+    first[0] = vec4u(0u);
+    second[0] = vec4u(0u);
+    var path = start_sample(member.place.x, member.place.y, globals.work.sample);
+    while path_step(&path) {}
+    firsts[at] = first[0];
+    firsts[at + 64u] = vec4u(first[1].xyz, path.rays);
+    firsts[at + 128u] = packed(path.radiance, 0u);
+//#if layers
+    let hit = path.first_hit;
+    firsts[at + 192u] = packed(hit.albedo, bitcast<u32>(hit.depth));
+    firsts[at + 256u] = packed(hit.normal, bitcast<u32>(hit.hits));
+//#end
+    if member.is_owner {
+        let is_found = second[0].w != 0u;
+        seconds[kept_at] =
+            vec4u(second[0].xyz, select(0u, second[0].w | (lane % MEMBERS), is_found));
+        seconds[kept_at + 1u] = second[1];
+    }
+}

@@ -1,0 +1,137 @@
+// Second vertices shared between the pixels of a tile: twin of src/path/sharing.rs, which says why that
+// is right. `find_seconds` follows paths to their second vertices, `light_seconds` estimates what
+// arrives at those that are kept, `connect_seconds` gathers light at the first vertices, from the second
+// ones of the whole tile, too. A workgroup holds one tile or several.
+
+// Pixels of a tile, and tiles of a workgroup.
+const MEMBERS = TILE_SIDE * TILE_SIDE;
+const TILES_OF_GROUP = 64u / MEMBERS;
+// Second vertices of a tile.
+const OWNERS = MEMBERS / (OWNER_SIDE * OWNER_SIDE);
+const TILE_SEED = 0x74696c65u;
+const LEAST_ALPHA = 0.01;
+const PAIRS_OF_ESTIMATE = 1u << 24u;
+
+// A pixel of a tile.
+struct Member {
+    // Outside of the picture if it is not less than its size.
+    place: vec2u,
+    is_inside: bool,
+    // Of the squares of which each keeps one second vertex.
+    square: u32,
+    is_owner: bool,
+}
+
+// Pixel number `index` of a tile of the picture.
+fn member_of(tile: u32, index: u32) -> Member {
+    let seed = hash(globals.seed ^ hash(globals.work.sample ^ TILE_SEED));
+    let before = vec2u(seed % TILE_SIDE, (seed >> 16u) % TILE_SIDE);
+    let across = (globals.width + before.x + TILE_SIDE - 1u) / TILE_SIDE;
+    let local = vec2u(index % TILE_SIDE, index / TILE_SIDE);
+    let corner = vec2u(tile % max(across, 1u), tile / max(across, 1u)) * TILE_SIDE;
+    var member: Member;
+    // What is left of or above the picture becomes very large.
+    member.place = corner + local - before;
+    member.is_inside = member.place.x < globals.width && member.place.y < globals.height;
+    let square = local / OWNER_SIDE;
+    let within = local % OWNER_SIDE;
+    member.square = square.y * (TILE_SIDE / OWNER_SIDE) + square.x;
+    let chosen = hash(hash(seed + tile) + member.square) % (OWNER_SIDE * OWNER_SIDE);
+    member.is_owner = within.y * OWNER_SIDE + within.x == chosen;
+    return member;
+}
+
+fn lane_member(group: u32, lane: u32) -> Member {
+    return member_of((globals.work.first + group) * TILES_OF_GROUP + lane / MEMBERS, lane % MEMBERS);
+}
+
+// Texels of a first vertex: triangle, barycentric coordinates and what it is; throughput and rays of its
+// path; the radiance that path brought back on its own. Then what the surface looks like.
+const IS_SHARED = 1u;
+const IS_COUNTED_FIRST = 2u;
+//#if layers
+const FIRST_TEXELS = 5u;
+//#else
+const FIRST_TEXELS = 3u;
+//#end
+
+// Where a lane's first vertex is; texels of a workgroup's lie side by side.
+fn first_at(group: u32, lane: u32) -> u32 {
+    return group * FIRST_TEXELS * 64u + lane;
+}
+
+// Texels of a second vertex: triangle, barycentric coordinates and what it is; direction of the ray that
+// found it and what its path carried. Then light that arrives, two texels each: direction; radiance over
+// density, and rays.
+const IS_FOUND = 64u;
+const IS_COUNTED_SECOND = 128u;
+//#if map_sampling
+const MAP_INCIDENTS = 1u;
+//#else
+const MAP_INCIDENTS = 0u;
+//#end
+//#if local_lights
+const INCIDENTS = MAP_INCIDENTS + 2u;
+//#else
+const INCIDENTS = MAP_INCIDENTS + 1u;
+//#end
+const SECOND_TEXELS = 2u + 2u * CONTINUATIONS * INCIDENTS;
+
+// Where the second vertex of a square of a lane's tile is.
+fn second_at(group: u32, lane: u32, square: u32) -> u32 {
+    return ((group * TILES_OF_GROUP + lane / MEMBERS) * OWNERS + square) * SECOND_TEXELS;
+}
+
+fn float3(texel: vec4u) -> vec3f {
+    return bitcast<vec3f>(texel.xyz);
+}
+
+fn packed(xyz: vec3f, w: u32) -> vec4u {
+    return vec4u(bitcast<vec3u>(xyz), w);
+}
+
+fn packed_hit(triangle: u32, barycentric: vec2f, what: u32) -> vec4u {
+    return vec4u(triangle, bitcast<vec2u>(barycentric), what);
+}
+
+// The vertex at a point of a triangle that a ray along `direction` has hit.
+fn vertex_at(hit: vec4u, direction: vec3f) -> Vertex {
+    var vertex: Vertex;
+    vertex.point = surface_at(hit.x, bitcast<vec2f>(hit.yz), direction);
+    vertex.bsdf = bsdf_new(vertex.point.parameters, vertex.point.front_face);
+    vertex.wo = local_from_world(vertex.point.shading_frame, -direction);
+    vertex.law = WHOLE_MAP;
+//#if light_grid
+    vertex.cell = cell_of(vertex.point.position, vertex.point.geometric_normal);
+    vertex.law = law_of_cell(vertex.cell);
+//#end
+    return vertex;
+}
+
+// Twin of `Scatterer::is_alike_nearby`.
+fn is_alike_nearby(vertex: Vertex) -> bool {
+//#if medium
+    if vertex.is_in_medium {
+        return false;
+    }
+//#end
+    var transmits = vertex.point.parameters.transmission > 0.0;
+//#if diffuse_transmission
+    transmits = transmits || vertex.point.parameters.diffuse_transmission > 0.0;
+//#end
+    let interface_ = vertex.bsdf.interface_;
+    var is_broad = interface_is_absent(interface_) || interface_.ggx.alpha >= LEAST_ALPHA;
+//#if clearcoat
+    is_broad = is_broad && vertex.bsdf.coat.strength == 0.0;
+//#end
+    return !transmits && is_broad && !bsdf_is_delta_only(vertex.bsdf);
+}
+
+// Twin of `SurfaceScatterer::is_true_from`.
+fn is_true_from(normal: vec3f, geometric_normal: vec3f, to_viewer: vec3f) -> bool {
+    let geometric_cosine = dot(geometric_normal, to_viewer);
+    let cosine = dot(normal, to_viewer);
+    let mirrored = 2.0 * cosine * dot(normal, geometric_normal) - geometric_cosine;
+    return geometric_cosine > 0.0 && cosine >= 0.1 * geometric_cosine
+        && mirrored >= min(0.95 * geometric_cosine, 0.02);
+}

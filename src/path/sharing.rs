@@ -1,0 +1,397 @@
+//! Second vertices shared between the pixels of a tile.
+//!
+//! Most of the noise of a path is that of the one radiance estimate behind its second vertex. So some
+//! pixels' second vertices get good estimates, and every pixel of the tile is connected with all of
+//! them: a shadow ray between neighbours costs a fraction of a path (Bekaert, Sbert, Halton,
+//! *Accelerating Path Tracing by Re-Using Paths*, EGRW 2002).
+//!
+//! A second vertex y is drawn by pixel k with the density `q_k p_k(y) V_k(y)`: the probability that the
+//! pixel keeps its own, the density per area of its BSDF, and whether nothing is in the way. All pixels
+//! are weighted by the sum of that over the tile, so each gets the integral it would get alone. That
+//! holds if it depends on x_k, the lobe, the segment and y alone whether a pair takes part, the same for
+//! all pixels; whatever does not goes on as a path of its own.
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+use super::{Path, PathResult, PathTracer, Scatterer, SurfaceScatterer, Vertex};
+use crate::bsdf::Bsdf;
+use crate::bvh::{Ray, offset_origin};
+use crate::sampler::{Sampler, hash};
+
+/// How the pixels of a tile share.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SharedTile {
+    /// Pixels along an edge; even.
+    pub side: u32,
+    /// Of each square of so many pixels along an edge one keeps its second vertex.
+    pub owner_side: u32,
+    /// Radiance estimates behind a second vertex.
+    pub continuations: u32,
+    /// Samples of the map at the first vertex.
+    pub map_samples: u32,
+}
+
+impl SharedTile {
+    /// One pixel in four keeps its own, which gets four estimates: most for the time.
+    pub const LARGE: Self = Self { side: 8, owner_side: 2, continuations: 4, map_samples: 3 };
+    /// All keep their own: less noise is shared.
+    pub const SMALL: Self = Self { side: 4, owner_side: 1, continuations: 1, map_samples: 3 };
+
+    /// Most samples of the map that one path takes, with `bounces` vertices.
+    pub fn most_map_samples(&self, bounces: u32) -> u32 {
+        self.map_samples + self.continuations * bounces.saturating_sub(1)
+    }
+}
+
+/// Where the path of a pixel begins.
+pub struct Start<'a> {
+    /// The pixel's place in the tile.
+    pub place: [u32; 2],
+    /// Through the pixel.
+    pub ray: Ray,
+    /// Its random numbers.
+    pub sampler: Sampler,
+    /// What it reads, and where it counts.
+    pub tracer: &'a PathTracer<'a>,
+}
+
+/// Least GGX alpha of a vertex that takes part: narrower reflections are not seen alike from two pixels.
+const LEAST_ALPHA: f32 = 0.01;
+
+/// Keeps the places of tiles apart from other random numbers.
+const TILE_SEED: u32 = 0x7469_6c65;
+/// Pairs of random numbers between those of two estimates behind one vertex: more than any takes.
+const PAIRS_OF_ESTIMATE: u32 = 1 << 24;
+
+/// A first vertex that other pixels' second vertices are connected with.
+struct First<'v> {
+    position: Vec3,
+    surface: SurfaceScatterer<'v>,
+    throughput: Vec3,
+}
+
+/// A second vertex that is shared.
+struct Second<'a, 'v> {
+    owner: usize,
+    vertex: Vertex<'v>,
+    /// The path that has arrived there.
+    path: Path<'a>,
+}
+
+/// Radiance that arrives at a second vertex, divided by its density.
+struct Incident {
+    /// Unit, in the shading frame.
+    wi: Vec3,
+    light: Vec3,
+}
+
+/// What a second vertex sends back.
+enum Outgoing<'v> {
+    /// The same everywhere.
+    Lambert(Vec3),
+    Directed(&'v Bsdf, Vec<Incident>),
+}
+
+/// One sample of each pixel of a tile, in the order of `starts`. `seed` chooses whose second vertices
+/// are kept. There must be no fog, and paths of two bounces at least.
+pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Vec<PathResult> {
+    let mut bsdfs: Vec<[Option<Bsdf>; 2]> = Vec::new();
+    bsdfs.resize_with(starts.len(), Default::default);
+    let mut firsts = Vec::with_capacity(starts.len());
+    let mut seconds = Vec::new();
+    let mut results = Vec::with_capacity(starts.len());
+    for (owner, (start, [first_bsdf, second_bsdf])) in starts.iter().zip(&mut bsdfs).enumerate() {
+        let mut path = Path::new(start.tracer, start.ray, start.sampler.clone());
+        let mut first = None;
+        if let Some(vertex) = path.next_vertex(first_bsdf) {
+            let shares = path.body.interior.is_none() && vertex.scatterer.is_alike_nearby();
+            if shares {
+                path.map_samples = tile.map_samples;
+            }
+            let throughput = path.throughput;
+            if path.visit(&vertex)
+                && let Some(second) = path.next_vertex(second_bsdf)
+            {
+                if !(shares && path.is_found_alike(&second)) {
+                    if path.visit(&second) {
+                        path.run();
+                    }
+                } else if tile.is_owner(start.place, seed) {
+                    seconds.push(Second { owner, vertex: second, path: path.clone() });
+                }
+            }
+            first = First::new(vertex, throughput).filter(|_| shares);
+        }
+        results.push(path.result());
+        firsts.push(first);
+    }
+    let mut connections = Vec::with_capacity(starts.len());
+    for second in seconds {
+        second.connect(&tile, &firsts, &mut connections, &mut results);
+    }
+    results
+}
+
+/// How a picture is cut into tiles for one sample of its pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tiling {
+    /// Pixels along an edge of a tile.
+    pub side: u32,
+    /// Size of the picture.
+    pub size: [u32; 2],
+    /// Columns and rows of the first tile that are left of and above the picture.
+    pub before: [u32; 2],
+    seed: u32,
+}
+
+impl Tiling {
+    /// Number of tiles.
+    pub(crate) fn count(&self) -> u64 {
+        let [columns, rows] = self.tiles();
+        u64::from(columns) * u64::from(rows)
+    }
+
+    /// Seed of the choices in a tile; they are numbered row after row.
+    pub(crate) fn seed_of(&self, tile: u32) -> u32 {
+        hash(self.seed.wrapping_add(tile))
+    }
+
+    /// Pixels of the picture in these tiles.
+    pub(crate) fn pixels(&self, tiles: Range<u64>) -> u64 {
+        let [columns, rows] = self.tiles().map(u64::from);
+        let length = |axis: usize, index: u64| {
+            let (side, before) = (u64::from(self.side), u64::from(self.before[axis]));
+            let end = ((index + 1) * side - before).min(u64::from(self.size[axis]));
+            end - (index * side).saturating_sub(before)
+        };
+        let tiles = tiles.start..tiles.end.min(columns * rows);
+        tiles.map(|tile| length(0, tile % columns) * length(1, tile / columns)).sum()
+    }
+
+    fn tiles(&self) -> [u32; 2] {
+        [0, 1].map(|axis| (self.size[axis] + self.before[axis]).div_ceil(self.side))
+    }
+}
+
+impl SharedTile {
+    /// The tiles of sample `sample` of each pixel: elsewhere for each, so that no edge of a tile shows.
+    pub(crate) fn tiling(&self, size: [u32; 2], seed: u32, sample: u32) -> Tiling {
+        let seed = hash(seed ^ hash(sample ^ TILE_SEED));
+        let before = [seed, seed >> 16].map(|bits| bits % self.side);
+        Tiling { side: self.side, size, before, seed }
+    }
+
+    /// Whether a pixel keeps its second vertex.
+    fn is_owner(&self, [x, y]: [u32; 2], seed: u32) -> bool {
+        let side = self.owner_side;
+        let square = (y / side) * self.side.div_ceil(side) + x / side;
+        let chosen = hash(seed.wrapping_add(square)) % (side * side);
+        (y % side) * side + x % side == chosen
+    }
+
+    /// Probability of [`Self::is_owner`].
+    fn owner_probability(&self) -> f32 {
+        1.0 / (self.owner_side * self.owner_side) as f32
+    }
+}
+
+impl<'v> First<'v> {
+    /// `None` of a vertex in a medium.
+    fn new(vertex: Vertex<'v>, throughput: Vec3) -> Option<Self> {
+        let Scatterer::Surface(surface) = vertex.scatterer else { return None };
+        Some(Self { position: vertex.position, surface, throughput })
+    }
+}
+
+impl Scatterer<'_> {
+    /// Whether it scatters much the same to and from places side by side, all on one side.
+    fn is_alike_nearby(&self) -> bool {
+        let Self::Surface(surface) = self else { return false };
+        !surface.transmits && !surface.bsdf.is_delta_only() && surface.bsdf.is_broad(LEAST_ALPHA)
+    }
+}
+
+impl Path<'_> {
+    /// Whether the vertex that the path has arrived at is found by other pixels in the same way.
+    fn is_found_alike(&self, vertex: &Vertex<'_>) -> bool {
+        let Scatterer::Surface(surface) = &vertex.scatterer else { return false };
+        self.is_clear
+            && self.departure.pdf_solid_angle.is_finite()
+            && self.bounces < self.tracer.limits.bounces
+            && vertex.scatterer.is_alike_nearby()
+            && surface.is_true_from(-self.ray.direction)
+    }
+}
+
+impl SurfaceScatterer<'_> {
+    /// Whether a viewer in this direction sees the normal as it is, not bent into sight
+    /// ([`crate::scene::surface::SurfacePoint`]). The bounds are beyond those where bending begins: what
+    /// is bent is not taken for true.
+    fn is_true_from(&self, to_viewer: Vec3) -> bool {
+        let (normal, geometric) = (self.shading_frame.z, self.geometric_normal);
+        let geometric_cos = geometric.dot(to_viewer);
+        let cos = normal.dot(to_viewer);
+        let mirrored = 2.0 * cos * normal.dot(geometric) - geometric_cos;
+        geometric_cos > 0.0
+            && cos >= 0.1 * geometric_cos
+            && mirrored >= (0.95 * geometric_cos).min(0.02)
+    }
+}
+
+/// A pixel's way to a second vertex.
+struct Connection {
+    pixel: usize,
+    /// Unit, from the second vertex to the first.
+    direction: Vec3,
+    /// What of the second vertex's radiance reaches the pixel, before it is divided by the density.
+    weight: Vec3,
+}
+
+impl Second<'_, '_> {
+    /// Adds what the vertex sends to every pixel of the tile.
+    fn connect(
+        mut self,
+        tile: &SharedTile,
+        firsts: &[Option<First<'_>>],
+        connections: &mut Vec<Connection>,
+        results: &mut [PathResult],
+    ) {
+        let Scatterer::Surface(surface) = &self.vertex.scatterer else { return };
+        let incident = self.path.incident(&self.vertex, surface, tile.continuations);
+        results[self.owner].rays += self.path.rays;
+        let outgoing = Outgoing::new(surface, incident);
+
+        connections.clear();
+        let normal = surface.geometric_normal;
+        let target = offset_origin(self.vertex.position, normal);
+        let mut density = 0.0;
+        for (pixel, first) in firsts.iter().enumerate() {
+            let Some(first) = first else { continue };
+            let to_second = self.vertex.position - first.position;
+            let squared = to_second.length_squared();
+            let direction = to_second / squared.sqrt();
+            let cosine = -normal.dot(direction);
+            if !(cosine > 0.0 && squared > 0.0) {
+                continue;
+            }
+            let Some((f, pdf_solid_angle)) = first.surface.scattered(direction) else { continue };
+            if pixel != self.owner {
+                if !surface.is_true_from(-direction) {
+                    continue;
+                }
+                results[pixel].rays += 1;
+                if !first.sees(target, direction, self.path.tracer) {
+                    continue;
+                }
+            }
+            let area = cosine / squared;
+            density += tile.owner_probability() * pdf_solid_angle * area;
+            connections.push(Connection {
+                pixel,
+                direction: -direction,
+                weight: first.throughput * f * area,
+            });
+        }
+        if density <= 0.0 {
+            return;
+        }
+        for connection in connections.iter() {
+            let radiance = outgoing.radiance(surface, connection.direction);
+            results[connection.pixel].add(connection.weight * radiance / density);
+        }
+    }
+}
+
+impl First<'_> {
+    /// Whether nothing at all is between this vertex and `target`, in about this direction.
+    fn sees(&self, target: Vec3, direction: Vec3, tracer: &PathTracer<'_>) -> bool {
+        let normal = self.surface.geometric_normal;
+        let is_above = normal.dot(direction) > 0.0;
+        let origin = offset_origin(self.position, if is_above { normal } else { -normal });
+        let way = target - origin;
+        let distance = way.length();
+        let t_max = distance * (1.0 - 1e-4);
+        let ray = Ray { origin, direction: way / distance, t_min: 0.0, t_max };
+        tracer.world.transmittance(&ray) == Vec3::ONE
+    }
+}
+
+impl<'v> Outgoing<'v> {
+    fn new(surface: &SurfaceScatterer<'v>, incident: Vec<Incident>) -> Self {
+        if !surface.bsdf.is_lambert() {
+            return Self::Directed(surface.bsdf, incident);
+        }
+        let up = Vec3::Z;
+        let reflected = |i: &Incident| surface.bsdf.eval(up, i.wi) * i.light;
+        Self::Lambert(incident.iter().map(reflected).sum())
+    }
+
+    /// Radiance towards a world direction.
+    fn radiance(&self, surface: &SurfaceScatterer<'_>, direction: Vec3) -> Vec3 {
+        match self {
+            Self::Lambert(radiance) => *radiance,
+            Self::Directed(bsdf, incident) => {
+                let wo = surface.shading_frame.local_from_world(direction);
+                incident.iter().map(|i| bsdf.eval(wo, i.wi) * i.light).sum()
+            }
+        }
+    }
+}
+
+impl Path<'_> {
+    /// Estimates what arrives at the vertex, `times` times over. Its perfect reflections, which no other
+    /// pixel sees, are none.
+    fn incident(
+        &mut self,
+        vertex: &Vertex<'_>,
+        surface: &SurfaceScatterer<'_>,
+        times: u32,
+    ) -> Vec<Incident> {
+        let share = 1.0 / times as f32;
+        let mut incident = Vec::with_capacity(3 * times as usize);
+        let mut add = |direction: Vec3, light: Vec3| {
+            let wi = surface.shading_frame.local_from_world(direction);
+            let agrees = (wi.z > 0.0) == (surface.geometric_normal.dot(direction) > 0.0);
+            if agrees && light != Vec3::ZERO {
+                incident.push(Incident { wi, light });
+            }
+        };
+        self.bounces += 1;
+        self.rays = 0;
+        self.throughput_before *= self.throughput.max_element();
+        self.throughput = Vec3::ONE;
+        let arrived = self.clone();
+        for time in 0..times {
+            *self = Self { rays: self.rays, ..arrived.clone() };
+            self.sampler.skip(time * PAIRS_OF_ESTIMATE);
+            self.for_arriving(vertex, |arriving| add(arriving.direction, arriving.light * share));
+            if !self.scatter(vertex) {
+                continue;
+            }
+            let density = self.departure.pdf_solid_angle;
+            let direction = self.ray.direction;
+            let weight = self.throughput;
+            let Some(survival) = self.survival() else { continue };
+            self.throughput = Vec3::ONE;
+            self.throughput_before *= weight.max_element() / survival;
+            self.radiance = Vec3::ZERO;
+            self.run();
+            add(direction, self.radiance * (share / (survival * density)));
+        }
+        incident
+    }
+}
+
+impl PathResult {
+    /// Adds radiance, unless it is not finite.
+    fn add(&mut self, radiance: Vec3) {
+        let sum = self.radiance + radiance;
+        if sum.is_finite() {
+            self.radiance = sum;
+        } else {
+            self.was_invalid = true;
+        }
+    }
+}

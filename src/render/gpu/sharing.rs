@@ -1,0 +1,108 @@
+//! Pixels that share second vertices: three kernels bring a band of tiles one sample further, see
+//! `shaders/sharing.wgsl`. The estimator of `crate::path::sharing`, in the same tiles.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::super::Pass;
+use super::buffers::Buffers;
+use super::flight::Job;
+use super::layout::{Globals, Work};
+use super::shader::{Features, Kernel};
+use super::{GROUP, LEAST_TILES, Progress, Renderer};
+use crate::error::Result;
+use crate::path::sharing::SharedTile;
+
+/// Most workgroups whose vertices are kept at a time: they keep the largest devices busy.
+const MOST_GROUPS: u64 = 4096;
+
+/// What a renderer keeps of pixels that share.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sharing {
+    tile: SharedTile,
+    most_groups: u64,
+    /// Of the sample in work, the first workgroup that is not under way.
+    next_group: u64,
+}
+
+impl Sharing {
+    /// Makes the buffers for a picture of this size.
+    pub(super) fn new(
+        buffers: &mut Buffers,
+        features: &Features,
+        tile: SharedTile,
+        size: [u32; 2],
+    ) -> Result<Self> {
+        // Tiles stand out of the picture on all sides.
+        let groups = size.map(|pixels| u64::from(pixels.div_ceil(tile.side)) + 1);
+        let tiles_of_group = GROUP / u64::from(tile.side * tile.side);
+        let most_groups = (groups[0] * groups[1]).div_ceil(tiles_of_group).min(MOST_GROUPS);
+        let first_texels = if features.has("layers") { 5 } else { 3 };
+        let lights = ["map_sampling", "local_lights"].map(|name| u64::from(features.has(name)));
+        let incidents = u64::from(tile.continuations) * (1 + lights[0] + lights[1]);
+        let owners = GROUP / u64::from(tile.owner_side * tile.owner_side);
+        let what = "the vertices that pixels share";
+        buffers.make("firsts", most_groups * GROUP * 16 * first_texels, what)?;
+        buffers.make("seconds", most_groups * owners * 16 * (2 + 2 * incidents), what)?;
+        Ok(Self { tile, most_groups, next_group: 0 })
+    }
+}
+
+impl Renderer {
+    /// As [`Self::render_tiles`], for pixels that share.
+    pub(super) fn render_shared(
+        &mut self,
+        pass: Pass,
+        stride: u32,
+        cancel: &AtomicBool,
+    ) -> Result<()> {
+        let Globals { width, height, seed, .. } = self.globals;
+        while self.progress.least < pass.target {
+            let sample = self.progress.least;
+            let Some(Sharing { tile, most_groups, next_group }) = self.sharing else {
+                return Ok(());
+            };
+            let tiling = tile.tiling([width, height], seed, sample);
+            let tiles_of_group = GROUP / u64::from(tile.side * tile.side);
+            let groups = tiling.count().div_ceil(tiles_of_group);
+            let mut first = next_group;
+            while first < groups {
+                if cancel.load(Ordering::Relaxed) {
+                    return Ok(());
+                }
+                let least = LEAST_TILES[usize::from(!self.gpu.facts().is_software())];
+                let affordable = self.flights.units(Kernel::FindSeconds).max(least);
+                let count = affordable.min(most_groups).min(groups - first);
+                let work = Work {
+                    first: first as u32,
+                    count: count as u32,
+                    sample,
+                    stride,
+                    ..Work::default()
+                };
+                self.dispatch_shared(&work)?;
+                let tiles = first * tiles_of_group..(first + count) * tiles_of_group;
+                self.progress.surplus += tiling.pixels(tiles);
+                first += count;
+                self.sharing = Some(Sharing { tile, most_groups, next_group: first });
+            }
+            self.sharing = Some(Sharing { tile, most_groups, next_group: 0 });
+            self.progress = Progress { least: sample + 1, ..Progress::default() };
+        }
+        Ok(())
+    }
+
+    fn dispatch_shared(&mut self, work: &Work) -> Result<()> {
+        let kernels = Kernel::OF_SHARING.map(|kernel| self.bound(kernel));
+        let kernels = kernels.into_iter().collect::<Result<Vec<_>>>()?;
+        self.buffers.write("globals", 0, bytemuck::bytes_of(work));
+        let job = Job {
+            kernel: Kernel::FindSeconds,
+            kernels: &kernels,
+            steps: 1,
+            groups: work.count,
+            units: u64::from(work.count),
+            report: None,
+        };
+        self.flights.start(&self.gpu, &job)
+    }
+}

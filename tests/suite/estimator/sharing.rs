@@ -1,0 +1,212 @@
+//! Second vertices shared between pixels: the same picture, only sooner.
+
+use std::sync::atomic::AtomicBool;
+
+use glam::Vec3;
+use lightgrid::environment::{Environment, EnvironmentOptions, sky};
+use lightgrid::metrics::statistics::{Estimate, z_test};
+use lightgrid::path::{PathLimits, World};
+use lightgrid::render::film::Film;
+use lightgrid::render::{Sampling, Sharing, View};
+use lightgrid::sampler::{hash, unit_from_bits};
+use lightgrid::scene::{Camera, Material, Scene, builtin};
+use rayon::prelude::*;
+
+use super::scenes::{black, blended, half_masked, lambert, lamp, pane, room};
+use super::{environment, mean, view};
+
+const SHARED: [Sharing; 2] = [Sharing::Small, Sharing::Large];
+
+/// A picture that begins and ends in the middle of a tile.
+fn picture(camera: &Camera, sampling: Sampling, sharing: Sharing, seed: u32) -> View {
+    View {
+        width: 27,
+        height: 21,
+        seed,
+        sharing,
+        limits: PathLimits { bounces: 4, russian_roulette: true },
+        ..view(camera.clone(), sampling, 4)
+    }
+}
+
+fn render(world: &World, environment: &Environment, view: View, samples: u32) -> Film {
+    let mut session = super::learned(world, environment, view);
+    session.advance(samples, &AtomicBool::new(false)).expect("the CPU does not fail");
+    session.film().clone()
+}
+
+/// Mean over seeds of the picture's mean, and its standard error: pixels that share vary together, so
+/// their own spread does not tell it.
+fn over_seeds(picture: impl Fn(u32) -> f64 + Send + Sync) -> (f64, f64) {
+    let means: Vec<f64> = (0..48).into_par_iter().map(picture).collect();
+    let count = means.len() as f64;
+    let mean = means.iter().sum::<f64>() / count;
+    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    (mean, (variance / count).sqrt())
+}
+
+/// Asserts that sharing changes no pixel's expectation, and none of the picture's mean within
+/// `precision`.
+fn expect_unbiased(what: &str, world: &World, map: &Environment, camera: &Camera, precision: f64) {
+    let alone = picture(camera, Sampling::Plain, Sharing::Off, 1);
+    let pixels = |film: &Film| -> (Vec<f64>, Vec<f64>) {
+        let floor = (1e-3 * mean(film).luminance).powi(2);
+        film.pixels().iter().map(|p| (p.mean_luminance(), p.variance_of_mean() + floor)).unzip()
+    };
+    let means = |sharing, first: u32| {
+        over_seeds(|seed| {
+            let view = picture(camera, Sampling::Plain, sharing, first + seed);
+            mean(&render(world, map, view, 32)).luminance
+        })
+    };
+    let (reference, reference_variance) = pixels(&render(world, map, alone, 512));
+    let (mean_alone, error_alone) = means(Sharing::Off, 1000);
+    for (seed, sharing) in (2..).zip(SHARED) {
+        let film = render(world, map, picture(camera, Sampling::Plain, sharing, seed), 256);
+        let (found, variance) = pixels(&film);
+        let test = z_test(
+            Estimate { mean: &reference, variance_of_mean: &reference_variance },
+            Estimate { mean: &found, variance_of_mean: &variance },
+            1e-3,
+        );
+        assert!(test.as_ref().is_ok_and(|test| test.passed()), "{what}, {sharing:?}: {test:?}");
+        let (mean, error) = means(sharing, 2000 * seed);
+        let (off, noise) = (mean / mean_alone - 1.0, error.hypot(error_alone) / mean_alone);
+        eprintln!("{what}, {sharing:?}: {:+.3} % +- {:.3}", 100.0 * off, 100.0 * noise);
+        assert!(noise < precision, "{what}, {sharing:?}: {noise} is too noisy to tell");
+        assert!(off.abs() < 4.0 * noise, "{what}, {sharing:?}: {off} +- {noise}");
+    }
+}
+
+fn overcast() -> Environment {
+    environment(sky::build("overcast", 64, 32).expect("a sky"))
+}
+
+/// The same scene with its materials and normals changed.
+fn changed(world: &World, change: impl FnOnce(&mut Scene)) -> World {
+    let mut scene = world.scene.clone();
+    change(&mut scene);
+    World::new(scene)
+}
+
+#[test]
+fn in_a_room_open_glazed_and_behind_leaves() {
+    let leaf = |material: Material| Material { double_sided: true, ..material };
+    for (what, window) in [
+        ("open", None),
+        ("pane", Some(pane())),
+        ("veil", Some(blended(leaf(lambert(0.6)), 0.4))),
+        ("mask of all", Some(half_masked(leaf(lambert(0.6))))),
+        // Nothing at all is there, but rays meet it.
+        ("nothing", Some(blended(leaf(lambert(0.6)), 0.0))),
+    ] {
+        let (world, camera) = room(0.7, window.as_ref());
+        expect_unbiased(what, &world, &overcast(), &camera, 0.006);
+    }
+}
+
+#[test]
+fn where_normals_are_bent_and_metal_is_bumpy() {
+    let (world, camera) = room(0.7, None);
+    for (what, metallic, roughness) in
+        [("matte", 0.0, 1.0), ("metal", 1.0, 0.35), ("both", 0.5, 0.2)]
+    {
+        let world = changed(&world, |scene| {
+            for material in &mut scene.materials {
+                *material = Material { metallic, roughness, specular: 1.0, ..material.clone() };
+            }
+            // Up to some 70 degrees off.
+            let random = |n: u32| unit_from_bits(hash(n)) - 0.5;
+            let positions = scene.positions.len() as u32;
+            let mut normals = vec![Vec3::ZERO; scene.positions.len()];
+            for corners in &scene.triangles {
+                let [a, b, c] = corners.map(|i| scene.positions[i as usize]);
+                let normal = (b - a).cross(c - a).normalize();
+                for &i in corners {
+                    let tilt = Vec3::from_array([0, 1, 2].map(|k| random(i + k * positions)));
+                    normals[i as usize] = (normal + 3.0 * tilt).normalize();
+                }
+            }
+            scene.normals = normals;
+        });
+        expect_unbiased(what, &world, &overcast(), &camera, 0.01);
+    }
+}
+
+#[test]
+fn with_a_lamp_and_wires() {
+    let (world, camera) = room(0.7, None);
+    let world = changed(&world, |scene| {
+        let first = scene.materials.len() as u32;
+        scene.materials.extend([lamp(5.0), black(), lambert(0.9)]);
+        let mut quad = |material: u32, corner: Vec3, a: Vec3, b: Vec3| {
+            let start = scene.positions.len() as u32;
+            scene.positions.extend([corner, corner + a, corner + a + b, corner + b]);
+            scene.uvs[0].extend([glam::Vec2::ZERO; 4]);
+            scene.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t| t.map(|i: u32| start + i)));
+            scene.triangle_materials.extend([first + material; 2]);
+        };
+        quad(0, Vec3::new(0.0, 2.4, 0.0), Vec3::X * 0.4, Vec3::Z * 0.4);
+        for wire in 0..12 {
+            let corner = Vec3::new(0.2, 0.1 + 0.15 * wire as f32, -1.0);
+            quad(1 + wire % 2, corner, Vec3::Y * 0.012, Vec3::Z * 1.8);
+        }
+    });
+    expect_unbiased("lamp and wires", &world, &overcast(), &camera, 0.006);
+}
+
+#[test]
+fn in_scenes_of_all_kinds() {
+    for (name, map) in
+        [("materials", "overcast"), ("living-room", "overcast"), ("exterior", "sunset")]
+    {
+        let world = World::new(builtin::build(name).expect("a scene"));
+        let map = sky::build(map, 256, 128).expect("a sky");
+        let map = Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        expect_unbiased(name, &world, &map, &world.scene.cameras[0], 0.03);
+    }
+}
+
+#[test]
+fn a_cancelled_pass_and_threads_change_nothing() {
+    let (world, camera) = room(0.7, None);
+    let environment = overcast();
+    let view = picture(&camera, Sampling::Adaptive, Sharing::Large, 5);
+    let whole = render(&world, &environment, view.clone(), 7);
+    let mut session = super::learned(&world, &environment, view.clone());
+    for samples in [3, 4] {
+        session.advance(samples, &AtomicBool::new(true)).expect("the CPU does not fail");
+        session.advance(samples, &AtomicBool::new(false)).expect("the CPU does not fail");
+    }
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+    let alone = one.install(|| render(&world, &environment, view, 7));
+    assert_eq!(alone, whole);
+    assert_eq!(session.film().pixels(), whole.pixels());
+}
+
+/// Error times samples does not rise: there is no floor of bias below the noise.
+#[test]
+fn the_error_has_no_floor() {
+    let (world, camera) = room(0.7, Some(&pane()));
+    let environment = overcast();
+    let reference =
+        render(&world, &environment, picture(&camera, Sampling::Plain, Sharing::Off, 1), 1 << 14);
+    let error = |samples: u32| -> f64 {
+        let film = render(
+            &world,
+            &environment,
+            picture(&camera, Sampling::Plain, Sharing::Large, 2),
+            samples,
+        );
+        let pixels = film.pixels().iter().zip(reference.pixels());
+        let of = |(a, b): (&lightgrid::render::film::Pixel, &lightgrid::render::film::Pixel)| {
+            let difference =
+                (a.mean_luminance() - b.mean_luminance()).powi(2) - b.variance_of_mean();
+            difference / b.mean_luminance().powi(2)
+        };
+        pixels.map(of).sum::<f64>() / film.pixels().len() as f64
+    };
+    let (few, many) = (error(64), error(2048));
+    eprintln!("error {few:.2e} of 64 samples, {many:.2e} of 2048");
+    assert!(many * 2048.0 < 1.5 * few * 64.0, "{many} of 2048 samples, {few} of 64");
+}
