@@ -151,20 +151,20 @@ impl Settings {
     /// Takes over what was changed in a window since it was opened with `start`: what the command line
     /// said was for that window alone.
     pub fn remember(&mut self, document: &Document, start: &Document, interface: &Interface) {
-        fn take<T: PartialEq>(kept: &mut T, now: T, before: T) {
-            if now != before {
+        fn take<T: PartialEq + Copy>(kept: &mut T, now: T, before: &T) {
+            if now != *before {
                 *kept = now;
             }
         }
         let (light, now, before) = (&mut self.light, document.light, start.light);
-        take(&mut light.device, now.device, before.device);
-        take(&mut light.sampling, now.sampling, before.sampling);
-        take(&mut light.split, now.split, before.split);
-        take(&mut light.bounces, now.bounces, before.bounces);
-        take(&mut light.seed, now.seed, before.seed);
-        take(&mut self.look, document.look, start.look);
-        take(&mut self.size, document.size, start.size);
-        take(&mut self.stop, document.stop, start.stop);
+        take(&mut light.device, now.device, &before.device);
+        take(&mut light.sampling, now.sampling, &before.sampling);
+        take(&mut light.split, now.split, &before.split);
+        take(&mut light.bounces, now.bounces, &before.bounces);
+        take(&mut light.seed, now.seed, &before.seed);
+        take(&mut self.look, document.look, &start.look);
+        take(&mut self.size, document.size, &start.size);
+        take(&mut self.stop, document.stop, &start.stop);
         self.tab = interface.tab;
         self.dock = interface.dock;
     }

@@ -30,10 +30,9 @@ pub(in crate::app) fn show(ui: &mut Ui, light: &mut Light) {
                 }
             },
         );
-        ui.toggle_value(&mut light.split, "Split view").on_hover_text(
-            "Plain on the left, the chosen sampling on the right, at equal time (V)",
-        );
     });
+    ui.checkbox(&mut light.split, "Split view")
+        .on_hover_text("Plain on the left, the chosen sampling on the right, at equal time (V)");
 }
 
 fn capital(sampling: Sampling) -> String {

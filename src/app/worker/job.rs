@@ -400,7 +400,10 @@ impl<'a> Job<'a> {
     /// Lets the session run on the device that is asked for now.
     fn place(&mut self, session: &mut Session<'_>) {
         // A GPU that is not ready, or is none, comes when there is something to be seen.
-        let begins = self.request.moving || self.beginning(session).is_some();
+        let is_fresh = session.samples() == 0 && !session.is_on_gpu();
+        let is_learning = session.phase() == Phase::Learning;
+        let begins =
+            self.request.moving || is_fresh && (is_learning || self.beginning(session).is_some());
         if begins && self.request.previews && !self.legacy.device.is_quick(&self.request) {
             session.continue_on_cpu();
             return;
