@@ -69,6 +69,8 @@ impl App {
                 interface.pinned = None;
             }
             Command::Undo => {
+                // What has just been changed may not have been noted as yet.
+                self.undo.settle(&self.document);
                 if let Some(document) = self.undo.undo() {
                     self.document = document;
                 }
