@@ -21,7 +21,8 @@ struct Guide {
     albedo: vec3f,
     depth: f32,
     normal: vec3f,
-    padding: f32,
+    // How strictly others are compared with it: a power of their likeness.
+    strictness: f32,
 }
 
 @group(0) @binding(0) var<uniform> settings: Pass;
@@ -34,6 +35,8 @@ struct Guide {
 @group(0) @binding(6) var<storage, read_write> result: array<vec4f>;
 @group(0) @binding(7) var<storage, read_write> result_counts: array<vec4u>;
 
+const LEAST_ALIKE = 3.0;
+const RELAXED_PASSES = 2u;
 const ERRORS_TOLERATED = 4.0;
 const REACH = 3;
 const LEAST_ALBEDO = 0.02;
@@ -94,6 +97,45 @@ fn undress(@builtin(global_invocation_id) id: vec3u) {
     light[index] = vec4f(mean / guide.albedo, min(variance * scale * scale, LARGEST_VARIANCE));
 }
 
+// What another pixel counts for one that compares so strictly.
+fn weight_of(guide: Guide, other: Guide, step: f32, strictness: f32) -> f32 {
+    let alike = likeness(guide, other, step);
+    if strictness == 1.0 {
+        return alike;
+    }
+    return select(0.0, pow(alike, strictness), alike > 0.0);
+}
+
+// Finds out how strictly a pixel is to be compared. Nobody asks another pixel how strict it is.
+@compute @workgroup_size(8, 8)
+fn relax(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= settings.size) {
+        return;
+    }
+    let index = id.y * settings.size.x + id.x;
+    let centre = vec2i(id.xy);
+    let low = max(centre - 2, vec2i());
+    let high = min(centre + 2, vec2i(settings.size) - 1);
+    var alike = vec3f();
+    for (var y = low.y; y <= high.y; y++) {
+        for (var x = low.x; x <= high.x; x++) {
+            let other = u32(y) * settings.size.x + u32(x);
+            if other != index {
+                let one = likeness(guides[index], guides[other], 1.0);
+                let fourth = sqrt(sqrt(one));
+                alike += vec3f(one, fourth, sqrt(sqrt(fourth)));
+            }
+        }
+    }
+    var strictness = 1.0 / 16.0;
+    if alike.x >= LEAST_ALIKE {
+        strictness = 1.0;
+    } else if alike.y >= LEAST_ALIKE {
+        strictness = 1.0 / 4.0;
+    }
+    guides[index].strictness = strictness;
+}
+
 @compute @workgroup_size(8, 8)
 fn share_errors(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= settings.size) {
@@ -109,7 +151,7 @@ fn share_errors(@builtin(global_invocation_id) id: vec3u) {
     for (var y = low.y; y <= high.y; y++) {
         for (var x = low.x; x <= high.x; x++) {
             let other = u32(y) * settings.size.x + u32(x);
-            let weight = likeness(guide, guides[other], 1.0);
+            let weight = weight_of(guide, guides[other], 1.0, guide.strictness);
             variance += weight * light[other].w;
             total += weight;
         }
@@ -137,6 +179,9 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     let own = light[index];
     let tolerance = ERRORS_TOLERATED * sqrt(max(own.w, 0.0)) + 1e-6;
     let own_luminance = luminance(own.xyz);
+    // Later passes reach other edges.
+    let is_relaxed = settings.step < (1u << RELAXED_PASSES);
+    let strictness = select(1.0, guide.strictness, is_relaxed);
     var rgb = vec3f();
     var variance = 0.0;
     var total = 0.0;
@@ -149,7 +194,7 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
             let other = u32(place.y) * settings.size.x + u32(place.x);
             let there = light[other];
             let weight = kernel(dx) * kernel(dy)
-                * likeness(guide, guides[other], f32(settings.step))
+                * weight_of(guide, guides[other], f32(settings.step), strictness)
                 * exp(-abs(luminance(there.xyz) - own_luminance) / tolerance);
             rgb += there.xyz * weight;
             variance += there.w * weight * weight;

@@ -3,7 +3,8 @@
 //! Dammertz et al., *Edge-Avoiding À-Trous Wavelet Transform for fast Global Illumination
 //! Filtering*, HPG 2010, on radiance divided by albedo, with the luminance tolerance taken from each
 //! pixel's own error estimate (as Schied et al., *Spatiotemporal Variance-Guided Filtering*, HPG
-//! 2017, do). Biased: for looking, not for measuring.
+//! 2017, do). A pixel on an edge shows a mixture like no other's around it; it is compared less
+//! strictly, with the pixels nearby, until it finds some. Biased: for looking, not for measuring.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -22,6 +23,13 @@ const REACH: usize = 3;
 const KERNEL: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 /// Power of the cosine between normals.
 const NORMAL_POWER: i32 = 64;
+/// How strictly guides are compared, as a power of their likeness: the first of these with which a pixel
+/// finds its like.
+const STRICTNESS: [f32; 3] = [1.0, 1.0 / 4.0, 1.0 / 16.0];
+/// Of the 24 pixels around one so many are its like.
+const LEAST_ALIKE: f32 = 3.0;
+/// Passes in which a pixel is compared less strictly; later ones reach other edges.
+const RELAXED_PASSES: u32 = 2;
 /// Albedo that counts as none: black surfaces and the sky are filtered as they are.
 const LEAST_ALBEDO: f32 = 0.02;
 
@@ -31,6 +39,8 @@ struct Guide {
     albedo: Vec3,
     normal: Vec3,
     depth: f32,
+    /// One of [`STRICTNESS`].
+    strictness: f32,
 }
 
 /// Light on one pixel, albedo taken out, and the variance of its luminance.
@@ -43,7 +53,7 @@ struct Light {
 /// The film's picture, filtered. Without layers on the film it is the film's picture as it is.
 pub(super) fn denoise(film: &Film) -> Image {
     let Some(layers) = film.surface_layers() else { return film.image() };
-    let guides: Vec<Guide> = layers
+    let mut guides: Vec<Guide> = layers
         .albedo
         .iter()
         .zip(&layers.normal)
@@ -51,12 +61,16 @@ pub(super) fn denoise(film: &Film) -> Image {
         .map(|((albedo, normal), &depth)| {
             let (albedo, normal) = (Vec3::from(*albedo), Vec3::from(*normal));
             let seen = if normal == Vec3::ZERO { Vec3::ONE } else { albedo };
-            Guide { albedo: seen.max(Vec3::splat(LEAST_ALBEDO)), normal, depth }
+            Guide { albedo: seen.max(Vec3::splat(LEAST_ALBEDO)), normal, depth, strictness: 1.0 }
         })
         .collect();
+    relax(&mut guides, film.width as usize);
     let mut light: Vec<Light> = film.pixels().iter().zip(&guides).map(undressed).collect();
     share_errors(&mut light, &guides, film.width as usize);
     for pass in 0..PASSES {
+        if pass == RELAXED_PASSES {
+            guides.iter_mut().for_each(|guide| guide.strictness = 1.0);
+        }
         light = filtered(&light, &guides, film.width as usize, 1 << pass);
     }
     let pixels = light.iter().zip(&guides).map(|(l, g)| (l.rgb * g.albedo).to_array()).collect();
@@ -71,20 +85,41 @@ fn undressed((pixel, guide): (&Pixel, &Guide)) -> Light {
     Light { rgb: mean / guide.albedo, variance: variance * scale * scale }
 }
 
+/// Finds out how strictly each pixel is to be compared.
+fn relax(guides: &mut [Guide], width: usize) {
+    let height = guides.len() / width.max(1);
+    let strictness_of = |index: usize| {
+        let mut alike = [0.0; STRICTNESS.len()];
+        for other in around(index, [width, height], 2).filter(|other| *other != index) {
+            let likeness = likeness(&guides[index], &guides[other], 1);
+            let powers = [likeness, likeness.sqrt().sqrt(), likeness.sqrt().sqrt().sqrt().sqrt()];
+            alike.iter_mut().zip(powers).for_each(|(sum, power)| *sum += power);
+        }
+        let first = alike.iter().position(|sum| *sum >= LEAST_ALIKE);
+        STRICTNESS[first.unwrap_or(STRICTNESS.len() - 1)]
+    };
+    let found: Vec<f32> = (0..guides.len()).into_par_iter().map(strictness_of).collect();
+    guides.iter_mut().zip(found).for_each(|(guide, strictness)| guide.strictness = strictness);
+}
+
+/// The pixels up to `reach` columns and rows from one, itself among them.
+fn around(index: usize, [width, height]: [usize; 2], reach: usize) -> impl Iterator<Item = usize> {
+    let (x, y) = (index % width, index / width);
+    let columns = x.saturating_sub(reach)..(x + reach + 1).min(width);
+    let rows = y.saturating_sub(reach)..(y + reach + 1).min(height);
+    rows.flat_map(move |y| columns.clone().map(move |x| y * width + x))
+}
+
 /// Gives each pixel the mean error of its surface around it: a pixel that has met no light yet knows
 /// nothing of its own error.
 fn share_errors(light: &mut [Light], guides: &[Guide], width: usize) {
     let height = light.len() / width.max(1);
     let shared = |index: usize| {
-        let (x, y) = (index % width, index / width);
         let (mut sum, mut total) = (0.0, 0.0);
-        for ny in y.saturating_sub(REACH)..(y + REACH + 1).min(height) {
-            for nx in x.saturating_sub(REACH)..(x + REACH + 1).min(width) {
-                let other = ny * width + nx;
-                let weight = likeness(&guides[index], &guides[other], 1);
-                sum += weight * light[other].variance;
-                total += weight;
-            }
+        for other in around(index, [width, height], REACH) {
+            let weight = guides[index].weight(&guides[other], 1);
+            sum += weight * light[other].variance;
+            total += weight;
         }
         // The pixel itself always counts.
         sum / total
@@ -125,7 +160,7 @@ fn filtered_pixel(
                 continue;
             }
             let index = ny as usize * width + nx as usize;
-            let likeness = likeness(&guide, &guides[index], step)
+            let likeness = guide.weight(&guides[index], step)
                 * (-(luminance(light[index].rgb) - own_luminance).abs() / tolerance).exp();
             let weight =
                 KERNEL[dx.unsigned_abs() as usize] * KERNEL[dy.unsigned_abs() as usize] * likeness;
@@ -138,6 +173,13 @@ fn filtered_pixel(
     Light { rgb: sum / total, variance: variance / (total * total) }
 }
 
+impl Guide {
+    /// What another pixel counts for this one.
+    fn weight(&self, other: &Self, step: i32) -> f32 {
+        likeness(self, other, step).powf(self.strictness)
+    }
+}
+
 /// How much two pixels belong to one surface, 1 for the same.
 fn likeness(a: &Guide, b: &Guide, step: i32) -> f32 {
     let albedo = (-(a.albedo - b.albedo).length_squared() / 0.01).exp();
@@ -148,4 +190,55 @@ fn likeness(a: &Guide, b: &Guide, step: i32) -> f32 {
     let nearer = a.depth.min(b.depth).max(1e-3);
     let depth = (-(a.depth - b.depth).abs() / (0.02 * nearer * step as f32)).exp();
     albedo * normal * depth
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::path::{FirstHit, PathResult};
+    use crate::sampler::{hash, unit_from_bits};
+
+    /// A dark and a bright wall, and between them a column of pixels that show some of each.
+    #[test]
+    fn the_mixed_pixels_of_an_edge_lose_their_noise_and_keep_their_light() {
+        let (width, height, edge) = (25, 40, 12);
+        let mut film = Film::new(width, height, true);
+        for y in 0..height {
+            for x in 0..width {
+                // What the edge covers of a pixel varies along it.
+                let share = 0.2 + 0.6 * unit_from_bits(hash(y));
+                for sample in 0..8 {
+                    let random = |n: u32| unit_from_bits(hash(n + 4 * (sample + 8 * (x + 99 * y))));
+                    let is_bright = x > edge || (x == edge && random(0) < share);
+                    let (albedo, normal) = if is_bright { (0.8, Vec3::Z) } else { (0.1, Vec3::X) };
+                    film.add(
+                        x,
+                        y,
+                        &PathResult {
+                            radiance: Vec3::splat(albedo * 2.0 * random(1)),
+                            first_hit: Some(FirstHit {
+                                albedo: Vec3::splat(albedo),
+                                normal,
+                                depth: 3.0,
+                            }),
+                            ..PathResult::default()
+                        },
+                    );
+                }
+            }
+        }
+        let guides = film.surface_layers().expect("layers").albedo;
+        let spread = |image: &Image| {
+            let light = |y: u32| {
+                let index = (y * width + edge) as usize;
+                f64::from(image.pixels[index][0] / guides[index][0])
+            };
+            let mean = (0..height).map(light).sum::<f64>() / f64::from(height);
+            let square = (0..height).map(|y| (light(y) - mean).powi(2)).sum::<f64>();
+            (mean, (square / f64::from(height)).sqrt())
+        };
+        let ((_, noise), (mean, left)) = (spread(&film.image()), spread(&denoise(&film)));
+        assert!((mean - 1.0).abs() < 0.05, "{mean}");
+        assert!(left < 0.4 * noise, "{left} of {noise} is left");
+    }
 }

@@ -12,6 +12,7 @@ const LIGHT_BYTES: u64 = 16;
 
 pub(super) struct Passes {
     undress: wgpu::ComputePipeline,
+    relax: wgpu::ComputePipeline,
     share_errors: wgpu::ComputePipeline,
     smooth_light: wgpu::ComputePipeline,
     dress: wgpu::ComputePipeline,
@@ -25,6 +26,7 @@ impl Passes {
         });
         Self {
             undress: pipeline(gpu, &shader, "undress"),
+            relax: pipeline(gpu, &shader, "relax"),
             share_errors: pipeline(gpu, &shader, "share_errors"),
             smooth_light: pipeline(gpu, &shader, "smooth_light"),
             dress: pipeline(gpu, &shader, "dress"),
@@ -72,6 +74,8 @@ impl Passes {
             entry(5, &light),
         ];
         dispatch(gpu, &mut commands, &self.undress, &entries, size);
+        let entries = [entry(0, &one), entry(4, &guides)];
+        dispatch(gpu, &mut commands, &self.relax, &entries, size);
         let mut pass = |pipeline, settings: &wgpu::Buffer| {
             let entries =
                 [entry(0, settings), entry(4, &guides), entry(5, &light), entry(6, &result)];

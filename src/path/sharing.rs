@@ -95,7 +95,7 @@ enum Outgoing<'v> {
 }
 
 /// One sample of each pixel of a tile, in the order of `starts`. `seed` chooses whose second vertices
-/// are kept. There must be no fog, and paths of two bounces at least.
+/// are kept. There must be no fog.
 pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Vec<PathResult> {
     let mut bsdfs: Vec<[Option<Bsdf>; 2]> = Vec::new();
     bsdfs.resize_with(starts.len(), Default::default);

@@ -140,17 +140,24 @@ impl View {
 
     /// How pixels share second vertices where there is no fog; `None` if they do not.
     pub fn shared_tile(&self) -> Option<SharedTile> {
-        let [width, height] = self.whole_size();
-        let tile = match self.sharing {
-            Sharing::Off => None,
+        match self.decided_sharing() {
+            Sharing::Auto | Sharing::Off => None,
             Sharing::Small => Some(SharedTile::SMALL),
             Sharing::Large => Some(SharedTile::LARGE),
-            Sharing::Auto => {
-                let suits = self.sampling == Sampling::Adaptive && width.min(height) >= 64;
-                suits.then_some(SharedTile::LARGE)
-            }
-        };
-        tile.filter(|_| self.limits.bounces >= 2)
+        }
+    }
+
+    /// What `sharing` comes to where it is left open.
+    pub fn decided_sharing(&self) -> Sharing {
+        let [width, height] = self.whole_size();
+        let suits = self.sampling == Sampling::Adaptive
+            && self.limits.bounces >= 2
+            && width.min(height) >= LEAST_SHARED_SIZE;
+        match self.sharing {
+            Sharing::Auto if suits => Sharing::Large,
+            Sharing::Auto => Sharing::Off,
+            asked => asked,
+        }
     }
 
     /// Width and height of the picture that this one is a part of.
@@ -176,6 +183,9 @@ impl View {
     }
 }
 
+/// Least width and height of a picture whose pixels share unasked: in a smaller one a tile is much of
+/// what is seen, and what its pixels have in common shows.
+const LEAST_SHARED_SIZE: u32 = 64;
 /// One learning path for this many paths rendered.
 const LEARNING_SHARE: u64 = 64;
 /// The same where each vertex tries several samples of the map: such a path takes four times as long.

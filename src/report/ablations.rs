@@ -3,7 +3,7 @@
 use super::plan::{Effort, Method, Plan, Row, Settings};
 use crate::environment::TableKind;
 use crate::light_grid::{LawOptions, Recording};
-use crate::render::Sampling;
+use crate::render::{Sampling, Sharing};
 use crate::sampler::Points;
 
 /// Scenes and maps, if none are asked for: one of each kind of occlusion.
@@ -144,6 +144,9 @@ fn samples_and_tables(add: &mut Add<'_>) {
     let group = "samples";
     add(group, "independent points instead of Sobol's", &|s| s.points = Points::Independent);
     add(group, "no Russian roulette", &|s| s.russian_roulette = false);
+    let group = "shared second vertices";
+    add(group, "paths of their own", &|s| s.sharing = Sharing::Off);
+    add(group, "4x4 tiles, all keep theirs", &|s| s.sharing = Sharing::Small);
     let group = "importance tables";
     for table in [TableKind::U32, TableKind::F32, TableKind::F64] {
         add(group, &format!("table {table}"), &|s| s.table = table);

@@ -121,9 +121,10 @@ fn compile() {
             continue;
         }
         let world = World::new(builtin::build(name).expect("built in"));
-        for kernel in [Kernel::Render, Kernel::Learn].into_iter().chain(Kernel::OF_QUEUE) {
+        let all = [Kernel::Render, Kernel::Learn].into_iter().chain(Kernel::OF_QUEUE);
+        for kernel in all.chain(Kernel::OF_SHARING) {
             let found = driver.statistics(kernel, &program_of(&world, kernel));
-            let mut line = format!("{name:12} {:14}", kernel.name());
+            let mut line = format!("{name:12} {:15}", kernel.name());
             for column in COLUMNS {
                 let _ = write!(line, " {:6}", found.get(column).copied().unwrap_or(u64::MAX));
             }

@@ -9,10 +9,10 @@ use lightgrid::path::{PathLimits, World};
 use lightgrid::render::film::Film;
 use lightgrid::render::{Sampling, Sharing, View};
 use lightgrid::sampler::{hash, unit_from_bits};
-use lightgrid::scene::{Camera, Material, Scene, builtin};
+use lightgrid::scene::{AlphaMode, Camera, Material, Scene, builtin};
 use rayon::prelude::*;
 
-use super::scenes::{black, blended, half_masked, lambert, lamp, pane, room};
+use super::scenes::{black, blended, lambert, lamp, pane, room};
 use super::{environment, mean, view};
 
 const SHARED: [Sharing; 2] = [Sharing::Small, Sharing::Large];
@@ -96,7 +96,13 @@ fn in_a_room_open_glazed_and_behind_leaves() {
         ("open", None),
         ("pane", Some(pane())),
         ("veil", Some(blended(leaf(lambert(0.6)), 0.4))),
-        ("mask of all", Some(half_masked(leaf(lambert(0.6))))),
+        (
+            "mask",
+            Some(Material {
+                alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
+                ..leaf(blended(lambert(0.6), 0.4))
+            }),
+        ),
         // Nothing at all is there, but rays meet it.
         ("nothing", Some(blended(leaf(lambert(0.6)), 0.0))),
     ] {
