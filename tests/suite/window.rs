@@ -217,7 +217,6 @@ fn a_real_window_moves_opens_saves_and_remembers() {
         desk.save("again.exr");
         let eye = desk.metadata("again.exr", "camera_eye");
         std::fs::remove_file(desk.path("again.exr")).expect("removed");
-        println!("{eye:?}");
         (eye == of("camera_eye")).then_some(())
     });
 
