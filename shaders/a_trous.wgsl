@@ -37,7 +37,7 @@ struct Guide {
 
 const LEAST_ALIKE = 3.0;
 const RELAXED_PASSES = 2u;
-const ERRORS_TOLERATED = 4.0;
+const ERRORS_TOLERATED = 1.5;
 const REACH = 3;
 const LEAST_ALBEDO = 0.02;
 // No variance is larger, so that sums of variances are finite.
@@ -157,7 +157,8 @@ fn share_errors(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     // The pixel itself always counts.
-    result[index] = vec4f(light[index].xyz, variance / total);
+    let own = light[index];
+    result[index] = vec4f(own.xyz, max(own.w, variance / total));
 }
 
 // B3 spline.
@@ -177,7 +178,6 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     let index = id.y * settings.size.x + id.x;
     let guide = guides[index];
     let own = light[index];
-    let tolerance = ERRORS_TOLERATED * sqrt(max(own.w, 0.0)) + 1e-6;
     let own_luminance = luminance(own.xyz);
     // Later passes reach other edges.
     let is_relaxed = settings.step < (1u << RELAXED_PASSES);
@@ -193,6 +193,7 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
             }
             let other = u32(place.y) * settings.size.x + u32(place.x);
             let there = light[other];
+            let tolerance = ERRORS_TOLERATED * sqrt(max(own.w + there.w, 0.0)) + 1e-6;
             let weight = kernel(dx) * kernel(dy)
                 * weight_of(guide, guides[other], f32(settings.step), strictness)
                 * exp(-abs(luminance(there.xyz) - own_luminance) / tolerance);

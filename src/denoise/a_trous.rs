@@ -15,8 +15,8 @@ use crate::render::film::{Film, Pixel};
 
 /// Filter passes; the last one reaches 2^5 pixels.
 const PASSES: u32 = 5;
-/// Luminance differences are tolerated up to this many standard errors.
-const ERRORS_TOLERATED: f32 = 4.0;
+/// Luminance differences are tolerated up to this many of their standard errors.
+const ERRORS_TOLERATED: f32 = 1.5;
 /// Pixels around one that share its error.
 const REACH: usize = 3;
 /// Weights of a B3 spline.
@@ -110,8 +110,9 @@ fn around(index: usize, [width, height]: [usize; 2], reach: usize) -> impl Itera
     rows.flat_map(move |y| columns.clone().map(move |x| y * width + x))
 }
 
-/// Gives each pixel the mean error of its surface around it: a pixel that has met no light yet knows
-/// nothing of its own error.
+/// Gives each pixel the mean error of its surface around it, if that is larger than its own: a pixel that
+/// has met no light yet knows nothing of its error. One that has met too much knows: so its neighbours
+/// take their part of it.
 fn share_errors(light: &mut [Light], guides: &[Guide], width: usize) {
     let height = light.len() / width.max(1);
     let shared = |index: usize| {
@@ -126,7 +127,7 @@ fn share_errors(light: &mut [Light], guides: &[Guide], width: usize) {
     };
     let variances: Vec<f32> = (0..light.len()).into_par_iter().map(shared).collect();
     for (light, variance) in light.iter_mut().zip(variances) {
-        light.variance = variance;
+        light.variance = light.variance.max(variance);
     }
 }
 
@@ -150,7 +151,6 @@ fn filtered_pixel(
 ) -> Light {
     let centre = y * width + x;
     let (own, guide) = (light[centre], guides[centre]);
-    let tolerance = ERRORS_TOLERATED * own.variance.max(0.0).sqrt() + 1e-6;
     let own_luminance = luminance(own.rgb);
     let (mut sum, mut variance, mut total) = (Vec3::ZERO, 0.0, 0.0);
     for dy in -2..=2_i32 {
@@ -160,12 +160,16 @@ fn filtered_pixel(
                 continue;
             }
             let index = ny as usize * width + nx as usize;
+            let other = light[index];
+            // The same for both of two pixels: what one gives the other gets.
+            let tolerance =
+                ERRORS_TOLERATED * (own.variance + other.variance).max(0.0).sqrt() + 1e-6;
             let likeness = guide.weight(&guides[index], step)
-                * (-(luminance(light[index].rgb) - own_luminance).abs() / tolerance).exp();
+                * (-(luminance(other.rgb) - own_luminance).abs() / tolerance).exp();
             let weight =
                 KERNEL[dx.unsigned_abs() as usize] * KERNEL[dy.unsigned_abs() as usize] * likeness;
-            sum += light[index].rgb * weight;
-            variance += light[index].variance * weight * weight;
+            sum += other.rgb * weight;
+            variance += other.variance * weight * weight;
             total += weight;
         }
     }
