@@ -3,6 +3,8 @@
 //! `cargo bench -- efficiency` prints the table of speed-ups instead. What a machine's devices do,
 //! `lightgrid bench` tells.
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "who runs this reads it")]
+
 use criterion::{Criterion, criterion_group};
 
 mod bvh;

@@ -24,6 +24,17 @@ impl Error {
     }
 }
 
+impl Error {
+    /// Whether nothing failed, else all that did.
+    ///
+    /// # Errors
+    /// The failures, if there are any.
+    pub fn all(failures: Vec<Self>) -> Result<()> {
+        let messages: Vec<String> = failures.into_iter().map(|failure| failure.message).collect();
+        if messages.is_empty() { Ok(()) } else { Err(Self::new(messages.join("; "))) }
+    }
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)
@@ -41,10 +52,16 @@ pub struct Notices {
 }
 
 impl Notices {
+    /// More than so many nobody reads.
+    const MOST: usize = 100;
+
     /// Adds a sentence unless it is already there.
     pub fn add(&mut self, sentence: impl Into<String>) {
-        let sentence = sentence.into();
-        if !self.sentences.contains(&sentence) {
+        let sentence = match self.sentences.len() {
+            0..Self::MOST => sentence.into(),
+            _ => "there is more of the kind, left out here".to_owned(),
+        };
+        if self.sentences.len() <= Self::MOST && !self.sentences.contains(&sentence) {
             self.sentences.push(sentence);
         }
     }

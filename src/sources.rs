@@ -6,7 +6,8 @@ use crate::environment::sky;
 use crate::error::{Error, Notices, Result};
 use crate::image::Image;
 use crate::image::{read_map, sanitise};
-use crate::scene::{Scene, builtin, gltf};
+use crate::memory;
+use crate::scene::{Scene, SceneOptions, builtin, gltf};
 
 /// Size of a built-in sky when none is asked for.
 const SKY_SIZE: (u32, u32) = (2048, 1024);
@@ -18,11 +19,19 @@ const MAX_SKY_SIZE: (u32, u32) = (16384, 8192);
 /// # Errors
 /// One sentence: the name is neither, or the file cannot be read.
 pub fn scene(name: &str) -> Result<Scene> {
+    scene_with(name, &SceneOptions::default())
+}
+
+/// As [`scene`], with what is asked of its file.
+///
+/// # Errors
+/// As [`scene`].
+pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
     check_scene(name)?;
     if builtin::names().contains(&name) {
         builtin::build(name)
     } else {
-        gltf::load(Path::new(name))
+        gltf::load_with(Path::new(name), options)
     }
 }
 
@@ -65,11 +74,16 @@ pub fn map(name: &str) -> Result<(Image, Notices)> {
     let mut loaded = read_map(Path::new(name))?;
     let repaired = sanitise(&mut loaded.image);
     loaded.notices.extend(&repaired);
+    // The tables made of it take as much again.
+    let bytes = loaded.image.pixels.len() * size_of::<[f32; 3]>();
+    memory::check(bytes as u64).map_err(|cause| Error::at(name, cause))?;
     Ok((loaded.image, loaded.notices))
 }
 
 fn built_in_sky(name: &str, rest: &str) -> Result<Image> {
     let (sky_name, (width, height)) = sky_and_size(name, rest)?;
+    memory::check(2 * u64::from(width) * u64::from(height) * size_of::<[f32; 3]>() as u64)
+        .map_err(|cause| Error::at(name, cause))?;
     sky::build(sky_name, width, height)
 }
 

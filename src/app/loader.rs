@@ -8,9 +8,10 @@ use super::Wake;
 use crate::environment::landmarks::{Sun, equal_energy_tiles};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{Error, Notices, Result};
-use crate::image::Image;
+use crate::image::{Image, catch_panic};
 use crate::path::World;
 use crate::render::gpu::KernelFacts;
+use crate::scene::SceneOptions;
 use crate::sources;
 
 /// A scene ready for rays.
@@ -59,20 +60,23 @@ pub struct Loader {
     receiver: Receiver<Loaded>,
     wake: Wake,
     in_flight: [Option<String>; 2],
+    /// What is asked of scenes.
+    options: SceneOptions,
     /// One file at a time: two large ones together may not fit into memory.
     turn: Arc<Mutex<()>>,
 }
 
 impl Loader {
     /// `wake` is called when something has been loaded.
-    pub fn new(wake: Wake) -> Self {
+    pub fn new(wake: Wake, options: SceneOptions) -> Self {
         let (sender, receiver) = channel();
-        Self { sender, receiver, wake, in_flight: [None, None], turn: Arc::default() }
+        Self { sender, receiver, wake, in_flight: [None, None], options, turn: Arc::default() }
     }
 
     /// Starts to load a scene unless it is being loaded.
     pub fn load_scene(&mut self, name: &str) {
-        self.start(0, name, |name| Loaded::Scene(name.to_owned(), load_scene(name)));
+        let options = self.options.clone();
+        self.start(0, name, move |name| Loaded::Scene(name.to_owned(), load_scene(name, &options)));
     }
 
     /// Starts to load a map unless it is being loaded.
@@ -101,7 +105,12 @@ impl Loader {
         results
     }
 
-    fn start(&mut self, kind: usize, name: &str, load: fn(&str) -> Loaded) {
+    fn start(
+        &mut self,
+        kind: usize,
+        name: &str,
+        load: impl FnOnce(&str) -> Loaded + Send + 'static,
+    ) {
         if self.in_flight[kind].as_deref() == Some(name) {
             return;
         }
@@ -110,8 +119,14 @@ impl Loader {
         let name = name.to_owned();
         let thread = std::thread::Builder::new().name("load".to_owned()).spawn(move || {
             let _turn = turn.lock().unwrap_or_else(PoisonError::into_inner);
+            // A panic must not leave the window waiting for ever.
+            let failed = || Error::at(&name, "cannot be read: the program failed at it");
+            let loaded = catch_panic(|| load(&name)).unwrap_or_else(|| match kind {
+                0 => Loaded::Scene(name.clone(), Err(failed())),
+                _ => Loaded::Map(name.clone(), Err(failed())),
+            });
             // The window may have gone meanwhile.
-            let _ = sender.send(load(&name));
+            let _ = sender.send(loaded);
             wake();
         });
         if thread.is_err() {
@@ -120,9 +135,9 @@ impl Loader {
     }
 }
 
-fn load_scene(name: &str) -> Result<LoadedScene> {
+fn load_scene(name: &str, options: &SceneOptions) -> Result<LoadedScene> {
     let start = Instant::now();
-    let scene = sources::scene(name)?;
+    let scene = sources::scene_with(name, options)?;
     let read = start.elapsed().as_secs_f64();
     let world = Arc::new(World::new(scene));
     let seconds = [read, start.elapsed().as_secs_f64() - read];

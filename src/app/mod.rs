@@ -80,6 +80,8 @@ pub struct Start {
     pub interface: Interface,
     /// What earlier windows left.
     pub settings: Settings,
+    /// What is asked of the scenes' files.
+    pub of_scene: crate::scene::SceneOptions,
     /// The GPU to take where one is wanted: part of its name or backend.
     pub adapter: Option<String>,
     /// What finds the surfaces that rays hit on it.
@@ -166,7 +168,7 @@ impl App {
             history: History::default(),
             convergence: Convergence::default(),
             inspector: Inspector::new(wake.clone()),
-            loader: Loader::new(wake.clone()),
+            loader: Loader::new(wake.clone(), start.of_scene.clone()),
             worker: Worker::start(relay, (start.adapter, start.rays), screen.gpu().clone())?,
             presenter: Presenter::start(wake.clone())?,
             scene: None,

@@ -48,6 +48,7 @@ pub(super) fn picture(path: &Path, picture: &Picture) -> Result<()> {
             build_table_seconds: picture.map.seconds[1],
         },
         notices: &notices,
+        with_times: true,
         options: settings(picture),
     };
     let options = PictureOptions {

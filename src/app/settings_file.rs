@@ -4,11 +4,12 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::document::{Document, Light, Look, PictureSize};
 use super::interface::{Dock, Interface, Tab};
 use crate::error::{Error, Result};
-use crate::image::write_beside_and_rename;
+use crate::image::{read_file, write_beside_and_rename};
 use crate::render::StopRule;
 
 /// Largest picture in pixels, as on the command line.
@@ -82,13 +83,38 @@ impl Settings {
     /// # Errors
     /// If the file is there but cannot be read or understood.
     pub fn read(path: &Path) -> Result<Self> {
-        match std::fs::read(path) {
-            Ok(bytes) => serde_json::from_slice(&bytes)
-                .map(Self::within_bounds)
-                .map_err(|e| Error::at(path, format!("settings not understood: {e}"))),
+        match std::fs::metadata(path) {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Self::default()),
-            Err(e) => Err(Error::at(path, e)),
+            _ => read_file(path)
+                .and_then(|bytes| {
+                    serde_json::from_slice(&bytes)
+                        .map(Self::within_bounds)
+                        .map_err(|e| format!("settings not understood: {e}"))
+                })
+                .map_err(|cause| Error::at(path, cause)),
         }
+    }
+
+    /// Reads them; of a file that cannot be understood, what can be. It will be overwritten one day, so
+    /// it is kept beside as `.bak`, which the second value says.
+    pub fn recover(path: &Path) -> (Self, Option<String>) {
+        let failure = match Self::read(path) {
+            Ok(settings) => return (settings, None),
+            Err(failure) => failure,
+        };
+        let mut aside = path.as_os_str().to_owned();
+        aside.push(".bak");
+        let notice = match std::fs::copy(path, &aside) {
+            Ok(_) => format!("{failure}; it is kept as {}", Path::new(&aside).display()),
+            Err(error) => format!("{failure}; it cannot be kept aside: {error}"),
+        };
+        let found = read_file(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+        let settings = found.and_then(|found: Value| {
+            let mut whole = serde_json::to_value(Self::default()).ok()?;
+            take_over(&mut whole, "", &found);
+            serde_json::from_value(whole).ok()
+        });
+        (settings.map(Self::within_bounds).unwrap_or_default(), Some(notice))
     }
 
     /// Values a window can work with: a file that was edited or damaged may hold anything.
@@ -184,6 +210,21 @@ impl Settings {
     }
 }
 
+/// Sets what of `found` fits into the settings below a place in them, field by field.
+fn take_over(whole: &mut Value, place: &str, found: &Value) {
+    for (key, value) in found.as_object().into_iter().flatten() {
+        let place = format!("{place}/{key}");
+        let Some(field) = whole.pointer_mut(&place) else { continue };
+        let before = std::mem::replace(field, value.clone());
+        if Settings::deserialize(&*whole).is_err() {
+            if let Some(field) = whole.pointer_mut(&place) {
+                *field = before;
+            }
+            take_over(whole, &place, value);
+        }
+    }
+}
+
 fn put_first(list: &mut Vec<String>, name: &str) {
     list.retain(|other| other != name);
     list.insert(0, name.to_owned());
@@ -229,5 +270,27 @@ mod tests {
         assert_eq!(Settings::read(&path).expect("read").window_size, [1.0, 2.0]);
         std::fs::write(&path, "{").expect("written");
         assert!(Settings::read(&path).expect_err("broken").to_string().contains("window.json"));
+    }
+
+    #[test]
+    fn what_is_understood_of_a_damaged_file_is_used_and_the_file_kept() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("window.json");
+        let text = r#"{"recent_maps": ["a.hdr"], "window_size": "large", "tab": 7,
+            "look": {"exposure_ev": 2.5, "curve": "gone"}, "stop": {"noise": 0.25, "samples": -1}}"#;
+        std::fs::write(&path, text).expect("written");
+        let (settings, notice) = Settings::recover(&path);
+        let usual = Settings::default();
+        assert_eq!(settings.recent_maps, ["a.hdr"]);
+        assert_eq!((settings.window_size, settings.tab), (usual.window_size, usual.tab));
+        assert_eq!((settings.look.exposure_ev, settings.look.curve), (2.5, usual.look.curve));
+        assert_eq!((settings.stop.noise, settings.stop.samples), (Some(0.25), usual.stop.samples));
+        assert!(notice.expect("it is said").contains("window.json.bak"));
+        let kept = std::fs::read_to_string(folder.path().join("window.json.bak"));
+        assert_eq!(kept.expect("kept"), text);
+        std::fs::write(&path, "{\"recent_maps\": [").expect("written");
+        assert_eq!(Settings::recover(&path).0, usual);
+        settings.write(&path).expect("written");
+        assert_eq!(Settings::recover(&path), (settings, None));
     }
 }

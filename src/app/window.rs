@@ -4,11 +4,14 @@ use std::num::NonZeroU32;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use egui::ViewportId;
 use egui_wgpu::winit::Painter;
 use egui_wgpu::{RendererOptions, WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
 use winit::event::WindowEvent;
@@ -70,6 +73,7 @@ pub fn run(
         failure: None,
         loss: None,
         repaint_at: None,
+        asked: Arc::default(),
     };
     event_loop.run_app(&mut runner).map_err(|e| no_display(&e))?;
     runner.failure.map_or(Ok(runner.loss), Err)
@@ -86,6 +90,24 @@ struct Runner {
     /// Why it was closed.
     loss: Option<Error>,
     repaint_at: Option<Instant>,
+    /// Whether a signal asked for the end.
+    asked: Arc<AtomicBool>,
+}
+
+/// Lets Ctrl-C and requests to end close the window as a person would; a second one leaves at once.
+fn close_on_signals(asked: &Arc<AtomicBool>, proxy: EventLoopProxy<Call>) {
+    for signal in [SIGINT, SIGTERM] {
+        // Where signals cannot be caught they end the process, as ever.
+        let _ = flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(asked));
+        let _ = flag::register(signal, Arc::clone(asked));
+    }
+    let asked = Arc::clone(asked);
+    let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+        while !asked.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        let _ = proxy.send_event(Call::Repaint(Instant::now()));
+    });
 }
 
 /// What there is once a window is open.
@@ -203,7 +225,7 @@ impl Runner {
             let size = running.window.inner_size().to_logical(running.window.scale_factor());
             settings.window_size = [size.width, size.height];
             if let Err(error) = settings.write(path) {
-                eprintln!("notice: {error}");
+                crate::terminal::notice(error);
             }
         }
         self.running = None;
@@ -286,6 +308,7 @@ impl ApplicationHandler<Call> for Runner {
         let Some(start) = self.start.take() else { return };
         match self.open(event_loop, start) {
             Ok(running) => {
+                close_on_signals(&self.asked, self.proxy.clone());
                 running.window.request_redraw();
                 self.running = Some(running);
             }
@@ -296,7 +319,10 @@ impl ApplicationHandler<Call> for Runner {
         }
     }
 
-    fn user_event(&mut self, _: &ActiveEventLoop, call: Call) {
+    fn user_event(&mut self, event_loop: &ActiveEventLoop, call: Call) {
+        if self.asked.load(Ordering::Relaxed) {
+            return self.close(event_loop);
+        }
         let Some(running) = &mut self.running else { return };
         let at = match call {
             Call::Repaint(at) => at,

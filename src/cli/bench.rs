@@ -12,17 +12,23 @@ use crate::output::record::write_json;
 use crate::path::World;
 use crate::render::gpu::{RayChoice, Schedule, adapters};
 use crate::report::Device;
-use crate::scene::builtin;
+use crate::scene::{SceneOptions, builtin};
+use crate::terminal::print;
 
 /// Arguments of `bench`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Rays are traced alone, the same ones on every device: through each pixel \
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Rays are traced alone, the same ones on every device: through each pixel \
 (primary), from where they end to the map (shadow), and as a matte surface spreads light (diffuse). \
 Paths are what `render` does. `pass` is a pass on the clock, `device` what of it the device was at \
-work; `laws` and `picture` are the seconds until there are any, compiling included.")]
+work; `laws` and `picture` are the seconds until there are any, compiling included."
+)]
 pub(super) struct BenchArguments {
     /// Scenes: glTF files or built-in ones; without any, all that are built in.
     scenes: Vec<String>,
+    #[command(flatten)]
+    of_scene: SceneOptions,
     /// The map.
     #[arg(long, default_value = "sky:day", value_name = "MAP")]
     env: String,
@@ -40,7 +46,7 @@ pub(super) struct BenchArguments {
     #[arg(long, value_enum)]
     schedule: Option<Schedule>,
     /// Picture size in pixels; without it, 1920x1080 with a real GPU, else 640x360.
-    #[arg(long, value_parser = values::size, value_name = "WxH")]
+    #[arg(long, value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
     size: Option<(u32, u32)>,
     /// Seconds of rendering a scene on a device.
     #[arg(long, default_value = "3", value_parser = values::positive, value_name = "S")]
@@ -73,7 +79,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     let has_real_gpu =
         devices.contains(&Device::Gpu) && adapters.iter().any(|adapter| !adapter.is_software());
     let suitable_size = if has_real_gpu { (1920, 1080) } else { (640, 360) };
-    let cancel = interrupt::flag("stopping after this scene");
+    let interrupt = interrupt::Interrupt::watch("stopping after this scene");
     let progress = Progress::start("loading");
     let names: Vec<&str> = if arguments.scenes.is_empty() {
         builtin::names().to_vec()
@@ -85,7 +91,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     let environment = Environment::new(map, &EnvironmentOptions::default())
         .map_err(|e| Error::at(&arguments.env, e))?;
     let subject = |name: &&str| {
-        let world = World::new(crate::sources::scene(name)?);
+        let world = World::new(crate::sources::scene_with(name, &arguments.of_scene)?);
         Ok(Subject { name: (*name).to_owned(), world, environment: environment.clone() })
     };
     let subjects = names.iter().map(subject).collect::<Result<Vec<_>>>()?;
@@ -97,11 +103,11 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         size: arguments.size.unwrap_or(suitable_size),
         seconds: arguments.seconds,
     };
-    let bench = measure(&options, &subjects, &cancel, &|doing| progress.say(doing))?;
+    interrupt.keep();
+    let bench = measure(&options, &subjects, interrupt.asked(), &|doing| progress.say(doing))?;
     progress.finish();
     if let Some(file) = &arguments.json {
         write_json(file, &crate::output::record::to_value(&bench)?)?;
     }
-    print!("{bench}");
-    Ok(())
+    print(bench.to_string().trim_end())
 }

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use crate::error::{Error, Result};
-use crate::image::read_picture;
-use crate::metrics::compare;
+use crate::image::{is_linear, read_picture};
+use crate::metrics::{Comparison, compare};
+use crate::terminal::print;
 
 /// Arguments of `compare`.
 #[derive(Debug, clap::Args)]
@@ -20,17 +21,28 @@ pub(super) struct CompareArguments {
 
 /// Prints the errors of a picture against a reference.
 pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
+    let [is_linear_picture, is_linear_reference] =
+        [is_linear(&arguments.picture)?, is_linear(&arguments.reference)?];
+    if is_linear_picture != is_linear_reference {
+        let (developed, linear) = match is_linear_picture {
+            true => (&arguments.reference, &arguments.picture),
+            false => (&arguments.picture, &arguments.reference),
+        };
+        let linear = linear.display();
+        let cause =
+            format!("is developed for a display and {linear} is linear: that is no comparison");
+        return Err(Error::at(developed, cause));
+    }
     let picture = read_picture(&arguments.picture)?;
     let reference = read_picture(&arguments.reference)?;
     let comparison = compare(&picture, &reference).map_err(|e| Error::at(&arguments.picture, e))?;
     if arguments.json {
-        println!("{}", crate::output::record::to_json(&comparison)?);
-    } else {
-        println!("mean ratio        {:.5}", comparison.mean_ratio);
-        println!("MSE               {:.4e}", comparison.mse);
-        println!("relMSE            {:.4e}", comparison.rel_mse);
-        println!("trimmed relMSE    {:.4e}", comparison.trimmed_rel_mse);
-        println!("FLIP              {:.4}", comparison.flip);
+        return print(crate::output::record::to_json(&comparison)?);
     }
-    Ok(())
+    let Comparison { mean_ratio, mse, rel_mse, trimmed_rel_mse, flip, .. } = comparison;
+    print(format_args!("mean ratio        {mean_ratio:.5}"))?;
+    print(format_args!("MSE               {mse:.4e}"))?;
+    print(format_args!("relMSE            {rel_mse:.4e}"))?;
+    print(format_args!("trimmed relMSE    {trimmed_rel_mse:.4e}"))?;
+    print(format_args!("FLIP              {flip:.4}"))
 }

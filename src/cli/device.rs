@@ -7,6 +7,7 @@ use crate::error::{Error, Notices, Result};
 use crate::path::World;
 use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, Schedule, Stage, adapters};
 use crate::render::{Session, View};
+use crate::terminal::{notice, print};
 
 /// Arguments of `devices`.
 #[derive(Debug, clap::Args)]
@@ -20,28 +21,27 @@ pub(super) struct DevicesArguments {
 pub(super) fn run(arguments: &DevicesArguments) -> Result<()> {
     let adapters = adapters();
     if arguments.json {
-        println!("{}", json!(adapters));
-        return Ok(());
+        return print(json!(adapters));
     }
     if adapters.is_empty() {
-        println!("no GPU: neither Vulkan, Metal, DX12 nor OpenGL has an adapter; the CPU renders");
+        print("no GPU: neither Vulkan, Metal, DX12 nor OpenGL has an adapter; the CPU renders")?;
     }
     for adapter in &adapters {
-        println!("{}", adapter.name);
-        println!("  {}, {}, driver {}", adapter.backend, adapter.kind, adapter.driver);
-        println!(
+        print(&adapter.name)?;
+        print(format_args!("  {}, {}, driver {}", adapter.backend, adapter.kind, adapter.driver))?;
+        print(format_args!(
             "  up to {} storage buffers of {} MiB, {} ray queries",
             adapter.storage_buffers,
             adapter.storage_binding_bytes >> 20,
             if adapter.has_ray_queries { "with" } else { "without" }
-        );
+        ))?;
     }
     Ok(())
 }
 
 /// Prints a notice and keeps it for the record.
 pub(super) fn say(notices: &mut Notices, sentence: String) {
-    eprintln!("notice: {sentence}");
+    notice(&sentence);
     notices.add(sentence);
 }
 

@@ -1,21 +1,25 @@
 //! `lightgrid info`.
 
+use std::io::Read as _;
 use std::path::Path;
 
 use serde_json::{Value, json};
 
 use crate::environment::landmarks::Sun;
 use crate::error::{Notices, Result};
-use crate::image::Image;
+use crate::image::{Image, looks_like_picture, looks_like_scene, open_file};
 use crate::path::World;
 use crate::render::gpu::KernelFacts;
-use crate::scene::{Projection, Scene, builtin};
+use crate::scene::{Projection, Scene, SceneOptions, builtin};
+use crate::terminal::print;
 
 /// Arguments of `info`.
 #[derive(Debug, clap::Args)]
 pub(super) struct InfoArguments {
     /// A glTF file, a map (.exr, .hdr, 8-bit picture), a built-in scene or a built-in sky.
     source: String,
+    #[command(flatten)]
+    of_scene: SceneOptions,
     /// Print JSON instead of text.
     #[arg(long)]
     json: bool,
@@ -25,20 +29,30 @@ pub(super) struct InfoArguments {
 pub(super) fn run(arguments: &InfoArguments) -> Result<()> {
     let name = arguments.source.as_str();
     let facts = if is_scene(name) {
-        scene_facts(name, crate::sources::scene(name)?)
+        scene_facts(name, crate::sources::scene_with(name, &arguments.of_scene)?)
     } else {
         let (map, notices) = crate::sources::map(name)?;
         map_facts(name, &map, &notices)
     };
     if arguments.json {
-        println!("{}", crate::output::record::to_json(&facts)?);
+        print(crate::output::record::to_json(&facts)?)
     } else {
-        print_facts(&facts, 0);
+        let mut lines = Vec::new();
+        list_facts(&facts, 0, &mut lines);
+        print(lines.join("\n"))
     }
-    Ok(())
 }
 
 fn is_scene(name: &str) -> bool {
+    let mut start = [0; 64];
+    let file = open_file(Path::new(name)).ok();
+    let count = file.and_then(|(mut file, _)| file.read(&mut start).ok()).unwrap_or(0);
+    if looks_like_scene(&start[..count]) {
+        return true;
+    }
+    if looks_like_picture(&start[..count]) {
+        return false;
+    }
     let extension = Path::new(name).extension().map(|e| e.to_string_lossy().to_lowercase());
     builtin::names().contains(&name)
         || matches!(extension.as_deref(), Some("gltf" | "glb"))
@@ -99,29 +113,29 @@ fn map_facts(name: &str, map: &Image, notices: &Notices) -> Value {
     })
 }
 
-/// Prints nested facts as indented `name: value` lines.
-fn print_facts(facts: &Value, indent: usize) {
+/// Nested facts as indented `name: value` lines.
+fn list_facts(facts: &Value, indent: usize, lines: &mut Vec<String>) {
     let Some(map) = facts.as_object() else { return };
     for (key, value) in map {
         let label = key.replace('_', " ");
         match value {
-            Value::Array(lines) if lines.iter().any(Value::is_string) => {
-                println!("{:indent$}{label}:", "");
-                for line in lines.iter().filter_map(Value::as_str) {
-                    println!("{:indent$}  - {line}", "");
+            Value::Array(texts) if texts.iter().any(Value::is_string) => {
+                lines.push(format!("{:indent$}{label}:", ""));
+                for text in texts.iter().filter_map(Value::as_str) {
+                    lines.push(format!("{:indent$}  - {text}", ""));
                 }
             }
             Value::Array(numbers) if !numbers.is_empty() => {
                 let texts: Vec<String> = numbers.iter().map(number).collect();
                 let separator = if key.starts_with("size") { " x " } else { ", " };
-                println!("{:indent$}{label}: {}", "", texts.join(separator));
+                lines.push(format!("{:indent$}{label}: {}", "", texts.join(separator)));
             }
             Value::Array(_) => {}
             Value::Object(_) => {
-                println!("{:indent$}{label}:", "");
-                print_facts(value, indent + 2);
+                lines.push(format!("{:indent$}{label}:", ""));
+                list_facts(value, indent + 2, lines);
             }
-            _ => println!("{:indent$}{label}: {}", "", number(value)),
+            _ => lines.push(format!("{:indent$}{label}: {}", "", number(value))),
         }
     }
 }

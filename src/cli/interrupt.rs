@@ -1,23 +1,74 @@
-//! Ctrl-C: once to finish early and keep what is done, twice to leave at once.
+//! Ctrl-C and requests to end: at once while there is nothing to keep, then once to finish early and
+//! keep what is done, twice to leave at once.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
 
-/// A flag that becomes true at the first Ctrl-C (or termination request), if nobody else has set it
-/// before; the second one ends the process with status 130. What will happen is said when it does.
-pub(super) fn flag(what: &'static str) -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let handler = Arc::clone(&flag);
-    let was_asked = AtomicBool::new(false);
-    let set = ctrlc::set_handler(move || {
-        if was_asked.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag::register_usize;
+
+use crate::terminal::tell;
+
+/// How often signals are looked for: sooner than anybody notices.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// What signals set.
+pub(super) struct Interrupt {
+    asked: Arc<AtomicBool>,
+    has_work: Arc<AtomicBool>,
+}
+
+impl Interrupt {
+    /// Watches from now on. `what` says what will be done when there is something to keep.
+    pub(super) fn watch(what: &'static str) -> Self {
+        let (asked, has_work) = (Arc::<AtomicBool>::default(), Arc::<AtomicBool>::default());
+        let caught = Arc::new(AtomicUsize::new(0));
+        let register = |signal| register_usize(signal, Arc::clone(&caught), signal as usize);
+        let inside = (Arc::clone(&asked), Arc::clone(&has_work), Arc::clone(&caught));
+        let watching = [SIGINT, SIGTERM].into_iter().try_for_each(|s| register(s).map(|_| ()));
+        let watching = watching.and_then(|()| {
+            std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+                let (asked, has_work, caught) = inside;
+                let mut was_asked = false;
+                loop {
+                    std::thread::sleep(LOOK_EVERY);
+                    let signal = caught.swap(0, Ordering::Relaxed);
+                    if signal == 0 {
+                        continue;
+                    }
+                    if was_asked || !has_work.load(Ordering::Relaxed) {
+                        if !was_asked {
+                            tell("\nlightgrid: interrupted before there was anything to keep");
+                        }
+                        std::process::exit(128 + signal as i32);
+                    }
+                    was_asked = true;
+                    asked.store(true, Ordering::Relaxed);
+                    tell(format_args!("\nlightgrid: {what} (again: leave now)"));
+                }
+            })
+        });
+        if watching.is_err() {
+            tell("lightgrid: Ctrl-C cannot be caught here and will end the process at once");
         }
-        handler.store(true, Ordering::Relaxed);
-        eprintln!("\nlightgrid: {what} (again: leave now)");
-    });
-    if set.is_err() {
-        eprintln!("lightgrid: Ctrl-C cannot be caught here and will end the process at once");
+        Self { asked, has_work }
     }
-    flag
+
+    /// From now on there is something to keep.
+    pub(super) fn keep(&self) {
+        self.has_work.store(true, Ordering::Relaxed);
+    }
+
+    /// Becomes true when the work is to end early. Others may set it, too.
+    pub(super) fn asked(&self) -> &Arc<AtomicBool> {
+        &self.asked
+    }
+}
+
+/// Watches where every moment's work is kept.
+pub(super) fn kept(what: &'static str) -> Interrupt {
+    let interrupt = Interrupt::watch(what);
+    interrupt.keep();
+    interrupt
 }

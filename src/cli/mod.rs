@@ -59,9 +59,6 @@ enum Command {
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let command = arguments.command.unwrap_or_else(|| Command::View(view::ViewArguments::plain()));
-    if !matches!(command, Command::View(_) | Command::Screenshot(_) | Command::Render(_)) {
-        end_with_the_reader();
-    }
     let result = match &command {
         Command::View(arguments) => view::run(arguments),
         Command::Screenshot(arguments) => screenshot::run(arguments),
@@ -77,19 +74,9 @@ pub fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("lightgrid: {error}");
+            crate::terminal::tell(format_args!("lightgrid: {error}"));
             ExitCode::FAILURE
         }
-    }
-}
-
-/// For commands whose work is what they print. Lets the process end in silence when whoever reads its output has seen enough (`| head`), as other
-/// commands do, instead of panicking.
-fn end_with_the_reader() {
-    #[cfg(target_os = "linux")]
-    // SAFETY: plain system call, made before there are other threads; the default action is no handler.
-    unsafe {
-        libc::signal(libc::SIGPIPE, libc::SIG_DFL);
     }
 }
 

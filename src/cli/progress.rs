@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::render::{Phase, Session, StopRule};
+use crate::terminal::tell;
 
 /// A live line on the terminal.
 pub(super) struct Progress {
@@ -54,7 +55,7 @@ impl Progress {
 
     /// Leaves a sentence on stderr, above the line.
     pub(super) fn tell(&self, sentence: &str) {
-        self.bar.suspend(|| eprintln!("{sentence}"));
+        self.bar.suspend(|| tell(sentence));
     }
 
     /// Removes the line.

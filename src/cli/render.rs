@@ -1,5 +1,7 @@
 //! `lightgrid render`.
 
+mod outputs;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,24 +10,24 @@ use std::time::{Duration, Instant};
 use glam::Vec3;
 
 use super::device;
+use super::interrupt::Interrupt;
 use super::progress::Progress;
 use super::values;
 use crate::alarm::Alarm;
 use crate::denoise::Denoiser;
 use crate::environment::{Environment, EnvironmentOptions, TableKind};
 use crate::error::{Error, Notices, Result};
-use crate::image::{check_writable, is_same_file};
 use crate::light_grid::LawOptions;
-use crate::medium::Fog;
-use crate::output::laws::{check_laws_extension, write_laws};
-use crate::output::record::{self, Phases, Record};
-use crate::output::{self, Exposure, LayerName, PictureOptions};
+use crate::memory;
+use crate::output::record::{Phases, Record};
+use crate::output::{self, Exposure, LayerName};
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
 use crate::render::{Crop, Sampling, Session, Sharing, StopRule, View};
 use crate::sampler::Points;
-use crate::scene::{Camera, Medium, Projection, Scene, builtin};
+use crate::scene::{Camera, Medium, Projection, Scene, SceneOptions, builtin};
+use crate::terminal::notice;
 use crate::tone::{ToneCurve, WhiteBalance};
 
 /// Arguments of `render`.
@@ -33,12 +35,14 @@ use crate::tone::{ToneCurve, WhiteBalance};
 #[command(
     allow_negative_numbers = true,
     after_help = "Ctrl-C ends the work early, writes the pictures and counts as success; a second \
-                  one leaves at once with status 130."
+                  one, or one before there is a picture, leaves at once with status 130."
 )]
 pub(super) struct RenderArguments {
     /// A glTF file (.gltf, .glb) or a built-in scene.
     #[arg(default_value = builtin::DEFAULT_SCENE)]
     scene: String,
+    #[command(flatten)]
+    pub(super) of_scene: SceneOptions,
     /// The picture to write: .png or .exr; may be given twice.
     #[arg(short, long = "output", required = true, value_name = "FILE")]
     outputs: Vec<PathBuf>,
@@ -51,7 +55,7 @@ pub(super) struct RenderArguments {
     #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG", help_heading = "Environment")]
     env_rotation: f64,
     /// What the camera sees of the map: `map`, `blur:DEGREES`, or a colour R,G,B (linear radiance).
-    #[arg(long, value_parser = values::background, value_name = "WHAT", help_heading = "Environment")]
+    #[arg(long, value_parser = values::background, allow_hyphen_values = true, value_name = "WHAT", help_heading = "Environment")]
     background: Option<Background>,
     /// Multiplies the map's radiance.
     #[arg(long, default_value = "1", value_parser = values::not_negative, value_name = "X", help_heading = "Environment")]
@@ -59,10 +63,10 @@ pub(super) struct RenderArguments {
 
     /// Fog: scattering per metre, one number or R,G,B; 0.02 halves what is seen over 35 metres. In
     /// place of the scene's own fog; 0 clears the air.
-    #[arg(long, value_parser = values::coefficient, value_name = "S", help_heading = "Fog")]
+    #[arg(long, value_parser = values::coefficient, allow_hyphen_values = true, value_name = "S", help_heading = "Fog")]
     fog: Option<Vec3>,
     /// Absorption of the fog per metre, one number or R,G,B.
-    #[arg(long, value_parser = values::coefficient, value_name = "A", help_heading = "Fog")]
+    #[arg(long, value_parser = values::coefficient, allow_hyphen_values = true, value_name = "A", help_heading = "Fog")]
     fog_absorption: Option<Vec3>,
     /// Mean cosine of scattering, -1 to 1: 0 to all sides alike, mist and haze 0.6 to 0.9.
     #[arg(long, value_parser = values::mean_cosine, allow_hyphen_values = true, value_name = "G", help_heading = "Fog")]
@@ -91,10 +95,10 @@ pub(super) struct RenderArguments {
     focus: Option<f64>,
 
     /// Picture size in pixels.
-    #[arg(long, default_value = "1280x720", value_parser = values::size, value_name = "WxH", help_heading = "Picture")]
+    #[arg(long, default_value = "1280x720", value_parser = values::size, allow_hyphen_values = true, value_name = "WxH", help_heading = "Picture")]
     size: (u32, u32),
     /// Renders only this part of the picture: its left and top, width and height in pixels.
-    #[arg(long, value_parser = values::region, value_name = "X,Y,W,H", help_heading = "Picture")]
+    #[arg(long, value_parser = values::region, allow_hyphen_values = true, value_name = "X,Y,W,H", help_heading = "Picture")]
     region: Option<[u32; 4]>,
     /// Pixel filter.
     #[arg(long, default_value = "blackman-harris", value_enum, help_heading = "Picture")]
@@ -150,7 +154,7 @@ pub(super) struct RenderArguments {
     #[arg(long, help_heading = "Light")]
     no_russian_roulette: bool,
     /// Tiles of the map, columns x rows.
-    #[arg(long, default_value = "16x8", value_parser = tile_grid, value_name = "CxR", help_heading = "Light")]
+    #[arg(long, default_value = "16x8", value_parser = tile_grid, allow_hyphen_values = true, value_name = "CxR", help_heading = "Light")]
     tiles: (u32, u32),
     /// Light Grid cells around the horizon; half as many from top to bottom.
     #[arg(long, default_value = "64", value_parser = clap::value_parser!(u32).range(2..=512), value_name = "N", help_heading = "Light")]
@@ -179,6 +183,9 @@ pub(super) struct RenderArguments {
     /// Threads; 0 uses every core.
     #[arg(long, default_value = "0", value_parser = clap::value_parser!(u16).range(0..=1024), value_name = "N", help_heading = "Run")]
     threads: u16,
+    /// Leaves times out of what pictures say about themselves: equal pictures are equal files.
+    #[arg(long, help_heading = "Run")]
+    reproducible: bool,
     /// Writes the run's figures as JSON.
     #[arg(long, value_name = "FILE", help_heading = "Run")]
     json: Option<PathBuf>,
@@ -213,36 +220,6 @@ fn parse_white(text: &str) -> std::result::Result<WhiteBalance, String> {
     Ok(WhiteBalance { kelvin, tint })
 }
 
-/// Refuses outputs before the work rather than after it.
-fn check_outputs(arguments: &RenderArguments) -> Result<()> {
-    for picture in &arguments.outputs {
-        output::check_extension(picture)?;
-    }
-    if let Some(laws) = &arguments.laws {
-        check_laws_extension(laws)?;
-    }
-    if let Some(denoiser) = arguments.denoise {
-        denoiser.check()?;
-    }
-    let (width, height) = arguments.size;
-    if let Some([left, top, w, h]) = arguments.region
-        && (left.saturating_add(w) > width || top.saturating_add(h) > height)
-    {
-        return Err(Error::new(format!(
-            "--region {left},{top},{w},{h} is not inside the picture of {width}x{height} pixels"
-        )));
-    }
-    let files: Vec<&PathBuf> =
-        arguments.outputs.iter().chain(&arguments.json).chain(&arguments.laws).collect();
-    for (i, file) in files.iter().enumerate() {
-        if files[..i].iter().any(|other| is_same_file(other, file)) {
-            return Err(Error::at(file, "two outputs would be written to this one file"));
-        }
-        check_writable(file)?;
-    }
-    Ok(())
-}
-
 impl RenderArguments {
     /// Defaults but for scene, map, picture, sampling, (size, samples, seconds) and (device,
     /// adapter, rays).
@@ -256,6 +233,7 @@ impl RenderArguments {
     ) -> Self {
         Self {
             scene: scene.to_owned(),
+            of_scene: SceneOptions::default(),
             outputs: vec![picture.to_owned()],
             env: map.to_owned(),
             env_rotation: 0.0,
@@ -296,17 +274,22 @@ impl RenderArguments {
             rays,
             schedule: None,
             threads: 0,
+            reproducible: false,
             json: None,
             laws: None,
         }
     }
 }
 
+/// Bytes of a pixel in the film and in what is made of it to be written; and with layers.
+const BYTES_OF_PIXEL: u64 = 72;
+const BYTES_WITH_LAYERS: u64 = 140;
+
 /// Loads, learns, renders, writes.
 pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
-    check_outputs(arguments)?;
+    outputs::check(arguments)?;
     start_threads(arguments.threads)?;
-    let cancel = super::interrupt::flag("stopping after this pass and writing the picture");
+    let interrupt = Interrupt::watch("stopping after this pass and writing the picture");
     let progress = Progress::start("loading the scene and the map");
     // Side by side: a large scene and a large map take seconds each.
     let (world, light) = rayon::join(|| load_world(arguments), || load_environment(arguments));
@@ -318,9 +301,10 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     let mut notices = world.scene.notices.clone();
     notices.extend(&map_notices);
     let view = view(arguments, &world, &mut notices)?;
-    for sentence in notices.iter() {
-        eprintln!("notice: {sentence}");
-    }
+    let bytes = if view.layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
+    memory::check(u64::from(view.width) * u64::from(view.height) * bytes)
+        .map_err(|cause| Error::new(format!("a picture of this size {cause}")))?;
+    notices.iter().for_each(notice);
     let rule = stop_rule(arguments);
     let gpu = device::open(
         arguments.device,
@@ -330,16 +314,14 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     )?;
     let mut session =
         device::start(arguments.device, gpu.as_ref(), &world, &environment, view, &mut notices)?;
-    let outcome = work(&mut session, &rule, &cancel, &progress, arguments, &mut notices);
+    let outcome = work(&mut session, &rule, &interrupt, &progress, arguments, &mut notices);
     progress.finish();
     if session.samples() == 0 {
         outcome?;
         return Ok(());
     }
-    for sentence in output::remarks(session.film(), &environment) {
-        eprintln!("notice: {sentence}");
-        notices.add(sentence);
-    }
+    let remarks = output::remarks(session.film(), &environment);
+    remarks.iter().for_each(|sentence| notices.add(sentence));
 
     let record = Record {
         scene: &arguments.scene,
@@ -351,32 +333,19 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         gpu: session.gpu_figures(),
         phases: &phases,
         notices: &notices,
-        options: settings(arguments, session.view().fog(&world)),
+        with_times: !arguments.reproducible,
+        options: outputs::settings(arguments, session.view().fog(&world)),
     };
-    let options = PictureOptions {
-        exposure: arguments.exposure,
-        tone_curve: arguments.tonemap,
-        denoiser: arguments.denoise,
-        white_balance: arguments.white.unwrap_or_default(),
-        layers: arguments.layers.clone(),
-    };
-    for picture in &arguments.outputs {
-        output::write_picture(picture, &options, &record)?;
-    }
-    if let Some(path) = &arguments.json {
-        record::write_json(path, &record.to_json())?;
-    }
-    if let Some(path) = &arguments.laws {
-        let none = || Error::at(path, "not written: this map and sampling have no laws");
-        write_laws(path, session.grid().ok_or_else(none)?)?;
-    }
-    outcome
+    let mut failures = outputs::write(arguments, &record, session.grid());
+    remarks.iter().for_each(notice);
+    failures.extend(outcome.err());
+    Error::all(failures)
 }
 
 /// The scene made ready for rays, and the seconds of loading and of building.
 fn load_world(arguments: &RenderArguments) -> Result<(World, f64, f64)> {
     let start = Instant::now();
-    let scene = crate::sources::scene(&arguments.scene)?;
+    let scene = crate::sources::scene_with(&arguments.scene, &arguments.of_scene)?;
     let load_seconds = lap(start);
     let start = Instant::now();
     let world = World::new(scene);
@@ -541,17 +510,21 @@ fn camera(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> 
 fn work(
     session: &mut Session<'_>,
     rule: &StopRule,
-    cancel: &Arc<AtomicBool>,
+    interrupt: &Interrupt,
     progress: &Progress,
     arguments: &RenderArguments,
     notices: &mut Notices,
 ) -> Result<()> {
     let never = AtomicBool::new(false);
+    let cancel = interrupt.asked();
     let alarm = Alarm::start(Arc::clone(cancel));
     let seconds = rule.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
     alarm.set(seconds.and_then(|seconds| Instant::now().checked_add(seconds)));
     loop {
         progress.show(session, rule);
+        if session.samples() > 0 {
+            interrupt.keep();
+        }
         let stopped = cancel.load(Ordering::Relaxed);
         if stopped || session.has_learned_enough(rule) {
             session.finish_learning();
@@ -574,36 +547,4 @@ fn work(
             session.continue_on_cpu();
         }
     }
-}
-
-/// Settings that belong into metadata and JSON, as typed or as chosen.
-fn settings(
-    arguments: &RenderArguments,
-    fog: Option<Fog>,
-) -> Vec<(&'static str, serde_json::Value)> {
-    let fog = fog.map(|fog| {
-        let Fog { interior, bounds: [low, high] } = fog;
-        serde_json::json!({
-            "scattering": interior.scattering.to_array(),
-            "absorption": (interior.extinction - interior.scattering).to_array(),
-            "anisotropy": interior.phase.mean_cosine(),
-            "box": [low.to_array(), high.to_array()],
-        })
-    });
-    vec![
-        ("fog", serde_json::json!(fog)),
-        ("sampling", serde_json::json!(arguments.sampling)),
-        ("sharing", serde_json::json!(sharing(arguments))),
-        ("table", serde_json::json!(arguments.table.to_string())),
-        ("tiles", serde_json::json!(format!("{}x{}", arguments.tiles.0, arguments.tiles.1))),
-        ("grid_columns", serde_json::json!(arguments.grid)),
-        ("bounces", serde_json::json!(arguments.bounces)),
-        ("russian_roulette", serde_json::json!(!arguments.no_russian_roulette)),
-        ("filter", serde_json::json!(arguments.filter)),
-        ("region", serde_json::json!(arguments.region)),
-        ("background", serde_json::json!(arguments.background.unwrap_or_default())),
-        ("env_rotation_degrees", serde_json::json!(arguments.env_rotation)),
-        ("env_intensity", serde_json::json!(arguments.env_intensity)),
-        ("seed", serde_json::json!(arguments.seed)),
-    ]
 }

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::interrupt::kept;
 use super::progress::Progress;
-use super::{interrupt, values};
+use super::values;
 use crate::error::{Error, Result};
 use crate::render::Sampling;
 use crate::render::gpu::adapters;
@@ -13,6 +14,7 @@ use crate::report::{
     markdown_table, sat, talk,
 };
 use crate::scene::builtin;
+use crate::terminal::{notice, print, tell};
 
 /// Arguments of `report`.
 #[derive(Debug, clap::Args)]
@@ -93,19 +95,19 @@ struct EffortArguments {
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Seconds of every run, learning included.
-    #[arg(long, default_value = "30", value_parser = values::positive, value_name = "S")]
+    #[arg(long, default_value = "30", value_parser = values::positive, allow_hyphen_values = true, value_name = "S")]
     seconds: f64,
     /// Independent runs of every combination; intervals need two and are worth something from four on.
     #[arg(long, default_value = "6", value_parser = clap::value_parser!(u32).range(1..=10_000), value_name = "N")]
     seeds: u32,
     /// Picture size in pixels.
-    #[arg(long, default_value = "240x135", value_parser = values::size, value_name = "WxH")]
+    #[arg(long, default_value = "240x135", value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
     size: (u32, u32),
     /// Surface vertices at which a path gathers light; 1 is direct light only.
     #[arg(long, default_value = "5", value_parser = clap::value_parser!(u32).range(1..=1000), value_name = "N")]
     bounces: u32,
     /// The reference is rendered until its noise is this share of the smallest error.
-    #[arg(long, default_value = "0.05", value_parser = share, value_name = "X")]
+    #[arg(long, default_value = "0.05", value_parser = share, allow_hyphen_values = true, value_name = "X")]
     reference_noise: f64,
     /// Folder that references are kept in, to share them between reports; without it, in the
     /// report's.
@@ -122,7 +124,7 @@ struct SatArguments {
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Makes the maps' sides this many times as long, for a quick look.
-    #[arg(long, default_value = "1", value_parser = share, value_name = "X")]
+    #[arg(long, default_value = "1", value_parser = share, allow_hyphen_values = true, value_name = "X")]
     scale: f64,
 }
 
@@ -169,7 +171,7 @@ fn all_devices() -> Vec<Device> {
     let mut devices = vec![Device::Cpu];
     match adapters().first() {
         Some(_) => devices.push(Device::Gpu),
-        None => eprintln!("notice: there is no GPU; the CPU alone is measured"),
+        None => notice("there is no GPU; the CPU alone is measured"),
     }
     devices
 }
@@ -238,8 +240,8 @@ fn report(plan: &Plan, arguments: &EffortArguments) -> Result<()> {
     check(plan)?;
     super::render::start_threads(arguments.threads)?;
     let folder = arguments.output.clone().unwrap_or_default();
-    let cancel = interrupt::flag("stopping; what is measured is kept");
-    eprintln!("{}", estimate(plan));
+    let cancel = kept("stopping; what is measured is kept");
+    tell(estimate(plan));
     let progress = Progress::start("starting");
     let made = make(
         plan,
@@ -247,7 +249,7 @@ fn report(plan: &Plan, arguments: &EffortArguments) -> Result<()> {
             folder: &folder,
             references: arguments.references.as_deref(),
             adapter: arguments.adapter.as_deref(),
-            cancel: &cancel,
+            cancel: cancel.asked(),
             progress: &|what| progress.say(what),
             tell: &|what| progress.tell(&what),
         },
@@ -257,8 +259,8 @@ fn report(plan: &Plan, arguments: &EffortArguments) -> Result<()> {
 }
 
 fn finish(report: &Report, folder: &std::path::Path) -> Result<()> {
-    println!("{}", markdown_table(report));
-    eprintln!("the report is {}", folder.join("report.html").display());
+    tell(format_args!("the report is {}", folder.join("report.html").display()));
+    print(markdown_table(report))?;
     if report.is_finished {
         return Ok(());
     }
@@ -283,20 +285,20 @@ fn estimate(plan: &Plan) -> String {
 
 /// The table of importance tables.
 fn tables(arguments: &SatArguments) -> Result<()> {
-    let cancel = interrupt::flag("stopping after this map");
+    let cancel = kept("stopping after this map");
     let progress = Progress::start("starting");
     let measured = sat::measure_all(
         arguments.scale,
         arguments.output.as_deref(),
         |case| {
             progress.say(format!("{}, {}x{}", case.title, case.size.0, case.size.1));
-            is_set(&cancel)
+            is_set(cancel.asked())
         },
         |measured| progress.tell(&format!("{}: {}", measured.title, measured.report)),
     );
     progress.finish();
     let measured = measured?;
-    println!("{}\n{}", sat::markdown(&measured), sat::REMARK);
+    print(format_args!("{}\n{}", sat::markdown(&measured), sat::REMARK))?;
     if measured.len() < sat::CASES.len() {
         return Err(Error::new("stopped before the end"));
     }

@@ -2,6 +2,7 @@
 
 use crate::environment::{Lookup, sat_report};
 use crate::error::{Error, Result};
+use crate::terminal::{notice, print};
 
 /// Arguments of `sat`.
 #[derive(Debug, clap::Args)]
@@ -30,16 +31,16 @@ pub(super) fn run(arguments: &SatArguments) -> Result<()> {
     let mut reports = serde_json::Map::new();
     for name in maps {
         let (map, notices) = crate::sources::map(name)?;
-        notices.iter().for_each(|sentence| eprintln!("notice: {name}: {sentence}"));
+        notices.iter().for_each(|sentence| notice(format_args!("{name}: {sentence}")));
         let report = sat_report(&map, Lookup::Bilinear, SAMPLES).map_err(|e| Error::at(name, e))?;
         if arguments.json {
             reports.insert(name.to_owned(), crate::output::record::to_value(&report)?);
         } else {
-            println!("{name}, {}x{}\n{report}", map.width, map.height);
+            print(format_args!("{name}, {}x{}\n{report}", map.width, map.height))?;
         }
     }
     if arguments.json {
-        println!("{}", crate::output::record::to_json(&reports)?);
+        print(crate::output::record::to_json(&reports)?)?;
     }
     Ok(())
 }

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::image::{check_writable, write_png};
 use crate::render::gpu::DeviceChoice;
 use crate::render::{Sampling, StopRule};
-use crate::scene::builtin;
+use crate::scene::{SceneOptions, builtin};
 
 /// A part of the window that can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -36,13 +36,18 @@ enum PanelName {
 
 /// Arguments of `screenshot`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Figures that depend on the clock are left out: a seed gives the same \
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Figures that depend on the clock are left out: a seed gives the same \
                         screenshot on the same machine. No display is needed, but a graphics \
-                        device is; software Vulkan will do.")]
+                        device is; software Vulkan will do."
+)]
 pub(super) struct ScreenshotArguments {
     /// A glTF file (.gltf, .glb) or a built-in scene.
     #[arg(default_value = builtin::DEFAULT_SCENE)]
     scene: String,
+    #[command(flatten)]
+    of_scene: SceneOptions,
     /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky.
     #[arg(long, default_value = "sky:day", value_name = "MAP")]
     env: String,
@@ -56,7 +61,7 @@ pub(super) struct ScreenshotArguments {
     #[arg(long, default_value = "16", value_parser = clap::value_parser!(u32).range(1..), value_name = "N")]
     samples: u32,
     /// Size of the window in pixels.
-    #[arg(long, default_value = "1440x900", value_parser = values::size, value_name = "WxH")]
+    #[arg(long, default_value = "1440x900", value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
     size: (u32, u32),
     /// How the map is sampled.
     #[arg(long, default_value = "adaptive", value_enum)]
@@ -71,7 +76,7 @@ pub(super) struct ScreenshotArguments {
     #[arg(long)]
     denoise: bool,
     /// The place to inspect, X,Y in [0,1] of the picture, with its brute-force truth.
-    #[arg(long, value_parser = place, value_name = "X,Y")]
+    #[arg(long, value_parser = place, allow_hyphen_values = true, value_name = "X,Y")]
     inspect: Option<Vec2>,
     /// The tile chosen on the map, for the overlay `tile`.
     #[arg(long, value_name = "N")]
@@ -80,7 +85,7 @@ pub(super) struct ScreenshotArguments {
     #[arg(long, value_enum, value_name = "WHAT")]
     tiles: Option<TileView>,
     /// Turns the map about the vertical, in degrees.
-    #[arg(long, default_value = "0", value_parser = values::finite, allow_negative_numbers = true, value_name = "DEG")]
+    #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG")]
     env_rotation: f64,
     /// Seed of the random numbers.
     #[arg(long, default_value = "0", value_name = "N")]
@@ -125,7 +130,12 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
         ..defaults
     };
     let mut studio = Studio::open(Shot {
-        start: Start { document, interface: interface(arguments), ..Start::default() },
+        start: Start {
+            document,
+            interface: interface(arguments),
+            of_scene: arguments.of_scene.clone(),
+            ..Start::default()
+        },
         size: arguments.size,
         patience: Duration::from_secs_f64(arguments.patience.min(1e9)),
     })?;

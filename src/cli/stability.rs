@@ -10,6 +10,7 @@ use crate::output::record::write_json;
 use crate::render::gpu::Gpu;
 use crate::stability::fuzz::{self, Kind};
 use crate::stability::{Case, Report, Setting, Verdict, cases, run as run_case};
+use crate::terminal::print;
 
 /// Arguments of `stability`.
 #[derive(Debug, clap::Args)]
@@ -58,8 +59,7 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<()> {
     }
     let chosen = choose(arguments)?;
     if arguments.list {
-        chosen.iter().for_each(|case| println!("{}", case.title()));
-        return Ok(());
+        return chosen.iter().try_for_each(|case| print(case.title()));
     }
     if let Some(file) = &arguments.json {
         check_writable(file)?;
@@ -78,7 +78,7 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<()> {
     let mut reports = Vec::new();
     for case in chosen {
         let report = run_case(case, &setting);
-        println!("{}", report.line());
+        print(report.line())?;
         reports.push(report);
     }
     if let Some(file) = &arguments.json {
@@ -122,12 +122,12 @@ fn conclude(reports: &[Report]) -> Result<()> {
     let of =
         |verdict: Verdict| reports.iter().filter(move |report| report.outcome.verdict() == verdict);
     let seconds: f64 = reports.iter().map(|report| report.seconds).sum();
-    println!(
+    print(format_args!(
         "{} passed, {} failed, {} skipped in {seconds:.0} s",
         of(Verdict::Passed).count(),
         of(Verdict::Failed).count(),
         of(Verdict::Skipped).count()
-    );
+    ))?;
     let failed: Vec<&str> = of(Verdict::Failed).map(|report| report.title.as_str()).collect();
     if failed.is_empty() {
         Ok(())

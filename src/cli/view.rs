@@ -7,20 +7,24 @@ use crate::app::Start;
 use crate::app::document::{Document, PictureSize};
 use crate::app::settings_file::Settings;
 use crate::app::window;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::render::gpu::{DeviceChoice, RayChoice};
 use crate::render::{Sampling, StopRule};
-use crate::scene::builtin;
+use crate::scene::{SceneOptions, builtin};
+use crate::terminal::tell;
 
 /// Seconds of rendering when there is no display and nothing else says when to stop.
 const HEADLESS_SECONDS: f64 = 60.0;
 
 /// Arguments of `view`.
 #[derive(Debug, clap::Args)]
+#[command(allow_negative_numbers = true)]
 pub(super) struct ViewArguments {
     /// A glTF file (.gltf, .glb) or a built-in scene.
     #[arg(default_value = builtin::DEFAULT_SCENE)]
     scene: String,
+    #[command(flatten)]
+    of_scene: SceneOptions,
     /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky.
     #[arg(long, default_value = "sky:day", value_name = "MAP")]
     env: String,
@@ -37,7 +41,7 @@ pub(super) struct ViewArguments {
     #[arg(long, default_value = "auto", value_enum)]
     rays: RayChoice,
     /// Picture size in pixels; without it, that of the viewport.
-    #[arg(long, value_parser = values::size, value_name = "WxH")]
+    #[arg(long, value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
     size: Option<(u32, u32)>,
     /// Stop at this many samples per pixel.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..), value_name = "N")]
@@ -55,6 +59,7 @@ impl ViewArguments {
     pub(super) fn plain() -> Self {
         Self {
             scene: builtin::DEFAULT_SCENE.to_owned(),
+            of_scene: SceneOptions::default(),
             env: "sky:day".to_owned(),
             sampling: None,
             device: None,
@@ -71,25 +76,21 @@ impl ViewArguments {
 /// Opens the window; without a display, says so and renders the picture into a file.
 pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
     let path = arguments.settings.clone().or_else(Settings::default_path);
-    let mut notices = Vec::new();
-    let settings = path.as_deref().map_or_else(|| Ok(Settings::default()), Settings::read);
-    let settings = settings.unwrap_or_else(|error: Error| {
-        notices.push(error.to_string());
-        Settings::default()
-    });
+    let (settings, notice) = path.as_deref().map(Settings::recover).unwrap_or_default();
     let start = Start {
         document: document(arguments, &settings),
         interface: settings.interface(),
         settings,
+        of_scene: arguments.of_scene.clone(),
         adapter: arguments.adapter.clone(),
         rays: arguments.rays,
         is_repeatable: false,
     };
-    match window::run(start, notices, path) {
+    match window::run(start, notice.into_iter().collect(), path) {
         Ok(closed_by) => closed_by.map_or(Ok(()), Err),
         Err(error) => {
             let picture = arguments.output.display();
-            eprintln!("lightgrid: {error}; rendering into {picture} instead");
+            tell(format_args!("lightgrid: {error}; rendering into {picture} instead"));
             super::render::run(&headless(arguments))
         }
     }
@@ -118,12 +119,14 @@ fn document(arguments: &ViewArguments, settings: &Settings) -> Document {
 
 fn headless(arguments: &ViewArguments) -> super::render::RenderArguments {
     let seconds = arguments.samples.is_none().then_some(HEADLESS_SECONDS);
-    super::render::RenderArguments::for_picture(
+    let mut headless = super::render::RenderArguments::for_picture(
         &arguments.scene,
         &arguments.env,
         &arguments.output,
         arguments.sampling.unwrap_or_default(),
         (arguments.size, arguments.samples, seconds),
         (arguments.device.unwrap_or_default(), arguments.adapter.clone(), arguments.rays),
-    )
+    );
+    headless.of_scene = arguments.of_scene.clone();
+    headless
 }

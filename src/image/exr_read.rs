@@ -1,26 +1,28 @@
 //! OpenEXR pictures, decoded block by block, in parallel, straight into the final pixels.
 
-use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
 use exr::block::UncompressedBlock;
-use exr::block::chunk::Chunk;
-use exr::block::reader::ChunksReader;
+use exr::block::chunk::{Chunk, CompressedBlock};
+use exr::block::reader::{ChunksReader, Reader as ChunkReader};
+use exr::compression::Compression;
 use exr::math::Vec2;
 use exr::meta::MetaData;
-use exr::meta::attribute::{AttributeValue, IntegerBounds, SampleType};
+use exr::meta::attribute::{AttributeValue, ChannelList, IntegerBounds, SampleType};
 use exr::meta::header::Header;
 use exr::prelude::f16;
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
 use super::exr_channels::{Channels, select};
-use super::file::read_cause;
+use super::exr_patch::patch;
+use super::file::{open_file, read_cause, read_file};
 use super::guard::catch_panic;
 use super::primaries::rec709_conversion;
 use super::{Decoded, Image, check_size};
 use crate::error::{Error, Notices, Result};
+use crate::memory;
 
 /// Linear Rec.709 pixels of an OpenEXR file, not repaired in any way.
 pub(crate) struct Exr {
@@ -35,14 +37,34 @@ pub(crate) struct Exr {
 /// are black.
 ///
 /// # Errors
-/// One sentence: missing, damaged, too large, or of a kind that is not read (deep, subsampled, an
-/// unknown compression).
+/// One sentence: missing, damaged, too large, or of a kind that is not read (deep, an unknown
+/// compression).
 pub(crate) fn read_exr(path: &Path) -> Result<Exr> {
-    let file = File::open(path).map_err(|e| Error::at(path, read_cause(&e)))?;
-    let file_bytes = file.metadata().map_err(|e| Error::at(path, read_cause(&e)))?.len();
-    catch_panic(|| decode(file, file_bytes))
+    let (file, file_bytes) = open_file(path).map_err(|cause| Error::at(path, cause))?;
+    let decoded =
+        || match ChunkReader::read_from_buffered(BufReader::with_capacity(1 << 20, file), false) {
+            Ok(reader) => decode(reader, file_bytes, None),
+            Err(failure) if is_patched(&failure) => {
+                let file = patch(read_file(path)?).ok_or_else(|| decode_cause(&failure))?;
+                let reader = ChunkReader::read_from_buffered(Cursor::new(file.bytes), false);
+                let reader = reader.map_err(|e| decode_cause(&e))?;
+                decode(reader, file_bytes, Some(file.sampling))
+            }
+            Err(failure) => Err(decode_cause(&failure)),
+        };
+    catch_panic(decoded)
         .unwrap_or_else(|| Err("is damaged: its decoder failed".into()))
         .map_err(|cause| Error::at(path, cause))
+}
+
+/// Whether a header is refused that [`patch`] cures.
+fn is_patched(failure: &exr::error::Error) -> bool {
+    use exr::error::Error as Exr;
+    match failure {
+        Exr::Invalid(what) => what.contains("not sorted"),
+        Exr::NotSupported(what) => what.contains("subsampling"),
+        _ => false,
+    }
 }
 
 /// The text attributes of the first part of an OpenEXR file, sorted by name: what
@@ -51,7 +73,7 @@ pub(crate) fn read_exr(path: &Path) -> Result<Exr> {
 /// # Errors
 /// If the file is missing or its header is damaged.
 pub fn read_exr_metadata(path: &Path) -> Result<Vec<(String, String)>> {
-    let file = File::open(path).map_err(|e| Error::at(path, read_cause(&e)))?;
+    let (file, _) = open_file(path).map_err(|cause| Error::at(path, cause))?;
     let meta = catch_panic(|| MetaData::read_from_buffered(BufReader::new(file), false))
         .ok_or_else(|| Error::at(path, "is damaged: its decoder failed"))?
         .map_err(|e| Error::at(path, decode_cause(&e)))?;
@@ -69,20 +91,28 @@ pub fn read_exr_metadata(path: &Path) -> Result<Vec<(String, String)>> {
     Ok(found)
 }
 
-fn decode(file: File, file_bytes: u64) -> Decoded<Exr> {
-    let reader = exr::block::read(BufReader::with_capacity(1 << 20, file), false)
-        .map_err(|e| decode_cause(&e))?;
+/// `sampling` is that of the first part's channels if they may differ from a sample a pixel.
+fn decode<R: Read + Seek>(
+    reader: ChunkReader<R>,
+    file_bytes: u64,
+    sampling: Option<Vec<[usize; 2]>>,
+) -> Decoded<Exr> {
     check_plausible(reader.headers(), file_bytes)?;
     let mut notices = Notices::default();
     let selection = select(reader.headers(), &mut notices)?;
     let header = reader.headers()[selection.part].clone();
+    let is_subsampled = |all: &Vec<[usize; 2]>| all.iter().any(|step| *step != [1, 1]);
+    let sampling = sampling.filter(|all| selection.part == 0 && is_subsampled(all));
     let placement = Placement::of(&header, &mut notices)?;
     let block_decoder = BlockDecoder {
         channels: selection.channels,
         layout: ChannelLayout::of(&header),
+        sampling,
         to_rec709: rec709_conversion(&header, selection.channels, &mut notices),
     };
-    let mut image = Image::filled(placement.width, placement.height, [0.0; 3]);
+    let (width, height) = (placement.width, placement.height);
+    let pixels = memory::filled(u64::from(width) * u64::from(height), [0.0; 3])?;
+    let mut image = Image { width, height, pixels };
     let mut chunks = reader
         .filter_chunks(false, |_, tile, block| {
             block.layer == selection.part && tile.is_largest_resolution_level()
@@ -104,6 +134,9 @@ fn decode(file: File, file_bytes: u64) -> Decoded<Exr> {
             .map(|chunk| block_decoder.decode(chunk, &meta))
             .collect::<Decoded<_>>()?;
         blocks.iter().for_each(|block| placement.copy(block, &mut image));
+    }
+    if block_decoder.sampling.is_some() {
+        block_decoder.hold(&mut image);
     }
     Ok(Exr { image, notices, is_cube_map: is_cube_map(&header) })
 }
@@ -241,11 +274,16 @@ impl ChannelLayout {
         Self { channels, bytes_per_pixel }
     }
 
-    /// Hands each sample of one channel in one row (native byte order) to `put`, left to right.
-    fn for_each(&self, channel: usize, width: usize, row: &[u8], mut put: impl FnMut(usize, f32)) {
-        let (sample_type, before) = self.channels[channel];
-        let start = before * width;
-        let bytes = &row[start..start + sample_type.bytes_per_sample() * width];
+    /// Hands `count` samples of one channel (native byte order) to `put`, left to right.
+    fn for_each(
+        &self,
+        channel: usize,
+        count: usize,
+        bytes: &[u8],
+        mut put: impl FnMut(usize, f32),
+    ) {
+        let (sample_type, _) = self.channels[channel];
+        let bytes = &bytes[..sample_type.bytes_per_sample() * count];
         match sample_type {
             SampleType::F16 => bytes.as_chunks().0.iter().enumerate().for_each(|(i, b)| {
                 put(i, f16::from_ne_bytes(*b).to_f32());
@@ -264,28 +302,135 @@ impl ChannelLayout {
 struct BlockDecoder {
     channels: Channels,
     layout: ChannelLayout,
+    /// Set if channels have lower resolutions: pixels that a sample of each stands for.
+    sampling: Option<Vec<[usize; 2]>>,
     to_rec709: Option<Mat3>,
 }
 
 impl BlockDecoder {
     fn decode(&self, chunk: Chunk, meta: &MetaData) -> Decoded<Block> {
         catch_panic(|| {
+            if let Some(sampling) = &self.sampling {
+                return self.decode_subsampled(chunk, meta, sampling);
+            }
             let block = UncompressedBlock::decompress_chunk(chunk, meta, false)
                 .map_err(|e| decode_cause(&e))?;
-            Ok(self.convert(&block))
+            let Vec2(width, height) = block.index.pixel_size;
+            let mut pixels = vec![[0.0; 3]; width * height];
+            let rows = block.data.chunks_exact(width * self.layout.bytes_per_pixel);
+            for (row, pixels) in rows.zip(pixels.chunks_exact_mut(width)) {
+                for (i, channel) in self.channels.indices().into_iter().enumerate() {
+                    let before = self.layout.channels[channel].1 * width;
+                    self.layout.for_each(channel, width, &row[before..], |x, v| pixels[x][i] = v);
+                }
+            }
+            let Vec2(x, y) = block.index.pixel_position;
+            self.convert(&mut pixels);
+            Ok(Block { x, y, width, pixels })
         })
         .unwrap_or_else(|| Err("is damaged: its decoder failed".into()))
     }
 
-    fn convert(&self, block: &UncompressedBlock) -> Block {
-        let Vec2(width, height) = block.index.pixel_size;
-        let mut pixels = vec![[0.0; 3]; width * height];
-        let rows = block.data.chunks_exact(width * self.layout.bytes_per_pixel);
-        for (row, pixels) in rows.zip(pixels.chunks_exact_mut(width)) {
-            for (i, channel) in self.channels.indices().into_iter().enumerate() {
-                self.layout.for_each(channel, width, row, |x, v| pixels[x][i] = v);
+    /// Pixels as they are stored, NaN where there is no sample: lines hold only the channels that have some
+    /// in them.
+    fn decode_subsampled(
+        &self,
+        chunk: Chunk,
+        meta: &MetaData,
+        sampling: &[[usize; 2]],
+    ) -> Decoded<Block> {
+        let damaged = || "is damaged: its channels of lower resolution make no sense".to_owned();
+        let mut meta = meta.clone();
+        let header = meta.headers.get_mut(chunk.layer_index).ok_or_else(damaged)?;
+        let place = header.get_block_data_indices(&chunk.compressed_block);
+        let place = place.and_then(|place| header.get_absolute_block_pixel_coordinates(place));
+        let place = place.map_err(|e| decode_cause(&e))?;
+        let (Vec2(width, height), first) = (place.size, place.position.1);
+        let has_samples = |row: usize, [_, down]: [usize; 2]| {
+            (i64::from(first) + row as i64).rem_euclid(down.max(1) as i64) == 0
+        };
+        // Channels with their bytes in a line.
+        let lines: Vec<(usize, [usize; 2], usize)> = (0..)
+            .zip(sampling)
+            .map(|(channel, &step)| {
+                let (sample_type, _) = self.layout.channels[channel];
+                let samples = width / step[0].max(1);
+                (channel, step, samples * sample_type.bytes_per_sample())
+            })
+            .collect();
+        let bytes: usize = (0..height)
+            .flat_map(|row| lines.iter().filter(move |(_, step, _)| has_samples(row, *step)))
+            .map(|(.., bytes)| bytes)
+            .sum();
+        let is_b44 = matches!(header.compression, Compression::B44 | Compression::B44A);
+        // What packing would make larger is stored plainly.
+        let is_plain = matches!(&chunk.compressed_block, CompressedBlock::ScanLine(block)
+            if block.compressed_pixels_le.len() == bytes);
+        let data = if is_b44 && !is_plain {
+            let rows = |step| (0..height).filter(|&row| has_samples(row, step)).count();
+            let planes = planes_of_b44(chunk, header, &lines, rows).ok_or_else(damaged)?;
+            let mut planes: Vec<&[u8]> = planes.iter().map(Vec::as_slice).collect();
+            let mut data = Vec::with_capacity(bytes);
+            for row in 0..height {
+                for (&(_, step, bytes), plane) in lines.iter().zip(&mut planes) {
+                    if has_samples(row, step) {
+                        let (line, after) = plane.split_at_checked(bytes).ok_or_else(damaged)?;
+                        data.extend_from_slice(line);
+                        *plane = after;
+                    }
+                }
+            }
+            data
+        } else {
+            // The crate knows of resolutions, but takes all lines to have as many bytes.
+            if !bytes.is_multiple_of(width * height) {
+                return Err(damaged());
+            }
+            header.channels.bytes_per_pixel = bytes / (width * height);
+            for (channel, step) in header.channels.list.iter_mut().zip(sampling) {
+                channel.sampling = Vec2(step[0], step[1]);
+            }
+            let block = UncompressedBlock::decompress_chunk(chunk, &meta, false);
+            block.map_err(|e| decode_cause(&e))?.data
+        };
+        let mut pixels = vec![[f32::NAN; 3]; width * height];
+        let mut rest = data.as_slice();
+        for (row, line) in pixels.chunks_exact_mut(width).enumerate() {
+            for &(channel, step, bytes) in
+                lines.iter().filter(|(_, step, _)| has_samples(row, *step))
+            {
+                let (samples, after) = rest.split_at_checked(bytes).ok_or_else(damaged)?;
+                rest = after;
+                for i in (0..3).filter(|i| self.channels.indices().get(*i) == Some(&channel)) {
+                    self.layout.for_each(channel, width / step[0], samples, |x, v| {
+                        line[x * step[0]..][..step[0]].iter_mut().for_each(|pixel| pixel[i] = v);
+                    });
+                }
             }
         }
+        let at = |axis: fn(Vec2<i32>) -> i32| {
+            usize::try_from(axis(place.position)).map_err(|_| damaged())
+        };
+        Ok(Block { x: at(|v| v.0)?, y: at(|v| v.1)?, width, pixels })
+    }
+
+    /// Makes a picture of blocks with channels of lower resolution: samples are held from line to line,
+    /// across blocks.
+    fn hold(&self, image: &mut Image) {
+        let width = image.width as usize;
+        for at in width..image.pixels.len() {
+            let above = image.pixels[at - width];
+            for (value, above) in image.pixels[at].iter_mut().zip(above) {
+                if value.is_nan() {
+                    *value = above;
+                }
+            }
+        }
+        self.convert(&mut image.pixels);
+    }
+
+    /// Makes linear Rec.709 of what was stored.
+    fn convert(&self, pixels: &mut [[f32; 3]]) {
         match self.channels {
             Channels::Rgb(_) => {}
             Channels::Grey(_) => pixels.iter_mut().for_each(|p| *p = [p[0]; 3]),
@@ -294,9 +439,49 @@ impl BlockDecoder {
         if let Some(matrix) = self.to_rec709 {
             pixels.iter_mut().for_each(|p| *p = (matrix * Vec3::from(*p)).to_array());
         }
-        let Vec2(x, y) = block.index.pixel_position;
-        Block { x, y, width, pixels }
     }
+}
+
+/// The samples of each channel in `lines` (number, sampling, bytes of a line) of a B44 block, whose channels
+/// lie one after another: the crate reckons wrongly with those of lower resolution, but can do one at a
+/// time. `None` if there are too few.
+fn planes_of_b44(
+    chunk: Chunk,
+    header: &Header,
+    lines: &[(usize, [usize; 2], usize)],
+    rows: impl Fn([usize; 2]) -> usize,
+) -> Option<Vec<Vec<u8>>> {
+    let CompressedBlock::ScanLine(block) = chunk.compressed_block else { return None };
+    let mut rest = block.compressed_pixels_le.as_slice();
+    let mut planes = Vec::new();
+    for &(channel, step, line_bytes) in lines {
+        let mut channel = header.channels.list[channel].clone();
+        channel.sampling = Vec2(1, 1);
+        let bytes_per_sample = channel.sample_type.bytes_per_sample();
+        let size = Vec2(line_bytes / bytes_per_sample, rows(step));
+        let mut length = 0;
+        if channel.sample_type == SampleType::F16 {
+            // Four by four samples take 14 bytes, or 3 where all are equal, which the third says.
+            for _ in 0..size.0.div_ceil(4) * size.1.div_ceil(4) {
+                length += if *rest.get(length + 2)? >= 13 << 2 { 3 } else { 14 };
+            }
+        } else {
+            length = line_bytes * size.1;
+        }
+        let (own, after) = rest.split_at_checked(length)?;
+        rest = after;
+        let mut alone = header.clone();
+        alone.channels = ChannelList::new(std::iter::once(channel).collect());
+        let section = IntegerBounds { position: Vec2(0, 0), size };
+        let plane = header.compression.decompress_image_section_from_le(
+            &alone,
+            own.to_vec(),
+            section,
+            false,
+        );
+        planes.push(plane.ok()?);
+    }
+    Some(planes)
 }
 
 /// RGB from luminance and the colour differences `(R-Y)/Y`, `(B-Y)/Y`, with Rec.709 weights (OpenEXR
@@ -325,11 +510,6 @@ fn decode_cause(error: &exr::error::Error) -> String {
         // What the crate makes of an unexpected end of the file.
         Exr::Invalid(what) if what.contains("missing bytes") => "is cut short or damaged".into(),
         Exr::Invalid(what) => format!("is a damaged OpenEXR file ({what})"),
-        Exr::NotSupported(what) if what.contains("subsampling") => {
-            "stores colour at a lower resolution (Y/RY/BY), which lightgrid does not read; save it \
-             as RGB"
-                .into()
-        }
         Exr::NotSupported(what) if what.contains("deep") => {
             "holds deep data, which lightgrid does not read".into()
         }

@@ -1,6 +1,6 @@
 //! OpenEXR pictures with feature layers and metadata.
 
-use std::io;
+use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::Path;
 
 use exr::prelude::{
@@ -9,6 +9,7 @@ use exr::prelude::{
     WritableImage,
 };
 
+use super::exr_patch::sort_attributes;
 use super::{Image, write_beside_and_rename};
 use crate::error::{Error, Result};
 
@@ -76,12 +77,23 @@ pub fn write_exr(path: &Path, picture: ExrPicture<'_>) -> Result<()> {
     let layer = ExrLayer::new(size, attributes, encoding, AnyChannels::sort(channels));
     let file_content = ExrImage::from_layer(layer);
     write_beside_and_rename(path, |file| {
-        file_content.write().to_buffered(file).map_err(|error| match error {
+        file_content.write().to_buffered(&mut *file).map_err(|error| match error {
             exr::error::Error::Io(error) => error,
             other => io::Error::other(other.to_string()),
-        })
+        })?;
+        file.rewind()?;
+        let mut start = Vec::new();
+        file.get_ref().take(MOST_OF_HEADER).read_to_end(&mut start)?;
+        if sort_attributes(&mut start).is_some() {
+            file.rewind()?;
+            file.write_all(&start)?;
+        }
+        Ok(())
     })
 }
+
+/// Longer headers than any of ours.
+const MOST_OF_HEADER: u64 = 1 << 18;
 
 /// What the `software` attribute says.
 const SOFTWARE: &str = concat!("lightgrid ", env!("CARGO_PKG_VERSION"));

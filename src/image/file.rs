@@ -1,11 +1,14 @@
 //! Writing a file so that it is either the old one or the whole new one.
 
-use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
 
+use super::Decoded;
 use crate::error::{Error, Result};
+use crate::memory;
 
 /// Writes a file through a temporary one in the same folder, flushed to the disk and then renamed:
 /// whoever reads `path`, even after a crash, sees the old content or all of the new. A symbolic
@@ -19,13 +22,15 @@ pub fn write_beside_and_rename(
 ) -> Result<()> {
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     check_target(&target).map_err(|cause| Error::at(path, cause))?;
+    remove_leftovers(folder_of(&target));
     let temporary = Temporary::beside(&target);
-    let written = OpenOptions::new()
-        .write(true)
-        .read(true)
-        .create_new(true)
-        .open(&temporary.path)
+    let written = temporary
+        .create()
         .and_then(|file| {
+            // Who may read the old content may read the new, and nobody else.
+            if let Ok(existing) = fs::metadata(&target) {
+                file.set_permissions(existing.permissions())?;
+            }
             let mut buffered = BufWriter::with_capacity(1 << 20, file);
             write(&mut buffered)?;
             buffered.flush()?;
@@ -49,7 +54,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     check_target(&target).map_err(|cause| Error::at(path, cause))?;
     let temporary = Temporary::beside(&target);
-    File::create_new(&temporary.path).map_err(|error| Error::at(path, write_cause(&error)))?;
+    temporary.create().map_err(|error| Error::at(path, write_cause(&error)))?;
     Ok(())
 }
 
@@ -81,6 +86,8 @@ fn check_target(target: &Path) -> std::result::Result<(), String> {
         Ok(existing) if existing.permissions().readonly() => {
             Err("cannot be written: it is read-only".into())
         }
+        // Such as a name that is too long.
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(write_cause(&error)),
         _ => Ok(()),
     }
 }
@@ -105,15 +112,42 @@ struct Temporary {
     path: PathBuf,
 }
 
+/// What temporary names begin and end with. They do not hold the target's name, which may be as long as
+/// a name can be.
+const TEMPORARY: [&str; 2] = [".lightgrid-", ".part"];
+
 impl Temporary {
     fn beside(target: &Path) -> Self {
-        let mut name = OsString::from(".");
-        name.push(target.file_name().unwrap_or_default());
-        name.push(format!(".{}.part", std::process::id()));
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let [begin, end] = TEMPORARY;
+        let name = format!("{begin}{}-{number}{end}", std::process::id());
         let path = folder_of(target).join(name);
         // A leftover of a crashed process that had our id.
         let _ = fs::remove_file(&path);
         Self { path }
+    }
+
+    fn create(&self) -> io::Result<File> {
+        OpenOptions::new().write(true).read(true).create_new(true).open(&self.path)
+    }
+}
+
+/// Nobody writes a file for so long without a byte.
+const LEFT_AFTER: Duration = Duration::from_secs(3600);
+
+/// Removes temporary files of processes that were killed long ago.
+fn remove_leftovers(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let is_temporary = name.starts_with(TEMPORARY[0]) && name.ends_with(TEMPORARY[1]);
+        if is_temporary
+            && let Ok(age) = entry.metadata().and_then(|facts| facts.modified())
+            && age.elapsed().is_ok_and(|age| age > LEFT_AFTER)
+        {
+            let _ = fs::remove_file(entry.path());
+        }
     }
 }
 
@@ -121,6 +155,28 @@ impl Drop for Temporary {
     fn drop(&mut self) {
         let _ = fs::remove_file(&self.path);
     }
+}
+
+/// Opens an ordinary file for reading, and its length. Devices and pipes may have no end, and opening
+/// one may already wait for ever.
+pub(crate) fn open_file(path: &Path) -> Decoded<(File, u64)> {
+    let facts = fs::metadata(path).map_err(|e| read_cause(&e))?;
+    if facts.is_dir() {
+        return Err("is a folder, not a file".into());
+    }
+    if !facts.is_file() {
+        return Err("is a device or a pipe, not an ordinary file".into());
+    }
+    let file = File::open(path).map_err(|e| read_cause(&e))?;
+    Ok((file, facts.len()))
+}
+
+/// The bytes of an ordinary file.
+pub(crate) fn read_file(path: &Path) -> Decoded<Vec<u8>> {
+    let (file, length) = open_file(path)?;
+    let mut bytes = memory::reserved(length)?;
+    file.take(length).read_to_end(&mut bytes).map_err(|e| read_cause(&e))?;
+    Ok(bytes)
 }
 
 /// An I/O error in the words of someone who wanted a file read.

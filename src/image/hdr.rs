@@ -4,6 +4,7 @@
 
 use super::{Decoded, Image, check_size};
 use crate::color::REC709_FROM_XYZ;
+use crate::memory;
 use glam::Vec3;
 
 /// Decodes a whole `.hdr` file. Header lines `EXPOSURE` and `COLORCORR` are undone, so that pixels
@@ -27,15 +28,22 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<Image> {
     }
     let decoder = PixelDecoder::new(&header);
     let mut line = vec![[0u8; 4]; minor.count as usize];
-    let mut pixels = Vec::new();
+    let mut pixels: Vec<[f32; 3]> = Vec::new();
     // All at once if the file can hold it in runs, else as it is read: old runs have no bound, and a
     // small file may claim gigabytes.
     let total = major.count as usize * minor.count as usize;
     if total / MAX_PIXELS_PER_BYTE <= cursor.rest.len() {
-        pixels.reserve_exact(total);
+        pixels = memory::reserved(total as u64)?;
     }
+    // Whoever writes runs needs less than four bytes a pixel. If there are as many, pixels that look like
+    // runs of the old kind are dark pixels.
+    let encoding = match cursor.rest {
+        rest if starts_with_runs(rest, line.len()) => Encoding::Runs,
+        rest if rest.len() >= 4 * total => Encoding::Flat,
+        _ => Encoding::Runs,
+    };
     for row in 0..major.count {
-        read_line(&mut cursor, &mut line)
+        read_line(&mut cursor, &mut line, encoding)
             .map_err(|cause| format!("{cause}: only {row} of {} rows can be read", major.count))?;
         pixels.extend(line.iter().map(|&rgbe| decoder.decode(rgbe)));
     }
@@ -224,12 +232,27 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Reads one line of pixels in whichever of the three encodings it is.
-fn read_line(cursor: &mut Cursor<'_>, line: &mut [[u8; 4]]) -> Decoded<()> {
-    if let [2, 2, high, low, ..] = *cursor.rest
-        && (8..0x8000).contains(&line.len())
-        && usize::from(high) << 8 | usize::from(low) == line.len()
-    {
+/// How the pixels of a file are written.
+#[derive(Clone, Copy, PartialEq)]
+enum Encoding {
+    /// Each by itself.
+    Flat,
+    /// In runs of the new kind or, line by line, of the old one or without runs.
+    Runs,
+}
+
+/// Whether a line of `width` pixels begins here that is written in runs of the new kind.
+fn starts_with_runs(rest: &[u8], width: usize) -> bool {
+    matches!(*rest, [2, 2, high, low, ..]
+        if (8..0x8000).contains(&width) && usize::from(high) << 8 | usize::from(low) == width)
+}
+
+/// Reads one line of pixels.
+fn read_line(cursor: &mut Cursor<'_>, line: &mut [[u8; 4]], encoding: Encoding) -> Decoded<()> {
+    if encoding == Encoding::Flat {
+        line.copy_from_slice(cursor.take(4 * line.len())?.as_chunks().0);
+        Ok(())
+    } else if starts_with_runs(cursor.rest, line.len()) {
         cursor.take(4)?;
         (0..4).try_for_each(|channel| read_runs(cursor, line, channel))
     } else {

@@ -3,9 +3,13 @@
 use std::io::Cursor;
 
 use crate::error::{Error, Result};
+use crate::memory;
 
 /// Widest and highest picture that is decoded.
 const MAX_SIDE: u32 = 32_768;
+
+/// Most pixels of a picture: 16384 x 16384.
+const MAX_PIXELS: u64 = 1 << 28;
 
 /// Most bytes one picture may take while it is decoded: 16384 x 16384 RGBA.
 const MAX_BYTES: u64 = 1 << 30;
@@ -49,8 +53,16 @@ pub fn ldr_size(bytes: &[u8], name: &str) -> Result<(u32, u32)> {
 ///
 /// # Errors
 /// When the format is not recognised, the data is damaged, or the picture would take more than
-/// 1 GiB or is wider or higher than 32768 pixels; the sentence begins with `name`.
+/// 1 GiB or is wider or higher than 32768 pixels, or memory is short; the sentence begins with `name`.
 pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
+    let (width, height) = ldr_size(bytes, name)?;
+    let pixels = u64::from(width) * u64::from(height);
+    if width > MAX_SIDE || height > MAX_SIDE || pixels > MAX_PIXELS {
+        let cause = format!("claims {width} x {height} pixels, more than lightgrid reads");
+        return Err(Error::at(name, cause));
+    }
+    // What the decoder makes, of up to four channels of its own depth, and what is made of it.
+    memory::check(8 * pixels).map_err(|cause| Error::at(name, cause))?;
     let mut reader = reader(bytes, name)?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIDE);

@@ -1,17 +1,16 @@
 //! Environment maps and pictures from files of any format we read.
 
-use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io::{self, Cursor, Read};
 use std::path::Path;
 
 use rayon::prelude::*;
 
 use super::exr_read::{Exr, read_exr};
-use super::file::read_cause;
+use super::file::{open_file, read_cause, read_file};
 use super::guard::catch_panic;
 use super::hdr::decode_hdr;
 use super::ldr::{decoder_bytes, decoder_cause};
-use super::{Decoded, Image, MAX_PIXELS, MAX_SIDE};
+use super::{Decoded, Image, MAX_PIXELS, MAX_SIDE, check_size};
 use crate::color::linear_from_srgb;
 use crate::error::{Error, Notices, Result};
 
@@ -63,6 +62,27 @@ pub fn read_picture(path: &Path) -> Result<Image> {
         Format::Hdr => read_hdr(path),
         Format::Other => Ok(read_ldr_map(path)?.image),
     }
+}
+
+/// Whether a picture holds linear values, rather than what was made of them for a display.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn is_linear(path: &Path) -> Result<bool> {
+    Ok(matches!(format_of(path)?, Format::Exr | Format::Hdr))
+}
+
+/// Whether these are the first bytes of a glTF scene.
+pub(crate) fn looks_like_scene(bytes: &[u8]) -> bool {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    bytes.starts_with(b"glTF") || text.trim_ascii_start().starts_with(b"{")
+}
+
+/// Whether these are the first bytes of a picture.
+pub(crate) fn looks_like_picture(bytes: &[u8]) -> bool {
+    let starts: [&[u8]; 7] =
+        [b"\x76\x2f\x31\x01", b"#?", b"\x89PNG", b"\xff\xd8\xff", b"RIFF", b"II*\0", b"MM\0*"];
+    starts.into_iter().any(|start| bytes.starts_with(start))
 }
 
 /// Makes a map usable as a light: NaN and negative values become 0, infinite ones the largest finite
@@ -140,12 +160,15 @@ enum Format {
 /// Tells the format by the first bytes, else by the extension.
 fn format_of(path: &Path) -> Result<Format> {
     let mut magic = [0u8; 4];
-    let mut file = File::open(path).map_err(|e| Error::at(path, read_cause(&e)))?;
+    let (mut file, _) = open_file(path).map_err(|cause| Error::at(path, cause))?;
     let known = match file.read_exact(&mut magic) {
         Ok(()) => true,
         Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => false,
         Err(e) => return Err(Error::at(path, read_cause(&e))),
     };
+    if known && looks_like_scene(&magic) {
+        return Err(Error::at(path, "is a glTF scene, where a map or a picture is expected"));
+    }
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     Ok(match (&magic, extension.as_deref()) {
         (b"\x76\x2f\x31\x01", _) if known => Format::Exr,
@@ -157,8 +180,7 @@ fn format_of(path: &Path) -> Result<Format> {
 }
 
 fn read_hdr(path: &Path) -> Result<Image> {
-    let bytes = fs::read(path).map_err(|e| Error::at(path, read_cause(&e)))?;
-    decode_hdr(&bytes).map_err(|cause| Error::at(path, cause))
+    read_file(path).and_then(|bytes| decode_hdr(&bytes)).map_err(|cause| Error::at(path, cause))
 }
 
 /// Reads an sRGB-encoded picture, or a float TIFF as it is.
@@ -189,19 +211,29 @@ fn read_ldr_map(path: &Path) -> Result<LoadedMap> {
 }
 
 fn decode_ldr_file(path: &Path) -> Decoded<image::DynamicImage> {
-    let mut reader = image::ImageReader::open(path)
-        .and_then(image::ImageReader::with_guessed_format)
-        .map_err(|e| read_cause(&e))?;
-    if reader.format().is_none() {
+    let bytes = read_file(path)?;
+    let file_bytes = bytes.len() as u64;
+    let reader = || {
+        let mut reader = image::ImageReader::new(Cursor::new(&bytes));
+        // Some formats, such as TGA, are told by the name alone.
+        if let Ok(format) = image::ImageFormat::from_path(path) {
+            reader.set_format(format);
+        }
+        reader.with_guessed_format().map_err(|e| read_cause(&e))
+    };
+    let mut reader_of_pixels = reader()?;
+    if reader_of_pixels.format().is_none() {
         return Err("is not a picture of a known format (EXR, HDR, PNG, JPEG, WebP, TIFF, BMP, \
                     TGA)"
             .into());
     }
+    let cause = |e| format!("cannot be decoded: {}", decoder_cause(&e, file_bytes));
+    let (width, height) = reader()?.into_dimensions().map_err(cause)?;
+    check_size(u64::from(width), u64::from(height))?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIDE as u32);
     limits.max_image_height = Some(MAX_SIDE as u32);
-    let file_bytes = fs::metadata(path).map_err(|e| read_cause(&e))?.len();
     limits.max_alloc = Some((MAX_PIXELS * 4).min(decoder_bytes(file_bytes)));
-    reader.limits(limits);
-    reader.decode().map_err(|e| format!("cannot be decoded: {}", decoder_cause(&e, file_bytes)))
+    reader_of_pixels.limits(limits);
+    reader_of_pixels.decode().map_err(cause)
 }

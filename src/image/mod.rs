@@ -5,6 +5,7 @@
 //! formats and the crates that decode them.
 
 mod exr_channels;
+mod exr_patch;
 mod exr_read;
 mod exr_write;
 mod file;
@@ -16,12 +17,16 @@ mod primaries;
 
 pub use exr_read::read_exr_metadata;
 pub use exr_write::{ExrPicture, Layer, write_exr};
-pub(crate) use file::read_cause;
 pub use file::{check_writable, is_same_file, write_beside_and_rename};
-pub use map::{LoadedMap, read_map, read_picture, sanitise};
+pub(crate) use file::{open_file, read_cause, read_file};
+pub(crate) use guard::catch_panic;
+pub use map::{LoadedMap, is_linear, read_map, read_picture, sanitise};
+pub(crate) use map::{looks_like_picture, looks_like_scene};
 pub use png::{encode_png, write_png};
 
 pub mod ldr;
+
+use crate::memory;
 
 /// A picture: linear Rec.709 radiance, row 0 at the top.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,7 +100,7 @@ pub struct Rgb8 {
 }
 
 /// What a decoder returns: the error is the cause, to which the caller adds the file's name.
-type Decoded<T> = Result<T, String>;
+pub(crate) type Decoded<T> = Result<T, String>;
 
 /// Most pixels a picture may have: 16384 x 16384, 3.2 GB of RGB.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -103,7 +108,7 @@ const MAX_PIXELS: u64 = 1 << 28;
 /// Longest side of a picture, in pixels.
 const MAX_SIDE: u64 = 1 << 16;
 
-/// Refuses sizes that are empty or beyond what a picture may have, before anything is allocated.
+/// Refuses sizes that are empty or beyond what a picture may have or memory holds, before anything is allocated.
 fn check_size(width: u64, height: u64) -> Decoded<(u32, u32)> {
     if width == 0 || height == 0 {
         return Err(format!("has no pixels ({width} x {height})"));
@@ -113,5 +118,6 @@ fn check_size(width: u64, height: u64) -> Decoded<(u32, u32)> {
             "claims {width} x {height} pixels, more than the 16384 x 16384 lightgrid reads"
         ));
     }
+    memory::check(width * height * size_of::<[f32; 3]>() as u64)?;
     Ok((width as u32, height as u32))
 }

@@ -47,6 +47,8 @@ pub struct Record<'a> {
     pub phases: &'a Phases,
     /// What was said about it.
     pub notices: &'a Notices,
+    /// Whether pictures say how long they took.
+    pub with_times: bool,
     /// Settings by name.
     pub options: Vec<(&'static str, Value)>,
 }
@@ -65,9 +67,12 @@ impl Record<'_> {
             ("lightgrid.scene".to_owned(), self.scene.to_owned()),
             ("lightgrid.map".to_owned(), self.map.to_owned()),
             ("lightgrid.samples_per_pixel".to_owned(), film.min_samples().to_string()),
-            ("lightgrid.seconds".to_owned(), format!("{:.3}", self.figures.elapsed_seconds())),
             ("lightgrid.device".to_owned(), self.device().to_owned()),
         ];
+        if self.with_times {
+            let seconds = format!("{:.3}", self.figures.elapsed_seconds());
+            pairs.push(("lightgrid.seconds".to_owned(), seconds));
+        }
         // A prefix keeps clear of the names that OpenEXR reserves.
         pairs.extend(self.options.iter().map(|(key, value)| {
             let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);

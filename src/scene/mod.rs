@@ -3,12 +3,42 @@
 pub mod builtin;
 pub mod gltf;
 pub mod needs;
+mod outlines;
 pub mod surface;
 pub mod texture;
 
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
 
 use crate::error::Notices;
+
+/// What is asked of a scene's file.
+#[derive(Debug, Clone, Default, PartialEq, clap::Args)]
+#[command(next_help_heading = "Scene")]
+pub struct SceneOptions {
+    /// Reads files that the scene names outside of its folder, too.
+    #[arg(long)]
+    pub allow_outside: bool,
+    /// The look of a model that has several, by its name.
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
+    /// What happens to outlines: enlarged copies of a model that face inwards and, here, would shut out
+    /// all light.
+    #[arg(long, value_enum, default_value = "remove", value_name = "WHAT")]
+    pub outlines: Outlines,
+    /// Leaves out all that is of the material of this name; may be given several times.
+    #[arg(long, value_name = "NAME")]
+    pub hide: Vec<String>,
+}
+
+/// What happens to inverted hulls.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Outlines {
+    /// They are left out, and it is said.
+    #[default]
+    Remove,
+    /// They are rendered like everything else.
+    Keep,
+}
 
 /// All that can be rendered, ready for a BVH: instances are baked into world space.
 ///

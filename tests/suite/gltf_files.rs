@@ -46,7 +46,8 @@ const FILES: &[(&str, usize, usize, usize, usize)] = &[
 /// Malformed files and what the error must say about them.
 const MALFORMED: &[(&str, &str)] = &[
     ("gltf/accessor/unresolved_bufferviews.gltf", "no triangles"),
-    ("gltf/buffer/not_found.gltf", "`not_found.bin`: there is no such file"),
+    // What is not used is not read.
+    ("gltf/buffer/not_found.gltf", "no triangles"),
     ("gltf/buffer_view/invalid_length.gltf", "no triangles"),
     ("gltf/glb/chunk_too_big.glb", "13 bytes, too few"),
     ("gltf/glb/empty_file.glb", "the file is empty"),
@@ -55,7 +56,7 @@ const MALFORMED: &[(&str, &str)] = &[
     ("gltf/glb/truncated_chunk_data.glb", "promises 48 bytes and there are 47"),
     ("gltf/glb/zero_length.glb", "0 bytes, too few"),
     ("gltf/image/invalid_image_data.gltf", "no triangles"),
-    ("gltf/mesh_data/index_buffer_oob.gltf", "`index_buffer_oob.bin`: there is no such file"),
+    ("gltf/mesh_data/index_buffer_oob.gltf", "no triangles"),
     ("gltf/node/node_loop.gltf", "form a loop"),
     ("gltf-assimp/IndexOutOfRange/IndexOutOfRange.gltf", "index 255 is beyond its 24 vertices"),
     ("gltf-assimp/MissingBin/BoxTextured.gltf", "`BoxTextured0.bin`: there is no such file"),

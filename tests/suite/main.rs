@@ -1,5 +1,7 @@
 //! The one integration-test binary.
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "who runs this reads it")]
+
 mod app;
 mod bench;
 mod bsdf;
@@ -8,11 +10,13 @@ mod bvh;
 mod cli;
 mod environment;
 mod estimator;
+mod faults;
 mod gltf_files;
 mod gpu;
 mod image_files;
 mod metrics;
 mod peers;
+mod real_files;
 mod report;
 mod shared;
 mod stability;

@@ -279,3 +279,18 @@ fn check(desk: &Desk, when: &str) {
     let stands = shown.windows(7).filter(is_begun).any(still);
     assert!(!stands, "{when}: the picture stands still: {errors:.2?}");
 }
+
+#[cfg(unix)]
+#[test]
+fn a_request_to_end_closes_a_window_as_a_person_would() {
+    let Some(mut desk) = Desk::open() else { return };
+    desk.start(
+        "view open --env sky:day@64x32 --size 96x64 --samples 2 --device cpu --settings w.json",
+    );
+    let mut child = desk.window.take().expect("started");
+    let kill = Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
+    assert!(kill.expect("kill is there").success());
+    let status = desk.wait_for("end", || child.try_wait().expect("asked"));
+    assert!(status.success(), "{}", desk.says());
+    assert!(desk.path("w.json").exists(), "the settings are kept");
+}

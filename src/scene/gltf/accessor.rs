@@ -1,5 +1,7 @@
 //! Accessors: typed elements in a buffer, checked once, then read at random without copying.
 
+use std::borrow::Cow;
+
 use gltf::json;
 use json::accessor::{ComponentType, Type};
 use json::validation::{Checked, USize64};
@@ -23,7 +25,7 @@ pub(super) struct Elements<'a> {
 
 /// Elements `stride` bytes apart.
 struct Strided<'a> {
-    bytes: &'a [u8],
+    bytes: Cow<'a, [u8]>,
     stride: usize,
 }
 
@@ -71,6 +73,20 @@ impl<'a> Elements<'a> {
         Ok(Self { count, components, component, normalized: accessor.normalized, base, sparse })
     }
 
+    /// Elements that were unpacked, one after another.
+    pub(super) fn unpacked(
+        bytes: Vec<u8>,
+        component: ComponentType,
+        kind: Type,
+        normalized: bool,
+    ) -> Self {
+        let components = kind.multiplicity();
+        let stride = component.size() * components;
+        let count = bytes.len() / stride;
+        let base = Some(Strided { bytes: Cow::Owned(bytes), stride });
+        Self { count, components, component, normalized, base, sparse: None }
+    }
+
     /// Reads integers as fractions of their largest value even if the file forgets to say so.
     pub(super) fn with_fractions(mut self) -> Self {
         self.normalized = true;
@@ -106,7 +122,7 @@ impl<'a> Elements<'a> {
         values
     }
 
-    fn bytes(&self, element: usize) -> Option<&'a [u8]> {
+    fn bytes(&self, element: usize) -> Option<&[u8]> {
         if element >= self.count {
             return None;
         }
@@ -154,14 +170,16 @@ impl<'a> Strided<'a> {
             .map_or(Some(0), |gaps| gaps.checked_mul(stride)?.checked_add(size));
         let bytes = usize::try_from(offset).ok().and_then(|offset| bytes.get(offset..));
         match (bytes, needed) {
-            (Some(bytes), Some(needed)) if needed <= bytes.len() => Ok(Self { bytes, stride }),
+            (Some(bytes), Some(needed)) if needed <= bytes.len() => {
+                Ok(Self { bytes: Cow::Borrowed(bytes), stride })
+            }
             _ => Err(format!(
                 "{count} elements from byte {offset} on are more than buffer view {view} holds"
             )),
         }
     }
 
-    fn row(&self, element: usize, size: usize) -> &'a [u8] {
+    fn row(&self, element: usize, size: usize) -> &[u8] {
         let begin = element * self.stride;
         &self.bytes[begin..begin + size]
     }

@@ -6,6 +6,7 @@ use super::geometry::{Part, Tally};
 use super::pose::Placing;
 use super::tangents::NO_TANGENT;
 use super::{Fallible, MAX_TRIANGLES};
+use crate::memory;
 use crate::scene::Scene;
 
 /// Appends a part once for each instance. Memory is reserved only after the limits are checked.
@@ -53,6 +54,12 @@ pub(super) fn append_skinned(
     Ok(())
 }
 
+/// Bytes of a triangle with its place in the tree while that is built, of a vertex, and how much of both
+/// is asked for at once.
+const TRIANGLE_BYTES: u64 = 250;
+const VERTEX_BYTES: u64 = 72;
+const STEP: u64 = 1 << 26;
+
 fn check_limits(scene: &Scene, part: &Part, copies: usize) -> Fallible<()> {
     let total = |present: usize, added: usize| {
         (added as u64).saturating_mul(copies as u64).saturating_add(present as u64)
@@ -60,6 +67,15 @@ fn check_limits(scene: &Scene, part: &Part, copies: usize) -> Fallible<()> {
     if total(scene.triangles.len(), part.triangles.len()) > MAX_TRIANGLES {
         let millions = MAX_TRIANGLES / 1_000_000;
         return Err(format!("with all instances there are more than {millions} million triangles"));
+    }
+    // Grown in steps, so that many small parts do not each ask for memory.
+    let bytes = |triangles: usize, vertices: usize| {
+        TRIANGLE_BYTES * triangles as u64 + VERTEX_BYTES * vertices as u64
+    };
+    let present = bytes(scene.triangles.len(), scene.positions.len());
+    let added = bytes(part.triangles.len(), part.positions.len()).saturating_mul(copies as u64);
+    if present / STEP != present.saturating_add(added) / STEP {
+        memory::check(added.max(STEP))?;
     }
     // Three per triangle, unless most triangles of a part were dropped; far below 2^32.
     if total(scene.positions.len(), part.positions.len()) > 3 * MAX_TRIANGLES {
@@ -99,7 +115,7 @@ fn append(
     for &[a, b, c] in &part.triangles {
         let [a, b, c] = [a, b, c].map(|vertex| first as u32 + vertex);
         let triangle = if mirrors { [a, c, b] } else { [a, b, c] };
-        if has_area(triangle.map(|vertex| scene.positions[vertex as usize])) {
+        if is_sound(triangle.map(|vertex| scene.positions[vertex as usize])) {
             scene.triangles.push(triangle);
             scene.triangle_materials.push(part.material);
         } else {
@@ -128,10 +144,10 @@ pub(super) fn finish(scene: &mut Scene) {
             array.resize(length, value);
         }
     }
-    // No triangle uses a non-finite position, but bounds are taken over all of them.
+    // No triangle uses such a position, but bounds are taken over all of them.
     if let Some(&[vertex, ..]) = scene.triangles.first() {
         let inside = scene.positions[vertex as usize];
-        for position in scene.positions.iter_mut().filter(|position| !position.is_finite()) {
+        for position in scene.positions.iter_mut().filter(|position| !is_near(**position)) {
             *position = inside;
         }
     }
@@ -143,9 +159,17 @@ pub(super) fn finish(scene: &mut Scene) {
     pad(&mut scene.colors, length, Vec4::ONE);
 }
 
-/// Whether a triangle has an area (in f64: small scenes have areas that f32 cannot tell from 0).
-fn has_area(corners: [Vec3; 3]) -> bool {
+/// Beyond this many metres nothing can be computed in f32: squares of distances would overflow.
+const FARTHEST: f32 = 1e18;
+
+/// Whether a position is finite and then some.
+fn is_near(position: Vec3) -> bool {
+    position.abs().max_element() <= FARTHEST && !position.is_nan()
+}
+
+/// Whether a triangle has an area and lies within reach (in f64: small scenes have areas that f32 cannot tell from 0).
+fn is_sound(corners: [Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
     let twice_area = (b - a).cross(c - a).length_squared();
-    twice_area.is_finite() && twice_area > 0.0
+    corners.into_iter().all(is_near) && twice_area.is_finite() && twice_area > 0.0
 }

@@ -1,15 +1,35 @@
 //! From bytes to glTF's JSON objects: the GLB container, the version, the extensions asked for.
 
 use gltf::json;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 use serde_json::Value;
 
-use super::Fallible;
-use super::extensions;
+use super::{Fallible, extensions, lenient};
 use crate::error::Notices;
 
 /// GLB chunk types (glTF 2.0, section 4.4.3).
 const JSON_CHUNK: &[u8] = b"JSON";
 const BIN_CHUNK: &[u8] = b"BIN\0";
+
+/// What decides whether the rest can be read.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Head {
+    asset: Option<Asset>,
+    #[serde(default)]
+    pub(super) extensions_used: Vec<String>,
+    #[serde(default)]
+    pub(super) extensions_required: Vec<String>,
+    animations: Option<IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Asset {
+    version: Option<String>,
+    min_version: Option<String>,
+}
 
 /// Parses the objects of a `.gltf` or `.glb`; the second part is the GLB's binary chunk.
 ///
@@ -25,26 +45,39 @@ pub(super) fn parse<'a>(
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     // Some writers pad the JSON chunk with zeros instead of spaces.
     let padding = text.iter().rev().take_while(|&&byte| byte == 0).count();
-    let mut value: Value = json::deserialize::from_slice(&text[..text.len() - padding])
-        .map_err(|cause| format!("it is neither GLB nor valid glTF JSON ({cause})"))?;
-    check_version(&value)?;
-    extensions::check(&value, notices)?;
-    // Animations of newer extensions would not even fit the types.
-    if value.as_object_mut().and_then(|root| root.remove("animations")).is_some() {
+    let text = &text[..text.len() - padding];
+    lenient::check_indices(text)?;
+    // Sound files take the short way: a tree of values takes some twenty times their size.
+    let tree = || -> Fallible<Value> {
+        let mut tree: Value = serde_json::from_slice(text).map_err(|e| e.to_string())?;
+        lenient::repair(&mut tree);
+        Ok(tree)
+    };
+    let other = |cause| format!("its JSON does not describe glTF 2.0 ({cause})");
+    let head: Head = match serde_json::from_slice(text) {
+        Ok(head) => head,
+        Err(_) => serde_json::from_value(tree()?).map_err(other)?,
+    };
+    check_version(head.asset.as_ref())?;
+    extensions::check(&head, notices)?;
+    let mut root: json::Root = match json::deserialize::from_slice(text) {
+        Ok(root) => root,
+        Err(_) => json::deserialize::from_value(tree()?).map_err(other)?,
+    };
+    if head.animations.is_some() {
         notices.add("the file has animations; its rest pose is shown");
+        root.animations = Vec::new();
     }
-    let root = json::deserialize::from_value(value)
-        .map_err(|cause| format!("its JSON does not describe glTF 2.0 ({cause})"))?;
     Ok((root, binary))
 }
 
-fn check_version(value: &Value) -> Fallible<()> {
-    let asset = value.get("asset").ok_or("its JSON has no `asset`, so it is not glTF")?;
-    let version = asset.get("version").and_then(Value::as_str).unwrap_or("?");
+fn check_version(asset: Option<&Asset>) -> Fallible<()> {
+    let asset = asset.ok_or("its JSON has no `asset`, so it is not glTF")?;
+    let version = asset.version.as_deref().unwrap_or("?");
     if version.split('.').next() != Some("2") {
         return Err(format!("it is glTF version {version}; only 2.0 can be read"));
     }
-    match asset.get("minVersion").and_then(Value::as_str) {
+    match asset.min_version.as_deref() {
         Some(least) if least != "2.0" => {
             Err(format!("it needs a reader for glTF {least}; only 2.0 can be read"))
         }

@@ -1,14 +1,15 @@
 //! Which extensions are honoured, and what is said about the others.
 
-use serde_json::Value;
-
 use super::Fallible;
+use super::document::Head;
 use crate::error::Notices;
 
 /// Extensions that are rendered, wholly or (specular-glossiness) nearly.
 const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -22,26 +23,27 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
     "KHR_texture_transform",
 ];
 
 /// Refuses a file that requires what is not supported; a notice where it is only used.
-pub(super) fn check(root: &Value, notices: &mut Notices) -> Fallible<()> {
-    let missing = unsupported(root, "extensionsRequired");
+pub(super) fn check(head: &Head, notices: &mut Notices) -> Fallible<()> {
+    let missing = unsupported(&head.extensions_required);
     if !missing.is_empty() {
         let plural = if missing.len() > 1 { "s" } else { "" };
         let names = missing.join(", ");
         return Err(format!("it requires the extension{plural} {names}, not supported here"));
     }
-    for name in unsupported(root, "extensionsUsed") {
+    for name in unsupported(&head.extensions_used) {
         notices.add(format!("the extension {name} is not supported; what it adds is left out"));
     }
     Ok(())
 }
 
-fn unsupported<'a>(root: &'a Value, list: &str) -> Vec<&'a str> {
-    let names = root.get(list).and_then(Value::as_array).into_iter().flatten();
-    names.filter_map(Value::as_str).filter(|name| !SUPPORTED.contains(name)).collect()
+fn unsupported(names: &[String]) -> Vec<&str> {
+    names.iter().map(String::as_str).filter(|name| !SUPPORTED.contains(name)).collect()
 }

@@ -15,6 +15,9 @@ use super::textures::Wanted;
 use crate::error::Notices;
 use crate::scene::{AlphaMode, Material, Texture, TextureImage, TextureRef};
 
+/// Largest radiance a surface may emit: its square is far from overflow.
+const BRIGHTEST: f32 = 1e12;
+
 /// The materials that primitives use, with their textures.
 pub(super) struct Materials {
     pub(super) materials: Vec<Material>,
@@ -141,8 +144,10 @@ impl<'a> Reader<'a> {
             metallic_roughness_texture: self.data(pbr.metallic_roughness_texture.as_ref())?,
             normal_texture: self.data(source.normal_texture.as_ref())?,
             normal_scale: self.finite(source.normal_texture.as_ref().map_or(1.0, |map| map.scale)),
-            // Older files put lamps' strengths here, so there is no upper limit.
-            emissive: Vec3::from_array(source.emissive_factor.0.map(|x| self.at_least(x, 0.0))),
+            // Older files put lamps' strengths here.
+            emissive: Vec3::from_array(
+                source.emissive_factor.0.map(|x| self.within(x, 0.0, BRIGHTEST)),
+            ),
             emissive_texture: self.colour(source.emissive_texture.as_ref())?,
             alpha_mode: match source.alpha_mode {
                 Checked::Valid(json::material::AlphaMode::Mask) => {
@@ -169,7 +174,8 @@ impl<'a> Reader<'a> {
     ) -> Fallible<()> {
         material.unlit = source.unlit.is_some();
         if let Some(strength) = &source.emissive_strength {
-            material.emissive *= self.at_least(strength.emissive_strength.0, 0.0);
+            let strength = self.within(strength.emissive_strength.0, 0.0, BRIGHTEST);
+            material.emissive = (material.emissive * strength).min(Vec3::splat(BRIGHTEST));
         }
         if let Some(ior) = &source.ior {
             let ior = ior.ior.0;

@@ -5,8 +5,9 @@
 //! backed by data. What cannot be rendered is left out with a notice; what makes the geometry
 //! meaningless is an error.
 //!
-//! `document` parses, `buffers`, `uri` and `accessor` give access to the data, `pose` places nodes
-//! and joints, `materials`, `textures` and `medium` read the look, `primitive`, `geometry` and `tangents` read
+//! `document` and `lenient` parse, `buffers`, `uri` and `accessor` give access to the data, `meshopt` and `draco`
+//! unpack them, `pose` places nodes
+//! and joints, `materials`, `variants`, `textures` and `medium` read the look, `primitive`, `geometry` and `tangents` read
 //! triangles,
 //! `bake` puts them into the world.
 
@@ -14,16 +15,20 @@ mod accessor;
 mod bake;
 mod buffers;
 mod document;
+mod draco;
 mod extensions;
 mod geometry;
+mod lenient;
 mod materials;
 mod medium;
+mod meshopt;
 mod newer;
 mod pose;
 mod primitive;
 mod tangents;
 mod textures;
 mod uri;
+mod variants;
 mod viewpoints;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,13 +38,15 @@ use glam::DAffine3;
 use gltf::json;
 
 use crate::error::{Error, Notices, Result};
-use crate::image::read_cause;
-use crate::scene::Scene;
+use crate::image::{looks_like_picture, read_file};
+use crate::scene::{Material, Outlines, Scene, SceneOptions};
 
 use buffers::{File, find};
 use geometry::{Needs, Part, Tally};
 use materials::Materials;
 use pose::Nodes;
+use uri::Folder;
+use variants::Look;
 
 /// Most triangles a scene may have, instances counted one by one.
 const MAX_TRIANGLES: u64 = 200_000_000;
@@ -53,9 +60,21 @@ type Fallible<T> = std::result::Result<T, String>;
 /// One sentence with the path and the cause: a file that cannot be read, is cut off, refers to
 /// what is not there, requires an unsupported extension, or has no triangles.
 pub fn load(path: &Path) -> Result<Scene> {
-    let bytes = std::fs::read(path).map_err(|e| Error::at(path, read_cause(&e)))?;
+    load_with(path, &SceneOptions::default())
+}
+
+/// Loads a file as [`load`] does, and as is asked.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
+    let bytes = read_file(path).map_err(|cause| Error::at(path, cause))?;
+    if looks_like_picture(&bytes) {
+        return Err(Error::at(path, "is a picture, where a scene is expected; --env takes a map"));
+    }
     let base_dir = path.parent().unwrap_or(Path::new(""));
-    let mut scene = read(&bytes, Some(base_dir)).map_err(|cause| Error::at(path, cause))?;
+    let mut scene =
+        read(&bytes, Some(base_dir), options).map_err(|cause| Error::at(path, cause))?;
     scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok(scene)
 }
@@ -65,15 +84,17 @@ pub fn load(path: &Path) -> Result<Scene> {
 /// # Errors
 /// As [`load`], with `name` in place of the path.
 pub fn load_slice(bytes: &[u8], base_dir: Option<&Path>, name: &str) -> Result<Scene> {
-    let mut scene = read(bytes, base_dir).map_err(|cause| Error::at(name, cause))?;
+    let options = SceneOptions::default();
+    let mut scene = read(bytes, base_dir, &options).map_err(|cause| Error::at(name, cause))?;
     name.clone_into(&mut scene.name);
     Ok(scene)
 }
 
-fn read(bytes: &[u8], base_dir: Option<&Path>) -> Fallible<Scene> {
+fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallible<Scene> {
     let mut notices = Notices::default();
     let (root, binary) = document::parse(bytes, &mut notices)?;
-    let file = File::open(root, binary, base_dir)?;
+    let folder = Folder { path: base_dir, allow_outside: options.allow_outside };
+    let file = File::new(root, binary, folder);
     let nodes = Nodes::new(&file.root, &mut notices)?;
     let mut scene = Scene {
         cameras: viewpoints::cameras(&file.root, &nodes, &mut notices)?,
@@ -82,16 +103,16 @@ fn read(bytes: &[u8], base_dir: Option<&Path>) -> Fallible<Scene> {
         ..Scene::default()
     };
     let placements = placements(&file, &nodes)?;
-    let used = used_materials(&file.root, &placements)?;
+    let look = Look::choose(&file.root, options.variant.as_deref(), &mut notices)?;
+    let used = used_materials(&file.root, &placements, &look)?;
     let materials = Materials::load(&file, &used, &mut notices)?;
     let mut tally = Tally::default();
     for (&mesh, placements) in &placements {
-        append_mesh(&file, &nodes, mesh, placements, &materials, &mut scene, &mut tally).map_err(
-            |cause| match &file.root.meshes[mesh].name {
-                Some(name) => format!("mesh {mesh} ({name}): {cause}"),
-                None => format!("mesh {mesh}: {cause}"),
-            },
-        )?;
+        append_mesh(&file, (&nodes, &look), mesh, placements, &materials, &mut scene, &mut tally)
+            .map_err(|cause| match &file.root.meshes[mesh].name {
+            Some(name) => format!("mesh {mesh} ({name}): {cause}"),
+            None => format!("mesh {mesh}: {cause}"),
+        })?;
     }
     if scene.triangles.is_empty() {
         let reasons = repairs(&tally).join(", ");
@@ -105,8 +126,37 @@ fn read(bytes: &[u8], base_dir: Option<&Path>) -> Fallible<Scene> {
     scene.materials = materials.materials;
     scene.textures = materials.textures;
     scene.images = materials.images;
+    leave_out(&mut scene, options, &mut notices)?;
     scene.notices = notices;
     Ok(scene)
+}
+
+/// Removes what is not to be shown: hidden materials, and hulls that would shut out the light.
+fn leave_out(scene: &mut Scene, options: &SceneOptions, notices: &mut Notices) -> Fallible<()> {
+    for name in &options.hide {
+        let named = |(_, material): &(u32, &Material)| material.name == *name;
+        let hidden: Vec<u32> =
+            (0..).zip(&scene.materials).filter(named).map(|(number, _)| number).collect();
+        if hidden.is_empty() {
+            return Err(format!("no material to hide is called {name}"));
+        }
+        scene.remove_triangles_of(&hidden);
+    }
+    if options.outlines == Outlines::Remove {
+        let hulls = scene.hulls();
+        for &hull in &hulls {
+            notices.add(format!(
+                "{} is an outline, a copy around the model that faces inwards and would shut out all \
+                 light; it is left out (--outlines keep shows it)",
+                scene.materials[hull as usize].name
+            ));
+        }
+        scene.remove_triangles_of(&hulls);
+    }
+    match scene.triangles.is_empty() {
+        true => Err("all of it is hidden, so there is nothing to render".into()),
+        false => Ok(()),
+    }
 }
 
 /// A node that shows a mesh.
@@ -138,21 +188,16 @@ fn placements<'a>(
 fn used_materials(
     root: &json::Root,
     placements: &BTreeMap<usize, Vec<Placement<'_>>>,
+    look: &Look,
 ) -> Fallible<BTreeSet<Option<usize>>> {
-    let mut used = BTreeSet::new();
-    for primitive in placements.keys().flat_map(|&mesh| &root.meshes[mesh].primitives) {
-        if let Some(material) = primitive.material {
-            find(&root.materials, material, "material")?;
-        }
-        used.insert(primitive.material.map(|material| material.value()));
-    }
-    Ok(used)
+    let primitives = placements.keys().flat_map(|&mesh| &root.meshes[mesh].primitives);
+    primitives.map(|primitive| look.material(root, primitive)).collect()
 }
 
 /// Appends all placements of one mesh, reading it again only where morph weights differ.
 fn append_mesh(
     file: &File<'_>,
-    nodes: &Nodes,
+    (nodes, look): (&Nodes, &Look),
     mesh: usize,
     placements: &[Placement<'_>],
     materials: &Materials,
@@ -166,7 +211,7 @@ fn append_mesh(
         let weights = weights.unwrap_or_default();
         let parts = match read.take() {
             Some((known, parts)) if known == weights => parts,
-            _ => read_parts(file, mesh, weights, materials, tally)?,
+            _ => read_parts(file, look, mesh, weights, materials, tally)?,
         };
         let joints = match placement.node.skin {
             Some(skin) => Some(pose::joint_transforms(file, nodes, skin)?),
@@ -187,6 +232,7 @@ fn append_mesh(
 
 fn read_parts(
     file: &File<'_>,
+    look: &Look,
     mesh: &json::Mesh,
     weights: &[f32],
     materials: &Materials,
@@ -194,7 +240,7 @@ fn read_parts(
 ) -> Fallible<Vec<Part>> {
     let mut parts = Vec::new();
     for (number, primitive) in mesh.primitives.iter().enumerate() {
-        let material = materials.places[&primitive.material.map(|material| material.value())];
+        let material = materials.places[&look.material(&file.root, primitive)?];
         let needs = Needs::of(&materials.materials[material as usize]);
         let part = geometry::read_part(file, primitive, weights, material, &needs, tally)
             .map_err(|cause| format!("primitive {number}: {cause}"))?;
@@ -215,7 +261,10 @@ fn repairs(tally: &Tally) -> Vec<String> {
     }
     for (count, what) in [
         (without_positions, "primitives without positions were skipped"),
-        (dropped_triangles, "triangles without area or with non-finite corners were dropped"),
+        (
+            dropped_triangles,
+            "triangles without area or with corners that are not finite or beyond 1e18 m were dropped",
+        ),
         (bad_normals, "unusable vertex normals were ignored: shading is flat there"),
         (bad_values, "texture coordinates or colours that are not finite were replaced"),
     ] {

@@ -7,7 +7,8 @@ use json::mesh::{Mode, Semantic};
 use json::validation::Checked;
 
 use super::accessor::Elements;
-use super::buffers::File;
+use super::buffers::{File, find};
+use super::draco::Unpacked;
 use super::geometry::{Part, Tally};
 use super::pose::unit;
 use super::{Fallible, MAX_TRIANGLES};
@@ -18,6 +19,8 @@ pub(super) struct Source<'a> {
     primitive: &'a json::mesh::Primitive,
     positions: Elements<'a>,
     mode: Mode,
+    /// What was packed of it.
+    draco: Option<Unpacked>,
 }
 
 impl<'a> Source<'a> {
@@ -36,8 +39,10 @@ impl<'a> Source<'a> {
             Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan => {
                 let positions = Checked::Valid(Semantic::Positions);
                 if let Some(&accessor) = primitive.attributes.get(&positions) {
-                    let positions = Elements::open(file, accessor, &[Type::Vec3])?;
-                    return Ok(Some(Self { file, primitive, positions, mode }));
+                    let draco = Unpacked::open(file, primitive)?;
+                    let semantic = Semantic::Positions;
+                    let positions = open(file, draco.as_ref(), &semantic, accessor, &[Type::Vec3])?;
+                    return Ok(Some(Self { file, primitive, positions, mode, draco }));
                 }
                 tally.without_positions += 1;
             }
@@ -46,9 +51,11 @@ impl<'a> Source<'a> {
     }
 
     /// An attribute, which must be as long as the positions.
-    fn attribute(&self, semantic: Semantic, types: &[Type]) -> Fallible<Option<Elements<'a>>> {
-        match self.primitive.attributes.get(&Checked::Valid(semantic)) {
-            Some(&accessor) => self.per_vertex(accessor, types).map(Some),
+    fn attribute(&self, semantic: &Semantic, types: &[Type]) -> Fallible<Option<Elements<'a>>> {
+        match self.primitive.attributes.get(&Checked::Valid(semantic.clone())) {
+            Some(&accessor) => open(self.file, self.draco.as_ref(), semantic, accessor, types)
+                .and_then(|elements| self.per_vertex(accessor, elements))
+                .map(Some),
             None => Ok(None),
         }
     }
@@ -56,9 +63,8 @@ impl<'a> Source<'a> {
     fn per_vertex(
         &self,
         accessor: json::Index<json::Accessor>,
-        types: &[Type],
+        elements: Elements<'a>,
     ) -> Fallible<Elements<'a>> {
-        let elements = Elements::open(self.file, accessor, types)?;
         if elements.count < self.positions.count {
             let (count, vertices) = (elements.count, self.positions.count);
             return Err(format!(
@@ -71,6 +77,10 @@ impl<'a> Source<'a> {
     /// Vertex numbers of the triangles, all below the number of vertices.
     pub(super) fn triangles(&self) -> Fallible<Vec<[u32; 3]>> {
         let vertices = self.positions.count;
+        if let Some(draco) = &self.draco {
+            // All points are below the number of them, and there are as many positions.
+            return Ok(draco.triangles().collect());
+        }
         let indices = match self.primitive.indices {
             Some(accessor) => Some(Elements::open(self.file, accessor, &[Type::Scalar])?),
             None => None,
@@ -118,7 +128,7 @@ impl<'a> Source<'a> {
         part: &mut Part,
         tally: &mut Tally,
     ) -> Fallible<()> {
-        let Some(elements) = self.attribute(Semantic::Normals, &[Type::Vec3])? else {
+        let Some(elements) = self.attribute(&Semantic::Normals, &[Type::Vec3])? else {
             return Ok(());
         };
         for &vertex in vertices {
@@ -131,7 +141,7 @@ impl<'a> Source<'a> {
 
     /// A set of texture coordinates; empty if there is none.
     pub(super) fn uvs(&self, vertices: &[u32], set: u32, tally: &mut Tally) -> Fallible<Vec<Vec2>> {
-        let Some(elements) = self.attribute(Semantic::TexCoords(set), &[Type::Vec2])? else {
+        let Some(elements) = self.attribute(&Semantic::TexCoords(set), &[Type::Vec2])? else {
             return Ok(Vec::new());
         };
         let read = |&vertex: &u32| {
@@ -145,7 +155,7 @@ impl<'a> Source<'a> {
     /// Linear colours with alpha; empty if there are none.
     pub(super) fn colors(&self, vertices: &[u32], tally: &mut Tally) -> Fallible<Vec<Vec4>> {
         let types = [Type::Vec3, Type::Vec4];
-        let Some(elements) = self.attribute(Semantic::Colors(0), &types)? else {
+        let Some(elements) = self.attribute(&Semantic::Colors(0), &types)? else {
             return Ok(Vec::new());
         };
         let elements = elements.with_fractions();
@@ -162,7 +172,7 @@ impl<'a> Source<'a> {
 
     /// Tangents of the file; without normals they mean nothing (section 3.7.2.1).
     pub(super) fn tangents(&self, vertices: &[u32], part: &mut Part) -> Fallible<()> {
-        let elements = self.attribute(Semantic::Tangents, &[Type::Vec4])?;
+        let elements = self.attribute(&Semantic::Tangents, &[Type::Vec4])?;
         if let Some(elements) = elements.filter(|_| !part.normals.is_empty()) {
             let tangents = vertices.iter().map(|&vertex| {
                 let tangent = Vec4::from_array(elements.floats(vertex as usize));
@@ -180,8 +190,8 @@ impl<'a> Source<'a> {
     pub(super) fn influences(&self, vertices: &[u32], part: &mut Part) -> Fallible<()> {
         let mut sets = Vec::new();
         for set in 0.. {
-            let joints = self.attribute(Semantic::Joints(set), &[Type::Vec4])?;
-            let weights = self.attribute(Semantic::Weights(set), &[Type::Vec4])?;
+            let joints = self.attribute(&Semantic::Joints(set), &[Type::Vec4])?;
+            let weights = self.attribute(&Semantic::Weights(set), &[Type::Vec4])?;
             let (Some(joints), Some(weights)) = (joints, weights) else { break };
             if !joints.is_unsigned() {
                 return Err("its joints are not unsigned integers".into());
@@ -209,7 +219,8 @@ impl<'a> Source<'a> {
             }
             let shift = |accessor: Option<json::Index<json::Accessor>>, values: &mut [Vec3]| {
                 let Some(accessor) = accessor else { return Ok(()) };
-                let elements = self.per_vertex(accessor, &[Type::Vec3])?;
+                let elements = Elements::open(self.file, accessor, &[Type::Vec3])?;
+                let elements = self.per_vertex(accessor, elements)?;
                 for (value, &vertex) in values.iter_mut().zip(vertices) {
                     *value += weight * Vec3::from_array(elements.floats(vertex as usize));
                 }
@@ -228,6 +239,23 @@ impl<'a> Source<'a> {
         }
         Ok(())
     }
+}
+
+/// The values of an attribute, packed or plain.
+fn open<'a>(
+    file: &'a File<'_>,
+    draco: Option<&Unpacked>,
+    semantic: &Semantic,
+    accessor: json::Index<json::Accessor>,
+    types: &[Type],
+) -> Fallible<Elements<'a>> {
+    if let Some(draco) = draco {
+        let promised = find(&file.root.accessors, accessor, "accessor")?;
+        if let Some(elements) = draco.attribute(&semantic.to_string(), promised, types)? {
+            return Ok(elements);
+        }
+    }
+    Elements::open(file, accessor, types)
 }
 
 /// Makes weights sum to one; a vertex that nothing holds follows its first joint.

@@ -11,13 +11,17 @@ use serde_json::Value;
 
 use super::Fallible;
 use super::buffers::{File, find};
-use super::uri;
+use super::uri::{self, Place};
 use crate::error::Notices;
 use crate::image::ldr;
+use crate::memory;
 use crate::scene::{Texture, TextureImage, Wrap};
 
 /// Most texels all images may have together: 4 GiB.
 const MAX_TEXELS: u64 = 1 << 30;
+
+/// So many images that cannot be used are named.
+const MOST_FAILURES: usize = 10;
 
 /// How the JSON types say that a texture names no image.
 const NO_IMAGE: u32 = u32::MAX;
@@ -70,22 +74,47 @@ impl Wanted {
         let mut wanted: Vec<u32> = self.textures.iter().map(|texture| texture.image).collect();
         wanted.sort_unstable();
         wanted.dedup();
-        let encoded: Vec<_> = wanted.iter().map(|&image| encoded(file, image)).collect();
+        // What several images of the file have in common is read and decoded once.
+        let sources: Vec<Fallible<Source<'_>>> =
+            wanted.iter().map(|&image| source(file, image)).collect();
+        let mut distinct: Vec<&Source<'_>> = sources.iter().flatten().collect();
+        distinct.sort_unstable();
+        distinct.dedup();
+        let encoded: Vec<_> = distinct.iter().map(|source| source.read(file)).collect();
         let decoded: Vec<Fallible<TextureImage>> =
             within_limit(encoded).into_par_iter().map(|bytes| decode(&bytes?)).collect();
         let mut images = Vec::new();
+        let places: Vec<Fallible<u32>> = decoded
+            .into_iter()
+            .map(|result| {
+                images.push(result?);
+                Ok(images.len() as u32 - 1)
+            })
+            .collect();
         let mut image_map = BTreeMap::new();
-        for (&number, result) in wanted.iter().zip(decoded) {
-            match result {
-                Ok(image) => {
-                    image_map.insert(number, images.len() as u32);
-                    images.push(image);
+        let mut failures = 0;
+        for (&number, source) in wanted.iter().zip(&sources) {
+            let place = source.as_ref().map_err(String::clone).and_then(|source| {
+                let found = distinct.binary_search(&source).expect("all sources are in it");
+                places[found].clone()
+            });
+            match place {
+                Ok(place) => {
+                    image_map.insert(number, place);
                 }
-                Err(cause) => notices.add(format!(
-                    "{} cannot be used: {cause}; materials do without it",
-                    image_name(&file.root, number)
-                )),
+                Err(cause) => {
+                    failures += 1;
+                    if failures <= MOST_FAILURES {
+                        let name = image_name(&file.root, number);
+                        notices.add(format!(
+                            "{name} cannot be used: {cause}; materials do without it"
+                        ));
+                    }
+                }
             }
+        }
+        if failures > MOST_FAILURES {
+            notices.add(format!("{} more images cannot be used", failures - MOST_FAILURES));
         }
         let mut textures = Vec::new();
         let place = |texture: &Texture| {
@@ -125,16 +154,32 @@ fn image_name(root: &json::Root, number: u32) -> String {
     }
 }
 
-/// The file's bytes of an image, not decoded yet.
-fn encoded<'a>(file: &'a File<'_>, number: u32) -> Fallible<Cow<'a, [u8]>> {
+/// Where the bytes of an image are.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Source<'a> {
+    View(u32),
+    Uri(Place<'a>),
+}
+
+fn source<'a>(file: &'a File<'_>, number: u32) -> Fallible<Source<'a>> {
     if number == NO_IMAGE {
         return Err("it has none in a supported format".into());
     }
     let image = file.root.images.get(number as usize).ok_or("it is not in the file")?;
     match (image.buffer_view, &image.uri) {
-        (Some(view), _) => Ok(Cow::Borrowed(file.view(view)?.0)),
-        (None, Some(uri)) => Ok(Cow::Owned(uri::read(uri, file.base_dir)?)),
+        (Some(view), _) => Ok(Source::View(view.value() as u32)),
+        (None, Some(uri)) => file.folder.place(uri).map(Source::Uri),
         (None, None) => Err("it has no data".into()),
+    }
+}
+
+impl Source<'_> {
+    /// The file's bytes of an image, not decoded yet.
+    fn read<'a>(&self, file: &'a File<'_>) -> Fallible<Cow<'a, [u8]>> {
+        match self {
+            Self::View(view) => Ok(Cow::Borrowed(file.view(json::Index::new(*view))?.0)),
+            Self::Uri(place) => place.read().map(Cow::Owned),
+        }
     }
 }
 
@@ -143,14 +188,19 @@ fn within_limit(mut images: Vec<Fallible<Cow<'_, [u8]>>>) -> Vec<Fallible<Cow<'_
     let mut texels = 0_u64;
     for image in &mut images {
         let Ok(bytes) = image else { continue };
-        match ldr::ldr_size(bytes, "its data") {
-            Ok((width, height)) => {
-                texels = texels.saturating_add(u64::from(width) * u64::from(height));
-                if texels > MAX_TEXELS {
-                    *image = Err("all images together take more than 4 GiB".into());
-                }
+        let checked = ldr::ldr_size(bytes, "its data").map_err(|cause| cause.to_string());
+        let checked = checked.and_then(|(width, height)| {
+            let more = texels.saturating_add(u64::from(width) * u64::from(height));
+            if more > MAX_TEXELS {
+                return Err("all images together take more than 4 GiB".into());
             }
-            Err(cause) => *image = Err(cause.to_string()),
+            // Twice: decoders keep their own copy for a while.
+            memory::check(8 * more)?;
+            texels = more;
+            Ok(())
+        });
+        if let Err(cause) = checked {
+            *image = Err(cause);
         }
     }
     images

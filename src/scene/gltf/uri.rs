@@ -1,29 +1,82 @@
 //! URIs of buffers and images: `data:` and relative paths.
 
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use super::Fallible;
-use crate::image::read_cause;
+use crate::image::{read_cause, read_file};
 
-/// The bytes a URI stands for; relative ones are files beside the glTF file.
-pub(super) fn read(uri: &str, base_dir: Option<&Path>) -> Fallible<Vec<u8>> {
-    if let Some(data) = uri.strip_prefix("data:") {
-        return read_data_uri(data);
-    }
-    let path = percent_decoded(uri);
-    let path = String::from_utf8(path).map_err(|_| format!("`{uri}` is not valid UTF-8"))?;
-    if path.contains("://") {
-        return Err(format!("`{path}` is not a file beside it, and nothing is fetched"));
-    }
-    let base_dir = base_dir.ok_or_else(|| {
-        format!("`{path}` cannot be looked up: the folder of the file is unknown")
-    })?;
-    std::fs::read(base_dir.join(&path)).map_err(|e| format!("`{path}`: {}", read_cause(&e)))
+/// The folder that URIs are looked up in.
+#[derive(Clone, Copy)]
+pub(super) struct Folder<'a> {
+    /// Where the scene's file lies; `None`: there is no folder, only embedded data can be read.
+    pub(super) path: Option<&'a Path>,
+    /// Whether files outside of it may be read.
+    pub(super) allow_outside: bool,
 }
 
-/// A URI as it is shown to a person: data URIs would fill pages.
-pub(super) fn shown(uri: &str) -> &str {
-    if uri.starts_with("data:") { "data URI" } else { uri }
+/// What a URI stands for.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Place<'u> {
+    /// What follows `data:`.
+    Embedded(&'u str),
+    /// A file, by its one name without links.
+    File(PathBuf),
+}
+
+impl Folder<'_> {
+    /// Where the data of a URI are. A file must lie in the folder or below it, links followed: a scene
+    /// that somebody sent must not make a picture of what is private.
+    pub(super) fn place<'u>(self, uri: &'u str) -> Fallible<Place<'u>> {
+        if let Some(data) = uri.strip_prefix("data:") {
+            return Ok(Place::Embedded(data));
+        }
+        let path = percent_decoded(uri);
+        let path = String::from_utf8(path).map_err(|_| format!("`{}` is not UTF-8", shown(uri)))?;
+        let name = shown(&path);
+        if path.contains("://") {
+            return Err(format!("`{name}` is not a file beside it, and nothing is fetched"));
+        }
+        let Some(folder) = self.path else {
+            return Err(format!("`{name}` cannot be looked up: the file's folder is unknown"));
+        };
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let found = |path: &Path| {
+            fs::canonicalize(path).map_err(|e| format!("`{name}`: {}", read_cause(&e)))
+        };
+        let file = found(&folder.join(&path))?;
+        if !self.allow_outside && !file.starts_with(found(folder)?) {
+            return Err(format!(
+                "`{name}` lies outside of the scene's folder; --allow-outside would read it"
+            ));
+        }
+        Ok(Place::File(file))
+    }
+}
+
+impl Place<'_> {
+    /// The bytes there.
+    pub(super) fn read(&self) -> Fallible<Vec<u8>> {
+        match self {
+            Self::Embedded(data) => read_data_uri(data),
+            Self::File(path) => read_file(path).map_err(|cause| {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                format!("`{name}` {cause}")
+            }),
+        }
+    }
+}
+
+/// A URI as it is shown to a person: data URIs, and some others, would fill pages.
+pub(super) fn shown(uri: &str) -> String {
+    const MOST: usize = 100;
+    if uri.starts_with("data:") {
+        return "data URI".to_owned();
+    }
+    match uri.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}...", &uri[..end]),
+        None => uri.to_owned(),
+    }
 }
 
 fn read_data_uri(data: &str) -> Fallible<Vec<u8>> {
@@ -119,10 +172,10 @@ mod tests {
 
     #[test]
     fn data_uris_may_be_plain_text() {
-        assert_eq!(read("data:text/plain,a%00b", None).unwrap(), b"a\0b");
-        assert!(read("data:nothing", None).unwrap_err().contains("comma"));
-        assert!(
-            read("https://example.org/a.bin", None).unwrap_err().contains("nothing is fetched")
-        );
+        let nowhere = Folder { path: None, allow_outside: false };
+        let read = |uri| nowhere.place(uri).and_then(|place| place.read());
+        assert_eq!(read("data:text/plain,a%00b").unwrap(), b"a\0b");
+        assert!(read("data:nothing").unwrap_err().contains("comma"));
+        assert!(read("https://example.org/a.bin").unwrap_err().contains("nothing is fetched"));
     }
 }

@@ -16,6 +16,7 @@ pub(super) fn all() -> Vec<(&'static str, Vec<u8>)> {
         ("pixels-1e9.png", png(31_623, 31_623, 40)),
         ("16000x16000.png", png(16_000, 16_000, 64)),
         ("16000x16000-in-64-kb.png", png(16_000, 16_000, 65_536)),
+        ("a-bit-a-pixel.png", png_of([1, 0], 32_767, 32_767, 65_536)),
         ("pixels-1e9.exr", exr(31_622, 31_622)),
         ("16000x16000.exr", exr(15_999, 15_999)),
         ("pixels-1e9.bmp", bmp(31_623)),
@@ -38,10 +39,16 @@ fn hdr(size: &str, bytes: usize) -> Vec<u8> {
 }
 
 fn png(width: u32, height: u32, bytes: usize) -> Vec<u8> {
+    png_of([8, 2], width, height, bytes)
+}
+
+/// `kind`: bits of a channel, and PNG's number for what the channels are.
+fn png_of(kind: [u8; 2], width: u32, height: u32, bytes: usize) -> Vec<u8> {
     let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
     let mut header = width.to_be_bytes().to_vec();
     header.extend(height.to_be_bytes());
-    header.extend([8, 2, 0, 0, 0]);
+    header.extend(kind);
+    header.extend([0; 3]);
     chunk_of(&mut file, *b"IHDR", &header);
     // A zlib stream of one stored block, cut short.
     let mut data = vec![0x78, 0x01, 0x01];

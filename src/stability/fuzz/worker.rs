@@ -13,6 +13,7 @@ use crate::scene::{Scene, gltf};
 use crate::stability::random::Random;
 use crate::stability::scenes::{constant, view};
 use crate::stability::scratch::Scratch;
+use crate::terminal::{print, tell};
 
 /// What an input turned out to be.
 enum Found {
@@ -43,7 +44,7 @@ pub fn work(kind: Kind, first: u64, count: u64, accepts: fn(&[String]) -> bool) 
     }
     let mut tally = Tally { worst_excess_bytes: i64::MIN, ..Tally::default() };
     for number in first..first + count {
-        println!("{number}");
+        print(number)?;
         let mut random = Random(number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let before = Memory::now();
         let (length, found) = match kind {
@@ -78,12 +79,11 @@ pub fn work(kind: Kind, first: u64, count: u64, accepts: fn(&[String]) -> bool) 
         };
         let grown = before.growth();
         if grown as f64 > ALLOWANCE_BYTES {
-            eprintln!("input {number} took {grown} bytes");
+            tell(format_args!("input {number} took {grown} bytes"));
         }
         count_in(&mut tally, number, grown, length as u64, &found);
     }
-    println!("{}", crate::output::record::to_value(&tally)?);
-    Ok(())
+    print(crate::output::record::to_value(&tally)?)
 }
 
 fn count_in(tally: &mut Tally, number: u64, grown: u64, length: u64, found: &Found) {

@@ -1,0 +1,113 @@
+//! Asking for memory before taking it: a program that is refused memory ends, one that asks can say so.
+
+use crate::image::Decoded;
+
+/// What is got without asking.
+const SMALL: u64 = 16 << 20;
+
+/// Whether so many more bytes can be had, as far as the system says.
+///
+/// # Errors
+/// A cause with both numbers.
+pub(crate) fn check(needed: u64) -> Decoded<()> {
+    // Asking takes longer than getting so little.
+    if needed < SMALL {
+        return Ok(());
+    }
+    match available() {
+        Some(left) if needed > left => {
+            Err(format!("needs {} of memory, and {} are left", in_units(needed), in_units(left)))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// An empty list with room for `count` elements.
+///
+/// # Errors
+/// As [`check`].
+pub(crate) fn reserved<T>(count: u64) -> Decoded<Vec<T>> {
+    let bytes = count.saturating_mul(size_of::<T>() as u64);
+    check(bytes)?;
+    let mut list = Vec::new();
+    usize::try_from(count)
+        .ok()
+        .and_then(|count| list.try_reserve_exact(count).ok())
+        .ok_or_else(|| format!("needs {} of memory, which cannot be had", in_units(bytes)))?;
+    Ok(list)
+}
+
+/// `count` copies of an element.
+///
+/// # Errors
+/// As [`check`].
+pub(crate) fn filled<T: Clone>(count: u64, value: T) -> Decoded<Vec<T>> {
+    let mut list = reserved(count)?;
+    list.resize(count as usize, value);
+    Ok(list)
+}
+
+/// Bytes in the largest unit that leaves a whole number of some size.
+fn in_units(bytes: u64) -> String {
+    match bytes {
+        0..10_000 => format!("{bytes} bytes"),
+        10_000..10_000_000 => format!("{} kB", bytes / 1000),
+        10_000_000..10_000_000_000 => format!("{} MB", bytes / 1_000_000),
+        _ => format!("{:.1} GB", bytes as f64 / 1e9),
+    }
+}
+
+/// The least of what the machine, this process' address space and its control group have left; `None`
+/// where nothing is known.
+#[cfg(target_os = "linux")]
+fn available() -> Option<u64> {
+    let machine = kilobytes("/proc/meminfo", "MemAvailable:");
+    [machine, address_space(), control_group()].into_iter().flatten().min()
+}
+
+#[cfg(not(target_os = "linux"))]
+fn available() -> Option<u64> {
+    None
+}
+
+/// The number after a name in one of the kernel's lists, which count in 1024 bytes.
+#[cfg(target_os = "linux")]
+fn kilobytes(file: &str, name: &str) -> Option<u64> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    line.split_whitespace().next()?.parse::<u64>().ok()?.checked_mul(1024)
+}
+
+/// What `ulimit -v` leaves.
+#[cfg(target_os = "linux")]
+fn address_space() -> Option<u64> {
+    let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
+    let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    let limit: u64 = line.split_whitespace().next()?.parse().ok()?;
+    Some(limit.saturating_sub(kilobytes("/proc/self/status", "VmSize:")?))
+}
+
+/// What a container's limit leaves; pages of files that were read do not count, for they go first.
+#[cfg(target_os = "linux")]
+fn control_group() -> Option<u64> {
+    let read = |name| std::fs::read_to_string(format!("/sys/fs/cgroup/{name}")).ok();
+    let number = |name| read(name)?.trim().parse::<u64>().ok();
+    let (limit, used) = (number("memory.max")?, number("memory.current")?);
+    let files = read("memory.stat")?;
+    let files = files.lines().find_map(|line| line.strip_prefix("inactive_file "))?;
+    Some(limit.saturating_sub(used.saturating_sub(files.parse().ok()?)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_had_is_refused_with_the_numbers() {
+        let refusal = reserved::<[f32; 3]>(1 << 50).unwrap_err();
+        assert!(refusal.starts_with("needs 13510798.9 GB of memory, and "), "{refusal}");
+        assert!(refusal.ends_with(" are left"), "{refusal}");
+        assert_eq!(filled(3, 7), Ok(vec![7; 3]));
+        assert!(reserved::<u64>(u64::MAX).is_err());
+    }
+}

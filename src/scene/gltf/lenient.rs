@@ -1,0 +1,191 @@
+//! What real writers do that the types do not allow, and what the types allow though it is wrong.
+
+use std::borrow::Cow;
+use std::fmt;
+
+use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde_json::Value;
+
+use super::Fallible;
+
+/// Keys whose whole numbers say which object of the file is meant.
+const INDICES: &[&str] = &[
+    "attributes",
+    "buffer",
+    "bufferView",
+    "camera",
+    "children",
+    "index",
+    "indices",
+    "input",
+    "inverseBindMatrices",
+    "joints",
+    "light",
+    "material",
+    "mesh",
+    "node",
+    "nodes",
+    "output",
+    "sampler",
+    "scene",
+    "skeleton",
+    "skin",
+    "source",
+    "targets",
+];
+
+/// Refuses text that is no JSON, and indices of more than 32 bits: the types would cut them to others.
+/// Nothing is kept of the text.
+pub(super) fn check_indices(text: &[u8]) -> Fallible<()> {
+    let mut reader = serde_json::Deserializer::from_slice(text);
+    Check { is_index: false, of_objects: false }
+        .deserialize(&mut reader)
+        .and_then(|()| reader.end())
+        .map_err(|cause| match cause.is_data() {
+            true => cause.to_string(),
+            false => format!("it is neither GLB nor valid glTF JSON ({cause})"),
+        })
+}
+
+/// Looks at a value: are the numbers in it indices?
+#[derive(Clone, Copy)]
+struct Check {
+    is_index: bool,
+    /// The same for the values of objects in it, whatever their keys.
+    of_objects: bool,
+}
+
+impl<'de> DeserializeSeed<'de> for Check {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<(), D::Error> {
+        reader.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Check {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("JSON")
+    }
+
+    fn visit_u64<E: serde::de::Error>(self, number: u64) -> Result<(), E> {
+        match self.is_index && number > u64::from(u32::MAX) {
+            true => Err(E::custom(format!("the index {number} has more than 32 bits"))),
+            false => Ok(()),
+        }
+    }
+
+    fn visit_i64<E>(self, _: i64) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<(), E> {
+        match self.is_index && number > f64::from(u32::MAX) {
+            true => Err(E::custom(format!("the index {number} has more than 32 bits"))),
+            false => Ok(()),
+        }
+    }
+
+    fn visit_bool<E>(self, _: bool) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_str<E>(self, _: &str) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_unit<E>(self) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+        while list.next_element_seed(self)?.is_some() {}
+        Ok(())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut object: A) -> Result<(), A::Error> {
+        while let Some(key) = object.next_key::<Cow<'de, str>>()? {
+            if key == "extras" {
+                object.next_value::<IgnoredAny>()?;
+            } else {
+                let is_index = self.of_objects || INDICES.contains(&&*key);
+                let of_objects = matches!(&*key, "attributes" | "targets");
+                object.next_value_seed(Self { is_index, of_objects })?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Makes a tree of values fit the types: whole numbers that are written `4.0`, scenes that show nothing
+/// and do not say so, and without animations, which are not shown and of which newer extensions are
+/// unknown to the types.
+pub(super) fn repair(tree: &mut Value) {
+    if let Some(root) = tree.as_object_mut() {
+        root.remove("animations");
+        for scene in root.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
+            if let Some(scene) = scene.as_object_mut() {
+                scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
+            }
+        }
+    }
+    make_whole(tree);
+}
+
+fn make_whole(value: &mut Value) {
+    /// Beyond this, not every whole number is an `f64`.
+    const EXACT: f64 = (1_u64 << 53) as f64;
+    match value {
+        Value::Number(number) if number.is_f64() => {
+            let float = number.as_f64().unwrap_or(f64::NAN);
+            if float.fract() == 0.0 && float.abs() < EXACT {
+                *number = (float as i64).into();
+            }
+        }
+        Value::Array(list) => list.iter_mut().for_each(make_whole),
+        Value::Object(object) => {
+            object.iter_mut().filter(|(key, _)| *key != "extras").for_each(|(_, v)| make_whole(v));
+        }
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn indices_have_32_bits_and_other_numbers_what_they_want() {
+        let check = |value: Value| check_indices(value.to_string().as_bytes());
+        let large = 1_u64 << 32;
+        assert_eq!(
+            check(json!({"nodes": [{"translation": [large, 0, 0], "children": [1]}]})),
+            Ok(())
+        );
+        assert_eq!(check(json!({"bufferViews": [{"byteLength": large}]})), Ok(()));
+        assert_eq!(check(json!({"extras": {"node": large}})), Ok(()));
+        for wrong in [
+            json!({"scenes": [{"nodes": [large]}]}),
+            json!({"meshes": [{"primitives": [{"attributes": {"POSITION": large}}]}]}),
+            json!({"nodes": [{"extensions": {"KHR_lights_punctual": {"light": large}}}]}),
+            json!({"nodes": [{"mesh": 4294967296.0}]}),
+        ] {
+            assert!(check(wrong.clone()).unwrap_err().contains("more than 32 bits"), "{wrong}");
+        }
+        assert!(check_indices(b"{} {}").unwrap_err().contains("valid glTF JSON"));
+    }
+
+    #[test]
+    fn whole_numbers_become_so_but_not_in_what_others_keep_there() {
+        let mut tree = json!({"scenes": [{"name": "a"}], "animations": [], "n": [4.0, 0.5, 1e300],
+            "extras": {"n": 4.0}});
+        repair(&mut tree);
+        let expected = json!({"scenes": [{"name": "a", "nodes": []}], "n": [4, 0.5, 1e300],
+            "extras": {"n": 4.0}});
+        assert_eq!(tree, expected);
+    }
+}

@@ -1,0 +1,58 @@
+//! The one way to speak to whoever started the program. It cannot panic: what is printed is never worth
+//! the work that is done.
+
+use std::fmt::Display;
+use std::io::{self, Write as _};
+
+use crate::error::{Error, Result};
+
+/// Prints a line that was asked for, on stdout. If nobody reads it any more (`| head`) the process
+/// ends in silence, as other commands do.
+///
+/// # Errors
+/// If stdout takes nothing, as on a full disk.
+pub(crate) fn print(text: impl Display) -> Result<()> {
+    let line = shown(&format!("{text}\n"));
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(line.as_bytes()).and_then(|()| stdout.flush()) {
+        Ok(()) => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => std::process::exit(0),
+        Err(error) => Err(Error::new(format!("what was asked for cannot be printed: {error}"))),
+    }
+}
+
+/// Says a line on stderr, if anybody is there to be told.
+pub(crate) fn tell(text: impl Display) {
+    let _ = io::stderr().lock().write_all(shown(&format!("{text}\n")).as_bytes());
+}
+
+/// Says what a person should know, though nothing failed.
+pub(crate) fn notice(text: impl Display) {
+    tell(format_args!("notice: {text}"));
+}
+
+/// Names come from files, and some characters command a terminal or turn the text around: these become
+/// escapes (in JSON's way, so that JSON stays what it is).
+fn shown(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        let commands = c.is_control() && !matches!(c, '\n' | '\t');
+        if commands || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}') {
+            shown.push_str(&format!("\\u{:04x}", u32::from(c)));
+        } else {
+            shown.push(c);
+        }
+    }
+    shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shown;
+
+    #[test]
+    fn what_commands_a_terminal_is_shown_and_the_rest_is_kept() {
+        assert_eq!(shown("a\u{1b}[31mb\u{9b}c\r\u{202e}d"), "a\\u001b[31mb\\u009bc\\u000d\\u202ed");
+        assert_eq!(shown("größe\t日本\n🎨"), "größe\t日本\n🎨");
+    }
+}

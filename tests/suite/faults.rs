@@ -1,0 +1,322 @@
+//! What must not cost a picture: nobody who listens, full disks, hostile files, signals.
+
+use std::fs;
+use std::process::{Output, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::cli::{Bench, text};
+
+/// As [`Bench::command`], a small picture of a built-in scene.
+const SMALL: &str = "render open --env sky:overcast@64x32 --device cpu --size 16x9 --spp 1";
+
+fn sentence(output: &Output) -> String {
+    let says = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{says}");
+    assert_eq!(says.lines().count(), 1, "{says}");
+    says
+}
+
+/// A triangle whose buffer is `uri`, with `rest` before its end.
+fn scene(uri: &str, rest: &str) -> String {
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{
+        "attributes":{{"POSITION":0}}}}]}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":9,
+        "type":"VEC3"}}],"bufferViews":[{{"buffer":0,"byteLength":108}}],
+        "buffers":[{{"uri":"{uri}","byteLength":108}}]{rest}}}"#
+    )
+}
+
+#[test]
+fn uris_stay_below_the_scenes_folder_unless_they_may_leave_it() {
+    let bench = Bench::new();
+    fs::create_dir_all(bench.path("sub/deep")).unwrap();
+    fs::copy(bench.path("scene.bin"), bench.path("sub/deep/own.bin")).unwrap();
+    let absolute = bench.path("scene.bin").display().to_string();
+    for (uri, reason) in [
+        ("deep/own.bin", ""),
+        ("./deep/../deep/own.bin", ""),
+        ("../scene.bin", "`../scene.bin` lies outside of the scene's folder"),
+        ("%2e%2e%2fscene.bin", "`../scene.bin` lies outside of the scene's folder"),
+        (absolute.as_str(), "lies outside of the scene's folder"),
+        ("deep", "`deep` is a folder, not a file"),
+        (&"a".repeat(5000), "aaa...`: "),
+    ] {
+        fs::write(bench.path("sub/scene.gltf"), scene(uri, "")).unwrap();
+        let output = bench.run("info sub/scene.gltf");
+        if reason.is_empty() {
+            assert!(output.status.success(), "{uri}: {}", text(&output.stderr));
+        } else {
+            let says = sentence(&output);
+            assert!(says.contains(reason) && says.len() < 500, "{uri}: {says}");
+        }
+    }
+    fs::write(bench.path("sub/scene.gltf"), scene("../scene.bin", "")).unwrap();
+    assert!(bench.run("info sub/scene.gltf --allow-outside").status.success());
+}
+
+#[cfg(unix)]
+#[test]
+fn links_out_of_the_folder_pipes_and_devices_are_not_read() {
+    let bench = Bench::new();
+    fs::create_dir(bench.path("sub")).unwrap();
+    std::os::unix::fs::symlink("../scene.bin", bench.path("sub/link.bin")).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(bench.path("sub/pipe.hdr")).status();
+    assert!(made.unwrap().success());
+    for (uri, options, reason) in [
+        ("link.bin", "", "`link.bin` lies outside"),
+        ("pipe.hdr", "", "`pipe.hdr` is a device or a pipe"),
+        ("/dev/zero", "", "`/dev/zero` lies outside"),
+        ("/dev/zero", "--allow-outside", "`zero` is a device or a pipe"),
+    ] {
+        fs::write(bench.path("sub/scene.gltf"), scene(uri, "")).unwrap();
+        let says = sentence(&bench.run(&format!("info sub/scene.gltf {options}")));
+        assert!(says.contains(reason), "{uri}: {says}");
+    }
+    for map in ["sub/pipe.hdr", "/dev/zero"] {
+        let says = sentence(&bench.run(&format!("render open -o a.png --env {map}")));
+        assert!(says.contains("is a device or a pipe"), "{map}: {says}");
+    }
+}
+
+#[test]
+fn a_file_named_many_times_is_read_once_and_only_if_it_is_used() {
+    let bench = Bench::new();
+    let file = fs::File::create(bench.path("large.bin")).unwrap();
+    file.set_len(64 << 20).unwrap();
+    let more = r#",{"uri":"large.bin","byteLength":1}"#.repeat(400) + r#",{"uri":"none.bin"}"#;
+    let text = scene("scene.bin", "").replace("108}]}", &format!("108}}{more}]}}"));
+    assert!(text.contains("large.bin"));
+    fs::write(
+        bench.path("scene.gltf"),
+        text.replace(r#""none.bin""#, r#""none.bin","byteLength":1"#),
+    )
+    .unwrap();
+    let start = Instant::now();
+    let output = bench.run("info scene.gltf");
+    assert!(output.status.success(), "{}", self::text(&output.stderr));
+    assert!(start.elapsed() < Duration::from_secs(5));
+}
+
+#[test]
+fn thousands_of_missing_images_are_ten_lines() {
+    let bench = Bench::new();
+    let images: Vec<String> = (0..2000).map(|i| format!(r#"{{"uri":"{i}.png"}}"#)).collect();
+    let textures: Vec<String> = (0..2000).map(|i| format!(r#"{{"source":{i}}}"#)).collect();
+    let materials: Vec<String> = (0..2000)
+        .map(|i| format!(r#"{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":{i}}}}}}}"#))
+        .collect();
+    let primitives: Vec<String> =
+        (0..2000).map(|i| format!(r#"{{"attributes":{{"POSITION":0}},"material":{i}}}"#)).collect();
+    let rest = format!(
+        r#","images":[{}],"textures":[{}],"materials":[{}]"#,
+        images.join(","),
+        textures.join(","),
+        materials.join(",")
+    );
+    let primitives = format!("\"primitives\":[{}]}}],\"acc", primitives.join(","));
+    let text = scene("scene.bin", &rest);
+    let (before, after) = text.split_once("\"primitives\"").unwrap();
+    let after = after.split_once("}],\"acc").unwrap().1;
+    fs::write(bench.path("scene.gltf"), format!("{before}{primitives}{after}")).unwrap();
+    let start = Instant::now();
+    let says = self::text(&bench.run("info scene.gltf").stdout);
+    assert!(says.contains("1990 more images cannot be used"), "{says}");
+    assert_eq!(says.matches("there is no such file").count(), 10, "{says}");
+    assert!(start.elapsed() < Duration::from_secs(10));
+}
+
+#[test]
+fn names_from_files_command_no_terminal() {
+    let bench = Bench::new();
+    let camera = r#","cameras":[{"name":"\u001b]0;owned\u0007","type":"perspective",
+        "perspective":{"yfov":0.5,"znear":0.1}}]"#;
+    let text = scene("scene.bin", camera).replace(r#"[{"mesh":0}]"#, r#"[{"mesh":0,"camera":0}]"#);
+    fs::write(bench.path("scene.gltf"), text).unwrap();
+    for options in ["", "--json"] {
+        let output = bench.run(&format!("info scene.gltf {options}"));
+        assert!(output.status.success());
+        let says = self::text(&output.stdout);
+        assert!(says.contains("owned") && !says.contains('\u{1b}'), "{says}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn nobody_who_listens_costs_no_picture() {
+    for to in ["2>/dev/full", "2>&-", "<&- >&- 2>&-"] {
+        let bench = Bench::new();
+        let binary = env!("CARGO_BIN_EXE_lightgrid");
+        // Without light there is something to remark.
+        let line = format!("exec {binary} {SMALL} --env-intensity 0 -o a.png {to}");
+        let status = std::process::Command::new("sh")
+            .args(["-c", &line])
+            .current_dir(bench.path(""))
+            .status();
+        assert_eq!(status.unwrap().code(), Some(0), "{to}");
+        assert!(bench.path("a.png").exists(), "{to}");
+    }
+}
+
+#[test]
+fn results_that_cannot_be_printed_are_a_sentence_or_silence() {
+    let bench = Bench::new();
+    let mut child = bench
+        .command("info living-room")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()));
+    #[cfg(target_os = "linux")]
+    {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = bench.command("info open").stdout(full).output().unwrap();
+        assert!(sentence(&output).contains("cannot be printed"));
+    }
+}
+
+/// The folder of one output goes away while the others are rendered.
+#[test]
+fn every_output_is_tried_every_failure_told_and_the_picture_rescued() {
+    let bench = Bench::new();
+    fs::create_dir(bench.path("gone")).unwrap();
+    fs::create_dir(bench.path("tmp")).unwrap();
+    let line = SMALL.replace("--spp 1", "--seconds 4");
+    let child = bench
+        .command(&format!("{line} -o gone/a.exr -o b.png --json gone/c.json --laws d.csv"))
+        .env("TMPDIR", bench.path("tmp"))
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(2000));
+    fs::remove_dir_all(bench.path("gone")).unwrap();
+    let says = sentence(&child.wait_with_output().unwrap());
+    assert!(bench.path("b.png").exists() && bench.path("d.csv").exists(), "{says}");
+    assert!(says.contains("gone/a.exr: ") && says.contains("gone/c.json: "), "{says}");
+    let kept: Vec<_> =
+        fs::read_dir(bench.path("tmp")).unwrap().map(|e| e.unwrap().path()).collect();
+    assert_eq!(kept.len(), 1);
+    assert!(says.contains(&format!("kept as {}", kept[0].display())), "{says}");
+    lightgrid::image::read_picture(&kept[0]).expect("a whole picture");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_file_written_anew_keeps_its_mode_and_long_names_are_written() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let bench = Bench::new();
+    fs::write(bench.path("a.png"), "old").unwrap();
+    fs::set_permissions(bench.path("a.png"), fs::Permissions::from_mode(0o600)).unwrap();
+    let long = "a".repeat(251) + ".png";
+    let output = bench.run(&format!("{SMALL} -o a.png -o {long}"));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(fs::read(bench.path("a.png")).unwrap().starts_with(b"\x89PNG"));
+    let mode = fs::metadata(bench.path("a.png")).unwrap().permissions().mode();
+    assert_eq!(mode & 0o777, 0o600);
+    assert!(bench.path(&long).exists());
+    let says = sentence(&bench.run(&format!("{SMALL} -o a{long}")));
+    assert!(says.contains("cannot be written"), "{says}");
+}
+
+#[test]
+fn what_killed_processes_left_is_removed_when_it_is_old() {
+    let bench = Bench::new();
+    for (name, hours) in [(".lightgrid-1-0.part", 2), (".lightgrid-1-1.part", 0), ("own.part", 2)] {
+        let file = fs::File::create(bench.path(name)).unwrap();
+        let age = Duration::from_secs(3600 * hours + 60);
+        file.set_modified(std::time::SystemTime::now() - age).unwrap();
+    }
+    assert!(bench.run(&format!("{SMALL} -o a.png")).status.success());
+    assert!(!bench.path(".lightgrid-1-0.part").exists());
+    assert!(bench.path(".lightgrid-1-1.part").exists() && bench.path("own.part").exists());
+}
+
+/// A picture of a bit a pixel that is small as a file: the sizes are looked at first.
+#[test]
+fn a_bomb_of_a_picture_is_refused_before_it_goes_off() {
+    let bench = Bench::new();
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 32_767, 32_767);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::One);
+    let mut writer = encoder.write_header().unwrap();
+    let mut stream = writer.stream_writer().unwrap();
+    for _ in 0..32_767 {
+        std::io::Write::write_all(&mut stream, &[0; 4096]).unwrap();
+    }
+    stream.finish().unwrap();
+    drop(writer);
+    fs::write(bench.path("bomb.png"), &bytes).unwrap();
+    let start = Instant::now();
+    let says = sentence(&bench.run("info bomb.png"));
+    assert!(says.contains("32767 x 32767"), "{says}");
+    let rest = r#","images":[{"uri":"bomb.png"}],"textures":[{"source":0}],
+        "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}]"#;
+    let text =
+        scene("scene.bin", rest).replace("\"POSITION\":0}", "\"POSITION\":0},\"material\":0");
+    fs::write(bench.path("scene.gltf"), text).unwrap();
+    let says = self::text(&bench.run("info scene.gltf").stdout);
+    assert!(says.contains("bomb.png) cannot be used: "), "{says}");
+    assert!(start.elapsed() < Duration::from_secs(5));
+}
+
+/// Under a limit on the address space, which a machine without memory is like.
+#[cfg(target_os = "linux")]
+#[test]
+fn short_memory_is_a_sentence_with_both_numbers() {
+    for line in [
+        "render open --env sky:overcast@64x32 --device cpu --size 11000x11000 --spp 1 -o a.png",
+        "info sky:day@16384x8192",
+    ] {
+        let bench = Bench::new();
+        let binary = env!("CARGO_BIN_EXE_lightgrid");
+        let output = std::process::Command::new("sh")
+            .args(["-c", &format!("ulimit -v 1500000; exec {binary} {line}")])
+            .current_dir(bench.path(""))
+            .output()
+            .unwrap();
+        let says = sentence(&output);
+        assert!(says.contains(" needs ") && says.contains(" MB are left"), "{says}");
+        assert!(!bench.path("a.png").exists());
+    }
+}
+
+#[cfg(unix)]
+mod signals {
+    use super::*;
+
+    fn send(child: &std::process::Child, signal: &str) {
+        let id = child.id().to_string();
+        assert!(
+            std::process::Command::new("kill")
+                .args([signal, &id])
+                .status()
+                .expect("kill is there")
+                .success()
+        );
+    }
+
+    #[test]
+    fn before_there_is_anything_to_keep_a_signal_ends_at_once() {
+        for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
+            let bench = Bench::new();
+            // One pass of this size takes longer than anyone waits.
+            let child = bench
+                .command("render living-room --device cpu --size 8192x8192 --bounces 64 -o a.png")
+                .stderr(Stdio::piped())
+                .spawn()
+                .unwrap();
+            std::thread::sleep(Duration::from_millis(700));
+            let start = Instant::now();
+            send(&child, signal);
+            let output = child.wait_with_output().unwrap();
+            assert_eq!(output.status.code(), Some(code));
+            let says = text(&output.stderr);
+            assert!(says.contains("before there was anything to keep"), "{says}");
+            assert!(start.elapsed() < Duration::from_secs(2));
+            assert!(!bench.files().iter().any(|name| name.contains("a.png")));
+        }
+    }
+}
