@@ -5,8 +5,6 @@ struct Develop {
     // White balance, linear Rec.709 to the same.
     matrix: mat3x3f,
     size: vec2u,
-    // Pixels of `under`; zero where there is none.
-    under_size: vec2u,
     // Pixels of `small`.
     small_size: vec2u,
     // Times the radiance, after the white balance.
@@ -24,7 +22,6 @@ struct Develop {
 @group(0) @binding(0) var<uniform> settings: Develop;
 @group(0) @binding(1) var<storage, read> sum: array<vec4f>;
 @group(0) @binding(2) var<storage, read> counts: array<vec4u>;
-@group(0) @binding(3) var<storage, read> under: array<vec4f>;
 @group(0) @binding(4) var overlay: texture_2d<f32>;
 @group(0) @binding(5) var display: texture_storage_2d<rgba8unorm, write>;
 @group(0) @binding(6) var<storage, read_write> small: array<vec4f>;
@@ -42,33 +39,10 @@ fn is_nan(x: f32) -> bool {
     return (bitcast<u32>(x) & 0x7fffffffu) > INFINITY_BITS;
 }
 
-fn under_at(x: u32, y: u32) -> vec3f {
-    let last = settings.under_size - 1u;
-    return under[min(y, last.y) * settings.under_size.x + min(x, last.x)].xyz;
-}
-
-// The radiance at the same place of the picture before, bilinear. The field of view is vertical:
-// pictures of different shapes share their middle.
-fn before(pixel: vec2u) -> vec3f {
-    let size_before = vec2f(settings.under_size);
-    let size = vec2f(settings.size);
-    let centred = (vec2f(pixel) + 0.5 - 0.5 * size) * (size_before.y / size.y);
-    let place = max(centred + 0.5 * size_before - 0.5, vec2f());
-    let low = vec2u(place);
-    let t = fract(place);
-    let upper = mix(under_at(low.x, low.y), under_at(low.x + 1u, low.y), t.x);
-    let lower = mix(under_at(low.x, low.y + 1u), under_at(low.x + 1u, low.y + 1u), t.x);
-    return mix(upper, lower, t.y);
-}
-
-// Mean radiance; where there are no samples, what there was before.
+// Mean radiance; black where there are no samples.
 fn radiance(pixel: vec2u) -> vec3f {
     let index = pixel.y * settings.size.x + pixel.x;
-    let samples = counts[index].x;
-    if samples == 0u && settings.under_size.x > 0u {
-        return before(pixel);
-    }
-    return sum[index].xyz / f32(max(samples, 1u)) * settings.unscale;
+    return sum[index].xyz / f32(max(counts[index].x, 1u)) * settings.unscale;
 }
 
 fn finite(x: f32) -> f32 {

@@ -58,6 +58,8 @@ pub enum Command {
     ToggleDeveloper,
     /// Show or hide the list of keys.
     ToggleShortcuts,
+    /// Close what lies over the picture, and mark no region.
+    CloseSheets,
     /// Keep the present picture for comparison.
     KeepPicture,
     /// Compute the true visible energy at the inspected point.
@@ -121,10 +123,12 @@ const fn control(key: Key) -> KeyboardShortcut {
     KeyboardShortcut::new(Modifiers::COMMAND, key)
 }
 
-/// Takes the shortcuts pressed in this frame, unless somebody is typing.
-pub fn pressed(context: &egui::Context) -> Vec<Command> {
-    if context.text_edit_focused() {
-        return Vec::new();
+/// Takes the shortcuts pressed in this frame; while somebody types or answers a question, it is only the
+/// one that leaves.
+pub fn pressed(context: &egui::Context, is_modal: bool) -> Vec<Command> {
+    if is_modal || context.text_edit_focused() {
+        let leaves = context.input_mut(|input| input.consume_shortcut(&control(Key::Q)));
+        return if leaves { vec![Command::Quit] } else { Vec::new() };
     }
     context.input_mut(|input| {
         let mut commands: Vec<Command> = SHORTCUTS
@@ -136,6 +140,10 @@ pub fn pressed(context: &egui::Context) -> Vec<Command> {
         let asks = input.events.iter().any(|e| matches!(e, egui::Event::Text(t) if t == "?"));
         if asks || input.consume_key(Modifiers::NONE, Key::F1) {
             commands.push(Command::ToggleShortcuts);
+        }
+        // After what opens a sheet: both may come in one frame.
+        if input.key_pressed(Key::Escape) {
+            commands.push(Command::CloseSheets);
         }
         let copies = input.events.iter().any(|e| matches!(e, egui::Event::Copy));
         if copies {

@@ -88,6 +88,9 @@ pub enum PictureSize {
     Fixed(u32, u32),
 }
 
+/// Paths to learn from before the first sample of a picture without end.
+const MOST_LEARNING_PATHS: u64 = 1 << 13;
+
 impl Default for Document {
     fn default() -> Self {
         Self {
@@ -110,7 +113,7 @@ impl Default for Document {
                 exposure_ev: 0.0,
                 curve: ToneCurve::Agx,
                 white_balance: WhiteBalance::default(),
-                denoise: false,
+                denoise: true,
                 denoiser: Denoiser::default(),
             },
             size: PictureSize::Viewport(1),
@@ -122,6 +125,15 @@ impl Default for Document {
 }
 
 impl Document {
+    /// So few that the first picture does not wait for them: rendered paths teach the rest.
+    fn learning_paths(&self, size: [u32; 2]) -> u64 {
+        let paths = View::suitable_learning_paths(self.light.sampling, size, self.stop.samples);
+        match (self.light.sampling, self.stop.samples) {
+            (Sampling::Adaptive, None) => paths.min(MOST_LEARNING_PATHS),
+            _ => paths,
+        }
+    }
+
     /// The render settings that follow for a picture of this size; `None` without a viewpoint.
     pub fn view(&self, width: u32, height: u32) -> Option<View> {
         let whole = [width, height];
@@ -139,11 +151,7 @@ impl Document {
             grid_columns: 64,
             // What neighbours share, denoising cannot tell from light.
             sharing: Sharing::Off,
-            learning_paths: View::suitable_learning_paths(
-                self.light.sampling,
-                [width, height],
-                self.stop.samples,
-            ),
+            learning_paths: self.learning_paths([width, height]),
             laws: LawOptions::ADAPTIVE,
             medium: self.fog,
             background: self.background,

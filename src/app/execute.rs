@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant};
 
 use egui::{Color32, ColorImage};
 
@@ -68,6 +69,8 @@ impl App {
                 interface.pinned = None;
             }
             Command::Undo => {
+                // What has just been changed may not have been noted as yet.
+                self.undo.settle(&self.document);
                 if let Some(document) = self.undo.undo() {
                     self.document = document;
                 }
@@ -87,6 +90,7 @@ impl App {
             Command::TogglePanels => interface.panels = !interface.panels,
             Command::ToggleDeveloper => interface.toggle_developer(),
             Command::ToggleShortcuts => interface.shortcuts = !interface.shortcuts,
+            Command::CloseSheets => (interface.shortcuts, interface.is_marking) = (false, false),
             Command::KeepPicture => self.keep(),
             Command::Quit => self.is_closing = true,
             Command::MeasureTruth => {
@@ -170,7 +174,7 @@ impl App {
     pub(super) fn save_when_whole(&mut self) {
         // Without a path to write to, nothing is to be copied either.
         let Some(path) = self.waiting_save.take() else { return };
-        let Some(picture) = self.picture().filter(|picture| !picture.snapshot.is_small()) else {
+        let Some(picture) = self.picture().filter(|picture| picture.snapshot.is_whole()) else {
             self.waiting_save = Some(path);
             return;
         };
@@ -270,12 +274,18 @@ impl App {
                 }
             };
         let thread = std::thread::Builder::new().name("dialogue".to_owned()).spawn(move || {
-            if let Some(file) = pollster::block_on(chosen) {
-                let command = purpose.command(&file.path().display().to_string());
-                // The window may have gone meanwhile.
-                let _ = sender.send(Later::Command(command));
-                wake();
-            }
+            let start = Instant::now();
+            let later = match pollster::block_on(chosen) {
+                Some(file) => Later::Command(purpose.command(&file.path().display().to_string())),
+                // Nobody closes a dialogue so soon: none was opened.
+                None if start.elapsed() < QUICKEST_ANSWER => Later::Failed(
+                    "this system offers no file dialogue; a path can be typed instead".to_owned(),
+                ),
+                None => return,
+            };
+            // The window may have gone meanwhile.
+            let _ = sender.send(later);
+            wake();
         });
         if thread.is_err() {
             self.messages.error("the file dialogue cannot be opened; a path can be typed instead");
@@ -301,6 +311,9 @@ fn color_image(picture: &Rgb8) -> ColorImage {
     let pixels = picture.pixels.iter().map(|[r, g, b]| Color32::from_rgb(*r, *g, *b)).collect();
     ColorImage::new([picture.width as usize, picture.height as usize], pixels)
 }
+
+/// A person takes longer to close a file dialogue.
+const QUICKEST_ANSWER: Duration = Duration::from_millis(500);
 
 /// What maps' files are called.
 const MAP_EXTENSIONS: [&str; 9] =

@@ -42,10 +42,11 @@ pub(super) struct Inspected {
 }
 
 /// True visible energy of each tile at a point, normalised to 1.
-#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Truth {
     /// Where.
-    pub(super) position: Vec3,
+    position: Vec3,
+    /// Of which map, turned and scaled.
+    environment: Arc<Environment>,
     /// Share of each tile.
     pub(super) shares: Vec<f32>,
 }
@@ -54,6 +55,8 @@ pub(super) struct Truth {
 pub(super) struct Inspector {
     inspected: Option<Inspected>,
     truth: Option<Truth>,
+    /// The map that is inspected.
+    environment: Option<Arc<Environment>>,
     learned: Option<(Arc<LightGrid>, Vec<f32>)>,
     source: Option<(Vec2, u64)>,
     sender: Sender<Truth>,
@@ -69,6 +72,7 @@ impl Inspector {
         Self {
             inspected: None,
             truth: None,
+            environment: None,
             learned: None,
             source: None,
             sender,
@@ -86,7 +90,10 @@ impl Inspector {
     /// The truth at the inspected point, if it was measured.
     pub(super) fn truth(&self) -> Option<&Truth> {
         let here = self.inspected.as_ref()?.spot.position;
-        self.truth.as_ref().filter(|truth| truth.position == here)
+        let is_of = |truth: &&Truth| {
+            self.environment.as_ref().is_some_and(|now| Arc::ptr_eq(now, &truth.environment))
+        };
+        self.truth.as_ref().filter(|truth| truth.position == here).filter(is_of)
     }
 
     /// Probability of each tile summed over all learned laws, `None` before anything was learned.
@@ -126,6 +133,7 @@ impl Inspector {
             return;
         }
         self.source = source;
+        self.environment = Some(Arc::clone(&snapshot.request.environment));
         self.inspected = inspect(snapshot, place);
     }
 
@@ -151,9 +159,10 @@ impl Inspector {
         let (spot, snapshot) = (inspected.spot, Arc::clone(snapshot));
         let (sender, wake) = (self.sender.clone(), self.wake.clone());
         let thread = std::thread::Builder::new().name("truth".to_owned()).spawn(move || {
-            let shares = true_shares(&snapshot.request.world, &snapshot.request.environment, &spot);
+            let environment = Arc::clone(&snapshot.request.environment);
+            let shares = true_shares(&snapshot.request.world, &environment, &spot);
             // The window may have gone meanwhile.
-            let _ = sender.send(Truth { position: spot.position, shares });
+            let _ = sender.send(Truth { position: spot.position, environment, shares });
             wake();
         });
         self.busy = thread.is_ok();

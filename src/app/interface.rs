@@ -3,6 +3,7 @@
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
 
+use super::drag::Drag;
 use super::overlays::Overlay;
 
 /// State of the window that is not the picture's.
@@ -38,12 +39,16 @@ pub struct Interface {
     pub is_frozen: bool,
     /// Whether the next drag marks the part that is to be rendered.
     pub is_marking: bool,
+    /// The drag over the picture under way.
+    pub drag: Option<Drag>,
     /// Whether rendering is halted.
     pub paused: bool,
     /// Counts restarts by hand.
     pub run: u32,
     /// Size of the viewport in pixels, once it was drawn.
     pub viewport_pixels: Option<[u32; 2]>,
+    /// Size of the window in pixels that this was for, and whether panels were shown.
+    pub viewport_of: Option<([u32; 2], bool)>,
     /// Until when the camera counts as moving, in the window's seconds.
     pub moving_until: f64,
 }
@@ -121,9 +126,11 @@ impl Default for Interface {
             wipe: 0.5,
             is_frozen: false,
             is_marking: false,
+            drag: None,
             paused: false,
             run: 0,
             viewport_pixels: None,
+            viewport_of: None,
             moving_until: f64::NEG_INFINITY,
         }
     }

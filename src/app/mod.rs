@@ -15,6 +15,7 @@ use glam::Vec2;
 pub mod commands;
 pub mod convergence;
 pub mod document;
+pub mod drag;
 mod execute;
 pub mod history;
 mod inspect;
@@ -54,11 +55,21 @@ use messages::Messages;
 use presenter::{Order, Presenter, Shown};
 use screen::Screen;
 use settings_file::Settings;
+use speed_up::SpeedUp;
 use undo::Undo;
 use worker::{Activity, Reference, Request, Snapshot, Worker};
 
-/// Called from any thread when there is something new to draw.
+/// Called from any thread when there is something new.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// Whom threads tell that there is something new.
+#[derive(Clone)]
+pub struct Wakes {
+    /// There is something to draw.
+    pub draw: Wake,
+    /// The worker has something for the presenter: see [`App::relay`].
+    pub relay: Wake,
+}
 
 /// What is shown at the start.
 #[derive(Debug, Clone, Default)]
@@ -83,6 +94,8 @@ pub struct Start {
 pub struct App {
     document: Document,
     undo: Undo<Document>,
+    /// What the window was opened with.
+    start: Document,
     interface: Interface,
     settings: Settings,
     messages: Messages,
@@ -97,6 +110,8 @@ pub struct App {
     /// The map turned and scaled as the document says.
     lit: Option<Lit>,
     snapshot: Option<Arc<Snapshot>>,
+    /// Of its two halves.
+    speed_up: Option<SpeedUp>,
     shown: Option<Arc<Shown>>,
     screen: Screen,
     textures: panels::viewport::Textures,
@@ -131,14 +146,21 @@ enum Later {
 }
 
 impl App {
-    /// Starts the threads; `wake` asks for a new frame.
+    /// Starts the threads, which call `wakes`.
     ///
     /// # Errors
     /// If the system gives no threads.
-    pub fn new(start: Start, screen: Screen, context: &egui::Context, wake: Wake) -> Result<Self> {
+    pub fn new(
+        start: Start,
+        screen: Screen,
+        context: &egui::Context,
+        wakes: Wakes,
+    ) -> Result<Self> {
+        let Wakes { draw: wake, relay } = wakes;
         theme::apply(context);
         Ok(Self {
             undo: Undo::new(start.document.clone()),
+            start: start.document.clone(),
             document: start.document,
             interface: start.interface,
             settings: start.settings,
@@ -147,12 +169,13 @@ impl App {
             convergence: Convergence::default(),
             inspector: Inspector::new(wake.clone()),
             loader: Loader::new(wake.clone(), start.of_scene.clone()),
-            worker: Worker::start(wake.clone(), (start.adapter, start.rays), screen.gpu().clone())?,
+            worker: Worker::start(relay, (start.adapter, start.rays), screen.gpu().clone())?,
             presenter: Presenter::start(wake.clone())?,
             scene: None,
             map: None,
             lit: None,
             snapshot: None,
+            speed_up: None,
             shown: None,
             screen,
             textures: panels::viewport::Textures::default(),
@@ -170,10 +193,7 @@ impl App {
     pub fn show(&mut self, ui: &mut egui::Ui) {
         let context = ui.ctx().clone();
         self.collect(&context);
-        let mut commands = Vec::new();
-        if !self.interface.is_modal() {
-            commands.extend(commands::pressed(&context));
-        }
+        let mut commands = commands::pressed(&context, self.interface.is_modal());
         commands.extend(self.dropped_files(&context));
         self.panels(ui, &mut commands);
         for command in commands {
@@ -181,6 +201,14 @@ impl App {
         }
         self.settle(&context);
         self.send_down(&context);
+    }
+
+    /// Passes what the worker has on to the presenter, without a frame; whether one is to be drawn all
+    /// the same, for there is nothing to present.
+    pub fn relay(&mut self, context: &egui::Context) -> bool {
+        self.collect(context);
+        self.send_down(context);
+        self.presenter.is_settled()
     }
 
     /// The screen that is drawn on.
@@ -227,7 +255,7 @@ impl App {
     /// What is to be kept for the next window.
     pub fn settings(&self) -> Settings {
         let mut settings = self.settings.clone();
-        settings.remember(&self.document, &self.interface);
+        settings.remember(&self.document, &self.start, &self.interface);
         settings
     }
 
@@ -253,6 +281,7 @@ impl App {
                 loading: self.loader.busy_with().collect(),
                 threads: self.worker.threads(),
                 is_preparing: self.worker.is_preparing(),
+                pointed: self.interface.pointed.filter(|_| !self.is_repeatable),
                 hides_clock: self.is_repeatable,
             };
             panels::status::show(ui, &status);
@@ -306,6 +335,7 @@ impl App {
                 panels::history::show(ui, &mut self.history, interface, commands);
             }
             interface::Tab::Inspect => {
+                panels::method::show(ui, &mut self.document.light);
                 panels::overlay::show(ui, interface, shown);
                 panels::inspector::show(
                     ui,
@@ -344,10 +374,6 @@ impl App {
     }
 
     fn viewport(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
-        let speed_up = self
-            .snapshot
-            .as_ref()
-            .and_then(|s| s.plain.as_ref().and_then(|plain| speed_up::SpeedUp::of(&s.main, plain)));
         let past = self.past().map(|kept| kept.name.clone());
         let settings = self.develop_settings();
         let mut scope = panels::viewport::Scope {
@@ -358,7 +384,7 @@ impl App {
             shown: self.shown.as_deref(),
             settings,
             snapshot: self.snapshot.as_deref(),
-            speed_up: speed_up.filter(|_| !self.is_repeatable),
+            speed_up: self.speed_up.filter(|_| !self.is_repeatable),
             past: past.as_deref(),
             scene: self.scene.as_ref(),
             loading: self.loader.busy_with().next().is_some(),
@@ -396,7 +422,10 @@ impl App {
         }
         while let Ok(later) = self.later.1.try_recv() {
             match later {
-                Later::Command(command) => self.execute(command, context),
+                Later::Command(command) => {
+                    self.interface.prompt = None;
+                    self.execute(command, context);
+                }
                 Later::Done(sentence) => self.messages.notice(sentence),
                 Later::Failed(sentence) => self.messages.error(sentence),
             }
@@ -415,6 +444,8 @@ impl App {
             && self.snapshot.as_ref().is_none_or(|old| old.number != snapshot.number)
         {
             self.convergence.add(&snapshot);
+            let plain = snapshot.plain.as_ref();
+            self.speed_up = plain.and_then(|plain| SpeedUp::of(&snapshot.main, plain));
             self.snapshot = Some(snapshot);
         }
         // What is on a device that was lost cannot be drawn.
@@ -467,8 +498,7 @@ impl App {
 
     /// Keeps a step for undo once nobody drags or types any more.
     fn settle(&mut self, context: &egui::Context) {
-        let busy = context.input(|i| i.pointer.any_down() || !i.keys_down.is_empty())
-            || context.text_edit_focused();
+        let busy = context.input(|i| i.pointer.any_down()) || context.text_edit_focused();
         // A file that is being read may turn out to be damaged: nothing has changed then.
         let is_there = self.scene.as_ref().is_some_and(|s| s.name == self.document.scene)
             && self.map.as_ref().is_some_and(|m| m.name == self.document.map);
@@ -492,7 +522,7 @@ impl App {
             self.inspector.update(&self.interface, self.snapshot.as_ref());
             self.worker.submit(request);
         }
-        if let Some(snapshot) = &self.snapshot {
+        if let Some(snapshot) = self.snapshot.as_ref().filter(|s| s.has_picture()) {
             let past = self.past().map(|kept| Arc::clone(&kept.image));
             let look = &self.document.look;
             self.presenter.order(Order {

@@ -9,11 +9,12 @@ use super::Wake;
 use super::overlays::{CellFacts, Label, Legend, Overlay, Sources};
 use super::surface_map::SurfaceMap;
 use super::worker::{Activity, Request, Snapshot, Take};
-use crate::denoise::{Denoiser, preview, quick};
+use crate::denoise::{Denoiser, blend};
 use crate::develop::{Developer, LinearPicture, OverlayTexture};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::light_grid::LightGrid;
+use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::tone::WhiteBalance;
 
@@ -57,9 +58,9 @@ impl Order {
     }
 }
 
-/// After a picture of work that goes on it rests so many times as long as that took: where the CPU draws,
-/// pictures would take all of it.
-const REST: u32 = 4;
+/// After a picture of work that goes on it rests so many times as long as that took: with half of the
+/// cores, it takes a twentieth of the machine.
+const REST: u32 = 9;
 
 fn address(image: Option<&Arc<Image>>) -> Option<usize> {
     image.map(|image| Arc::as_ptr(image).addr())
@@ -247,12 +248,11 @@ struct Memory {
 #[derive(Default)]
 struct Uploads {
     developer: Option<Arc<Developer>>,
-    /// By snapshot and filter.
-    picture: Last<(u64, Option<Denoiser>), Prepared>,
-    plain: Last<(u64, Option<Denoiser>), Prepared>,
+    picture: Last<Source, Prepared>,
+    plain: Last<Source, Prepared>,
     /// By the picture's address, which stays its own for as long as it is kept.
     past: Last<Option<usize>, (LinearPicture, Arc<Image>)>,
-    metered: Last<(u64, Option<Denoiser>, WhiteBalance), f32>,
+    metered: Last<(Source, WhiteBalance), f32>,
     /// By snapshot, overlay and tile.
     overlay: Last<(u64, Overlay, Option<u32>), Option<Painted>>,
 }
@@ -273,21 +273,17 @@ impl Memory {
             let developer = Some(Arc::clone(&developer));
             self.uploads = Uploads { developer, ..Uploads::default() };
         }
-        let snapshot = Arc::clone(&order.snapshot);
-        let key = (snapshot.number, order.denoiser);
-        let (picture, failure) = self
-            .uploads
-            .picture
-            .or_make(key, || Ok(picture(&developer, &snapshot, order.denoiser)))?;
+        let source = Source::main(&order);
+        let prepare = || Ok(source.prepare(&developer));
+        let (picture, failure) = self.uploads.picture.or_make(source.clone(), prepare)?;
         let (other, other_failure) = self.other(&order)?.unzip();
         let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
-            let key = (snapshot.number, order.denoiser, white_balance);
             let meter = || developer.auto_exposure_ev(&picture, white_balance);
-            self.uploads.metered.or_make(key, meter)
+            self.uploads.metered.or_make((source.clone(), white_balance), meter)
         })?;
         let painted = order.overlay.map_or(Ok(None), |overlay| {
             let mut last = std::mem::take(&mut self.uploads.overlay);
-            let key = (snapshot.number, overlay, order.tile);
+            let key = (order.snapshot.number, overlay, order.tile);
             let painted = last.or_make(key, || Ok(self.paint(&order, overlay, &picture)));
             self.uploads.overlay = last;
             painted
@@ -318,10 +314,9 @@ impl Memory {
             let (picture, _) = self.uploads.past.or_make(address(Some(past)), upload)?;
             return Ok(Some((picture, None)));
         }
-        let Some(plain) = &order.snapshot.plain else { return Ok(None) };
-        let key = (order.snapshot.number, order.denoiser);
-        let prepare = || Ok(without_noise(developer, plain, order.denoiser));
-        self.uploads.plain.or_make(key, prepare).map(Some)
+        let Some(source) = Source::plain(order) else { return Ok(None) };
+        let prepare = || Ok(source.prepare(developer));
+        self.uploads.plain.or_make(source.clone(), prepare).map(Some)
     }
 
     fn paint(
@@ -380,40 +375,61 @@ impl Memory {
     }
 }
 
-/// The linear picture; pixels without samples show what there was before.
-fn picture(developer: &Developer, snapshot: &Snapshot, denoiser: Option<Denoiser>) -> Prepared {
-    let film = &snapshot.main.film;
-    // A small picture is there to see where one is going, not to judge noise.
-    let (picture, failure) = if snapshot.is_small() {
-        (developer.upload_filtered(&preview(film), film), None)
-    } else {
-        without_noise(developer, &snapshot.main, denoiser)
-    };
-    match snapshot.under.as_ref().filter(|_| film.min_samples() == 0) {
-        Some(under) => (developer.with_under(picture, under), failure),
-        None => (picture, failure),
+/// What a linear picture is made from; equal ones give the same picture.
+#[derive(Clone)]
+struct Source {
+    take: Take,
+    under: Option<Arc<Film>>,
+    denoiser: Option<Denoiser>,
+    /// Whether every pixel has a sample and the picture its full size.
+    is_whole: bool,
+}
+
+impl PartialEq for Source {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.take.film, &other.take.film)
+            && self.under.as_ref().map(Arc::as_ptr) == other.under.as_ref().map(Arc::as_ptr)
+            && (self.denoiser, self.is_whole) == (other.denoiser, other.is_whole)
     }
 }
 
-/// The film's picture, denoised if that is asked for.
-fn without_noise(developer: &Developer, take: &Take, denoiser: Option<Denoiser>) -> Prepared {
-    let film = &take.film;
-    let is_here = |(gpu, _): &&(Gpu, DeviceFilm)| gpu.is_same(developer.gpu());
-    let noisy = |layers| match take.on_device.as_ref().filter(is_here) {
-        Some((_, on_device)) => LinearPicture::live(on_device.clone()),
-        None => developer.upload_film(film, layers),
-    };
-    match denoiser {
-        None => (noisy(false), None),
-        Some(Denoiser::ATrous) if developer.can_denoise(film.width, film.height) => {
-            (developer.denoised(&noisy(true)), None)
-        }
-        Some(denoiser) => {
-            let (image, failure) = match denoiser.denoise(film) {
-                Ok(image) => (image, None),
-                Err(failure) => (quick(film), Some(failure.to_string())),
-            };
-            (developer.upload_filtered(&image, film), failure)
+impl Source {
+    fn main(order: &Order) -> Self {
+        let snapshot = &order.snapshot;
+        // Where there are no samples, the film is that from before.
+        let under = snapshot.under.clone().filter(|film| !Arc::ptr_eq(film, &snapshot.main.film));
+        let take = snapshot.main.clone();
+        Self { take, under, denoiser: order.denoiser, is_whole: snapshot.is_whole() }
+    }
+
+    fn plain(order: &Order) -> Option<Self> {
+        let take = order.snapshot.plain.clone()?;
+        let is_whole = take.samples > 0;
+        Some(Self { take, under: None, denoiser: order.denoiser, is_whole })
+    }
+
+    /// The picture on the device, without noise if that is asked for.
+    fn prepare(&self, developer: &Developer) -> Prepared {
+        let film = &self.take.film;
+        let is_here = |(gpu, _): &&(Gpu, DeviceFilm)| gpu.is_same(developer.gpu());
+        let noisy = |layers| match self.take.on_device.as_ref().filter(is_here) {
+            Some((_, on_device)) => LinearPicture::live(on_device.clone()),
+            None => developer.upload_film(film, layers),
+        };
+        let blended = || developer.upload_image(&blend(film, self.under.as_deref()));
+        match self.denoiser {
+            // A picture with holes or in other pixels is there to see where one is going.
+            _ if !self.is_whole => (blended(), None),
+            None => (noisy(false), None),
+            Some(Denoiser::ATrous) if developer.can_denoise(film.width, film.height) => {
+                (developer.denoised(&noisy(true)), None)
+            }
+            // Where that takes seconds, what takes a twentieth of it will do.
+            Some(Denoiser::ATrous) => (blended(), None),
+            Some(Denoiser::Oidn) => match Denoiser::Oidn.denoise(film) {
+                Ok(image) => (developer.upload_image(&image), None),
+                Err(failure) => (blended(), Some(failure.to_string())),
+            },
         }
     }
 }
@@ -435,6 +451,7 @@ mod tests {
         };
         let film = Film::new(6, 4, true);
         let mut take = Take {
+            samples: 1,
             sampling: Sampling::Plain,
             film: Arc::new(film),
             figures: Figures::default(),
@@ -443,12 +460,17 @@ mod tests {
             gpu: None,
             on_device: None,
         };
-        assert!(!without_noise(&developer, &take, None).0.is_live());
+        let is_live = |developer: &Developer, take: &Take, denoiser| {
+            let take = take.clone();
+            let source = Source { take, under: None, denoiser, is_whole: true };
+            source.prepare(developer).0.is_live()
+        };
+        assert!(!is_live(&developer, &take, None));
         let uploaded = developer.upload_film(&take.film, true);
         take.on_device = Some((developer.gpu().clone(), uploaded.film().clone()));
-        assert!(without_noise(&developer, &take, None).0.is_live());
-        assert!(!without_noise(&other, &take, None).0.is_live());
-        assert!(!without_noise(&developer, &take, Some(Denoiser::ATrous)).0.is_live());
+        assert!(is_live(&developer, &take, None));
+        assert!(!is_live(&other, &take, None));
+        assert!(!is_live(&developer, &take, Some(Denoiser::ATrous)));
         developer.gpu().check().and(other.gpu().check()).expect("no buffer is used elsewhere");
     }
 }

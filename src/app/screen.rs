@@ -41,8 +41,20 @@ pub(super) struct Recipe {
     pub(super) picture: LinearPicture,
     pub(super) overlay: Option<OverlayTexture>,
     pub(super) settings: DevelopSettings,
-    /// Number of the snapshot it is of.
-    pub(super) number: u64,
+    /// Number of the snapshot it is of, where the picture changes by itself.
+    number: Option<u64>,
+}
+
+impl Recipe {
+    pub(super) fn new(
+        picture: &LinearPicture,
+        overlay: Option<&OverlayTexture>,
+        settings: DevelopSettings,
+        number: u64,
+    ) -> Self {
+        let number = picture.is_live().then_some(number);
+        Self { picture: picture.clone(), overlay: overlay.cloned(), settings, number }
+    }
 }
 
 /// A developed picture that egui can draw; it is forgotten when dropped.

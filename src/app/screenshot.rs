@@ -11,7 +11,7 @@ use wgpu::{Extent3d, TextureFormat, TextureUsages};
 
 use super::interface::Interface;
 use super::screen::{Screen, TextureCopies};
-use super::{App, Start};
+use super::{App, Start, Wake, Wakes};
 use crate::error::{Error, Result};
 use crate::image::Rgb8;
 use crate::render::gpu::{DeviceChoice, Gpu};
@@ -53,20 +53,21 @@ impl Studio {
         let screen = Screen::new(&canvas.gpu, Arc::clone(&canvas.renderer))?;
         let context = egui::Context::default();
         let (sender, news) = channel();
-        let wake = Arc::new(move || {
+        let wake: Wake = Arc::new(move || {
             // The screenshot may have been taken meanwhile.
             let _ = sender.send(());
         });
         let start = Start { is_repeatable: true, ..shot.start };
-        let app = App::new(start, screen, &context, wake)?;
+        let wakes = Wakes { draw: wake.clone(), relay: wake };
+        let app = App::new(start, screen, &context, wakes)?;
         let deadline = Instant::now() + shot.patience;
         Ok(Self { app, context, canvas, news, deadline, patience: shot.patience, time: 0.0 })
     }
 
     /// Opens and chooses what `interface` says; the picture is not rendered again.
     pub fn arrange(&mut self, interface: Interface) {
-        let viewport_pixels = self.app.interface.viewport_pixels;
-        self.app.interface = Interface { viewport_pixels, ..interface };
+        let Interface { viewport_pixels, viewport_of, .. } = self.app.interface;
+        self.app.interface = Interface { viewport_pixels, viewport_of, ..interface };
     }
 
     /// Measures the truth at the pinned place.

@@ -174,12 +174,23 @@ impl Settings {
         Interface { tab: self.tab, dock: self.dock, ..Interface::default() }
     }
 
-    /// Takes over what a window has.
-    pub fn remember(&mut self, document: &Document, interface: &Interface) {
-        self.look = document.look;
-        self.light = document.light;
-        self.size = document.size;
-        self.stop = document.stop;
+    /// Takes over what was changed in a window since it was opened with `start`: what the command line
+    /// said was for that window alone.
+    pub fn remember(&mut self, document: &Document, start: &Document, interface: &Interface) {
+        fn take<T: PartialEq + Copy>(kept: &mut T, now: T, before: &T) {
+            if now != *before {
+                *kept = now;
+            }
+        }
+        let (light, now, before) = (&mut self.light, document.light, start.light);
+        take(&mut light.device, now.device, &before.device);
+        take(&mut light.sampling, now.sampling, &before.sampling);
+        take(&mut light.split, now.split, &before.split);
+        take(&mut light.bounces, now.bounces, &before.bounces);
+        take(&mut light.seed, now.seed, &before.seed);
+        take(&mut self.look, document.look, &start.look);
+        take(&mut self.size, document.size, &start.size);
+        take(&mut self.stop, document.stop, &start.stop);
         self.tab = interface.tab;
         self.dock = interface.dock;
     }
@@ -223,6 +234,21 @@ fn put_first(list: &mut Vec<String>, name: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_the_command_line_said_is_not_kept_and_what_was_changed_is() {
+        let mut settings = Settings::default();
+        let mut document = settings.document();
+        document.stop.samples = Some(2);
+        document.light.sampling = crate::render::Sampling::Plain;
+        let start = document.clone();
+        document.light.bounces = 3;
+        document.look.exposure_ev = 1.0;
+        settings.remember(&document, &start, &Interface::default());
+        let mut expected = Settings::default();
+        (expected.light.bounces, expected.look.exposure_ev) = (3, 1.0);
+        assert_eq!(settings, expected);
+    }
 
     #[test]
     fn settings_read_back_and_old_files_are_understood() {

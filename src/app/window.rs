@@ -21,15 +21,26 @@ use winit::event_loop::{
 use winit::window::{Window, WindowId};
 
 use super::screen::{Screen, TextureCopies};
-use super::{App, Start, theme};
+use super::{App, Start, Wake, Wakes, theme};
 use crate::error::{Error, Result};
 use crate::render::gpu::Gpu;
 
-/// Asks for a frame, at once or later.
+/// What other threads ask the event loop for.
 #[derive(Debug, Clone, Copy)]
-struct Repaint {
-    at: Instant,
+enum Call {
+    /// A frame, at once or later.
+    Repaint(Instant),
+    /// A frame with what is new, when it can be afforded.
+    Draw,
+    /// To hand on what the worker has.
+    Relay,
 }
+
+/// Where software draws, it rests so many times as long as a frame took before it draws again what is
+/// new: frames take the renderer's time.
+const REST: u32 = 19;
+/// But it rests no longer than this.
+const LONGEST_REST: Duration = Duration::from_millis(900);
 
 /// Losses of a device sooner after one another than this belong together.
 const LOSS_GAP: Duration = Duration::from_secs(10);
@@ -52,7 +63,7 @@ pub fn run(
         let cause = text.rsplit_once(": ").map_or(&*text, |(_, cause)| cause);
         Error::new(format!("no window can be opened: {cause}"))
     };
-    let event_loop = EventLoop::<Repaint>::with_user_event().build().map_err(|e| no_display(&e))?;
+    let event_loop = EventLoop::<Call>::with_user_event().build().map_err(|e| no_display(&e))?;
     let mut runner = Runner {
         proxy: event_loop.create_proxy(),
         start: Some(start),
@@ -69,7 +80,7 @@ pub fn run(
 }
 
 struct Runner {
-    proxy: EventLoopProxy<Repaint>,
+    proxy: EventLoopProxy<Call>,
     start: Option<Start>,
     notices: Vec<String>,
     settings_path: Option<PathBuf>,
@@ -84,7 +95,7 @@ struct Runner {
 }
 
 /// Lets Ctrl-C and requests to end close the window as a person would; a second one leaves at once.
-fn close_on_signals(asked: &Arc<AtomicBool>, proxy: EventLoopProxy<Repaint>) {
+fn close_on_signals(asked: &Arc<AtomicBool>, proxy: EventLoopProxy<Call>) {
     for signal in [SIGINT, SIGTERM] {
         // Where signals cannot be caught they end the process, as ever.
         let _ = flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(asked));
@@ -95,7 +106,7 @@ fn close_on_signals(asked: &Arc<AtomicBool>, proxy: EventLoopProxy<Repaint>) {
         while !asked.load(Ordering::Relaxed) {
             std::thread::sleep(Duration::from_millis(50));
         }
-        let _ = proxy.send_event(Repaint { at: Instant::now() });
+        let _ = proxy.send_event(Call::Repaint(Instant::now()));
     });
 }
 
@@ -111,6 +122,8 @@ struct Running {
     copies: TextureCopies,
     /// When a device was lost last, and how many were in a row.
     lost: Option<(Instant, u32)>,
+    /// When the next frame of what is new can be afforded.
+    rested_at: Instant,
     app: App,
     title: String,
 }
@@ -162,7 +175,7 @@ impl Runner {
         let proxy = self.proxy.clone();
         context.set_request_repaint_callback(move |info| {
             // The event loop may have ended meanwhile.
-            let _ = proxy.send_event(Repaint { at: Instant::now() + info.delay });
+            let _ = proxy.send_event(Call::Repaint(Instant::now() + info.delay));
         });
         let display = event_loop.owned_display_handle();
         let adapter = start.adapter.clone();
@@ -177,9 +190,15 @@ impl Runner {
             None,
             Some(screen.gpu().limits.max_texture_dimension_2d as usize),
         );
-        let waking = context.clone();
-        let wake = Arc::new(move || waking.request_repaint());
-        let mut app = App::new(start, screen, &context, wake)?;
+        let wake = |call: Call| -> Wake {
+            let proxy = self.proxy.clone();
+            Arc::new(move || {
+                // The event loop may have ended meanwhile.
+                let _ = proxy.send_event(call);
+            })
+        };
+        let wakes = Wakes { draw: wake(Call::Draw), relay: wake(Call::Relay) };
+        let mut app = App::new(start, screen, &context, wakes)?;
         self.notices.drain(..).for_each(|sentence| app.say(sentence));
         Ok(Running {
             window,
@@ -190,12 +209,17 @@ impl Runner {
             painter: Some(painter),
             copies,
             lost: None,
+            rested_at: Instant::now(),
             app,
             title: String::new(),
         })
     }
 
     fn close(&mut self, event_loop: &ActiveEventLoop) {
+        if let Some(running) = &self.running {
+            // A GPU that is being made ready cannot be stopped; nobody has to look at that.
+            running.window.set_visible(false);
+        }
         if let (Some(running), Some(path)) = (&self.running, &self.settings_path) {
             let mut settings = running.app.settings();
             let size = running.window.inner_size().to_logical(running.window.scale_factor());
@@ -215,6 +239,7 @@ impl Running {
     /// # Errors
     /// If there is no other.
     fn draw(&mut self) -> Result<()> {
+        let start = Instant::now();
         if let Err(loss) = self.app.screen().gpu().check() {
             self.replace_device(&loss)?;
         }
@@ -249,6 +274,10 @@ impl Running {
             self.window.set_title(&title);
             self.title = title;
         }
+        self.rested_at = Instant::now();
+        if self.app.screen().gpu().facts().is_software() {
+            self.rested_at += (REST * start.elapsed()).min(LONGEST_REST);
+        }
         Ok(())
     }
 
@@ -274,7 +303,7 @@ impl Running {
     }
 }
 
-impl ApplicationHandler<Repaint> for Runner {
+impl ApplicationHandler<Call> for Runner {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
         let Some(start) = self.start.take() else { return };
         match self.open(event_loop, start) {
@@ -290,12 +319,18 @@ impl ApplicationHandler<Repaint> for Runner {
         }
     }
 
-    fn user_event(&mut self, event_loop: &ActiveEventLoop, repaint: Repaint) {
+    fn user_event(&mut self, event_loop: &ActiveEventLoop, call: Call) {
         if self.asked.load(Ordering::Relaxed) {
             return self.close(event_loop);
         }
-        let at = self.repaint_at.map_or(repaint.at, |at| at.min(repaint.at));
-        self.repaint_at = Some(at);
+        let Some(running) = &mut self.running else { return };
+        let at = match call {
+            Call::Repaint(at) => at,
+            Call::Draw => running.rested_at,
+            Call::Relay if running.app.relay(&running.context) => running.rested_at,
+            Call::Relay => return,
+        };
+        self.repaint_at = Some(self.repaint_at.map_or(at, |before| before.min(at)));
     }
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {

@@ -27,8 +27,6 @@ const TILE: u32 = 8;
 #[derive(Clone, PartialEq)]
 pub(crate) struct LinearPicture {
     film: DeviceFilm,
-    /// What pixels without samples show.
-    under: Option<Under>,
     is_live: bool,
 }
 
@@ -40,7 +38,7 @@ impl LinearPicture {
 
     /// Sums that nobody will change.
     fn fixed(film: DeviceFilm) -> Self {
-        Self { film, under: None, is_live: false }
+        Self { film, is_live: false }
     }
 
     /// Whether it may change by itself.
@@ -58,13 +56,6 @@ impl LinearPicture {
     pub(crate) fn size(&self) -> [u32; 2] {
         [self.film.width, self.film.height]
     }
-}
-
-/// A picture of the same view from before.
-#[derive(Clone, PartialEq)]
-struct Under {
-    pixels: wgpu::Buffer,
-    size: [u32; 2],
 }
 
 /// Colours to be blended over a picture of the same size; clones share them, and only those are equal.
@@ -110,7 +101,6 @@ pub(crate) struct DevelopSettings {
 struct Uniforms {
     matrix: [[f32; 4]; 3],
     size: [u32; 2],
-    under_size: [u32; 2],
     small_size: [u32; 2],
     gain: f32,
     curve: u32,
@@ -118,7 +108,7 @@ struct Uniforms {
     is_balanced: u32,
     has_overlay: u32,
     unscale: f32,
-    padding: [u32; 3],
+    padding: u32,
 }
 
 impl Uniforms {
@@ -127,7 +117,6 @@ impl Uniforms {
         Self {
             matrix: matrix.to_cols_array_2d().map(|[x, y, z]| [x, y, z, 0.0]),
             size: picture.size(),
-            under_size: picture.under.as_ref().map_or([0; 2], |under| under.size),
             small_size: [0; 2],
             gain: settings.exposure_ev.exp2(),
             curve: settings.curve as u32,
@@ -135,7 +124,7 @@ impl Uniforms {
             is_balanced: (matrix != Mat3::IDENTITY).into(),
             has_overlay: 0,
             unscale: picture.film.scale.recip(),
-            padding: [0; 3],
+            padding: 0,
         }
     }
 }
@@ -146,8 +135,6 @@ pub(crate) struct Developer {
     develop: wgpu::ComputePipeline,
     shrink: wgpu::ComputePipeline,
     a_trous: a_trous::Passes,
-    /// Bound where there is nothing to bind.
-    nothing: wgpu::Buffer,
     no_overlay: OverlayTexture,
 }
 
@@ -161,19 +148,12 @@ impl Developer {
             label: Some("develop"),
             source: wgpu::ShaderSource::Wgsl(include_str!("../../shaders/develop.wgsl").into()),
         });
-        let nothing = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("nothing"),
-            size: 16,
-            usage: wgpu::BufferUsages::STORAGE,
-            mapped_at_creation: false,
-        });
         let no_overlay = upload::texture(gpu, [1, 1], &[[0; 4]]);
         let developer = Self {
             develop: pipeline(gpu, &shader, "develop"),
             shrink: pipeline(gpu, &shader, "shrink"),
             a_trous: a_trous::Passes::new(gpu),
             gpu: gpu.clone(),
-            nothing,
             no_overlay,
         };
         gpu.check()?;
@@ -185,7 +165,7 @@ impl Developer {
         &self.gpu
     }
 
-    /// The picture through the à-trous filter, without anything under it; as it is without layers or
+    /// The picture through the à-trous filter; as it is without layers or
     /// where these do not fit into one binding. Of a live picture it is that of this moment.
     pub(crate) fn denoised(&self, picture: &LinearPicture) -> LinearPicture {
         let film = self.a_trous.run(&self.gpu, &picture.film);
@@ -296,10 +276,9 @@ impl Developer {
         &'a self,
         picture: &'a LinearPicture,
         uniforms: &'a wgpu::Buffer,
-    ) -> [wgpu::BindGroupEntry<'a>; 4] {
-        let under = picture.under.as_ref().map_or(&self.nothing, |under| &under.pixels);
+    ) -> [wgpu::BindGroupEntry<'a>; 3] {
         let film = &picture.film;
-        [entry(0, uniforms), entry(1, &film.sum), entry(2, &film.counts), entry(3, under)]
+        [entry(0, uniforms), entry(1, &film.sum), entry(2, &film.counts)]
     }
 }
 

@@ -197,28 +197,6 @@ fn overlays_are_blended_and_the_rest_steps_back() {
     }
 }
 
-/// The field of view is vertical, so what is in the middle stays there.
-#[test]
-fn pixels_without_samples_show_what_was_there_before() {
-    let Some(developer) = developer() else { return };
-    let before = Image::from_fn(20, 20, |x, y| [0.05 * x as f32, 0.05 * y as f32, 0.5]);
-    let mut film = Film::new(20, 10, false);
-    let white = PathResult { radiance: Vec3::ONE, rays: 1, was_invalid: false, first_hit: None };
-    film.add(3, 2, &white);
-    let picture = developer.with_under(developer.upload_film(&film, false), &before);
-    let found = developed(&developer, &picture, None, &settings(ToneCurve::None, 0.0));
-    let expected = Image::from_fn(20, 10, |x, y| match (x, y) {
-        (3, 2) => [1.0; 3],
-        // Two pixels of it cover one here; beyond its sides its last column goes on.
-        _ => {
-            let column = 2.0 * (x as f32 + 0.5 - 10.0) + 10.0 - 0.5;
-            [0.05 * column.clamp(0.0, 19.0), 0.05 * (2.0 * y as f32 + 0.5), 0.5]
-        }
-    });
-    let expected = display_rgb8(&expected, 0.0, ToneCurve::None);
-    assert!(difference(&found, &expected).0 <= 1);
-}
-
 #[test]
 fn a_picture_too_large_for_the_device_becomes_smaller() {
     let Some(mut developer) = developer() else { return };

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Developer, LinearPicture, OverlayTexture, Under, filled};
+use super::{Developer, LinearPicture, OverlayTexture, filled};
 use crate::image::Image;
 use crate::render::film::{Film, Surface};
 use crate::render::gpu::{DeviceFilm, Gpu};
@@ -42,38 +42,14 @@ impl Developer {
         if most < image.width {
             return self.upload_image(&image.shrunk(most));
         }
-        self.upload(image, &vec![[1, 0, 0, 0]; image.pixels.len()])
-    }
-
-    /// What a filter has made of a film.
-    pub(crate) fn upload_filtered(&self, image: &Image, film: &Film) -> LinearPicture {
-        if self.most_width(image.width, image.height) < image.width {
-            return self.upload_image(image);
-        }
-        let counts: Vec<[u32; 4]> =
-            film.pixels().par_iter().map(|pixel| [pixel.samples().min(1), 0, 0, 0]).collect();
-        self.upload(image, &counts)
-    }
-
-    fn upload(&self, image: &Image, counts: &[[u32; 4]]) -> LinearPicture {
         LinearPicture::fixed(DeviceFilm {
             sum: self.pixels(image),
-            counts: self.buffer(bytemuck::cast_slice(counts)),
+            counts: self.buffer(bytemuck::cast_slice(&vec![[1_u32, 0, 0, 0]; image.pixels.len()])),
             surfaces: None,
             width: image.width,
             height: image.height,
             scale: 1.0,
         })
-    }
-
-    /// The picture with another one of the same view under pixels without samples.
-    pub(crate) fn with_under(&self, picture: LinearPicture, under: &Image) -> LinearPicture {
-        let most = self.most_width(under.width, under.height);
-        if most < under.width {
-            return self.with_under(picture, &under.shrunk(most));
-        }
-        let under = Under { pixels: self.pixels(under), size: [under.width, under.height] };
-        LinearPicture { under: Some(under), ..picture }
     }
 
     /// An overlay for a picture: colours of an sRGB display, row after row of `width` pixels, `None`

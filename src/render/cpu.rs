@@ -76,7 +76,8 @@ pub(super) fn most_paths_per_pass(view: &View) -> u64 {
     (MAX_RECORDS_PER_PASS / u64::from(tries)).max(1)
 }
 
-/// Brings every pixel of the film to a pass's target; returns the numbers of samples and rays.
+/// Brings every pixel that a pass is about to its target; returns the numbers of samples and rays. Rows
+/// come in an order that leaves none far from those that are done, should the pass be cut short.
 pub(super) fn render(
     tracer: &PathTracer<'_>,
     rays: &CameraRays,
@@ -88,12 +89,14 @@ pub(super) fn render(
     let without_counts = PathTracer { counts: None, ..*tracer };
     let task = Task { tracers: [&without_counts, tracer], rays, view, pass, cancel };
     let add = |a: (u64, u64), b: (u64, u64)| (a.0 + b.0, a.1 + b.1);
-    let Some(tile) = view.shared_tile().filter(|_| tracer.fog.is_none()) else {
-        return film
-            .tiles(film.width, 1, [0, 0])
-            .into_par_iter()
-            .map(|row| task.render_pixels(row))
-            .reduce(|| (0, 0), add);
+    let is_whole = pass.every == 1;
+    let Some(tile) = view.shared_tile().filter(|_| tracer.fog.is_none() && is_whole) else {
+        let rows = film.tiles(film.width, 1, [0, 0]).into_iter().enumerate();
+        let mut rows: Vec<_> = rows.step_by(pass.every as usize).collect();
+        // Multiples of the golden ratio lie evenly.
+        rows.sort_unstable_by_key(|(y, _)| (*y as u32).wrapping_mul(0x9e37_79b9));
+        let rows = rows.into_par_iter();
+        return rows.map(|(_, row)| task.render_pixels(row)).reduce(|| (0, 0), add);
     };
     let mut done = (0, 0);
     for sample in film.min_samples()..pass.target {
@@ -133,7 +136,7 @@ impl Task<'_> {
     /// Brings pixel after pixel to the target; returns the numbers of samples and rays.
     fn render_pixels(&self, mut tile: FilmTile<'_>) -> (u64, u64) {
         let (mut samples, mut ray_count) = (0, 0);
-        for (at, mut pixel) in tile.pixels() {
+        for (at, mut pixel) in tile.pixels().step_by(self.pass.every as usize) {
             // A row of a long pass takes too long for somebody who waits.
             if self.cancel.load(Ordering::Relaxed) {
                 break;

@@ -1,6 +1,7 @@
 //! What the samples add up to.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::color::luminance;
 use crate::image::Image;
@@ -176,8 +177,26 @@ impl Film {
         self.pixels.iter().map(|p| u64::from(p.invalid)).sum()
     }
 
+    /// Mean luminance of every pixel and those around it. What a pixel's error is measured against must
+    /// not be its own mean: a lone bright sample raises both, and would hide.
+    pub(crate) fn luminance_around(&self) -> Vec<f64> {
+        let (width, height) = (self.width as usize, self.height as usize);
+        let mean = |index: usize| {
+            let (x, y) = (index % width, index / width);
+            let rows = y.saturating_sub(1)..(y + 2).min(height);
+            let columns = x.saturating_sub(1)..(x + 2).min(width);
+            let count = (rows.len() * columns.len()) as f64;
+            rows.flat_map(|row| &self.pixels[row * width..][columns.clone()])
+                .map(Pixel::mean_luminance)
+                .sum::<f64>()
+                / count
+        };
+        (0..self.pixels.len()).into_par_iter().map(mean).collect()
+    }
+
     /// Estimated root of the relative mean squared error of the picture: the root of the mean over
-    /// pixels of `variance_of_mean / (luminance^2 + 0.01 mean_luminance^2)`.
+    /// pixels of `variance_of_mean / (luminance^2 + 0.01 mean_luminance^2)`, with the luminance of the
+    /// pixel and those around it.
     ///
     /// It is an estimate from the samples' own spread: conservative for low-discrepancy samples,
     /// blind to light no sample has met yet. Infinite below two samples a pixel.
@@ -188,9 +207,10 @@ impl Film {
         let sum: f64 = self
             .pixels
             .iter()
-            .map(|p| {
-                let variance = p.variance_of_mean();
-                if variance == 0.0 { 0.0 } else { variance / (p.mean_luminance().powi(2) + floor) }
+            .zip(self.luminance_around())
+            .map(|(pixel, light)| {
+                let variance = pixel.variance_of_mean();
+                if variance == 0.0 { 0.0 } else { variance / (light.powi(2) + floor) }
             })
             .sum();
         (sum / count).sqrt()

@@ -253,6 +253,8 @@ pub struct Figures {
 struct Pass {
     /// Samples that every pixel is to have after it.
     target: u32,
+    /// It is about every so-manyth pixel of every so-manyth row; on a GPU about all.
+    every: u32,
     /// Of so many samples one is counted, lest a counter wrap.
     stride: u32,
     /// Which points its samples are.
@@ -385,12 +387,24 @@ impl<'a> Session<'a> {
                 result
             }
             Phase::Rendering => {
-                let result = self.render(self.samples.saturating_add(samples), cancel);
+                let result = self.render(self.samples.saturating_add(samples), 1, cancel);
                 let laws = self.figures.law_seconds - law_seconds;
                 self.figures.learning_seconds += laws;
                 self.figures.render_seconds += start.elapsed().as_secs_f64() - laws;
                 result
             }
+        }
+    }
+
+    /// Gives every `every`-th pixel of every `every`-th row its first sample: a picture can be made of
+    /// so few that shows the whole view. It is the sample that [`Self::advance`] would take, which
+    /// goes on with the others. Does nothing on a GPU, whose first samples come all at once.
+    pub fn begin(&mut self, every: u32, cancel: &AtomicBool) {
+        if self.samples == 0 && !self.is_on_gpu() {
+            let start = Instant::now();
+            // Only a GPU fails, and laws are made of whole passes.
+            let _ = self.render(1, every.max(1), cancel);
+            self.figures.render_seconds += start.elapsed().as_secs_f64();
         }
     }
 
@@ -663,9 +677,9 @@ impl<'a> Session<'a> {
         self.figures.law_seconds += start.elapsed().as_secs_f64();
     }
 
-    fn render(&mut self, target: u32, cancel: &AtomicBool) -> Result<()> {
+    fn render(&mut self, target: u32, every: u32, cancel: &AtomicBool) -> Result<()> {
         let stride = self.prepare_counting(target - self.samples);
-        let pass = Pass { target, stride, sequence: self.sequence };
+        let pass = Pass { target, every, stride, sequence: self.sequence };
         let film_before = self.film_before.get_mut().unwrap_or_else(PoisonError::into_inner);
         if let Some(film) = self.film.take() {
             *film_before = film;

@@ -20,3 +20,4 @@ mod real_files;
 mod report;
 mod shared;
 mod stability;
+mod window;

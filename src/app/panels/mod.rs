@@ -3,11 +3,13 @@
 mod color_bar;
 pub(super) mod convergence;
 pub(super) mod dock;
+mod gestures;
 pub(super) mod history;
 pub(super) mod inspector;
 pub(super) mod left;
 mod map_view;
 pub(super) mod messages;
+pub(super) mod method;
 pub(super) mod needs;
 pub(super) mod overlay;
 pub(super) mod picture;

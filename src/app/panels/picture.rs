@@ -53,7 +53,7 @@ pub(in crate::app) fn show(
 fn denoiser(ui: &mut Ui, document: &mut Document) {
     ui.horizontal(|ui| {
         ui.checkbox(&mut document.look.denoise, "Denoise")
-            .on_hover_text("For display and .png; .exr files keep what was rendered (N)");
+            .on_hover_text("Noise is shared out by how sure each pixel is; without it every sample is shown as it is. For display and .png: .exr files keep what was rendered (N)");
         // The library is looked for once.
         if !document.look.denoise || Denoiser::Oidn.check().is_err() {
             return;

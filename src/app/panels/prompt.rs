@@ -48,7 +48,11 @@ pub(in crate::app) fn show(
             field.request_focus();
             prompt.is_focused = true;
         }
-        is_done |= field.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
+        if field.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
+            is_done = true;
+            // Enter takes the keyboard away; without a path there is nothing to be done yet.
+            field.request_focus();
+        }
         for name in recent {
             if ui.link(RichText::new(name).size(12.5)).clicked() {
                 prompt.path.clone_from(name);
@@ -60,7 +64,6 @@ pub(in crate::app) fn show(
             is_done |= ui.button(RichText::new(accept).color(theme::ACCENT)).clicked();
             if ui.button("Browse…").on_hover_text("The system's file dialogue").clicked() {
                 commands.push(Command::Browse(prompt.purpose));
-                is_closed = true;
             }
             is_closed |= ui.button("Cancel").clicked();
         });

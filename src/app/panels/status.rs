@@ -13,6 +13,8 @@ pub(in crate::app) struct Status<'a> {
     pub(in crate::app) loading: Vec<&'a str>,
     /// Whether a GPU is being made ready.
     pub(in crate::app) is_preparing: bool,
+    /// Place of the picture under the pointer, both coordinates in `[0,1]`.
+    pub(in crate::app) pointed: Option<glam::Vec2>,
     /// Render threads.
     pub(in crate::app) threads: usize,
     /// Figures that depend on the clock are left out.
@@ -30,6 +32,9 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
                 figures(ui, snapshot, status.hides_clock);
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     device(ui, snapshot, status.threads);
+                    if let Some(place) = status.pointed.filter(|_| !theme::is_narrow(ui)) {
+                        pixel(ui, snapshot, place);
+                    }
                 });
             }
         });
@@ -38,13 +43,11 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
 
 fn phase(ui: &mut Ui, status: &Status<'_>) {
     if let Some(name) = status.loading.first() {
-        ui.spinner();
-        ui.label(RichText::new(format!("Loading {name}")).color(theme::ACCENT));
+        ui.label(RichText::new(format!("Loading {name}…")).color(theme::ACCENT));
         return;
     }
     if status.is_preparing {
-        ui.spinner();
-        ui.label(RichText::new("Preparing the GPU").color(theme::ACCENT)).on_hover_text(
+        ui.label(RichText::new("Preparing the GPU…").color(theme::ACCENT)).on_hover_text(
             "The scene is uploaded and the kernels are compiled; software Vulkan takes some \
              seconds for it",
         );
@@ -57,7 +60,7 @@ fn phase(ui: &mut Ui, status: &Status<'_>) {
     match snapshot.activity {
         Activity::Moving => word(ui, "Moving", theme::SECOND, "A small picture while it moves"),
         Activity::Learning(share) => {
-            let learning = &snapshot.learning;
+            let learning = &snapshot.main.figures;
             let all = snapshot.request.view.learning_paths;
             let text = format!(
                 "Learning {} / {} paths",
@@ -71,10 +74,7 @@ fn phase(ui: &mut Ui, status: &Status<'_>) {
                     .fill(Color32::from_rgb(122, 86, 34))
                     .text(RichText::new(text).size(11.5).color(theme::TEXT)),
             )
-            .on_hover_text(
-                "Finding out which tiles of the map each part of the picture can see; until then \
-                 the picture is made with what was learned before",
-            );
+            .on_hover_text("Finding out which tiles of the map each part of the picture can see");
         }
         Activity::Rendering => word(ui, "Rendering", theme::ACCENT, "Adding samples"),
         Activity::Paused => word(ui, "Paused", theme::SECOND, "Space goes on"),
@@ -88,10 +88,13 @@ fn word(ui: &mut Ui, text: &str, color: Color32, hint: &str) {
 
 fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
     let take = &snapshot.main;
-    let film = &take.film;
-    let pixels = film.pixels().len().max(1) as f64;
-    let mean = film.total_samples() as f64 / pixels;
-    let samples = if mean < 10.0 { format!("{mean:.1}") } else { theme::count(mean as u64) };
+    let [width, height] = size(snapshot);
+    let mean = take.figures.samples as f64 / (f64::from(width) * f64::from(height));
+    let samples = match mean {
+        ..1.0 => format!("{mean:.2}"),
+        ..10.0 => format!("{mean:.1}"),
+        _ => theme::count(mean as u64),
+    };
     number(ui, &samples, "samples", "Mean samples per pixel");
     if !hides_clock {
         let seconds = take.figures.elapsed_seconds();
@@ -108,7 +111,7 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
             "Estimated relative RMS error of the pixels, from the samples' own spread",
         );
     }
-    let invalid = film.invalid_samples();
+    let invalid = take.film.invalid_samples();
     if invalid > 0 {
         let text = RichText::new(format!("{} not finite", theme::count(invalid)));
         ui.label(text.color(theme::ALERT)).on_hover_text(
@@ -125,6 +128,17 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
     );
 }
 
+/// What the film holds under the pointer.
+fn pixel(ui: &mut Ui, snapshot: &Snapshot, place: glam::Vec2) {
+    let film = &snapshot.main.film;
+    let index = |share: f32, count: u32| ((share * count as f32) as u32).min(count.max(1) - 1);
+    let (x, y) = (index(place.x, film.width), index(place.y, film.height));
+    let Some(pixel) = film.pixels().get((y * film.width + x) as usize) else { return };
+    let [r, g, b] = pixel.mean();
+    let text = format!("{x}, {y}:  {r:.3}  {g:.3}  {b:.3}  ·  {} samples", pixel.samples());
+    ui.label(theme::quiet(text)).on_hover_text("Linear radiance of the pixel, unfiltered");
+}
+
 fn number(ui: &mut Ui, value: &str, unit: &str, hint: &str) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
@@ -135,8 +149,17 @@ fn number(ui: &mut Ui, value: &str, unit: &str, hint: &str) {
     .on_hover_text(hint);
 }
 
-fn device(ui: &mut Ui, snapshot: &Snapshot, threads: usize) {
+/// Pixels across and down of the picture being made.
+fn size(snapshot: &Snapshot) -> [u32; 2] {
     let film = &snapshot.main.film;
+    match snapshot.activity {
+        Activity::Moving => [film.width, film.height],
+        _ => [snapshot.request.view.width, snapshot.request.view.height],
+    }
+}
+
+fn device(ui: &mut Ui, snapshot: &Snapshot, threads: usize) {
+    let [width, height] = size(snapshot);
     let (name, hint) = match &snapshot.main.gpu {
         Some(gpu) => {
             let adapter = &gpu.adapter;
@@ -157,6 +180,5 @@ fn device(ui: &mut Ui, snapshot: &Snapshot, threads: usize) {
             )
         }
     };
-    ui.label(theme::quiet(format!("{} x {}  ·  {name}", film.width, film.height)))
-        .on_hover_text(hint);
+    ui.label(theme::quiet(format!("{width} x {height}  ·  {name}"))).on_hover_text(hint);
 }

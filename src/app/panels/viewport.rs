@@ -1,22 +1,20 @@
-//! The picture, and moving about in it.
+//! The picture.
 
 use egui::{
-    Align2, CentralPanel, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Response,
-    Sense, Shape, Stroke, StrokeKind, TextureId, Ui, Vec2,
+    Align2, CentralPanel, Color32, CursorIcon, FontId, Pos2, Rect, Sense, Shape, Stroke,
+    StrokeKind, TextureId, Ui, Vec2,
 };
-use glam::Vec3;
 
+use super::gestures;
 use crate::app::commands::Command;
-use crate::app::document::{Document, Viewpoint};
+use crate::app::document::Document;
 use crate::app::interface::{Interface, Tab};
 use crate::app::loader::LoadedScene;
 use crate::app::presenter::Shown;
 use crate::app::screen::{Developed, Recipe, Screen};
 use crate::app::speed_up::SpeedUp;
-use crate::app::surface_map::look_at_place;
 use crate::app::theme;
 use crate::app::worker::{Activity, Snapshot};
-use crate::bvh::Ray;
 use crate::develop::{DevelopSettings, LinearPicture};
 use crate::render::View;
 
@@ -61,10 +59,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
     let frame = egui::Frame::new().fill(theme::BACKGROUND);
     CentralPanel::default().frame(frame).show(ui, |ui| {
         let area = ui.max_rect();
-        let points = ui.ctx().pixels_per_point();
-        let pixels = (area.size() * points).round();
-        scope.interface.viewport_pixels =
-            Some([pixels.x.max(1.0) as u32, pixels.y.max(1.0) as u32]);
+        measure(ui, area, scope);
         let response = ui.interact(area, ui.scope_id().with("picture"), Sense::click_and_drag());
         let Some((shown, settings)) = scope.shown.zip(scope.settings) else {
             waiting(ui, area, scope.loading);
@@ -75,26 +70,29 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
         let rect = part_rect(whole, &shown.order.snapshot.request.view);
         picture(ui, (whole, rect), shown, settings, scope);
         labels(ui, rect, shown);
-        let mut is_wiping = false;
+        let mut handle = Rect::NOTHING;
         if let Some(other) = &shown.other {
-            let recipe = Recipe {
-                picture: other.clone(),
-                overlay: None,
-                settings,
-                number: shown.order.snapshot.number,
-            };
+            let recipe = Recipe::new(other, None, settings, shown.order.snapshot.number);
             let changes = changes(ui, other, scope);
             let texture =
                 Developed::update(&mut scope.textures.other, scope.screen, recipe, changes);
-            is_wiping = wipe(ui, rect, texture, scope);
+            handle = wipe(ui, rect, texture, scope);
         }
-        if scope.interface.is_marking {
-            mark_region(ui, whole, &response, scope);
-        } else if !is_wiping {
-            gestures(ui, (whole, rect), &response, scope);
-        }
+        gestures::show(ui, (whole, rect), &response, handle, scope);
         pin(ui, rect, scope.interface);
     });
+}
+
+/// Notes how large a picture may be. A panel that opens leaves it as it is: it would begin anew, and
+/// what one wants to look at would be gone.
+fn measure(ui: &Ui, area: Rect, scope: &mut Scope<'_>) {
+    let points = ui.ctx().pixels_per_point();
+    let pixels = |size: Vec2| [size.x, size.y].map(|side| (side * points).round().max(1.0) as u32);
+    let window = Some((pixels(ui.ctx().content_rect().size()), scope.interface.panels));
+    if scope.interface.viewport_of != window || scope.shown.is_none() {
+        scope.interface.viewport_of = window;
+        scope.interface.viewport_pixels = Some(pixels(area.size()));
+    }
 }
 
 /// The picture as large as fits, in its own shape.
@@ -125,12 +123,8 @@ fn picture(
 ) {
     let full = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
     let painter = ui.painter();
-    let recipe = Recipe {
-        picture: shown.picture.clone(),
-        overlay: shown.overlay.clone(),
-        settings,
-        number: shown.order.snapshot.number,
-    };
+    let number = shown.order.snapshot.number;
+    let recipe = Recipe::new(&shown.picture, shown.overlay.as_ref(), settings, number);
     let changes = changes(ui, &shown.picture, scope);
     if shown.order.snapshot.request.view.crop.is_none() {
         let texture = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);
@@ -169,25 +163,6 @@ fn labels(ui: &Ui, rect: Rect, shown: &Shown) {
     }
 }
 
-/// Lets a drag mark the part that is to be rendered.
-fn mark_region(ui: &Ui, whole: Rect, response: &Response, scope: &mut Scope<'_>) {
-    ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
-    let hint = "Drag over the part that is to be rendered";
-    let top = Pos2::new(whole.center().x, whole.top() + 14.0);
-    badge(ui, top, Align2::CENTER_TOP, hint, theme::ACCENT);
-    let start = ui.ctx().input(|i| i.pointer.press_origin());
-    let (Some(start), Some(now)) = (start, response.interact_pointer_pos()) else { return };
-    let marked = Rect::from_two_pos(start, now).intersect(whole);
-    ui.painter().rect_stroke(marked, 0.0, Stroke::new(1.5, theme::ACCENT), StrokeKind::Inside);
-    if response.drag_stopped() {
-        scope.interface.is_marking = false;
-        if marked.width() >= 4.0 && marked.height() >= 4.0 {
-            let (low, high) = (place_of(whole, marked.min), place_of(whole, marked.max));
-            scope.document.region = Some([low.x, low.y, high.x, high.y]);
-        }
-    }
-}
-
 fn waiting(ui: &Ui, area: Rect, is_loading: bool) {
     let text = if is_loading { "Loading…" } else { "The first samples are on their way…" };
     ui.painter().text(
@@ -199,8 +174,8 @@ fn waiting(ui: &Ui, area: Rect, is_loading: bool) {
     );
 }
 
-/// The other picture left of a line that can be dragged; whether it is being dragged.
-fn wipe(ui: &Ui, rect: Rect, texture: TextureId, scope: &mut Scope<'_>) -> bool {
+/// The other picture left of a line that can be dragged; where that can be taken hold of.
+fn wipe(ui: &Ui, rect: Rect, texture: TextureId, scope: &mut Scope<'_>) -> Rect {
     let x = rect.left() + rect.width() * scope.interface.wipe;
     let left = Rect::from_min_max(rect.min, Pos2::new(x, rect.bottom()));
     let uv = Rect::from_min_max(Pos2::ZERO, Pos2::new(scope.interface.wipe, 1.0));
@@ -220,7 +195,7 @@ fn wipe(ui: &Ui, rect: Rect, texture: TextureId, scope: &mut Scope<'_>) -> bool 
     ui.painter().line_segment(line, Stroke::new(1.5, color));
     ui.painter().circle_filled(Pos2::new(x, rect.center().y), 6.0, color);
     wipe_labels(ui, rect, scope);
-    response.dragged()
+    handle
 }
 
 fn wipe_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
@@ -245,9 +220,10 @@ fn wipe_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
     corner(rect.right() - 14.0, Align2::RIGHT_TOP, &right);
     if let Some(speed_up) = scope.speed_up.filter(|_| scope.past.is_none()) {
         let text = format!(
-            "{:.1} × as fast, ± {:.0} %",
+            "{:.2} × as fast ({:.2} to {:.2})",
             speed_up.ratio,
-            (100.0 * speed_up.relative_error).max(1.0)
+            speed_up.ratio / speed_up.factor,
+            speed_up.ratio * speed_up.factor
         );
         let at = Pos2::new(rect.center().x, rect.top() + 14.0);
         badge(ui, at, Align2::CENTER_TOP, &text, theme::ACCENT);
@@ -255,123 +231,12 @@ fn wipe_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
 }
 
 /// Text on a dark plate.
-fn badge(ui: &Ui, at: Pos2, align: Align2, text: &str, color: Color32) {
+pub(super) fn badge(ui: &Ui, at: Pos2, align: Align2, text: &str, color: Color32) {
     let galley = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(13.0), color);
     let rect = align.anchor_size(at, galley.size());
     let plate = rect.expand2(Vec2::new(8.0, 4.0));
     ui.painter().add(Shape::rect_filled(plate, 5.0, Color32::from_black_alpha(170)));
     ui.painter().galley(rect.min, galley, color);
-}
-
-fn place_of(rect: Rect, at: Pos2) -> glam::Vec2 {
-    let place = (at - rect.min) / rect.size();
-    glam::Vec2::new(place.x, place.y)
-}
-
-fn gestures(ui: &Ui, (whole, rect): (Rect, Rect), response: &Response, scope: &mut Scope<'_>) {
-    let context = ui.ctx();
-    scope.interface.pointed =
-        response.hover_pos().filter(|at| rect.contains(*at)).map(|at| place_of(rect, at));
-    let modifiers = context.input(|i| i.modifiers);
-    if response.double_clicked() {
-        pick(rect, response, scope, Viewpoint::set_pivot);
-    } else if response.clicked() && modifiers.command {
-        pick(rect, response, scope, Viewpoint::focus_on);
-    } else if response.clicked() {
-        let place = response.interact_pointer_pos().map(|at| place_of(rect, at));
-        let is_inspecting = scope.interface.tab == Tab::Inspect;
-        scope.interface.pinned = place.filter(|_| is_inspecting);
-    }
-    let Some(viewpoint) = &mut scope.document.viewpoint else { return };
-    let mut moved = false;
-    let delta = response.drag_delta();
-    let drag = glam::Vec2::new(delta.x, delta.y);
-    // Holding still counts too: letting go ends it.
-    moved |= response.dragged();
-    if drag != glam::Vec2::ZERO {
-        let by = |button| response.dragged_by(button);
-        if by(PointerButton::Secondary) {
-            viewpoint.look_around(-drag);
-        } else if by(PointerButton::Middle) || modifiers.shift {
-            viewpoint.pan(drag, whole.height());
-        } else {
-            orbit(viewpoint, drag, scope.scene);
-        }
-    }
-    if response.hovered() {
-        let wheel = context.input(|i| i.smooth_scroll_delta().y);
-        if wheel != 0.0 {
-            moved = true;
-            viewpoint.dolly(wheel / 50.0);
-        }
-    }
-    if !context.text_edit_focused() && !scope.interface.is_modal() {
-        let speed = scope.scene.map_or(1.0, |scene| flying_speed(&scene.world));
-        if let Some(metres) = flight(context, speed) {
-            moved = true;
-            viewpoint.fly(metres);
-            context.request_repaint();
-        }
-    }
-    if moved {
-        scope.interface.keep_moving(context.time(), context.input(|i| i.unstable_dt));
-    }
-}
-
-/// Orbits, unless a wall is in the way: then the camera turns where it is, and stays in its room.
-fn orbit(viewpoint: &mut Viewpoint, drag: glam::Vec2, scene: Option<&LoadedScene>) {
-    let mut moved = viewpoint.clone();
-    moved.orbit(drag);
-    let step = moved.eye() - viewpoint.eye();
-    let is_blocked = scene.is_some_and(|scene| {
-        // Some room to the wall is kept.
-        let margin = 0.1 * step.length() + 0.02 * viewpoint.pivot_distance;
-        let direction = step.normalize_or_zero();
-        let ray =
-            Ray { origin: viewpoint.eye(), direction, t_min: 0.0, t_max: step.length() + margin };
-        direction != Vec3::ZERO && scene.world.bvh.any_hit(&ray, |_| true)
-    });
-    if is_blocked {
-        viewpoint.look_around(drag);
-    } else {
-        *viewpoint = moved;
-    }
-}
-
-/// Does something with the surface under a click.
-fn pick(rect: Rect, response: &Response, scope: &mut Scope<'_>, act: fn(&mut Viewpoint, Vec3)) {
-    let (Some(at), Some(snapshot)) = (response.interact_pointer_pos(), scope.snapshot) else {
-        return;
-    };
-    let request = &snapshot.request;
-    let spot = look_at_place(&request.world, &request.view, place_of(rect, at));
-    if let (Some(spot), Some(viewpoint)) = (spot, &mut scope.document.viewpoint) {
-        let mut moved = viewpoint.clone();
-        act(&mut moved, spot.position);
-        scope.commands.push(Command::LookFrom(moved));
-    }
-}
-
-/// Metres per second that suit the scene: a walk in a room, faster outdoors.
-fn flying_speed(world: &crate::path::World) -> f32 {
-    let (low, high) = world.bvh.bounds();
-    (0.25 * (high - low).length()).clamp(0.05, 50.0)
-}
-
-/// Metres along right, up and forward that the keys held down ask for.
-fn flight(context: &egui::Context, speed: f32) -> Option<Vec3> {
-    context.input(|input| {
-        if input.modifiers.command || input.modifiers.alt {
-            return None;
-        }
-        let axis = |plus: Key, minus: Key| {
-            f32::from(input.key_down(plus)) - f32::from(input.key_down(minus))
-        };
-        let direction = Vec3::new(axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S));
-        let faster = if input.modifiers.shift { 4.0 } else { 1.0 };
-        let seconds = input.stable_dt.min(0.1);
-        (direction != Vec3::ZERO).then(|| direction.normalize() * speed * faster * seconds)
-    })
 }
 
 /// A ring where the inspector stays.

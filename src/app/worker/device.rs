@@ -44,6 +44,12 @@ impl Device {
         self.choice != Some(request.device) || (self.gpu.is_some() && !is_staged)
     }
 
+    /// Whether a GPU is ready that has all first samples in a moment; software has not.
+    pub(super) fn is_quick(&self, request: &Request) -> bool {
+        let is_real = self.gpu.as_ref().is_some_and(|gpu| !gpu.facts().is_software());
+        is_real && !self.needs_preparation(request)
+    }
+
     /// Lets the session run where the request says; what it has so far is kept.
     pub(super) fn place(&mut self, session: &mut Session<'_>, request: &Request) {
         if self.choice != Some(request.device) {

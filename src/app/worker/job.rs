@@ -7,10 +7,8 @@ use std::time::{Duration, Instant};
 use super::device::Device;
 use super::{Activity, Point, Request, Shared, Snapshot, Take, lock};
 use crate::alarm::Alarm;
-use crate::denoise;
 use crate::environment::Environment;
 use crate::error::Result;
-use crate::image::Image;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::metrics;
 use crate::path::World;
@@ -24,19 +22,14 @@ const SLICE: Duration = Duration::from_millis(120);
 const MOVING_SECONDS: f64 = 0.07;
 /// What a camera path takes, until it has been measured.
 const LIKELY_SECONDS_PER_PATH: f64 = 1e-5;
-/// The first pass of a preview for which nothing was learned before should take about this long: many
-/// samples of a small picture, filtered, show more than one sample of a large one.
-const PREVIEW_SECONDS: f64 = 0.4;
-/// By what a preview's sides are divided at most.
-const PREVIEW_SHRINK: u32 = 4;
-/// Samples and seconds that the very first small picture may take.
-const GLANCE: (u32, Duration) = (4, Duration::from_millis(300));
-/// Pixels across of the picture that is kept for the next one's first moments.
-const UNDER_WIDTH: u32 = 640;
+/// A film begins with every so-manyth pixel of every so-manyth row.
+const BEGINNINGS: [u32; 3] = [8, 4, 2];
 /// A film that is shown in place is read back this seldom.
 const READING_GAP: Duration = Duration::from_millis(250);
 /// Publishing may take at most about one part in this of the time.
-const PUBLISH_SHARE: u32 = 20;
+const PUBLISH_SHARE: u32 = 40;
+/// But a picture that changes is shown at least so often.
+const LONGEST_GAP: Duration = Duration::from_millis(800);
 
 /// What one job leaves for the next.
 pub(super) struct Legacy {
@@ -50,8 +43,8 @@ pub(super) struct Legacy {
     /// Seconds one camera path takes, all threads together.
     seconds_per_path: Option<f64>,
     snapshots: u64,
-    /// The last picture, small, and what it was rendered for.
-    under: Option<(Arc<Request>, Arc<Image>)>,
+    /// A film of what was seen last, and what it was rendered for.
+    under: Option<(Arc<Request>, Arc<Film>)>,
 }
 
 impl Legacy {
@@ -108,7 +101,9 @@ pub(super) struct Job<'a> {
     legacy: &'a mut Legacy,
     request: Arc<Request>,
     counters: Option<Arc<LearningGrid>>,
+    /// When what was published last, and when there may be something new.
     published: Instant,
+    last: Option<(Activity, u64)>,
     publish_gap: Duration,
     /// Films that the window shows in place, as they were read last; they go with the request.
     readings: Vec<Reading>,
@@ -132,6 +127,7 @@ impl<'a> Job<'a> {
             request,
             counters: None,
             published: Instant::now(),
+            last: None,
             publish_gap: Duration::ZERO,
             readings: Vec::new(),
             laws: None,
@@ -151,7 +147,7 @@ impl<'a> Job<'a> {
 
     /// Small pictures for as long as the camera rests at this very place.
     pub(super) fn follow(&mut self, world: &World, environment: &Environment) {
-        let mut session = self.small_session(world, environment, MOVING_SECONDS, 16);
+        let mut session = self.small_session(world, environment);
         while !self.is_superseded() {
             // The first pass is never cut short: some picture is better than none.
             let cut = session.samples() > 0;
@@ -161,24 +157,17 @@ impl<'a> Job<'a> {
             }
             self.measure(&session);
             self.keep_under(&session);
-            self.publish(Activity::Moving, &session, None, None);
+            self.publish(Activity::Moving, &session, None);
             if session.samples() >= 64 {
                 self.rest();
             }
         }
     }
 
-    /// A session for a picture so small that a pass takes `seconds`, with what was learned before;
-    /// its sides are divided by `most` at most.
-    fn small_session<'b>(
-        &mut self,
-        world: &'b World,
-        environment: &'b Environment,
-        seconds: f64,
-        most: u32,
-    ) -> Session<'b> {
+    /// A session for a picture so small that a pass takes a moment, with what was learned before.
+    fn small_session<'b>(&mut self, world: &'b World, environment: &'b Environment) -> Session<'b> {
         let mut view = self.request.view.clone();
-        let shrink = self.shrink(&view, seconds, most);
+        let shrink = self.shrink(&view);
         view.width = (view.width / shrink).max(1);
         view.height = (view.height / shrink).max(1);
         if let Some(crop) = &mut view.crop {
@@ -204,78 +193,49 @@ impl<'a> Job<'a> {
         session
     }
 
-    /// A small picture to begin with, unless one of this view is shown.
-    fn glance(&mut self, world: &World, environment: &Environment) {
-        if self.under().is_some() || !self.request.previews {
-            return;
-        }
-        let start = Instant::now();
-        let mut session = self.small_session(world, environment, MOVING_SECONDS, 16);
-        while session.samples() < GLANCE.0 && start.elapsed() < GLANCE.1 {
-            self.advance(&mut session, None, false);
-            if session.samples() == 0 || self.is_superseded() {
-                return;
-            }
-            self.measure(&session);
-            self.keep_under(&session);
-            self.publish(Activity::Moving, &session, None, None);
-        }
-    }
-
-    /// What was shown of this view before, if there is anything.
-    fn under(&self) -> Option<Arc<Image>> {
-        let (request, image) = self.legacy.under.as_ref()?;
+    /// A film of this view from before, if there is one.
+    fn under(&self) -> Option<Arc<Film>> {
+        let (request, film) = self.legacy.under.as_ref()?;
         let aspect = |view: &View| f64::from(view.width) / f64::from(view.height);
         let is_as_wide = 1.02 * aspect(&request.view) >= aspect(&self.request.view);
-        (is_as_wide && request.looks_like(&self.request)).then(|| Arc::clone(image))
+        (is_as_wide && request.looks_like(&self.request)).then(|| Arc::clone(film))
     }
 
-    /// Keeps the picture for the next one's first moments.
+    /// Keeps the film for the next one's first moments, unless there is a better one of the same view.
     fn keep_under(&mut self, session: &Session<'_>) {
+        let known = self.under().map_or(0, |film| film.total_samples());
         let film = session.film();
-        let is_small = film.width < self.request.view.width;
-        let image =
-            if is_small { denoise::preview(film) } else { film.image().shrunk(UNDER_WIDTH) };
-        self.legacy.under = Some((Arc::clone(&self.request), Arc::new(image)));
+        if film.min_samples() > 0 && film.total_samples() > known {
+            self.legacy.under = Some((Arc::clone(&self.request), Arc::new(film.clone())));
+        }
     }
 
-    /// By what the picture's sides are divided for a pass to take `seconds`.
-    fn shrink(&self, view: &View, seconds: f64, most: u32) -> u32 {
+    /// By what a moving picture's sides are divided.
+    fn shrink(&self, view: &View) -> u32 {
         let pixels = f64::from(view.width) * f64::from(view.height);
         let seconds_per_path = self.legacy.seconds_per_path.unwrap_or(LIKELY_SECONDS_PER_PATH);
-        let shrink = (pixels * seconds_per_path / seconds).sqrt().ceil();
-        (shrink as u32).clamp(1, most)
+        let shrink = (pixels * seconds_per_path / MOVING_SECONDS).sqrt().ceil();
+        (shrink as u32).clamp(1, 16)
     }
 
-    /// The full picture: learning first, with a preview meanwhile, then samples until a rule is met.
+    /// The full picture: learning first, then samples until a rule is met.
     pub(super) fn render(&mut self, world: &World, environment: &Environment) {
-        self.glance(world, environment);
+        let view = self.request.view.clone();
         let keeps_laws = self.request.is_frozen && self.legacy.laws_for(&self.request).is_some();
         let mut main = if keeps_laws {
-            self.experienced_session(world, environment, self.request.view.clone())
+            self.experienced_session(world, environment, view.clone())
         } else {
-            Session::new(world, environment, self.request.view.clone())
+            Session::new(world, environment, view.clone())
         };
-        let mut plain = self.request.split.then(|| {
-            let view = View { sampling: Sampling::Plain, ..self.request.view.clone() };
-            Session::new(world, environment, view)
-        });
-        let is_experienced = self.legacy.laws_for(&self.request).is_some();
-        let mut preview = None;
-        if self.request.previews && main.phase() == Phase::Learning {
-            let view = self.request.view.clone();
-            preview = Some(if is_experienced {
-                self.experienced_session(world, environment, view)
-            } else {
-                self.small_session(world, environment, PREVIEW_SECONDS, PREVIEW_SHRINK)
-            });
-        }
+        let mut plain = self
+            .request
+            .split
+            .then(|| Session::new(world, environment, View { sampling: Sampling::Plain, ..view }));
         while let Some(activity) = self.next_activity(&main) {
             if !self.request.split {
                 plain = None;
                 self.curves[1].clear();
             }
-            self.place(&mut main);
             match activity {
                 Activity::Paused | Activity::Done => {
                     if activity == Activity::Done {
@@ -285,51 +245,40 @@ impl<'a> Job<'a> {
                         if has_failed {
                             continue;
                         }
-                        // It may have more samples than were asked for, but fewer pixels.
-                        preview = None;
                     }
-                    self.publish(activity, &main, plain.as_ref(), preview.as_ref());
+                    self.publish(activity, &main, plain.as_ref());
                     self.rest();
                     continue;
                 }
-                Activity::Learning(_) => {
-                    self.learn(&mut main, preview.as_mut());
-                    // Where nothing was learned before, even a little helps.
-                    if let (Some(preview), Some(laws)) = (&mut preview, main.grid())
-                        && !is_experienced
-                    {
-                        let given = preview.set_grid(laws.clone());
-                        self.go_on(preview, given);
-                    }
-                }
-                Activity::Rendering | Activity::Moving => {
+                // A picture first.
+                Activity::Learning(_) if self.beginning(&main).is_some() => {
+                    self.advance(&mut main, None, true);
                     self.measure(&main);
-                    match &mut plain {
-                        // Equal time, learning included.
-                        Some(plain) if plain.elapsed_seconds() < main.elapsed_seconds() => {
-                            self.advance(plain, None, true);
-                        }
-                        _ => {
-                            let law_paths = main.figures().law_paths;
-                            self.advance(&mut main, Some(self.request.rule), self.request.previews);
-                            if main.figures().law_paths > law_paths {
-                                self.keep_laws(&main, true);
-                            }
+                }
+                Activity::Learning(_) => self.learn(&mut main),
+                Activity::Rendering | Activity::Moving => match &mut plain {
+                    // Equal time, learning included.
+                    Some(plain) if plain.elapsed_seconds() < main.elapsed_seconds() => {
+                        self.advance(plain, None, true);
+                    }
+                    _ => {
+                        let law_paths = main.figures().law_paths;
+                        self.advance(&mut main, Some(self.request.rule), self.request.previews);
+                        self.measure(&main);
+                        if main.figures().law_paths > law_paths {
+                            self.keep_laws(&main, true);
                         }
                     }
-                }
-            }
-            if let Some(session) = &preview
-                && main.samples() >= session.samples().min(4)
-                && main.phase() == Phase::Rendering
-                && main.samples() > 0
-            {
-                preview = None;
+                },
             }
             let due = self.published.elapsed() >= self.publish_gap;
             let is_reading_due = due && self.is_reading_due(&main);
             if due && self.request.previews && !self.is_superseded() {
-                self.publish(activity, &main, plain.as_ref(), preview.as_ref());
+                let progress = progress(&main) + plain.as_ref().map_or(0, progress);
+                if self.last != Some((activity, progress)) {
+                    self.publish(activity, &main, plain.as_ref());
+                    self.last = Some((activity, progress));
+                }
             }
             // After publishing, which has read the film.
             if is_reading_due || !self.request.previews {
@@ -337,15 +286,8 @@ impl<'a> Job<'a> {
                 plain.iter().for_each(|plain| self.note(1, plain));
             }
         }
-        // One sample a pixel is no better than what there was before, unless it can be filtered.
-        let is_better = |session: &&Session<'_>| {
-            let film = session.film();
-            let least = if film.width < self.request.view.width { 1 } else { GLANCE.0 };
-            film.min_samples() >= least
-        };
-        let best = [Some(&main), preview.as_ref()].into_iter().flatten().find(is_better);
-        if let Some(session) = best.filter(|_| self.request.previews) {
-            self.keep_under(session);
+        if self.request.previews {
+            self.keep_under(&main);
         }
     }
 
@@ -375,29 +317,9 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// One learning pass, then the preview for as long.
-    fn learn(&mut self, main: &mut Session<'_>, preview: Option<&mut Session<'_>>) {
-        if let Some(preview) = preview {
-            // A picture first.
-            let start = Instant::now();
-            let owed = main.figures().learning_seconds - preview.figures().render_seconds;
-            while !self.is_superseded()
-                && (preview.samples() == 0 || start.elapsed().as_secs_f64() < owed.min(1.0))
-            {
-                self.advance(preview, None, true);
-                self.measure(preview);
-                if preview.figures().samples > 0
-                    && self.published.elapsed() >= self.publish_gap
-                    && !self.is_superseded()
-                {
-                    let activity = Activity::Learning(learned_share(main));
-                    self.publish(activity, main, None, Some(preview));
-                }
-            }
-        }
-        if self.is_superseded() {
-            return;
-        }
+    /// One learning pass.
+    fn learn(&mut self, main: &mut Session<'_>) {
+        self.place(main);
         let learned = main.advance(1, &self.shared.cancel);
         self.go_on(main, learned);
         let is_done = main.phase() == Phase::Rendering;
@@ -439,8 +361,16 @@ impl<'a> Job<'a> {
     fn advance(&mut self, session: &mut Session<'_>, rule: Option<StopRule>, cut: bool) {
         self.place(session);
         self.alarm.set(cut.then(|| Instant::now() + SLICE));
-        let samples = session.next_pass(&rule.unwrap_or_default());
-        let advanced = session.advance(samples, &self.shared.cancel);
+        let advanced = match self.beginning(session) {
+            Some(every) => {
+                session.begin(every, &self.shared.cancel);
+                Ok(())
+            }
+            None => {
+                let samples = session.next_pass(&rule.unwrap_or_default());
+                session.advance(samples, &self.shared.cancel)
+            }
+        };
         self.alarm.set(None);
         self.go_on(session, advanced);
         let slot = lock(&self.shared.slot);
@@ -449,8 +379,35 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// How far apart the pixels are that the film is to begin with now; `None` once it has begun, and
+    /// for moving pictures, which are small.
+    fn beginning(&self, session: &Session<'_>) -> Option<u32> {
+        if !self.request.previews
+            || self.request.moving
+            || session.samples() > 0
+            || session.is_on_gpu()
+        {
+            return None;
+        }
+        let (view, samples) = (session.view(), session.figures().samples);
+        let pixels =
+            |every| u64::from(view.width.div_ceil(every)) * u64::from(view.height.div_ceil(every));
+        let is_learning = session.phase() == Phase::Learning;
+        let stages = &BEGINNINGS[..if is_learning { 1 } else { BEGINNINGS.len() }];
+        stages.iter().copied().find(|every| samples < pixels(*every))
+    }
+
     /// Lets the session run on the device that is asked for now.
     fn place(&mut self, session: &mut Session<'_>) {
+        // A GPU that is not ready, or is none, comes when there is something to be seen.
+        let is_fresh = session.samples() == 0 && !session.is_on_gpu();
+        let is_learning = session.phase() == Phase::Learning;
+        let begins =
+            self.request.moving || is_fresh && (is_learning || self.beginning(session).is_some());
+        if begins && self.request.previews && !self.legacy.device.is_quick(&self.request) {
+            session.continue_on_cpu();
+            return;
+        }
         let is_long = self.legacy.device.needs_preparation(&self.request);
         if is_long {
             self.shared.is_preparing.store(true, Ordering::Relaxed);
@@ -499,18 +456,11 @@ impl<'a> Job<'a> {
         }
     }
 
-    fn publish(
-        &mut self,
-        activity: Activity,
-        main: &Session<'_>,
-        plain: Option<&Session<'_>>,
-        preview: Option<&Session<'_>>,
-    ) {
+    fn publish(&mut self, activity: Activity, main: &Session<'_>, plain: Option<&Session<'_>>) {
         let start = Instant::now();
         self.legacy.snapshots += 1;
-        let shown = preview.unwrap_or(main);
         let is_final = matches!(activity, Activity::Paused | Activity::Done);
-        let (main_take, main_cost) = self.take(shown, is_final);
+        let (main_take, main_cost) = self.take(main, is_final);
         let plain_take = plain.map(|session| self.take(session, is_final));
         let reading = main_cost + plain_take.as_ref().map_or(Duration::ZERO, |(_, cost)| *cost);
         let snapshot = Snapshot {
@@ -519,9 +469,7 @@ impl<'a> Job<'a> {
             activity,
             main: main_take,
             plain: plain_take.map(|(take, _)| take),
-            is_preview: preview.is_some(),
             counters: self.counters.clone(),
-            learning: main.figures(),
             under: self.under(),
             curves: self.curves.clone(),
         };
@@ -562,7 +510,7 @@ impl<'a> Job<'a> {
             }
             None => {
                 let start = Instant::now();
-                let film = Arc::new(session.film().clone());
+                let film = self.film_of(session);
                 let (noise, figures) = (session.noise(), session.figures());
                 let cost = in_place.as_ref().map_or(Duration::ZERO, |_| start.elapsed());
                 if let Some(of) = in_place {
@@ -575,6 +523,7 @@ impl<'a> Job<'a> {
             }
         };
         let take = Take {
+            samples: session.samples(),
             sampling: session.view().sampling,
             noise,
             film,
@@ -584,6 +533,12 @@ impl<'a> Job<'a> {
             grid: self.laws_of(session),
         };
         (take, cost)
+    }
+
+    /// The session's film; before the first sample, one of the same view from before.
+    fn film_of(&self, session: &Session<'_>) -> Arc<Film> {
+        let before = if session.figures().samples == 0 { self.under() } else { None };
+        before.unwrap_or_else(|| Arc::new(session.film().clone()))
     }
 
     /// The session's film if the window shows it in every frame without its being read. Small ones are
@@ -613,10 +568,16 @@ fn is_same((gpu, film): &(Gpu, DeviceFilm), other: &(Gpu, DeviceFilm)) -> bool {
 
 /// Time until something that took `cost` may be done again.
 fn gap_after(cost: Duration) -> Duration {
-    (cost * PUBLISH_SHARE).clamp(SLICE, Duration::from_secs(3))
+    (cost * PUBLISH_SHARE).clamp(SLICE, LONGEST_GAP)
 }
 
 fn learned_share(session: &Session<'_>) -> f32 {
     let (done, all) = (session.figures().learning_paths, session.view().learning_paths);
     done as f32 / all.max(1) as f32
+}
+
+/// Grows with whatever a session does.
+fn progress(session: &Session<'_>) -> u64 {
+    let figures = session.figures();
+    figures.learning_paths + figures.samples
 }

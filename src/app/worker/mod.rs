@@ -1,9 +1,9 @@
 //! The render thread: takes the latest request, publishes the latest picture.
 //!
 //! The only place that runs a [`crate::render::Session`]. A request that differs in what is seen starts anew; one
-//! that differs in when to stop or whether to pause is taken on the way. While learning for a new
-//! view, a second session renders with what was learned for the view before, around its centre, so
-//! that there is a picture at once.
+//! that differs in when to stop or whether to pause is taken on the way. A film begins with every eighth
+//! pixel of every eighth row, then every fourth and second, so that there is a picture of the whole
+//! view at once and no sample is lost.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -73,6 +73,8 @@ impl Request {
             && Arc::ptr_eq(&self.environment, &new.environment)
             && (&a.camera, a.crop, a.medium) == (&b.camera, b.crop, b.medium)
             && (a.background, a.limits) == (b.background, b.limits)
+            // Whoever asks for other samples wants to see those.
+            && (a.sampling, a.seed, self.run) == (b.sampling, b.seed, new.run)
     }
 
     fn is_same(&self, new: &Self) -> bool {
@@ -130,6 +132,8 @@ pub struct Take {
     /// The sums. Where the window shows those on its own device in every frame, they are as they were
     /// read last: at most a few seconds ago, and the last ones when nothing is rendered.
     pub film: Arc<Film>,
+    /// Fewest samples of any of its pixels.
+    pub samples: u32,
     /// What was done for them.
     pub figures: Figures,
     /// [`Film::noise`].
@@ -155,22 +159,24 @@ pub struct Snapshot {
     pub main: Take,
     /// The plain picture of a split view.
     pub plain: Option<Take>,
-    /// Whether `main` only bridges the time until learning is done.
-    pub is_preview: bool,
     /// What learning counted, once it has ended.
     pub counters: Option<Arc<LearningGrid>>,
-    /// Figures of the session that learns, while `main` is a preview.
-    pub learning: Figures,
     /// How the error of `main` and of `plain` fell.
     pub curves: [Vec<Point>; 2],
-    /// An earlier picture of the same view, for pixels that have no samples yet.
-    pub under: Option<Arc<Image>>,
+    /// An earlier film of the same view; its samples help where `main` has few.
+    pub under: Option<Arc<Film>>,
 }
 
 impl Snapshot {
-    /// Whether the picture is smaller than asked for, as it is at first and while the camera moves.
-    pub fn is_small(&self) -> bool {
-        self.main.film.width < self.request.view.width
+    /// Whether the picture has its full size and every pixel a sample: it has not at first and while
+    /// the camera moves.
+    pub fn is_whole(&self) -> bool {
+        self.main.samples > 0 && self.main.film.width == self.request.view.width
+    }
+
+    /// Whether there is anything to be seen.
+    pub fn has_picture(&self) -> bool {
+        self.main.figures.samples > 0 || self.under.is_some()
     }
 }
 

@@ -1,0 +1,179 @@
+//! Moving about in the picture, and marking a part of it.
+
+use egui::{
+    Align2, CursorIcon, Key, Modifiers, PointerButton, Pos2, Rect, Response, Stroke, StrokeKind, Ui,
+};
+use glam::Vec3;
+
+use super::viewport::{Scope, badge};
+use crate::app::commands::Command;
+use crate::app::document::Viewpoint;
+use crate::app::drag::{Drag, Step};
+use crate::app::interface::Tab;
+use crate::app::loader::LoadedScene;
+use crate::app::surface_map::look_at_place;
+use crate::app::theme;
+use crate::bvh::Ray;
+
+/// Takes gestures in the picture: `whole` is all of it, `rect` the part that is rendered, and what
+/// begins on `handle` is not meant for it.
+pub(super) fn show(
+    ui: &Ui,
+    (whole, rect): (Rect, Rect),
+    response: &Response,
+    handle: Rect,
+    scope: &mut Scope<'_>,
+) {
+    let layer = ui.layer_id();
+    let is_free = !scope.interface.is_modal();
+    let accepts = |at: Pos2| {
+        is_free
+            && response.rect.contains(at)
+            && !handle.contains(at)
+            && ui.ctx().layer_id_at(at).is_none_or(|there| there == layer)
+    };
+    let (events, modifiers) = ui.input(|i| (i.events.clone(), i.modifiers));
+    let steps = Drag::follow(&mut scope.interface.drag, &events, modifiers, accepts);
+    if scope.interface.is_marking {
+        mark_region(ui, whole, &steps, scope);
+        return;
+    }
+    point(rect, response, modifiers, scope);
+    travel(ui, whole, response, &steps, scope);
+}
+
+/// Lets a drag mark the part that is to be rendered.
+fn mark_region(ui: &Ui, whole: Rect, steps: &[Step], scope: &mut Scope<'_>) {
+    ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
+    let hint = "Drag over the part that is to be rendered";
+    let top = Pos2::new(whole.center().x, whole.top() + 14.0);
+    badge(ui, top, Align2::CENTER_TOP, hint, theme::ACCENT);
+    let marked = |[from, to]: [Pos2; 2]| Rect::from_two_pos(from, to).intersect(whole);
+    if let Some(span) = scope.interface.drag.and_then(|drag| drag.span()) {
+        let stroke = Stroke::new(1.5, theme::ACCENT);
+        ui.painter().rect_stroke(marked(span), 0.0, stroke, StrokeKind::Inside);
+    }
+    for step in steps {
+        let Step::End { from, to } = *step else { continue };
+        let marked = marked([from, to]);
+        scope.interface.is_marking = false;
+        if marked.width() >= 4.0 && marked.height() >= 4.0 {
+            let (low, high) = (place_of(whole, marked.min), place_of(whole, marked.max));
+            scope.document.region = Some([low.x, low.y, high.x, high.y]);
+        }
+    }
+}
+
+/// Where the pointer is, and what a click does there.
+fn point(rect: Rect, response: &Response, modifiers: Modifiers, scope: &mut Scope<'_>) {
+    scope.interface.pointed =
+        response.hover_pos().filter(|at| rect.contains(*at)).map(|at| place_of(rect, at));
+    if response.double_clicked() {
+        pick(rect, response, scope, Viewpoint::set_pivot);
+    } else if response.clicked() && modifiers.command {
+        pick(rect, response, scope, Viewpoint::focus_on);
+    } else if response.clicked() {
+        let place = response.interact_pointer_pos().map(|at| place_of(rect, at));
+        let is_inspecting = scope.interface.tab == Tab::Inspect;
+        scope.interface.pinned = place.filter(|_| is_inspecting);
+    }
+}
+
+/// Moves the camera.
+fn travel(ui: &Ui, whole: Rect, response: &Response, steps: &[Step], scope: &mut Scope<'_>) {
+    let context = ui.ctx();
+    let Some(viewpoint) = &mut scope.document.viewpoint else { return };
+    // Holding still counts too: letting go ends it.
+    let mut moved = scope.interface.drag.is_some_and(|drag| drag.span().is_some());
+    for step in steps {
+        let Step::Move { button, by, modifiers } = *step else { continue };
+        moved = true;
+        let by = glam::Vec2::new(by.x, by.y);
+        if button == PointerButton::Secondary {
+            viewpoint.look_around(-by);
+        } else if button == PointerButton::Middle || modifiers.shift {
+            viewpoint.pan(by, whole.height());
+        } else {
+            orbit(viewpoint, by, scope.scene);
+        }
+    }
+    if response.hovered() {
+        let wheel = context.input(|i| i.smooth_scroll_delta().y);
+        if wheel != 0.0 {
+            moved = true;
+            viewpoint.dolly(wheel / 50.0);
+        }
+    }
+    if !context.text_edit_focused() && !scope.interface.is_modal() {
+        let speed = scope.scene.map_or(1.0, |scene| flying_speed(&scene.world));
+        if let Some(metres) = flight(context, speed) {
+            moved = true;
+            viewpoint.fly(metres);
+            context.request_repaint();
+        }
+    }
+    if moved {
+        scope.interface.keep_moving(context.time(), context.input(|i| i.unstable_dt));
+    }
+}
+
+fn place_of(rect: Rect, at: Pos2) -> glam::Vec2 {
+    let place = (at - rect.min) / rect.size();
+    glam::Vec2::new(place.x, place.y)
+}
+
+/// Orbits, unless a wall is in the way: then the camera turns where it is, and stays in its room.
+fn orbit(viewpoint: &mut Viewpoint, drag: glam::Vec2, scene: Option<&LoadedScene>) {
+    let mut moved = viewpoint.clone();
+    moved.orbit(drag);
+    let step = moved.eye() - viewpoint.eye();
+    let is_blocked = scene.is_some_and(|scene| {
+        // Some room to the wall is kept.
+        let margin = 0.1 * step.length() + 0.02 * viewpoint.pivot_distance;
+        let direction = step.normalize_or_zero();
+        let ray =
+            Ray { origin: viewpoint.eye(), direction, t_min: 0.0, t_max: step.length() + margin };
+        direction != Vec3::ZERO && scene.world.bvh.any_hit(&ray, |_| true)
+    });
+    if is_blocked {
+        viewpoint.look_around(drag);
+    } else {
+        *viewpoint = moved;
+    }
+}
+
+/// Does something with the surface under a click.
+fn pick(rect: Rect, response: &Response, scope: &mut Scope<'_>, act: fn(&mut Viewpoint, Vec3)) {
+    let (Some(at), Some(snapshot)) = (response.interact_pointer_pos(), scope.snapshot) else {
+        return;
+    };
+    let request = &snapshot.request;
+    let spot = look_at_place(&request.world, &request.view, place_of(rect, at));
+    if let (Some(spot), Some(viewpoint)) = (spot, &mut scope.document.viewpoint) {
+        let mut moved = viewpoint.clone();
+        act(&mut moved, spot.position);
+        scope.commands.push(Command::LookFrom(moved));
+    }
+}
+
+/// Metres per second that suit the scene: a walk in a room, faster outdoors.
+fn flying_speed(world: &crate::path::World) -> f32 {
+    let (low, high) = world.bvh.bounds();
+    (0.25 * (high - low).length()).clamp(0.05, 50.0)
+}
+
+/// Metres along right, up and forward that the keys held down ask for.
+fn flight(context: &egui::Context, speed: f32) -> Option<Vec3> {
+    context.input(|input| {
+        if input.modifiers.command || input.modifiers.alt {
+            return None;
+        }
+        let axis = |plus: Key, minus: Key| {
+            f32::from(input.key_down(plus)) - f32::from(input.key_down(minus))
+        };
+        let direction = Vec3::new(axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S));
+        let faster = if input.modifiers.shift { 4.0 } else { 1.0 };
+        let seconds = input.stable_dt.min(0.1);
+        (direction != Vec3::ZERO).then(|| direction.normalize() * speed * faster * seconds)
+    })
+}

@@ -1,0 +1,41 @@
+//! How light is found, and two ways compared: for whoever wants to know, not for making pictures.
+
+use egui::{ComboBox, Ui};
+
+use crate::app::convergence::name_of;
+use crate::app::document::Light;
+use crate::app::theme;
+use crate::render::Sampling;
+
+/// Ways of sampling the map, and what they do.
+const WAYS: [(Sampling, &str); 4] = [
+    (
+        Sampling::Adaptive,
+        "What each part of the scene sees of the map is learned, and only that sampled",
+    ),
+    (Sampling::Talk, "The same as the SIGGRAPH talk of 2018 describes it, for comparison"),
+    (Sampling::Plain, "The whole map by its brightness, whether it is seen or not"),
+    (Sampling::Bsdf, "Directions of the surfaces alone, without regard to the map"),
+];
+
+/// Draws the choice.
+pub(in crate::app) fn show(ui: &mut Ui, light: &mut Light) {
+    theme::row(ui, "Sampling", "How light from the map is found; the picture is the same", |ui| {
+        ComboBox::from_id_salt("sampling").selected_text(capital(light.sampling)).show_ui(
+            ui,
+            |ui| {
+                for (sampling, hint) in WAYS {
+                    let chosen = &mut light.sampling;
+                    ui.selectable_value(chosen, sampling, capital(sampling)).on_hover_text(hint);
+                }
+            },
+        );
+    });
+    ui.checkbox(&mut light.split, "Split view")
+        .on_hover_text("Plain on the left, the chosen sampling on the right, at equal time (V)");
+}
+
+fn capital(sampling: Sampling) -> String {
+    let name = name_of(sampling);
+    format!("{}{}", name[..1].to_uppercase(), &name[1..])
+}

@@ -1,0 +1,451 @@
+//! The best picture of a film that has only begun: each pixel blends what it knows itself with what
+//! coarser scales know of its surroundings, by how sure each is.
+//!
+//! From the coarsest scale on, what a scale adds to the one above it (a level of Burt and Adelson's
+//! Laplacian pyramid, 1983) is taken by Wiener's share: the energy of the detail over that energy and
+//! the noise's. Pixels without samples have no detail of their own, so that any set of pixels makes a
+//! picture; with many samples all detail counts, and the film is what comes out. Light is blended
+//! without albedo, and between neighbours on like surfaces (Kopf et al., *Joint Bilateral Upsampling*,
+//! 2007). One look at every pixel and a third more, a twentieth of the à-trous filter's time.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::color::luminance;
+use crate::image::Image;
+use crate::render::film::{Film, Pixel, Surface};
+
+/// The coarsest scale's cells are 2^7 pixels wide.
+const SCALES: usize = 8;
+/// What neighbours on another surface count, so that somebody always does.
+const LEAST_LIKENESS: f32 = 1e-3;
+/// Albedo that counts as none: black surfaces and the sky are blended as they are.
+const LEAST_ALBEDO: f32 = 0.02;
+/// Relative difference of depths at which two neighbouring pixels are half alike.
+const DEPTH_TOLERANCE: f32 = 0.02;
+/// The spread around a cell counts as much as so many samples of its own, at least.
+const SPREAD_SAMPLES: f32 = 2.0;
+/// Neighbours that are no more alike than this say nothing of each other's spread.
+const ALIKE: f32 = 0.3;
+
+/// Sums over the samples of a cell.
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    /// Radiance over albedo.
+    light: Vec3,
+    samples: f32,
+    /// Squared deviations of its luminance among like samples, and how many say so.
+    deviation: f32,
+    freedom: f32,
+    albedo: Vec3,
+    normal: Vec3,
+    depth: f32,
+    hits: f32,
+}
+
+/// What tells surfaces apart.
+#[derive(Clone, Copy, Default)]
+struct Guide {
+    normal: Vec3,
+    depth: f32,
+    /// Share of the samples that met a surface; negative without samples.
+    coverage: f32,
+}
+
+/// What is known of a cell, all scales down to its own together.
+#[derive(Clone, Copy, Default)]
+struct Estimate {
+    light: Vec3,
+    albedo: Vec3,
+    /// Variance of one sample's luminance.
+    spread: f32,
+    /// How far the cell's own mean is from what coarser scales say, and the variance of that mean.
+    detail: Vec3,
+    variance: f32,
+}
+
+/// One scale: cells row after row.
+struct Scale<T> {
+    width: usize,
+    height: usize,
+    cells: Vec<T>,
+}
+
+/// The film's picture, whole from the first samples on; `under` is a film of the same view, of any
+/// size, whose samples count as well.
+pub fn blend(film: &Film, under: Option<&Film>) -> Image {
+    let scales = scales(film, under);
+    let mut coarser: Option<(Scale<Guide>, Scale<Estimate>)> = None;
+    for (number, cells) in scales.iter().enumerate().rev() {
+        let guides = cells.guides();
+        let estimates = refined(cells, &guides, coarser.as_ref(), number);
+        coarser = Some((guides, estimates));
+    }
+    let finest = coarser.map_or_else(Vec::new, |(_, finest)| finest.cells);
+    let pixels = finest.par_iter().map(|e| (e.light * e.albedo).to_array()).collect();
+    Image { width: film.width, height: film.height, pixels }
+}
+
+/// Sums of all scales, the finest first.
+fn scales(film: &Film, under: Option<&Film>) -> Vec<Scale<Cell>> {
+    let mut scales = vec![Scale::of(film)];
+    let mut under = under.map(Scale::of);
+    for number in 0..SCALES {
+        let finest = &mut scales[number];
+        let is_smallest = number + 1 == SCALES || finest.width.max(finest.height) == 1;
+        // Its samples count where cells are about as large as its pixels.
+        if let Some(other) = under.take_if(|u| is_smallest || 3 * finest.height < 4 * u.height) {
+            finest.add(&other);
+        }
+        if is_smallest {
+            break;
+        }
+        let coarser = finest.halved();
+        scales.push(coarser);
+    }
+    scales
+}
+
+impl Cell {
+    fn new(pixel: &Pixel, surface: Option<&Surface>) -> Self {
+        let samples = pixel.samples() as f32;
+        if samples == 0.0 {
+            return Self::default();
+        }
+        let [r, g, b, squared] = pixel.sums();
+        let sums = surface.map_or([0.0; 8], Surface::sums).map(|sum| sum as f32);
+        let [ar, ag, ab, depth, nx, ny, nz, hits] = sums;
+        let albedo = if hits > 0.0 {
+            (Vec3::new(ar, ag, ab) / samples).max(Vec3::splat(LEAST_ALBEDO))
+        } else {
+            Vec3::ONE
+        };
+        let mean = 0.2126 * r + 0.7152 * g + 0.0722 * b;
+        let deviation = (squared - mean * mean / f64::from(samples)).max(0.0) as f32;
+        Self {
+            light: Vec3::new(r as f32, g as f32, b as f32) / albedo,
+            samples,
+            deviation: deviation / luminance(albedo).powi(2),
+            freedom: samples - 1.0,
+            albedo: albedo * samples,
+            normal: Vec3::new(nx, ny, nz),
+            depth,
+            hits,
+        }
+    }
+
+    fn add(&mut self, other: &Self, times: f32) {
+        self.light += other.light * times;
+        self.samples += other.samples * times;
+        self.deviation += other.deviation * times;
+        self.freedom += other.freedom * times;
+        self.albedo += other.albedo * times;
+        self.normal += other.normal * times;
+        self.depth += other.depth * times;
+        self.hits += other.hits * times;
+    }
+
+    fn is_sky(&self) -> bool {
+        self.hits < 0.99 * self.samples
+    }
+
+    /// Four cells as one. What is behind all surfaces may be a thousand times as bright: the larger
+    /// part speaks for both.
+    fn together(four: [Option<&Self>; 4]) -> Self {
+        let four = four.map(|cell| cell.filter(|cell| cell.samples > 0.0));
+        let weight: f32 =
+            four.iter().flatten().map(|c| if c.is_sky() { c.samples } else { -c.samples }).sum();
+        let mut sum = Self::default();
+        let mut alike: Option<(Guide, Self, f32, f32)> = None;
+        for cell in four.into_iter().flatten().filter(|cell| cell.is_sky() == (weight > 0.0)) {
+            sum.add(cell, 1.0);
+            let (first, like, squares, count) =
+                alike.get_or_insert((cell.guide(), Self::default(), 0.0, 0.0));
+            if first.likeness(&cell.guide(), 2.0) > ALIKE {
+                like.add(cell, 1.0);
+                *squares += luminance(cell.light).powi(2) / cell.samples;
+                *count += 1.0;
+            }
+        }
+        // Single samples say something of each other only.
+        if let Some((_, like, squares, count)) = alike.filter(|_| sum.freedom < 1.0) {
+            sum.deviation += (squares - luminance(like.light).powi(2) / like.samples).max(0.0);
+            sum.freedom += count - 1.0;
+        }
+        sum
+    }
+
+    fn guide(&self) -> Guide {
+        Guide {
+            normal: self.normal.normalize_or_zero(),
+            depth: if self.hits > 0.0 { self.depth / self.hits } else { 0.0 },
+            coverage: if self.samples > 0.0 { self.hits / self.samples } else { -1.0 },
+        }
+    }
+}
+
+impl Guide {
+    /// How much two cells of so many pixels belong to one surface, 1 for the same.
+    fn likeness(&self, other: &Self, pixels: f32) -> f32 {
+        if self.coverage < 0.0 || other.coverage < 0.0 {
+            return 1.0;
+        }
+        let coverage = 1.0 - (self.coverage - other.coverage).abs();
+        if self.normal == Vec3::ZERO || other.normal == Vec3::ZERO {
+            return coverage;
+        }
+        let normal = self.normal.dot(other.normal).max(0.0).powi(16);
+        let tolerance = DEPTH_TOLERANCE * pixels.min(8.0) * self.depth.min(other.depth);
+        let depth = (self.depth - other.depth) / tolerance.max(1e-6);
+        coverage * coverage * normal / (1.0 + depth * depth)
+    }
+}
+
+impl<T> Scale<T> {
+    /// The cell in column `x` of row `y`, or the nearest one.
+    fn at(&self, x: isize, y: isize) -> &T {
+        let x = x.clamp(0, self.width as isize - 1) as usize;
+        let y = y.clamp(0, self.height as isize - 1) as usize;
+        &self.cells[y * self.width + x]
+    }
+}
+
+impl Scale<Cell> {
+    fn of(film: &Film) -> Self {
+        let surfaces = film.surfaces();
+        let cell = |(i, pixel)| Cell::new(pixel, surfaces.get(i));
+        let cells = film.pixels().par_iter().enumerate().map(cell).collect();
+        Self { width: film.width as usize, height: film.height as usize, cells }
+    }
+
+    fn guides(&self) -> Scale<Guide> {
+        let cells = self.cells.par_iter().map(Cell::guide).collect();
+        Scale { width: self.width, height: self.height, cells }
+    }
+
+    /// Cells twice as wide and high.
+    fn halved(&self) -> Self {
+        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
+        let cell = |i: usize| {
+            let (x, y) = (2 * (i % width), 2 * (i / width));
+            let at = |dx, dy| {
+                (x + dx < self.width).then(|| self.cells.get((y + dy) * self.width + x + dx))?
+            };
+            Cell::together([at(0, 0), at(1, 0), at(0, 1), at(1, 1)])
+        };
+        let cells = (0..width * height).into_par_iter().map(cell).collect();
+        Self { width, height, cells }
+    }
+
+    /// Adds the samples of another picture. The field of view is vertical: pictures of different
+    /// shapes share their middle.
+    fn add(&mut self, other: &Self) {
+        let step = other.height as f32 / self.height as f32;
+        let (width, height) = (self.width, self.height);
+        self.cells.par_iter_mut().enumerate().for_each(|(i, cell)| {
+            let place = |at: usize, all: usize, other: usize| {
+                (at as f32 + 0.5 - 0.5 * all as f32) * step + 0.5 * other as f32 - 0.5
+            };
+            let x = place(i % width, width, other.width);
+            let y = place(i / width, height, other.height);
+            for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                let (tx, ty) = (x - x.floor(), y - y.floor());
+                let share = |t: f32, d: isize| if d == 0 { 1.0 - t } else { t };
+                let near = other.at(x.floor() as isize + dx, y.floor() as isize + dy);
+                cell.add(near, share(tx, dx) * share(ty, dy) * step * step);
+            }
+        });
+    }
+}
+
+/// Takes a scale's details to what coarser scales say.
+fn refined(
+    cells: &Scale<Cell>,
+    guides: &Scale<Guide>,
+    coarser: Option<&(Scale<Guide>, Scale<Estimate>)>,
+    number: usize,
+) -> Scale<Estimate> {
+    let (width, height) = (cells.width, cells.height);
+    let pixels = (1 << number) as f32;
+    let expected = |i: usize| {
+        let cell = &cells.cells[i];
+        let mut estimate = coarser.map_or_else(Estimate::default, |(their_guides, estimates)| {
+            from_parents(&guides.cells[i], (i % width, i / width), their_guides, estimates, pixels)
+        });
+        if cell.samples > 0.0 {
+            let mean = cell.light / cell.samples;
+            estimate.albedo = cell.albedo / cell.samples;
+            // One sample says nothing about its own spread, and where few have met no light they agree:
+            // the fewer there are, the more counts what is around.
+            let per_pixel = (cell.samples / (pixels * pixels)).max(1.0);
+            let around = match coarser {
+                Some(_) => SPREAD_SAMPLES + cell.freedom / (per_pixel * per_pixel),
+                None => 0.0,
+            };
+            estimate.spread =
+                (cell.deviation + around * estimate.spread) / (cell.freedom + around).max(1.0);
+            estimate.variance = estimate.spread / cell.samples;
+            if coarser.is_some() {
+                estimate.detail = mean - estimate.light;
+            } else {
+                estimate.light = mean;
+            }
+        }
+        estimate
+    };
+    let estimates = (0..width * height).into_par_iter().map(expected).collect();
+    let estimates = Scale { width, height, cells: estimates };
+    if coarser.is_none() {
+        return estimates;
+    }
+    let cells = estimates
+        .cells
+        .par_iter()
+        .enumerate()
+        .map(|(i, estimate)| {
+            if estimate.detail == Vec3::ZERO {
+                return *estimate;
+            }
+            let share = wieners_share(&estimates, (i % width, i / width), estimate.variance);
+            Estimate { light: estimate.light + estimate.detail * share, ..*estimate }
+        })
+        .collect();
+    Scale { width, height, cells }
+}
+
+/// What the four nearest cells of the coarser scale say of a cell.
+fn from_parents(
+    guide: &Guide,
+    (x, y): (usize, usize),
+    guides: &Scale<Guide>,
+    estimates: &Scale<Estimate>,
+    pixels: f32,
+) -> Estimate {
+    let (x, y) = (x as isize, y as isize);
+    // The parent and its neighbour on the cell's side.
+    let (px, py) = (x / 2, y / 2);
+    let (qx, qy) = (px + 2 * (x % 2) - 1, py + 2 * (y % 2) - 1);
+    let mut sum = Estimate::default();
+    let mut total = 0.0;
+    for (x, y, share) in [(px, py, 9.0), (qx, py, 3.0), (px, qy, 3.0), (qx, qy, 1.0)] {
+        let weight = share * (LEAST_LIKENESS + guide.likeness(guides.at(x, y), 2.0 * pixels));
+        let estimate = estimates.at(x, y);
+        sum.light += estimate.light * weight;
+        sum.albedo += estimate.albedo * weight;
+        sum.spread += estimate.spread * weight;
+        total += weight;
+    }
+    Estimate {
+        light: sum.light / total,
+        albedo: sum.albedo / total,
+        spread: sum.spread / total,
+        ..sum
+    }
+}
+
+/// The energy of the details around a cell over that and the noise's. The strongest one does not
+/// count: a lone bright sample is no detail.
+fn wieners_share(estimates: &Scale<Estimate>, (x, y): (usize, usize), variance: f32) -> f32 {
+    let (mut energy, mut noise, mut strongest) = (0.0, 0.0, 0.0_f32);
+    for row in y.saturating_sub(1)..(y + 2).min(estimates.height) {
+        let row = &estimates.cells[row * estimates.width..][..estimates.width];
+        for near in &row[x.saturating_sub(1)..(x + 2).min(estimates.width)] {
+            let own = luminance(near.detail).powi(2);
+            energy += own;
+            noise += near.variance;
+            strongest = strongest.max(own);
+        }
+    }
+    let signal = (energy - strongest - noise).max(0.0) / 8.0;
+    if signal > 0.0 { signal / (signal + variance) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::path::PathResult;
+
+    /// A film where every `every`-th pixel of every `every`-th row has samples of this light.
+    fn film(
+        size: [u32; 2],
+        every: u32,
+        samples: u32,
+        light: impl Fn(u32, u32, u32) -> f32,
+    ) -> Film {
+        let mut film = Film::new(size[0], size[1], false);
+        for y in (0..size[1]).step_by(every as usize) {
+            for x in (0..size[0]).step_by(every as usize) {
+                for sample in 0..samples {
+                    let radiance = Vec3::splat(light(x, y, sample));
+                    let (rays, was_invalid, first_hit) = (1, false, None);
+                    film.add(x, y, &PathResult { radiance, rays, was_invalid, first_hit });
+                }
+            }
+        }
+        film
+    }
+
+    /// Noise with mean 1 and variance 1/3 that is the same at every call.
+    fn noise(x: u32, y: u32, sample: u32) -> f32 {
+        let mut hash = x.wrapping_mul(0x9e37_79b9) ^ y.wrapping_mul(0x85eb_ca6b) ^ (sample << 7);
+        for _ in 0..3 {
+            hash = (hash ^ (hash >> 15)).wrapping_mul(0x2c1b_3c6d);
+        }
+        (hash >> 8) as f32 / (1 << 23) as f32
+    }
+
+    fn error(image: &Image, truth: impl Fn(u32, u32) -> f32) -> f32 {
+        let squared = |i: u32| {
+            (image.pixels[i as usize][1] - truth(i % image.width, i / image.width)).powi(2)
+        };
+        let count = image.width * image.height;
+        ((0..count).map(squared).sum::<f32>() / count as f32).sqrt()
+    }
+
+    #[test]
+    fn what_is_known_exactly_stays_as_it_is() {
+        let edge = |x: u32, y: u32| if x + y < 40 { 0.2 } else { 3.0 };
+        let image = blend(&film([61, 37], 1, 2, |x, y, _| edge(x, y)), None);
+        assert!(error(&image, edge) < 1e-4);
+    }
+
+    #[test]
+    fn a_few_pixels_make_a_whole_picture_and_more_a_better_one() {
+        let edge = |x: u32, _: u32| if x < 32 { 0.5 } else { 4.0 };
+        let mut last = f32::INFINITY;
+        for (every, samples) in [(8, 1), (4, 1), (2, 1), (1, 1), (1, 4), (1, 64)] {
+            let light = |x, y, sample| edge(x, y) * noise(x, y, sample);
+            let film = film([64, 48], every, samples, light);
+            let image = blend(&film, None);
+            let found = error(&image, edge);
+            assert!(found < last, "{found} after {last}, every {every}, {samples} samples");
+            assert!(found < 0.8 * error(&film.image(), edge), "better than the film: {found}");
+            last = found;
+        }
+    }
+
+    #[test]
+    fn lone_bright_samples_are_shared_out() {
+        let light = |x, y, sample| {
+            if (x, y, sample) == (20, 11, 0) { 500.0 } else { noise(x, y, sample) }
+        };
+        let image = blend(&film([40, 30], 1, 2, light), None);
+        let brightest = image.pixels.iter().map(|p| p[0]).fold(0.0, f32::max);
+        assert!(brightest < 25.0, "{brightest}");
+    }
+
+    #[test]
+    fn a_small_film_of_the_same_view_helps_where_there_is_little() {
+        let slope = |x: u32, y: u32| 1.0 + 0.02 * (x + y) as f32;
+        let light = |x, y, sample| slope(x, y) * noise(x, y, sample);
+        let little = film([64, 48], 8, 1, light);
+        let small = film([16, 12], 1, 64, |x, y, sample| light(4 * x, 4 * y, sample));
+        let (alone, helped) = (blend(&little, None), blend(&little, Some(&small)));
+        assert!(error(&helped, slope) < 0.5 * error(&alone, slope));
+        // Of another shape they share their middle, and a film without samples says nothing.
+        let wide = blend(&Film::new(64, 24, false), Some(&small));
+        assert!(wide.pixels.iter().all(|p| p[0] > 0.5 && p[0] < 4.0));
+        let nothing = blend(&Film::new(7, 5, true), None);
+        assert!(nothing.pixels.iter().all(|p| *p == [0.0; 3]));
+    }
+}

@@ -1,0 +1,296 @@
+//! A real window under Xvfb.
+
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use lightgrid::image::read_picture;
+
+/// An X server without a screen, and a window of ours in it.
+struct Desk {
+    server: Child,
+    window: Option<Child>,
+    display: String,
+    /// What the window is called by the server.
+    id: String,
+    folder: tempfile::TempDir,
+}
+
+impl Drop for Desk {
+    fn drop(&mut self) {
+        for child in self.window.iter_mut().chain([&mut self.server]) {
+            // It may have ended by itself.
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+impl Desk {
+    const WIDTH: usize = 1100;
+    const HEIGHT: usize = 760;
+
+    /// `None`, said on stderr, where Xvfb or xdotool is not installed.
+    fn open() -> Option<Self> {
+        let is_there = |tool: &str| {
+            let which = Command::new("which").arg(tool).stdout(Stdio::null()).status();
+            which.is_ok_and(|status| status.success())
+        };
+        if let Some(tool) = ["Xvfb", "xdotool"].into_iter().find(|tool| !is_there(tool)) {
+            eprintln!("SKIPPED: {tool} is not installed");
+            return None;
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let screen = format!("{}x{}x24", Self::WIDTH, Self::HEIGHT);
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", &screen, "-nolisten", "tcp", "-fbdir"])
+            .arg(folder.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb starts");
+        let mut number = String::new();
+        let stdout = server.stdout.take().expect("piped");
+        std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut number)
+            .expect("Xvfb says its display");
+        let display = format!(":{}", number.trim());
+        Some(Self { server, window: None, display, id: String::new(), folder })
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Starts the program and waits until its window shows its buttons and has the keyboard.
+    fn start(&mut self, line: &str) {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lightgrid"));
+        command.current_dir(self.folder.path()).args(line.split_whitespace());
+        command.env("DISPLAY", &self.display).env_remove("WAYLAND_DISPLAY");
+        command.stderr(std::fs::File::create(self.path("says.txt")).expect("a file"));
+        self.window = Some(command.spawn().expect("the binary starts"));
+        self.id = self.wait_for("window", || {
+            let found = self.xdotool("search --onlyvisible --name lightgrid");
+            found.lines().next().map(str::to_owned).filter(|id| !id.is_empty())
+        });
+        self.xdotool(&format!("windowfocus {}", self.id));
+        self.wait_for("buttons", || (self.brightness() > 8.0).then_some(()));
+    }
+
+    fn xdotool(&self, line: &str) -> String {
+        let output = Command::new("xdotool")
+            .args(line.split_whitespace())
+            .env("DISPLAY", &self.display)
+            .output()
+            .expect("xdotool starts");
+        String::from_utf8_lossy(&output.stdout).trim().to_owned()
+    }
+
+    fn title(&self) -> String {
+        self.xdotool(&format!("getwindowname {}", self.id))
+    }
+
+    fn says(&self) -> String {
+        std::fs::read_to_string(self.path("says.txt")).unwrap_or_default()
+    }
+
+    /// Mean level, 0 to 255, of the corner with the first buttons, which are always there.
+    fn brightness(&self) -> f64 {
+        let (width, height) = (270, 36);
+        let file = std::fs::read(self.path("Xvfb_screen0")).expect("the server's screen");
+        let screen = &file[file.len() - 4 * Self::WIDTH * Self::HEIGHT..];
+        let rows = screen.chunks_exact(4 * Self::WIDTH).take(height);
+        let pixels = rows.flat_map(|row| row[..4 * width].chunks_exact(4));
+        pixels.map(|p| f64::from(p[0].max(p[1]).max(p[2]))).sum::<f64>() / (width * height) as f64
+    }
+
+    /// Waits for something for at most ten minutes: software draws a frame in seconds when other
+    /// tests keep all cores busy.
+    fn wait_for<T>(&self, what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
+        let start = Instant::now();
+        loop {
+            if let Some(it) = ready() {
+                return it;
+            }
+            assert!(start.elapsed() < Duration::from_secs(600), "no {what}: {}", self.says());
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    }
+
+    /// Types a path into the prompt that a key opens. An open prompt darkens what is behind it;
+    /// what is typed before is not meant for it.
+    fn answer(&self, key: &str, path: &str) {
+        let level = self.brightness();
+        self.xdotool(&format!("key {key}"));
+        self.wait_for("prompt", || (self.brightness() < 0.8 * level).then_some(()));
+        self.xdotool("key ctrl+a");
+        self.xdotool(&format!("type --delay 20 {path}"));
+        self.xdotool("key Return");
+        self.wait_for("end of the prompt", || (self.brightness() > 0.9 * level).then_some(()));
+    }
+
+    /// Drags with the left button, in steps with pauses between them.
+    fn drag(&self, (x, y): (i32, i32), (dx, dy): (i32, i32), pause: Duration) {
+        self.xdotool(&format!("mousemove {x} {y} mousedown 1"));
+        for _ in 0..10 {
+            std::thread::sleep(pause);
+            self.xdotool(&format!("mousemove_relative -- {} {}", dx / 10, dy / 10));
+        }
+        self.xdotool("mouseup 1");
+    }
+
+    /// The levels of the middle of the picture on the screen.
+    fn picture(&self) -> Vec<u8> {
+        let file = std::fs::read(self.path("Xvfb_screen0")).expect("the server's screen");
+        let screen = &file[file.len() - 4 * Self::WIDTH * Self::HEIGHT..];
+        let rows = screen.chunks_exact(4 * Self::WIDTH).skip(150).take(420);
+        let columns = rows.flat_map(|row| row[4 * 300..4 * 780].chunks_exact(4));
+        columns.flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
+    }
+
+    /// What is shown every half second until nothing has changed for a while: it is done then.
+    fn watch(&self) -> Vec<Vec<u8>> {
+        let mut shown: Vec<Vec<u8>> = Vec::new();
+        let mut unchanged = 0;
+        while unchanged < 20 || shown.len() < 30 {
+            std::thread::sleep(Duration::from_millis(500));
+            let now = self.picture();
+            unchanged = if shown.last() == Some(&now) { unchanged + 1 } else { 0 };
+            shown.push(now);
+            assert!(shown.len() < 1200, "it never ends");
+        }
+        shown.truncate(shown.len() - unchanged);
+        shown
+    }
+
+    /// Saves a picture and waits until it is there.
+    fn save(&self, name: &str) -> lightgrid::image::Image {
+        let path = self.path(name);
+        self.answer("ctrl+s", name);
+        self.wait_for(name, || path.exists().then(|| read_picture(&path).expect("a picture")))
+    }
+
+    /// What a picture's file says of a key.
+    fn metadata(&self, name: &str, key: &str) -> Option<String> {
+        let metadata = lightgrid::image::read_exr_metadata(&self.path(name)).expect("metadata");
+        let key = format!("lightgrid.{key}");
+        metadata.into_iter().find(|(k, _)| *k == key).map(|(_, value)| value)
+    }
+}
+
+#[test]
+fn a_real_window_moves_opens_saves_and_remembers() {
+    let Some(mut desk) = Desk::open() else { return };
+    desk.start("view open --env sky:day@64x32 --size 96x64 --samples 2 --device cpu --settings window.json");
+    let first = desk.save("first.exr");
+    assert_eq!((first.width, first.height), (96, 64));
+    let of = |key: &str| desk.metadata("first.exr", key);
+    assert_eq!(of("scene").as_deref(), Some("open"));
+    assert_eq!(of("sampling").as_deref(), Some("adaptive"));
+    assert_eq!(of("device").as_deref(), Some("CPU"));
+
+    // The other device goes on; software Vulkan takes seconds to compile for it.
+    desk.xdotool("key g");
+    desk.xdotool("key r");
+    desk.wait_for("picture from the GPU", || {
+        desk.save("gpu.exr");
+        let device = desk.metadata("gpu.exr", "device");
+        std::fs::remove_file(desk.path("gpu.exr")).expect("removed");
+        device.filter(|name| name != "CPU")
+    });
+    desk.xdotool("key g");
+
+    // A file that is not there changes nothing: the camera can still be turned.
+    desk.answer("ctrl+o", "none.glb");
+    desk.wait_for("old scene", || desk.title().starts_with("open").then_some(()));
+
+    // A drag turns the camera: another picture. It is taken back, also after the list of keys was open.
+    desk.drag((560, 400), (-120, 20), Duration::ZERO);
+    desk.wait_for("turned picture", || {
+        let turned = desk.save("turned.exr");
+        std::fs::remove_file(desk.path("turned.exr")).expect("removed");
+        (first.pixels != turned.pixels).then_some(())
+    });
+    desk.xdotool("key question");
+    desk.xdotool("key Escape");
+    desk.xdotool("key ctrl+z");
+    desk.wait_for("first camera", || {
+        desk.save("again.exr");
+        let eye = desk.metadata("again.exr", "camera_eye");
+        std::fs::remove_file(desk.path("again.exr")).expect("removed");
+        (eye == of("camera_eye")).then_some(())
+    });
+
+    // A part of it, marked by a drag so fast that it may fall into one frame; then the whole again.
+    desk.xdotool("key x");
+    desk.drag((450, 300), (150, 120), Duration::ZERO);
+    desk.wait_for("part", || {
+        let part = desk.save("part.exr");
+        std::fs::remove_file(desk.path("part.exr")).expect("removed");
+        (part.width < 60 && part.height < 50).then_some(())
+    });
+    desk.xdotool("key x");
+
+    // Another scene.
+    desk.answer("ctrl+o", "crack");
+    desk.wait_for("new scene", || desk.title().starts_with("crack").then_some(()));
+    desk.save("crack.png");
+
+    desk.xdotool("key ctrl+q");
+    let mut child = desk.window.take().expect("started");
+    let status = desk.wait_for("end", || child.try_wait().expect("asked"));
+    assert!(status.success(), "{}", desk.says());
+    assert!(!desk.says().contains("panicked"), "{}", desk.says());
+    let settings = std::fs::read_to_string(desk.path("window.json")).expect("settings");
+    assert!(settings.contains("window_size"), "{settings}");
+}
+
+/// Mean squared difference of levels.
+fn error(a: &[u8], b: &[u8]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum();
+    sum / a.len() as f64
+}
+
+/// What is on the screen only gets better, and does not stand still while work goes on.
+#[test]
+fn the_picture_on_the_screen_never_gets_worse() {
+    let Some(mut desk) = Desk::open() else { return };
+    desk.start(
+        "view office --env sky:day@256x128 --size 240x160 --samples 32 --device cpu --settings window.json",
+    );
+    check(&desk, "at the start");
+    desk.drag((560, 400), (60, 10), Duration::from_millis(50));
+    check(&desk, "after a move");
+}
+
+fn check(desk: &Desk, when: &str) {
+    let shown = desk.watch();
+    let last = shown.last().expect("something is shown");
+    let errors: Vec<f64> = shown.iter().map(|picture| error(picture, last).sqrt()).collect();
+    println!("{when}: {errors:.2?}");
+    let first = errors[0];
+    assert!(errors.iter().any(|error| *error < 0.5 * first), "{when}: {errors:.2?}");
+    for (at, pair) in errors.windows(2).enumerate() {
+        // Two per cent, and a fifth of a level for rounding.
+        assert!(pair[1] <= 1.02 * pair[0] + 0.2, "{when}: worse at {at}: {errors:.2?}");
+    }
+    // Three seconds: the other tests may have taken all cores meanwhile.
+    let still = |pair: &[Vec<u8>]| pair.iter().all(|picture| *picture == pair[0]);
+    let is_begun = |pair: &&[Vec<u8>]| error(&pair[0], &shown[0]) > 0.0 || when != "at the start";
+    let stands = shown.windows(7).filter(is_begun).any(still);
+    assert!(!stands, "{when}: the picture stands still: {errors:.2?}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_request_to_end_closes_a_window_as_a_person_would() {
+    let Some(mut desk) = Desk::open() else { return };
+    desk.start(
+        "view open --env sky:day@64x32 --size 96x64 --samples 2 --device cpu --settings w.json",
+    );
+    let mut child = desk.window.take().expect("started");
+    let kill = Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
+    assert!(kill.expect("kill is there").success());
+    let status = desk.wait_for("end", || child.try_wait().expect("asked"));
+    assert!(status.success(), "{}", desk.says());
+    assert!(desk.path("w.json").exists(), "the settings are kept");
+}
