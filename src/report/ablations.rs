@@ -146,7 +146,7 @@ fn samples_and_tables(add: &mut Add<'_>) {
     add(group, "no Russian roulette", &|s| s.russian_roulette = false);
     let group = "shared second vertices";
     add(group, "paths of their own", &|s| s.sharing = Sharing::Off);
-    add(group, "4x4 tiles, all keep theirs", &|s| s.sharing = Sharing::Small);
+    add(group, "squares of 4x4 pixels, all keep theirs", &|s| s.sharing = Sharing::Small);
     let group = "importance tables";
     for table in [TableKind::U32, TableKind::F32, TableKind::F64] {
         add(group, &format!("table {table}"), &|s| s.table = table);

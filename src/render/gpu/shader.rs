@@ -838,13 +838,16 @@ mod tests {
 
     /// Divisions and remainders of integers by what is no constant. naga does not guard them (see
     /// `RUNTIME_CHECKS`), so here is why each divisor is at least 1.
-    const DIVISIONS: [&str; 14] = [
+    const DIVISIONS: [&str; 16] = [
         // The share of the whole map's law is 1 to 256, and with 256 no number lies beyond it.
         "choose_tile: (((rest % width) << 8u) | (finer & 0xffu)) / width",
         "choose_tile: rest % width",
         "choose_tile: rest / width",
         // The map has tiles, and as many patches or more.
         "first_row_sum: tile % globals.tile_columns",
+        // A constant, in a vector.
+        "member_of: local % OWNER_SIDE",
+        "member_of: local / OWNER_SIDE",
         "member_of: tile % max(across, 1u)",
         "member_of: tile / max(across, 1u)",
         // Tiles across a picture of at least one pixel.
