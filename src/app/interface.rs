@@ -51,6 +51,8 @@ pub struct Interface {
     pub viewport_of: Option<([u32; 2], bool)>,
     /// Until when the camera counts as moving, in the window's seconds.
     pub moving_until: f64,
+    /// Keys held that fly the camera.
+    pub flying: Vec<egui::Key>,
 }
 
 /// What the right panel shows.
@@ -132,6 +134,7 @@ impl Default for Interface {
             viewport_pixels: None,
             viewport_of: None,
             moving_until: f64::NEG_INFINITY,
+            flying: Vec::new(),
         }
     }
 }

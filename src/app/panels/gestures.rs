@@ -104,13 +104,13 @@ fn travel(ui: &Ui, whole: Rect, response: &Response, steps: &[Step], scope: &mut
             viewpoint.dolly(wheel / 50.0);
         }
     }
-    if !context.text_edit_focused() && !scope.interface.is_modal() {
-        let speed = scope.scene.map_or(1.0, |scene| flying_speed(&scene.world));
-        if let Some(metres) = flight(context, speed) {
-            moved = true;
-            viewpoint.fly(metres);
-            context.request_repaint();
-        }
+    let may_fly = !context.text_edit_focused() && !scope.interface.is_modal();
+    hold_keys(context, may_fly, &mut scope.interface.flying);
+    let speed = scope.scene.map_or(1.0, |scene| flying_speed(&scene.world));
+    if let Some(metres) = flight(context, &scope.interface.flying, speed) {
+        moved = true;
+        viewpoint.fly(metres);
+        context.request_repaint();
     }
     if moved {
         scope.interface.keep_moving(context.time(), context.input(|i| i.unstable_dt));
@@ -162,18 +162,67 @@ fn flying_speed(world: &crate::path::World) -> f32 {
     (0.25 * (high - low).length()).clamp(0.05, 50.0)
 }
 
-/// Metres along right, up and forward that the keys held down ask for.
-fn flight(context: &egui::Context, speed: f32) -> Option<Vec3> {
+/// Keys that fly: right, left, up, down, forward, back.
+const FLYING: [Key; 6] = [Key::D, Key::A, Key::E, Key::Q, Key::W, Key::S];
+
+/// Follows which of them are held: those that were pressed on their own. What is part of a shortcut
+/// never flies, however the releases of its keys fall into frames.
+fn hold_keys(context: &egui::Context, may_fly: bool, held: &mut Vec<Key>) {
     context.input(|input| {
-        if input.modifiers.command || input.modifiers.alt {
-            return None;
+        for event in &input.events {
+            if let egui::Event::Key { key, pressed: true, repeat: false, modifiers, .. } = event
+                && FLYING.contains(key)
+                && !(modifiers.command || modifiers.alt)
+            {
+                held.push(*key);
+            }
         }
-        let axis = |plus: Key, minus: Key| {
-            f32::from(input.key_down(plus)) - f32::from(input.key_down(minus))
-        };
-        let direction = Vec3::new(axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S));
+        held.retain(|key| may_fly && input.key_down(*key));
+    });
+}
+
+/// Metres along right, up and forward that the keys held down ask for.
+fn flight(context: &egui::Context, held: &[Key], speed: f32) -> Option<Vec3> {
+    let axis =
+        |plus: Key, minus: Key| f32::from(held.contains(&plus)) - f32::from(held.contains(&minus));
+    let [right, left, up, down, forward, back] = FLYING;
+    let direction = Vec3::new(axis(right, left), axis(up, down), axis(forward, back));
+    context.input(|input| {
         let faster = if input.modifiers.shift { 4.0 } else { 1.0 };
         let seconds = input.stable_dt.min(0.1);
         (direction != Vec3::ZERO).then(|| direction.normalize() * speed * faster * seconds)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::{Event, RawInput};
+
+    use super::*;
+
+    fn key(key: Key, pressed: bool, modifiers: Modifiers) -> Event {
+        Event::Key { key, physical_key: None, pressed, repeat: false, modifiers }
+    }
+
+    #[test]
+    fn a_key_flies_alone_and_not_as_part_of_a_shortcut() {
+        let context = egui::Context::default();
+        let mut held = Vec::new();
+        let mut frame = |events: Vec<Event>, may_fly| {
+            let _ = context.run_ui(RawInput { events, ..RawInput::default() }, |_| {});
+            hold_keys(&context, may_fly, &mut held);
+            flight(&context, &held, 1.0).is_some()
+        };
+        let (none, control) = (Modifiers::NONE, Modifiers::COMMAND);
+        assert!(frame(vec![key(Key::W, true, none)], true));
+        assert!(frame(Vec::new(), true));
+        assert!(!frame(vec![key(Key::W, false, none)], true));
+        // Ctrl is let go before S.
+        assert!(!frame(vec![key(Key::S, true, control)], true));
+        assert!(!frame(Vec::new(), true));
+        assert!(!frame(vec![key(Key::S, false, none)], true));
+        // Typing is no flight, nor what is held when it ends.
+        assert!(!frame(vec![key(Key::A, true, none)], false));
+        assert!(!frame(Vec::new(), true));
+    }
 }
