@@ -6,6 +6,21 @@ fn put_incident(at: u32, direction: vec3f, light: vec3f, rays: u32) {
     seconds[at + 1u] = packed(select(vec3f(0.0), light, is_valid), rays);
 }
 
+// With which probability a path that has left a second vertex survives; 0 if it has not.
+fn survival(path: ptr<function, Path>) -> f32 {
+    if !plays_roulette(path) {
+        return 1.0;
+    }
+    let probability = roulette_probability(path);
+    if probability < 1.0 {
+        let draw = path_pair(path).y;
+        if draw >= probability {
+            return 0.0;
+        }
+    }
+    return probability;
+}
+
 //#if shadow_rays
 // What comes along a ray towards a light.
 fn light_along(path: ptr<function, Path>, shadow: Shadow) -> vec3f {

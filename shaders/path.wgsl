@@ -835,16 +835,25 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
 }
 
 fn survives(path: ptr<function, Path>) -> bool {
-    let probability = survival(path);
-    (*path).throughput /= max(probability, 0.05);
-    return probability > 0.0;
+    if !plays_roulette(path) {
+        return true;
+    }
+    let probability = roulette_probability(path);
+    if probability < 1.0 {
+        let draw = path_pair(path).y;
+        if draw >= probability {
+            return false;
+        }
+    }
+    (*path).throughput /= probability;
+    return true;
 }
 
-// With which probability the path has survived; 0 if it has not.
-fn survival(path: ptr<function, Path>) -> f32 {
-    if globals.russian_roulette == 0u || (*path).bounces < ROULETTE_AFTER {
-        return 1.0;
-    }
+fn plays_roulette(path: ptr<function, Path>) -> bool {
+    return globals.russian_roulette != 0u && (*path).bounces >= ROULETTE_AFTER;
+}
+
+fn roulette_probability(path: ptr<function, Path>) -> f32 {
     var in_air = max_element((*path).throughput);
 //#if solid_transmission
     in_air *= (*path).body.squared_index;
@@ -852,12 +861,5 @@ fn survival(path: ptr<function, Path>) -> f32 {
 //#if sharing
     in_air *= (*path).throughput_before;
 //#end
-    let probability = clamp(ROULETTE_MILDNESS * in_air, 0.05, 1.0);
-    if probability < 1.0 {
-        let draw = path_pair(path).y;
-        if draw >= probability {
-            return 0.0;
-        }
-    }
-    return probability;
+    return clamp(ROULETTE_MILDNESS * in_air, 0.05, 1.0);
 }
