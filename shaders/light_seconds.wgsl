@@ -6,7 +6,8 @@ fn put_incident(at: u32, direction: vec3f, light: vec3f, rays: u32) {
     seconds[at + 1u] = packed(select(vec3f(0.0), light, is_valid), rays);
 }
 
-// With which probability a path that has left a second vertex survives; 0 if it has not.
+// With which probability a path that has left a second vertex survives; 0 if it has not. (`survives`
+// divides by it at once: were it to ask this, a scene's kernel would take 16 registers more.)
 fn survival(path: ptr<function, Path>) -> f32 {
     if !plays_roulette(path) {
         return 1.0;

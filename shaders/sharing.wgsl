@@ -82,10 +82,6 @@ fn second_at(group: u32, lane: u32, square: u32) -> u32 {
     return ((group * TILES_OF_GROUP + lane / MEMBERS) * OWNERS + square) * SECOND_TEXELS;
 }
 
-fn float3(texel: vec4u) -> vec3f {
-    return bitcast<vec3f>(texel.xyz);
-}
-
 fn packed(xyz: vec3f, w: u32) -> vec4u {
     return vec4u(bitcast<vec3u>(xyz), w);
 }

@@ -53,10 +53,6 @@ fn slot_write(slot: u32, texel: u32, xyz: vec3f, w: u32) {
     slots[slot + 64u * texel] = vec4u(bitcast<vec3u>(xyz), w);
 }
 
-fn float3(texel: vec4u) -> vec3f {
-    return bitcast<vec3f>(texel.xyz);
-}
-
 fn slot_state(slot: u32) -> State {
     let texel = slot_read(slot, STATE);
     return State(texel.x, texel.y & 3u);

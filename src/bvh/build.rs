@@ -8,6 +8,8 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2};
 use rayon::prelude::*;
 
+use crate::sampler::{hash, unit_from_bits};
+
 use super::wide::{Block, LEAF, MAX_DEPTH, Node, Reference, WIDTH};
 
 /// Cost of testing one block of triangles, relative to one node.
@@ -85,18 +87,13 @@ pub(super) fn binary(positions: &[Vec3], triangles: &[[u32; 3]]) -> Option<(Vec<
 /// distributed, so that boxes of many merged ones differ by as much as those of two.
 fn loosened(tight: &Aabb, number: u32) -> Aabb {
     const HAIR: f32 = 64.0 * f32::EPSILON;
-    let mut state = u64::from(number);
-    let mut hairs = || {
-        Vec3A::from_array(std::array::from_fn(|_| {
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mixed = (state ^ state >> 31).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            // From 2^-24 to 1.
-            let uniform = ((mixed >> 40) + 1) as f32 / (1_u32 << 24) as f32;
-            -uniform.ln() * HAIR
-        }))
+    let hair = |side: u32| {
+        let uniform = unit_from_bits(hash(number.wrapping_mul(6).wrapping_add(side)));
+        -(1.0 - uniform).ln() * HAIR
     };
+    let hairs = |first: u32| Vec3A::from_array([0, 1, 2].map(|axis| hair(first + axis)));
     let size = tight.min.abs().max(tight.max.abs());
-    Aabb { min: tight.min - size * hairs(), max: tight.max + size * hairs() }
+    Aabb { min: tight.min - size * hairs(0), max: tight.max + size * hairs(3) }
 }
 
 /// The scene as the caller gave it.

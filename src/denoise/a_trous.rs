@@ -9,6 +9,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::LEAST_ALBEDO;
 use crate::color::luminance;
 use crate::image::Image;
 use crate::render::film::{Film, Pixel};
@@ -30,8 +31,6 @@ const STRICTNESS: [f32; 3] = [1.0, 1.0 / 4.0, 1.0 / 16.0];
 const LEAST_ALIKE: f32 = 3.0;
 /// Passes in which a pixel is compared less strictly; later ones reach other edges.
 const RELAXED_PASSES: u32 = 2;
-/// Albedo that counts as none: black surfaces and the sky are filtered as they are.
-const LEAST_ALBEDO: f32 = 0.02;
 
 /// What tells surfaces apart.
 #[derive(Clone, Copy)]
@@ -92,6 +91,7 @@ fn relax(guides: &mut [Guide], width: usize) {
         let mut alike = [0.0; STRICTNESS.len()];
         for other in around(index, [width, height], 2).filter(|other| *other != index) {
             let likeness = likeness(&guides[index], &guides[other], 1);
+            // Those of `STRICTNESS`.
             let powers = [likeness, likeness.sqrt().sqrt(), likeness.sqrt().sqrt().sqrt().sqrt()];
             alike.iter_mut().zip(powers).for_each(|(sum, power)| *sum += power);
         }
@@ -180,7 +180,9 @@ fn filtered_pixel(
 impl Guide {
     /// What another pixel counts for this one.
     fn weight(&self, other: &Self, step: i32) -> f32 {
-        likeness(self, other, step).powf(self.strictness)
+        let likeness = likeness(self, other, step);
+        // Most pixels, and a power takes longer than all else.
+        if self.strictness == 1.0 { likeness } else { likeness.powf(self.strictness) }
     }
 }
 

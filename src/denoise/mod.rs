@@ -11,6 +11,9 @@ use crate::error::Result;
 use crate::image::Image;
 use crate::render::film::Film;
 
+/// Albedo that counts as none: black surfaces and the sky are smoothed as they are.
+const LEAST_ALBEDO: f32 = 0.02;
+
 /// What takes noise out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]

@@ -11,6 +11,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::LEAST_ALBEDO;
 use crate::color::luminance;
 use crate::image::Image;
 use crate::render::film::{Film, Pixel, Surface};
@@ -19,8 +20,6 @@ use crate::render::film::{Film, Pixel, Surface};
 const SCALES: usize = 8;
 /// What neighbours on another surface count, so that somebody always does.
 const LEAST_LIKENESS: f32 = 1e-3;
-/// Albedo that counts as none: black surfaces and the sky are blended as they are.
-const LEAST_ALBEDO: f32 = 0.02;
 /// Relative difference of depths at which two neighbouring pixels are half alike.
 const DEPTH_TOLERANCE: f32 = 0.02;
 /// The spread around a cell counts as much as so many samples of its own, at least.

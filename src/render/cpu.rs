@@ -168,7 +168,7 @@ impl Task<'_> {
             .pixels()
             .map(|(at, _)| {
                 let (ray, sampler, tracer) = self.start(at, sample);
-                let place = [0, 1].map(|axis| (at[axis] as i32 - corner[axis]) as u32);
+                let place = [0, 1].map(|axis| (i64::from(at[axis]) - corner[axis]) as u32);
                 Start { place, ray, sampler, tracer }
             })
             .collect();

@@ -236,9 +236,7 @@ impl Film {
 /// A part of the film for one thread.
 pub(super) struct FilmTile<'a> {
     /// Column and row of its first pixel, were none of it outside of the picture.
-    corner: [i32; 2],
-    /// Column and row of the first pixel that is there.
-    first: [u32; 2],
+    corner: [i64; 2],
     rows: Vec<(&'a mut [Pixel], &'a mut [Surface])>,
 }
 
@@ -256,13 +254,12 @@ impl Film {
         let rows = (self.height + before[1]).div_ceil(height) as usize;
         let mut tiles = Vec::with_capacity(columns * rows);
         for tile in 0..columns * rows {
+            let [column, row] = [tile % columns, tile / columns].map(|index| index as i64);
             let corner = [
-                (tile % columns) as i64 * i64::from(width),
-                (tile / columns) as i64 * i64::from(height),
+                column * i64::from(width) - i64::from(before[0]),
+                row * i64::from(height) - i64::from(before[1]),
             ];
-            let corner = [0, 1].map(|axis| (corner[axis] - i64::from(before[axis])) as i32);
-            let first = corner.map(|c| c.max(0) as u32);
-            tiles.push(FilmTile { corner, first, rows: Vec::with_capacity(height as usize) });
+            tiles.push(FilmTile { corner, rows: Vec::with_capacity(height as usize) });
         }
         let row_length = self.width as usize;
         let mut surfaces = self.surfaces.chunks_mut(row_length);
@@ -270,8 +267,8 @@ impl Film {
             let mut surfaces = surfaces.next().unwrap_or_default();
             let tile_row = (y + before[1] as usize) / height as usize;
             for tile in &mut tiles[tile_row * columns..(tile_row + 1) * columns] {
-                let end = (i64::from(tile.corner[0]) + i64::from(width)) as usize;
-                let length = end.min(row_length) - tile.first[0] as usize;
+                let end = (tile.corner[0] + i64::from(width)) as usize;
+                let length = end.min(row_length) - tile.first()[0] as usize;
                 let (own, rest) = pixels.split_at_mut(length);
                 let (own_surfaces, rest_surfaces) =
                     surfaces.split_at_mut(if surfaces.is_empty() { 0 } else { length });
@@ -285,13 +282,18 @@ impl Film {
 
 impl FilmTile<'_> {
     /// Column and row where it begins; it may be outside of the picture.
-    pub(super) fn corner(&self) -> [i32; 2] {
+    pub(super) fn corner(&self) -> [i64; 2] {
         self.corner
+    }
+
+    /// Column and row of the first pixel that is in the picture.
+    fn first(&self) -> [u32; 2] {
+        self.corner.map(|at| at.max(0) as u32)
     }
 
     /// Its pixels that are in the picture with their column and row, row after row.
     pub(super) fn pixels(&mut self) -> impl Iterator<Item = ([u32; 2], FilmPixel<'_>)> {
-        let [left, top] = self.first;
+        let [left, top] = self.first();
         (top..).zip(&mut self.rows).flat_map(move |(y, (pixels, surfaces))| {
             let mut surfaces = surfaces.iter_mut();
             (left..)

@@ -81,8 +81,11 @@ impl Gpu {
             // The receiver waits below, unless the device has failed.
             let _ = sender.send(result);
         });
-        // While wgpu 30 waits, it holds a lock that presenting a frame takes too: so this looks now and
-        // then, for others may have long work under way.
+        if !self.has_window {
+            self.wait_for(None)?;
+        }
+        // While wgpu 30 waits, it holds a lock that presenting a frame takes too: so with a window this
+        // looks now and then, for others may have long work under way.
         let mapped = loop {
             match receiver.recv_timeout(LOOK_GAP) {
                 Err(RecvTimeoutError::Timeout) => {

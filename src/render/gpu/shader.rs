@@ -685,7 +685,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 41] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 42] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -726,6 +726,7 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 41] {
         (wgsl!("cast"), kernel.casts()),
         (wgsl!("closest_hits"), kernel == Kernel::ClosestHits),
         (wgsl!("shadow_rays"), kernel == Kernel::ShadowRays),
+        (wgsl!("words"), kernel.is_of_queue() || kernel.shares()),
         (wgsl!("slots"), kernel.is_of_queue()),
         (wgsl!("trace"), kernel == Kernel::Trace),
         (wgsl!("shade"), kernel == Kernel::Shade),
@@ -902,8 +903,14 @@ mod tests {
             let kind = typifier.get(right, &module.types).scalar_kind();
             let is_integer = kind != Some(ScalarKind::Float);
             let divides = matches!(op, BinaryOperator::Divide | BinaryOperator::Modulo);
-            let divisor = &function.expressions[right];
-            let by_constant = matches!(divisor, Expression::Literal(_) | Expression::Constant(_));
+            let by_constant = match function.expressions[right] {
+                Expression::Literal(_) => true,
+                Expression::Constant(constant) => {
+                    let value = &module.global_expressions[module.constants[constant].init];
+                    matches!(value, Expression::Literal(naga::Literal::U32(1..)))
+                }
+                _ => false,
+            };
             if divides && is_integer && !by_constant {
                 let text =
                     &source[function.expressions.get_span(handle).to_range().unwrap_or(0..0)];

@@ -33,9 +33,8 @@ impl Sharing {
         size: [u32; 2],
     ) -> Result<Self> {
         // Tiles stand out of the picture on all sides.
-        let groups = size.map(|pixels| u64::from(pixels.div_ceil(tile.side)) + 1);
-        let tiles_of_group = GROUP / u64::from(tile.side * tile.side);
-        let most_groups = (groups[0] * groups[1]).div_ceil(tiles_of_group).min(MOST_GROUPS);
+        let tiles = size.map(|pixels| u64::from(pixels.div_ceil(tile.side)) + 1);
+        let most_groups = (tiles[0] * tiles[1]).div_ceil(tiles_of_group(tile)).min(MOST_GROUPS);
         let first_texels = if features.has("layers") { 5 } else { 3 };
         let lights = ["map_sampling", "local_lights"].map(|name| u64::from(features.has(name)));
         let incidents = u64::from(tile.continuations) * (1 + lights[0] + lights[1]);
@@ -47,6 +46,11 @@ impl Sharing {
     }
 }
 
+/// Tiles of a workgroup.
+fn tiles_of_group(tile: SharedTile) -> u64 {
+    GROUP / u64::from(tile.side * tile.side)
+}
+
 impl Renderer {
     /// As [`Self::render_tiles`], for pixels that share.
     pub(super) fn render_shared(
@@ -56,39 +60,43 @@ impl Renderer {
         cancel: &AtomicBool,
     ) -> Result<()> {
         let Globals { width, height, seed, .. } = self.globals;
+        let Some(Sharing { tile, most_groups, next_group: mut first }) = self.sharing else {
+            return Ok(());
+        };
+        let least = LEAST_TILES[usize::from(!self.gpu.facts().is_software())];
         while self.progress.least < pass.target {
             let sample = self.progress.least;
-            let Some(Sharing { tile, most_groups, next_group }) = self.sharing else {
-                return Ok(());
-            };
             let tiling = tile.tiling([width, height], seed, sample);
-            let tiles_of_group = GROUP / u64::from(tile.side * tile.side);
-            let groups = tiling.count().div_ceil(tiles_of_group);
-            let mut first = next_group;
+            let groups = tiling.count().div_ceil(tiles_of_group(tile));
             while first < groups {
                 if cancel.load(Ordering::Relaxed) {
                     return Ok(());
                 }
-                let least = LEAST_TILES[usize::from(!self.gpu.facts().is_software())];
                 let affordable = self.flights.units(Kernel::FindSeconds).max(least);
                 let count = affordable.min(most_groups).min(groups - first);
-                let work = Work {
+                self.dispatch_shared(&Work {
                     first: first as u32,
                     count: count as u32,
                     sample,
                     stride,
                     ..Work::default()
-                };
-                self.dispatch_shared(&work)?;
-                let tiles = first * tiles_of_group..(first + count) * tiles_of_group;
-                self.progress.surplus += tiling.pixels(tiles);
-                first += count;
-                self.sharing = Some(Sharing { tile, most_groups, next_group: first });
+                })?;
+                let tiles = [first, first + count].map(|group| group * tiles_of_group(tile));
+                self.progress.surplus += tiling.pixels(tiles[0]..tiles[1]);
+                first = self.goes_on_at(first + count);
             }
-            self.sharing = Some(Sharing { tile, most_groups, next_group: 0 });
+            first = self.goes_on_at(0);
             self.progress = Progress { least: sample + 1, ..Progress::default() };
         }
         Ok(())
+    }
+
+    /// Keeps where the sample in work goes on, should this call end.
+    fn goes_on_at(&mut self, group: u64) -> u64 {
+        if let Some(sharing) = &mut self.sharing {
+            sharing.next_group = group;
+        }
+        group
     }
 
     fn dispatch_shared(&mut self, work: &Work) -> Result<()> {
