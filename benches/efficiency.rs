@@ -12,7 +12,7 @@ use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LawOptions;
 use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::{Figures, Phase, Sampling, Session, Sharing, View};
+use lightgrid::render::{Figures, Gi, Phase, Sampling, Session, Sharing, View};
 use lightgrid::sampler::Points;
 use lightgrid::scene::builtin;
 
@@ -133,6 +133,7 @@ impl Case<'_> {
             points: Points::Sobol,
             grid_columns: 64,
             sharing: Sharing::Auto,
+            gi: Gi::Exact,
             learning_paths: LEARNING_PATHS,
             laws: LawOptions::ADAPTIVE,
             medium: None,

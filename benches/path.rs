@@ -9,7 +9,7 @@ use lightgrid::light_grid::LawOptions;
 use lightgrid::light_grid::tile_laws::TileLaws;
 use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::{Sampling, Session, Sharing, View};
+use lightgrid::render::{Gi, Sampling, Session, Sharing, View};
 use lightgrid::sampler::Points;
 use lightgrid::scene::builtin;
 
@@ -29,6 +29,7 @@ pub(crate) fn bench(criterion: &mut Criterion) {
         points: Points::Sobol,
         grid_columns: 64,
         sharing: Sharing::Auto,
+        gi: Gi::Exact,
         learning_paths,
         laws: LawOptions::ADAPTIVE,
         medium: None,

@@ -337,8 +337,8 @@ fn bsdf_straight_transmittance(b: Bsdf, wo: vec3f) -> vec3f {
 }
 //#end
 
-//#if layers
-// Share of uniform light that reaches a viewer straight above, for guide layers.
+//#if albedo
+// Share of uniform light that reaches a viewer straight above.
 fn bsdf_albedo(b: Bsdf) -> vec3f {
     let terms = terms_towards(b.interface_.ggx, b.roughness, vec3f(0.0, 0.0, 1.0));
     let let_in = 1.0 - dot(b.f0_f90, terms_mean(b.interface_.ggx, b.roughness));

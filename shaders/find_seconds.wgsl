@@ -9,16 +9,7 @@ var<private> second: array<vec4u, 2>;
 
 // At the first vertex: whether its light is gathered later, by `connect_seconds`.
 fn meet_first(path: ptr<function, Path>, vertex: Vertex) -> bool {
-    var shares = is_alike_nearby(vertex);
-//#if solid_transmission
-//#if medium
-    shares = shares && !(*path).body.is_solid;
-//#else
-    let body = (*path).body;
-    shares = shares && body.squared_index == 1.0 && all(body.absorption == vec3f(0.0));
-//#end
-//#end
-    if !shares {
+    if !is_broad(vertex, LEAST_ALPHA) || !is_in_air(path) {
         return false;
     }
     let pair = (*path).sampler.pair;
@@ -45,7 +36,7 @@ fn meet_second(path: ptr<function, Path>, vertex: Vertex) -> bool {
     let shares = (first[0].w & IS_SHARED) != 0u
         && (*path).is_clear
         && (*path).departure_pdf_solid_angle < F32_MAX
-        && is_alike_nearby(vertex)
+        && is_broad(vertex, LEAST_ALPHA)
         && is_true_from(
             vertex.point.shading_frame.z, vertex.point.geometric_normal, -(*path).ray.direction);
     if shares {

@@ -85,6 +85,12 @@ struct Globals {
     film_scale: f32,
     // Triangles in the driver's tree that end every ray; those after them are asked.
     opaque_triangles: u32,
-    padding_2: u32,
-    padding_3: u32,
+    // Of the radiance cache: whether there is one yet, units a radiance of 1 counts, where its cells lie,
+    // mean radiance over albedo.
+    cache_is_known: u32,
+    cache_scale: f32,
+    cache_center: vec3f,
+    cache_edge: f32,
+    cache_mean: vec3f,
+    cache_least_distance: f32,
 }

@@ -43,14 +43,7 @@ fn learn(
     if offset >= globals.work.count {
         return;
     }
-    // One long sequence over the whole picture; its high bits count its restarts.
-    let index = globals.work.first + offset;
-    let restarts = globals.work.first_high + select(0u, 1u, index < globals.work.first);
-    var sampler = sampler_new(globals.seed ^ LEARNING_SEED, restarts, index);
-    let on_picture = next_pair(&sampler);
-    let lens = lens_point(&sampler);
-    let pixel = on_picture * vec2f(f32(globals.width), f32(globals.height));
-    var path = path_new(camera_ray(pixel, lens), sampler);
+    var path = path_anywhere(offset, LEARNING_SEED);
     path.is_counted = true;
     while path_step(&path) {}
     atomicAdd(&learning_rays, path.rays);

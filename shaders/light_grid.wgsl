@@ -2,14 +2,6 @@
 
 const WHOLE_MAP = 0u;
 
-//#if map_sampling
-struct TileChoice {
-    tile: u32,
-    probability: f32,
-    // A fresh 32-bit fraction of one.
-    remainder: u32,
-}
-
 // Twin of `cells::dominant_face`.
 fn dominant_face(normal: vec3f) -> u32 {
     let a = abs(normal);
@@ -20,6 +12,14 @@ fn dominant_face(normal: vec3f) -> u32 {
         return select(2u, 3u, normal.y < 0.0);
     }
     return select(4u, 5u, normal.z < 0.0);
+}
+
+//#if map_sampling
+struct TileChoice {
+    tile: u32,
+    probability: f32,
+    // A fresh 32-bit fraction of one.
+    remainder: u32,
 }
 
 fn cell_of(position: vec3f, normal: vec3f) -> u32 {

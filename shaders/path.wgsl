@@ -24,6 +24,10 @@ struct Path {
     passes: u32,
     bounces: u32,
     rays: u32,
+//#if cached
+    // Metres over which surfaces average what the path would find.
+    spread: f32,
+//#end
 //#if sharing
     // What the path carried where its throughput was set to one.
     throughput_before: f32,
@@ -412,11 +416,28 @@ fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
     return visit(path, vertex);
 }
 
+fn most_vertices() -> u32 {
+//#if teaching
+    // The last that teach see as far as the others.
+    return globals.bounces + TEACHERS - 2u;
+//#else
+    return globals.bounces;
+//#end
+}
+
 // Gathers light at a vertex, if the path may have one more, and chooses where the path goes on.
 fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
-    if (*path).bounces == globals.bounces {
+    if (*path).bounces == most_vertices() {
         return false;
     }
+//#if cached
+    if ends_in_cache(path, vertex) {
+        return false;
+    }
+//#end
+//#if teaching
+    meet_teachers(path, vertex);
+//#end
 //#if finding
     if (*path).bounces == 1u && meet_second(path, vertex) {
         return false;

@@ -104,25 +104,6 @@ fn vertex_at(hit: vec4u, direction: vec3f) -> Vertex {
     return vertex;
 }
 
-// Twin of `Scatterer::is_alike_nearby`.
-fn is_alike_nearby(vertex: Vertex) -> bool {
-//#if medium
-    if vertex.is_in_medium {
-        return false;
-    }
-//#end
-    var transmits = vertex.point.parameters.transmission > 0.0;
-//#if diffuse_transmission
-    transmits = transmits || vertex.point.parameters.diffuse_transmission > 0.0;
-//#end
-    let interface_ = vertex.bsdf.interface_;
-    var is_broad = interface_is_absent(interface_) || interface_.ggx.alpha >= LEAST_ALPHA;
-//#if clearcoat
-    is_broad = is_broad && vertex.bsdf.coat.strength == 0.0;
-//#end
-    return !transmits && is_broad && !bsdf_is_delta_only(vertex.bsdf);
-}
-
 // Twin of `SurfaceScatterer::is_true_from`.
 fn is_true_from(normal: vec3f, geometric_normal: vec3f, to_viewer: vec3f) -> bool {
     let geometric_cosine = dot(geometric_normal, to_viewer);

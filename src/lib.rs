@@ -43,6 +43,7 @@ pub mod noise;
 pub mod output;
 pub mod path;
 mod prefetch;
+pub mod radiance_cache;
 pub mod render;
 pub mod report;
 pub mod sampler;

@@ -9,7 +9,7 @@ use crate::light_grid::LawOptions;
 use crate::path::{Background, PathLimits};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::DeviceChoice;
-use crate::render::{Crop, Sampling, Sharing, StopRule, View};
+use crate::render::{Crop, Gi, Sampling, Sharing, StopRule, View};
 use crate::sampler::Points;
 use crate::scene::{Camera, Medium, Projection, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
@@ -151,6 +151,7 @@ impl Document {
             grid_columns: 64,
             // What neighbours share, denoising cannot tell from light.
             sharing: Sharing::Off,
+            gi: Gi::Exact,
             learning_paths: self.learning_paths([width, height]),
             laws: LawOptions::ADAPTIVE,
             medium: self.fog,

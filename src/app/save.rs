@@ -68,6 +68,7 @@ fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
     vec![
         ("sampling", json!(view.sampling)),
         ("sharing", json!(view.sharing)),
+        ("gi", json!(view.gi)),
         ("grid_columns", json!(view.grid_columns)),
         ("bounces", json!(view.limits.bounces)),
         ("filter", json!(view.filter)),

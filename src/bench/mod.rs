@@ -19,7 +19,7 @@ use crate::metrics;
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::{AdapterFacts, Gpu, KernelFacts, RayChoice, Schedule, Stage};
-use crate::render::{Phase, Sampling, Session, Sharing, StopRule, View};
+use crate::render::{Gi, Phase, Sampling, Session, Sharing, StopRule, View};
 use crate::report::{Device, Machine, OpenDevice};
 use crate::sampler::Points;
 
@@ -270,6 +270,7 @@ impl Place<'_> {
             points: Points::Sobol,
             grid_columns: 64,
             sharing: Sharing::Auto,
+            gi: Gi::Exact,
             learning_paths: View::suitable_learning_paths(
                 Sampling::Adaptive,
                 [width, height],

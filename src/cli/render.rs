@@ -24,7 +24,7 @@ use crate::output::{self, Exposure, LayerName};
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
-use crate::render::{Crop, Sampling, Session, Sharing, StopRule, View};
+use crate::render::{Crop, Gi, Sampling, Session, Sharing, StopRule, View};
 use crate::sampler::Points;
 use crate::scene::{Camera, Medium, Projection, Scene, SceneOptions, builtin};
 use crate::terminal::notice;
@@ -144,6 +144,15 @@ pub(super) struct RenderArguments {
         help_heading = "Light"
     )]
     sharing: Sharing,
+    /// What becomes of light that has met several surfaces.
+    #[arg(
+        long,
+        default_value = "exact",
+        value_enum,
+        value_name = "exact|cached",
+        help_heading = "Light"
+    )]
+    gi: Gi,
     /// Importance table of the map: tile-local, u32, f32, f64.
     #[arg(long, default_value = "tile-local", value_name = "KIND", help_heading = "Light")]
     table: TableKind,
@@ -262,6 +271,7 @@ impl RenderArguments {
             noise: None,
             sampling,
             sharing: Sharing::Auto,
+            gi: Gi::Exact,
             table: TableKind::default(),
             bounces: 8,
             no_russian_roulette: false,
@@ -420,6 +430,7 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
         points: Points::Sobol,
         grid_columns: arguments.grid,
         sharing: sharing(arguments),
+        gi: arguments.gi,
         learning_paths: arguments.learning_paths.unwrap_or_else(|| {
             View::suitable_learning_paths(arguments.sampling, [width, height], arguments.spp)
         }),

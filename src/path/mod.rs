@@ -11,6 +11,7 @@ use std::borrow::Cow;
 use glam::{Vec2, Vec3};
 
 pub mod background;
+mod cached;
 pub mod camera;
 mod draw;
 pub mod framing;
@@ -20,11 +21,13 @@ mod lights;
 mod materials;
 mod ray_clock;
 pub mod sharing;
+mod teach;
 mod world;
 
 pub use background::Background;
 pub use light_tree::Receiver;
 pub use lights::{LightSample, LocalLights};
+pub(crate) use teach::TEACHERS;
 pub use world::World;
 
 use crate::bsdf::{Bsdf, Hero};
@@ -34,6 +37,7 @@ use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
 use crate::math::{Frame, balance_heuristic};
 use crate::medium::{Fog, Interior, Phase};
+use crate::radiance_cache::RadianceCache;
 use crate::sampler::Sampler;
 use crate::scene::surface::SurfacePoint;
 
@@ -58,6 +62,8 @@ pub struct PathTracer<'a> {
     pub grid: Option<&'a LightGrid>,
     /// Where it is counted what samples of the map see.
     pub counts: Option<&'a LearningGrid>,
+    /// Where paths end once they have spread wide enough; `None` follows them all.
+    pub cache: Option<&'a RadianceCache>,
     /// What lies between surfaces; `None` is clear air.
     pub fog: Option<Fog>,
     /// What the camera sees where it sees no surface.
@@ -173,6 +179,12 @@ impl Scatterer<'_> {
 }
 
 impl SurfaceScatterer<'_> {
+    /// Whether it scatters much the same to and from places side by side, all on one side: no reflection
+    /// narrower than GGX makes it with this alpha.
+    fn is_broad(&self, least_alpha: f32) -> bool {
+        !self.transmits && !self.bsdf.is_delta_only() && self.bsdf.is_broad(least_alpha)
+    }
+
     /// BSDF times cosine and the BSDF's density for light from `direction`; `None` where it is
     /// black, or where shading and geometric normal disagree about the side.
     fn scattered(&self, direction: Vec3) -> Option<(Vec3, f32)> {
@@ -255,6 +267,8 @@ struct Path<'a> {
     travelled: f32,
     /// Whether nothing on the way since the last vertex has taken any light.
     is_clear: bool,
+    /// Metres over which surfaces average what the path would find; kept if there is a cache.
+    spread: f32,
     bounces: u32,
     /// Samples of the map that the next vertex takes.
     map_samples: u32,
@@ -278,6 +292,7 @@ impl<'a> Path<'a> {
             body: Body::AIR,
             travelled: 0.0,
             is_clear: true,
+            spread: 0.0,
             bounces: 0,
             map_samples: 1,
             rays: 0,
@@ -289,7 +304,7 @@ impl<'a> Path<'a> {
     fn run(&mut self) {
         let mut own_bsdf = None;
         while let Some(vertex) = self.next_vertex(&mut own_bsdf) {
-            if !self.visit(&vertex) {
+            if self.ends_in_cache(&vertex) || !self.visit(&vertex) {
                 break;
             }
         }

@@ -106,7 +106,7 @@ pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Ve
         let mut path = Path::new(start.tracer, start.ray, start.sampler.clone());
         let mut first = None;
         if let Some(vertex) = path.next_vertex(first_bsdf) {
-            let shares = path.body.interior.is_none() && vertex.scatterer.is_alike_nearby();
+            let shares = path.is_in_air() && vertex.scatterer.is_alike_nearby();
             if shares {
                 path.map_samples = tile.map_samples;
             }
@@ -206,10 +206,9 @@ impl<'v> First<'v> {
 }
 
 impl Scatterer<'_> {
-    /// Whether it scatters much the same to and from places side by side, all on one side.
+    /// Whether it scatters much the same to and from places side by side.
     fn is_alike_nearby(&self) -> bool {
-        let Self::Surface(surface) = self else { return false };
-        !surface.transmits && !surface.bsdf.is_delta_only() && surface.bsdf.is_broad(LEAST_ALPHA)
+        matches!(self, Self::Surface(surface) if surface.is_broad(LEAST_ALPHA))
     }
 }
 

@@ -6,6 +6,7 @@ use super::lights::LocalLights;
 use super::materials::ReadyMaterial;
 use super::ray_clock::RayClock;
 use crate::bvh::{Bvh, Hit, Ray};
+use crate::environment::Environment;
 use crate::huge_pages::on_huge_pages;
 use crate::scene::needs::SceneNeeds;
 use crate::scene::surface::{SurfacePoint, alpha_at};
@@ -33,6 +34,15 @@ impl World {
         let materials = scene.materials.iter().map(ReadyMaterial::new).collect();
         let lights = LocalLights::new(&scene, bvh.bounds());
         Self { needs: SceneNeeds::of(&scene), scene, bvh, lights, materials, clock: None }
+    }
+
+    /// About the largest radiance of the map and of lamps; 0 without any.
+    pub(crate) fn brightest(&self, environment: &Environment) -> f32 {
+        let map = environment.rotation_and_intensity().1 / environment.importance_scale().0;
+        let map = if environment.is_black() { 0.0 } else { map };
+        let emissive = self.scene.materials.iter().map(|material| material.emissive.max_element());
+        let lights = self.scene.lights.iter().map(|light| light.intensity.max_element());
+        emissive.chain(lights).fold(map, f32::max)
     }
 
     /// Times all rays from now on, which slows them down a little.

@@ -13,10 +13,14 @@ use crate::light_grid::counters::MAX_RECORDS_PER_PASS;
 use crate::path::PathTracer;
 use crate::path::camera::CameraRays;
 use crate::path::sharing::{SharedTile, Start, radiance_of_tile};
+use crate::radiance_cache::RadianceSums;
 use crate::sampler::Sampler;
 
 /// Seed offset that keeps learning's random numbers apart from rendering's.
 const LEARNING_SEED: u32 = 0x6c65_6172;
+
+/// The same for teaching the radiance cache.
+const TEACHING_SEED: u32 = 0x7465_6163;
 
 /// Learning paths one task traces between two looks at `cancel`.
 const PATHS_PER_TASK: u64 = 512;
@@ -44,28 +48,48 @@ pub(super) fn learn(
     paths: Range<u64>,
     cancel: &AtomicBool,
 ) -> u64 {
+    in_tasks(paths, cancel, |path| {
+        let (ray, sampler) = anywhere(rays, view, LEARNING_SEED, path);
+        tracer.learn(ray, sampler)
+    })
+}
+
+/// Traces the teaching paths in `paths`, all of them, and adds what they find; returns the number of
+/// rays.
+pub(super) fn teach(
+    tracer: &PathTracer<'_>,
+    rays: &CameraRays,
+    view: &View,
+    paths: Range<u64>,
+    sums: &RadianceSums,
+) -> u64 {
+    in_tasks(paths, &AtomicBool::new(false), |path| {
+        let (ray, sampler) = anywhere(rays, view, TEACHING_SEED, path);
+        tracer.teach(ray, sampler, sums)
+    })
+}
+
+/// Does something with each of `paths`, on all threads; returns the number of rays.
+fn in_tasks(paths: Range<u64>, cancel: &AtomicBool, trace: impl Fn(u64) -> u32 + Sync) -> u64 {
     let tasks = (paths.end - paths.start).div_ceil(PATHS_PER_TASK);
+    let task_of = |task: u64| {
+        let start = paths.start + task * PATHS_PER_TASK;
+        start..(start + PATHS_PER_TASK).min(paths.end)
+    };
     (0..tasks)
         .into_par_iter()
-        .map(|task| {
-            if cancel.load(Ordering::Relaxed) {
-                return 0;
-            }
-            let start = paths.start + task * PATHS_PER_TASK;
-            (start..(start + PATHS_PER_TASK).min(paths.end))
-                .map(|path| {
-                    // One long sequence over the whole picture; its high bits count its restarts.
-                    let seed = view.seed ^ LEARNING_SEED;
-                    let mut sampler = Sampler::new(seed, (path >> 32) as u32, path as u32);
-                    let on_picture = Vec2::from(sampler.next_pair());
-                    let lens = lens_point(rays, &mut sampler);
-                    let pixel = on_picture * Vec2::new(view.width as f32, view.height as f32);
-                    let ray = rays.ray(pixel, lens);
-                    u64::from(tracer.learn(ray, sampler))
-                })
-                .sum::<u64>()
-        })
+        .filter(|_| !cancel.load(Ordering::Relaxed))
+        .map(|task| task_of(task).map(|path| u64::from(trace(path))).sum::<u64>())
         .sum()
+}
+
+/// Where path `path` of one long sequence over the whole picture begins; high bits count its restarts.
+fn anywhere(rays: &CameraRays, view: &View, seed: u32, path: u64) -> (Ray, Sampler) {
+    let mut sampler = Sampler::new(view.seed ^ seed, (path >> 32) as u32, path as u32);
+    let on_picture = Vec2::from(sampler.next_pair());
+    let lens = lens_point(rays, &mut sampler);
+    let pixel = on_picture * Vec2::new(view.width as f32, view.height as f32);
+    (rays.ray(pixel, lens), sampler)
 }
 
 /// Most paths that can be counted in one pass, at one try a vertex where second vertices are not

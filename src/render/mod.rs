@@ -5,7 +5,7 @@
 //! sample's random numbers depend on its pixel and index alone, a pixel's samples are added in
 //! order, and learning counts integers.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -14,10 +14,13 @@ use serde::{Deserialize, Serialize};
 mod cpu;
 pub mod film;
 pub mod filter;
+mod gi;
 pub mod gpu;
 
 use film::Film;
 use filter::PixelFilter;
+pub use gi::Gi;
+use gi::Lessons;
 
 use crate::environment::Environment;
 use crate::error::Result;
@@ -83,6 +86,8 @@ pub struct View {
     pub seed: u32,
     /// Whether pixels share their second vertices.
     pub sharing: Sharing,
+    /// How light that has met several surfaces is found.
+    pub gi: Gi,
     /// Which points samples are taken at; learning always takes [`Points::Sobol`].
     pub points: Points,
     /// Light Grid cells around the horizon; half as many from top to bottom.
@@ -138,8 +143,12 @@ impl View {
         }
     }
 
-    /// How pixels share second vertices where there is no fog; `None` if they do not.
+    /// How pixels share second vertices where there is no fog; `None` if they do not. Paths that end in
+    /// the radiance cache have nothing to share.
     pub fn shared_tile(&self) -> Option<SharedTile> {
+        if self.gi == Gi::Cached {
+            return None;
+        }
         match self.decided_sharing() {
             Sharing::Auto | Sharing::Off => None,
             Sharing::Small => Some(SharedTile::SMALL),
@@ -240,6 +249,8 @@ pub struct Figures {
     pub grid_peak_bytes: usize,
     /// Bytes the grid holds, counters included.
     pub grid_bytes: usize,
+    /// Camera paths that have taught the radiance cache.
+    pub teaching_paths: u64,
     /// Camera paths rendered.
     pub samples: u64,
     /// Rays traced while rendering, shadow rays included.
@@ -304,6 +315,7 @@ pub struct Session<'a> {
     sequence: Sequence,
     phase: Phase,
     learning: Option<Learning>,
+    lessons: Option<Lessons>,
     figures: Figures,
 }
 
@@ -335,7 +347,9 @@ impl<'a> Session<'a> {
             _ => LightGrid::whole_map(environment.tile_energies()),
         };
         let learning = new_learning(world, environment, &view, &rays);
+        let lessons = Lessons::new(world, environment, &view, &rays);
         Self {
+            lessons,
             film: OnceLock::new(),
             noise: OnceLock::new(),
             film_before: Mutex::default(),
@@ -387,6 +401,8 @@ impl<'a> Session<'a> {
                 result
             }
             Phase::Rendering => {
+                self.teach(cancel)?;
+                let start = Instant::now();
                 let result = self.render(self.samples.saturating_add(samples), 1, cancel);
                 let laws = self.figures.law_seconds - law_seconds;
                 self.figures.learning_seconds += laws;
@@ -401,8 +417,9 @@ impl<'a> Session<'a> {
     /// goes on with the others. Does nothing on a GPU, whose first samples come all at once.
     pub fn begin(&mut self, every: u32, cancel: &AtomicBool) {
         if self.samples == 0 && !self.is_on_gpu() {
-            let start = Instant::now();
             // Only a GPU fails, and laws are made of whole passes.
+            let _ = self.teach(cancel);
+            let start = Instant::now();
             let _ = self.render(1, every.max(1), cancel);
             self.figures.render_seconds += start.elapsed().as_secs_f64();
         }
@@ -460,6 +477,7 @@ impl<'a> Session<'a> {
         let mut renderer =
             gpu::Renderer::new(stage, world, environment, &self.view, &self.rays, film)?;
         renderer.set_grid(self.learned.as_ref().or(self.whole_map.as_ref()))?;
+        renderer.set_cache(self.lessons.as_ref().and_then(Lessons::cache))?;
         self.engine = Engine::Gpu(Box::new(renderer));
         Ok(())
     }
@@ -488,6 +506,10 @@ impl<'a> Session<'a> {
                 affordable.max(samples / 16).min(samples).clamp(1, 64)
             }
         };
+        // The radiance cache learns where samples are a power of two.
+        let until_lesson =
+            self.lessons.as_ref().map(|_| (samples + 1).next_power_of_two() - samples);
+        let pass = until_lesson.map_or(pass, |until| pass.min(until));
         rule.samples.map_or(pass, |limit| pass.min(limit.saturating_sub(samples)).max(1))
     }
 
@@ -609,6 +631,7 @@ impl<'a> Session<'a> {
             environment: self.environment,
             grid: self.grid(),
             counts,
+            cache: self.lessons.as_ref().and_then(Lessons::cache),
             fog: self.fog,
             background: self.view.background,
             limits: self.view.limits,
@@ -625,7 +648,7 @@ impl<'a> Session<'a> {
             }
             Engine::Gpu(renderer) => renderer.learn(range.clone(), &learning.grid, cancel)?,
         };
-        if cancel.load(std::sync::atomic::Ordering::Relaxed) {
+        if cancel.load(Ordering::Relaxed) {
             // Which paths of the pass were counted depends on the threads: start over.
             self.learned = None;
             self.learning = new_learning(self.world, self.environment, &self.view, &self.rays);
@@ -641,6 +664,40 @@ impl<'a> Session<'a> {
             self.finish_learning();
         }
         self.take_up_laws()
+    }
+
+    /// Teaches the radiance cache what it is to know before the next pass, if there is one. What has been
+    /// cut short goes on at the next call.
+    fn teach(&mut self, cancel: &AtomicBool) -> Result<()> {
+        let start = Instant::now();
+        if let Some(lessons) = &mut self.lessons {
+            lessons.begin(&self.view, self.samples);
+        }
+        while let Some(lessons) = &self.lessons
+            && let Some(paths) = lessons.next()
+            && !cancel.load(Ordering::Relaxed)
+        {
+            let (sums, cache) = (lessons.sums(), lessons.cache());
+            let (done, rays) = match &mut self.engine {
+                Engine::Cpu => {
+                    let paths = paths.start..paths.end.min(paths.start + gi::PATHS_AT_A_TIME);
+                    let rays =
+                        cpu::teach(&self.tracer(None), &self.rays, &self.view, paths.clone(), sums);
+                    (paths.end, rays)
+                }
+                Engine::Gpu(renderer) => renderer.teach(paths, sums, cache, cancel)?,
+            };
+            self.figures.learning_rays += rays;
+            self.figures.teaching_paths = done;
+            if let Some(lessons) = &mut self.lessons {
+                lessons.advance(done);
+                if let Engine::Gpu(renderer) = &mut self.engine {
+                    renderer.set_cache(lessons.cache())?;
+                }
+            }
+        }
+        self.figures.learning_seconds += start.elapsed().as_secs_f64();
+        Ok(())
     }
 
     /// Begins the sequence that goes with the laws in use, and gives them to the GPU, if one is at work.

@@ -9,7 +9,7 @@ use crate::environment::{EnvironmentOptions, TableKind};
 use crate::light_grid::LawOptions;
 use crate::path::{Background, PathLimits};
 use crate::render::filter::PixelFilter;
-use crate::render::{Sampling, Sharing, View};
+use crate::render::{Gi, Sampling, Sharing, View};
 use crate::sampler::Points;
 use crate::scene::Camera;
 
@@ -48,6 +48,8 @@ pub struct Settings {
     pub grid_columns: u32,
     /// Whether pixels share their second vertices.
     pub sharing: Sharing,
+    /// How light that has met several surfaces is found.
+    pub gi: Gi,
     /// Camera paths to learn from; `None` for as many as suit the picture.
     pub learning_paths: Option<u64>,
     /// Points samples are taken at.
@@ -67,6 +69,7 @@ impl Settings {
             tiles: (environment.tile_columns, environment.tile_rows),
             grid_columns: 64,
             sharing: Sharing::Auto,
+            gi: Gi::Exact,
             learning_paths: None,
             points: Points::default(),
             russian_roulette: true,
@@ -97,6 +100,7 @@ impl Settings {
             points: self.points,
             grid_columns: self.grid_columns,
             sharing: self.sharing,
+            gi: self.gi,
             learning_paths: self.learning_paths.unwrap_or_else(|| {
                 View::suitable_learning_paths(self.sampling, [width, height], None)
             }),

@@ -13,7 +13,7 @@ use crate::path::{Background, PathLimits, World};
 use crate::render::film::{Film, Pixel};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::Stage as GpuStage;
-use crate::render::{Phase, Sampling, Session, Sharing, View};
+use crate::render::{Gi, Phase, Sampling, Session, Sharing, View};
 use crate::sampler::Points;
 use crate::scene::{Camera, Material, Scene, Texture, TextureImage, TextureRef, Wrap};
 
@@ -201,6 +201,7 @@ pub(super) fn view(camera: Camera, sampling: Sampling, bounces: u32) -> View {
         seed: 1,
         grid_columns: 64,
         sharing: Sharing::Auto,
+        gi: Gi::Exact,
         learning_paths: 1 << 13,
         laws: LawOptions::ADAPTIVE,
         layers: false,

@@ -23,7 +23,7 @@ use lightgrid::light_grid::LawOptions;
 use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::{Phase, Sampling, Session, Sharing, StopRule, View};
+use lightgrid::render::{Gi, Phase, Sampling, Session, Sharing, StopRule, View};
 use lightgrid::sampler::Points;
 use lightgrid::scene::Camera;
 
@@ -46,6 +46,7 @@ pub(crate) fn view(camera: Camera, sampling: Sampling, bounces: u32) -> View {
         points: Points::Sobol,
         grid_columns: 64,
         sharing: Sharing::Auto,
+        gi: Gi::Exact,
         learning_paths: 1 << 13,
         laws: LawOptions::ADAPTIVE,
         medium: None,

@@ -7,7 +7,7 @@ mod statistics;
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::metrics::statistics::chi_square_test;
 use lightgrid::path::{PathLimits, World};
-use lightgrid::render::{Sampling, Sharing, View};
+use lightgrid::render::{Gi, Sampling, Sharing, View};
 use lightgrid::report::{Device, Effort, Frame, Plan, ablations, talk};
 use lightgrid::sampler::Points;
 use lightgrid::scene::builtin;
@@ -78,6 +78,7 @@ fn every_ablation_converges_to_the_same_picture() {
             laws: settings.laws,
             grid_columns: settings.grid_columns,
             sharing: Sharing::Auto,
+            gi: Gi::Exact,
             learning_paths: 1 << 11,
             limits: PathLimits { bounces: 3, russian_roulette: settings.russian_roulette },
             ..view(world.scene.cameras[0].clone(), settings.sampling, 3)

@@ -100,6 +100,7 @@ pub(super) fn settings(
         ("fog", serde_json::json!(fog)),
         ("sampling", serde_json::json!(arguments.sampling)),
         ("sharing", serde_json::json!(sharing(arguments))),
+        ("gi", serde_json::json!(arguments.gi)),
         ("table", serde_json::json!(arguments.table.to_string())),
         ("tiles", serde_json::json!(format!("{}x{}", arguments.tiles.0, arguments.tiles.1))),
         ("grid_columns", serde_json::json!(arguments.grid)),

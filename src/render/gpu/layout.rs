@@ -14,6 +14,7 @@ use crate::medium::{Fog, Phase};
 use crate::path::World;
 use crate::path::background::{Background, concentration};
 use crate::path::camera::CameraRays;
+use crate::radiance_cache::CacheCells;
 use crate::scene::surface::absorption;
 use crate::scene::{self, AlphaMode, PunctualKind, Scene, Wrap};
 
@@ -91,7 +92,12 @@ pub(crate) struct Globals {
     pub(crate) background_concentration: f32,
     pub(crate) film_scale: f32,
     pub(crate) opaque_triangles: u32,
-    pub(crate) padding: [u32; 2],
+    pub(crate) cache_is_known: u32,
+    pub(crate) cache_scale: f32,
+    pub(crate) cache_center: Vec3,
+    pub(crate) cache_edge: f32,
+    pub(crate) cache_mean: Vec3,
+    pub(crate) cache_least_distance: f32,
 }
 
 /// Twin of `Material` in `surface.wgsl`.
@@ -163,6 +169,14 @@ pub(super) mod texture_flags {
 }
 
 impl Globals {
+    /// Where the radiance cache's cells lie, and what a radiance of 1 counts.
+    pub(crate) fn set_cells_of_cache(&mut self, cells: &CacheCells, scale: f32) {
+        self.cache_center = cells.center;
+        self.cache_edge = cells.edge;
+        self.cache_least_distance = cells.least_distance;
+        self.cache_scale = scale;
+    }
+
     /// Sets what the view asks for.
     pub(crate) fn set_view(&mut self, view: &View, rays: &CameraRays) {
         self.camera_position = rays.position;

@@ -29,6 +29,8 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use glam::Vec3;
+
 use super::film::Film;
 use super::{Pass, View};
 use crate::bsdf::{albedo, sheen};
@@ -37,6 +39,7 @@ use crate::error::{Error, Result};
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::path::camera::CameraRays;
+use crate::radiance_cache::{RadianceCache, RadianceSums};
 use buffers::Buffers;
 use film::Sums;
 use flight::{Flights, Job};
@@ -151,7 +154,8 @@ impl Renderer {
     ) -> Result<Self> {
         let mut renderer = Self::without_kernels(stage, (world, environment), view, rays, film)?;
         let is_queue = Schedule::of(&stage.gpu, &renderer.features) == Schedule::Queue;
-        if is_queue && renderer.sharing.is_none() {
+        let takes_turns = renderer.sharing.is_none() && !renderer.features.has("radiance_cache");
+        if is_queue && takes_turns {
             let tiles = renderer.tiles();
             let queue = Queue::new(&mut renderer.buffers, &renderer.features, tiles)?;
             renderer.queue = Some(queue);
@@ -198,7 +202,7 @@ impl Renderer {
         let mut constants = stage.constants;
         upload_tables(&mut buffers, view, environment, &features, &mut constants)?;
         let size = [view.width, view.height];
-        globals.film_scale = film::scale_for(brightest(world, environment));
+        globals.film_scale = film::scale_for(world.brightest(environment));
         let sums = Sums::new(&mut buffers, size, view.layers, globals.film_scale, film)?;
         let progress = film.map(Progress::of).unwrap_or_default();
         if features.has("counting") {
@@ -230,6 +234,7 @@ impl Renderer {
             kernel_facts,
             seed: view.seed,
         };
+        renderer.set_cache(None)?;
         renderer.write_globals();
         renderer.told = renderer.total_samples();
         Ok(renderer)
@@ -254,15 +259,65 @@ impl Renderer {
         learning: &LearningGrid,
         cancel: &AtomicBool,
     ) -> Result<u64> {
-        self.globals.seed = self.seed;
         self.put_counters(learning)?;
+        let (done, rays) = self.trace_anywhere(Kernel::Learn, paths.clone(), cancel)?;
+        if done < paths.end {
+            return Ok(0);
+        }
+        self.take_counters(learning)?;
+        Ok(rays)
+    }
+
+    /// Traces paths that teach the radiance cache, of which `cache` is what is known by now. Returns
+    /// the first path that was not traced, and the number of rays.
+    pub(crate) fn teach(
+        &mut self,
+        paths: Range<u64>,
+        sums: &RadianceSums,
+        cache: Option<&RadianceCache>,
+        cancel: &AtomicBool,
+    ) -> Result<(u64, u64)> {
+        self.set_cache(cache)?;
+        let (words, scale) = sums.words_and_scale();
+        self.globals.set_cells_of_cache(sums.cells(), scale);
+        self.write_globals();
+        self.buffers.put("cache_sums", bytemuck::cast_slice(&words), "the radiance cache")?;
+        let done = self.trace_anywhere(Kernel::Teach, paths, cancel)?;
+        sums.set_words(&self.read_words("cache_sums", words.len())?);
+        Ok(done)
+    }
+
+    /// Uploads the cache that paths end in; without one they go on.
+    pub(crate) fn set_cache(&mut self, cache: Option<&RadianceCache>) -> Result<()> {
+        if !self.features.has("radiance_cache") {
+            return Ok(());
+        }
+        let (slots, mean) = cache.map_or((&[][..], Vec3::ZERO), RadianceCache::slots_and_mean);
+        self.globals.cache_is_known = u32::from(cache.is_some());
+        self.globals.cache_mean = mean;
+        if let Some(cache) = cache {
+            self.globals.set_cells_of_cache(cache.cells(), self.globals.cache_scale);
+        }
+        let slots = if slots.is_empty() { &[[0; 4]; 1] } else { slots };
+        put_array(&mut self.buffers, "cache_slots", "the radiance cache", slots)?;
+        self.write_globals();
+        Ok(())
+    }
+
+    /// Traces paths that begin anywhere in the picture, as far as `cancel` allows. Returns the first one
+    /// that was not traced, and the number of rays of the others.
+    fn trace_anywhere(
+        &mut self,
+        kernel: Kernel,
+        paths: Range<u64>,
+        cancel: &AtomicBool,
+    ) -> Result<(u64, u64)> {
+        self.globals.seed = self.seed;
+        self.write_globals();
         self.buffers.put("learning_rays", &[0; 4], "a count")?;
         let mut first = paths.start;
-        while first < paths.end {
-            if cancel.load(Ordering::Relaxed) {
-                return Ok(0);
-            }
-            let groups = self.flights.units(Kernel::Learn).min(MAX_GROUPS);
+        while first < paths.end && !cancel.load(Ordering::Relaxed) {
+            let groups = self.flights.units(kernel).min(MAX_GROUPS);
             let count = (groups * GROUP).min(paths.end - first);
             let work = Work {
                 first: first as u32,
@@ -271,12 +326,12 @@ impl Renderer {
                 ..Work::default()
             };
             let groups = count.div_ceil(GROUP);
-            self.dispatch(Kernel::Learn, &work, groups as u32, groups)?;
+            self.dispatch(kernel, &work, groups as u32, groups)?;
             first += count;
         }
         self.settle()?;
-        self.take_counters(learning)?;
-        Ok(self.read_words("learning_rays", 1)?.first().copied().map_or(0, u64::from))
+        let rays = self.read_words("learning_rays", 1)?.first().copied();
+        Ok((first, rays.map_or(0, u64::from)))
     }
 
     /// Uploads counters, to be counted on.
@@ -562,16 +617,6 @@ impl Bound {
     }
 }
 
-/// About the largest radiance of the map and of lamps.
-fn brightest(world: &World, environment: &Environment) -> f32 {
-    let scene = &world.scene;
-    let map = environment.rotation_and_intensity().1 / environment.importance_scale().0;
-    let emissive = scene.materials.iter().map(|material| material.emissive.max_element());
-    let lights = scene.lights.iter().map(|light| light.intensity.max_element());
-    let map = if environment.is_black() { 0.0 } else { map };
-    emissive.chain(lights).fold(map, f32::max)
-}
-
 /// Uploads the small tables of numbers; says where each begins.
 fn upload_tables(
     buffers: &mut Buffers,
@@ -599,7 +644,8 @@ mod tests {
     use crate::light_grid::cells::SphericalGrid;
     use crate::light_grid::{LawOptions, Recording};
     use crate::path::{Background, PathLimits, PathTracer};
-    use crate::render::{Sampling, Sharing, cpu};
+    use crate::render::gi::Lessons;
+    use crate::render::{Gi, Sampling, Sharing, cpu};
     use crate::sampler::{Points, Sequence};
     use crate::scene::builtin;
 
@@ -624,6 +670,7 @@ mod tests {
             points: Points::Sobol,
             grid_columns: 64,
             sharing: Sharing::Off,
+            gi: Gi::Exact,
             learning_paths: 1 << 13,
             laws: recording,
             medium: None,
@@ -679,6 +726,7 @@ mod tests {
                         world: &world,
                         environment: &environment,
                         grid: laws.as_ref(),
+                        cache: None,
                         fog: view.fog(&world),
                         background: Background::Map,
                         limits: view.limits,
@@ -786,6 +834,60 @@ mod tests {
                 assert!(total > 10_000 && moved * 500 < total, "{what}: {moved} of {total}");
             }
             assert!(cpu_rays.abs_diff(gpu_rays) * 1000 < cpu_rays, "{cpu_rays} {gpu_rays}");
+        }
+    }
+
+    /// As above: one path in a thousand goes elsewhere.
+    #[test]
+    fn both_devices_teach_the_same() {
+        let gpu = match Gpu::open(None) {
+            Ok(gpu) => gpu,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let (world, environment) = crack();
+        let view = View { gi: Gi::Cached, ..view(&world, LawOptions::ADAPTIVE) };
+        let rays = CameraRays::new(&view.camera, view.width, view.height);
+        let lessons = || Lessons::new(&world, &environment, &view, &rays).expect("there is light");
+        let laws = LightGrid::whole_map(environment.tile_energies());
+        let (on_cpu, on_gpu) = (lessons(), lessons());
+        let tracer = PathTracer {
+            world: &world,
+            environment: &environment,
+            grid: laws.as_ref(),
+            cache: None,
+            fog: None,
+            background: Background::Map,
+            limits: view.limits,
+            counts: None,
+        };
+        let stage = Stage::new(&gpu, &world, &environment).expect("it fits");
+        let mut renderer =
+            Renderer::new(&stage, &world, &environment, &view, &rays, None).expect("it fits");
+        renderer.set_grid(laws.as_ref()).expect("uploaded");
+        let never = AtomicBool::new(false);
+        let mut known = None;
+        for paths in [0..8192, 8192..16384] {
+            let cpu_rays = cpu::teach(
+                &PathTracer { cache: known.as_ref(), ..tracer },
+                &rays,
+                &view,
+                paths.clone(),
+                on_cpu.sums(),
+            );
+            let (end, gpu_rays) = renderer
+                .teach(paths.clone(), on_gpu.sums(), known.as_ref(), &never)
+                .expect("taught");
+            assert_eq!(end, paths.end);
+            assert!(cpu_rays.abs_diff(gpu_rays) * 500 < cpu_rays, "{cpu_rays} {gpu_rays}");
+            let totals = [&on_cpu, &on_gpu].map(|lessons| lessons.sums().totals());
+            let [(cpu_count, cpu_sums), (gpu_count, gpu_sums)] = totals;
+            eprintln!("{cpu_count} {cpu_sums} against {gpu_count} {gpu_sums}");
+            assert!(cpu_count.abs_diff(gpu_count) * 500 < cpu_count);
+            assert!((cpu_sums / gpu_sums - 1.0).abs().max_element() < 0.01);
+            known = on_cpu.sums().cache();
+            let found = on_gpu.sums().cache().expect("there is room").learned_cells();
+            let cells = known.as_ref().map_or(0, RadianceCache::learned_cells);
+            assert!(cells.abs_diff(found) * 200 < cells, "{cells} {found}");
         }
     }
 }

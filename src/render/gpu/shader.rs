@@ -8,11 +8,12 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::super::filter::PixelFilter;
-use super::super::{Sampling, View};
+use super::super::{Gi, Sampling, View};
 use crate::environment::{Environment, Lookup, TableKind};
 use crate::light_grid::Recording;
 use crate::path::sharing::SharedTile;
-use crate::path::{Background, World};
+use crate::path::{Background, TEACHERS, World};
+use crate::radiance_cache;
 use crate::sampler::Points;
 
 /// Entry points.
@@ -22,6 +23,8 @@ pub(crate) enum Kernel {
     Render,
     /// Traces learning paths.
     Learn,
+    /// Traces paths that teach the radiance cache.
+    Teach,
     /// Finds the nearest hits of rays, for measurements.
     ClosestHits,
     /// Finds how much light comes along rays, for measurements.
@@ -46,6 +49,7 @@ impl Kernel {
         match self {
             Self::Render => "render",
             Self::Learn => "learn",
+            Self::Teach => "teach",
             Self::ClosestHits => "closest_hits",
             Self::ShadowRays => "shadow_rays",
             Self::Trace => "trace",
@@ -58,7 +62,7 @@ impl Kernel {
     }
 
     /// Number of kernels.
-    pub(crate) const COUNT: usize = 10;
+    pub(crate) const COUNT: usize = 11;
 
     /// Those that bring all paths one ray further, in order.
     pub(crate) const OF_QUEUE: [Self; 3] = [Self::Trace, Self::Shade, Self::FollowShadows];
@@ -82,6 +86,11 @@ impl Kernel {
         self.adds_samples() || self == Self::FindSeconds
     }
 
+    /// Whether its paths are not those of pixels.
+    fn begins_anywhere(self) -> bool {
+        matches!(self, Self::Learn | Self::Teach)
+    }
+
     /// Whether its pixels share second vertices.
     fn shares(self) -> bool {
         Self::OF_SHARING.contains(&self)
@@ -99,11 +108,13 @@ pub(crate) struct Features(BTreeSet<&'static str>);
 
 impl Features {
     /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 54] = [
+    pub(crate) const ALL: [&'static str; 58] = [
+        "albedo",
         "alpha_mask",
         "anisotropy",
         "background_blur",
         "background_color",
+        "cached",
         "clearcoat",
         "counting",
         "deep_tree",
@@ -131,6 +142,7 @@ impl Features {
         "partial",
         "pass_through",
         "punctual_lights",
+        "radiance_cache",
         "record_cosine",
         "record_ratio",
         "record_squared_cosine",
@@ -148,6 +160,7 @@ impl Features {
         "table_f64",
         "table_u32",
         "tangents",
+        "teaching",
         "textures",
         "transmission",
         "uncommon_textures",
@@ -202,6 +215,7 @@ impl Features {
             ("map_sampling", samples_map),
             ("medium", world.needs.scattering_solids || view.fog(world).is_some()),
             ("nearest_lookup", options.1 == Lookup::Nearest),
+            ("radiance_cache", view.gi == Gi::Cached),
             ("record_cosine", cosine_power == 1),
             ("record_ratio", recording.is_some_and(Recording::is_ratio)),
             ("record_squared_cosine", cosine_power == 2),
@@ -217,8 +231,17 @@ impl Features {
     /// stack's size says.
     pub(crate) fn most() -> Self {
         let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_"));
-        let others =
-            ["deep_tree", "finding", "hardware_rays", "learning", "sharing", "summed_area"];
+        let others = [
+            "cached",
+            "deep_tree",
+            "finding",
+            "hardware_rays",
+            "learning",
+            "radiance_cache",
+            "sharing",
+            "summed_area",
+            "teaching",
+        ];
         Self::from_names(names.filter(|n| !others.contains(n)).map(|n| (n, true)))
     }
 
@@ -226,7 +249,8 @@ impl Features {
     pub(crate) fn from_names(names: impl IntoIterator<Item = (&'static str, bool)>) -> Self {
         let mut set: BTreeSet<_> =
             names.into_iter().filter(|(_, on)| *on).map(|(n, _)| n).collect();
-        let follows: [(&str, &[&str]); 9] = [
+        let follows: [(&str, &[&str]); 10] = [
+            ("albedo", &["layers", "radiance_cache"]),
             ("filtered_hits", &["alpha_mask", "single_sided"]),
             ("filtered_or_passed", &["alpha_mask", "partial", "single_sided"]),
             ("pass_through", &["alpha_mask", "partial"]),
@@ -261,9 +285,7 @@ impl Features {
         if constants.stack_size > constants.shared_stack_size {
             set.insert("deep_tree");
         }
-        if kernel == Kernel::Learn {
-            set.insert("counting");
-            set.insert("learning");
+        if kernel.begins_anywhere() {
             set.remove("layers");
             set.remove("independent_points");
         } else if kernel.casts() {
@@ -273,11 +295,27 @@ impl Features {
             set.insert("sharing");
         }
         match kernel {
-            Kernel::FindSeconds => set.insert("finding"),
+            Kernel::Learn => set.extend(["counting", "learning"]),
+            Kernel::Teach => {
+                set.remove("counting");
+                set.insert("teaching");
+            }
+            Kernel::FindSeconds => set.extend(["finding"]),
             // Only first vertices are shown.
-            Kernel::LightSeconds => set.remove("layers"),
-            _ => false,
-        };
+            Kernel::LightSeconds => {
+                set.remove("layers");
+            }
+            Kernel::Render if set.contains("radiance_cache") => set.extend(["cached"]),
+            _ => {}
+        }
+        if !(set.contains("cached") || set.contains("teaching")) {
+            set.remove("radiance_cache");
+        }
+        if set.contains("layers") || set.contains("radiance_cache") {
+            set.insert("albedo");
+        } else {
+            set.remove("albedo");
+        }
         Self(set)
     }
 
@@ -507,7 +545,7 @@ impl TexelFormat {
 }
 
 /// All arrays.
-pub(crate) const ARRAYS: [ArrayKind; 14] = {
+pub(crate) const ARRAYS: [ArrayKind; 15] = {
     use TexelFormat::{Bytes4, Floats4, Words1, Words2, Words4};
     const fn array(
         name: &'static str,
@@ -531,6 +569,7 @@ pub(crate) const ARRAYS: [ArrayKind; 14] = {
         array("laws", Words1, Some("map_sampling")),
         array("lights", Words1, Some("scene_lights")),
         array("light_nodes", Words4, Some("scene_lights")),
+        array("cache_slots", Words4, Some("radiance_cache")),
     ]
 };
 
@@ -651,6 +690,16 @@ impl Program {
                 let _ = writeln!(source, "const {name} = {value}u;");
             }
         }
+        if features.has("radiance_cache") {
+            for (name, value) in [
+                ("CACHE_SLOTS", radiance_cache::SLOTS as u32),
+                ("CACHE_PROBES", radiance_cache::MOST_PROBES as u32),
+                ("CACHE_WORDS", radiance_cache::WORDS as u32),
+                ("TEACHERS", TEACHERS),
+            ] {
+                let _ = writeln!(source, "const {name} = {value}u;");
+            }
+        }
         for (index, binding) in bindings.iter().enumerate() {
             let array = match binding {
                 Binding::Buffer { name, .. } => ARRAYS.into_iter().find(|kind| kind.name == *name),
@@ -685,7 +734,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 42] {
+fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 46] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -718,11 +767,15 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 42] {
         (wgsl!("ray_query"), features.has("hardware_rays")),
         (wgsl!("camera"), true),
         (wgsl!("path"), true),
+        (wgsl!("broad"), kernel.shares() || features.has("radiance_cache")),
+        (wgsl!("radiance_cache"), features.has("radiance_cache")),
         (wgsl!("count"), features.has("counting")),
         (wgsl!("film"), kernel.adds_samples()),
         (wgsl!("sample"), kernel.begins_samples()),
         (wgsl!("render"), kernel == Kernel::Render),
+        (wgsl!("anywhere"), kernel.begins_anywhere()),
         (wgsl!("learn"), kernel == Kernel::Learn),
+        (wgsl!("teach"), kernel == Kernel::Teach),
         (wgsl!("cast"), kernel.casts()),
         (wgsl!("closest_hits"), kernel == Kernel::ClosestHits),
         (wgsl!("shadow_rays"), kernel == Kernel::ShadowRays),
@@ -739,7 +792,7 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 42] {
 }
 
 fn bindings(kernel: Kernel, features: &Features, places: &ArrayPlaces) -> Vec<Binding> {
-    let (learns, counts) = (kernel == Kernel::Learn, features.has("counting"));
+    let (teaches, counts) = (kernel == Kernel::Teach, features.has("counting"));
     let (renders, is_of_queue) = (kernel.adds_samples(), kernel.is_of_queue());
     let has_layers = renders && features.has("layers");
     let buffers = [
@@ -754,7 +807,8 @@ fn bindings(kernel: Kernel, features: &Features, places: &ArrayPlaces) -> Vec<Bi
         ("visits", "array<atomic<u32>>", true, counts),
         ("counters", "array<atomic<u32>>", true, counts),
         ("slot_of_cell", "array<u32>", false, counts),
-        ("learning_rays", "atomic<u32>", true, learns),
+        ("learning_rays", "atomic<u32>", true, kernel.begins_anywhere()),
+        ("cache_sums", "array<atomic<u32>>", true, teaches),
         ("slots", "array<vec4u>", true, is_of_queue),
         ("queue", "Queue", true, is_of_queue),
         ("firsts", "array<vec4u>", true, kernel.shares() && kernel != Kernel::LightSeconds),
@@ -865,7 +919,7 @@ mod tests {
     #[test]
     fn no_integer_is_divided_by_zero() {
         let mut found = BTreeSet::new();
-        let all = [Kernel::Render, Kernel::Learn, Kernel::Trace].into_iter();
+        let all = [Kernel::Render, Kernel::Learn, Kernel::Teach, Kernel::Trace].into_iter();
         for kernel in all.chain(Kernel::OF_SHARING) {
             for table in [None, Some("table_u32")] {
                 let features = reachable(|_| true, table);
@@ -924,6 +978,8 @@ mod tests {
     /// Features that a picture can have or not have on their own; the others follow from them.
     fn independent() -> Vec<&'static str> {
         let follow = [
+            "albedo",
+            "cached",
             "filtered_hits",
             "filtered_or_passed",
             "finding",
@@ -937,6 +993,7 @@ mod tests {
             "sharing",
             "software_walk",
             "tangents",
+            "teaching",
             "uncommon_textures",
         ];
         let names = Features::ALL.into_iter();
@@ -995,6 +1052,9 @@ mod tests {
             validate(Kernel::Render, features, places);
             if features.has("light_grid") {
                 validate(Kernel::Learn, features, places);
+            }
+            if features.has("radiance_cache") {
+                validate(Kernel::Teach, features, places);
             }
             for kernel in Kernel::OF_SHARING {
                 validate(kernel, features, places);

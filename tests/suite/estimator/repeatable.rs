@@ -114,6 +114,7 @@ fn counters_do_not_depend_on_the_threads() {
                 environment: &setting.environment,
                 grid: Some(&whole_map),
                 counts: Some(&learning),
+                cache: None,
                 fog: None,
                 background: Background::Map,
                 limits: view.limits,

@@ -85,7 +85,8 @@ fn structs_are_laid_out_as_the_host_writes_them() {
         tile_columns tile_rows rotation_turns intensity tile_sums_at
         distant_light_count light_triangle_count width height seed bounces russian_roulette orthographic scene_extent
         mean_contribution zero grid_medium whole_map_share fog_low fog_mean_cosine fog_high tries_per_vertex
-        fog_scattering importance_scale fog_extinction first_of_sequence background background_concentration film_scale opaque_triangles padding
+        fog_scattering importance_scale fog_extinction first_of_sequence background background_concentration film_scale opaque_triangles
+            cache_is_known cache_scale cache_center cache_edge cache_mean cache_least_distance
     );
     assert_same(&module, "Globals", globals);
     let ray = fields!(CastRay: origin t_max direction padding);

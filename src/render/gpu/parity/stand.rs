@@ -14,7 +14,7 @@ use crate::path::camera::CameraRays;
 use crate::path::{Background, PathLimits, PathTracer, World};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::layout::{pack_radiance, unpack_radiance};
-use crate::render::{Sampling, Sharing, View};
+use crate::render::{Gi, Sampling, Sharing, View};
 use crate::sampler::{Points, Sampler};
 use crate::scene::{
     AlphaMode, Camera, Material, Medium, Projection, PunctualKind, PunctualLight, Scene, Texture,
@@ -93,6 +93,7 @@ impl Stand {
             grid: Some(&self.grid),
             counts: None,
             limits: self.view.limits,
+            cache: None,
             fog: self.view.fog(&self.world),
             background: self.view.background,
         }
@@ -126,6 +127,7 @@ fn view(camera: Camera, filter: PixelFilter, sampling: Sampling) -> View {
         points: Points::Sobol,
         grid_columns: 64,
         sharing: Sharing::Off,
+        gi: Gi::Exact,
         learning_paths: 0,
         laws: LawOptions::ADAPTIVE,
         medium: None,

@@ -1,0 +1,45 @@
+//! Where a path may end: in what the radiance cache knows of a surface.
+
+use super::{Path, Scatterer, SurfaceScatterer, Vertex};
+
+/// Least GGX alpha of a surface that sends back much the same to all sides.
+const LEAST_ALPHA: f32 = 0.05;
+
+impl SurfaceScatterer<'_> {
+    /// Whether what it sends back may be kept in a cache.
+    pub(super) fn is_cacheable(&self) -> bool {
+        self.is_broad(LEAST_ALPHA)
+    }
+}
+
+impl Path<'_> {
+    /// Ends the path at a vertex after its first if there is a cache, and what the path would find from
+    /// there is averaged over more than a cell: light that is added is what the cache knows.
+    ///
+    /// How wide a path spreads is the root of the area over which one sample stands, summed over its
+    /// rays (Müller et al., *Real-time Neural Radiance Caching for Path Tracing*, SIGGRAPH 2021). So
+    /// reflections are followed, and corners, where cells would show.
+    pub(super) fn ends_in_cache(&mut self, vertex: &Vertex<'_>) -> bool {
+        let Some(cache) = self.tracer.cache else { return false };
+        if self.bounces == 0 || self.bounces == self.tracer.limits.bounces {
+            return false;
+        }
+        let Scatterer::Surface(surface) = &vertex.scatterer else { return false };
+        let cosine = surface.geometric_normal.dot(self.ray.direction).abs();
+        // Of perfect reflections the density is infinite.
+        self.spread += self.travelled / (self.departure.pdf_solid_angle * cosine).sqrt();
+        let is_known = self.spread >= cache.cells().edge_at(vertex.position)
+            && self.is_in_air()
+            && surface.is_cacheable();
+        if is_known {
+            let radiance = cache.radiance_over_albedo(vertex.position, surface.geometric_normal);
+            self.radiance += self.throughput * surface.bsdf.albedo() * radiance;
+        }
+        is_known
+    }
+
+    /// Whether the path is outside of all bodies.
+    pub(super) fn is_in_air(&self) -> bool {
+        self.body.interior.is_none()
+    }
+}

@@ -1,0 +1,198 @@
+//! What paths bring back to the cells of the cache.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use glam::{DVec3, Vec3};
+
+use super::cells::{CacheCells, Key};
+use super::{LEAST_ALBEDO, PARENTS_PATHS, PATHS_OF_ALL, RadianceCache, SLOTS};
+use crate::sampler::{hash, unit_from_bits};
+
+/// Words of a slot: check word, slot of the parent plus one, number of paths, albedo (three), radiance
+/// (three times low and high word).
+pub(crate) const WORDS: usize = 12;
+const PARENT_AT: usize = 1;
+const COUNT_AT: usize = 2;
+const ALBEDO_AT: usize = 3;
+const RADIANCE_AT: usize = 6;
+/// An albedo of 1: 2^24 paths do not overflow a word.
+const ALBEDO_ONE: f32 = 255.0;
+/// The brightest radiance there is in the scene; estimates may be 2^[`HEADROOM`] times as bright.
+const BRIGHTEST: f32 = (1_u64 << 36) as f32;
+const MOST: f32 = (1_u64 << 40) as f32;
+/// Share of slots in use beyond which cells no longer find one for sure.
+const FULL: f64 = 0.75;
+/// Most paths that may teach in all.
+pub(crate) const MOST_PATHS: u64 = 1 << 22;
+
+/// Sums of what paths have brought back, cell by cell.
+pub struct RadianceSums {
+    cells: CacheCells,
+    /// Units a radiance of 1 counts.
+    scale: f32,
+    words: Box<[AtomicU32]>,
+}
+
+/// What a slot holds.
+#[derive(Clone, Copy, Default)]
+struct Tally {
+    check: u32,
+    parent: Option<usize>,
+    count: u64,
+    albedo: [u64; 3],
+    radiance: [u64; 3],
+}
+
+impl RadianceSums {
+    /// Bytes held.
+    pub const BYTES: usize = SLOTS * WORDS * size_of::<u32>();
+
+    /// Empty. `brightest` is about the largest radiance that anything emits.
+    pub fn new(cells: CacheCells, brightest: f32) -> Self {
+        let scale = BRIGHTEST / brightest.clamp(f32::MIN_POSITIVE * BRIGHTEST, f32::MAX);
+        Self { cells, scale, words: (0..SLOTS * WORDS).map(|_| AtomicU32::new(0)).collect() }
+    }
+
+    /// Where its cells lie.
+    pub fn cells(&self) -> &CacheCells {
+        &self.cells
+    }
+
+    /// All words and how many units a radiance of 1 counts: what a GPU needs to count on.
+    pub(crate) fn words_and_scale(&self) -> (Vec<u32>, f32) {
+        (self.words.iter().map(|word| word.load(Ordering::Relaxed)).collect(), self.scale)
+    }
+
+    /// Takes the words back, counted on.
+    pub(crate) fn set_words(&self, words: &[u32]) {
+        self.words
+            .iter()
+            .zip(words)
+            .for_each(|(word, value)| word.store(*value, Ordering::Relaxed));
+    }
+
+    /// Counts an estimate of the radiance that a surface with this unit normal and albedo reflects.
+    /// Safe to call from any thread.
+    pub fn add(&self, position: Vec3, normal: Vec3, radiance: Vec3, albedo: Vec3) {
+        if !radiance.is_finite() {
+            return;
+        }
+        let cell = self.cells.cell_at(position, normal);
+        let (Some(parent), Some(slot)) =
+            (self.slot_of(cell.parent().key()), self.slot_of(cell.key()))
+        else {
+            return;
+        };
+        let words = &self.words[slot * WORDS..][..WORDS];
+        words[PARENT_AT].store(parent as u32 + 1, Ordering::Relaxed);
+        words[COUNT_AT].fetch_add(1, Ordering::Relaxed);
+        for channel in 0..3 {
+            let albedo = dithered(albedo[channel] * ALBEDO_ONE, ALBEDO_ONE);
+            words[ALBEDO_AT + channel].fetch_add(albedo as u32, Ordering::Relaxed);
+            let units = dithered(radiance[channel] * self.scale, MOST);
+            let (low, high) = (units as u32, (units >> 32) as u32);
+            let at = RADIANCE_AT + 2 * channel;
+            let carry = words[at].fetch_add(low, Ordering::Relaxed).checked_add(low).is_none();
+            words[at + 1].fetch_add(high + u32::from(carry), Ordering::Relaxed);
+        }
+    }
+
+    /// How often something was added, and mean radiance of all that was.
+    #[cfg(test)]
+    pub(crate) fn totals(&self) -> (u64, DVec3) {
+        let mut all = Tally::default();
+        self.words.chunks_exact(WORDS).for_each(|words| all.add(&Tally::new(words)));
+        let radiance = all.radiance.map(|units| units as f64 / f64::from(self.scale));
+        (all.count, DVec3::from_array(radiance) / all.count as f64)
+    }
+
+    /// The slot of a cell, a new one if it has none; `None` if there is no more room for it.
+    fn slot_of(&self, key: Key) -> Option<usize> {
+        key.probes().find(|slot| {
+            let check = &self.words[slot * WORDS];
+            match check.compare_exchange(0, key.check, Ordering::Relaxed, Ordering::Relaxed) {
+                Ok(_) => true,
+                Err(found) => found == key.check,
+            }
+        })
+    }
+
+    /// What has been learned so far; `None` if there are more cells than the table has room for: then
+    /// which of them have found a slot is a matter of chance.
+    pub fn cache(&self) -> Option<RadianceCache> {
+        let mut tallies: Vec<Tally> = self.words.chunks_exact(WORDS).map(Tally::new).collect();
+        let used = tallies.iter().filter(|tally| tally.check != 0).count();
+        if used as f64 > FULL * SLOTS as f64 {
+            return None;
+        }
+        let mut all = Tally::default();
+        for slot in 0..SLOTS {
+            let tally = tallies[slot];
+            if let Some(parent) = tally.parent {
+                tallies[parent].add(&tally);
+                all.add(&tally);
+            }
+        }
+        let scale = f64::from(self.scale);
+        let mean = all.radiance_over_albedo(scale).unwrap_or_default();
+        let of_all = |tally: &Tally| tally.leaning(mean, PATHS_OF_ALL, scale);
+        let slot_of = |tally: &Tally| {
+            let radiance = tally.parent.map_or_else(
+                || of_all(tally),
+                |parent| tally.leaning(of_all(&tallies[parent]), PARENTS_PATHS, scale),
+            );
+            let [r, g, b] = radiance.as_vec3().to_array().map(f32::to_bits);
+            if tally.check == 0 { [0; 4] } else { [tally.check, r, g, b] }
+        };
+        Some(RadianceCache {
+            cells: self.cells,
+            slots: tallies.iter().map(slot_of).collect(),
+            mean: mean.as_vec3(),
+            learned_cells: tallies.iter().filter(|tally| tally.parent.is_some()).count(),
+        })
+    }
+}
+
+impl Tally {
+    fn new(words: &[AtomicU32]) -> Self {
+        let word = |at: usize| words[at].load(Ordering::Relaxed);
+        let wide = |at: usize| u64::from(word(at)) | u64::from(word(at + 1)) << 32;
+        Self {
+            check: word(0),
+            parent: word(PARENT_AT).checked_sub(1).map(|parent| parent as usize),
+            count: u64::from(word(COUNT_AT)),
+            albedo: [0, 1, 2].map(|channel| u64::from(word(ALBEDO_AT + channel))),
+            radiance: [0, 2, 4].map(|channel| wide(RADIANCE_AT + channel)),
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.count += other.count;
+        for channel in 0..3 {
+            self.albedo[channel] += other.albedo[channel];
+            self.radiance[channel] = self.radiance[channel].saturating_add(other.radiance[channel]);
+        }
+    }
+
+    /// `None` if no path has come here.
+    fn radiance_over_albedo(&self, scale: f64) -> Option<DVec3> {
+        let paths = (self.count > 0).then_some(self.count as f64)?;
+        Some(DVec3::from_array([0, 1, 2].map(|channel| {
+            let albedo = self.albedo[channel] as f64 / f64::from(ALBEDO_ONE);
+            self.radiance[channel] as f64 / scale / albedo.max(LEAST_ALBEDO * paths)
+        })))
+    }
+
+    /// The same where what is expected counts as much as `weight` paths.
+    fn leaning(&self, expected: DVec3, weight: f64, scale: f64) -> DVec3 {
+        let paths = self.count as f64;
+        self.radiance_over_albedo(scale)
+            .map_or(expected, |own| (own * paths + expected * weight) / (paths + weight))
+    }
+}
+
+/// A whole number near `value`, as often above as makes the mean right; at most `most`.
+fn dithered(value: f32, most: f32) -> u64 {
+    let value = value.clamp(0.0, most);
+    (value + unit_from_bits(hash(value.to_bits()))) as u64
+}

@@ -1,0 +1,137 @@
+//! How light that has met several surfaces is found, and what the radiance cache is taught when.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use super::View;
+use crate::environment::Environment;
+use crate::path::World;
+use crate::path::camera::CameraRays;
+use crate::radiance_cache::{CacheCells, MOST_PATHS, RadianceCache, RadianceSums};
+
+/// How light that has met several surfaces is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Gi {
+    /// Paths are followed to their end: no error but noise.
+    #[default]
+    Exact,
+    /// Paths end where a radiance cache knows what they would find: less noise, and a few percent of error that stays.
+    Cached,
+}
+
+/// One teaching path for this many paths rendered; it takes about twice as long as one of them. With
+/// twice as many, means of 8x8 pixels are better for their time by day, pixels worse.
+const TEACHING_SHARE: u64 = 8;
+/// Paths that find out how bright it is about where, before others teach.
+const PILOT_PATHS: u64 = 1 << 12;
+/// Fewest paths that teach.
+const LEAST_PATHS: u64 = 1 << 14;
+/// Paths that the CPU traces between two looks at whether to stop.
+pub(super) const PATHS_AT_A_TIME: u64 = 1 << 12;
+/// Rays of the camera, along each axis, that tell how far away things are.
+const LOOKS: u32 = 16;
+/// Edge of the smallest cells over the middle distance of what the camera sees, which is twice that
+/// within which they are all alike.
+const EDGE: f32 = 0.025;
+
+/// A radiance cache in the making.
+pub(super) struct Lessons {
+    sums: RadianceSums,
+    /// Paths that have taught, and that are to before the next pass.
+    paths: u64,
+    wanted: u64,
+    /// Until others have taught, what a few have found.
+    cache: Option<RadianceCache>,
+    brightest: f32,
+}
+
+impl Lessons {
+    /// `None` if paths are followed to their end.
+    pub(super) fn new(
+        world: &World,
+        environment: &Environment,
+        view: &View,
+        rays: &CameraRays,
+    ) -> Option<Self> {
+        let brightest = world.brightest(environment);
+        if view.gi == Gi::Exact || view.limits.bounces < 2 || brightest <= 0.0 {
+            return None;
+        }
+        let distance = middle_distance(world, view, rays)?;
+        let cells = CacheCells {
+            center: rays.position(),
+            edge: EDGE * distance,
+            least_distance: 0.5 * distance,
+        };
+        let sums = RadianceSums::new(cells, brightest);
+        Some(Self { sums, paths: 0, wanted: 0, cache: None, brightest })
+    }
+
+    /// Decides how many paths are to have taught before the next pass, where each pixel has so many
+    /// samples: all there are double each time. What was begun is brought to its end first.
+    pub(super) fn begin(&mut self, view: &View, samples: u32) {
+        let pixels = u64::from(view.width) * u64::from(view.height);
+        let wanted = pixels * (u64::from(samples) + 1) / TEACHING_SHARE;
+        let wanted = wanted.clamp(LEAST_PATHS, MOST_PATHS);
+        // Where passes end between powers of two is a matter of time.
+        let is_time = samples == 0 || samples.is_power_of_two();
+        if is_time && self.paths >= self.wanted && wanted >= 2 * self.wanted {
+            self.wanted = wanted;
+        }
+    }
+
+    /// Paths that are to teach next; `None` if enough have.
+    pub(super) fn next(&self) -> Option<Range<u64>> {
+        let paths = self.paths..self.end();
+        (!paths.is_empty()).then_some(paths)
+    }
+
+    fn end(&self) -> u64 {
+        if self.cache.is_none() { PILOT_PATHS } else { self.wanted }
+    }
+
+    /// What they are added to.
+    pub(super) fn sums(&self) -> &RadianceSums {
+        &self.sums
+    }
+
+    /// Takes note that paths up to this one have taught. After the last of them there is a new cache; if
+    /// the table has no room for so many cells, they begin anew with larger ones.
+    pub(super) fn advance(&mut self, paths: u64) {
+        self.paths = paths;
+        if paths < self.end() {
+            return;
+        }
+        let mut cells = *self.sums.cells();
+        let cache = self.sums.cache();
+        if cache.is_none() {
+            cells.edge *= 2.0;
+        }
+        if cache.is_none() || self.cache.is_none() {
+            self.sums = RadianceSums::new(cells, self.brightest);
+            self.paths = 0;
+        }
+        self.cache = cache.or(self.cache.take());
+    }
+
+    /// What is known so far.
+    pub(super) fn cache(&self) -> Option<&RadianceCache> {
+        self.cache.as_ref()
+    }
+}
+
+/// Metres to what the camera sees, the median over its picture; `None` if it sees no surface.
+fn middle_distance(world: &World, view: &View, rays: &CameraRays) -> Option<f32> {
+    let size = glam::Vec2::new(view.width as f32, view.height as f32) / LOOKS as f32;
+    let places =
+        (0..LOOKS * LOOKS).map(|i| glam::Vec2::new((i % LOOKS) as f32, (i / LOOKS) as f32));
+    let hits = places.filter_map(|place| {
+        let ray = rays.ray((place + 0.5) * size, glam::Vec2::ZERO);
+        world.closest_hit(&ray, true).map(|hit| hit.t)
+    });
+    let mut distances: Vec<f32> = hits.collect();
+    distances.sort_unstable_by(f32::total_cmp);
+    distances.get(distances.len() / 2).copied().filter(|distance| *distance > 0.0)
+}
