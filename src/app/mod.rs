@@ -556,6 +556,7 @@ impl App {
             moving: self.interface.is_moving(now) && !self.is_repeatable,
             previews: !self.is_repeatable,
             device: self.document.light.device,
+            is_calm: self.document.look.denoise && !self.is_repeatable,
             rule: self.document.stop,
             is_frozen: self.interface.is_frozen,
             reference: self.reference.clone(),

@@ -8,13 +8,12 @@ use std::time::{Duration, Instant};
 use super::Wake;
 use super::overlays::{CellFacts, Label, Legend, Overlay, Sources};
 use super::surface_map::SurfaceMap;
-use super::worker::{Activity, Request, Snapshot, Take};
+use super::worker::{Activity, Request, Snapshot, Take, Under};
 use crate::denoise::{Denoiser, blend};
 use crate::develop::{Developer, LinearPicture, OverlayTexture};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::light_grid::LightGrid;
-use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::tone::WhiteBalance;
 
@@ -379,7 +378,7 @@ impl Memory {
 #[derive(Clone)]
 struct Source {
     take: Take,
-    under: Option<Arc<Film>>,
+    under: Option<Under>,
     denoiser: Option<Denoiser>,
     /// Whether every pixel has a sample and the picture its full size.
     is_whole: bool,
@@ -388,7 +387,11 @@ struct Source {
 impl PartialEq for Source {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.take.film, &other.take.film)
-            && self.under.as_ref().map(Arc::as_ptr) == other.under.as_ref().map(Arc::as_ptr)
+            && match (&self.under, &other.under) {
+                (None, None) => true,
+                (Some(one), Some(another)) => one.is_same(another),
+                _ => false,
+            }
             && (self.denoiser, self.is_whole) == (other.denoiser, other.is_whole)
     }
 }
@@ -397,7 +400,8 @@ impl Source {
     fn main(order: &Order) -> Self {
         let snapshot = &order.snapshot;
         // Where there are no samples, the film is that from before.
-        let under = snapshot.under.clone().filter(|film| !Arc::ptr_eq(film, &snapshot.main.film));
+        let under = snapshot.under.clone();
+        let under = under.filter(|under| !Arc::ptr_eq(&under.film, &snapshot.main.film));
         let take = snapshot.main.clone();
         Self { take, under, denoiser: order.denoiser, is_whole: snapshot.is_whole() }
     }
@@ -416,10 +420,15 @@ impl Source {
             Some((_, on_device)) => LinearPicture::live(on_device.clone()),
             None => developer.upload_film(film, layers),
         };
-        let blended = || developer.upload_image(&blend(film, self.under.as_deref()));
+        let blended = || {
+            let under = self.under.as_ref().map(|under| (&*under.film, under.worth));
+            developer.upload_image(&blend(film, under))
+        };
+        let is_calmed = self.under.as_ref().is_some_and(|under| under.is_cached);
         match self.denoiser {
             // A picture with holes or in other pixels is there to see where one is going.
             _ if !self.is_whole => (blended(), None),
+            Some(_) if is_calmed => (blended(), None),
             None => (noisy(false), None),
             Some(Denoiser::ATrous) if developer.can_denoise(film.width, film.height) => {
                 (developer.denoised(&noisy(true)), None)

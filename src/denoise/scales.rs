@@ -71,8 +71,8 @@ struct Scale<T> {
 }
 
 /// The film's picture, whole from the first samples on; `under` is a film of the same view, of any
-/// size, whose samples count as well.
-pub fn blend(film: &Film, under: Option<&Film>) -> Image {
+/// size, whose samples count as well, each as much as so many of the film's own.
+pub fn blend(film: &Film, under: Option<(&Film, f32)>) -> Image {
     let scales = scales(film, under);
     let mut coarser: Option<(Scale<Guide>, Scale<Estimate>)> = None;
     for (number, cells) in scales.iter().enumerate().rev() {
@@ -86,15 +86,16 @@ pub fn blend(film: &Film, under: Option<&Film>) -> Image {
 }
 
 /// Sums of all scales, the finest first.
-fn scales(film: &Film, under: Option<&Film>) -> Vec<Scale<Cell>> {
+fn scales(film: &Film, under: Option<(&Film, f32)>) -> Vec<Scale<Cell>> {
     let mut scales = vec![Scale::of(film)];
-    let mut under = under.map(Scale::of);
+    let worth = under.map_or(0.0, |(_, worth)| worth);
+    let mut under = under.map(|(film, _)| Scale::of(film));
     for number in 0..SCALES {
         let finest = &mut scales[number];
         let is_smallest = number + 1 == SCALES || finest.width.max(finest.height) == 1;
         // Its samples count where cells are about as large as its pixels.
         if let Some(other) = under.take_if(|u| is_smallest || 3 * finest.height < 4 * u.height) {
-            finest.add(&other);
+            finest.add(&other, worth);
         }
         if is_smallest {
             break;
@@ -238,7 +239,7 @@ impl Scale<Cell> {
 
     /// Adds the samples of another picture. The field of view is vertical: pictures of different
     /// shapes share their middle.
-    fn add(&mut self, other: &Self) {
+    fn add(&mut self, other: &Self, worth: f32) {
         let step = other.height as f32 / self.height as f32;
         let (width, height) = (self.width, self.height);
         self.cells.par_iter_mut().enumerate().for_each(|(i, cell)| {
@@ -251,7 +252,7 @@ impl Scale<Cell> {
                 let (tx, ty) = (x - x.floor(), y - y.floor());
                 let share = |t: f32, d: isize| if d == 0 { 1.0 - t } else { t };
                 let near = other.at(x.floor() as isize + dx, y.floor() as isize + dy);
-                cell.add(near, share(tx, dx) * share(ty, dy) * step * step);
+                cell.add(near, worth * share(tx, dx) * share(ty, dy) * step * step);
             }
         });
     }
@@ -439,10 +440,10 @@ mod tests {
         let light = |x, y, sample| slope(x, y) * noise(x, y, sample);
         let little = film([64, 48], 8, 1, light);
         let small = film([16, 12], 1, 64, |x, y, sample| light(4 * x, 4 * y, sample));
-        let (alone, helped) = (blend(&little, None), blend(&little, Some(&small)));
+        let (alone, helped) = (blend(&little, None), blend(&little, Some((&small, 1.0))));
         assert!(error(&helped, slope) < 0.5 * error(&alone, slope));
         // Of another shape they share their middle, and a film without samples says nothing.
-        let wide = blend(&Film::new(64, 24, false), Some(&small));
+        let wide = blend(&Film::new(64, 24, false), Some((&small, 1.0)));
         assert!(wide.pixels.iter().all(|p| p[0] > 0.5 && p[0] < 4.0));
         let nothing = blend(&Film::new(7, 5, true), None);
         assert!(nothing.pixels.iter().all(|p| *p == [0.0; 3]));

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
 use super::View;
@@ -36,8 +37,8 @@ const LOOKS: u32 = 16;
 /// within which they are all alike.
 const EDGE: f32 = 0.025;
 
-/// A radiance cache in the making.
-pub(super) struct Lessons {
+/// A radiance cache in the making. It outlives the picture, for it lies in the world.
+pub(crate) struct Lessons {
     sums: RadianceSums,
     /// Paths that have taught, and that are to before the next pass.
     paths: u64,
@@ -116,6 +117,12 @@ impl Lessons {
         self.cache = cache.or(self.cache.take());
     }
 
+    /// Whether its cells are as large as those for a camera at `position` would be, or nearly so.
+    pub(crate) fn suits(&self, position: Vec3) -> bool {
+        let cells = self.sums.cells();
+        position.distance(cells.center) < cells.least_distance
+    }
+
     /// What is known so far.
     pub(super) fn cache(&self) -> Option<&RadianceCache> {
         self.cache.as_ref()
@@ -124,11 +131,10 @@ impl Lessons {
 
 /// Metres to what the camera sees, the median over its picture; `None` if it sees no surface.
 fn middle_distance(world: &World, view: &View, rays: &CameraRays) -> Option<f32> {
-    let size = glam::Vec2::new(view.width as f32, view.height as f32) / LOOKS as f32;
-    let places =
-        (0..LOOKS * LOOKS).map(|i| glam::Vec2::new((i % LOOKS) as f32, (i / LOOKS) as f32));
+    let size = Vec2::new(view.width as f32, view.height as f32) / LOOKS as f32;
+    let places = (0..LOOKS * LOOKS).map(|i| Vec2::new((i % LOOKS) as f32, (i / LOOKS) as f32));
     let hits = places.filter_map(|place| {
-        let ray = rays.ray((place + 0.5) * size, glam::Vec2::ZERO);
+        let ray = rays.ray((place + 0.5) * size, Vec2::ZERO);
         world.closest_hit(&ray, true).map(|hit| hit.t)
     });
     let mut distances: Vec<f32> = hits.collect();

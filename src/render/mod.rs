@@ -20,7 +20,7 @@ pub mod gpu;
 use film::Film;
 use filter::PixelFilter;
 pub use gi::Gi;
-use gi::Lessons;
+pub(crate) use gi::Lessons;
 
 use crate::environment::Environment;
 use crate::error::Result;
@@ -549,6 +549,30 @@ impl<'a> Session<'a> {
         self.phase = Phase::Rendering;
         self.learned = Some(grid);
         self.take_up_laws()
+    }
+
+    /// Goes on with what paths have taught the radiance cache before, in the same world with the same
+    /// light, if it suits the camera.
+    ///
+    /// # Errors
+    /// If it does not fit on the GPU.
+    pub(crate) fn set_lessons(&mut self, lessons: Lessons) -> Result<()> {
+        if self.lessons.is_none() || !lessons.suits(self.rays.position()) {
+            return Ok(());
+        }
+        self.lessons = Some(lessons);
+        match &mut self.engine {
+            Engine::Cpu => Ok(()),
+            Engine::Gpu(renderer) => {
+                renderer.set_cache(self.lessons.as_ref().and_then(Lessons::cache))
+            }
+        }
+    }
+
+    /// What paths have taught the radiance cache, for another session; this one follows all paths to
+    /// their end from now on.
+    pub(crate) fn take_lessons(&mut self) -> Option<Lessons> {
+        self.lessons.take()
     }
 
     /// What was counted, for inspection.

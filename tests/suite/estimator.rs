@@ -4,6 +4,7 @@
 //! seed gives the same bits, then bounds on memory and odd input.
 
 mod bounds;
+mod cached;
 mod known_glass;
 mod known_light;
 mod known_media;

@@ -12,7 +12,7 @@ use lightgrid::path::{Background, PathLimits, World, framing};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::gpu::{Gpu, Stage};
-use lightgrid::render::{Crop, Sampling, Session, Sharing, StopRule, View};
+use lightgrid::render::{Crop, Gi, Phase, Sampling, Session, Sharing, StopRule, View};
 use lightgrid::sampler::Points;
 use lightgrid::scene::{Camera, Material, Medium, builtin, gltf};
 
@@ -333,6 +333,39 @@ fn pixels_share_the_same_vertices() {
         session.advance(1, &never).expect("rendering");
         let whole = render(&world, &environment, view, 4);
         assert!(difference_over_noise(session.film(), &whole) < 0.1);
+    }
+}
+
+#[test]
+fn paths_end_in_the_same_cache() {
+    let Some(gpu) = gpu() else { return };
+    for (name, map, bounces) in [("evening", "sunset", 5), ("exterior", "overcast", 3)] {
+        let world = World::new(builtin::build(name).expect("built in"));
+        let environment = sky_map(map);
+        let limits = PathLimits { bounces, russian_roulette: true };
+        let camera = world.scene.cameras[0].clone();
+        let view = view(camera, Sampling::Adaptive, bounces);
+        let view = View { width: 44, height: 27, gi: Gi::Cached, limits, ..view };
+        let gpu_film = finish(on_gpu(&world, &environment, view.clone(), &gpu), 16);
+        let same = render(&world, &environment, view.clone(), 16);
+        let share = difference_over_noise(&gpu_film, &same);
+        eprintln!("{name}: differences are {share:.4} of the noise");
+        assert!(share < 0.1, "{name}: {share}");
+
+        // Cut short while it teaches, and taken over by the CPU.
+        let never = AtomicBool::new(false);
+        let mut session = on_gpu(&world, &environment, view, &gpu);
+        while session.phase() == Phase::Learning {
+            session.advance(0, &never).expect("learning");
+        }
+        session.advance(2, &AtomicBool::new(true)).expect("cancelled");
+        session.advance(1, &never).expect("rendering");
+        session.continue_on_cpu();
+        while session.samples() < 16 {
+            session.advance(session.samples(), &never).expect("rendering");
+        }
+        let share = difference_over_noise(session.film(), &same);
+        assert!(share < 0.1, "{name}, taken over: {share}");
     }
 }
 

@@ -102,6 +102,16 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
         let rate = take.figures.rays as f64 / take.figures.render_seconds.max(1e-9);
         number(ui, &theme::figure(rate), "rays/s", "Rays, shadow rays included, while rendering");
     }
+    if let Some(under) = snapshot.under.as_ref().filter(|under| under.is_cached) {
+        let share = format!("{:.0} %", 100.0 * under.share(take.samples));
+        number(
+            ui,
+            &share,
+            "fast light",
+            "So much of what is shown is light remembered by place: calm at once, a few percent off, \
+             gone when there are enough samples, and never in what is saved",
+        );
+    }
     if take.noise.is_finite() {
         let percent = format!("{:.1} %", 100.0 * take.noise);
         number(

@@ -42,6 +42,8 @@ pub struct Request {
     pub previews: bool,
     /// Where it is rendered.
     pub device: DeviceChoice,
+    /// Show light from a radiance cache while there is little of what is asked for.
+    pub is_calm: bool,
     /// When to stop.
     pub rule: StopRule,
     /// Render with what was learned before rather than learn anew.
@@ -66,6 +68,13 @@ impl Request {
             || self.run != new.run
     }
 
+    /// Whether the same light falls on the same scene.
+    fn is_lit_like(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.world, &other.world)
+            && Arc::ptr_eq(&self.environment, &other.environment)
+            && (self.view.medium, self.view.limits) == (other.view.medium, other.view.limits)
+    }
+
     /// Whether a picture for `self` shows what one for `new` will show, but for its size and noise.
     fn looks_like(&self, new: &Self) -> bool {
         let (a, b) = (&self.view, &new.view);
@@ -82,6 +91,7 @@ impl Request {
             && self.split == new.split
             && self.device == new.device
             && self.is_frozen == new.is_frozen
+            && self.is_calm == new.is_calm
             && self.reference.as_ref().map(Arc::as_ptr) == new.reference.as_ref().map(Arc::as_ptr)
             && self.rule == new.rule
             && self.paused == new.paused
@@ -163,8 +173,33 @@ pub struct Snapshot {
     pub counters: Option<Arc<LearningGrid>>,
     /// How the error of `main` and of `plain` fell.
     pub curves: [Vec<Point>; 2],
-    /// An earlier film of the same view; its samples help where `main` has few.
-    pub under: Option<Arc<Film>>,
+    /// Another film of the same view; its samples help where `main` has few.
+    pub under: Option<Under>,
+}
+
+/// A film that is shown together with the picture's own, and never saved.
+#[derive(Clone)]
+pub struct Under {
+    /// Of any size.
+    pub film: Arc<Film>,
+    /// What one of its samples counts beside one of the picture's own.
+    pub worth: f32,
+    /// Whether its light comes from a radiance cache.
+    pub is_cached: bool,
+}
+
+impl Under {
+    /// The share of what is shown that it makes up, in `[0,1]`, beside a film of the same size with so
+    /// many samples a pixel.
+    pub fn share(&self, samples: u32) -> f32 {
+        let own = self.worth * self.film.min_samples() as f32;
+        if own > 0.0 { own / (own + samples as f32) } else { 0.0 }
+    }
+
+    /// Whether both are the same film and count alike.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.film, &other.film) && self.worth == other.worth
+    }
 }
 
 impl Snapshot {
