@@ -135,10 +135,17 @@ impl Cell {
     }
 
     fn add(&mut self, other: &Self, times: f32) {
+        self.add_worth(other, times, 1.0);
+    }
+
+    /// Adds `times` the samples of another cell, each as `worth` samples that deviate accordingly: they
+    /// say no more of how much.
+    fn add_worth(&mut self, other: &Self, times: f32, worth: f32) {
+        self.freedom += other.freedom * times;
+        let times = times * worth;
+        self.deviation += other.deviation * times;
         self.light += other.light * times;
         self.samples += other.samples * times;
-        self.deviation += other.deviation * times;
-        self.freedom += other.freedom * times;
         self.albedo += other.albedo * times;
         self.normal += other.normal * times;
         self.depth += other.depth * times;
@@ -252,7 +259,7 @@ impl Scale<Cell> {
                 let (tx, ty) = (x - x.floor(), y - y.floor());
                 let share = |t: f32, d: isize| if d == 0 { 1.0 - t } else { t };
                 let near = other.at(x.floor() as isize + dx, y.floor() as isize + dy);
-                cell.add(near, worth * share(tx, dx) * share(ty, dy) * step * step);
+                cell.add_worth(near, share(tx, dx) * share(ty, dy) * step * step, worth);
             }
         });
     }
@@ -442,6 +449,16 @@ mod tests {
         let small = film([16, 12], 1, 64, |x, y, sample| light(4 * x, 4 * y, sample));
         let (alone, helped) = (blend(&little, None), blend(&little, Some((&small, 1.0))));
         assert!(error(&helped, slope) < 0.5 * error(&alone, slope));
+        let calm = film([64, 48], 1, 8, |x, y, sample| {
+            slope(x, y) * (1.0 + 0.5 * (noise(x, y, sample) - 1.0))
+        });
+        let nobody = Film::new(64, 48, false);
+        let [once, worth] = [1.0, 4.0].map(|worth| blend(&nobody, Some((&calm, worth))));
+        let off = once.pixels.iter().zip(&worth.pixels).map(|(a, b)| (a[0] / b[0] - 1.0).abs());
+        assert!(
+            off.fold(0.0, f32::max) < 0.05,
+            "alone, it is the same picture whatever it is worth"
+        );
         // Of another shape they share their middle, and a film without samples says nothing.
         let wide = blend(&Film::new(64, 24, false), Some((&small, 1.0)));
         assert!(wide.pixels.iter().all(|p| p[0] > 0.5 && p[0] < 4.0));

@@ -141,3 +141,94 @@ fn middle_distance(world: &World, view: &View, rays: &CameraRays) -> Option<f32>
     distances.sort_unstable_by(f32::total_cmp);
     distances.get(distances.len() / 2).copied().filter(|distance| *distance > 0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::{EnvironmentOptions, sky};
+    use crate::light_grid::LightGrid;
+    use crate::path::{Background, PathTracer};
+    use crate::render::cpu;
+    use crate::render::gpu::tests::view;
+    use crate::scene::builtin;
+
+    fn office() -> (World, Environment, View) {
+        let world = World::new(builtin::build("office").expect("built in"));
+        let map = sky::build("sunset", 128, 64).expect("a sky");
+        let environment =
+            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let view = View { gi: Gi::Cached, ..view(&world, crate::light_grid::LawOptions::ADAPTIVE) };
+        (world, environment, view)
+    }
+
+    #[test]
+    fn error_falls_as_paths_teach() {
+        let (world, environment, view) = office();
+        let rays = view.rays();
+        let laws = LightGrid::whole_map(environment.tile_energies());
+        let tracer = PathTracer {
+            world: &world,
+            environment: &environment,
+            grid: laws.as_ref(),
+            cache: None,
+            fog: None,
+            background: Background::Map,
+            limits: view.limits,
+            counts: None,
+        };
+        let lessons = Lessons::new(&world, &environment, &view, &rays).expect("there is light");
+        let places = (0..900).filter_map(|i| {
+            let at = Vec2::new((i % 30) as f32 * 2.1, (i / 30) as f32 * 1.2);
+            let ray = rays.ray(at, Vec2::ZERO);
+            let hit = world.closest_hit(&ray, true)?;
+            let point = world.point(&hit, ray.direction);
+            Some((point.position, point.geometric_normal))
+        });
+        let places: Vec<_> = places.collect();
+        let mut known: Vec<Vec<f32>> = Vec::new();
+        let mut start = 0;
+        for end in [1 << 12, 1 << 15, 1 << 19] {
+            cpu::teach(&tracer, &rays, &view, start..end, lessons.sums());
+            start = end;
+            let cache = lessons.sums().cache().expect("there is room");
+            let radiance = |(position, normal): &(Vec3, Vec3)| {
+                crate::color::luminance(cache.radiance_over_albedo(*position, *normal))
+            };
+            known.push(places.iter().map(radiance).collect());
+        }
+        let error = |some: &[f32]| {
+            let mut off: Vec<f32> =
+                some.iter().zip(&known[2]).map(|(a, b)| (a - b).abs() / (a + b + 1e-6)).collect();
+            off.sort_unstable_by(f32::total_cmp);
+            off[off.len() / 2]
+        };
+        let (little, much) = (error(&known[0]), error(&known[1]));
+        eprintln!("{little} after 2^12 paths, {much} after 2^15");
+        assert!(much < 0.7 * little, "{little} {much}");
+    }
+
+    #[test]
+    fn cells_grow_where_there_are_too_many() {
+        let (world, environment, view) = office();
+        let rays = view.rays();
+        let mut lessons = Lessons::new(&world, &environment, &view, &rays).expect("there is light");
+        let edge = lessons.sums.cells().edge;
+        let cells = CacheCells { edge: edge / 64.0, ..*lessons.sums.cells() };
+        lessons.sums = RadianceSums::new(cells, 1.0);
+        lessons.begin(&view, 0);
+        let mut paths = 0;
+        while let Some(range) = lessons.next() {
+            // In a square so large that the smallest cells do not suffice for it.
+            for path in range.clone() {
+                let at = Vec3::new((path % 256) as f32, 0.0, (path / 256) as f32) * (0.02 * edge);
+                let sums = lessons.sums();
+                sums.add(sums.cells().center + at, Vec3::Y, Vec3::ONE, Vec3::ONE);
+                paths += 1;
+            }
+            lessons.advance(range.end);
+            assert!(paths < 1_000_000, "it comes to an end");
+        }
+        let cells = lessons.cache().expect("it was taught").cells();
+        assert!(cells.edge > edge / 64.0, "{} for {edge}", cells.edge);
+    }
+}

@@ -638,7 +638,7 @@ fn upload_tables(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::environment::EnvironmentOptions;
     use crate::light_grid::cells::SphericalGrid;
@@ -657,7 +657,7 @@ mod tests {
         (world, environment)
     }
 
-    fn view(world: &World, recording: LawOptions) -> View {
+    pub(in super::super) fn view(world: &World, recording: LawOptions) -> View {
         let talk = recording == LawOptions::TALK;
         View {
             camera: world.scene.cameras[0].clone(),

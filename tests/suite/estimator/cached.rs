@@ -7,7 +7,7 @@ use lightgrid::environment::sky;
 use lightgrid::path::{Background, PathLimits, World};
 use lightgrid::render::film::Film;
 use lightgrid::render::{Gi, Sampling, Session, Sharing, View};
-use lightgrid::scene::{Camera, builtin};
+use lightgrid::scene::Camera;
 
 use super::scenes::{Stage, lambert, lamp, room};
 use super::{constant, environment, learned, mean, render, view};
@@ -70,25 +70,6 @@ fn a_glowing_box_is_as_bright_as_its_bounces_make_it() {
         eprintln!("{bounces} bounces: {found:.4} for {expected:.4}");
         assert!((found / expected - 1.0).abs() < 0.01, "{bounces}: {found} for {expected}");
     }
-}
-
-#[test]
-fn error_falls_as_it_learns() {
-    let world = World::new(builtin::build("office").expect("built in"));
-    let sky = environment(sky::build("day", 128, 64).expect("a sky"));
-    let camera = world.scene.cameras[0].clone();
-    let truth = render(&world, &sky, picture(&camera, Gi::Exact, 100), 1024);
-    // In one pass there is one lesson before it, else one more at each power of two.
-    let errors = [1, 2, 3].map(|seed| {
-        let view = picture(&camera, Gi::Cached, seed);
-        let mut taught_once = learned(&world, &sky, view.clone());
-        taught_once.advance(1024, &AtomicBool::new(false)).expect("the CPU does not fail");
-        let taught_often = render(&world, &sky, view, 1024);
-        [taught_once.film(), &taught_often].map(|film| difference(film, &truth).powi(2))
-    });
-    let [once, often] = [0, 1].map(|i| (errors.iter().map(|e| e[i]).sum::<f64>() / 3.0).sqrt());
-    eprintln!("{:.2} % taught once, {:.2} % taught on", 100.0 * once, 100.0 * often);
-    assert!(often < 0.8 * once && often < 0.05, "{once} {often}");
 }
 
 /// Two closed rooms with a wall of 5 cm between them, a lamp in one, and a camera that sees both, for it
