@@ -9,6 +9,8 @@ mod compare;
 mod device;
 mod info;
 mod interrupt;
+mod merge;
+mod picture;
 mod progress;
 mod render;
 mod report;
@@ -39,6 +41,8 @@ enum Command {
     Screenshot(Box<screenshot::ScreenshotArguments>),
     /// Render a scene into a picture.
     Render(Box<render::RenderArguments>),
+    /// Join parts of a picture that were rendered apart.
+    Merge(merge::MergeArguments),
     /// Measure how far a picture is from a reference.
     Compare(compare::CompareArguments),
     /// Say what is in a scene or a map, and what the renderer leaves out.
@@ -63,6 +67,7 @@ pub fn main() -> ExitCode {
         Command::View(arguments) => view::run(arguments),
         Command::Screenshot(arguments) => screenshot::run(arguments),
         Command::Render(arguments) => render::run(arguments),
+        Command::Merge(arguments) => merge::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Info(arguments) => info::run(arguments),
         Command::Devices(arguments) => device::run(arguments),

@@ -87,9 +87,13 @@ fn line(session: &Session<'_>, rule: &StopRule, noise: f64) -> String {
 /// Shortest estimate of what the rules leave: samples at the speed so far, the clock, and noise
 /// falling with the root of the samples.
 fn seconds_left(session: &Session<'_>, rule: &StopRule, noise: f64) -> Option<f64> {
-    let rendered = session.figures().render_seconds;
-    let samples = f64::from(session.samples());
-    let by_samples = rule.samples.map(|limit| rendered * (f64::from(limit) / samples - 1.0));
+    let figures = session.figures();
+    let rendered = figures.render_seconds;
+    let pixels = f64::from(session.view().width) * f64::from(session.view().height);
+    let seconds_a_sample = rendered * pixels / figures.samples as f64;
+    let by_samples = rule
+        .samples
+        .map(|limit| seconds_a_sample * f64::from(limit.saturating_sub(session.samples())));
     let by_clock = rule.seconds.map(|limit| limit - session.elapsed_seconds());
     let by_noise = rule.noise.map(|limit| rendered * ((noise / limit).powi(2) - 1.0));
     [by_samples, by_clock, by_noise]

@@ -1,26 +1,27 @@
 //! `lightgrid render`.
 
 mod outputs;
+mod share;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use glam::Vec3;
 
 use super::device;
 use super::interrupt::Interrupt;
+use super::picture::PictureArguments;
 use super::progress::Progress;
 use super::values;
 use crate::alarm::Alarm;
-use crate::denoise::Denoiser;
 use crate::environment::{Environment, EnvironmentOptions, TableKind};
 use crate::error::{Error, Notices, Result};
 use crate::light_grid::LawOptions;
 use crate::memory;
+use crate::output;
+use crate::output::film_file::Part;
 use crate::output::record::{Phases, Record};
-use crate::output::{self, Exposure, LayerName};
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
@@ -28,7 +29,7 @@ use crate::render::{Crop, Sampling, Session, Sharing, StopRule, View};
 use crate::sampler::Points;
 use crate::scene::{Camera, Medium, Projection, Scene, SceneOptions, builtin};
 use crate::terminal::notice;
-use crate::tone::{ToneCurve, WhiteBalance};
+use share::Share;
 
 /// Arguments of `render`.
 #[derive(Debug, clap::Args)]
@@ -43,7 +44,7 @@ pub(super) struct RenderArguments {
     scene: String,
     #[command(flatten)]
     pub(super) of_scene: SceneOptions,
-    /// The picture to write: .png or .exr; may be given twice.
+    /// The picture to write: .png or .exr; may be given twice. With --part, one .part.
     #[arg(short, long = "output", required = true, value_name = "FILE")]
     outputs: Vec<PathBuf>,
 
@@ -103,25 +104,11 @@ pub(super) struct RenderArguments {
     /// Pixel filter.
     #[arg(long, default_value = "blackman-harris", value_enum, help_heading = "Picture")]
     filter: PixelFilter,
-    /// Exposure of .png pictures in stops, or `auto`.
-    #[arg(long, default_value = "auto", value_parser = parse_exposure, allow_hyphen_values = true, value_name = "EV|auto", help_heading = "Picture")]
-    exposure: Exposure,
-    /// Tone curve of .png pictures: agx, aces, neutral, reinhard, none.
-    #[arg(long, default_value = "agx", value_name = "CURVE", help_heading = "Picture")]
-    tonemap: ToneCurve,
-    /// Takes noise out of .png pictures: a-trous (our own filter) or oidn (Open Image Denoise, if its
-    /// library is installed).
-    #[arg(long, value_enum, value_name = "FILTER", num_args = 0..=1, default_missing_value = "a-trous", help_heading = "Picture")]
-    denoise: Option<Denoiser>,
-    /// The light that looks white in .png pictures: kelvin, and a tint from -1 (green) to 1.
-    #[arg(long, value_parser = parse_white, allow_hyphen_values = true, value_name = "K[,TINT]", help_heading = "Picture")]
-    white: Option<WhiteBalance>,
-    /// Extra layers in .exr pictures: albedo, normal, depth, samples, variance, or all.
-    #[arg(long, value_delimiter = ',', value_name = "LAYER", help_heading = "Picture")]
-    layers: Vec<LayerName>,
+    #[command(flatten)]
+    picture: PictureArguments,
 
     /// Stop at this many samples per pixel (256 if no stop rule is given).
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), value_name = "N", help_heading = "Stop")]
+    #[arg(long, visible_alias = "samples", value_parser = clap::value_parser!(u32).range(1..), value_name = "N", help_heading = "Stop")]
     spp: Option<u32>,
     /// Stop after this many seconds of learning and rendering.
     #[arg(long, value_parser = values::positive, value_name = "S", help_heading = "Stop")]
@@ -192,6 +179,17 @@ pub(super) struct RenderArguments {
     /// Writes what was learned, each cell's probability of each tile: .csv, .json or .exr.
     #[arg(long, value_name = "FILE", help_heading = "Run")]
     laws: Option<PathBuf>,
+
+    /// Renders only this share of every pixel's samples, such as 2/8, into a .part for `lightgrid
+    /// merge`. All parts take the same options, of which those for .png and .exr are for merge.
+    #[arg(long, value_parser = values::part, conflicts_with_all = ["seconds", "noise"], value_name = "I/N", help_heading = "Farm")]
+    part: Option<Part>,
+    /// Keeps what is done in this file; the same command goes on from it, should this one be killed.
+    #[arg(long, value_name = "FILE", help_heading = "Farm")]
+    checkpoint: Option<PathBuf>,
+    /// Seconds between two writings of the checkpoint.
+    #[arg(long, requires = "checkpoint", default_value = "60", value_parser = values::positive, value_name = "S", help_heading = "Farm")]
+    checkpoint_every: f64,
 }
 
 fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
@@ -200,24 +198,6 @@ fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
         return Err("at most 256x256 tiles".to_owned());
     }
     Ok((columns, rows))
-}
-
-fn parse_exposure(text: &str) -> std::result::Result<Exposure, String> {
-    if text == "auto" {
-        return Ok(Exposure::Auto);
-    }
-    values::finite(text)
-        .map(|stops| Exposure::Stops(stops as f32))
-        .map_err(|e| format!("{e} of stops, or auto"))
-}
-
-fn parse_white(text: &str) -> std::result::Result<WhiteBalance, String> {
-    let (kelvin, tint) = text.split_once(',').unwrap_or((text, "0"));
-    let (kelvin, tint) = (values::finite(kelvin)? as f32, values::finite(tint)? as f32);
-    if !((2000.0..=12000.0).contains(&kelvin) && (-1.0..=1.0).contains(&tint)) {
-        return Err("expected 2000 to 12000 kelvin and a tint from -1 to 1".to_owned());
-    }
-    Ok(WhiteBalance { kelvin, tint })
 }
 
 impl RenderArguments {
@@ -252,11 +232,7 @@ impl RenderArguments {
             focus: None,
             size: size.unwrap_or((1280, 720)),
             filter: PixelFilter::default(),
-            exposure: Exposure::Auto,
-            tonemap: ToneCurve::default(),
-            denoise: None,
-            white: None,
-            layers: Vec::new(),
+            picture: PictureArguments::default(),
             spp: samples,
             seconds,
             noise: None,
@@ -277,6 +253,9 @@ impl RenderArguments {
             reproducible: false,
             json: None,
             laws: None,
+            part: None,
+            checkpoint: None,
+            checkpoint_every: 60.0,
         }
     }
 }
@@ -312,15 +291,18 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         (arguments.rays, arguments.schedule),
         &mut notices,
     )?;
+    let mut share = Share::open(arguments, rule, (&world, &environment), &view)?;
+    share.say(&mut notices);
     let mut session =
         device::start(arguments.device, gpu.as_ref(), &world, &environment, view, &mut notices)?;
-    let outcome = work(&mut session, &rule, &interrupt, &progress, arguments, &mut notices);
+    let outcome = work(&mut session, &mut share, &interrupt, &progress, arguments, &mut notices);
     progress.finish();
-    if session.samples() == 0 {
+    if !share.has_samples(&session) {
         outcome?;
         return Ok(());
     }
-    let remarks = output::remarks(session.film(), &environment);
+    let film = share.film(&session);
+    let remarks = output::remarks(&film, &environment);
     remarks.iter().for_each(|sentence| notices.add(sentence));
 
     let record = Record {
@@ -328,7 +310,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         map: &arguments.env,
         world: &world,
         environment: &environment,
-        film: session.film(),
+        film: &film,
         figures: &session.figures(),
         gpu: session.gpu_figures(),
         phases: &phases,
@@ -336,7 +318,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         with_times: !arguments.reproducible,
         options: outputs::settings(arguments, session.view().fog(&world)),
     };
-    let mut failures = outputs::write(arguments, &record, session.grid());
+    let mut failures = outputs::write(arguments, &share, &record, session.grid());
+    failures.extend(share.keep(&session).err());
     remarks.iter().for_each(notice);
     failures.extend(outcome.err());
     Error::all(failures)
@@ -399,7 +382,7 @@ fn stop_rule(arguments: &RenderArguments) -> StopRule {
 /// A picture to be denoised gains nothing from noise that neighbours share, which filters keep.
 fn sharing(arguments: &RenderArguments) -> Sharing {
     match arguments.sharing {
-        Sharing::Auto if arguments.denoise.is_some() => Sharing::Off,
+        Sharing::Auto if arguments.picture.denoise.is_some() => Sharing::Off,
         asked => asked,
     }
 }
@@ -430,11 +413,7 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
             corner: [left, top],
             whole: [arguments.size.0, arguments.size.1],
         }),
-        layers: arguments
-            .layers
-            .iter()
-            .any(|l| !matches!(l, LayerName::Samples | LayerName::Variance))
-            || arguments.denoise.is_some(),
+        layers: arguments.picture.wants_surfaces(),
     })
 }
 
@@ -509,42 +488,23 @@ fn camera(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> 
 /// the CPU takes over.
 fn work(
     session: &mut Session<'_>,
-    rule: &StopRule,
+    share: &mut Share,
     interrupt: &Interrupt,
     progress: &Progress,
     arguments: &RenderArguments,
     notices: &mut Notices,
 ) -> Result<()> {
-    let never = AtomicBool::new(false);
-    let cancel = interrupt.asked();
-    let alarm = Alarm::start(Arc::clone(cancel));
-    let seconds = rule.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    alarm.set(seconds.and_then(|seconds| Instant::now().checked_add(seconds)));
+    let alarm = Alarm::start(Arc::clone(interrupt.asked()));
     loop {
-        progress.show(session, rule);
-        if session.samples() > 0 {
-            interrupt.keep();
-        }
-        let stopped = cancel.load(Ordering::Relaxed);
-        if stopped || session.has_learned_enough(rule) {
-            session.finish_learning();
-        }
-        let is_last = session.samples() > 0 && (stopped || session.is_done(rule));
-        let outcome = if is_last {
-            session.settle()
-        } else {
-            let cancel = if stopped { &never } else { &**cancel };
-            session.advance(session.next_pass(rule), cancel)
-        };
-        if is_last && outcome.is_ok() {
-            return Ok(());
-        }
-        if let Err(failure) = outcome {
-            if arguments.device != DeviceChoice::Auto {
-                return Err(failure);
+        progress.show(session, share.rule());
+        match share.step(session, interrupt, &alarm, notices) {
+            Ok(true) => return Ok(()),
+            Ok(false) => {}
+            Err(failure) if arguments.device != DeviceChoice::Auto => return Err(failure),
+            Err(failure) => {
+                device::say(notices, format!("{failure}; the CPU goes on"));
+                session.continue_on_cpu();
             }
-            device::say(notices, format!("{failure}; the CPU goes on"));
-            session.continue_on_cpu();
         }
     }
 }

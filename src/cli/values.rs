@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::output::film_file::Part;
 use crate::path::Background;
 pub(super) use crate::sources::size_pair as pair;
 
@@ -47,6 +48,16 @@ pub(super) fn region(text: &str) -> Result<[u32; 4], String> {
         [x, y, w, h] if text.split(',').count() == 4 && w > 0 && h > 0 => Ok([x, y, w, h]),
         _ => Err("expected four numbers like 100,50,320,180, the last two not 0".to_owned()),
     }
+}
+
+/// `I/N`, the first part being 1.
+pub(super) fn part(text: &str) -> Result<Part, String> {
+    let numbers = text.split_once('/').and_then(|(number, count)| {
+        Some(Part { number: number.trim().parse().ok()?, count: count.trim().parse().ok()? })
+    });
+    numbers
+        .filter(|part| (1..=part.count).contains(&part.number))
+        .ok_or_else(|| "expected two numbers like 2/8: the second of eight parts".to_owned())
 }
 
 /// `map`, `blur:DEGREES` or a colour.
