@@ -69,11 +69,16 @@ impl Interrupt {
         &self.asked
     }
 
+    /// Whether a signal asked.
+    pub(super) fn was_signalled(&self) -> bool {
+        self.signalled.load(Ordering::SeqCst)
+    }
+
     /// Lets the work go on unless a signal wants its end: for somebody who only cut it short.
     pub(super) fn go_on(&self) {
         self.asked.store(false, Ordering::SeqCst);
         // A signal may have come in between.
-        if self.signalled.load(Ordering::SeqCst) {
+        if self.was_signalled() {
             self.asked.store(true, Ordering::SeqCst);
         }
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::picture::PictureArguments;
+use super::picture::{PictureArguments, say_written};
 use super::progress::Progress;
 use crate::error::{Error, Result};
 use crate::image::{check_writable, is_same_file};
@@ -14,8 +14,12 @@ use crate::terminal::notice;
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,
-    after_help = "A checkpoint of `lightgrid render` is a part, too: with --allow-missing, a picture of how \
-                  far that is."
+    after_help = "\
+A checkpoint of `lightgrid render` is a part, too: with --allow-missing, a picture of how far that is.
+
+Examples:
+  lightgrid merge office.*.part -o office.exr -o office.png
+  lightgrid merge office.checkpoint --allow-missing --denoise -o so-far.png"
 )]
 pub(super) struct MergeArguments {
     /// What `lightgrid render --part` wrote, in any order.
@@ -34,7 +38,7 @@ pub(super) struct MergeArguments {
 /// Reads, adds up, writes.
 pub(super) fn run(arguments: &MergeArguments) -> Result<()> {
     let MergeArguments { parts, outputs, picture, .. } = arguments;
-    picture.check(outputs.iter().map(PathBuf::as_path))?;
+    picture.check(outputs)?;
     for (i, output) in outputs.iter().enumerate() {
         if outputs[..i].iter().chain(parts).any(|other| is_same_file(other, output)) {
             return Err(Error::at(output, "would be written over a part or another output"));
@@ -70,8 +74,9 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<()> {
     }
     let Some(film) = joined else { return Err(Error::new("there is no part to be merged")) };
     let metadata = metadata(&parts, &film);
-    let failures = outputs.iter().filter_map(|path| picture.write(path, &film, &metadata).err());
-    Error::all(failures.collect())
+    let write =
+        |path: &PathBuf| picture.write(path, &film, &metadata).map(|()| say_written(path)).err();
+    Error::all(outputs.iter().filter_map(write).collect())
 }
 
 /// What the parts say about themselves, in the order of their numbers: sums in f64 depend on the order

@@ -7,6 +7,7 @@ use clap::{Parser, Subcommand};
 mod bench;
 mod compare;
 mod device;
+mod generate;
 mod info;
 mod interrupt;
 mod merge;
@@ -26,7 +27,12 @@ mod view;
 #[command(
     name = "lightgrid",
     version,
-    after_help = "Without a command the window opens with the built-in living room."
+    after_help = "\
+Without a command the window opens with the built-in living room.
+
+Examples:
+  lightgrid view kitchen.glb --env meadow.hdr
+  lightgrid render office --env sky:sunset --spp 64 -o office.png"
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -57,6 +63,10 @@ enum Command {
     Sat(sat::SatArguments),
     /// Try stiff and extreme cases on this machine; fails if one does.
     Stability(stability::StabilityArguments),
+    /// Print what completes these commands in a shell.
+    Completions(generate::CompletionsArguments),
+    /// Write a manual page for each command.
+    Man(generate::ManArguments),
 }
 
 /// Runs the command line; errors become one sentence on stderr and a non-zero exit.
@@ -75,6 +85,8 @@ pub fn main() -> ExitCode {
         Command::Report(arguments) => report::run(arguments),
         Command::Sat(arguments) => sat::run(arguments),
         Command::Stability(arguments) => stability::run(arguments),
+        Command::Completions(arguments) => generate::completions(arguments),
+        Command::Man(arguments) => generate::man(arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

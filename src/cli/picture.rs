@@ -1,6 +1,6 @@
 //! How a picture is made of a film and written, wherever the film comes from.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::values;
 use crate::denoise::Denoiser;
@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::render::film::Film;
 use crate::terminal::tell;
-use crate::tone::{ToneCurve, WhiteBalance};
+use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev};
 
 /// How pictures are written.
 #[derive(Debug, Clone, clap::Args)]
@@ -63,8 +63,8 @@ fn parse_white(text: &str) -> std::result::Result<WhiteBalance, String> {
 
 impl PictureArguments {
     /// Refuses names no picture is written by, and denoisers that are not there.
-    pub(super) fn check<'a>(&self, pictures: impl IntoIterator<Item = &'a Path>) -> Result<()> {
-        pictures.into_iter().try_for_each(output::check_extension)?;
+    pub(super) fn check<'a>(&self, pictures: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
+        pictures.into_iter().try_for_each(|path| output::check_extension(path))?;
         self.denoise.map_or(Ok(()), Denoiser::check)
     }
 
@@ -72,6 +72,22 @@ impl PictureArguments {
     pub(super) fn wants_surfaces(&self) -> bool {
         let is_surface = |l: &LayerName| !matches!(l, LayerName::Samples | LayerName::Variance);
         self.denoise.is_some() || self.layers.iter().any(is_surface)
+    }
+
+    /// The exposure that a film's picture gets, to be that of others, too.
+    pub(super) fn exposure_of(&self, film: &Film) -> Exposure {
+        match self.exposure {
+            Exposure::Stops(stops) => Exposure::Stops(stops),
+            Exposure::Auto => {
+                let image = self.white.unwrap_or_default().apply(film.image());
+                Exposure::Stops(auto_exposure_ev(&image))
+            }
+        }
+    }
+
+    /// Takes this exposure.
+    pub(super) fn set_exposure(&mut self, exposure: Exposure) {
+        self.exposure = exposure;
     }
 
     fn options(&self) -> PictureOptions {
@@ -84,7 +100,7 @@ impl PictureArguments {
         }
     }
 
-    /// Writes a picture where it was asked to be or, if that fails, into the temporary folder; says so.
+    /// Writes a picture where it was asked to be or, if that fails, into the temporary folder.
     pub(super) fn write(
         &self,
         path: &Path,
@@ -93,7 +109,6 @@ impl PictureArguments {
     ) -> Result<()> {
         let options = self.options();
         let Err(failure) = output::write_picture(path, &options, film, metadata.to_vec()) else {
-            say_written(path);
             return Ok(());
         };
         let name = path.file_name().unwrap_or_default().to_string_lossy();

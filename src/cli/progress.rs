@@ -11,6 +11,8 @@ use crate::terminal::tell;
 /// A live line on the terminal.
 pub(super) struct Progress {
     bar: ProgressBar,
+    /// What every message begins with.
+    prefix: String,
     /// The noise shown, and when it was found.
     noise: Cell<Option<(Instant, f64)>>,
 }
@@ -27,12 +29,17 @@ impl Progress {
         }
         bar.set_message(message.to_owned());
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self { bar, noise: Cell::default() }
+        Self { bar, prefix: String::new(), noise: Cell::default() }
+    }
+
+    /// One that says which of the frames it is about.
+    pub(super) fn of_frame(number: u32, last: u32) -> Self {
+        Self { prefix: format!("frame {number} up to {last}: "), ..Self::start("") }
     }
 
     /// Shows another message.
     pub(super) fn say(&self, message: impl Into<String>) {
-        self.bar.set_message(message.into());
+        self.bar.set_message(format!("{}{}", self.prefix, message.into()));
     }
 
     /// Shows where a session is.

@@ -1,8 +1,10 @@
 //! `lightgrid render`.
 
+mod frames;
 mod outputs;
 mod share;
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -19,24 +21,32 @@ use crate::environment::{Environment, EnvironmentOptions, TableKind};
 use crate::error::{Error, Notices, Result};
 use crate::light_grid::LawOptions;
 use crate::memory;
-use crate::output;
 use crate::output::film_file::Part;
 use crate::output::record::{Phases, Record};
+use crate::output::{self, Exposure};
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
-use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
+use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, Schedule};
 use crate::render::{Crop, Sampling, Session, Sharing, StopRule, View};
 use crate::sampler::Points;
 use crate::scene::{Camera, Medium, Projection, Scene, SceneOptions, builtin};
 use crate::terminal::notice;
+use frames::{Frames, Reel};
 use share::Share;
 
 /// Arguments of `render`.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(
     allow_negative_numbers = true,
-    after_help = "Ctrl-C ends the work early, writes the pictures and counts as success; a second \
-                  one, or one before there is a picture, leaves at once with status 130."
+    after_help = "\
+Ctrl-C ends the work early, writes the pictures and counts as success; a second one, or one before there
+is a picture, leaves at once with status 130.
+
+Examples:
+  lightgrid render kitchen.glb --env meadow.hdr --noise 0.05 -o kitchen.exr -o kitchen.png
+  lightgrid render office --spp 4096 --checkpoint office.checkpoint -o office.exr
+  lightgrid render office --spp 4096 --part 2/8 -o office.2.part
+  lightgrid render car.glb --turntable 48 --spp 64 --denoise -o car.####.png -o car.mp4"
 )]
 pub(super) struct RenderArguments {
     /// A glTF file (.gltf, .glb) or a built-in scene.
@@ -190,6 +200,21 @@ pub(super) struct RenderArguments {
     /// Seconds between two writings of the checkpoint.
     #[arg(long, requires = "checkpoint", default_value = "60", value_parser = values::positive, value_name = "S", help_heading = "Farm")]
     checkpoint_every: f64,
+
+    /// Renders these frames of the camera's movement in the file, or of a turn: 0..47, or one number.
+    /// Outputs are out.####.png, or .mp4, .webm and .gif by ffmpeg. Frame N is at N / fps seconds.
+    #[arg(long, value_parser = values::frames, value_name = "A..B", help_heading = "Frames")]
+    frames: Option<RangeInclusive<u32>>,
+    /// Turns the camera once in so many frames about the vertical through --target; without it, through
+    /// what the middle of the picture shows or, in a room, the camera itself.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000), value_name = "N", help_heading = "Frames")]
+    turntable: Option<u32>,
+    /// Frames per second.
+    #[arg(long, default_value = "24", value_parser = values::positive, value_name = "F", help_heading = "Frames")]
+    fps: f64,
+    /// A frame of a video, which nobody asked for by name.
+    #[arg(skip)]
+    frame_of_video: Option<PathBuf>,
 }
 
 fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
@@ -256,6 +281,10 @@ impl RenderArguments {
             part: None,
             checkpoint: None,
             checkpoint_every: 60.0,
+            frames: None,
+            turntable: None,
+            fps: 24.0,
+            frame_of_video: None,
         }
     }
 }
@@ -279,50 +308,117 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
 
     let mut notices = world.scene.notices.clone();
     notices.extend(&map_notices);
-    let view = view(arguments, &world, &mut notices)?;
-    let bytes = if view.layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
-    memory::check(u64::from(view.width) * u64::from(view.height) * bytes)
+    let camera = camera(arguments, &world, &mut notices)?;
+    let frames = Frames::plan(arguments, &world, &camera)?;
+    let ([width, height], has_layers) = (size(arguments), arguments.picture.wants_surfaces());
+    let bytes = if has_layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
+    memory::check(u64::from(width) * u64::from(height) * bytes)
         .map_err(|cause| Error::new(format!("a picture of this size {cause}")))?;
+    progress.finish();
     notices.iter().for_each(notice);
-    let rule = stop_rule(arguments);
     let gpu = device::open(
         arguments.device,
         arguments.adapter.as_deref(),
         (arguments.rays, arguments.schedule),
         &mut notices,
     )?;
-    let mut share = Share::open(arguments, rule, (&world, &environment), &view)?;
-    share.say(&mut notices);
-    let mut session =
-        device::start(arguments.device, gpu.as_ref(), &world, &environment, view, &mut notices)?;
-    let outcome = work(&mut session, &mut share, &interrupt, &progress, arguments, &mut notices);
-    progress.finish();
-    if !share.has_samples(&session) {
-        outcome?;
-        return Ok(());
+    let job = Job { world: &world, environment: &environment, phases, notices, gpu, interrupt };
+    match frames {
+        None => job.render(arguments, camera, &Progress::start("learning")).map(|_| ()),
+        Some(frames) => job.render_frames(arguments, &frames, &camera),
     }
-    let film = share.film(&session);
-    let remarks = output::remarks(&film, &environment);
-    remarks.iter().for_each(|sentence| notices.add(sentence));
+}
 
-    let record = Record {
-        scene: &arguments.scene,
-        map: &arguments.env,
-        world: &world,
-        environment: &environment,
-        film: &film,
-        figures: &session.figures(),
-        gpu: session.gpu_figures(),
-        phases: &phases,
-        notices: &notices,
-        with_times: !arguments.reproducible,
-        options: outputs::settings(arguments, session.view().fog(&world)),
-    };
-    let mut failures = outputs::write(arguments, &share, &record, session.grid());
-    failures.extend(share.keep(&session).err());
-    remarks.iter().for_each(notice);
-    failures.extend(outcome.err());
-    Error::all(failures)
+/// What all pictures of a command have in common.
+struct Job<'a> {
+    world: &'a World,
+    environment: &'a Environment,
+    phases: Phases,
+    notices: Notices,
+    gpu: Option<Gpu>,
+    interrupt: Interrupt,
+}
+
+impl Job<'_> {
+    /// Renders and writes one picture; returns the exposure that suits the next, if there may be one.
+    fn render(
+        &self,
+        arguments: &RenderArguments,
+        camera: Camera,
+        progress: &Progress,
+    ) -> Result<Exposure> {
+        let Self { world, environment, .. } = *self;
+        let mut notices = self.notices.clone();
+        let view = view(arguments, world, camera);
+        let rule = stop_rule(arguments);
+        let mut share = Share::open(arguments, rule, (world, environment), &view)?;
+        share.say(&mut notices);
+        let gpu = self.gpu.as_ref();
+        let mut session =
+            device::start(arguments.device, gpu, world, environment, view, &mut notices)?;
+        let outcome =
+            work(&mut session, &mut share, &self.interrupt, progress, arguments, &mut notices);
+        progress.finish();
+        if !share.has_samples(&session) {
+            outcome?;
+            return Ok(Exposure::Auto);
+        }
+        let film = share.film(&session);
+        let remarks = output::remarks(&film, environment);
+        remarks.iter().for_each(|sentence| notices.add(sentence));
+
+        let record = Record {
+            scene: &arguments.scene,
+            map: &arguments.env,
+            world,
+            environment,
+            film: &film,
+            figures: &session.figures(),
+            gpu: session.gpu_figures(),
+            phases: &self.phases,
+            notices: &notices,
+            with_times: !arguments.reproducible,
+            options: outputs::settings(arguments, session.view().fog(world)),
+        };
+        let mut failures = outputs::write(arguments, &share, &record, session.grid());
+        failures.extend(share.keep(&session).err());
+        remarks.iter().for_each(notice);
+        failures.extend(outcome.err());
+        Error::all(failures)?;
+        Ok(arguments.picture.exposure_of(&film))
+    }
+
+    /// Renders one picture after another, each with what it learned itself: cells lie around the camera.
+    /// The first one's exposure is that of all.
+    fn render_frames(
+        &self,
+        arguments: &RenderArguments,
+        frames: &Frames<'_>,
+        camera: &Camera,
+    ) -> Result<()> {
+        let mut of_frame = arguments.clone();
+        let (videos, pictures): (Vec<_>, Vec<_>) =
+            arguments.outputs.iter().partition(|path| frames::is_video(path));
+        let mut reel = if videos.is_empty() { None } else { Some(Reel::new()?) };
+        for number in frames.numbers() {
+            let name = |path: &PathBuf| frames::numbered(path, number);
+            of_frame.outputs = pictures.iter().map(|path| name(path)).collect();
+            of_frame.json = arguments.json.as_ref().map(name);
+            of_frame.laws = arguments.laws.as_ref().map(name);
+            of_frame.frame_of_video = reel.as_mut().map(Reel::next);
+            self.interrupt.go_on();
+            let progress = Progress::of_frame(number, *frames.numbers().end());
+            let exposure = self.render(&of_frame, frames.camera(number, camera), &progress)?;
+            of_frame.picture.set_exposure(exposure);
+            if self.interrupt.was_signalled() {
+                notice(format_args!("frame {number} was ended early and is the last"));
+                break;
+            }
+        }
+        let reel = reel.as_ref();
+        let write = |video: &PathBuf| reel.and_then(|reel| reel.write(video, arguments.fps).err());
+        Error::all(videos.into_iter().filter_map(write).collect())
+    }
 }
 
 /// The scene made ready for rays, and the seconds of loading and of building.
@@ -387,10 +483,15 @@ fn sharing(arguments: &RenderArguments) -> Sharing {
     }
 }
 
-fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Result<View> {
-    let (width, height) = arguments.region.map_or(arguments.size, |[_, _, w, h]| (w, h));
-    Ok(View {
-        camera: camera(arguments, world, notices)?,
+/// Width and height of what is rendered.
+fn size(arguments: &RenderArguments) -> [u32; 2] {
+    arguments.region.map_or(arguments.size.into(), |[_, _, width, height]| [width, height])
+}
+
+fn view(arguments: &RenderArguments, world: &World, camera: Camera) -> View {
+    let [width, height] = size(arguments);
+    View {
+        camera,
         width,
         height,
         filter: arguments.filter,
@@ -414,7 +515,7 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
             whole: [arguments.size.0, arguments.size.1],
         }),
         layers: arguments.picture.wants_surfaces(),
-    })
+    }
 }
 
 /// The medium the options ask for: what they leave out is the scene's.

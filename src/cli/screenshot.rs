@@ -58,7 +58,7 @@ pub(super) struct ScreenshotArguments {
     #[arg(long, value_enum, value_name = "NAME")]
     panel: Vec<PanelName>,
     /// Samples per pixel.
-    #[arg(long, default_value = "16", value_parser = clap::value_parser!(u32).range(1..), value_name = "N")]
+    #[arg(long, visible_alias = "spp", default_value = "16", value_parser = clap::value_parser!(u32).range(1..), value_name = "N")]
     samples: u32,
     /// Size of the window in pixels.
     #[arg(long, default_value = "1440x900", value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]

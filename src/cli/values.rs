@@ -1,5 +1,7 @@
 //! Argument values: sizes, vectors, positive numbers, each refused with the reason.
 
+use std::ops::RangeInclusive;
+
 use glam::Vec3;
 
 use crate::output::film_file::Part;
@@ -58,6 +60,16 @@ pub(super) fn part(text: &str) -> Result<Part, String> {
     numbers
         .filter(|part| (1..=part.count).contains(&part.number))
         .ok_or_else(|| "expected two numbers like 2/8: the second of eight parts".to_owned())
+}
+
+/// `A..B`, both included, or one number.
+pub(super) fn frames(text: &str) -> Result<RangeInclusive<u32>, String> {
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    let number = |text: &str| text.trim().parse::<u32>().ok();
+    let range = number(first).zip(number(last)).map(|(first, last)| first..=last);
+    range
+        .filter(|range| !range.is_empty())
+        .ok_or_else(|| "expected frames like 0..47, the first one not after the last".to_owned())
 }
 
 /// `map`, `blur:DEGREES` or a colour.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::share::Share;
-use super::{RenderArguments, sharing};
+use super::{RenderArguments, frames, sharing};
 use crate::cli::picture::say_written;
 use crate::error::{Error, Result};
 use crate::image::{check_writable, is_same_file};
@@ -23,7 +23,12 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
         }
         arguments.picture.check([])?;
     } else {
-        arguments.picture.check(arguments.outputs.iter().map(PathBuf::as_path))?;
+        let has_frames = arguments.frames.is_some() || arguments.turntable.is_some();
+        let is_picture = |path: &&PathBuf| !(has_frames && frames::is_video(path));
+        arguments.picture.check(arguments.outputs.iter().filter(is_picture))?;
+        if has_frames {
+            frames::check(arguments)?;
+        }
     }
     if let Some(laws) = &arguments.laws {
         check_laws_extension(laws)?;
@@ -60,8 +65,9 @@ pub(super) fn write(
         Some(_) => share.write_part(path, record),
         None => arguments.picture.write(path, record.film, &metadata),
     };
-    let mut failures: Vec<Error> =
-        arguments.outputs.iter().filter_map(|path| write(path).err()).collect();
+    let write_and_say = |path: &PathBuf| write(path).map(|()| say_written(path)).err();
+    let mut failures: Vec<Error> = arguments.outputs.iter().filter_map(write_and_say).collect();
+    failures.extend(arguments.frame_of_video.as_ref().and_then(|path| write(path).err()));
     if let Some(path) = &arguments.json {
         let written = record::write_json(path, &record.to_json());
         failures.extend(written.map(|()| say_written(path)).err());

@@ -13,7 +13,6 @@ use super::{RenderArguments, environment_options, sharing};
 use crate::alarm::Alarm;
 use crate::cli::device::say;
 use crate::cli::interrupt::Interrupt;
-use crate::cli::picture::say_written;
 use crate::digest::Digest;
 use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
@@ -78,6 +77,8 @@ impl Share {
                 part.number, part.count
             )));
         }
+        // It takes a look at all of the scene and the map.
+        let is_kept = arguments.part.is_some() || arguments.checkpoint.is_some();
         let mut share = Self {
             part,
             first: range.start,
@@ -88,11 +89,14 @@ impl Share {
             deadline: None,
             checkpoint: None,
             wants_laws: arguments.laws.is_some(),
-            picture: identity(arguments, world, environment, view),
+            picture: match is_kept {
+                true => identity(arguments, world, environment, view),
+                false => Vec::new(),
+            },
         };
         if let Some(path) = &arguments.checkpoint {
             if path.exists() {
-                share.take_up(path)?;
+                share.take_up(path, view)?;
             }
             share.checkpoint = Some(Checkpoint {
                 path: path.clone(),
@@ -109,7 +113,7 @@ impl Share {
     }
 
     /// Goes on from a checkpoint, if it is one of this share.
-    fn take_up(&mut self, path: &Path) -> Result<()> {
+    fn take_up(&mut self, path: &Path, view: &View) -> Result<()> {
         let (facts, film) = read_film(path)?;
         let advice = "remove it or name another";
         if let Some(difference) = facts.difference(&self.picture) {
@@ -122,7 +126,9 @@ impl Share {
         }
         let is_of_share =
             facts.part == self.part && (self.part == Part::WHOLE || facts.samples == self.samples);
-        if !is_of_share {
+        let is_alike = (film.width, film.height) == (view.width, view.height)
+            && film.has_layers() == view.layers;
+        if !is_of_share || !is_alike {
             return Err(Error::at(
                 path,
                 format!("is the checkpoint of {}: {advice}", facts.share()),
@@ -289,9 +295,7 @@ impl Share {
             figures =
                 Figures { learning_seconds: 0.0, law_seconds: 0.0, render_seconds: 0.0, ..figures };
         }
-        write_film(path, &self.facts(figures, record.metadata()), record.film, 0)?;
-        say_written(path);
-        Ok(())
+        write_film(path, &self.facts(figures, record.metadata()), record.film, 0)
     }
 
     fn facts(&self, figures: Figures, metadata: Vec<(String, String)>) -> FilmFacts {
