@@ -52,11 +52,11 @@ pub(super) struct RenderArguments {
     /// A glTF file (.gltf, .glb) or a built-in scene.
     #[arg(default_value = builtin::DEFAULT_SCENE)]
     scene: String,
-    #[command(flatten)]
-    pub(super) of_scene: SceneOptions,
     /// The picture to write: .png or .exr; may be given twice. With --part, one .part.
     #[arg(short, long = "output", required = true, value_name = "FILE")]
     outputs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) of_scene: SceneOptions,
 
     /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky (sky:day, sky:sunset, sky:night,
     /// sky:overcast, sky:hallway, each with @WIDTHxHEIGHT if wanted).
@@ -400,6 +400,7 @@ impl Job<'_> {
         let (videos, pictures): (Vec<_>, Vec<_>) =
             arguments.outputs.iter().partition(|path| frames::is_video(path));
         let mut reel = if videos.is_empty() { None } else { Some(Reel::new()?) };
+        let mut failures = Vec::new();
         for number in frames.numbers() {
             let name = |path: &PathBuf| frames::numbered(path, number);
             of_frame.outputs = pictures.iter().map(|path| name(path)).collect();
@@ -408,16 +409,23 @@ impl Job<'_> {
             of_frame.frame_of_video = reel.as_mut().map(Reel::next);
             self.interrupt.go_on();
             let progress = Progress::of_frame(number, *frames.numbers().end());
-            let exposure = self.render(&of_frame, frames.camera(number, camera), &progress)?;
-            of_frame.picture.set_exposure(exposure);
+            match self.render(&of_frame, frames.camera(number, camera), &progress) {
+                Ok(exposure) => of_frame.picture.set_exposure(exposure),
+                Err(failure) => {
+                    failures.push(failure);
+                    break;
+                }
+            }
             if self.interrupt.was_signalled() {
                 notice(format_args!("frame {number} was ended early and is the last"));
                 break;
             }
         }
-        let reel = reel.as_ref();
+        // What there is of them, should a frame have failed.
+        let reel = reel.as_ref().filter(|reel| reel.has_frames());
         let write = |video: &PathBuf| reel.and_then(|reel| reel.write(video, arguments.fps).err());
-        Error::all(videos.into_iter().filter_map(write).collect())
+        failures.extend(videos.into_iter().filter_map(write));
+        Error::all(failures)
     }
 }
 

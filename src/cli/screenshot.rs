@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use glam::Vec2;
 
+use super::picture::say_written;
 use super::values;
 use crate::app::Start;
 use crate::app::document::{Document, Light};
@@ -142,7 +143,9 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     if arguments.inspect.is_some() {
         studio.measure_truth()?;
     }
-    write_png(path, &studio.take()?, &[])
+    write_png(path, &studio.take()?, &[])?;
+    say_written(path);
+    Ok(())
 }
 
 fn interface(arguments: &ScreenshotArguments) -> Interface {

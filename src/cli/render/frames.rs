@@ -177,7 +177,7 @@ fn has_ffmpeg() -> bool {
 /// A folder for the frames of a video, gone when this value is.
 pub(super) struct Reel {
     folder: PathBuf,
-    /// Frames so far.
+    /// Frames asked for so far.
     count: u32,
 }
 
@@ -196,7 +196,16 @@ impl Reel {
     /// Where the next frame is to be written.
     pub(super) fn next(&mut self) -> PathBuf {
         self.count += 1;
-        self.folder.join(format!("{:08}.png", self.count - 1))
+        self.frame(self.count - 1)
+    }
+
+    fn frame(&self, number: u32) -> PathBuf {
+        self.folder.join(format!("{number:08}.png"))
+    }
+
+    /// Whether the first frame was written.
+    pub(super) fn has_frames(&self) -> bool {
+        self.frame(0).exists()
     }
 
     /// Makes a video of the frames.
