@@ -30,6 +30,7 @@ pub mod cli;
 pub mod color;
 pub mod denoise;
 mod develop;
+mod digest;
 pub mod environment;
 pub mod error;
 mod huge_pages;

@@ -58,7 +58,7 @@ pub(super) fn picture(path: &Path, picture: &Picture) -> Result<()> {
         white_balance: document.look.white_balance,
         layers: vec![LayerName::All],
     };
-    write_picture(path, &options, &record)
+    write_picture(path, &options, record.film, record.metadata())
 }
 
 fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {

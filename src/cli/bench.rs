@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::picture::say_written;
 use super::progress::Progress;
 use super::{interrupt, render, values};
 use crate::bench::{Options, Subject, run as measure};
@@ -108,6 +109,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     progress.finish();
     if let Some(file) = &arguments.json {
         write_json(file, &crate::output::record::to_value(&bench)?)?;
+        say_written(file);
     }
     print(bench.to_string().trim_end())
 }

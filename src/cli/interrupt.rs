@@ -16,20 +16,23 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 /// What signals set.
 pub(super) struct Interrupt {
     asked: Arc<AtomicBool>,
+    /// Whether it was a signal that asked.
+    signalled: Arc<AtomicBool>,
     has_work: Arc<AtomicBool>,
 }
 
 impl Interrupt {
     /// Watches from now on. `what` says what will be done when there is something to keep.
     pub(super) fn watch(what: &'static str) -> Self {
-        let (asked, has_work) = (Arc::<AtomicBool>::default(), Arc::<AtomicBool>::default());
+        let [asked, signalled, has_work] = [(); 3].map(|()| Arc::<AtomicBool>::default());
         let caught = Arc::new(AtomicUsize::new(0));
         let register = |signal| register_usize(signal, Arc::clone(&caught), signal as usize);
-        let inside = (Arc::clone(&asked), Arc::clone(&has_work), Arc::clone(&caught));
+        let flags = [&asked, &signalled, &has_work].map(Arc::clone);
+        let inside = (flags, Arc::clone(&caught));
         let watching = [SIGINT, SIGTERM].into_iter().try_for_each(|s| register(s).map(|_| ()));
         let watching = watching.and_then(|()| {
             std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
-                let (asked, has_work, caught) = inside;
+                let ([asked, signalled, has_work], caught) = inside;
                 let mut was_asked = false;
                 loop {
                     std::thread::sleep(LOOK_EVERY);
@@ -44,7 +47,8 @@ impl Interrupt {
                         std::process::exit(128 + signal as i32);
                     }
                     was_asked = true;
-                    asked.store(true, Ordering::Relaxed);
+                    signalled.store(true, Ordering::SeqCst);
+                    asked.store(true, Ordering::SeqCst);
                     tell(format_args!("\nlightgrid: {what} (again: leave now)"));
                 }
             })
@@ -52,7 +56,7 @@ impl Interrupt {
         if watching.is_err() {
             tell("lightgrid: Ctrl-C cannot be caught here and will end the process at once");
         }
-        Self { asked, has_work }
+        Self { asked, signalled, has_work }
     }
 
     /// From now on there is something to keep.
@@ -63,6 +67,20 @@ impl Interrupt {
     /// Becomes true when the work is to end early. Others may set it, too.
     pub(super) fn asked(&self) -> &Arc<AtomicBool> {
         &self.asked
+    }
+
+    /// Whether a signal asked.
+    pub(super) fn was_signalled(&self) -> bool {
+        self.signalled.load(Ordering::SeqCst)
+    }
+
+    /// Lets the work go on unless a signal wants its end: for somebody who only cut it short.
+    pub(super) fn go_on(&self) {
+        self.asked.store(false, Ordering::SeqCst);
+        // A signal may have come in between.
+        if self.was_signalled() {
+            self.asked.store(true, Ordering::SeqCst);
+        }
     }
 }
 

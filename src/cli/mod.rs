@@ -7,8 +7,11 @@ use clap::{Parser, Subcommand};
 mod bench;
 mod compare;
 mod device;
+mod generate;
 mod info;
 mod interrupt;
+mod merge;
+mod picture;
 mod progress;
 mod render;
 mod report;
@@ -24,7 +27,12 @@ mod view;
 #[command(
     name = "lightgrid",
     version,
-    after_help = "Without a command the window opens with the built-in living room."
+    after_help = "\
+Without a command the window opens with the built-in living room.
+
+Examples:
+  lightgrid view kitchen.glb --env meadow.hdr
+  lightgrid render office --env sky:sunset --spp 64 -o office.png"
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -39,6 +47,8 @@ enum Command {
     Screenshot(Box<screenshot::ScreenshotArguments>),
     /// Render a scene into a picture.
     Render(Box<render::RenderArguments>),
+    /// Join parts of a picture that were rendered apart.
+    Merge(merge::MergeArguments),
     /// Measure how far a picture is from a reference.
     Compare(compare::CompareArguments),
     /// Say what is in a scene or a map, and what the renderer leaves out.
@@ -53,6 +63,10 @@ enum Command {
     Sat(sat::SatArguments),
     /// Try stiff and extreme cases on this machine; fails if one does.
     Stability(stability::StabilityArguments),
+    /// Print what completes these commands in a shell.
+    Completions(generate::CompletionsArguments),
+    /// Write a manual page for each command.
+    Man(generate::ManArguments),
 }
 
 /// Runs the command line; errors become one sentence on stderr and a non-zero exit.
@@ -63,6 +77,7 @@ pub fn main() -> ExitCode {
         Command::View(arguments) => view::run(arguments),
         Command::Screenshot(arguments) => screenshot::run(arguments),
         Command::Render(arguments) => render::run(arguments),
+        Command::Merge(arguments) => merge::run(arguments),
         Command::Compare(arguments) => compare::run(arguments),
         Command::Info(arguments) => info::run(arguments),
         Command::Devices(arguments) => device::run(arguments),
@@ -70,6 +85,8 @@ pub fn main() -> ExitCode {
         Command::Report(arguments) => report::run(arguments),
         Command::Sat(arguments) => sat::run(arguments),
         Command::Stability(arguments) => stability::run(arguments),
+        Command::Completions(arguments) => generate::completions(arguments),
+        Command::Man(arguments) => generate::man(arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

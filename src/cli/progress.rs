@@ -11,6 +11,8 @@ use crate::terminal::tell;
 /// A live line on the terminal.
 pub(super) struct Progress {
     bar: ProgressBar,
+    /// What every message begins with.
+    prefix: String,
     /// The noise shown, and when it was found.
     noise: Cell<Option<(Instant, f64)>>,
 }
@@ -27,12 +29,17 @@ impl Progress {
         }
         bar.set_message(message.to_owned());
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self { bar, noise: Cell::default() }
+        Self { bar, prefix: String::new(), noise: Cell::default() }
+    }
+
+    /// One that says which of the frames it is about.
+    pub(super) fn of_frame(number: u32, last: u32) -> Self {
+        Self { prefix: format!("frame {number} up to {last}: "), ..Self::start("") }
     }
 
     /// Shows another message.
     pub(super) fn say(&self, message: impl Into<String>) {
-        self.bar.set_message(message.into());
+        self.bar.set_message(format!("{}{}", self.prefix, message.into()));
     }
 
     /// Shows where a session is.
@@ -87,9 +94,13 @@ fn line(session: &Session<'_>, rule: &StopRule, noise: f64) -> String {
 /// Shortest estimate of what the rules leave: samples at the speed so far, the clock, and noise
 /// falling with the root of the samples.
 fn seconds_left(session: &Session<'_>, rule: &StopRule, noise: f64) -> Option<f64> {
-    let rendered = session.figures().render_seconds;
-    let samples = f64::from(session.samples());
-    let by_samples = rule.samples.map(|limit| rendered * (f64::from(limit) / samples - 1.0));
+    let figures = session.figures();
+    let rendered = figures.render_seconds;
+    let pixels = f64::from(session.view().width) * f64::from(session.view().height);
+    let seconds_a_sample = rendered * pixels / figures.samples as f64;
+    let by_samples = rule
+        .samples
+        .map(|limit| seconds_a_sample * f64::from(limit.saturating_sub(session.samples())));
     let by_clock = rule.seconds.map(|limit| limit - session.elapsed_seconds());
     let by_noise = rule.noise.map(|limit| rendered * ((noise / limit).powi(2) - 1.0));
     [by_samples, by_clock, by_noise]

@@ -1,51 +1,62 @@
 //! `lightgrid render`.
 
+mod frames;
 mod outputs;
+mod share;
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use glam::Vec3;
 
 use super::device;
 use super::interrupt::Interrupt;
+use super::picture::PictureArguments;
 use super::progress::Progress;
 use super::values;
 use crate::alarm::Alarm;
-use crate::denoise::Denoiser;
 use crate::environment::{Environment, EnvironmentOptions, TableKind};
 use crate::error::{Error, Notices, Result};
 use crate::light_grid::LawOptions;
 use crate::memory;
+use crate::output::film_file::Part;
 use crate::output::record::{Phases, Record};
-use crate::output::{self, Exposure, LayerName};
+use crate::output::{self, Exposure};
 use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
-use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
+use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, Schedule};
 use crate::render::{Crop, Gi, Sampling, Session, Sharing, StopRule, View};
 use crate::sampler::Points;
 use crate::scene::{Camera, Medium, Projection, Scene, SceneOptions, builtin};
 use crate::terminal::notice;
-use crate::tone::{ToneCurve, WhiteBalance};
+use frames::{Frames, Reel};
+use share::Share;
 
 /// Arguments of `render`.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(
     allow_negative_numbers = true,
-    after_help = "Ctrl-C ends the work early, writes the pictures and counts as success; a second \
-                  one, or one before there is a picture, leaves at once with status 130."
+    after_help = "\
+Ctrl-C ends the work early, writes the pictures and counts as success; a second one, or one before there
+is a picture, leaves at once with status 130.
+
+Examples:
+  lightgrid render kitchen.glb --env meadow.hdr --noise 0.05 -o kitchen.exr -o kitchen.png
+  lightgrid render office --spp 4096 --checkpoint office.checkpoint -o office.exr
+  lightgrid render office --spp 4096 --part 2/8 -o office.2.part
+  lightgrid render car.glb --turntable 48 --spp 64 --denoise -o car.####.png -o car.mp4"
 )]
 pub(super) struct RenderArguments {
     /// A glTF file (.gltf, .glb) or a built-in scene.
     #[arg(default_value = builtin::DEFAULT_SCENE)]
     scene: String,
-    #[command(flatten)]
-    pub(super) of_scene: SceneOptions,
-    /// The picture to write: .png or .exr; may be given twice.
+    /// The picture to write: .png or .exr; may be given twice. With --part, one .part.
     #[arg(short, long = "output", required = true, value_name = "FILE")]
     outputs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) of_scene: SceneOptions,
 
     /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky (sky:day, sky:sunset, sky:night,
     /// sky:overcast, sky:hallway, each with @WIDTHxHEIGHT if wanted).
@@ -103,25 +114,11 @@ pub(super) struct RenderArguments {
     /// Pixel filter.
     #[arg(long, default_value = "blackman-harris", value_enum, help_heading = "Picture")]
     filter: PixelFilter,
-    /// Exposure of .png pictures in stops, or `auto`.
-    #[arg(long, default_value = "auto", value_parser = parse_exposure, allow_hyphen_values = true, value_name = "EV|auto", help_heading = "Picture")]
-    exposure: Exposure,
-    /// Tone curve of .png pictures: agx, aces, neutral, reinhard, none.
-    #[arg(long, default_value = "agx", value_name = "CURVE", help_heading = "Picture")]
-    tonemap: ToneCurve,
-    /// Takes noise out of .png pictures: a-trous (our own filter) or oidn (Open Image Denoise, if its
-    /// library is installed).
-    #[arg(long, value_enum, value_name = "FILTER", num_args = 0..=1, default_missing_value = "a-trous", help_heading = "Picture")]
-    denoise: Option<Denoiser>,
-    /// The light that looks white in .png pictures: kelvin, and a tint from -1 (green) to 1.
-    #[arg(long, value_parser = parse_white, allow_hyphen_values = true, value_name = "K[,TINT]", help_heading = "Picture")]
-    white: Option<WhiteBalance>,
-    /// Extra layers in .exr pictures: albedo, normal, depth, samples, variance, or all.
-    #[arg(long, value_delimiter = ',', value_name = "LAYER", help_heading = "Picture")]
-    layers: Vec<LayerName>,
+    #[command(flatten)]
+    picture: PictureArguments,
 
     /// Stop at this many samples per pixel (256 if no stop rule is given).
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), value_name = "N", help_heading = "Stop")]
+    #[arg(long, visible_alias = "samples", value_parser = clap::value_parser!(u32).range(1..), value_name = "N", help_heading = "Stop")]
     spp: Option<u32>,
     /// Stop after this many seconds of learning and rendering.
     #[arg(long, value_parser = values::positive, value_name = "S", help_heading = "Stop")]
@@ -201,6 +198,32 @@ pub(super) struct RenderArguments {
     /// Writes what was learned, each cell's probability of each tile: .csv, .json or .exr.
     #[arg(long, value_name = "FILE", help_heading = "Run")]
     laws: Option<PathBuf>,
+
+    /// Renders only this share of every pixel's samples, such as 2/8, into a .part for `lightgrid
+    /// merge`. All parts take the same options, of which those for .png and .exr are for merge.
+    #[arg(long, value_parser = values::part, conflicts_with_all = ["seconds", "noise"], value_name = "I/N", help_heading = "Farm")]
+    part: Option<Part>,
+    /// Keeps what is done in this file; the same command goes on from it, should this one be killed.
+    #[arg(long, value_name = "FILE", help_heading = "Farm")]
+    checkpoint: Option<PathBuf>,
+    /// Seconds between two writings of the checkpoint.
+    #[arg(long, requires = "checkpoint", default_value = "60", value_parser = values::positive, value_name = "S", help_heading = "Farm")]
+    checkpoint_every: f64,
+
+    /// Renders these frames of the camera's movement in the file, or of a turn: 0..47, or one number.
+    /// Outputs are out.####.png, or .mp4, .webm and .gif by ffmpeg. Frame N is at N / fps seconds.
+    #[arg(long, value_parser = values::frames, value_name = "A..B", help_heading = "Frames")]
+    frames: Option<RangeInclusive<u32>>,
+    /// Turns the camera once in so many frames about the vertical through --target; without it, through
+    /// what the middle of the picture shows or, in a room, the camera itself.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000), value_name = "N", help_heading = "Frames")]
+    turntable: Option<u32>,
+    /// Frames per second.
+    #[arg(long, default_value = "24", value_parser = values::positive, value_name = "F", help_heading = "Frames")]
+    fps: f64,
+    /// A frame of a video, which nobody asked for by name.
+    #[arg(skip)]
+    frame_of_video: Option<PathBuf>,
 }
 
 fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
@@ -209,24 +232,6 @@ fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
         return Err("at most 256x256 tiles".to_owned());
     }
     Ok((columns, rows))
-}
-
-fn parse_exposure(text: &str) -> std::result::Result<Exposure, String> {
-    if text == "auto" {
-        return Ok(Exposure::Auto);
-    }
-    values::finite(text)
-        .map(|stops| Exposure::Stops(stops as f32))
-        .map_err(|e| format!("{e} of stops, or auto"))
-}
-
-fn parse_white(text: &str) -> std::result::Result<WhiteBalance, String> {
-    let (kelvin, tint) = text.split_once(',').unwrap_or((text, "0"));
-    let (kelvin, tint) = (values::finite(kelvin)? as f32, values::finite(tint)? as f32);
-    if !((2000.0..=12000.0).contains(&kelvin) && (-1.0..=1.0).contains(&tint)) {
-        return Err("expected 2000 to 12000 kelvin and a tint from -1 to 1".to_owned());
-    }
-    Ok(WhiteBalance { kelvin, tint })
 }
 
 impl RenderArguments {
@@ -261,11 +266,7 @@ impl RenderArguments {
             focus: None,
             size: size.unwrap_or((1280, 720)),
             filter: PixelFilter::default(),
-            exposure: Exposure::Auto,
-            tonemap: ToneCurve::default(),
-            denoise: None,
-            white: None,
-            layers: Vec::new(),
+            picture: PictureArguments::default(),
             spp: samples,
             seconds,
             noise: None,
@@ -287,6 +288,13 @@ impl RenderArguments {
             reproducible: false,
             json: None,
             laws: None,
+            part: None,
+            checkpoint: None,
+            checkpoint_every: 60.0,
+            frames: None,
+            turntable: None,
+            fps: 24.0,
+            frame_of_video: None,
         }
     }
 }
@@ -310,46 +318,125 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
 
     let mut notices = world.scene.notices.clone();
     notices.extend(&map_notices);
-    let view = view(arguments, &world, &mut notices)?;
-    let bytes = if view.layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
-    memory::check(u64::from(view.width) * u64::from(view.height) * bytes)
+    let camera = camera(arguments, &world, &mut notices)?;
+    let frames = Frames::plan(arguments, &world, &camera)?;
+    let ([width, height], has_layers) = (size(arguments), arguments.picture.wants_surfaces());
+    let bytes = if has_layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
+    memory::check(u64::from(width) * u64::from(height) * bytes)
         .map_err(|cause| Error::new(format!("a picture of this size {cause}")))?;
+    progress.finish();
     notices.iter().for_each(notice);
-    let rule = stop_rule(arguments);
     let gpu = device::open(
         arguments.device,
         arguments.adapter.as_deref(),
         (arguments.rays, arguments.schedule),
         &mut notices,
     )?;
-    let mut session =
-        device::start(arguments.device, gpu.as_ref(), &world, &environment, view, &mut notices)?;
-    let outcome = work(&mut session, &rule, &interrupt, &progress, arguments, &mut notices);
-    progress.finish();
-    if session.samples() == 0 {
-        outcome?;
-        return Ok(());
+    let job = Job { world: &world, environment: &environment, phases, notices, gpu, interrupt };
+    match frames {
+        None => job.render(arguments, camera, &Progress::start("learning")).map(|_| ()),
+        Some(frames) => job.render_frames(arguments, &frames, &camera),
     }
-    let remarks = output::remarks(session.film(), &environment);
-    remarks.iter().for_each(|sentence| notices.add(sentence));
+}
 
-    let record = Record {
-        scene: &arguments.scene,
-        map: &arguments.env,
-        world: &world,
-        environment: &environment,
-        film: session.film(),
-        figures: &session.figures(),
-        gpu: session.gpu_figures(),
-        phases: &phases,
-        notices: &notices,
-        with_times: !arguments.reproducible,
-        options: outputs::settings(arguments, session.view().fog(&world)),
-    };
-    let mut failures = outputs::write(arguments, &record, session.grid());
-    remarks.iter().for_each(notice);
-    failures.extend(outcome.err());
-    Error::all(failures)
+/// What all pictures of a command have in common.
+struct Job<'a> {
+    world: &'a World,
+    environment: &'a Environment,
+    phases: Phases,
+    notices: Notices,
+    gpu: Option<Gpu>,
+    interrupt: Interrupt,
+}
+
+impl Job<'_> {
+    /// Renders and writes one picture; returns the exposure that suits the next, if there may be one.
+    fn render(
+        &self,
+        arguments: &RenderArguments,
+        camera: Camera,
+        progress: &Progress,
+    ) -> Result<Exposure> {
+        let Self { world, environment, .. } = *self;
+        let mut notices = self.notices.clone();
+        let view = view(arguments, world, camera);
+        let rule = stop_rule(arguments);
+        let mut share = Share::open(arguments, rule, (world, environment), &view)?;
+        share.say(&mut notices);
+        let gpu = self.gpu.as_ref();
+        let mut session =
+            device::start(arguments.device, gpu, world, environment, view, &mut notices)?;
+        let outcome =
+            work(&mut session, &mut share, &self.interrupt, progress, arguments, &mut notices);
+        progress.finish();
+        if !share.has_samples(&session) {
+            outcome?;
+            return Ok(Exposure::Auto);
+        }
+        let film = share.film(&session);
+        let remarks = output::remarks(&film, environment);
+        remarks.iter().for_each(|sentence| notices.add(sentence));
+
+        let record = Record {
+            scene: &arguments.scene,
+            map: &arguments.env,
+            world,
+            environment,
+            film: &film,
+            figures: &session.figures(),
+            gpu: session.gpu_figures(),
+            phases: &self.phases,
+            notices: &notices,
+            with_times: !arguments.reproducible,
+            options: outputs::settings(arguments, session.view().fog(world)),
+        };
+        let mut failures = outputs::write(arguments, &share, &record, session.grid());
+        failures.extend(share.keep(&session).err());
+        remarks.iter().for_each(notice);
+        failures.extend(outcome.err());
+        Error::all(failures)?;
+        Ok(arguments.picture.exposure_of(&film))
+    }
+
+    /// Renders one picture after another, each with what it learned itself: cells lie around the camera.
+    /// The first one's exposure is that of all.
+    fn render_frames(
+        &self,
+        arguments: &RenderArguments,
+        frames: &Frames<'_>,
+        camera: &Camera,
+    ) -> Result<()> {
+        let mut of_frame = arguments.clone();
+        let (videos, pictures): (Vec<_>, Vec<_>) =
+            arguments.outputs.iter().partition(|path| frames::is_video(path));
+        let mut reel = if videos.is_empty() { None } else { Some(Reel::new()?) };
+        let mut failures = Vec::new();
+        for number in frames.numbers() {
+            let name = |path: &PathBuf| frames::numbered(path, number);
+            of_frame.outputs = pictures.iter().map(|path| name(path)).collect();
+            of_frame.json = arguments.json.as_ref().map(name);
+            of_frame.laws = arguments.laws.as_ref().map(name);
+            of_frame.frame_of_video = reel.as_mut().map(Reel::next);
+            self.interrupt.go_on();
+            let progress = Progress::of_frame(number, *frames.numbers().end());
+            match self.render(&of_frame, frames.camera(number, camera), &progress) {
+                Ok(exposure) => of_frame.picture.set_exposure(exposure),
+                Err(failure) => {
+                    failures.push(failure);
+                    break;
+                }
+            }
+            if self.interrupt.was_signalled() {
+                notice(format_args!("frame {number} was ended early and is the last"));
+                break;
+            }
+        }
+        // What there is of them, should a frame have failed.
+        let reel = reel.as_ref().filter(|reel| reel.has_frames());
+        let write = |video: &PathBuf| reel.and_then(|reel| reel.write(video, arguments.fps).err());
+        failures.extend(videos.into_iter().filter_map(write));
+        Error::all(failures)
+    }
 }
 
 /// The scene made ready for rays, and the seconds of loading and of building.
@@ -409,15 +496,20 @@ fn stop_rule(arguments: &RenderArguments) -> StopRule {
 /// A picture to be denoised gains nothing from noise that neighbours share, which filters keep.
 fn sharing(arguments: &RenderArguments) -> Sharing {
     match arguments.sharing {
-        Sharing::Auto if arguments.denoise.is_some() => Sharing::Off,
+        Sharing::Auto if arguments.picture.denoise.is_some() => Sharing::Off,
         asked => asked,
     }
 }
 
-fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Result<View> {
-    let (width, height) = arguments.region.map_or(arguments.size, |[_, _, w, h]| (w, h));
-    Ok(View {
-        camera: camera(arguments, world, notices)?,
+/// Width and height of what is rendered.
+fn size(arguments: &RenderArguments) -> [u32; 2] {
+    arguments.region.map_or(arguments.size.into(), |[_, _, width, height]| [width, height])
+}
+
+fn view(arguments: &RenderArguments, world: &World, camera: Camera) -> View {
+    let [width, height] = size(arguments);
+    View {
+        camera,
         width,
         height,
         filter: arguments.filter,
@@ -441,12 +533,8 @@ fn view(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> Re
             corner: [left, top],
             whole: [arguments.size.0, arguments.size.1],
         }),
-        layers: arguments
-            .layers
-            .iter()
-            .any(|l| !matches!(l, LayerName::Samples | LayerName::Variance))
-            || arguments.denoise.is_some(),
-    })
+        layers: arguments.picture.wants_surfaces(),
+    }
 }
 
 /// The medium the options ask for: what they leave out is the scene's.
@@ -520,42 +608,23 @@ fn camera(arguments: &RenderArguments, world: &World, notices: &mut Notices) -> 
 /// the CPU takes over.
 fn work(
     session: &mut Session<'_>,
-    rule: &StopRule,
+    share: &mut Share,
     interrupt: &Interrupt,
     progress: &Progress,
     arguments: &RenderArguments,
     notices: &mut Notices,
 ) -> Result<()> {
-    let never = AtomicBool::new(false);
-    let cancel = interrupt.asked();
-    let alarm = Alarm::start(Arc::clone(cancel));
-    let seconds = rule.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    alarm.set(seconds.and_then(|seconds| Instant::now().checked_add(seconds)));
+    let alarm = Alarm::start(Arc::clone(interrupt.asked()));
     loop {
-        progress.show(session, rule);
-        if session.samples() > 0 {
-            interrupt.keep();
-        }
-        let stopped = cancel.load(Ordering::Relaxed);
-        if stopped || session.has_learned_enough(rule) {
-            session.finish_learning();
-        }
-        let is_last = session.samples() > 0 && (stopped || session.is_done(rule));
-        let outcome = if is_last {
-            session.settle()
-        } else {
-            let cancel = if stopped { &never } else { &**cancel };
-            session.advance(session.next_pass(rule), cancel)
-        };
-        if is_last && outcome.is_ok() {
-            return Ok(());
-        }
-        if let Err(failure) = outcome {
-            if arguments.device != DeviceChoice::Auto {
-                return Err(failure);
+        progress.show(session, share.rule());
+        match share.step(session, interrupt, &alarm, notices) {
+            Ok(true) => return Ok(()),
+            Ok(false) => {}
+            Err(failure) if arguments.device != DeviceChoice::Auto => return Err(failure),
+            Err(failure) => {
+                device::say(notices, format!("{failure}; the CPU goes on"));
+                session.continue_on_cpu();
             }
-            device::say(notices, format!("{failure}; the CPU goes on"));
-            session.continue_on_cpu();
         }
     }
 }

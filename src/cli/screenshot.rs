@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use glam::Vec2;
 
+use super::picture::say_written;
 use super::values;
 use crate::app::Start;
 use crate::app::document::{Document, Light};
@@ -58,7 +59,7 @@ pub(super) struct ScreenshotArguments {
     #[arg(long, value_enum, value_name = "NAME")]
     panel: Vec<PanelName>,
     /// Samples per pixel.
-    #[arg(long, default_value = "16", value_parser = clap::value_parser!(u32).range(1..), value_name = "N")]
+    #[arg(long, visible_alias = "spp", default_value = "16", value_parser = clap::value_parser!(u32).range(1..), value_name = "N")]
     samples: u32,
     /// Size of the window in pixels.
     #[arg(long, default_value = "1440x900", value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
@@ -142,7 +143,9 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     if arguments.inspect.is_some() {
         studio.measure_truth()?;
     }
-    write_png(path, &studio.take()?, &[])
+    write_png(path, &studio.take()?, &[])?;
+    say_written(path);
+    Ok(())
 }
 
 fn interface(arguments: &ScreenshotArguments) -> Interface {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
+use super::picture::say_written;
 use crate::error::{Error, Result};
 use crate::image::check_writable;
 use crate::output::record::write_json;
@@ -90,6 +91,7 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<()> {
             "cases": all,
         });
         write_json(file, &value)?;
+        say_written(file);
     }
     conclude(&reports)
 }

@@ -1,7 +1,10 @@
 //! Argument values: sizes, vectors, positive numbers, each refused with the reason.
 
+use std::ops::RangeInclusive;
+
 use glam::Vec3;
 
+use crate::output::film_file::Part;
 use crate::path::Background;
 pub(super) use crate::sources::size_pair as pair;
 
@@ -47,6 +50,26 @@ pub(super) fn region(text: &str) -> Result<[u32; 4], String> {
         [x, y, w, h] if text.split(',').count() == 4 && w > 0 && h > 0 => Ok([x, y, w, h]),
         _ => Err("expected four numbers like 100,50,320,180, the last two not 0".to_owned()),
     }
+}
+
+/// `I/N`, the first part being 1.
+pub(super) fn part(text: &str) -> Result<Part, String> {
+    let numbers = text.split_once('/').and_then(|(number, count)| {
+        Some(Part { number: number.trim().parse().ok()?, count: count.trim().parse().ok()? })
+    });
+    numbers
+        .filter(|part| (1..=part.count).contains(&part.number))
+        .ok_or_else(|| "expected two numbers like 2/8: the second of eight parts".to_owned())
+}
+
+/// `A..B`, both included, or one number.
+pub(super) fn frames(text: &str) -> Result<RangeInclusive<u32>, String> {
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    let number = |text: &str| text.trim().parse::<u32>().ok();
+    let range = number(first).zip(number(last)).map(|(first, last)| first..=last);
+    range
+        .filter(|range| !range.is_empty())
+        .ok_or_else(|| "expected frames like 0..47, the first one not after the last".to_owned())
 }
 
 /// `map`, `blur:DEGREES` or a colour.

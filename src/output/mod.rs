@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+pub mod film_file;
 pub mod laws;
 pub mod record;
 
-use self::record::Record;
 use crate::color::luminance;
 use crate::denoise::Denoiser;
 use crate::environment::Environment;
@@ -87,15 +87,18 @@ pub fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
 const BLACK_SHARE: f64 = 2e-6;
 
 /// Writes the film as `.exr` (linear, with layers) or `.png` (8 bits), told by the extension, with
-/// the record's metadata.
+/// key and value pairs such as [`Record::metadata`](record::Record::metadata).
 ///
 /// # Errors
 /// If the file is of another kind or cannot be written.
-pub fn write_picture(path: &Path, options: &PictureOptions, record: &Record<'_>) -> Result<()> {
+pub fn write_picture(
+    path: &Path,
+    options: &PictureOptions,
+    film: &Film,
+    mut metadata: Vec<(String, String)>,
+) -> Result<()> {
     check_extension(path)?;
-    let film = record.film;
     let image = film.image();
-    let mut metadata = record.metadata();
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
         let layers = layers(film, &options.layers);
         return write_exr(path, ExrPicture { image: &image, layers, metadata: &metadata });

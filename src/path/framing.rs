@@ -45,27 +45,44 @@ fn look(world: &World, origin: Vec3, direction: Vec3) -> Option<Sight> {
     Some(Sight { distance: hit.t, from_front })
 }
 
-/// Share of directions, over places spread through the middle of the scene, in which a surface is
-/// seen from its front: near 1 in a room, near 0 within an object. Looking down does not count, for
-/// an object on a ground plane is not inside anything.
+/// Median share, over places spread through the middle of the scene, of [`enclosure_at`]: furniture and
+/// pillars have an inside too.
 fn enclosure(world: &World) -> f32 {
     let (low, high) = world.bvh.bounds();
     let mut shares: Vec<f32> = (0..27)
         .map(|i| {
             let at = Vec3::new((i % 3) as f32, (i / 3 % 3) as f32, (i / 9) as f32);
-            let place = low + (high - low) * (0.3 + 0.2 * at);
-            let (mut fronts, mut count) = (0, 0);
-            for direction in directions(128).filter(|d| d.y > -0.2) {
-                count += 1;
-                let sight = look(world, place, direction);
-                fronts += u32::from(sight.is_some_and(|s| s.from_front && s.distance > 0.0));
-            }
-            fronts as f32 / count as f32
+            enclosure_at(world, low + (high - low) * (0.3 + 0.2 * at))
         })
         .collect();
-    // The median: furniture and pillars have an inside too.
     shares.sort_by(f32::total_cmp);
     shares[shares.len() / 2]
+}
+
+/// Share of directions in which a surface is seen from its front: near 1 in a room, near 0 within an
+/// object. Looking down does not count, for an object on a ground plane is not inside anything.
+fn enclosure_at(world: &World, place: Vec3) -> f32 {
+    let (mut fronts, mut count) = (0, 0);
+    for direction in directions(128).filter(|d| d.y > -0.2) {
+        count += 1;
+        let sight = look(world, place, direction);
+        fronts += u32::from(sight.is_some_and(|s| s.from_front && s.distance > 0.0));
+    }
+    fronts as f32 / count as f32
+}
+
+/// Whether a place is in a room, by what is seen from there.
+pub fn is_in_room(world: &World, place: Vec3) -> bool {
+    enclosure_at(world, place) > ROOM_ENCLOSURE
+}
+
+/// The point that the middle of a camera's picture shows; where that is nothing, what is in focus.
+pub fn middle(world: &World, camera: &Camera) -> Vec3 {
+    let transform = &camera.world_from_camera;
+    let origin = Vec3::from(transform.translation);
+    let direction = -Vec3::from(transform.matrix3.z_axis.normalize_or(Vec3A::Z));
+    let sight = look(world, origin, direction);
+    origin + direction * sight.map_or(camera.focus_distance, |sight| sight.distance)
 }
 
 /// Looks across the room from the place, at eye height, that sees farthest.

@@ -48,7 +48,7 @@ impl Pixel {
     }
 
     /// Of sums over `samples` samples: red, green, blue and squared luminance.
-    pub(super) fn of_sums(
+    pub(crate) fn of_sums(
         [r, g, b, luminance_squared]: [f64; 4],
         samples: u32,
         invalid: u32,
@@ -63,7 +63,7 @@ impl Pixel {
     }
 
     /// Number of samples that were left out because they were not finite.
-    pub(super) fn invalid(&self) -> u32 {
+    pub(crate) fn invalid(&self) -> u32 {
         self.invalid
     }
 
@@ -108,7 +108,7 @@ impl Surface {
     }
 
     /// Of sums over first hits: albedo, depth, normal and their number.
-    pub(super) fn of_sums([r, g, b, depth, x, y, z, hits]: [f64; 8]) -> Self {
+    pub(crate) fn of_sums([r, g, b, depth, x, y, z, hits]: [f64; 8]) -> Self {
         Self { albedo: DVec3::new(r, g, b), normal: DVec3::new(x, y, z), depth, hits: hits as u32 }
     }
 
@@ -128,6 +128,53 @@ impl Film {
             height,
             pixels: vec![Pixel::default(); count],
             surfaces: vec![Surface::default(); if layers { count } else { 0 }],
+        }
+    }
+
+    /// Of sums, row after row; no surfaces without layers.
+    pub(crate) fn of_pixels(
+        [width, height]: [u32; 2],
+        pixels: Vec<Pixel>,
+        surfaces: Vec<Surface>,
+    ) -> Self {
+        Self { width, height, pixels, surfaces }
+    }
+
+    /// Counts so many samples of every pixel more, without their light: others take them. Only for
+    /// [`super::Session::continue_from`].
+    pub(crate) fn skip(&mut self, samples: u32) {
+        for pixel in &mut self.pixels {
+            pixel.samples = pixel.samples.saturating_add(samples);
+        }
+    }
+
+    /// A copy that does not count the first `skipped` samples of every pixel, which [`Self::skip`] did.
+    pub(crate) fn without_skipped(&self, skipped: u32) -> Self {
+        let mut film = self.clone();
+        film.pixels.iter_mut().for_each(|pixel| pixel.samples -= skipped);
+        film
+    }
+
+    /// Whether another film has the same size and the same layers.
+    pub(crate) fn is_alike(&self, other: &Self) -> bool {
+        (self.width, self.height) == (other.width, other.height)
+            && self.has_layers() == other.has_layers()
+    }
+
+    /// Adds the samples of another film of the same size and with the same layers: each counts as much
+    /// as any of this one's.
+    pub(crate) fn add_film(&mut self, other: &Self) {
+        for (pixel, more) in self.pixels.iter_mut().zip(&other.pixels) {
+            pixel.sum.iter_mut().zip(more.sum).for_each(|(sum, more)| *sum += more);
+            pixel.luminance_squared += more.luminance_squared;
+            pixel.samples = pixel.samples.saturating_add(more.samples);
+            pixel.invalid = pixel.invalid.saturating_add(more.invalid);
+        }
+        for (surface, more) in self.surfaces.iter_mut().zip(&other.surfaces) {
+            surface.albedo += more.albedo;
+            surface.normal += more.normal;
+            surface.depth += more.depth;
+            surface.hits = surface.hits.saturating_add(more.hits);
         }
     }
 

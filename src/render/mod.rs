@@ -308,6 +308,8 @@ pub struct Session<'a> {
     film_before: Mutex<Film>,
     /// Fewest samples of any pixel.
     samples: u32,
+    /// So many first samples of each pixel are others'.
+    skipped: u32,
     /// When a GPU's film was read last.
     last_read: Instant,
     whole_map: Option<LightGrid>,
@@ -354,6 +356,7 @@ impl<'a> Session<'a> {
             noise: OnceLock::new(),
             film_before: Mutex::default(),
             samples: 0,
+            skipped: 0,
             last_read: Instant::now(),
             world,
             environment,
@@ -457,7 +460,8 @@ impl<'a> Session<'a> {
     /// Reads what there is on a GPU that is to be left.
     fn leave_gpu(&mut self) {
         let film = self.film();
-        (self.samples, self.figures.samples) = (film.min_samples(), film.total_samples());
+        let skipped = u64::from(self.skipped) * film.pixels().len() as u64;
+        (self.samples, self.figures.samples) = (film.min_samples(), film.total_samples() - skipped);
         self.figures.rays = self.figures().rays;
         // With a device goes what was done since its film was read.
         self.sequence.first_sample = self.sequence.first_sample.min(self.samples);
@@ -575,6 +579,51 @@ impl<'a> Session<'a> {
         self.lessons.take()
     }
 
+    /// Whether no samples to come change what is sampled by: each is then a matter of its pixel and its
+    /// index alone.
+    pub fn has_final_laws(&self) -> bool {
+        self.phase == Phase::Rendering
+            && self.learning.as_ref().is_none_or(|learning| learning.is_over)
+    }
+
+    /// Goes on from another film of this view with what was learned so far, as if its samples were
+    /// this session's. The first `skipped` of each pixel are others': [`Self::film`] counts them without
+    /// their light. Whoever took the rest learned as this session did, so that all films of a view
+    /// together are the one that a single session would have made.
+    ///
+    /// # Errors
+    /// If the GPU fails; [`Self::continue_on_cpu`] goes on from that film.
+    pub(crate) fn continue_from(&mut self, mut film: Film, skipped: u32) -> Result<()> {
+        // A GPU counts its rays on its film; if it fails, it will be heard of below.
+        let _ = self.settle();
+        self.figures.rays = self.figures().rays;
+        film.skip(skipped);
+        self.skipped = skipped;
+        self.samples = film.min_samples();
+        self.noise = OnceLock::new();
+        match &mut self.engine {
+            Engine::Cpu => self.film = OnceLock::from(film),
+            Engine::Gpu(renderer) => {
+                let set = renderer.set_film(&film);
+                self.film = OnceLock::new();
+                self.film_before = Mutex::new(film);
+                set?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Counts what an earlier process did for the film that is gone on from.
+    pub(crate) fn add_figures(&mut self, before: &Figures) {
+        let figures = &mut self.figures;
+        figures.samples += before.samples;
+        figures.rays += before.rays;
+        figures.learning_rays += before.learning_rays;
+        figures.learning_seconds += before.learning_seconds;
+        figures.law_seconds += before.law_seconds;
+        figures.render_seconds += before.render_seconds;
+    }
+
     /// What was counted, for inspection.
     pub fn counters(&self) -> Option<&LearningGrid> {
         self.learning.as_ref().map(|learning| &learning.grid)
@@ -587,9 +636,11 @@ impl<'a> Session<'a> {
         self.film.get_or_init(|| self.newest_film().0)
     }
 
-    /// [`Film::noise`] of [`Self::film`], which looks at every pixel once.
+    /// [`Film::noise`] of [`Self::film`], which looks at every pixel once; infinite if some of its
+    /// samples are others'.
     pub fn noise(&self) -> f64 {
-        *self.noise.get_or_init(|| self.film().noise())
+        let noise = || if self.skipped == 0 { self.film().noise() } else { f64::INFINITY };
+        *self.noise.get_or_init(noise)
     }
 
     /// The last film brought up to date, as far as that worked.

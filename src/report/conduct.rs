@@ -7,7 +7,6 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use super::digest::Digest;
 use super::machine::{Machine, OpenDevice};
 use super::measure::{Run, measure};
 use super::pages::{duration, row_sentence};
@@ -16,6 +15,7 @@ use super::reference::{LEAST_PICTURES, Reference, read_reference};
 use super::stage::Stage;
 use super::store::Store;
 use super::summary::{DeviceReport, Pictures, Report, RowReport, summarise};
+use crate::digest::Digest;
 use crate::error::{Error, Result};
 use crate::image::Image;
 

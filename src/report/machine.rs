@@ -4,8 +4,8 @@ use std::fs;
 
 use serde::{Deserialize, Serialize};
 
-use super::digest::Digest;
 use super::plan::Device;
+use crate::digest::Digest;
 use crate::error::Result;
 use crate::render::gpu::Gpu;
 

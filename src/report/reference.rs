@@ -10,9 +10,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::{Deserialize, Serialize};
 
-use super::digest::Digest;
 use super::measure::Place;
 use super::plan::Settings;
+use crate::digest::Digest;
 use crate::error::{Error, Result};
 use crate::image::{Image, read_picture, write_beside_and_rename};
 use crate::metrics::{REL_MSE_EPSILON, trimmed_mean};

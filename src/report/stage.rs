@@ -3,10 +3,11 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use super::digest::{self, Digest};
+use super::digest;
 use super::machine::OpenDevice;
 use super::measure::Place;
 use super::plan::{Plan, Row, Settings};
+use crate::digest::Digest;
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{Error, Notices, Result};
 use crate::light_grid::LightGrid;

@@ -1,6 +1,7 @@
 //! The scene: flat arrays and `u32` indices, everything in world space (metres, +Y up).
 
 pub mod builtin;
+pub mod camera_path;
 pub mod gltf;
 pub mod needs;
 mod outlines;
@@ -10,6 +11,7 @@ pub mod texture;
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
 
 use crate::error::Notices;
+use camera_path::CameraPath;
 
 /// What is asked of a scene's file.
 #[derive(Debug, Clone, Default, PartialEq, clap::Args)]
@@ -69,6 +71,8 @@ pub struct Scene {
     pub images: Vec<TextureImage>,
     /// Cameras in file order.
     pub cameras: Vec<Camera>,
+    /// How each of them moves, if it does; empty for built-in scenes.
+    pub camera_paths: Vec<Option<CameraPath>>,
     /// Point, spot and directional lights.
     pub lights: Vec<PunctualLight>,
     /// What fills the space between surfaces; `None` is clear air.

@@ -10,6 +10,7 @@ mod bvh;
 mod cli;
 mod environment;
 mod estimator;
+mod farm;
 mod faults;
 mod gltf_files;
 mod gpu;

@@ -1,26 +1,37 @@
 //! What `lightgrid render` writes.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use super::{RenderArguments, sharing};
+use super::share::Share;
+use super::{RenderArguments, frames, sharing};
+use crate::cli::picture::say_written;
 use crate::error::{Error, Result};
 use crate::image::{check_writable, is_same_file};
 use crate::light_grid::LightGrid;
 use crate::medium::Fog;
 use crate::output::laws::{check_laws_extension, write_laws};
 use crate::output::record::{self, Record};
-use crate::output::{self, PictureOptions};
 
 /// Refuses outputs before the work rather than after it.
 pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
-    for picture in &arguments.outputs {
-        output::check_extension(picture)?;
+    if arguments.part.is_some() {
+        let [part] = &arguments.outputs[..] else {
+            return Err(Error::new("--part writes one file: give -o once"));
+        };
+        if part.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("part")) {
+            return Err(Error::at(part, "a part is written as .part, for `lightgrid merge`"));
+        }
+        arguments.picture.check([])?;
+    } else {
+        let has_frames = arguments.frames.is_some() || arguments.turntable.is_some();
+        let is_picture = |path: &&PathBuf| !(has_frames && frames::is_video(path));
+        arguments.picture.check(arguments.outputs.iter().filter(is_picture))?;
+        if has_frames {
+            frames::check(arguments)?;
+        }
     }
     if let Some(laws) = &arguments.laws {
         check_laws_extension(laws)?;
-    }
-    if let Some(denoiser) = arguments.denoise {
-        denoiser.check()?;
     }
     let (width, height) = arguments.size;
     if let Some([left, top, w, h]) = arguments.region
@@ -30,8 +41,8 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
             "--region {left},{top},{w},{h} is not inside the picture of {width}x{height} pixels"
         )));
     }
-    let files: Vec<&PathBuf> =
-        arguments.outputs.iter().chain(&arguments.json).chain(&arguments.laws).collect();
+    let RenderArguments { outputs, json, laws, checkpoint, .. } = arguments;
+    let files: Vec<&PathBuf> = outputs.iter().chain(json).chain(laws).chain(checkpoint).collect();
     for (i, file) in files.iter().enumerate() {
         if files[..i].iter().any(|other| is_same_file(other, file)) {
             return Err(Error::at(file, "two outputs would be written to this one file"));
@@ -45,41 +56,28 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
 /// failed.
 pub(super) fn write(
     arguments: &RenderArguments,
+    share: &Share,
     record: &Record<'_>,
     grid: Option<&LightGrid>,
 ) -> Vec<Error> {
-    let options = PictureOptions {
-        exposure: arguments.exposure,
-        tone_curve: arguments.tonemap,
-        denoiser: arguments.denoise,
-        white_balance: arguments.white.unwrap_or_default(),
-        layers: arguments.layers.clone(),
+    let metadata = record.metadata();
+    let write = |path: &PathBuf| match arguments.part {
+        Some(_) => share.write_part(path, record),
+        None => arguments.picture.write(path, record.film, &metadata),
     };
-    let mut failures: Vec<Error> = arguments
-        .outputs
-        .iter()
-        .filter_map(|path| write_or_rescue(path, &options, record).err())
-        .collect();
+    let write_and_say = |path: &PathBuf| write(path).map(|()| say_written(path)).err();
+    let mut failures: Vec<Error> = arguments.outputs.iter().filter_map(write_and_say).collect();
+    failures.extend(arguments.frame_of_video.as_ref().and_then(|path| write(path).err()));
     if let Some(path) = &arguments.json {
-        failures.extend(record::write_json(path, &record.to_json()).err());
+        let written = record::write_json(path, &record.to_json());
+        failures.extend(written.map(|()| say_written(path)).err());
     }
     if let Some(path) = &arguments.laws {
         let none = || Error::at(path, "not written: this map and sampling have no laws");
         let written = grid.ok_or_else(none).and_then(|grid| write_laws(path, grid));
-        failures.extend(written.err());
+        failures.extend(written.map(|()| say_written(path)).err());
     }
     failures
-}
-
-/// Writes a picture where it was asked to be or, if that fails, into the temporary folder.
-fn write_or_rescue(path: &Path, options: &PictureOptions, record: &Record<'_>) -> Result<()> {
-    let Err(failure) = output::write_picture(path, options, record) else { return Ok(()) };
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let rescued = std::env::temp_dir().join(format!("lightgrid-{}-{name}", std::process::id()));
-    Err(match output::write_picture(&rescued, options, record) {
-        Ok(()) => Error::new(format!("{failure}; the picture is kept as {}", rescued.display())),
-        Err(_) => failure,
-    })
 }
 
 /// Settings that belong into metadata and JSON, as typed or as chosen.

@@ -133,7 +133,9 @@ impl Sums {
         [scale, scale, scale, scale * scale]
     }
 
-    fn write(&self, buffers: &Buffers, film: &Film) {
+    /// Puts a film in the place of what is there.
+    pub(super) fn write(&self, buffers: &Buffers, film: &Film) {
+        self.rays.store(0, Ordering::Relaxed);
         for (piece, pixels) in film.pixels.chunks(PIECE_PIXELS).enumerate() {
             let at = (piece * PIECE_PIXELS) as u64 * PIXEL_BYTES;
             let (high, low) = split(pixels.iter().map(|p| times(p.sums(), self.factors())));

@@ -240,6 +240,16 @@ impl Renderer {
         Ok(renderer)
     }
 
+    /// Goes on from another film of this size.
+    pub(super) fn set_film(&mut self, film: &Film) -> Result<()> {
+        self.settle()?;
+        self.forget_paths()?;
+        self.film.write(&self.buffers, film);
+        self.progress = Progress::of(film);
+        self.told = self.total_samples();
+        Ok(())
+    }
+
     /// Uploads the laws paths choose tiles by.
     pub(crate) fn set_grid(&mut self, grid: Option<&LightGrid>) -> Result<()> {
         let Some(grid) = grid.filter(|_| self.features.has("map_sampling")) else { return Ok(()) };

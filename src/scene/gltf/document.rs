@@ -60,13 +60,12 @@ pub(super) fn parse<'a>(
     };
     check_version(head.asset.as_ref())?;
     extensions::check(&head, notices)?;
-    let mut root: json::Root = match json::deserialize::from_slice(text) {
+    let root: json::Root = match json::deserialize::from_slice(text) {
         Ok(root) => root,
         Err(_) => json::deserialize::from_value(tree()?).map_err(other)?,
     };
     if head.animations.is_some() {
         notices.add("the file has animations; its rest pose is shown");
-        root.animations = Vec::new();
     }
     Ok((root, binary))
 }

@@ -7,11 +7,12 @@
 //!
 //! `document` and `lenient` parse, `buffers`, `uri` and `accessor` give access to the data, `meshopt` and `draco`
 //! unpack them, `pose` places nodes
-//! and joints, `materials`, `variants`, `textures` and `medium` read the look, `primitive`, `geometry` and `tangents` read
+//! and joints, `animation` moves cameras, `materials`, `variants`, `textures` and `medium` read the look, `primitive`, `geometry` and `tangents` read
 //! triangles,
 //! `bake` puts them into the world.
 
 mod accessor;
+mod animation;
 mod bake;
 mod buffers;
 mod document;
@@ -96,8 +97,10 @@ fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallib
     let folder = Folder { path: base_dir, allow_outside: options.allow_outside };
     let file = File::new(root, binary, folder);
     let nodes = Nodes::new(&file.root, &mut notices)?;
+    let (cameras, camera_paths) = viewpoints::cameras(&file, &nodes, &mut notices)?;
     let mut scene = Scene {
-        cameras: viewpoints::cameras(&file.root, &nodes, &mut notices)?,
+        cameras,
+        camera_paths,
         lights: viewpoints::lights(&file.root, &nodes, &mut notices)?,
         medium: medium::medium(&file.root, &nodes, &mut notices),
         ..Scene::default()

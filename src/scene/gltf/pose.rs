@@ -16,6 +16,8 @@ pub(super) struct Nodes {
     pub(super) world: Vec<DAffine3>,
     /// Nodes of the shown scene, parents before children, in file order.
     pub(super) shown: Vec<usize>,
+    /// Each node's parent.
+    pub(super) parents: Vec<Option<usize>>,
 }
 
 impl Nodes {
@@ -38,7 +40,7 @@ impl Nodes {
             Some(roots) => descend(root, &roots),
             None => descend(root, &tops),
         };
-        Ok(Self { world, shown })
+        Ok(Self { world, shown, parents })
     }
 }
 
@@ -88,7 +90,8 @@ fn scene_roots(root: &json::Root, notices: &mut Notices) -> Fallible<Option<Vec<
     Ok(Some(scene.nodes.iter().map(json::Index::value).collect()))
 }
 
-fn local_transform(node: &json::Node) -> DAffine3 {
+/// Parent from node, at rest.
+pub(super) fn local_transform(node: &json::Node) -> DAffine3 {
     if let Some(m) = node.matrix {
         return affine_from_columns(&m.map(f64::from));
     }

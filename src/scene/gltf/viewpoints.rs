@@ -8,20 +8,27 @@ use json::extensions::scene::khr_lights_punctual::{Light, Type};
 use json::validation::Checked;
 
 use super::Fallible;
-use super::buffers::find;
+use super::animation::Channels;
+use super::buffers::{File, find};
 use super::pose::Nodes;
 use crate::error::Notices;
+use crate::scene::camera_path::CameraPath;
 use crate::scene::{Camera, Projection, PunctualKind, PunctualLight};
 
 /// Field of view where the file's is unusable.
 const DEFAULT_FOV_Y_RADIANS: f32 = 0.8;
 
-/// Cameras of the shown nodes, in the order of the file's cameras.
+/// More moving cameras than any scene has: each keeps all keys of the nodes above it.
+const MOST_MOVING: usize = 64;
+
+/// Cameras of the shown nodes, in the order of the file's cameras, and how each moves.
 pub(super) fn cameras(
-    root: &json::Root,
+    file: &File<'_>,
     nodes: &Nodes,
     notices: &mut Notices,
-) -> Fallible<Vec<Camera>> {
+) -> Fallible<(Vec<Camera>, Vec<Option<CameraPath>>)> {
+    let root = &file.root;
+    let channels = Channels::new(file);
     let mut cameras = Vec::new();
     for &number in &nodes.shown {
         let node = &root.nodes[number];
@@ -29,11 +36,19 @@ pub(super) fn cameras(
             let source = find(&root.cameras, index, "camera")?;
             let name = source.name.clone().or_else(|| node.name.clone());
             let name = name.unwrap_or_else(|| format!("camera {index}"));
-            cameras.push((index.value(), camera(source, name, nodes.world[number], notices)));
+            let path = match cameras.len() < MOST_MOVING {
+                true => channels.camera_path(nodes, number),
+                false => Ok(None),
+            };
+            let path = path.unwrap_or_else(|cause| {
+                notices.add(format!("the movement of camera {name} is left out: {cause}"));
+                None
+            });
+            cameras.push((index.value(), camera(source, name, nodes.world[number], notices), path));
         }
     }
-    cameras.sort_by_key(|&(index, _)| index);
-    Ok(cameras.into_iter().map(|(_, camera)| camera).collect())
+    cameras.sort_by_key(|&(index, ..)| index);
+    Ok(cameras.into_iter().map(|(_, camera, path)| (camera, path)).unzip())
 }
 
 fn camera(

@@ -1,0 +1,55 @@
+//! `lightgrid completions` and `lightgrid man`: what shells and `man` know about the commands.
+
+use std::path::PathBuf;
+
+use clap::CommandFactory as _;
+use clap_complete::Shell;
+use clap_mangen::Man;
+
+use super::Arguments;
+use super::picture::say_written;
+use crate::error::{Error, Result};
+use crate::image::write_beside_and_rename;
+use crate::terminal::print;
+
+/// Arguments of `completions`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Example:
+  lightgrid completions bash > ~/.local/share/bash-completion/completions/lightgrid")]
+pub(super) struct CompletionsArguments {
+    /// The shell.
+    shell: Shell,
+}
+
+/// Arguments of `man`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Example:
+  lightgrid man ~/.local/share/man/man1")]
+pub(super) struct ManArguments {
+    /// An existing folder.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+}
+
+/// Prints what completes commands in a shell.
+pub(super) fn completions(arguments: &CompletionsArguments) -> Result<()> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut Arguments::command(), "lightgrid", &mut script);
+    print(String::from_utf8_lossy(&script).trim_end())
+}
+
+/// Writes a manual page for each command.
+pub(super) fn man(arguments: &ManArguments) -> Result<()> {
+    let mut command = Arguments::command().disable_help_subcommand(true);
+    command.build();
+    let shown = command.get_subcommands().filter(|command| !command.is_hide_set());
+    let pages = std::iter::once(&command).chain(shown).map(|command| Man::new(command.clone()));
+    let write = |page: Man| {
+        let path = arguments.folder.join(page.get_filename());
+        let written = write_beside_and_rename(&path, |file| page.render(file));
+        written.map(|()| say_written(&path)).err()
+    };
+    Error::all(pages.filter_map(write).collect())
+}

@@ -1,0 +1,128 @@
+//! How a picture is made of a film and written, wherever the film comes from.
+
+use std::path::{Path, PathBuf};
+
+use super::values;
+use crate::denoise::Denoiser;
+use crate::error::{Error, Result};
+use crate::output::{self, Exposure, LayerName, PictureOptions};
+use crate::render::film::Film;
+use crate::terminal::tell;
+use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev};
+
+/// How pictures are written.
+#[derive(Debug, Clone, clap::Args)]
+pub(super) struct PictureArguments {
+    /// Exposure of .png pictures in stops, or `auto`.
+    #[arg(long, default_value = "auto", value_parser = parse_exposure, allow_hyphen_values = true, value_name = "EV|auto", help_heading = "Picture")]
+    exposure: Exposure,
+    /// Tone curve of .png pictures: agx, aces, neutral, reinhard, none.
+    #[arg(long, default_value = "agx", value_name = "CURVE", help_heading = "Picture")]
+    tonemap: ToneCurve,
+    /// Takes noise out of .png pictures: a-trous (our own filter) or oidn (Open Image Denoise, if its
+    /// library is installed).
+    #[arg(long, value_enum, value_name = "FILTER", num_args = 0..=1, default_missing_value = "a-trous", help_heading = "Picture")]
+    pub(super) denoise: Option<Denoiser>,
+    /// The light that looks white in .png pictures: kelvin, and a tint from -1 (green) to 1.
+    #[arg(long, value_parser = parse_white, allow_hyphen_values = true, value_name = "K[,TINT]", help_heading = "Picture")]
+    white: Option<WhiteBalance>,
+    /// Extra layers in .exr pictures: albedo, normal, depth, samples, variance, or all.
+    #[arg(long, value_delimiter = ',', value_name = "LAYER", help_heading = "Picture")]
+    layers: Vec<LayerName>,
+}
+
+impl Default for PictureArguments {
+    fn default() -> Self {
+        Self {
+            exposure: Exposure::Auto,
+            tonemap: ToneCurve::default(),
+            denoise: None,
+            white: None,
+            layers: Vec::new(),
+        }
+    }
+}
+
+fn parse_exposure(text: &str) -> std::result::Result<Exposure, String> {
+    if text == "auto" {
+        return Ok(Exposure::Auto);
+    }
+    values::finite(text)
+        .map(|stops| Exposure::Stops(stops as f32))
+        .map_err(|e| format!("{e} of stops, or auto"))
+}
+
+fn parse_white(text: &str) -> std::result::Result<WhiteBalance, String> {
+    let (kelvin, tint) = text.split_once(',').unwrap_or((text, "0"));
+    let (kelvin, tint) = (values::finite(kelvin)? as f32, values::finite(tint)? as f32);
+    if !((2000.0..=12000.0).contains(&kelvin) && (-1.0..=1.0).contains(&tint)) {
+        return Err("expected 2000 to 12000 kelvin and a tint from -1 to 1".to_owned());
+    }
+    Ok(WhiteBalance { kelvin, tint })
+}
+
+impl PictureArguments {
+    /// Refuses names no picture is written by, and denoisers that are not there.
+    pub(super) fn check<'a>(&self, pictures: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
+        pictures.into_iter().try_for_each(|path| output::check_extension(path))?;
+        self.denoise.map_or(Ok(()), Denoiser::check)
+    }
+
+    /// Whether albedo, normal and depth are wanted.
+    pub(super) fn wants_surfaces(&self) -> bool {
+        let is_surface = |l: &LayerName| !matches!(l, LayerName::Samples | LayerName::Variance);
+        self.denoise.is_some() || self.layers.iter().any(is_surface)
+    }
+
+    /// The exposure that a film's picture gets, to be that of others, too.
+    pub(super) fn exposure_of(&self, film: &Film) -> Exposure {
+        match self.exposure {
+            Exposure::Stops(stops) => Exposure::Stops(stops),
+            Exposure::Auto => {
+                let image = self.white.unwrap_or_default().apply(film.image());
+                Exposure::Stops(auto_exposure_ev(&image))
+            }
+        }
+    }
+
+    /// Takes this exposure.
+    pub(super) fn set_exposure(&mut self, exposure: Exposure) {
+        self.exposure = exposure;
+    }
+
+    fn options(&self) -> PictureOptions {
+        PictureOptions {
+            exposure: self.exposure,
+            tone_curve: self.tonemap,
+            denoiser: self.denoise,
+            white_balance: self.white.unwrap_or_default(),
+            layers: self.layers.clone(),
+        }
+    }
+
+    /// Writes a picture where it was asked to be or, if that fails, into the temporary folder.
+    pub(super) fn write(
+        &self,
+        path: &Path,
+        film: &Film,
+        metadata: &[(String, String)],
+    ) -> Result<()> {
+        let options = self.options();
+        let Err(failure) = output::write_picture(path, &options, film, metadata.to_vec()) else {
+            return Ok(());
+        };
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let rescued = std::env::temp_dir().join(format!("lightgrid-{}-{name}", std::process::id()));
+        Err(match output::write_picture(&rescued, &options, film, metadata.to_vec()) {
+            Ok(()) => {
+                Error::new(format!("{failure}; the picture is kept as {}", rescued.display()))
+            }
+            Err(_) => failure,
+        })
+    }
+}
+
+/// Says that a file is there.
+pub(super) fn say_written(path: &Path) {
+    tell(format_args!("wrote {}", path.display()));
+}

@@ -1,0 +1,260 @@
+//! Many pictures by one command: a camera that moves, one picture a frame, or a video of them.
+
+use std::fs;
+use std::io;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use glam::{Affine3A, Vec3};
+
+use super::RenderArguments;
+use crate::cli::picture::say_written;
+use crate::error::{Error, Result};
+use crate::image::write_beside_and_rename;
+use crate::path::{World, framing};
+use crate::scene::Camera;
+use crate::scene::camera_path::CameraPath;
+
+/// Which pictures are asked for, and where the camera is in each.
+pub(super) struct Frames<'a> {
+    numbers: RangeInclusive<u32>,
+    motion: Motion<'a>,
+    frames_per_second: f64,
+}
+
+enum Motion<'a> {
+    Path(&'a CameraPath),
+    Turn { about: Vec3, count: u32 },
+}
+
+impl<'a> Frames<'a> {
+    /// What the arguments ask for; `None` is one picture. The camera is the one at rest.
+    ///
+    /// # Errors
+    /// If that camera does not move, or a frame is beyond the turn.
+    pub(super) fn plan(
+        arguments: &RenderArguments,
+        world: &'a World,
+        camera: &Camera,
+    ) -> Result<Option<Self>> {
+        let (motion, all) = match (&arguments.frames, arguments.turntable) {
+            (None, None) => return Ok(None),
+            (_, Some(count)) => {
+                let about = arguments.target.unwrap_or_else(|| centre(world, camera));
+                (Motion::Turn { about, count }, 0..=count - 1)
+            }
+            (Some(frames), None) => {
+                let paths = &world.scene.camera_paths;
+                let path = paths.get(arguments.camera.unwrap_or(0)).and_then(Option::as_ref);
+                let path = path.filter(|_| arguments.eye.is_none()).ok_or_else(|| {
+                    Error::new(format!(
+                        "--frames: the camera does not move in {} (--turntable turns any)",
+                        arguments.scene
+                    ))
+                })?;
+                (Motion::Path(path), frames.clone())
+            }
+        };
+        let numbers = arguments.frames.clone().unwrap_or_else(|| all.clone());
+        if numbers.end() > all.end() {
+            return Err(Error::new(format!(
+                "--frames {}..{}: the last of a turn's {} is {}",
+                numbers.start(),
+                numbers.end(),
+                all.end() + 1,
+                all.end()
+            )));
+        }
+        if numbers.end() > numbers.start()
+            && (arguments.part.is_some() || arguments.checkpoint.is_some())
+        {
+            return Err(Error::new("--part and --checkpoint are of one frame, such as --frames 3"));
+        }
+        Ok(Some(Self { numbers, motion, frames_per_second: arguments.fps }))
+    }
+
+    /// Numbers of the pictures.
+    pub(super) fn numbers(&self) -> RangeInclusive<u32> {
+        self.numbers.clone()
+    }
+
+    /// Where the camera is in a frame: at `frame / fps` seconds, or so much of a turn further.
+    pub(super) fn camera(&self, frame: u32, at_rest: &Camera) -> Camera {
+        let world_from_camera = match self.motion {
+            Motion::Path(path) => {
+                let placed = path.at(f64::from(frame) / self.frames_per_second);
+                let is_sound = placed.is_finite();
+                if is_sound { placed.as_affine3a() } else { at_rest.world_from_camera }
+            }
+            Motion::Turn { about, count } => {
+                let turn = std::f64::consts::TAU * f64::from(frame) / f64::from(count);
+                Affine3A::from_translation(about)
+                    * Affine3A::from_rotation_y(turn as f32)
+                    * Affine3A::from_translation(-about)
+                    * at_rest.world_from_camera
+            }
+        };
+        Camera { world_from_camera, ..at_rest.clone() }
+    }
+}
+
+/// What a camera is turned about: in a room it stays where it is, for the walls are all around it.
+fn centre(world: &World, camera: &Camera) -> Vec3 {
+    let eye = Vec3::from(camera.world_from_camera.translation);
+    if framing::is_in_room(world, eye) { eye } else { framing::middle(world, camera) }
+}
+
+/// A name with the frame's number in place of the `#`s, as many digits as there are at least.
+pub(super) fn numbered(path: &Path, frame: u32) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let Some(start) = name.find('#') else { return path.to_owned() };
+    let width = name[start..].bytes().take_while(|byte| *byte == b'#').count();
+    let (before, after) = (&name[..start], &name[start + width..]);
+    path.with_file_name(format!("{before}{frame:0width$}{after}"))
+}
+
+/// Whether a name is that of a video.
+pub(super) fn is_video(path: &Path) -> bool {
+    codec(path).is_some()
+}
+
+/// What ffmpeg is told for a kind of video. Those of the first two have an even size.
+fn codec(path: &Path) -> Option<&'static [&'static str]> {
+    const EVEN: &str = "crop=trunc(iw/2)*2:trunc(ih/2)*2";
+    let extension = path.extension()?.to_string_lossy().to_lowercase();
+    match extension.as_str() {
+        "mp4" => Some(&["-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", "-vf", EVEN]),
+        "webm" => Some(&[
+            "-c:v",
+            "libvpx-vp9",
+            "-crf",
+            "24",
+            "-b:v",
+            "0",
+            "-pix_fmt",
+            "yuv420p",
+            "-vf",
+            EVEN,
+        ]),
+        "gif" => Some(&["-vf", "split[a][b];[a]palettegen[p];[b][p]paletteuse"]),
+        _ => None,
+    }
+}
+
+/// Refuses names that cannot hold many pictures, and videos that nothing here can make.
+///
+/// # Errors
+/// One sentence that names the file.
+pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
+    let RenderArguments { outputs, json, laws, .. } = arguments;
+    for path in outputs.iter().chain(json).chain(laws) {
+        let has_number = numbered(path, 0) != *path;
+        if !is_video(path) && !has_number {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            let extension = path.extension().unwrap_or_default().to_string_lossy();
+            return Err(Error::at(
+                path,
+                format!("frames need a number in their names, as {name}.####.{extension} has"),
+            ));
+        }
+        if is_video(path) && !has_ffmpeg() {
+            return Err(Error::at(
+                path,
+                "ffmpeg, which makes videos, is not found: install it, or ask for .####.png",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn has_ffmpeg() -> bool {
+    let mut version = Command::new("ffmpeg");
+    version.arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    version.status().is_ok_and(|status| status.success())
+}
+
+/// A folder for the frames of a video, gone when this value is.
+pub(super) struct Reel {
+    folder: PathBuf,
+    /// Frames asked for so far.
+    count: u32,
+}
+
+impl Reel {
+    /// An empty one in the temporary folder.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    pub(super) fn new() -> Result<Self> {
+        let folder = std::env::temp_dir().join(format!("lightgrid-{}-frames", std::process::id()));
+        fs::create_dir_all(&folder)
+            .map_err(|e| Error::at(&folder, format!("cannot be made: {e}")))?;
+        Ok(Self { folder, count: 0 })
+    }
+
+    /// Where the next frame is to be written.
+    pub(super) fn next(&mut self) -> PathBuf {
+        self.count += 1;
+        self.frame(self.count - 1)
+    }
+
+    fn frame(&self, number: u32) -> PathBuf {
+        self.folder.join(format!("{number:08}.png"))
+    }
+
+    /// Whether the first frame was written.
+    pub(super) fn has_frames(&self) -> bool {
+        self.frame(0).exists()
+    }
+
+    /// Makes a video of the frames.
+    ///
+    /// # Errors
+    /// If ffmpeg fails or the file cannot be written.
+    pub(super) fn write(&self, path: &Path, frames_per_second: f64) -> Result<()> {
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        let made = self.folder.join(format!("video.{extension}"));
+        let output = Command::new("ffmpeg")
+            .args(["-y", "-v", "error", "-framerate", &frames_per_second.to_string(), "-i"])
+            .arg(self.folder.join("%08d.png"))
+            .args(codec(path).unwrap_or_default())
+            .arg(&made)
+            .stdin(Stdio::null())
+            .output()
+            .map_err(|e| Error::at(path, format!("ffmpeg cannot be started: {e}")))?;
+        if !output.status.success() {
+            let says = String::from_utf8_lossy(&output.stderr);
+            let cause = says.lines().last().unwrap_or("no reason given");
+            return Err(Error::at(path, format!("ffmpeg failed: {cause}")));
+        }
+        write_beside_and_rename(path, |file| {
+            io::copy(&mut fs::File::open(&made)?, file).map(|_| ())
+        })?;
+        say_written(path);
+        Ok(())
+    }
+}
+
+impl Drop for Reel {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_take_the_place_of_hashes() {
+        for (pattern, frame, name) in [
+            ("a.####.png", 7, "a.0007.png"),
+            ("a#.exr", 12, "a12.exr"),
+            ("x#/b##.png", 123, "x#/b123.png"),
+            ("a.png", 1, "a.png"),
+        ] {
+            assert_eq!(numbered(Path::new(pattern), frame), Path::new(name), "{pattern}");
+        }
+    }
+}

@@ -1,0 +1,364 @@
+//! Which samples of a picture one process takes: all, a part of them, or those that an earlier process
+//! left; and what it keeps lest it be killed.
+//!
+//! Whoever begins in the middle learns first what the others learned, by the same paths and the same first
+//! samples: from then on a sample is a matter of its pixel and its index alone.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use super::{RenderArguments, environment_options, sharing};
+use crate::alarm::Alarm;
+use crate::cli::device::say;
+use crate::cli::interrupt::Interrupt;
+use crate::digest::Digest;
+use crate::environment::Environment;
+use crate::error::{Error, Notices, Result};
+use crate::output::film_file::{FilmFacts, Part, read_film, write_film};
+use crate::output::record::Record;
+use crate::path::World;
+use crate::render::film::Film;
+use crate::render::{Figures, Gi, Phase, Session, StopRule, View};
+use crate::scene::builtin;
+
+/// What one process renders of a picture.
+pub(super) struct Share {
+    part: Part,
+    /// Samples a pixel before those of this part.
+    first: u32,
+    /// When this part is done; samples are counted from the picture's first.
+    rule: StopRule,
+    /// Samples of the whole picture.
+    samples: Option<u32>,
+    /// What the session is to go on from, once it has learned what belongs to it.
+    awaited: Option<Awaited>,
+    /// Samples a pixel that the pass under way is to reach.
+    target: u32,
+    deadline: Option<Instant>,
+    checkpoint: Option<Checkpoint>,
+    /// Whether what was learned is wanted for its own sake.
+    wants_laws: bool,
+    /// See [`FilmFacts::picture`].
+    picture: Vec<(String, String)>,
+}
+
+/// A film to go on from.
+struct Awaited {
+    film: Film,
+    /// What was done for it.
+    figures: Option<Figures>,
+}
+
+struct Checkpoint {
+    path: PathBuf,
+    every: Duration,
+    written: Instant,
+}
+
+impl Share {
+    /// The share that the arguments ask for, without what a checkpoint says is done.
+    ///
+    /// # Errors
+    /// If there is a checkpoint that is of another picture or cannot be read, or a part has no samples.
+    pub(super) fn open(
+        arguments: &RenderArguments,
+        rule: StopRule,
+        (world, environment): (&World, &Environment),
+        view: &View,
+    ) -> Result<Self> {
+        let is_kept = arguments.part.is_some() || arguments.checkpoint.is_some();
+        if is_kept && arguments.gi == Gi::Cached {
+            return Err(Error::new(
+                "--part and --checkpoint keep samples, not the cache that --gi cached ends paths in: \
+                 they want --gi exact",
+            ));
+        }
+        let part = arguments.part.unwrap_or(Part::WHOLE);
+        let range = part.range(rule.samples.unwrap_or(0));
+        if arguments.part.is_some() && range.is_empty() {
+            let samples = rule.samples.unwrap_or(0);
+            return Err(Error::new(format!(
+                "--part {}/{}: {samples} samples a pixel cannot be shared by so many",
+                part.number, part.count
+            )));
+        }
+        let mut share = Self {
+            part,
+            first: range.start,
+            rule: StopRule { samples: rule.samples.map(|_| range.end), ..rule },
+            samples: rule.samples,
+            awaited: None,
+            target: 0,
+            deadline: None,
+            checkpoint: None,
+            wants_laws: arguments.laws.is_some(),
+            // It takes a look at all of the scene and the map.
+            picture: match is_kept {
+                true => identity(arguments, world, environment, view),
+                false => Vec::new(),
+            },
+        };
+        if let Some(path) = &arguments.checkpoint {
+            if path.exists() {
+                share.take_up(path, view)?;
+            }
+            share.checkpoint = Some(Checkpoint {
+                path: path.clone(),
+                every: Duration::try_from_secs_f64(arguments.checkpoint_every)
+                    .unwrap_or(Duration::MAX),
+                written: Instant::now(),
+            });
+        }
+        if share.awaited.is_none() && share.first > 0 {
+            let film = Film::new(view.width, view.height, view.layers);
+            share.awaited = Some(Awaited { film, figures: None });
+        }
+        Ok(share)
+    }
+
+    /// Goes on from a checkpoint, if it is one of this share.
+    fn take_up(&mut self, path: &Path, view: &View) -> Result<()> {
+        let (facts, film) = read_film(path)?;
+        let advice = "remove it or name another";
+        if let Some(difference) = facts.difference(&self.picture) {
+            return Err(Error::at(
+                path,
+                format!(
+                    "is the checkpoint of another picture, which differs in {difference}: {advice}"
+                ),
+            ));
+        }
+        let is_of_share =
+            facts.part == self.part && (self.part == Part::WHOLE || facts.samples == self.samples);
+        let is_alike = (film.width, film.height) == (view.width, view.height)
+            && film.has_layers() == view.layers;
+        if !is_of_share || !is_alike {
+            return Err(Error::at(
+                path,
+                format!("is the checkpoint of {}: {advice}", facts.share()),
+            ));
+        }
+        self.target = facts.target;
+        self.awaited = Some(Awaited { film, figures: Some(facts.figures) });
+        Ok(())
+    }
+
+    /// Says what is gone on from.
+    pub(super) fn say(&self, notices: &mut Notices) {
+        let before = self.awaited.as_ref().filter(|awaited| awaited.figures.is_some());
+        if let (Some(Awaited { film, .. }), Some(checkpoint)) = (before, &self.checkpoint) {
+            let (path, samples) = (checkpoint.path.display(), film.min_samples());
+            say(notices, format!("{path}: goes on from {samples} samples a pixel"));
+        }
+    }
+
+    /// When to stop; samples are counted from the picture's first.
+    pub(super) fn rule(&self) -> &StopRule {
+        &self.rule
+    }
+
+    /// Whether there is a picture of this share's own samples.
+    pub(super) fn has_samples(&self, session: &Session<'_>) -> bool {
+        self.awaited.is_none() && session.samples() > self.first
+    }
+
+    /// This share's own samples.
+    pub(super) fn film<'s>(&self, session: &'s Session<'_>) -> Cow<'s, Film> {
+        match self.first {
+            0 => Cow::Borrowed(session.film()),
+            skipped => Cow::Owned(session.film().without_skipped(skipped)),
+        }
+    }
+
+    /// Does one piece of work; whether it was the last.
+    ///
+    /// # Errors
+    /// If a GPU fails.
+    pub(super) fn step(
+        &mut self,
+        session: &mut Session<'_>,
+        interrupt: &Interrupt,
+        alarm: &Alarm,
+        notices: &mut Notices,
+    ) -> Result<bool> {
+        if self.is_ready(session) {
+            self.begin(session)?;
+        }
+        if self.awaited.is_none() {
+            self.look_at_clock(session, interrupt, alarm, notices);
+        }
+        let has_samples = self.has_samples(session);
+        if has_samples {
+            interrupt.keep();
+        }
+        let stopped = interrupt.asked().load(Ordering::Relaxed);
+        if stopped || self.has_learned_enough(session) {
+            session.finish_learning();
+        }
+        if has_samples && (stopped || session.is_done(&self.rule)) {
+            session.settle()?;
+            return Ok(true);
+        }
+        let never = AtomicBool::new(false);
+        let cancel = if stopped { &never } else { &**interrupt.asked() };
+        session.advance(self.next_pass(session), cancel)?;
+        Ok(false)
+    }
+
+    /// Whether the session has learned what belongs to the film that awaits it.
+    fn is_ready(&self, session: &Session<'_>) -> bool {
+        self.awaited.as_ref().is_some_and(|awaited| {
+            let samples = self.first + awaited.film.min_samples();
+            let is_done = self.rule.samples.is_some_and(|limit| samples >= limit);
+            (is_done && !self.wants_laws)
+                || session.has_final_laws()
+                || (session.phase() == Phase::Rendering && session.samples() >= samples)
+        })
+    }
+
+    fn begin(&mut self, session: &mut Session<'_>) -> Result<()> {
+        let Some(Awaited { film, figures }) = self.awaited.take() else { return Ok(()) };
+        session.add_figures(&figures.unwrap_or_default());
+        session.continue_from(film, self.first)
+    }
+
+    /// Learning ends where it ended for the film that awaits the session.
+    fn has_learned_enough(&self, session: &Session<'_>) -> bool {
+        let before = self.awaited.as_ref().and_then(|awaited| awaited.figures);
+        match before {
+            Some(before) => session.figures().learning_paths >= before.learning_paths,
+            None => session.has_learned_enough(&self.rule),
+        }
+    }
+
+    /// Samples a pixel that the next pass should take. One that was cut short keeps its target, so that
+    /// noise is looked at after the same samples whatever the clock says.
+    fn next_pass(&mut self, session: &Session<'_>) -> u32 {
+        let samples = session.samples();
+        if let Some(awaited) = &self.awaited {
+            let missing = (self.first + awaited.film.min_samples()).saturating_sub(samples);
+            return session.next_pass(&StopRule::default()).min(missing).max(1);
+        }
+        if self.target <= samples {
+            self.target = samples + session.next_pass(&self.rule);
+        }
+        self.target.min(self.rule.samples.unwrap_or(u32::MAX)).saturating_sub(samples).max(1)
+    }
+
+    /// Writes the checkpoint if it is time, and has the next pass cut short when it will be so again or
+    /// the seconds are over.
+    fn look_at_clock(
+        &mut self,
+        session: &Session<'_>,
+        interrupt: &Interrupt,
+        alarm: &Alarm,
+        notices: &mut Notices,
+    ) {
+        let after = |seconds: f64| {
+            Instant::now().checked_add(Duration::try_from_secs_f64(seconds.max(0.0)).ok()?)
+        };
+        if self.deadline.is_none() {
+            let left = self.rule.seconds.map(|seconds| seconds - session.elapsed_seconds());
+            self.deadline = left.and_then(after);
+        }
+        // Earlier the first samples would be worth nothing without what was counted meanwhile.
+        let kept = self.checkpoint.as_ref().filter(|_| session.has_final_laws());
+        let due = kept.and_then(|kept| kept.written.checked_add(kept.every));
+        if due.is_some_and(|due| due <= Instant::now()) {
+            if let Err(failure) = self.keep(session) {
+                say(notices, failure.to_string());
+            }
+            if self.deadline.is_none_or(|deadline| deadline > Instant::now()) {
+                interrupt.go_on();
+            }
+        }
+        let kept = self.checkpoint.as_ref().filter(|_| session.has_final_laws());
+        let due = kept.and_then(|kept| kept.written.checked_add(kept.every));
+        alarm.set(self.deadline.into_iter().chain(due).min());
+    }
+
+    /// Writes the checkpoint, if there is to be one.
+    ///
+    /// # Errors
+    /// If it cannot be written; the one from before is kept.
+    pub(super) fn keep(&mut self, session: &Session<'_>) -> Result<()> {
+        let facts = self.facts(session.figures(), Vec::new());
+        let Some(checkpoint) = &mut self.checkpoint else { return Ok(()) };
+        let written = write_film(&checkpoint.path, &facts, session.film(), self.first);
+        checkpoint.written = Instant::now();
+        written
+    }
+
+    /// Writes this share's own samples for `lightgrid merge`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub(super) fn write_part(&self, path: &Path, record: &Record<'_>) -> Result<()> {
+        let mut figures = *record.figures;
+        if !record.with_times {
+            figures =
+                Figures { learning_seconds: 0.0, law_seconds: 0.0, render_seconds: 0.0, ..figures };
+        }
+        write_film(path, &self.facts(figures, record.metadata()), record.film, 0)
+    }
+
+    fn facts(&self, figures: Figures, metadata: Vec<(String, String)>) -> FilmFacts {
+        FilmFacts {
+            picture: self.picture.clone(),
+            part: self.part,
+            samples: self.samples,
+            target: self.target,
+            figures,
+            metadata,
+        }
+    }
+}
+
+/// What a picture's samples depend on, by names for sentences. Built-in scenes and skies are known by
+/// their names: another processor's sines may differ in the last bit.
+fn identity(
+    arguments: &RenderArguments,
+    world: &World,
+    environment: &Environment,
+    view: &View,
+) -> Vec<(String, String)> {
+    let View {
+        camera,
+        width,
+        height,
+        filter,
+        sampling,
+        limits,
+        seed,
+        points,
+        grid_columns,
+        laws,
+        medium,
+        ..
+    } = view;
+    let scene = match builtin::names().contains(&arguments.scene.as_str()) {
+        true => arguments.scene.clone(),
+        false => Digest::new().scene(&world.scene).to_string(),
+    };
+    let map = match arguments.env.starts_with("sky:") {
+        true => arguments.env.clone(),
+        false => Digest::new().map(environment.map()).to_string(),
+    };
+    let settings = Digest::new()
+        .debug(&(filter, sampling, sharing(arguments), limits, points, grid_columns))
+        .debug(&(laws, medium, view.background, view.layers, arguments.learning_paths))
+        .debug(&environment_options(arguments));
+    let pairs = [
+        ("version", env!("CARGO_PKG_VERSION").to_owned()),
+        ("scene", scene),
+        ("map", map),
+        ("camera", Digest::new().debug(camera).to_string()),
+        ("size", format!("{width}x{height}")),
+        ("region", format!("{:?}", view.crop)),
+        ("seed", seed.to_string()),
+        ("settings", settings.to_string()),
+    ];
+    pairs.map(|(name, value)| (name.to_owned(), value)).into()
+}

@@ -1,0 +1,74 @@
+//! What something was made of, as a short name: the same content gives the same name.
+
+use std::fmt;
+
+use crate::image::Image;
+use crate::scene::Scene;
+
+/// A running 64-bit digest; not for secrets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Digest(u64);
+
+impl Digest {
+    /// Of nothing.
+    pub(crate) fn new() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+
+    /// Takes in eight bytes; the finaliser is MurmurHash3's.
+    fn word(&mut self, word: u64) {
+        let mut x = (self.0 ^ word).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        x = (x ^ (x >> 33)).wrapping_mul(0xc4ce_b9fe_1a85_ec53);
+        self.0 = x ^ (x >> 29);
+    }
+
+    /// Takes in bytes and their number.
+    pub(crate) fn bytes(mut self, bytes: &[u8]) -> Self {
+        let (words, rest) = bytes.as_chunks::<8>();
+        words.iter().for_each(|word| self.word(u64::from_le_bytes(*word)));
+        let mut last = [0; 8];
+        last[..rest.len()].copy_from_slice(rest);
+        self.word(u64::from_le_bytes(last));
+        self.word(bytes.len() as u64);
+        self
+    }
+
+    /// Takes in all of a scene that a picture depends on. Tangents follow from the rest.
+    pub(crate) fn scene(self, scene: &Scene) -> Self {
+        let digest = self
+            .bytes(bytemuck::cast_slice(&scene.positions))
+            .bytes(bytemuck::cast_slice(&scene.normals))
+            .bytes(bytemuck::cast_slice(&scene.uvs[0]))
+            .bytes(bytemuck::cast_slice(&scene.uvs[1]))
+            .bytes(bytemuck::cast_slice(&scene.colors))
+            .bytes(bytemuck::cast_slice(scene.triangles.as_flattened()))
+            .bytes(bytemuck::cast_slice(&scene.triangle_materials))
+            .debug(&scene.materials)
+            .debug(&scene.textures)
+            .debug(&scene.lights)
+            .debug(&scene.medium);
+        let texels = scene.images.iter().map(|image| image.texels.as_flattened());
+        texels.fold(digest, Self::bytes)
+    }
+
+    /// Takes in a map.
+    pub(crate) fn map(self, map: &Image) -> Self {
+        self.bytes(bytemuck::cast_slice(map.pixels.as_flattened()))
+    }
+
+    /// The digest as a number.
+    pub(crate) fn value(self) -> u64 {
+        self.0
+    }
+
+    /// Takes in what a value prints.
+    pub(crate) fn debug(self, value: &impl fmt::Debug) -> Self {
+        self.bytes(format!("{value:?}").as_bytes())
+    }
+}
+
+impl fmt::Display for Digest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:016x}", self.0)
+    }
+}

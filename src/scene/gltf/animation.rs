@@ -1,0 +1,95 @@
+//! How cameras move by a file's animations; everything else stays at rest.
+
+use std::collections::BTreeMap;
+
+use glam::DAffine3;
+use gltf::json;
+use json::accessor::Type;
+use json::animation::{Interpolation as Written, Property, Sampler};
+use json::validation::Checked;
+
+use super::Fallible;
+use super::accessor::Elements;
+use super::buffers::File;
+use super::pose::{Nodes, local_transform};
+use crate::scene::camera_path::{CameraPath, Interpolation, Link, Track};
+
+/// What is animated of the nodes of a file.
+pub(super) struct Channels<'a> {
+    file: &'a File<'a>,
+    /// Of each node and property, by the first animation that has it.
+    samplers: BTreeMap<(usize, u8), &'a Sampler>,
+}
+
+impl<'a> Channels<'a> {
+    /// Of all animations together. What refers to nothing is passed over.
+    pub(super) fn new(file: &'a File<'a>) -> Self {
+        let mut samplers = BTreeMap::new();
+        for animation in &file.root.animations {
+            for channel in &animation.channels {
+                let Checked::Valid(property) = channel.target.path else { continue };
+                if let Some(sampler) = animation.samplers.get(channel.sampler.value()) {
+                    let target = (channel.target.node.value(), property as u8);
+                    samplers.entry(target).or_insert(sampler);
+                }
+            }
+        }
+        Self { file, samplers }
+    }
+
+    /// The movement of a camera at a node; `None` if it stands still.
+    pub(super) fn camera_path(&self, nodes: &Nodes, node: usize) -> Fallible<Option<CameraPath>> {
+        let mut links = Vec::new();
+        // Nodes at rest below the last one that moves.
+        let mut fixed = DAffine3::IDENTITY;
+        let mut next = Some(node);
+        while let Some(node) = next {
+            match self.moving(node)? {
+                None => fixed = local_transform(&self.file.root.nodes[node]) * fixed,
+                Some(link) => links.extend([Link::Fixed(std::mem::take(&mut fixed)), link]),
+            }
+            next = nodes.parents[node];
+        }
+        links.push(Link::Fixed(fixed));
+        links.reverse();
+        Ok(CameraPath::new(links))
+    }
+
+    /// A node of which something is animated.
+    fn moving(&self, number: usize) -> Fallible<Option<Link>> {
+        let node = &self.file.root.nodes[number];
+        let translation = self.track::<3>(number, Property::Translation)?;
+        let rotation = self.track::<4>(number, Property::Rotation)?;
+        let scale = self.track::<3>(number, Property::Scale)?;
+        let is_still = translation.is_none() && rotation.is_none() && scale.is_none();
+        if is_still || node.matrix.is_some() {
+            return Ok(None);
+        }
+        let at_rest = |value: Option<[f32; 3]>, default| {
+            Track::constant(value.map_or(default, |value| value.map(f64::from)))
+        };
+        let turned = node.rotation.unwrap_or_default().0.map(f64::from);
+        Ok(Some(Link::Moving {
+            translation: translation.unwrap_or_else(|| at_rest(node.translation, [0.0; 3])),
+            rotation: rotation.unwrap_or_else(|| Track::constant(turned)),
+            scale: scale.unwrap_or_else(|| at_rest(node.scale, [1.0; 3])),
+        }))
+    }
+
+    /// The keys of one property of a node, if it is animated.
+    fn track<const N: usize>(&self, node: usize, property: Property) -> Fallible<Option<Track<N>>> {
+        let Some(sampler) = self.samplers.get(&(node, property as u8)) else { return Ok(None) };
+        let interpolation = match sampler.interpolation {
+            Checked::Valid(Written::Linear) => Interpolation::Linear,
+            Checked::Valid(Written::Step) => Interpolation::Step,
+            Checked::Valid(Written::CubicSpline) => Interpolation::Cubic,
+            Checked::Invalid => return Err("its interpolation is unknown to glTF 2.0".into()),
+        };
+        let times = Elements::open(self.file, sampler.input, &[Type::Scalar])?;
+        let values = Elements::open(self.file, sampler.output, &[Type::Vec3, Type::Vec4])?;
+        let times = (0..times.count).map(|key| times.floats::<1>(key)[0].into()).collect();
+        let values = (0..values.count).map(|key| values.floats::<N>(key).map(f64::from)).collect();
+        let track = Track::new(times, values, interpolation);
+        track.map(Some).ok_or_else(|| "its keys do not rise or have no values".into())
+    }
+}
