@@ -54,7 +54,10 @@ impl Desk {
         std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut number)
             .expect("Xvfb says its display");
         let display = format!(":{}", number.trim());
-        Some(Self { server, window: None, display, id: String::new(), folder })
+        let desk = Self { server, window: None, display, id: String::new(), folder };
+        // It has been seen to refuse the first connection when all cores are busy.
+        desk.wait_for("display", || (!desk.xdotool("getdisplaygeometry").is_empty()).then_some(()));
+        Some(desk)
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -67,11 +70,14 @@ impl Desk {
         command.current_dir(self.folder.path()).args(line.split_whitespace());
         command.env("DISPLAY", &self.display).env_remove("WAYLAND_DISPLAY");
         command.stderr(std::fs::File::create(self.path("says.txt")).expect("a file"));
-        self.window = Some(command.spawn().expect("the binary starts"));
+        let mut window = command.spawn().expect("the binary starts");
         self.id = self.wait_for("window", || {
+            let ended = window.try_wait().expect("asked");
+            assert!(ended.is_none(), "it ends with {ended:?}: {}", self.says());
             let found = self.xdotool("search --onlyvisible --name lightgrid");
             found.lines().next().map(str::to_owned).filter(|id| !id.is_empty())
         });
+        self.window = Some(window);
         self.xdotool(&format!("windowfocus {}", self.id));
         self.wait_for("buttons", || (self.brightness() > 8.0).then_some(()));
     }

@@ -252,8 +252,8 @@ fn program_of(stand: &Stand, kernel: Kernel) -> Program {
 
 /// Functions whose effect is no return value: entry points, and what looks at the map to count,
 /// which `both_devices_learn_the_same_counters` and the tests of pictures compare.
-const COMPARED_ELSEWHERE: [&str; 5] =
-    ["add_to_film", "learn", "look_at_map", "pixel_in_tile", "render"];
+const COMPARED_ELSEWHERE: [&str; 6] =
+    ["add_to_film", "learn", "look_at_map", "path_anywhere", "pixel_in_tile", "render"];
 
 /// Whatever the shaders define runs in some probe.
 #[test]
