@@ -289,9 +289,11 @@ fn refined(
                 Some(_) => SPREAD_SAMPLES + cell.freedom / (per_pixel * per_pixel),
                 None => 0.0,
             };
+            let expected = estimate.spread;
             estimate.spread =
-                (cell.deviation + around * estimate.spread) / (cell.freedom + around).max(1.0);
-            estimate.variance = estimate.spread / cell.samples;
+                (cell.deviation + around * expected) / (cell.freedom + around).max(1.0);
+            // A pixel that has met little light is too dark and sure of it.
+            estimate.variance = estimate.spread.max(expected) / cell.samples;
             if coarser.is_some() {
                 estimate.detail = mean - estimate.light;
             } else {

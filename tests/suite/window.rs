@@ -43,7 +43,17 @@ impl Desk {
         let folder = tempfile::tempdir().expect("a folder");
         let screen = format!("{}x{}x24", Self::WIDTH, Self::HEIGHT);
         let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", &screen, "-nolisten", "tcp", "-fbdir"])
+            .args([
+                "-displayfd",
+                "1",
+                "-noreset",
+                "-screen",
+                "0",
+                &screen,
+                "-nolisten",
+                "tcp",
+                "-fbdir",
+            ])
             .arg(folder.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -55,7 +65,8 @@ impl Desk {
             .expect("Xvfb says its display");
         let display = format!(":{}", number.trim());
         let desk = Self { server, window: None, display, id: String::new(), folder };
-        // It has been seen to refuse the first connection when all cores are busy.
+        // It has been seen to refuse the first connection when all cores are busy. (Nor does it take any
+        // while it starts anew after its last client, if it may.)
         desk.wait_for("display", || (!desk.xdotool("getdisplaygeometry").is_empty()).then_some(()));
         Some(desk)
     }
@@ -276,8 +287,8 @@ fn check(desk: &Desk, when: &str) {
     let first = errors[0];
     assert!(errors.iter().any(|error| *error < 0.5 * first), "{when}: {errors:.2?}");
     for (at, pair) in errors.windows(2).enumerate() {
-        // Two per cent, and a fifth of a level for rounding.
-        assert!(pair[1] <= 1.02 * pair[0] + 0.2, "{when}: worse at {at}: {errors:.2?}");
+        // Two per cent, and half a level: what it is compared with is rounded and has noise, too.
+        assert!(pair[1] <= 1.02 * pair[0] + 0.5, "{when}: worse at {at}: {errors:.2?}");
     }
     // Three seconds: the other tests may have taken all cores meanwhile.
     let still = |pair: &[Vec<u8>]| pair.iter().all(|picture| *picture == pair[0]);

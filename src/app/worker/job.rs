@@ -134,6 +134,8 @@ pub(super) struct Job<'a> {
     readings: Vec<Reading>,
     /// The laws published last, with what tells whether they are still those in use.
     laws: Option<((usize, u64), Arc<LightGrid>)>,
+    /// The calm film published last, of so many samples in all.
+    calm_film: Option<(u64, Arc<Film>)>,
     /// How the error of the main and of the plain picture fell.
     curves: [Vec<Point>; 2],
 }
@@ -156,6 +158,7 @@ impl<'a> Job<'a> {
             publish_gap: Duration::ZERO,
             readings: Vec::new(),
             laws: None,
+            calm_film: None,
             curves: [Vec::new(), Vec::new()],
         }
     }
@@ -364,6 +367,7 @@ impl<'a> Job<'a> {
 
     fn end_calm(&mut self, calm: &mut Option<Session<'_>>) {
         if let Some(mut calm) = calm.take() {
+            self.calm_film = None;
             self.legacy.keep_lessons(&mut calm, &self.request);
         }
     }
@@ -564,12 +568,16 @@ impl<'a> Job<'a> {
 
     /// What is shown together with the session's own film: the calm one once it has more to say than
     /// what was seen before.
-    fn shown_under(&self, main: &Session<'_>, calm: Option<&Session<'_>>) -> Option<Under> {
+    fn shown_under(&mut self, main: &Session<'_>, calm: Option<&Session<'_>>) -> Option<Under> {
         let before = self.under().map(|film| Under { film, worth: 1.0, is_cached: false });
         let seen = before.as_ref().map_or(0, |under| under.film.total_samples());
         let Some(calm) = calm.filter(|calm| calm.figures().samples > seen) else { return before };
-        let worth = calm_worth(main.samples());
-        Some(Under { film: Arc::new(calm.film().clone()), worth, is_cached: true })
+        // It is megabytes and is soon complete.
+        let samples = calm.figures().samples;
+        let kept = self.calm_film.take().filter(|(of, _)| *of == samples);
+        let kept = kept.unwrap_or_else(|| (samples, Arc::new(calm.film().clone())));
+        let film = Arc::clone(&self.calm_film.insert(kept).1);
+        Some(Under { film, worth: calm_worth(main.samples()), is_cached: true })
     }
 
     /// Adds a point to a curve, unless nothing has happened since the last one.
