@@ -387,11 +387,7 @@ struct Source {
 impl PartialEq for Source {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.take.film, &other.take.film)
-            && match (&self.under, &other.under) {
-                (None, None) => true,
-                (Some(one), Some(another)) => one.is_same(another),
-                _ => false,
-            }
+            && self.under == other.under
             && (self.denoiser, self.is_whole) == (other.denoiser, other.is_whole)
     }
 }

@@ -37,9 +37,4 @@ impl Path<'_> {
         }
         is_known
     }
-
-    /// Whether the path is outside of all bodies.
-    pub(super) fn is_in_air(&self) -> bool {
-        self.body.interior.is_none()
-    }
 }

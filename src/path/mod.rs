@@ -367,6 +367,11 @@ impl<'a> Path<'a> {
         None
     }
 
+    /// Whether the path is outside of all bodies.
+    fn is_in_air(&self) -> bool {
+        self.body.interior.is_none()
+    }
+
     /// Whether nothing is left that f32 can weigh.
     fn has_faded(&self) -> bool {
         self.throughput.max_element() < f32::MIN_POSITIVE
@@ -390,7 +395,7 @@ impl<'a> Path<'a> {
         self.throughput *= flight.weight;
         let position = origin + direction * (from + flight.scattered_at?);
         // From inside of a solid the map is not seen: its vertices would spoil what fog learns.
-        let cells = self.tracer.cells().filter(|_| self.body.interior.is_none());
+        let cells = self.tracer.cells().filter(|_| self.is_in_air());
         let cell = cells.map(|cells| cells.cell_in_medium(position));
         Some(self.tracer.vertex(position, cell, Scatterer::Medium(interior.phase)))
     }

@@ -41,9 +41,9 @@ impl PathTracer<'_> {
         let mut own_bsdf = None;
         while let Some(vertex) = path.next_vertex(&mut own_bsdf) {
             let arrived = path.bounces;
-            let mut done = teachers.extract_if(.., |teacher| arrived == teacher.vertex + window);
-            done.by_ref().for_each(|teacher| teacher.teach(&path, sums, self.cache));
-            drop(done);
+            for done in teachers.extract_if(.., |teacher| arrived == teacher.vertex + window) {
+                done.teach(&path, sums, self.cache);
+            }
             teachers.extend(Teacher::new(&path, &vertex));
             if !path.visit(&vertex) {
                 break;

@@ -38,7 +38,6 @@ pub struct RadianceCache {
     /// albedo, linear RGB.
     slots: Vec<[u32; 4]>,
     mean: Vec3,
-    learned_cells: usize,
 }
 
 impl RadianceCache {
@@ -67,13 +66,9 @@ impl RadianceCache {
         (check != 0).then(|| Vec3::from_array(rgb.map(f32::from_bits)))
     }
 
-    /// Number of cells that paths have taught.
-    pub fn learned_cells(&self) -> usize {
-        self.learned_cells
-    }
-
-    /// Bytes held, those of the sums that it is made of included.
-    pub fn memory_bytes(&self) -> usize {
-        self.slots.len() * size_of::<[u32; 4]>() + RadianceSums::BYTES
+    /// Number of slots in use, those of parents included.
+    #[cfg(test)]
+    pub(crate) fn used_slots(&self) -> usize {
+        self.slots.iter().filter(|[check, ..]| *check != 0).count()
     }
 }

@@ -17,7 +17,8 @@ const ALBEDO_AT: usize = 3;
 const RADIANCE_AT: usize = 6;
 /// An albedo of 1: 2^24 paths do not overflow a word.
 const ALBEDO_ONE: f32 = 255.0;
-/// The brightest radiance there is in the scene; estimates may be 2^[`HEADROOM`] times as bright.
+/// Units of the brightest radiance there is in the scene, and most of one estimate: so many times 2^24
+/// do not overflow two words.
 const BRIGHTEST: f32 = (1_u64 << 36) as f32;
 const MOST: f32 = (1_u64 << 40) as f32;
 /// Share of slots in use beyond which cells no longer find one for sure.
@@ -44,9 +45,6 @@ struct Tally {
 }
 
 impl RadianceSums {
-    /// Bytes held.
-    pub const BYTES: usize = SLOTS * WORDS * size_of::<u32>();
-
     /// Empty. `brightest` is about the largest radiance that anything emits.
     pub fn new(cells: CacheCells, brightest: f32) -> Self {
         let scale = BRIGHTEST / brightest.clamp(f32::MIN_POSITIVE * BRIGHTEST, f32::MAX);
@@ -148,7 +146,6 @@ impl RadianceSums {
             cells: self.cells,
             slots: tallies.iter().map(slot_of).collect(),
             mean: mean.as_vec3(),
-            learned_cells: tallies.iter().filter(|tally| tally.parent.is_some()).count(),
         })
     }
 }

@@ -105,16 +105,19 @@ impl Lessons {
         if paths < self.end() {
             return;
         }
-        let mut cells = *self.sums.cells();
+        let cells = *self.sums.cells();
         let cache = self.sums.cache();
-        if cache.is_none() {
-            cells.edge *= 2.0;
-        }
-        if cache.is_none() || self.cache.is_none() {
+        let cells = match &cache {
+            Some(_) if self.cache.is_some() => None,
+            // What follows the pilot begins with empty sums.
+            Some(_) => Some(cells),
+            None => Some(CacheCells { edge: 2.0 * cells.edge, ..cells }),
+        };
+        if let Some(cells) = cells {
             self.sums = RadianceSums::new(cells, self.brightest);
             self.paths = 0;
         }
-        self.cache = cache.or(self.cache.take());
+        self.cache = cache;
     }
 
     /// Whether its cells are as large as those for a camera at `position` would be, or nearly so.
@@ -147,7 +150,6 @@ mod tests {
     use super::*;
     use crate::environment::{EnvironmentOptions, sky};
     use crate::light_grid::LightGrid;
-    use crate::path::{Background, PathTracer};
     use crate::render::cpu;
     use crate::render::gpu::tests::view;
     use crate::scene::builtin;
@@ -166,16 +168,7 @@ mod tests {
         let (world, environment, view) = office();
         let rays = view.rays();
         let laws = LightGrid::whole_map(environment.tile_energies());
-        let tracer = PathTracer {
-            world: &world,
-            environment: &environment,
-            grid: laws.as_ref(),
-            cache: None,
-            fog: None,
-            background: Background::Map,
-            limits: view.limits,
-            counts: None,
-        };
+        let tracer = view.tracer(&world, &environment, laws.as_ref());
         let lessons = Lessons::new(&world, &environment, &view, &rays).expect("there is light");
         let places = (0..900).filter_map(|i| {
             let at = Vec2::new((i % 30) as f32 * 2.1, (i / 30) as f32 * 1.2);

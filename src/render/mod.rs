@@ -143,12 +143,8 @@ impl View {
         }
     }
 
-    /// How pixels share second vertices where there is no fog; `None` if they do not. Paths that end in
-    /// the radiance cache have nothing to share.
+    /// How pixels share second vertices where there is no fog; `None` if they do not.
     pub fn shared_tile(&self) -> Option<SharedTile> {
-        if self.gi == Gi::Cached {
-            return None;
-        }
         match self.decided_sharing() {
             Sharing::Auto | Sharing::Off => None,
             Sharing::Small => Some(SharedTile::SMALL),
@@ -156,13 +152,15 @@ impl View {
         }
     }
 
-    /// What `sharing` comes to where it is left open.
+    /// What `sharing` comes to where it is left open. Paths that end in the radiance cache have nothing to
+    /// share.
     pub fn decided_sharing(&self) -> Sharing {
         let [width, height] = self.whole_size();
         let suits = self.sampling == Sampling::Adaptive
             && self.limits.bounces >= 2
             && width.min(height) >= LEAST_SHARED_SIZE;
         match self.sharing {
+            _ if self.gi == Gi::Cached => Sharing::Off,
             Sharing::Auto if suits => Sharing::Large,
             Sharing::Auto => Sharing::Off,
             asked => asked,
@@ -182,6 +180,25 @@ impl View {
                 let whole = CameraRays::new(&self.camera, width, height);
                 whole.cropped(corner, [self.width, self.height])
             }
+        }
+    }
+
+    /// What follows its paths by these laws; it counts nothing, and no path ends in a cache.
+    pub(crate) fn tracer<'a>(
+        &self,
+        world: &'a World,
+        environment: &'a Environment,
+        grid: Option<&'a LightGrid>,
+    ) -> PathTracer<'a> {
+        PathTracer {
+            world,
+            environment,
+            grid,
+            counts: None,
+            cache: None,
+            fog: self.fog(world),
+            background: self.background,
+            limits: self.limits,
         }
     }
 
@@ -298,7 +315,6 @@ pub struct Session<'a> {
     environment: &'a Environment,
     view: View,
     rays: CameraRays,
-    fog: Option<Fog>,
     engine: Engine,
     /// The film as it is; made when somebody asks.
     film: OnceLock<Film>,
@@ -360,7 +376,6 @@ impl<'a> Session<'a> {
             last_read: Instant::now(),
             world,
             environment,
-            fog: view.fog(world),
             view,
             rays,
             engine: Engine::Cpu,
@@ -556,20 +571,15 @@ impl<'a> Session<'a> {
     }
 
     /// Goes on with what paths have taught the radiance cache before, in the same world with the same
-    /// light, if it suits the camera.
+    /// light. It is to suit the camera ([`Lessons::suits`]).
     ///
     /// # Errors
     /// If it does not fit on the GPU.
     pub(crate) fn set_lessons(&mut self, lessons: Lessons) -> Result<()> {
-        if self.lessons.is_none() || !lessons.suits(self.rays.position()) {
-            return Ok(());
-        }
-        self.lessons = Some(lessons);
+        let lessons = self.lessons.insert(lessons);
         match &mut self.engine {
             Engine::Cpu => Ok(()),
-            Engine::Gpu(renderer) => {
-                renderer.set_cache(self.lessons.as_ref().and_then(Lessons::cache))
-            }
+            Engine::Gpu(renderer) => renderer.set_cache(lessons.cache()),
         }
     }
 
@@ -701,16 +711,9 @@ impl<'a> Session<'a> {
     }
 
     fn tracer<'b>(&'b self, counts: Option<&'b LearningGrid>) -> PathTracer<'b> {
-        PathTracer {
-            world: self.world,
-            environment: self.environment,
-            grid: self.grid(),
-            counts,
-            cache: self.lessons.as_ref().and_then(Lessons::cache),
-            fog: self.fog,
-            background: self.view.background,
-            limits: self.view.limits,
-        }
+        let cache = self.lessons.as_ref().and_then(Lessons::cache);
+        let tracer = self.view.tracer(self.world, self.environment, self.grid());
+        PathTracer { counts, cache, ..tracer }
     }
 
     fn learn(&mut self, cancel: &AtomicBool) -> Result<()> {
@@ -752,7 +755,7 @@ impl<'a> Session<'a> {
             && let Some(paths) = lessons.next()
             && !cancel.load(Ordering::Relaxed)
         {
-            let (sums, cache) = (lessons.sums(), lessons.cache());
+            let sums = lessons.sums();
             let (done, rays) = match &mut self.engine {
                 Engine::Cpu => {
                     let paths = paths.start..paths.end.min(paths.start + gi::PATHS_AT_A_TIME);
@@ -760,7 +763,7 @@ impl<'a> Session<'a> {
                         cpu::teach(&self.tracer(None), &self.rays, &self.view, paths.clone(), sums);
                     (paths.end, rays)
                 }
-                Engine::Gpu(renderer) => renderer.teach(paths, sums, cache, cancel)?,
+                Engine::Gpu(renderer) => renderer.teach(paths, sums, cancel)?,
             };
             self.figures.learning_rays += rays;
             self.figures.teaching_paths = done;

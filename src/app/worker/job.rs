@@ -77,12 +77,12 @@ impl Legacy {
             && self.world.as_ref().is_some_and(|world| Arc::ptr_eq(world, &request.world))
     }
 
-    /// Lets a session go on with what the radiance cache has been taught in this scene with this light.
-    fn give_lessons(&mut self, session: &mut Session<'_>, request: &Request) -> Result<()> {
-        match self.lessons.take_if(|(_, of)| of.is_lit_like(request)) {
-            Some((lessons, _)) => session.set_lessons(lessons),
-            None => Ok(()),
-        }
+    /// Whether the radiance cache was taught in this scene with this light, near by.
+    fn has_lessons_for(&self, request: &Request) -> bool {
+        let position = request.view.camera.world_from_camera.translation.into();
+        self.lessons
+            .as_ref()
+            .is_some_and(|(lessons, of)| of.is_lit_like(request) && lessons.suits(position))
     }
 
     /// Keeps them for the next session.
@@ -176,8 +176,6 @@ impl<'a> Job<'a> {
     /// Small pictures for as long as the camera rests at this very place.
     pub(super) fn follow(&mut self, world: &World, environment: &Environment) {
         let mut session = self.small_session(world, environment);
-        let given = self.legacy.give_lessons(&mut session, &self.request);
-        self.go_on(&mut session, given);
         while !self.is_superseded() {
             // The first pass is never cut short: some picture is better than none.
             let cut = session.samples() > 0;
@@ -206,9 +204,7 @@ impl<'a> Job<'a> {
             crop.whole = crop.whole.map(|pixels| (pixels / shrink).max(1));
         }
         // Learning would take longer than the picture.
-        let has_learned =
-            self.legacy.lessons.as_ref().is_some_and(|(_, of)| of.is_lit_like(&self.request));
-        if self.request.is_calm && has_learned {
+        if self.request.is_calm && self.legacy.has_lessons_for(&self.request) {
             view.gi = Gi::Cached;
         }
         self.experienced_session(world, environment, view)
@@ -223,8 +219,16 @@ impl<'a> Job<'a> {
     ) -> Session<'b> {
         let mut session = Session::new(world, environment, view);
         session.finish_learning();
-        if let Some(laws) = self.legacy.laws_for(&self.request) {
+        let is_taught = session.view().law_options().is_some();
+        if let Some(laws) = self.legacy.laws_for(&self.request).filter(|_| is_taught) {
             let given = session.set_grid((*laws).clone());
+            self.go_on(&mut session, given);
+        }
+        if session.view().gi == Gi::Cached
+            && self.legacy.has_lessons_for(&self.request)
+            && let Some((lessons, _)) = self.legacy.lessons.take()
+        {
+            let given = session.set_lessons(lessons);
             self.go_on(&mut session, given);
         }
         session
@@ -273,7 +277,8 @@ impl<'a> Job<'a> {
             if !wants_calm {
                 self.end_calm(&mut calm);
             } else if calm.is_none() && main.phase() == Phase::Rendering {
-                calm = Some(self.calm_session(world, environment, &main));
+                let view = View { gi: Gi::Cached, ..view.clone() };
+                calm = Some(self.experienced_session(world, environment, view));
             }
             if !self.request.split {
                 plain = None;
@@ -347,22 +352,6 @@ impl<'a> Job<'a> {
             && !self.request.split
             && !self.legacy.device.is_quick(&self.request)
             && calm_worth(main.samples()) > 0.0
-    }
-
-    /// A session whose paths end in the radiance cache, with the laws of `main`.
-    fn calm_session<'b>(
-        &mut self,
-        world: &'b World,
-        environment: &'b Environment,
-        main: &Session<'_>,
-    ) -> Session<'b> {
-        let view = View { gi: Gi::Cached, ..self.request.view.clone() };
-        let mut calm = Session::new(world, environment, view);
-        calm.finish_learning();
-        let laws = main.grid().map_or(Ok(()), |laws| calm.set_grid(laws.clone()));
-        let given = laws.and_then(|()| self.legacy.give_lessons(&mut calm, &self.request));
-        self.go_on(&mut calm, given);
-        calm
     }
 
     fn end_calm(&mut self, calm: &mut Option<Session<'_>>) {

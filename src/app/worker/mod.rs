@@ -195,10 +195,13 @@ impl Under {
         let own = self.worth * self.film.min_samples() as f32;
         if own > 0.0 { own / (own + samples as f32) } else { 0.0 }
     }
+}
 
-    /// Whether both are the same film and count alike.
-    pub(super) fn is_same(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.film, &other.film) && self.worth == other.worth
+/// Of the very same film, counting alike.
+impl PartialEq for Under {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.film, &other.film)
+            && (self.worth, self.is_cached) == (other.worth, other.is_cached)
     }
 }
 

@@ -87,16 +87,7 @@ impl Stand {
     }
 
     pub(super) fn tracer(&self) -> PathTracer<'_> {
-        PathTracer {
-            world: &self.world,
-            environment: &self.environment,
-            grid: Some(&self.grid),
-            counts: None,
-            limits: self.view.limits,
-            cache: None,
-            fog: self.view.fog(&self.world),
-            background: self.view.background,
-        }
+        self.view.tracer(&self.world, &self.environment, Some(&self.grid))
     }
 }
 
