@@ -157,14 +157,15 @@ impl Cell {
     }
 
     /// Four cells as one. What is behind all surfaces may be a thousand times as bright: the larger
-    /// part speaks for both.
+    /// part speaks for both, surfaces where they are as many. Cells count, not samples: of those some
+    /// have one more for as long as a pass lasts, and edges would flicker.
     fn together(four: [Option<&Self>; 4]) -> Self {
         let four = four.map(|cell| cell.filter(|cell| cell.samples > 0.0));
-        let weight: f32 =
-            four.iter().flatten().map(|c| if c.is_sky() { c.samples } else { -c.samples }).sum();
+        let sky = four.iter().flatten().filter(|cell| cell.is_sky()).count();
+        let is_sky = 2 * sky > four.iter().flatten().count();
         let mut sum = Self::default();
         let mut alike: Option<(Guide, Self, f32, f32)> = None;
-        for cell in four.into_iter().flatten().filter(|cell| cell.is_sky() == (weight > 0.0)) {
+        for cell in four.into_iter().flatten().filter(|cell| cell.is_sky() == is_sky) {
             sum.add(cell, 1.0);
             let (first, like, squares, count) =
                 alike.get_or_insert((cell.guide(), Self::default(), 0.0, 0.0));
@@ -372,7 +373,7 @@ fn wieners_share(estimates: &Scale<Estimate>, (x, y): (usize, usize), variance: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::path::PathResult;
+    use crate::path::{FirstHit, PathResult};
 
     /// A film where every `every`-th pixel of every `every`-th row has samples of this light.
     fn film(
@@ -441,6 +442,35 @@ mod tests {
         let image = blend(&film([40, 30], 1, 2, light), None);
         let brightest = image.pixels.iter().map(|p| p[0]).fold(0.0, f32::max);
         assert!(brightest < 25.0, "{brightest}");
+    }
+
+    /// A window's edge while a pass is under way, when part of the rows has one sample more.
+    #[test]
+    fn edges_of_the_sky_do_not_change_from_sample_to_sample() {
+        let window = |more_rows: u32| {
+            let mut film = Film::new(48, 48, true);
+            for (x, y) in (0..48).flat_map(|y| (0..48).map(move |x| (x, y))) {
+                let is_sky = (13..27).contains(&x) && (11..35).contains(&y);
+                let surface = FirstHit { albedo: Vec3::splat(0.5), normal: Vec3::Z, depth: 4.0 };
+                for sample in 0..8 + u32::from(y < more_rows) {
+                    let light = if is_sky { 100.0 } else { 0.5 * noise(x, y, sample) };
+                    let (radiance, first_hit) = (Vec3::splat(light), (!is_sky).then_some(surface));
+                    film.add(
+                        x,
+                        y,
+                        &PathResult { radiance, first_hit, rays: 1, was_invalid: false },
+                    );
+                }
+            }
+            blend(&film, None)
+        };
+        let before = window(0);
+        for rows in [11, 12, 35, 36] {
+            let now = window(rows);
+            let off = now.pixels.iter().zip(&before.pixels).map(|(a, b)| (a[0] - b[0]).abs());
+            let most = off.fold(0.0, f32::max);
+            assert!(most < 0.15, "{most} with {rows} rows ahead");
+        }
     }
 
     #[test]
