@@ -39,10 +39,12 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
     if arguments.json {
         return print(crate::output::record::to_json(&comparison)?);
     }
-    let Comparison { mean_ratio, mse, rel_mse, trimmed_rel_mse, flip, .. } = comparison;
+    let Comparison { mean_ratio, mse, rel_mse, trimmed_rel_mse, block_rel_mse, flip, .. } =
+        comparison;
     print(format_args!("mean ratio        {mean_ratio:.5}"))?;
     print(format_args!("MSE               {mse:.4e}"))?;
     print(format_args!("relMSE            {rel_mse:.4e}"))?;
     print(format_args!("trimmed relMSE    {trimmed_rel_mse:.4e}"))?;
+    print(format_args!("of 8x8 blocks     {block_rel_mse:.4e}"))?;
     print(format_args!("FLIP              {flip:.4}"))
 }

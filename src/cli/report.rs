@@ -7,8 +7,8 @@ use super::interrupt::kept;
 use super::progress::Progress;
 use super::values;
 use crate::error::{Error, Result};
-use crate::render::Sampling;
 use crate::render::gpu::adapters;
+use crate::render::{Gi, Sampling};
 use crate::report::{
     Device, Effort, Frame, Method, Options, Plan, Report, Row, ablations, check, duration, make,
     markdown_table, sat, talk,
@@ -54,6 +54,9 @@ struct FreeArguments {
         value_name = "LIST"
     )]
     sampling: Vec<Sampling>,
+    /// Whether paths are followed to their end, end in the radiance cache, or are measured both ways.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "exact", value_name = "LIST")]
+    gi: Vec<Gi>,
     /// A picture to take as the reference, linear, of the size of the runs (box filter, as many
     /// bounces); without it one is computed and kept.
     #[arg(long, value_name = "FILE")]
@@ -213,9 +216,11 @@ fn rows(places: &PlaceArguments) -> Vec<Row> {
 
 fn free(arguments: &FreeArguments, command: String) -> Plan {
     let mut methods: Vec<Method> = Vec::new();
-    for method in arguments.sampling.iter().map(|sampling| Method::of(*sampling)) {
-        if !methods.contains(&method) {
-            methods.push(method);
+    for gi in &arguments.gi {
+        for method in arguments.sampling.iter().map(|sampling| Method::of(*sampling).with_gi(*gi)) {
+            if !methods.contains(&method) {
+                methods.push(method);
+            }
         }
     }
     Plan {

@@ -22,6 +22,9 @@ pub struct Comparison {
     /// [`Self::rel_mse`] without the 0.1 % of the pixels (at least one) where it is worst: robust to
     /// fireflies.
     pub trimmed_rel_mse: f64,
+    /// [`Self::rel_mse`] of the means of [`BLOCK`] x [`BLOCK`] pixels, without its worst block: the coarse
+    /// error, which no denoiser can tell from the picture.
+    pub block_rel_mse: f64,
     /// Mean of the picture over mean of the reference, all channels together.
     pub mean_ratio: f64,
     /// Mean LDR-FLIP error in `[0,1]` at 67 pixels per degree (Andersson et al. 2020), of both
@@ -33,6 +36,9 @@ pub struct Comparison {
 
 /// Added to the squared reference in relMSE, in units of its squared mean.
 pub(crate) const REL_MSE_EPSILON: f64 = 1e-2;
+
+/// Sides of the blocks that coarse errors are taken of, in pixels.
+pub(crate) const BLOCK: u32 = 8;
 
 /// Compares a linear picture with its reference.
 ///
@@ -51,28 +57,55 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison> {
     if reference_mean <= 0.0 {
         return Err(Error::new("the reference is black: errors relative to it have no meaning"));
     }
-    let mut relative: Vec<f64> = Vec::with_capacity(image.pixels.len());
-    let mut squared = 0.0;
-    for (a, r) in image.pixels.iter().zip(&reference.pixels) {
-        let mut pixel_relative = 0.0;
-        for (a, r) in a.iter().zip(r) {
-            let (a, r) = (f64::from(*a) / reference_mean, f64::from(*r) / reference_mean);
-            let difference = (a - r) * (a - r);
-            squared += difference / 3.0;
-            pixel_relative += difference / (r * r + REL_MSE_EPSILON) / 3.0;
-        }
-        relative.push(pixel_relative);
-    }
+    let (mse, mut relative) = squared_errors(image, reference, reference_mean);
+    let (_, mut of_blocks) =
+        squared_errors(&block_means(image), &block_means(reference), reference_mean);
     let flip_exposure_ev = auto_exposure_ev(reference);
-    let count = relative.len() as f64;
     Ok(Comparison {
-        mse: squared / count,
-        rel_mse: relative.iter().sum::<f64>() / count,
+        mse,
+        rel_mse: relative.iter().sum::<f64>() / relative.len() as f64,
         trimmed_rel_mse: trimmed_mean(&mut relative),
+        block_rel_mse: trimmed_mean(&mut of_blocks),
         mean_ratio: mean(image) / reference_mean,
         flip: mean_flip(image, reference, flip_exposure_ev),
         flip_exposure_ev,
     })
+}
+
+/// Mean squared error in units of `unit`, and each pixel's relative one.
+fn squared_errors(image: &Image, reference: &Image, unit: f64) -> (f64, Vec<f64>) {
+    let mut squared = 0.0;
+    let of_pixel = |(a, r): (&[f32; 3], &[f32; 3])| {
+        let mut relative = 0.0;
+        for (a, r) in a.iter().zip(r) {
+            let (a, r) = (f64::from(*a) / unit, f64::from(*r) / unit);
+            let difference = (a - r) * (a - r);
+            squared += difference / 3.0;
+            relative += difference / (r * r + REL_MSE_EPSILON) / 3.0;
+        }
+        relative
+    };
+    let relative: Vec<f64> = image.pixels.iter().zip(&reference.pixels).map(of_pixel).collect();
+    (squared / relative.len() as f64, relative)
+}
+
+/// Means of [`BLOCK`] x [`BLOCK`] pixels; what is left over at the right and at the bottom makes smaller
+/// blocks.
+pub(crate) fn block_means(image: &Image) -> Image {
+    let (width, height) = (image.width.div_ceil(BLOCK), image.height.div_ceil(BLOCK));
+    let mean = |block: u32| {
+        let (x, y) = (block % width * BLOCK, block / width * BLOCK);
+        let rows = y..(y + BLOCK).min(image.height);
+        let columns = x..(x + BLOCK).min(image.width);
+        let count = (rows.len() * columns.len()) as f64;
+        let mut sum = [0.0; 3];
+        for (x, y) in rows.flat_map(|y| columns.clone().map(move |x| (x, y))) {
+            let pixel = image.pixels[(y * image.width + x) as usize];
+            sum.iter_mut().zip(pixel).for_each(|(sum, p)| *sum += f64::from(p));
+        }
+        sum.map(|sum| (sum / count) as f32)
+    };
+    Image { width, height, pixels: (0..width * height).map(mean).collect() }
 }
 
 /// What `Film::noise` estimates: the root of the mean over pixels of

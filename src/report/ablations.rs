@@ -3,7 +3,7 @@
 use super::plan::{Effort, Method, Plan, Row, Settings};
 use crate::environment::TableKind;
 use crate::light_grid::{LawOptions, Recording};
-use crate::render::{Sampling, Sharing};
+use crate::render::{Gi, Sampling, Sharing};
 use crate::sampler::Points;
 
 /// Scenes and maps, if none are asked for: one of each kind of occlusion.
@@ -147,6 +147,8 @@ fn samples_and_tables(add: &mut Add<'_>) {
     let group = "shared second vertices";
     add(group, "paths of their own", &|s| s.sharing = Sharing::Off);
     add(group, "squares of 4x4 pixels, all keep theirs", &|s| s.sharing = Sharing::Small);
+    let group = "radiance cache at the second vertex (biased)";
+    add(group, "cached", &|s| s.gi = Gi::Cached);
     let group = "importance tables";
     for table in [TableKind::U32, TableKind::F32, TableKind::F64] {
         add(group, &format!("table {table}"), &|s| s.table = table);

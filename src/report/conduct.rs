@@ -120,6 +120,7 @@ impl Conductor<'_> {
             reference: None,
             devices: Vec::new(),
             shares: Vec::new(),
+            biases: Vec::new(),
             pictures: Pictures::default(),
         };
         self.report.rows.push(report);
@@ -145,6 +146,7 @@ impl Conductor<'_> {
             && self.judge_well(&mut work)?;
         self.update(&mut work)?;
         if is_whole && self.take_apart(&work)? {
+            self.find_biases(&work)?;
             self.forget_pictures(&work);
         }
         Ok(())
@@ -174,8 +176,7 @@ impl Conductor<'_> {
         let key = self.key(work, device, &plan.methods[method], seed);
         if let Some(run) = self.store.read::<Run>(&key) {
             let has_errors = run.points.iter().all(|p| p.errors.is_some());
-            let films = self.store.read_pictures(&key, plan.effort.frame.size);
-            if has_errors || films.is_some_and(|films| films.len() == run.points.len()) {
+            if has_errors || self.pictures(&key, &run).is_some() {
                 work.runs[device][method].push((key, run));
                 return Ok(true);
             }
@@ -203,11 +204,12 @@ impl Conductor<'_> {
             )?;
         }
         if let Some((reference, pictures)) = self.reference(work) {
-            done.run.judge(&done.films, &reference)?;
+            done.run.judge(&done.films, &done.denoised, &reference)?;
             done.run.reference_pictures = pictures;
         }
         // Pictures first: a run without them is measured again.
         self.store.write_pictures(&key, &done.films)?;
+        self.store.write_pictures(&denoised(&key), &[done.denoised])?;
         self.store.write(&key, &done.run)?;
         work.runs[device][method].push((key, done.run));
         if self.pages_written.is_none_or(|at| at.elapsed() > PAGES_EVERY) {
@@ -238,12 +240,21 @@ impl Conductor<'_> {
         outcome.is_ok()
     }
 
+    /// All pictures of a run, one a point, and the last one without noise, if they are still there.
+    fn pictures(&self, key: &str, run: &Run) -> Option<(Vec<Image>, Image)> {
+        let size = self.plan.effort.frame.size;
+        let films = self.store.read_pictures(key, size)?;
+        let denoised = self.store.read_pictures(&denoised(key), size)?.pop()?;
+        (films.len() == run.points.len()).then_some((films, denoised))
+    }
+
     /// Keeps the last pictures of first runs only (all of them for a given reference, whose noise is
     /// judged by them).
     fn forget_pictures(&self, work: &Work) {
         for (key, run) in work.runs.iter().flatten().flatten() {
             if run.seed > 0 && self.file_reference.is_none() {
                 self.store.remove_pictures(key);
+                self.store.remove_pictures(&denoised(key));
                 continue;
             }
             let films =
@@ -362,6 +373,11 @@ pub fn check(plan: &Plan) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// Under which name a run's last picture without noise is kept.
+fn denoised(key: &str) -> String {
+    format!("{key}_denoised")
 }
 
 /// Which devices a plan measures on, in words.

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::{Deserialize, Serialize};
 
 use super::plan::{Frame, Settings};
+use crate::denoise::quick;
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::image::Image;
@@ -75,6 +76,8 @@ pub struct Errors {
     pub rel_mse: f64,
     /// The same without the worst 0.1 % of the pixels.
     pub trimmed_rel_mse: f64,
+    /// Trimmed relMSE of the means of 8x8 pixels.
+    pub block_rel_mse: f64,
     /// Mean LDR-FLIP.
     pub flip: f64,
     /// Mean over the reference's mean.
@@ -128,6 +131,8 @@ pub struct Run {
     pub nanoseconds_per_ray: Option<f64>,
     /// In order of time; the last one is at or after the end.
     pub points: Vec<Point>,
+    /// Mean LDR-FLIP of the last picture through the built-in denoiser.
+    pub denoised_flip: Option<f64>,
     /// Pictures of the reference that errors were taken against.
     pub reference_pictures: Option<u32>,
 }
@@ -136,6 +141,8 @@ pub struct Run {
 pub(super) struct Finished {
     pub(super) run: Run,
     pub(super) films: Vec<Image>,
+    /// The last one without noise.
+    pub(super) denoised: Image,
     /// What was learned, for measurements beside the run.
     pub(super) grid: Option<LightGrid>,
 }
@@ -200,9 +207,11 @@ pub(super) fn measure(
         memory: memory(place, &session),
         nanoseconds_per_ray: None,
         points,
+        denoised_flip: None,
         reference_pictures: None,
     };
-    Ok(Some(Finished { run, films, grid: session.grid().cloned() }))
+    let denoised = quick(session.film());
+    Ok(Some(Finished { run, films, denoised, grid: session.grid().cloned() }))
 }
 
 fn memory(place: &Place<'_>, session: &Session<'_>) -> Memory {
@@ -216,21 +225,28 @@ fn memory(place: &Place<'_>, session: &Session<'_>) -> Memory {
 }
 
 impl Run {
-    /// Takes the errors of its pictures, one a point.
+    /// Takes the errors of its pictures, one a point, and of the last one without noise.
     ///
     /// # Errors
     /// If the reference is black or a picture is not finite.
-    pub(super) fn judge(&mut self, films: &[Image], reference: &Image) -> Result<()> {
+    pub(super) fn judge(
+        &mut self,
+        films: &[Image],
+        denoised: &Image,
+        reference: &Image,
+    ) -> Result<()> {
         for (point, film) in self.points.iter_mut().zip(films) {
             let found = compare(film, reference)?;
             point.errors = Some(Errors {
                 mse: found.mse,
                 rel_mse: found.rel_mse,
                 trimmed_rel_mse: found.trimmed_rel_mse,
+                block_rel_mse: found.block_rel_mse,
                 flip: found.flip,
                 mean_ratio: found.mean_ratio,
             });
         }
+        self.denoised_flip = Some(compare(denoised, reference)?.flip);
         Ok(())
     }
 }

@@ -7,6 +7,7 @@
 //! tables alone.
 
 pub mod ablations;
+mod bias;
 mod conduct;
 mod digest;
 mod machine;
@@ -22,6 +23,7 @@ mod store;
 mod summary;
 pub mod talk;
 
+pub use bias::Bias;
 pub use conduct::{Options, check, make};
 pub use machine::Machine;
 pub(crate) use machine::OpenDevice;

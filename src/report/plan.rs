@@ -108,7 +108,8 @@ impl Settings {
             medium: None,
             background: Background::Map,
             crop: None,
-            layers: false,
+            // For the denoiser.
+            layers: true,
         }
     }
 }
@@ -134,6 +135,15 @@ impl Method {
             Sampling::Bsdf => "bsdf",
         };
         Self { name: name.to_owned(), group: None, settings: Settings::of(sampling) }
+    }
+
+    /// The same with indirect light found like this.
+    pub fn with_gi(self, gi: Gi) -> Self {
+        let name = match gi {
+            Gi::Exact => self.name,
+            Gi::Cached => format!("{} cached", self.name),
+        };
+        Self { name, settings: Settings { gi, ..self.settings }, ..self }
     }
 }
 
@@ -227,10 +237,10 @@ impl Plan {
         (runs as f64 + reference + shares) * self.effort.seconds * OVERHEAD
     }
 
-    /// Methods whose error is taken apart: the baseline and `adaptive`.
+    /// Methods whose error is taken apart: the sampling modes as they are.
     pub(super) fn compared(&self) -> Vec<&Method> {
-        let is_ours = |m: &&Method| m.name == "adaptive";
-        self.methods.iter().take(1).chain(self.methods.iter().skip(1).filter(is_ours)).collect()
+        let is_mode = |m: &&Method| m.settings == Settings::of(m.settings.sampling);
+        self.methods.iter().filter(is_mode).collect()
     }
 }
 

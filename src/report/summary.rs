@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::bias::Bias;
 use super::measure::{Errors, Memory, Run};
 use super::plan::{Device, Method, Plan, Row};
 use super::reference::{Noise, ReferenceFacts};
@@ -19,13 +20,16 @@ pub enum Measure {
     RelMse,
     /// Mean squared error.
     Mse,
+    /// Trimmed relMSE of the means of 8x8 pixels.
+    Blocks,
     /// Mean LDR-FLIP.
     Flip,
 }
 
 impl Measure {
     /// All of them, the most telling first.
-    pub const ALL: [Self; 4] = [Self::TrimmedRelMse, Self::RelMse, Self::Mse, Self::Flip];
+    pub const ALL: [Self; 5] =
+        [Self::TrimmedRelMse, Self::RelMse, Self::Mse, Self::Blocks, Self::Flip];
 
     /// In words.
     pub fn title(self) -> &'static str {
@@ -33,6 +37,7 @@ impl Measure {
             Self::TrimmedRelMse => "trimmed relMSE",
             Self::RelMse => "relMSE",
             Self::Mse => "MSE",
+            Self::Blocks => "8x8 blocks",
             Self::Flip => "FLIP",
         }
     }
@@ -43,6 +48,7 @@ impl Measure {
             Self::TrimmedRelMse => errors.trimmed_rel_mse,
             Self::RelMse => errors.rel_mse,
             Self::Mse => errors.mse,
+            Self::Blocks => errors.block_rel_mse,
             Self::Flip => errors.flip,
         }
     }
@@ -78,6 +84,8 @@ pub struct RowReport {
     pub devices: Vec<DeviceReport>,
     /// Where the error is left.
     pub shares: Vec<Shares>,
+    /// How far what methods converge to is from the reference.
+    pub biases: Vec<Bias>,
     /// The reference and, by device and method, pictures of the first seed at the end.
     #[serde(skip)]
     pub pictures: Pictures,
@@ -127,6 +135,8 @@ pub struct MethodReport {
     pub method: Method,
     /// At the end, mean over runs with its standard error, by measure.
     pub errors: Vec<(Measure, Estimate)>,
+    /// FLIP of the last picture through the built-in denoiser.
+    pub denoised_flip: Option<Estimate>,
     /// Mean of the picture over the reference's.
     pub mean_ratio: Option<Estimate>,
     /// Power of the rendering time that the error falls with, by measure; FLIP is no power law.
@@ -195,7 +205,7 @@ pub(super) fn curves(runs: &[Run], measure: Measure) -> Vec<Curve> {
 
 /// Summaries of all methods of a row on one device; `runs` holds each method's runs.
 pub(super) fn summarise(plan: &Plan, threads: usize, runs: Vec<Vec<Run>>) -> Vec<MethodReport> {
-    let bundles: Vec<[Option<Bundle>; 4]> = runs
+    let bundles: Vec<[Option<Bundle>; Measure::ALL.len()]> = runs
         .iter()
         .map(|runs| Measure::ALL.map(|m| Bundle::new(&curves(runs, m), plan.effort.seconds)))
         .collect();
@@ -224,9 +234,11 @@ pub(super) fn summarise(plan: &Plan, threads: usize, runs: Vec<Vec<Run>>) -> Vec
                 .zip(bundles)
                 .filter_map(|(m, b)| Some((m, (*b.as_ref()?.estimates().last()?)?)))
                 .collect(),
+            denoised_flip: estimate(&runs, |run| run.denoised_flip),
             mean_ratio: estimate(&runs, |run| Some(run.points.last()?.errors?.mean_ratio)),
-            slopes: Measure::ALL[..3]
+            slopes: Measure::ALL
                 .iter()
+                .filter(|m| **m != Measure::Flip)
                 .filter_map(|m| Some((*m, estimate(&runs, |run| slope(run, *m))?)))
                 .collect(),
             speed_ups,

@@ -161,6 +161,21 @@ fn errors_have_their_known_values_whatever_the_exposure() {
 }
 
 #[test]
+fn what_averages_out_in_a_block_is_no_error_of_blocks() {
+    // Blocks at the right and at the bottom are smaller ones.
+    let reference = Image::filled(50, 42, [1.0; 3]);
+    let blocks = |value: fn(u32, u32) -> f32| {
+        let image = Image::from_fn(50, 42, |x, y| [value(x, y); 3]);
+        compare(&image, &reference).unwrap().block_rel_mse
+    };
+    assert_relative(blocks(|_, _| 1.1), 0.01 / 1.01, 1e-5);
+    assert!(blocks(|x, y| if (x + y).is_multiple_of(2) { 1.1 } else { 0.9 }) < 1e-12);
+    let every_other_block =
+        |x: u32, y: u32| if (x / 8 + y / 8).is_multiple_of(2) { 1.1 } else { 0.9 };
+    assert_relative(blocks(every_other_block), 0.01 / 1.01, 1e-5);
+}
+
+#[test]
 fn flip_grows_with_the_difference_and_is_free_of_exposure() {
     let reference = structured();
     let brighter = |gain: f32| {

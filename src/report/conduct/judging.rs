@@ -1,5 +1,6 @@
 //! Judging runs: a reference that is good enough, errors against it, and where they are left.
 
+use super::super::bias::Bias;
 use super::super::measure::Run;
 use super::super::plan::{SHARE_RUNS, Settings};
 use super::super::reference::{LEAST_PICTURES, Noise};
@@ -82,10 +83,8 @@ impl Conductor<'_> {
             if is_new {
                 continue;
             }
-            let films =
-                self.store.read_pictures(key, self.plan.effort.frame.size).unwrap_or_default();
-            if films.len() == run.points.len() {
-                run.judge(&films, &reference)?;
+            if let Some((films, denoised)) = self.pictures(key, run) {
+                run.judge(&films, &denoised, &reference)?;
                 run.reference_pictures = pictures;
                 self.store.write(key, run)?;
             }
@@ -126,6 +125,29 @@ impl Conductor<'_> {
             }
         }
         Ok(true)
+    }
+
+    /// How far what each method converges to is from the reference, with two runs or more.
+    pub(super) fn find_biases(&mut self, work: &Work) -> Result<()> {
+        let Some((reference, _)) = self.reference(work) else { return Ok(()) };
+        let size = self.plan.effort.frame.size;
+        for (device, methods) in work.runs.iter().enumerate() {
+            for (method, runs) in self.plan.methods.iter().zip(methods) {
+                let Some((key, _)) = runs.first() else { continue };
+                let key = format!("{key}_bias_of_{}", runs.len());
+                let last = |(key, _): &(String, Run)| self.store.read_pictures(key, size)?.pop();
+                let found = self.store.read(&key).or_else(|| {
+                    let pictures = runs.iter().map(last).collect::<Option<Vec<Image>>>()?;
+                    let device = self.devices[device].device.title();
+                    Bias::new(device, &method.name, &pictures, &reference)
+                });
+                if let Some((bias, row)) = found.zip(self.report.rows.last_mut()) {
+                    self.store.write(&key, &bias)?;
+                    row.biases.push(bias);
+                }
+            }
+        }
+        Ok(())
     }
 
     pub(super) fn reference_report(&self, work: &Work) -> Result<Option<ReferenceReport>> {

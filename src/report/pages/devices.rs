@@ -11,13 +11,14 @@ pub(super) fn errors(report: &Report, device: &DeviceReport, html: &mut String) 
     let _ = writeln!(html, "<h3>{title}: errors after {} s</h3>", report.plan.effort.seconds);
     let mut head = vec!["", "runs"];
     head.extend(Measure::ALL.map(Measure::title));
-    head.extend(["slope", "mean ratio"]);
+    head.extend(["FLIP, denoised", "slope", "mean ratio"]);
     let mut table = Table::new(&head);
     for method in device.methods.iter().filter(|m| !m.runs.is_empty()) {
         let mut cells = vec![method.method.name.clone(), method.runs.len().to_string()];
         cells.extend(
             Measure::ALL.map(|m| method.error(m).map_or_else(String::new, words::estimate)),
         );
+        cells.push(words::plain_estimate(method.denoised_flip, 4));
         let slope = method.slopes.iter().find(|(m, _)| *m == Measure::TrimmedRelMse);
         cells.push(words::plain_estimate(slope.map(|(_, s)| *s), 2));
         cells.push(words::plain_estimate(method.mean_ratio, 4));

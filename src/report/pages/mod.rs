@@ -65,7 +65,7 @@ fn escape(text: &str) -> String {
 fn csv(report: &Report) -> String {
     let mut text = String::from(
         "row,scene,map,device,method,seed,seconds,render_seconds,samples_per_pixel,rays,mse,\
-         rel_mse,trimmed_rel_mse,flip,mean_ratio\n",
+         rel_mse,trimmed_rel_mse,block_rel_mse,flip,mean_ratio\n",
     );
     for row in &report.rows {
         for device in &row.devices {
@@ -81,10 +81,16 @@ fn csv(report: &Report) -> String {
                 for run in &method.runs {
                     for point in &run.points {
                         let errors = point.errors.map_or_else(
-                            || ",,,,".to_owned(),
+                            || ",,,,,".to_owned(),
                             |e| {
-                                let values =
-                                    [e.mse, e.rel_mse, e.trimmed_rel_mse, e.flip, e.mean_ratio];
+                                let values = [
+                                    e.mse,
+                                    e.rel_mse,
+                                    e.trimmed_rel_mse,
+                                    e.block_rel_mse,
+                                    e.flip,
+                                    e.mean_ratio,
+                                ];
                                 values.map(|v| v.to_string()).join(",")
                             },
                         );

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::super::statistics::Estimate;
 use super::super::summary::{Measure, Report, RowReport};
 use super::pictures::{Window, data_uri, developed};
 use super::plots::error_plot;
@@ -12,7 +13,7 @@ use crate::error::Result;
 use crate::image::Rgb8;
 
 /// With more methods than this a row shows ratios instead of curves and pictures.
-const MANY: usize = 6;
+const MANY: usize = 7;
 
 pub(super) fn is_long(report: &Report) -> bool {
     report.plan.methods.len() > MANY
@@ -47,8 +48,32 @@ pub(super) fn row(report: &Report, row: &RowReport, html: &mut String) -> Result
         devices::errors(report, device, html);
         devices::costs(report, device, html);
     }
+    biases(row, html);
     what_is_left(report, row, html);
     Ok(())
+}
+
+fn biases(row: &RowReport, html: &mut String) {
+    if row.biases.is_empty() {
+        return;
+    }
+    html.push_str("<h3>What is systematic</h3>\n");
+    let mut table = Table::new(&["", "device", "of 8x8 blocks, rms", "squared"]);
+    for bias in &row.biases {
+        let squared = Estimate { mean: bias.squared, standard_error: bias.standard_error };
+        table.row(&[
+            bias.method.clone(),
+            bias.device.clone(),
+            percent(bias.root()),
+            words::estimate(squared),
+        ]);
+    }
+    html.push_str(&table.finish());
+    html.push_str(
+        "<p class=\"soft\">How far the mean of ever more runs would be from the reference, relative, \
+         by what different runs err alike. Only cached paths have a bias; what others show is the \
+         reference's noise, and chance.</p>\n",
+    );
 }
 
 fn facts(row: &RowReport) -> String {
@@ -139,6 +164,8 @@ fn what_is_left(report: &Report, row: &RowReport, html: &mut String) {
     }
     let baseline = baseline(report);
     html.push_str("<h3>Where the error is left</h3>\n");
+    let first = &row.shares[0];
+    let against = ["first", "later"].map(|part| format!("{part}, {} over it", first.method));
     let mut table = Table::new(&[
         "",
         "samples / pixel",
@@ -147,6 +174,8 @@ fn what_is_left(report: &Report, row: &RowReport, html: &mut String) {
         "later vertices",
         "pixel filter",
         "together",
+        &against[0],
+        &against[1],
     ]);
     for s in &row.shares {
         let part = |value: f64| format!("{} ({})", words::error(value), percent(value / s.total));
@@ -158,6 +187,8 @@ fn what_is_left(report: &Report, row: &RowReport, html: &mut String) {
             part(s.later_vertices),
             part(s.filter),
             percent(s.together() / s.total),
+            words::ratio(first.first_vertex / s.first_vertex),
+            words::ratio(first.later_vertices / s.later_vertices),
         ]);
     }
     html.push_str(&table.finish());

@@ -38,7 +38,7 @@ pub(super) fn estimate(estimate: Estimate) -> String {
         return format!("{:.3} ± {s:.3}", estimate.mean);
     }
     // Both in the same power of ten.
-    let exponent = estimate.mean.max(f64::MIN_POSITIVE).log10().floor() as i32;
+    let exponent = estimate.mean.abs().max(f64::MIN_POSITIVE).log10().floor() as i32;
     let unit = 10f64.powi(exponent);
     format!("({:.2} ± {:.2})e{exponent}", estimate.mean / unit, s / unit)
 }
