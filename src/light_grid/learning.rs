@@ -135,6 +135,12 @@ impl LearningGrid {
         self.options.tries_per_vertex
     }
 
+    /// Whether what was counted is of the same kind, be it around another centre.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let around_other = SphericalGrid { center: other.grid.center, ..self.grid };
+        (around_other, self.options) == (other.grid, other.options)
+    }
+
     /// A copy of the counters as they are now.
     pub fn snapshot(&self) -> Self {
         Self { counters: self.counters.snapshot(), ..*self }

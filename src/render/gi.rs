@@ -133,7 +133,7 @@ impl Lessons {
 }
 
 /// Metres to what the camera sees, the median over its picture; `None` if it sees no surface.
-fn middle_distance(world: &World, view: &View, rays: &CameraRays) -> Option<f32> {
+pub(super) fn middle_distance(world: &World, view: &View, rays: &CameraRays) -> Option<f32> {
     let size = Vec2::new(view.width as f32, view.height as f32) / LOOKS as f32;
     let places = (0..LOOKS * LOOKS).map(|i| Vec2::new((i % LOOKS) as f32, (i / LOOKS) as f32));
     let hits = places.filter_map(|place| {

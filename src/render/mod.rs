@@ -16,15 +16,16 @@ pub mod film;
 pub mod filter;
 mod gi;
 pub mod gpu;
+mod learning;
 
 use film::Film;
 use filter::PixelFilter;
 pub use gi::Gi;
 pub(crate) use gi::Lessons;
+use learning::Learning;
 
 use crate::environment::Environment;
 use crate::error::Result;
-use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LawOptions, LearningGrid, LightGrid};
 use crate::medium::Fog;
 use crate::path::camera::CameraRays;
@@ -337,25 +338,6 @@ pub struct Session<'a> {
     figures: Figures,
 }
 
-struct Learning {
-    grid: LearningGrid,
-    pass: u32,
-    /// Paths counted since the counters were last looked through.
-    paths_of_pass: u64,
-    /// Whether nothing is counted any more.
-    is_over: bool,
-}
-
-/// Paths, traced to learn from or rendered, after which learning ends: the laws of 2^20 paths leave
-/// 1.2 times the error of 2^23 (office at sunset, 128x72), those of 2^16 three times.
-const ENOUGH_PATHS: u64 = 1 << 23;
-
-/// Samples of a pixel after which it learns no more. New laws begin a new sequence, and many short
-/// sequences are worse than a long one: laws of 16 samples in place of 4 have 0.97 to 1.06 times the
-/// error of an interior at 64 samples, 1.06 times that of the exterior, 1.14 times that of an open
-/// scene (160x90).
-const LAST_LESSON: u32 = 4;
-
 impl<'a> Session<'a> {
     /// Starts a session on the CPU; nothing is traced yet.
     pub fn new(world: &'a World, environment: &'a Environment, view: View) -> Self {
@@ -364,7 +346,7 @@ impl<'a> Session<'a> {
             Sampling::Bsdf => None,
             _ => LightGrid::whole_map(environment.tile_energies()),
         };
-        let learning = new_learning(world, environment, &view, &rays);
+        let learning = Learning::new(world, environment, &view, &rays);
         let lessons = Lessons::new(world, environment, &view, &rays);
         Self {
             lessons,
@@ -716,34 +698,6 @@ impl<'a> Session<'a> {
         PathTracer { counts, cache, ..tracer }
     }
 
-    fn learn(&mut self, cancel: &AtomicBool) -> Result<()> {
-        let Some(learning) = &self.learning else { return Ok(()) };
-        let range = cpu::learning_range(&self.view, learning.pass);
-        let rays = match &mut self.engine {
-            Engine::Cpu => {
-                let tracer = self.tracer(Some(&learning.grid));
-                cpu::learn(&tracer, &self.rays, &self.view, range.clone(), cancel)
-            }
-            Engine::Gpu(renderer) => renderer.learn(range.clone(), &learning.grid, cancel)?,
-        };
-        if cancel.load(Ordering::Relaxed) {
-            // Which paths of the pass were counted depends on the threads: start over.
-            self.learned = None;
-            self.learning = new_learning(self.world, self.environment, &self.view, &self.rays);
-            return self.take_up_laws();
-        }
-        self.figures.learning_rays += rays;
-        self.figures.learning_paths = range.end;
-        if let Some(learning) = &mut self.learning {
-            learning.pass += 1;
-        }
-        self.update_laws();
-        if range.end >= self.view.learning_paths {
-            self.finish_learning();
-        }
-        self.take_up_laws()
-    }
-
     /// Teaches the radiance cache what it is to know before the next pass, if there is one. What has been
     /// cut short goes on at the next call.
     fn teach(&mut self, cancel: &AtomicBool) -> Result<()> {
@@ -792,26 +746,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Makes laws of what all passes so far counted: the next pass draws from them.
-    fn update_laws(&mut self) {
-        let Some(learning) = &mut self.learning else { return };
-        let start = Instant::now();
-        learning.grid.counters.end_pass();
-        learning.paths_of_pass = 0;
-        self.figures.law_paths = self.figures.learning_paths + self.figures.counted_paths;
-        // The old laws go first: both together would not fit the budget.
-        self.learned = None;
-        self.learned = learning.grid.laws(self.environment);
-        let laws = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
-        let held = learning.grid.counters.memory_bytes() + laws;
-        self.figures.grid_bytes = held;
-        self.figures.grid_peak_bytes = self.figures.grid_peak_bytes.max(held);
-        self.figures.visited_cells = learning.grid.counters.visited_cells();
-        self.figures.learned_cells =
-            self.learned.as_ref().map_or(0, |grid| grid.laws().len() as usize - 1);
-        self.figures.law_seconds += start.elapsed().as_secs_f64();
-    }
-
     fn render(&mut self, target: u32, every: u32, cancel: &AtomicBool) -> Result<()> {
         let stride = self.prepare_counting(target - self.samples);
         let pass = Pass { target, every, stride, sequence: self.sequence };
@@ -849,44 +783,6 @@ impl<'a> Session<'a> {
         let is_whole = self.samples >= target;
         self.learn_from_rendered(samples.div_ceil(u64::from(stride)), is_whole)
     }
-
-    /// Makes room in the counters for a pass of so many samples a pixel; returns of how many one
-    /// can be counted.
-    fn prepare_counting(&mut self, samples: u32) -> u32 {
-        let most = cpu::most_paths_per_pass(&self.view);
-        let pixels = u64::from(self.view.width) * u64::from(self.view.height);
-        let paths = pixels * u64::from(samples);
-        let stride = paths.div_ceil(most).max(1);
-        if let Some(learning) = self.learning.as_mut().filter(|learning| !learning.is_over)
-            && learning.paths_of_pass + paths.div_ceil(stride) > most
-        {
-            learning.grid.counters.end_pass();
-            learning.paths_of_pass = 0;
-        }
-        u32::try_from(stride).unwrap_or(u32::MAX)
-    }
-
-    /// Takes note that so many rendered paths were counted. There are new laws of twice as many paths as
-    /// those in use were made of, where each pixel has a power of two of samples: the points of the
-    /// sequences that then end and begin are evenly spread.
-    fn learn_from_rendered(&mut self, paths: u64, is_whole: bool) -> Result<()> {
-        let Some(learning) = self.learning.as_mut().filter(|learning| !learning.is_over) else {
-            return Ok(());
-        };
-        self.figures.counted_paths += paths;
-        learning.paths_of_pass += paths;
-        let all = self.figures.learning_paths + self.figures.counted_paths;
-        let samples = self.samples;
-        if !is_whole || !samples.is_power_of_two() {
-            return Ok(());
-        }
-        learning.is_over = all >= ENOUGH_PATHS || samples >= LAST_LESSON;
-        if all < 2 * self.figures.law_paths {
-            return Ok(());
-        }
-        self.update_laws();
-        self.take_up_laws()
-    }
 }
 
 /// Makes a black film of one that has no pixels yet.
@@ -894,26 +790,4 @@ fn prepare_film(film: &mut Film, view: &View) {
     if film.pixels().is_empty() {
         *film = Film::new(view.width, view.height, view.layers);
     }
-}
-
-/// An untaught grid, if the view is to learn and the map has anything to learn about.
-fn new_learning(
-    world: &World,
-    environment: &Environment,
-    view: &View,
-    rays: &CameraRays,
-) -> Option<Learning> {
-    let options = view.law_options()?;
-    if environment.is_black() || view.limits.bounces == 0 {
-        return None;
-    }
-    let grid = SphericalGrid {
-        center: rays.position(),
-        columns: view.grid_columns,
-        rows: (view.grid_columns / 2).max(1),
-        faces: options.faces,
-        medium: view.fog(world).is_some(),
-    };
-    let grid = LearningGrid::new(grid, environment.tile_count(), options);
-    Some(Learning { grid, pass: 0, paths_of_pass: 0, is_over: false })
 }

@@ -45,6 +45,8 @@ pub(super) struct Legacy {
     learned: Option<(Arc<LightGrid>, Arc<Environment>)>,
     /// Whether that learning came to its end.
     is_complete: bool,
+    /// What was counted, if it came to its end, and what for.
+    counted: Option<(Arc<LearningGrid>, Arc<Request>)>,
     /// The world they were learned in.
     world: Option<Arc<World>>,
     /// Seconds one camera path takes, all threads together.
@@ -63,6 +65,7 @@ impl Legacy {
             device: Device::new(gpu, screen),
             learned: None,
             is_complete: false,
+            counted: None,
             world: None,
             seconds_per_path: None,
             snapshots: 0,
@@ -73,8 +76,7 @@ impl Legacy {
 
     /// Whether learning has come to its end in this scene.
     fn has_learned_in(&self, request: &Request) -> bool {
-        self.is_complete
-            && self.world.as_ref().is_some_and(|world| Arc::ptr_eq(world, &request.world))
+        self.is_complete && self.is_of_world(request)
     }
 
     /// Whether the radiance cache was taught in this scene with this light, near by.
@@ -94,7 +96,7 @@ impl Legacy {
 
     /// Laws for this request from the last ones, if they are of the same scene.
     fn laws_for(&self, request: &Request) -> Option<Arc<LightGrid>> {
-        if !self.world.as_ref().is_some_and(|world| Arc::ptr_eq(world, &request.world)) {
+        if !self.is_of_world(request) {
             return None;
         }
         let (laws, map) = self.learned.as_ref()?;
@@ -105,6 +107,16 @@ impl Legacy {
             return Some(Arc::clone(laws));
         }
         laws.transferred(map, &request.environment).map(Arc::new)
+    }
+
+    /// What was counted in this scene with this light.
+    fn counted_for(&self, request: &Request) -> Option<Arc<LearningGrid>> {
+        let (counted, of) = self.counted.as_ref()?;
+        of.is_lit_like(request).then(|| Arc::clone(counted))
+    }
+
+    fn is_of_world(&self, request: &Request) -> bool {
+        self.world.as_ref().is_some_and(|world| Arc::ptr_eq(world, &request.world))
     }
 }
 
@@ -210,6 +222,24 @@ impl<'a> Job<'a> {
         self.experienced_session(world, environment, view)
     }
 
+    /// A session that learns, from what is known of the scene if the camera has not gone far.
+    fn learning_session<'b>(
+        &mut self,
+        world: &'b World,
+        environment: &'b Environment,
+        view: View,
+    ) -> Session<'b> {
+        let mut session = Session::new(world, environment, view);
+        if let Some(counted) = self.legacy.counted_for(&self.request) {
+            match session.continue_learning(&counted) {
+                Ok(true) => self.counters = Some(counted),
+                Ok(false) => {}
+                Err(error) => self.go_on(&mut session, Err(error)),
+            }
+        }
+        session
+    }
+
     /// A session that does not learn but uses what was learned before.
     fn experienced_session<'b>(
         &mut self,
@@ -266,7 +296,7 @@ impl<'a> Job<'a> {
         let mut main = if keeps_laws {
             self.experienced_session(world, environment, view.clone())
         } else {
-            Session::new(world, environment, view.clone())
+            self.learning_session(world, environment, view.clone())
         };
         let mut plain = self.request.split.then(|| {
             Session::new(world, environment, View { sampling: Sampling::Plain, ..view.clone() })
@@ -405,6 +435,8 @@ impl<'a> Job<'a> {
     fn keep_laws(&mut self, main: &Session<'_>, is_complete: bool) {
         if is_complete {
             self.counters = main.counters().map(|counters| Arc::new(counters.snapshot()));
+            let request = || Arc::clone(&self.request);
+            self.legacy.counted = self.counters.clone().map(|counted| (counted, request()));
         }
         if let Some(laws) = self.laws_of(main) {
             self.legacy.learned = Some((laws, Arc::clone(&self.request.environment)));
