@@ -3,8 +3,9 @@
 #
 #     sh docs/pictures.sh [WORD]
 #
-# Each command stands beside its picture, in a comment that begins with `<!-- lightgrid`; what it writes as .png
-# is kept as .jpg. Needs ImageMagick, for windows a graphics device, and `lightgrid` on the PATH or in LIGHTGRID.
+# Each command stands beside its picture, in a comment that begins with `<!-- lightgrid`; what it writes as .png is
+# kept as .jpg. Needs ImageMagick, for windows a graphics device, for .gif ffmpeg, and `lightgrid` on the PATH or in
+# LIGHTGRID.
 set -eu
 cd "$(dirname "$0")/.."
 mkdir -p docs/pictures
@@ -16,6 +17,7 @@ sed -n 's/^<!-- \(lightgrid .*\) -->$/\1/p' README.md docs/*.md | grep -F -e "${
         set -f
         # shellcheck disable=SC2086
         "${LIGHTGRID:-lightgrid}" $words </dev/null
+        case $png in *.gif) continue ;; esac
         convert "$png" -quality 88 "${png%.png}.jpg"
         rm "$png"
     done
