@@ -170,14 +170,19 @@ const MOVING: &str = r#"{
     "buffers": [{"uri": "scene.bin", "byteLength": 108}, {"uri": "keys.bin", "byteLength": 40}]
 }"#;
 
-#[test]
-fn frames_are_the_pictures_from_where_the_camera_is_then() {
-    let bench = Bench::new();
+/// Writes [`MOVING`] under this name.
+pub(crate) fn put_moving_scene(bench: &Bench, name: &str) {
     let half = std::f32::consts::FRAC_1_SQRT_2;
     let keys = [0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, half, 0.0, half];
     let bytes: Vec<u8> = keys.iter().flat_map(|x: &f32| x.to_le_bytes()).collect();
     fs::write(bench.path("keys.bin"), bytes).expect("written");
-    fs::write(bench.path("moving.gltf"), MOVING).expect("written");
+    fs::write(bench.path(name), MOVING).expect("written");
+}
+
+#[test]
+fn frames_are_the_pictures_from_where_the_camera_is_then() {
+    let bench = Bench::new();
+    put_moving_scene(&bench, "moving.gltf");
     let common = "--env map.exr --size 32x18 --spp 4 --sampling plain --device cpu --fov 50";
     let run = |line: &str| {
         let output = bench.run(&format!("render {line} {common}"));

@@ -8,6 +8,7 @@ mod bsdf;
 mod builtin;
 mod bvh;
 mod cli;
+mod docs;
 mod environment;
 mod estimator;
 mod farm;
