@@ -22,6 +22,8 @@ const SCALES: usize = 8;
 const LEAST_LIKENESS: f32 = 1e-3;
 /// Relative difference of depths at which two neighbouring pixels are half alike.
 const DEPTH_TOLERANCE: f32 = 0.02;
+/// Whether chance decides what a sample meets is seen in cells 2^3 pixels wide: in smaller ones an edge does.
+const LEAST_SCALE_OF_CHANCE: usize = 3;
 /// The spread around a cell counts as much as so many samples of its own, at least.
 const SPREAD_SAMPLES: f32 = 2.0;
 /// Neighbours that are no more alike than this say nothing of each other's spread.
@@ -40,6 +42,8 @@ struct Cell {
     normal: Vec3,
     depth: f32,
     hits: f32,
+    /// Variance within pixels of whether a sample meets a surface, times the samples.
+    chance: f32,
 }
 
 /// What tells surfaces apart.
@@ -56,6 +60,10 @@ struct Guide {
 struct Estimate {
     light: Vec3,
     albedo: Vec3,
+    /// Share of the samples that met a surface, and the variance of whether one does: in fog that is
+    /// chance.
+    coverage: f32,
+    chance: f32,
     /// Variance of one sample's luminance.
     spread: f32,
     /// How far the cell's own mean is from what coarser scales say, and the variance of that mean.
@@ -115,11 +123,9 @@ impl Cell {
         let [r, g, b, squared] = pixel.sums();
         let sums = surface.map_or([0.0; 8], Surface::sums).map(|sum| sum as f32);
         let [ar, ag, ab, depth, nx, ny, nz, hits] = sums;
-        let albedo = if hits > 0.0 {
-            (Vec3::new(ar, ag, ab) / samples).max(Vec3::splat(LEAST_ALBEDO))
-        } else {
-            Vec3::ONE
-        };
+        // What does not come from a surface, from the sky or from fog, is as it is.
+        let as_it_is = Vec3::splat(samples - hits);
+        let albedo = ((Vec3::new(ar, ag, ab) + as_it_is) / samples).max(Vec3::splat(LEAST_ALBEDO));
         let mean = 0.2126 * r + 0.7152 * g + 0.0722 * b;
         let deviation = (squared - mean * mean / f64::from(samples)).max(0.0) as f32;
         Self {
@@ -131,6 +137,7 @@ impl Cell {
             normal: Vec3::new(nx, ny, nz),
             depth,
             hits,
+            chance: hits * (samples - hits) / (samples - 1.0).max(1.0),
         }
     }
 
@@ -150,6 +157,22 @@ impl Cell {
         self.normal += other.normal * times;
         self.depth += other.depth * times;
         self.hits += other.hits * times;
+        self.chance += other.chance * times;
+    }
+
+    /// By what light is multiplied again, and the share of the samples that met a surface. Where fog
+    /// decides that by chance, it is drawn to what is around.
+    fn dress(&self, around: f32, chance: f32) -> (Vec3, f32) {
+        let own = self.hits / self.samples;
+        // Up to two standard errors are chance.
+        let (detail, noise) = ((own - around).powi(2), 4.0 * chance / self.samples);
+        let share = if detail > noise { 1.0 - noise / detail } else { 0.0 };
+        let coverage = around + (own - around) * share;
+        // Of what was met: the rest has an albedo of 1.
+        let mixed = self.albedo / self.samples;
+        let of_surface = (mixed - (1.0 - own)) / own.max(f32::MIN_POSITIVE);
+        let albedo = if own > 0.0 { of_surface * coverage + (1.0 - coverage) } else { Vec3::ONE };
+        (albedo.max(Vec3::splat(LEAST_ALBEDO)), coverage)
     }
 
     fn is_sky(&self) -> bool {
@@ -282,17 +305,23 @@ fn refined(
         });
         if cell.samples > 0.0 {
             let mean = cell.light / cell.samples;
-            estimate.albedo = cell.albedo / cell.samples;
-            // One sample says nothing about its own spread, and where few have met no light they agree:
-            // the fewer there are, the more counts what is around.
-            let per_pixel = (cell.samples / (pixels * pixels)).max(1.0);
-            let around = match coarser {
-                Some(_) => SPREAD_SAMPLES + cell.freedom / (per_pixel * per_pixel),
-                None => 0.0,
-            };
+            if number >= LEAST_SCALE_OF_CHANCE || coarser.is_none() {
+                estimate.chance = cell.chance / cell.samples;
+            }
+            let chance = if coarser.is_some() { estimate.chance } else { 0.0 };
+            (estimate.albedo, estimate.coverage) = cell.dress(estimate.coverage, chance);
+            // Where light comes in few bright samples, a cell knows of their spread as much as it is to have
+            // met of them: those that have met none agree.
             let expected = estimate.spread;
-            estimate.spread =
-                (cell.deviation + around * expected) / (cell.freedom + around).max(1.0);
+            let (bright, around) = match coarser {
+                Some(_) => {
+                    let energy = luminance(estimate.light).powi(2);
+                    (energy / (energy + expected).max(f32::MIN_POSITIVE), SPREAD_SAMPLES)
+                }
+                None => (1.0, 0.0),
+            };
+            let total = cell.freedom * bright + around;
+            estimate.spread = (cell.deviation * bright + around * expected) / total.max(1.0);
             // A pixel that has met little light is too dark and sure of it.
             estimate.variance = estimate.spread.max(expected) / cell.samples;
             if coarser.is_some() {
@@ -342,12 +371,16 @@ fn from_parents(
         let estimate = estimates.at(x, y);
         sum.light += estimate.light * weight;
         sum.albedo += estimate.albedo * weight;
+        sum.coverage += estimate.coverage * weight;
+        sum.chance += estimate.chance * weight;
         sum.spread += estimate.spread * weight;
         total += weight;
     }
     Estimate {
         light: sum.light / total,
         albedo: sum.albedo / total,
+        coverage: sum.coverage / total,
+        chance: sum.chance / total,
         spread: sum.spread / total,
         ..sum
     }
@@ -471,6 +504,34 @@ mod tests {
             let most = off.fold(0.0, f32::max);
             assert!(most < 0.15, "{most} with {rows} rows ahead");
         }
+    }
+
+    #[test]
+    fn where_few_samples_are_bright_no_pixel_stays_dark() {
+        let light = |x, y, sample| if noise(x, y, sample) < 0.02 { 100.0 } else { 0.0 };
+        let image = blend(&film([64, 64], 1, 16, light), None);
+        let darkest = image.pixels.iter().map(|p| p[0]).fold(f32::INFINITY, f32::min);
+        assert!(darkest > 0.3, "{darkest} where 1 is right");
+    }
+
+    #[test]
+    fn fog_in_front_of_a_dark_surface_is_smooth_and_the_sky_beside_it_as_it_is() {
+        let mut film = Film::new(64, 48, true);
+        for (x, y) in (0..48).flat_map(|y| (0..64).map(move |x| (x, y))) {
+            for sample in 0..8 {
+                let is_fog = x >= 32 || noise(x, y, sample) < 0.6;
+                let surface = FirstHit { albedo: Vec3::splat(0.05), normal: Vec3::Z, depth: 9.0 };
+                let radiance = Vec3::splat(if is_fog { 1.0 } else { 0.05 });
+                let first_hit = (!is_fog).then_some(surface);
+                film.add(x, y, &PathResult { radiance, first_hit, rays: 1, was_invalid: false });
+            }
+        }
+        let truth = |x: u32, _: u32| if x >= 32 { 1.0 } else { 0.3 + 0.7 * 0.05 };
+        let image = blend(&film, None);
+        let brightest = image.pixels.iter().map(|p| p[0]).fold(0.0, f32::max);
+        assert!(brightest < 1.1, "no halo: {brightest}");
+        let (found, noisy) = (error(&image, truth), error(&film.image(), truth));
+        assert!(found < 0.45 * noisy, "{found} {noisy}");
     }
 
     #[test]
