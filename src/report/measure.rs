@@ -227,7 +227,8 @@ impl Run {
                 mse: found.mse,
                 rel_mse: found.rel_mse,
                 trimmed_rel_mse: found.trimmed_rel_mse,
-                flip: found.flip,
+                // The feature `report` brings `flip`.
+                flip: found.flip.unwrap_or(f64::NAN),
                 mean_ratio: found.mean_ratio,
             });
         }

@@ -2,7 +2,9 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "who runs this reads it")]
 
+#[cfg(feature = "window")]
 mod app;
+#[cfg(feature = "report")]
 mod bench;
 mod bsdf;
 mod builtin;
@@ -10,15 +12,20 @@ mod bvh;
 mod cli;
 mod environment;
 mod estimator;
+mod examples;
 mod farm;
 mod faults;
 mod gltf_files;
+#[cfg(feature = "gpu")]
 mod gpu;
 mod image_files;
 mod metrics;
 mod peers;
 mod real_files;
+#[cfg(feature = "report")]
 mod report;
 mod shared;
+#[cfg(all(feature = "window", feature = "report"))]
 mod stability;
+#[cfg(feature = "window")]
 mod window;
