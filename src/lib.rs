@@ -20,15 +20,30 @@
 //! Arrows point down: `cli -> {stability -> app, bench -> report} -> render -> path ->
 //! {light_grid, bsdf, medium, bvh} ->
 //! {scene, environment} -> {image, sampler, math, color, error}`.
+//!
+//! Without the default features it renders on the CPU: `gpu` adds GPUs, `window` the window and with it
+//! GPUs, `report` what measures, `flip` a metric, `meshopt` a compression of glTF files.
+
+#![cfg_attr(
+    not(all(feature = "window", feature = "report")),
+    allow(
+        dead_code,
+        unused_imports,
+        reason = "what only a part that is left out would use is not worth a `cfg`"
+    )
+)]
 
 mod alarm;
+#[cfg(feature = "window")]
 pub mod app;
+#[cfg(feature = "report")]
 pub mod bench;
 pub mod bsdf;
 pub mod bvh;
 pub mod cli;
 pub mod color;
 pub mod denoise;
+#[cfg(feature = "window")]
 mod develop;
 mod digest;
 pub mod environment;
@@ -46,10 +61,12 @@ pub mod path;
 mod prefetch;
 pub mod radiance_cache;
 pub mod render;
+#[cfg(feature = "report")]
 pub mod report;
 pub mod sampler;
 pub mod scene;
 pub mod sources;
+#[cfg(all(feature = "window", feature = "report"))]
 pub mod stability;
 mod terminal;
 pub mod tone;

@@ -1,11 +1,12 @@
 //! Scenes and maps by name: a file, or something built in.
 
+use std::io::Read as _;
 use std::path::Path;
 
 use crate::environment::sky;
 use crate::error::{Error, Notices, Result};
 use crate::image::Image;
-use crate::image::{read_map, sanitise};
+use crate::image::{looks_like_picture, looks_like_scene, open_file, read_map, sanitise};
 use crate::memory;
 use crate::scene::{Scene, SceneOptions, builtin, gltf};
 
@@ -33,6 +34,23 @@ pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
     } else {
         gltf::load_with(Path::new(name), options)
     }
+}
+
+/// Whether a name stands for a scene rather than a map: by how its file begins, else by the name.
+pub(crate) fn is_scene(name: &str) -> bool {
+    let mut start = [0; 64];
+    let file = open_file(Path::new(name)).ok();
+    let count = file.and_then(|(mut file, _)| file.read(&mut start).ok()).unwrap_or(0);
+    if looks_like_scene(&start[..count]) {
+        return true;
+    }
+    if looks_like_picture(&start[..count]) {
+        return false;
+    }
+    let extension = Path::new(name).extension().map(|e| e.to_string_lossy().to_lowercase());
+    builtin::names().contains(&name)
+        || matches!(extension.as_deref(), Some("gltf" | "glb"))
+        || (extension.is_none() && !name.starts_with("sky:"))
 }
 
 /// Whether there is such a scene, without reading it.

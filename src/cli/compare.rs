@@ -46,5 +46,8 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
     print(format_args!("relMSE            {rel_mse:.4e}"))?;
     print(format_args!("trimmed relMSE    {trimmed_rel_mse:.4e}"))?;
     print(format_args!("of 8x8 blocks     {block_rel_mse:.4e}"))?;
-    print(format_args!("FLIP              {flip:.4}"))
+    match flip {
+        Some(flip) => print(format_args!("FLIP              {flip:.4}")),
+        None => print("FLIP              not built in (feature `flip`)"),
+    }
 }

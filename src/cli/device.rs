@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
 use crate::path::World;
-use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, Schedule, Stage, adapters};
+use crate::render::gpu::{DeviceChoice, Gpu, NO_GPU, RayChoice, Schedule, Stage, adapters};
 use crate::render::{Session, View};
 use crate::terminal::{notice, print};
 
@@ -24,7 +24,7 @@ pub(super) fn run(arguments: &DevicesArguments) -> Result<()> {
         return print(json!(adapters));
     }
     if adapters.is_empty() {
-        print("no GPU: neither Vulkan, Metal, DX12 nor OpenGL has an adapter; the CPU renders")?;
+        print(format_args!("{NO_GPU}; the CPU renders"))?;
     }
     for adapter in &adapters {
         print(&adapter.name)?;

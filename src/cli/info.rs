@@ -1,16 +1,13 @@
 //! `lightgrid info`.
 
-use std::io::Read as _;
-use std::path::Path;
-
 use serde_json::{Value, json};
 
 use crate::environment::landmarks::Sun;
 use crate::error::{Notices, Result};
-use crate::image::{Image, looks_like_picture, looks_like_scene, open_file};
+use crate::image::Image;
 use crate::path::World;
 use crate::render::gpu::KernelFacts;
-use crate::scene::{Projection, Scene, SceneOptions, builtin};
+use crate::scene::{Projection, Scene, SceneOptions};
 use crate::terminal::print;
 
 /// Arguments of `info`.
@@ -28,7 +25,7 @@ pub(super) struct InfoArguments {
 /// Prints what is in a scene or a map.
 pub(super) fn run(arguments: &InfoArguments) -> Result<()> {
     let name = arguments.source.as_str();
-    let facts = if is_scene(name) {
+    let facts = if crate::sources::is_scene(name) {
         scene_facts(name, crate::sources::scene_with(name, &arguments.of_scene)?)
     } else {
         let (map, notices) = crate::sources::map(name)?;
@@ -41,22 +38,6 @@ pub(super) fn run(arguments: &InfoArguments) -> Result<()> {
         list_facts(&facts, 0, &mut lines);
         print(lines.join("\n"))
     }
-}
-
-fn is_scene(name: &str) -> bool {
-    let mut start = [0; 64];
-    let file = open_file(Path::new(name)).ok();
-    let count = file.and_then(|(mut file, _)| file.read(&mut start).ok()).unwrap_or(0);
-    if looks_like_scene(&start[..count]) {
-        return true;
-    }
-    if looks_like_picture(&start[..count]) {
-        return false;
-    }
-    let extension = Path::new(name).extension().map(|e| e.to_string_lossy().to_lowercase());
-    builtin::names().contains(&name)
-        || matches!(extension.as_deref(), Some("gltf" | "glb"))
-        || (extension.is_none() && !name.starts_with("sky:"))
 }
 
 fn scene_facts(name: &str, scene: Scene) -> Value {

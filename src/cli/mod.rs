@@ -4,6 +4,11 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::error::Result;
+
+#[cfg(not(all(feature = "window", feature = "report")))]
+mod absent;
+#[cfg(feature = "report")]
 mod bench;
 mod compare;
 mod device;
@@ -14,12 +19,19 @@ mod merge;
 mod picture;
 mod progress;
 mod render;
+#[cfg(feature = "report")]
 mod report;
 mod sat;
+#[cfg(feature = "window")]
 mod screenshot;
+#[cfg(all(feature = "window", feature = "report"))]
 mod stability;
 mod values;
+#[cfg(feature = "window")]
 mod view;
+
+#[cfg(not(all(feature = "window", feature = "report")))]
+use absent::*;
 
 /// A progressive path tracer for scenes lit by an HDR environment map. It learns which tiles of the
 /// map each part of the picture can see, and samples only those.
@@ -42,8 +54,10 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Open the window.
+    #[cfg_attr(not(feature = "window"), command(hide = true))]
     View(view::ViewArguments),
     /// Draw the window's content into a file; no display is needed.
+    #[cfg_attr(not(feature = "window"), command(hide = true))]
     Screenshot(Box<screenshot::ScreenshotArguments>),
     /// Render a scene into a picture.
     Render(Box<render::RenderArguments>),
@@ -56,12 +70,15 @@ enum Command {
     /// List the GPUs and what they allow.
     Devices(device::DevicesArguments),
     /// Measure what this machine can do: rays and samples a second, waits, what the host costs.
+    #[cfg_attr(not(feature = "report"), command(hide = true))]
     Bench(bench::BenchArguments),
     /// Measure error against run time: curves, speed-ups, the talk's table.
+    #[cfg_attr(not(feature = "report"), command(hide = true))]
     Report(Box<report::ReportArguments>),
     /// Compare the importance tables' accuracy on maps (the talk's summed-area-table claim).
     Sat(sat::SatArguments),
     /// Try stiff and extreme cases on this machine; fails if one does.
+    #[cfg_attr(not(all(feature = "window", feature = "report")), command(hide = true))]
     Stability(stability::StabilityArguments),
     /// Print what completes these commands in a shell.
     Completions(generate::CompletionsArguments),
@@ -71,9 +88,18 @@ enum Command {
 
 /// Runs the command line; errors become one sentence on stderr and a non-zero exit.
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    match run(Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            crate::terminal::tell(format_args!("lightgrid: {error}"));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: Arguments) -> Result<()> {
     let command = arguments.command.unwrap_or_else(|| Command::View(view::ViewArguments::plain()));
-    let result = match &command {
+    match &command {
         Command::View(arguments) => view::run(arguments),
         Command::Screenshot(arguments) => screenshot::run(arguments),
         Command::Render(arguments) => render::run(arguments),
@@ -87,13 +113,6 @@ pub fn main() -> ExitCode {
         Command::Stability(arguments) => stability::run(arguments),
         Command::Completions(arguments) => generate::completions(arguments),
         Command::Man(arguments) => generate::man(arguments),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            crate::terminal::tell(format_args!("lightgrid: {error}"));
-            ExitCode::FAILURE
-        }
     }
 }
 

@@ -11,22 +11,25 @@ use crate::error::Result;
 use crate::render::gpu::{DeviceChoice, RayChoice};
 use crate::render::{Sampling, StopRule};
 use crate::scene::{SceneOptions, builtin};
+use crate::sources::is_scene;
 use crate::terminal::tell;
 
 /// Seconds of rendering when there is no display and nothing else says when to stop.
 const HEADLESS_SECONDS: f64 = 60.0;
+/// The map where none is asked for.
+const DEFAULT_MAP: &str = "sky:day";
 
 /// Arguments of `view`.
 #[derive(Debug, clap::Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct ViewArguments {
-    /// A glTF file (.gltf, .glb) or a built-in scene.
+    /// A glTF file (.gltf, .glb) or a built-in scene; a map here lights the built-in living room.
     #[arg(default_value = builtin::DEFAULT_SCENE)]
     scene: String,
     #[command(flatten)]
     of_scene: SceneOptions,
     /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky.
-    #[arg(long, default_value = "sky:day", value_name = "MAP")]
+    #[arg(long, default_value = DEFAULT_MAP, value_name = "MAP")]
     env: String,
     /// How the map is sampled.
     #[arg(long, value_enum)]
@@ -55,12 +58,20 @@ pub(super) struct ViewArguments {
 }
 
 impl ViewArguments {
+    /// The scene and the map: a file manager hands over maps as it does scenes.
+    fn names(&self) -> [&str; 2] {
+        if self.env == DEFAULT_MAP && !is_scene(&self.scene) {
+            return [builtin::DEFAULT_SCENE, &self.scene];
+        }
+        [&self.scene, &self.env]
+    }
+
     /// What `lightgrid` alone stands for.
     pub(super) fn plain() -> Self {
         Self {
             scene: builtin::DEFAULT_SCENE.to_owned(),
             of_scene: SceneOptions::default(),
-            env: "sky:day".to_owned(),
+            env: DEFAULT_MAP.to_owned(),
             sampling: None,
             device: None,
             adapter: None,
@@ -97,11 +108,8 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
 }
 
 fn document(arguments: &ViewArguments, settings: &Settings) -> Document {
-    let mut document = Document {
-        scene: arguments.scene.clone(),
-        map: arguments.env.clone(),
-        ..settings.document()
-    };
+    let [scene, map] = arguments.names().map(str::to_owned);
+    let mut document = Document { scene, map, ..settings.document() };
     if let Some(sampling) = arguments.sampling {
         document.light.sampling = sampling;
     }
@@ -119,9 +127,10 @@ fn document(arguments: &ViewArguments, settings: &Settings) -> Document {
 
 fn headless(arguments: &ViewArguments) -> super::render::RenderArguments {
     let seconds = arguments.samples.is_none().then_some(HEADLESS_SECONDS);
+    let [scene, map] = arguments.names();
     let mut headless = super::render::RenderArguments::for_picture(
-        &arguments.scene,
-        &arguments.env,
+        scene,
+        map,
         &arguments.output,
         arguments.sampling.unwrap_or_default(),
         (arguments.size, arguments.samples, seconds),

@@ -1,15 +1,16 @@
 //! Comparing pictures, and deciding whether two estimates agree.
 
+#[cfg_attr(not(feature = "flip"), path = "no_flip.rs")]
+mod flip;
 pub mod statistics;
 
-use nv_flip::{DEFAULT_PIXELS_PER_DEGREE, FlipImageRgb8, FlipPool};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::color::luminance;
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
+use crate::tone::auto_exposure_ev;
 
 /// How far a picture is from its reference. All but `flip` are in units of the reference's mean, so
 /// that they do not depend on the exposure. 0 is equal (1 for `mean_ratio`).
@@ -28,8 +29,9 @@ pub struct Comparison {
     /// Mean of the picture over mean of the reference, all channels together.
     pub mean_ratio: f64,
     /// Mean LDR-FLIP error in `[0,1]` at 67 pixels per degree (Andersson et al. 2020), of both
-    /// pictures through the ACES curve at [`Self::flip_exposure_ev`].
-    pub flip: f64,
+    /// pictures through the ACES curve at [`Self::flip_exposure_ev`]; `None` where the feature `flip` is
+    /// not built in.
+    pub flip: Option<f64>,
     /// The automatic exposure of the reference, in stops.
     pub flip_exposure_ev: f32,
 }
@@ -67,7 +69,7 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Comparison> {
         trimmed_rel_mse: trimmed_mean(&mut relative),
         block_rel_mse: trimmed_mean(&mut of_blocks),
         mean_ratio: mean(image) / reference_mean,
-        flip: mean_flip(image, reference, flip_exposure_ev),
+        flip: flip::mean(image, reference, flip_exposure_ev),
         flip_exposure_ev,
     })
 }
@@ -150,14 +152,4 @@ pub(crate) fn trimmed_mean(values: &mut [f64]) -> f64 {
     let kept = (values.len() - trimmed).max(1);
     values.sort_unstable_by(f64::total_cmp);
     values[..kept].iter().sum::<f64>() / kept as f64
-}
-
-/// Mean LDR-FLIP error of both pictures through the same exposure and curve.
-fn mean_flip(image: &Image, reference: &Image, exposure_ev: f32) -> f64 {
-    let display = |image: &Image| {
-        let shown = display_rgb8(image, exposure_ev, ToneCurve::Aces);
-        FlipImageRgb8::with_data(shown.width, shown.height, shown.pixels.as_flattened())
-    };
-    let errors = nv_flip::flip(display(reference), display(image), DEFAULT_PIXELS_PER_DEGREE);
-    f64::from(FlipPool::from_image(&errors).mean())
 }

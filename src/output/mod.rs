@@ -55,6 +55,19 @@ pub struct PictureOptions {
     pub layers: Vec<LayerName>,
 }
 
+impl Default for PictureOptions {
+    /// As `lightgrid render` does where nothing else is asked for.
+    fn default() -> Self {
+        Self {
+            exposure: Exposure::Auto,
+            tone_curve: ToneCurve::default(),
+            denoiser: None,
+            white_balance: WhiteBalance::default(),
+            layers: Vec::new(),
+        }
+    }
+}
+
 /// Refuses pictures that are neither `.png` nor `.exr`.
 ///
 /// # Errors

@@ -146,20 +146,35 @@ pub(super) fn middle_distance(world: &World, view: &View, rays: &CameraRays) -> 
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::environment::{EnvironmentOptions, sky};
-    use crate::light_grid::LightGrid;
-    use crate::render::cpu;
-    use crate::render::gpu::tests::view;
+    use crate::light_grid::{LawOptions, LightGrid};
+    use crate::path::PathLimits;
+    use crate::render::filter::PixelFilter;
+    use crate::render::{Sampling, Sharing, cpu};
     use crate::scene::builtin;
+
+    pub(in crate::render) fn view(world: &World, recording: LawOptions) -> View {
+        let talk = recording == LawOptions::TALK;
+        View {
+            filter: PixelFilter::Box,
+            sampling: if talk { Sampling::Talk } else { Sampling::Adaptive },
+            limits: PathLimits { bounces: 4, russian_roulette: true },
+            seed: 5,
+            sharing: Sharing::Off,
+            learning_paths: 1 << 13,
+            laws: recording,
+            ..View::new(world.scene.cameras[0].clone(), [64, 36])
+        }
+    }
 
     fn office() -> (World, Environment, View) {
         let world = World::new(builtin::build("office").expect("built in"));
         let map = sky::build("overcast", 128, 64).expect("a sky");
         let environment =
             Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
-        let view = View { gi: Gi::Cached, ..view(&world, crate::light_grid::LawOptions::ADAPTIVE) };
+        let view = View { gi: Gi::Cached, ..view(&world, LawOptions::ADAPTIVE) };
         (world, environment, view)
     }
 

@@ -177,7 +177,7 @@ mod tests {
     use super::*;
     use crate::environment::{EnvironmentOptions, sky};
     use crate::light_grid::LawOptions;
-    use crate::render::gpu::tests::view;
+    use crate::render::gi::tests::view;
     use crate::render::{Phase, Sampling};
     use crate::scene::builtin;
 

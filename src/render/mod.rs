@@ -12,9 +12,11 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 mod cpu;
+mod devices;
 pub mod film;
 pub mod filter;
 mod gi;
+#[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;
 mod learning;
 
@@ -118,6 +120,30 @@ pub struct Crop {
 }
 
 impl View {
+    /// What `lightgrid render` takes where nothing else is asked for.
+    pub fn new(camera: Camera, [width, height]: [u32; 2]) -> Self {
+        let sampling = Sampling::default();
+        Self {
+            camera,
+            width,
+            height,
+            filter: PixelFilter::default(),
+            sampling,
+            limits: PathLimits { bounces: 8, russian_roulette: true },
+            seed: 0,
+            sharing: Sharing::default(),
+            gi: Gi::default(),
+            points: Points::Sobol,
+            grid_columns: 64,
+            learning_paths: Self::suitable_learning_paths(sampling, [width, height], None),
+            laws: LawOptions::ADAPTIVE,
+            medium: None,
+            background: Background::default(),
+            crop: None,
+            layers: false,
+        }
+    }
+
     /// How counters become laws; `None` if nothing is learned.
     pub fn law_options(&self) -> Option<LawOptions> {
         match self.sampling {

@@ -242,11 +242,12 @@ impl Run {
                 rel_mse: found.rel_mse,
                 trimmed_rel_mse: found.trimmed_rel_mse,
                 block_rel_mse: found.block_rel_mse,
-                flip: found.flip,
+                // The feature `report` brings `flip`.
+                flip: found.flip.unwrap_or(f64::NAN),
                 mean_ratio: found.mean_ratio,
             });
         }
-        self.denoised_flip = Some(compare(denoised, reference)?.flip);
+        self.denoised_flip = compare(denoised, reference)?.flip;
         Ok(())
     }
 }

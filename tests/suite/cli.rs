@@ -140,8 +140,17 @@ fn laws_are_exported_as_tables() {
 #[test]
 fn help_names_every_command() {
     let help = text(&Bench::new().run("--help").stdout);
-    for word in ["view", "screenshot", "render", "compare", "info", "report", "sat"] {
-        assert!(help.contains(word), "{help}");
+    for word in ["render", "merge", "compare", "info", "sat"] {
+        assert!(help.contains(&format!("\n  {word} ")), "{help}");
+    }
+    let (window, report) = (cfg!(feature = "window"), cfg!(feature = "report"));
+    for (word, is_built_in) in [
+        ("view", window),
+        ("screenshot", window),
+        ("report", report),
+        ("stability", window && report),
+    ] {
+        assert_eq!(help.contains(&format!("\n  {word} ")), is_built_in, "{help}");
     }
 }
 
@@ -454,7 +463,7 @@ fn a_region_is_that_part_of_the_picture_and_the_background_is_the_cameras_alone(
 #[test]
 fn a_reader_who_has_seen_enough_is_no_reason_to_panic() {
     let mut child = Command::new(env!("CARGO_BIN_EXE_lightgrid"))
-        .args(["stability", "--list"])
+        .args(["completions", "bash"])
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::piped())
         .spawn()

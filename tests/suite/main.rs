@@ -2,24 +2,32 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "who runs this reads it")]
 
+#[cfg(feature = "window")]
 mod app;
+#[cfg(feature = "report")]
 mod bench;
 mod bsdf;
 mod builtin;
 mod bvh;
 mod cli;
+#[cfg(all(feature = "window", feature = "report"))]
 mod docs;
 mod environment;
 mod estimator;
+mod examples;
 mod farm;
 mod faults;
 mod gltf_files;
+#[cfg(feature = "gpu")]
 mod gpu;
 mod image_files;
 mod metrics;
 mod peers;
 mod real_files;
+#[cfg(feature = "report")]
 mod report;
 mod shared;
+#[cfg(all(feature = "window", feature = "report"))]
 mod stability;
+#[cfg(feature = "window")]
 mod window;

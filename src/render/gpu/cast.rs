@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::layout::Work;
 use super::shader::Kernel;
-use super::{GROUP, MAX_GROUPS, Renderer};
+use super::{GROUP, MAX_GROUPS, Question, Renderer};
 use crate::bvh::Ray;
 use crate::error::Result;
 
@@ -17,15 +17,6 @@ pub(super) struct CastRay {
     pub(super) t_max: f32,
     pub(super) direction: Vec3,
     pub(super) padding: u32,
-}
-
-/// What is asked of rays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Question {
-    /// Where they end.
-    ClosestHit,
-    /// How much light comes along them.
-    Transmittance,
 }
 
 impl Question {

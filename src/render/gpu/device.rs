@@ -3,37 +3,13 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-use serde::{Deserialize, Serialize};
 use wgpu::wgt::WgpuHasDisplayHandle;
 use wgpu::{Adapter, Backends, DeviceType, Features, Instance, InstanceDescriptor, Limits};
 use wgpu::{PollType, SubmissionIndex, Surface};
 
 use super::pipeline::Pipeline;
-use super::queue::Schedule;
 use crate::error::{Error, Result};
-
-/// What an adapter is and how much it allows.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct AdapterFacts {
-    /// Name of the device.
-    pub name: String,
-    /// Vulkan, OpenGL, Metal or DX12.
-    pub backend: String,
-    /// `discrete`, `integrated`, `virtual`, `software` or `other`.
-    pub kind: &'static str,
-    /// Driver and version.
-    pub driver: String,
-    /// Most bytes of one storage binding.
-    pub storage_binding_bytes: u64,
-    /// Most bytes of one buffer.
-    pub buffer_bytes: u64,
-    /// Most storage buffers of a shader.
-    pub storage_buffers: u32,
-    /// Whether path tracing shaders can run at all.
-    pub can_compute: bool,
-    /// Whether it finds what rays hit by itself.
-    pub has_ray_queries: bool,
-}
+use crate::render::devices::{AdapterFacts, RayChoice, Schedule};
 
 impl AdapterFacts {
     fn of(adapter: &Adapter) -> Self {
@@ -62,11 +38,6 @@ impl AdapterFacts {
         }
     }
 
-    /// The name without what stands in brackets.
-    pub fn short_name(&self) -> &str {
-        self.name.split(" (").next().unwrap_or(&self.name)
-    }
-
     fn title(&self) -> String {
         format!("{} ({})", self.name, self.backend)
     }
@@ -75,11 +46,6 @@ impl AdapterFacts {
     fn is_called(&self, name: Option<&str>) -> bool {
         let title = self.title().to_lowercase();
         name.is_none_or(|name| title.contains(&name.to_lowercase()))
-    }
-
-    /// Whether it only pretends to be a GPU.
-    pub fn is_software(&self) -> bool {
-        self.kind == "software"
     }
 
     /// Discrete before integrated before the rest, Vulkan, Metal and DX12 before OpenGL.
@@ -94,6 +60,9 @@ impl AdapterFacts {
         (kind, self.backend == "OpenGL")
     }
 }
+
+/// What is said where there is no adapter.
+pub(crate) const NO_GPU: &str = "no GPU: neither Vulkan, Metal, DX12 nor OpenGL has an adapter";
 
 /// All adapters of this machine, the best one first.
 pub fn adapters() -> Vec<AdapterFacts> {
@@ -124,65 +93,6 @@ fn enumerate(instance: &Instance, surface: Option<&Surface<'_>>) -> Vec<(Adapter
         .collect();
     found.sort_by_key(|(facts, _)| facts.rank());
     found
-}
-
-/// Where to render.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum DeviceChoice {
-    /// A real GPU if there is one and everything fits on it, else the CPU.
-    #[default]
-    Auto,
-    /// A GPU, be it a software one, or an error.
-    Gpu,
-    /// The CPU.
-    Cpu,
-}
-
-impl DeviceChoice {
-    /// Connects to the GPU that is chosen, the best whose name or backend contains `adapter`;
-    /// `None` is the CPU.
-    ///
-    /// # Errors
-    /// If it cannot be opened; with [`Self::Auto`] and no name this is no reason to stop.
-    pub fn open(self, adapter: Option<&str>) -> Result<Option<Gpu>> {
-        self.open_or_share(adapter, None)
-    }
-
-    /// [`Self::open`], but a clone of `shared` if that is the GPU chosen and still of use.
-    ///
-    /// # Errors
-    /// As [`Self::open`].
-    pub(crate) fn open_or_share(
-        self,
-        adapter: Option<&str>,
-        shared: Option<&Gpu>,
-    ) -> Result<Option<Gpu>> {
-        match (self, adapter) {
-            (Self::Cpu, Some(name)) => {
-                Err(Error::new(format!("--adapter {name} and --device cpu exclude each other")))
-            }
-            (Self::Cpu, None) => Ok(None),
-            (Self::Auto, None) if adapters().first().is_none_or(AdapterFacts::is_software) => {
-                Ok(None)
-            }
-            (_, name) => Gpu::open_or_share(name, shared).map(Some),
-        }
-    }
-}
-
-/// What finds the surfaces that rays hit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum RayChoice {
-    /// A real GPU's own ray queries where it has them, else our kernels.
-    #[default]
-    Auto,
-    /// The GPU's ray queries, or an error. They are not watertight to the last bit: a ray along an edge
-    /// may hit another triangle or, seldom, none.
-    Hardware,
-    /// Our kernels.
-    Software,
 }
 
 /// A connection to an adapter; clones share it.
@@ -219,7 +129,11 @@ impl Gpu {
         Self::open_or_share(name, None)
     }
 
-    fn open_or_share(name: Option<&str>, shared: Option<&Self>) -> Result<Self> {
+    /// [`Self::open`], but a clone of `shared` if that is the GPU chosen and still of use.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub(crate) fn open_or_share(name: Option<&str>, shared: Option<&Self>) -> Result<Self> {
         let mut others = Vec::new();
         for backends in [PRIMARY, Backends::GL] {
             let instance = instance(backends, None);
@@ -237,7 +151,7 @@ impl Gpu {
             Some(name) if !others.is_empty() => {
                 format!("no adapter is called {name}; there are {}", others.join(", "))
             }
-            _ => "no GPU: neither Vulkan, Metal, DX12 nor OpenGL has an adapter".to_owned(),
+            _ => NO_GPU.to_owned(),
         }))
     }
 

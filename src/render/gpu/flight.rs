@@ -12,6 +12,7 @@ use super::pacer::{Pacer, TARGET_SECONDS, WINDOW_TARGET_SECONDS};
 use super::queue::REPORT_BYTES;
 use super::shader::Kernel;
 use crate::error::{Error, Result};
+use crate::render::devices::FlightFigures;
 
 /// Dispatches under way at a time: one runs, one waits, one is being made.
 const MOST: usize = 3;
@@ -58,17 +59,6 @@ struct Flight {
     slot: usize,
     /// Lanes of a job that reports.
     lanes: Option<u32>,
-}
-
-/// What dispatches took.
-#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
-pub struct FlightFigures {
-    /// Dispatches that have ended.
-    pub dispatches: u64,
-    /// Seconds they took on the device: its own timestamps, or what the host saw.
-    pub device_seconds: f64,
-    /// Whether these are the device's timestamps.
-    pub has_timestamps: bool,
 }
 
 impl Flights {

@@ -50,11 +50,13 @@ use shader::{Binding, Constants, Features, Kernel, Program};
 use sharing::Sharing;
 use stage::put_array;
 
-pub(crate) use cast::Question;
-pub use device::{AdapterFacts, DeviceChoice, Gpu, RayChoice, adapters};
+pub(crate) use super::devices::Question;
+pub use super::devices::{
+    AdapterFacts, DeviceChoice, FlightFigures, GpuFigures, RayChoice, Schedule,
+};
+pub(crate) use device::NO_GPU;
+pub use device::{Gpu, adapters};
 pub(crate) use film::DeviceFilm;
-pub use flight::FlightFigures;
-pub use queue::Schedule;
 pub use shader::KernelFacts;
 pub use stage::Stage;
 
@@ -118,25 +120,6 @@ pub(super) struct Advance {
     pub(super) samples: u64,
     /// Fewest samples of any pixel from now on.
     pub(super) least: u32,
-}
-
-/// What was left out of the kernels and what they take.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct GpuFigures {
-    /// The device.
-    pub adapter: AdapterFacts,
-    /// Bytes of all buffers on it.
-    pub device_bytes: u64,
-    /// Bytes read back from it for this picture.
-    pub bytes_read: u64,
-    /// What its dispatches took.
-    pub flights: FlightFigures,
-    /// Seconds in which the driver compiled its kernels, when it did.
-    pub compile_seconds: f64,
-    /// How its kernels share the work.
-    pub schedule: Schedule,
-    /// What its render kernel holds.
-    pub kernel: KernelFacts,
 }
 
 impl Renderer {
@@ -650,10 +633,11 @@ pub(super) mod tests {
     use crate::environment::EnvironmentOptions;
     use crate::light_grid::cells::SphericalGrid;
     use crate::light_grid::{LawOptions, Recording};
-    use crate::path::{Background, PathLimits, PathTracer};
+    use crate::path::PathTracer;
     use crate::render::gi::Lessons;
-    use crate::render::{Gi, Sampling, Sharing, cpu};
-    use crate::sampler::{Points, Sequence};
+    use crate::render::gi::tests::view;
+    use crate::render::{Gi, Sampling, cpu};
+    use crate::sampler::Sequence;
     use crate::scene::builtin;
 
     fn crack() -> (World, Environment) {
@@ -662,29 +646,6 @@ pub(super) mod tests {
         let environment =
             Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
         (world, environment)
-    }
-
-    pub(in super::super) fn view(world: &World, recording: LawOptions) -> View {
-        let talk = recording == LawOptions::TALK;
-        View {
-            camera: world.scene.cameras[0].clone(),
-            width: 64,
-            height: 36,
-            filter: crate::render::filter::PixelFilter::Box,
-            sampling: if talk { Sampling::Talk } else { Sampling::Adaptive },
-            limits: PathLimits { bounces: 4, russian_roulette: true },
-            seed: 5,
-            points: Points::Sobol,
-            grid_columns: 64,
-            sharing: Sharing::Off,
-            gi: Gi::Exact,
-            learning_paths: 1 << 13,
-            laws: recording,
-            medium: None,
-            background: Background::Map,
-            crop: None,
-            layers: false,
-        }
     }
 
     /// Visits of each cell and, cell by cell, tile counters after two learning passes, the second with

@@ -12,6 +12,7 @@ use super::layout::Work;
 use super::shader::{Features, Kernel, SlotTexels};
 use super::{GROUP, Progress, Renderer};
 use crate::error::Result;
+use crate::render::devices::Schedule;
 
 /// Most workgroups of slots: they keep the largest devices busy and fit their caches.
 const MOST_GROUPS: u64 = 4096;
@@ -19,16 +20,6 @@ const MOST_GROUPS: u64 = 4096;
 const MOST_STEPS: u64 = 64;
 /// Words that the host reads of the work: pixels taken, slots that hold a path, samples, nothing.
 pub(super) const REPORT_BYTES: u64 = 16;
-
-/// How kernels share the work of rendering.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Schedule {
-    /// One does all.
-    Whole,
-    /// Three take turns.
-    Queue,
-}
 
 impl Schedule {
     /// What suits a picture on a device.

@@ -1,7 +1,9 @@
 //! `EXT_meshopt_compression` and its successor `KHR_meshopt_compression`: buffer views that are packed.
 
+#[cfg_attr(not(feature = "meshopt"), path = "meshopt/absent.rs")]
+mod codec;
+
 use gltf::json;
-use meshopt::ffi;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -80,39 +82,12 @@ impl Packed {
             return Err("its meshopt compression makes no sense".into());
         }
         let mut unpacked = memory::filled(total, 0_u8)?;
-        let (to, from) = (unpacked.as_mut_ptr().cast(), bytes.as_ptr());
-        let (count, length) = (count as usize, bytes.len());
-        // SAFETY: `to` has room for `count` elements of `stride` bytes, `from` holds `length` bytes, and
-        // the strides are those that the decoders and filters ask for.
-        let status = unsafe {
-            match self.mode {
-                Mode::Attributes => {
-                    ffi::meshopt_decodeVertexBuffer(to, count, stride, from, length)
-                }
-                Mode::Triangles => ffi::meshopt_decodeIndexBuffer(to, count, stride, from, length),
-                Mode::Indices => ffi::meshopt_decodeIndexSequence(to, count, stride, from, length),
-            }
-        };
-        if status != 0 {
-            return Err("its meshopt data are damaged".into());
-        }
-        if matches!(self.mode, Mode::Attributes) {
-            // SAFETY: as above.
-            unsafe {
-                match self.filter {
-                    Filter::None => {}
-                    Filter::Octahedral => ffi::meshopt_decodeFilterOct(to, count, stride),
-                    Filter::Quaternion => ffi::meshopt_decodeFilterQuat(to, count, stride),
-                    Filter::Exponential => ffi::meshopt_decodeFilterExp(to, count, stride),
-                    Filter::Color => ffi::meshopt_decodeFilterColor(to, count, stride),
-                }
-            }
-        }
+        codec::decode(self, bytes, &mut unpacked)?;
         Ok(unpacked)
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "meshopt"))]
 mod tests {
     use super::*;
 

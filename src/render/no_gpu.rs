@@ -1,0 +1,195 @@
+//! In the place of GPUs where the feature `gpu` is not built in: there are none, and what would be on
+//! one cannot exist.
+
+use std::ops::Range;
+use std::sync::atomic::AtomicBool;
+
+use serde::Serialize;
+
+use super::film::Film;
+use super::{Pass, View};
+use crate::bvh::Ray;
+use crate::environment::Environment;
+use crate::error::{Error, Result};
+use crate::light_grid::{LearningGrid, LightGrid};
+use crate::path::World;
+use crate::path::camera::CameraRays;
+use crate::radiance_cache::{RadianceCache, RadianceSums};
+
+pub(crate) use super::devices::Question;
+pub use super::devices::{
+    AdapterFacts, DeviceChoice, FlightFigures, GpuFigures, RayChoice, Schedule,
+};
+
+/// What is said where a GPU is asked for.
+pub(crate) const NO_GPU: &str = "this lightgrid was built without GPU rendering (feature `gpu`)";
+
+/// All adapters: none.
+pub fn adapters() -> Vec<AdapterFacts> {
+    Vec::new()
+}
+
+/// A connection to an adapter.
+#[derive(Clone)]
+pub enum Gpu {}
+
+impl Gpu {
+    /// Opens an adapter.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn open(name: Option<&str>) -> Result<Self> {
+        Self::open_or_share(name, None)
+    }
+
+    pub(super) fn open_or_share(_: Option<&str>, _: Option<&Self>) -> Result<Self> {
+        Err(Error::new(NO_GPU))
+    }
+
+    /// What it is.
+    pub fn facts(&self) -> &AdapterFacts {
+        match *self {}
+    }
+
+    /// The same connection with rays traced as is asked for.
+    ///
+    /// # Errors
+    /// None.
+    pub fn with_rays(self, _: RayChoice) -> Result<Self> {
+        match self {}
+    }
+
+    /// The same connection with kernels that share the work so.
+    #[must_use]
+    pub fn with_schedule(self, _: Option<Schedule>) -> Self {
+        match self {}
+    }
+
+    /// Whether its own ray queries find what rays hit.
+    pub fn has_hardware_rays(&self) -> bool {
+        match *self {}
+    }
+}
+
+/// A scene and a map on a device.
+pub enum Stage {}
+
+impl Stage {
+    /// Uploads both.
+    ///
+    /// # Errors
+    /// None.
+    pub fn new(gpu: &Gpu, _: &World, _: &Environment) -> Result<Self> {
+        match *gpu {}
+    }
+
+    /// The same scene under another map.
+    ///
+    /// # Errors
+    /// None.
+    pub fn relit(&self, _: &Environment) -> Result<Self> {
+        match *self {}
+    }
+}
+
+/// What there is to say of kernels: nothing.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct KernelFacts;
+
+impl KernelFacts {
+    /// Of the kernel for a scene.
+    pub fn of_scene(_: &World) -> Self {
+        Self
+    }
+}
+
+/// The film on a device.
+pub(crate) enum DeviceFilm {}
+
+/// What a call of [`Renderer::render`] has set going.
+pub(super) struct Advance {
+    pub(super) samples: u64,
+    pub(super) least: u32,
+}
+
+/// What a device holds of a picture in the making.
+pub(crate) enum Renderer {}
+
+impl Renderer {
+    pub(crate) fn new(
+        stage: &Stage,
+        _: &World,
+        _: &Environment,
+        _: &View,
+        _: &CameraRays,
+        _: Option<&Film>,
+    ) -> Result<Self> {
+        match *stage {}
+    }
+
+    pub(super) fn set_film(&mut self, _: &Film) -> Result<()> {
+        match *self {}
+    }
+
+    pub(crate) fn set_grid(&mut self, _: Option<&LightGrid>) -> Result<()> {
+        match *self {}
+    }
+
+    pub(crate) fn set_cache(&mut self, _: Option<&RadianceCache>) -> Result<()> {
+        match *self {}
+    }
+
+    pub(crate) fn learn(&mut self, _: Range<u64>, _: &LearningGrid, _: &AtomicBool) -> Result<u64> {
+        match *self {}
+    }
+
+    pub(crate) fn teach(
+        &mut self,
+        _: Range<u64>,
+        _: &RadianceSums,
+        _: &AtomicBool,
+    ) -> Result<(u64, u64)> {
+        match *self {}
+    }
+
+    pub(super) fn render(
+        &mut self,
+        _: Pass,
+        _: Option<&LearningGrid>,
+        _: &AtomicBool,
+    ) -> Result<Advance> {
+        match *self {}
+    }
+
+    pub(super) fn settle(&mut self) -> Result<()> {
+        match *self {}
+    }
+
+    pub(super) fn read_film(&self, _: &mut Film) -> Result<()> {
+        match *self {}
+    }
+
+    pub(super) fn rays(&self) -> u64 {
+        match *self {}
+    }
+
+    pub(crate) fn film_on_device(&self) -> Option<(Gpu, DeviceFilm)> {
+        match *self {}
+    }
+
+    pub(crate) fn figures(&self) -> GpuFigures {
+        match *self {}
+    }
+
+    pub(crate) fn put_rays(&mut self, _: &[Ray]) -> Result<()> {
+        match *self {}
+    }
+
+    pub(crate) fn cast(&mut self, _: Question, _: u32) -> Result<f64> {
+        match *self {}
+    }
+
+    pub(crate) fn cast_results(&self, _: usize) -> Result<Vec<(f32, u32)>> {
+        match *self {}
+    }
+}
