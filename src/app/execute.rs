@@ -14,6 +14,7 @@ use super::{App, Later, convergence, save, surface_map, theme};
 use crate::error::{Error, Result};
 use crate::image::{Rgb8, read_picture};
 use crate::render::gpu::DeviceChoice;
+use crate::scene::builtin;
 
 impl App {
     pub(super) fn execute(&mut self, command: Command, context: &egui::Context) {
@@ -21,6 +22,11 @@ impl App {
         match command {
             Command::OpenScene(name) => {
                 if self.scene.as_ref().is_none_or(|scene| scene.name != name) {
+                    // Built-in scenes bring their own sky, unless another map was chosen.
+                    let is_own_sky = self.document.map == builtin::sky(&self.document.scene);
+                    if is_own_sky && builtin::names().contains(&name.as_str()) {
+                        builtin::sky(&name).clone_into(&mut self.document.map);
+                    }
                     // A file that cannot be read must leave what is shown as it is.
                     self.document.scene = name;
                     self.document.viewpoint = None;

@@ -59,9 +59,10 @@ pub(super) struct RenderArguments {
     pub(super) of_scene: SceneOptions,
 
     /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky (sky:day, sky:sunset, sky:night,
-    /// sky:overcast, sky:hallway, each with @WIDTHxHEIGHT if wanted).
-    #[arg(long, default_value = "sky:day", value_name = "MAP", help_heading = "Environment")]
-    env: String,
+    /// sky:overcast, sky:hallway, each with @WIDTHxHEIGHT if wanted). Without it, sky:day, or the sky of a
+    /// built-in scene.
+    #[arg(long, value_name = "MAP", help_heading = "Environment")]
+    env: Option<String>,
     /// Turns the map about the vertical, in degrees.
     #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG", help_heading = "Environment")]
     env_rotation: f64,
@@ -235,6 +236,11 @@ fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
 }
 
 impl RenderArguments {
+    /// Name of the map.
+    pub(super) fn map(&self) -> &str {
+        self.env.as_deref().unwrap_or_else(|| builtin::sky(&self.scene))
+    }
+
     /// Defaults but for scene, map, picture, sampling, (size, samples, seconds) and (device,
     /// adapter, rays).
     pub(super) fn for_picture(
@@ -249,7 +255,7 @@ impl RenderArguments {
             scene: scene.to_owned(),
             of_scene: SceneOptions::default(),
             outputs: vec![picture.to_owned()],
-            env: map.to_owned(),
+            env: Some(map.to_owned()),
             env_rotation: 0.0,
             env_intensity: 1.0,
             background: None,
@@ -379,7 +385,7 @@ impl Job<'_> {
 
         let record = Record {
             scene: &arguments.scene,
-            map: &arguments.env,
+            map: arguments.map(),
             world,
             environment,
             film: &film,
@@ -453,11 +459,11 @@ fn load_world(arguments: &RenderArguments) -> Result<(World, f64, f64)> {
 /// building.
 fn load_environment(arguments: &RenderArguments) -> Result<(Environment, Notices, f64, f64)> {
     let start = Instant::now();
-    let (map, notices) = crate::sources::map(&arguments.env)?;
+    let (map, notices) = crate::sources::map(arguments.map())?;
     let load_seconds = lap(start);
     let start = Instant::now();
     let environment = Environment::new(map, &environment_options(arguments))
-        .map_err(|e| Error::at(&arguments.env, e))?;
+        .map_err(|e| Error::at(arguments.map(), e))?;
     Ok((environment, notices, load_seconds, lap(start)))
 }
 

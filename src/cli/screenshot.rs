@@ -49,9 +49,10 @@ pub(super) struct ScreenshotArguments {
     scene: String,
     #[command(flatten)]
     of_scene: SceneOptions,
-    /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky.
-    #[arg(long, default_value = "sky:day", value_name = "MAP")]
-    env: String,
+    /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky; without it, sky:day, or the sky of a
+    /// built-in scene.
+    #[arg(long, value_name = "MAP")]
+    env: Option<String>,
     /// What is drawn over the picture.
     #[arg(long, value_enum, value_name = "NAME")]
     overlay: Option<Overlay>,
@@ -117,7 +118,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     let defaults = Document::default();
     let document = Document {
         scene: arguments.scene.clone(),
-        map: arguments.env.clone(),
+        map: arguments.env.clone().unwrap_or_else(|| builtin::sky(&arguments.scene).to_owned()),
         rotation_degrees: arguments.env_rotation.rem_euclid(360.0) as f32,
         light: Light {
             device: arguments.device,

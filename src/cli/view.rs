@@ -16,8 +16,6 @@ use crate::terminal::tell;
 
 /// Seconds of rendering when there is no display and nothing else says when to stop.
 const HEADLESS_SECONDS: f64 = 60.0;
-/// The map where none is asked for.
-const DEFAULT_MAP: &str = "sky:day";
 
 /// Arguments of `view`.
 #[derive(Debug, clap::Args)]
@@ -28,9 +26,10 @@ pub(super) struct ViewArguments {
     scene: String,
     #[command(flatten)]
     of_scene: SceneOptions,
-    /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky.
-    #[arg(long, default_value = DEFAULT_MAP, value_name = "MAP")]
-    env: String,
+    /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky; without it, sky:day, or the sky of a
+    /// built-in scene.
+    #[arg(long, value_name = "MAP")]
+    env: Option<String>,
     /// How the map is sampled.
     #[arg(long, value_enum)]
     sampling: Option<Sampling>,
@@ -60,10 +59,11 @@ pub(super) struct ViewArguments {
 impl ViewArguments {
     /// The scene and the map: a file manager hands over maps as it does scenes.
     fn names(&self) -> [&str; 2] {
-        if self.env == DEFAULT_MAP && !is_scene(&self.scene) {
-            return [builtin::DEFAULT_SCENE, &self.scene];
+        match &self.env {
+            Some(map) => [&self.scene, map],
+            None if is_scene(&self.scene) => [&self.scene, builtin::sky(&self.scene)],
+            None => [builtin::DEFAULT_SCENE, &self.scene],
         }
-        [&self.scene, &self.env]
     }
 
     /// What `lightgrid` alone stands for.
@@ -71,7 +71,7 @@ impl ViewArguments {
         Self {
             scene: builtin::DEFAULT_SCENE.to_owned(),
             of_scene: SceneOptions::default(),
-            env: DEFAULT_MAP.to_owned(),
+            env: None,
             sampling: None,
             device: None,
             adapter: None,
@@ -101,6 +101,8 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
         Ok(closed_by) => closed_by.map_or(Ok(()), Err),
         Err(error) => {
             let picture = arguments.output.display();
+            let error = error.to_string();
+            let error = error.trim_end_matches('.');
             tell(format_args!("lightgrid: {error}; rendering into {picture} instead"));
             super::render::run(&headless(arguments))
         }

@@ -197,6 +197,17 @@ fn a_render_writes_picture_figures_and_metadata() {
 }
 
 #[test]
+fn a_built_in_scene_has_its_own_sky_unless_another_is_named() {
+    let bench = Bench::new();
+    for (rest, map) in [("evening", "sky:night"), ("evening --env sky:day", "sky:day")] {
+        let line = format!("render {rest} --size 8x6 --spp 1 --device cpu -o evening.exr");
+        assert!(bench.run(&line).status.success(), "{line}");
+        let metadata = read_exr_metadata(&bench.path("evening.exr")).expect("attributes");
+        assert!(metadata.contains(&("lightgrid.map".to_owned(), map.to_owned())), "{metadata:?}");
+    }
+}
+
+#[test]
 fn the_same_seed_gives_the_same_picture_whatever_the_threads() {
     let bench = Bench::new();
     for (name, rest) in [("a", "--threads 1"), ("b", "--threads 3"), ("c", "--seed 1")] {

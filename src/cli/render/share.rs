@@ -342,8 +342,8 @@ fn identity(
         true => arguments.scene.clone(),
         false => Digest::new().scene(&world.scene).to_string(),
     };
-    let map = match arguments.env.starts_with("sky:") {
-        true => arguments.env.clone(),
+    let map = match arguments.map().starts_with("sky:") {
+        true => arguments.map().to_owned(),
         false => Digest::new().map(environment.map()).to_string(),
     };
     let settings = Digest::new()

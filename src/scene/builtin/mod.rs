@@ -42,6 +42,16 @@ pub fn names() -> &'static [&'static str] {
     &["living-room", "evening", "office", "exterior", "fog", "open", "materials", "crack"]
 }
 
+/// The built-in sky that suits a scene, be it built in or not.
+pub fn sky(name: &str) -> &'static str {
+    match name {
+        "evening" => "sky:night",
+        "fog" => "sky:sunset",
+        "materials" => "sky:hallway",
+        _ => "sky:day",
+    }
+}
+
 /// Builds the scene called `name`; an error lists the names there are.
 pub fn build(name: &str) -> Result<Scene> {
     match name {
