@@ -23,7 +23,7 @@ pub struct Comparison {
     /// [`Self::rel_mse`] without the 0.1 % of the pixels (at least one) where it is worst: robust to
     /// fireflies.
     pub trimmed_rel_mse: f64,
-    /// [`Self::rel_mse`] of the means of [`BLOCK`] x [`BLOCK`] pixels, without its worst block: the coarse
+    /// [`Self::rel_mse`] of the means of 8x8 pixels, without its worst block: the coarse
     /// error, which no denoiser can tell from the picture.
     pub block_rel_mse: f64,
     /// Mean of the picture over mean of the reference, all channels together.

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use egui::{Color32, Ui, Vec2b};
-use egui_plot::{GridMark, Legend, Line, LineStyle, Plot, PlotPoints};
+use egui_plot::{Corner, GridMark, Legend, Line, LineStyle, Plot, PlotPoints};
 
 use crate::app::commands::Command;
 use crate::app::convergence::{Convergence, Run};
@@ -41,7 +41,8 @@ pub(in crate::app) fn show(
         return;
     }
     Plot::new("convergence")
-        .legend(Legend::default())
+        // Errors fall: there is room below their beginning.
+        .legend(Legend::default().position(Corner::LeftBottom))
         .height((ui.available_height() - 4.0).max(90.0))
         .allow_scroll(false)
         .show_grid(Vec2b::TRUE)
@@ -49,7 +50,11 @@ pub(in crate::app) fn show(
         .y_axis_label("relative RMS error")
         .x_grid_spacer(|input| grid_lines(input.bounds))
         .y_grid_spacer(|input| grid_lines(input.bounds))
-        .x_axis_formatter(|mark, range| tick(mark, range, 1.0))
+        .x_axis_formatter(|mark, range| match along(mark, range) {
+            // Cut off at the edge.
+            place if place > LAST_TICK => String::new(),
+            _ => tick(mark, range, 1.0),
+        })
         .y_axis_formatter(|mark, range| match tick(mark, range, 100.0) {
             text if text.is_empty() => text,
             text => format!("{text} %"),
@@ -61,6 +66,13 @@ pub(in crate::app) fn show(
                 plot.line(line);
             }
         });
+}
+
+/// Part of the axis beyond which nothing is written.
+const LAST_TICK: f64 = 0.98;
+
+fn along(mark: GridMark, range: &RangeInclusive<f64>) -> f64 {
+    (mark.value - range.start()) / (range.end() - range.start())
 }
 
 /// Span in decades below which grid lines are evenly spaced.
