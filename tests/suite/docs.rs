@@ -212,8 +212,15 @@ fn every_command_parses() {
 #[test]
 fn every_option_that_is_spoken_of_exists() {
     let known: Vec<String> = options().into_values().flatten().collect();
-    // Those of srun, sbatch and GNU parallel.
-    let others = ["--requeue", "--retries", "--transferfile"];
+    // Those of srun, sbatch, GNU parallel, and cargo.
+    let others = [
+        "--requeue",
+        "--retries",
+        "--transferfile",
+        "--profile",
+        "--features",
+        "--no-default-features",
+    ];
     // What was tried and left out.
     let past = ["--lookup"];
     for page in pages() {
