@@ -215,20 +215,27 @@ fn a_screenshot_is_repeatable_and_says_what_is_wrong() {
 #[test]
 fn without_a_display_the_picture_is_rendered_into_a_file() {
     let folder = tempfile::tempdir().expect("a folder");
-    let output = Command::new(env!("CARGO_BIN_EXE_lightgrid"))
-        .current_dir(folder.path())
-        .args("view crack --env sky:day@64x32 --size 32x18 --samples 1".split_whitespace())
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .env_remove("WAYLAND_SOCKET")
-        .output()
-        .expect("the binary starts");
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    if cfg!(target_os = "linux") {
-        assert!(output.status.success(), "{message}");
-        assert!(message.contains("no window can be opened"), "{message}");
-        assert!(message.contains("rendering into lightgrid.png instead"), "{message}");
-        let picture = read_picture(&folder.path().join("lightgrid.png")).expect("a picture");
-        assert_eq!((picture.width, picture.height), (32, 18));
+    // The second is lit by the first: a map in the place of a scene, as file managers hand it over.
+    for (what, file) in
+        [("crack --env sky:day@64x32", "lightgrid.png"), ("lightgrid.png -o lit.png", "lit.png")]
+    {
+        let line = format!("view {what} --size 32x18 --samples 1");
+        let output = Command::new(env!("CARGO_BIN_EXE_lightgrid"))
+            .current_dir(folder.path())
+            .args(line.split_whitespace())
+            .env_remove("DISPLAY")
+            .env_remove("WAYLAND_DISPLAY")
+            .env_remove("WAYLAND_SOCKET")
+            .output()
+            .expect("the binary starts");
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        if cfg!(target_os = "linux") {
+            assert!(output.status.success(), "{message}");
+            assert!(message.contains("no window can be opened"), "{message}");
+            assert!(message.contains(&format!("; rendering into {file} instead")), "{message}");
+            assert!(!message.contains(".;"), "{message}");
+            let picture = read_picture(&folder.path().join(file)).expect("a picture");
+            assert_eq!((picture.width, picture.height), (32, 18));
+        }
     }
 }
