@@ -9,11 +9,9 @@
 use std::sync::atomic::AtomicBool;
 
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
-use lightgrid::light_grid::LawOptions;
-use lightgrid::path::{Background, PathLimits, World};
+use lightgrid::path::{PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::{Figures, Gi, Phase, Sampling, Session, Sharing, View};
-use lightgrid::sampler::Points;
+use lightgrid::render::{Figures, Phase, Sampling, Session, View};
 use lightgrid::scene::builtin;
 
 const SIZE: (u32, u32) = (128, 72);
@@ -123,23 +121,12 @@ impl Case<'_> {
         bounces: u32,
     ) -> (Vec<[f64; 3]>, Figures) {
         let view = View {
-            camera: self.world.scene.cameras[0].clone(),
-            width: SIZE.0,
-            height: SIZE.1,
             filter: PixelFilter::Box,
             sampling,
             limits: PathLimits { bounces, russian_roulette: true },
             seed,
-            points: Points::Sobol,
-            grid_columns: 64,
-            sharing: Sharing::Auto,
-            gi: Gi::Exact,
             learning_paths: LEARNING_PATHS,
-            laws: LawOptions::ADAPTIVE,
-            medium: None,
-            background: Background::Map,
-            crop: None,
-            layers: false,
+            ..View::new(self.world.scene.cameras[0].clone(), [SIZE.0, SIZE.1])
         };
         let never = AtomicBool::new(false);
         let mut session = Session::new(self.world, self.environment, view);

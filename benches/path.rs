@@ -5,12 +5,10 @@ use std::sync::atomic::AtomicBool;
 
 use criterion::{Criterion, Throughput};
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
-use lightgrid::light_grid::LawOptions;
 use lightgrid::light_grid::tile_laws::TileLaws;
-use lightgrid::path::{Background, PathLimits, World};
+use lightgrid::path::{PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::{Gi, Sampling, Session, Sharing, View};
-use lightgrid::sampler::Points;
+use lightgrid::render::{Sampling, Session, View};
 use lightgrid::scene::builtin;
 
 pub(crate) fn bench(criterion: &mut Criterion) {
@@ -19,23 +17,11 @@ pub(crate) fn bench(criterion: &mut Criterion) {
     let environment = Environment::new(map, &EnvironmentOptions::default()).expect("finite");
     let never = AtomicBool::new(false);
     let view = |sampling, learning_paths| View {
-        camera: world.scene.cameras[0].clone(),
-        width: 128,
-        height: 72,
         filter: PixelFilter::Box,
         sampling,
         limits: PathLimits { bounces: 5, russian_roulette: true },
-        seed: 0,
-        points: Points::Sobol,
-        grid_columns: 64,
-        sharing: Sharing::Auto,
-        gi: Gi::Exact,
         learning_paths,
-        laws: LawOptions::ADAPTIVE,
-        medium: None,
-        background: Background::Map,
-        crop: None,
-        layers: false,
+        ..View::new(world.scene.cameras[0].clone(), [128, 72])
     };
     let mut group = criterion.benchmark_group("path");
     group.sample_size(10);

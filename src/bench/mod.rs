@@ -14,14 +14,12 @@ use serde::Serialize;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::light_grid::{LawOptions, LightGrid};
+use crate::light_grid::LightGrid;
 use crate::metrics;
-use crate::path::{Background, PathLimits, World, framing};
-use crate::render::filter::PixelFilter;
+use crate::path::{World, framing};
 use crate::render::gpu::{AdapterFacts, Gpu, KernelFacts, RayChoice, Schedule, Stage};
-use crate::render::{Gi, Phase, Sampling, Session, Sharing, StopRule, View};
+use crate::render::{Phase, Sampling, Session, StopRule, View};
 use crate::report::{Device, Machine, OpenDevice};
-use crate::sampler::Points;
 
 pub use rays::{RayFigures, RayKind};
 
@@ -259,29 +257,8 @@ impl Place<'_> {
     fn view(&self, (width, height): (u32, u32)) -> View {
         let world = &self.subject.world;
         let camera = world.scene.cameras.first().cloned();
-        View {
-            camera: camera.unwrap_or_else(|| framing::frame(world, width as f32 / height as f32)),
-            width,
-            height,
-            filter: PixelFilter::default(),
-            sampling: Sampling::Adaptive,
-            limits: PathLimits { bounces: 8, russian_roulette: true },
-            seed: 0,
-            points: Points::Sobol,
-            grid_columns: 64,
-            sharing: Sharing::Auto,
-            gi: Gi::Exact,
-            learning_paths: View::suitable_learning_paths(
-                Sampling::Adaptive,
-                [width, height],
-                None,
-            ),
-            laws: LawOptions::ADAPTIVE,
-            medium: None,
-            background: Background::Map,
-            crop: None,
-            layers: false,
-        }
+        let aspect = width as f32 / height as f32;
+        View::new(camera.unwrap_or_else(|| framing::frame(world, aspect)), [width, height])
     }
 
     /// Seconds to the first picture of another view with laws learned before, the median of a few.

@@ -244,8 +244,13 @@ impl Conductor<'_> {
     fn pictures(&self, key: &str, run: &Run) -> Option<(Vec<Image>, Image)> {
         let size = self.plan.effort.frame.size;
         let films = self.store.read_pictures(key, size)?;
-        let denoised = self.store.read_pictures(&denoised(key), size)?.pop()?;
+        let denoised = self.last_picture(&denoised(key))?;
         (films.len() == run.points.len()).then_some((films, denoised))
+    }
+
+    /// The last of the pictures kept under a name.
+    fn last_picture(&self, key: &str) -> Option<Image> {
+        self.store.read_pictures(key, self.plan.effort.frame.size)?.pop()
     }
 
     /// Keeps the last pictures of first runs only (all of them for a given reference, whose noise is
@@ -272,16 +277,12 @@ impl Conductor<'_> {
         let reference = self.reference(work);
         let threads = self.report.machine.threads;
         let reference_report = self.reference_report(work)?;
-        let last_picture = |runs: &[(String, Run)]| {
-            let (key, _) = runs.first()?;
-            self.store.read_pictures(key, plan.effort.frame.size)?.pop()
-        };
         let mut pictures =
             Pictures { reference: reference.map(|(image, _)| image), runs: Vec::new() };
         let mut devices = Vec::new();
         for (index, device) in self.devices.iter().enumerate() {
             for (method, runs) in plan.methods.iter().zip(&work.runs[index]) {
-                if let Some(picture) = last_picture(runs) {
+                if let Some(picture) = runs.first().and_then(|(key, _)| self.last_picture(key)) {
                     pictures.runs.push((device.device, method.name.clone(), picture));
                 }
             }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::reference::LEAST_PICTURES;
 use crate::environment::{EnvironmentOptions, TableKind};
 use crate::light_grid::LawOptions;
-use crate::path::{Background, PathLimits};
+use crate::path::PathLimits;
 use crate::render::filter::PixelFilter;
 use crate::render::{Gi, Sampling, Sharing, View};
 use crate::sampler::Points;
@@ -90,9 +90,6 @@ impl Settings {
     pub(super) fn view(&self, camera: &Camera, frame: &Frame, seed: u32) -> View {
         let (width, height) = frame.size;
         View {
-            camera: camera.clone(),
-            width,
-            height,
             filter: PixelFilter::Box,
             sampling: self.sampling,
             limits: PathLimits { bounces: frame.bounces, russian_roulette: self.russian_roulette },
@@ -105,11 +102,9 @@ impl Settings {
                 View::suitable_learning_paths(self.sampling, [width, height], None)
             }),
             laws: self.laws,
-            medium: None,
-            background: Background::Map,
-            crop: None,
             // For the denoiser.
             layers: true,
+            ..View::new(camera.clone(), [width, height])
         }
     }
 }

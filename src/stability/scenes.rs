@@ -8,13 +8,11 @@ use super::{Outcome, Setting};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::Result;
 use crate::image::Image;
-use crate::light_grid::LawOptions;
-use crate::path::{Background, PathLimits, World};
+use crate::path::{PathLimits, World};
 use crate::render::film::{Film, Pixel};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::Stage as GpuStage;
-use crate::render::{Gi, Phase, Sampling, Session, Sharing, View};
-use crate::sampler::Points;
+use crate::render::{Phase, Sampling, Session, View};
 use crate::scene::{Camera, Material, Scene, Texture, TextureImage, TextureRef, Wrap};
 
 /// Lambert's reflectance alone, both sides alike.
@@ -192,23 +190,12 @@ pub(super) fn sky(name: &str) -> Result<Environment> {
 /// A small picture without Russian roulette.
 pub(super) fn view(camera: Camera, sampling: Sampling, bounces: u32) -> View {
     View {
-        camera,
-        width: 16,
-        height: 16,
         filter: PixelFilter::Box,
         sampling,
         limits: PathLimits { bounces, russian_roulette: false },
         seed: 1,
-        grid_columns: 64,
-        sharing: Sharing::Auto,
-        gi: Gi::Exact,
         learning_paths: 1 << 13,
-        laws: LawOptions::ADAPTIVE,
-        layers: false,
-        points: Points::Sobol,
-        medium: None,
-        background: Background::default(),
-        crop: None,
+        ..View::new(camera, [16, 16])
     }
 }
 

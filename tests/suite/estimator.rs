@@ -20,12 +20,10 @@ use std::sync::atomic::AtomicBool;
 use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions};
 use lightgrid::image::Image;
-use lightgrid::light_grid::LawOptions;
-use lightgrid::path::{Background, PathLimits, World};
+use lightgrid::path::{PathLimits, World};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::{Gi, Phase, Sampling, Session, Sharing, StopRule, View};
-use lightgrid::sampler::Points;
+use lightgrid::render::{Phase, Sampling, Session, StopRule, View};
 use lightgrid::scene::Camera;
 
 pub(crate) const MODES: [Sampling; 4] =
@@ -37,23 +35,12 @@ const ROUNDING: f64 = 1e-4;
 /// A small picture without Russian roulette.
 pub(crate) fn view(camera: Camera, sampling: Sampling, bounces: u32) -> View {
     View {
-        camera,
-        width: 16,
-        height: 16,
         filter: PixelFilter::Box,
         sampling,
         limits: PathLimits { bounces, russian_roulette: false },
         seed: 1,
-        points: Points::Sobol,
-        grid_columns: 64,
-        sharing: Sharing::Auto,
-        gi: Gi::Exact,
         learning_paths: 1 << 13,
-        laws: LawOptions::ADAPTIVE,
-        medium: None,
-        background: Background::Map,
-        crop: None,
-        layers: false,
+        ..View::new(camera, [16, 16])
     }
 }
 

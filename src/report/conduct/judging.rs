@@ -130,24 +130,32 @@ impl Conductor<'_> {
     /// How far what each method converges to is from the reference, with two runs or more.
     pub(super) fn find_biases(&mut self, work: &Work) -> Result<()> {
         let Some((reference, _)) = self.reference(work) else { return Ok(()) };
-        let size = self.plan.effort.frame.size;
         for (device, methods) in work.runs.iter().enumerate() {
             for (method, runs) in self.plan.methods.iter().zip(methods) {
                 let Some((key, _)) = runs.first() else { continue };
                 let key = format!("{key}_bias_of_{}", runs.len());
-                let last = |(key, _): &(String, Run)| self.store.read_pictures(key, size)?.pop();
-                let found = self.store.read(&key).or_else(|| {
-                    let pictures = runs.iter().map(last).collect::<Option<Vec<Image>>>()?;
-                    let device = self.devices[device].device.title();
-                    Bias::new(device, &method.name, &pictures, &reference)
-                });
-                if let Some((bias, row)) = found.zip(self.report.rows.last_mut()) {
-                    self.store.write(&key, &bias)?;
-                    row.biases.push(bias);
+                let found = match self.store.read(&key) {
+                    Some(found) => Some(found),
+                    None => {
+                        let device = self.devices[device].device.title();
+                        let bias = self
+                            .last_pictures(runs)
+                            .and_then(|p| Bias::new(device, &method.name, &p, &reference));
+                        bias.iter().try_for_each(|bias| self.store.write(&key, bias))?;
+                        bias
+                    }
+                };
+                if let Some(row) = self.report.rows.last_mut() {
+                    row.biases.extend(found);
                 }
             }
         }
         Ok(())
+    }
+
+    /// The last picture of each of these runs, if they are all there.
+    fn last_pictures(&self, runs: &[(String, Run)]) -> Option<Vec<Image>> {
+        runs.iter().map(|(key, _)| self.last_picture(key)).collect()
     }
 
     pub(super) fn reference_report(&self, work: &Work) -> Result<Option<ReferenceReport>> {
@@ -179,11 +187,7 @@ impl Conductor<'_> {
         let all = work.runs.iter().flatten().filter(|runs| runs.len() > 1);
         let best = all.min_by(|a, b| mean_error(a).total_cmp(&mean_error(b)));
         let Some(runs) = best else { return Ok(None) };
-        let films: Option<Vec<Image>> = runs
-            .iter()
-            .map(|(key, _)| self.store.read_pictures(key, self.plan.effort.frame.size)?.pop())
-            .collect();
-        let Some(films) = films else { return Ok(None) };
+        let Some(films) = self.last_pictures(runs) else { return Ok(None) };
         let count = films.len() as f64;
         let mut mean = Image::filled(reference.width, reference.height, [0.0; 3]);
         let mut variances = vec![[0.0; 3]; reference.pixels.len()];

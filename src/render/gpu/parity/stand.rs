@@ -8,14 +8,14 @@ use super::cases::Random;
 use crate::bvh::Ray;
 use crate::environment::{Environment, EnvironmentOptions, Lookup, TableKind};
 use crate::image::Image;
+use crate::light_grid::LightGrid;
 use crate::light_grid::cells::SphericalGrid;
-use crate::light_grid::{LawOptions, LightGrid};
 use crate::path::camera::CameraRays;
-use crate::path::{Background, PathLimits, PathTracer, World};
+use crate::path::{PathLimits, PathTracer, World};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::layout::{pack_radiance, unpack_radiance};
-use crate::render::{Gi, Sampling, Sharing, View};
-use crate::sampler::{Points, Sampler};
+use crate::render::{Sampling, Sharing, View};
+use crate::sampler::Sampler;
 use crate::scene::{
     AlphaMode, Camera, Material, Medium, Projection, PunctualKind, PunctualLight, Scene, Texture,
     TextureImage, TextureRef, Wrap,
@@ -108,23 +108,14 @@ fn camera() -> Camera {
 
 fn view(camera: Camera, filter: PixelFilter, sampling: Sampling) -> View {
     View {
-        camera,
-        width: 50,
-        height: 40,
         filter,
         sampling,
         limits: PathLimits { bounces: 6, russian_roulette: true },
         seed: 11,
-        points: Points::Sobol,
-        grid_columns: 64,
         sharing: Sharing::Off,
-        gi: Gi::Exact,
         learning_paths: 0,
-        laws: LawOptions::ADAPTIVE,
-        medium: None,
-        background: Background::Map,
-        crop: None,
         layers: true,
+        ..View::new(camera, [50, 40])
     }
 }
 
