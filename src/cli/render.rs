@@ -394,7 +394,7 @@ impl Job<'_> {
             phases: &self.phases,
             notices: &notices,
             with_times: !arguments.reproducible,
-            options: outputs::settings(arguments, session.view().fog(world)),
+            options: outputs::settings(arguments, world, session.view()),
         };
         let mut failures = outputs::write(arguments, &share, &record, session.grid());
         failures.extend(share.keep(&session).err());

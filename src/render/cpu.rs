@@ -114,7 +114,7 @@ pub(super) fn render(
     let task = Task { tracers: [&without_counts, tracer], rays, view, pass, cancel };
     let add = |a: (u64, u64), b: (u64, u64)| (a.0 + b.0, a.1 + b.1);
     let is_whole = pass.every == 1;
-    let Some(tile) = view.shared_tile().filter(|_| tracer.fog.is_none() && is_whole) else {
+    let Some(tile) = view.shared_tile().filter(|_| is_whole) else {
         let rows = film.tiles(film.width, 1, [0, 0]).into_iter().enumerate();
         let mut rows: Vec<_> = rows.step_by(pass.every as usize).collect();
         // Multiples of the golden ratio lie evenly.

@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::View;
+use super::outlook::middle_distance;
 use crate::environment::Environment;
 use crate::path::World;
 use crate::path::camera::CameraRays;
@@ -31,8 +32,6 @@ const PILOT_PATHS: u64 = 1 << 12;
 const LEAST_PATHS: u64 = 1 << 14;
 /// Paths that the CPU traces between two looks at whether to stop.
 pub(super) const PATHS_AT_A_TIME: u64 = 1 << 12;
-/// Rays of the camera, along each axis, that tell how far away things are.
-const LOOKS: u32 = 16;
 /// Edge of the smallest cells over the middle distance of what the camera sees, which is twice that
 /// within which they are all alike.
 const EDGE: f32 = 0.025;
@@ -60,7 +59,7 @@ impl Lessons {
         if view.gi == Gi::Exact || view.limits.bounces < 2 || brightest <= 0.0 {
             return None;
         }
-        let distance = middle_distance(world, view, rays)?;
+        let distance = middle_distance(world, [view.width, view.height], rays)?;
         let cells = CacheCells {
             center: rays.position(),
             edge: EDGE * distance,
@@ -132,21 +131,10 @@ impl Lessons {
     }
 }
 
-/// Metres to what the camera sees, the median over its picture; `None` if it sees no surface.
-pub(super) fn middle_distance(world: &World, view: &View, rays: &CameraRays) -> Option<f32> {
-    let size = Vec2::new(view.width as f32, view.height as f32) / LOOKS as f32;
-    let places = (0..LOOKS * LOOKS).map(|i| Vec2::new((i % LOOKS) as f32, (i / LOOKS) as f32));
-    let hits = places.filter_map(|place| {
-        let ray = rays.ray((place + 0.5) * size, Vec2::ZERO);
-        world.closest_hit(&ray, true).map(|hit| hit.t)
-    });
-    let mut distances: Vec<f32> = hits.collect();
-    distances.sort_unstable_by(f32::total_cmp);
-    distances.get(distances.len() / 2).copied().filter(|distance| *distance > 0.0)
-}
-
 #[cfg(test)]
 pub(super) mod tests {
+    use glam::Vec2;
+
     use super::*;
     use crate::environment::{EnvironmentOptions, sky};
     use crate::light_grid::{LawOptions, LightGrid};

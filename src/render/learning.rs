@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use super::gi::middle_distance;
+use super::outlook::middle_distance;
 use super::{Engine, Session, View, cpu};
 use crate::environment::Environment;
 use crate::error::Result;
@@ -70,7 +70,7 @@ impl Session<'_> {
     pub(crate) fn continue_learning(&mut self, counted: &LearningGrid) -> Result<bool> {
         let Some(learning) = &mut self.learning else { return Ok(false) };
         let moved = self.rays.position().distance(counted.grid.center);
-        let is_near = middle_distance(self.world, &self.view, &self.rays)
+        let is_near = middle_distance(self.world, [self.view.width, self.view.height], &self.rays)
             .is_some_and(|distance| moved <= MOST_MOVED * distance);
         if !is_near || !counted.is_like(&learning.grid) {
             return Ok(false);

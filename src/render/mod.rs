@@ -19,19 +19,21 @@ mod gi;
 #[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;
 mod learning;
+mod outlook;
+mod sharing;
 
 use film::Film;
 use filter::PixelFilter;
 pub use gi::Gi;
 pub(crate) use gi::Lessons;
 use learning::Learning;
+pub use sharing::Sharing;
 
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::{LawOptions, LearningGrid, LightGrid};
 use crate::medium::Fog;
 use crate::path::camera::CameraRays;
-use crate::path::sharing::SharedTile;
 use crate::path::{Background, PathLimits, PathTracer, World};
 use crate::sampler::{Points, Sequence};
 use crate::scene::{Camera, Medium};
@@ -49,25 +51,6 @@ pub enum Sampling {
     Plain,
     /// BSDF sampling alone.
     Bsdf,
-}
-
-/// Whether neighbouring pixels share their second vertices ([`crate::path::sharing`]).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Sharing {
-    /// As it suits the way the map is sampled and the size of the picture.
-    #[default]
-    Auto,
-    /// Each path is one pixel's.
-    Off,
-    /// In tiles of 4x4 pixels, all of which keep their own: less of the noise is shared.
-    #[value(name = "4x4")]
-    #[serde(rename = "4x4")]
-    Small,
-    /// In tiles of 8x8 pixels, of which every fourth keeps its own.
-    #[value(name = "8x8")]
-    #[serde(rename = "8x8")]
-    Large,
 }
 
 /// What is to be rendered and how. Equal views give equal pictures.
@@ -170,30 +153,6 @@ impl View {
         }
     }
 
-    /// How pixels share second vertices where there is no fog; `None` if they do not.
-    pub fn shared_tile(&self) -> Option<SharedTile> {
-        match self.decided_sharing() {
-            Sharing::Auto | Sharing::Off => None,
-            Sharing::Small => Some(SharedTile::SMALL),
-            Sharing::Large => Some(SharedTile::LARGE),
-        }
-    }
-
-    /// What `sharing` comes to where it is left open. Paths that end in the radiance cache have nothing to
-    /// share.
-    pub fn decided_sharing(&self) -> Sharing {
-        let [width, height] = self.whole_size();
-        let suits = self.sampling == Sampling::Adaptive
-            && self.limits.bounces >= 2
-            && width.min(height) >= LEAST_SHARED_SIZE;
-        match self.sharing {
-            _ if self.gi == Gi::Cached => Sharing::Off,
-            Sharing::Auto if suits => Sharing::Large,
-            Sharing::Auto => Sharing::Off,
-            asked => asked,
-        }
-    }
-
     /// Width and height of the picture that this one is a part of.
     pub fn whole_size(&self) -> [u32; 2] {
         self.crop.map_or([self.width, self.height], |crop| crop.whole)
@@ -236,9 +195,6 @@ impl View {
     }
 }
 
-/// Least width and height of a picture whose pixels share unasked: in a smaller one a tile is much of
-/// what is seen, and what its pixels have in common shows.
-const LEAST_SHARED_SIZE: u32 = 64;
 /// One learning path for this many paths rendered.
 const LEARNING_SHARE: u64 = 64;
 /// The same where each vertex tries several samples of the map: such a path takes four times as long.
@@ -366,7 +322,8 @@ pub struct Session<'a> {
 
 impl<'a> Session<'a> {
     /// Starts a session on the CPU; nothing is traced yet.
-    pub fn new(world: &'a World, environment: &'a Environment, view: View) -> Self {
+    pub fn new(world: &'a World, environment: &'a Environment, mut view: View) -> Self {
+        view.sharing = view.sharing.decided(world, &view);
         let rays = view.rays();
         let whole_map = match view.sampling {
             Sampling::Bsdf => None,
@@ -686,7 +643,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// What is rendered.
+    /// What is rendered; it is decided whether pixels share.
     pub fn view(&self) -> &View {
         &self.view
     }

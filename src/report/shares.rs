@@ -99,7 +99,7 @@ fn three_depths(
     }
     let grid = session.grid().cloned();
     // Paths of one bounce would not share by themselves, and then draw other numbers.
-    let settings = &Settings { sharing: session.view().decided_sharing(), ..settings.clone() };
+    let settings = &Settings { sharing: session.view().sharing, ..settings.clone() };
     let mut pictures = [Vec::new(), Vec::new(), Vec::new()];
     for (picture, bounces) in pictures.iter_mut().zip([u32::MAX, 1, 0]) {
         let frame = Frame { bounces: bounces.min(place.frame.bounces), ..place.frame.clone() };

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::share::Share;
-use super::{RenderArguments, frames, sharing};
+use super::{RenderArguments, frames};
 use crate::cli::picture::say_written;
 use crate::error::{Error, Result};
 use crate::image::{check_writable, is_same_file};
@@ -11,6 +11,8 @@ use crate::light_grid::LightGrid;
 use crate::medium::Fog;
 use crate::output::laws::{check_laws_extension, write_laws};
 use crate::output::record::{self, Record};
+use crate::path::World;
+use crate::render::View;
 
 /// Refuses outputs before the work rather than after it.
 pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
@@ -83,9 +85,10 @@ pub(super) fn write(
 /// Settings that belong into metadata and JSON, as typed or as chosen.
 pub(super) fn settings(
     arguments: &RenderArguments,
-    fog: Option<Fog>,
+    world: &World,
+    view: &View,
 ) -> Vec<(&'static str, serde_json::Value)> {
-    let fog = fog.map(|fog| {
+    let fog = view.fog(world).map(|fog| {
         let Fog { interior, bounds: [low, high] } = fog;
         serde_json::json!({
             "scattering": interior.scattering.to_array(),
@@ -97,7 +100,7 @@ pub(super) fn settings(
     vec![
         ("fog", serde_json::json!(fog)),
         ("sampling", serde_json::json!(arguments.sampling)),
-        ("sharing", serde_json::json!(sharing(arguments))),
+        ("sharing", serde_json::json!(view.sharing)),
         ("gi", serde_json::json!(arguments.gi)),
         ("table", serde_json::json!(arguments.table.to_string())),
         ("tiles", serde_json::json!(format!("{}x{}", arguments.tiles.0, arguments.tiles.1))),

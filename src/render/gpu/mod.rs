@@ -196,7 +196,7 @@ impl Renderer {
         }
         buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
         let kernel_facts = KernelFacts::of(&features);
-        constants.shared_tile = view.shared_tile().filter(|_| view.fog(world).is_none());
+        constants.shared_tile = view.shared_tile();
         let sharing = constants
             .shared_tile
             .map(|tile| Sharing::new(&mut buffers, &features, tile, size))
