@@ -1,11 +1,11 @@
-//! Benches of whole paths: rays per second of rendering and of learning, and the tile laws.
+//! Benches of whole paths: rays per second of rendering and of learning, and the tile distributions.
 
 use std::hint::black_box;
 use std::sync::atomic::AtomicBool;
 
 use criterion::{Criterion, Throughput};
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
-use lightgrid::light_grid::tile_laws::TileLaws;
+use lightgrid::light_grid::tile_distributions::TileDistributions;
 use lightgrid::path::{PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Sampling, Session, View};
@@ -46,29 +46,29 @@ pub(crate) fn bench(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements(learn()));
     group.bench_function("learn from 8192 paths, rays", |b| b.iter(learn));
     group.finish();
-    laws(criterion);
+    distributions(criterion);
 }
 
-fn laws(criterion: &mut Criterion) {
-    let mut laws = TileLaws::new(512);
-    for law in 0..1000_u32 {
+fn distributions(criterion: &mut Criterion) {
+    let mut distributions = TileDistributions::new(512);
+    for distribution in 0..1000_u32 {
         let weights: Vec<f64> = (0..512_u32)
-            .map(|tile| lightgrid::sampler::hash(law << 16 | tile))
+            .map(|tile| lightgrid::sampler::hash(distribution << 16 | tile))
             .map(|h| if h % 3 == 0 { f64::from(h >> 8) } else { 0.0 })
             .collect();
-        laws.push(&weights);
+        distributions.push(&weights);
     }
-    let mut group = criterion.benchmark_group("tile laws");
+    let mut group = criterion.benchmark_group("tile distributions");
     let mut state = 1_u32;
     let mut next = move || {
         state = lightgrid::sampler::hash(state.wrapping_add(0x9e37_79b9));
         state
     };
-    group.bench_function("sample, one of 1000 laws", |b| {
-        b.iter(|| black_box(laws.sample(next() % 1000, next(), next())));
+    group.bench_function("sample, one of 1000 distributions", |b| {
+        b.iter(|| black_box(distributions.sample(next() % 1000, next(), next())));
     });
-    group.bench_function("probability, one of 1000 laws", |b| {
-        b.iter(|| black_box(laws.probability(next() % 1000, next() % 512)));
+    group.bench_function("probability, one of 1000 distributions", |b| {
+        b.iter(|| black_box(distributions.probability(next() % 1000, next() % 512)));
     });
     group.finish();
 }

@@ -33,12 +33,15 @@ fn main() -> Result<()> {
 
     let Some(light_grid) = session.grid() else { return Err(Error::new("the map is black")) };
     let cell = light_grid.grid().map(|grid| grid.cell_of(point.position, point.geometric_normal));
-    let law = cell.map_or(WHOLE_MAP, |cell| light_grid.law_of_cell(cell));
+    let distribution = cell.map_or(WHOLE_MAP, |cell| light_grid.distribution_of_cell(cell));
     let mut tiles: Vec<(f32, u32)> = (0..environment.tile_count())
-        .map(|tile| (light_grid.probability(law, tile), tile))
+        .map(|tile| (light_grid.probability(distribution, tile), tile))
         .collect();
     tiles.sort_by(|a, b| b.0.total_cmp(&a.0));
-    println!("cell {cell:?} has law {law}; its likeliest of {} tiles:", tiles.len());
+    println!(
+        "cell {cell:?} has distribution {distribution}; its likeliest of {} tiles:",
+        tiles.len()
+    );
     for (probability, tile) in &tiles[..5] {
         println!("  tile {tile}: {:.1} %", 100.0 * probability);
     }

@@ -26,7 +26,7 @@ fn albedo_terms_mean(roughness: f32) -> vec2f {
     return mix(terms.xy, terms.zw, y - f32(row));
 }
 
-//#if anisotropy
+//#if ANISOTROPY
 fn stretched_terms(ggx: Ggx, diagonal: vec2f, towards: vec2f) -> vec2f {
     let a = diagonal.x + 0.3 * (1.0 - ggx.alpha / ggx.along) * (1.0 - diagonal.x);
     return vec2f(min(a, 1.0 - towards.y), towards.y);
@@ -35,7 +35,7 @@ fn stretched_terms(ggx: Ggx, diagonal: vec2f, towards: vec2f) -> vec2f {
 
 // `AlbedoTerms::at` and `AlbedoTerms::mean` of a GGX of this roughness across its axis.
 fn terms_towards(ggx: Ggx, roughness: f32, v: vec3f) -> vec2f {
-//#if anisotropy
+//#if ANISOTROPY
     if is_stretched(ggx) {
         let diagonal = roughness_off_axis(ggx, 0.70710678, 0.70710678);
         let towards = albedo_terms_at(roughness_towards(ggx, v), v.z);
@@ -46,7 +46,7 @@ fn terms_towards(ggx: Ggx, roughness: f32, v: vec3f) -> vec2f {
 }
 
 fn terms_mean(ggx: Ggx, roughness: f32) -> vec2f {
-//#if anisotropy
+//#if ANISOTROPY
     if is_stretched(ggx) {
         let diagonal = roughness_off_axis(ggx, 0.70710678, 0.70710678);
         let towards = albedo_terms_mean(roughness_off_axis(ggx, 0.92387953, 0.38268343))

@@ -1,18 +1,18 @@
 // Whether a surface scatters much the same to and from places side by side, all on one side: twin of
 // `SurfaceScatterer::is_broad`.
 fn is_broad(vertex: Vertex, least_alpha: f32) -> bool {
-//#if medium
+//#if MEDIUM
     if vertex.is_in_medium {
         return false;
     }
 //#end
     var transmits = vertex.point.parameters.transmission > 0.0;
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
     transmits = transmits || vertex.point.parameters.diffuse_transmission > 0.0;
 //#end
     let interface_ = vertex.bsdf.interface_;
     var is_broad = interface_is_absent(interface_) || interface_.ggx.alpha >= least_alpha;
-//#if clearcoat
+//#if CLEARCOAT
     is_broad = is_broad && vertex.bsdf.coat.strength == 0.0;
 //#end
     return !transmits && is_broad && !bsdf_is_delta_only(vertex.bsdf);
@@ -20,8 +20,8 @@ fn is_broad(vertex: Vertex, least_alpha: f32) -> bool {
 
 // Whether the path is outside of all bodies.
 fn is_in_air(path: ptr<function, Path>) -> bool {
-//#if solid_transmission
-//#if medium
+//#if SOLID_TRANSMISSION
+//#if MEDIUM
     return !(*path).body.is_solid;
 //#else
     let body = (*path).body;

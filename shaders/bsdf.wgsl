@@ -5,7 +5,7 @@ struct Bsdf {
     interface_: Interface,
     // Lambert's lobe: base colour times share, over what the interface lets in on average.
     diffuse_color: vec3f,
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
     // The same for light from the far side, and the probability of choosing it.
     transmitted_color: vec3f,
     through: f32,
@@ -13,10 +13,10 @@ struct Bsdf {
     // The dielectric's largest F0 and its F90.
     f0_f90: vec2f,
     roughness: f32,
-//#if sheen
+//#if SHEEN
     sheen: Sheen,
 //#end
-//#if clearcoat
+//#if CLEARCOAT
     coat: Coat,
 //#end
 }
@@ -27,7 +27,7 @@ struct Outgoing {
     coat_probability: f32,
     interface_probability: f32,
     diffuse_probability: f32,
-//#if sheen
+//#if SHEEN
     sheen_probability: f32,
 //#end
 }
@@ -63,7 +63,7 @@ struct BsdfSample {
 const NO_SAMPLE = LobeSample(ABSORBED, vec3f(0.0), vec3f(0.0));
 
 fn has_diffuse(b: Bsdf) -> bool {
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
     return any(b.diffuse_color != vec3f(0.0)) || any(b.transmitted_color != vec3f(0.0));
 //#else
     return any(b.diffuse_color != vec3f(0.0));
@@ -72,7 +72,7 @@ fn has_diffuse(b: Bsdf) -> bool {
 
 // Both of Lambert's lobes.
 fn diffuse_sum(b: Bsdf) -> vec3f {
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
     return b.diffuse_color + b.transmitted_color;
 //#else
     return b.diffuse_color;
@@ -86,7 +86,7 @@ fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
     b.f0_f90 = vec2f(max_element(f0), f90);
     b.roughness = p.roughness;
     b.interface_ = interface_new(p, f0, f90, entering);
-//#if iridescence
+//#if IRIDESCENCE
     let film = b.interface_.film;
     if film.share > 0.0 && b.interface_.dielectric_share > 0.0 {
         let most = film_largest_f0(film, b.interface_.base_f0, p.specular);
@@ -94,7 +94,7 @@ fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
     }
 //#end
     b.diffuse_color = p.base_color * ((1.0 - p.metallic) * (1.0 - p.transmission));
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
     if p.diffuse_transmission > 0.0 {
         let share = (1.0 - p.metallic) * (1.0 - p.transmission);
         b.diffuse_color = p.base_color * (share * (1.0 - p.diffuse_transmission));
@@ -109,14 +109,14 @@ fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
     if f90 > 0.0 && has_diffuse(b) {
         let let_in = 1.0 - dot(b.f0_f90, terms_mean(b.interface_.ggx, p.roughness));
         b.diffuse_color = select(vec3f(0.0), b.diffuse_color / let_in, let_in > 1e-4);
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
         b.transmitted_color = select(vec3f(0.0), b.transmitted_color / let_in, let_in > 1e-4);
 //#end
     }
-//#if sheen
+//#if SHEEN
     b.sheen = sheen_new(p, entering);
 //#end
-//#if clearcoat
+//#if CLEARCOAT
     b.coat = coat_new(p, entering);
 //#end
     return b;
@@ -124,10 +124,10 @@ fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
 
 fn bsdf_is_delta_only(b: Bsdf) -> bool {
     var delta = !has_diffuse(b) && interface_is_delta_or_absent(b.interface_);
-//#if sheen
+//#if SHEEN
     delta = delta && sheen_is_hidden(b.sheen);
 //#end
-//#if clearcoat
+//#if CLEARCOAT
     delta = delta && coat_is_delta_or_absent(b.coat);
 //#end
     return delta;
@@ -152,10 +152,10 @@ fn bsdf_outgoing(b: Bsdf, wo: vec3f) -> Outgoing {
     let has_diffuse_ = has_diffuse(b);
     let has_interface = !interface_is_absent(b.interface_);
     var bare = true;
-//#if clearcoat
+//#if CLEARCOAT
     bare = b.coat.strength == 0.0;
 //#end
-//#if sheen
+//#if SHEEN
     bare = bare && b.sheen.strength == 0.0;
 //#end
     if bare && !(has_diffuse_ && has_interface) {
@@ -169,23 +169,23 @@ fn bsdf_outgoing(b: Bsdf, wo: vec3f) -> Outgoing {
     var interface_albedo_ = importance(interface_albedo(b.interface_, wo.z, terms));
     var diffuse = diffuse_left * importance(diffuse_sum(b));
     var coat = 0.0;
-//#if sheen
+//#if SHEEN
     let base = sheen_left(b.sheen, wo, wo);
     interface_albedo_ *= base;
     diffuse *= base;
     var sheen = importance(b.sheen.color) * sheen_albedo(b.sheen, wo);
 //#end
-//#if clearcoat
+//#if CLEARCOAT
     let under = coat_attenuation(b.coat, wo);
     interface_albedo_ *= under;
     diffuse *= under;
-//#if sheen
+//#if SHEEN
     sheen *= under;
 //#end
     coat = coat_albedo(b.coat, wo);
 //#end
     var sum = coat + interface_albedo_ + diffuse;
-//#if sheen
+//#if SHEEN
     sum += sheen;
 //#end
     if !(sum > 0.0) {
@@ -195,7 +195,7 @@ fn bsdf_outgoing(b: Bsdf, wo: vec3f) -> Outgoing {
     out.coat_probability = coat / sum;
     out.interface_probability = interface_albedo_ / sum;
     out.diffuse_probability = diffuse / sum;
-//#if sheen
+//#if SHEEN
     out.sheen_probability = sheen / sum;
 //#end
     return out;
@@ -207,13 +207,13 @@ fn bsdf_eval_pdf_with(b: Bsdf, wo: vec3f, wi: vec3f, out: Outgoing) -> EvalPdf {
         let lambert = wi.z * FRAC_1_PI;
         let left = out.diffuse_left * bsdf_diffuse_left_at(b, wi);
         result.value += b.diffuse_color * (left * lambert);
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
         result.pdf_solid_angle += out.diffuse_probability * lambert * (1.0 - b.through);
 //#else
         result.pdf_solid_angle += out.diffuse_probability * lambert;
 //#end
     }
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
     if out.diffuse_probability > 0.0 && wi.z <= 0.0 && b.through > 0.0 {
         let lambert = -wi.z * FRAC_1_PI;
         let left = out.diffuse_left * bsdf_diffuse_left_at(b, -wi);
@@ -226,7 +226,7 @@ fn bsdf_eval_pdf_with(b: Bsdf, wo: vec3f, wi: vec3f, out: Outgoing) -> EvalPdf {
         result.value += lobe.value;
         result.pdf_solid_angle += out.interface_probability * lobe.pdf_solid_angle;
     }
-//#if sheen
+//#if SHEEN
     if b.sheen.strength > 0.0 {
         result.value *= sheen_left(b.sheen, wo, wi);
         if out.sheen_probability > 0.0 {
@@ -236,7 +236,7 @@ fn bsdf_eval_pdf_with(b: Bsdf, wo: vec3f, wi: vec3f, out: Outgoing) -> EvalPdf {
         }
     }
 //#end
-//#if clearcoat
+//#if CLEARCOAT
     if b.coat.strength > 0.0 {
         result.value *= coat_attenuation(b.coat, wo) * coat_attenuation(b.coat, wi);
         if out.coat_probability > 0.0 {
@@ -266,7 +266,7 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
     var result = BsdfSample(vec3f(0.0), vec3f(0.0), 0.0, false);
     let out = bsdf_outgoing(b, wo);
     var any_probability = out.coat_probability + out.interface_probability + out.diffuse_probability;
-//#if sheen
+//#if SHEEN
     any_probability += out.sheen_probability;
 //#end
     var lobe = NO_SAMPLE;
@@ -274,7 +274,7 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
     if any_probability <= 0.0 {
         lobe.kind = ABSORBED;
     } else if choice < 0.0 {
-//#if clearcoat
+//#if CLEARCOAT
         lobe = coat_sample(b.coat, wo, u.yz, out.coat_probability);
 //#end
     } else if choice < out.interface_probability {
@@ -282,15 +282,15 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
         lobe = interface_sample(b.interface_, wo, within, u.yz);
     } else {
         lobe = LobeSample(SPREAD, cosine_hemisphere(u.yz), vec3f(0.0));
-//#if sheen
+//#if SHEEN
         let is_sheen = choice - out.interface_probability < out.sheen_probability;
         if is_sheen {
             lobe.wi = sheen_sample(u.yz);
         }
 //#end
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
         var rest = choice - out.interface_probability;
-//#if sheen
+//#if SHEEN
         rest = select(rest - out.sheen_probability, out.diffuse_probability, is_sheen);
 //#end
         if rest / out.diffuse_probability < b.through {
@@ -308,10 +308,10 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
         var weight = lobe.weight;
         if lobe.kind == DELTA {
             weight /= out.interface_probability;
-//#if clearcoat
+//#if CLEARCOAT
             weight *= coat_attenuation(b.coat, wo) * coat_attenuation(b.coat, lobe.wi);
 //#end
-//#if sheen
+//#if SHEEN
             weight *= sheen_left(b.sheen, wo, lobe.wi);
 //#end
         }
@@ -322,41 +322,41 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
     return result;
 }
 
-//#if transmission
+//#if TRANSMISSION
 // Light that goes straight through: smooth thin-walled transmission.
 fn bsdf_straight_transmittance(b: Bsdf, wo: vec3f) -> vec3f {
     var through = interface_straight_transmittance(b.interface_, abs(wo.z));
-//#if clearcoat
+//#if CLEARCOAT
     let coat = coat_attenuation(b.coat, wo);
     through *= coat * coat;
 //#end
-//#if sheen
+//#if SHEEN
     through *= sheen_left(b.sheen, wo, wo);
 //#end
     return through;
 }
 //#end
 
-//#if albedo
+//#if ALBEDO
 // Share of uniform light that reaches a viewer straight above.
 fn bsdf_albedo(b: Bsdf) -> vec3f {
     let terms = terms_towards(b.interface_.ggx, b.roughness, vec3f(0.0, 0.0, 1.0));
     let let_in = 1.0 - dot(b.f0_f90, terms_mean(b.interface_.ggx, b.roughness));
     let up = vec3f(0.0, 0.0, 1.0);
     var body = b.diffuse_color;
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
     body += b.transmitted_color / radiance_scale(b.interface_);
 //#end
     var albedo = body * (bsdf_diffuse_left(b, terms) * let_in)
         + interface_albedo(b.interface_, 1.0, terms);
-//#if transmission
+//#if TRANSMISSION
     albedo += interface_straight_transmittance(b.interface_, 1.0);
 //#end
-//#if sheen
+//#if SHEEN
     albedo = albedo * sheen_left(b.sheen, up, SHEEN_TYPICAL)
         + b.sheen.color * sheen_albedo(b.sheen, up);
 //#end
-//#if clearcoat
+//#if CLEARCOAT
     let under = coat_attenuation(b.coat, up);
     albedo = coat_albedo(b.coat, up) + under * under * albedo;
 //#end

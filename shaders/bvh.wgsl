@@ -27,19 +27,19 @@ const FROM_BEHIND = 0x80000000u;
 // Which invocation of its workgroup this is.
 var<private> own_lane: u32;
 
-//#if software_walk
+//#if SOFTWARE_WALK
 // Invocations of a workgroup.
 const LANES = 64u;
 // The lower entries of a walk's stack; at most SHARED_STACK_SIZE of them. In registers or a lane's own
 // memory they would cost far more.
 var<workgroup> shared_stack: array<vec2u, LANES * SHARED_STACK_SIZE>;
-//#if deep_tree
+//#if DEEP_TREE
 // The others, seldom reached.
 var<private> far_stack: array<vec2u, STACK_SIZE - SHARED_STACK_SIZE>;
 //#end
 
 fn stack_put(height: u32, group: vec2u) {
-//#if deep_tree
+//#if DEEP_TREE
     if height >= SHARED_STACK_SIZE {
         far_stack[height - SHARED_STACK_SIZE] = group;
         return;
@@ -49,7 +49,7 @@ fn stack_put(height: u32, group: vec2u) {
 }
 
 fn stack_at(height: u32) -> vec2u {
-//#if deep_tree
+//#if DEEP_TREE
     if height >= SHARED_STACK_SIZE {
         return far_stack[height - SHARED_STACK_SIZE];
     }
@@ -263,7 +263,7 @@ fn closest_hit(ray: Ray, from_camera: bool) -> Hit {
             let hit = intersect_triangle(entered.triangle_base + bit, shear, t_max);
             let nearer = hit.t < best.t || (hit.t == best.t && hit.triangle < best.triangle);
             if hit.t < MISS && nearer {
-//#if filtered_hits
+//#if FILTERED_HITS
                 if !accepts(hit, from_camera) {
                     continue;
                 }
@@ -340,7 +340,7 @@ fn transmittance_along(ray: Ray) -> vec3f {
         if hit.t >= MISS {
             break;
         }
-//#if pass_through
+//#if PASS_THROUGH
         transmittance *= passed(hit, ray.direction);
         if max_element(transmittance) > 0.0 {
             continue;

@@ -25,7 +25,7 @@ fn camera_ray(pixel: vec2f, lens: vec2f) -> Ray {
         origin = globals.camera_position + offset;
         direction = globals.camera_forward;
     }
-//#if lens
+//#if LENS
     let focus = origin + direction * globals.focus_distance;
     let on_lens = disk_from_square(lens) * globals.lens_radius;
     origin += globals.camera_right * on_lens.x + globals.camera_up * on_lens.y;
@@ -35,14 +35,14 @@ fn camera_ray(pixel: vec2f, lens: vec2f) -> Ray {
 }
 
 fn lens_point(sampler: ptr<function, Sampler>) -> vec2f {
-//#if lens
+//#if LENS
     return next_pair(sampler);
 //#else
     return vec2f(0.0);
 //#end
 }
 
-//#if wide_filter
+//#if WIDE_FILTER
 const FILTER_STEPS = 256u;
 const FILTER_RADIUS = 1.5;
 
@@ -70,7 +70,7 @@ fn invert_filter(u: f32) -> f32 {
 
 // Offset from the pixel's centre in pixels.
 fn filter_sample(u: vec2f) -> vec2f {
-//#if wide_filter
+//#if WIDE_FILTER
     return vec2f(invert_filter(u.x), invert_filter(u.y));
 //#else
     return u - 0.5;

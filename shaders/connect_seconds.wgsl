@@ -99,15 +99,15 @@ fn connect_seconds(
         vertex = vertex_at(hit, path.ray.direction);
         path.sampler.pair = hit.w >> 2u;
         path.map_samples = f32(MAP_SAMPLES);
-//#if counting
+//#if COUNTING
         path.is_counted = (hit.w & IS_COUNTED_FIRST) != 0u;
 //#end
-//#if map_sampling
+//#if MAP_SAMPLING
         for (var i = 0u; i < MAP_SAMPLES; i++) {
             add_light(&path, shadow_of(&path, vertex, light_of_map(&path, vertex), true));
         }
 //#end
-//#if local_lights
+//#if LOCAL_LIGHTS
         add_light(&path, shadow_of(&path, vertex, light_of_lamps(&path, vertex), false));
 //#end
     }
@@ -165,7 +165,7 @@ fn connect_seconds(
             }
         }
     }
-//#if layers
+//#if LAYERS
     let albedo = firsts[at + 192u];
     let normal = firsts[at + 256u];
     path.first_hit = FirstHit(

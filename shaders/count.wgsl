@@ -16,7 +16,7 @@ fn count_try(path: ptr<function, Path>, vertex: Vertex, tile: u32) -> u32 {
     if !(*path).is_counted {
         return 0u;
     }
-//#if medium
+//#if MEDIUM
     // Inside of a solid the map is never seen; its vertices would spoil what fog sees.
     if vertex.is_in_medium && is_in_solid(path) {
         return 0u;
@@ -44,20 +44,20 @@ fn count_weight(counter: u32, weight: f32) {
     }
 }
 
-//#if record_ratio
+//#if RECORD_RATIO
 // What a try counts whose light is not held up: a power of what the surface or the phase function
 // makes of its direction.
 fn visibility_share(vertex: Vertex, direction: vec3f, own_pdf: f32) -> f32 {
     var share = abs(dot(vertex.point.shading_frame.z, direction));
-//#if medium
+//#if MEDIUM
     if vertex.is_in_medium {
         share = 4.0 * PI * own_pdf;
     }
 //#end
-//#if record_cosine
+//#if RECORD_COSINE
     return share;
 //#else
-//#if record_squared_cosine
+//#if RECORD_SQUARED_COSINE
     return share * share;
 //#else
     return 1.0;

@@ -2,7 +2,7 @@
 // radiance is read smoothly, see src/environment/patches.rs.
 
 // How far patch edges lie before texel edges, in texels.
-//#if nearest_lookup
+//#if NEAREST_LOOKUP
 const MAP_SHIFT = 0.0;
 //#else
 const MAP_SHIFT = 0.5;
@@ -54,7 +54,7 @@ struct TilePatches {
 
 // Columns and rows of patches.
 fn patch_grid() -> vec2u {
-//#if nearest_lookup
+//#if NEAREST_LOOKUP
     return vec2u(globals.map_width, globals.map_height);
 //#else
     return vec2u(globals.map_width, globals.map_height + 1u);
@@ -74,7 +74,7 @@ fn tile_of_patch(at: vec2u) -> u32 {
     return tile.y * tiles.x + tile.x;
 }
 
-//#if map
+//#if MAP
 // Of a row of patches: distance of the cosine at its upper edge from its pole's, which keeps its digits
 // near that, the lower edge's less that, steradians of a patch.
 fn patch_row(row: u32) -> vec3f {
@@ -121,7 +121,7 @@ fn unpack_radiance(words: vec2u) -> vec3f {
 
 // Wrapped in u, clamped in v.
 fn corners_of(at: vec2u) -> Corners {
-//#if nearest_lookup
+//#if NEAREST_LOOKUP
     let texel = map_texel(at.x, at.y);
     return Corners(texel, texel, texel, texel);
 //#else
@@ -149,7 +149,7 @@ fn scaled_radiance(radiance: vec3f) -> vec3f {
 //#end
 
 fn environment_radiance(direction: vec3f) -> vec3f {
-//#if map
+//#if MAP
     let point = map_point(direction);
     return scaled_radiance(interpolated(corners_of(point.at), point.within));
 //#else
@@ -157,7 +157,7 @@ fn environment_radiance(direction: vec3f) -> vec3f {
 //#end
 }
 
-//#if map_sampling
+//#if MAP_SAMPLING
 // Scaled importance of radiance at intensity 1. Drivers take a common factor out of a sum, which then
 // overflows where radiance nearly does: so that is cut off.
 fn map_importance(radiance: vec3f) -> f32 {
@@ -177,7 +177,7 @@ fn inverse_energy(tile: u32) -> f32 {
 // Density of `sample_in_tile`, given the tile, where a patch with these corners shows this radiance.
 fn tile_density(tile: u32, at: vec2u, corners: Corners, radiance: vec3f) -> f32 {
     let here = map_importance(radiance);
-//#if summed_area
+//#if SUMMED_AREA
     let sum = map_importance(corners.upper_left) + map_importance(corners.upper_right)
         + map_importance(corners.lower_left) + map_importance(corners.lower_right);
     let energy = patch_energy(sum, at.y);
@@ -227,7 +227,7 @@ fn sample_in_tile(tile: u32, u: vec2u) -> EnvironmentSample {
     result.radiance = scaled_radiance(radiance);
     result.pdf_solid_angle = tile_density(tile, chosen.at, corners, radiance);
     let row = patch_row(chosen.at.y);
-//#if summed_area
+//#if SUMMED_AREA
     result.weight = 1.0;
 //#else
     let energy = patch_energy(a + b + c + d, chosen.at.y);

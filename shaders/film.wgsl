@@ -40,7 +40,7 @@ fn add_to_film(pixel: u32, path: ptr<function, Path>) {
         film_rest[pixel] = after.low;
     }
     film_counts[pixel] += vec4u(1u, select(1u, 0u, is_valid), (*path).rays, 0u);
-//#if layers
+//#if LAYERS
     let hit = (*path).first_hit;
     let albedo = add_to_sum(
         Sum(surfaces[2u * pixel], surfaces_rest[2u * pixel]), vec4f(hit.albedo, hit.depth));

@@ -14,16 +14,16 @@ fn meet_first(path: ptr<function, Path>, vertex: Vertex) -> bool {
     }
     let pair = (*path).sampler.pair;
     var what = IS_SHARED | (pair << 2u);
-//#if counting
+//#if COUNTING
     what |= select(0u, IS_COUNTED_FIRST, (*path).is_counted);
 //#end
     first[0] = packed_hit(arrival.triangle, arrival.barycentric, what);
     first[1] = packed((*path).throughput, 0u);
     var pairs = 0u;
-//#if map_sampling
+//#if MAP_SAMPLING
     pairs += MAP_SAMPLES;
 //#end
-//#if local_lights
+//#if LOCAL_LIGHTS
     pairs += 1u;
 //#end
     (*path).sampler.pair = pair + pairs;
@@ -41,7 +41,7 @@ fn meet_second(path: ptr<function, Path>, vertex: Vertex) -> bool {
             vertex.point.shading_frame.z, vertex.point.geometric_normal, -(*path).ray.direction);
     if shares {
         var what = IS_FOUND | ((*path).sampler.pair << 8u);
-//#if counting
+//#if COUNTING
         what |= select(0u, IS_COUNTED_SECOND, (*path).is_counted);
 //#end
         second[0] = packed_hit(arrival.triangle, arrival.barycentric, what);
@@ -74,7 +74,7 @@ fn find_seconds(
     firsts[at] = first[0];
     firsts[at + 64u] = vec4u(first[1].xyz, path.rays);
     firsts[at + 128u] = packed(path.radiance, 0u);
-//#if layers
+//#if LAYERS
     let hit = path.first_hit;
     firsts[at + 192u] = packed(hit.albedo, bitcast<u32>(hit.depth));
     firsts[at + 256u] = packed(hit.normal, bitcast<u32>(hit.hits));

@@ -12,11 +12,11 @@ fn follow_shadows(
     }
     var path: Path;
     var is_lit = false;
-//#if map_sampling
+//#if MAP_SAMPLING
     path.map_shadow = read_shadow(slot, MAP_SHADOW_TEXEL);
     is_lit = path.map_shadow.ray.t_max > 0.0;
 //#end
-//#if local_lights
+//#if LOCAL_LIGHTS
     path.lamp_shadow = read_shadow(slot, LAMP_SHADOW_TEXEL);
     is_lit = is_lit || path.lamp_shadow.ray.t_max > 0.0;
 //#end

@@ -32,14 +32,14 @@ struct Globals {
     half_height: f32,
     grid_center: vec3f,
     grid_columns: u32,
-    // Words of `laws` at which each array begins.
-    law_starts_at: u32,
-    law_masks_at: u32,
-    law_ranks_at: u32,
-    law_tiles_at: u32,
-    law_last_at: u32,
-    law_of_cell_at: u32,
-    words_per_law: u32,
+    // Words of `distributions` at which each array begins.
+    distribution_starts_at: u32,
+    distribution_masks_at: u32,
+    distribution_ranks_at: u32,
+    distribution_tiles_at: u32,
+    distribution_last_at: u32,
+    distribution_of_cell_at: u32,
+    words_per_distribution: u32,
     grid_rows: u32,
     map_width: u32,
     map_height: u32,
@@ -64,7 +64,7 @@ struct Globals {
     zero: u32,
     // Whether points in a medium have a face of their own.
     grid_medium: u32,
-    // Of 256 samples of the map so many follow the whole map's law.
+    // Of 256 samples of the map so many follow the whole map's distribution.
     whole_map_share: u32,
     // Corners and coefficients of the fog; without fog the lower corner is above the upper one.
     fog_low: vec3f,

@@ -6,7 +6,7 @@ struct Interface {
     f0: vec3f,
     f90: f32,
     ggx: Ggx,
-//#if transmission
+//#if TRANSMISSION
     glass: f32,
     glass_f90: f32,
     eta: f32,
@@ -14,11 +14,11 @@ struct Interface {
     thin: bool,
     tint: vec3f,
 //#end
-//#if dispersion
+//#if DISPERSION
     etas: vec3f,
     hero: vec3f,
 //#end
-//#if iridescence
+//#if IRIDESCENCE
     film: Film,
     // What is under the film: F0 and share of the opaque dielectric and of the metal.
     base_f0: vec3f,
@@ -35,7 +35,7 @@ struct Facet {
 
 fn interface_new(p: SurfaceParameters, f0: vec3f, f90: f32, entering: bool) -> Interface {
     var i: Interface;
-//#if anisotropy
+//#if ANISOTROPY
     i.ggx = ggx_stretched(p.roughness, p.anisotropy, p.anisotropy_axis);
 //#else
     i.ggx = ggx_from_roughness(p.roughness);
@@ -43,7 +43,7 @@ fn interface_new(p: SurfaceParameters, f0: vec3f, f90: f32, entering: bool) -> I
     let opaque_share = (1.0 - p.metallic) * (1.0 - p.transmission);
     i.f0 = f0 * opaque_share + p.base_color * p.metallic;
     i.f90 = f90 * opaque_share + p.metallic;
-//#if transmission
+//#if TRANSMISSION
     i.glass = (1.0 - p.metallic) * p.transmission;
     i.glass_f0 = f0;
     i.glass_f90 = f90;
@@ -51,7 +51,7 @@ fn interface_new(p: SurfaceParameters, f0: vec3f, f90: f32, entering: bool) -> I
     i.thin = p.thin;
     i.eta = eta_of(p.ior, entering || p.thin);
 //#end
-//#if dispersion
+//#if DISPERSION
     i.etas = vec3f(i.eta);
     i.hero = vec3f(1.0);
     if p.dispersion > 0.0 && p.ior > 0.0 {
@@ -60,7 +60,7 @@ fn interface_new(p: SurfaceParameters, f0: vec3f, f90: f32, entering: bool) -> I
         i.etas.z = eta_of(p.ior + spread, entering || p.thin);
     }
 //#end
-//#if iridescence
+//#if IRIDESCENCE
     i.film = film_new(p);
     i.base_f0 = min(normal_reflectance(p.ior) * p.specular_color, vec3f(1.0));
     i.dielectric_share = p.specular * opaque_share;
@@ -70,7 +70,7 @@ fn interface_new(p: SurfaceParameters, f0: vec3f, f90: f32, entering: bool) -> I
     return i;
 }
 
-//#if transmission
+//#if TRANSMISSION
 // Index on the far side over this side.
 fn eta_of(index: f32, is_outside: bool) -> f32 {
     let ior = max(index, 1.0);
@@ -81,7 +81,7 @@ fn eta_of(index: f32, is_outside: bool) -> f32 {
 }
 //#end
 
-//#if dispersion
+//#if DISPERSION
 struct Hero {
     channel: u32,
     probability: f32,
@@ -117,7 +117,7 @@ fn interface_of_hero(i: Interface, hero: Hero) -> Interface {
 }
 //#end
 
-//#if iridescence
+//#if IRIDESCENCE
 // Reflectance of the opaque share.
 fn interface_opaque(i: Interface, cosine: f32) -> vec3f {
     let plain = i.f0 + (i.f90 - i.f0) * schlick_weight(cosine);
@@ -139,7 +139,7 @@ fn interface_opaque(i: Interface, cosine: f32) -> vec3f {
 
 fn interface_is_absent(i: Interface) -> bool {
     var absent = i.f90 == 0.0 && all(i.f0 == vec3f(0.0));
-//#if transmission
+//#if TRANSMISSION
     absent = absent && i.glass == 0.0;
 //#end
     return absent;
@@ -149,7 +149,7 @@ fn interface_is_delta_or_absent(i: Interface) -> bool {
     if is_smooth(i.ggx) || interface_is_absent(i) {
         return true;
     }
-//#if transmission
+//#if TRANSMISSION
     let reflects_nothing = i.f90 == 0.0 && all(i.f0 == vec3f(0.0)) && all(i.glass_f0 == vec3f(0.0));
     return transmits_delta(i) && reflects_nothing;
 //#else
@@ -159,14 +159,14 @@ fn interface_is_delta_or_absent(i: Interface) -> bool {
 
 // Reflectance and transmittance of a facet seen at this cosine.
 fn interface_facet(i: Interface, cosine: f32) -> Facet {
-//#if iridescence
+//#if IRIDESCENCE
     let opaque_share = interface_opaque(i, cosine);
 //#else
     let opaque_share = i.f0 + (i.f90 - i.f0) * schlick_weight(cosine);
 //#end
-//#if transmission
+//#if TRANSMISSION
     if i.glass > 0.0 {
-//#if dispersion
+//#if DISPERSION
         // A loop, for what it calls is long: first the hero's index, then that of each channel.
         let turns = select(1u, 4u, is_dispersive(i));
         var reflected_share = vec3f(0.0);
@@ -189,7 +189,7 @@ fn interface_facet(i: Interface, cosine: f32) -> Facet {
     return Facet(opaque_share, vec3f(0.0));
 }
 
-//#if transmission
+//#if TRANSMISSION
 // Reflectance of the transmissive share, and what passes it, at a relative index.
 fn glass_at(i: Interface, cosine: f32, eta: f32) -> vec4f {
     let exact = dielectric(cosine, eta);
@@ -199,7 +199,7 @@ fn glass_at(i: Interface, cosine: f32, eta: f32) -> vec4f {
     let exact_f0 = normal_reflectance(eta);
     let weight = saturate((exact - exact_f0) / (1.0 - exact_f0));
     var fresnel = i.glass_f0 + (i.glass_f90 - i.glass_f0) * weight;
-//#if iridescence
+//#if IRIDESCENCE
     if i.film.share > 0.0 {
         let sin2 = (1.0 - cosine * cosine) / select(1.0, eta * eta, eta < 1.0);
         let filmed = film_reflectance(i.film, sqrt(max(1.0 - sin2, 0.0)), i.base_f0);
@@ -220,7 +220,7 @@ fn facet_reflection_probability(facet: Facet) -> f32 {
     return select(1.0, r / (r + t), t > 0.0);
 }
 
-//#if transmission
+//#if TRANSMISSION
 fn passes_straight(i: Interface) -> bool {
     return i.glass > 0.0 && i.thin && is_smooth(i.ggx);
 }
@@ -240,7 +240,7 @@ fn interface_straight_transmittance(i: Interface, cosine: f32) -> vec3f {
 // The facet as far as evaluation and sampling answer for it.
 fn scattering_facet(i: Interface, cosine: f32) -> Facet {
     var facet = interface_facet(i, cosine);
-//#if transmission
+//#if TRANSMISSION
     if passes_straight(i) {
         facet.transmittance = vec3f(0.0);
     }
@@ -257,7 +257,7 @@ struct Facets {
 
 fn scattering_facets(i: Interface, cosine: f32, wo: vec3f) -> Facets {
     var facets: Facets;
-//#if transmission
+//#if TRANSMISSION
     // A loop, for what it calls is long.
     let turns = select(1u, 2u, i.glass > 0.0 && transmits_delta(i));
     for (var turn = 0u; turn < turns; turn++) {
@@ -289,12 +289,12 @@ fn interface_sample(i: Interface, wo: vec3f, choice: f32, u: vec2f) -> LobeSampl
         } else {
             result = LobeSample(select(ABSORBED, SPREAD, wi.z > 0.0), wi, vec3f(0.0));
         }
-//#if transmission
+//#if TRANSMISSION
     } else if transmits_delta(i) {
         let wi = refracted(wo, vec3f(0.0, 0.0, 1.0), i.eta);
         if any(wi != vec3f(0.0)) {
             var radiance = facets.deciding.transmittance / (i.eta * i.eta);
-//#if dispersion
+//#if DISPERSION
             radiance *= i.hero;
 //#end
             result = LobeSample(DELTA, wi, radiance / (1.0 - probability));
@@ -315,7 +315,7 @@ fn interface_eval_pdf(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
         return EvalPdf(vec3f(0.0), 0.0);
     }
     let is_reflected = wi.z > 0.0;
-//#if transmission
+//#if TRANSMISSION
     if !is_reflected && (i.glass == 0.0 || transmits_delta(i)) {
         return EvalPdf(vec3f(0.0), 0.0);
     }
@@ -348,7 +348,7 @@ fn eval_pdf_mirrored(i: Interface, wo: vec3f, wi: vec3f, is_reflected: bool) -> 
     );
 }
 
-//#if transmission
+//#if TRANSMISSION
 fn eval_pdf_refracted(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
     let none = EvalPdf(vec3f(0.0), 0.0);
     var h = normalize_or(wo + i.eta * wi, vec3f(0.0));
@@ -365,7 +365,7 @@ fn eval_pdf_refracted(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
     let masking = 2.0 * -wi.z * ggx_visibility(i.ggx, -wi);
     let probability = 1.0 - facet_reflection_probability(facet);
     var transmitted = facet.transmittance;
-//#if dispersion
+//#if DISPERSION
     transmitted *= i.hero;
 //#end
     return EvalPdf(
@@ -377,17 +377,17 @@ fn eval_pdf_refracted(i: Interface, wo: vec3f, wi: vec3f) -> EvalPdf {
 
 fn interface_albedo(i: Interface, cosine: f32, terms: vec2f) -> vec3f {
     var albedo = i.f0 * terms.x + i.f90 * terms.y;
-//#if iridescence
+//#if IRIDESCENCE
     if i.film.share > 0.0 {
         albedo = interface_opaque(i, cosine) * (terms.x + terms.y);
     }
 //#end
-//#if transmission
+//#if TRANSMISSION
     if i.glass > 0.0 {
         var glass = i;
         glass.f0 = vec3f(0.0);
         glass.f90 = 0.0;
-//#if iridescence
+//#if IRIDESCENCE
         glass.dielectric_share = 0.0;
         glass.metal_share = 0.0;
 //#end
@@ -398,12 +398,12 @@ fn interface_albedo(i: Interface, cosine: f32, terms: vec2f) -> vec3f {
     return albedo;
 }
 
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
 // Twin of `Interface::radiance_scale`.
 fn radiance_scale(i: Interface) -> vec3f {
-//#if transmission
+//#if TRANSMISSION
     if !i.thin {
-//#if dispersion
+//#if DISPERSION
         return 1.0 / (i.etas * i.etas);
 //#else
         return vec3f(1.0 / (i.eta * i.eta));

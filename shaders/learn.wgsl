@@ -1,7 +1,7 @@
 // What the map shows to the vertices of camera paths: twin of src/path/learn.rs.
 
 const LEARNING_SEED = 0x6c656172u;
-//#if record_ratio
+//#if RECORD_RATIO
 const WHOLE_MAP_SHARE = 128u;
 //#else
 const WHOLE_MAP_SHARE = 256u;
@@ -10,7 +10,7 @@ const WHOLE_MAP_SHARE = 256u;
 // Samples the map to see what is visible of it.
 fn look_at_map(path: ptr<function, Path>, vertex: Vertex) {
     let bits = path_pair_bits(path);
-    let choice = choose_tile(vertex.law, bits, WHOLE_MAP_SHARE);
+    let choice = choose_tile(vertex.distribution, bits, WHOLE_MAP_SHARE);
     let sample = sample_in_tile(choice.tile, vec2u(choice.remainder, bits.y));
     if sample.pdf_solid_angle <= 0.0 {
         return;
@@ -22,7 +22,7 @@ fn look_at_map(path: ptr<function, Path>, vertex: Vertex) {
     }
     let shadow = shadow_towards(path, vertex, sample.direction, F32_MAX);
     let visible = follow_shadow(path, shadow);
-//#if record_ratio
+//#if RECORD_RATIO
     let share = visibility_share(vertex, sample.direction, f.pdf_solid_angle);
     count_visible(Visibility(counter, share), visible);
 //#else

@@ -22,11 +22,11 @@ fn survival(path: ptr<function, Path>) -> f32 {
     return probability;
 }
 
-//#if shadow_rays
+//#if SHADOW_RAYS
 // What comes along a ray towards a light.
 fn light_along(path: ptr<function, Path>, shadow: Shadow) -> vec3f {
     let visible = follow_shadow(path, shadow);
-//#if counting
+//#if COUNTING
     if any(visible != vec3f(0.0)) {
         count_visible(shadow.visibility, visible);
     }
@@ -74,15 +74,15 @@ fn light_seconds(
     var path = path_new(Ray(vec3f(0.0), direction, F32_MAX), sampler);
     path.bounces = 2u;
     path.throughput_before = bitcast<f32>(arrived.w);
-//#if counting
+//#if COUNTING
     path.is_counted = (hit.w & IS_COUNTED_SECOND) != 0u;
 //#end
     let vertex = vertex_at(hit, direction);
     var put_at = at + 2u + 2u * INCIDENTS * estimate;
-//#if map_sampling
+//#if MAP_SAMPLING
     let map_shadow = unscattered_shadow(&path, vertex, light_of_map(&path, vertex), true);
 //#end
-//#if local_lights
+//#if LOCAL_LIGHTS
     let lamp_shadow = unscattered_shadow(&path, vertex, light_of_lamps(&path, vertex), false);
 //#end
     var survival_ = 0.0;
@@ -93,11 +93,11 @@ fn light_seconds(
     let onwards = path.ray.direction;
     path.throughput_before *= max_element(path.throughput) / max(survival_, 1e-30);
     path.throughput = vec3f(1.0);
-//#if map_sampling
+//#if MAP_SAMPLING
     put_incident(put_at, map_shadow.ray.direction, light_along(&path, map_shadow), 0u);
     put_at += 2u;
 //#end
-//#if local_lights
+//#if LOCAL_LIGHTS
     put_incident(put_at, lamp_shadow.ray.direction, light_along(&path, lamp_shadow), 0u);
     put_at += 2u;
 //#end

@@ -67,7 +67,7 @@ fn distant_light_at(index: u32) -> u32 {
 // Chooses a light with a uniform 32-bit number.
 fn choose_light(receiver: Receiver, bits: u32) -> LightChoice {
     var draw = draw_new(bits);
-//#if punctual_lights
+//#if PUNCTUAL_LIGHTS
     for (var i = 0u; i < globals.distant_light_count; i++) {
         let at = distant_light_at(i);
         if draw_chooses_first(&draw, lights(at).x) {
@@ -86,12 +86,12 @@ fn choose_light(receiver: Receiver, bits: u32) -> LightChoice {
     return LightChoice(link & ~LEAF, interval_probability(draw.left), draw_remainder(draw));
 }
 
-//#if emitters
+//#if EMITTERS
 // Probability with which `choose_light` chooses an emissive triangle, counted among such.
 fn light_probability(receiver: Receiver, light: u32) -> f32 {
     let leaf = lights(globals.light_triangle_count + light).x;
     var chosen = whole_interval();
-//#if punctual_lights
+//#if PUNCTUAL_LIGHTS
     for (var i = 0u; i < globals.distant_light_count; i++) {
         chosen = interval_choose(chosen, lights(distant_light_at(i)).x, false);
     }

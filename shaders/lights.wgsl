@@ -26,14 +26,14 @@ fn light_vec3(at: u32) -> vec3f {
 fn sample_local_light(receiver: Receiver, bits: vec2u) -> LightSample {
     let choice = choose_light(receiver, bits.x);
     let probability = choice.probability;
-//#if punctual_lights
+//#if PUNCTUAL_LIGHTS
     if choice.light >= globals.light_triangle_count {
         let index = choice.light - globals.light_triangle_count;
         return sample_punctual(index, receiver.position, probability);
     }
 //#end
     var none: LightSample;
-//#if emitters
+//#if EMITTERS
     let u = vec2f(choice.remainder, unit_from_bits(bits.y));
     let root = sqrt(u.x);
     let barycentric = vec2f(root * (1.0 - u.y), root * u.y);
@@ -55,7 +55,7 @@ fn sample_local_light(receiver: Receiver, bits: vec2u) -> LightSample {
 //#end
 }
 
-//#if emitters
+//#if EMITTERS
 fn light_corners(triangle: u32) -> array<vec3f, 3> {
     let corners = triangles(triangle).xyz;
     return array<vec3f, 3>(
@@ -110,7 +110,7 @@ fn emitted(point: SurfacePoint) -> vec3f {
 }
 //#end
 
-//#if punctual_lights
+//#if PUNCTUAL_LIGHTS
 fn sample_punctual(index: u32, position: vec3f, probability: f32) -> LightSample {
     var none: LightSample;
     let at = distant_light_at(globals.distant_light_count) + PUNCTUAL_WORDS * index;

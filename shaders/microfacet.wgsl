@@ -4,7 +4,7 @@ const SMOOTH_ALPHA = 1e-3;
 
 struct Ggx {
     alpha: f32,
-//#if anisotropy
+//#if ANISOTROPY
     along: f32,
     axis: vec2f,
 //#end
@@ -12,7 +12,7 @@ struct Ggx {
 
 fn ggx_from_roughness(roughness: f32) -> Ggx {
     let alpha = roughness * roughness;
-//#if anisotropy
+//#if ANISOTROPY
     return Ggx(alpha, alpha, vec2f(1.0, 0.0));
 //#else
     return Ggx(alpha);
@@ -23,7 +23,7 @@ fn is_smooth(ggx: Ggx) -> bool {
     return ggx.alpha < SMOOTH_ALPHA;
 }
 
-//#if anisotropy
+//#if ANISOTROPY
 fn ggx_stretched(roughness: f32, strength: f32, axis: vec2f) -> Ggx {
     let ggx = ggx_from_roughness(roughness);
     let along = ggx.alpha + (1.0 - ggx.alpha) * (strength * strength);
@@ -58,7 +58,7 @@ fn roughness_towards(ggx: Ggx, v: vec3f) -> f32 {
 //#end
 
 fn ggx_distribution(ggx: Ggx, h: vec3f) -> f32 {
-//#if anisotropy
+//#if ANISOTROPY
     if is_stretched(ggx) {
         let slopes = ggx_along_axis(ggx, h) / vec2f(ggx.along, ggx.alpha);
         let t = dot(slopes, slopes) + h.z * h.z;
@@ -71,7 +71,7 @@ fn ggx_distribution(ggx: Ggx, h: vec3f) -> f32 {
 }
 
 fn ggx_visibility(ggx: Ggx, v: vec3f) -> f32 {
-//#if anisotropy
+//#if ANISOTROPY
     if is_stretched(ggx) {
         return 1.0 / (v.z + length(widened(ggx, v)));
     }
@@ -81,7 +81,7 @@ fn ggx_visibility(ggx: Ggx, v: vec3f) -> f32 {
 }
 
 fn ggx_sample_visible_normal(ggx: Ggx, wo: vec3f, u: vec2f) -> vec3f {
-//#if anisotropy
+//#if ANISOTROPY
     let wo_std = normalize(widened(ggx, wo));
 //#else
     let wo_std = normalize(vec3f(ggx.alpha * wo.xy, wo.z));
@@ -90,7 +90,7 @@ fn ggx_sample_visible_normal(ggx: Ggx, wo: vec3f, u: vec2f) -> vec3f {
     let r = sqrt(max(1.0 - z * z, 0.0));
     let sin_cos = sin_cos_turns(u.x);
     let h_std = vec3f(r * sin_cos.y, r * sin_cos.x, z) + wo_std;
-//#if anisotropy
+//#if ANISOTROPY
     let flat = ggx.axis * (ggx.along * h_std.x)
         + vec2f(-ggx.axis.y, ggx.axis.x) * (ggx.alpha * h_std.y);
 //#else

@@ -11,24 +11,24 @@ struct Path {
     throughput: vec3f,
     radiance: vec3f,
     // The vertex the ray left from: density of its direction (F32_MAX if no NEE competes with
-    // it), tile law, and what lights are chosen for.
+    // it), tile distribution, and what lights are chosen for.
     departure_pdf_solid_angle: f32,
-    departure_law: u32,
-//#if emitters
+    departure_distribution: u32,
+//#if EMITTERS
     departure_receiver: Receiver,
 //#end
-//#if solid_transmission
+//#if SOLID_TRANSMISSION
     body: Body,
 //#end
     travelled: f32,
     passes: u32,
     bounces: u32,
     rays: u32,
-//#if cached
+//#if CACHED
     // Metres over which surfaces average what the path would find.
     spread: f32,
 //#end
-//#if sharing
+//#if SHARING
     // What the path carried where its throughput was set to one.
     throughput_before: f32,
     // Whether nothing on the way since the last vertex has taken any light.
@@ -37,24 +37,24 @@ struct Path {
     map_samples: f32,
     departure_map_samples: f32,
 //#end
-//#if counting
+//#if COUNTING
     is_counted: bool,
 //#end
-//#if layers
+//#if LAYERS
     first_hit: FirstHit,
 //#end
-//#if learning
+//#if LEARNING
 //#else
-//#if map_sampling
+//#if MAP_SAMPLING
     map_shadow: Shadow,
 //#end
-//#if local_lights
+//#if LOCAL_LIGHTS
     lamp_shadow: Shadow,
 //#end
 //#end
 }
 
-//#if shadow_rays
+//#if SHADOW_RAYS
 // A ray towards a light. It waits until the path has chosen where to go on: so nothing of the vertex
 // takes registers while it is followed.
 struct Shadow {
@@ -63,11 +63,11 @@ struct Shadow {
     // What arrives if nothing is in the way, before its weight.
     light: vec3f,
     weight: f32,
-//#if shadow_media
+//#if SHADOW_MEDIA
     // What media let through of it.
     left: vec3f,
 //#end
-//#if counting
+//#if COUNTING
     visibility: Visibility,
 //#end
 }
@@ -86,19 +86,19 @@ struct Vertex {
     bsdf: Bsdf,
     // Direction to where the path came from, in the shading frame.
     wo: vec3f,
-    law: u32,
-//#if light_grid
+    distribution: u32,
+//#if LIGHT_GRID
     cell: u32,
 //#end
-//#if medium
+//#if MEDIUM
     is_in_medium: bool,
     mean_cosine: f32,
 //#end
 }
 
-//#if solid_transmission
+//#if SOLID_TRANSMISSION
 struct Body {
-//#if medium
+//#if MEDIUM
     interior: Interior,
     is_solid: bool,
 //#else
@@ -113,7 +113,7 @@ fn body_air() -> Body {
     return body;
 }
 
-//#if medium
+//#if MEDIUM
 //#else
 fn body_transmittance(body: Body, distance: f32) -> vec3f {
     if all(body.absorption == vec3f(0.0)) || distance >= F32_MAX {
@@ -131,7 +131,7 @@ fn body_behind(point: SurfacePoint, before: Body) -> Body {
     if point.front_face {
         let index = max(point.parameters.ior, 1.0);
         body.squared_index = index * index;
-//#if medium
+//#if MEDIUM
         let inside = material_numbers(point.material, SCATTERING);
         body.interior =
             Interior(inside.xyz, inside.w, point.parameters.absorption + inside.xyz);
@@ -150,11 +150,11 @@ fn path_new(ray: Ray, sampler: Sampler) -> Path {
     path.ray = ray;
     path.throughput = vec3f(1.0);
     path.departure_pdf_solid_angle = F32_MAX;
-    path.departure_law = WHOLE_MAP;
-//#if solid_transmission
+    path.departure_distribution = WHOLE_MAP;
+//#if SOLID_TRANSMISSION
     path.body = body_air();
 //#end
-//#if sharing
+//#if SHARING
     path.throughput_before = 1.0;
     path.is_clear = true;
     path.map_samples = 1.0;
@@ -176,7 +176,7 @@ fn path_pair(path: ptr<function, Path>) -> vec2f {
     return vec2f(unit_from_bits(bits.x), unit_from_bits(bits.y));
 }
 
-//#if partial
+//#if PARTIAL
 // Share of light that goes straight through a surface: what alpha does not cover, and what smooth
 // thin glass transmits.
 fn straight_through(point: SurfacePoint, direction: vec3f) -> vec3f {
@@ -184,7 +184,7 @@ fn straight_through(point: SurfacePoint, direction: vec3f) -> vec3f {
         return vec3f(0.0);
     }
     var glass = vec3f(0.0);
-//#if transmission
+//#if TRANSMISSION
     if point.parameters.transmission > 0.0 {
         let bsdf = bsdf_new(point.parameters, point.front_face);
         glass = bsdf_straight_transmittance(
@@ -201,13 +201,13 @@ fn coverage(point: SurfacePoint) -> f32 {
 }
 //#end
 
-//#if filtered_hits
+//#if FILTERED_HITS
 // Whether a path sees a hit: not where a mask cuts it out, nor, for camera rays, a back side.
 fn accepts(hit: Hit, from_camera: bool) -> bool {
     if from_camera && (hit.flags & (DOUBLE_SIDED | FROM_BEHIND)) == FROM_BEHIND {
         return false;
     }
-//#if alpha_mask
+//#if ALPHA_MASK
     if (hit.flags & ALPHA_MASK) != 0u {
         return alpha_at(hit.triangle, hit.barycentric) > 0.0;
     }
@@ -216,15 +216,15 @@ fn accepts(hit: Hit, from_camera: bool) -> bool {
 }
 //#end
 
-//#if pass_through
+//#if PASS_THROUGH
 // Share of light that a surface on a shadow ray's way lets through.
 fn passed(hit: Hit, direction: vec3f) -> vec3f {
-//#if partial
+//#if PARTIAL
     if (hit.flags & PARTIAL) != 0u {
         return straight_through(surface_at(hit.triangle, hit.barycentric, direction), direction);
     }
 //#end
-//#if alpha_mask
+//#if ALPHA_MASK
     if (hit.flags & ALPHA_MASK) != 0u {
         return vec3f(1.0 - alpha_at(hit.triangle, hit.barycentric));
     }
@@ -238,9 +238,9 @@ fn passed(hit: Hit, direction: vec3f) -> vec3f {
 fn path_step(path: ptr<function, Path>) -> bool {
     let hit = closest_hit((*path).ray, (*path).bounces == 0u);
     let goes_on = follow(path, hit);
-//#if learning
+//#if LEARNING
 //#else
-//#if shadow_rays
+//#if SHADOW_RAYS
     add_lights(path);
 //#end
 //#end
@@ -250,7 +250,7 @@ fn path_step(path: ptr<function, Path>) -> bool {
 // What becomes of the path at the end of its ray. `false` if it ends.
 fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
     (*path).rays += 1u;
-//#if medium
+//#if MEDIUM
     let stretch = stretch_ahead(path, (*path).ray.origin, (*path).ray.direction, hit.t);
     if stretch.start < stretch.end {
         if all(stretch.interior.scattering == vec3f(0.0)) {
@@ -269,7 +269,7 @@ fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
         }
     }
 //#else
-//#if solid_transmission
+//#if SOLID_TRANSMISSION
     (*path).throughput *= body_transmittance((*path).body, hit.t);
 //#end
 //#end
@@ -281,15 +281,15 @@ fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
         return false;
     }
     (*path).travelled += hit.t;
-//#if finding
+//#if FINDING
     arrival = hit;
 //#end
     let direction = (*path).ray.direction;
     let point = surface_at(hit.triangle, hit.barycentric, direction);
-//#if emitters
+//#if EMITTERS
     add_emitted(path, point);
 //#end
-//#if partial
+//#if PARTIAL
     if passes(path, point) {
         (*path).ray.origin = offset_origin(point.position, -point.geometric_normal);
         (*path).passes += 1u;
@@ -304,7 +304,7 @@ fn has_faded(path: ptr<function, Path>) -> bool {
     return max_element((*path).throughput) < 1.17549435e-38;
 }
 
-//#if medium
+//#if MEDIUM
 // What fills the way of a ray from where the path is.
 fn stretch_ahead(
     path: ptr<function, Path>,
@@ -312,14 +312,14 @@ fn stretch_ahead(
     direction: vec3f,
     distance: f32,
 ) -> Stretch {
-//#if solid_transmission
+//#if SOLID_TRANSMISSION
     return stretch_in((*path).body, origin, direction, distance);
 //#else
     return fog_stretch(origin, direction, distance);
 //#end
 }
 
-//#if solid_transmission
+//#if SOLID_TRANSMISSION
 // Twin of `Body::stretch`.
 fn stretch_in(body: Body, origin: vec3f, direction: vec3f, distance: f32) -> Stretch {
     if !body.is_solid {
@@ -331,7 +331,7 @@ fn stretch_in(body: Body, origin: vec3f, direction: vec3f, distance: f32) -> Str
 //#end
 
 fn is_in_solid(path: ptr<function, Path>) -> bool {
-//#if solid_transmission
+//#if SOLID_TRANSMISSION
     return (*path).body.is_solid;
 //#else
     return false;
@@ -343,19 +343,19 @@ fn medium_vertex(path: ptr<function, Path>, position: vec3f, mean_cosine: f32) -
     vertex.point.position = position;
     vertex.is_in_medium = true;
     vertex.mean_cosine = mean_cosine;
-    vertex.law = WHOLE_MAP;
-//#if light_grid
+    vertex.distribution = WHOLE_MAP;
+//#if LIGHT_GRID
     // From inside of a solid the map is not seen anyway.
     if !is_in_solid(path) {
         vertex.cell = cell_in_medium(position);
-        vertex.law = law_of_cell(vertex.cell);
+        vertex.distribution = distribution_of_cell(vertex.cell);
     }
 //#end
     return vertex;
 }
 //#end
 
-//#if partial
+//#if PARTIAL
 fn passes(path: ptr<function, Path>, point: SurfacePoint) -> bool {
     let through = straight_through(point, (*path).ray.direction);
     let probability = min(max_element(through), 1.0);
@@ -366,7 +366,7 @@ fn passes(path: ptr<function, Path>, point: SurfacePoint) -> bool {
     if !goes_on {
         goes_on = path_pair(path).x < probability;
     }
-//#if sharing
+//#if SHARING
     (*path).is_clear = (*path).is_clear && (!goes_on || all(through == vec3f(1.0)));
 //#end
     if goes_on {
@@ -380,7 +380,7 @@ fn passes(path: ptr<function, Path>, point: SurfacePoint) -> bool {
 
 // Makes the surface a vertex, unless it is unlit: then it is seen as it is.
 fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
-//#if dispersion
+//#if DISPERSION
     var bsdf = bsdf_new(point.parameters, point.front_face);
     if point.parameters.dispersion > 0.0 {
         let hero = hero_choose((*path).throughput, path_pair(path).x);
@@ -389,7 +389,7 @@ fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
 //#else
     let bsdf = bsdf_new(point.parameters, point.front_face);
 //#end
-//#if layers
+//#if LAYERS
     if (*path).bounces == 0u {
         var albedo = bsdf_albedo(bsdf);
         if point.parameters.unlit {
@@ -398,7 +398,7 @@ fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
         (*path).first_hit = FirstHit(albedo, (*path).travelled, point.shading_frame.z, 1.0);
     }
 //#end
-//#if unlit
+//#if UNLIT
     if point.parameters.unlit {
         (*path).radiance += (*path).throughput * point.parameters.emissive;
         return false;
@@ -408,18 +408,18 @@ fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
     vertex.point = point;
     vertex.bsdf = bsdf;
     vertex.wo = local_from_world(point.shading_frame, -(*path).ray.direction);
-    vertex.law = WHOLE_MAP;
-//#if light_grid
+    vertex.distribution = WHOLE_MAP;
+//#if LIGHT_GRID
     vertex.cell = cell_of(point.position, point.geometric_normal);
-    vertex.law = law_of_cell(vertex.cell);
+    vertex.distribution = distribution_of_cell(vertex.cell);
 //#end
     return visit(path, vertex);
 }
 
 fn most_vertices() -> u32 {
-//#if teaching
-    // The last that teach see as far as the others.
-    return globals.bounces + TEACHERS - 2u;
+//#if TRAINING
+    // The last that train see as far as the others.
+    return globals.bounces + TRAINING_VERTICES - 2u;
 //#else
     return globals.bounces;
 //#end
@@ -430,15 +430,15 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
     if (*path).bounces == most_vertices() {
         return false;
     }
-//#if cached
+//#if CACHED
     if ends_in_cache(path, vertex) {
         return false;
     }
 //#end
-//#if teaching
-    meet_teachers(path, vertex);
+//#if TRAINING
+    meet_training_vertices(path, vertex);
 //#end
-//#if finding
+//#if FINDING
     if (*path).bounces == 1u && meet_second(path, vertex) {
         return false;
     }
@@ -449,25 +449,25 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
     (*path).travelled = 0.0;
     (*path).passes = 0u;
     var gathers = !bsdf_is_delta_only(vertex.bsdf);
-//#if sharing
+//#if SHARING
     (*path).is_clear = true;
 //#end
-//#if medium
+//#if MEDIUM
     gathers = gathers || vertex.is_in_medium;
-//#if learning
+//#if LEARNING
     gathers = gathers && !(vertex.is_in_medium && is_in_solid(path));
 //#end
 //#end
-//#if finding
+//#if FINDING
     gathers = gathers && !waits;
 //#end
     if gathers {
-//#if learning
+//#if LEARNING
         for (var i = 0u; i < globals.tries_per_vertex; i++) {
             look_at_map(path, vertex);
         }
 //#else
-//#if shadow_rays
+//#if SHADOW_RAYS
         gather(path, vertex);
 //#end
 //#end
@@ -481,22 +481,22 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
 // What nobody asks for any more, for it comes anew or the path ends: else it would take registers.
 fn forget_arrival(path: ptr<function, Path>) {
     (*path).ray.origin = vec3f(0.0);
-//#if medium
+//#if MEDIUM
 //#else
     (*path).ray.direction = vec3f(0.0);
 //#end
     (*path).departure_pdf_solid_angle = 0.0;
-    (*path).departure_law = 0u;
-//#if emitters
+    (*path).departure_distribution = 0u;
+//#if EMITTERS
     (*path).departure_receiver = Receiver();
 //#end
 }
 
-//#if scene_lights
+//#if SCENE_LIGHTS
 // Twin of `Vertex::receiver`. In a medium the frame is zero.
 fn receiver_of(vertex: Vertex) -> Receiver {
     var transmits = vertex.point.parameters.transmission > 0.0;
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
     transmits = transmits || vertex.point.parameters.diffuse_transmission > 0.0;
 //#end
     let normal = select(vertex.point.shading_frame.z, vec3f(0.0), transmits);
@@ -504,7 +504,7 @@ fn receiver_of(vertex: Vertex) -> Receiver {
 }
 //#end
 
-//#if emitters
+//#if EMITTERS
 fn add_emitted(path: ptr<function, Path>, point: SurfacePoint) {
     if point.parameters.unlit {
         return;
@@ -525,7 +525,7 @@ fn add_emitted(path: ptr<function, Path>, point: SurfacePoint) {
 }
 //#end
 
-//#if background_blur
+//#if BACKGROUND_BLUR
 // Twin of `background::spread`.
 fn spread(direction: vec3f, concentration: f32, u: vec2f) -> vec3f {
     let share = u.x + (1.0 - u.x) * exp(-2.0 * concentration);
@@ -539,7 +539,7 @@ fn spread(direction: vec3f, concentration: f32, u: vec2f) -> vec3f {
 // The ray leaves the scene: adds the map's radiance, or for the camera the background's.
 fn escape(path: ptr<function, Path>) {
     let direction = (*path).ray.direction;
-//#if background_blur
+//#if BACKGROUND_BLUR
     if (*path).bounces == 0u {
         var sampler = (*path).sampler;
         let blurred = spread(direction, globals.background_concentration, next_pair(&sampler));
@@ -547,17 +547,17 @@ fn escape(path: ptr<function, Path>) {
         return;
     }
 //#end
-//#if background_color
+//#if BACKGROUND_COLOR
     if (*path).bounces == 0u {
         (*path).radiance += (*path).throughput * globals.background;
         return;
     }
 //#end
-//#if map_sampling
+//#if MAP_SAMPLING
     if (*path).departure_pdf_solid_angle < F32_MAX {
         let seen = radiance_and_tile_pdf(direction);
-        var nee = choice_probability((*path).departure_law, seen.tile) * seen.pdf_solid_angle;
-//#if sharing
+        var nee = choice_probability((*path).departure_distribution, seen.tile) * seen.pdf_solid_angle;
+//#if SHARING
         nee *= (*path).departure_map_samples;
 //#end
         let weight = balance_heuristic((*path).departure_pdf_solid_angle, nee);
@@ -571,7 +571,7 @@ fn escape(path: ptr<function, Path>) {
 // What share of light from `direction` goes on along the path, and the density with which `scatter`
 // chooses that direction; zero where shading and geometric normal disagree about the side.
 fn scattered(path: ptr<function, Path>, vertex: Vertex, direction: vec3f) -> EvalPdf {
-//#if medium
+//#if MEDIUM
     if vertex.is_in_medium {
         let cosine = dot((*path).ray.direction, direction);
         let density = phase_pdf_solid_angle(vertex.mean_cosine, cosine);
@@ -585,7 +585,7 @@ fn scattered(path: ptr<function, Path>, vertex: Vertex, direction: vec3f) -> Eva
     return bsdf_eval_pdf(vertex.bsdf, vertex.wo, wi);
 }
 
-//#if shadow_rays
+//#if SHADOW_RAYS
 // A ray from the vertex towards a light so far away; its light is zero. There is none if media let
 // nothing through.
 fn shadow_towards(
@@ -598,11 +598,11 @@ fn shadow_towards(
     let is_above = dot(normal, direction) > 0.0;
     var shadow: Shadow;
     var origin = offset_origin(vertex.point.position, select(-normal, normal, is_above));
-//#if shadow_media
+//#if SHADOW_MEDIA
     shadow.left = vec3f(1.0);
-//#if solid_transmission
+//#if SOLID_TRANSMISSION
     var body = (*path).body;
-//#if medium
+//#if MEDIUM
     let goes_behind = !is_above && !vertex.is_in_medium;
 //#else
     let goes_behind = !is_above;
@@ -611,11 +611,11 @@ fn shadow_towards(
         body = body_behind(vertex.point, body);
     }
 //#end
-//#if medium
+//#if MEDIUM
     if vertex.is_in_medium {
         origin = vertex.point.position;
     }
-//#if solid_transmission
+//#if SOLID_TRANSMISSION
     let stretch = stretch_in(body, origin, direction, distance);
 //#else
     let stretch = fog_stretch(origin, direction, distance);
@@ -642,20 +642,20 @@ fn follow_shadow(path: ptr<function, Path>, shadow: Shadow) -> vec3f {
     }
     (*path).rays += 1u;
     let visible = transmittance_along(shadow.ray);
-//#if shadow_media
+//#if SHADOW_MEDIA
     return visible * shadow.left;
 //#else
     return visible;
 //#end
 }
 
-//#if learning
+//#if LEARNING
 //#else
 // Follows a shadow ray and adds what comes along it.
 fn add_light(path: ptr<function, Path>, shadow: Shadow) {
     let visible = follow_shadow(path, shadow);
     if any(visible != vec3f(0.0)) {
-//#if counting
+//#if COUNTING
         count_visible(shadow.visibility, visible);
 //#end
         (*path).radiance += shadow.light * visible * shadow.weight;
@@ -665,10 +665,10 @@ fn add_light(path: ptr<function, Path>, shadow: Shadow) {
 // Follows the path's shadow rays, the map's first. They share the code, which is long where panes and
 // leaves let light through.
 fn add_lights(path: ptr<function, Path>) {
-//#if map_sampling
+//#if MAP_SAMPLING
     var shadow = (*path).map_shadow;
     (*path).map_shadow = Shadow();
-//#if local_lights
+//#if LOCAL_LIGHTS
     for (var i = 0u; i < 2u; i++) {
         add_light(path, shadow);
         shadow = (*path).lamp_shadow;
@@ -686,9 +686,9 @@ fn add_lights(path: ptr<function, Path>) {
 //#end
 //#end
 
-//#if learning
+//#if LEARNING
 //#else
-//#if shadow_rays
+//#if SHADOW_RAYS
 // Light that may reach a vertex from a direction.
 struct Arriving {
     is_some: bool,
@@ -699,7 +699,7 @@ struct Arriving {
     pdf_solid_angle: f32,
     // For the map: what is divided by the sum of all densities.
     weight: f32,
-//#if counting
+//#if COUNTING
     // Of the try; 0 if it has none.
     counter: u32,
 //#end
@@ -727,18 +727,18 @@ fn shadow_of(
     } else {
         shadow.weight = balance_heuristic(arriving.pdf_solid_angle, f.pdf_solid_angle);
     }
-//#if counting
+//#if COUNTING
     shadow.visibility = Visibility(
         arriving.counter, visibility_share(vertex, arriving.direction, f.pdf_solid_angle));
 //#end
     return shadow;
 }
 
-//#if map_sampling
+//#if MAP_SAMPLING
 fn light_of_map(path: ptr<function, Path>, vertex: Vertex) -> Arriving {
     var arriving: Arriving;
     let bits = path_pair_bits(path);
-    let choice = choose_tile(vertex.law, bits, globals.whole_map_share);
+    let choice = choose_tile(vertex.distribution, bits, globals.whole_map_share);
     let sample = sample_in_tile(choice.tile, vec2u(choice.remainder, bits.y));
     if sample.pdf_solid_angle > 0.0 {
         arriving.is_some = true;
@@ -746,11 +746,11 @@ fn light_of_map(path: ptr<function, Path>, vertex: Vertex) -> Arriving {
         arriving.distance = F32_MAX;
         arriving.light = sample.radiance;
         arriving.pdf_solid_angle = choice.probability * sample.pdf_solid_angle;
-//#if sharing
+//#if SHARING
         arriving.pdf_solid_angle *= (*path).map_samples;
 //#end
         arriving.weight = sample.weight;
-//#if counting
+//#if COUNTING
         arriving.counter = count_try(path, vertex, choice.tile);
 //#end
     }
@@ -758,7 +758,7 @@ fn light_of_map(path: ptr<function, Path>, vertex: Vertex) -> Arriving {
 }
 //#end
 
-//#if local_lights
+//#if LOCAL_LIGHTS
 fn light_of_lamps(path: ptr<function, Path>, vertex: Vertex) -> Arriving {
     var arriving: Arriving;
     let bits = path_pair_bits(path);
@@ -777,8 +777,8 @@ fn light_of_lamps(path: ptr<function, Path>, vertex: Vertex) -> Arriving {
 // Chooses light that may reach a vertex, the map's first. Both share the code for what the vertex makes
 // of it, which is long.
 fn gather(path: ptr<function, Path>, vertex: Vertex) {
-//#if map_sampling
-//#if local_lights
+//#if MAP_SAMPLING
+//#if LOCAL_LIGHTS
     for (var i = 0u; i < 2u; i++) {
         var arriving: Arriving;
         if i == 0u {
@@ -805,14 +805,14 @@ fn gather(path: ptr<function, Path>, vertex: Vertex) {
 
 // Chooses where the path goes on. `false` if it ends.
 fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
-//#if medium
+//#if MEDIUM
     if vertex.is_in_medium {
         let travel = (*path).ray.direction;
         let turned_ = normalize(sample_phase(vertex.mean_cosine, travel, path_pair(path)));
         (*path).departure_pdf_solid_angle =
             phase_pdf_solid_angle(vertex.mean_cosine, dot(travel, turned_));
-        (*path).departure_law = vertex.law;
-//#if emitters
+        (*path).departure_distribution = vertex.distribution;
+//#if EMITTERS
         (*path).departure_receiver = receiver_of(vertex);
 //#end
         (*path).ray = Ray(vertex.point.position, turned_, F32_MAX);
@@ -836,17 +836,17 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
     if max_element((*path).throughput) <= 0.0 || !is_finite3((*path).throughput) {
         return false;
     }
-//#if solid_transmission
+//#if SOLID_TRANSMISSION
     if is_transmission {
         (*path).body = body_behind(vertex.point, (*path).body);
     }
 //#end
     (*path).departure_pdf_solid_angle = select(sample.pdf_solid_angle, F32_MAX, sample.is_delta);
-    (*path).departure_law = vertex.law;
-//#if emitters
+    (*path).departure_distribution = vertex.distribution;
+//#if EMITTERS
     (*path).departure_receiver = receiver_of(vertex);
 //#end
-//#if sharing
+//#if SHARING
     (*path).departure_map_samples = (*path).map_samples;
     (*path).map_samples = 1.0;
 //#end
@@ -876,10 +876,10 @@ fn plays_roulette(path: ptr<function, Path>) -> bool {
 
 fn roulette_probability(path: ptr<function, Path>) -> f32 {
     var in_air = max_element((*path).throughput);
-//#if solid_transmission
+//#if SOLID_TRANSMISSION
     in_air *= (*path).body.squared_index;
 //#end
-//#if sharing
+//#if SHARING
     in_air *= (*path).throughput_before;
 //#end
     return clamp(ROULETTE_MILDNESS * in_air, 0.05, 1.0);

@@ -65,14 +65,14 @@ fn cached_radiance_over_albedo(position: vec3f, normal: vec3f) -> vec3f {
     return select(globals.cache_mean, bitcast<vec3f>(slot.yzw), slot.x != 0u);
 }
 
-//#if cached
+//#if CACHED
 // Ends the path at a vertex after its first if what it would find from there is averaged over more than
 // a cell.
 fn ends_in_cache(path: ptr<function, Path>, vertex: Vertex) -> bool {
     if globals.cache_is_known == 0u || (*path).bounces == 0u {
         return false;
     }
-//#if medium
+//#if MEDIUM
     if vertex.is_in_medium {
         return false;
     }

@@ -10,10 +10,10 @@ fn queried_hit(found: RayIntersection, direction: vec3f) -> Hit {
     }
     let triangle = query_triangles(place).x;
     var flags = 0u;
-//#if filtered_or_passed
+//#if FILTERED_OR_PASSED
     let corners = triangles(triangle);
     flags = material_flags(corners.w);
-//#if single_sided
+//#if SINGLE_SIDED
     let a = vertex_texel(corners.x, 0u).xyz;
     let b = vertex_texel(corners.y, 0u).xyz;
     let c = vertex_texel(corners.z, 0u).xyz;
@@ -37,9 +37,9 @@ fn closest_hit(ray: Ray, from_camera: bool) -> Hit {
         return none;
     }
     var query: ray_query;
-//#if filtered_hits
+//#if FILTERED_HITS
     var flags = RAY_FLAG_NONE;
-//#if single_sided
+//#if SINGLE_SIDED
     // Only camera rays ask from which side.
     if from_camera {
         flags = RAY_FLAG_FORCE_NO_OPAQUE;
@@ -80,7 +80,7 @@ fn transmittance_along(ray: Ray) -> vec3f {
         RayDesc(
             RAY_FLAG_TERMINATE_ON_FIRST_HIT, 0xffu, 0.0, ray.t_max, ray.origin, ray.direction));
     while rayQueryProceed(&query) {
-//#if pass_through
+//#if PASS_THROUGH
         let found = rayQueryGetCandidateIntersection(&query);
         transmittance *= passed(queried_hit(found, ray.direction), ray.direction);
         if max_element(transmittance) <= 0.0 {

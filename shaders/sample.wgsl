@@ -13,7 +13,7 @@ fn start_sample(x: u32, y: u32, index: u32) -> Path {
     let lens = lens_point(&sampler);
     let centre = vec2f(f32(x) + 0.5, f32(y) + 0.5);
     var path = path_new(camera_ray(centre + offset, lens), sampler);
-//#if counting
+//#if COUNTING
     let stride = globals.work.stride;
     path.is_counted = stride != 0u && (y * globals.width + x + index) % max(stride, 1u) == 0u;
 //#end

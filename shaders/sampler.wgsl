@@ -8,7 +8,7 @@ struct Sampler {
 
 fn sampler_new(seed: u32, pixel: u32, index: u32) -> Sampler {
     let pixel_seed = hash(hash(pixel) + hash(seed));
-//#if independent_points
+//#if INDEPENDENT_POINTS
     return Sampler(0u, hash(pixel_seed ^ index), 0u);
 //#else
     return Sampler(reverseBits(index), pixel_seed, 0u);

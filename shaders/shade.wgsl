@@ -18,14 +18,14 @@ fn shade(
     } else {
         slots[slot + 64u * STATE] = vec4u(state.pixel, HAS_ENDED, 0u, 0u);
         write_radiance(slot, &path);
-//#if layers
+//#if LAYERS
         write_first_hit(slot, &path);
 //#end
     }
-//#if map_sampling
+//#if MAP_SAMPLING
     write_shadow(slot, MAP_SHADOW_TEXEL, path.map_shadow);
 //#end
-//#if local_lights
+//#if LOCAL_LIGHTS
     write_shadow(slot, LAMP_SHADOW_TEXEL, path.lamp_shadow);
 //#end
 }

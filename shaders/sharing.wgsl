@@ -49,7 +49,7 @@ fn lane_member(group: u32, lane: u32) -> Member {
 // path; the radiance that path brought back on its own. Then what the surface looks like.
 const IS_SHARED = 1u;
 const IS_COUNTED_FIRST = 2u;
-//#if layers
+//#if LAYERS
 const FIRST_TEXELS = 5u;
 //#else
 const FIRST_TEXELS = 3u;
@@ -65,12 +65,12 @@ fn first_at(group: u32, lane: u32) -> u32 {
 // density, and rays.
 const IS_FOUND = 64u;
 const IS_COUNTED_SECOND = 128u;
-//#if map_sampling
+//#if MAP_SAMPLING
 const MAP_INCIDENTS = 1u;
 //#else
 const MAP_INCIDENTS = 0u;
 //#end
-//#if local_lights
+//#if LOCAL_LIGHTS
 const INCIDENTS = MAP_INCIDENTS + 2u;
 //#else
 const INCIDENTS = MAP_INCIDENTS + 1u;
@@ -96,10 +96,10 @@ fn vertex_at(hit: vec4u, direction: vec3f) -> Vertex {
     vertex.point = surface_at(hit.x, bitcast<vec2f>(hit.yz), direction);
     vertex.bsdf = bsdf_new(vertex.point.parameters, vertex.point.front_face);
     vertex.wo = local_from_world(vertex.point.shading_frame, -direction);
-    vertex.law = WHOLE_MAP;
-//#if light_grid
+    vertex.distribution = WHOLE_MAP;
+//#if LIGHT_GRID
     vertex.cell = cell_of(vertex.point.position, vertex.point.geometric_normal);
-    vertex.law = law_of_cell(vertex.cell);
+    vertex.distribution = distribution_of_cell(vertex.cell);
 //#end
     return vertex;
 }

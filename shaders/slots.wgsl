@@ -69,7 +69,7 @@ fn write_radiance(slot: u32, path: ptr<function, Path>) {
     slot_write(slot, RADIANCE, (*path).radiance, (*path).rays);
 }
 
-//#if layers
+//#if LAYERS
 fn read_first_hit(slot: u32, path: ptr<function, Path>) {
     let albedo = slot_read(slot, FIRST_HIT_TEXEL);
     let normal = slot_read(slot, FIRST_HIT_TEXEL + 1u);
@@ -94,25 +94,25 @@ fn read_path(slot: u32) -> Path {
     let state = slot_read(slot, STATE);
     path.ray = Ray(float3(origin), float3(direction), F32_MAX);
     path.departure_pdf_solid_angle = bitcast<f32>(origin.w);
-    path.departure_law = direction.w;
+    path.departure_distribution = direction.w;
     path.throughput = float3(throughput);
     path.travelled = bitcast<f32>(throughput.w);
     path.sampler = Sampler(sampler.x, sampler.y, sampler.z);
     path.bounces = sampler.w;
     path.passes = state.z;
-//#if counting
+//#if COUNTING
     path.is_counted = (state.y & IS_COUNTED) != 0u;
 //#end
     read_radiance(slot, &path);
-//#if emitters
+//#if EMITTERS
     let position = slot_read(slot, RECEIVER_TEXEL);
     let normal = slot_read(slot, RECEIVER_TEXEL + 1u);
     path.departure_receiver = Receiver(float3(position), float3(normal));
 //#end
-//#if solid_transmission
+//#if SOLID_TRANSMISSION
     path.body.squared_index = bitcast<f32>(state.w);
     let inside = slot_read(slot, BODY_TEXEL);
-//#if medium
+//#if MEDIUM
     let extinction = slot_read(slot, BODY_TEXEL + 1u);
     path.body.interior =
         Interior(float3(inside), bitcast<f32>(inside.w), float3(extinction));
@@ -121,7 +121,7 @@ fn read_path(slot: u32) -> Path {
     path.body.absorption = float3(inside);
 //#end
 //#end
-//#if layers
+//#if LAYERS
     read_first_hit(slot, &path);
 //#end
     return path;
@@ -130,29 +130,29 @@ fn read_path(slot: u32) -> Path {
 // Keeps a path of pixel `pixel` that goes on.
 fn write_path(slot: u32, pixel: u32, path: ptr<function, Path>) {
     slot_write(slot, ORIGIN, (*path).ray.origin, bitcast<u32>((*path).departure_pdf_solid_angle));
-    slot_write(slot, DIRECTION, (*path).ray.direction, (*path).departure_law);
+    slot_write(slot, DIRECTION, (*path).ray.direction, (*path).departure_distribution);
     slot_write(slot, THROUGHPUT, (*path).throughput, bitcast<u32>((*path).travelled));
     let sampler = (*path).sampler;
     slots[slot + 64u * SAMPLER] =
         vec4u(sampler.reversed_index, sampler.pixel_seed, sampler.pair, (*path).bounces);
     var what = GOES_ON;
-//#if counting
+//#if COUNTING
     what |= select(0u, IS_COUNTED, (*path).is_counted);
 //#end
     var squared_index = 1.0;
-//#if solid_transmission
+//#if SOLID_TRANSMISSION
     squared_index = (*path).body.squared_index;
 //#end
     slots[slot + 64u * STATE] =
         vec4u(pixel, what, (*path).passes, bitcast<u32>(squared_index));
     write_radiance(slot, path);
-//#if emitters
+//#if EMITTERS
     let receiver = (*path).departure_receiver;
     slot_write(slot, RECEIVER_TEXEL, receiver.position, 0u);
     slot_write(slot, RECEIVER_TEXEL + 1u, receiver.normal, 0u);
 //#end
-//#if solid_transmission
-//#if medium
+//#if SOLID_TRANSMISSION
+//#if MEDIUM
     let inside = (*path).body.interior;
     slot_write(slot, BODY_TEXEL, inside.scattering, bitcast<u32>(inside.mean_cosine));
     slot_write(slot, BODY_TEXEL + 1u, inside.extinction, select(0u, 1u, (*path).body.is_solid));
@@ -160,12 +160,12 @@ fn write_path(slot: u32, pixel: u32, path: ptr<function, Path>) {
     slot_write(slot, BODY_TEXEL, (*path).body.absorption, 0u);
 //#end
 //#end
-//#if layers
+//#if LAYERS
     write_first_hit(slot, path);
 //#end
 }
 
-//#if shadow_rays
+//#if SHADOW_RAYS
 // Texels of a ray towards a light.
 const SHADOW_TEXELS = 4u;
 
@@ -182,10 +182,10 @@ fn read_shadow(slot: u32, texel: u32) -> Shadow {
     shadow.ray.direction = float3(direction);
     shadow.weight = bitcast<f32>(direction.w);
     shadow.light = float3(light);
-//#if shadow_media
+//#if SHADOW_MEDIA
     shadow.left = float3(slot_read(slot, texel + 3u));
 //#end
-//#if counting
+//#if COUNTING
     shadow.visibility =
         Visibility(light.w, bitcast<f32>(slot_read(slot, texel + 3u).w));
 //#end
@@ -200,10 +200,10 @@ fn write_shadow(slot: u32, texel: u32, shadow: Shadow) {
     var left = vec3f(1.0);
     var counter = 0u;
     var share = 0.0;
-//#if shadow_media
+//#if SHADOW_MEDIA
     left = shadow.left;
 //#end
-//#if counting
+//#if COUNTING
     counter = shadow.visibility.counter;
     share = shadow.visibility.share;
 //#end

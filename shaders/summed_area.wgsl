@@ -21,14 +21,14 @@ fn pair_difference(a: vec2f, b: vec2f) -> vec2f {
 
 fn corner_at(x: u32, y: u32) -> vec2f {
     let index = y * (globals.map_width + 1u) + x;
-//#if table_u32
+//#if TABLE_U32
     let bits = sums(index).x;
     return vec2f(f32(bits & 0xffff0000u), f32(bits & 0xffffu));
 //#end
-//#if table_f32
+//#if TABLE_F32
     return vec2f(bitcast<f32>(sums(index).x), 0.0);
 //#end
-//#if table_f64
+//#if TABLE_F64
     return vec2f(bitcast<f32>(sums(2u * index).x), bitcast<f32>(sums(2u * index + 1u).x));
 //#end
 }

@@ -46,7 +46,7 @@ const TRANSMISSION = 6u;
 const CLEARCOAT = 7u;
 const CLEARCOAT_ROUGHNESS = 8u;
 const CLEARCOAT_NORMAL = 9u;
-//#if uncommon_textures
+//#if UNCOMMON_TEXTURES
 const ANISOTROPY_MAP = 10u;
 const SHEEN_COLOR_MAP = 11u;
 const SHEEN_ROUGHNESS_MAP = 12u;
@@ -75,24 +75,24 @@ struct SurfaceParameters {
     emissive: vec3f,
     thin: bool,
     unlit: bool,
-//#if anisotropy
+//#if ANISOTROPY
     anisotropy: f32,
     anisotropy_axis: vec2f,
 //#end
-//#if sheen
+//#if SHEEN
     sheen_color: vec3f,
     sheen_roughness: f32,
 //#end
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
     diffuse_transmission: f32,
     diffuse_transmission_color: vec3f,
 //#end
-//#if iridescence
+//#if IRIDESCENCE
     iridescence: f32,
     iridescence_ior: f32,
     iridescence_thickness: f32,
 //#end
-//#if dispersion
+//#if DISPERSION
     dispersion: f32,
 //#end
 }
@@ -150,7 +150,7 @@ fn interpolate(corner: Corner, texel: u32) -> vec4f {
 
 // The texture's value at coordinates of both sets, ones without a texture.
 fn read_texture(reference: u32, uvs: vec4f) -> vec4f {
-//#if textures
+//#if TEXTURES
     if reference != NO_TEXTURE {
         return sample_texture(reference, uvs);
     }
@@ -160,7 +160,7 @@ fn read_texture(reference: u32, uvs: vec4f) -> vec4f {
 
 // Texture coordinates of both sets.
 fn corner_uvs(corner: Corner, first_set: vec2f) -> vec4f {
-//#if second_uv_set
+//#if SECOND_UV_SET
     return vec4f(first_set, interpolate(corner, SECOND_UV_TEXEL).xy);
 //#else
     return vec4f(first_set, 0.0, 0.0);
@@ -192,7 +192,7 @@ fn read_textures(corner: Corner, uvs: vec4f) -> array<vec4f, TEXTURES> {
             put_texture(CLEARCOAT_ROUGHNESS, i, value, values[CLEARCOAT_ROUGHNESS]);
         values[CLEARCOAT_NORMAL] =
             put_texture(CLEARCOAT_NORMAL, i, value, values[CLEARCOAT_NORMAL]);
-//#if uncommon_textures
+//#if UNCOMMON_TEXTURES
         values[ANISOTROPY_MAP] = put_texture(ANISOTROPY_MAP, i, value, values[ANISOTROPY_MAP]);
         values[SHEEN_COLOR_MAP] = put_texture(SHEEN_COLOR_MAP, i, value, values[SHEEN_COLOR_MAP]);
         values[SHEEN_ROUGHNESS_MAP] =
@@ -224,7 +224,7 @@ fn texture_of(material: u32, texture: u32) -> u32 {
 
 fn corner_base_color(corner: Corner, texture: vec4f) -> vec4f {
     var color = material_numbers(corner.material, BASE_COLOR_ALPHA) * texture;
-//#if vertex_colors
+//#if VERTEX_COLORS
     color *= interpolate(corner, COLOR_TEXEL);
 //#end
     return color;
@@ -232,7 +232,7 @@ fn corner_base_color(corner: Corner, texture: vec4f) -> vec4f {
 
 // The normal a tangent-space map makes of `normal`, not of unit length (see `Corner::mapped`).
 fn mapped_normal(corner: Corner, normal: vec3f, slot: u32, texture: vec4f, scale: f32) -> vec3f {
-//#if normal_maps
+//#if NORMAL_MAPS
     if texture_of(corner.material, slot) != NO_TEXTURE {
         let first = vertex_texel(corner.vertices.x, TANGENT_TEXEL);
         let tangent = interpolate(corner, TANGENT_TEXEL).xyz;
@@ -244,7 +244,7 @@ fn mapped_normal(corner: Corner, normal: vec3f, slot: u32, texture: vec4f, scale
     return normal;
 }
 
-//#if anisotropy
+//#if ANISOTROPY
 // Twin of `Corner::anisotropy_direction`.
 fn anisotropy_direction(corner: Corner, normal: vec3f, texture: vec4f) -> vec3f {
     let first = vertex_texel(corner.vertices.x, TANGENT_TEXEL);
@@ -297,38 +297,38 @@ fn corner_parameters(corner: Corner, textures: array<vec4f, TEXTURES>) -> Surfac
     p.specular = saturate(specular.w * textures[SPECULAR].w);
     p.specular_color = specular.xyz * textures[SPECULAR_COLOR].xyz;
     p.thin = (flags & THIN) != 0u;
-//#if transmission
+//#if TRANSMISSION
     p.transmission = saturate(factors.z * textures[TRANSMISSION].x);
     p.absorption = absorption_ior.xyz;
 //#end
     p.clearcoat_normal = vec3f(0.0, 0.0, 1.0);
-//#if clearcoat
+//#if CLEARCOAT
     let roughness = material_numbers(m, SCALES_FLAGS).x;
     p.clearcoat = saturate(factors.w * textures[CLEARCOAT].x);
     p.clearcoat_roughness = saturate(roughness * textures[CLEARCOAT_ROUGHNESS].y);
 //#end
-//#if anisotropy
+//#if ANISOTROPY
     p.anisotropy =
         saturate(material_numbers(m, ANISOTROPY_SHEEN_ROUGHNESS).x * textures[ANISOTROPY_MAP].z);
     p.anisotropy_axis = vec2f(1.0, 0.0);
 //#end
-//#if sheen
+//#if SHEEN
     p.sheen_color = material_numbers(m, SHEEN_COLOR_DISPERSION).xyz * textures[SHEEN_COLOR_MAP].xyz;
     let sheen_roughness = material_numbers(m, ANISOTROPY_SHEEN_ROUGHNESS).w;
     p.sheen_roughness = saturate(sheen_roughness * textures[SHEEN_ROUGHNESS_MAP].w);
 //#end
-//#if diffuse_transmission
+//#if DIFFUSE_TRANSMISSION
     let through = material_numbers(m, DIFFUSE_TRANSMISSION);
     p.diffuse_transmission = saturate(through.w * textures[DIFFUSE_TRANSMISSION_MAP].w);
     p.diffuse_transmission_color = through.xyz * textures[DIFFUSE_TRANSMISSION_COLOR_MAP].xyz;
 //#end
-//#if iridescence
+//#if IRIDESCENCE
     let film = material_numbers(m, FILM);
     p.iridescence = saturate(film.x * textures[IRIDESCENCE_MAP].x);
     p.iridescence_ior = film.y;
     p.iridescence_thickness = film.z + (film.w - film.z) * textures[IRIDESCENCE_THICKNESS_MAP].y;
 //#end
-//#if dispersion
+//#if DISPERSION
     if !p.thin && factors.z > 0.0 {
         p.dispersion = material_numbers(m, SHEEN_COLOR_DISPERSION).w;
     }
@@ -337,7 +337,7 @@ fn corner_parameters(corner: Corner, textures: array<vec4f, TEXTURES>) -> Surfac
     if p.unlit {
         p.emissive = p.base_color;
     } else {
-//#if emitters
+//#if EMITTERS
         p.emissive = emissive.xyz * textures[EMISSIVE].xyz;
 //#end
     }
@@ -371,14 +371,14 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
     let scales = material_numbers(corner.material, SCALES_FLAGS);
     var normal = mapped_normal(corner, unmapped, NORMAL, textures[NORMAL], scales.y);
     normal = turned(normal, unmapped, point.geometric_normal, to_viewer);
-//#if metals
+//#if METALS
     if point.parameters.metallic > 0.0 {
         let mirroring = mirroring_normal(normal, point.geometric_normal, to_viewer);
         normal = mix(normal, mirroring, point.parameters.metallic);
     }
 //#end
     point.shading_frame = frame_from_z(normalize(normal));
-//#if anisotropy
+//#if ANISOTROPY
     if point.parameters.anisotropy > 0.0 {
         let wide = anisotropy_direction(corner, unmapped, textures[ANISOTROPY_MAP]);
         let axis = local_from_world(point.shading_frame, wide).xy;
@@ -386,7 +386,7 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
             normalize_or(vec3f(axis, 0.0), vec3f(1.0, 0.0, 0.0)).xy;
     }
 //#end
-//#if clearcoat
+//#if CLEARCOAT
     let maps = TEXTURES_IN_SCENE & ((1u << NORMAL) | (1u << CLEARCOAT_NORMAL));
     let is_mapped = maps != 0u && (bitcast<u32>(scales.w) & NORMAL_MAPPED) != 0u;
     if point.parameters.clearcoat > 0.0 && is_mapped {

@@ -10,7 +10,7 @@ fn begin_next(slot: u32, path: ptr<function, Path>) -> bool {
     if before.what == HAS_ENDED {
         var ended: Path;
         read_radiance(slot, &ended);
-//#if layers
+//#if LAYERS
         read_first_hit(slot, &ended);
 //#end
         add_to_film(pixel, &ended);

@@ -64,9 +64,9 @@ pub enum Command {
     KeepPicture,
     /// Compute the true visible energy at the inspected point.
     MeasureTruth,
-    /// Ask where to write the inspected cell's law.
+    /// Ask where to write the inspected cell's distribution.
     ChooseExport,
-    /// Write all laws.
+    /// Write all distributions.
     Export(PathBuf),
     /// Ask for a picture without noise.
     ChooseReference,

@@ -5,7 +5,7 @@ use glam::{Affine3A, Mat3A, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::denoise::Denoiser;
-use crate::light_grid::LawOptions;
+use crate::light_grid::DistributionOptions;
 use crate::path::{Background, PathLimits};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::DeviceChoice;
@@ -153,7 +153,7 @@ impl Document {
             sharing: Sharing::Off,
             gi: Gi::Exact,
             learning_paths: self.learning_paths([width, height]),
-            laws: LawOptions::ADAPTIVE,
+            distributions: DistributionOptions::ADAPTIVE,
             medium: self.fog,
             background: self.background,
             crop: crop.map(|(corner, _)| Crop { corner, whole }),

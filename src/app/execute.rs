@@ -43,7 +43,9 @@ impl App {
                 let file = self.suggested_file();
                 self.interface.ask(Purpose::Picture, file);
             }
-            Command::ChooseExport => interface.ask(Purpose::Laws, "laws.csv".to_owned()),
+            Command::ChooseExport => {
+                interface.ask(Purpose::Distributions, "distributions.csv".to_owned());
+            }
             Command::ChooseReference => interface.ask(Purpose::Reference, String::new()),
             Command::OpenReference(path) => self.open_reference(path),
             Command::ForgetReference => self.reference = None,
@@ -215,13 +217,15 @@ impl App {
     fn export(&mut self, path: PathBuf) {
         let grid = self.snapshot.as_ref().and_then(|s| s.main.grid.clone());
         let Some(grid) = grid else {
-            self.messages
-                .error("there are no laws to export: the map is sampled by the BSDF alone");
+            self.messages.error(
+                "there are no distributions to export: the map is sampled by the BSDF alone",
+            );
             return;
         };
-        let sentence = format!("Exported {} laws to {}", grid.laws().len(), path.display());
+        let sentence =
+            format!("Exported {} distributions to {}", grid.distributions().len(), path.display());
         self.do_later("export", move || {
-            crate::output::laws::write_laws(&path, &grid).map(|()| sentence)
+            crate::output::distributions::write_distributions(&path, &grid).map(|()| sentence)
         });
     }
 
@@ -275,9 +279,9 @@ impl App {
                 Purpose::Picture => {
                     Box::pin(dialog.add_filter("Picture", &["png", "exr"]).save_file())
                 }
-                Purpose::Laws => {
-                    Box::pin(dialog.add_filter("Laws", &["csv", "json", "exr"]).save_file())
-                }
+                Purpose::Distributions => Box::pin(
+                    dialog.add_filter("Distributions", &["csv", "json", "exr"]).save_file(),
+                ),
             };
         let thread = std::thread::Builder::new().name("dialogue".to_owned()).spawn(move || {
             let start = Instant::now();
@@ -342,7 +346,7 @@ impl Purpose {
             Self::Scene => Command::OpenScene(path.to_owned()),
             Self::Map => Command::OpenMap(path.to_owned()),
             Self::Picture => Command::Save(path.into()),
-            Self::Laws => Command::Export(path.into()),
+            Self::Distributions => Command::Export(path.into()),
             Self::Reference => Command::OpenReference(path.to_owned()),
         }
     }

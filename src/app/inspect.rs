@@ -13,7 +13,7 @@ use crate::bvh::{Ray, offset_origin};
 use crate::color::importance;
 use crate::environment::Environment;
 use crate::light_grid::counters::Tally;
-use crate::light_grid::tile_laws::TileLaws;
+use crate::light_grid::tile_distributions::TileDistributions;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
 use crate::path::World;
 
@@ -31,9 +31,9 @@ pub(super) struct Inspected {
     pub(super) cell: Option<u32>,
     /// Face, row and column of the cell.
     pub(super) coordinates: [u32; 3],
-    /// Index of its law.
-    pub(super) law: u32,
-    /// Bytes of its law.
+    /// Index of its distribution.
+    pub(super) distribution: u32,
+    /// Bytes of its distribution.
     pub(super) memory_bytes: Option<usize>,
     /// Probability of each tile.
     pub(super) probabilities: Vec<f32>,
@@ -96,7 +96,7 @@ impl Inspector {
         self.truth.as_ref().filter(|truth| truth.position == here).filter(is_of)
     }
 
-    /// Probability of each tile summed over all learned laws, `None` before anything was learned.
+    /// Probability of each tile summed over all learned distributions, `None` before anything was learned.
     pub(super) fn learned(&self) -> Option<&[f32]> {
         self.learned.as_ref().map(|(_, sums)| &sums[..])
     }
@@ -137,19 +137,24 @@ impl Inspector {
         self.inspected = inspect(snapshot, place);
     }
 
-    /// Sums up the laws, unless they are still the same.
+    /// Sums up the distributions, unless they are still the same.
     fn sum_up(&mut self, snapshot: &Snapshot) {
-        let Some(grid) = snapshot.main.grid.as_ref().filter(|grid| grid.laws().len() > 1) else {
+        let Some(grid) = snapshot.main.grid.as_ref().filter(|grid| grid.distributions().len() > 1)
+        else {
             self.learned = None;
             return;
         };
         if self.learned.as_ref().is_some_and(|(old, _)| Arc::ptr_eq(old, grid)) {
             return;
         }
-        let laws = grid.laws();
-        // The first law is the whole map's.
-        let sum = |tile| (1..laws.len()).map(|law| laws.probability(law, tile)).sum();
-        let sums = (0..laws.tile_count()).map(sum).collect();
+        let distributions = grid.distributions();
+        // The first distribution is the whole map's.
+        let sum = |tile| {
+            (1..distributions.len())
+                .map(|distribution| distributions.probability(distribution, tile))
+                .sum()
+        };
+        let sums = (0..distributions.tile_count()).map(sum).collect();
         self.learned = Some((Arc::clone(grid), sums));
     }
 
@@ -178,19 +183,23 @@ fn inspect(snapshot: &Snapshot, place: Vec2) -> Option<Inspected> {
         material,
         cell: None,
         coordinates: [0; 3],
-        law: WHOLE_MAP,
+        distribution: WHOLE_MAP,
         memory_bytes: None,
         probabilities: Vec::new(),
         tallies: Vec::new(),
     };
     let Some(grid) = &snapshot.main.grid else { return Some(inspected) };
     let cell = grid.grid().map(|cells| cells.cell_of(spot.position, spot.normal));
-    inspected.law = cell.map_or(WHOLE_MAP, |cell| grid.law_of_cell(cell));
-    let (laws, law) = (grid.laws(), inspected.law);
-    inspected.memory_bytes =
-        (law != WHOLE_MAP).then(|| TileLaws::law_bytes(laws.tile_count(), laws.support(law)));
+    inspected.distribution = cell.map_or(WHOLE_MAP, |cell| grid.distribution_of_cell(cell));
+    let (distributions, distribution) = (grid.distributions(), inspected.distribution);
+    inspected.memory_bytes = (distribution != WHOLE_MAP).then(|| {
+        TileDistributions::distribution_bytes(
+            distributions.tile_count(),
+            distributions.support(distribution),
+        )
+    });
     inspected.probabilities =
-        (0..laws.tile_count()).map(|tile| grid.probability(law, tile)).collect();
+        (0..distributions.tile_count()).map(|tile| grid.probability(distribution, tile)).collect();
     if let (Some(cells), Some(cell)) = (grid.grid(), cell) {
         inspected.cell = Some(cell);
         inspected.coordinates = cells.coordinates(cell).into();

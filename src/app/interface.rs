@@ -104,8 +104,8 @@ pub enum Purpose {
     Map,
     /// A picture to write.
     Picture,
-    /// A file for the laws.
-    Laws,
+    /// A file for the distributions.
+    Distributions,
     /// A picture without noise.
     Reference,
 }

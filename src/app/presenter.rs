@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::Wake;
 use super::overlays::{CellFacts, Label, Legend, Overlay, Sources};
 use super::surface_map::SurfaceMap;
-use super::worker::{Activity, Request, Snapshot, Take, Under};
+use super::worker::{Activity, Backdrop, Request, SessionSnapshot, Snapshot};
 use crate::denoise::{Denoiser, blend};
 use crate::develop::{Developer, LinearPicture, OverlayTexture};
 use crate::error::{Error, Result};
@@ -325,21 +325,21 @@ impl Memory {
         picture: &LinearPicture,
     ) -> Option<Painted> {
         let snapshot = &order.snapshot;
-        let take = &snapshot.main;
+        let session = &snapshot.main;
         if overlay.needs_surfaces() {
             self.prepare(snapshot);
         }
         let sources = Sources {
-            film: &take.film,
+            film: &session.film,
             environment: &snapshot.request.environment,
-            grid: take.grid.as_ref(),
+            grid: session.grid.as_ref(),
             counters: snapshot.counters.as_deref(),
             surfaces: self.surfaces.as_ref().map(|(_, surfaces)| surfaces),
             facts: self.facts.as_ref().map(|(_, _, facts)| &**facts),
             tile: order.tile,
         };
         let painted = sources.paint(overlay)?;
-        let colors = order.developer.upload_overlay(&painted.colors, take.film.width, picture);
+        let colors = order.developer.upload_overlay(&painted.colors, session.film.width, picture);
         Some(Painted { colors, legend: painted.legend, labels: painted.labels })
     }
 
@@ -377,8 +377,8 @@ impl Memory {
 /// What a linear picture is made from; equal ones give the same picture.
 #[derive(Clone)]
 struct Source {
-    take: Take,
-    under: Option<Under>,
+    session: SessionSnapshot,
+    backdrop: Option<Backdrop>,
     denoiser: Option<Denoiser>,
     /// Whether every pixel has a sample and the picture its full size.
     is_whole: bool,
@@ -386,8 +386,8 @@ struct Source {
 
 impl PartialEq for Source {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.take.film, &other.take.film)
-            && self.under == other.under
+        Arc::ptr_eq(&self.session.film, &other.session.film)
+            && self.backdrop == other.backdrop
             && (self.denoiser, self.is_whole) == (other.denoiser, other.is_whole)
     }
 }
@@ -396,31 +396,32 @@ impl Source {
     fn main(order: &Order) -> Self {
         let snapshot = &order.snapshot;
         // Where there are no samples, the film is that from before.
-        let under = snapshot.under.clone();
-        let under = under.filter(|under| !Arc::ptr_eq(&under.film, &snapshot.main.film));
-        let take = snapshot.main.clone();
-        Self { take, under, denoiser: order.denoiser, is_whole: snapshot.is_whole() }
+        let backdrop = snapshot.backdrop.clone();
+        let backdrop =
+            backdrop.filter(|backdrop| !Arc::ptr_eq(&backdrop.film, &snapshot.main.film));
+        let session = snapshot.main.clone();
+        Self { session, backdrop, denoiser: order.denoiser, is_whole: snapshot.is_whole() }
     }
 
     fn plain(order: &Order) -> Option<Self> {
-        let take = order.snapshot.plain.clone()?;
-        let is_whole = take.samples > 0;
-        Some(Self { take, under: None, denoiser: order.denoiser, is_whole })
+        let session = order.snapshot.plain.clone()?;
+        let is_whole = session.samples > 0;
+        Some(Self { session, backdrop: None, denoiser: order.denoiser, is_whole })
     }
 
     /// The picture on the device, without noise if that is asked for.
     fn prepare(&self, developer: &Developer) -> Prepared {
-        let film = &self.take.film;
+        let film = &self.session.film;
         let is_here = |(gpu, _): &&(Gpu, DeviceFilm)| gpu.is_same(developer.gpu());
-        let noisy = |layers| match self.take.on_device.as_ref().filter(is_here) {
+        let noisy = |layers| match self.session.on_device.as_ref().filter(is_here) {
             Some((_, on_device)) => LinearPicture::live(on_device.clone()),
             None => developer.upload_film(film, layers),
         };
         let blended = || {
-            let under = self.under.as_ref().map(|under| (&*under.film, under.worth));
-            developer.upload_image(&blend(film, under))
+            let backdrop = self.backdrop.as_ref().map(|backdrop| (&*backdrop.film, backdrop.worth));
+            developer.upload_image(&blend(film, backdrop))
         };
-        let is_calmed = self.under.as_ref().is_some_and(|under| under.is_cached);
+        let is_calmed = self.backdrop.as_ref().is_some_and(|backdrop| backdrop.is_cached);
         match self.denoiser {
             // A picture with holes or in other pixels is there to see where one is going.
             _ if !self.is_whole => (blended(), None),
@@ -455,7 +456,7 @@ mod tests {
             Err(reason) => return eprintln!("SKIPPED: {reason}"),
         };
         let film = Film::new(6, 4, true);
-        let mut take = Take {
+        let mut session = SessionSnapshot {
             samples: 1,
             sampling: Sampling::Plain,
             film: Arc::new(film),
@@ -465,17 +466,17 @@ mod tests {
             gpu: None,
             on_device: None,
         };
-        let is_live = |developer: &Developer, take: &Take, denoiser| {
-            let take = take.clone();
-            let source = Source { take, under: None, denoiser, is_whole: true };
+        let is_live = |developer: &Developer, session: &SessionSnapshot, denoiser| {
+            let session = session.clone();
+            let source = Source { session, backdrop: None, denoiser, is_whole: true };
             source.prepare(developer).0.is_live()
         };
-        assert!(!is_live(&developer, &take, None));
-        let uploaded = developer.upload_film(&take.film, true);
-        take.on_device = Some((developer.gpu().clone(), uploaded.film().clone()));
-        assert!(is_live(&developer, &take, None));
-        assert!(!is_live(&other, &take, None));
-        assert!(!is_live(&developer, &take, Some(Denoiser::ATrous)));
+        assert!(!is_live(&developer, &session, None));
+        let uploaded = developer.upload_film(&session.film, true);
+        session.on_device = Some((developer.gpu().clone(), uploaded.film().clone()));
+        assert!(is_live(&developer, &session, None));
+        assert!(!is_live(&other, &session, None));
+        assert!(!is_live(&developer, &session, Some(Denoiser::ATrous)));
         developer.gpu().check().and(other.gpu().check()).expect("no buffer is used elsewhere");
     }
 }

@@ -1,6 +1,6 @@
 //! How much faster one way of sampling is than another, from two films of the same view.
 
-use super::worker::Take;
+use super::worker::SessionSnapshot;
 
 /// Blocks along each side of the picture that the uncertainty is taken from.
 const BLOCKS: usize = 8;
@@ -22,7 +22,7 @@ pub(super) struct SpeedUp {
 
 impl SpeedUp {
     /// From relative squared errors times seconds; `None` below eight samples a pixel.
-    pub(super) fn of(main: &Take, plain: &Take) -> Option<Self> {
+    pub(super) fn of(main: &SessionSnapshot, plain: &SessionSnapshot) -> Option<Self> {
         if main.samples < 8 || plain.samples < 8 {
             return None;
         }
@@ -51,8 +51,8 @@ impl SpeedUp {
 }
 
 /// Sum over each block's pixels of variance over squared luminance, the worst ones left out.
-fn block_errors(take: &Take, lights: &[f64]) -> Vec<f64> {
-    let film = &take.film;
+fn block_errors(session: &SessionSnapshot, lights: &[f64]) -> Vec<f64> {
+    let film = &session.film;
     let (width, height) = (film.width as usize, film.height as usize);
     let mean = lights.iter().sum::<f64>() / lights.len() as f64;
     let error = |(pixel, light): (&crate::render::film::Pixel, &f64)| {
@@ -81,7 +81,7 @@ mod tests {
     use crate::render::{Figures, Sampling};
 
     /// A picture of so many samples a pixel whose logarithms are normal with deviation `sigma`.
-    fn take(seed: u64, samples: u32, sigma: f32) -> Take {
+    fn rendered(seed: u64, samples: u32, sigma: f32) -> SessionSnapshot {
         let mut film = Film::new(48, 32, false);
         let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         let mut uniform = || {
@@ -96,7 +96,7 @@ mod tests {
             let radiance = Vec3::splat(light);
             film.add(x, y, &PathResult { radiance, rays: 1, was_invalid: false, first_hit: None });
         }
-        Take {
+        SessionSnapshot {
             samples,
             sampling: Sampling::Plain,
             film: Arc::new(film),
@@ -113,7 +113,8 @@ mod tests {
         for sigma in [0.7, 1.5] {
             let (mut covered, mut logarithms) = (0, 0.0);
             for run in 0..200 {
-                let found = SpeedUp::of(&take(2 * run, 16, sigma), &take(2 * run + 1, 16, sigma));
+                let found =
+                    SpeedUp::of(&rendered(2 * run, 16, sigma), &rendered(2 * run + 1, 16, sigma));
                 let found = found.expect("enough samples");
                 covered += u32::from(found.ratio.ln().abs() <= found.factor.ln());
                 logarithms += found.ratio.ln() / 200.0;
@@ -126,8 +127,9 @@ mod tests {
 
     #[test]
     fn the_share_of_samples_is_the_ratio() {
-        let found = SpeedUp::of(&take(1, 64, 0.7), &take(2, 16, 0.7)).expect("enough samples");
+        let found =
+            SpeedUp::of(&rendered(1, 64, 0.7), &rendered(2, 16, 0.7)).expect("enough samples");
         assert!((found.ratio / 4.0).ln().abs() <= found.factor.ln().max(0.1), "{found:?}");
-        assert_eq!(SpeedUp::of(&take(1, 7, 0.7), &take(2, 16, 0.7)), None);
+        assert_eq!(SpeedUp::of(&rendered(1, 7, 0.7), &rendered(2, 16, 0.7)), None);
     }
 }

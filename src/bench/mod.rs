@@ -17,7 +17,7 @@ use crate::image::Image;
 use crate::light_grid::LightGrid;
 use crate::metrics;
 use crate::path::{World, framing};
-use crate::render::gpu::{AdapterFacts, Gpu, KernelFacts, RayChoice, Schedule, Stage};
+use crate::render::gpu::{AdapterFacts, Gpu, KernelFacts, RayChoice, Schedule, UploadedScene};
 use crate::render::{Phase, Sampling, Session, StopRule, View};
 use crate::report::{Device, Machine, OpenDevice};
 
@@ -98,8 +98,8 @@ pub struct PathFigures {
     pub upload_seconds: f64,
     /// Seconds in which the driver compiled; some compile when a kernel first runs instead.
     pub compile_seconds: f64,
-    /// Seconds from then to the first laws, kernels included.
-    pub first_laws_seconds: f64,
+    /// Seconds from then to the first distributions, kernels included.
+    pub first_distributions_seconds: f64,
     /// Seconds from the same moment to the first sample of every pixel.
     pub first_picture_seconds: f64,
     /// Camera paths a second, all pixels together, without learning and the first pass.
@@ -230,25 +230,25 @@ impl Place<'_> {
     fn fill(&self, figures: &mut SceneFigures) -> Result<Compared> {
         let Subject { world, environment, .. } = self.subject;
         let start = Instant::now();
-        let stage = match &self.open.gpu {
-            Some(gpu) => Some(Stage::new(gpu, world, environment)?),
+        let uploaded = match &self.open.gpu {
+            Some(gpu) => Some(UploadedScene::new(gpu, world, environment)?),
             None => None,
         };
         let upload_seconds = start.elapsed().as_secs_f64();
-        figures.paths = Some(self.paths(stage.as_ref(), upload_seconds)?);
-        let (rays, hits) = rays::measure(self, stage.as_ref())?;
+        figures.paths = Some(self.paths(uploaded.as_ref(), upload_seconds)?);
+        let (rays, hits) = rays::measure(self, uploaded.as_ref())?;
         figures.rays = rays;
         let view = View { sampling: Sampling::Plain, ..self.view(COMPARED.0) };
-        let mut session = self.session(stage.as_ref(), view)?;
+        let mut session = self.session(uploaded.as_ref(), view)?;
         session.advance(COMPARED.1, self.cancel)?;
         session.settle()?;
         Ok(Compared { picture: session.film().image(), hits })
     }
 
-    fn session(&self, stage: Option<&Stage>, view: View) -> Result<Session<'_>> {
+    fn session(&self, uploaded: Option<&UploadedScene>, view: View) -> Result<Session<'_>> {
         let Subject { world, environment, .. } = self.subject;
-        match stage {
-            Some(stage) => Session::on_gpu(world, environment, view, stage),
+        match uploaded {
+            Some(uploaded) => Session::on_gpu(world, environment, view, uploaded),
             None => Ok(Session::new(world, environment, view)),
         }
     }
@@ -261,18 +261,22 @@ impl Place<'_> {
         View::new(camera.unwrap_or_else(|| framing::frame(world, aspect)), [width, height])
     }
 
-    /// Seconds to the first picture of another view with laws learned before, the median of a few.
-    fn turn(&self, stage: Option<&Stage>, laws: Option<&LightGrid>) -> Result<f64> {
+    /// Seconds to the first picture of another view with distributions learned before, the median of a few.
+    fn turn(
+        &self,
+        uploaded: Option<&UploadedScene>,
+        distributions: Option<&LightGrid>,
+    ) -> Result<f64> {
         let mut seconds = Vec::new();
         for round in 0..6_u8 {
             let start = Instant::now();
             let mut view = self.view(TURNING);
             let turn = Affine3A::from_rotation_y(0.02 * f32::from(round));
             view.camera.world_from_camera *= turn;
-            let mut session = self.session(stage, view)?;
+            let mut session = self.session(uploaded, view)?;
             session.finish_learning();
-            if let Some(laws) = laws {
-                session.set_grid(laws.clone())?;
+            if let Some(distributions) = distributions {
+                session.set_grid(distributions.clone())?;
             }
             session.advance(1, self.cancel)?;
             session.settle()?;
@@ -285,18 +289,18 @@ impl Place<'_> {
         Ok(seconds[seconds.len() / 2])
     }
 
-    fn paths(&self, stage: Option<&Stage>, upload_seconds: f64) -> Result<PathFigures> {
+    fn paths(&self, uploaded: Option<&UploadedScene>, upload_seconds: f64) -> Result<PathFigures> {
         let start = Instant::now();
         let seconds = || start.elapsed().as_secs_f64();
-        let mut session = self.session(stage, self.view(self.options.size))?;
-        let mut first_laws = None;
+        let mut session = self.session(uploaded, self.view(self.options.size))?;
+        let mut first_distributions = None;
         while session.samples() == 0 {
             session.advance(1, self.cancel)?;
             if is_set(self.cancel) {
                 return Err(Error::new("cancelled"));
             }
             if session.phase() == Phase::Rendering || session.figures().learned_cells > 0 {
-                first_laws.get_or_insert_with(seconds);
+                first_distributions.get_or_insert_with(seconds);
             }
         }
         session.settle()?;
@@ -324,7 +328,7 @@ impl Place<'_> {
         Ok(PathFigures {
             upload_seconds,
             compile_seconds: gpu.as_ref().map_or(0.0, |gpu| gpu.compile_seconds),
-            first_laws_seconds: first_laws.unwrap_or(first_picture_seconds),
+            first_distributions_seconds: first_distributions.unwrap_or(first_picture_seconds),
             first_picture_seconds,
             samples_per_second: (after.samples - before.samples) as f64 / elapsed,
             rays_per_second: (after.rays - before.rays) as f64 / elapsed,
@@ -334,7 +338,7 @@ impl Place<'_> {
             has_timestamps: gpu.as_ref().is_some_and(|gpu| gpu.flights.has_timestamps),
             bytes_read_per_pass: per_pass(difference(|gpu| gpu.bytes_read as f64).unwrap_or(0.0)),
             stop_milliseconds,
-            turn_milliseconds: 1e3 * self.turn(stage, session.grid())?,
+            turn_milliseconds: 1e3 * self.turn(uploaded, session.grid())?,
             device_bytes: gpu.as_ref().map_or(0, |gpu| gpu.device_bytes),
             schedule: gpu.as_ref().map(|gpu| gpu.schedule),
             kernel: gpu.map(|gpu| gpu.kernel),

@@ -14,7 +14,7 @@ use crate::light_grid::LightGrid;
 use crate::math::Frame;
 use crate::path::World;
 use crate::path::camera::{CameraRays, disk_from_square};
-use crate::render::gpu::{Question, Renderer, Stage};
+use crate::render::gpu::{Question, Renderer, UploadedScene};
 use crate::render::{Sampling, View};
 use crate::sampler::Sampler;
 
@@ -75,16 +75,16 @@ const TILE: u32 = 8;
 /// Measures each kind; returns with it what the diffuse ones hit.
 pub(super) fn measure(
     place: &Place<'_>,
-    stage: Option<&Stage>,
+    uploaded: Option<&UploadedScene>,
 ) -> Result<(Vec<RayFigures>, Answers)> {
     let world = &place.subject.world;
-    let mut caster = match stage {
-        Some(stage) => {
+    let mut caster = match uploaded {
+        Some(uploaded) => {
             // Whose kernels know nothing of the map.
             let view = View { sampling: Sampling::Bsdf, ..place.view((TILE, TILE)) };
             let environment = &place.subject.environment;
             let rays = view.rays();
-            Some(Renderer::new(stage, world, environment, &view, &rays, None)?)
+            Some(Renderer::new(uploaded, world, environment, &view, &rays, None)?)
         }
         None => None,
     };
@@ -185,9 +185,11 @@ fn spread(frame: Frame, u: [f32; 2]) -> Vec3 {
 /// Rays to where the map is bright, above the surface.
 fn towards_map(place: &Place<'_>, rays: &[Ray]) -> Vec<Ray> {
     let environment = &place.subject.environment;
-    let Some(laws) = LightGrid::whole_map(environment.tile_energies()) else { return Vec::new() };
+    let Some(distributions) = LightGrid::whole_map(environment.tile_energies()) else {
+        return Vec::new();
+    };
     onward(&place.subject.world, rays, |bits, frame, _| {
-        let choice = laws.sample(0, bits);
+        let choice = distributions.sample(0, bits);
         let sample = environment.sample_in_tile(choice.tile, [choice.remainder, bits[1]])?;
         (frame.z.dot(sample.direction) > 0.0).then_some(sample.direction)
     })

@@ -49,7 +49,7 @@ impl fmt::Display for DeviceFigures {
                 "to stop",
                 "to turn",
                 "compiling",
-                "to laws",
+                "to distributions",
                 "picture",
                 "on device",
             ],
@@ -93,7 +93,7 @@ impl SceneFigures {
             format!("{:.0}", paths.stop_milliseconds),
             format!("{:.1}", paths.turn_milliseconds),
             format!("{:.2}", paths.compile_seconds),
-            format!("{:.2}", paths.first_laws_seconds),
+            format!("{:.2}", paths.first_distributions_seconds),
             format!("{:.2}", paths.first_picture_seconds),
             format!("{:.1}", paths.device_bytes as f64 * 1e-6),
         ];

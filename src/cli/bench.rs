@@ -23,7 +23,7 @@ use crate::terminal::print;
     after_help = "Rays are traced alone, the same ones on every device: through each pixel \
 (primary), from where they end to the map (shadow), and as a matte surface spreads light (diffuse). \
 Paths are what `render` does. `pass` is a pass on the clock, `device` what of it the device was at \
-work; `laws` and `picture` are the seconds until there are any, compiling included."
+work; `distributions` and `picture` are the seconds until there are any, compiling included."
 )]
 pub(super) struct BenchArguments {
     /// Scenes: glTF files or built-in ones; without any, all that are built in.

@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
 use crate::path::World;
-use crate::render::gpu::{DeviceChoice, Gpu, NO_GPU, RayChoice, Schedule, Stage, adapters};
+use crate::render::gpu::{DeviceChoice, Gpu, NO_GPU, RayChoice, Schedule, UploadedScene, adapters};
 use crate::render::{Session, View};
 use crate::terminal::{notice, print};
 
@@ -78,8 +78,8 @@ pub(super) fn start<'a>(
     notices: &mut Notices,
 ) -> Result<Session<'a>> {
     let Some(gpu) = gpu else { return Ok(Session::new(world, environment, view)) };
-    let on_gpu = Stage::new(gpu, world, environment)
-        .and_then(|stage| Session::on_gpu(world, environment, view.clone(), &stage));
+    let on_gpu = UploadedScene::new(gpu, world, environment)
+        .and_then(|uploaded| Session::on_gpu(world, environment, view.clone(), &uploaded));
     match on_gpu {
         Ok(session) => Ok(session),
         Err(failure) if choice == DeviceChoice::Auto => {

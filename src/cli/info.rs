@@ -65,7 +65,7 @@ fn scene_facts(name: &str, scene: Scene) -> Value {
             };
             format!("{i}: {} ({view})", camera.name)
         }).collect::<Vec<_>>(),
-        "left_out": world.needs.left_out(),
+        "left_out": world.needs.left_out().collect::<Vec<_>>(),
         "gpu_kernel": KernelFacts::of_scene(&world),
         "notices": scene.notices.iter().collect::<Vec<_>>(),
     })

@@ -19,7 +19,7 @@ use super::values;
 use crate::alarm::Alarm;
 use crate::environment::{Environment, EnvironmentOptions, TableKind};
 use crate::error::{Error, Notices, Result};
-use crate::light_grid::LawOptions;
+use crate::light_grid::DistributionOptions;
 use crate::memory;
 use crate::output::film_file::Part;
 use crate::output::record::{Phases, Record};
@@ -197,8 +197,8 @@ pub(super) struct RenderArguments {
     #[arg(long, value_name = "FILE", help_heading = "Run")]
     json: Option<PathBuf>,
     /// Writes what was learned, each cell's probability of each tile: .csv, .json or .exr.
-    #[arg(long, value_name = "FILE", help_heading = "Run")]
-    laws: Option<PathBuf>,
+    #[arg(long, alias = "laws", value_name = "FILE", help_heading = "Run")]
+    distributions: Option<PathBuf>,
 
     /// Renders only this share of every pixel's samples, such as 2/8, into a .part for `lightgrid
     /// merge`. All parts take the same options, of which those for .png and .exr are for merge.
@@ -293,7 +293,7 @@ impl RenderArguments {
             threads: 0,
             reproducible: false,
             json: None,
-            laws: None,
+            distributions: None,
             part: None,
             checkpoint: None,
             checkpoint_every: 60.0,
@@ -421,7 +421,7 @@ impl Job<'_> {
             let name = |path: &PathBuf| frames::numbered(path, number);
             of_frame.outputs = pictures.iter().map(|path| name(path)).collect();
             of_frame.json = arguments.json.as_ref().map(name);
-            of_frame.laws = arguments.laws.as_ref().map(name);
+            of_frame.distributions = arguments.distributions.as_ref().map(name);
             of_frame.frame_of_video = reel.as_mut().map(Reel::next);
             self.interrupt.go_on();
             let progress = Progress::of_frame(number, *frames.numbers().end());
@@ -532,7 +532,7 @@ fn view(arguments: &RenderArguments, world: &World, camera: Camera) -> View {
         learning_paths: arguments.learning_paths.unwrap_or_else(|| {
             View::suitable_learning_paths(arguments.sampling, [width, height], arguments.spp)
         }),
-        laws: LawOptions::ADAPTIVE,
+        distributions: DistributionOptions::ADAPTIVE,
         medium: medium(arguments, &world.scene),
         background: arguments.background.unwrap_or_default(),
         crop: arguments.region.map(|[left, top, ..]| Crop {

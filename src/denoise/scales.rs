@@ -57,7 +57,7 @@ struct Guide {
 
 /// What is known of a cell, all scales down to its own together.
 #[derive(Clone, Copy, Default)]
-struct Estimate {
+struct Filtered {
     light: Vec3,
     albedo: Vec3,
     /// Share of the samples that met a surface, and the variance of whether one does: in fog that is
@@ -82,7 +82,7 @@ struct Scale<T> {
 /// size, whose samples count as well, each as much as so many of the film's own.
 pub fn blend(film: &Film, under: Option<(&Film, f32)>) -> Image {
     let scales = scales(film, under);
-    let mut coarser: Option<(Scale<Guide>, Scale<Estimate>)> = None;
+    let mut coarser: Option<(Scale<Guide>, Scale<Filtered>)> = None;
     for (number, cells) in scales.iter().enumerate().rev() {
         let guides = cells.guides();
         let estimates = refined(cells, &guides, coarser.as_ref(), number);
@@ -293,14 +293,14 @@ impl Scale<Cell> {
 fn refined(
     cells: &Scale<Cell>,
     guides: &Scale<Guide>,
-    coarser: Option<&(Scale<Guide>, Scale<Estimate>)>,
+    coarser: Option<&(Scale<Guide>, Scale<Filtered>)>,
     number: usize,
-) -> Scale<Estimate> {
+) -> Scale<Filtered> {
     let (width, height) = (cells.width, cells.height);
     let pixels = (1 << number) as f32;
     let expected = |i: usize| {
         let cell = &cells.cells[i];
-        let mut estimate = coarser.map_or_else(Estimate::default, |(their_guides, estimates)| {
+        let mut estimate = coarser.map_or_else(Filtered::default, |(their_guides, estimates)| {
             from_parents(&guides.cells[i], (i % width, i / width), their_guides, estimates, pixels)
         });
         if cell.samples > 0.0 {
@@ -346,7 +346,7 @@ fn refined(
                 return *estimate;
             }
             let share = wieners_share(&estimates, (i % width, i / width), estimate.variance);
-            Estimate { light: estimate.light + estimate.detail * share, ..*estimate }
+            Filtered { light: estimate.light + estimate.detail * share, ..*estimate }
         })
         .collect();
     Scale { width, height, cells }
@@ -357,14 +357,14 @@ fn from_parents(
     guide: &Guide,
     (x, y): (usize, usize),
     guides: &Scale<Guide>,
-    estimates: &Scale<Estimate>,
+    estimates: &Scale<Filtered>,
     pixels: f32,
-) -> Estimate {
+) -> Filtered {
     let (x, y) = (x as isize, y as isize);
     // The parent and its neighbour on the cell's side.
     let (px, py) = (x / 2, y / 2);
     let (qx, qy) = (px + 2 * (x % 2) - 1, py + 2 * (y % 2) - 1);
-    let mut sum = Estimate::default();
+    let mut sum = Filtered::default();
     let mut total = 0.0;
     for (x, y, share) in [(px, py, 9.0), (qx, py, 3.0), (px, qy, 3.0), (qx, qy, 1.0)] {
         let weight = share * (LEAST_LIKENESS + guide.likeness(guides.at(x, y), 2.0 * pixels));
@@ -376,7 +376,7 @@ fn from_parents(
         sum.spread += estimate.spread * weight;
         total += weight;
     }
-    Estimate {
+    Filtered {
         light: sum.light / total,
         albedo: sum.albedo / total,
         coverage: sum.coverage / total,
@@ -388,7 +388,7 @@ fn from_parents(
 
 /// The energy of the details around a cell over that and the noise's. The strongest one does not
 /// count: a lone bright sample is no detail.
-fn wieners_share(estimates: &Scale<Estimate>, (x, y): (usize, usize), variance: f32) -> f32 {
+fn wieners_share(estimates: &Scale<Filtered>, (x, y): (usize, usize), variance: f32) -> f32 {
     let (mut energy, mut noise, mut strongest) = (0.0, 0.0, 0.0_f32);
     for row in y.saturating_sub(1)..(y + 2).min(estimates.height) {
         let row = &estimates.cells[row * estimates.width..][..estimates.width];

@@ -83,8 +83,8 @@ pub fn sat_report(map: &Image, lookup: Lookup, timed_samples: u32) -> Result<Sat
         let start = Instant::now();
         let (table, energies) = Table::build(kind, &weights, &grid);
         let build_seconds = start.elapsed().as_secs_f64();
-        let law = Law::new(&table, &grid, &energies);
-        let deviation = Deviation::of(&law, &weights, total);
+        let distribution = Distribution::new(&table, &grid, &energies);
+        let deviation = Deviation::of(&distribution, &weights, total);
         SatReportRow {
             table: kind,
             mean_squared_error: deviation.squares * patches,
@@ -118,7 +118,7 @@ struct Deviation {
 
 impl Deviation {
     /// Of the whole map; rows are added in order, so that the result does not depend on threads.
-    fn of(law: &Law<'_>, weights: &Weights<'_>, total: f64) -> Self {
+    fn of(distribution: &Distribution<'_>, weights: &Weights<'_>, total: f64) -> Self {
         let (width, height) = weights.size();
         let rows: Vec<Self> = (0..height)
             .into_par_iter()
@@ -126,7 +126,7 @@ impl Deviation {
                 || (vec![0.0; width as usize], Vec::new()),
                 |(row, scratch), y| {
                     weights.row(0, y, row, scratch);
-                    Self::of_row(row, &law.sampled(y), &law.reported(y), total)
+                    Self::of_row(row, &distribution.sampled(y), &distribution.reported(y), total)
                 },
             )
             .collect();
@@ -156,12 +156,12 @@ impl Deviation {
 }
 
 /// How a table samples the whole map, row by row.
-enum Law<'a> {
+enum Distribution<'a> {
     TileLocal { table: &'a TileLocal, grid: &'a TileGrid, tile_probabilities: Vec<f64> },
     SummedArea { table: &'a dyn RectangleTable, whole: TilePatches, row_probabilities: Vec<f64> },
 }
 
-impl<'a> Law<'a> {
+impl<'a> Distribution<'a> {
     fn new(table: &'a Table, grid: &'a TileGrid, energies: &[f64]) -> Self {
         match table {
             Table::TileLocal(table) => {
@@ -172,7 +172,7 @@ impl<'a> Law<'a> {
             }
             Table::SummedArea(table) => {
                 let whole = grid.whole();
-                let row_probabilities = table.row_law(&whole);
+                let row_probabilities = table.row_distribution(&whole);
                 Self::SummedArea { table: &**table, whole, row_probabilities }
             }
         }
@@ -184,7 +184,7 @@ impl<'a> Law<'a> {
             // Exact sums: each entry is met as often as reported.
             Self::TileLocal { .. } => self.reported(y),
             Self::SummedArea { table, whole, row_probabilities } => {
-                let columns = table.column_law(whole, y);
+                let columns = table.column_distribution(whole, y);
                 columns.iter().map(|column| column * row_probabilities[y as usize]).collect()
             }
         }

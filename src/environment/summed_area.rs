@@ -138,10 +138,10 @@ pub(crate) trait RectangleTable: std::fmt::Debug + Send + Sync {
     fn sample_probability(&self, patches: &TilePatches, x: u32, y: u32) -> f64;
 
     /// With what probability [`Self::sample`] really ends in each row of the rectangle.
-    fn row_law(&self, patches: &TilePatches) -> Vec<f64>;
+    fn row_distribution(&self, patches: &TilePatches) -> Vec<f64>;
 
     /// With what probability [`Self::sample`], once in row `y`, really ends in each column.
-    fn column_law(&self, patches: &TilePatches, y: u32) -> Vec<f64>;
+    fn column_distribution(&self, patches: &TilePatches, y: u32) -> Vec<f64>;
 
     /// Mass of a rectangle, as the table has it: may be negative through rounding.
     fn mass(&self, x: &Range<u32>, y: &Range<u32>) -> f64;
@@ -180,14 +180,14 @@ impl<T: Corner> RectangleTable for SummedArea<T> {
         if total > 0.0 && mass > 0.0 { mass / total } else { 0.0 }
     }
 
-    fn row_law(&self, patches: &TilePatches) -> Vec<f64> {
+    fn row_distribution(&self, patches: &TilePatches) -> Vec<f64> {
         let sum = |y| self.mass(&patches.x, &(patches.y.start..y + 1));
-        search_law(&patches.y.clone().map(sum).collect::<Vec<_>>())
+        search_distribution(&patches.y.clone().map(sum).collect::<Vec<_>>())
     }
 
-    fn column_law(&self, patches: &TilePatches, y: u32) -> Vec<f64> {
+    fn column_distribution(&self, patches: &TilePatches, y: u32) -> Vec<f64> {
         let sum = |x| self.mass(&(patches.x.start..x + 1), &(y..y + 1));
-        search_law(&patches.x.clone().map(sum).collect::<Vec<_>>())
+        search_distribution(&patches.x.clone().map(sum).collect::<Vec<_>>())
     }
 
     fn mass(&self, x: &Range<u32>, y: &Range<u32>) -> f64 {
@@ -237,8 +237,14 @@ fn search(range: &Range<u32>, u: f64, sum_to: impl Fn(u32) -> f64) -> Option<Cho
 
 /// With what probability [`search`] ends at each entry of these inclusive sums. Each comparison
 /// cuts the interval of `u` that leads on, so this is exact even where the sums fall.
-fn search_law(sums: &[f64]) -> Vec<f64> {
-    fn descend(sums: &[f64], first: usize, last: usize, interval: [f64; 2], law: &mut [f64]) {
+fn search_distribution(sums: &[f64]) -> Vec<f64> {
+    fn descend(
+        sums: &[f64],
+        first: usize,
+        last: usize,
+        interval: [f64; 2],
+        distribution: &mut [f64],
+    ) {
         let [low, high] = interval;
         if high <= low {
             return;
@@ -246,21 +252,21 @@ fn search_law(sums: &[f64]) -> Vec<f64> {
         if first == last {
             let before = if first == 0 { 0.0 } else { sums[first - 1] };
             if sums[first] > before {
-                law[first] = high - low;
+                distribution[first] = high - low;
             }
             return;
         }
         let middle = first + (last - first) / 2;
-        descend(sums, first, middle, [low, high.min(sums[middle])], law);
-        descend(sums, middle + 1, last, [low.max(sums[middle]), high], law);
+        descend(sums, first, middle, [low, high.min(sums[middle])], distribution);
+        descend(sums, middle + 1, last, [low.max(sums[middle]), high], distribution);
     }
-    let mut law = vec![0.0; sums.len()];
+    let mut distribution = vec![0.0; sums.len()];
     let total = sums[sums.len() - 1];
-    descend(sums, 0, sums.len() - 1, [0.0, total], &mut law);
+    descend(sums, 0, sums.len() - 1, [0.0, total], &mut distribution);
     if total > 0.0 {
-        law.iter_mut().for_each(|probability| *probability /= total);
+        distribution.iter_mut().for_each(|probability| *probability /= total);
     }
-    law
+    distribution
 }
 
 /// Calls `f` with the f64 sums at the lower corners of each row of patches, top to bottom.
@@ -290,9 +296,9 @@ mod tests {
     use crate::image::Image;
 
     #[test]
-    fn the_law_of_a_search_is_that_of_its_outcomes_even_where_sums_fall() {
+    fn the_distribution_of_a_search_is_that_of_its_outcomes_even_where_sums_fall() {
         for sums in [vec![1.0, 3.0, 6.0, 10.0, 12.0], vec![3.0, 2.0, 5.0, 4.0, 4.0, 9.0, 8.0]] {
-            let law = search_law(&sums);
+            let distribution = search_distribution(&sums);
             let sum_to = |end: u32| if end == 0 { 0.0 } else { sums[end as usize - 1] };
             let mut counts = vec![0.0; sums.len()];
             const STEPS: u32 = 100_000;
@@ -302,14 +308,14 @@ mod tests {
                     counts[choice.index as usize] += 1.0 / f64::from(STEPS);
                 }
             }
-            for (count, probability) in counts.iter().zip(&law) {
-                assert!((count - probability).abs() < 1e-4, "{counts:?} {law:?}");
+            for (count, probability) in counts.iter().zip(&distribution) {
+                assert!((count - probability).abs() < 1e-4, "{counts:?} {distribution:?}");
             }
         }
     }
 
     #[test]
-    fn the_law_of_a_table_is_that_of_its_samples_where_patches_are_about_one_unit() {
+    fn the_distribution_of_a_table_is_that_of_its_samples_where_patches_are_about_one_unit() {
         let map = Image::from_fn(64, 32, |x, y| {
             let sky = 0.1 + ((x * 7919 + y * 104_729) % 97) as f32 / 97.0;
             if (x, y) == (20, 10) { [6e9; 3] } else { [sky; 3] }
@@ -317,8 +323,9 @@ mod tests {
         let table = SummedArea::<u32>::build(&Weights::new(&map, Lookup::Nearest));
         let sky = TilePatches { x: 10..40, y: 11..20 };
         let mut expected = Vec::new();
-        for (row, y) in table.row_law(&sky).into_iter().zip(sky.y.clone()) {
-            expected.extend(table.column_law(&sky, y).into_iter().map(|column| row * column));
+        for (row, y) in table.row_distribution(&sky).into_iter().zip(sky.y.clone()) {
+            expected
+                .extend(table.column_distribution(&sky, y).into_iter().map(|column| row * column));
         }
         let falls = sky.y.clone().flat_map(|y| sky.x.clone().map(move |x| (x, y)));
         assert!(falls.filter(|(x, y)| table.mass(&(*x..x + 1), &(*y..y + 1)) < 0.0).count() > 5);

@@ -1,10 +1,10 @@
-//! From counters to laws.
+//! From counters to distributions.
 
 use serde::{Deserialize, Serialize};
 
 use super::cells::SphericalGrid;
 use super::counters::Counters;
-use super::law_builder::LawBuilder;
+use super::distribution_builder::DistributionBuilder;
 use super::{Cells, LightGrid, MEMORY_BUDGET_BYTES, WHOLE_MAP};
 use crate::environment::Environment;
 
@@ -40,9 +40,9 @@ impl Recording {
     }
 }
 
-/// How counters become laws. The defaults are *measured*: `lightgrid report ablations`.
+/// How counters become distributions. The defaults are *measured*: `lightgrid report ablations`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct LawOptions {
+pub struct DistributionOptions {
     /// Whether cells are split six-fold by the direction a surface faces.
     pub faces: bool,
     /// What the counters hold.
@@ -53,21 +53,21 @@ pub struct LawOptions {
     /// mean square, which is best where each point of a cell sees either all or nothing of it
     /// (Rath et al. 2020).
     pub ratio_exponent: f64,
-    /// Share of samples, in 256ths, that follow the whole map's law whatever was learned; see
+    /// Share of samples, in 256ths, that follow the whole map's distribution whatever was learned; see
     /// [`LightGrid::sample`].
     pub whole_map_share: u32,
-    /// How much of the diffuse BSDF's own density is subtracted from a law (MIS compensation,
+    /// How much of the diffuse BSDF's own density is subtracted from a distribution (MIS compensation,
     /// Karlik et al. 2019, on tiles).
     pub compensation: f64,
     /// Samples of the map that each vertex of a learning path tries: another shadow ray is cheaper
     /// than another path. A rendered path tries one.
     pub tries_per_vertex: u32,
-    /// Whether rendered paths count too, until the laws hardly get better.
+    /// Whether rendered paths count too, until the distributions hardly get better.
     pub while_rendering: bool,
 }
 
-impl LawOptions {
-    /// Our own laws.
+impl DistributionOptions {
+    /// Our own distributions.
     pub const ADAPTIVE: Self = Self {
         faces: true,
         recording: Recording::VisibleCosine,
@@ -91,7 +91,7 @@ impl LawOptions {
         while_rendering: false,
     };
 
-    /// Whether rendered paths count too. Their samples of the map follow the laws, so only ratios
+    /// Whether rendered paths count too. Their samples of the map follow the distributions, so only ratios
     /// can be counted.
     pub fn goes_on(&self) -> bool {
         self.while_rendering && self.recording.is_ratio()
@@ -105,17 +105,17 @@ pub struct LearningGrid {
     pub grid: SphericalGrid,
     /// What was counted.
     pub counters: Counters,
-    options: LawOptions,
-    /// How many times laws were made.
+    options: DistributionOptions,
+    /// How many times distributions were made.
     generation: u32,
 }
 
-/// Share of the budget for the counters; laws take the rest while both are held.
+/// Share of the budget for the counters; distributions take the rest while both are held.
 const COUNTER_SHARE: f64 = 0.65;
 
 impl LearningGrid {
     /// An empty grid over the tiles of a map.
-    pub fn new(grid: SphericalGrid, tile_count: u32, options: LawOptions) -> Self {
+    pub fn new(grid: SphericalGrid, tile_count: u32, options: DistributionOptions) -> Self {
         let budget = (MEMORY_BUDGET_BYTES as f64 * COUNTER_SHARE) as usize;
         Self {
             grid,
@@ -146,19 +146,20 @@ impl LearningGrid {
         Self { counters: self.counters.snapshot(), ..*self }
     }
 
-    /// The laws that follow from what was counted so far: the next generation. `None` for a black map.
-    pub fn laws(&mut self, environment: &Environment) -> Option<LightGrid> {
+    /// The distributions that follow from what was counted so far: the next generation. `None` for a black map.
+    pub fn distributions(&mut self, environment: &Environment) -> Option<LightGrid> {
         self.generation += 1;
         let mut result = LightGrid::whole_map(environment.tile_energies())?;
-        let builder = LawBuilder::new(self.grid, &self.counters, self.options, environment);
-        let mut law_of_cell = vec![WHOLE_MAP as u16; self.grid.cell_count() as usize];
+        let builder =
+            DistributionBuilder::new(self.grid, &self.counters, self.options, environment);
+        let mut distribution_of_cell = vec![WHOLE_MAP as u16; self.grid.cell_count() as usize];
         let room = MEMORY_BUDGET_BYTES
-            .saturating_sub(self.counters.memory_bytes() + law_of_cell.len() * 2)
-            .saturating_sub(result.laws.memory_bytes());
-        builder.build(room, &mut result.laws, &mut law_of_cell);
+            .saturating_sub(self.counters.memory_bytes() + distribution_of_cell.len() * 2)
+            .saturating_sub(result.distributions.memory_bytes());
+        builder.build(room, &mut result.distributions, &mut distribution_of_cell);
         result.whole_map_share = self.options.whole_map_share;
         result.generation = self.generation;
-        result.cells = Some(Cells { grid: self.grid, law_of_cell });
+        result.cells = Some(Cells { grid: self.grid, distribution_of_cell });
         Some(result)
     }
 }

@@ -2,79 +2,85 @@
 //!
 //! Atanasov et al., *Adaptive Environment Sampling on CPU and GPU*, ACM SIGGRAPH 2018 Talks. A
 //! [`cells::SphericalGrid`] around the camera maps a point to a cell, [`counters::Counters`] collect
-//! what camera paths saw, and [`LightGrid`] holds the resulting [`tile_laws::TileLaws`]. Whatever
-//! was learned, the estimate stays unbiased: the law that chose a sample also gives its pdf, and
-//! BSDF sampling covers what a law cannot choose.
+//! what camera paths saw, and [`LightGrid`] holds the resulting [`tile_distributions::TileDistributions`].
+//! Whatever was learned, the estimate stays unbiased: the distribution that chose a sample also gives its pdf,
+//! and BSDF sampling covers what a distribution cannot choose.
 
 pub mod cells;
 pub mod counters;
-mod law_builder;
+mod distribution_builder;
 mod learning;
-pub mod tile_laws;
+pub mod tile_distributions;
 mod transfer;
 
 use crate::sampler::hash;
 use cells::SphericalGrid;
-use tile_laws::{TileChoice, TileLaws};
+use tile_distributions::{TileChoice, TileDistributions};
 
-pub use learning::{LawOptions, LearningGrid, Recording};
+pub use learning::{DistributionOptions, LearningGrid, Recording};
 
-/// Index of the law proportional to the whole map's tile energies.
+/// Index of the distribution proportional to the whole map's tile energies.
 pub const WHOLE_MAP: u32 = 0;
 
 /// Most bytes the grid may hold, learning and rendering alike (the talk's 10 MB).
 pub const MEMORY_BUDGET_BYTES: usize = 10 << 20;
 
-/// The tile laws and which of them a point uses.
+/// The tile distributions and which of them a point uses.
 #[derive(Debug, Clone)]
 pub struct LightGrid {
-    laws: TileLaws,
+    distributions: TileDistributions,
     cells: Option<Cells>,
-    /// Of 256 samples so many follow the whole map's law whatever was learned.
+    /// Of 256 samples so many follow the whole map's distribution whatever was learned.
     whole_map_share: u32,
-    /// How many times laws were made of what was counted; see [`Self::generation`].
+    /// How many times distributions were made of what was counted; see [`Self::generation`].
     generation: u32,
 }
 
 #[derive(Debug, Clone)]
 struct Cells {
     grid: SphericalGrid,
-    /// Law of each cell; [`WHOLE_MAP`] where nothing was learned.
-    law_of_cell: Vec<u16>,
+    /// Distribution of each cell; [`WHOLE_MAP`] where nothing was learned.
+    distribution_of_cell: Vec<u16>,
 }
 
 impl LightGrid {
     /// The plain sampler: every point uses the whole map. `energies` holds one energy per tile; a
     /// black map gives `None`, for there is nothing to sample.
     pub fn whole_map(energies: &[f64]) -> Option<Self> {
-        let mut laws = TileLaws::new(energies.len() as u32);
-        laws.reserve_exact(1, energies.iter().filter(|e| **e > 0.0).count());
-        laws.push(energies)?;
-        Some(Self { laws, cells: None, whole_map_share: 0, generation: 0 })
+        let mut distributions = TileDistributions::new(energies.len() as u32);
+        distributions.reserve_exact(1, energies.iter().filter(|e| **e > 0.0).count());
+        distributions.push(energies)?;
+        Some(Self { distributions, cells: None, whole_map_share: 0, generation: 0 })
     }
 
-    /// Chooses a tile at a point of law `law` with the first of two uniform 32-bit numbers; the second
-    /// stays unused but for a hash of it, the bits below the first. A share of samples follows the
-    /// whole map's law (defensive mixture, Hesterberg 1995), which bounds the estimate where a law is
-    /// wrong and finds what it missed.
-    pub fn sample(&self, law: u32, bits: [u32; 2]) -> TileChoice {
-        self.sample_sharing(law, bits, self.whole_map_share)
+    /// Chooses a tile at a point of distribution `distribution` with the first of two uniform 32-bit numbers;
+    /// the second stays unused but for a hash of it, the bits below the first. A share of samples follows the
+    /// whole map's distribution (defensive mixture, Hesterberg 1995), which bounds the estimate where a
+    /// distribution is wrong and finds what it missed.
+    pub fn sample(&self, distribution: u32, bits: [u32; 2]) -> TileChoice {
+        self.sample_sharing(distribution, bits, self.whole_map_share)
     }
 
-    /// [`Self::sample`] with another share, in 256ths, of the whole map's law.
+    /// [`Self::sample`] with another share, in 256ths, of the whole map's distribution.
     pub fn sample_sharing(
         &self,
-        law: u32,
+        distribution: u32,
         [bits, other_bits]: [u32; 2],
         whole_map_share: u32,
     ) -> TileChoice {
         let finer = hash(bits ^ hash(other_bits));
-        if law == WHOLE_MAP || whole_map_share == 0 {
-            return self.laws.sample(law, bits, finer);
+        if distribution == WHOLE_MAP || whole_map_share == 0 {
+            return self.distributions.sample(distribution, bits, finer);
         }
         let (by_whole_map, bits) = split(bits, finer, whole_map_share);
-        let choice = self.laws.sample(if by_whole_map { WHOLE_MAP } else { law }, bits, finer);
-        let other = self.laws.probability(if by_whole_map { law } else { WHOLE_MAP }, choice.tile);
+        let choice = self.distributions.sample(
+            if by_whole_map { WHOLE_MAP } else { distribution },
+            bits,
+            finer,
+        );
+        let other = self
+            .distributions
+            .probability(if by_whole_map { distribution } else { WHOLE_MAP }, choice.tile);
         let probability = if by_whole_map {
             mixed(choice.probability, other, whole_map_share)
         } else {
@@ -83,27 +89,28 @@ impl LightGrid {
         TileChoice { probability, ..choice }
     }
 
-    /// Probability that [`Self::sample`] chooses `tile` at a point of law `law`.
-    pub fn probability(&self, law: u32, tile: u32) -> f32 {
-        let learned = self.laws.probability(law, tile);
-        if law == WHOLE_MAP || self.whole_map_share == 0 {
+    /// Probability that [`Self::sample`] chooses `tile` at a point of distribution `distribution`.
+    pub fn probability(&self, distribution: u32, tile: u32) -> f32 {
+        let learned = self.distributions.probability(distribution, tile);
+        if distribution == WHOLE_MAP || self.whole_map_share == 0 {
             return learned;
         }
-        mixed(self.laws.probability(WHOLE_MAP, tile), learned, self.whole_map_share)
+        mixed(self.distributions.probability(WHOLE_MAP, tile), learned, self.whole_map_share)
     }
 
-    /// The laws over the map's tiles; law 0 is [`WHOLE_MAP`]. [`Self::sample`] mixes them.
-    pub fn laws(&self) -> &TileLaws {
-        &self.laws
+    /// The distributions over the map's tiles; distribution 0 is [`WHOLE_MAP`]. [`Self::sample`] mixes them.
+    pub fn distributions(&self) -> &TileDistributions {
+        &self.distributions
     }
 
-    /// 0 where nothing was learned; later laws of one learning have a higher one. The samples that laws
-    /// were made of followed laws of lower generations: see [`crate::sampler::Sequence`].
+    /// 0 where nothing was learned; later distributions of one learning have a higher one. The samples that
+    /// distributions were made of followed distributions of lower generations: see
+    /// [`crate::sampler::Sequence`].
     pub(crate) fn generation(&self) -> u32 {
         self.generation
     }
 
-    /// Of 256 samples so many follow the whole map's law whatever was learned.
+    /// Of 256 samples so many follow the whole map's distribution whatever was learned.
     pub(crate) fn whole_map_share(&self) -> u32 {
         self.whole_map_share
     }
@@ -113,37 +120,45 @@ impl LightGrid {
         self.cells.as_ref().map(|cells| &cells.grid)
     }
 
-    /// Law of a cell; [`WHOLE_MAP`] without a grid.
-    pub fn law_of_cell(&self, cell: u32) -> u32 {
-        self.cells.as_ref().map_or(WHOLE_MAP, |cells| u32::from(cells.law_of_cell[cell as usize]))
+    /// Distribution of a cell; [`WHOLE_MAP`] without a grid.
+    pub fn distribution_of_cell(&self, cell: u32) -> u32 {
+        self.cells
+            .as_ref()
+            .map_or(WHOLE_MAP, |cells| u32::from(cells.distribution_of_cell[cell as usize]))
     }
 
-    /// Where the cells lie and which law each uses; `None` if every point uses the whole map.
+    /// Where the cells lie and which distribution each uses; `None` if every point uses the whole map.
     pub(crate) fn cells(&self) -> Option<(&SphericalGrid, &[u16])> {
-        self.cells.as_ref().map(|cells| (&cells.grid, cells.law_of_cell.as_slice()))
+        self.cells.as_ref().map(|cells| (&cells.grid, cells.distribution_of_cell.as_slice()))
     }
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.laws.memory_bytes() + self.cells.as_ref().map_or(0, |c| c.law_of_cell.capacity() * 2)
+        self.distributions.memory_bytes()
+            + self.cells.as_ref().map_or(0, |c| c.distribution_of_cell.capacity() * 2)
     }
 
-    /// The same grid with the laws of all cells replaced by arbitrary ones, in which about half of
+    /// The same grid with the distributions of all cells replaced by arbitrary ones, in which about half of
     /// the tiles cannot be chosen: for tests that unbiasedness does not depend on learning.
-    pub fn with_garbage_laws(grid: SphericalGrid, energies: &[f64], seed: u32) -> Option<Self> {
+    pub fn with_garbage_distributions(
+        grid: SphericalGrid,
+        energies: &[f64],
+        seed: u32,
+    ) -> Option<Self> {
         let mut result = Self::whole_map(energies)?;
-        let mut law_of_cell = vec![WHOLE_MAP as u16; grid.cell_count() as usize];
-        for law in 1..=64_u32 {
+        let mut distribution_of_cell = vec![WHOLE_MAP as u16; grid.cell_count() as usize];
+        for distribution in 1..=64_u32 {
             let weights: Vec<f64> = (0..energies.len() as u32)
-                .map(|tile| hash(seed ^ hash(law << 16 | tile)))
+                .map(|tile| hash(seed ^ hash(distribution << 16 | tile)))
                 .map(|h| if h & 1 == 0 { 0.0 } else { f64::from(h >> 8) })
                 .collect();
-            result.laws.push(&weights);
+            result.distributions.push(&weights);
         }
-        for (cell, law) in law_of_cell.iter_mut().enumerate() {
-            *law = (hash(seed.wrapping_add(cell as u32)) % result.laws.len()) as u16;
+        for (cell, distribution) in distribution_of_cell.iter_mut().enumerate() {
+            *distribution =
+                (hash(seed.wrapping_add(cell as u32)) % result.distributions.len()) as u16;
         }
-        result.cells = Some(Cells { grid, law_of_cell });
+        result.cells = Some(Cells { grid, distribution_of_cell });
         result.whole_map_share = 32;
         result.generation = 1;
         Some(result)
@@ -162,7 +177,7 @@ fn split(bits: u32, finer: u32, share: u32) -> (bool, u32) {
     (is_below, (whole << 8) + ((left << 8) | finer & 0xff) / width)
 }
 
-/// A probability of the whole map's law and one of a learned law, mixed.
+/// A probability of the whole map's distribution and one of a learned distribution, mixed.
 fn mixed(whole_map: f32, learned: f32, share: u32) -> f32 {
     let share = share as f32 * (1.0 / 256.0);
     share * whole_map + (1.0 - share) * learned
@@ -171,7 +186,7 @@ fn mixed(whole_map: f32, learned: f32, share: u32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::statistics::chi_square_test;
+    use crate::metrics::hypothesis::chi_square_test;
 
     const GRID: SphericalGrid =
         SphericalGrid { center: glam::Vec3::ZERO, columns: 4, rows: 2, faces: true, medium: false };
@@ -179,22 +194,23 @@ mod tests {
     #[test]
     fn samples_follow_the_mixture_that_gives_their_probability() {
         let energies: Vec<f64> = (0..200).map(|tile| f64::from(tile % 7 * tile)).collect();
-        let grid = LightGrid::with_garbage_laws(GRID, &energies, 3).expect("a map with light");
+        let grid =
+            LightGrid::with_garbage_distributions(GRID, &energies, 3).expect("a map with light");
         assert!(grid.whole_map_share() > 0);
         const COUNT: u32 = 200_000;
-        for law in [WHOLE_MAP, 1, 2, 3] {
+        for distribution in [WHOLE_MAP, 1, 2, 3] {
             let mut found = vec![0.0; energies.len()];
             for i in 0..COUNT {
-                let choice = grid.sample(law, [hash(i), hash(!i)]);
-                assert_eq!(choice.probability, grid.probability(law, choice.tile));
+                let choice = grid.sample(distribution, [hash(i), hash(!i)]);
+                assert_eq!(choice.probability, grid.probability(distribution, choice.tile));
                 found[choice.tile as usize] += 1.0;
             }
             let expected: Vec<f64> = (0..energies.len() as u32)
-                .map(|tile| f64::from(grid.probability(law, tile)) * f64::from(COUNT))
+                .map(|tile| f64::from(grid.probability(distribution, tile)) * f64::from(COUNT))
                 .collect();
             assert!((expected.iter().sum::<f64>() / f64::from(COUNT) - 1.0).abs() < 1e-6);
             let test = chi_square_test(&found, &expected, 1e-3).expect("enough samples");
-            assert!(test.passed, "law {law}: {test:?}");
+            assert!(test.passed, "distribution {distribution}: {test:?}");
         }
     }
 
@@ -221,9 +237,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_in_a_law_is_found_by_the_whole_maps_share() {
-        let grid = LightGrid::with_garbage_laws(GRID, &[1.0; 64], 5).expect("a map with light");
-        let unreachable = |tile: &u32| grid.laws().probability(1, *tile) == 0.0;
+    fn what_is_missing_in_a_distribution_is_found_by_the_whole_maps_share() {
+        let grid =
+            LightGrid::with_garbage_distributions(GRID, &[1.0; 64], 5).expect("a map with light");
+        let unreachable = |tile: &u32| grid.distributions().probability(1, *tile) == 0.0;
         let tile = (0..64).find(unreachable).expect("garbage has gaps");
         let share = grid.whole_map_share() as f32 / 256.0;
         assert!((grid.probability(1, tile) * 64.0 / share - 1.0).abs() < 1e-5);

@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::tile_laws::TileLaws;
+use super::tile_distributions::TileDistributions;
 use super::{LightGrid, WHOLE_MAP};
 use crate::environment::Environment;
 
@@ -10,9 +10,9 @@ use crate::environment::Environment;
 const PLACES: [f32; 3] = [0.15, 0.5, 0.85];
 
 impl LightGrid {
-    /// Laws for the map `new` from laws learned under `old`: what a cell sees of a direction does
-    /// not depend on the map, so a tile's old probability over its old energy tells how visible its
-    /// direction is. Approximate (laws are compensated, and a turned map's tiles lie between the old
+    /// Distributions for the map `new` from distributions learned under `old`: what a cell sees of a direction
+    /// does not depend on the map, so a tile's old probability over its old energy tells how visible its
+    /// direction is. Approximate (distributions are compensated, and a turned map's tiles lie between the old
     /// ones), which costs noise and never bias; it bridges the time until learning anew is done.
     /// `None` for a black map.
     pub fn transferred(&self, old: &Environment, new: &Environment) -> Option<Self> {
@@ -20,17 +20,24 @@ impl LightGrid {
         let sources: Vec<[u32; PLACES.len()]> = (0..new.tile_count())
             .map(|tile| PLACES.map(|x| old.tile_of(new.direction_in_tile(tile, Vec2::new(x, 0.5)))))
             .collect();
-        let mut law_of_law = vec![WHOLE_MAP as u16; self.laws.len() as usize];
+        let mut distribution_of_distribution =
+            vec![WHOLE_MAP as u16; self.distributions.len() as usize];
         let mut weights = vec![0.0; new.tile_count() as usize];
-        for law in 1..self.laws.len() {
-            transfer_law(&self.laws, law, (old, new), &sources, &mut weights);
-            if let Some(index) = result.laws.push(&weights) {
-                law_of_law[law as usize] = index as u16;
+        for distribution in 1..self.distributions.len() {
+            transfer_distribution(
+                &self.distributions,
+                distribution,
+                (old, new),
+                &sources,
+                &mut weights,
+            );
+            if let Some(index) = result.distributions.push(&weights) {
+                distribution_of_distribution[distribution as usize] = index as u16;
             }
         }
         result.cells = self.cells.clone().map(|mut cells| {
-            for law in &mut cells.law_of_cell {
-                *law = law_of_law[usize::from(*law)];
+            for distribution in &mut cells.distribution_of_cell {
+                *distribution = distribution_of_distribution[usize::from(*distribution)];
             }
             cells
         });
@@ -40,16 +47,20 @@ impl LightGrid {
     }
 }
 
-fn transfer_law(
-    laws: &TileLaws,
-    law: u32,
+fn transfer_distribution(
+    distributions: &TileDistributions,
+    distribution: u32,
     (old, new): (&Environment, &Environment),
     sources: &[[u32; PLACES.len()]],
     weights: &mut [f64],
 ) {
     let visibility = |tile: u32| {
         let energy = old.tile_energies()[tile as usize];
-        if energy > 0.0 { f64::from(laws.probability(law, tile)) / energy } else { 0.0 }
+        if energy > 0.0 {
+            f64::from(distributions.probability(distribution, tile)) / energy
+        } else {
+            0.0
+        }
     };
     for ((weight, sources), energy) in weights.iter_mut().zip(sources).zip(new.tile_energies()) {
         *weight = energy * sources.iter().map(|tile| visibility(*tile)).sum::<f64>();
@@ -82,17 +93,18 @@ mod tests {
     #[test]
     fn a_turned_map_keeps_what_is_seen_where() {
         let old = environment(3, 0.0);
-        let learned = LightGrid::with_garbage_laws(GRID, old.tile_energies(), 1).expect("a grid");
+        let learned =
+            LightGrid::with_garbage_distributions(GRID, old.tile_energies(), 1).expect("a grid");
         let turned = environment(3, 5.0);
-        let laws = learned.transferred(&old, &turned).expect("a grid");
+        let distributions = learned.transferred(&old, &turned).expect("a grid");
         let mut compared = 0;
-        for law in 1..learned.laws().len() {
+        for distribution in 1..learned.distributions().len() {
             for tile in 0..512_u32 {
                 // The tile that now lies where `tile` was, five columns back on the map.
                 let now = tile / 32 * 32 + (tile % 32 + 27) % 32;
-                let before = learned.laws().probability(law, tile);
-                let after = laws.laws().probability(law, now);
-                assert_eq!(before > 0.0, after > 0.0, "law {law}, tile {tile}");
+                let before = learned.distributions().probability(distribution, tile);
+                let after = distributions.distributions().probability(distribution, now);
+                assert_eq!(before > 0.0, after > 0.0, "distribution {distribution}, tile {tile}");
                 compared += u32::from(before > 0.0);
             }
         }
@@ -100,23 +112,30 @@ mod tests {
     }
 
     #[test]
-    fn the_same_map_keeps_its_laws_and_a_brighter_tile_gets_more() {
+    fn the_same_map_keeps_its_distributions_and_a_brighter_tile_gets_more() {
         let old = environment(3, 0.0);
-        let learned = LightGrid::with_garbage_laws(GRID, old.tile_energies(), 2).expect("a grid");
+        let learned =
+            LightGrid::with_garbage_distributions(GRID, old.tile_energies(), 2).expect("a grid");
         let same = learned.transferred(&old, &old).expect("a grid");
         let sun_moved = learned.transferred(&old, &environment(20, 0.0)).expect("a grid");
         for cell in 0..GRID.cell_count() {
-            let law = learned.law_of_cell(cell);
-            assert_eq!(same.law_of_cell(cell), law);
+            let distribution = learned.distribution_of_cell(cell);
+            assert_eq!(same.distribution_of_cell(cell), distribution);
             for tile in 0..512 {
-                let (a, b) =
-                    (learned.laws().probability(law, tile), same.laws().probability(law, tile));
+                let (a, b) = (
+                    learned.distributions().probability(distribution, tile),
+                    same.distributions().probability(distribution, tile),
+                );
                 assert!((a - b).abs() < 1e-5 + 1e-4 * a, "{a} {b}");
             }
-            let share = |laws: &LightGrid| -> f32 {
-                (0..16).map(|row| laws.laws().probability(law, row * 32 + 20)).sum()
+            let share = |distributions: &LightGrid| -> f32 {
+                (0..16)
+                    .map(|row| {
+                        distributions.distributions().probability(distribution, row * 32 + 20)
+                    })
+                    .sum()
             };
-            assert!(law == WHOLE_MAP || share(&sun_moved) > 2.0 * share(&learned));
+            assert!(distribution == WHOLE_MAP || share(&sun_moved) > 2.0 * share(&learned));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 #[cfg_attr(not(feature = "flip"), path = "no_flip.rs")]
 mod flip;
-pub mod statistics;
+pub mod hypothesis;
 
 use rayon::prelude::*;
 use serde::Serialize;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+pub mod distributions;
 pub mod film_file;
-pub mod laws;
 pub mod record;
 
 use crate::color::luminance;

@@ -114,8 +114,8 @@ impl Record<'_> {
             "simd": self.world.bvh.simd_name(),
             "device": self.device(),
             "gpu": self.gpu,
-            "needs": self.world.needs,
-            "left_out": self.world.needs.left_out(),
+            "needs": self.world.needs.by_name(),
+            "left_out": self.world.needs.left_out().collect::<Vec<_>>(),
             "notices": self.notices.iter().collect::<Vec<_>>(),
         })
     }

@@ -78,7 +78,7 @@ impl Path<'_> {
         let is_ratio = learning.recording().is_ratio();
         let bits = self.sampler.next_pair_bits();
         let whole_map_share = if is_ratio { 128 } else { 256 };
-        let choice = grid.sample_sharing(vertex.law, bits, whole_map_share);
+        let choice = grid.sample_sharing(vertex.distribution, bits, whole_map_share);
         self.expect_count(vertex, choice.tile);
         let u = [choice.remainder, bits[1]];
         let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };

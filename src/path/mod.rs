@@ -21,18 +21,19 @@ mod lights;
 mod materials;
 mod ray_clock;
 pub mod sharing;
-mod teach;
+mod train;
 mod world;
 
 pub use background::Background;
 pub use light_tree::Receiver;
 pub use lights::{LightSample, LocalLights};
-pub(crate) use teach::TEACHERS;
+pub(crate) use train::TRAINING_VERTICES;
 pub use world::World;
 
 use crate::bsdf::{Bsdf, Hero};
 use crate::bvh::{Hit, Ray, offset_origin};
 use crate::environment::Environment;
+use crate::features::Features;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
 use crate::math::{Frame, balance_heuristic};
@@ -124,8 +125,9 @@ impl PathTracer<'_> {
         cell: Option<u32>,
         scatterer: Scatterer<'v>,
     ) -> Vertex<'v> {
-        let law = self.grid.zip(cell).map_or(WHOLE_MAP, |(grid, cell)| grid.law_of_cell(cell));
-        Vertex { position, cell, law, scatterer }
+        let distribution =
+            self.grid.zip(cell).map_or(WHOLE_MAP, |(grid, cell)| grid.distribution_of_cell(cell));
+        Vertex { position, cell, distribution, scatterer }
     }
 }
 
@@ -134,8 +136,8 @@ struct Vertex<'v> {
     position: Vec3,
     /// Cell of the Light Grid it lies in; `None` without one.
     cell: Option<u32>,
-    /// Tile law of NEE here.
-    law: u32,
+    /// Tile distribution of NEE here.
+    distribution: u32,
     scatterer: Scatterer<'v>,
 }
 
@@ -246,7 +248,7 @@ struct Departure {
     /// Density in solid angle of the ray's direction; infinite if no NEE competes with it.
     pdf_solid_angle: f32,
     receiver: Receiver,
-    law: u32,
+    distribution: u32,
     /// Samples of the map that compete with it.
     map_samples: u32,
 }
@@ -279,8 +281,12 @@ struct Path<'a> {
 impl<'a> Path<'a> {
     fn new(tracer: &'a PathTracer<'a>, ray: Ray, sampler: Sampler) -> Self {
         let receiver = Receiver { position: ray.origin, normal: Vec3::ZERO };
-        let departure =
-            Departure { pdf_solid_angle: f32::INFINITY, receiver, law: WHOLE_MAP, map_samples: 1 };
+        let departure = Departure {
+            pdf_solid_angle: f32::INFINITY,
+            receiver,
+            distribution: WHOLE_MAP,
+            map_samples: 1,
+        };
         Self {
             tracer,
             sampler,
@@ -355,7 +361,7 @@ impl<'a> Path<'a> {
             };
             self.travelled += hit.t;
             let point = self.tracer.world.point(&hit, self.ray.direction);
-            if self.tracer.world.needs.emitters {
+            if self.tracer.world.needs.has(Features::EMITTERS) {
                 self.add_emitted(&hit, &point);
             }
             if self.passes(&point) {
@@ -504,7 +510,7 @@ impl<'a> Path<'a> {
             return;
         };
         let (radiance, tile, in_tile) = environment.radiance_and_tile_pdf(self.ray.direction);
-        let nee = from.map_samples as f32 * grid.probability(from.law, tile) * in_tile;
+        let nee = from.map_samples as f32 * grid.probability(from.distribution, tile) * in_tile;
         self.radiance += self.throughput * radiance * balance_heuristic(from.pdf_solid_angle, nee);
     }
 
@@ -532,7 +538,7 @@ impl<'a> Path<'a> {
 
     fn light_of_map(&mut self, vertex: &Vertex<'_>, grid: &LightGrid) -> Option<Arriving> {
         let bits = self.sampler.next_pair_bits();
-        let choice = grid.sample(vertex.law, bits);
+        let choice = grid.sample(vertex.distribution, bits);
         self.expect_count(vertex, choice.tile);
         let u = [choice.remainder, bits[1]];
         let sample = self.tracer.environment.sample_in_tile(choice.tile, u)?;
@@ -649,7 +655,7 @@ impl<'a> Path<'a> {
         self.departure = Departure {
             pdf_solid_angle,
             receiver: vertex.receiver(),
-            law: vertex.law,
+            distribution: vertex.distribution,
             map_samples: self.map_samples,
         };
         self.map_samples = 1;

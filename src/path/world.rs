@@ -7,6 +7,7 @@ use super::materials::ReadyMaterial;
 use super::ray_clock::RayClock;
 use crate::bvh::{Bvh, Hit, Ray};
 use crate::environment::Environment;
+use crate::features::Features;
 use crate::huge_pages::on_huge_pages;
 use crate::scene::needs::SceneNeeds;
 use crate::scene::surface::{SurfacePoint, alpha_at};
@@ -58,9 +59,9 @@ impl World {
     /// Nearest surface along a ray. A camera ray passes single-sided surfaces from behind.
     pub fn closest_hit(&self, ray: &Ray, from_camera: bool) -> Option<Hit> {
         let _running = self.clock.as_ref().map(RayClock::start);
-        if from_camera && self.needs.single_sided {
+        if from_camera && self.needs.has(Features::SINGLE_SIDED) {
             self.bvh.closest_hit(ray, |hit| self.faces(hit, ray) && self.is_covered(hit))
-        } else if self.needs.alpha_mask {
+        } else if self.needs.has(Features::ALPHA_MASK) {
             self.bvh.closest_hit(ray, |hit| self.is_covered(hit))
         } else {
             self.bvh.closest_hit(ray, |_| true)

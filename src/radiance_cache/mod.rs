@@ -4,7 +4,7 @@
 //! fixed size (Binder, Fricke, Keller, *Massively Parallel Path Space Filtering*, 2019). Cells grow with
 //! the distance from the camera, so that their number is bounded. Each holds the mean radiance that
 //! paths have brought back to it, over the mean albedo: textures are put back where it is read. What
-//! few paths have taught leans on a cell four times as large.
+//! few paths have trained leans on a cell four times as large.
 //!
 //! Sums are integers: they do not depend on the order of the paths. A [`RadianceCache`] is read while
 //! the [`RadianceSums`] that it was made of go on.

@@ -19,8 +19,8 @@ use crate::sampler::Sampler;
 /// Seed offset that keeps learning's random numbers apart from rendering's.
 const LEARNING_SEED: u32 = 0x6c65_6172;
 
-/// The same for teaching the radiance cache.
-const TEACHING_SEED: u32 = 0x7465_6163;
+/// The same for training the radiance cache.
+const TRAINING_SEED: u32 = 0x7465_6163;
 
 /// Learning paths one task traces between two looks at `cancel`.
 const PATHS_PER_TASK: u64 = 512;
@@ -29,7 +29,9 @@ const PATHS_PER_TASK: u64 = 512;
 /// what cells there are, then doubling, as far as the counters allow in one pass.
 pub(super) fn learning_range(view: &View, pass: u32) -> Range<u64> {
     let total = view.learning_paths;
-    let tries = view.law_options().map_or(1, |laws| u64::from(laws.tries_per_vertex.max(1)));
+    let tries = view
+        .distribution_options()
+        .map_or(1, |distributions| u64::from(distributions.tries_per_vertex.max(1)));
     let longest = (most_paths_per_pass(view) / tries).max(1);
     let mut start = 0;
     let mut length = total.div_ceil(64).min(longest);
@@ -54,9 +56,9 @@ pub(super) fn learn(
     })
 }
 
-/// Traces the teaching paths in `paths`, all of them, and adds what they find; returns the number of
+/// Traces the training paths in `paths`, all of them, and adds what they find; returns the number of
 /// rays.
-pub(super) fn teach(
+pub(super) fn train(
     tracer: &PathTracer<'_>,
     rays: &CameraRays,
     view: &View,
@@ -64,8 +66,8 @@ pub(super) fn teach(
     sums: &RadianceSums,
 ) -> u64 {
     in_tasks(paths, &AtomicBool::new(false), |path| {
-        let (ray, sampler) = anywhere(rays, view, TEACHING_SEED, path);
-        tracer.teach(ray, sampler, sums)
+        let (ray, sampler) = anywhere(rays, view, TRAINING_SEED, path);
+        tracer.train(ray, sampler, sums)
     })
 }
 

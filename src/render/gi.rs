@@ -1,4 +1,4 @@
-//! How light that has met several surfaces is found, and what the radiance cache is taught when.
+//! How light that has met several surfaces is found, and what the radiance cache is trained when.
 
 use std::ops::Range;
 
@@ -23,12 +23,12 @@ pub enum Gi {
     Cached,
 }
 
-/// One teaching path for this many paths rendered; it takes about twice as long as one of them. With
+/// One training path for this many paths rendered; it takes about twice as long as one of them. With
 /// twice as many, means of 8x8 pixels are better for their time by day, pixels worse.
-const TEACHING_SHARE: u64 = 8;
-/// Paths that find out how bright it is about where, before others teach.
+const TRAINING_SHARE: u64 = 8;
+/// Paths that find out how bright it is about where, before others train.
 const PILOT_PATHS: u64 = 1 << 12;
-/// Fewest paths that teach.
+/// Fewest paths that train.
 const LEAST_PATHS: u64 = 1 << 14;
 /// Paths that the CPU traces between two looks at whether to stop.
 pub(super) const PATHS_AT_A_TIME: u64 = 1 << 12;
@@ -37,17 +37,17 @@ pub(super) const PATHS_AT_A_TIME: u64 = 1 << 12;
 const EDGE: f32 = 0.025;
 
 /// A radiance cache in the making. It outlives the picture, for it lies in the world.
-pub(crate) struct Lessons {
+pub(crate) struct CacheTraining {
     sums: RadianceSums,
-    /// Paths that have taught, and that are to before the next pass.
+    /// Paths that have trained, and that are to before the next pass.
     paths: u64,
     wanted: u64,
-    /// Until others have taught, what a few have found.
+    /// Until others have trained, what a few have found.
     cache: Option<RadianceCache>,
     brightest: f32,
 }
 
-impl Lessons {
+impl CacheTraining {
     /// `None` if paths are followed to their end.
     pub(super) fn new(
         world: &World,
@@ -69,11 +69,11 @@ impl Lessons {
         Some(Self { sums, paths: 0, wanted: 0, cache: None, brightest })
     }
 
-    /// Decides how many paths are to have taught before the next pass, where each pixel has so many
+    /// Decides how many paths are to have trained before the next pass, where each pixel has so many
     /// samples: all there are double each time. What was begun is brought to its end first.
     pub(super) fn begin(&mut self, view: &View, samples: u32) {
         let pixels = u64::from(view.width) * u64::from(view.height);
-        let wanted = pixels * (u64::from(samples) + 1) / TEACHING_SHARE;
+        let wanted = pixels * (u64::from(samples) + 1) / TRAINING_SHARE;
         let wanted = wanted.clamp(LEAST_PATHS, MOST_PATHS);
         // Where passes end between powers of two is a matter of time.
         let is_time = samples == 0 || samples.is_power_of_two();
@@ -82,7 +82,7 @@ impl Lessons {
         }
     }
 
-    /// Paths that are to teach next; `None` if enough have.
+    /// Paths that are to train next; `None` if enough have.
     pub(super) fn next(&self) -> Option<Range<u64>> {
         let paths = self.paths..self.end();
         (!paths.is_empty()).then_some(paths)
@@ -97,7 +97,7 @@ impl Lessons {
         &self.sums
     }
 
-    /// Takes note that paths up to this one have taught. After the last of them there is a new cache; if
+    /// Takes note that paths up to this one have trained. After the last of them there is a new cache; if
     /// the table has no room for so many cells, they begin anew with larger ones.
     pub(super) fn advance(&mut self, paths: u64) {
         self.paths = paths;
@@ -137,14 +137,14 @@ pub(super) mod tests {
 
     use super::*;
     use crate::environment::{EnvironmentOptions, sky};
-    use crate::light_grid::{LawOptions, LightGrid};
+    use crate::light_grid::{DistributionOptions, LightGrid};
     use crate::path::PathLimits;
     use crate::render::filter::PixelFilter;
     use crate::render::{Sampling, Sharing, cpu};
     use crate::scene::builtin;
 
-    pub(in crate::render) fn view(world: &World, recording: LawOptions) -> View {
-        let talk = recording == LawOptions::TALK;
+    pub(in crate::render) fn view(world: &World, recording: DistributionOptions) -> View {
+        let talk = recording == DistributionOptions::TALK;
         View {
             filter: PixelFilter::Box,
             sampling: if talk { Sampling::Talk } else { Sampling::Adaptive },
@@ -152,7 +152,7 @@ pub(super) mod tests {
             seed: 5,
             sharing: Sharing::Off,
             learning_paths: 1 << 13,
-            laws: recording,
+            distributions: recording,
             ..View::new(world.scene.cameras[0].clone(), [64, 36])
         }
     }
@@ -162,17 +162,18 @@ pub(super) mod tests {
         let map = sky::build("overcast", 128, 64).expect("a sky");
         let environment =
             Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
-        let view = View { gi: Gi::Cached, ..view(&world, LawOptions::ADAPTIVE) };
+        let view = View { gi: Gi::Cached, ..view(&world, DistributionOptions::ADAPTIVE) };
         (world, environment, view)
     }
 
     #[test]
-    fn error_falls_as_paths_teach() {
+    fn error_falls_as_paths_train() {
         let (world, environment, view) = office();
         let rays = view.rays();
-        let laws = LightGrid::whole_map(environment.tile_energies());
-        let tracer = view.tracer(&world, &environment, laws.as_ref());
-        let lessons = Lessons::new(&world, &environment, &view, &rays).expect("there is light");
+        let distributions = LightGrid::whole_map(environment.tile_energies());
+        let tracer = view.tracer(&world, &environment, distributions.as_ref());
+        let training =
+            CacheTraining::new(&world, &environment, &view, &rays).expect("there is light");
         let places = (0..900).filter_map(|i| {
             let at = Vec2::new((i % 30) as f32 * 2.1, (i / 30) as f32 * 1.2);
             let ray = rays.ray(at, Vec2::ZERO);
@@ -184,9 +185,9 @@ pub(super) mod tests {
         let mut known: Vec<Vec<f32>> = Vec::new();
         let mut start = 0;
         for end in [1 << 12, 1 << 17, 1 << 20] {
-            cpu::teach(&tracer, &rays, &view, start..end, lessons.sums());
+            cpu::train(&tracer, &rays, &view, start..end, training.sums());
             start = end;
-            let cache = lessons.sums().cache().expect("there is room");
+            let cache = training.sums().cache().expect("there is room");
             let radiance = |(position, normal): &(Vec3, Vec3)| {
                 crate::color::luminance(cache.radiance_over_albedo(*position, *normal))
             };
@@ -207,24 +208,25 @@ pub(super) mod tests {
     fn cells_grow_where_there_are_too_many() {
         let (world, environment, view) = office();
         let rays = view.rays();
-        let mut lessons = Lessons::new(&world, &environment, &view, &rays).expect("there is light");
-        let edge = lessons.sums.cells().edge;
-        let cells = CacheCells { edge: edge / 64.0, ..*lessons.sums.cells() };
-        lessons.sums = RadianceSums::new(cells, 1.0);
-        lessons.begin(&view, 0);
+        let mut training =
+            CacheTraining::new(&world, &environment, &view, &rays).expect("there is light");
+        let edge = training.sums.cells().edge;
+        let cells = CacheCells { edge: edge / 64.0, ..*training.sums.cells() };
+        training.sums = RadianceSums::new(cells, 1.0);
+        training.begin(&view, 0);
         let mut places = 0;
-        while let Some(range) = lessons.next() {
+        while let Some(range) = training.next() {
             // In a square so large that the smallest cells do not suffice for it.
             for place in 4 * range.start..4 * range.end {
                 let [x, z] = [place % 256, place / 256].map(|at| at as f32 * 0.02 * edge);
-                let sums = lessons.sums();
+                let sums = training.sums();
                 sums.add(sums.cells().center + Vec3::new(x, 0.0, z), Vec3::Y, Vec3::ONE, Vec3::ONE);
                 places += 1;
             }
-            lessons.advance(range.end);
+            training.advance(range.end);
             assert!(places < 1_000_000, "it comes to an end");
         }
-        let cells = lessons.cache().expect("it was taught").cells();
+        let cells = training.cache().expect("it was trained").cells();
         assert!(cells.edge > edge / 64.0, "{} for {edge}", cells.edge);
     }
 }

@@ -72,9 +72,9 @@ impl Gpu {
 }
 
 /// A scene and a map on a device.
-pub enum Stage {}
+pub enum UploadedScene {}
 
-impl Stage {
+impl UploadedScene {
     /// Uploads both.
     ///
     /// # Errors
@@ -117,14 +117,14 @@ pub(crate) enum Renderer {}
 
 impl Renderer {
     pub(crate) fn new(
-        stage: &Stage,
+        uploaded: &UploadedScene,
         _: &World,
         _: &Environment,
         _: &View,
         _: &CameraRays,
         _: Option<&Film>,
     ) -> Result<Self> {
-        match *stage {}
+        match *uploaded {}
     }
 
     pub(super) fn set_film(&mut self, _: &Film) -> Result<()> {
@@ -143,7 +143,7 @@ impl Renderer {
         match *self {}
     }
 
-    pub(crate) fn teach(
+    pub(crate) fn train(
         &mut self,
         _: Range<u64>,
         _: &RadianceSums,

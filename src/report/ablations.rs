@@ -2,7 +2,7 @@
 
 use super::plan::{Effort, Method, Plan, Row, Settings};
 use crate::environment::TableKind;
-use crate::light_grid::{LawOptions, Recording};
+use crate::light_grid::{DistributionOptions, Recording};
 use crate::render::{Gi, Sampling, Sharing};
 use crate::sampler::Points;
 
@@ -62,7 +62,7 @@ fn variants() -> Vec<Method> {
     };
     modes(&mut add);
     steps(&mut add);
-    laws(&mut add);
+    distributions(&mut add);
     sizes(&mut add);
     samples_and_tables(&mut add);
     found
@@ -78,47 +78,52 @@ fn modes(add: &mut Add<'_>) {
 
 /// From counted visibility, without anything, to what the design study left unmeasured.
 fn steps(add: &mut Add<'_>) {
-    const VISIBLE: LawOptions = LawOptions { recording: Recording::Visible, ..LawOptions::TALK };
-    const COSINE: LawOptions =
-        LawOptions { recording: Recording::VisibleCosine, ..LawOptions::TALK };
+    const VISIBLE: DistributionOptions =
+        DistributionOptions { recording: Recording::Visible, ..DistributionOptions::TALK };
+    const COSINE: DistributionOptions =
+        DistributionOptions { recording: Recording::VisibleCosine, ..DistributionOptions::TALK };
     let group = "step by step, neither pooling nor powers";
-    add(group, "talk + faces", &|s| s.laws = LawOptions { faces: true, ..LawOptions::TALK });
-    add(group, "visibility", &|s| s.laws = VISIBLE);
-    add(group, "visibility + faces", &|s| s.laws = LawOptions { faces: true, ..VISIBLE });
-    add(group, "visibility + cosine", &|s| s.laws = COSINE);
+    add(group, "talk + faces", &|s| {
+        s.distributions = DistributionOptions { faces: true, ..DistributionOptions::TALK }
+    });
+    add(group, "visibility", &|s| s.distributions = VISIBLE);
+    add(group, "visibility + faces", &|s| {
+        s.distributions = DistributionOptions { faces: true, ..VISIBLE }
+    });
+    add(group, "visibility + cosine", &|s| s.distributions = COSINE);
     add(group, "visibility + faces + cosine", &|s| {
-        s.laws = LawOptions { faces: true, ..COSINE };
+        s.distributions = DistributionOptions { faces: true, ..COSINE };
     });
     add(group, "visibility + faces + cosine + compensation", &|s| {
-        s.laws = LawOptions { faces: true, compensation: 0.5, ..COSINE };
+        s.distributions = DistributionOptions { faces: true, compensation: 0.5, ..COSINE };
     });
 }
 
-fn laws(add: &mut Add<'_>) {
+fn distributions(add: &mut Add<'_>) {
     let group = "faces and cosine";
-    add(group, "no faces (nor compensation)", &|s| s.laws.faces = false);
-    add(group, "no cosine", &|s| s.laws.recording = Recording::Visible);
+    add(group, "no faces (nor compensation)", &|s| s.distributions.faces = false);
+    add(group, "no cosine", &|s| s.distributions.recording = Recording::Visible);
     let group = "weights";
-    add(group, "mean visibility (power 1)", &|s| s.laws.ratio_exponent = 1.0);
-    add(group, "root of mean visibility (power 1/2)", &|s| s.laws.ratio_exponent = 0.5);
+    add(group, "mean visibility (power 1)", &|s| s.distributions.ratio_exponent = 1.0);
+    add(group, "root of mean visibility (power 1/2)", &|s| s.distributions.ratio_exponent = 0.5);
     add(group, "root of second moment", &|s| {
-        s.laws.recording = Recording::VisibleCosineSquared;
-        s.laws.ratio_exponent = 0.5;
+        s.distributions.recording = Recording::VisibleCosineSquared;
+        s.distributions.ratio_exponent = 0.5;
     });
     let group = "pooling, tries";
     for tries in [0.0, 4.0, 64.0] {
-        add(group, &format!("pooling {tries}"), &|s| s.laws.pooling_tries = tries);
+        add(group, &format!("pooling {tries}"), &|s| s.distributions.pooling_tries = tries);
     }
     let group = "MIS compensation";
     for share in [0.0, 0.25, 1.0] {
-        add(group, &format!("compensation {share}"), &|s| s.laws.compensation = share);
+        add(group, &format!("compensation {share}"), &|s| s.distributions.compensation = share);
     }
     let group = "defensive share of the whole map";
     for share in [0, 4, 64, 128] {
-        add(group, &format!("whole map {share}/256"), &|s| s.laws.whole_map_share = share);
+        add(group, &format!("whole map {share}/256"), &|s| s.distributions.whole_map_share = share);
     }
     let group = "learning from rendered paths";
-    add(group, "traced paths only", &|s| s.laws.while_rendering = false);
+    add(group, "traced paths only", &|s| s.distributions.while_rendering = false);
 }
 
 fn sizes(add: &mut Add<'_>) {
@@ -136,7 +141,7 @@ fn sizes(add: &mut Add<'_>) {
     }
     let group = "tries per vertex of a learning path";
     for tries in [1, 4, 16] {
-        add(group, &format!("tries {tries}"), &|s| s.laws.tries_per_vertex = tries);
+        add(group, &format!("tries {tries}"), &|s| s.distributions.tries_per_vertex = tries);
     }
 }
 

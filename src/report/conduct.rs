@@ -11,8 +11,8 @@ use super::machine::{Machine, OpenDevice};
 use super::measure::{Run, measure};
 use super::pages::{duration, row_sentence};
 use super::plan::{Device, Method, Plan, Row};
+use super::prepared_row::PreparedRow;
 use super::reference::{LEAST_PICTURES, Reference, read_reference};
-use super::stage::Stage;
 use super::store::Store;
 use super::summary::{DeviceReport, Pictures, Report, RowReport, summarise};
 use crate::digest::Digest;
@@ -94,7 +94,7 @@ const PAGES_EVERY: Duration = Duration::from_secs(30);
 
 /// What is known of a row while it is measured.
 struct Work {
-    stage: Stage,
+    prepared: PreparedRow,
     reference: Option<Reference>,
     /// Runs by device and method, with the names they are kept under.
     runs: Vec<Vec<Vec<(String, Run)>>>,
@@ -111,12 +111,12 @@ impl Conductor<'_> {
 
     fn row(&mut self, row: &Row) -> Result<()> {
         self.say(&format!("{}: loading", row.title), 0.0);
-        let stage = Stage::load(row, self.plan)?;
+        let prepared = PreparedRow::load(row, self.plan)?;
         let report = RowReport {
             row: row.clone(),
-            notices: stage.notices.iter().map(str::to_owned).collect(),
-            triangles: stage.world.scene.triangles.len(),
-            map_size: stage.map_size,
+            notices: prepared.notices.iter().map(str::to_owned).collect(),
+            triangles: prepared.world.scene.triangles.len(),
+            map_size: prepared.map_size,
             reference: None,
             devices: Vec::new(),
             shares: Vec::new(),
@@ -125,17 +125,17 @@ impl Conductor<'_> {
         };
         self.report.rows.push(report);
         let reference = self.file_reference.is_none().then(|| {
-            Reference::open(self.store.references(), stage.digest, self.plan.effort.frame.size)
+            Reference::open(self.store.references(), prepared.digest, self.plan.effort.frame.size)
         });
         let mut work = Work {
             runs: vec![vec![Vec::new(); self.plan.methods.len()]; self.devices.len()],
             refusals: vec![None; self.devices.len()],
             is_ready: vec![false; self.plan.methods.len()],
-            stage,
+            prepared,
             reference,
         };
         for device in 0..self.devices.len() {
-            let uploaded = work.stage.upload(&self.devices[device]);
+            let uploaded = work.prepared.upload(&self.devices[device]);
             self.can(&mut work, device, &uploaded);
         }
         if work.refusals.iter().all(Option::is_some) {
@@ -187,7 +187,7 @@ impl Conductor<'_> {
         if !self.make_ready(work, device, method) {
             return Ok(true);
         }
-        let place = work.stage.place(plan, &self.devices[device], settings);
+        let place = work.prepared.place(plan, &self.devices[device], settings);
         let seconds = plan.effort.seconds;
         let cancel = self.options.cancel;
         let Some(mut done) = measure(&place, (name, settings), seed, seconds, cancel)? else {
@@ -195,7 +195,7 @@ impl Conductor<'_> {
         };
         if seed == 0 && self.devices[device].gpu.is_none() {
             let grid = done.grid.take();
-            done.run.nanoseconds_per_ray = work.stage.time_rays(
+            done.run.nanoseconds_per_ray = work.prepared.time_rays(
                 plan,
                 &self.devices[device],
                 settings,
@@ -225,7 +225,7 @@ impl Conductor<'_> {
             return true;
         }
         let settings = &self.plan.methods[method].settings;
-        let place = work.stage.place(self.plan, &self.devices[device], settings);
+        let place = work.prepared.place(self.plan, &self.devices[device], settings);
         let ready = place.warm_up(settings);
         work.is_ready[method] = ready.is_ok();
         self.can(work, device, &ready)
@@ -234,7 +234,7 @@ impl Conductor<'_> {
     /// Notes why a device cannot do a row, if it cannot; whether it can.
     fn can(&self, work: &mut Work, device: usize, outcome: &Result<()>) -> bool {
         if let Err(reason) = outcome {
-            (self.options.tell)(format!("{}: {reason}", work.stage.title));
+            (self.options.tell)(format!("{}: {reason}", work.prepared.title));
             work.refusals[device] = Some(format!("not measured: {reason}"));
         }
         outcome.is_ok()
@@ -314,13 +314,13 @@ impl Conductor<'_> {
     /// Name of a run: readable, and a digest of all that it depends on.
     fn key(&self, work: &Work, device: usize, method: &Method, seed: u32) -> String {
         let device = &self.devices[device];
-        let digest = self.machine_digest.debug(&work.stage.digest).debug(&(
+        let digest = self.machine_digest.debug(&work.prepared.digest).debug(&(
             &method.settings,
             &device.name,
             self.plan.effort.seconds,
             seed,
         ));
-        let readable = format!("{}-{}-{}", work.stage.title, device.device.title(), method.name);
+        let readable = format!("{}-{}-{}", work.prepared.title, device.device.title(), method.name);
         let readable: String = readable
             .chars()
             .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' })
@@ -341,7 +341,7 @@ impl Conductor<'_> {
         self.say(
             &format!(
                 "{}: {} on {}, run {} of {}",
-                work.stage.title,
+                work.prepared.title,
                 plan.methods[method].name,
                 self.devices[device].device.title(),
                 seed + 1,

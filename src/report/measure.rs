@@ -25,7 +25,7 @@ pub(super) struct Place<'a> {
     /// Seconds that the map's importance table took.
     pub(super) table_seconds: f64,
     /// Scene and map on the GPU, if that is the device.
-    pub(super) upload: Option<&'a gpu::Stage>,
+    pub(super) upload: Option<&'a gpu::UploadedScene>,
 }
 
 impl<'a> Place<'a> {

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::reference::LEAST_PICTURES;
 use crate::environment::{EnvironmentOptions, TableKind};
-use crate::light_grid::LawOptions;
+use crate::light_grid::DistributionOptions;
 use crate::path::PathLimits;
 use crate::render::filter::PixelFilter;
 use crate::render::{Gi, Sampling, Sharing, View};
@@ -38,8 +38,8 @@ impl Device {
 pub struct Settings {
     /// How the map is sampled.
     pub sampling: Sampling,
-    /// How counters become laws in [`Sampling::Adaptive`].
-    pub laws: LawOptions,
+    /// How counters become distributions in [`Sampling::Adaptive`].
+    pub distributions: DistributionOptions,
     /// Importance table.
     pub table: TableKind,
     /// Columns and rows of tiles.
@@ -64,7 +64,7 @@ impl Settings {
         let environment = EnvironmentOptions::default();
         Self {
             sampling,
-            laws: LawOptions::ADAPTIVE,
+            distributions: DistributionOptions::ADAPTIVE,
             table: environment.table,
             tiles: (environment.tile_columns, environment.tile_rows),
             grid_columns: 64,
@@ -101,7 +101,7 @@ impl Settings {
             learning_paths: self.learning_paths.unwrap_or_else(|| {
                 View::suitable_learning_paths(self.sampling, [width, height], None)
             }),
-            laws: self.laws,
+            distributions: self.distributions,
             // For the denoiser.
             layers: true,
             ..View::new(camera.clone(), [width, height])

@@ -84,7 +84,7 @@ pub(super) fn shares(
     Ok(Some(Shares { method, pictures, samples, total, filter, first_vertex, later_vertices }))
 }
 
-/// Means per pixel with all bounces, with one and with none, from the same random numbers and laws.
+/// Means per pixel with all bounces, with one and with none, from the same random numbers and distributions.
 fn three_depths(
     place: &Place<'_>,
     settings: &Settings,
@@ -93,7 +93,7 @@ fn three_depths(
     cancel: &AtomicBool,
 ) -> Result<Option<[Vec<[f64; 3]>; 3]>> {
     let Some(mut session) = place.learned(settings, seed, cancel)? else { return Ok(None) };
-    // Laws as they are after that many samples.
+    // Distributions as they are after that many samples.
     if finish(&mut session, samples, cancel)?.is_none() {
         return Ok(None);
     }

@@ -214,7 +214,7 @@ pub fn bootstrap(counts: [usize; 2], statistic: impl Fn([&[usize]; 2]) -> f64) -
 fn expanded_tail(count: usize) -> f64 {
     let student = STUDENT_975.get(count - 2).copied().unwrap_or(1.96);
     let z = student * (count as f64 / (count as f64 - 1.0)).sqrt();
-    0.5 * crate::metrics::statistics::two_sided_p(z)
+    0.5 * crate::metrics::hypothesis::two_sided_p(z)
 }
 
 /// 97.5 % quantiles of Student's distribution with 1, 2, ... degrees of freedom (any table).

@@ -158,7 +158,7 @@ pub struct MethodReport {
 pub struct Costs {
     /// Seconds of tracing learning paths.
     pub learn_seconds: f64,
-    /// Seconds of building the map's table and the laws.
+    /// Seconds of building the map's table and the distributions.
     pub table_seconds: f64,
     /// Seconds of rendering that went into rays; unknown on a GPU.
     pub ray_seconds: Option<f64>,
@@ -170,7 +170,7 @@ pub struct Costs {
     pub samples: f64,
     /// Camera paths learned from.
     pub learning_paths: u64,
-    /// Cells with a law of their own.
+    /// Cells with a distribution of their own.
     pub learned_cells: f64,
 }
 
@@ -286,8 +286,8 @@ fn costs(runs: &[Run], threads: usize) -> Costs {
     let render_seconds = mean(&|r| r.figures.render_seconds);
     let rays = mean(&|r| r.figures.rays as f64);
     Costs {
-        learn_seconds: mean(&|r| r.figures.learning_seconds - r.figures.law_seconds),
-        table_seconds: mean(&|r| r.table_seconds + r.figures.law_seconds),
+        learn_seconds: mean(&|r| r.figures.learning_seconds - r.figures.distribution_seconds),
+        table_seconds: mean(&|r| r.table_seconds + r.figures.distribution_seconds),
         ray_seconds: nanoseconds.map(|ns| (ns * 1e-9 * rays / threads as f64).min(render_seconds)),
         render_seconds,
         rays_per_sample: rays / mean(&|r| r.figures.samples as f64).max(1.0),

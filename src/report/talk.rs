@@ -51,7 +51,7 @@ pub fn plan(effort: Effort, command: String) -> Plan {
                 .to_owned(),
             "The talk was measured in a renderer whose paths end in a light cache after their first \
              bounce. The methods called cached do the like: their paths end at the second vertex, in a \
-             cache that other paths have taught, which costs a bias. With --bounces 1 the first vertex \
+             cache that other paths have trained, which costs a bias. With --bounces 1 the first vertex \
              alone is measured."
                 .to_owned(),
         ],

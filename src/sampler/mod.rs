@@ -16,15 +16,16 @@ pub struct Sampler {
 }
 
 /// The random numbers of a picture from one sample on: a scramble of their own for each generation of
-/// tile laws.
+/// tile distributions.
 ///
-/// Laws are made of what a pixel's own samples have seen, too, and the points of one scrambled sequence
-/// avoid each other: a sample whose law knows its predecessors is not uniform given that law. Laws of
-/// generation `g` are made of samples of earlier generations alone, so with a fresh scramble for each
-/// generation an estimate is independent of the law it is made by, hence unbiased.
+/// Distributions are made of what a pixel's own samples have seen, too, and the points of one scrambled
+/// sequence avoid each other: a sample whose distribution knows its predecessors is not uniform given that
+/// distribution. Distributions of generation `g` are made of samples of earlier generations alone, so with a
+/// fresh scramble for each generation an estimate is independent of the distribution it is made by, hence
+/// unbiased.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Sequence {
-    /// Generation of the laws in use; 0 without any.
+    /// Generation of the distributions in use; 0 without any.
     pub(crate) generation: u32,
     /// First sample of a pixel that is one of this sequence's points.
     pub(crate) first_sample: u32,

@@ -1,60 +1,78 @@
 //! What a scene needs of the renderer, asked once.
 
+use std::collections::BTreeMap;
+
 use glam::Vec3;
-use serde::Serialize;
 
 use super::{AlphaMode, Material, Scene};
+use crate::features::Features;
 
-/// Features a scene uses; what is `false` here is neither evaluated nor, on a GPU, compiled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+/// What a scene uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SceneNeeds {
-    /// Any texture at all.
-    pub textures: bool,
+    /// Features of scenes alone.
+    pub features: Features,
     /// Bit `i`: some material has the `i`-th of [`Material::textures`].
     pub texture_slots: u32,
-    /// A second set of texture coordinates.
-    pub second_uv_set: bool,
-    /// Normal maps, hence tangents.
-    pub normal_maps: bool,
-    /// Vertex colours.
-    pub vertex_colors: bool,
-    /// Surfaces cut out by an alpha threshold.
-    pub alpha_mask: bool,
-    /// Surfaces with partial opacity.
-    pub alpha_blend: bool,
-    /// Single-sided surfaces, which camera rays pass from behind.
-    pub single_sided: bool,
-    /// Metals.
-    pub metals: bool,
-    /// Thin-walled transmission.
-    pub thin_transmission: bool,
-    /// Light that enters solid bodies.
-    pub solid_transmission: bool,
-    /// Light that comes through diffusely.
-    pub diffuse_transmission: bool,
-    /// Absorption inside solid bodies.
-    pub absorption: bool,
-    /// A medium between surfaces.
-    pub medium: bool,
-    /// Scattering inside solid bodies.
-    pub scattering_solids: bool,
-    /// Reflections that are wider in one direction.
-    pub anisotropy: bool,
-    /// Sheen.
-    pub sheen: bool,
-    /// Thin films on surfaces.
-    pub iridescence: bool,
-    /// Solids that bend colours differently.
-    pub dispersion: bool,
-    /// Clearcoat.
-    pub clearcoat: bool,
-    /// Unlit surfaces.
-    pub unlit: bool,
-    /// Emissive triangles.
-    pub emitters: bool,
-    /// Point, spot or directional lights.
-    pub punctual_lights: bool,
 }
+
+/// A feature of scenes, what it is called, and what is left out without it, with the reason.
+const WORDS: [(Features, &str, Option<&str>); 22] = [
+    (Features::TEXTURES, "Textures", Some("texture reads: no material has a texture")),
+    (Features::NORMAL_MAPS, "Normal maps", Some("tangent frames: no material has a normal map")),
+    (
+        Features::SECOND_UV_SET,
+        "A second set of texture coordinates",
+        Some("the second set of texture coordinates: no texture uses it"),
+    ),
+    (Features::VERTEX_COLORS, "Vertex colours", Some("vertex colours: no mesh has them")),
+    (Features::ALPHA_MASK, "Alpha tests", Some("alpha tests: no material is masked")),
+    (
+        Features::ALPHA_BLEND,
+        "Opacity along rays",
+        Some("opacity along rays: no material is blended"),
+    ),
+    (Features::SINGLE_SIDED, "Single-sided surfaces", None),
+    (Features::METALS, "Metals", None),
+    (
+        Features::THIN_TRANSMISSION,
+        "Thin glass",
+        Some("thin glass: no material transmits without volume"),
+    ),
+    (
+        Features::SOLID_TRANSMISSION,
+        "Refraction",
+        Some("refraction: no material is a transmitting solid"),
+    ),
+    (
+        Features::DIFFUSE_TRANSMISSION,
+        "Diffuse transmission",
+        Some("diffuse transmission: no material has it"),
+    ),
+    (Features::ABSORPTION, "Absorption", Some("absorption: no solid absorbs")),
+    (Features::FOG, "Fog", Some("fog: the scene has none")),
+    (
+        Features::SCATTERING_SOLIDS,
+        "Scattering inside of solids",
+        Some("scattering inside of solids: none is filled"),
+    ),
+    (Features::ANISOTROPY, "Anisotropy", Some("anisotropy: no material has a direction")),
+    (Features::SHEEN, "Sheen", Some("sheen: no material has it")),
+    (Features::IRIDESCENCE, "Iridescence", Some("iridescence: no material has a film")),
+    (Features::DISPERSION, "Dispersion", Some("dispersion: no solid bends colours differently")),
+    (Features::CLEARCOAT, "Clearcoat", Some("clearcoat: no material is coated")),
+    (Features::UNLIT, "Unlit surfaces", None),
+    (
+        Features::EMITTERS,
+        "Emissive triangles",
+        Some("sampling of emissive triangles: nothing emits"),
+    ),
+    (
+        Features::PUNCTUAL_LIGHTS,
+        "Point, spot or directional lights",
+        Some("punctual lights: the scene has none"),
+    ),
+];
 
 impl SceneNeeds {
     /// Looks at every material that a triangle uses.
@@ -63,12 +81,10 @@ impl SceneNeeds {
         for &material in &scene.triangle_materials {
             used[material as usize] = true;
         }
-        let mut needs = Self {
-            vertex_colors: !scene.colors.is_empty(),
-            punctual_lights: !scene.lights.is_empty(),
-            medium: scene.medium.is_some(),
-            ..Self::default()
-        };
+        let mut needs = Self::default();
+        needs.features.set(Features::VERTEX_COLORS, !scene.colors.is_empty());
+        needs.features.set(Features::PUNCTUAL_LIGHTS, !scene.lights.is_empty());
+        needs.features.set(Features::FOG, scene.medium.is_some());
         for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
             needs.add(material);
         }
@@ -76,66 +92,65 @@ impl SceneNeeds {
     }
 
     fn add(&mut self, m: &Material) {
+        let Self { features, texture_slots } = self;
         for (slot, texture) in m.textures().into_iter().enumerate() {
             if let Some(texture) = texture {
-                self.textures = true;
-                self.texture_slots |= 1 << slot;
-                self.second_uv_set |= texture.uv_set == 1;
+                *features |= Features::TEXTURES;
+                *features |= Features::SECOND_UV_SET.only_if(texture.uv_set == 1);
+                *texture_slots |= 1 << slot;
             }
         }
-        self.normal_maps |= m.normal_texture.is_some() || m.clearcoat_normal_texture.is_some();
-        self.alpha_mask |= matches!(m.alpha_mode, AlphaMode::Mask { .. });
-        self.alpha_blend |= m.alpha_mode == AlphaMode::Blend;
-        self.single_sided |= !m.double_sided;
-        self.metals |= m.metallic > 0.0;
-        self.thin_transmission |= m.transmission > 0.0 && m.thickness == 0.0;
-        self.diffuse_transmission |= m.diffuse_transmission > 0.0;
+        let has_normal_map = m.normal_texture.is_some() || m.clearcoat_normal_texture.is_some();
         let has_inside =
             (m.transmission > 0.0 || m.diffuse_transmission > 0.0) && m.thickness > 0.0;
-        self.solid_transmission |= has_inside;
-        self.absorption |= has_inside && m.attenuation_distance.is_finite();
-        self.scattering_solids |= has_inside && m.scattering != Vec3::ZERO;
-        self.anisotropy |= m.anisotropy > 0.0;
-        self.sheen |= m.sheen_color != Vec3::ZERO;
-        self.iridescence |= m.iridescence > 0.0;
-        self.dispersion |= m.dispersion > 0.0 && m.transmission > 0.0 && m.thickness > 0.0;
-        self.clearcoat |= m.clearcoat > 0.0;
-        self.unlit |= m.unlit;
-        self.emitters |= is_emitter(m);
+        for (feature, is_needed) in [
+            (Features::NORMAL_MAPS, has_normal_map),
+            (Features::ALPHA_MASK, matches!(m.alpha_mode, AlphaMode::Mask { .. })),
+            (Features::ALPHA_BLEND, m.alpha_mode == AlphaMode::Blend),
+            (Features::SINGLE_SIDED, !m.double_sided),
+            (Features::METALS, m.metallic > 0.0),
+            (Features::THIN_TRANSMISSION, m.transmission > 0.0 && m.thickness == 0.0),
+            (Features::DIFFUSE_TRANSMISSION, m.diffuse_transmission > 0.0),
+            (Features::SOLID_TRANSMISSION, has_inside),
+            (Features::ABSORPTION, has_inside && m.attenuation_distance.is_finite()),
+            (Features::SCATTERING_SOLIDS, has_inside && m.scattering != Vec3::ZERO),
+            (Features::ANISOTROPY, m.anisotropy > 0.0),
+            (Features::SHEEN, m.sheen_color != Vec3::ZERO),
+            (Features::IRIDESCENCE, m.iridescence > 0.0),
+            (Features::DISPERSION, m.dispersion > 0.0 && m.transmission > 0.0 && m.thickness > 0.0),
+            (Features::CLEARCOAT, m.clearcoat > 0.0),
+            (Features::UNLIT, m.unlit),
+            (Features::EMITTERS, is_emitter(m)),
+        ] {
+            *features |= feature.only_if(is_needed);
+        }
+    }
+
+    /// Whether all of these are needed.
+    pub fn has(&self, features: Features) -> bool {
+        self.features.contains(features)
     }
 
     /// Whether a ray may pass a surface without being scattered.
     pub fn pass_through(&self) -> bool {
-        self.alpha_mask || self.alpha_blend || self.thin_transmission
+        let passed = Features::ALPHA_MASK | Features::ALPHA_BLEND | Features::THIN_TRANSMISSION;
+        self.features.intersects(passed)
+    }
+
+    /// What the scene uses, in words.
+    pub fn used(&self) -> impl Iterator<Item = &'static str> {
+        WORDS.iter().filter(|(feature, ..)| self.has(*feature)).map(|(_, name, _)| *name)
     }
 
     /// What the renderer leaves out, each with the reason.
-    pub fn left_out(&self) -> Vec<String> {
-        [
-            (self.textures, "texture reads: no material has a texture"),
-            (self.normal_maps, "tangent frames: no material has a normal map"),
-            (self.second_uv_set, "the second set of texture coordinates: no texture uses it"),
-            (self.vertex_colors, "vertex colours: no mesh has them"),
-            (self.alpha_mask, "alpha tests: no material is masked"),
-            (self.alpha_blend, "opacity along rays: no material is blended"),
-            (self.thin_transmission, "thin glass: no material transmits without volume"),
-            (self.solid_transmission, "refraction: no material is a transmitting solid"),
-            (self.diffuse_transmission, "diffuse transmission: no material has it"),
-            (self.absorption, "absorption: no solid absorbs"),
-            (self.medium, "fog: the scene has none"),
-            (self.scattering_solids, "scattering inside of solids: none is filled"),
-            (self.anisotropy, "anisotropy: no material has a direction"),
-            (self.sheen, "sheen: no material has it"),
-            (self.iridescence, "iridescence: no material has a film"),
-            (self.dispersion, "dispersion: no solid bends colours differently"),
-            (self.clearcoat, "clearcoat: no material is coated"),
-            (self.emitters, "sampling of emissive triangles: nothing emits"),
-            (self.punctual_lights, "punctual lights: the scene has none"),
-        ]
-        .into_iter()
-        .filter(|(needed, _)| !needed)
-        .map(|(_, sentence)| sentence.to_owned())
-        .collect()
+    pub fn left_out(&self) -> impl Iterator<Item = &'static str> {
+        WORDS.iter().filter(|(feature, ..)| !self.has(*feature)).filter_map(|(.., words)| *words)
+    }
+
+    /// Whether each feature of scenes is needed, by name.
+    pub fn by_name(&self) -> BTreeMap<String, bool> {
+        let all = WORDS.iter().fold(Features::empty(), |all, (feature, ..)| all | *feature);
+        all.iter_names().map(|(name, feature)| (name.to_lowercase(), self.has(feature))).collect()
     }
 }
 

@@ -4,7 +4,9 @@ use glam::Vec3;
 
 use super::maps::sun;
 use super::reference::Reference;
-use super::scenes::{Stage, first_texture, glass, lambert, light, mean, render, room, sky, view};
+use super::scenes::{
+    SceneBuilder, first_texture, glass, lambert, light, mean, render, room, sky, view,
+};
 use super::{Case, On, Outcome, Setting};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
@@ -54,7 +56,7 @@ fn against_f64(setting: &Setting) -> Result<Outcome> {
     let mut outcome = Outcome::new();
     for (name, environment) in [("day", sky("day")?), ("sun of 1e5", light(sun(96, 48, 1e5))?)] {
         let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::new(0.0, 0.4, -1.0), 1.2);
-        let world = Stage::default().floor(&lambert(0.5), Vec3::ZERO, 1e4).build();
+        let world = SceneBuilder::default().floor(&lambert(0.5), Vec3::ZERO, 1e4).build();
         let reference = Reference::new(&environment, 0.5);
         let reference = reference.ok_or_else(|| Error::new("the sky is black"))?;
         for (side, samples) in [(setting.count(96, 512), 1), (16, setting.count(256, 4096))] {
@@ -81,8 +83,8 @@ fn against_f64(setting: &Setting) -> Result<Outcome> {
 }
 
 /// The same seed draws the same paths but for rounding; expectations are the same.
-fn against_cpu(setting: &Setting, (stage, camera): (Stage, Camera)) -> Result<Outcome> {
-    let (world, environment) = (stage.build(), sky("day")?);
+fn against_cpu(setting: &Setting, (builder, camera): (SceneBuilder, Camera)) -> Result<Outcome> {
+    let (world, environment) = (builder.build(), sky("day")?);
     let view = View { width: 32, height: 32, ..view(camera, Sampling::Plain, 3) };
     compare(setting, &world, &environment, view)
 }
@@ -110,25 +112,26 @@ fn compare(
 }
 
 /// Spheres of smooth and rough glass on the room's floor.
-fn glasses() -> (Stage, Camera) {
-    let (stage, camera) = room(0.7, 1.0, Vec3::ZERO);
+fn glasses() -> (SceneBuilder, Camera) {
+    let (builder, camera) = room(0.7, 1.0, Vec3::ZERO);
     let smoked = Material {
         attenuation_color: Vec3::new(0.9, 0.5, 0.2),
         attenuation_distance: 0.5,
         ..glass(1.5, 0.0)
     };
-    let stage = stage.sphere(&smoked, Vec3::new(0.2, 0.5, 0.3), 0.4).sphere(
+    let builder = builder.sphere(&smoked, Vec3::new(0.2, 0.5, 0.3), 0.4).sphere(
         &glass(1.5, 0.3),
         Vec3::new(-0.3, 0.4, 0.9),
         0.3,
     );
-    (stage, camera)
+    (builder, camera)
 }
 
 /// A floor with a normal map beside the room's block.
-fn textured() -> (Stage, Camera) {
+fn textured() -> (SceneBuilder, Camera) {
     let mapped =
         Material { normal_texture: first_texture(), metallic: 0.5, roughness: 0.4, ..lambert(0.8) };
-    let stage = Stage::default().floor(&mapped, Vec3::ZERO, 4.0).with_texel([170, 110, 220, 255]);
-    (stage, Camera::look_at(Vec3::new(0.5, 1.5, 1.5), Vec3::ZERO, 0.8))
+    let builder =
+        SceneBuilder::default().floor(&mapped, Vec3::ZERO, 4.0).with_texel([170, 110, 220, 255]);
+    (builder, Camera::look_at(Vec3::new(0.5, 1.5, 1.5), Vec3::ZERO, 0.8))
 }

@@ -12,7 +12,7 @@ use super::scratch::{Finished, Scratch, finish};
 use super::{Case, On, Outcome, Setting};
 use crate::error::{Error, Result};
 use crate::image::{read_map, read_picture};
-use crate::render::gpu::{Gpu, Stage as GpuStage};
+use crate::render::gpu::{Gpu, UploadedScene};
 use crate::render::{Sampling, Session, View};
 use crate::scene::{Camera, gltf};
 
@@ -274,10 +274,10 @@ fn interrupted_twice(setting: &Setting) -> Result<Outcome> {
 fn device_lost(setting: &Setting) -> Result<Outcome> {
     let Some(known) = &setting.gpu else { return Ok(Outcome::skipped("needs --device gpu")) };
     let gpu = Gpu::open(Some(&known.facts().name))?;
-    let (stage, camera) = room(0.7, 1.0, Vec3::ZERO);
-    let (world, environment) = (stage.build(), sky("day")?);
+    let (builder, camera) = room(0.7, 1.0, Vec3::ZERO);
+    let (world, environment) = (builder.build(), sky("day")?);
     let never = AtomicBool::new(false);
-    let on_gpu = GpuStage::new(&gpu, &world, &environment)?;
+    let on_gpu = UploadedScene::new(&gpu, &world, &environment)?;
     let view = view(camera, Sampling::Plain, 2);
     let mut session = Session::on_gpu(&world, &environment, view, &on_gpu)?;
     session.advance(4, &never)?;
@@ -309,16 +309,17 @@ fn out_of_gpu_memory(setting: &Setting) -> Result<Outcome> {
             "the device takes {gibibytes} GiB in one piece: the film in main memory would not fit first"
         )));
     }
-    let world = super::scenes::Stage::default().floor(&lambert(0.5), Vec3::ZERO, 1.0).build();
+    let world =
+        super::scenes::SceneBuilder::default().floor(&lambert(0.5), Vec3::ZERO, 1.0).build();
     let environment = sky("day")?;
-    let stage = GpuStage::new(gpu, &world, &environment)?;
+    let uploaded = UploadedScene::new(gpu, &world, &environment)?;
     let camera = Camera::look_at(Vec3::ONE, Vec3::ZERO, 0.5);
     let small = view(camera, Sampling::Plain, 1);
     let large = View { width: side, height: side, ..small.clone() };
-    let refusal = Session::on_gpu(&world, &environment, large, &stage).err();
+    let refusal = Session::on_gpu(&world, &environment, large, &uploaded).err();
     let refusal = refusal.map(|e| e.to_string()).unwrap_or_default();
     let clear = refusal.contains("MiB") && !refusal.contains('\n');
-    let mut session = Session::on_gpu(&world, &environment, small, &stage)?;
+    let mut session = Session::on_gpu(&world, &environment, small, &uploaded)?;
     session.advance(1, &AtomicBool::new(false))?;
     Ok(Outcome::new()
         .at_least("refused with the numbers", f64::from(u8::from(clear)), 1.0)

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::random::Random;
 use super::scenes::{
-    Mean, SIGMAS, Stage, constant, deviation, difference, lambert, mean, render, room, sealed, sky,
-    view,
+    Mean, SIGMAS, SceneBuilder, constant, deviation, difference, lambert, mean, render, room,
+    sealed, sky, view,
 };
 use super::{Case, On, Outcome, Setting};
 use crate::bvh::{Bvh, Ray, offset_origin};
@@ -196,10 +196,10 @@ fn slivers(setting: &Setting) -> Outcome {
 /// Triangles without area, twice the same, and with corners that are no numbers change nothing.
 fn degenerate(setting: &Setting) -> Result<Outcome> {
     let wall = lambert(0.7);
-    let (stage, camera) = room(0.7, 1.0, Vec3::ZERO);
-    let twice: Vec<[Vec3; 3]> = stage.scene.triangles[..4]
+    let (builder, camera) = room(0.7, 1.0, Vec3::ZERO);
+    let twice: Vec<[Vec3; 3]> = builder.scene.triangles[..4]
         .iter()
-        .map(|t| t.map(|i| stage.scene.positions[i as usize]))
+        .map(|t| t.map(|i| builder.scene.positions[i as usize]))
         .collect();
     let p = Vec3::new(0.1, 0.2, 0.3);
     let odd = [
@@ -210,7 +210,7 @@ fn degenerate(setting: &Setting) -> Result<Outcome> {
         [p, p + Vec3::Y, Vec3::new(f32::INFINITY, 0.0, 0.0)],
     ];
     let (sound, spoilt) = (
-        stage.build(),
+        builder.build(),
         room(0.7, 1.0, Vec3::ZERO).0.triangles(&wall, &odd).triangles(&wall, &twice).build(),
     );
     let environment = sky("day")?;
@@ -235,7 +235,7 @@ fn coplanar(setting: &Setting) -> Result<Outcome> {
     for tilt in [0.0, 0.3] {
         let (a, b) = (Vec3::new(4.0, tilt, 0.0), Vec3::new(0.0, 0.2, -4.0));
         let corner = Vec3::new(-2.0, 0.0, 2.0);
-        let world = Stage::default()
+        let world = SceneBuilder::default()
             .quad(&lambert(0.25), corner, a, b)
             .quad(&lambert(0.75), corner + 0.25 * a, a, b)
             .quad(&lambert(0.5), corner, b, a)
@@ -258,9 +258,9 @@ fn coplanar(setting: &Setting) -> Result<Outcome> {
 fn scaled_room(setting: &Setting, scale: f32) -> Result<Outcome> {
     let environment = sky("day")?;
     let of = |scale: f32| -> Result<Mean> {
-        let (stage, camera) = room(0.7, scale, Vec3::ZERO);
+        let (builder, camera) = room(0.7, scale, Vec3::ZERO);
         let view = View { learning_paths: 1 << 14, ..view(camera, Sampling::Adaptive, 4) };
-        Ok(mean(&render(setting, &stage.build(), &environment, view, 256)?))
+        Ok(mean(&render(setting, &builder.build(), &environment, view, 256)?))
     };
     let off = difference(of(1.0)?, of(scale)?);
     let (world, camera) = sealed(0.8, scale, Vec3::ZERO);
@@ -275,19 +275,20 @@ fn scaled_room(setting: &Setting, scale: f32) -> Result<Outcome> {
 fn small_beside_large(setting: &Setting) -> Result<Outcome> {
     let environment = constant(1.0)?;
     let scale = 2.5e-4;
-    let ground = |stage: Stage| stage.floor(&lambert(0.2), Vec3::new(0.0, -scale, 0.0), 1e4);
+    let ground =
+        |builder: SceneBuilder| builder.floor(&lambert(0.2), Vec3::new(0.0, -scale, 0.0), 1e4);
     let dark = {
-        let (stage, camera) = room(0.8, scale, Vec3::ZERO);
+        let (builder, camera) = room(0.8, scale, Vec3::ZERO);
         let low = Vec3::new(-2.0, 0.0, -1.5) * scale;
         let high = Vec3::new(2.0, 2.5, 1.5) * scale;
-        let world = ground(stage.faces(&lambert(0.8), low, high, [0])).build();
+        let world = ground(builder.faces(&lambert(0.8), low, high, [0])).build();
         render(setting, &world, &environment, view(camera, Sampling::Plain, 8), 64)?
     };
     // The same room at its usual size on a ground that is as much larger.
     let lit = |factor: f32| -> Result<Mean> {
-        let (stage, camera) = room(0.8, factor, Vec3::ZERO);
+        let (builder, camera) = room(0.8, factor, Vec3::ZERO);
         let floor = Vec3::new(0.0, -factor, 0.0);
-        let world: World = stage.floor(&lambert(0.2), floor, 4e7 * factor).build();
+        let world: World = builder.floor(&lambert(0.2), floor, 4e7 * factor).build();
         Ok(mean(&render(setting, &world, &environment, view(camera, Sampling::Plain, 4), 256)?))
     };
     // Near zero the origins of rays are moved by 1.5e-5 m: a hundredth of this room, so its light may be

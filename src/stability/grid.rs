@@ -9,8 +9,8 @@ use glam::Vec3;
 
 use super::random::Random;
 use super::scenes::{
-    SIGMAS, Stage, constant, deviation, difference, lambert, learned, mean, render, room, sealed,
-    sky, view,
+    SIGMAS, SceneBuilder, constant, deviation, difference, lambert, learned, mean, render, room,
+    sealed, sky, view,
 };
 use super::{Case, On, Outcome, Setting};
 use crate::environment::Environment;
@@ -126,9 +126,9 @@ fn in_the_room(setting: &Setting, scale: f32, center: Vec3, camera: Camera) -> R
 
 /// A camera in a closed box that stands in the room sees that box from inside, black.
 fn camera_inside(setting: &Setting) -> Result<Outcome> {
-    let (stage, _) = room(0.7, 1.0, Vec3::ZERO);
+    let (builder, _) = room(0.7, 1.0, Vec3::ZERO);
     let (low, high) = (Vec3::new(0.0, 0.5, 0.0), Vec3::new(0.5, 1.0, 0.5));
-    let world = stage.faces(&lambert(0.8), low, high, 0..6).build();
+    let world = builder.faces(&lambert(0.8), low, high, 0..6).build();
     let camera = Camera::look_at(Vec3::new(0.25, 0.75, 0.25), Vec3::new(0.5, 0.5, 0.0), 1.0);
     black(setting, &world, &camera)
 }
@@ -149,7 +149,11 @@ fn black(setting: &Setting, world: &World, camera: &Camera) -> Result<Outcome> {
         outcome = outcome
             .sound(film)
             .at_most(format!("{sampling:?}: light in the dark"), mean(film).luminance, 0.0)
-            .at_most(format!("{sampling:?}: laws of nothing"), figures.learned_cells as f64, 0.0)
+            .at_most(
+                format!("{sampling:?}: distributions of nothing"),
+                figures.learned_cells as f64,
+                0.0,
+            )
             .at_least("cells visited", figures.visited_cells as f64, 1.0);
     }
     Ok(outcome)
@@ -161,18 +165,18 @@ fn crack(setting: &Setting, width: f32) -> Result<Outcome> {
     const LENGTH: f32 = 2.0;
     let black = lambert(0.0);
     let (half, end) = (0.5 * width, 0.5 * LENGTH);
-    let lid = |stage: Stage, x: [f32; 2], z: [f32; 2]| {
+    let lid = |builder: SceneBuilder, x: [f32; 2], z: [f32; 2]| {
         let corner = Vec3::new(x[0], 1.0, z[0]);
-        stage.quad(&black, corner, Vec3::X * (x[1] - x[0]), Vec3::Z * (z[1] - z[0]))
+        builder.quad(&black, corner, Vec3::X * (x[1] - x[0]), Vec3::Z * (z[1] - z[0]))
     };
     let (low, high) = (Vec3::new(-2.0, 0.0, -2.0), Vec3::new(2.0, 1.0, 2.0));
-    let mut stage = Stage::default().faces(&black, low, high, [0, 1, 4, 5]);
-    stage = stage.floor(&lambert(1.0), Vec3::ZERO, 4.0);
-    stage = lid(stage, [-2.0, -half], [-2.0, 2.0]);
-    stage = lid(stage, [half, 2.0], [-2.0, 2.0]);
-    stage = lid(stage, [-half, half], [-2.0, -end]);
-    stage = lid(stage, [-half, half], [end, 2.0]);
-    let world = stage.build();
+    let mut builder = SceneBuilder::default().faces(&black, low, high, [0, 1, 4, 5]);
+    builder = builder.floor(&lambert(1.0), Vec3::ZERO, 4.0);
+    builder = lid(builder, [-2.0, -half], [-2.0, 2.0]);
+    builder = lid(builder, [half, 2.0], [-2.0, 2.0]);
+    builder = lid(builder, [-half, half], [-2.0, -end]);
+    builder = lid(builder, [-half, half], [end, 2.0]);
+    let world = builder.build();
     let eye = Vec3::new(0.3, 0.5, 0.2);
     // Less than the slit's width is seen of the floor.
     let camera = Camera::look_at(eye, Vec3::new(0.02, 0.0, 0.1), 1e-4);
@@ -200,16 +204,16 @@ fn crack(setting: &Setting, width: f32) -> Result<Outcome> {
         .at_most("noise, relative", found.error / expected, 0.1))
 }
 
-/// A grid that learned one corner is used everywhere else: the whole map's law there.
+/// A grid that learned one corner is used everywhere else: the whole map's distribution there.
 fn empty_cells(setting: &Setting) -> Result<Outcome> {
-    let (stage, camera) = room(0.7, 1.0, Vec3::ZERO);
-    let (world, environment) = (stage.build(), sky("day")?);
+    let (builder, camera) = room(0.7, 1.0, Vec3::ZERO);
+    let (world, environment) = (builder.build(), sky("day")?);
     let eye: Vec3 = camera.world_from_camera.translation.into();
     let narrow = Camera::look_at(eye, Vec3::new(-1.0, 0.0, 1.0), 0.05);
-    let taught = learned(setting, &world, &environment, view(narrow, Sampling::Adaptive, 1))?;
-    let grid = taught.grid().ok_or_else(|| Error::new("nothing was learned"))?.clone();
+    let first = learned(setting, &world, &environment, view(narrow, Sampling::Adaptive, 1))?;
+    let grid = first.grid().ok_or_else(|| Error::new("nothing was learned"))?.clone();
     let cells = grid.grid().map_or(0, SphericalGrid::cell_count);
-    let empty = (0..cells).filter(|cell| grid.law_of_cell(*cell) == WHOLE_MAP).count();
+    let empty = (0..cells).filter(|cell| grid.distribution_of_cell(*cell) == WHOLE_MAP).count();
     let outcome = with_grids(setting, &world, &environment, &camera, &[grid])?;
     Ok(outcome.at_least("share of empty cells", empty as f64 / f64::from(cells), 0.9))
 }
@@ -292,19 +296,19 @@ fn moving_camera(setting: &Setting) -> Result<Outcome> {
         if let Some(grid) = before.take() {
             outcome = outcome.and(with_grids(setting, &world, &environment, &camera, &[grid])?);
         }
-        let taught = learned(setting, &world, &environment, view(camera, Sampling::Adaptive, 2))?;
-        before = taught.grid().cloned();
+        let first = learned(setting, &world, &environment, view(camera, Sampling::Adaptive, 2))?;
+        before = first.grid().cloned();
     }
     let grid = SphericalGrid { center: Vec3::Y, columns: 64, rows: 32, faces: true, medium: false };
-    let garbage = LightGrid::with_garbage_laws(grid, environment.tile_energies(), 9);
+    let garbage = LightGrid::with_garbage_distributions(grid, environment.tile_energies(), 9);
     let garbage = garbage.ok_or_else(|| Error::new("the sky is black"))?;
     let camera = room(0.7, 1.0, Vec3::ZERO).1;
     Ok(outcome.and(with_grids(setting, &world, &environment, &camera, &[garbage])?))
 }
 
 fn learning_paths(setting: &Setting, paths: u64) -> Result<Outcome> {
-    let (stage, camera) = room(0.7, 1.0, Vec3::ZERO);
-    let (world, environment) = (stage.build(), sky("day")?);
+    let (builder, camera) = room(0.7, 1.0, Vec3::ZERO);
+    let (world, environment) = (builder.build(), sky("day")?);
     let view = View { learning_paths: paths, ..view(camera, Sampling::Adaptive, 1) };
     let mut session = learned(setting, &world, &environment, view.clone())?;
     session.advance(64, &AtomicBool::new(false))?;

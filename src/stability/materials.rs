@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use super::random::Random;
 use super::scenes::{
-    Mean, SIGMAS, Stage, constant, deviation, first_texture, glass, lambert, learned, mean, render,
-    room, view,
+    Mean, SIGMAS, SceneBuilder, constant, deviation, first_texture, glass, lambert, learned, mean,
+    render, room, view,
 };
 use super::{Case, On, Outcome, Setting};
 use crate::error::Result;
@@ -53,7 +53,7 @@ fn pane(roughness: f32) -> Material {
 
 /// A ball of one metre and a camera that it fills.
 fn ball(material: &Material) -> (World, Camera) {
-    let world = Stage::default().sphere(material, Vec3::ZERO, 1.0).build();
+    let world = SceneBuilder::default().sphere(material, Vec3::ZERO, 1.0).build();
     (world, Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, 0.4))
 }
 
@@ -125,8 +125,8 @@ fn indices(setting: &Setting) -> Result<Outcome> {
 
 /// Every path finds the window in the end.
 fn white_room(setting: &Setting) -> Result<Outcome> {
-    let (stage, camera) = room(1.0, 1.0, Vec3::ZERO);
-    let (world, view) = (stage.build(), view(camera, Sampling::Plain, 1000));
+    let (builder, camera) = room(1.0, 1.0, Vec3::ZERO);
+    let (world, view) = (builder.build(), view(camera, Sampling::Plain, 1000));
     // The block is half as white as the walls; give it back its whiteness.
     let mut scene = world.scene;
     scene.materials.iter_mut().for_each(|m| m.base_color = Vec3::ONE.extend(1.0));
@@ -150,9 +150,10 @@ fn buried_normals(setting: &Setting) -> Result<Outcome> {
     ] {
         for base in [lambert(1.0), metal(0.0), metal(0.5), plastic(0.2)] {
             let material = Material { normal_texture: first_texture(), ..base };
-            let stage = Stage::default().floor(&material, Vec3::ZERO, 100.0).with_texel(texel);
+            let builder =
+                SceneBuilder::default().floor(&material, Vec3::ZERO, 100.0).with_texel(texel);
             let camera = Camera::look_at(Vec3::new(0.0, 1.0, 2.0), Vec3::ZERO, 0.4);
-            furnaces.add(&furnace(setting, (stage.build(), camera), 16)?);
+            furnaces.add(&furnace(setting, (builder.build(), camera), 16)?);
         }
     }
     Ok(furnaces.judged("buried normals"))
@@ -165,7 +166,7 @@ fn grazing(setting: &Setting) -> Result<Outcome> {
         [lambert(1.0), metal(0.0), metal(0.3), plastic(0.0), plastic(0.6), pane(0.0), pane(0.3)]
     {
         for drop in [1e-2, 1e-5] {
-            let world = Stage::default().floor(&material, Vec3::ZERO, 1e4).build();
+            let world = SceneBuilder::default().floor(&material, Vec3::ZERO, 1e4).build();
             let eye = Vec3::new(0.3, 1e-3, 0.2);
             let camera = Camera::look_at(eye, eye + Vec3::new(1.0, -drop, 0.3), 1e-4);
             furnaces.add(&furnace(setting, (world, camera), 16)?);
@@ -180,10 +181,11 @@ fn nested(setting: &Setting) -> Result<Outcome> {
     let (outer, inner) = (glass(1.5, 0.0), glass(3.0, 0.0));
     for (center, radius) in [(Vec3::ZERO, 0.5), (Vec3::X * 0.8, 0.5), (Vec3::X * 0.5, 0.5)] {
         for material in [&inner, &outer, &glass(1.5, 0.3)] {
-            let stage =
-                Stage::default().sphere(&outer, Vec3::ZERO, 1.0).sphere(material, center, radius);
+            let builder = SceneBuilder::default()
+                .sphere(&outer, Vec3::ZERO, 1.0)
+                .sphere(material, center, radius);
             let camera = Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, 0.5);
-            furnaces.add(&furnace(setting, (stage.build(), camera), 200)?);
+            furnaces.add(&furnace(setting, (builder.build(), camera), 200)?);
         }
     }
     Ok(furnaces.judged("nested glass"))
@@ -221,7 +223,7 @@ fn media(setting: &Setting) -> Result<Outcome> {
                 anisotropy,
                 bounds: Some([Vec3::splat(-2.0), Vec3::splat(2.0)]),
             };
-            let world = Stage::default().floor(&lambert(1.0), Vec3::ZERO, 3.0).build();
+            let world = SceneBuilder::default().floor(&lambert(1.0), Vec3::ZERO, 3.0).build();
             let view = View {
                 width: 12,
                 height: 12,
@@ -278,7 +280,7 @@ fn random_materials(setting: &Setting) -> Result<Outcome> {
 /// Light beyond what f32 holds: samples overflow, are left out, counted, and told.
 fn overflow(setting: &Setting) -> Result<Outcome> {
     let material = Material { emissive: Vec3::splat(f32::MAX), ..lambert(1.0) };
-    let world = Stage::default().floor(&material, Vec3::ZERO, 10.0).build();
+    let world = SceneBuilder::default().floor(&material, Vec3::ZERO, 10.0).build();
     let environment = constant(f32::MAX)?;
     let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::ZERO, 0.3);
     let mut session = learned(setting, &world, &environment, view(camera, Sampling::Plain, 2))?;

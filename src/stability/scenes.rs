@@ -11,7 +11,7 @@ use crate::image::Image;
 use crate::path::{PathLimits, World};
 use crate::render::film::{Film, Pixel};
 use crate::render::filter::PixelFilter;
-use crate::render::gpu::Stage as GpuStage;
+use crate::render::gpu::UploadedScene;
 use crate::render::{Phase, Sampling, Session, View};
 use crate::scene::{Camera, Material, Scene, Texture, TextureImage, TextureRef, Wrap};
 
@@ -33,11 +33,11 @@ pub(super) fn glass(ior: f32, roughness: f32) -> Material {
 
 /// A scene being put together; every method returns it.
 #[derive(Default)]
-pub(super) struct Stage {
+pub(super) struct SceneBuilder {
     pub(super) scene: Scene,
 }
 
-impl Stage {
+impl SceneBuilder {
     pub(super) fn build(self) -> World {
         World::new(self.scene)
     }
@@ -86,13 +86,13 @@ impl Stage {
     ) -> Self {
         let size = high - low;
         let edge = |axis: usize| Vec3::AXES[axis % 3] * size[axis % 3];
-        faces.into_iter().fold(self, |stage, face| {
+        faces.into_iter().fold(self, |builder, face| {
             let axis = face / 2;
             let (a, b) = (edge(axis + 1), edge(axis + 2));
             if face.is_multiple_of(2) {
-                stage.quad(material, low + edge(axis), a, b)
+                builder.quad(material, low + edge(axis), a, b)
             } else {
-                stage.quad(material, low, b, a)
+                builder.quad(material, low, b, a)
             }
         })
     }
@@ -142,34 +142,35 @@ pub(super) fn first_texture() -> Option<TextureRef> {
 
 /// A room of 4 x 2.5 x 3 units, `scale` metres each, around `center`, with a window in its +X wall
 /// and a block on the floor; a camera that looks at the block.
-pub(super) fn room(albedo: f32, scale: f32, center: Vec3) -> (Stage, Camera) {
+pub(super) fn room(albedo: f32, scale: f32, center: Vec3) -> (SceneBuilder, Camera) {
     let at = |x: f32, y: f32, z: f32| center + Vec3::new(x, y, z) * scale;
     let walls = lambert(albedo);
     let (low, high) = (at(-2.0, 0.0, -1.5), at(2.0, 2.5, 1.5));
-    let frame = |stage: Stage, y: [f32; 2], z: [f32; 2]| {
+    let frame = |builder: SceneBuilder, y: [f32; 2], z: [f32; 2]| {
         let (corner, top, side) = (at(2.0, y[0], z[0]), at(2.0, y[1], z[0]), at(2.0, y[0], z[1]));
-        stage.quad(&walls, corner, top - corner, side - corner)
+        builder.quad(&walls, corner, top - corner, side - corner)
     };
-    let mut stage = Stage::default().faces(&walls, low, high, 1..6);
+    let mut builder = SceneBuilder::default().faces(&walls, low, high, 1..6);
     for (y, z) in [
         ([0.0, 0.75], [-1.5, 1.5]),
         ([2.25, 2.5], [-1.5, 1.5]),
         ([0.75, 2.25], [-1.5, -1.0]),
         ([0.75, 2.25], [1.0, 1.5]),
     ] {
-        stage = frame(stage, y, z);
+        builder = frame(builder, y, z);
     }
     let block = lambert(0.5 * albedo);
-    let stage = stage.faces(&block, at(-1.25, 0.0, -0.75), at(-0.5, 1.0, 0.25), [0, 1, 2, 4, 5]);
-    (stage, Camera::look_at(at(1.75, 1.5, 1.25), at(-1.0, 0.75, -0.5), 1.0))
+    let builder =
+        builder.faces(&block, at(-1.25, 0.0, -0.75), at(-0.5, 1.0, 0.25), [0, 1, 2, 4, 5]);
+    (builder, Camera::look_at(at(1.75, 1.5, 1.25), at(-1.0, 0.75, -0.5), 1.0))
 }
 
 /// The room without its window.
 pub(super) fn sealed(albedo: f32, scale: f32, center: Vec3) -> (World, Camera) {
-    let (stage, camera) = room(albedo, scale, center);
+    let (builder, camera) = room(albedo, scale, center);
     let low = center + Vec3::new(-2.0, 0.0, -1.5) * scale;
     let high = center + Vec3::new(2.0, 2.5, 1.5) * scale;
-    (stage.faces(&lambert(albedo), low, high, [0]).build(), camera)
+    (builder.faces(&lambert(albedo), low, high, [0]).build(), camera)
 }
 
 /// A map of one radiance.
@@ -209,8 +210,8 @@ pub(super) fn session<'a>(
     match &setting.gpu {
         None => Ok(Session::new(world, environment, view)),
         Some(gpu) => {
-            let stage = GpuStage::new(gpu, world, environment)?;
-            Session::on_gpu(world, environment, view, &stage)
+            let uploaded = UploadedScene::new(gpu, world, environment)?;
+            Session::on_gpu(world, environment, view, &uploaded)
         }
     }
 }

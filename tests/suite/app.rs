@@ -93,7 +93,7 @@ fn overlays_and_panels_look_as_they_did() {
 
 /// What a cell knows and what is true there, in a window high enough for both.
 #[test]
-fn the_inspector_shows_law_and_truth() {
+fn the_inspector_shows_distribution_and_truth() {
     let Some(mut studio) = studio(start(), (1000, 1200)) else { return };
     let pinned = Some(Vec2::new(0.45, 0.75));
     studio.arrange(Interface { tab: Tab::Inspect, pinned, ..Interface::default() });

@@ -35,8 +35,12 @@ fn a_machine_is_measured() {
         assert!(kinds.iter().all(|rays| rays["per_second"].as_f64() > Some(1e3)), "{scene}");
         assert!(scene["paths"]["samples_per_second"].as_f64() > Some(1e2), "{scene}");
         let waits = &scene["paths"];
-        let (laws, picture) = (&waits["first_laws_seconds"], &waits["first_picture_seconds"]);
-        assert!(laws.as_f64() <= picture.as_f64() && laws.as_f64() > Some(0.0), "{waits}");
+        let (distributions, picture) =
+            (&waits["first_distributions_seconds"], &waits["first_picture_seconds"]);
+        assert!(
+            distributions.as_f64() <= picture.as_f64() && distributions.as_f64() > Some(0.0),
+            "{waits}"
+        );
     }
     if has_gpu {
         let parity = &json["parity"][0];

@@ -110,12 +110,12 @@ pub(crate) fn text(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn laws_are_exported_as_tables() {
+fn distributions_are_exported_as_tables() {
     let bench = Bench::new();
-    bench.render("-o a.exr --laws laws.csv");
-    let csv = fs::read_to_string(bench.path("laws.csv")).expect("written");
+    bench.render("-o a.exr --distributions distributions.csv");
+    let csv = fs::read_to_string(bench.path("distributions.csv")).expect("written");
     let mut lines = csv.lines();
-    assert_eq!(lines.next(), Some("cell,law,tile,probability"));
+    assert_eq!(lines.next(), Some("cell,distribution,tile,probability"));
     let mut sums = std::collections::BTreeMap::new();
     for line in lines {
         let fields: Vec<f64> = line.split(',').map(|f| f.parse().expect("a number")).collect();
@@ -124,17 +124,20 @@ fn laws_are_exported_as_tables() {
     assert!(!sums.is_empty());
     assert!(sums.values().all(|sum: &f64| (sum - 1.0).abs() < 1e-4), "{sums:?}");
 
-    bench.render("-o a.exr --laws laws.json");
-    let json = bench.json("laws.json");
+    bench.render("-o a.exr --distributions distributions.json");
+    let json = bench.json("distributions.json");
     assert_eq!(json["tiles"], 128);
-    assert_eq!(json["law_of_cell"].as_object().expect("a map").len(), sums.len());
-    bench.render("-o a.exr --laws laws.exr");
-    let picture = read_picture(&bench.path("laws.exr")).expect("a picture");
+    assert_eq!(json["distribution_of_cell"].as_object().expect("a map").len(), sums.len());
+    bench.render("-o a.exr --distributions distributions.exr");
+    let picture = read_picture(&bench.path("distributions.exr")).expect("a picture");
     assert_eq!(picture.width, 128);
     assert!(picture.height > 1);
 
-    let message = bench.refusal("render scene.gltf -o b.exr --laws laws.txt", 1);
-    assert!(message.contains("laws.txt: laws are written as .csv, .json or .exr"), "{message}");
+    let message = bench.refusal("render scene.gltf -o b.exr --distributions distributions.txt", 1);
+    assert!(
+        message.contains("distributions.txt: distributions are written as .csv, .json or .exr"),
+        "{message}"
+    );
 }
 
 #[test]

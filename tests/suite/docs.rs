@@ -145,7 +145,7 @@ fn filled(words: &[String]) -> Vec<String> {
             (_, "NAME") => "name",
             (_, "SCENE") => "office",
             (_, "MAP") => "sky:day",
-            ("--laws", "FILE") => "laws.csv",
+            ("--distributions", "FILE") => "distributions.csv",
             ("--json", "FILE") => "figures.json",
             (_, "FILE") => "out.png",
             (_, "PICTURE" | "REFERENCE") => "out.exr",
@@ -429,7 +429,8 @@ fn what_the_guides_call_things_is_what_the_window_calls_them() {
         let page = page.replace("**", "").replace('\n', " ");
         for called in page.split('*').skip(1).step_by(2) {
             // Another program's menu, and what is only stressed.
-            let is_other = called.contains(", ") || ["cell", "tile", "law"].contains(&called);
+            let is_other =
+                called.contains(", ") || ["cell", "tile", "distribution"].contains(&called);
             let is_there = window.contains(&format!("\"{}", called.to_lowercase()));
             assert!(is_other || is_there, "{name}: the window has no \"{called}\"");
         }

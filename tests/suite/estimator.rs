@@ -57,7 +57,7 @@ fn environment(map: Image) -> Environment {
     Environment::new(map, &EnvironmentOptions::default()).expect("a sound map")
 }
 
-/// Learns if the view asks for it, then renders pass by pass as users do, so that laws change on
+/// Learns if the view asks for it, then renders pass by pass as users do, so that distributions change on
 /// the way.
 pub(crate) fn render(world: &World, environment: &Environment, view: View, samples: u32) -> Film {
     let mut session = learned(world, environment, view);

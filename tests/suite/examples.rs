@@ -35,7 +35,10 @@ fn the_light_grid_is_read() {
     let folder = tempfile::tempdir().expect("a folder");
     if let Some(output) = run("light_grid", &["living-room"], folder.path()) {
         let says = String::from_utf8_lossy(&output.stdout);
-        assert!(says.contains("has law") && !says.contains("has law 0"), "{says}");
+        assert!(
+            says.contains("has distribution") && !says.contains("has distribution 0"),
+            "{says}"
+        );
         assert_eq!(says.matches(" tile ").count(), 5, "{says}");
     }
 }

@@ -186,7 +186,7 @@ fn every_output_is_tried_every_failure_told_and_the_picture_rescued() {
     fs::create_dir(bench.path("tmp")).unwrap();
     let line = SMALL.replace("--spp 1", "--seconds 4");
     let child = bench
-        .command(&format!("{line} -o gone/a.exr -o b.png --json gone/c.json --laws d.csv"))
+        .command(&format!("{line} -o gone/a.exr -o b.png --json gone/c.json --distributions d.csv"))
         .env("TMPDIR", bench.path("tmp"))
         .stderr(Stdio::piped())
         .spawn()

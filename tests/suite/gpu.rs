@@ -7,11 +7,11 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions, TableKind, sky};
-use lightgrid::metrics::statistics::{Estimate, z_test};
+use lightgrid::metrics::hypothesis::{Means, z_test};
 use lightgrid::path::{Background, PathLimits, World, framing};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::gpu::{Gpu, Stage};
+use lightgrid::render::gpu::{Gpu, UploadedScene};
 use lightgrid::render::{Crop, Gi, Phase, Sampling, Session, Sharing, StopRule, View};
 use lightgrid::sampler::Points;
 use lightgrid::scene::{Camera, Material, Medium, builtin, gltf};
@@ -28,15 +28,15 @@ fn gpu() -> Option<Gpu> {
     Gpu::open(None).inspect_err(|reason| eprintln!("SKIPPED: {reason}")).ok()
 }
 
-/// A session on a stage of its own.
+/// A session whose scene is uploaded for it alone.
 fn on_gpu<'a>(
     world: &'a World,
     environment: &'a Environment,
     view: View,
     gpu: &Gpu,
 ) -> Session<'a> {
-    let stage = Stage::new(gpu, world, environment).expect("it fits");
-    Session::on_gpu(world, environment, view, &stage).expect("it fits")
+    let uploaded = UploadedScene::new(gpu, world, environment).expect("it fits");
+    Session::on_gpu(world, environment, view, &uploaded).expect("it fits")
 }
 
 /// Learns and renders pass by pass, as [`render`] does.
@@ -84,8 +84,8 @@ fn expect_agreement(what: &str, a: &Film, b: &Film) {
     };
     let ((a_mean, a_variance), (b_mean, b_variance)) = (of(a), of(b));
     let test = z_test(
-        Estimate { mean: &a_mean, variance_of_mean: &a_variance },
-        Estimate { mean: &b_mean, variance_of_mean: &b_variance },
+        Means { mean: &a_mean, variance_of_mean: &a_variance },
+        Means { mean: &b_mean, variance_of_mean: &b_variance },
         ALPHA,
     );
     let test = test.expect("two pictures of one size");
@@ -109,7 +109,7 @@ fn compare_views(gpu: &Gpu, what: &str, world: &World, environment: &Environment
         "{what}, {sampling:?}: {:.1} % of pixels differ, mean ratio {ratio:.4}",
         100.0 * share
     );
-    // One path that is counted elsewhere moves the laws of sixteen cells, hence all samples there.
+    // One path that is counted elsewhere moves the distributions of sixteen cells, hence all samples there.
     let learns = matches!(sampling, Sampling::Adaptive | Sampling::Talk);
     let most = if learns { 0.5 } else { 0.05 };
     assert!(share < most, "{what}, {sampling:?}: {share} of the pixels differ");
@@ -198,17 +198,16 @@ fn every_feature_of_a_material_looks_the_same() {
         ("flint glass", Material { dispersion: 5.0, ior: 1.7, roughness: 0.0, ..solid }),
     ];
     let camera = Camera::look_at(Vec3::new(1.5, 1.6, 2.5), Vec3::new(0.0, 0.5, 0.0), 0.8);
-    let block = |stage: scenes::Stage, material: &Material, x: f32| {
-        stage.faces(material, Vec3::new(x - 0.4, 0.1, -0.4), Vec3::new(x + 0.4, 0.9, 0.4), 0..6)
+    let block = |builder: scenes::SceneBuilder, material: &Material, x: f32| {
+        builder.faces(material, Vec3::new(x - 0.4, 0.1, -0.4), Vec3::new(x + 0.4, 0.9, 0.4), 0..6)
     };
-    let floor = || scenes::Stage::new().floor(&lambert(0.5));
-    let all = features
-        .iter()
-        .zip(-4..)
-        .fold(floor(), |stage, ((_, material), place)| block(stage, material, 0.9 * place as f32));
+    let floor = || scenes::SceneBuilder::new().floor(&lambert(0.5));
+    let all = features.iter().zip(-4..).fold(floor(), |builder, ((_, material), place)| {
+        block(builder, material, 0.9 * place as f32)
+    });
     let alone = [&features[2], &features[7]].map(|(what, m)| (*what, block(floor(), m, 0.0)));
-    for (what, stage) in alone.into_iter().chain([("all", all)]) {
-        let world = stage.build();
+    for (what, builder) in alone.into_iter().chain([("all", all)]) {
+        let world = builder.build();
         let mut view = picture(&world, Sampling::Plain);
         (view.camera, view.limits.bounces) = (camera.clone(), 8);
         compare_views(&gpu, what, &world, &sky_map("overcast"), view);
@@ -234,7 +233,7 @@ fn fog_and_milk_look_the_same() {
         ..smoked_glass()
     };
     let lump = || {
-        scenes::Stage::new().floor(&lambert(0.5)).faces(
+        scenes::SceneBuilder::new().floor(&lambert(0.5)).faces(
             &milk,
             Vec3::new(-0.5, 0.1, -0.5),
             Vec3::new(0.5, 1.1, 0.5),
@@ -352,7 +351,7 @@ fn paths_end_in_the_same_cache() {
         eprintln!("{name}: differences are {share:.4} of the noise");
         assert!(share < 0.1, "{name}: {share}");
 
-        // Cut short while it teaches, and taken over by the CPU.
+        // Cut short while it trains, and taken over by the CPU.
         let never = AtomicBool::new(false);
         let mut session = on_gpu(&world, &environment, view, &gpu);
         while session.phase() == Phase::Learning {

@@ -2,8 +2,8 @@
 
 use lightgrid::image::Image;
 use lightgrid::metrics::compare;
-use lightgrid::metrics::statistics::{
-    Estimate, chi_square_test, erfc, ln_gamma, sidak, upper_gamma, z_test,
+use lightgrid::metrics::hypothesis::{
+    Means, chi_square_test, erfc, ln_gamma, sidak, upper_gamma, z_test,
 };
 
 use crate::shared::SplitMix;
@@ -67,11 +67,11 @@ fn noisy_means(seed: u64, bias: f64) -> (Vec<f64>, Vec<f64>) {
 #[test]
 fn z_test_passes_equal_and_fails_shifted_estimates() {
     let (mean, variance) = noisy_means(1, 0.0);
-    let a = Estimate { mean: &mean, variance_of_mean: &variance };
+    let a = Means { mean: &mean, variance_of_mean: &variance };
     let (same_mean, same_variance) = noisy_means(2, 0.0);
-    let same = Estimate { mean: &same_mean, variance_of_mean: &same_variance };
+    let same = Means { mean: &same_mean, variance_of_mean: &same_variance };
     let (other_mean, other_variance) = noisy_means(3, 0.25);
-    let other = Estimate { mean: &other_mean, variance_of_mean: &other_variance };
+    let other = Means { mean: &other_mean, variance_of_mean: &other_variance };
 
     let equal = z_test(a, same, 0.001).unwrap();
     assert!(equal.passed() && equal.passing_share == 1.0, "{equal:?}");
@@ -83,7 +83,7 @@ fn z_test_passes_equal_and_fails_shifted_estimates() {
 
 #[test]
 fn z_test_edges() {
-    let estimate = |mean: &'static [f64]| Estimate { mean, variance_of_mean: &[0.0] };
+    let estimate = |mean: &'static [f64]| Means { mean, variance_of_mean: &[0.0] };
     assert!(z_test(estimate(&[1.0]), estimate(&[1.0]), 0.01).unwrap().passed());
     assert!(z_test(estimate(&[1.0]), estimate(&[1.0 + 1e-7]), 0.01).unwrap().passed());
     assert!(!z_test(estimate(&[1.0]), estimate(&[1.001]), 0.01).unwrap().passed());

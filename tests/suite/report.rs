@@ -5,7 +5,7 @@ mod command;
 mod statistics;
 
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
-use lightgrid::metrics::statistics::chi_square_test;
+use lightgrid::metrics::hypothesis::chi_square_test;
 use lightgrid::path::{PathLimits, World};
 use lightgrid::render::{Gi, Sampling, View};
 use lightgrid::report::{Device, Effort, Frame, Plan, ablations, talk};
@@ -81,7 +81,7 @@ fn every_ablation_converges_to_the_same_picture() {
             height: 12,
             seed,
             points: settings.points,
-            laws: settings.laws,
+            distributions: settings.distributions,
             grid_columns: settings.grid_columns,
             sharing: settings.sharing,
             gi: settings.gi,

@@ -1,16 +1,16 @@
-//! Numbers about cells and their laws, computed once per grid.
+//! Numbers about cells and their distributions, computed once per grid.
 
 use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
 
-/// What overlays and the inspector say of cells; laws are indexed as in the grid.
+/// What overlays and the inspector say of cells; distributions are indexed as in the grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellFacts {
-    /// Entropy of each law in bits.
+    /// Entropy of each distribution in bits.
     pub entropy: Vec<f32>,
-    /// Total variation between each law and the whole map's, in `[0,1]`.
+    /// Total variation between each distribution and the whole map's, in `[0,1]`.
     pub distance: Vec<f32>,
-    /// The likeliest tile of each law.
+    /// The likeliest tile of each distribution.
     pub best_tile: Vec<u32>,
     /// Tries of each cell, 0 for cells without counters; empty without counters.
     tries: Vec<f32>,
@@ -19,15 +19,16 @@ pub struct CellFacts {
 }
 
 impl CellFacts {
-    /// Looks at every law and every counted cell.
+    /// Looks at every distribution and every counted cell.
     pub fn of(
         grid: &LightGrid,
         counters: Option<&LearningGrid>,
         environment: &Environment,
     ) -> Self {
-        let laws = grid.laws();
-        let tiles = laws.tile_count();
-        let whole: Vec<f32> = (0..tiles).map(|tile| laws.probability(WHOLE_MAP, tile)).collect();
+        let distributions = grid.distributions();
+        let tiles = distributions.tile_count();
+        let whole: Vec<f32> =
+            (0..tiles).map(|tile| distributions.probability(WHOLE_MAP, tile)).collect();
         let mut facts = Self {
             entropy: Vec::new(),
             distance: Vec::new(),
@@ -35,10 +36,10 @@ impl CellFacts {
             tries: Vec::new(),
             visible: Vec::new(),
         };
-        for law in 0..laws.len() {
+        for distribution in 0..distributions.len() {
             let (mut entropy, mut distance, mut best) = (0.0, 0.0, (0.0, 0));
             for tile in 0..tiles {
-                let p = laws.probability(law, tile);
+                let p = distributions.probability(distribution, tile);
                 entropy -= if p > 0.0 { p * p.log2() } else { 0.0 };
                 distance += 0.5 * (p - whole[tile as usize]).abs();
                 if p > best.0 {

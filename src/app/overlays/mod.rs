@@ -23,7 +23,7 @@ pub enum Overlay {
     Cells,
     /// Six-fold split of cells by the direction a surface faces.
     Faces,
-    /// Cells with laws of their own.
+    /// Cells with distributions of their own.
     Learned,
     /// Learning visits of each cell.
     Visits,
@@ -31,9 +31,9 @@ pub enum Overlay {
     Sky,
     /// Each cell's most important tile.
     BestTile,
-    /// Entropy of the cell's law.
+    /// Entropy of the cell's distribution.
     Entropy,
-    /// Distance of the cell's law from the whole map's.
+    /// Distance of the cell's distribution from the whole map's.
     Distance,
     /// Each cell's probability of the tile chosen on the map.
     Tile,
@@ -77,8 +77,8 @@ impl Overlay {
             Self::Visits => "Learning visits",
             Self::Sky => "Visible sky",
             Self::BestTile => "Most important tile",
-            Self::Entropy => "Entropy of the law",
-            Self::Distance => "Distance from the whole map's law",
+            Self::Entropy => "Entropy of the distribution",
+            Self::Distance => "Distance from the whole map's distribution",
             Self::Tile => "Wish for the chosen tile",
             Self::Samples => "Samples",
             Self::Error => "Estimated error",
@@ -95,7 +95,9 @@ impl Overlay {
                 "Cells of the grid around the camera, with their numbers; borders are bright."
             }
             Self::Faces => "Cells are split by the axis that a surface's normal is nearest to.",
-            Self::Learned => "Where a cell has its own law; elsewhere the whole map is sampled.",
+            Self::Learned => {
+                "Where a cell has its own distribution; elsewhere the whole map is sampled."
+            }
             Self::Visits => "How often learning paths tried the map from each cell.",
             Self::Sky => {
                 "Mean visibility times cosine over all tiles of the map, as learning found it."
@@ -105,7 +107,7 @@ impl Overlay {
             }
             Self::Entropy => "0 bits: always the same tile. High: no preference.",
             Self::Distance => {
-                "Total variation between the cell's law and the whole map's: 0 equal, 1 disjoint."
+                "Total variation between the cell's distribution and the whole map's: 0 equal, 1 disjoint."
             }
             Self::Tile => "Probability with which each cell samples the tile chosen on the map.",
             Self::Samples => "Samples each pixel has.",
@@ -173,7 +175,7 @@ pub struct Sources<'a> {
     pub film: &'a Film,
     /// The map.
     pub environment: &'a Environment,
-    /// The laws in use.
+    /// The distributions in use.
     pub grid: Option<&'a Arc<LightGrid>>,
     /// What learning counted.
     pub counters: Option<&'a LearningGrid>,
@@ -235,7 +237,7 @@ impl Sources<'_> {
         let by_cell = |value: &dyn Fn(u32) -> Option<f32>, range: Range, unit| {
             scaled(surfaces.spots.iter().map(|s| cell_of(s).and_then(value)), range, unit)
         };
-        let law = |cell: u32| grid.law_of_cell(cell) as usize;
+        let distribution = |cell: u32| grid.distribution_of_cell(cell) as usize;
         Some(match overlay {
             Overlay::Cells => with_borders(surfaces, cells),
             Overlay::Faces => faces(surfaces, cells),
@@ -251,7 +253,7 @@ impl Sources<'_> {
             Overlay::BestTile => {
                 let (columns, rows) = self.environment.tile_grid();
                 let color = |cell| {
-                    let tile = facts.best_tile[law(cell)];
+                    let tile = facts.best_tile[distribution(cell)];
                     let u = (f64::from(tile % columns) + 0.5) / f64::from(columns);
                     let v = (f64::from(tile / columns) + 0.5) / f64::from(rows);
                     palette::of_map_place(u as f32, v as f32)
@@ -261,17 +263,22 @@ impl Sources<'_> {
             }
             Overlay::Entropy => {
                 let most = (self.environment.tile_count() as f32).log2();
-                by_cell(&|cell| Some(facts.entropy[law(cell)]), Range::between(0.0, most), "bits")
+                by_cell(
+                    &|cell| Some(facts.entropy[distribution(cell)]),
+                    Range::between(0.0, most),
+                    "bits",
+                )
             }
             Overlay::Distance => by_cell(
-                &|cell| Some(facts.distance[law(cell)]),
+                &|cell| Some(facts.distance[distribution(cell)]),
                 Range::between(0.0, 1.0),
                 "total variation",
             ),
             _ => {
                 let tile = self.tile?;
                 let probability = |cell| {
-                    Some(grid.laws().probability(grid.law_of_cell(cell), tile)).filter(|p| *p > 0.0)
+                    Some(grid.distributions().probability(grid.distribution_of_cell(cell), tile))
+                        .filter(|p| *p > 0.0)
                 };
                 by_cell(&probability, Range::LOGARITHMIC, "probability")
             }
@@ -328,11 +335,12 @@ fn faces(surfaces: &SurfaceMap, grid: &SphericalGrid) -> Painted {
     Painted::new(colors, Legend::Names(legend.map(|(c, n)| (c, n.to_owned())).collect()))
 }
 
-fn learned(surfaces: &SurfaceMap, grid: &SphericalGrid, laws: &LightGrid) -> Painted {
+fn learned(surfaces: &SurfaceMap, grid: &SphericalGrid, distributions: &LightGrid) -> Painted {
     const OWN: [u8; 3] = [84, 190, 140];
     const NONE: [u8; 3] = [226, 120, 70];
-    let is_learned =
-        |spot: &Spot| laws.law_of_cell(grid.cell_of(spot.position, spot.normal)) != WHOLE_MAP;
+    let is_learned = |spot: &Spot| {
+        distributions.distribution_of_cell(grid.cell_of(spot.position, spot.normal)) != WHOLE_MAP
+    };
     let colors: Vec<Option<[u8; 3]>> = surfaces
         .spots
         .iter()
@@ -342,8 +350,8 @@ fn learned(surfaces: &SurfaceMap, grid: &SphericalGrid, laws: &LightGrid) -> Pai
     let own = colors.iter().flatten().filter(|c| **c == OWN).count();
     let percent = 100.0 * own as f32 / pixels as f32;
     let legend = Legend::Names(vec![
-        (OWN, format!("a law of its own, {percent:.1} % of the pixels")),
-        (NONE, "the whole map's law".to_owned()),
+        (OWN, format!("a distribution of its own, {percent:.1} % of the pixels")),
+        (NONE, "the whole map's distribution".to_owned()),
     ]);
     Painted::new(colors, legend)
 }

@@ -51,7 +51,7 @@ pub(in crate::app) fn show(
         ui.label(theme::quiet("Click a tile to see which cells want it."));
     }
     ui.checkbox(&mut interface.is_frozen, "Freeze learning").on_hover_text(
-        "Go on with the laws there are, around their old centre, when the camera or a setting \
+        "Go on with the distributions there are, around their old centre, when the camera or a setting \
          changes",
     );
     ui.add_space(4.0);
@@ -68,8 +68,9 @@ pub(in crate::app) fn show(
     }
     if snapshot.is_some_and(|s| s.main.grid.is_some()) {
         ui.add_space(4.0);
-        let hint = "All laws as .csv, .json or .exr (one row a law, one column a tile)";
-        if ui.button("Export laws…").on_hover_text(hint).clicked() {
+        let hint =
+            "All distributions as .csv, .json or .exr (one row a distribution, one column a tile)";
+        if ui.button("Export distributions…").on_hover_text(hint).clicked() {
             commands.push(Command::ChooseExport);
         }
     }
@@ -262,9 +263,9 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
         Some(cell) => format!("{cell}: row {row}, column {column}, face {face}"),
         None => "no grid: the whole map everywhere".to_owned(),
     };
-    let law = match inspected.law {
+    let distribution = match inspected.distribution {
         crate::light_grid::WHOLE_MAP => "the whole map's".to_owned(),
-        law => law.to_string(),
+        distribution => distribution.to_string(),
     };
     let tries: f64 = inspected.tallies.iter().map(|t| t.tries).sum();
     Grid::new("cell").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
@@ -274,7 +275,7 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
             ui.end_row();
         };
         line("Cell", cell);
-        line("Law", law);
+        line("Distribution", distribution);
         line("Position", format!("{:.2}, {:.2}, {:.2} m", p.x, p.y, p.z));
         line("Material", inspected.material.clone());
         if !inspected.probabilities.is_empty() {
@@ -287,7 +288,7 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
             line("Learned from", format!("{} tries", theme::count(tries as u64)));
         }
         if let Some(bytes) = inspected.memory_bytes {
-            line("Memory", format!("{} for this law", theme::bytes(bytes)));
+            line("Memory", format!("{} for this distribution", theme::bytes(bytes)));
         }
     });
 }
@@ -298,7 +299,7 @@ fn table(ui: &mut Ui, inspected: &Inspected, inspector: &Inspector) {
     tiles.sort_by(|a, b| inspected.probabilities[*b].total_cmp(&inspected.probabilities[*a]));
     let truth = inspector.truth();
     Grid::new("tiles").num_columns(5).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
-        for name in ["Tile", "Law", "Tries", "Ratio"] {
+        for name in ["Tile", "Distribution", "Tries", "Ratio"] {
             ui.label(theme::quiet(name));
         }
         if truth.is_some() {

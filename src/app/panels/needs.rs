@@ -9,36 +9,14 @@ use crate::app::theme;
 pub(in crate::app) fn show(ui: &mut Ui, scene: Option<&LoadedScene>, map: Option<&LoadedMap>) {
     let Some(scene) = scene else { return };
     let needs = &scene.world.needs;
-    let used = [
-        (needs.textures, "Textures"),
-        (needs.normal_maps, "Normal maps"),
-        (needs.second_uv_set, "A second set of texture coordinates"),
-        (needs.vertex_colors, "Vertex colours"),
-        (needs.alpha_mask, "Alpha tests"),
-        (needs.alpha_blend, "Opacity along rays"),
-        (needs.single_sided, "Single-sided surfaces"),
-        (needs.metals, "Metals"),
-        (needs.thin_transmission, "Thin glass"),
-        (needs.solid_transmission, "Refraction"),
-        (needs.diffuse_transmission, "Diffuse transmission"),
-        (needs.absorption, "Absorption"),
-        (needs.anisotropy, "Anisotropy"),
-        (needs.sheen, "Sheen"),
-        (needs.iridescence, "Iridescence"),
-        (needs.dispersion, "Dispersion"),
-        (needs.clearcoat, "Clearcoat"),
-        (needs.unlit, "Unlit surfaces"),
-        (needs.emitters, "Emissive triangles"),
-        (needs.punctual_lights, "Point, spot or directional lights"),
-    ];
     ui.columns_const(|[left, right]| {
         for column in [&mut *left, &mut *right] {
             // Columns stretch lines to their width otherwise.
             column.style_mut().wrap_mode = Some(egui::TextWrapMode::Truncate);
         }
         theme::heading(left, "USED");
-        for (_, name) in used.iter().filter(|(is_used, _)| *is_used) {
-            left.label(RichText::new(*name).size(12.5));
+        for name in needs.used() {
+            left.label(RichText::new(name).size(12.5));
         }
         theme::heading(right, "LEFT OUT");
         for sentence in needs.left_out() {

@@ -34,7 +34,9 @@ pub(in crate::app) fn show(
             "Open",
             &[],
         ),
-        Purpose::Laws => ("Export the laws", "Path of a .csv, .json or .exr file", "Export", &[]),
+        Purpose::Distributions => {
+            ("Export the distributions", "Path of a .csv, .json or .exr file", "Export", &[])
+        }
     };
     let (mut is_done, mut is_closed) = (false, false);
     let response = Modal::new(Id::unique("prompt")).show(context, |ui| {

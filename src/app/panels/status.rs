@@ -87,9 +87,9 @@ fn word(ui: &mut Ui, text: &str, color: Color32, hint: &str) {
 }
 
 fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
-    let take = &snapshot.main;
+    let session = &snapshot.main;
     let [width, height] = size(snapshot);
-    let mean = take.figures.samples as f64 / (f64::from(width) * f64::from(height));
+    let mean = session.figures.samples as f64 / (f64::from(width) * f64::from(height));
     let samples = match mean {
         ..1.0 => format!("{mean:.2}"),
         ..10.0 => format!("{mean:.1}"),
@@ -97,13 +97,13 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
     };
     number(ui, &samples, "samples", "Mean samples per pixel");
     if !hides_clock {
-        let seconds = take.figures.elapsed_seconds();
+        let seconds = session.figures.elapsed_seconds();
         number(ui, &theme::clock(seconds), "", "Learning and rendering");
-        let rate = take.figures.rays as f64 / take.figures.render_seconds.max(1e-9);
+        let rate = session.figures.rays as f64 / session.figures.render_seconds.max(1e-9);
         number(ui, &theme::figure(rate), "rays/s", "Rays, shadow rays included, while rendering");
     }
-    if let Some(under) = snapshot.under.as_ref().filter(|under| under.is_cached) {
-        let share = format!("{:.0} %", 100.0 * under.share(take.samples));
+    if let Some(backdrop) = snapshot.backdrop.as_ref().filter(|backdrop| backdrop.is_cached) {
+        let share = format!("{:.0} %", 100.0 * backdrop.share(session.samples));
         number(
             ui,
             &share,
@@ -112,8 +112,8 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
              gone when there are enough samples, and never in what is saved",
         );
     }
-    if take.noise.is_finite() {
-        let percent = format!("{:.1} %", 100.0 * take.noise);
+    if session.noise.is_finite() {
+        let percent = format!("{:.1} %", 100.0 * session.noise);
         number(
             ui,
             &percent,
@@ -121,14 +121,14 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
             "Estimated relative RMS error of the pixels, from the samples' own spread",
         );
     }
-    let invalid = take.film.invalid_samples();
+    let invalid = session.film.invalid_samples();
     if invalid > 0 {
         let text = RichText::new(format!("{} not finite", theme::count(invalid)));
         ui.label(text.color(theme::ALERT)).on_hover_text(
             "Samples that were NaN or infinite: they are left out of the picture and counted as black",
         );
     }
-    let grid = take.grid.as_ref().map_or(0, |grid| grid.memory_bytes());
+    let grid = session.grid.as_ref().map_or(0, |grid| grid.memory_bytes());
     let map = snapshot.request.environment.memory_bytes();
     number(
         ui,

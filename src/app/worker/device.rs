@@ -7,7 +7,7 @@ use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::World;
 use crate::render::Session;
-use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, Stage};
+use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, UploadedScene};
 
 /// The device in use and what is on it.
 pub(super) struct Device {
@@ -18,15 +18,15 @@ pub(super) struct Device {
     screen: Arc<Mutex<Gpu>>,
     choice: Option<DeviceChoice>,
     gpu: Option<Gpu>,
-    staged: Option<Staged>,
+    uploaded: Option<Uploaded>,
     failure: Option<String>,
 }
 
 /// What is on the GPU.
-struct Staged {
+struct Uploaded {
     world: Arc<World>,
     environment: Arc<Environment>,
-    stage: Stage,
+    scene: UploadedScene,
 }
 
 impl Device {
@@ -34,14 +34,14 @@ impl Device {
         (adapter, rays): (Option<String>, RayChoice),
         screen: Arc<Mutex<Gpu>>,
     ) -> Self {
-        Self { adapter, rays, screen, choice: None, gpu: None, staged: None, failure: None }
+        Self { adapter, rays, screen, choice: None, gpu: None, uploaded: None, failure: None }
     }
 
     /// Whether [`Self::place`] may take long.
     pub(super) fn needs_preparation(&self, request: &Request) -> bool {
-        let is_staged =
-            self.staged.as_ref().is_some_and(|on| Arc::ptr_eq(&on.world, &request.world));
-        self.choice != Some(request.device) || (self.gpu.is_some() && !is_staged)
+        let is_uploaded =
+            self.uploaded.as_ref().is_some_and(|on| Arc::ptr_eq(&on.world, &request.world));
+        self.choice != Some(request.device) || (self.gpu.is_some() && !is_uploaded)
     }
 
     /// Whether a GPU is ready that has all first samples in a moment; software has not.
@@ -62,7 +62,8 @@ impl Device {
         if session.is_on_gpu() {
             return;
         }
-        let placed = self.stage(&gpu, request).and_then(|stage| session.continue_on_gpu(stage));
+        let placed =
+            self.upload(&gpu, request).and_then(|uploaded| session.continue_on_gpu(uploaded));
         if let Err(failure) = placed {
             self.give_up(&failure);
         }
@@ -71,7 +72,7 @@ impl Device {
     /// Does without the GPU until something else is chosen.
     pub(super) fn give_up(&mut self, failure: &Error) {
         self.failure.get_or_insert_with(|| format!("{failure}; the CPU renders"));
-        (self.gpu, self.staged) = (None, None);
+        (self.gpu, self.uploaded) = (None, None);
     }
 
     /// What went wrong since this was asked last.
@@ -81,7 +82,7 @@ impl Device {
 
     fn choose(&mut self, choice: DeviceChoice) {
         self.choice = Some(choice);
-        (self.gpu, self.staged) = (None, None);
+        (self.gpu, self.uploaded) = (None, None);
         // The name only says which GPU is meant.
         let adapter = self.adapter.as_deref().filter(|_| choice != DeviceChoice::Cpu);
         let screen = lock(&self.screen).clone();
@@ -93,15 +94,15 @@ impl Device {
     }
 
     /// The request's scene and map on the GPU; what is there already is not uploaded again.
-    fn stage(&mut self, gpu: &Gpu, request: &Request) -> Result<&Stage> {
+    fn upload(&mut self, gpu: &Gpu, request: &Request) -> Result<&UploadedScene> {
         let (world, environment) = (&request.world, &request.environment);
-        let before = self.staged.take().filter(|on| Arc::ptr_eq(&on.world, world));
-        let stage = match before {
-            Some(on) if Arc::ptr_eq(&on.environment, environment) => on.stage,
-            Some(on) => on.stage.relit(environment)?,
-            None => Stage::new(gpu, world, environment)?,
+        let before = self.uploaded.take().filter(|on| Arc::ptr_eq(&on.world, world));
+        let scene = match before {
+            Some(on) if Arc::ptr_eq(&on.environment, environment) => on.scene,
+            Some(on) => on.scene.relit(environment)?,
+            None => UploadedScene::new(gpu, world, environment)?,
         };
         let (world, environment) = (Arc::clone(world), Arc::clone(environment));
-        Ok(&self.staged.insert(Staged { world, environment, stage }).stage)
+        Ok(&self.uploaded.insert(Uploaded { world, environment, scene }).scene)
     }
 }

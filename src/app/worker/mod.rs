@@ -11,8 +11,10 @@ use std::thread::JoinHandle;
 
 mod device;
 mod job;
+mod kept;
 
-use job::{Job, Legacy};
+use job::Job;
+use kept::Kept;
 
 use super::Wake;
 use crate::alarm::Alarm;
@@ -136,7 +138,7 @@ pub struct Point {
 
 /// One picture and what was done for it.
 #[derive(Clone)]
-pub struct Take {
+pub struct SessionSnapshot {
     /// How the map was sampled.
     pub sampling: Sampling,
     /// The sums. Where the window shows those on its own device in every frame, they are as they were
@@ -148,7 +150,7 @@ pub struct Take {
     pub figures: Figures,
     /// [`Film::noise`].
     pub noise: f64,
-    /// The laws in use.
+    /// The distributions in use.
     pub grid: Option<Arc<LightGrid>>,
     /// The GPU at work; `None` is the CPU.
     pub gpu: Option<Arc<GpuFigures>>,
@@ -166,20 +168,20 @@ pub struct Snapshot {
     /// What is going on.
     pub activity: Activity,
     /// The picture.
-    pub main: Take,
+    pub main: SessionSnapshot,
     /// The plain picture of a split view.
-    pub plain: Option<Take>,
+    pub plain: Option<SessionSnapshot>,
     /// What learning counted, once it has ended.
     pub counters: Option<Arc<LearningGrid>>,
     /// How the error of `main` and of `plain` fell.
     pub curves: [Vec<Point>; 2],
     /// Another film of the same view; its samples help where `main` has few.
-    pub under: Option<Under>,
+    pub backdrop: Option<Backdrop>,
 }
 
 /// A film that is shown together with the picture's own, and never saved.
 #[derive(Clone)]
-pub struct Under {
+pub struct Backdrop {
     /// Of any size.
     pub film: Arc<Film>,
     /// What one of its samples counts beside one of the picture's own.
@@ -188,7 +190,7 @@ pub struct Under {
     pub is_cached: bool,
 }
 
-impl Under {
+impl Backdrop {
     /// The share of what is shown that it makes up, in `[0,1]`, beside a film of the same size with so
     /// many samples a pixel.
     pub fn share(&self, samples: u32) -> f32 {
@@ -198,7 +200,7 @@ impl Under {
 }
 
 /// Of the very same film, counting alike.
-impl PartialEq for Under {
+impl PartialEq for Backdrop {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.film, &other.film)
             && (self.worth, self.is_cached) == (other.worth, other.is_cached)
@@ -214,7 +216,7 @@ impl Snapshot {
 
     /// Whether there is anything to be seen.
     pub fn has_picture(&self) -> bool {
-        self.main.figures.samples > 0 || self.under.is_some()
+        self.main.figures.samples > 0 || self.backdrop.is_some()
     }
 }
 
@@ -348,7 +350,7 @@ fn lower_priority() {
 }
 
 fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: (Option<String>, RayChoice)) {
-    let mut legacy = Legacy::new(gpu, Arc::clone(&shared.screen));
+    let mut kept = Kept::new(gpu, Arc::clone(&shared.screen));
     let alarm = Alarm::start(Arc::clone(&shared.cancel));
     let mut done: Option<Arc<Request>> = None;
     loop {
@@ -372,7 +374,7 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: (Option<String>, Ray
         };
         let world = Arc::clone(&request.world);
         let environment = Arc::clone(&request.environment);
-        let mut job = Job::new(shared, &alarm, &mut legacy, request);
+        let mut job = Job::new(shared, &alarm, &mut kept, request);
         pool.install(|| {
             if job.is_moving() {
                 job.follow(&world, &environment);

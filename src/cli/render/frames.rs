@@ -147,8 +147,8 @@ fn codec(path: &Path) -> Option<&'static [&'static str]> {
 /// # Errors
 /// One sentence that names the file.
 pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
-    let RenderArguments { outputs, json, laws, .. } = arguments;
-    for path in outputs.iter().chain(json).chain(laws) {
+    let RenderArguments { outputs, json, distributions, .. } = arguments;
+    for path in outputs.iter().chain(json).chain(distributions) {
         let has_number = numbered(path, 0) != *path;
         if !is_video(path) && !has_number {
             let name = path.file_stem().unwrap_or_default().to_string_lossy();

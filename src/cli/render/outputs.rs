@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::image::{check_writable, is_same_file};
 use crate::light_grid::LightGrid;
 use crate::medium::Fog;
-use crate::output::laws::{check_laws_extension, write_laws};
+use crate::output::distributions::{check_distributions_extension, write_distributions};
 use crate::output::record::{self, Record};
 use crate::path::World;
 use crate::render::View;
@@ -32,8 +32,8 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
             frames::check(arguments)?;
         }
     }
-    if let Some(laws) = &arguments.laws {
-        check_laws_extension(laws)?;
+    if let Some(distributions) = &arguments.distributions {
+        check_distributions_extension(distributions)?;
     }
     let (width, height) = arguments.size;
     if let Some([left, top, w, h]) = arguments.region
@@ -43,8 +43,9 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
             "--region {left},{top},{w},{h} is not inside the picture of {width}x{height} pixels"
         )));
     }
-    let RenderArguments { outputs, json, laws, checkpoint, .. } = arguments;
-    let files: Vec<&PathBuf> = outputs.iter().chain(json).chain(laws).chain(checkpoint).collect();
+    let RenderArguments { outputs, json, distributions, checkpoint, .. } = arguments;
+    let files: Vec<&PathBuf> =
+        outputs.iter().chain(json).chain(distributions).chain(checkpoint).collect();
     for (i, file) in files.iter().enumerate() {
         if files[..i].iter().any(|other| is_same_file(other, file)) {
             return Err(Error::at(file, "two outputs would be written to this one file"));
@@ -74,9 +75,9 @@ pub(super) fn write(
         let written = record::write_json(path, &record.to_json());
         failures.extend(written.map(|()| say_written(path)).err());
     }
-    if let Some(path) = &arguments.laws {
-        let none = || Error::at(path, "not written: this map and sampling have no laws");
-        let written = grid.ok_or_else(none).and_then(|grid| write_laws(path, grid));
+    if let Some(path) = &arguments.distributions {
+        let none = || Error::at(path, "not written: this map and sampling have no distributions");
+        let written = grid.ok_or_else(none).and_then(|grid| write_distributions(path, grid));
         failures.extend(written.map(|()| say_written(path)).err());
     }
     failures

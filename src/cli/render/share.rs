@@ -39,7 +39,7 @@ pub(super) struct Share {
     deadline: Option<Instant>,
     checkpoint: Option<Checkpoint>,
     /// Whether what was learned is wanted for its own sake.
-    wants_laws: bool,
+    wants_distributions: bool,
     /// See [`FilmFacts::picture`].
     picture: Vec<(String, String)>,
 }
@@ -93,7 +93,7 @@ impl Share {
             target: 0,
             deadline: None,
             checkpoint: None,
-            wants_laws: arguments.laws.is_some(),
+            wants_distributions: arguments.distributions.is_some(),
             // It takes a look at all of the scene and the map.
             picture: match is_kept {
                 true => identity(arguments, world, environment, view),
@@ -212,8 +212,8 @@ impl Share {
         self.awaited.as_ref().is_some_and(|awaited| {
             let samples = self.first + awaited.film.min_samples();
             let is_done = self.rule.samples.is_some_and(|limit| samples >= limit);
-            (is_done && !self.wants_laws)
-                || session.has_final_laws()
+            (is_done && !self.wants_distributions)
+                || session.has_final_distributions()
                 || (session.phase() == Phase::Rendering && session.samples() >= samples)
         })
     }
@@ -264,7 +264,7 @@ impl Share {
             self.deadline = left.and_then(after);
         }
         // Earlier the first samples would be worth nothing without what was counted meanwhile.
-        let kept = self.checkpoint.as_ref().filter(|_| session.has_final_laws());
+        let kept = self.checkpoint.as_ref().filter(|_| session.has_final_distributions());
         let due = kept.and_then(|kept| kept.written.checked_add(kept.every));
         if due.is_some_and(|due| due <= Instant::now()) {
             if let Err(failure) = self.keep(session) {
@@ -274,7 +274,7 @@ impl Share {
                 interrupt.go_on();
             }
         }
-        let kept = self.checkpoint.as_ref().filter(|_| session.has_final_laws());
+        let kept = self.checkpoint.as_ref().filter(|_| session.has_final_distributions());
         let due = kept.and_then(|kept| kept.written.checked_add(kept.every));
         alarm.set(self.deadline.into_iter().chain(due).min());
     }
@@ -298,8 +298,12 @@ impl Share {
     pub(super) fn write_part(&self, path: &Path, record: &Record<'_>) -> Result<()> {
         let mut figures = *record.figures;
         if !record.with_times {
-            figures =
-                Figures { learning_seconds: 0.0, law_seconds: 0.0, render_seconds: 0.0, ..figures };
+            figures = Figures {
+                learning_seconds: 0.0,
+                distribution_seconds: 0.0,
+                render_seconds: 0.0,
+                ..figures
+            };
         }
         write_film(path, &self.facts(figures, record.metadata()), record.film, 0)
     }
@@ -334,7 +338,7 @@ fn identity(
         seed,
         points,
         grid_columns,
-        laws,
+        distributions,
         medium,
         ..
     } = view;
@@ -348,7 +352,7 @@ fn identity(
     };
     let settings = Digest::new()
         .debug(&(filter, sampling, sharing(arguments), limits, points, grid_columns))
-        .debug(&(laws, medium, view.background, view.layers, arguments.learning_paths))
+        .debug(&(distributions, medium, view.background, view.layers, arguments.learning_paths))
         .debug(&environment_options(arguments));
     let pairs = [
         ("version", env!("CARGO_PKG_VERSION").to_owned()),

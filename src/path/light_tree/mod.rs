@@ -223,7 +223,7 @@ fn clamped_mean(cosine: f32, scatter: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::statistics::chi_square_test;
+    use crate::metrics::hypothesis::chi_square_test;
     use crate::noise::Stream;
     use crate::sampler::hash;
 

@@ -107,15 +107,15 @@ impl Buffers {
     ) -> Result<()> {
         let Some(kind) = ARRAYS.into_iter().find(|kind| kind.name == name) else { return Ok(()) };
         let bytes = texels * kind.format.bytes();
-        // A kernel may have been made for laws in a buffer.
-        if self.prefers_buffers && (bytes <= self.most_bytes() || name == "laws") {
+        // A kernel may have been made for distributions in a buffer.
+        if self.prefers_buffers && (bytes <= self.most_bytes() || name == "distributions") {
             self.arrays.remove(name);
             return self.put_parts(name, what, bytes, parts);
         }
         let (width, most) = (1_u64 << self.width_log2, self.gpu.limits.max_texture_dimension_2d);
         let rows = texels.div_ceil(width).max(1);
         // Software Vulkan compiles a kernel anew where a texture's height becomes a power of two or
-        // ceases to be one, as that of the laws did while they grew.
+        // ceases to be one, as that of the distributions did while they grew.
         let rows = if rows <= SMALL_ROWS { rows.next_power_of_two() } else { rows };
         if rows > u64::from(most) {
             return Err(Error::new(format!(

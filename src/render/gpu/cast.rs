@@ -3,8 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use super::kernel::Kernel;
 use super::layout::Work;
-use super::shader::Kernel;
 use super::{GROUP, MAX_GROUPS, Question, Renderer};
 use crate::bvh::Ray;
 use crate::error::Result;
@@ -71,12 +71,12 @@ impl Renderer {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Gpu, RayChoice, Stage};
+    use super::super::{Gpu, RayChoice, UploadedScene};
     use super::*;
     use crate::environment::{Environment, EnvironmentOptions};
     use crate::path::World;
     use crate::render::Sampling;
-    use crate::render::gpu::parity::stand;
+    use crate::render::gpu::parity::fixture;
     use crate::sampler::Sampler;
     use crate::scene::builtin;
 
@@ -98,10 +98,10 @@ mod tests {
     fn apart(gpu: &Gpu, world: &World, rays: &[Ray]) -> [f64; 2] {
         let map = crate::environment::sky::build("overcast", 64, 32).expect("a sky");
         let environment = Environment::new(map, &EnvironmentOptions::default()).expect("sound");
-        let view = stand::view_of(world, Sampling::Bsdf);
-        let stage = Stage::new(gpu, world, &environment).expect("it fits");
+        let view = fixture::view_of(world, Sampling::Bsdf);
+        let uploaded = UploadedScene::new(gpu, world, &environment).expect("it fits");
         let camera = view.rays();
-        let renderer = Renderer::new(&stage, world, &environment, &view, &camera, None);
+        let renderer = Renderer::new(&uploaded, world, &environment, &view, &camera, None);
         let mut renderer = renderer.expect("it fits");
         renderer.put_rays(rays).expect("they fit");
         [Question::ClosestHit, Question::Transmittance].map(|question| {

@@ -8,9 +8,9 @@ use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 use super::GROUP;
 use super::device::Gpu;
+use super::kernel::Kernel;
 use super::pacer::{Pacer, TARGET_SECONDS, WINDOW_TARGET_SECONDS};
 use super::queue::REPORT_BYTES;
-use super::shader::Kernel;
 use crate::error::{Error, Result};
 use crate::render::devices::FlightFigures;
 
@@ -180,7 +180,7 @@ impl Flights {
             }
             None => flight.units,
         };
-        // A clock that stands still must not let dispatches grow for ever.
+        // A clock that fixtures still must not let dispatches grow for ever.
         let is_far_too_long = !had_ended && seen > FAR_TOO_LONG * self.target_seconds;
         let paced = if is_far_too_long { seen } else { seconds };
         if told.is_some() || !had_ended || paced < self.target_seconds {

@@ -18,7 +18,7 @@ use crate::radiance_cache::CacheCells;
 use crate::scene::surface::absorption;
 use crate::scene::{self, AlphaMode, PunctualKind, Scene, Wrap};
 
-/// No law of cells.
+/// No distribution of cells.
 pub(crate) const NO_ARRAY: u32 = u32::MAX;
 /// A material without this texture.
 const NO_TEXTURE: u32 = u32::MAX;
@@ -52,13 +52,13 @@ pub(crate) struct Globals {
     pub(crate) half_height: f32,
     pub(crate) grid_center: Vec3,
     pub(crate) grid_columns: u32,
-    pub(crate) law_starts_at: u32,
-    pub(crate) law_masks_at: u32,
-    pub(crate) law_ranks_at: u32,
-    pub(crate) law_tiles_at: u32,
-    pub(crate) law_last_at: u32,
-    pub(crate) law_of_cell_at: u32,
-    pub(crate) words_per_law: u32,
+    pub(crate) distribution_starts_at: u32,
+    pub(crate) distribution_masks_at: u32,
+    pub(crate) distribution_ranks_at: u32,
+    pub(crate) distribution_tiles_at: u32,
+    pub(crate) distribution_last_at: u32,
+    pub(crate) distribution_of_cell_at: u32,
+    pub(crate) words_per_distribution: u32,
     pub(crate) grid_rows: u32,
     pub(crate) map_width: u32,
     pub(crate) map_height: u32,
@@ -263,28 +263,28 @@ pub(crate) fn vertices(scene: &Scene, texels: &VertexTexels) -> Vec<[f32; 4]> {
     result
 }
 
-/// The laws of a grid; sets where each array begins.
-pub(crate) fn laws(grid: &LightGrid, globals: &mut Globals) -> Vec<u32> {
-    let laws = grid.laws().arrays();
+/// The distributions of a grid; sets where each array begins.
+pub(crate) fn distributions(grid: &LightGrid, globals: &mut Globals) -> Vec<u32> {
+    let distributions = grid.distributions().arrays();
     let mut words = Vec::new();
     let mut push = |part: &mut dyn Iterator<Item = u32>| {
         let at = words.len() as u32;
         words.extend(part);
         at
     };
-    globals.law_starts_at = push(&mut laws.starts.iter().copied());
-    globals.law_masks_at =
-        push(&mut laws.masks.iter().flat_map(|mask| [*mask as u32, (mask >> 32) as u32]));
-    globals.law_ranks_at = push(&mut pairs(laws.ranks));
-    globals.law_tiles_at = push(&mut pairs(laws.tiles));
-    globals.law_last_at = push(&mut laws.last.iter().copied());
-    globals.law_of_cell_at = NO_ARRAY;
-    if let Some((cells, law_of_cell)) = grid.cells() {
-        globals.law_of_cell_at = push(&mut pairs(law_of_cell));
+    globals.distribution_starts_at = push(&mut distributions.starts.iter().copied());
+    globals.distribution_masks_at =
+        push(&mut distributions.masks.iter().flat_map(|mask| [*mask as u32, (mask >> 32) as u32]));
+    globals.distribution_ranks_at = push(&mut pairs(distributions.ranks));
+    globals.distribution_tiles_at = push(&mut pairs(distributions.tiles));
+    globals.distribution_last_at = push(&mut distributions.last.iter().copied());
+    globals.distribution_of_cell_at = NO_ARRAY;
+    if let Some((cells, distribution_of_cell)) = grid.cells() {
+        globals.distribution_of_cell_at = push(&mut pairs(distribution_of_cell));
         globals.set_cells(cells);
     }
     globals.whole_map_share = grid.whole_map_share();
-    globals.words_per_law = laws.words_per_law;
+    globals.words_per_distribution = distributions.words_per_distribution;
     words
 }
 

@@ -1,6 +1,6 @@
 //! The GPU's schedule: the same paths in compute shaders, in dispatches too short to be felt.
 //!
-//! `Renderer` holds the scene, the map, the laws and the film on a device and brings that film forward
+//! `Renderer` holds the scene, the map, the distributions and the film on a device and brings that film forward
 //! as `cpu` does. Nothing waits in between: a few dispatches are always under way, and the host reads
 //! the film, whose sums lose nothing at any number of samples, only when somebody asks for it.
 
@@ -8,9 +8,11 @@ mod acceleration;
 mod buffers;
 mod cast;
 mod device;
+mod features;
 mod film;
 mod flight;
-pub(crate) mod layout;
+pub(crate) mod kernel;
+mod layout;
 mod pacer;
 #[cfg(test)]
 mod parity;
@@ -21,7 +23,7 @@ mod read;
 mod registers;
 pub(crate) mod shader;
 mod sharing;
-mod stage;
+mod uploaded_scene;
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -36,6 +38,7 @@ use super::{Pass, View};
 use crate::bsdf::{albedo, sheen};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
+use crate::features::Features;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::path::camera::CameraRays;
@@ -43,12 +46,13 @@ use crate::radiance_cache::{RadianceCache, RadianceSums};
 use buffers::Buffers;
 use film::Sums;
 use flight::{Flights, Job};
+use kernel::Kernel;
 use layout::{Globals, Work};
 use pipeline::Pipeline;
 use queue::Queue;
-use shader::{Binding, Constants, Features, Kernel, Program};
+use shader::{Binding, Constants, Program};
 use sharing::Sharing;
-use stage::put_array;
+use uploaded_scene::put_array;
 
 pub(crate) use super::devices::Question;
 pub use super::devices::{
@@ -57,8 +61,8 @@ pub use super::devices::{
 pub(crate) use device::NO_GPU;
 pub use device::{Gpu, adapters};
 pub(crate) use film::DeviceFilm;
-pub use shader::KernelFacts;
-pub use stage::Stage;
+pub use kernel::KernelFacts;
+pub use uploaded_scene::UploadedScene;
 
 /// Pixels along a side of a workgroup's tile.
 const TILE: u32 = 8;
@@ -123,24 +127,25 @@ pub(super) struct Advance {
 }
 
 impl Renderer {
-    /// Builds the kernel for a view of what is on the stage; goes on from `film` if there is one.
+    /// Builds the kernel for a view of what is uploaded; goes on from `film` if there is one.
     ///
     /// # Errors
     /// If something does not fit on the device, with the numbers.
     pub(crate) fn new(
-        stage: &Stage,
+        uploaded: &UploadedScene,
         world: &World,
         environment: &Environment,
         view: &View,
         rays: &CameraRays,
         film: Option<&Film>,
     ) -> Result<Self> {
-        let mut renderer = Self::without_kernels(stage, (world, environment), view, rays, film)?;
-        let is_queue = Schedule::of(&stage.gpu, &renderer.features) == Schedule::Queue;
-        let takes_turns = renderer.sharing.is_none() && !renderer.features.has("radiance_cache");
+        let mut renderer = Self::without_kernels(uploaded, (world, environment), view, rays, film)?;
+        let is_queue = Schedule::of(&uploaded.gpu, renderer.features) == Schedule::Queue;
+        let takes_turns =
+            renderer.sharing.is_none() && !renderer.features.contains(Features::RADIANCE_CACHE);
         if is_queue && takes_turns {
             let tiles = renderer.tiles();
-            let queue = Queue::new(&mut renderer.buffers, &renderer.features, tiles)?;
+            let queue = Queue::new(&mut renderer.buffers, renderer.features, tiles)?;
             renderer.queue = Some(queue);
         }
         for kernel in renderer.render_kernels() {
@@ -152,64 +157,64 @@ impl Renderer {
     /// [`Self::new`] with the kernel that `compile` makes of the program for rendering.
     #[cfg(test)]
     fn with_kernel(
-        stage: &Stage,
+        uploaded: &UploadedScene,
         (world, environment): (&World, &Environment),
         view: &View,
         rays: &CameraRays,
         compile: impl FnOnce(&Gpu, Program) -> Result<Arc<Pipeline>>,
     ) -> Result<Self> {
-        let mut renderer = Self::without_kernels(stage, (world, environment), view, rays, None)?;
+        let mut renderer = Self::without_kernels(uploaded, (world, environment), view, rays, None)?;
         let Self { features, constants, buffers, .. } = &renderer;
         let places = buffers.array_places();
-        let program = Program::new(Kernel::Render, features, constants, &places);
+        let program = Program::new(Kernel::Render, *features, constants, &places);
         let pipeline = compile(&renderer.gpu, program)?;
         renderer.kernels.insert(Kernel::Render, Bound::new(pipeline));
         Ok(renderer)
     }
 
     fn without_kernels(
-        stage: &Stage,
+        uploaded: &UploadedScene,
         (world, environment): (&World, &Environment),
         view: &View,
         rays: &CameraRays,
         film: Option<&Film>,
     ) -> Result<Self> {
         let mut features = Features::of(world, environment, view);
-        if stage.gpu.has_hardware_rays() {
+        if uploaded.gpu.has_hardware_rays() {
             features = features.with_hardware_rays();
         }
-        let mut buffers = stage.buffers.for_renderer();
-        let mut globals = stage.globals;
+        let mut buffers = uploaded.buffers.for_renderer();
+        let mut globals = uploaded.globals;
         globals.set_view(view, rays);
         globals.set_fog(view.fog(world).as_ref());
-        let mut constants = stage.constants;
-        upload_tables(&mut buffers, view, environment, &features, &mut constants)?;
+        let mut constants = uploaded.constants;
+        upload_tables(&mut buffers, view, environment, features, &mut constants)?;
         let size = [view.width, view.height];
         globals.film_scale = film::scale_for(world.brightest(environment));
         let sums = Sums::new(&mut buffers, size, view.layers, globals.film_scale, film)?;
         let progress = film.map(Progress::of).unwrap_or_default();
-        if features.has("counting") {
+        if features.contains(Features::COUNTING) {
             // Until there is something to count.
             for name in ["visits", "slot_of_cell", "counters"] {
                 buffers.make(name, 4, "the learning counters")?;
             }
         }
         buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
-        let kernel_facts = KernelFacts::of(&features);
+        let kernel_facts = KernelFacts::of(features);
         constants.shared_tile = view.shared_tile();
         let sharing = constants
             .shared_tile
-            .map(|tile| Sharing::new(&mut buffers, &features, tile, size))
+            .map(|tile| Sharing::new(&mut buffers, features, tile, size))
             .transpose()?;
         let mut renderer = Self {
             kernels: BTreeMap::new(),
-            flights: Flights::new(&stage.gpu),
+            flights: Flights::new(&uploaded.gpu),
             queue: None,
             sharing,
             film: sums,
             progress,
             told: 0,
-            gpu: stage.gpu.clone(),
+            gpu: uploaded.gpu.clone(),
             buffers,
             globals,
             features,
@@ -233,18 +238,20 @@ impl Renderer {
         Ok(())
     }
 
-    /// Uploads the laws paths choose tiles by.
+    /// Uploads the distributions paths choose tiles by.
     pub(crate) fn set_grid(&mut self, grid: Option<&LightGrid>) -> Result<()> {
-        let Some(grid) = grid.filter(|_| self.features.has("map_sampling")) else { return Ok(()) };
-        // Paths remember which law they come from.
+        let Some(grid) = grid.filter(|_| self.features.contains(Features::MAP_SAMPLING)) else {
+            return Ok(());
+        };
+        // Paths remember which distribution they come from.
         self.forget_paths()?;
-        let words = layout::laws(grid, &mut self.globals);
-        put_array(&mut self.buffers, "laws", "the light grid", &words)?;
+        let words = layout::distributions(grid, &mut self.globals);
+        put_array(&mut self.buffers, "distributions", "the light grid", &words)?;
         self.write_globals();
         Ok(())
     }
 
-    /// Traces the learning paths in `paths`, drawing from the laws last set; returns the number of
+    /// Traces the learning paths in `paths`, drawing from the distributions last set; returns the number of
     /// rays. The counters are as before if it is cancelled or fails.
     pub(crate) fn learn(
         &mut self,
@@ -261,9 +268,9 @@ impl Renderer {
         Ok(rays)
     }
 
-    /// Traces paths that teach the radiance cache; what was set of it last is what is known by now.
+    /// Traces paths that train the radiance cache; what was set of it last is what is known by now.
     /// Returns the first path that was not traced, and the number of rays.
-    pub(crate) fn teach(
+    pub(crate) fn train(
         &mut self,
         paths: Range<u64>,
         sums: &RadianceSums,
@@ -272,14 +279,14 @@ impl Renderer {
         let (words, scale) = sums.words_and_scale();
         self.globals.set_cells_of_cache(sums.cells(), scale);
         self.buffers.put("cache_sums", bytemuck::cast_slice(&words), "the radiance cache")?;
-        let done = self.trace_anywhere(Kernel::Teach, paths, cancel)?;
+        let done = self.trace_anywhere(Kernel::Train, paths, cancel)?;
         sums.set_words(&self.read_words("cache_sums", words.len())?);
         Ok(done)
     }
 
     /// Uploads the cache that paths end in; without one they go on.
     pub(crate) fn set_cache(&mut self, cache: Option<&RadianceCache>) -> Result<()> {
-        if !self.features.has("radiance_cache") {
+        if !self.features.contains(Features::RADIANCE_CACHE) {
             return Ok(());
         }
         let (slots, mean) = cache.map_or((&[][..], Vec3::ZERO), RadianceCache::slots_and_mean);
@@ -507,7 +514,7 @@ impl Renderer {
         if self.sharing.is_some() {
             return &Kernel::OF_SHARING;
         }
-        match (&self.queue, self.features.has("shadow_rays")) {
+        match (&self.queue, self.features.contains(Features::SHADOW_RAYS)) {
             (None, _) => &[Kernel::Render],
             (Some(_), true) => &Kernel::OF_QUEUE,
             (Some(_), false) => &Kernel::OF_QUEUE[..2],
@@ -520,7 +527,7 @@ impl Renderer {
         let bound = match kernels.entry(kernel) {
             Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(vacant) => {
-                let program = Program::new(kernel, features, constants, &buffers.array_places());
+                let program = Program::new(kernel, *features, constants, &buffers.array_places());
                 vacant.insert(Bound::new(gpu.pipeline(kernel, program)?))
             }
         };
@@ -612,12 +619,12 @@ fn upload_tables(
     buffers: &mut Buffers,
     view: &View,
     environment: &Environment,
-    features: &Features,
+    features: Features,
     constants: &mut Constants,
 ) -> Result<()> {
     let mut texels = albedo::texels();
     constants.sheen_at = texels.len() as u32;
-    if features.has("sheen") {
+    if features.contains(Features::SHEEN) {
         texels.extend(sheen::texels());
     }
     constants.filter_at = texels.len() as u32;
@@ -632,9 +639,9 @@ pub(super) mod tests {
     use super::*;
     use crate::environment::EnvironmentOptions;
     use crate::light_grid::cells::SphericalGrid;
-    use crate::light_grid::{LawOptions, Recording};
+    use crate::light_grid::{DistributionOptions, Recording};
     use crate::path::PathTracer;
-    use crate::render::gi::Lessons;
+    use crate::render::gi::CacheTraining;
     use crate::render::gi::tests::view;
     use crate::render::{Gi, Sampling, cpu};
     use crate::sampler::Sequence;
@@ -649,8 +656,11 @@ pub(super) mod tests {
     }
 
     /// Visits of each cell and, cell by cell, tile counters after two learning passes, the second with
-    /// laws of the first, and a rendering pass of which a third is counted, if rendered paths count.
-    pub(super) fn learn(gpu: Option<&Gpu>, recording: LawOptions) -> (Vec<u32>, Vec<u32>, u64) {
+    /// distributions of the first, and a rendering pass of which a third is counted, if rendered paths count.
+    pub(super) fn learn(
+        gpu: Option<&Gpu>,
+        recording: DistributionOptions,
+    ) -> (Vec<u32>, Vec<u32>, u64) {
         let (world, environment) = crack();
         let view = view(&world, recording);
         let rays = CameraRays::new(&view.camera, view.width, view.height);
@@ -662,11 +672,11 @@ pub(super) mod tests {
             medium: false,
         };
         let mut learning = LearningGrid::new(grid, environment.tile_count(), recording);
-        let mut laws = LightGrid::whole_map(environment.tile_energies());
+        let mut distributions = LightGrid::whole_map(environment.tile_energies());
         let never = AtomicBool::new(false);
         let mut renderer = gpu.map(|gpu| {
-            let stage = Stage::new(gpu, &world, &environment).expect("it fits");
-            Renderer::new(&stage, &world, &environment, &view, &rays, None).expect("it fits")
+            let uploaded = UploadedScene::new(gpu, &world, &environment).expect("it fits");
+            Renderer::new(&uploaded, &world, &environment, &view, &rays, None).expect("it fits")
         });
         let mut traced = 0;
         for paths in [Some(0..4096), Some(4096..16384), None] {
@@ -675,7 +685,7 @@ pub(super) mod tests {
             let rendered = recording.goes_on().then_some(pass);
             traced += match (&mut renderer, paths) {
                 (Some(renderer), paths) => {
-                    renderer.set_grid(laws.as_ref()).expect("uploaded");
+                    renderer.set_grid(distributions.as_ref()).expect("uploaded");
                     let counts = Some(&learning);
                     match (paths, rendered) {
                         (Some(paths), _) => renderer.learn(paths, &learning, &never),
@@ -690,7 +700,7 @@ pub(super) mod tests {
                     .expect("done")
                 }
                 (None, paths) => {
-                    let tracer = view.tracer(&world, &environment, laws.as_ref());
+                    let tracer = view.tracer(&world, &environment, distributions.as_ref());
                     let tracer = PathTracer { counts: Some(&learning), ..tracer };
                     match (paths, rendered) {
                         (Some(paths), _) => cpu::learn(&tracer, &rays, &view, paths, &never),
@@ -702,7 +712,7 @@ pub(super) mod tests {
                 }
             };
             learning.counters.end_pass();
-            laws = learning.laws(&environment);
+            distributions = learning.distributions(&environment);
         }
         let (visits, slots, blocks) = learning.counters.words();
         let words = 2 * environment.tile_count() as usize;
@@ -725,12 +735,13 @@ pub(super) mod tests {
 
     fn cut_short(gpu: &Gpu) {
         let (world, environment) = crack();
-        let view = View { sampling: Sampling::Plain, ..view(&world, LawOptions::ADAPTIVE) };
+        let view =
+            View { sampling: Sampling::Plain, ..view(&world, DistributionOptions::ADAPTIVE) };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
-        let stage = Stage::new(gpu, &world, &environment).expect("it fits");
+        let uploaded = UploadedScene::new(gpu, &world, &environment).expect("it fits");
         let grid = LightGrid::whole_map(environment.tile_energies());
         let begin = || {
-            let renderer = Renderer::new(&stage, &world, &environment, &view, &rays, None);
+            let renderer = Renderer::new(&uploaded, &world, &environment, &view, &rays, None);
             let mut renderer = renderer.expect("it fits");
             renderer.set_grid(grid.as_ref()).expect("uploaded");
             renderer
@@ -776,12 +787,12 @@ pub(super) mod tests {
             Ok(gpu) => gpu,
             Err(reason) => return eprintln!("SKIPPED: {reason}"),
         };
-        let squared = LawOptions {
+        let squared = DistributionOptions {
             faces: false,
             recording: Recording::VisibleCosineSquared,
-            ..LawOptions::ADAPTIVE
+            ..DistributionOptions::ADAPTIVE
         };
-        for recording in [LawOptions::ADAPTIVE, LawOptions::TALK, squared] {
+        for recording in [DistributionOptions::ADAPTIVE, DistributionOptions::TALK, squared] {
             let (cpu_visits, cpu_blocks, cpu_rays) = learn(None, recording);
             let (gpu_visits, gpu_blocks, gpu_rays) = learn(Some(&gpu), recording);
             assert_eq!(cpu_blocks.len(), gpu_blocks.len(), "the same cells have counters");
@@ -799,26 +810,27 @@ pub(super) mod tests {
 
     /// As above: one path in a thousand goes elsewhere.
     #[test]
-    fn both_devices_teach_the_same() {
+    fn both_devices_train_the_same() {
         let gpu = match Gpu::open(None) {
             Ok(gpu) => gpu,
             Err(reason) => return eprintln!("SKIPPED: {reason}"),
         };
         let (world, environment) = crack();
-        let view = View { gi: Gi::Cached, ..view(&world, LawOptions::ADAPTIVE) };
+        let view = View { gi: Gi::Cached, ..view(&world, DistributionOptions::ADAPTIVE) };
         let rays = CameraRays::new(&view.camera, view.width, view.height);
-        let lessons = || Lessons::new(&world, &environment, &view, &rays).expect("there is light");
-        let laws = LightGrid::whole_map(environment.tile_energies());
-        let (on_cpu, on_gpu) = (lessons(), lessons());
-        let tracer = view.tracer(&world, &environment, laws.as_ref());
-        let stage = Stage::new(&gpu, &world, &environment).expect("it fits");
+        let training =
+            || CacheTraining::new(&world, &environment, &view, &rays).expect("there is light");
+        let distributions = LightGrid::whole_map(environment.tile_energies());
+        let (on_cpu, on_gpu) = (training(), training());
+        let tracer = view.tracer(&world, &environment, distributions.as_ref());
+        let uploaded = UploadedScene::new(&gpu, &world, &environment).expect("it fits");
         let mut renderer =
-            Renderer::new(&stage, &world, &environment, &view, &rays, None).expect("it fits");
-        renderer.set_grid(laws.as_ref()).expect("uploaded");
+            Renderer::new(&uploaded, &world, &environment, &view, &rays, None).expect("it fits");
+        renderer.set_grid(distributions.as_ref()).expect("uploaded");
         let never = AtomicBool::new(false);
         let mut known = None;
         for paths in [0..8192, 8192..16384] {
-            let cpu_rays = cpu::teach(
+            let cpu_rays = cpu::train(
                 &PathTracer { cache: known.as_ref(), ..tracer },
                 &rays,
                 &view,
@@ -827,10 +839,10 @@ pub(super) mod tests {
             );
             renderer.set_cache(known.as_ref()).expect("uploaded");
             let (end, gpu_rays) =
-                renderer.teach(paths.clone(), on_gpu.sums(), &never).expect("taught");
+                renderer.train(paths.clone(), on_gpu.sums(), &never).expect("trained");
             assert_eq!(end, paths.end);
             assert!(cpu_rays.abs_diff(gpu_rays) * 500 < cpu_rays, "{cpu_rays} {gpu_rays}");
-            let totals = [&on_cpu, &on_gpu].map(|lessons| lessons.sums().totals());
+            let totals = [&on_cpu, &on_gpu].map(|training| training.sums().totals());
             let [(cpu_count, cpu_sums), (gpu_count, gpu_sums)] = totals;
             eprintln!("{cpu_count} {cpu_sums} against {gpu_count} {gpu_sums}");
             assert!(cpu_count.abs_diff(gpu_count) * 500 < cpu_count);

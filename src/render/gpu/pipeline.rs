@@ -5,7 +5,8 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use super::device::Gpu;
-use super::shader::{Binding, Kernel, Program};
+use super::kernel::Kernel;
+use super::shader::{Binding, Program};
 use crate::error::Result;
 
 /// What naga adds to the kernels so that they cannot do harm, whatever they read. Counters that end

@@ -8,10 +8,12 @@ use super::super::Pass;
 use super::buffers::Buffers;
 use super::device::Gpu;
 use super::flight::Job;
+use super::kernel::Kernel;
 use super::layout::Work;
-use super::shader::{Features, Kernel, SlotTexels};
+use super::shader::SlotTexels;
 use super::{GROUP, Progress, Renderer};
 use crate::error::Result;
+use crate::features::Features;
 use crate::render::devices::Schedule;
 
 /// Most workgroups of slots: they keep the largest devices busy and fit their caches.
@@ -23,7 +25,7 @@ pub(super) const REPORT_BYTES: u64 = 16;
 
 impl Schedule {
     /// What suits a picture on a device.
-    pub(super) fn of(gpu: &Gpu, features: &Features) -> Self {
+    pub(super) fn of(gpu: &Gpu, features: Features) -> Self {
         if let Some(asked) = gpu.schedule {
             return asked;
         }
@@ -43,7 +45,7 @@ pub(super) struct Queue {
 
 impl Queue {
     /// Makes the buffers for a picture of so many tiles.
-    pub(super) fn new(buffers: &mut Buffers, features: &Features, tiles: u64) -> Result<Self> {
+    pub(super) fn new(buffers: &mut Buffers, features: Features, tiles: u64) -> Result<Self> {
         let groups = tiles.min(MOST_GROUPS);
         let slot_bytes = 16 * u64::from(SlotTexels::of(features).count);
         buffers.make("slots", groups * GROUP * slot_bytes, "the set of paths")?;
@@ -128,11 +130,11 @@ impl Renderer {
 
 #[cfg(test)]
 mod tests {
-    use super::super::parity::stand;
-    use super::super::{Advance, Stage, tests};
+    use super::super::parity::fixture;
+    use super::super::{Advance, UploadedScene, tests};
     use super::*;
     use crate::environment::{Environment, EnvironmentOptions};
-    use crate::light_grid::{LawOptions, LightGrid};
+    use crate::light_grid::{DistributionOptions, LightGrid};
     use crate::path::World;
     use crate::render::film::Film;
     use crate::render::{Sampling, View};
@@ -158,9 +160,9 @@ mod tests {
         (world, environment, view): (&World, &Environment, &View),
         grid: Option<&LightGrid>,
     ) -> Film {
-        let stage = Stage::new(gpu, world, environment).expect("it fits");
+        let uploaded = UploadedScene::new(gpu, world, environment).expect("it fits");
         let rays = view.rays();
-        let renderer = Renderer::new(&stage, world, environment, view, &rays, None);
+        let renderer = Renderer::new(&uploaded, world, environment, view, &rays, None);
         let mut renderer = renderer.expect("it fits");
         if let Some(queue) = &mut renderer.queue {
             queue.groups = 7;
@@ -189,8 +191,8 @@ mod tests {
     #[test]
     fn both_schedules_render_the_same_picture() {
         let Some(gpus) = devices() else { return };
-        let stand = stand::foggy_one();
-        assert_same("everything", &gpus, (&stand.world, &stand.environment, &stand.view));
+        let fixture = fixture::foggy_one();
+        assert_same("everything", &gpus, (&fixture.world, &fixture.environment, &fixture.view));
         let sky = crate::environment::sky::build("sunset", 128, 64).expect("a sky");
         let sky = Environment::new(sky, &EnvironmentOptions::default()).expect("sound");
         for (name, sampling) in [
@@ -200,7 +202,7 @@ mod tests {
             ("crack", Sampling::Bsdf),
         ] {
             let world = World::new(builtin::build(name).expect("built in"));
-            let view = View { layers: false, ..stand::view_of(&world, sampling) };
+            let view = View { layers: false, ..fixture::view_of(&world, sampling) };
             assert_same(name, &gpus, (&world, &sky, &view));
         }
     }
@@ -209,7 +211,7 @@ mod tests {
     fn both_schedules_count_the_same() {
         let Some(gpus) = devices() else { return };
         let [whole, queue] =
-            gpus.each_ref().map(|gpu| tests::learn(Some(gpu), LawOptions::ADAPTIVE));
+            gpus.each_ref().map(|gpu| tests::learn(Some(gpu), DistributionOptions::ADAPTIVE));
         assert!(whole == queue, "the same visits, counters and rays");
     }
 }

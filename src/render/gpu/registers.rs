@@ -12,10 +12,11 @@ use std::process::Command;
 
 use ash::vk;
 
+use super::kernel::Kernel;
 use super::shader::{
-    ARRAYS, ArrayPlaces, Binding, Constants, Features, Kernel, Program, SHARED_STACK_SIZE,
-    VertexTexels,
+    ARRAYS, ArrayPlaces, Binding, Constants, Program, SHARED_STACK_SIZE, VertexTexels,
 };
+use crate::features::Features;
 use crate::path::World;
 use crate::scene::builtin;
 
@@ -142,38 +143,19 @@ fn a_queue_is_for_kernels_of_few_waves() {
     for name in builtin::names() {
         let world = World::new(builtin::build(name).expect("built in"));
         let waves = table[&((*name).to_owned(), Kernel::Render.name().to_owned())][WAVES];
-        let is_large = features_of(&world).shading_is_large();
+        let is_large = Features::by_default(&world).shading_is_large();
         assert_eq!(is_large, waves <= FEW_WAVES, "{name}: {waves} waves");
     }
 }
 
-/// What a scene's kernels hold with the defaults of `render`.
-fn features_of(world: &World) -> Features {
-    let medium = world.needs.scattering_solids || world.scene.medium.is_some();
-    let defaults = [
-        ("counting", true),
-        ("faces", true),
-        ("light_grid", true),
-        ("map", true),
-        ("map_sampling", true),
-        ("medium", medium),
-        ("record_cosine", true),
-        ("record_ratio", true),
-        ("wide_filter", true),
-    ];
-    let of_world = Features::of_world(world);
-    let names = of_world.names().map(|name| (name, true));
-    Features::from_names(names.chain(defaults))
-}
-
 /// A scene's kernel, with arrays where GPUs have them.
 fn program_of(world: &World, kernel: Kernel) -> Program {
-    let features = features_of(world);
+    let features = Features::by_default(world);
     // Where the tables begin is of no account, nor is how deep the tree is: none here is deeper.
     let constants = Constants {
         stack_size: SHARED_STACK_SIZE,
         shared_stack_size: SHARED_STACK_SIZE,
-        vertex: VertexTexels::of(&features),
+        vertex: VertexTexels::of(features),
         textures_in_scene: world.needs.texture_slots,
         albedo_at: 0,
         sheen_at: 4096,
@@ -182,7 +164,7 @@ fn program_of(world: &World, kernel: Kernel) -> Program {
         shared_tile: None,
     };
     let in_buffers = ARRAYS.map(|array| array.name).into();
-    Program::new(kernel, &features, &constants, &ArrayPlaces { in_buffers, ..Default::default() })
+    Program::new(kernel, features, &constants, &ArrayPlaces { in_buffers, ..Default::default() })
 }
 
 /// A program as SPIR-V, made as wgpu makes it.

@@ -5,407 +5,11 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use serde::Serialize;
-
-use super::super::filter::PixelFilter;
-use super::super::{Gi, Sampling, View};
-use crate::environment::{Environment, Lookup, TableKind};
-use crate::light_grid::Recording;
+use super::kernel::Kernel;
+use crate::features::Features;
+use crate::path::TRAINING_VERTICES;
 use crate::path::sharing::SharedTile;
-use crate::path::{Background, TEACHERS, World};
 use crate::radiance_cache;
-use crate::sampler::Points;
-
-/// Entry points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Kernel {
-    /// Adds samples to pixels.
-    Render,
-    /// Traces learning paths.
-    Learn,
-    /// Traces paths that teach the radiance cache.
-    Teach,
-    /// Finds the nearest hits of rays, for measurements.
-    ClosestHits,
-    /// Finds how much light comes along rays, for measurements.
-    ShadowRays,
-    /// Adds samples to pixels, with the two that follow: finds what rays of paths hit.
-    Trace,
-    /// Finds what becomes of paths there.
-    Shade,
-    /// Follows their rays towards lights.
-    FollowShadows,
-    /// Adds samples to pixels that share, with the two that follow: finds second vertices.
-    FindSeconds,
-    /// Estimates what arrives there.
-    LightSeconds,
-    /// Gathers light at the first vertices.
-    ConnectSeconds,
-}
-
-impl Kernel {
-    /// Name of the entry point.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Render => "render",
-            Self::Learn => "learn",
-            Self::Teach => "teach",
-            Self::ClosestHits => "closest_hits",
-            Self::ShadowRays => "shadow_rays",
-            Self::Trace => "trace",
-            Self::Shade => "shade",
-            Self::FollowShadows => "follow_shadows",
-            Self::FindSeconds => "find_seconds",
-            Self::LightSeconds => "light_seconds",
-            Self::ConnectSeconds => "connect_seconds",
-        }
-    }
-
-    /// Number of kernels.
-    pub(crate) const COUNT: usize = 11;
-
-    /// Those that bring all paths one ray further, in order.
-    pub(crate) const OF_QUEUE: [Self; 3] = [Self::Trace, Self::Shade, Self::FollowShadows];
-
-    /// Those that add one sample to every pixel, in order.
-    pub(crate) const OF_SHARING: [Self; 3] =
-        [Self::FindSeconds, Self::LightSeconds, Self::ConnectSeconds];
-
-    /// Whether it traces rays that the host made, not paths.
-    fn casts(self) -> bool {
-        matches!(self, Self::ClosestHits | Self::ShadowRays)
-    }
-
-    /// Whether it adds finished paths to the film.
-    fn adds_samples(self) -> bool {
-        matches!(self, Self::Render | Self::Trace | Self::ConnectSeconds)
-    }
-
-    /// Whether it begins samples.
-    fn begins_samples(self) -> bool {
-        self.adds_samples() || self == Self::FindSeconds
-    }
-
-    /// Whether its paths are not those of pixels.
-    fn begins_anywhere(self) -> bool {
-        matches!(self, Self::Learn | Self::Teach)
-    }
-
-    /// Whether its pixels share second vertices.
-    fn shares(self) -> bool {
-        Self::OF_SHARING.contains(&self)
-    }
-
-    /// Whether its paths lie in slots.
-    fn is_of_queue(self) -> bool {
-        Self::OF_QUEUE.contains(&self)
-    }
-}
-
-/// What a shader is built with, by name.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct Features(BTreeSet<&'static str>);
-
-impl Features {
-    /// All names a shader asks for.
-    pub(crate) const ALL: [&'static str; 58] = [
-        "albedo",
-        "alpha_mask",
-        "anisotropy",
-        "background_blur",
-        "background_color",
-        "cached",
-        "clearcoat",
-        "counting",
-        "deep_tree",
-        "diffuse_transmission",
-        "dispersion",
-        "emitters",
-        "faces",
-        "filtered_hits",
-        "filtered_or_passed",
-        "finding",
-        "hardware_rays",
-        "independent_points",
-        "iridescence",
-        "learning",
-        "layers",
-        "lens",
-        "light_grid",
-        "local_lights",
-        "map",
-        "map_sampling",
-        "medium",
-        "metals",
-        "nearest_lookup",
-        "normal_maps",
-        "partial",
-        "pass_through",
-        "punctual_lights",
-        "radiance_cache",
-        "record_cosine",
-        "record_ratio",
-        "record_squared_cosine",
-        "scene_lights",
-        "second_uv_set",
-        "shadow_media",
-        "shadow_rays",
-        "sharing",
-        "sheen",
-        "single_sided",
-        "software_walk",
-        "solid_transmission",
-        "summed_area",
-        "table_f32",
-        "table_f64",
-        "table_u32",
-        "tangents",
-        "teaching",
-        "textures",
-        "transmission",
-        "uncommon_textures",
-        "unlit",
-        "vertex_colors",
-        "wide_filter",
-    ];
-
-    /// What a scene needs: its materials and lights.
-    pub(crate) fn of_world(world: &World) -> Self {
-        let needs = &world.needs;
-        Self::from_names([
-            ("alpha_mask", needs.alpha_mask),
-            ("anisotropy", needs.anisotropy),
-            ("clearcoat", needs.clearcoat),
-            ("diffuse_transmission", needs.diffuse_transmission),
-            ("dispersion", needs.dispersion),
-            ("emitters", needs.emitters),
-            ("iridescence", needs.iridescence),
-            ("local_lights", !world.lights.is_empty()),
-            ("metals", needs.metals),
-            ("normal_maps", needs.normal_maps && !world.scene.tangents.is_empty()),
-            ("partial", needs.alpha_blend || needs.thin_transmission),
-            ("punctual_lights", needs.punctual_lights),
-            ("second_uv_set", needs.second_uv_set),
-            ("sheen", needs.sheen),
-            ("single_sided", needs.single_sided),
-            ("solid_transmission", needs.solid_transmission),
-            ("textures", needs.textures),
-            ("transmission", needs.thin_transmission || needs.solid_transmission),
-            ("unlit", needs.unlit),
-            ("vertex_colors", needs.vertex_colors),
-        ])
-    }
-
-    /// What a picture needs: the scene's materials and lights, the map, how it is sampled.
-    pub(crate) fn of(world: &World, environment: &Environment, view: &View) -> Self {
-        let samples_map = view.sampling != Sampling::Bsdf && !environment.is_black();
-        let recording = view.law_options().map(|laws| laws.recording);
-        let cosine_power = recording.map_or(0, Recording::cosine_power);
-        let options = environment.kind();
-        let of_view = [
-            ("background_blur", matches!(view.background, Background::Blurred(_))),
-            ("background_color", matches!(view.background, Background::Color(_))),
-            ("counting", samples_map && view.law_options().is_some_and(|laws| laws.goes_on())),
-            ("faces", view.law_options().is_some_and(|laws| laws.faces)),
-            ("independent_points", view.points == Points::Independent),
-            ("layers", view.layers),
-            ("lens", view.camera.lens_radius > 0.0),
-            ("light_grid", samples_map && recording.is_some()),
-            ("map", !environment.is_black()),
-            ("map_sampling", samples_map),
-            ("medium", world.needs.scattering_solids || view.fog(world).is_some()),
-            ("nearest_lookup", options.1 == Lookup::Nearest),
-            ("radiance_cache", view.gi == Gi::Cached),
-            ("record_cosine", cosine_power == 1),
-            ("record_ratio", recording.is_some_and(Recording::is_ratio)),
-            ("record_squared_cosine", cosine_power == 2),
-            ("table_f32", options.0 == TableKind::F32),
-            ("table_f64", options.0 == TableKind::F64),
-            ("table_u32", options.0 == TableKind::U32),
-            ("wide_filter", view.filter != PixelFilter::Box),
-        ];
-        Self::from_names(Self::of_world(world).0.into_iter().map(|n| (n, true)).chain(of_view))
-    }
-
-    /// Every feature at once, with the table that is used by default. How deep the tree is, its
-    /// stack's size says.
-    pub(crate) fn most() -> Self {
-        let names = Self::ALL.into_iter().filter(|n| !n.starts_with("table_"));
-        let others = [
-            "cached",
-            "deep_tree",
-            "finding",
-            "hardware_rays",
-            "learning",
-            "radiance_cache",
-            "sharing",
-            "summed_area",
-            "teaching",
-        ];
-        Self::from_names(names.filter(|n| !others.contains(n)).map(|n| (n, true)))
-    }
-
-    /// Features by name, and those that follow from them.
-    pub(crate) fn from_names(names: impl IntoIterator<Item = (&'static str, bool)>) -> Self {
-        let mut set: BTreeSet<_> =
-            names.into_iter().filter(|(_, on)| *on).map(|(n, _)| n).collect();
-        let follows: [(&str, &[&str]); 10] = [
-            ("albedo", &["layers", "radiance_cache"]),
-            ("filtered_hits", &["alpha_mask", "single_sided"]),
-            ("filtered_or_passed", &["alpha_mask", "partial", "single_sided"]),
-            ("pass_through", &["alpha_mask", "partial"]),
-            ("scene_lights", &["emitters", "punctual_lights"]),
-            ("shadow_media", &["medium", "solid_transmission"]),
-            ("shadow_rays", &["map_sampling", "local_lights"]),
-            ("summed_area", &["table_f32", "table_f64", "table_u32"]),
-            ("tangents", &["anisotropy", "normal_maps"]),
-            ("uncommon_textures", &["anisotropy", "diffuse_transmission", "iridescence", "sheen"]),
-        ];
-        for (name, causes) in follows {
-            if causes.iter().any(|cause| set.contains(cause)) {
-                set.insert(name);
-            }
-        }
-        if !set.contains("hardware_rays") {
-            set.insert("software_walk");
-        }
-        Self(set)
-    }
-
-    /// The same for a device whose own ray queries find what rays hit.
-    pub(crate) fn with_hardware_rays(mut self) -> Self {
-        self.0.remove("software_walk");
-        self.0.insert("hardware_rays");
-        self
-    }
-
-    /// The same for a kernel with these constants.
-    fn in_kernel(&self, kernel: Kernel, constants: &Constants) -> Self {
-        let mut set = self.0.clone();
-        if constants.stack_size > constants.shared_stack_size {
-            set.insert("deep_tree");
-        }
-        if kernel.begins_anywhere() {
-            set.remove("layers");
-            set.remove("independent_points");
-        } else if kernel.casts() {
-            set.remove("counting");
-            set.remove("layers");
-        } else if kernel.shares() {
-            set.insert("sharing");
-        }
-        match kernel {
-            Kernel::Learn => set.extend(["counting", "learning"]),
-            Kernel::Teach => {
-                set.remove("counting");
-                set.insert("teaching");
-            }
-            Kernel::FindSeconds => set.extend(["finding"]),
-            // Only first vertices are shown.
-            Kernel::LightSeconds => {
-                set.remove("layers");
-            }
-            Kernel::Render if set.contains("radiance_cache") => set.extend(["cached"]),
-            _ => {}
-        }
-        if !(set.contains("cached") || set.contains("teaching")) {
-            set.remove("radiance_cache");
-        }
-        if set.contains("layers") || set.contains("radiance_cache") {
-            set.insert("albedo");
-        } else {
-            set.remove("albedo");
-        }
-        Self(set)
-    }
-
-    /// Whether a feature is on.
-    pub(crate) fn has(&self, name: &str) -> bool {
-        debug_assert!(Self::ALL.contains(&name), "{name} is no feature");
-        self.0.contains(name)
-    }
-
-    /// Whether shading takes so many registers that walks in the same kernel run in half of the waves
-    /// that would otherwise fit, or in less.
-    pub(crate) fn shading_is_large(&self) -> bool {
-        // What features add to the registers, roughly, in steps of 8 to 12. Compiled by RADV for RDNA2,
-        // kernels of 6 steps or more took over 168 and ran in 4 waves, others in 6 or 8.
-        let weights = [
-            ("diffuse_transmission", 1),
-            ("dispersion", 1),
-            ("iridescence", 2),
-            ("layers", 1),
-            ("partial", 1),
-            ("sheen", 1),
-        ];
-        let pairs = [("local_lights", "map_sampling", 1), ("medium", "solid_transmission", 2)];
-        let alone = weights.iter().filter(|(name, _)| self.has(name)).map(|(_, weight)| weight);
-        let both = pairs.iter().filter(|(a, b, _)| self.has(a) && self.has(b));
-        alone.sum::<u32>() + both.map(|(.., weight)| weight).sum::<u32>() >= 6
-    }
-
-    /// Names of the features that are on.
-    pub(crate) fn names(&self) -> impl Iterator<Item = &'static str> {
-        self.0.iter().copied()
-    }
-}
-
-/// What the render kernel of a picture holds and what was left out of it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct KernelFacts {
-    /// Features it was built with.
-    pub features: Vec<&'static str>,
-    /// Features it does without.
-    pub left_out: Vec<&'static str>,
-    /// Bytes of its source.
-    pub source_bytes: usize,
-    /// Bytes of the source with every feature.
-    pub full_source_bytes: usize,
-    /// Bytes of a vertex on the device.
-    pub vertex_bytes: u32,
-    /// Bytes of a vertex with everything a scene can have.
-    pub full_vertex_bytes: u32,
-}
-
-impl KernelFacts {
-    /// Of the kernel for these features.
-    pub(crate) fn of(features: &Features) -> Self {
-        let bytes_of = |features: &Features| {
-            let vertex = VertexTexels::of(features);
-            let constants = Constants { vertex, ..Constants::default() };
-            let places = ArrayPlaces::default();
-            let program = Program::new(Kernel::Render, features, &constants, &places);
-            (program.source.len(), 16 * vertex.count)
-        };
-        let (source_bytes, vertex_bytes) = bytes_of(features);
-        let (full_source_bytes, full_vertex_bytes) = bytes_of(&Features::most());
-        let most = Features::most();
-        Self {
-            features: features.names().collect(),
-            left_out: most.names().filter(|name| !features.0.contains(name)).collect(),
-            source_bytes,
-            full_source_bytes,
-            vertex_bytes,
-            full_vertex_bytes,
-        }
-    }
-
-    /// Of the kernel for a scene with a map that is not black, with the defaults of `render`.
-    pub fn of_scene(world: &World) -> Self {
-        let defaults = [
-            "counting",
-            "faces",
-            "light_grid",
-            "map",
-            "map_sampling",
-            "record_cosine",
-            "record_ratio",
-            "wide_filter",
-        ];
-        let names = Features::of_world(world).0.into_iter().chain(defaults);
-        Self::of(&Features::from_names(names.map(|name| (name, true))))
-    }
-}
 
 /// Numbers of a shader that are known when it is built.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -436,15 +40,18 @@ pub(crate) struct VertexTexels {
 }
 
 impl VertexTexels {
-    pub(crate) fn of(features: &Features) -> Self {
+    pub(crate) fn of(features: Features) -> Self {
         let mut count = 2;
-        let mut next = |name: &str| {
+        let mut next = |feature| {
             let at = count;
-            count += u32::from(features.has(name));
+            count += u32::from(features.contains(feature));
             at
         };
-        let (second_uv, tangent, color) =
-            (next("second_uv_set"), next("tangents"), next("vertex_colors"));
+        let (second_uv, tangent, color) = (
+            next(Features::SECOND_UV_SET),
+            next(Features::TANGENTS),
+            next(Features::VERTEX_COLORS),
+        );
         Self { count, second_uv, tangent, color }
     }
 }
@@ -461,17 +68,21 @@ pub(crate) struct SlotTexels {
 }
 
 impl SlotTexels {
-    pub(crate) fn of(features: &Features) -> Self {
+    pub(crate) fn of(features: Features) -> Self {
         let mut count = 7;
-        let mut next = |name: &str, texels| {
+        let mut next = |feature, texels| {
             let at = count;
-            count += if features.has(name) { texels } else { 0 };
+            count += if features.contains(feature) { texels } else { 0 };
             at
         };
-        let receiver = next("emitters", 2);
-        let body = next("solid_transmission", if features.has("medium") { 2 } else { 1 });
-        let first_hit = next("layers", 2);
-        let (map_shadow, lamp_shadow) = (next("map_sampling", 4), next("local_lights", 4));
+        let receiver = next(Features::EMITTERS, 2);
+        let body = next(
+            Features::SOLID_TRANSMISSION,
+            if features.contains(Features::MEDIUM) { 2 } else { 1 },
+        );
+        let first_hit = next(Features::LAYERS, 2);
+        let (map_shadow, lamp_shadow) =
+            (next(Features::MAP_SAMPLING, 4), next(Features::LOCAL_LIGHTS, 4));
         Self { count, receiver, body, first_hit, map_shadow, lamp_shadow }
     }
 }
@@ -503,8 +114,8 @@ pub(crate) struct ArrayKind {
     /// Name of the function that reads an element.
     pub(crate) name: &'static str,
     pub(crate) format: TexelFormat,
-    /// Feature without which there is no such array.
-    feature: Option<&'static str>,
+    /// What makes it needed, all of it.
+    features: Features,
 }
 
 /// What a texel holds.
@@ -547,36 +158,32 @@ impl TexelFormat {
 /// All arrays.
 pub(crate) const ARRAYS: [ArrayKind; 15] = {
     use TexelFormat::{Bytes4, Floats4, Words1, Words2, Words4};
-    const fn array(
-        name: &'static str,
-        format: TexelFormat,
-        feature: Option<&'static str>,
-    ) -> ArrayKind {
-        ArrayKind { name, format, feature }
+    const fn array(name: &'static str, format: TexelFormat, features: Features) -> ArrayKind {
+        ArrayKind { name, format, features }
     }
     [
-        array("bvh_nodes", Words4, Some("software_walk")),
-        array("bvh_triangles", Words4, Some("software_walk")),
-        array("query_triangles", Words1, Some("hardware_rays")),
-        array("triangles", Words4, None),
-        array("vertices", Words4, None),
-        array("materials", Words4, None),
-        array("tables", Floats4, None),
-        array("texture_refs", Words4, Some("textures")),
-        array("texels", Bytes4, Some("textures")),
-        array("map_texels", Words2, Some("map")),
-        array("sums", Words1, Some("map_sampling")),
-        array("laws", Words1, Some("map_sampling")),
-        array("lights", Words1, Some("scene_lights")),
-        array("light_nodes", Words4, Some("scene_lights")),
-        array("cache_slots", Words4, Some("radiance_cache")),
+        array("bvh_nodes", Words4, Features::SOFTWARE_WALK),
+        array("bvh_triangles", Words4, Features::SOFTWARE_WALK),
+        array("query_triangles", Words1, Features::HARDWARE_RAYS),
+        array("triangles", Words4, Features::empty()),
+        array("vertices", Words4, Features::empty()),
+        array("materials", Words4, Features::empty()),
+        array("tables", Floats4, Features::empty()),
+        array("texture_refs", Words4, Features::TEXTURES),
+        array("texels", Bytes4, Features::TEXTURES),
+        array("map_texels", Words2, Features::MAP),
+        array("sums", Words1, Features::MAP_SAMPLING),
+        array("distributions", Words1, Features::MAP_SAMPLING),
+        array("lights", Words1, Features::SCENE_LIGHTS),
+        array("light_nodes", Words4, Features::SCENE_LIGHTS),
+        array("cache_slots", Words4, Features::RADIANCE_CACHE),
     ]
 };
 
 impl ArrayKind {
     /// Whether a picture with these features reads it.
-    pub(crate) fn is_needed(&self, features: &Features) -> bool {
-        self.feature.is_none_or(|feature| features.has(feature))
+    pub(crate) fn is_needed(&self, features: Features) -> bool {
+        features.contains(self.features)
     }
 
     /// The declaration and the function that reads an element.
@@ -628,14 +235,14 @@ impl Program {
     /// Puts a kernel together.
     pub(crate) fn new(
         kernel: Kernel,
-        features: &Features,
+        features: Features,
         constants: &Constants,
         places: &ArrayPlaces,
     ) -> Self {
         let features = features.in_kernel(kernel, constants);
-        let bindings = bindings(kernel, &features, places);
+        let bindings = bindings(kernel, features, places);
         let mut source = String::new();
-        if features.has("hardware_rays") {
+        if features.contains(Features::HARDWARE_RAYS) {
             source.push_str("enable wgpu_ray_query;\n");
         }
         let Constants {
@@ -666,7 +273,7 @@ impl Program {
         }
         if kernel.is_of_queue() {
             let SlotTexels { count, receiver, body, first_hit, map_shadow, lamp_shadow } =
-                SlotTexels::of(&features);
+                SlotTexels::of(features);
             for (name, value) in [
                 ("SLOT_TEXELS", count),
                 ("RECEIVER_TEXEL", receiver),
@@ -690,12 +297,12 @@ impl Program {
                 let _ = writeln!(source, "const {name} = {value}u;");
             }
         }
-        if features.has("radiance_cache") {
+        if features.contains(Features::RADIANCE_CACHE) {
             for (name, value) in [
                 ("CACHE_SLOTS", radiance_cache::SLOTS as u32),
                 ("CACHE_PROBES", radiance_cache::MOST_PROBES as u32),
                 ("CACHE_WORDS", radiance_cache::WORDS as u32),
-                ("TEACHERS", TEACHERS),
+                ("TRAINING_VERTICES", TRAINING_VERTICES),
             ] {
                 let _ = writeln!(source, "const {name} = {value}u;");
             }
@@ -724,9 +331,9 @@ impl Program {
                 }
             }
         }
-        for (text, is_needed) in files(kernel, &features) {
+        for (text, is_needed) in files(kernel, features) {
             if is_needed {
-                keep_lines(text, &features, &mut source);
+                keep_lines(text, features, &mut source);
             }
         }
         Self { source, bindings }
@@ -734,48 +341,48 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 46] {
+fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 46] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
         };
     }
-    let samples_map = features.has("map_sampling");
+    let samples_map = features.contains(Features::MAP_SAMPLING);
     [
         (wgsl!("globals"), true),
         (wgsl!("math"), true),
         (wgsl!("sampler"), true),
-        (wgsl!("texture"), features.has("textures")),
+        (wgsl!("texture"), features.contains(Features::TEXTURES)),
         (wgsl!("surface"), true),
         (wgsl!("fresnel"), true),
         (wgsl!("microfacet"), true),
-        (wgsl!("iridescence"), features.has("iridescence")),
-        (wgsl!("sheen"), features.has("sheen")),
+        (wgsl!("iridescence"), features.contains(Features::IRIDESCENCE)),
+        (wgsl!("sheen"), features.contains(Features::SHEEN)),
         (wgsl!("albedo"), true),
         (wgsl!("interface"), true),
-        (wgsl!("coat"), features.has("clearcoat")),
+        (wgsl!("coat"), features.contains(Features::CLEARCOAT)),
         (wgsl!("bsdf"), true),
         (wgsl!("light_grid"), true),
         (wgsl!("environment"), true),
-        (wgsl!("tile_local"), samples_map && !features.has("summed_area")),
-        (wgsl!("summed_area"), samples_map && features.has("summed_area")),
-        (wgsl!("draw"), features.has("scene_lights")),
-        (wgsl!("light_tree"), features.has("scene_lights")),
-        (wgsl!("lights"), features.has("scene_lights")),
-        (wgsl!("medium"), features.has("medium")),
+        (wgsl!("tile_local"), samples_map && !features.contains(Features::SUMMED_AREA)),
+        (wgsl!("summed_area"), samples_map && features.contains(Features::SUMMED_AREA)),
+        (wgsl!("draw"), features.contains(Features::SCENE_LIGHTS)),
+        (wgsl!("light_tree"), features.contains(Features::SCENE_LIGHTS)),
+        (wgsl!("lights"), features.contains(Features::SCENE_LIGHTS)),
+        (wgsl!("medium"), features.contains(Features::MEDIUM)),
         (wgsl!("bvh"), true),
-        (wgsl!("ray_query"), features.has("hardware_rays")),
+        (wgsl!("ray_query"), features.contains(Features::HARDWARE_RAYS)),
         (wgsl!("camera"), true),
         (wgsl!("path"), true),
-        (wgsl!("broad"), kernel.shares() || features.has("radiance_cache")),
-        (wgsl!("radiance_cache"), features.has("radiance_cache")),
-        (wgsl!("count"), features.has("counting")),
+        (wgsl!("broad"), kernel.shares() || features.contains(Features::RADIANCE_CACHE)),
+        (wgsl!("radiance_cache"), features.contains(Features::RADIANCE_CACHE)),
+        (wgsl!("count"), features.contains(Features::COUNTING)),
         (wgsl!("film"), kernel.adds_samples()),
         (wgsl!("sample"), kernel.begins_samples()),
         (wgsl!("render"), kernel == Kernel::Render),
         (wgsl!("anywhere"), kernel.begins_anywhere()),
         (wgsl!("learn"), kernel == Kernel::Learn),
-        (wgsl!("teach"), kernel == Kernel::Teach),
+        (wgsl!("train"), kernel == Kernel::Train),
         (wgsl!("cast"), kernel.casts()),
         (wgsl!("closest_hits"), kernel == Kernel::ClosestHits),
         (wgsl!("shadow_rays"), kernel == Kernel::ShadowRays),
@@ -791,10 +398,10 @@ fn files(kernel: Kernel, features: &Features) -> [(&'static str, bool); 46] {
     ]
 }
 
-fn bindings(kernel: Kernel, features: &Features, places: &ArrayPlaces) -> Vec<Binding> {
-    let (teaches, counts) = (kernel == Kernel::Teach, features.has("counting"));
+fn bindings(kernel: Kernel, features: Features, places: &ArrayPlaces) -> Vec<Binding> {
+    let (trains, counts) = (kernel == Kernel::Train, features.contains(Features::COUNTING));
     let (renders, is_of_queue) = (kernel.adds_samples(), kernel.is_of_queue());
-    let has_layers = renders && features.has("layers");
+    let has_layers = renders && features.contains(Features::LAYERS);
     let buffers = [
         // Not a uniform: software Vulkan optimises a shader anew, for 40 ms, before each dispatch if
         // it branches on uniforms.
@@ -808,7 +415,7 @@ fn bindings(kernel: Kernel, features: &Features, places: &ArrayPlaces) -> Vec<Bi
         ("counters", "array<atomic<u32>>", true, counts),
         ("slot_of_cell", "array<u32>", false, counts),
         ("learning_rays", "atomic<u32>", true, kernel.begins_anywhere()),
-        ("cache_sums", "array<atomic<u32>>", true, teaches),
+        ("cache_sums", "array<atomic<u32>>", true, trains),
         ("slots", "array<vec4u>", true, is_of_queue),
         ("queue", "Queue", true, is_of_queue),
         ("firsts", "array<vec4u>", true, kernel.shares() && kernel != Kernel::LightSeconds),
@@ -828,16 +435,18 @@ fn bindings(kernel: Kernel, features: &Features, places: &ArrayPlaces) -> Vec<Bi
             Binding::Array(array)
         }
     });
-    let tree = features.has("hardware_rays").then_some(Binding::Tree);
+    let tree = features.contains(Features::HARDWARE_RAYS).then_some(Binding::Tree);
     buffers.chain(arrays).chain(tree).collect()
 }
 
 /// Appends the lines of `text` whose conditions hold.
-fn keep_lines(text: &str, features: &Features, source: &mut String) {
+fn keep_lines(text: &str, features: Features, source: &mut String) {
     let mut conditions = Vec::new();
     for line in text.lines() {
         if let Some(name) = line.strip_prefix("//#if ") {
-            conditions.push(features.has(name.trim()));
+            let feature = Features::from_name(name.trim());
+            debug_assert!(feature.is_some(), "{name} is no feature");
+            conditions.push(feature.is_some_and(|feature| features.contains(feature)));
         } else if line == "//#else" {
             if let Some(condition) = conditions.last_mut() {
                 *condition = !*condition;
@@ -858,14 +467,14 @@ mod tests {
 
     #[test]
     fn conditions_nest_and_have_an_else() {
-        let features = Features::from_names([("map", true)]);
-        let text = "a\n//#if map\nb\n//#if lens\nc\n//#else\nd\n//#end\n//#else\ne\n//#end\nf";
+        let features = Features::MAP;
+        let text = "a\n//#if MAP\nb\n//#if LENS\nc\n//#else\nd\n//#end\n//#else\ne\n//#end\nf";
         let mut kept = String::new();
-        keep_lines(text, &features, &mut kept);
+        keep_lines(text, features, &mut kept);
         assert_eq!(kept, "a\nb\nd\nf\n");
     }
 
-    fn validate(kernel: Kernel, features: &Features, places: &ArrayPlaces) {
+    fn validate(kernel: Kernel, features: Features, places: &ArrayPlaces) {
         let constants = Constants {
             stack_size: if places.in_buffers.is_empty() { 20 } else { 10 },
             shared_stack_size: 10,
@@ -894,7 +503,7 @@ mod tests {
     /// Divisions and remainders of integers by what is no constant. naga does not guard them (see
     /// `RUNTIME_CHECKS`), so here is why each divisor is at least 1.
     const DIVISIONS: [&str; 16] = [
-        // The share of the whole map's law is 1 to 256, and with 256 no number lies beyond it.
+        // The share of the whole map's distribution is 1 to 256, and with 256 no number lies beyond it.
         "choose_tile: (((rest % width) << 8u) | (finer & 0xffu)) / width",
         "choose_tile: rest % width",
         "choose_tile: rest / width",
@@ -919,14 +528,14 @@ mod tests {
     #[test]
     fn no_integer_is_divided_by_zero() {
         let mut found = BTreeSet::new();
-        let all = [Kernel::Render, Kernel::Learn, Kernel::Teach, Kernel::Trace].into_iter();
+        let all = [Kernel::Render, Kernel::Learn, Kernel::Train, Kernel::Trace].into_iter();
         for kernel in all.chain(Kernel::OF_SHARING) {
-            for table in [None, Some("table_u32")] {
+            for table in [Features::empty(), Features::TABLE_U32] {
                 let features = reachable(|_| true, table);
                 let constants =
                     Constants { stack_size: 20, shared_stack_size: 10, ..Constants::default() };
                 let source =
-                    Program::new(kernel, &features, &constants, &ArrayPlaces::default()).source;
+                    Program::new(kernel, features, &constants, &ArrayPlaces::default()).source;
                 let module = naga::front::wgsl::parse_str(&source).expect("it is valid");
                 let entries = module.entry_points.iter().map(|entry| &entry.function);
                 for function in module.functions.iter().map(|(_, f)| f).chain(entries) {
@@ -976,56 +585,35 @@ mod tests {
     }
 
     /// Features that a picture can have or not have on their own; the others follow from them.
-    fn independent() -> Vec<&'static str> {
-        let follow = [
-            "albedo",
-            "cached",
-            "filtered_hits",
-            "filtered_or_passed",
-            "finding",
-            "hardware_rays",
-            "learning",
-            "pass_through",
-            "deep_tree",
-            "scene_lights",
-            "shadow_media",
-            "shadow_rays",
-            "sharing",
-            "software_walk",
-            "tangents",
-            "teaching",
-            "uncommon_textures",
-        ];
-        let names = Features::ALL.into_iter();
-        names
-            .filter(|n| !follow.contains(n) && !n.starts_with("table_") && *n != "summed_area")
-            .collect()
+    fn independent() -> Vec<Features> {
+        let others = Features::following()
+            | Features::OF_KERNEL
+            | Features::NOT_ASKED_FOR
+            | Features::TABLES;
+        (Features::all() - others).iter().collect()
     }
 
     /// What reachable pictures have: no map to sample without a map, no grid without sampling it.
-    fn reachable(on: impl Fn(usize) -> bool, table: Option<&'static str>) -> Features {
-        let names = independent();
-        let mut chosen: BTreeSet<_> =
-            names.iter().enumerate().filter(|(i, _)| on(*i)).map(|(_, name)| *name).collect();
-        if !chosen.contains("map") {
-            chosen.remove("map_sampling");
+    fn reachable(on: impl Fn(usize) -> bool, table: Features) -> Features {
+        let mut chosen = table;
+        let chosen_ones = independent().into_iter().enumerate().filter(|(i, _)| on(*i));
+        chosen.extend(chosen_ones.map(|(_, feature)| feature));
+        let lights = Features::EMITTERS | Features::PUNCTUAL_LIGHTS;
+        for (causes, effect) in [
+            (Features::MAP, Features::MAP_SAMPLING),
+            (Features::MAP_SAMPLING, Features::LIGHT_GRID),
+            (Features::LIGHT_GRID | Features::RECORD_RATIO, Features::COUNTING),
+            (Features::SOLID_TRANSMISSION | Features::TRANSMISSION, Features::DISPERSION),
+            (Features::TEXTURES, Features::NORMAL_MAPS),
+        ] {
+            if !chosen.contains(causes) {
+                chosen -= effect;
+            }
         }
-        if !chosen.contains("map_sampling") {
-            chosen.remove("light_grid");
+        if !chosen.intersects(lights) {
+            chosen -= Features::LOCAL_LIGHTS;
         }
-        if !(chosen.contains("light_grid") && chosen.contains("record_ratio")) {
-            chosen.remove("counting");
-        }
-        if !(chosen.contains("emitters") || chosen.contains("punctual_lights")) {
-            chosen.remove("local_lights");
-        }
-        if !(chosen.contains("solid_transmission") && chosen.contains("transmission")) {
-            chosen.remove("dispersion");
-        }
-        if !chosen.contains("textures") {
-            chosen.remove("normal_maps");
-        }
-        Features::from_names(chosen.into_iter().chain(table).map(|name| (name, true)))
+        chosen.completed()
     }
 
     /// Each feature alone and all but it, and 60 random sets, in which every combination of two
@@ -1033,11 +621,12 @@ mod tests {
     #[test]
     fn every_variant_validates() {
         let count = independent().len();
-        let tables = [None, Some("table_u32"), Some("table_f32"), Some("table_f64")];
-        let mut sets = vec![reachable(|_| false, None), reachable(|_| true, None)];
+        let none = Features::empty();
+        let tables = [none, Features::TABLE_U32, Features::TABLE_F32, Features::TABLE_F64];
+        let mut sets = vec![reachable(|_| false, none), reachable(|_| true, none)];
         for one in 0..count {
-            sets.push(reachable(|i| i == one, None));
-            sets.push(reachable(|i| i != one, None));
+            sets.push(reachable(|i| i == one, none));
+            sets.push(reachable(|i| i != one, none));
         }
         for seed in 0..60_u32 {
             let half = |at| u64::from(crate::sampler::hash(2 * seed + at));
@@ -1047,26 +636,26 @@ mod tests {
         let in_textures = ArrayPlaces { width_log2: 12, ..ArrayPlaces::default() };
         let in_buffers = ARRAYS.map(|array| array.name).into();
         let in_buffers = ArrayPlaces { in_buffers, ..in_textures.clone() };
-        for (features, number) in sets.iter().zip(0..) {
+        for (features, number) in sets.into_iter().zip(0..) {
             let places = if number % 2 == 0 { &in_textures } else { &in_buffers };
             validate(Kernel::Render, features, places);
-            if features.has("light_grid") {
+            if features.contains(Features::LIGHT_GRID) {
                 validate(Kernel::Learn, features, places);
             }
-            if features.has("radiance_cache") {
-                validate(Kernel::Teach, features, places);
+            if features.contains(Features::RADIANCE_CACHE) {
+                validate(Kernel::Train, features, places);
             }
             for kernel in Kernel::OF_SHARING {
                 validate(kernel, features, places);
             }
             for kernel in Kernel::OF_QUEUE {
-                if kernel != Kernel::FollowShadows || features.has("shadow_rays") {
+                if kernel != Kernel::FollowShadows || features.contains(Features::SHADOW_RAYS) {
                     validate(kernel, features, places);
                 }
             }
             validate(Kernel::ClosestHits, features, places);
             validate(Kernel::ShadowRays, features, places);
-            validate(Kernel::Render, &features.clone().with_hardware_rays(), places);
+            validate(Kernel::Render, features.with_hardware_rays(), places);
         }
     }
 }

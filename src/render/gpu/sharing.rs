@@ -6,10 +6,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::super::Pass;
 use super::buffers::Buffers;
 use super::flight::Job;
+use super::kernel::Kernel;
 use super::layout::{Globals, Work};
-use super::shader::{Features, Kernel};
 use super::{GROUP, LEAST_TILES, Progress, Renderer};
 use crate::error::Result;
+use crate::features::Features;
 use crate::path::sharing::SharedTile;
 
 /// Most workgroups whose vertices are kept at a time: they keep the largest devices busy.
@@ -28,15 +29,16 @@ impl Sharing {
     /// Makes the buffers for a picture of this size.
     pub(super) fn new(
         buffers: &mut Buffers,
-        features: &Features,
+        features: Features,
         tile: SharedTile,
         size: [u32; 2],
     ) -> Result<Self> {
-        // Tiles stand out of the picture on all sides.
+        // Tiles fixture out of the picture on all sides.
         let tiles = size.map(|pixels| u64::from(pixels.div_ceil(tile.side)) + 1);
         let most_groups = (tiles[0] * tiles[1]).div_ceil(tiles_of_group(tile)).min(MOST_GROUPS);
-        let first_texels = if features.has("layers") { 5 } else { 3 };
-        let lights = ["map_sampling", "local_lights"].map(|name| u64::from(features.has(name)));
+        let first_texels = if features.contains(Features::LAYERS) { 5 } else { 3 };
+        let lights = [Features::MAP_SAMPLING, Features::LOCAL_LIGHTS]
+            .map(|feature| u64::from(features.contains(feature)));
         let incidents = u64::from(tile.continuations) * (1 + lights[0] + lights[1]);
         let owners = GROUP / u64::from(tile.owner_side * tile.owner_side);
         let what = "the vertices that pixels share";

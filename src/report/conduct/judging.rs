@@ -39,10 +39,10 @@ impl Conductor<'_> {
         while is_whole && reference.facts.pictures < pictures {
             let done = reference.facts.pictures;
             self.say(
-                &format!("{}: reference, picture {} of {pictures}", work.stage.title, done + 1),
+                &format!("{}: reference, picture {} of {pictures}", work.prepared.title, done + 1),
                 f64::from(pictures - done) * self.plan.effort.seconds,
             );
-            let place = work.stage.place(self.plan, &self.devices[fastest], settings);
+            let place = work.prepared.place(self.plan, &self.devices[fastest], settings);
             let (seconds, cancel) = (self.plan.effort.seconds, self.options.cancel);
             is_whole =
                 reference.add_picture(&place, &self.devices[fastest].name, seconds, cancel)?
@@ -107,11 +107,11 @@ impl Conductor<'_> {
                 Some(found) => found,
                 None => {
                     self.say(
-                        &format!("{}: where {}'s error is left", work.stage.title, method.name),
+                        &format!("{}: where {}'s error is left", work.prepared.title, method.name),
                         SHARE_RUNS * self.plan.effort.seconds,
                     );
                     let place =
-                        work.stage.place(self.plan, &self.devices[fastest], &method.settings);
+                        work.prepared.place(self.plan, &self.devices[fastest], &method.settings);
                     let method = (method.name.as_str(), &method.settings);
                     let samples = (samples / 8).max(4);
                     let found = shares(&place, method, samples, &reference, self.options.cancel)?;

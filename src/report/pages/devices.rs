@@ -95,7 +95,7 @@ fn memory(device: &DeviceReport, html: &mut String) {
         "",
         "Light Grid",
         "while learning, at most",
-        "cells with a law",
+        "cells with a distribution",
         "map's table",
         "scene's tree",
         "all on the device",

@@ -131,7 +131,7 @@ fn method(report: &Report, html: &mut String) {
             plan.effort.frame.bounces
         ),
         "Time counts from the start of building the map's importance table and includes learning and \
-         the making of tile laws. It does not include reading files, building the scene's tree, and, on \
+         the making of tile distributions. It does not include reading files, building the scene's tree, and, on \
          a GPU, uploading and building kernels, which are the same for all methods or nearly so and are \
          done once beforehand. Errors are taken while the clock stands still."
             .to_owned(),

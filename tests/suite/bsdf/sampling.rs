@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 use lightgrid::bsdf::Bsdf;
-use lightgrid::metrics::statistics::chi_square_test;
+use lightgrid::metrics::hypothesis::chi_square_test;
 
 use super::{METAL, PANE, Random, WHITE, cases, spherical, viewers};
 use crate::shared::SplitMix;

@@ -8,7 +8,7 @@ use lightgrid::render::film::Pixel;
 use lightgrid::render::{Sampling, View};
 use lightgrid::scene::{Camera, Material, PunctualKind, PunctualLight};
 
-use super::scenes::{Stage, lambert, lamp, sunlight, unlit};
+use super::scenes::{SceneBuilder, lambert, lamp, sunlight, unlit};
 use super::unbiased::expect_agreement;
 use super::{constant, expect, probe, render, view};
 use crate::shared::SplitMix;
@@ -41,7 +41,7 @@ fn panel_irradiance(radiance: f64, corner: Vec3, a: Vec3, b: Vec3) -> f64 {
 fn lamps_of_all_kinds_light_by_their_sum() {
     let mut random = SplitMix(5);
     let mut between = |low: f32, high: f32| low + (high - low) * random.next_f32();
-    let floor = || Stage::new().floor(&lambert(0.6));
+    let floor = || SceneBuilder::new().floor(&lambert(0.6));
     // The sun is overhead, where no lamp is.
     let mut stages = [floor(), floor().light(sunlight(Vec3::NEG_Y, 5.0))];
     let mut irradiance = 0.0;
@@ -51,13 +51,13 @@ fn lamps_of_all_kinds_light_by_their_sum() {
         let strength = 10.0_f32.powf(between(-2.0, 1.0));
         let point = PunctualLight { position: place, ..sunlight(-direction, strength) };
         let falloff = f64::from(strength * direction.y / (distance * distance));
-        let mut add = |to: &dyn Fn(Stage) -> Stage| {
+        let mut add = |to: &dyn Fn(SceneBuilder) -> SceneBuilder| {
             stages = std::mem::take(&mut stages).map(to);
         };
         match i % 6 {
             0 => {
                 let kind = PunctualKind::Point;
-                add(&|stage| stage.light(PunctualLight { kind, ..point.clone() }));
+                add(&|builder| builder.light(PunctualLight { kind, ..point.clone() }));
                 irradiance += falloff;
             }
             1 => {
@@ -65,7 +65,7 @@ fn lamps_of_all_kinds_light_by_their_sum() {
                 let looks_away = i % 12 == 1;
                 let kind = PunctualKind::Spot { inner_radians: 0.2, outer_radians: 0.5 };
                 let direction = if looks_away { direction } else { -direction };
-                add(&|stage| stage.light(PunctualLight { kind, direction, ..point.clone() }));
+                add(&|builder| builder.light(PunctualLight { kind, direction, ..point.clone() }));
                 irradiance += if looks_away { 0.0 } else { falloff };
             }
             _ => {
@@ -73,7 +73,7 @@ fn lamps_of_all_kinds_light_by_their_sum() {
                 let a = 0.06 * (direction + tilt).any_orthonormal_vector();
                 let b = a.cross(direction + tilt).normalize() * 0.06;
                 let material = Material { double_sided: i % 6 == 2, ..lamp(100.0 * strength) };
-                add(&|stage| stage.quad(&material, place, a, b));
+                add(&|builder| builder.quad(&material, place, a, b));
                 let front = panel_irradiance(100.0 * f64::from(strength), place, a, b);
                 let back = panel_irradiance(100.0 * f64::from(strength), place, b, a);
                 irradiance += front + if material.double_sided { back } else { 0.0 };
@@ -81,8 +81,8 @@ fn lamps_of_all_kinds_light_by_their_sum() {
         }
     }
     let view = view(probe([0.1, 0.5, 0.15], [0.0; 3]), Sampling::Plain, 1);
-    for (stage, sun) in stages.into_iter().zip([0.0, 5.0]) {
-        let film = render(&stage.build(), &constant(0.0), view.clone(), 1024);
+    for (builder, sun) in stages.into_iter().zip([0.0, 5.0]) {
+        let film = render(&builder.build(), &constant(0.0), view.clone(), 1024);
         expect(&format!("sun {sun}"), &film, 0.6 / PI * (irradiance + sun), 0.01);
     }
 }
@@ -94,16 +94,16 @@ fn sampled_lamps_agree_with_lamps_that_are_found() {
     let shiny = Material { metallic: 1.0, roughness: 0.4, ..lambert(0.8) };
     for (floor, precision) in [(lambert(0.6), 0.03), (shiny, 0.03)] {
         let film = |material: &Material, seed| {
-            let mut stage = Stage::new().floor(&floor);
+            let mut builder = SceneBuilder::new().floor(&floor);
             for (i, direction) in over_hemisphere(80).enumerate() {
                 let a = 0.25 * direction.any_orthonormal_vector();
                 let b = a.cross(direction);
                 let place = direction * (1.5 + (i % 3) as f32);
-                stage = stage.quad(material, place - 0.5 * (a + b), a, b);
+                builder = builder.quad(material, place - 0.5 * (a + b), a, b);
             }
             let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.8), Vec3::ZERO, 0.8);
             let view = View { seed, ..view(camera, Sampling::Plain, 1) };
-            render(&stage.build(), &constant(0.0), view, 2048)
+            render(&builder.build(), &constant(0.0), view, 2048)
         };
         let one_sided = Material { double_sided: false, ..lamp(0.9) };
         let found = film(&unlit(0.9), 1);
@@ -118,12 +118,12 @@ fn hall(lamps: u32) -> (World, Camera) {
     let mut random = SplitMix(lamps.into());
     let mut between = |low: f32, high: f32| low + (high - low) * random.next_f64() as f32;
     let (low, high) = (Vec3::new(-30.0, 0.0, -10.0), Vec3::new(30.0, 6.0, 10.0));
-    let mut stage = Stage::new().faces(&lambert(0.6), low, high, 2..6);
+    let mut builder = SceneBuilder::new().faces(&lambert(0.6), low, high, 2..6);
     for index in 0..lamps {
         let place = Vec3::new(between(-29.0, 29.0), between(4.5, 5.8), between(-9.5, 9.5));
         let power = 20_000.0 / lamps as f32 * 10.0_f32.powf(between(-2.0, 1.0));
         if index % 4 == 3 {
-            stage = stage.light(PunctualLight {
+            builder = builder.light(PunctualLight {
                 kind: PunctualKind::Point,
                 position: place,
                 ..sunlight(Vec3::NEG_Y, power / (4.0 * std::f32::consts::PI))
@@ -133,11 +133,11 @@ fn hall(lamps: u32) -> (World, Camera) {
             let across = side.cross(Vec3::new(between(-0.3, 0.3), 1.0, between(-0.3, 0.3)));
             let radiance = power / (std::f32::consts::PI * 0.01);
             let material = Material { double_sided: false, ..lamp(radiance) };
-            stage = stage.quad(&material, place, 0.1 * side, 0.1 * across.normalize());
+            builder = builder.quad(&material, place, 0.1 * side, 0.1 * across.normalize());
         }
     }
     let eye = Vec3::new(-27.0, 1.7, -6.0);
-    (stage.build(), Camera::look_at(eye, Vec3::new(0.0, 1.5, 2.0), 0.9))
+    (builder.build(), Camera::look_at(eye, Vec3::new(0.0, 1.5, 2.0), 0.9))
 }
 
 /// Half of the pixels have a relative variance of 0.19 a sample or less; of 8.9 by power alone.

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use glam::Vec2;
 use lightgrid::environment::{Environment, sky};
 use lightgrid::light_grid::cells::SphericalGrid;
-use lightgrid::light_grid::{LawOptions, LearningGrid, LightGrid, MEMORY_BUDGET_BYTES};
+use lightgrid::light_grid::{DistributionOptions, LearningGrid, LightGrid, MEMORY_BUDGET_BYTES};
 use lightgrid::path::camera::CameraRays;
 use lightgrid::path::{Background, PathLimits, PathTracer, World};
 use lightgrid::render::film::Film;
@@ -48,43 +48,50 @@ fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     pool.install(work)
 }
 
-/// Every probability of every cell's law.
-fn laws(grid: &LightGrid) -> Vec<(u32, Vec<u32>)> {
+/// Every probability of every cell's distribution.
+fn distributions(grid: &LightGrid) -> Vec<(u32, Vec<u32>)> {
     let cells = grid.grid().map_or(0, |grid| grid.cell_count());
-    let laws = grid.laws();
-    let of_law = |law| -> Vec<u32> {
-        (0..laws.tile_count()).map(|tile| laws.probability(law, tile).to_bits()).collect()
+    let distributions = grid.distributions();
+    let of_distribution = |distribution| -> Vec<u32> {
+        (0..distributions.tile_count())
+            .map(|tile| distributions.probability(distribution, tile).to_bits())
+            .collect()
     };
-    let used = (0..cells).map(|cell| (cell, grid.law_of_cell(cell))).filter(|(_, law)| *law > 0);
-    used.map(|(cell, law)| (cell, of_law(law))).collect()
+    let used = (0..cells)
+        .map(|cell| (cell, grid.distribution_of_cell(cell)))
+        .filter(|(_, distribution)| *distribution > 0);
+    used.map(|(cell, distribution)| (cell, of_distribution(distribution))).collect()
 }
 
 #[test]
-fn film_and_laws_do_not_depend_on_the_threads() {
+fn film_and_distributions_do_not_depend_on_the_threads() {
     let setting = Setting::new();
     for sampling in [Sampling::Adaptive, Sampling::Talk] {
         let result = |threads| {
             with_threads(threads, || {
-                // Few learning paths, so that rendered ones make new laws.
+                // Few learning paths, so that rendered ones make new distributions.
                 let view = View { learning_paths: 1 << 10, ..setting.view(sampling) };
                 let mut session = setting.session(view);
                 for _ in 0..20 {
                     session.advance(1, &AtomicBool::new(false)).expect("the CPU does not fail");
                 }
-                let laws = laws(session.grid().expect("a map with light"));
-                (session.film().clone(), laws, session.figures())
+                let distributions = distributions(session.grid().expect("a map with light"));
+                (session.film().clone(), distributions, session.figures())
             })
         };
-        let (film, laws, figures) = result(1);
+        let (film, distributions, figures) = result(1);
         assert!(figures.learned_cells > 50, "{figures:?}");
-        assert_eq!(laws.len(), figures.learned_cells);
-        let by_rendered = figures.law_paths > figures.learning_paths;
+        assert_eq!(distributions.len(), figures.learned_cells);
+        let by_rendered = figures.distribution_paths > figures.learning_paths;
         assert_eq!(by_rendered, sampling == Sampling::Adaptive, "{figures:?}");
         assert!(figures.grid_bytes <= MEMORY_BUDGET_BYTES, "{figures:?}");
         for threads in [2, 5] {
             let other = result(threads);
             assert!(film == other.0, "{sampling:?}: the film differs with {threads} threads");
-            assert!(laws == other.1, "{sampling:?}: the laws differ with {threads} threads");
+            assert!(
+                distributions == other.1,
+                "{sampling:?}: the distributions differ with {threads} threads"
+            );
             assert_eq!(figures.rays, other.2.rays);
             assert_eq!(figures.learning_rays, other.2.learning_rays);
         }
@@ -106,8 +113,11 @@ fn counters_do_not_depend_on_the_threads() {
             faces: true,
             medium: false,
         };
-        let mut learning =
-            LearningGrid::new(grid, setting.environment.tile_count(), LawOptions::ADAPTIVE);
+        let mut learning = LearningGrid::new(
+            grid,
+            setting.environment.tile_count(),
+            DistributionOptions::ADAPTIVE,
+        );
         for pass in 0..3 {
             let tracer = PathTracer {
                 world: &setting.world,
@@ -187,7 +197,7 @@ fn a_cancelled_pass_resumes_to_the_same_picture() {
 }
 
 #[test]
-fn cancelled_learning_gives_the_same_laws_in_the_end() {
+fn cancelled_learning_gives_the_same_distributions_in_the_end() {
     let setting = Setting::new();
     let view = setting.view(Sampling::Adaptive);
     let mut session = Session::new(&setting.world, &setting.environment, view.clone());
@@ -198,7 +208,7 @@ fn cancelled_learning_gives_the_same_laws_in_the_end() {
         session.advance(1, &AtomicBool::new(false)).expect("the CPU does not fail");
     }
     let other = setting.session(view);
-    let of = |session: &Session<'_>| laws(session.grid().expect("a map with light"));
+    let of = |session: &Session<'_>| distributions(session.grid().expect("a map with light"));
     assert!(of(&session) == of(&other));
 }
 
@@ -209,7 +219,7 @@ fn another_seed_gives_another_picture() {
         let view = View { seed, ..setting.view(Sampling::Adaptive) };
         let mut session = setting.session(view);
         session.advance(2, &AtomicBool::new(false)).expect("the CPU does not fail");
-        (session.film().clone(), laws(session.grid().expect("a map with light")))
+        (session.film().clone(), distributions(session.grid().expect("a map with light")))
     };
     let (a, b) = (film(1), film(2));
     assert!(a.0 != b.0 && a.1 != b.1);

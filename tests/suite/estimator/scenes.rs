@@ -48,7 +48,7 @@ pub(crate) fn smoked_glass() -> Material {
 }
 
 /// Covers the half of its texture coordinates where `u < 1/2`; made for scenes of
-/// [`Stage::with_half_texture`].
+/// [`SceneBuilder::with_half_texture`].
 pub(crate) fn half_masked(material: Material) -> Material {
     let texture = TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY };
     Material {
@@ -85,29 +85,29 @@ pub(crate) fn orthographic(eye: Vec3) -> Camera {
 
 /// A scene being put together; every method returns it.
 #[derive(Default)]
-pub(crate) struct Stage {
+pub(crate) struct SceneBuilder {
     scene: Scene,
 }
 
-impl Stage {
+impl SceneBuilder {
     pub(crate) fn new() -> Self {
         Self::default()
     }
 
     /// Texture 0: opaque white where `u < 1/2`, clear elsewhere.
     pub(crate) fn with_half_texture() -> Self {
-        let mut stage = Self::new();
+        let mut builder = Self::new();
         let texels = vec![[255; 4], [255, 255, 255, 0]];
-        stage.scene.images.push(TextureImage { width: 2, height: 1, texels });
+        builder.scene.images.push(TextureImage { width: 2, height: 1, texels });
         let wrap = Wrap::ClampToEdge;
-        stage.scene.textures.push(Texture {
+        builder.scene.textures.push(Texture {
             image: 0,
             wrap_u: wrap,
             wrap_v: wrap,
             nearest: true,
             srgb: true,
         });
-        stage
+        builder
     }
 
     pub(crate) fn build(self) -> World {
@@ -167,7 +167,7 @@ impl Stage {
         high: Vec3,
         faces: impl IntoIterator<Item = usize>,
     ) -> Self {
-        faces.into_iter().fold(self, |stage, face| stage.face(material, low, high, face))
+        faces.into_iter().fold(self, |builder, face| builder.face(material, low, high, face))
     }
 
     /// A sphere of flat faces.
@@ -178,18 +178,18 @@ impl Stage {
             center + radius * lightgrid::math::direction_from_uv(uv)
         };
         let cells = (0..2 * rings).flat_map(|i| (0..rings).map(move |j| (i, j)));
-        cells.fold(self, |stage, (i, j)| {
+        cells.fold(self, |builder, (i, j)| {
             // A ring's quads are trapezoids: two halves of parallelograms would stick out.
             let corners = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-            stage.trapezoid(material, corners)
+            builder.trapezoid(material, corners)
         })
     }
 
     fn trapezoid(self, material: &Material, corners: [Vec3; 4]) -> Self {
-        let mut stage = self.quad(material, corners[0], Vec3::ZERO, Vec3::ZERO);
-        let first = stage.scene.positions.len() - 4;
-        stage.scene.positions[first..].copy_from_slice(&corners);
-        stage
+        let mut builder = self.quad(material, corners[0], Vec3::ZERO, Vec3::ZERO);
+        let first = builder.scene.positions.len() - 4;
+        builder.scene.positions[first..].copy_from_slice(&corners);
+        builder
     }
 }
 
@@ -199,18 +199,18 @@ pub(crate) fn room(albedo: f32, window: Option<&Material>) -> (World, Camera) {
     let (low, high) = (Vec3::new(-2.0, 0.0, -1.5), Vec3::new(2.0, 2.5, 1.5));
     let (sill, head) = (Vec3::new(2.0, 0.8, -1.0), Vec3::new(2.0, 2.2, 1.0));
     let walls = lambert(albedo);
-    let frame = |stage: Stage, y: [f32; 2], z: [f32; 2]| {
-        stage.quad(&walls, [2.0, y[0], z[0]], [0.0, y[1] - y[0], 0.0], [0.0, 0.0, z[1] - z[0]])
+    let frame = |builder: SceneBuilder, y: [f32; 2], z: [f32; 2]| {
+        builder.quad(&walls, [2.0, y[0], z[0]], [0.0, y[1] - y[0], 0.0], [0.0, 0.0, z[1] - z[0]])
     };
-    let mut stage = Stage::new().faces(&walls, low, high, 1..6);
-    stage = frame(stage, [low.y, sill.y], [low.z, high.z]);
-    stage = frame(stage, [head.y, high.y], [low.z, high.z]);
-    stage = frame(stage, [sill.y, head.y], [low.z, sill.z]);
-    stage = frame(stage, [sill.y, head.y], [head.z, high.z]);
+    let mut builder = SceneBuilder::new().faces(&walls, low, high, 1..6);
+    builder = frame(builder, [low.y, sill.y], [low.z, high.z]);
+    builder = frame(builder, [head.y, high.y], [low.z, high.z]);
+    builder = frame(builder, [sill.y, head.y], [low.z, sill.z]);
+    builder = frame(builder, [sill.y, head.y], [head.z, high.z]);
     let (block_low, block_high) = (Vec3::new(-1.2, 0.0, -0.8), Vec3::new(-0.4, 1.0, 0.2));
-    stage = stage.faces(&lambert(0.5 * albedo), block_low, block_high, [0, 1, 2, 4, 5]);
+    builder = builder.faces(&lambert(0.5 * albedo), block_low, block_high, [0, 1, 2, 4, 5]);
     if let Some(window) = window {
-        stage = stage.face(window, sill, head, 0);
+        builder = builder.face(window, sill, head, 0);
     }
-    (stage.build(), Camera::look_at(Vec3::new(1.7, 1.6, 1.2), Vec3::new(-1.0, 0.7, -0.4), 1.0))
+    (builder.build(), Camera::look_at(Vec3::new(1.7, 1.6, 1.2), Vec3::new(-1.0, 0.7, -0.4), 1.0))
 }

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
-use lightgrid::metrics::statistics::{Estimate, z_test};
+use lightgrid::metrics::hypothesis::{Means, z_test};
 use lightgrid::path::{PathLimits, World};
 use lightgrid::render::film::Film;
 use lightgrid::render::{Sampling, Sharing, View};
@@ -65,8 +65,8 @@ fn expect_unbiased(what: &str, world: &World, map: &Environment, camera: &Camera
         let film = render(world, map, picture(camera, Sampling::Plain, sharing, seed), 256);
         let (found, variance) = pixels(&film);
         let test = z_test(
-            Estimate { mean: &reference, variance_of_mean: &reference_variance },
-            Estimate { mean: &found, variance_of_mean: &variance },
+            Means { mean: &reference, variance_of_mean: &reference_variance },
+            Means { mean: &found, variance_of_mean: &variance },
             1e-3,
         );
         assert!(test.as_ref().is_ok_and(|test| test.passed()), "{what}, {sharing:?}: {test:?}");

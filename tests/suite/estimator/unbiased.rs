@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 use lightgrid::environment::{Environment, EnvironmentOptions, TableKind, sky};
 use lightgrid::image::Image;
 use lightgrid::light_grid::cells::SphericalGrid;
-use lightgrid::light_grid::{LawOptions, LightGrid};
-use lightgrid::metrics::statistics::{Estimate, ZTest, z_test};
+use lightgrid::light_grid::{DistributionOptions, LightGrid};
+use lightgrid::metrics::hypothesis::{Means, ZTest, z_test};
 use lightgrid::path::World;
 use lightgrid::render::film::Film;
 use lightgrid::render::{Sampling, Session, StopRule, View};
@@ -31,8 +31,8 @@ fn compare(a: &Film, b: &Film) -> ZTest {
     };
     let ((a_mean, a_variance), (b_mean, b_variance)) = (of(a), of(b));
     z_test(
-        Estimate { mean: &a_mean, variance_of_mean: &a_variance },
-        Estimate { mean: &b_mean, variance_of_mean: &b_variance },
+        Means { mean: &a_mean, variance_of_mean: &a_variance },
+        Means { mean: &b_mean, variance_of_mean: &b_variance },
         ALPHA,
     )
     .expect("two pictures of one size")
@@ -90,7 +90,8 @@ fn a_grid_full_of_garbage_is_noisy_but_right() {
         let view = View { seed, ..view(camera.clone(), Sampling::Plain, 3) };
         let center = camera.world_from_camera.translation.into();
         let grid = SphericalGrid { center, columns: 32, rows: 16, faces, medium: false };
-        let garbage = LightGrid::with_garbage_laws(grid, environment.tile_energies(), seed);
+        let garbage =
+            LightGrid::with_garbage_distributions(grid, environment.tile_energies(), seed);
         let mut session = Session::new(&world, &environment, view);
         session.set_grid(garbage.expect("a map with light")).expect("the CPU does not fail");
         session.advance(512, &AtomicBool::new(false)).expect("the CPU does not fail");
@@ -125,14 +126,14 @@ fn builtin_agrees(name: &str, map: &str, modes: &[Sampling], precision: f64) {
 }
 
 #[test]
-fn learned_laws_agree_with_plain_sampling_in_the_office() {
+fn learned_distributions_agree_with_plain_sampling_in_the_office() {
     builtin_agrees("office", "overcast", &[Sampling::Talk, Sampling::Adaptive], 0.05);
 }
 
 #[test]
-fn learned_laws_agree_with_plain_sampling_in_the_living_room() {
+fn learned_distributions_agree_with_plain_sampling_in_the_living_room() {
     builtin_agrees("living-room", "overcast", &[Sampling::Talk], 0.05);
-    // Not the talk's laws: where learning met no sun they cannot choose its tile. What is left to
+    // Not the talk's distributions: where learning met no sun they cannot choose its tile. What is left to
     // BSDF sampling is right on average, but not seen with this many samples. Ours need enough
     // learning paths for the same reason.
     builtin_agrees("living-room", "day", &[Sampling::Adaptive], 0.05);
@@ -148,11 +149,11 @@ fn over_seeds(seeds: u32, picture: impl Fn(u32) -> f64 + Send + Sync) -> (f64, f
 }
 
 /// One pixel, or sixteen, see a cell of their own of which nothing was learned before: all that its
-/// laws know they know from these pixels' earlier samples. With one scramble for all samples this is
+/// distributions know they know from these pixels' earlier samples. With one scramble for all samples this is
 /// 1 % too bright here for one pixel (9 % after 64 samples in a study), and 7 % too dark where it is
-/// rendered again from the same seed with the laws it made.
+/// rendered again from the same seed with the distributions it made.
 #[test]
-fn laws_made_of_a_pixel_s_own_samples_do_not_bias_it() {
+fn distributions_made_of_a_pixel_s_own_samples_do_not_bias_it() {
     const SAMPLES: u32 = 8;
     let environment = environment(soft_map());
     let (world, room_camera) = room(0.7, None);
@@ -165,8 +166,11 @@ fn laws_made_of_a_pixel_s_own_samples_do_not_bias_it() {
             height: side,
             learning_paths: 0,
             grid_columns: 8,
-            // What it takes from the laws is noise here.
-            laws: LawOptions { compensation: 0.0, ..LawOptions::ADAPTIVE },
+            // What it takes from the distributions is noise here.
+            distributions: DistributionOptions {
+                compensation: 0.0,
+                ..DistributionOptions::ADAPTIVE
+            },
             ..view(camera.clone(), Sampling::Adaptive, 1)
         };
         let view_of = |sampling, seed| View { sampling, seed, ..view.clone() };

@@ -1,6 +1,7 @@
 //! One small file made here for each feature of the format.
 
 use glam::{Vec2, Vec3, Vec4};
+use lightgrid::features::Features;
 use lightgrid::scene::needs::SceneNeeds;
 use lightgrid::scene::{AlphaMode, Medium, Projection, PunctualKind, Scene, Wrap, gltf};
 
@@ -329,7 +330,8 @@ fn newer_material_extensions() {
     // The file has no tangents, and the direction needs them: u grows along +X.
     assert!(scene.tangents.iter().all(|t| t.truncate().abs_diff_eq(Vec3::X, 1e-5)));
     let needs = SceneNeeds::of(&scene);
-    assert!(needs.anisotropy && needs.sheen && !needs.iridescence && !needs.dispersion);
+    assert!(needs.has(Features::ANISOTROPY | Features::SHEEN));
+    assert!(!needs.features.intersects(Features::IRIDESCENCE | Features::DISPERSION));
     assert!(scene.notices.is_empty());
 
     let scene = load(&format!(
@@ -357,9 +359,9 @@ fn newer_material_extensions() {
         "KHR_materials_volume":{"thicknessFactor":1},"KHR_materials_dispersion":{"dispersion":0.3}"#;
     let scene = load(glass);
     assert_eq!(scene.materials[0].dispersion, 0.3);
-    assert!(SceneNeeds::of(&scene).dispersion);
+    assert!(SceneNeeds::of(&scene).has(Features::DISPERSION));
     let thin = load(&glass.replace(r#""thicknessFactor":1"#, ""));
-    assert!(!SceneNeeds::of(&thin).dispersion, "a thin wall bends nothing");
+    assert!(!SceneNeeds::of(&thin).has(Features::DISPERSION), "a thin wall bends nothing");
 
     let odd = load(
         r#""KHR_materials_sheen":{"sheenColorFactor":[2,0,0]},"KHR_materials_iridescence":
@@ -490,7 +492,7 @@ fn fog_is_read_from_the_scene_a_node_and_a_material() {
     };
     let fog = |keys: &str| format!(r#","extras":{{"other":1,"fog":{{{keys}}}}}"#);
     let clear = load("", "", "");
-    assert!(clear.medium.is_none() && !SceneNeeds::of(&clear).medium);
+    assert!(clear.medium.is_none() && !SceneNeeds::of(&clear).has(Features::FOG));
 
     let scene =
         load(&fog(r#""scattering":0.5,"absorption":[0,0.1,0.2],"anisotropy":-0.3"#), "", "");
@@ -501,7 +503,7 @@ fn fog_is_read_from_the_scene_a_node_and_a_material() {
         bounds: None,
     };
     assert_eq!(scene.medium, Some(expected));
-    assert!(SceneNeeds::of(&scene).medium);
+    assert!(SceneNeeds::of(&scene).has(Features::FOG));
 
     let placed = load("", &fog(r#""scattering":2"#), "").medium.expect("a medium");
     let (low, high) = (Vec3::new(0.0, 0.0, -1.0), Vec3::new(2.0, 4.0, 7.0));
@@ -516,7 +518,10 @@ fn fog_is_read_from_the_scene_a_node_and_a_material() {
     let milk = load("", "", &format!("{glass}{}", fog(r#""scattering":[1,2,3],"anisotropy":0.5"#)));
     assert_eq!(milk.materials[0].scattering, Vec3::new(1.0, 2.0, 3.0));
     assert_eq!(milk.materials[0].scatter_anisotropy, 0.5);
-    assert!(SceneNeeds::of(&milk).scattering_solids && !SceneNeeds::of(&milk).medium);
+    assert!(
+        SceneNeeds::of(&milk).has(Features::SCATTERING_SOLIDS)
+            && !SceneNeeds::of(&milk).has(Features::FOG)
+    );
 
     for bad in
         [r#""scattering":-1"#, r#""anisotropy":2"#, r#""box":[[0,0,0],[0,1,1]]"#, r#""box":3"#]

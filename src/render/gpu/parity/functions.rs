@@ -4,7 +4,7 @@ use glam::{UVec2, Vec2, Vec3, Vec4};
 
 use super::Probe;
 use super::cases::{Random, case, cases, edge_directions, edge_squares, edge_words};
-use super::stand::Stand;
+use super::fixture::Fixture;
 use super::twin::{EXACT, ulps};
 use crate::bvh::offset_origin;
 use crate::color::{importance, luminance};
@@ -14,11 +14,11 @@ use crate::path::camera::disk_from_square;
 use crate::sampler::{Sampler, hash, unit_from_bits};
 
 /// The probes that need no map.
-pub(super) fn probes(stand: &Stand) -> Vec<Probe<'_>> {
+pub(super) fn probes(fixture: &Fixture) -> Vec<Probe<'_>> {
     let mut probes = numbers();
     probes.extend(directions());
     probes.extend(random_points());
-    probes.extend(camera(stand));
+    probes.extend(camera(fixture));
     probes.push(long_sums());
     probes
 }
@@ -260,9 +260,9 @@ fn random_points() -> Vec<Probe<'static>> {
     ]
 }
 
-/// Cameras and filters; which ones depends on the stand.
-pub(super) fn camera(stand: &Stand) -> Vec<Probe<'_>> {
-    let Stand { view, rays, .. } = stand;
+/// Cameras and filters; which ones depends on the fixture.
+pub(super) fn camera(fixture: &Fixture) -> Vec<Probe<'_>> {
+    let Fixture { view, rays, .. } = fixture;
     let size = Vec2::new(view.width as f32, view.height as f32);
     let corners = [Vec2::ZERO, size, 0.5 * size].map(|p| case(&[&p, &Vec2::splat(0.5)]));
     let reach = rays.position().length() + rays.focus_distance;
@@ -295,7 +295,7 @@ pub(super) fn camera(stand: &Stand) -> Vec<Probe<'_>> {
             cases([], |r| case(&[&r.below(view.width), &r.below(view.height), &r.below(4096)])),
             move |t| {
                 let pixel = UVec2::new(t.take_word(), t.take_word());
-                let (ray, mut sampler) = stand.start_sample(pixel, t.take_word());
+                let (ray, mut sampler) = fixture.start_sample(pixel, t.take_word());
                 t.near(ray.origin, ulps(4.0).of(reach));
                 t.near(ray.direction, ulps(8.0).of(1.0));
                 t.same(sampler.next_pair_bits()[0]);

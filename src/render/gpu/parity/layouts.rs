@@ -5,8 +5,10 @@ use std::mem::offset_of;
 use naga::{Expression, Literal, Module, ScalarKind, Type, TypeInner};
 
 use super::super::cast::CastRay;
+use super::super::kernel::Kernel;
 use super::super::layout::{Globals, Material, TextureRef, Work, material_flags, texture_flags};
-use super::super::shader::{ArrayPlaces, Constants, Features, Kernel, Program, VertexTexels};
+use super::super::shader::{ArrayPlaces, Constants, Program, VertexTexels};
+use crate::features::Features;
 
 /// A struct's fields in bytes: name, offset, size.
 type Fields = Vec<(&'static str, usize, usize)>;
@@ -33,10 +35,10 @@ fn module() -> Module {
 
 fn module_of(kernel: Kernel) -> Module {
     let features = Features::most();
-    let vertex = VertexTexels::of(&features);
+    let vertex = VertexTexels::of(features);
     let constants =
         Constants { stack_size: 20, shared_stack_size: 10, vertex, ..Constants::default() };
-    let source = Program::new(kernel, &features, &constants, &ArrayPlaces::default()).source;
+    let source = Program::new(kernel, features, &constants, &ArrayPlaces::default()).source;
     naga::front::wgsl::parse_str(&source)
         .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&source)))
 }
@@ -80,8 +82,8 @@ fn structs_are_laid_out_as_the_host_writes_them() {
     assert_same(&module, "Work", work);
     let globals = fields!(Globals:
         work camera_position lens_radius camera_right focus_distance camera_up half_width
-        camera_forward half_height grid_center grid_columns law_starts_at law_masks_at law_ranks_at
-        law_tiles_at law_last_at law_of_cell_at words_per_law grid_rows map_width map_height
+        camera_forward half_height grid_center grid_columns distribution_starts_at distribution_masks_at distribution_ranks_at
+        distribution_tiles_at distribution_last_at distribution_of_cell_at words_per_distribution grid_rows map_width map_height
         tile_columns tile_rows rotation_turns intensity tile_sums_at
         distant_light_count light_triangle_count width height seed bounces russian_roulette orthographic scene_extent
         mean_contribution zero grid_medium whole_map_share fog_low fog_mean_cosine fog_high tries_per_vertex

@@ -1,11 +1,11 @@
-//! The map, its tables, the grid's cells and laws.
+//! The map, its tables, the grid's cells and distributions.
 
 use glam::Vec3;
 
 use super::Probe;
 use super::cases::{case, cases, edge_directions, edge_words};
+use super::fixture::Fixture;
 use super::functions::camera;
-use super::stand::Stand;
 use super::twin::{Bound, EXACT, Twin, ulps};
 use crate::environment::{Environment, Lookup, TableKind};
 use crate::light_grid::WHOLE_MAP;
@@ -13,12 +13,12 @@ use crate::light_grid::cells::dominant_face;
 use crate::render::gpu::layout::unpack_radiance;
 
 /// The probes that depend on the table, the look-up, the cells or the camera.
-pub(super) fn probes(stand: &Stand) -> Vec<Probe<'_>> {
-    let mut probes = look_ups(&stand.environment);
-    probes.extend(samples(&stand.environment));
-    probes.extend(cells(stand));
-    probes.extend(laws(stand));
-    probes.extend(camera(stand));
+pub(super) fn probes(fixture: &Fixture) -> Vec<Probe<'_>> {
+    let mut probes = look_ups(&fixture.environment);
+    probes.extend(samples(&fixture.environment));
+    probes.extend(cells(fixture));
+    probes.extend(distributions(fixture));
+    probes.extend(camera(fixture));
     probes
 }
 
@@ -185,8 +185,8 @@ pub(super) fn samples(environment: &Environment) -> Vec<Probe<'_>> {
     vec![sample.flips(flips), density.flips(500)]
 }
 
-fn cells(stand: &Stand) -> Vec<Probe<'_>> {
-    let center = stand.rays.position();
+fn cells(fixture: &Fixture) -> Vec<Probe<'_>> {
+    let center = fixture.rays.position();
     let edge_points = move || {
         let around = edge_directions().into_iter().map(move |d| (center + 3.0 * d, d));
         around.chain([(center, Vec3::ONE), (Vec3::splat(1e30), Vec3::ZERO)])
@@ -204,15 +204,15 @@ fn cells(stand: &Stand) -> Vec<Probe<'_>> {
             t.same(right);
         },
     )];
-    if let Some(grid) = stand.grid.grid() {
+    if let Some(grid) = fixture.grid.grid() {
         let cells = grid.cell_count();
         probes.push(Probe::new(
-            "law_of_cell",
-            "put_word(law_of_cell(take_word()));",
+            "distribution_of_cell",
+            "put_word(distribution_of_cell(take_word()));",
             cases([case(&[&0_u32]), case(&[&(cells - 1)])], |r| case(&[&r.below(cells)])),
             |t| {
-                let law = stand.grid.law_of_cell(t.take_word());
-                t.same(law);
+                let distribution = fixture.grid.distribution_of_cell(t.take_word());
+                t.same(distribution);
             },
         ));
         // Exact, but for points that lie on the border of cells.
@@ -239,24 +239,26 @@ fn near_remainder(t: &mut Twin<'_>, right: u32) {
     t.check(off <= 3 << 8, || format!("a remainder of {device:#x} instead of {right:#x}"));
 }
 
-fn laws(stand: &Stand) -> Vec<Probe<'_>> {
-    let laws = stand.grid.laws();
-    let tiles = laws.tile_count();
+fn distributions(fixture: &Fixture) -> Vec<Probe<'_>> {
+    let distributions = fixture.grid.distributions();
+    let tiles = distributions.tile_count();
     let ends = [0, 1, 0x7fff_ffff, 0x8000_0000, u32::MAX];
-    let edges = (0..laws.len()).flat_map(move |law| ends.map(|bits| case(&[&law, &bits, &!bits])));
-    let all = (0..laws.len()).flat_map(move |law| (0..tiles).map(move |tile| case(&[&law, &tile])));
-    let edges_of_shares = (0..laws.len()).flat_map(move |law| {
-        [0, 32, 128, 256].map(|share| case(&[&law, &0x8000_0000_u32, &31_u32, &share]))
+    let edges = (0..distributions.len())
+        .flat_map(move |distribution| ends.map(|bits| case(&[&distribution, &bits, &!bits])));
+    let all = (0..distributions.len())
+        .flat_map(move |distribution| (0..tiles).map(move |tile| case(&[&distribution, &tile])));
+    let edges_of_shares = (0..distributions.len()).flat_map(move |distribution| {
+        [0, 32, 128, 256].map(|share| case(&[&distribution, &0x8000_0000_u32, &31_u32, &share]))
     });
     vec![
         Probe::new(
             "sample_tile",
-            "let law = take_word(); let bits = take_word();
-            let choice = sample_tile(law, bits, take_word());
+            "let distribution = take_word(); let bits = take_word();
+            let choice = sample_tile(distribution, bits, take_word());
             put_word(choice.tile); put(choice.probability); put_word(choice.remainder);",
-            cases(edges, |r| case(&[&r.below(laws.len()), &r.word(), &r.word()])),
+            cases(edges, |r| case(&[&r.below(distributions.len()), &r.word(), &r.word()])),
             move |t| {
-                let choice = laws.sample(t.take_word(), t.take_word(), t.take_word());
+                let choice = distributions.sample(t.take_word(), t.take_word(), t.take_word());
                 t.same(choice.tile);
                 t.near(choice.probability, ulps(1.0));
                 near_remainder(t, choice.remainder);
@@ -264,15 +266,15 @@ fn laws(stand: &Stand) -> Vec<Probe<'_>> {
         ),
         Probe::new(
             "choose_tile",
-            "let law = take_word(); let bits = vec2u(take_word(), take_word());
-            let choice = choose_tile(law, bits, take_word());
+            "let distribution = take_word(); let bits = vec2u(take_word(), take_word());
+            let choice = choose_tile(distribution, bits, take_word());
             put_word(choice.tile); put(choice.probability); put_word(choice.remainder);",
             cases(edges_of_shares, |r| {
-                case(&[&r.below(laws.len()), &r.word(), &r.word(), &r.below(257)])
+                case(&[&r.below(distributions.len()), &r.word(), &r.word(), &r.below(257)])
             }),
             move |t| {
-                let (law, bits) = (t.take_word(), [t.take_word(), t.take_word()]);
-                let choice = stand.grid.sample_sharing(law, bits, t.take_word());
+                let (distribution, bits) = (t.take_word(), [t.take_word(), t.take_word()]);
+                let choice = fixture.grid.sample_sharing(distribution, bits, t.take_word());
                 t.same(choice.tile);
                 t.near(choice.probability, ulps(3.0));
                 near_remainder(t, choice.remainder);
@@ -280,19 +282,19 @@ fn laws(stand: &Stand) -> Vec<Probe<'_>> {
         ),
         Probe::new(
             "choice_probability",
-            "let law = take_word(); put(choice_probability(law, take_word()));",
-            cases(all.clone(), |r| case(&[&r.below(laws.len()), &r.below(tiles)])),
+            "let distribution = take_word(); put(choice_probability(distribution, take_word()));",
+            cases(all.clone(), |r| case(&[&r.below(distributions.len()), &r.below(tiles)])),
             move |t| {
-                let right = stand.grid.probability(t.take_word(), t.take_word());
+                let right = fixture.grid.probability(t.take_word(), t.take_word());
                 t.near(right, ulps(3.0));
             },
         ),
         Probe::new(
             "tile_probability",
-            "let law = take_word(); put(tile_probability(law, take_word()));",
+            "let distribution = take_word(); put(tile_probability(distribution, take_word()));",
             cases(all, |r| case(&[&WHOLE_MAP, &r.below(tiles)])),
             move |t| {
-                let right = laws.probability(t.take_word(), t.take_word());
+                let right = distributions.probability(t.take_word(), t.take_word());
                 t.near(right, ulps(1.0));
             },
         ),

@@ -4,13 +4,13 @@ use glam::{Vec2, Vec3};
 
 use super::Probe;
 use super::cases::{case, cases, edge_directions, edge_squares};
-use super::stand::Stand;
+use super::fixture::Fixture;
 use super::twin::ulps;
 use crate::medium::{Interior, Phase};
 
 /// The probes of what lies between surfaces.
-pub(super) fn probes(stand: &Stand) -> Vec<Probe<'_>> {
-    let fog = stand.view.fog(&stand.world).expect("this stand has fog");
+pub(super) fn probes(fixture: &Fixture) -> Vec<Probe<'_>> {
+    let fog = fixture.view.fog(&fixture.world).expect("this fixture has fog");
     let anisotropies = [0.0, 0.5, -0.9, 0.99];
     let squares = move || {
         let squares = edge_squares().into_iter();
@@ -106,7 +106,7 @@ pub(super) fn probes(stand: &Stand) -> Vec<Probe<'_>> {
                 case(&[&(4.0 * r.in_cube())])
             }),
             move |t| {
-                let cells = stand.grid.grid().expect("stands in fog have one");
+                let cells = fixture.grid.grid().expect("stands in fog have one");
                 let cell = cells.cell_in_medium(t.take3());
                 t.same(cell);
             },

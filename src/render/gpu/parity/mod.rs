@@ -13,21 +13,23 @@
 //! takes up.
 
 mod cases;
+pub(super) mod fixture;
 mod functions;
 mod layouts;
 mod map;
 mod media;
 mod scattering;
-pub(super) mod stand;
 mod surfaces;
 mod twin;
 
 use std::collections::BTreeSet;
 
+use super::kernel::Kernel;
 use super::pipeline::Pipeline;
-use super::shader::{ArrayPlaces, Binding, Constants, Features, Kernel, Program, VertexTexels};
-use super::{Gpu, Renderer, Stage, Work};
-use stand::Stand;
+use super::shader::{ArrayPlaces, Binding, Constants, Program, VertexTexels};
+use super::{Gpu, Renderer, UploadedScene, Work};
+use crate::features::Features;
+use fixture::Fixture;
 use twin::Twin;
 
 /// Words of a case, and of its answer.
@@ -148,21 +150,21 @@ enum Places {
     Other,
 }
 
-/// Runs probes on a stand's scene and map and compares; prints a line a probe.
-fn run(stand: &Stand, preludes: &[&str], probes: &[Probe<'_>], places: Places) {
+/// Runs probes on a fixture's scene and map and compares; prints a line a probe.
+fn run(fixture: &Fixture, preludes: &[&str], probes: &[Probe<'_>], places: Places) {
     let gpu = match Gpu::open(None) {
         Ok(gpu) if places == Places::Other => gpu.with_arrays_in_buffers(),
         Ok(gpu) => gpu,
         Err(reason) => return eprintln!("SKIPPED: {reason}"),
     };
-    let Stand { world, environment, view, rays, grid } = stand;
-    let mut stage = Stage::new(&gpu, world, environment).expect("it fits");
+    let Fixture { world, environment, view, rays, grid } = fixture;
+    let mut uploaded = UploadedScene::new(&gpu, world, environment).expect("it fits");
     if places == Places::Other {
-        stage.constants.shared_stack_size = 1;
-        assert!(stage.constants.stack_size > 1, "the tree is deep enough");
+        uploaded.constants.shared_stack_size = 1;
+        assert!(uploaded.constants.stack_size > 1, "the tree is deep enough");
     }
     let mut renderer =
-        Renderer::with_kernel(&stage, (world, environment), view, rays, |gpu, program| {
+        Renderer::with_kernel(&uploaded, (world, environment), view, rays, |gpu, program| {
             Pipeline::new(gpu, "probe", with_probes(program, preludes, probes))
         })
         .expect("it compiles");
@@ -195,21 +197,21 @@ fn ask(renderer: &mut Renderer, index: usize, probe: &Probe<'_>) -> Vec<u32> {
     renderer.read_words("probe_answers", words.len()).expect("it can be read")
 }
 
-/// A stand, what its probes' WGSL shares, and the probes.
-type Group<'a> = (&'a Stand, &'static [&'static str], Vec<Probe<'a>>);
+/// A fixture, what its probes' WGSL shares, and the probes.
+type Group<'a> = (&'a Fixture, &'static [&'static str], Vec<Probe<'a>>);
 
 /// All probes: most on a scene with everything, those of the map with each table and look-up.
-fn groups(stands: &[Stand]) -> Vec<Group<'_>> {
+fn groups(fixtures: &[Fixture]) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = vec![
-        (&stands[0], &[], functions::probes(&stands[0])),
-        (&stands[0], &[scattering::PRELUDE], scattering::probes()),
-        (&stands[0], &[scattering::PRELUDE], surfaces::probes(&stands[0])),
-        (&stands[0], &[], surfaces::path_probes(&stands[0])),
-        (&stands[0], &[], media::probes(&stands[0])),
+        (&fixtures[0], &[], functions::probes(&fixtures[0])),
+        (&fixtures[0], &[scattering::PRELUDE], scattering::probes()),
+        (&fixtures[0], &[scattering::PRELUDE], surfaces::probes(&fixtures[0])),
+        (&fixtures[0], &[], surfaces::path_probes(&fixtures[0])),
+        (&fixtures[0], &[], media::probes(&fixtures[0])),
     ];
-    groups.extend(stands[..4].iter().map(|stand| (stand, &[][..], map::probes(stand))));
-    let large = stands[4..].iter();
-    groups.extend(large.map(|stand| (stand, &[][..], map::samples(&stand.environment))));
+    groups.extend(fixtures[..4].iter().map(|fixture| (fixture, &[][..], map::probes(fixture))));
+    let large = fixtures[4..].iter();
+    groups.extend(large.map(|fixture| (fixture, &[][..], map::samples(&fixture.environment))));
     groups
 }
 
@@ -217,9 +219,9 @@ macro_rules! run_group {
     ($($test:ident: $group:literal, $places:ident;)*) => {$(
         #[test]
         fn $test() {
-            let stands = stand::all();
-            let (stand, preludes, probes) = groups(&stands).swap_remove($group);
-            run(stand, preludes, &probes, Places::$places);
+            let fixtures = fixture::all();
+            let (fixture, preludes, probes) = groups(&fixtures).swap_remove($group);
+            run(fixture, preludes, &probes, Places::$places);
         }
     )*};
 }
@@ -241,13 +243,13 @@ run_group! {
     map_in_other_places: 5, Other;
 }
 
-/// The source of a stand's kernel; the numbers in it do not matter here.
-fn program_of(stand: &Stand, kernel: Kernel) -> Program {
-    let features = Features::of(&stand.world, &stand.environment, &stand.view);
-    let vertex = VertexTexels::of(&features);
+/// The source of a fixture's kernel; the numbers in it do not matter here.
+fn program_of(fixture: &Fixture, kernel: Kernel) -> Program {
+    let features = Features::of(&fixture.world, &fixture.environment, &fixture.view);
+    let vertex = VertexTexels::of(features);
     let constants =
         Constants { stack_size: 20, shared_stack_size: 10, vertex, ..Constants::default() };
-    Program::new(kernel, &features, &constants, &ArrayPlaces::default())
+    Program::new(kernel, features, &constants, &ArrayPlaces::default())
 }
 
 /// Functions whose effect is no return value: entry points, and what looks at the map to count,
@@ -258,17 +260,17 @@ const COMPARED_ELSEWHERE: [&str; 6] =
 /// Whatever the shaders define runs in some probe.
 #[test]
 fn no_function_is_left_out() {
-    let stands = stand::all();
+    let fixtures = fixture::all();
     let (mut defined, mut reached) = (BTreeSet::new(), BTreeSet::new());
-    for stand in &stands {
+    for fixture in &fixtures {
         for kernel in [Kernel::Render, Kernel::Learn] {
-            let source = program_of(stand, kernel).source;
+            let source = program_of(fixture, kernel).source;
             let names = source.lines().filter_map(|line| line.strip_prefix("fn "));
             defined.extend(names.map(|rest| rest.split('(').next().unwrap_or(rest).to_owned()));
         }
     }
-    for (stand, preludes, probes) in groups(&stands) {
-        let source = with_probes(program_of(stand, Kernel::Render), preludes, &probes).source;
+    for (fixture, preludes, probes) in groups(&fixtures) {
+        let source = with_probes(program_of(fixture, Kernel::Render), preludes, &probes).source;
         let module = naga::front::wgsl::parse_str(&source)
             .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&source)));
         let probe = module.entry_points.iter().find(|e| e.name == "probe").expect("it is there");

@@ -4,8 +4,8 @@ use glam::{UVec2, Vec2, Vec3, Vec4, Vec4Swizzles};
 
 use super::Probe;
 use super::cases::{Random, case, cases};
+use super::fixture::Fixture;
 use super::scattering::expect_parameters;
-use super::stand::Stand;
 use super::twin::{EXACT, Twin, ulps};
 use crate::bvh::Ray;
 use crate::path::Receiver;
@@ -14,11 +14,11 @@ use crate::scene::texture::sample_texture;
 use crate::scene::{Scene, TextureRef};
 
 /// The probes but for whole paths.
-pub(super) fn probes(stand: &Stand) -> Vec<Probe<'_>> {
-    let mut probes = textures(&stand.world.scene);
-    probes.extend(points(stand));
-    probes.extend(lights(stand));
-    probes.extend(hits(stand));
+pub(super) fn probes(fixture: &Fixture) -> Vec<Probe<'_>> {
+    let mut probes = textures(&fixture.world.scene);
+    probes.extend(points(fixture));
+    probes.extend(lights(fixture));
+    probes.extend(hits(fixture));
     probes
 }
 
@@ -68,8 +68,8 @@ fn textures(scene: &Scene) -> Vec<Probe<'_>> {
     ]
 }
 
-fn points(stand: &Stand) -> Vec<Probe<'_>> {
-    let scene = &stand.world.scene;
+fn points(fixture: &Fixture) -> Vec<Probe<'_>> {
+    let scene = &fixture.world.scene;
     let case_of = |r: &mut Random| {
         let (triangle, barycentric) = place(r, scene);
         case(&[&triangle, &barycentric, &r.direction()])
@@ -109,7 +109,7 @@ fn points(stand: &Stand) -> Vec<Probe<'_>> {
             move |t| {
                 let (triangle, barycentric, direction) = (t.take_word(), t.take2(), t.take3());
                 let point = SurfacePoint::at(scene, triangle, barycentric, direction);
-                t.near(stand.world.straight_through(&point, direction), ulps(32.0).of(1.0));
+                t.near(fixture.world.straight_through(&point, direction), ulps(32.0).of(1.0));
             },
         )
         .flips(500),
@@ -132,8 +132,8 @@ fn take_receiver(t: &mut Twin<'_>) -> Receiver {
 }
 
 // Cosines that are differences of angles have lost some bits, more on each level of the tree.
-fn lights(stand: &Stand) -> Vec<Probe<'_>> {
-    let world = &stand.world;
+fn lights(fixture: &Fixture) -> Vec<Probe<'_>> {
+    let world = &fixture.world;
     let scene = &world.scene;
     let triangles = scene.triangles.len() as u32;
     let edges = [0, 1, u32::MAX / 2, u32::MAX].map(|x| case(&[&Vec3::ONE, &Vec3::ZERO, &x, &x]));
@@ -199,8 +199,8 @@ fn ray(r: &mut Random, scene: &Scene) -> (Vec3, Vec3) {
     }
 }
 
-fn hits(stand: &Stand) -> Vec<Probe<'_>> {
-    let world = &stand.world;
+fn hits(fixture: &Fixture) -> Vec<Probe<'_>> {
+    let world = &fixture.world;
     let scene = &world.scene;
     let away = case(&[&Vec3::splat(1e6), &Vec3::ONE, &1e30_f32, &0_u32]);
     vec![
@@ -255,8 +255,8 @@ fn hits(stand: &Stand) -> Vec<Probe<'_>> {
 
 /// Paths from the camera to their ends. Rounding sends one in a few hundred to another triangle,
 /// texel or lobe; what it meets from there on differs.
-pub(super) fn path_probes(stand: &Stand) -> Vec<Probe<'_>> {
-    let Stand { view, .. } = stand;
+pub(super) fn path_probes(fixture: &Fixture) -> Vec<Probe<'_>> {
+    let Fixture { view, .. } = fixture;
     vec![
         Probe::new(
             "path_step until the end",
@@ -267,8 +267,8 @@ pub(super) fn path_probes(stand: &Stand) -> Vec<Probe<'_>> {
             cases([], |r| case(&[&r.below(view.width), &r.below(view.height), &r.below(4096)])),
             move |t| {
                 let pixel = UVec2::new(t.take_word(), t.take_word());
-                let (ray, sampler) = stand.start_sample(pixel, t.take_word());
-                let path = stand.tracer().radiance(ray, sampler);
+                let (ray, sampler) = fixture.start_sample(pixel, t.take_word());
+                let path = fixture.tracer().radiance(ray, sampler);
                 t.same(path.rays);
                 t.near(path.radiance, ulps(8192.0).of(path.radiance.max_element()));
                 t.near(if path.first_hit.is_some() { 1.0 } else { 0.0 }, EXACT);
@@ -289,13 +289,13 @@ pub(super) fn path_probes(stand: &Stand) -> Vec<Probe<'_>> {
 
 #[test]
 fn rays_hit_and_miss() {
-    let [stand, ..] = super::stand::all();
+    let [fixture, ..] = super::fixture::all();
     let mut random = Random::default();
     let mut hits = 0;
     for _ in 0..1000 {
-        let (origin, direction) = ray(&mut random, &stand.world.scene);
+        let (origin, direction) = ray(&mut random, &fixture.world.scene);
         let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
-        hits += u32::from(stand.world.closest_hit(&ray, false).is_some());
+        hits += u32::from(fixture.world.closest_hit(&ray, false).is_some());
     }
     assert!((300..900).contains(&hits), "{hits}");
 }

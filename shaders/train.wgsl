@@ -1,7 +1,7 @@
-// Teaching paths for the radiance cache: twin of src/path/teach.rs and of what counts in
+// Training paths for the radiance cache: twin of src/path/train.rs and of what counts in
 // src/radiance_cache/sums.rs.
 
-const TEACHING_SEED = 0x74656163u;
+const TRAINING_SEED = 0x74656163u;
 const MOST_TIMES = 128.0;
 const LEAST_SHARE = 1e-3;
 const NO_CACHE_SLOT = 0xffffffffu;
@@ -9,8 +9,8 @@ const ALBEDO_ONE = 255.0;
 const MOST_UNITS = 1099511627776.0;
 const TWO_TO_32 = 4294967296.0;
 
-// A vertex of the path that has not yet brought back all that it is to teach.
-struct Teacher {
+// A vertex of the path that has not yet brought back all that the cache is to learn from it.
+struct TrainingVertex {
     throughput: vec3f,
     slot: u32,
     radiance_before: vec3f,
@@ -18,10 +18,10 @@ struct Teacher {
     most: f32,
 }
 
-var<private> teachers: array<Teacher, TEACHERS>;
+var<private> training_vertices: array<TrainingVertex, TRAINING_VERTICES>;
 
 // The slot of a cell, a new one if it has none.
-fn slot_to_teach(key: CacheKey) -> u32 {
+fn slot_to_train(key: CacheKey) -> u32 {
     for (var probe = 0u; probe < CACHE_PROBES; probe++) {
         let slot = (key.place + probe) & (CACHE_SLOTS - 1u);
         loop {
@@ -43,23 +43,23 @@ fn dithered(value: f32, most: f32) -> f32 {
     return floor(bounded + unit_from_bits(hash(bitcast<u32>(bounded))));
 }
 
-fn teacher_at(path: ptr<function, Path>, vertex: Vertex) -> Teacher {
-    var teacher = Teacher(vec3f(0.0), NO_CACHE_SLOT, vec3f(0.0), F32_MAX);
+fn training_vertex_at(path: ptr<function, Path>, vertex: Vertex) -> TrainingVertex {
+    var trained = TrainingVertex(vec3f(0.0), NO_CACHE_SLOT, vec3f(0.0), F32_MAX);
     let throughput = (*path).throughput;
     let least = min(min(throughput.x, throughput.y), throughput.z);
-    let teaches = is_in_air(path)
+    let trains = is_in_air(path)
         && is_broad(vertex, LEAST_CACHED_ALPHA)
         && least > LEAST_SHARE * max_element(throughput);
-    if !teaches {
-        return teacher;
+    if !trains {
+        return trained;
     }
     let position = vertex.point.position;
     let normal = vertex.point.geometric_normal;
     let cell = cache_cell(position, normal);
-    let parent = slot_to_teach(cache_key(cache_parent(cell)));
-    let slot = slot_to_teach(cache_key(cell));
+    let parent = slot_to_train(cache_key(cache_parent(cell)));
+    let slot = slot_to_train(cache_key(cell));
     if parent == NO_CACHE_SLOT || slot == NO_CACHE_SLOT {
-        return teacher;
+        return trained;
     }
     let words = slot * CACHE_WORDS;
     let albedo = bsdf_albedo(vertex.bsdf);
@@ -71,34 +71,34 @@ fn teacher_at(path: ptr<function, Path>, vertex: Vertex) -> Teacher {
     }
     if globals.cache_is_known != 0u {
         let known = cached_radiance_over_albedo(position, normal) * albedo;
-        teacher.most = MOST_TIMES * luminance(known);
+        trained.most = MOST_TIMES * luminance(known);
     }
-    teacher.slot = slot;
-    teacher.throughput = throughput;
-    teacher.radiance_before = (*path).radiance;
-    return teacher;
+    trained.slot = slot;
+    trained.throughput = throughput;
+    trained.radiance_before = (*path).radiance;
+    return trained;
 }
 
 // Adds what the path has brought back since.
-fn end_teacher(path: ptr<function, Path>, index: u32) {
-    let teacher = teachers[index];
-    teachers[index].slot = NO_CACHE_SLOT;
-    if teacher.slot == NO_CACHE_SLOT {
+fn end_training_vertex(path: ptr<function, Path>, index: u32) {
+    let trained = training_vertices[index];
+    training_vertices[index].slot = NO_CACHE_SLOT;
+    if trained.slot == NO_CACHE_SLOT {
         return;
     }
-    var radiance = ((*path).radiance - teacher.radiance_before) / teacher.throughput;
+    var radiance = ((*path).radiance - trained.radiance_before) / trained.throughput;
     if !is_finite3(radiance) {
         return;
     }
     let own = luminance(radiance);
-    if own > teacher.most {
-        radiance *= teacher.most / own;
+    if own > trained.most {
+        radiance *= trained.most / own;
     }
     for (var channel = 0u; channel < 3u; channel++) {
         let units = dithered(radiance[channel] * globals.cache_scale, MOST_UNITS);
         let high = floor(units / TWO_TO_32);
         let low = u32(units - high * TWO_TO_32);
-        let at = teacher.slot * CACHE_WORDS + 6u + 2u * channel;
+        let at = trained.slot * CACHE_WORDS + 6u + 2u * channel;
         let before = atomicAdd(&cache_sums[at], low);
         let carry = select(0u, 1u, before + low < low);
         atomicAdd(&cache_sums[at + 1u], u32(high) + carry);
@@ -106,19 +106,19 @@ fn end_teacher(path: ptr<function, Path>, index: u32) {
 }
 
 // At each vertex of the path.
-fn meet_teachers(path: ptr<function, Path>, vertex: Vertex) {
+fn meet_training_vertices(path: ptr<function, Path>, vertex: Vertex) {
     let arrived = (*path).bounces;
     let window = globals.bounces - 1u;
-    if arrived >= window && arrived - window < TEACHERS {
-        end_teacher(path, arrived - window);
+    if arrived >= window && arrived - window < TRAINING_VERTICES {
+        end_training_vertex(path, arrived - window);
     }
-    if arrived < TEACHERS {
-        teachers[arrived] = teacher_at(path, vertex);
+    if arrived < TRAINING_VERTICES {
+        training_vertices[arrived] = training_vertex_at(path, vertex);
     }
 }
 
 @compute @workgroup_size(64)
-fn teach(
+fn train(
     @builtin(workgroup_id) group: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
@@ -127,13 +127,13 @@ fn teach(
     if offset >= globals.work.count {
         return;
     }
-    for (var i = 0u; i < TEACHERS; i++) {
-        teachers[i].slot = NO_CACHE_SLOT;
+    for (var i = 0u; i < TRAINING_VERTICES; i++) {
+        training_vertices[i].slot = NO_CACHE_SLOT;
     }
-    var path = path_anywhere(offset, TEACHING_SEED);
+    var path = path_anywhere(offset, TRAINING_SEED);
     while path_step(&path) {}
-    for (var i = 0u; i < TEACHERS; i++) {
-        end_teacher(&path, i);
+    for (var i = 0u; i < TRAINING_VERTICES; i++) {
+        end_training_vertex(&path, i);
     }
     atomicAdd(&learning_rays, path.rays);
 }

@@ -1,4 +1,4 @@
-//! Teaching paths: what surfaces send back, for the radiance cache.
+//! Training paths: what surfaces send back, for the radiance cache.
 
 use glam::Vec3;
 
@@ -8,8 +8,8 @@ use crate::color::luminance;
 use crate::radiance_cache::{RadianceCache, RadianceSums};
 use crate::sampler::Sampler;
 
-/// First vertices of a path that teach.
-pub(crate) const TEACHERS: u32 = 3;
+/// First vertices of a path that train.
+pub(crate) const TRAINING_VERTICES: u32 = 3;
 /// An estimate so many times as bright as what is known of its cell counts as if it were just that: one
 /// path in a million would make a cell shine. Less costs light (1 % at 64, 5 % at 16, of a living room
 /// at sunset).
@@ -17,8 +17,8 @@ const MOST_TIMES: f32 = 128.0;
 /// A path that carries less of one channel than this share of the largest says too little about it.
 const LEAST_SHARE: f32 = 1e-3;
 
-/// A vertex of a path that has not yet brought back all that it is to teach.
-struct Teacher {
+/// A vertex of a path that has not yet brought back all that the cache is to learn from it.
+struct TrainingVertex {
     vertex: u32,
     position: Vec3,
     normal: Vec3,
@@ -32,37 +32,40 @@ impl PathTracer<'_> {
     /// Traces one camera path and adds to `sums` what it has found at its first vertices, after so many
     /// vertices as a path has that arrives there second. What [`PathTracer::cache`] knows by now bounds
     /// it. Returns the number of rays.
-    pub(crate) fn teach(&self, ray: Ray, sampler: Sampler, sums: &RadianceSums) -> u32 {
+    pub(crate) fn train(&self, ray: Ray, sampler: Sampler, sums: &RadianceSums) -> u32 {
         let Some(window) = self.limits.bounces.checked_sub(1) else { return 0 };
-        let limits = PathLimits { bounces: window + TEACHERS - 1, ..self.limits };
+        let limits = PathLimits { bounces: window + TRAINING_VERTICES - 1, ..self.limits };
         let tracer = PathTracer { limits, cache: None, counts: None, ..*self };
         let mut path = Path::new(&tracer, ray, sampler);
-        let mut teachers: Vec<Teacher> = Vec::with_capacity(TEACHERS as usize);
+        let mut training_vertices: Vec<TrainingVertex> =
+            Vec::with_capacity(TRAINING_VERTICES as usize);
         let mut own_bsdf = None;
         while let Some(vertex) = path.next_vertex(&mut own_bsdf) {
             let arrived = path.bounces;
-            for done in teachers.extract_if(.., |teacher| arrived == teacher.vertex + window) {
-                done.teach(&path, sums, self.cache);
+            for done in
+                training_vertices.extract_if(.., |trained| arrived == trained.vertex + window)
+            {
+                done.train(&path, sums, self.cache);
             }
-            teachers.extend(Teacher::new(&path, &vertex));
+            training_vertices.extend(TrainingVertex::new(&path, &vertex));
             if !path.visit(&vertex) {
                 break;
             }
         }
-        teachers.iter().for_each(|teacher| teacher.teach(&path, sums, self.cache));
+        training_vertices.iter().for_each(|trained| trained.train(&path, sums, self.cache));
         path.rays
     }
 }
 
-impl Teacher {
+impl TrainingVertex {
     fn new(path: &Path<'_>, vertex: &Vertex<'_>) -> Option<Self> {
         let Scatterer::Surface(surface) = &vertex.scatterer else { return None };
         let throughput = path.throughput;
-        let teaches = path.bounces < TEACHERS
+        let trains = path.bounces < TRAINING_VERTICES
             && path.is_in_air()
             && surface.is_cacheable()
             && throughput.min_element() > LEAST_SHARE * throughput.max_element();
-        teaches.then(|| Self {
+        trains.then(|| Self {
             vertex: path.bounces,
             position: vertex.position,
             normal: surface.geometric_normal,
@@ -72,7 +75,7 @@ impl Teacher {
         })
     }
 
-    fn teach(&self, path: &Path<'_>, sums: &RadianceSums, known: Option<&RadianceCache>) {
+    fn train(&self, path: &Path<'_>, sums: &RadianceSums, known: Option<&RadianceCache>) {
         let radiance = (path.radiance - self.radiance_before) / self.throughput;
         let times = known.map_or(1.0, |cache| {
             let known = cache.radiance_over_albedo(self.position, self.normal) * self.albedo;

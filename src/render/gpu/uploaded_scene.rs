@@ -8,10 +8,11 @@ use super::acceleration::Acceleration;
 use super::buffers::Buffers;
 use super::device::Gpu;
 use super::layout::{self, Globals};
-use super::shader::{self, Constants, Features, SHARED_STACK_SIZE, VertexTexels};
+use super::shader::{self, Constants, SHARED_STACK_SIZE, VertexTexels};
 use crate::bvh::compressed::CompressedTree;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
+use crate::features::Features;
 use crate::path::World;
 use crate::scene::Scene;
 
@@ -19,7 +20,7 @@ use crate::scene::Scene;
 const MAX_DEPTH: u32 = 96;
 
 /// A scene and a map uploaded once for any number of views.
-pub struct Stage {
+pub struct UploadedScene {
     pub(super) gpu: Gpu,
     pub(super) buffers: Buffers,
     pub(super) globals: Globals,
@@ -28,7 +29,7 @@ pub struct Stage {
     environment: Environment,
 }
 
-impl Stage {
+impl UploadedScene {
     /// Uploads both.
     ///
     /// # Errors
@@ -47,7 +48,7 @@ impl Stage {
     /// # Errors
     /// If it does not fit on the device, with the numbers.
     pub fn relit(&self, environment: &Environment) -> Result<Self> {
-        let mut stage = Self {
+        let mut uploaded = Self {
             gpu: self.gpu.clone(),
             buffers: self.buffers.clone(),
             globals: self.globals,
@@ -55,11 +56,11 @@ impl Stage {
             environment: environment.clone(),
         };
         if environment.shares_map_with(&self.environment) {
-            stage.globals.set_environment(environment);
+            uploaded.globals.set_environment(environment);
         } else {
-            upload_map(&mut stage.buffers, &mut stage.globals, environment)?;
+            upload_map(&mut uploaded.buffers, &mut uploaded.globals, environment)?;
         }
-        Ok(stage)
+        Ok(uploaded)
     }
 
     /// The device it is on.
@@ -91,17 +92,17 @@ fn upload_world(
     } else {
         upload_tree(buffers, scene, flags_of)?
     };
-    let vertex = VertexTexels::of(&features);
+    let vertex = VertexTexels::of(features);
     put_array(buffers, "triangles", "the scene's geometry", &layout::triangles(scene))?;
     put_array(buffers, "vertices", "the scene's geometry", &layout::vertices(scene, &vertex))?;
     put_array(buffers, "materials", "the list of materials", &materials)?;
-    if features.has("textures") {
+    if features.contains(Features::TEXTURES) {
         put_array(buffers, "texture_refs", "the list of textures", &texture_refs)?;
         let texels = scene.images.iter().map(|image| image.texels.len() as u64).sum();
         let images = scene.images.iter().map(|image| bytemuck::cast_slice(&image.texels));
         buffers.put_array("texels", "the set of textures", texels, images.map(Cow::Borrowed))?;
     }
-    if features.has("scene_lights") {
+    if features.contains(Features::SCENE_LIGHTS) {
         let lights = layout::light_words(world, globals);
         put_array(buffers, "lights", "the list of lights", &lights)?;
         put_array(buffers, "light_nodes", "the tree of lights", world.lights.arrays().1.nodes)?;

@@ -21,8 +21,8 @@ use crate::scene::{
     TextureImage, TextureRef, Wrap,
 };
 
-/// A scene, a map, a view and laws.
-pub(in super::super) struct Stand {
+/// A scene, a map, a view and distributions.
+pub(in super::super) struct Fixture {
     pub(in super::super) world: World,
     pub(in super::super) environment: Environment,
     pub(in super::super) view: View,
@@ -31,20 +31,20 @@ pub(in super::super) struct Stand {
 }
 
 /// The one with everything.
-pub(in super::super) fn foggy_one() -> Stand {
-    let [stand, ..] = all();
-    stand
+pub(in super::super) fn foggy_one() -> Fixture {
+    let [fixture, ..] = all();
+    fixture
 }
 
 /// First the one with everything, whose map has tile-local sums; then one for each other table, with
 /// other look-ups, cameras, filters and cells; then the widest and the tallest map.
-pub(super) fn all() -> [Stand; 6] {
+pub(super) fn all() -> [Fixture; 6] {
     use PixelFilter::{BlackmanHarris, Box, Gauss};
     use Sampling::{Adaptive, Plain, Talk};
     use TableKind::{F32, F64, TileLocal, U32};
     let thin_lens = Camera { lens_radius: 0.1, focus_distance: 5.0, ..camera() };
     let parallel = Projection::Orthographic { half_height: 3.0 };
-    let stand = |scene: Scene, environment: Environment, camera, filter, sampling| {
+    let fixture = |scene: Scene, environment: Environment, camera, filter, sampling| {
         let world = World::new(scene);
         let view = view(camera, filter, sampling);
         let rays = CameraRays::new(&view.camera, view.width, view.height);
@@ -60,24 +60,24 @@ pub(super) fn all() -> [Stand; 6] {
         let grid = if sampling == Plain {
             LightGrid::whole_map(energies)
         } else {
-            LightGrid::with_garbage_laws(cells, energies, 7)
+            LightGrid::with_garbage_distributions(cells, energies, 7)
         };
         let grid = grid.expect("the map is not black");
-        Stand { world, environment, view, rays, grid }
+        Fixture { world, environment, view, rays, grid }
     };
     let map = |table| environment((61, 37), table, Lookup::Bilinear);
     let large = |size| environment(size, TileLocal, Lookup::Bilinear);
     [
-        stand(foggy(scene(300)), map(TileLocal), thin_lens, BlackmanHarris, Adaptive),
-        stand(scene(1), environment((61, 37), U32, Lookup::Nearest), camera(), Box, Talk),
-        stand(scene(1), map(F32), Camera { projection: parallel, ..camera() }, Gauss, Adaptive),
-        stand(scene(1), map(F64), camera(), Gauss, Plain),
-        stand(scene(1), large((16384, 8)), camera(), Box, Plain),
-        stand(scene(1), large((8, 8192)), camera(), Box, Plain),
+        fixture(foggy(scene(300)), map(TileLocal), thin_lens, BlackmanHarris, Adaptive),
+        fixture(scene(1), environment((61, 37), U32, Lookup::Nearest), camera(), Box, Talk),
+        fixture(scene(1), map(F32), Camera { projection: parallel, ..camera() }, Gauss, Adaptive),
+        fixture(scene(1), map(F64), camera(), Gauss, Plain),
+        fixture(scene(1), large((16384, 8)), camera(), Box, Plain),
+        fixture(scene(1), large((8, 8192)), camera(), Box, Plain),
     ]
 }
 
-impl Stand {
+impl Fixture {
     /// A sample's camera ray and random numbers, as `render::cpu` starts it.
     pub(super) fn start_sample(&self, pixel: UVec2, index: u32) -> (Ray, Sampler) {
         let mut sampler = Sampler::new(self.view.seed, pixel.y * self.view.width + pixel.x, index);

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 /// Estimates of many quantities (pixels, cells), each with the variance of its mean, i.e. the
 /// sample variance divided by the number of samples.
 #[derive(Debug, Clone, Copy)]
-pub struct Estimate<'a> {
+pub struct Means<'a> {
     /// Mean of each quantity.
     pub mean: &'a [f64],
     /// Variance of each mean, `>= 0`.
@@ -30,7 +30,7 @@ impl ZTest {
     }
 }
 
-/// Two-sample Z-test of every quantity (Welch's statistic with the normal law, so each mean should
+/// Two-sample Z-test of every quantity (Welch's statistic with the normal distribution, so each mean should
 /// come from some 30 samples or more), as in Mitsuba 3's `test_renders.py`.
 ///
 /// `alpha` is the chance that equal estimates fail anywhere; each quantity is tested at the level
@@ -39,7 +39,7 @@ impl ZTest {
 ///
 /// # Errors
 /// If the four slices are empty or differ in length.
-pub fn z_test(a: Estimate<'_>, b: Estimate<'_>, alpha: f64) -> Result<ZTest> {
+pub fn z_test(a: Means<'_>, b: Means<'_>, alpha: f64) -> Result<ZTest> {
     let count = a.mean.len();
     if [a.variance_of_mean.len(), b.mean.len(), b.variance_of_mean.len()] != [count; 3] {
         return Err(Error::new("the two estimates to be tested differ in size"));

@@ -16,7 +16,7 @@ use crate::render::{Sampling, gpu};
 use crate::scene::Camera;
 
 /// A scene under a map.
-pub(super) struct Stage {
+pub(super) struct PreparedRow {
     pub(super) title: String,
     pub(super) world: World,
     camera: Camera,
@@ -33,10 +33,10 @@ struct Light {
     environment: Environment,
     seconds: f64,
     /// The scene under it on the GPU.
-    upload: Option<gpu::Stage>,
+    upload: Option<gpu::UploadedScene>,
 }
 
-impl Stage {
+impl PreparedRow {
     /// Loads a row's scene and map and builds all that the plan's methods need.
     pub(super) fn load(row: &Row, plan: &Plan) -> Result<Self> {
         let world = World::new(crate::sources::scene(&row.scene)?);
@@ -74,11 +74,11 @@ impl Stage {
     /// If it does not fit.
     pub(super) fn upload(&mut self, device: &OpenDevice) -> Result<()> {
         let Some(gpu) = &device.gpu else { return Ok(()) };
-        let mut uploads: Vec<gpu::Stage> = Vec::new();
+        let mut uploads: Vec<gpu::UploadedScene> = Vec::new();
         for light in &self.lights {
             uploads.push(match uploads.first() {
                 Some(first) => first.relit(&light.environment)?,
-                None => gpu::Stage::new(gpu, &self.world, &light.environment)?,
+                None => gpu::UploadedScene::new(gpu, &self.world, &light.environment)?,
             });
         }
         for (light, upload) in self.lights.iter_mut().zip(uploads) {

@@ -1,4 +1,4 @@
-//! Laws of all cells from their counters, on all threads.
+//! Distributions of all cells from their counters, on all threads.
 
 use std::collections::BTreeMap;
 
@@ -6,26 +6,26 @@ use rayon::prelude::*;
 
 use super::cells::{MEDIUM_FACE, SphericalGrid, face_axis};
 use super::counters::{Counters, Tally};
-use super::learning::LawOptions;
-use super::tile_laws::TileLaws;
+use super::learning::DistributionOptions;
+use super::tile_distributions::TileDistributions;
 use crate::environment::Environment;
 
 /// Cells per side of the blocks that visibility is pooled over.
 const POOL: u32 = 4;
 
-/// Laws are made of so many bytes at a time before they are appended to the others.
+/// Distributions are made of so many bytes at a time before they are appended to the others.
 const BYTES_AT_ONCE: usize = 1 << 19;
 
-/// Law entries left over by MIS compensation must carry at least this much of the law.
+/// Distribution entries left over by MIS compensation must carry at least this much of the distribution.
 const LEAST_COMPENSATED: f64 = 0.05;
 
 /// How a slot's counters, those around it and the map become weights of tiles.
-pub(super) struct LawBuilder<'a> {
+pub(super) struct DistributionBuilder<'a> {
     grid: SphericalGrid,
     counters: &'a Counters,
-    options: LawOptions,
+    options: DistributionOptions,
     /// Whole-map probability of each tile.
-    map_law: Vec<f64>,
+    map_distribution: Vec<f64>,
     /// Tallies of all cells of each face; empty if nothing is pooled.
     faces: Vec<Vec<Tally>>,
     /// Slots of each block of 4x4 cells of a face.
@@ -34,11 +34,11 @@ pub(super) struct LawBuilder<'a> {
     diffuse: Vec<Vec<f64>>,
 }
 
-impl<'a> LawBuilder<'a> {
+impl<'a> DistributionBuilder<'a> {
     pub(super) fn new(
         grid: SphericalGrid,
         counters: &'a Counters,
-        options: LawOptions,
+        options: DistributionOptions,
         environment: &Environment,
     ) -> Self {
         let energies = environment.tile_energies();
@@ -47,7 +47,7 @@ impl<'a> LawBuilder<'a> {
             grid,
             counters,
             options,
-            map_law: energies.iter().map(|e| e / total).collect(),
+            map_distribution: energies.iter().map(|e| e / total).collect(),
             faces: Vec::new(),
             blocks: Vec::new(),
             diffuse: Vec::new(),
@@ -69,10 +69,15 @@ impl<'a> LawBuilder<'a> {
         builder
     }
 
-    /// Appends the laws of the most visited cells, as many as fit into `room` bytes beside what making
-    /// them takes, and notes which law each of these cells uses. Which law is which does not depend on
-    /// the threads.
-    pub(super) fn build(&self, room: usize, laws: &mut TileLaws, law_of_cell: &mut [u16]) {
+    /// Appends the distributions of the most visited cells, as many as fit into `room` bytes beside what making
+    /// them takes, and notes which distribution each of these cells uses. Which distribution is which does not
+    /// depend on the threads.
+    pub(super) fn build(
+        &self,
+        room: usize,
+        distributions: &mut TileDistributions,
+        distribution_of_cell: &mut [u16],
+    ) {
         let mut supports = vec![0; self.counters.cells().len()];
         let by_block = self.blocks.par_iter().flat_map_iter(|slots| {
             let mut found = Vec::with_capacity(slots.len());
@@ -84,19 +89,22 @@ impl<'a> LawBuilder<'a> {
         for (slot, support) in by_block.collect::<Vec<_>>() {
             supports[slot] = support;
         }
-        let tile_count = laws.tile_count();
-        let bytes = |slot: &usize| TileLaws::law_bytes(tile_count, supports[*slot] as u32);
-        let most =
-            BYTES_AT_ONCE / (POOL * POOL) as usize / TileLaws::law_bytes(tile_count, tile_count);
+        let tile_count = distributions.tile_count();
+        let bytes = |slot: &usize| {
+            TileDistributions::distribution_bytes(tile_count, supports[*slot] as u32)
+        };
+        let most = BYTES_AT_ONCE
+            / (POOL * POOL) as usize
+            / TileDistributions::distribution_bytes(tile_count, tile_count);
         let chunks = self.blocks.chunks(most.max(1));
         let pieces = chunks.clone().map(|blocks| blocks.iter().flatten().map(bytes).sum());
         let room = room.saturating_sub(self.memory_bytes() + pieces.max().unwrap_or(0));
         // The most visited cells have the lowest slots.
         let kept = fitting(&supports, room, tile_count);
-        laws.reserve_exact(kept, supports[..kept].iter().sum());
+        distributions.reserve_exact(kept, supports[..kept].iter().sum());
         for blocks in chunks {
             let pieces = blocks.par_iter().map(|slots| {
-                let mut piece = TileLaws::new(tile_count);
+                let mut piece = TileDistributions::new(tile_count);
                 let mut cells = Vec::with_capacity(slots.len());
                 self.weigh(slots, kept, |slot, weights| {
                     if piece.push(weights).is_some() {
@@ -106,9 +114,9 @@ impl<'a> LawBuilder<'a> {
                 (piece, cells)
             });
             for (piece, cells) in pieces.collect::<Vec<_>>() {
-                let first = laws.append(&piece);
-                for (law, cell) in (first..).zip(cells) {
-                    law_of_cell[cell as usize] = law as u16;
+                let first = distributions.append(&piece);
+                for (distribution, cell) in (first..).zip(cells) {
+                    distribution_of_cell[cell as usize] = distribution as u16;
                 }
             }
         }
@@ -116,8 +124,8 @@ impl<'a> LawBuilder<'a> {
 
     /// Bytes held beside the counters and what is made of them.
     fn memory_bytes(&self) -> usize {
-        let tile_count = self.map_law.len();
-        // As for eight threads, however many there are: laws must not depend on it.
+        let tile_count = self.map_distribution.len();
+        // As for eight threads, however many there are: distributions must not depend on it.
         let threads = 8;
         let tallies = (self.faces.len() + threads) * tile_count * size_of::<Tally>();
         let doubles = (self.diffuse.len() + 1 + threads) * tile_count * size_of::<f64>();
@@ -125,7 +133,7 @@ impl<'a> LawBuilder<'a> {
     }
 
     fn sum(&self, slots: &[usize]) -> Vec<Tally> {
-        let mut sums = vec![Tally::default(); self.map_law.len()];
+        let mut sums = vec![Tally::default(); self.map_distribution.len()];
         for &slot in slots {
             for (sum, tally) in sums.iter_mut().zip(self.counters.tallies(slot)) {
                 sum.tries += tally.tries;
@@ -135,9 +143,9 @@ impl<'a> LawBuilder<'a> {
         sums
     }
 
-    /// Unnormalised laws of a block's slots below `end`, one after the other.
+    /// Unnormalised distributions of a block's slots below `end`, one after the other.
     fn weigh(&self, slots: &[usize], end: usize, mut take: impl FnMut(usize, &[f64])) {
-        let mut weights = Vec::with_capacity(self.map_law.len());
+        let mut weights = Vec::with_capacity(self.map_distribution.len());
         let mut block = Vec::new();
         for &slot in slots.iter().filter(|slot| **slot < end) {
             let (face, ..) = self.grid.coordinates(self.counters.cells()[slot]);
@@ -171,7 +179,7 @@ impl<'a> LawBuilder<'a> {
         };
         let exponent = self.options.ratio_exponent;
         let own = self.counters.tallies(slot);
-        weights.extend(own.zip(block).zip(face).zip(&self.map_law).map(
+        weights.extend(own.zip(block).zip(face).zip(&self.map_distribution).map(
             |(((own, block), face), map)| {
                 let ratio = shrink(&own, shrink(block, shrink(face, 0.0)));
                 // Most tiles of an interior are never seen, and a power takes long.
@@ -197,14 +205,14 @@ fn power(base: f64, exponent: f64) -> f64 {
     if exponent == 0.75 { (base * base.sqrt()).sqrt() } else { base.powf(exponent) }
 }
 
-/// How many of the first laws fit into `room` bytes (and into 16-bit law indices).
+/// How many of the first distributions fit into `room` bytes (and into 16-bit distribution indices).
 fn fitting(supports: &[usize], room: usize, tile_count: u32) -> usize {
     let mut used = 0;
     supports
         .iter()
         .take(usize::from(u16::MAX))
         .take_while(|support| {
-            used += TileLaws::law_bytes(tile_count, **support as u32);
+            used += TileDistributions::distribution_bytes(tile_count, **support as u32);
             used <= room
         })
         .count()

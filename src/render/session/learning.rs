@@ -3,14 +3,15 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use super::outlook::middle_distance;
-use super::{Engine, Session, View, cpu};
+use super::{Engine, Session};
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::path::camera::CameraRays;
+use crate::render::outlook::middle_distance;
+use crate::render::{View, cpu};
 
 /// Learning under way, or over.
 pub(super) struct Learning {
@@ -18,33 +19,43 @@ pub(super) struct Learning {
     pass: u32,
     /// Paths counted since the counters were last looked through.
     paths_of_pass: u64,
-    /// Whether nothing is counted any more.
-    pub(super) is_over: bool,
+    pub(super) stage: Stage,
 }
 
-/// Paths, traced to learn from or rendered, after which learning ends: the laws of 2^20 paths leave
+/// How far learning is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stage {
+    /// Learning paths are traced.
+    Tracing,
+    /// What rendered paths see is counted.
+    Counting,
+    /// Nothing is counted any more.
+    Over,
+}
+
+/// Paths, traced to learn from or rendered, after which learning ends: the distributions of 2^20 paths leave
 /// 1.2 times the error of 2^23 (office at sunset, 128x72), those of 2^16 three times.
 const ENOUGH_PATHS: u64 = 1 << 23;
 
-/// Samples of a pixel after which it learns no more. New laws begin a new sequence, and many short
-/// sequences are worse than a long one: laws of 16 samples in place of 4 have 0.97 to 1.06 times the
+/// Samples of a pixel after which it learns no more. New distributions begin a new sequence, and many short
+/// sequences are worse than a long one: distributions of 16 samples in place of 4 have 0.97 to 1.06 times the
 /// error of an interior at 64 samples, 1.06 times that of the exterior, 1.14 times that of an open
 /// scene (160x90).
-const LAST_LESSON: u32 = 4;
+const LAST_LEARNING_SAMPLE: u32 = 4;
 
 /// How far the camera may be from the centre of cells that were learned in, over the middle distance of
 /// what it sees.
 const MOST_MOVED: f32 = 0.5;
 
 impl Learning {
-    /// An untaught grid, if the view is to learn and the map has anything to learn about.
+    /// An empty grid, if the view is to learn and the map has anything to learn about.
     pub(super) fn new(
         world: &World,
         environment: &Environment,
         view: &View,
         rays: &CameraRays,
     ) -> Option<Self> {
-        let options = view.law_options()?;
+        let options = view.distribution_options()?;
         if environment.is_black() || view.limits.bounces == 0 {
             return None;
         }
@@ -56,7 +67,7 @@ impl Learning {
             medium: view.fog(world).is_some(),
         };
         let grid = LearningGrid::new(grid, environment.tile_count(), options);
-        Some(Self { grid, pass: 0, paths_of_pass: 0, is_over: false })
+        Some(Self { grid, pass: 0, paths_of_pass: 0, stage: Stage::Tracing })
     }
 }
 
@@ -77,8 +88,8 @@ impl Session<'_> {
         }
         learning.grid = counted.snapshot();
         self.finish_learning();
-        self.update_laws();
-        self.take_up_laws()?;
+        self.update_distributions();
+        self.take_up_distributions()?;
         Ok(true)
     }
 
@@ -97,38 +108,38 @@ impl Session<'_> {
             // Which paths of the pass were counted depends on the threads: start over.
             self.learned = None;
             self.learning = Learning::new(self.world, self.environment, &self.view, &self.rays);
-            return self.take_up_laws();
+            return self.take_up_distributions();
         }
         self.figures.learning_rays += rays;
         self.figures.learning_paths = range.end;
         if let Some(learning) = &mut self.learning {
             learning.pass += 1;
         }
-        self.update_laws();
+        self.update_distributions();
         if range.end >= self.view.learning_paths {
             self.finish_learning();
         }
-        self.take_up_laws()
+        self.take_up_distributions()
     }
 
-    /// Makes laws of what all passes so far counted: the next pass draws from them.
-    pub(super) fn update_laws(&mut self) {
+    /// Makes distributions of what all passes so far counted: the next pass draws from them.
+    pub(super) fn update_distributions(&mut self) {
         let Some(learning) = &mut self.learning else { return };
         let start = Instant::now();
         learning.grid.counters.end_pass();
         learning.paths_of_pass = 0;
-        self.figures.law_paths = self.figures.learning_paths + self.figures.counted_paths;
-        // The old laws go first: both together would not fit the budget.
+        self.figures.distribution_paths = self.figures.learning_paths + self.figures.counted_paths;
+        // The old distributions go first: both together would not fit the budget.
         self.learned = None;
-        self.learned = learning.grid.laws(self.environment);
-        let laws = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
-        let held = learning.grid.counters.memory_bytes() + laws;
+        self.learned = learning.grid.distributions(self.environment);
+        let distributions = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
+        let held = learning.grid.counters.memory_bytes() + distributions;
         self.figures.grid_bytes = held;
         self.figures.grid_peak_bytes = self.figures.grid_peak_bytes.max(held);
         self.figures.visited_cells = learning.grid.counters.visited_cells();
         self.figures.learned_cells =
-            self.learned.as_ref().map_or(0, |grid| grid.laws().len() as usize - 1);
-        self.figures.law_seconds += start.elapsed().as_secs_f64();
+            self.learned.as_ref().map_or(0, |grid| grid.distributions().len() as usize - 1);
+        self.figures.distribution_seconds += start.elapsed().as_secs_f64();
     }
 
     /// Makes room in the counters for a pass of so many samples a pixel; returns of how many one
@@ -138,7 +149,8 @@ impl Session<'_> {
         let pixels = u64::from(self.view.width) * u64::from(self.view.height);
         let paths = pixels * u64::from(samples);
         let stride = paths.div_ceil(most).max(1);
-        if let Some(learning) = self.learning.as_mut().filter(|learning| !learning.is_over)
+        if let Some(learning) =
+            self.learning.as_mut().filter(|learning| learning.stage != Stage::Over)
             && learning.paths_of_pass + paths.div_ceil(stride) > most
         {
             learning.grid.counters.end_pass();
@@ -147,11 +159,13 @@ impl Session<'_> {
         u32::try_from(stride).unwrap_or(u32::MAX)
     }
 
-    /// Takes note that so many rendered paths were counted. There are new laws of twice as many paths as
-    /// those in use were made of, where each pixel has a power of two of samples: the points of the
+    /// Takes note that so many rendered paths were counted. There are new distributions of twice as many paths
+    /// as those in use were made of, where each pixel has a power of two of samples: the points of the
     /// sequences that then end and begin are evenly spread.
     pub(super) fn learn_from_rendered(&mut self, paths: u64, is_whole: bool) -> Result<()> {
-        let Some(learning) = self.learning.as_mut().filter(|learning| !learning.is_over) else {
+        let Some(learning) =
+            self.learning.as_mut().filter(|learning| learning.stage != Stage::Over)
+        else {
             return Ok(());
         };
         self.figures.counted_paths += paths;
@@ -161,12 +175,14 @@ impl Session<'_> {
         if !is_whole || !samples.is_power_of_two() {
             return Ok(());
         }
-        learning.is_over = all >= ENOUGH_PATHS || samples >= LAST_LESSON;
-        if all < 2 * self.figures.law_paths {
+        if all >= ENOUGH_PATHS || samples >= LAST_LEARNING_SAMPLE {
+            learning.stage = Stage::Over;
+        }
+        if all < 2 * self.figures.distribution_paths {
             return Ok(());
         }
-        self.update_laws();
-        self.take_up_laws()
+        self.update_distributions();
+        self.take_up_distributions()
     }
 }
 
@@ -176,7 +192,7 @@ mod tests {
 
     use super::*;
     use crate::environment::{EnvironmentOptions, sky};
-    use crate::light_grid::LawOptions;
+    use crate::light_grid::DistributionOptions;
     use crate::render::gi::tests::view;
     use crate::render::{Phase, Sampling};
     use crate::scene::builtin;
@@ -198,7 +214,7 @@ mod tests {
         let map = sky::build("overcast", 128, 64).expect("a sky");
         let environment =
             Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
-        let view = view(&world, LawOptions::ADAPTIVE);
+        let view = view(&world, DistributionOptions::ADAPTIVE);
         let session = |view: View| Session::new(&world, &environment, view);
         let mut first = session(view.clone());
         while first.phase() == Phase::Learning {
@@ -233,8 +249,8 @@ mod tests {
 
         let takes = |view: View| session(view).continue_learning(counted).expect("no GPU");
         assert!(!takes(moved(&view, Vec3::new(0.0, 0.0, 50.0), 0)), "too far");
-        let no_faces = LawOptions { faces: false, ..LawOptions::ADAPTIVE };
-        assert!(!takes(View { laws: no_faces, ..view.clone() }), "other cells");
+        let no_faces = DistributionOptions { faces: false, ..DistributionOptions::ADAPTIVE };
+        assert!(!takes(View { distributions: no_faces, ..view.clone() }), "other cells");
         assert!(!takes(View { sampling: Sampling::Plain, ..view.clone() }), "nothing to learn");
     }
 }

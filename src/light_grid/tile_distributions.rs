@@ -1,4 +1,4 @@
-//! Probability laws over tiles, sparse and exact.
+//! Probability distributions over tiles, sparse and exact.
 
 use crate::sampler::unit_from_bits;
 
@@ -14,31 +14,31 @@ pub struct TileChoice {
     pub remainder: u32,
 }
 
-/// Many discrete laws over the same tiles, in flat arrays (law 0 is the whole map's).
+/// Many discrete distributions over the same tiles, in flat arrays (distribution 0 is the whole map's).
 ///
-/// A law keeps only the tiles it can choose: interiors see few. It holds a running sum in units of
+/// A distribution keeps only the tiles it can choose: interiors see few. It holds a running sum in units of
 /// `2^-32`, so that sampling is a binary search that keeps the order, and therefore the
 /// stratification, of Sobol points; a bit mask with ranks finds a tile's entry in constant time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TileLaws {
+pub struct TileDistributions {
     tile_count: u32,
-    words_per_law: u32,
-    /// First entry of each law, and one more.
+    words_per_distribution: u32,
+    /// First entry of each distribution, and one more.
     starts: Vec<u32>,
-    /// `words_per_law` words a law: which tiles it can choose.
+    /// `words_per_distribution` words a distribution: which tiles it can choose.
     masks: Vec<u64>,
     /// Entries before each word of the mask.
     ranks: Vec<u16>,
-    /// Tile of each entry, ascending within a law.
+    /// Tile of each entry, ascending within a distribution.
     tiles: Vec<u16>,
-    /// Largest 32-bit number that chooses this entry; ends with `u32::MAX` in every law.
+    /// Largest 32-bit number that chooses this entry; ends with `u32::MAX` in every distribution.
     last: Vec<u32>,
 }
 
-/// The arrays of [`TileLaws`], for a GPU.
+/// The arrays of [`TileDistributions`], for a GPU.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct LawArrays<'a> {
-    pub(crate) words_per_law: u32,
+pub(crate) struct DistributionArrays<'a> {
+    pub(crate) words_per_distribution: u32,
     pub(crate) starts: &'a [u32],
     pub(crate) masks: &'a [u64],
     pub(crate) ranks: &'a [u16],
@@ -46,11 +46,11 @@ pub(crate) struct LawArrays<'a> {
     pub(crate) last: &'a [u32],
 }
 
-impl TileLaws {
+impl TileDistributions {
     /// The arrays.
-    pub(crate) fn arrays(&self) -> LawArrays<'_> {
-        LawArrays {
-            words_per_law: self.words_per_law,
+    pub(crate) fn arrays(&self) -> DistributionArrays<'_> {
+        DistributionArrays {
+            words_per_distribution: self.words_per_distribution,
             starts: &self.starts,
             masks: &self.masks,
             ranks: &self.ranks,
@@ -59,12 +59,12 @@ impl TileLaws {
         }
     }
 
-    /// No laws yet, over `tile_count` tiles (at most 65536).
+    /// No distributions yet, over `tile_count` tiles (at most 65536).
     pub fn new(tile_count: u32) -> Self {
         assert!((1..=65536).contains(&tile_count), "tile indices are 16 bits wide");
         Self {
             tile_count,
-            words_per_law: tile_count.div_ceil(64),
+            words_per_distribution: tile_count.div_ceil(64),
             starts: vec![0],
             masks: Vec::new(),
             ranks: Vec::new(),
@@ -73,24 +73,24 @@ impl TileLaws {
         }
     }
 
-    /// Number of laws.
+    /// Number of distributions.
     pub fn len(&self) -> u32 {
         self.starts.len() as u32 - 1
     }
 
-    /// Whether there is no law.
+    /// Whether there is no distribution.
     pub fn is_empty(&self) -> bool {
         self.starts.len() == 1
     }
 
-    /// Number of tiles the laws are over.
+    /// Number of tiles the distributions are over.
     pub fn tile_count(&self) -> u32 {
         self.tile_count
     }
 
-    /// Number of tiles law `law` can choose.
-    pub fn support(&self, law: u32) -> u32 {
-        self.starts[law as usize + 1] - self.starts[law as usize]
+    /// Number of tiles distribution `distribution` can choose.
+    pub fn support(&self, distribution: u32) -> u32 {
+        self.starts[distribution as usize + 1] - self.starts[distribution as usize]
     }
 
     /// Bytes held.
@@ -102,21 +102,21 @@ impl TileLaws {
             + self.last.capacity() * 4
     }
 
-    /// Bytes one more law over `support` tiles takes.
-    pub fn law_bytes(tile_count: u32, support: u32) -> usize {
+    /// Bytes one more distribution over `support` tiles takes.
+    pub fn distribution_bytes(tile_count: u32, support: u32) -> usize {
         4 + tile_count.div_ceil(64) as usize * 10 + support as usize * 6
     }
 
     /// Makes room for exactly this much, so that growing never holds twice the memory.
-    pub fn reserve_exact(&mut self, laws: usize, entries: usize) {
-        self.starts.reserve_exact(laws);
-        self.masks.reserve_exact(laws * self.words_per_law as usize);
-        self.ranks.reserve_exact(laws * self.words_per_law as usize);
+    pub fn reserve_exact(&mut self, distributions: usize, entries: usize) {
+        self.starts.reserve_exact(distributions);
+        self.masks.reserve_exact(distributions * self.words_per_distribution as usize);
+        self.ranks.reserve_exact(distributions * self.words_per_distribution as usize);
         self.tiles.reserve_exact(entries);
         self.last.reserve_exact(entries);
     }
 
-    /// Appends the law proportional to `weights` (one per tile, finite, not negative) and gives its
+    /// Appends the distribution proportional to `weights` (one per tile, finite, not negative) and gives its
     /// index; `None`, and nothing appended, when no weight is positive.
     ///
     /// Every tile with a positive weight gets at least `2^-32`, so none becomes unreachable.
@@ -130,7 +130,7 @@ impl TileLaws {
         let support = weights.iter().filter(|w| **w > 0.0).count();
         let units = 4_294_967_296.0 - support as f64;
         let base = self.masks.len();
-        self.masks.resize(base + self.words_per_law as usize, 0);
+        self.masks.resize(base + self.words_per_distribution as usize, 0);
         let (mut sum, mut largest) = (0_u64, (0.0, 0));
         for (tile, &weight) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
             sum += 1 + (weight / total * units) as u64;
@@ -156,7 +156,7 @@ impl TileLaws {
         Some(self.len() - 1)
     }
 
-    /// Appends all laws of another set over the same tiles; gives the index of the first of them.
+    /// Appends all distributions of another set over the same tiles; gives the index of the first of them.
     pub fn append(&mut self, other: &Self) -> u32 {
         assert_eq!(self.tile_count, other.tile_count, "the same tiles");
         let (first, entries) = (self.len(), self.tiles.len() as u32);
@@ -168,10 +168,10 @@ impl TileLaws {
         first
     }
 
-    /// Chooses a tile of law `law` with a uniform 32-bit number. `finer` is the bits below it, without
-    /// which there would be no remainder of a tile that has few units of `2^-32`.
-    pub fn sample(&self, law: u32, bits: u32, finer: u32) -> TileChoice {
-        let (start, end) = self.range(law);
+    /// Chooses a tile of distribution `distribution` with a uniform 32-bit number. `finer` is the bits below
+    /// it, without which there would be no remainder of a tile that has few units of `2^-32`.
+    pub fn sample(&self, distribution: u32, bits: u32, finer: u32) -> TileChoice {
+        let (start, end) = self.range(distribution);
         let last = &self.last[start..end];
         let entry = last.partition_point(|&l| l < bits);
         let low = if entry == 0 { 0 } else { last[entry - 1] + 1 };
@@ -186,22 +186,25 @@ impl TileLaws {
         }
     }
 
-    /// Probability that law `law` chooses `tile`.
-    pub fn probability(&self, law: u32, tile: u32) -> f32 {
-        let word = (law * self.words_per_law + tile / 64) as usize;
+    /// Probability that distribution `distribution` chooses `tile`.
+    pub fn probability(&self, distribution: u32, tile: u32) -> f32 {
+        let word = (distribution * self.words_per_distribution + tile / 64) as usize;
         let bit = tile % 64;
         if self.masks[word] >> bit & 1 == 0 {
             return 0.0;
         }
         let rank = self.ranks[word] + (self.masks[word] & ((1 << bit) - 1)).count_ones() as u16;
-        let (start, _) = self.range(law);
+        let (start, _) = self.range(distribution);
         let entry = start + rank as usize;
         let low = if rank == 0 { 0 } else { self.last[entry - 1] + 1 };
         ((self.last[entry] - low) as f32 + 1.0) * (1.0 / 4_294_967_296.0)
     }
 
-    fn range(&self, law: u32) -> (usize, usize) {
-        (self.starts[law as usize] as usize, self.starts[law as usize + 1] as usize)
+    fn range(&self, distribution: u32) -> (usize, usize) {
+        (
+            self.starts[distribution as usize] as usize,
+            self.starts[distribution as usize + 1] as usize,
+        )
     }
 }
 
@@ -209,11 +212,11 @@ impl TileLaws {
 mod tests {
     use super::*;
 
-    fn laws_of(weights: &[f64]) -> TileLaws {
-        let mut laws = TileLaws::new(weights.len() as u32);
-        laws.push(&vec![1.0; weights.len()]).expect("uniform");
-        laws.push(weights).expect("positive");
-        laws
+    fn distributions_of(weights: &[f64]) -> TileDistributions {
+        let mut distributions = TileDistributions::new(weights.len() as u32);
+        distributions.push(&vec![1.0; weights.len()]).expect("uniform");
+        distributions.push(weights).expect("positive");
+        distributions
     }
 
     #[test]
@@ -221,11 +224,11 @@ mod tests {
         let mut weights: Vec<f64> = (0..512).map(|t| f64::from(t * 7919 % 101)).collect();
         weights[300] = 1e9;
         weights[301] = 1e-12;
-        let laws = laws_of(&weights);
+        let distributions = distributions_of(&weights);
         let total: f64 = weights.iter().sum();
         let mut sum = 0.0;
         for (tile, weight) in weights.iter().enumerate() {
-            let p = f64::from(laws.probability(1, tile as u32));
+            let p = f64::from(distributions.probability(1, tile as u32));
             assert_eq!(p > 0.0, *weight > 0.0);
             assert!((p - weight / total).abs() < 520.0 / 4_294_967_296.0 + 1e-7 * p, "{tile}: {p}");
             sum += p;
@@ -237,59 +240,59 @@ mod tests {
     fn sample_agrees_with_probability_at_every_border() {
         let weights: Vec<f64> =
             (0..100).map(|t| if t % 3 == 0 { 0.0 } else { f64::from(t) }).collect();
-        let laws = laws_of(&weights);
+        let distributions = distributions_of(&weights);
         let mut previous = 0;
         for step in 0..4096_u32 {
             for bits in [step << 20, (step << 20) + 0xf_ffff] {
-                let choice = laws.sample(1, bits, 0);
+                let choice = distributions.sample(1, bits, 0);
                 assert!(choice.tile >= previous, "order is kept");
                 previous = choice.tile;
-                assert_eq!(choice.probability, laws.probability(1, choice.tile));
+                assert_eq!(choice.probability, distributions.probability(1, choice.tile));
             }
         }
-        assert_eq!(laws.sample(1, 0, 0).tile, 1);
-        assert_eq!(laws.sample(1, u32::MAX, 0).tile, 98);
+        assert_eq!(distributions.sample(1, 0, 0).tile, 1);
+        assert_eq!(distributions.sample(1, u32::MAX, 0).tile, 98);
     }
 
     /// A tile of a single unit is met by one number only: its remainder comes from the finer bits.
     #[test]
     fn remainders_are_uniform_however_small_a_tile_s_share() {
         for share in [1e-12, 1e-6, 0.1, 1.0] {
-            let laws = laws_of(&[1.0 - share, share]);
-            let range = (laws.probability(1, 1) * 4_294_967_296.0) as u64;
+            let distributions = distributions_of(&[1.0 - share, share]);
+            let range = (distributions.probability(1, 1) * 4_294_967_296.0) as u64;
             let mut counts = [0.0; 16];
             for i in 0..4096_u64 {
                 let bits = u64::from(u32::MAX) - i * range / 4096;
                 let finer = crate::sampler::hash(i as u32);
-                let choice = laws.sample(1, bits as u32, finer);
+                let choice = distributions.sample(1, bits as u32, finer);
                 assert_eq!(choice.tile, 1);
                 counts[(choice.remainder >> 28) as usize] += 1.0;
             }
-            let test = crate::metrics::statistics::chi_square_test(&counts, &[256.0; 16], 1e-4)
+            let test = crate::metrics::hypothesis::chi_square_test(&counts, &[256.0; 16], 1e-4)
                 .expect("enough");
             assert!(test.passed, "{share}: {test:?} {counts:?}");
         }
     }
 
     #[test]
-    fn one_tile_gets_everything_and_nothing_gets_no_law() {
-        let mut laws = TileLaws::new(70);
-        assert_eq!(laws.push(&[0.0; 70]), None);
+    fn one_tile_gets_everything_and_nothing_gets_no_distribution() {
+        let mut distributions = TileDistributions::new(70);
+        assert_eq!(distributions.push(&[0.0; 70]), None);
         let mut weights = [0.0; 70];
         weights[69] = 1e-300;
-        assert_eq!(laws.push(&weights), Some(0));
-        assert_eq!(laws.probability(0, 69), 1.0);
-        let choice = laws.sample(0, u32::MAX, u32::MAX);
+        assert_eq!(distributions.push(&weights), Some(0));
+        assert_eq!(distributions.probability(0, 69), 1.0);
+        let choice = distributions.sample(0, u32::MAX, u32::MAX);
         assert_eq!((choice.tile, choice.probability), (69, 1.0));
         assert_eq!(choice.remainder, u32::MAX);
     }
 
     #[test]
-    fn appended_laws_are_the_same() {
-        let mut all = laws_of(&[3.0, 0.0, 1.0]);
-        let mut other = laws_of(&[0.0, 2.0, 5.0]);
+    fn appended_distributions_are_the_same() {
+        let mut all = distributions_of(&[3.0, 0.0, 1.0]);
+        let mut other = distributions_of(&[0.0, 2.0, 5.0]);
         assert_eq!(all.append(&other), 2);
-        other = laws_of(&[3.0, 0.0, 1.0]);
+        other = distributions_of(&[3.0, 0.0, 1.0]);
         for weights in [[1.0; 3], [0.0, 2.0, 5.0]] {
             other.push(&weights);
         }
@@ -298,11 +301,14 @@ mod tests {
 
     #[test]
     fn memory_is_as_announced() {
-        let mut laws = TileLaws::new(512);
-        laws.reserve_exact(3, 512 * 3);
+        let mut distributions = TileDistributions::new(512);
+        distributions.reserve_exact(3, 512 * 3);
         for _ in 0..3 {
-            laws.push(&[1.0; 512]);
+            distributions.push(&[1.0; 512]);
         }
-        assert_eq!(laws.memory_bytes(), 4 + 3 * TileLaws::law_bytes(512, 512));
+        assert_eq!(
+            distributions.memory_bytes(),
+            4 + 3 * TileDistributions::distribution_bytes(512, 512)
+        );
     }
 }

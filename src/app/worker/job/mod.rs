@@ -1,0 +1,282 @@
+//! One request being worked on.
+
+mod publishing;
+mod sessions;
+
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant};
+
+use publishing::{Reading, calm_worth};
+
+use super::kept::Kept;
+use super::{Activity, Point, Request, Shared, lock};
+use crate::alarm::Alarm;
+use crate::environment::Environment;
+use crate::light_grid::{LearningGrid, LightGrid};
+use crate::path::World;
+use crate::render::film::Film;
+use crate::render::{Gi, Phase, Sampling, Session, View};
+
+/// Samples a pixel of the calm picture, which is rendered before the exact one: with them it is as good,
+/// denoised, as the exact one with twice as many, in half the time.
+const CALM_SAMPLES: u32 = 16;
+
+pub(super) struct Job<'a> {
+    shared: &'a Shared,
+    alarm: &'a Alarm,
+    kept: &'a mut Kept,
+    request: Arc<Request>,
+    counters: Option<Arc<LearningGrid>>,
+    /// When what was published last, and when there may be something new.
+    published: Instant,
+    last: Option<(Activity, u64)>,
+    publish_gap: Duration,
+    /// Films that the window shows in place, as they were read last; they go with the request.
+    readings: Vec<Reading>,
+    /// The distributions published last, with what tells whether they are still those in use.
+    distributions: Option<((usize, u64), Arc<LightGrid>)>,
+    /// The calm film published last, of so many samples in all.
+    calm_film: Option<(u64, Arc<Film>)>,
+    /// How the error of the main and of the plain picture fell.
+    curves: [Vec<Point>; 2],
+}
+
+impl<'a> Job<'a> {
+    pub(super) fn new(
+        shared: &'a Shared,
+        alarm: &'a Alarm,
+        kept: &'a mut Kept,
+        request: Arc<Request>,
+    ) -> Self {
+        Self {
+            shared,
+            alarm,
+            kept,
+            request,
+            counters: None,
+            published: Instant::now(),
+            last: None,
+            publish_gap: Duration::ZERO,
+            readings: Vec::new(),
+            distributions: None,
+            calm_film: None,
+            curves: [Vec::new(), Vec::new()],
+        }
+    }
+
+    /// Whether the camera moves.
+    pub(super) fn is_moving(&self) -> bool {
+        self.request.moving
+    }
+
+    /// What was worked on last.
+    pub(super) fn into_request(self) -> Arc<Request> {
+        self.request
+    }
+
+    /// Small pictures for as long as the camera rests at this very place.
+    pub(super) fn follow(&mut self, world: &World, environment: &Environment) {
+        let mut session = self.small_session(world, environment);
+        while !self.is_superseded() {
+            // The first pass is never cut short: some picture is better than none.
+            let cut = session.samples() > 0;
+            self.advance(&mut session, None, cut);
+            if session.samples() == 0 || self.is_superseded() {
+                break;
+            }
+            self.measure(&session);
+            self.keep_backdrop(&session);
+            self.publish(Activity::Moving, &session, [None, None]);
+            if session.samples() >= 64 {
+                self.rest();
+            }
+        }
+        self.kept.keep_training(&mut session, &self.request);
+    }
+
+    /// The full picture: learning first, then samples until a rule is met.
+    pub(super) fn render(&mut self, world: &World, environment: &Environment) {
+        let view = self.request.view.clone();
+        let keeps_distributions =
+            self.request.is_frozen && self.kept.distributions_for(&self.request).is_some();
+        let mut main = if keeps_distributions {
+            self.experienced_session(world, environment, view.clone())
+        } else {
+            self.learning_session(world, environment, view.clone())
+        };
+        let mut plain = self.request.split.then(|| {
+            Session::new(world, environment, View { sampling: Sampling::Plain, ..view.clone() })
+        });
+        let mut calm = None;
+        while let Some(activity) = self.next_activity(&main) {
+            let wants_calm = self.is_calm(&main);
+            if !wants_calm {
+                self.end_calm(&mut calm);
+            } else if calm.is_none() && main.phase() == Phase::Rendering {
+                let view = View { gi: Gi::Cached, ..view.clone() };
+                calm = Some(self.experienced_session(world, environment, view));
+            }
+            if !self.request.split {
+                plain = None;
+                self.curves[1].clear();
+            }
+            match activity {
+                Activity::Paused | Activity::Done => {
+                    if activity == Activity::Done {
+                        let settled = main.settle();
+                        let has_failed = settled.is_err();
+                        self.go_on(&mut main, settled);
+                        if has_failed {
+                            continue;
+                        }
+                    }
+                    self.publish(activity, &main, [plain.as_ref(), calm.as_ref()]);
+                    self.rest();
+                    continue;
+                }
+                // A picture first.
+                Activity::Learning(_) if self.beginning(&main).is_some() => {
+                    self.advance(&mut main, None, true);
+                    self.measure(&main);
+                }
+                Activity::Learning(_) => self.learn(&mut main),
+                Activity::Rendering | Activity::Moving => match &mut plain {
+                    // Equal time, learning included.
+                    Some(plain) if plain.elapsed_seconds() < main.elapsed_seconds() => {
+                        self.advance(plain, None, true);
+                    }
+                    _ if let Some(calm) = calm.as_mut().filter(|calm| goes_first(calm, &main)) => {
+                        self.advance(calm, None, true);
+                    }
+                    _ => {
+                        let distribution_paths = main.figures().distribution_paths;
+                        self.advance(&mut main, Some(self.request.rule), self.request.previews);
+                        self.measure(&main);
+                        if main.figures().distribution_paths > distribution_paths {
+                            self.keep_distributions(&main, true);
+                        }
+                    }
+                },
+            }
+            let due = self.published.elapsed() >= self.publish_gap;
+            let is_reading_due = due && self.is_reading_due(&main);
+            if due && self.request.previews && !self.is_superseded() {
+                let others = [plain.as_ref(), calm.as_ref()];
+                let progress =
+                    progress(&main) + others.iter().flatten().map(|s| progress(s)).sum::<u64>();
+                if self.last != Some((activity, progress)) {
+                    self.publish(activity, &main, others);
+                    self.last = Some((activity, progress));
+                }
+            }
+            // After publishing, which has read the film.
+            if is_reading_due || !self.request.previews {
+                self.note(0, &main);
+                plain.iter().for_each(|plain| self.note(1, plain));
+            }
+        }
+        self.end_calm(&mut calm);
+        if self.request.previews {
+            self.keep_backdrop(&main);
+        }
+    }
+
+    /// Whether light from a radiance cache is to be shown beside what there is: not where a real GPU has
+    /// many samples in a moment, nor where pictures are compared.
+    fn is_calm(&self, main: &Session<'_>) -> bool {
+        self.request.is_calm
+            && !self.request.split
+            && !self.kept.device.is_quick(&self.request)
+            && calm_worth(main.samples()) > 0.0
+    }
+
+    fn end_calm(&mut self, calm: &mut Option<Session<'_>>) {
+        if let Some(mut calm) = calm.take() {
+            self.calm_film = None;
+            self.kept.keep_training(&mut calm, &self.request);
+        }
+    }
+
+    /// What is to be done next; `None` when something else is asked for.
+    fn next_activity(&mut self, main: &Session<'_>) -> Option<Activity> {
+        {
+            let slot = lock(&self.shared.slot);
+            if slot.quit {
+                return None;
+            }
+            if let Some(new) = &slot.request {
+                if self.request.restarts(new) {
+                    return None;
+                }
+                self.request = Arc::clone(new);
+            }
+            self.shared.cancel.store(false, Ordering::Relaxed);
+        }
+        Some(if self.request.paused {
+            Activity::Paused
+        } else if main.phase() == Phase::Learning {
+            Activity::Learning(learned_share(main))
+        } else if main.samples() > 0 && main.is_done(&self.request.rule) {
+            Activity::Done
+        } else {
+            Activity::Rendering
+        })
+    }
+
+    /// One learning pass.
+    fn learn(&mut self, main: &mut Session<'_>) {
+        self.place(main);
+        let learned = main.advance(1, &self.shared.cancel);
+        self.go_on(main, learned);
+        let is_done = main.phase() == Phase::Rendering;
+        // A little learned is better than nothing, but what was learned to the end is better still.
+        if is_done || (main.figures().learned_cells > 0 && !self.kept.has_learned_in(&self.request))
+        {
+            self.keep_distributions(main, is_done);
+        }
+    }
+
+    /// Keeps what was learned, for inspection and for the next request.
+    fn keep_distributions(&mut self, main: &Session<'_>, is_complete: bool) {
+        if is_complete {
+            self.counters = main.counters().map(|counters| Arc::new(counters.snapshot()));
+            let request = || Arc::clone(&self.request);
+            self.kept.counted = self.counters.clone().map(|counted| (counted, request()));
+        }
+        if let Some(distributions) = self.distributions_of(main) {
+            self.kept.learned = Some((distributions, Arc::clone(&self.request.environment)));
+            self.kept.world = Some(Arc::clone(&self.request.world));
+            self.kept.is_complete = is_complete;
+        }
+    }
+
+    fn is_superseded(&self) -> bool {
+        let slot = lock(&self.shared.slot);
+        slot.quit || slot.request.as_ref().is_some_and(|new| self.request.restarts(new))
+    }
+
+    /// Waits until something else is asked for.
+    fn rest(&self) {
+        let mut slot = lock(&self.shared.slot);
+        while !slot.quit && slot.request.as_ref().is_some_and(|new| self.request.is_same(new)) {
+            slot = self.shared.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}
+
+/// Whether the calm picture gets its next sample before the exact one: a few of them for each.
+fn goes_first(calm: &Session<'_>, main: &Session<'_>) -> bool {
+    calm.samples() < CALM_SAMPLES.min(2 + 4 * main.samples())
+}
+
+fn learned_share(session: &Session<'_>) -> f32 {
+    let (done, all) = (session.figures().learning_paths, session.view().learning_paths);
+    done as f32 / all.max(1) as f32
+}
+
+/// Grows with whatever a session does.
+fn progress(session: &Session<'_>) -> u64 {
+    let figures = session.figures();
+    figures.learning_paths + figures.samples
+}

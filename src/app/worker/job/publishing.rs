@@ -1,0 +1,215 @@
+//! What the window gets of a job.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::sessions::SLICE;
+use super::{CALM_SAMPLES, Job};
+use crate::app::worker::{Activity, Backdrop, Point, SessionSnapshot, Snapshot, lock};
+use crate::light_grid::LightGrid;
+use crate::metrics;
+use crate::render::film::Film;
+use crate::render::gpu::{DeviceFilm, Gpu};
+use crate::render::{Figures, Session, View};
+
+/// A film that is shown in place is read back this seldom.
+const READING_GAP: Duration = Duration::from_millis(250);
+/// Publishing may take at most about one part in this of the time.
+const PUBLISH_SHARE: u32 = 40;
+/// But a picture that changes is shown at least so often.
+const LONGEST_GAP: Duration = Duration::from_millis(800);
+/// What one of them counts beside an exact one. (Before filtering it is worth five to ten; but its error
+/// falls no further.)
+const CALM_WORTH: f32 = 4.0;
+
+/// A film read back from the window's device, where it is shown in place meanwhile.
+pub(super) struct Reading {
+    of: (Gpu, DeviceFilm),
+    film: Arc<Film>,
+    /// Of the moment it was read, so that both belong together.
+    figures: Figures,
+    noise: f64,
+    at: Instant,
+    /// Age at which it is too old.
+    gap: Duration,
+}
+
+impl Job<'_> {
+    /// A film of this view from before, if there is one.
+    pub(super) fn backdrop(&self) -> Option<Arc<Film>> {
+        let (request, film) = self.kept.backdrop.as_ref()?;
+        let aspect = |view: &View| f64::from(view.width) / f64::from(view.height);
+        let is_as_wide = 1.02 * aspect(&request.view) >= aspect(&self.request.view);
+        (is_as_wide && request.looks_like(&self.request)).then(|| Arc::clone(film))
+    }
+
+    /// Keeps the film for the next one's first moments, unless there is a better one of the same view.
+    pub(super) fn keep_backdrop(&mut self, session: &Session<'_>) {
+        let known = self.backdrop().map_or(0, |film| film.total_samples());
+        let film = session.film();
+        if film.min_samples() > 0 && film.total_samples() > known {
+            self.kept.backdrop = Some((Arc::clone(&self.request), Arc::new(film.clone())));
+        }
+    }
+
+    /// The distributions in use. They are megabytes and seldom change: they are copied once.
+    pub(super) fn distributions_of(&mut self, session: &Session<'_>) -> Option<Arc<LightGrid>> {
+        let grid = session.grid()?;
+        let key = (std::ptr::from_ref(grid).addr(), session.figures().distribution_paths);
+        Some(match &self.distributions {
+            Some((old, distributions)) if *old == key => Arc::clone(distributions),
+            _ => {
+                let distributions = Arc::new(grid.clone());
+                self.distributions = Some((key, Arc::clone(&distributions)));
+                distributions
+            }
+        })
+    }
+
+    pub(super) fn publish(
+        &mut self,
+        activity: Activity,
+        main: &Session<'_>,
+        [plain, calm]: [Option<&Session<'_>>; 2],
+    ) {
+        let start = Instant::now();
+        self.kept.snapshots += 1;
+        let is_final = matches!(activity, Activity::Paused | Activity::Done);
+        let (main_snapshot, main_cost) = self.session_snapshot(main, is_final);
+        let plain_snapshot = plain.map(|session| self.session_snapshot(session, is_final));
+        let reading = main_cost + plain_snapshot.as_ref().map_or(Duration::ZERO, |(_, cost)| *cost);
+        let snapshot = Snapshot {
+            number: self.kept.snapshots,
+            request: Arc::clone(&self.request),
+            activity,
+            main: main_snapshot,
+            plain: plain_snapshot.map(|(snapshot, _)| snapshot),
+            counters: self.counters.clone(),
+            backdrop: self.shown_backdrop(main, calm),
+            curves: self.curves.clone(),
+        };
+        *lock(&self.shared.snapshot) = Some(Arc::new(snapshot));
+        (self.shared.wake)();
+        self.published = Instant::now();
+        let cost = (self.published - start).saturating_sub(reading);
+        self.publish_gap = gap_after(cost);
+    }
+
+    /// What is shown together with the session's own film: the calm one once it has more to say than
+    /// what was seen before.
+    pub(super) fn shown_backdrop(
+        &mut self,
+        main: &Session<'_>,
+        calm: Option<&Session<'_>>,
+    ) -> Option<Backdrop> {
+        let before = self.backdrop().map(|film| Backdrop { film, worth: 1.0, is_cached: false });
+        let seen = before.as_ref().map_or(0, |backdrop| backdrop.film.total_samples());
+        let Some(calm) = calm.filter(|calm| calm.figures().samples > seen) else { return before };
+        // It is megabytes and is soon complete.
+        let samples = calm.figures().samples;
+        let kept = self.calm_film.take().filter(|(of, _)| *of == samples);
+        let kept = kept.unwrap_or_else(|| (samples, Arc::new(calm.film().clone())));
+        let film = Arc::clone(&self.calm_film.insert(kept).1);
+        Some(Backdrop { film, worth: calm_worth(main.samples()), is_cached: true })
+    }
+
+    /// Adds a point to a curve, unless nothing has happened since the last one.
+    pub(super) fn note(&mut self, curve: usize, session: &Session<'_>) {
+        let film = session.film();
+        let point =
+            Point {
+                seconds: session.elapsed_seconds(),
+                samples: film.total_samples() as f64 / film.pixels().len().max(1) as f64,
+                noise: session.noise(),
+                error: self.request.reference.as_ref().and_then(|reference| {
+                    metrics::relative_rms_error(&film.image(), &reference.image)
+                }),
+            };
+        let curve = &mut self.curves[curve];
+        let is_later = curve.last().is_none_or(|last| point.samples > last.samples);
+        if point.noise.is_finite() && point.noise > 0.0 && is_later {
+            curve.push(point);
+        }
+    }
+
+    /// The session's picture, and what reading a film that is shown in place took of the time.
+    pub(super) fn session_snapshot(
+        &mut self,
+        session: &Session<'_>,
+        is_final: bool,
+    ) -> (SessionSnapshot, Duration) {
+        let on_device = session.film_on_device();
+        let in_place = self.in_place(session);
+        let kept = self.reading(in_place.as_ref()).filter(|_| !is_final);
+        let (film, figures, noise, cost) = match kept {
+            Some(reading) => {
+                (Arc::clone(&reading.film), reading.figures, reading.noise, Duration::ZERO)
+            }
+            None => {
+                let start = Instant::now();
+                let film = self.film_of(session);
+                let (noise, figures) = (session.noise(), session.figures());
+                let cost = in_place.as_ref().map_or(Duration::ZERO, |_| start.elapsed());
+                if let Some(of) = in_place {
+                    let (at, gap) = (Instant::now(), gap_after(cost).max(READING_GAP));
+                    self.readings.retain(|reading| !is_same(&reading.of, &of));
+                    let film = Arc::clone(&film);
+                    self.readings.push(Reading { of, film, figures, noise, at, gap });
+                }
+                (film, figures, noise, cost)
+            }
+        };
+        let snapshot = SessionSnapshot {
+            samples: session.samples(),
+            sampling: session.view().sampling,
+            noise,
+            film,
+            figures,
+            gpu: session.gpu_figures().map(Arc::new),
+            on_device,
+            grid: self.distributions_of(session),
+        };
+        (snapshot, cost)
+    }
+
+    /// The session's film; before the first sample, one of the same view from before.
+    pub(super) fn film_of(&self, session: &Session<'_>) -> Arc<Film> {
+        let before = if session.figures().samples == 0 { self.backdrop() } else { None };
+        before.unwrap_or_else(|| Arc::new(session.film().clone()))
+    }
+
+    /// The session's film if the window shows it in every frame without its being read. Small ones are
+    /// filtered on the CPU, and software does not draw so often.
+    pub(super) fn in_place(&self, session: &Session<'_>) -> Option<(Gpu, DeviceFilm)> {
+        let (gpu, film) = session.film_on_device()?;
+        let is_small = film.width < self.request.view.width;
+        let is_live = !gpu.facts().is_software() && gpu.is_same(&lock(&self.shared.screen));
+        (is_live && !is_small).then_some((gpu, film))
+    }
+
+    /// The last reading of a film, unless it is too old.
+    pub(super) fn reading(&self, of: Option<&(Gpu, DeviceFilm)>) -> Option<&Reading> {
+        let of = of?;
+        self.readings.iter().find(|r| is_same(&r.of, of) && r.at.elapsed() < r.gap)
+    }
+
+    /// Whether figures that need the film are to be taken anew.
+    pub(super) fn is_reading_due(&self, session: &Session<'_>) -> bool {
+        session.samples() > 0 && self.reading(self.in_place(session).as_ref()).is_none()
+    }
+}
+
+/// What a sample of the calm picture counts where the exact one has so many: it fades out.
+pub(super) fn calm_worth(samples: u32) -> f32 {
+    let all = CALM_WORTH * CALM_SAMPLES as f32;
+    CALM_WORTH * ((4.0 * all - samples as f32) / (3.0 * all)).clamp(0.0, 1.0)
+}
+
+fn is_same((gpu, film): &(Gpu, DeviceFilm), other: &(Gpu, DeviceFilm)) -> bool {
+    gpu.is_same(&other.0) && *film == other.1
+}
+
+/// Time until something that took `cost` may be done again.
+fn gap_after(cost: Duration) -> Duration {
+    (cost * PUBLISH_SHARE).clamp(SLICE, LONGEST_GAP)
+}

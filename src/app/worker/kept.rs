@@ -1,0 +1,94 @@
+//! What one job leaves for the next.
+
+use std::sync::{Arc, Mutex};
+
+use super::Request;
+use super::device::Device;
+use crate::environment::Environment;
+use crate::light_grid::{LearningGrid, LightGrid};
+use crate::path::World;
+use crate::render::film::Film;
+use crate::render::gpu::{Gpu, RayChoice};
+use crate::render::{CacheTraining, Session};
+
+/// What one job leaves for the next.
+pub(super) struct Kept {
+    pub(super) device: Device,
+    /// The last distributions that learning ended with, and the map they are for.
+    pub(super) learned: Option<(Arc<LightGrid>, Arc<Environment>)>,
+    /// Whether that learning came to its end.
+    pub(super) is_complete: bool,
+    /// What was counted, if it came to its end, and what for.
+    pub(super) counted: Option<(Arc<LearningGrid>, Arc<Request>)>,
+    /// The world they were learned in.
+    pub(super) world: Option<Arc<World>>,
+    /// Seconds one camera path takes, all threads together.
+    pub(super) seconds_per_path: Option<f64>,
+    pub(super) snapshots: u64,
+    /// A film of what was seen last, and what it was rendered for.
+    pub(super) backdrop: Option<(Arc<Request>, Arc<Film>)>,
+    /// What paths have trained the radiance cache, and where.
+    pub(super) training: Option<(CacheTraining, Arc<Request>)>,
+}
+
+impl Kept {
+    /// Of a worker that has done nothing yet.
+    pub(super) fn new(gpu: (Option<String>, RayChoice), screen: Arc<Mutex<Gpu>>) -> Self {
+        Self {
+            device: Device::new(gpu, screen),
+            learned: None,
+            is_complete: false,
+            counted: None,
+            world: None,
+            seconds_per_path: None,
+            snapshots: 0,
+            backdrop: None,
+            training: None,
+        }
+    }
+
+    /// Whether learning has come to its end in this scene.
+    pub(super) fn has_learned_in(&self, request: &Request) -> bool {
+        self.is_complete && self.is_of_world(request)
+    }
+
+    /// Whether the radiance cache was trained in this scene with this light, near by.
+    pub(super) fn has_training_for(&self, request: &Request) -> bool {
+        let position = request.view.camera.world_from_camera.translation.into();
+        self.training
+            .as_ref()
+            .is_some_and(|(training, of)| of.is_lit_like(request) && training.suits(position))
+    }
+
+    /// Keeps them for the next session.
+    pub(super) fn keep_training(&mut self, session: &mut Session<'_>, request: &Arc<Request>) {
+        if let Some(training) = session.take_training() {
+            self.training = Some((training, Arc::clone(request)));
+        }
+    }
+
+    /// Distributions for this request from the last ones, if they are of the same scene.
+    pub(super) fn distributions_for(&self, request: &Request) -> Option<Arc<LightGrid>> {
+        if !self.is_of_world(request) {
+            return None;
+        }
+        let (distributions, map) = self.learned.as_ref()?;
+        let same = map.tile_energies() == request.environment.tile_energies()
+            && map.direction_in_tile(0, glam::Vec2::ZERO)
+                == request.environment.direction_in_tile(0, glam::Vec2::ZERO);
+        if same {
+            return Some(Arc::clone(distributions));
+        }
+        distributions.transferred(map, &request.environment).map(Arc::new)
+    }
+
+    /// What was counted in this scene with this light.
+    pub(super) fn counted_for(&self, request: &Request) -> Option<Arc<LearningGrid>> {
+        let (counted, of) = self.counted.as_ref()?;
+        of.is_lit_like(request).then(|| Arc::clone(counted))
+    }
+
+    fn is_of_world(&self, request: &Request) -> bool {
+        self.world.as_ref().is_some_and(|world| Arc::ptr_eq(world, &request.world))
+    }
+}

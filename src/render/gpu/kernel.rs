@@ -1,0 +1,138 @@
+//! The kernels, and what is told of them.
+
+use serde::Serialize;
+
+use super::shader::{ArrayPlaces, Constants, Program, VertexTexels};
+use crate::features::Features;
+use crate::path::World;
+
+/// Entry points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Kernel {
+    /// Adds samples to pixels.
+    Render,
+    /// Traces learning paths.
+    Learn,
+    /// Traces paths that train the radiance cache.
+    Train,
+    /// Finds the nearest hits of rays, for measurements.
+    ClosestHits,
+    /// Finds how much light comes along rays, for measurements.
+    ShadowRays,
+    /// Adds samples to pixels, with the two that follow: finds what rays of paths hit.
+    Trace,
+    /// Finds what becomes of paths there.
+    Shade,
+    /// Follows their rays towards lights.
+    FollowShadows,
+    /// Adds samples to pixels that share, with the two that follow: finds second vertices.
+    FindSeconds,
+    /// Estimates what arrives there.
+    LightSeconds,
+    /// Gathers light at the first vertices.
+    ConnectSeconds,
+}
+
+impl Kernel {
+    /// Name of the entry point.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Render => "render",
+            Self::Learn => "learn",
+            Self::Train => "train",
+            Self::ClosestHits => "closest_hits",
+            Self::ShadowRays => "shadow_rays",
+            Self::Trace => "trace",
+            Self::Shade => "shade",
+            Self::FollowShadows => "follow_shadows",
+            Self::FindSeconds => "find_seconds",
+            Self::LightSeconds => "light_seconds",
+            Self::ConnectSeconds => "connect_seconds",
+        }
+    }
+
+    /// Number of kernels.
+    pub(crate) const COUNT: usize = 11;
+
+    /// Those that bring all paths one ray further, in order.
+    pub(crate) const OF_QUEUE: [Self; 3] = [Self::Trace, Self::Shade, Self::FollowShadows];
+
+    /// Those that add one sample to every pixel, in order.
+    pub(crate) const OF_SHARING: [Self; 3] =
+        [Self::FindSeconds, Self::LightSeconds, Self::ConnectSeconds];
+
+    /// Whether it traces rays that the host made, not paths.
+    pub(super) fn casts(self) -> bool {
+        matches!(self, Self::ClosestHits | Self::ShadowRays)
+    }
+
+    /// Whether it adds finished paths to the film.
+    pub(super) fn adds_samples(self) -> bool {
+        matches!(self, Self::Render | Self::Trace | Self::ConnectSeconds)
+    }
+
+    /// Whether it begins samples.
+    pub(super) fn begins_samples(self) -> bool {
+        self.adds_samples() || self == Self::FindSeconds
+    }
+
+    /// Whether its paths are not those of pixels.
+    pub(super) fn begins_anywhere(self) -> bool {
+        matches!(self, Self::Learn | Self::Train)
+    }
+
+    /// Whether its pixels share second vertices.
+    pub(super) fn shares(self) -> bool {
+        Self::OF_SHARING.contains(&self)
+    }
+
+    /// Whether its paths lie in slots.
+    pub(super) fn is_of_queue(self) -> bool {
+        Self::OF_QUEUE.contains(&self)
+    }
+}
+
+/// What the render kernel of a picture holds and what was left out of it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct KernelFacts {
+    /// Features it was built with.
+    pub features: Vec<String>,
+    /// Features it does without.
+    pub left_out: Vec<String>,
+    /// Bytes of its source.
+    pub source_bytes: usize,
+    /// Bytes of the source with every feature.
+    pub full_source_bytes: usize,
+    /// Bytes of a vertex on the device.
+    pub vertex_bytes: u32,
+    /// Bytes of a vertex with everything a scene can have.
+    pub full_vertex_bytes: u32,
+}
+
+impl KernelFacts {
+    /// Of the kernel for these features.
+    pub(crate) fn of(features: Features) -> Self {
+        let bytes_of = |features| {
+            let vertex = VertexTexels::of(features);
+            let constants = Constants { vertex, ..Constants::default() };
+            let places = ArrayPlaces::default();
+            let program = Program::new(Kernel::Render, features, &constants, &places);
+            (program.source.len(), 16 * vertex.count)
+        };
+        let (source_bytes, vertex_bytes) = bytes_of(features);
+        let (full_source_bytes, full_vertex_bytes) = bytes_of(Features::most());
+        Self {
+            features: features.names().collect(),
+            left_out: (Features::most() - features).names().collect(),
+            source_bytes,
+            full_source_bytes,
+            vertex_bytes,
+            full_vertex_bytes,
+        }
+    }
+
+    /// Of the kernel for a scene with a map that is not black, with the defaults of `render`.
+    pub fn of_scene(world: &World) -> Self {
+        Self::of(Features::by_default(world))
+    }
+}

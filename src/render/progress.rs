@@ -1,0 +1,63 @@
+//! How far a picture is, and when it is done.
+
+use serde::{Deserialize, Serialize};
+
+/// When to stop; whichever comes first.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct StopRule {
+    /// Samples per pixel.
+    pub samples: Option<u32>,
+    /// Seconds of learning and rendering.
+    pub seconds: Option<f64>,
+    /// Noise as [`super::film::Film::noise`] estimates it.
+    pub noise: Option<f64>,
+}
+
+/// What a session is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// Tracing learning paths.
+    Learning,
+    /// Adding samples to the film.
+    Rendering,
+}
+
+/// Figures of what has been done.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Camera paths traced to learn from.
+    pub learning_paths: u64,
+    /// Rendered paths learned from besides.
+    pub counted_paths: u64,
+    /// Paths of both kinds that the distributions in use were made of.
+    pub distribution_paths: u64,
+    /// Rays traced while learning.
+    pub learning_rays: u64,
+    /// Seconds of learning, distributions included; what counting costs while rendering is not apart.
+    pub learning_seconds: f64,
+    /// Seconds of learning that went into making distributions.
+    pub distribution_seconds: f64,
+    /// Cells that learning paths visited.
+    pub visited_cells: usize,
+    /// Cells with a distribution of their own.
+    pub learned_cells: usize,
+    /// Most bytes the grid held while learning: counters and distributions.
+    pub grid_peak_bytes: usize,
+    /// Bytes the grid holds, counters included.
+    pub grid_bytes: usize,
+    /// Camera paths that have trained the radiance cache.
+    pub training_paths: u64,
+    /// Camera paths rendered.
+    pub samples: u64,
+    /// Rays traced while rendering, shadow rays included.
+    pub rays: u64,
+    /// Seconds of rendering.
+    pub render_seconds: f64,
+}
+
+impl Figures {
+    /// Seconds of learning and rendering.
+    pub fn elapsed_seconds(&self) -> f64 {
+        self.learning_seconds + self.render_seconds
+    }
+}

@@ -1,0 +1,520 @@
+//! One session: learn, then render pass by pass, until told to stop.
+//!
+//! [`View`] says what is wanted, [`Session::advance`] does a bounded piece of work and says how far
+//! it is, [`Film`] holds the sums. A seed gives the same picture whatever the threads: every
+//! sample's random numbers depend on its pixel and index alone, a pixel's samples are added in
+//! order, and learning counts integers.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
+
+mod learning;
+
+use learning::{Learning, Stage};
+
+use super::film::Film;
+use super::gi::{CacheTraining, PATHS_AT_A_TIME};
+use super::pass::Pass;
+use super::{Figures, Phase, Sampling, StopRule, View, cpu, gpu};
+use crate::environment::Environment;
+use crate::error::Result;
+use crate::light_grid::{LearningGrid, LightGrid};
+use crate::path::camera::CameraRays;
+use crate::path::{PathTracer, World};
+use crate::sampler::Sequence;
+
+/// Seconds a pass on a GPU should take: what is told to the user between two is this old at most.
+const GPU_PASS_SECONDS: f64 = 0.1;
+/// A GPU's film is read at least this often: so much work is lost with a device.
+const KEPT_SECONDS: Duration = Duration::from_secs(5);
+/// Learning takes at most this share of the seconds asked for.
+const LEARNING_TIME_SHARE: f64 = 0.05;
+
+/// What does the work.
+enum Engine {
+    Cpu,
+    Gpu(Box<gpu::Renderer>),
+}
+
+/// A picture in the making.
+pub struct Session<'a> {
+    world: &'a World,
+    environment: &'a Environment,
+    view: View,
+    rays: CameraRays,
+    engine: Engine,
+    /// The film as it is; made when somebody asks.
+    film: OnceLock<Film>,
+    /// Its noise, once somebody has asked.
+    noise: OnceLock<f64>,
+    /// The film as it was when somebody asked last, to be brought up to date; it survives a GPU.
+    film_before: Mutex<Film>,
+    /// Fewest samples of any pixel.
+    samples: u32,
+    /// So many first samples of each pixel are others'.
+    skipped: u32,
+    /// When a GPU's film was read last.
+    last_read: Instant,
+    whole_map: Option<LightGrid>,
+    learned: Option<LightGrid>,
+    sequence: Sequence,
+    /// `None` if nothing is to be learned, or everything has been by others.
+    learning: Option<Learning>,
+    training: Option<CacheTraining>,
+    figures: Figures,
+}
+
+impl<'a> Session<'a> {
+    /// Starts a session on the CPU; nothing is traced yet.
+    pub fn new(world: &'a World, environment: &'a Environment, mut view: View) -> Self {
+        view.sharing = view.sharing.decided(world, &view);
+        let rays = view.rays();
+        let whole_map = match view.sampling {
+            Sampling::Bsdf => None,
+            _ => LightGrid::whole_map(environment.tile_energies()),
+        };
+        let learning = Learning::new(world, environment, &view, &rays);
+        let training = CacheTraining::new(world, environment, &view, &rays);
+        Self {
+            training,
+            film: OnceLock::new(),
+            noise: OnceLock::new(),
+            film_before: Mutex::default(),
+            samples: 0,
+            skipped: 0,
+            last_read: Instant::now(),
+            world,
+            environment,
+            view,
+            rays,
+            engine: Engine::Cpu,
+            whole_map,
+            learned: None,
+            sequence: Sequence::default(),
+            learning,
+            figures: Figures::default(),
+        }
+    }
+
+    /// Starts a session on a GPU, to which this world and this environment are uploaded.
+    ///
+    /// # Errors
+    /// If it does not fit on the device.
+    pub fn on_gpu(
+        world: &'a World,
+        environment: &'a Environment,
+        view: View,
+        uploaded: &gpu::UploadedScene,
+    ) -> Result<Self> {
+        let mut session = Self::new(world, environment, view);
+        session.continue_on_gpu(uploaded)?;
+        Ok(session)
+    }
+
+    /// Does one piece of work: a learning pass, or one that brings every pixel `samples` further.
+    /// Returns early, with what is done so far kept, when `cancel` becomes true. A GPU may still be at
+    /// work on the last hundredths of a second of it; see [`Self::settle`].
+    ///
+    /// # Errors
+    /// If the GPU fails; the film as it was read last is kept, and [`Self::continue_on_cpu`] goes on
+    /// from there.
+    pub fn advance(&mut self, samples: u32, cancel: &AtomicBool) -> Result<()> {
+        let (start, distribution_seconds) = (Instant::now(), self.figures.distribution_seconds);
+        match self.phase() {
+            Phase::Learning => {
+                let result = self.learn(cancel);
+                self.figures.learning_seconds += start.elapsed().as_secs_f64();
+                result
+            }
+            Phase::Rendering => {
+                self.train(cancel)?;
+                let start = Instant::now();
+                let result = self.render(self.samples.saturating_add(samples), 1, cancel);
+                let distributions = self.figures.distribution_seconds - distribution_seconds;
+                self.figures.learning_seconds += distributions;
+                self.figures.render_seconds += start.elapsed().as_secs_f64() - distributions;
+                result
+            }
+        }
+    }
+
+    /// Gives every `every`-th pixel of every `every`-th row its first sample: a picture can be made of
+    /// so few that shows the whole view. It is the sample that [`Self::advance`] would take, which
+    /// goes on with the others. Does nothing on a GPU, whose first samples come all at once.
+    pub fn begin(&mut self, every: u32, cancel: &AtomicBool) {
+        if self.samples == 0 && !self.is_on_gpu() {
+            // Only a GPU fails, and distributions are made of whole passes.
+            let _ = self.train(cancel);
+            let start = Instant::now();
+            let _ = self.render(1, every.max(1), cancel);
+            self.figures.render_seconds += start.elapsed().as_secs_f64();
+        }
+    }
+
+    /// Waits for what a GPU is still at work on and reads its film, so that film and figures are those
+    /// of now.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub fn settle(&mut self) -> Result<()> {
+        let start = Instant::now();
+        if let Engine::Gpu(renderer) = &mut self.engine {
+            renderer.settle()?;
+            if self.film.get().is_none() {
+                let (film, read) = self.newest_film();
+                self.film = OnceLock::from(film);
+                read?;
+                self.last_read = Instant::now();
+            }
+            self.figures.render_seconds += start.elapsed().as_secs_f64();
+        }
+        Ok(())
+    }
+
+    /// Lets the CPU take over from a GPU, with everything learned and rendered so far, as far as it can
+    /// still be read.
+    pub fn continue_on_cpu(&mut self) {
+        if self.is_on_gpu() {
+            self.leave_gpu();
+            self.engine = Engine::Cpu;
+        }
+    }
+
+    /// Reads what there is on a GPU that is to be left.
+    fn leave_gpu(&mut self) {
+        let film = self.film();
+        let skipped = u64::from(self.skipped) * film.pixels().len() as u64;
+        (self.samples, self.figures.samples) = (film.min_samples(), film.total_samples() - skipped);
+        self.figures.rays = self.figures().rays;
+        // With a device goes what was done since its film was read.
+        self.sequence.first_sample = self.sequence.first_sample.min(self.samples);
+    }
+
+    /// Lets a GPU take over, to which this session's world and environment are uploaded, with
+    /// everything learned and rendered so far.
+    ///
+    /// # Errors
+    /// If it does not fit on the device; the session stays where it is.
+    pub fn continue_on_gpu(&mut self, uploaded: &gpu::UploadedScene) -> Result<()> {
+        if self.is_on_gpu() {
+            self.leave_gpu();
+        }
+        let (world, environment) = (self.world, self.environment);
+        let film = (self.figures.samples > 0).then(|| self.film());
+        let mut renderer =
+            gpu::Renderer::new(uploaded, world, environment, &self.view, &self.rays, film)?;
+        renderer.set_grid(self.learned.as_ref().or(self.whole_map.as_ref()))?;
+        renderer.set_cache(self.training.as_ref().and_then(CacheTraining::cache))?;
+        self.engine = Engine::Gpu(Box::new(renderer));
+        Ok(())
+    }
+
+    /// Figures of the GPU at work; `None` on the CPU.
+    pub fn gpu_figures(&self) -> Option<gpu::GpuFigures> {
+        match &self.engine {
+            Engine::Cpu => None,
+            Engine::Gpu(renderer) => Some(renderer.figures()),
+        }
+    }
+
+    /// Samples per pixel that the next pass should take: growing with what is there, so that few
+    /// passes are needed and none is much longer than those before it. Where noise is asked for it
+    /// depends on counts alone, so that the picture is repeatable; else a GPU takes as many as it can in
+    /// a moment.
+    pub fn next_pass(&self, rule: &StopRule) -> u32 {
+        let samples = self.samples;
+        let pass = match &self.engine {
+            Engine::Cpu => (samples / 16).clamp(1, 64),
+            // Each look at the noise reads the film.
+            Engine::Gpu(_) if rule.noise.is_some() => (samples / 8).clamp(1, 64),
+            Engine::Gpu(_) => {
+                let each = self.figures.render_seconds / f64::from(samples.max(1));
+                let affordable = (GPU_PASS_SECONDS / each.max(1e-9)) as u32;
+                affordable.max(samples / 16).min(samples).clamp(1, 64)
+            }
+        };
+        // The radiance cache learns where samples are a power of two.
+        let until_training =
+            self.training.as_ref().map(|_| (samples + 1).next_power_of_two() - samples);
+        let pass = until_training.map_or(pass, |until| pass.min(until));
+        rule.samples.map_or(pass, |limit| pass.min(limit.saturating_sub(samples)).max(1))
+    }
+
+    /// Fewest samples any pixel has: [`Film::min_samples`] without a film.
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    /// What the next [`Self::advance`] will do.
+    pub fn phase(&self) -> Phase {
+        match &self.learning {
+            Some(Learning { stage: Stage::Tracing, .. }) => Phase::Learning,
+            _ => Phase::Rendering,
+        }
+    }
+
+    /// Whether another learning pass, as long as all before it, would take more than its share of the
+    /// seconds asked for.
+    pub fn has_learned_enough(&self, rule: &StopRule) -> bool {
+        let share = |seconds| LEARNING_TIME_SHARE * seconds;
+        rule.seconds.is_some_and(|s| 2.0 * self.figures.learning_seconds >= share(s))
+    }
+
+    /// Goes over to rendering with what was learned so far.
+    pub fn finish_learning(&mut self) {
+        let goes_on = self.view.distribution_options().is_some_and(|options| options.goes_on());
+        if let Some(Learning { stage: stage @ Stage::Tracing, .. }) = &mut self.learning {
+            *stage = if goes_on { Stage::Counting } else { Stage::Over };
+        }
+    }
+
+    /// Replaces what was learned; for tests of unbiasedness and for inspection.
+    ///
+    /// # Errors
+    /// If it does not fit on the GPU.
+    pub fn set_grid(&mut self, grid: LightGrid) -> Result<()> {
+        self.learning = None;
+        self.learned = Some(grid);
+        self.take_up_distributions()
+    }
+
+    /// Goes on with what paths have trained the radiance cache before, in the same world with the same
+    /// light. It is to suit the camera ([`CacheTraining::suits`]).
+    ///
+    /// # Errors
+    /// If it does not fit on the GPU.
+    pub(crate) fn set_training(&mut self, training: CacheTraining) -> Result<()> {
+        let training = self.training.insert(training);
+        match &mut self.engine {
+            Engine::Cpu => Ok(()),
+            Engine::Gpu(renderer) => renderer.set_cache(training.cache()),
+        }
+    }
+
+    /// What paths have trained the radiance cache, for another session; this one follows all paths to
+    /// their end from now on.
+    pub(crate) fn take_training(&mut self) -> Option<CacheTraining> {
+        self.training.take()
+    }
+
+    /// Whether no samples to come change what is sampled by: each is then a matter of its pixel and its
+    /// index alone.
+    pub fn has_final_distributions(&self) -> bool {
+        self.learning.as_ref().is_none_or(|learning| learning.stage == Stage::Over)
+    }
+
+    /// Goes on from another film of this view with what was learned so far, as if its samples were
+    /// this session's. The first `skipped` of each pixel are others': [`Self::film`] counts them without
+    /// their light. Whoever took the rest learned as this session did, so that all films of a view
+    /// together are the one that a single session would have made.
+    ///
+    /// # Errors
+    /// If the GPU fails; [`Self::continue_on_cpu`] goes on from that film.
+    pub(crate) fn continue_from(&mut self, mut film: Film, skipped: u32) -> Result<()> {
+        // A GPU counts its rays on its film; if it fails, it will be heard of below.
+        let _ = self.settle();
+        self.figures.rays = self.figures().rays;
+        film.skip(skipped);
+        self.skipped = skipped;
+        self.samples = film.min_samples();
+        self.noise = OnceLock::new();
+        match &mut self.engine {
+            Engine::Cpu => self.film = OnceLock::from(film),
+            Engine::Gpu(renderer) => {
+                let set = renderer.set_film(&film);
+                self.film = OnceLock::new();
+                self.film_before = Mutex::new(film);
+                set?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Counts what an earlier process did for the film that is gone on from.
+    pub(crate) fn add_figures(&mut self, before: &Figures) {
+        let figures = &mut self.figures;
+        figures.samples += before.samples;
+        figures.rays += before.rays;
+        figures.learning_rays += before.learning_rays;
+        figures.learning_seconds += before.learning_seconds;
+        figures.distribution_seconds += before.distribution_seconds;
+        figures.render_seconds += before.render_seconds;
+    }
+
+    /// What was counted, for inspection.
+    pub fn counters(&self) -> Option<&LearningGrid> {
+        self.learning.as_ref().map(|learning| &learning.grid)
+    }
+
+    /// The film so far. A GPU's is read back at the first call after an [`Self::advance`], which takes
+    /// its time; should the GPU fail meanwhile, it is the film as it was read last, and the next call of
+    /// [`Self::advance`] or [`Self::settle`] says why.
+    pub fn film(&self) -> &Film {
+        self.film.get_or_init(|| self.newest_film().0)
+    }
+
+    /// [`Film::noise`] of [`Self::film`], which looks at every pixel once; infinite if some of its
+    /// samples are others'.
+    pub fn noise(&self) -> f64 {
+        let noise = || if self.skipped == 0 { self.film().noise() } else { f64::INFINITY };
+        *self.noise.get_or_init(noise)
+    }
+
+    /// The last film brought up to date, as far as that worked.
+    fn newest_film(&self) -> (Film, Result<()>) {
+        let mut before = self.film_before.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut film = std::mem::take(&mut *before);
+        prepare_film(&mut film, &self.view);
+        let read = match &self.engine {
+            Engine::Cpu => Ok(()),
+            Engine::Gpu(renderer) => renderer.read_film(&mut film),
+        };
+        (film, read)
+    }
+
+    /// Whether a GPU is at work.
+    pub fn is_on_gpu(&self) -> bool {
+        matches!(self.engine, Engine::Gpu(_))
+    }
+
+    /// The film where a GPU keeps it, and that GPU; `None` on the CPU.
+    pub(crate) fn film_on_device(&self) -> Option<(gpu::Gpu, gpu::DeviceFilm)> {
+        match &self.engine {
+            Engine::Cpu => None,
+            Engine::Gpu(renderer) => renderer.film_on_device(),
+        }
+    }
+
+    /// What is rendered; it is decided whether pixels share.
+    pub fn view(&self) -> &View {
+        &self.view
+    }
+
+    /// The grid in use, once learning has ended.
+    pub fn grid(&self) -> Option<&LightGrid> {
+        self.learned.as_ref().or(self.whole_map.as_ref())
+    }
+
+    /// What has been done so far. A GPU's rays are those up to the last reading of its film.
+    pub fn figures(&self) -> Figures {
+        let rays = match &self.engine {
+            Engine::Cpu => 0,
+            Engine::Gpu(renderer) => renderer.rays(),
+        };
+        Figures { rays: self.figures.rays + rays, ..self.figures }
+    }
+
+    /// Seconds of learning and rendering so far.
+    pub fn elapsed_seconds(&self) -> f64 {
+        self.figures.elapsed_seconds()
+    }
+
+    /// Whether a rule says to stop. Noise is only asked for from 16 samples on.
+    pub fn is_done(&self, rule: &StopRule) -> bool {
+        let samples = self.samples;
+        rule.samples.is_some_and(|limit| samples >= limit)
+            || (samples > 0 && rule.seconds.is_some_and(|limit| self.elapsed_seconds() >= limit))
+            || (samples >= 16 && rule.noise.is_some_and(|limit| self.noise() <= limit))
+    }
+
+    fn tracer<'b>(&'b self, counts: Option<&'b LearningGrid>) -> PathTracer<'b> {
+        let cache = self.training.as_ref().and_then(CacheTraining::cache);
+        let tracer = self.view.tracer(self.world, self.environment, self.grid());
+        PathTracer { counts, cache, ..tracer }
+    }
+
+    /// Trains the radiance cache what it is to know before the next pass, if there is one. What has been
+    /// cut short goes on at the next call.
+    fn train(&mut self, cancel: &AtomicBool) -> Result<()> {
+        let start = Instant::now();
+        if let Some(training) = &mut self.training {
+            training.begin(&self.view, self.samples);
+        }
+        while let Some(training) = &self.training
+            && let Some(paths) = training.next()
+            && !cancel.load(Ordering::Relaxed)
+        {
+            let sums = training.sums();
+            let (done, rays) = match &mut self.engine {
+                Engine::Cpu => {
+                    let paths = paths.start..paths.end.min(paths.start + PATHS_AT_A_TIME);
+                    let rays =
+                        cpu::train(&self.tracer(None), &self.rays, &self.view, paths.clone(), sums);
+                    (paths.end, rays)
+                }
+                Engine::Gpu(renderer) => renderer.train(paths, sums, cancel)?,
+            };
+            self.figures.learning_rays += rays;
+            self.figures.training_paths = done;
+            if let Some(training) = &mut self.training {
+                training.advance(done);
+                if let Engine::Gpu(renderer) = &mut self.engine {
+                    renderer.set_cache(training.cache())?;
+                }
+            }
+        }
+        self.figures.learning_seconds += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Begins the sequence that goes with the distributions in use, and gives them to the GPU, if one is at
+    /// work.
+    fn take_up_distributions(&mut self) -> Result<()> {
+        let grid = self.learned.as_ref().or(self.whole_map.as_ref());
+        let generation = grid.map_or(0, LightGrid::generation);
+        if generation != self.sequence.generation {
+            // Pixels that are ahead begin later in it.
+            self.sequence = Sequence { generation, first_sample: self.samples };
+        }
+        match &mut self.engine {
+            Engine::Cpu => Ok(()),
+            Engine::Gpu(renderer) => renderer.set_grid(grid),
+        }
+    }
+
+    fn render(&mut self, target: u32, every: u32, cancel: &AtomicBool) -> Result<()> {
+        let stride = self.prepare_counting(target - self.samples);
+        let pass = Pass { target, every, stride, sequence: self.sequence };
+        let film_before = self.film_before.get_mut().unwrap_or_else(PoisonError::into_inner);
+        if let Some(film) = self.film.take() {
+            *film_before = film;
+        }
+        self.noise = OnceLock::new();
+        let learning = self.learning.as_ref().filter(|learning| learning.stage != Stage::Over);
+        let counts = learning.map(|learning| &learning.grid);
+        let samples = match &mut self.engine {
+            Engine::Cpu => {
+                let mut film = std::mem::take(film_before);
+                prepare_film(&mut film, &self.view);
+                let tracer = self.tracer(counts);
+                let (samples, rays) =
+                    cpu::render(&tracer, &self.rays, &self.view, pass, &mut film, cancel);
+                self.samples = film.min_samples();
+                self.film = OnceLock::from(film);
+                self.figures.rays += rays;
+                samples
+            }
+            Engine::Gpu(renderer) => {
+                let done = renderer.render(pass, counts, cancel)?;
+                self.samples = done.least;
+                if self.last_read.elapsed() > KEPT_SECONDS {
+                    // What is on the host outlives the device.
+                    let _ = self.film();
+                    self.last_read = Instant::now();
+                }
+                done.samples
+            }
+        };
+        self.figures.samples += samples;
+        let is_whole = self.samples >= target;
+        self.learn_from_rendered(samples.div_ceil(u64::from(stride)), is_whole)
+    }
+}
+
+/// Makes a black film of one that has no pixels yet.
+fn prepare_film(film: &mut Film, view: &View) {
+    if film.pixels().is_empty() {
+        *film = Film::new(view.width, view.height, view.layers);
+    }
+}

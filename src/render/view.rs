@@ -1,0 +1,174 @@
+//! What is to be rendered and how.
+
+use serde::{Deserialize, Serialize};
+
+use super::filter::PixelFilter;
+use super::{Gi, Sharing};
+use crate::environment::Environment;
+use crate::light_grid::{DistributionOptions, LightGrid};
+use crate::medium::Fog;
+use crate::path::camera::CameraRays;
+use crate::path::{Background, PathLimits, PathTracer, World};
+use crate::sampler::Points;
+use crate::scene::{Camera, Medium};
+
+/// How the environment map is sampled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    /// Learned tiles, our way: faces, cosine, pooling; with BSDF sampling.
+    #[default]
+    Adaptive,
+    /// Learned tiles as the talk describes them; with BSDF sampling.
+    Talk,
+    /// The whole map; with BSDF sampling.
+    Plain,
+    /// BSDF sampling alone.
+    Bsdf,
+}
+
+/// One learning path for this many paths rendered.
+const LEARNING_SHARE: u64 = 64;
+/// The same where each vertex tries several samples of the map: such a path takes four times as long.
+const ADAPTIVE_LEARNING_SHARE: u64 = 96;
+/// What is to be rendered and how. Equal views give equal pictures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// Where from.
+    pub camera: Camera,
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Pixel filter.
+    pub filter: PixelFilter,
+    /// How the map is sampled.
+    pub sampling: Sampling,
+    /// When paths end.
+    pub limits: PathLimits,
+    /// Seed of all random numbers.
+    pub seed: u32,
+    /// Whether pixels share their second vertices.
+    pub sharing: Sharing,
+    /// How light that has met several surfaces is found.
+    pub gi: Gi,
+    /// Which points samples are taken at; learning always takes [`Points::Sobol`].
+    pub points: Points,
+    /// Light Grid cells around the horizon; half as many from top to bottom.
+    pub grid_columns: u32,
+    /// Camera paths to learn from.
+    pub learning_paths: u64,
+    /// How counters become distributions in [`Sampling::Adaptive`].
+    pub distributions: DistributionOptions,
+    /// What fills the space between surfaces, in place of the scene's own medium; `None` keeps that,
+    /// and a medium that is all zero is clear air.
+    pub medium: Option<Medium>,
+    /// What the camera sees where it sees no surface.
+    pub background: Background,
+    /// The part of a larger picture that this one is; `None` is the whole.
+    pub crop: Option<Crop>,
+    /// Whether albedo, normal and depth are kept.
+    pub layers: bool,
+}
+
+/// Where a part lies in the whole picture, in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Crop {
+    /// Column and row of the part's first pixel.
+    pub corner: [u32; 2],
+    /// Width and height of the whole.
+    pub whole: [u32; 2],
+}
+
+impl View {
+    /// What `lightgrid render` takes where nothing else is asked for.
+    pub fn new(camera: Camera, [width, height]: [u32; 2]) -> Self {
+        let sampling = Sampling::default();
+        Self {
+            camera,
+            width,
+            height,
+            filter: PixelFilter::default(),
+            sampling,
+            limits: PathLimits { bounces: 8, russian_roulette: true },
+            seed: 0,
+            sharing: Sharing::default(),
+            gi: Gi::default(),
+            points: Points::Sobol,
+            grid_columns: 64,
+            learning_paths: Self::suitable_learning_paths(sampling, [width, height], None),
+            distributions: DistributionOptions::ADAPTIVE,
+            medium: None,
+            background: Background::default(),
+            crop: None,
+            layers: false,
+        }
+    }
+
+    /// How counters become distributions; `None` if nothing is learned.
+    pub fn distribution_options(&self) -> Option<DistributionOptions> {
+        match self.sampling {
+            Sampling::Adaptive => Some(self.distributions),
+            Sampling::Talk => Some(DistributionOptions::TALK),
+            Sampling::Plain | Sampling::Bsdf => None,
+        }
+    }
+
+    /// Learning paths that suit a picture of this size and sample count: a twentieth of the time that
+    /// rendering takes. Where rendered paths count too, and a vertex tries several samples, few are
+    /// enough to begin with.
+    pub fn suitable_learning_paths(
+        sampling: Sampling,
+        [width, height]: [u32; 2],
+        samples: Option<u32>,
+    ) -> u64 {
+        let pixels = u64::from(width) * u64::from(height);
+        let work = pixels * u64::from(samples.unwrap_or(256));
+        if sampling == Sampling::Adaptive {
+            (work / ADAPTIVE_LEARNING_SHARE).clamp(1 << 9, 1 << 16)
+        } else {
+            (work / LEARNING_SHARE).clamp(1 << 16, 1 << 20)
+        }
+    }
+
+    /// Width and height of the picture that this one is a part of.
+    pub fn whole_size(&self) -> [u32; 2] {
+        self.crop.map_or([self.width, self.height], |crop| crop.whole)
+    }
+
+    /// The camera's rays through this picture.
+    pub fn rays(&self) -> CameraRays {
+        match self.crop {
+            None => CameraRays::new(&self.camera, self.width, self.height),
+            Some(Crop { corner, whole: [width, height] }) => {
+                let whole = CameraRays::new(&self.camera, width, height);
+                whole.cropped(corner, [self.width, self.height])
+            }
+        }
+    }
+
+    /// What follows its paths by these distributions; it counts nothing, and no path ends in a cache.
+    pub(crate) fn tracer<'a>(
+        &self,
+        world: &'a World,
+        environment: &'a Environment,
+        grid: Option<&'a LightGrid>,
+    ) -> PathTracer<'a> {
+        PathTracer {
+            world,
+            environment,
+            grid,
+            counts: None,
+            cache: None,
+            fog: self.fog(world),
+            background: self.background,
+            limits: self.limits,
+        }
+    }
+
+    /// The medium that is rendered, in its box; `None` in clear air.
+    pub fn fog(&self, world: &World) -> Option<Fog> {
+        let medium = self.medium.or(world.scene.medium)?;
+        Fog::new(&medium, world.bvh.bounds())
+    }
+}
