@@ -65,7 +65,7 @@ pub enum Tab {
 }
 
 /// What the map of tiles shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TileView {
     /// Share of the map's energy.
     Energy,

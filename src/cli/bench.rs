@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::choices::SceneArguments;
 use super::picture::say_written;
 use super::progress::Progress;
 use super::{interrupt, render, values};
@@ -13,7 +14,7 @@ use crate::output::record::write_json;
 use crate::path::World;
 use crate::render::gpu::{RayChoice, Schedule, adapters};
 use crate::report::Device;
-use crate::scene::{SceneOptions, builtin};
+use crate::scene::builtin;
 use crate::terminal::print;
 
 /// Arguments of `bench`.
@@ -29,7 +30,7 @@ pub(super) struct BenchArguments {
     /// Scenes: glTF files or built-in ones; without any, all that are built in.
     scenes: Vec<String>,
     #[command(flatten)]
-    of_scene: SceneOptions,
+    of_scene: SceneArguments,
     /// The map.
     #[arg(long, default_value = "sky:day", value_name = "MAP")]
     env: String,
@@ -92,7 +93,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     let environment = Environment::new(map, &EnvironmentOptions::default())
         .map_err(|e| Error::at(&arguments.env, e))?;
     let subject = |name: &&str| {
-        let world = World::new(crate::sources::scene_with(name, &arguments.of_scene)?);
+        let world = World::new(crate::sources::scene_with(name, &arguments.of_scene.options())?);
         Ok(Subject { name: (*name).to_owned(), world, environment: environment.clone() })
     };
     let subjects = names.iter().map(subject).collect::<Result<Vec<_>>>()?;

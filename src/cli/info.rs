@@ -2,12 +2,13 @@
 
 use serde_json::{Value, json};
 
+use super::choices::SceneArguments;
 use crate::environment::landmarks::Sun;
 use crate::error::{Notices, Result};
 use crate::image::Image;
 use crate::path::World;
 use crate::render::gpu::KernelFacts;
-use crate::scene::{Projection, Scene, SceneOptions};
+use crate::scene::{Projection, Scene};
 use crate::terminal::print;
 
 /// Arguments of `info`.
@@ -16,7 +17,7 @@ pub(super) struct InfoArguments {
     /// A glTF file, a map (.exr, .hdr, 8-bit picture), a built-in scene or a built-in sky.
     source: String,
     #[command(flatten)]
-    of_scene: SceneOptions,
+    of_scene: SceneArguments,
     /// Print JSON instead of text.
     #[arg(long)]
     json: bool,
@@ -26,7 +27,7 @@ pub(super) struct InfoArguments {
 pub(super) fn run(arguments: &InfoArguments) -> Result<()> {
     let name = arguments.source.as_str();
     let facts = if crate::sources::is_scene(name) {
-        scene_facts(name, crate::sources::scene_with(name, &arguments.of_scene)?)
+        scene_facts(name, crate::sources::scene_with(name, &arguments.of_scene.options())?)
     } else {
         let (map, notices) = crate::sources::map(name)?;
         map_facts(name, &map, &notices)

@@ -10,6 +10,7 @@ use crate::error::Result;
 mod absent;
 #[cfg(feature = "report")]
 mod bench;
+mod choices;
 mod compare;
 mod device;
 mod generate;

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use glam::Vec2;
 
+use super::choices::SceneArguments;
 use super::picture::say_written;
 use super::values;
 use crate::app::Start;
@@ -16,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::image::{check_writable, write_png};
 use crate::render::gpu::DeviceChoice;
 use crate::render::{Sampling, StopRule};
-use crate::scene::{SceneOptions, builtin};
+use crate::scene::builtin;
 
 /// A part of the window that can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -48,7 +49,7 @@ pub(super) struct ScreenshotArguments {
     #[arg(default_value = builtin::DEFAULT_SCENE)]
     scene: String,
     #[command(flatten)]
-    of_scene: SceneOptions,
+    of_scene: SceneArguments,
     /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky; without it, sky:day, or the sky of a
     /// built-in scene.
     #[arg(long, value_name = "MAP")]
@@ -135,7 +136,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
         start: Start {
             document,
             interface: interface(arguments),
-            of_scene: arguments.of_scene.clone(),
+            of_scene: arguments.of_scene.options(),
             ..Start::default()
         },
         size: arguments.size,

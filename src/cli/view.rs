@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::choices::SceneArguments;
 use super::values;
 use crate::app::Start;
 use crate::app::document::{Document, PictureSize};
@@ -10,7 +11,7 @@ use crate::app::window;
 use crate::error::Result;
 use crate::render::gpu::{DeviceChoice, RayChoice};
 use crate::render::{Sampling, StopRule};
-use crate::scene::{SceneOptions, builtin};
+use crate::scene::builtin;
 use crate::sources::is_scene;
 use crate::terminal::tell;
 
@@ -25,7 +26,7 @@ pub(super) struct ViewArguments {
     #[arg(default_value = builtin::DEFAULT_SCENE)]
     scene: String,
     #[command(flatten)]
-    of_scene: SceneOptions,
+    of_scene: SceneArguments,
     /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky; without it, sky:day, or the sky of a
     /// built-in scene.
     #[arg(long, value_name = "MAP")]
@@ -70,7 +71,7 @@ impl ViewArguments {
     pub(super) fn plain() -> Self {
         Self {
             scene: builtin::DEFAULT_SCENE.to_owned(),
-            of_scene: SceneOptions::default(),
+            of_scene: SceneArguments::default(),
             env: None,
             sampling: None,
             device: None,
@@ -92,7 +93,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
         document: document(arguments, &settings),
         interface: settings.interface(),
         settings,
-        of_scene: arguments.of_scene.clone(),
+        of_scene: arguments.of_scene.options(),
         adapter: arguments.adapter.clone(),
         rays: arguments.rays,
         is_repeatable: false,

@@ -15,7 +15,7 @@ use crate::render::film::Film;
 const LEAST_ALBEDO: f32 = 0.02;
 
 /// What takes noise out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Denoiser {
     /// Our edge-avoiding filter over albedo, normal and depth: fast, always there.

@@ -15,7 +15,7 @@ use crate::render::film::{Film, Pixel};
 use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev, display_rgb8};
 
 /// A layer that can be asked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LayerName {
     /// Mean albedo of the first surface.
     Albedo,

@@ -6,7 +6,7 @@ use super::gpu::{self, Gpu, KernelFacts};
 use crate::error::{Error, Result};
 
 /// Where to render.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DeviceChoice {
     /// A real GPU if there is one and everything fits on it, else the CPU.
@@ -51,7 +51,7 @@ impl DeviceChoice {
 }
 
 /// What finds the surfaces that rays hit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RayChoice {
     /// A real GPU's own ray queries where it has them, else our kernels.
@@ -65,7 +65,7 @@ pub enum RayChoice {
 }
 
 /// How kernels share the work of rendering.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Schedule {
     /// One does all.

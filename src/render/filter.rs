@@ -6,17 +6,7 @@ use glam::Vec2;
 
 /// Pixel reconstruction filters, sampled in proportion to their weight so that every sample counts
 /// one in its own pixel (filter importance sampling, Ernst et al. 2006).
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Default,
-    serde::Serialize,
-    serde::Deserialize,
-    clap::ValueEnum,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PixelFilter {
     /// One pixel wide, constant: what metrics expect.

@@ -13,7 +13,7 @@ use crate::path::camera::CameraRays;
 use crate::radiance_cache::{CacheCells, MOST_PATHS, RadianceCache, RadianceSums};
 
 /// How light that has met several surfaces is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Gi {
     /// Paths are followed to their end: no error but noise.

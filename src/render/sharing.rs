@@ -9,7 +9,7 @@ use crate::path::camera::CameraRays;
 use crate::path::sharing::SharedTile;
 
 /// Whether neighbouring pixels share their second vertices ([`crate::path::sharing`]).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sharing {
     /// As it suits the scene, the way the map is sampled and the size of the picture.
@@ -18,11 +18,9 @@ pub enum Sharing {
     /// Each path is one pixel's.
     Off,
     /// In tiles of 4x4 pixels, all of which keep their own: less of the noise is shared.
-    #[value(name = "4x4")]
     #[serde(rename = "4x4")]
     Small,
     /// In tiles of 8x8 pixels, of which every fourth keeps its own.
-    #[value(name = "8x8")]
     #[serde(rename = "8x8")]
     Large,
 }

@@ -13,7 +13,7 @@ use crate::sampler::Points;
 use crate::scene::{Camera, Medium};
 
 /// How the environment map is sampled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
     /// Learned tiles, our way: faces, cosine, pooling; with BSDF sampling.

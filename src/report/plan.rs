@@ -14,7 +14,7 @@ use crate::sampler::Points;
 use crate::scene::Camera;
 
 /// A device to measure on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Device {
     /// All threads.

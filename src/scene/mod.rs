@@ -14,26 +14,21 @@ use crate::error::Notices;
 use camera_path::CameraPath;
 
 /// What is asked of a scene's file.
-#[derive(Debug, Clone, Default, PartialEq, clap::Args)]
-#[command(next_help_heading = "Scene")]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct SceneOptions {
     /// Reads files that the scene names outside of its folder, too.
-    #[arg(long)]
     pub allow_outside: bool,
     /// The look of a model that has several, by its name.
-    #[arg(long, value_name = "NAME")]
     pub variant: Option<String>,
     /// What happens to outlines: enlarged copies of a model that face inwards and, here, would shut out
     /// all light.
-    #[arg(long, value_enum, default_value = "remove", value_name = "WHAT")]
     pub outlines: Outlines,
     /// Leaves out all that is of the material of this name; may be given several times.
-    #[arg(long, value_name = "NAME")]
     pub hide: Vec<String>,
 }
 
 /// What happens to inverted hulls.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Outlines {
     /// They are left out, and it is said.
     #[default]

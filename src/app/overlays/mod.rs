@@ -17,7 +17,7 @@ pub use cell_facts::CellFacts;
 pub use labels::Label;
 
 /// What can be drawn over the picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Overlay {
     /// Cells of the Light Grid.
     Cells,

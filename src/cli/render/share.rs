@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use super::{RenderArguments, environment_options, sharing};
+use super::RenderArguments;
 use crate::alarm::Alarm;
 use crate::cli::device::say;
 use crate::cli::interrupt::Interrupt;
@@ -351,9 +351,9 @@ fn identity(
         false => Digest::new().map(environment.map()).to_string(),
     };
     let settings = Digest::new()
-        .debug(&(filter, sampling, sharing(arguments), limits, points, grid_columns))
+        .debug(&(filter, sampling, arguments.sharing(), limits, points, grid_columns))
         .debug(&(distributions, medium, view.background, view.layers, arguments.learning_paths))
-        .debug(&environment_options(arguments));
+        .debug(&arguments.environment_options());
     let pairs = [
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
         ("scene", scene),

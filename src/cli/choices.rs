@@ -1,0 +1,144 @@
+//! What the command line calls the choices that there are, with a line of help for each.
+
+use clap::ValueEnum;
+use clap::builder::PossibleValue;
+
+#[cfg(feature = "window")]
+use crate::app::{interface::TileView, overlays::Overlay};
+use crate::denoise::Denoiser;
+use crate::output::LayerName;
+use crate::render::filter::PixelFilter;
+use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
+use crate::render::{Gi, Sampling, Sharing};
+#[cfg(feature = "report")]
+use crate::report::Device;
+use crate::scene::{Outlines, SceneOptions};
+
+/// What is asked of a scene's file.
+#[derive(Debug, Clone, Default, PartialEq, clap::Args)]
+#[command(next_help_heading = "Scene")]
+pub(super) struct SceneArguments {
+    /// Reads files that the scene names outside of its folder, too.
+    #[arg(long)]
+    allow_outside: bool,
+    /// The look of a model that has several, by its name.
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
+    /// What happens to outlines: enlarged copies of a model that face inwards and, here, would shut out
+    /// all light.
+    #[arg(long, value_enum, default_value = "remove", value_name = "WHAT")]
+    outlines: Outlines,
+    /// Leaves out all that is of the material of this name; may be given several times.
+    #[arg(long, value_name = "NAME")]
+    hide: Vec<String>,
+}
+
+impl SceneArguments {
+    pub(super) fn options(&self) -> SceneOptions {
+        let Self { allow_outside, variant, outlines, hide } = self.clone();
+        SceneOptions { allow_outside, variant, outlines, hide }
+    }
+}
+
+macro_rules! choices {
+    ($($type:ty { $($variant:ident = $name:literal: $help:literal)+ })+) => {
+        $(impl ValueEnum for $type {
+            fn value_variants<'a>() -> &'a [Self] {
+                &[$(Self::$variant),+]
+            }
+
+            fn to_possible_value(&self) -> Option<PossibleValue> {
+                Some(match self {
+                    $(Self::$variant => PossibleValue::new($name).help($help)),+
+                })
+            }
+        })+
+    };
+}
+
+choices! {
+    Outlines {
+        Remove = "remove": "They are left out, and it is said"
+        Keep = "keep": "They are rendered like everything else"
+    }
+    PixelFilter {
+        Box = "box": "One pixel wide, constant: what metrics expect"
+        Gauss = "gauss": "Gaussian of standard deviation 0.45 pixels, cut at 1.5"
+        BlackmanHarris = "blackman-harris": "Blackman-Harris window 3 pixels wide, Cycles' default shape"
+    }
+    Sampling {
+        Adaptive = "adaptive": "Learned tiles, our way: faces, cosine, pooling; with BSDF sampling"
+        Talk = "talk": "Learned tiles as the talk describes them; with BSDF sampling"
+        Plain = "plain": "The whole map; with BSDF sampling"
+        Bsdf = "bsdf": "BSDF sampling alone"
+    }
+    Gi {
+        Exact = "exact": "Paths are followed to their end: no error but noise"
+        Cached = "cached": "Paths end where a radiance cache knows what they would find: less noise, and a few percent of error that stays"
+    }
+    Sharing {
+        Auto = "auto": "As it suits the scene, the way the map is sampled and the size of the picture"
+        Off = "off": "Each path is one pixel's"
+        Small = "4x4": "In tiles of 4x4 pixels, all of which keep their own: less of the noise is shared"
+        Large = "8x8": "In tiles of 8x8 pixels, of which every fourth keeps its own"
+    }
+    DeviceChoice {
+        Auto = "auto": "A real GPU if there is one and everything fits on it, else the CPU"
+        Gpu = "gpu": "A GPU, be it a software one, or an error"
+        Cpu = "cpu": "The CPU"
+    }
+    RayChoice {
+        Auto = "auto": "A real GPU's own ray queries where it has them, else our kernels"
+        Hardware = "hardware": "The GPU's ray queries, or an error. They are not watertight to the last bit: a ray along an edge may hit another triangle or, seldom, none"
+        Software = "software": "Our kernels"
+    }
+    Schedule {
+        Whole = "whole": "One does all"
+        Queue = "queue": "Three take turns"
+    }
+    LayerName {
+        Albedo = "albedo": "Mean albedo of the first surface"
+        Normal = "normal": "World normal of the first surface"
+        Depth = "depth": "Metres to the first surface"
+        Samples = "samples": "Samples per pixel"
+        Variance = "variance": "Variance of one sample's luminance"
+        All = "all": "All of them"
+    }
+    Denoiser {
+        ATrous = "a-trous": "Our edge-avoiding filter over albedo, normal and depth: fast, always there"
+        Oidn = "oidn": "Intel's Open Image Denoise, if its library is installed"
+    }
+}
+
+#[cfg(feature = "report")]
+choices! {
+    Device {
+        Cpu = "cpu": "All threads"
+        Gpu = "gpu": "The best adapter, be it a software one"
+    }
+}
+
+#[cfg(feature = "window")]
+choices! {
+    Overlay {
+        Cells = "cells": "Cells of the Light Grid"
+        Faces = "faces": "Six-fold split of cells by the direction a surface faces"
+        Learned = "learned": "Cells with distributions of their own"
+        Visits = "visits": "Learning visits of each cell"
+        Sky = "sky": "How much of the sky learning found visible"
+        BestTile = "best-tile": "Each cell's most important tile"
+        Entropy = "entropy": "Entropy of the cell's distribution"
+        Distance = "distance": "Distance of the cell's distribution from the whole map's"
+        Tile = "tile": "Each cell's probability of the tile chosen on the map"
+        Samples = "samples": "Samples of each pixel"
+        Error = "error": "Estimated error of each pixel"
+        Albedo = "albedo": "Albedo of the first surface"
+        Normal = "normal": "Normal of the first surface"
+        Depth = "depth": "Distance of the first surface"
+    }
+    TileView {
+        Energy = "energy": "Share of the map's energy"
+        Learned = "learned": "Share of what all cells together have learned to want"
+        EqualEnergy = "equal-energy": "Tiles of equal energy, which are not used"
+    }
+}

@@ -1,0 +1,420 @@
+//! Arguments of `render`, and what they ask for.
+
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+use glam::Vec3;
+
+use crate::cli::choices::SceneArguments;
+use crate::cli::picture::PictureArguments;
+use crate::cli::values;
+use crate::environment::{EnvironmentOptions, TableKind};
+use crate::error::{Error, Notices, Result};
+use crate::output::film_file::Part;
+use crate::path::{Background, PathLimits, World, framing};
+use crate::render::filter::PixelFilter;
+use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
+use crate::render::{Crop, Gi, Sampling, Sharing, StopRule, View};
+use crate::scene::{Camera, Medium, Projection, Scene, builtin};
+
+/// Arguments of `render`.
+#[derive(Debug, Clone, clap::Args)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "\
+Ctrl-C ends the work early, writes the pictures and counts as success; a second one, or one before there
+is a picture, leaves at once with status 130.
+
+Examples:
+  lightgrid render kitchen.glb --env meadow.hdr --noise 0.05 -o kitchen.exr -o kitchen.png
+  lightgrid render office --spp 4096 --checkpoint office.checkpoint -o office.exr
+  lightgrid render office --spp 4096 --part 2/8 -o office.2.part
+  lightgrid render car.glb --turntable 48 --spp 64 --denoise -o car.####.png -o car.mp4"
+)]
+pub(in crate::cli) struct RenderArguments {
+    /// A glTF file (.gltf, .glb) or a built-in scene.
+    #[arg(default_value = builtin::DEFAULT_SCENE)]
+    pub(super) scene: String,
+    /// The picture to write: .png or .exr; may be given twice. With --part, one .part.
+    #[arg(short, long = "output", required = true, value_name = "FILE")]
+    pub(super) outputs: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(in crate::cli) of_scene: SceneArguments,
+
+    /// The map: .exr, .hdr, an 8-bit picture, or a built-in sky (sky:day, sky:sunset, sky:night,
+    /// sky:overcast, sky:hallway, each with @WIDTHxHEIGHT if wanted). Without it, sky:day, or the sky of a
+    /// built-in scene.
+    #[arg(long, value_name = "MAP", help_heading = "Environment")]
+    pub(super) env: Option<String>,
+    /// Turns the map about the vertical, in degrees.
+    #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG", help_heading = "Environment")]
+    pub(super) env_rotation: f64,
+    /// What the camera sees of the map: `map`, `blur:DEGREES`, or a colour R,G,B (linear radiance).
+    #[arg(long, value_parser = values::background, allow_hyphen_values = true, value_name = "WHAT", help_heading = "Environment")]
+    pub(super) background: Option<Background>,
+    /// Multiplies the map's radiance.
+    #[arg(long, default_value = "1", value_parser = values::not_negative, value_name = "X", help_heading = "Environment")]
+    pub(super) env_intensity: f32,
+
+    /// Fog: scattering per metre, one number or R,G,B; 0.02 halves what is seen over 35 metres. In
+    /// place of the scene's own fog; 0 clears the air.
+    #[arg(long, value_parser = values::coefficient, allow_hyphen_values = true, value_name = "S", help_heading = "Fog")]
+    pub(super) fog: Option<Vec3>,
+    /// Absorption of the fog per metre, one number or R,G,B.
+    #[arg(long, value_parser = values::coefficient, allow_hyphen_values = true, value_name = "A", help_heading = "Fog")]
+    pub(super) fog_absorption: Option<Vec3>,
+    /// Mean cosine of scattering, -1 to 1: 0 to all sides alike, mist and haze 0.6 to 0.9.
+    #[arg(long, value_parser = values::mean_cosine, allow_hyphen_values = true, value_name = "G", help_heading = "Fog")]
+    pub(super) fog_anisotropy: Option<f32>,
+    /// Lower and upper corner of the fog in metres; without it, the fog fills the scene's own box.
+    #[arg(long, value_parser = values::corners, allow_hyphen_values = true, value_name = "X,Y,Z,X,Y,Z", help_heading = "Fog")]
+    pub(super) fog_box: Option<[Vec3; 2]>,
+
+    /// Which of the file's cameras, counted from 0.
+    #[arg(long, value_name = "N", help_heading = "Camera")]
+    pub(super) camera: Option<usize>,
+    /// Camera position in metres, instead of a camera of the file.
+    #[arg(long, value_parser = values::vector, requires = "target", allow_hyphen_values = true, value_name = "X,Y,Z", help_heading = "Camera")]
+    pub(super) eye: Option<Vec3>,
+    /// What the camera at --eye looks at.
+    #[arg(long, value_parser = values::vector, requires = "eye", allow_hyphen_values = true, value_name = "X,Y,Z", help_heading = "Camera")]
+    pub(super) target: Option<Vec3>,
+    /// Vertical field of view in degrees.
+    #[arg(long, value_parser = values::positive, value_name = "DEG", help_heading = "Camera")]
+    pub(super) fov: Option<f64>,
+    /// Radius of a thin lens in metres; 0 keeps everything sharp.
+    #[arg(long, value_parser = values::not_negative, value_name = "M", help_heading = "Camera")]
+    pub(super) lens_radius: Option<f32>,
+    /// Distance at which the picture is sharp, in metres.
+    #[arg(long, value_parser = values::positive, value_name = "M", help_heading = "Camera")]
+    pub(super) focus: Option<f64>,
+
+    /// Picture size in pixels.
+    #[arg(long, default_value = "1280x720", value_parser = values::size, allow_hyphen_values = true, value_name = "WxH", help_heading = "Picture")]
+    pub(super) size: (u32, u32),
+    /// Renders only this part of the picture: its left and top, width and height in pixels.
+    #[arg(long, value_parser = values::region, allow_hyphen_values = true, value_name = "X,Y,W,H", help_heading = "Picture")]
+    pub(super) region: Option<[u32; 4]>,
+    /// Pixel filter.
+    #[arg(long, default_value = "blackman-harris", value_enum, help_heading = "Picture")]
+    pub(super) filter: PixelFilter,
+    #[command(flatten)]
+    pub(super) picture: PictureArguments,
+
+    /// Stop at this many samples per pixel (256 if no stop rule is given).
+    #[arg(long, visible_alias = "samples", value_parser = clap::value_parser!(u32).range(1..), value_name = "N", help_heading = "Stop")]
+    pub(super) spp: Option<u32>,
+    /// Stop after this many seconds of learning and rendering.
+    #[arg(long, value_parser = values::positive, value_name = "S", help_heading = "Stop")]
+    pub(super) seconds: Option<f64>,
+    /// Stop when the estimated relative RMS error falls below this, e.g. 0.05.
+    #[arg(long, value_parser = values::positive, value_name = "E", help_heading = "Stop")]
+    pub(super) noise: Option<f64>,
+
+    /// How the map is sampled.
+    #[arg(long, default_value = "adaptive", value_enum, help_heading = "Light")]
+    pub(super) sampling: Sampling,
+    /// Whether the pixels of a tile share what their paths find behind the second vertex: less noise at
+    /// each pixel, but coarser. `auto` is 8x8 for adaptive sampling in clear air from 64x64 pixels on
+    /// that are not denoised.
+    #[arg(
+        long,
+        default_value = "auto",
+        value_enum,
+        value_name = "off|4x4|8x8|auto",
+        help_heading = "Light"
+    )]
+    pub(super) sharing: Sharing,
+    /// What becomes of light that has met several surfaces.
+    #[arg(
+        long,
+        default_value = "exact",
+        value_enum,
+        value_name = "exact|cached",
+        help_heading = "Light"
+    )]
+    pub(super) gi: Gi,
+    /// Importance table of the map: tile-local, u32, f32, f64.
+    #[arg(long, default_value = "tile-local", value_name = "KIND", help_heading = "Light")]
+    pub(super) table: TableKind,
+    /// Surface vertices at which a path gathers light; 1 is direct light only.
+    #[arg(long, default_value = "8", value_parser = clap::value_parser!(u32).range(0..=100_000), value_name = "N", help_heading = "Light")]
+    pub(super) bounces: u32,
+    /// Never end dim paths at random.
+    #[arg(long, help_heading = "Light")]
+    pub(super) no_russian_roulette: bool,
+    /// Tiles of the map, columns x rows.
+    #[arg(long, default_value = "16x8", value_parser = tile_grid, allow_hyphen_values = true, value_name = "CxR", help_heading = "Light")]
+    pub(super) tiles: (u32, u32),
+    /// Light Grid cells around the horizon; half as many from top to bottom.
+    #[arg(long, default_value = "64", value_parser = clap::value_parser!(u32).range(2..=512), value_name = "N", help_heading = "Light")]
+    pub(super) grid: u32,
+    /// Camera paths to learn from before rendering, which goes on learning; without it, as many as
+    /// suit the picture.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000), value_name = "N", help_heading = "Light")]
+    pub(super) learning_paths: Option<u64>,
+
+    /// Seed of the random numbers; the same seed gives the same picture.
+    #[arg(long, default_value = "0", value_name = "N", help_heading = "Run")]
+    pub(super) seed: u32,
+    /// Where to render: auto takes a GPU if there is a real one and everything fits on it.
+    #[arg(long, default_value = "auto", value_enum, help_heading = "Run")]
+    pub(super) device: DeviceChoice,
+    /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
+    #[arg(long, value_name = "NAME", help_heading = "Run")]
+    pub(super) adapter: Option<String>,
+    /// What finds the surfaces that rays hit on a GPU.
+    #[arg(long, default_value = "auto", value_enum, help_heading = "Run")]
+    pub(super) rays: RayChoice,
+    /// How a GPU's kernels share the work: one does all, or three take turns; without it, what suits the
+    /// scene. The picture is the same.
+    #[arg(long, value_enum, help_heading = "Run")]
+    pub(super) schedule: Option<Schedule>,
+    /// Threads; 0 uses every core.
+    #[arg(long, default_value = "0", value_parser = clap::value_parser!(u16).range(0..=1024), value_name = "N", help_heading = "Run")]
+    pub(super) threads: u16,
+    /// Leaves times out of what pictures say about themselves: equal pictures are equal files.
+    #[arg(long, help_heading = "Run")]
+    pub(super) reproducible: bool,
+    /// Writes the run's figures as JSON.
+    #[arg(long, value_name = "FILE", help_heading = "Run")]
+    pub(super) json: Option<PathBuf>,
+    /// Writes what was learned, each cell's probability of each tile: .csv, .json or .exr.
+    #[arg(long, alias = "laws", value_name = "FILE", help_heading = "Run")]
+    pub(super) distributions: Option<PathBuf>,
+
+    /// Renders only this share of every pixel's samples, such as 2/8, into a .part for `lightgrid
+    /// merge`. All parts take the same options, of which those for .png and .exr are for merge.
+    #[arg(long, value_parser = values::part, conflicts_with_all = ["seconds", "noise"], value_name = "I/N", help_heading = "Farm")]
+    pub(super) part: Option<Part>,
+    /// Keeps what is done in this file; the same command goes on from it, should this one be killed.
+    #[arg(long, value_name = "FILE", help_heading = "Farm")]
+    pub(super) checkpoint: Option<PathBuf>,
+    /// Seconds between two writings of the checkpoint.
+    #[arg(long, requires = "checkpoint", default_value = "60", value_parser = values::positive, value_name = "S", help_heading = "Farm")]
+    pub(super) checkpoint_every: f64,
+
+    /// Renders these frames of the camera's movement in the file, or of a turn: 0..47, or one number.
+    /// Outputs are out.####.png, or .mp4, .webm and .gif by ffmpeg. Frame N is at N / fps seconds.
+    #[arg(long, value_parser = values::frames, value_name = "A..B", help_heading = "Frames")]
+    pub(super) frames: Option<RangeInclusive<u32>>,
+    /// Turns the camera once in so many frames about the vertical through --target; without it, through
+    /// what the middle of the picture shows or, in a room, the camera itself.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000), value_name = "N", help_heading = "Frames")]
+    pub(super) turntable: Option<u32>,
+    /// Frames per second.
+    #[arg(long, default_value = "24", value_parser = values::positive, value_name = "F", help_heading = "Frames")]
+    pub(super) fps: f64,
+    /// A frame of a video, which nobody asked for by name.
+    #[arg(skip)]
+    pub(super) frame_of_video: Option<PathBuf>,
+}
+
+fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
+    let (columns, rows) = values::pair(text)?;
+    if columns > 256 || rows > 256 {
+        return Err("at most 256x256 tiles".to_owned());
+    }
+    Ok((columns, rows))
+}
+
+impl RenderArguments {
+    /// Name of the map.
+    pub(in crate::cli) fn map(&self) -> &str {
+        self.env.as_deref().unwrap_or_else(|| builtin::sky(&self.scene))
+    }
+
+    /// Defaults but for scene, map, picture, sampling, (size, samples, seconds) and (device,
+    /// adapter, rays).
+    pub(in crate::cli) fn for_picture(
+        scene: &str,
+        map: &str,
+        picture: &Path,
+        sampling: Sampling,
+        (size, samples, seconds): (Option<(u32, u32)>, Option<u32>, Option<f64>),
+        (device, adapter, rays): (DeviceChoice, Option<String>, RayChoice),
+    ) -> Self {
+        Self {
+            scene: scene.to_owned(),
+            of_scene: SceneArguments::default(),
+            outputs: vec![picture.to_owned()],
+            env: Some(map.to_owned()),
+            env_rotation: 0.0,
+            env_intensity: 1.0,
+            background: None,
+            region: None,
+            fog: None,
+            fog_absorption: None,
+            fog_anisotropy: None,
+            fog_box: None,
+            camera: None,
+            eye: None,
+            target: None,
+            fov: None,
+            lens_radius: None,
+            focus: None,
+            size: size.unwrap_or((1280, 720)),
+            filter: PixelFilter::default(),
+            picture: PictureArguments::default(),
+            spp: samples,
+            seconds,
+            noise: None,
+            sampling,
+            sharing: Sharing::Auto,
+            gi: Gi::Exact,
+            table: TableKind::default(),
+            bounces: 8,
+            no_russian_roulette: false,
+            tiles: (16, 8),
+            grid: 64,
+            learning_paths: None,
+            seed: 0,
+            device,
+            adapter,
+            rays,
+            schedule: None,
+            threads: 0,
+            reproducible: false,
+            json: None,
+            distributions: None,
+            part: None,
+            checkpoint: None,
+            checkpoint_every: 60.0,
+            frames: None,
+            turntable: None,
+            fps: 24.0,
+            frame_of_video: None,
+        }
+    }
+
+    pub(super) fn environment_options(&self) -> EnvironmentOptions {
+        EnvironmentOptions {
+            table: self.table,
+            tile_columns: self.tiles.0,
+            tile_rows: self.tiles.1,
+            rotation_radians: self.env_rotation.to_radians() as f32,
+            intensity: self.env_intensity,
+            ..EnvironmentOptions::default()
+        }
+    }
+
+    pub(super) fn stop_rule(&self) -> StopRule {
+        let none = self.spp.is_none() && self.seconds.is_none() && self.noise.is_none();
+        StopRule {
+            samples: self.spp.or(none.then_some(256)),
+            seconds: self.seconds,
+            noise: self.noise,
+        }
+    }
+
+    /// A picture to be denoised gains nothing from noise that neighbours share, which filters keep.
+    pub(super) fn sharing(&self) -> Sharing {
+        match self.sharing {
+            Sharing::Auto if self.picture.denoise.is_some() => Sharing::Off,
+            asked => asked,
+        }
+    }
+
+    /// Width and height of what is rendered.
+    pub(super) fn size(&self) -> [u32; 2] {
+        self.region.map_or(self.size.into(), |[_, _, width, height]| [width, height])
+    }
+
+    pub(super) fn view(&self, world: &World, camera: Camera) -> View {
+        let size = self.size();
+        View {
+            filter: self.filter,
+            sampling: self.sampling,
+            limits: PathLimits {
+                bounces: self.bounces,
+                russian_roulette: !self.no_russian_roulette,
+            },
+            seed: self.seed,
+            grid_columns: self.grid,
+            sharing: self.sharing(),
+            gi: self.gi,
+            learning_paths: self
+                .learning_paths
+                .unwrap_or_else(|| View::suitable_learning_paths(self.sampling, size, self.spp)),
+            medium: self.medium(&world.scene),
+            background: self.background.unwrap_or_default(),
+            crop: self.region.map(|[left, top, ..]| Crop {
+                corner: [left, top],
+                whole: [self.size.0, self.size.1],
+            }),
+            layers: self.picture.wants_surfaces(),
+            ..View::new(camera, size)
+        }
+    }
+
+    /// The medium the options ask for: what they leave out is the scene's.
+    fn medium(&self, scene: &Scene) -> Option<Medium> {
+        let RenderArguments { fog, fog_absorption, fog_anisotropy, fog_box, .. } = self;
+        if fog.is_none()
+            && fog_absorption.is_none()
+            && fog_anisotropy.is_none()
+            && fog_box.is_none()
+        {
+            return None;
+        }
+        let of_scene = scene.medium.unwrap_or_default();
+        let cleared = *fog == Some(Vec3::ZERO) && fog_absorption.is_none();
+        Some(Medium {
+            scattering: fog.unwrap_or(of_scene.scattering),
+            absorption: fog_absorption.unwrap_or(if cleared {
+                Vec3::ZERO
+            } else {
+                of_scene.absorption
+            }),
+            anisotropy: fog_anisotropy.unwrap_or(of_scene.anisotropy),
+            bounds: fog_box.or(of_scene.bounds),
+        })
+    }
+
+    pub(super) fn camera(&self, world: &World, notices: &mut Notices) -> Result<Camera> {
+        let cameras = &world.scene.cameras;
+        let mut camera = if let (Some(eye), Some(target)) = (self.eye, self.target) {
+            if eye == target {
+                return Err(Error::new("--eye and --target are the same point"));
+            }
+            Camera::look_at(eye, target, 0.9)
+        } else if let Some(index) = self.camera {
+            cameras.get(index).cloned().ok_or_else(|| {
+                let there_are = match cameras.len() {
+                    0 => "no camera".to_owned(),
+                    1 => "one camera, number 0".to_owned(),
+                    count => format!("cameras 0 to {}", count - 1),
+                };
+                Error::new(format!("--camera {index}: {} has {there_are}", self.scene))
+            })?
+        } else if let Some(camera) = cameras.first() {
+            camera.clone()
+        } else {
+            let chosen = framing::frame(world, self.size.0 as f32 / self.size.1 as f32);
+            let eye = chosen.world_from_camera.translation;
+            let target = eye - chosen.world_from_camera.matrix3.z_axis * chosen.focus_distance;
+            notices.add(format!(
+                "{} has no camera; the view is --eye {},{},{} --target {},{},{} --fov {:.1}",
+                self.scene,
+                eye.x,
+                eye.y,
+                eye.z,
+                target.x,
+                target.y,
+                target.z,
+                framing::FOV_Y_RADIANS.to_degrees(),
+            ));
+            chosen
+        };
+        if let Some(degrees) = self.fov {
+            if degrees >= 179.0 {
+                return Err(Error::new(format!("--fov {degrees}: must be below 179 degrees")));
+            }
+            camera.projection =
+                Projection::Perspective { fov_y_radians: degrees.to_radians() as f32 };
+        }
+        camera.lens_radius = self.lens_radius.unwrap_or(camera.lens_radius);
+        camera.focus_distance = self.focus.map_or(camera.focus_distance, |f| f as f32);
+        Ok(camera)
+    }
+}
