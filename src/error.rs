@@ -12,6 +12,9 @@ pub struct Error {
 /// Result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// What a decoder returns: the error is the cause, to which the caller adds the file's name.
+pub(crate) type Decoded<T> = std::result::Result<T, String>;
+
 impl Error {
     /// An error that is not about one file.
     pub fn new(message: impl Into<String>) -> Self {

@@ -1,6 +1,6 @@
 //! Asking for memory before taking it: a program that is refused memory ends, one that asks can say so.
 
-use crate::image::Decoded;
+use crate::error::Decoded;
 
 /// What is got without asking.
 const SMALL: u64 = 16 << 20;

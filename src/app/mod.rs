@@ -114,7 +114,7 @@ pub struct App {
     speed_up: Option<SpeedUp>,
     shown: Option<Arc<Shown>>,
     screen: Screen,
-    textures: panels::viewport::Textures,
+    textures: panels::scope::Textures,
     /// What errors are measured against, and one that has just been read.
     reference: Option<Arc<Reference>>,
     arriving: Arc<Mutex<Option<Arc<Reference>>>>,
@@ -178,7 +178,7 @@ impl App {
             speed_up: None,
             shown: None,
             screen,
-            textures: panels::viewport::Textures::default(),
+            textures: panels::scope::Textures::default(),
             reference: None,
             arriving: Arc::default(),
             later: channel(),
@@ -221,7 +221,7 @@ impl App {
         let name = screen.gpu().facts().short_name();
         self.messages.notice(format!("{why}; the window goes on with {name}"));
         self.worker.move_to(screen.gpu().clone());
-        self.textures = panels::viewport::Textures::default();
+        self.textures = panels::scope::Textures::default();
         // It is on the device that was lost.
         self.shown = None;
         self.screen = screen;
@@ -376,7 +376,7 @@ impl App {
     fn viewport(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
         let past = self.past().map(|kept| kept.name.clone());
         let settings = self.develop_settings();
-        let mut scope = panels::viewport::Scope {
+        let mut scope = panels::scope::Scope {
             document: &mut self.document,
             interface: &mut self.interface,
             textures: &mut self.textures,

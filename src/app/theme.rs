@@ -1,6 +1,9 @@
 //! Colours, spacing and small pieces of layout that all panels share.
 
-use egui::{Color32, CornerRadius, FontId, Margin, RichText, Stroke, TextStyle, Ui, Vec2, Visuals};
+use egui::{
+    Align2, Color32, CornerRadius, FontId, Margin, Pos2, RichText, Shape, Stroke, TextStyle, Ui,
+    Vec2, Visuals,
+};
 
 /// Behind everything.
 pub(super) const BACKGROUND: Color32 = Color32::from_rgb(24, 25, 28);
@@ -96,7 +99,7 @@ pub(super) fn row<R>(ui: &mut Ui, name: &str, hint: &str, add: impl FnOnce(&mut 
             ui.allocate_exact_size(Vec2::new(LABEL_WIDTH, height), egui::Sense::hover());
         ui.painter().text(
             rect.left_center(),
-            egui::Align2::LEFT_CENTER,
+            Align2::LEFT_CENTER,
             name,
             TextStyle::Body.resolve(ui.style()),
             TEXT,
@@ -162,6 +165,15 @@ pub(super) fn clock(seconds: f64) -> String {
         60..3600 => format!("{}:{:02}", whole / 60, whole % 60),
         _ => format!("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60),
     }
+}
+
+/// Text on a dark plate.
+pub(in crate::app) fn badge(ui: &Ui, at: Pos2, align: Align2, text: &str, color: Color32) {
+    let galley = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(13.0), color);
+    let rect = align.anchor_size(at, galley.size());
+    let plate = rect.expand2(Vec2::new(8.0, 4.0));
+    ui.painter().add(Shape::rect_filled(plate, 5.0, Color32::from_black_alpha(170)));
+    ui.painter().galley(rect.min, galley, color);
 }
 
 #[cfg(test)]

@@ -6,7 +6,8 @@ use std::arch::x86_64::{
     _mm256_set1_ps, _mm256_storeu_ps, _mm256_sub_ps,
 };
 
-use super::traverse::{self, Lanes, TreeRef};
+use super::lanes::Lanes;
+use super::traverse::{self, TreeRef};
 use super::wide::WIDTH;
 use super::{Hit, Ray};
 

@@ -5,6 +5,7 @@
 
 mod build;
 pub(crate) mod compressed;
+mod lanes;
 mod traverse;
 mod triangle;
 mod wide;
@@ -17,7 +18,8 @@ use std::mem::size_of_val;
 use crate::huge_pages::on_huge_pages;
 use glam::{IVec3, Vec2, Vec3};
 
-use traverse::{Portable, TreeRef};
+use lanes::Portable;
+use traverse::TreeRef;
 use wide::{Block, Node};
 
 /// Points `origin + t * direction` with `t_min <= t <= t_max`.

@@ -1,96 +1,13 @@
-//! The walk through the tree, written once over eight lanes of f32, and the portable lanes.
+//! The walk through the tree, written once over eight lanes of f32.
 
 use std::mem::MaybeUninit;
 
 use glam::Vec3;
 
+use super::lanes::{Bits, Lanes};
 use super::triangle::{self, BlockHits, Shear};
 use super::wide::{Block, LEAF, Node, Reference, STACK_CAPACITY, WIDTH};
 use super::{Hit, Ray};
-
-/// Eight lanes of f32. Comparisons return one bit a lane and are false for NaN.
-pub(super) trait Lanes: Copy {
-    fn splat(value: f32) -> Self;
-    fn load(values: &[f32; WIDTH]) -> Self;
-    fn store(self) -> [f32; WIDTH];
-    fn add(self, other: Self) -> Self;
-    fn sub(self, other: Self) -> Self;
-    fn mul(self, other: Self) -> Self;
-    fn div(self, other: Self) -> Self;
-    /// `self * factor + term`; whether it is rounded once or twice is up to the machine.
-    fn mul_add(self, factor: Self, term: Self) -> Self;
-    fn min(self, other: Self) -> Self;
-    fn max(self, other: Self) -> Self;
-    fn le(self, other: Self) -> u32;
-    fn eq(self, other: Self) -> u32;
-}
-
-/// Lanes for every machine: loops that the compiler turns into whatever vectors it may use.
-#[derive(Clone, Copy)]
-pub(super) struct Portable([f32; WIDTH]);
-
-impl Portable {
-    #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
-        Self(std::array::from_fn(|i| f(self.0[i], other.0[i])))
-    }
-
-    #[inline(always)]
-    fn mask(self, other: Self, f: impl Fn(f32, f32) -> bool) -> u32 {
-        (0..WIDTH).fold(0, |mask, i| mask | u32::from(f(self.0[i], other.0[i])) << i)
-    }
-}
-
-impl Lanes for Portable {
-    #[inline(always)]
-    fn splat(value: f32) -> Self {
-        Self([value; WIDTH])
-    }
-    #[inline(always)]
-    fn load(values: &[f32; WIDTH]) -> Self {
-        Self(*values)
-    }
-    #[inline(always)]
-    fn store(self) -> [f32; WIDTH] {
-        self.0
-    }
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
-    }
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
-    }
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.zip(other, |a, b| a * b)
-    }
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        self.zip(other, |a, b| a / b)
-    }
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        self.mul(factor).add(term)
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a < b { a } else { b })
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a > b { a } else { b })
-    }
-    #[inline(always)]
-    fn le(self, other: Self) -> u32 {
-        self.mask(other, |a, b| a <= b)
-    }
-    #[inline(always)]
-    fn eq(self, other: Self) -> u32 {
-        self.mask(other, |a, b| a == b)
-    }
-}
 
 /// A borrowed tree.
 #[derive(Clone, Copy)]
@@ -230,23 +147,6 @@ impl Stack {
             at -= 1;
         }
         self.entries[at].write(entry);
-    }
-}
-
-/// The positions of set bits among the lowest eight.
-pub(super) struct Bits(pub(super) u32);
-
-impl Iterator for Bits {
-    type Item = usize;
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<usize> {
-        if self.0 == 0 {
-            return None;
-        }
-        let lane = self.0.trailing_zeros() as usize % WIDTH;
-        self.0 &= self.0 - 1;
-        Some(lane)
     }
 }
 

@@ -3,7 +3,7 @@
 
 use glam::{DVec3, Vec2};
 
-use super::traverse::{Bits, Lanes};
+use super::lanes::{Bits, Lanes};
 use super::wide::{Block, WIDTH};
 use super::{Hit, Ray};
 

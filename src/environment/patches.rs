@@ -7,6 +7,8 @@
 //! read there. (Linear in the angle itself, as others have it, differs by the share
 //! `pi / (8 height tan(theta))` of two texels' difference: 0.08 % at 512 rows, halfway to the pole.)
 
+use glam::Vec2;
+
 use std::f64::consts::{PI, TAU};
 
 use super::Lookup;
@@ -132,6 +134,19 @@ pub(crate) fn sample_linear(a: f32, b: f32, u: f32) -> f32 {
 }
 
 const SAFE_TO_SQUARE: f32 = 1e15;
+
+/// A patch chosen by a table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PatchSample {
+    /// Column.
+    pub(crate) x: u32,
+    /// Row.
+    pub(crate) y: u32,
+    /// What the random numbers have left, uniform in `[0,1]`^2.
+    pub(crate) within: Vec2,
+    /// Probability of the patch given the tile.
+    pub(crate) probability: f32,
+}
 
 #[cfg(test)]
 mod tests {

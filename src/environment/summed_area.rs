@@ -12,7 +12,7 @@ use std::ops::Range;
 use glam::DVec2;
 
 use super::TableKind;
-use super::table::PatchSample;
+use super::patches::PatchSample;
 use super::tiles::TilePatches;
 use super::weights::Weights;
 

@@ -3,26 +3,14 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use glam::{DVec2, Vec2};
+use glam::DVec2;
 
 use super::TableKind;
+use super::patches::PatchSample;
 use super::summed_area::{RectangleTable, SummedArea};
 use super::tile_local::TileLocal;
 use super::tiles::TileGrid;
 use super::weights::Weights;
-
-/// A patch chosen by a table.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PatchSample {
-    /// Column.
-    pub(crate) x: u32,
-    /// Row.
-    pub(crate) y: u32,
-    /// What the random numbers have left, uniform in `[0,1]`^2.
-    pub(crate) within: Vec2,
-    /// Probability of the patch given the tile.
-    pub(crate) probability: f32,
-}
 
 /// An importance table of any kind.
 #[derive(Debug, Clone)]

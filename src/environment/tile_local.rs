@@ -10,7 +10,7 @@
 use glam::Vec2;
 use rayon::prelude::*;
 
-use super::table::PatchSample;
+use super::patches::PatchSample;
 use super::tiles::{TileGrid, TilePatches};
 use super::weights::Weights;
 use crate::huge_pages::zeros_on_huge_pages;

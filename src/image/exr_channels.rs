@@ -3,8 +3,7 @@
 use exr::meta::attribute::ChannelDescription;
 use exr::meta::header::Header;
 
-use super::Decoded;
-use crate::error::Notices;
+use crate::error::{Decoded, Notices};
 
 /// What the picture is made of: indices into the part's channel list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

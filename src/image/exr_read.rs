@@ -20,8 +20,8 @@ use super::exr_patch::patch;
 use super::file::{open_file, read_cause, read_file};
 use super::guard::catch_panic;
 use super::primaries::rec709_conversion;
-use super::{Decoded, Image, check_size};
-use crate::error::{Error, Notices, Result};
+use super::{Image, check_size};
+use crate::error::{Decoded, Error, Notices, Result};
 use crate::memory;
 
 /// Linear Rec.709 pixels of an OpenEXR file, not repaired in any way.

@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
-use super::Decoded;
-use crate::error::{Error, Result};
+use crate::error::{Decoded, Error, Result};
 use crate::memory;
 
 /// Writes a file through a temporary one in the same folder, flushed to the disk and then renamed:

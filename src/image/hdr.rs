@@ -2,8 +2,9 @@
 //!
 //! Format: Greg Ward, "Real Pixels", Graphics Gems II; Radiance's `color.c` and `resolu.c`.
 
-use super::{Decoded, Image, check_size};
+use super::{Image, check_size};
 use crate::color::REC709_FROM_XYZ;
+use crate::error::Decoded;
 use crate::memory;
 use glam::Vec3;
 

@@ -10,9 +10,9 @@ use super::file::{open_file, read_cause, read_file};
 use super::guard::catch_panic;
 use super::hdr::decode_hdr;
 use super::ldr::{decoder_bytes, decoder_cause};
-use super::{Decoded, Image, MAX_PIXELS, MAX_SIDE, check_size};
+use super::{Image, MAX_PIXELS, MAX_SIDE, check_size};
 use crate::color::linear_from_srgb;
-use crate::error::{Error, Notices, Result};
+use crate::error::{Decoded, Error, Notices, Result};
 
 /// An environment map: finite, non-negative radiance, and what had to be done to get it.
 #[derive(Debug, Clone, PartialEq)]

@@ -26,6 +26,7 @@ pub use png::{encode_png, write_png};
 
 pub mod ldr;
 
+use crate::error::Decoded;
 use crate::memory;
 
 /// A picture: linear Rec.709 radiance, row 0 at the top.
@@ -98,9 +99,6 @@ pub struct Rgb8 {
     /// `width * height` RGB triples, row after row.
     pub pixels: Vec<[u8; 3]>,
 }
-
-/// What a decoder returns: the error is the cause, to which the caller adds the file's name.
-pub(crate) type Decoded<T> = Result<T, String>;
 
 /// Most pixels a picture may have: 16384 x 16384, 3.2 GB of RGB.
 const MAX_PIXELS: u64 = 1 << 28;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::cells::{MEDIUM_FACE, SphericalGrid, face_axis};
 use super::counters::{Counters, Tally};
-use super::learning::DistributionOptions;
+use super::options::DistributionOptions;
 use super::tile_distributions::TileDistributions;
 use crate::environment::Environment;
 

@@ -10,6 +10,7 @@ pub mod cells;
 pub mod counters;
 mod distribution_builder;
 mod learning;
+mod options;
 pub mod tile_distributions;
 mod transfer;
 
@@ -17,7 +18,8 @@ use crate::sampler::hash;
 use cells::SphericalGrid;
 use tile_distributions::{TileChoice, TileDistributions};
 
-pub use learning::{DistributionOptions, LearningGrid, Recording};
+pub use learning::LearningGrid;
+pub use options::{DistributionOptions, Recording};
 
 /// Index of the distribution proportional to the whole map's tile energies.
 pub const WHOLE_MAP: u32 = 0;

@@ -14,8 +14,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::digest::Digest;
-use crate::error::{Error, Result};
-use crate::image::{Decoded, open_file, read_cause, read_file, write_beside_and_rename};
+use crate::error::{Decoded, Error, Result};
+use crate::image::{open_file, read_cause, read_file, write_beside_and_rename};
 use crate::memory;
 use crate::render::Figures;
 use crate::render::film::{Film, Pixel, Surface};

@@ -1,8 +1,9 @@
-//! What there is to say of devices, be the code for GPUs built in or not.
+//! Where to render.
 
 use serde::{Deserialize, Serialize};
 
-use super::gpu::{self, Gpu, KernelFacts};
+use super::gpu::{self, Gpu};
+use super::gpu_facts::AdapterFacts;
 use crate::error::{Error, Result};
 
 /// Where to render.
@@ -48,102 +49,4 @@ impl DeviceChoice {
             (_, name) => Gpu::open_or_share(name, shared).map(Some),
         }
     }
-}
-
-/// What finds the surfaces that rays hit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum RayChoice {
-    /// A real GPU's own ray queries where it has them, else our kernels.
-    #[default]
-    Auto,
-    /// The GPU's ray queries, or an error. They are not watertight to the last bit: a ray along an edge
-    /// may hit another triangle or, seldom, none.
-    Hardware,
-    /// Our kernels.
-    Software,
-}
-
-/// How kernels share the work of rendering.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Schedule {
-    /// One does all.
-    Whole,
-    /// Three take turns.
-    Queue,
-}
-
-/// What is asked of rays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Question {
-    /// Where they end.
-    ClosestHit,
-    /// How much light comes along them.
-    Transmittance,
-}
-
-/// What an adapter is and how much it allows.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct AdapterFacts {
-    /// Name of the device.
-    pub name: String,
-    /// Vulkan, OpenGL, Metal or DX12.
-    pub backend: String,
-    /// `discrete`, `integrated`, `virtual`, `software` or `other`.
-    pub kind: &'static str,
-    /// Driver and version.
-    pub driver: String,
-    /// Most bytes of one storage binding.
-    pub storage_binding_bytes: u64,
-    /// Most bytes of one buffer.
-    pub buffer_bytes: u64,
-    /// Most storage buffers of a shader.
-    pub storage_buffers: u32,
-    /// Whether path tracing shaders can run at all.
-    pub can_compute: bool,
-    /// Whether it finds what rays hit by itself.
-    pub has_ray_queries: bool,
-}
-
-impl AdapterFacts {
-    /// The name without what stands in brackets.
-    pub fn short_name(&self) -> &str {
-        self.name.split(" (").next().unwrap_or(&self.name)
-    }
-
-    /// Whether it only pretends to be a GPU.
-    pub fn is_software(&self) -> bool {
-        self.kind == "software"
-    }
-}
-
-/// What dispatches took.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct FlightFigures {
-    /// Dispatches that have ended.
-    pub dispatches: u64,
-    /// Seconds they took on the device: its own timestamps, or what the host saw.
-    pub device_seconds: f64,
-    /// Whether these are the device's timestamps.
-    pub has_timestamps: bool,
-}
-
-/// What was left out of the kernels and what they take.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct GpuFigures {
-    /// The device.
-    pub adapter: AdapterFacts,
-    /// Bytes of all buffers on it.
-    pub device_bytes: u64,
-    /// Bytes read back from it for this picture.
-    pub bytes_read: u64,
-    /// What its dispatches took.
-    pub flights: FlightFigures,
-    /// Seconds in which the driver compiled its kernels, when it did.
-    pub compile_seconds: f64,
-    /// How its kernels share the work.
-    pub schedule: Schedule,
-    /// What its render kernel holds.
-    pub kernel: KernelFacts,
 }

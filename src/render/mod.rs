@@ -7,6 +7,7 @@ pub mod filter;
 mod gi;
 #[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;
+mod gpu_facts;
 mod outlook;
 mod pass;
 mod progress;

@@ -16,10 +16,9 @@ use crate::path::World;
 use crate::path::camera::CameraRays;
 use crate::radiance_cache::{RadianceCache, RadianceSums};
 
-pub(crate) use super::devices::Question;
-pub use super::devices::{
-    AdapterFacts, DeviceChoice, FlightFigures, GpuFigures, RayChoice, Schedule,
-};
+pub use super::devices::DeviceChoice;
+pub(crate) use super::gpu_facts::Question;
+pub use super::gpu_facts::{AdapterFacts, FlightFigures, GpuFigures, RayChoice, Schedule};
 
 /// What is said where a GPU is asked for.
 pub(crate) const NO_GPU: &str = "this lightgrid was built without GPU rendering (feature `gpu`)";

@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 use super::machine::{Machine, OpenDevice};
 use super::measure::{Run, measure};
 use super::pages::{duration, row_sentence};
-use super::plan::{Device, Method, Plan, Row};
+use super::plan::{LEAST_PICTURES, Method, Plan, Row};
 use super::prepared_row::PreparedRow;
-use super::reference::{LEAST_PICTURES, Reference, read_reference};
+use super::reference::{Reference, read_reference};
 use super::store::Store;
 use super::summary::{DeviceReport, Pictures, Report, RowReport, summarise};
 use crate::digest::Digest;
@@ -379,9 +379,4 @@ pub fn check(plan: &Plan) -> Result<()> {
 /// Under which name a run's last picture without noise is kept.
 fn denoised(key: &str) -> String {
     format!("{key}_denoised")
-}
-
-/// Which devices a plan measures on, in words.
-pub(super) fn device_names(devices: &[Device]) -> String {
-    devices.iter().map(|d| d.title()).collect::<Vec<_>>().join(" and ")
 }

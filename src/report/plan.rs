@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::reference::LEAST_PICTURES;
 use crate::environment::{EnvironmentOptions, TableKind};
 use crate::light_grid::DistributionOptions;
 use crate::path::PathLimits;
@@ -12,6 +11,9 @@ use crate::render::filter::PixelFilter;
 use crate::render::{Gi, Sampling, Sharing, View};
 use crate::sampler::Points;
 use crate::scene::Camera;
+
+/// Fewest pictures: their spread must be worth something.
+pub(super) const LEAST_PICTURES: u32 = 8;
 
 /// A device to measure on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -31,6 +33,11 @@ impl Device {
             Self::Gpu => "GPU",
         }
     }
+}
+
+/// Which devices a plan measures on, in words.
+pub(super) fn device_names(devices: &[Device]) -> String {
+    devices.iter().map(|d| d.title()).collect::<Vec<_>>().join(" and ")
 }
 
 /// All that a way of rendering may differ in without changing what the picture converges to.

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::{Deserialize, Serialize};
 
 use super::measure::Place;
-use super::plan::Settings;
+use super::plan::{LEAST_PICTURES, Settings};
 use crate::digest::Digest;
 use crate::error::{Error, Result};
 use crate::image::{Image, read_picture, write_beside_and_rename};
@@ -81,9 +81,6 @@ pub(super) struct Reference {
 
 /// Seeds of its pictures begin here, far from those of runs.
 const FIRST_SEED: u32 = 0x5265_6600;
-
-/// Fewest pictures: their spread must be worth something.
-pub(super) const LEAST_PICTURES: u32 = 8;
 
 impl Reference {
     /// The one kept in `folder`, or an empty one that will be.

@@ -5,7 +5,7 @@ use egui::{
 };
 use glam::Vec3;
 
-use super::viewport::{Scope, badge};
+use super::scope::Scope;
 use crate::app::commands::Command;
 use crate::app::document::Viewpoint;
 use crate::app::drag::{Drag, Step};
@@ -47,7 +47,7 @@ fn mark_region(ui: &Ui, whole: Rect, steps: &[Step], scope: &mut Scope<'_>) {
     ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
     let hint = "Drag over the part that is to be rendered";
     let top = Pos2::new(whole.center().x, whole.top() + 14.0);
-    badge(ui, top, Align2::CENTER_TOP, hint, theme::ACCENT);
+    theme::badge(ui, top, Align2::CENTER_TOP, hint, theme::ACCENT);
     let marked = |[from, to]: [Pos2; 2]| Rect::from_two_pos(from, to).intersect(whole);
     if let Some(span) = scope.interface.drag.and_then(|drag| drag.span()) {
         let stroke = Stroke::new(1.5, theme::ACCENT);

@@ -15,6 +15,7 @@ pub(super) mod overlay;
 pub(super) mod picture;
 pub(super) mod prompt;
 pub(super) mod right;
+pub(super) mod scope;
 pub(super) mod shortcuts;
 pub(super) mod status;
 pub(super) mod top;

@@ -1,58 +1,19 @@
 //! The picture.
 
 use egui::{
-    Align2, CentralPanel, Color32, CursorIcon, FontId, Pos2, Rect, Sense, Shape, Stroke,
-    StrokeKind, TextureId, Ui, Vec2,
+    Align2, CentralPanel, Color32, CursorIcon, FontId, Pos2, Rect, Sense, Stroke, StrokeKind,
+    TextureId, Ui, Vec2,
 };
 
 use super::gestures;
-use crate::app::commands::Command;
-use crate::app::document::Document;
+use super::scope::Scope;
 use crate::app::interface::{Interface, Tab};
-use crate::app::loader::LoadedScene;
 use crate::app::presenter::Shown;
-use crate::app::screen::{Developed, Recipe, Screen};
-use crate::app::speed_up::SpeedUp;
+use crate::app::screen::{Developed, Recipe};
 use crate::app::theme;
 use crate::app::worker::{Activity, Snapshot};
 use crate::develop::{DevelopSettings, LinearPicture};
 use crate::render::View;
-
-/// Developed pictures.
-#[derive(Default)]
-pub(in crate::app) struct Textures {
-    /// The last whole picture.
-    main: Option<Developed>,
-    /// A part of it that is rendered alone.
-    part: Option<Developed>,
-    other: Option<Developed>,
-}
-
-impl Textures {
-    /// The picture that is shown, if one was drawn as yet.
-    pub(in crate::app) fn picture(&self, shown: Option<&Shown>) -> Option<&Developed> {
-        let is_part = shown?.order.snapshot.request.view.crop.is_some();
-        if is_part { self.part.as_ref() } else { self.main.as_ref() }
-    }
-}
-
-/// What the viewport is drawn from.
-pub(in crate::app) struct Scope<'a> {
-    pub(in crate::app) document: &'a mut Document,
-    pub(in crate::app) interface: &'a mut Interface,
-    pub(in crate::app) textures: &'a mut Textures,
-    pub(in crate::app) screen: &'a Screen,
-    pub(in crate::app) shown: Option<&'a Shown>,
-    /// How what is shown is developed.
-    pub(in crate::app) settings: Option<DevelopSettings>,
-    pub(in crate::app) snapshot: Option<&'a Snapshot>,
-    pub(in crate::app) speed_up: Option<SpeedUp>,
-    /// Name of the kept picture that is compared.
-    pub(in crate::app) past: Option<&'a str>,
-    pub(in crate::app) scene: Option<&'a LoadedScene>,
-    pub(in crate::app) loading: bool,
-    pub(in crate::app) commands: &'a mut Vec<Command>,
-}
 
 /// Draws the picture and takes gestures.
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
@@ -200,7 +161,7 @@ fn wipe(ui: &Ui, rect: Rect, texture: TextureId, scope: &mut Scope<'_>) -> Rect 
 
 fn wipe_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
     let corner = |x: f32, align: Align2, text: &str| {
-        badge(ui, Pos2::new(x, rect.top() + 14.0), align, text, theme::TEXT);
+        theme::badge(ui, Pos2::new(x, rect.top() + 14.0), align, text, theme::TEXT);
     };
     let noise =
         |noise: f64, samples: u32| format!("{samples} samples, noise {:.1} %", 100.0 * noise);
@@ -226,17 +187,8 @@ fn wipe_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
             speed_up.ratio * speed_up.factor
         );
         let at = Pos2::new(rect.center().x, rect.top() + 14.0);
-        badge(ui, at, Align2::CENTER_TOP, &text, theme::ACCENT);
+        theme::badge(ui, at, Align2::CENTER_TOP, &text, theme::ACCENT);
     }
-}
-
-/// Text on a dark plate.
-pub(super) fn badge(ui: &Ui, at: Pos2, align: Align2, text: &str, color: Color32) {
-    let galley = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(13.0), color);
-    let rect = align.anchor_size(at, galley.size());
-    let plate = rect.expand2(Vec2::new(8.0, 4.0));
-    ui.painter().add(Shape::rect_filled(plate, 5.0, Color32::from_black_alpha(170)));
-    ui.painter().galley(rect.min, galley, color);
 }
 
 /// A ring where the inspector stays.

@@ -9,7 +9,7 @@ use wgpu::{PollType, SubmissionIndex, Surface};
 
 use super::pipeline::Pipeline;
 use crate::error::{Error, Result};
-use crate::render::devices::{AdapterFacts, RayChoice, Schedule};
+use crate::render::gpu_facts::{AdapterFacts, RayChoice, Schedule};
 
 impl AdapterFacts {
     fn of(adapter: &Adapter) -> Self {

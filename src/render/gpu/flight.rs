@@ -10,9 +10,11 @@ use super::GROUP;
 use super::device::Gpu;
 use super::kernel::Kernel;
 use super::pacer::{Pacer, TARGET_SECONDS, WINDOW_TARGET_SECONDS};
-use super::queue::REPORT_BYTES;
 use crate::error::{Error, Result};
-use crate::render::devices::FlightFigures;
+use crate::render::gpu_facts::FlightFigures;
+
+/// Words that the host reads of the work: pixels taken, slots that hold a path, samples, nothing.
+pub(super) const REPORT_BYTES: u64 = 16;
 
 /// Dispatches under way at a time: one runs, one waits, one is being made.
 const MOST: usize = 3;

@@ -8,6 +8,7 @@ mod acceleration;
 mod buffers;
 mod cast;
 mod device;
+mod facts;
 mod features;
 mod film;
 mod flight;
@@ -54,14 +55,13 @@ use shader::{Binding, Constants, Program};
 use sharing::Sharing;
 use uploaded_scene::put_array;
 
-pub(crate) use super::devices::Question;
-pub use super::devices::{
-    AdapterFacts, DeviceChoice, FlightFigures, GpuFigures, RayChoice, Schedule,
-};
+pub use super::devices::DeviceChoice;
+pub(crate) use super::gpu_facts::Question;
+pub use super::gpu_facts::{AdapterFacts, FlightFigures, GpuFigures, RayChoice, Schedule};
 pub(crate) use device::NO_GPU;
 pub use device::{Gpu, adapters};
+pub use facts::KernelFacts;
 pub(crate) use film::DeviceFilm;
-pub use kernel::KernelFacts;
 pub use uploaded_scene::UploadedScene;
 
 /// Pixels along a side of a workgroup's tile.

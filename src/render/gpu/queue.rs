@@ -7,21 +7,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::super::Pass;
 use super::buffers::Buffers;
 use super::device::Gpu;
-use super::flight::Job;
+use super::flight::{Job, REPORT_BYTES};
 use super::kernel::Kernel;
 use super::layout::Work;
 use super::shader::SlotTexels;
 use super::{GROUP, Progress, Renderer};
 use crate::error::Result;
 use crate::features::Features;
-use crate::render::devices::Schedule;
+use crate::render::gpu_facts::Schedule;
 
 /// Most workgroups of slots: they keep the largest devices busy and fit their caches.
 const MOST_GROUPS: u64 = 4096;
 /// Most steps of all slots in one submission.
 const MOST_STEPS: u64 = 64;
-/// Words that the host reads of the work: pixels taken, slots that hold a path, samples, nothing.
-pub(super) const REPORT_BYTES: u64 = 16;
 
 impl Schedule {
     /// What suits a picture on a device.

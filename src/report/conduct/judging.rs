@@ -2,8 +2,9 @@
 
 use super::super::bias::Bias;
 use super::super::measure::Run;
+use super::super::plan::LEAST_PICTURES;
 use super::super::plan::{SHARE_RUNS, Settings};
-use super::super::reference::{LEAST_PICTURES, Noise};
+use super::super::reference::Noise;
 use super::super::shares::shares;
 use super::super::summary::{Measure, ReferenceReport};
 use super::{Conductor, Work};

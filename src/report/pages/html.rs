@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::super::conduct::device_names;
+use super::super::plan::device_names;
 use super::super::summary::Report;
 use super::words::percent;
 use super::{escape, overview, sections};

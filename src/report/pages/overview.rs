@@ -4,10 +4,12 @@ use std::fmt::Write as _;
 
 use super::super::summary::{DeviceReport, Measure, MethodReport, Report, RowReport};
 use super::plots::{Entry, ratio_plot};
-use super::sections::{baseline, is_long};
 use super::tables::Table;
 use super::words;
-use super::{escape, words::percent};
+use super::{
+    escape,
+    words::{baseline, is_long, percent},
+};
 
 /// What came out, in one table and one plot.
 pub(super) fn overview(report: &Report, html: &mut String) {

@@ -8,20 +8,12 @@ use super::pictures::{Window, data_uri, developed};
 use super::plots::error_plot;
 use super::tables::Table;
 use super::words;
-use super::{devices, escape, overview, words::percent};
+use super::{
+    devices, escape, overview,
+    words::{baseline, is_long, percent},
+};
 use crate::error::Result;
 use crate::image::Rgb8;
-
-/// With more methods than this a row shows ratios instead of curves and pictures.
-const MANY: usize = 7;
-
-pub(super) fn is_long(report: &Report) -> bool {
-    report.plan.methods.len() > MANY
-}
-
-pub(super) fn baseline(report: &Report) -> &str {
-    &report.plan.methods[report.plan.baselines[0]].name
-}
 
 /// One scene under one map.
 pub(super) fn row(report: &Report, row: &RowReport, html: &mut String) -> Result<()> {

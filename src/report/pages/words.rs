@@ -222,3 +222,14 @@ pub(super) fn target_cell(row: &RowReport, device: &DeviceReport, baseline: &str
     let found = found.map_or("", |found| verdict(found, target));
     format!("{target}: {found}").trim_end_matches(": ").to_owned()
 }
+
+/// With more methods than this a row shows ratios instead of curves and pictures.
+const MANY: usize = 7;
+
+pub(super) fn is_long(report: &Report) -> bool {
+    report.plan.methods.len() > MANY
+}
+
+pub(super) fn baseline(report: &Report) -> &str {
+    &report.plan.methods[report.plan.baselines[0]].name
+}

@@ -2,8 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
-use super::furniture::placed;
 use super::materials::{self as make, matte, textured};
+use super::mesh::placed;
 use super::mesh::{Builder, Mat};
 use super::objects as thing;
 use super::room::{self, Hole, Shell};

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::furniture::placed;
+use super::mesh::placed;
 use super::mesh::{Builder, Mat};
 use super::objects::COVERS;
 use crate::noise::Stream;

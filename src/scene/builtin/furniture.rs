@@ -2,17 +2,11 @@
 
 use std::f32::consts::{PI, TAU};
 
-use glam::{Affine3A, EulerRot, Quat, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 use super::mesh::{Builder, Mat};
 use super::objects::books;
 use crate::noise::Stream;
-
-/// A rotation by degrees about X, then Y, then Z, and a translation.
-pub(super) fn placed(at: [f32; 3], degrees: [f32; 3]) -> Affine3A {
-    let [x, y, z] = degrees.map(f32::to_radians);
-    Affine3A::from_rotation_translation(Quat::from_euler(EulerRot::YXZ, y, x, z), Vec3::from(at))
-}
 
 /// A table of `width` x `depth` x `height` on four tapered, slightly splayed legs.
 pub(super) fn table(b: &mut Builder, top: Mat, legs: Mat, [width, depth, height]: [f32; 3]) {

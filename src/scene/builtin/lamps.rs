@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{Affine3A, Vec3};
 
-use super::furniture::placed;
+use super::mesh::placed;
 use super::mesh::{Builder, Mat};
 
 /// A floor lamp: a curved arm over a heavy foot, and a linen drum shade.

@@ -1,6 +1,6 @@
 //! Triangles from a few parametric shapes, in metres: the tools all built-in scenes are made with.
 
-use glam::{Affine3A, Mat3, Quat, Vec2, Vec3, Vec4};
+use glam::{Affine3A, EulerRot, Mat3, Quat, Vec2, Vec3, Vec4};
 
 use crate::scene::{Camera, Material, Scene, Texture, TextureImage, TextureRef, Wrap};
 
@@ -188,4 +188,10 @@ impl Builder {
             }
         }
     }
+}
+
+/// A rotation by degrees about X, then Y, then Z, and a translation.
+pub(super) fn placed(at: [f32; 3], degrees: [f32; 3]) -> Affine3A {
+    let [x, y, z] = degrees.map(f32::to_radians);
+    Affine3A::from_rotation_translation(Quat::from_euler(EulerRot::YXZ, y, x, z), Vec3::from(at))
 }

@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{Affine3A, Vec2, Vec3};
 
-use super::furniture::placed;
+use super::mesh::placed;
 use super::mesh::{Builder, LIFT, Mat};
 use crate::noise::Stream;
 

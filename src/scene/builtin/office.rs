@@ -3,8 +3,9 @@
 
 use glam::{Vec2, Vec3};
 
-use super::furniture::{self as piece, placed};
+use super::furniture as piece;
 use super::materials::{self as make, matte, metal, textured, two_sided, varnished};
+use super::mesh::placed;
 use super::mesh::{Builder, Mat};
 use super::objects as thing;
 use super::plants;

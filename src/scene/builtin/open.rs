@@ -4,8 +4,8 @@ use std::f32::consts::TAU;
 
 use glam::{Affine3A, Vec2, Vec3};
 
-use super::furniture::placed;
 use super::materials::{self as make, matte, textured};
+use super::mesh::placed;
 use super::mesh::{Builder, Mat};
 use super::objects as thing;
 use super::textures as paint;

@@ -4,7 +4,7 @@ use std::f32::consts::{PI, TAU};
 
 use glam::{Vec2, Vec3};
 
-use super::furniture::placed;
+use super::mesh::placed;
 use super::mesh::{Builder, Mat};
 use crate::noise::smoothstep;
 

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 
-use super::geometry::{Part, Tally};
+use super::part::{Part, Tally};
 use super::pose::Placing;
 use super::tangents::NO_TANGENT;
 use super::{Fallible, MAX_TRIANGLES};

@@ -18,9 +18,9 @@ const BIN_CHUNK: &[u8] = b"BIN\0";
 pub(super) struct Head {
     asset: Option<Asset>,
     #[serde(default)]
-    pub(super) extensions_used: Vec<String>,
+    extensions_used: Vec<String>,
     #[serde(default)]
-    pub(super) extensions_required: Vec<String>,
+    extensions_required: Vec<String>,
     animations: Option<IgnoredAny>,
 }
 
@@ -59,7 +59,7 @@ pub(super) fn parse<'a>(
         Err(_) => serde_json::from_value(tree()?).map_err(other)?,
     };
     check_version(head.asset.as_ref())?;
-    extensions::check(&head, notices)?;
+    extensions::check(&head.extensions_used, &head.extensions_required, notices)?;
     let root: json::Root = match json::deserialize::from_slice(text) {
         Ok(root) => root,
         Err(_) => json::deserialize::from_value(tree()?).map_err(other)?,

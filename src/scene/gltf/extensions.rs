@@ -1,7 +1,6 @@
 //! Which extensions are honoured, and what is said about the others.
 
 use super::Fallible;
-use super::document::Head;
 use crate::error::Notices;
 
 /// Extensions that are rendered, wholly or (specular-glossiness) nearly.
@@ -31,14 +30,14 @@ const SUPPORTED: &[&str] = &[
 ];
 
 /// Refuses a file that requires what is not supported; a notice where it is only used.
-pub(super) fn check(head: &Head, notices: &mut Notices) -> Fallible<()> {
-    let missing = unsupported(&head.extensions_required);
+pub(super) fn check(used: &[String], required: &[String], notices: &mut Notices) -> Fallible<()> {
+    let missing = unsupported(required);
     if !missing.is_empty() {
         let plural = if missing.len() > 1 { "s" } else { "" };
         let names = missing.join(", ");
         return Err(format!("it requires the extension{plural} {names}, not supported here"));
     }
-    for name in unsupported(&head.extensions_used) {
+    for name in unsupported(used) {
         notices.add(format!("the extension {name} is not supported; what it adds is left out"));
     }
     Ok(())

@@ -24,6 +24,7 @@ mod materials;
 mod medium;
 mod meshopt;
 mod newer;
+mod part;
 mod pose;
 mod primitive;
 mod tangents;
@@ -43,8 +44,9 @@ use crate::image::{looks_like_picture, read_file};
 use crate::scene::{Material, Outlines, Scene, SceneOptions};
 
 use buffers::{File, find};
-use geometry::{Needs, Part, Tally};
+use geometry::Needs;
 use materials::Materials;
+use part::{Part, Tally};
 use pose::Nodes;
 use uri::Folder;
 use variants::Look;

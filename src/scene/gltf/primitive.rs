@@ -9,7 +9,7 @@ use json::validation::Checked;
 use super::accessor::Elements;
 use super::buffers::{File, find};
 use super::draco::Unpacked;
-use super::geometry::{Part, Tally};
+use super::part::{Part, Tally};
 use super::pose::unit;
 use super::{Fallible, MAX_TRIANGLES};
 

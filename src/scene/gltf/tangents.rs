@@ -3,7 +3,7 @@
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 use glam::{Affine2, Vec2, Vec3, Vec4};
 
-use super::geometry::Part;
+use super::part::Part;
 use super::pose::unit;
 use crate::math::Frame;
 
