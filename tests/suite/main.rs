@@ -26,6 +26,7 @@ mod peers;
 mod real_files;
 #[cfg(feature = "report")]
 mod report;
+mod rooms;
 mod shared;
 #[cfg(all(feature = "window", feature = "report"))]
 mod stability;
