@@ -1,8 +1,5 @@
 // Tabulated directional albedos of the interface: twin of src/bsdf/albedo.rs.
 
-// Rows and columns of the table.
-const ALBEDO_NODES = 32u;
-
 // Terms of a row and a column, and of the row after it.
 fn albedo_nodes(row: u32, column: u32) -> vec4f {
     return tables(ALBEDO_AT + row * (ALBEDO_NODES + 1u) + column);

@@ -43,8 +43,6 @@ fn lens_point(sampler: ptr<function, Sampler>) -> vec2f {
 }
 
 //#if WIDE_FILTER
-const FILTER_STEPS = 256u;
-const FILTER_RADIUS = 1.5;
 
 // Inverts the running integral of the filter's window.
 fn invert_filter(u: f32) -> f32 {

@@ -1,7 +1,5 @@
 // A clear layer over everything else: twin of src/bsdf/coat.rs.
 
-const COAT_F0 = 0.04;
-
 struct Coat {
     strength: f32,
     ggx: Ggx,

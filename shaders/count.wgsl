@@ -1,7 +1,5 @@
 // What samples of the map see, counted: twin of light_grid/counters.rs and part of src/path/learn.rs.
 
-const WEIGHT_ONE = 256.0;
-const MAX_WEIGHT = 4.0;
 const NO_SLOT = 0xffffffffu;
 
 // A try's counter of what is seen, 0 if it has none, and what its share of light is multiplied by.

@@ -1,7 +1,5 @@
 // The GGX interface of a dielectric or a metal: twin of src/bsdf/interface.rs.
 
-const STRAIGHT_ETA = 1e-3;
-
 struct Interface {
     f0: vec3f,
     f90: f32,

@@ -1,6 +1,5 @@
 // What the map shows to the vertices of camera paths: twin of src/path/learn.rs.
 
-const LEARNING_SEED = 0x6c656172u;
 //#if RECORD_RATIO
 const WHOLE_MAP_SHARE = 128u;
 //#else

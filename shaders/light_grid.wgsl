@@ -1,7 +1,5 @@
 // Which distribution over the map's tiles a point uses, and the distributions: twin of src/light_grid/.
 
-const WHOLE_MAP = 0u;
-
 // Twin of `cells::dominant_face`.
 fn dominant_face(normal: vec3f) -> u32 {
     let a = abs(normal);
@@ -31,7 +29,6 @@ fn cell_of(position: vec3f, normal: vec3f) -> u32 {
 }
 
 //#if MEDIUM
-const MEDIUM_FACE = 6u;
 
 fn cell_in_medium(position: vec3f) -> u32 {
 //#if FACES

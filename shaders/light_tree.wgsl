@@ -3,10 +3,6 @@
 // (ascending), the node of each, the distant lights (share and light) and the punctual lights.
 
 const LIGHT_NODE_TEXELS = 3u;
-// Marks the link of a leaf.
-const LEAF = 0x80000000u;
-const LEAST_COSINE = 1.0 / 64.0;
-const NEAREST_SQUARED = 1e-20;
 
 // A place at which light is gathered; the normal is zero where light from all around is scattered.
 struct Receiver {
@@ -47,7 +43,7 @@ fn light_importance(node: u32, receiver: Receiver) -> f32 {
     return axis_intensity.w * emitted * received * inverse_squared;
 }
 
-// The second child of a node (the first one is the next node), or `LEAF` and a light.
+// The second child of a node (the first one is the next node), or `LIGHT_LEAF` and a light.
 fn light_link(node: u32) -> u32 {
     return light_nodes(LIGHT_NODE_TEXELS * node + 2u).w;
 }
@@ -78,12 +74,12 @@ fn choose_light(receiver: Receiver, bits: u32) -> LightChoice {
 //#end
     var node = 0u;
     var link = light_link(node);
-    while (link & LEAF) == 0u {
+    while (link & LIGHT_LEAF) == 0u {
         let share = share_of_first(node, link, receiver);
         node = select(link, node + 1u, draw_chooses_first(&draw, share));
         link = light_link(node);
     }
-    return LightChoice(link & ~LEAF, interval_probability(draw.left), draw_remainder(draw));
+    return LightChoice(link & ~LIGHT_LEAF, interval_probability(draw.left), draw_remainder(draw));
 }
 
 //#if EMITTERS

@@ -1,7 +1,5 @@
 // Light sources inside the scene: twin of src/path/lights.rs.
 
-// Words of a punctual light; packed by `layout::light_words`.
-const PUNCTUAL_WORDS = 16u;
 const POINT_LIGHT = 0u;
 const SPOT_LIGHT = 1u;
 const DIRECTIONAL_LIGHT = 2u;

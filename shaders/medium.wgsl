@@ -1,6 +1,5 @@
 // What lies between surfaces: twin of src/medium.rs.
 
-const LEAST_COMPONENT = 1e-18;
 const UNIT_OF_2_POW_32 = 2.3283064365386963e-10;
 
 // What a medium does to light, per metre, and the mean cosine of its scattering.

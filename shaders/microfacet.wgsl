@@ -1,7 +1,5 @@
 // GGX: twin of src/bsdf/microfacet.rs.
 
-const SMOOTH_ALPHA = 1e-3;
-
 struct Ggx {
     alpha: f32,
 //#if ANISOTROPY

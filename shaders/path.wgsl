@@ -1,10 +1,5 @@
 // The path tracing loop, one ray a step: twin of src/path/mod.rs, the same random numbers.
 
-const ROULETTE_AFTER = 3u;
-const ROULETTE_MILDNESS = 3.0;
-// Panes and leaves one ray may pass; only a scene that is broken has more.
-const MAX_PASSES = 1000u;
-
 struct Path {
     sampler: Sampler,
     ray: Ray,

@@ -1,12 +1,6 @@
 // A world-space cache of reflected radiance: twin of src/radiance_cache/cells.rs, of what reads the cache
 // in src/radiance_cache/mod.rs, and of src/path/cached.rs.
 
-// Marks the cells four times as large that others lean on.
-const CACHE_PARENT = 256u;
-const CACHE_CHECK_SEED = 0x63656c6cu;
-// Least GGX alpha of a surface that sends back much the same to all sides.
-const LEAST_CACHED_ALPHA = 0.05;
-
 struct CacheCell {
     coordinates: vec3i,
     kind: u32,

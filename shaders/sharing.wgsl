@@ -8,9 +8,6 @@ const MEMBERS = TILE_SIDE * TILE_SIDE;
 const TILES_OF_GROUP = 64u / MEMBERS;
 // Second vertices of a tile.
 const OWNERS = MEMBERS / (OWNER_SIDE * OWNER_SIDE);
-const TILE_SEED = 0x74696c65u;
-const LEAST_ALPHA = 0.01;
-const PAIRS_OF_ESTIMATE = 1u << 24u;
 
 // A pixel of a tile.
 struct Member {

@@ -1,9 +1,5 @@
 // Light that upright fibres scatter back at grazing angles: twin of src/bsdf/sheen.rs.
 
-const SHEEN_NODES = 32u;
-const MIN_SHEEN_ROUGHNESS = 0.07;
-// Where light under a sheen mostly comes from, for estimates.
-const SHEEN_TYPICAL = vec3f(0.0, 0.76, 0.65);
 const UNIFORM_HEMISPHERE = 0.15915494;
 
 struct Sheen {

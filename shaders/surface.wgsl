@@ -1,20 +1,5 @@
 // What a ray finds at a point of a triangle: twin of src/scene/surface.rs.
 
-const MIN_COSINE_SHARE = 0.05;
-const MIN_MIRROR_COSINE = 0.01;
-
-// Flags of a material.
-const ALPHA_MASK = 1u;
-const ALPHA_BLEND = 2u;
-const DOUBLE_SIDED = 4u;
-const UNLIT = 8u;
-const THIN = 16u;
-// Part of the light may go straight through.
-const PARTIAL = 32u;
-const NORMAL_MAPPED = 64u;
-
-const NO_TEXTURE = 0xffffffffu;
-
 // Texels of a material in `materials`, as `layout::Material` has them.
 const MATERIAL_TEXELS = 16u;
 const BASE_COLOR_ALPHA = 0u;

@@ -1,11 +1,5 @@
 // Reading textures: twin of src/scene/texture.rs. Texels of all images lie in one array.
 
-// Flags of a texture.
-const SECOND_UV_SET = 1u;
-const NEAREST = 2u;
-const SRGB = 4u;
-const WRAP_U_SHIFT = 4u;
-const WRAP_V_SHIFT = 6u;
 const REPEAT = 0u;
 const MIRRORED_REPEAT = 1u;
 

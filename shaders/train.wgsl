@@ -1,11 +1,7 @@
 // Training paths for the radiance cache: twin of src/path/train.rs and of what counts in
 // src/radiance_cache/sums.rs.
 
-const TRAINING_SEED = 0x74656163u;
-const MOST_TIMES = 128.0;
-const LEAST_SHARE = 1e-3;
 const NO_CACHE_SLOT = 0xffffffffu;
-const ALBEDO_ONE = 255.0;
 const MOST_UNITS = 1099511627776.0;
 const TWO_TO_32 = 4294967296.0;
 

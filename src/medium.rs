@@ -18,7 +18,7 @@ use crate::scene::{Material, Medium};
 const MARGIN: f32 = 0.02;
 
 /// A direction's components are taken for at least this large.
-const LEAST_COMPONENT: f32 = 1e-18;
+pub(crate) const LEAST_COMPONENT: f32 = 1e-18;
 
 /// Largest mean cosine of scattering, either way.
 pub const MAX_ANISOTROPY: f32 = 0.99;

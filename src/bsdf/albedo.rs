@@ -16,7 +16,7 @@ use glam::{Vec2, Vec3};
 use super::fresnel::{reflect, schlick_weight};
 use super::microfacet::Ggx;
 
-const COSINES: usize = 32;
+pub(crate) const COSINES: usize = 32;
 const ROUGHNESSES: usize = 32;
 /// Visible normals per entry. With it the table is within 0.008 of its limit, between nodes too.
 const SAMPLES: u32 = 1024;

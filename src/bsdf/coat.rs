@@ -11,7 +11,7 @@ use super::{LobeSample, SurfaceParameters};
 use crate::math::Frame;
 
 /// F0 of index of refraction 1.5.
-const F0: f32 = 0.04;
+pub(crate) const F0: f32 = 0.04;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Coat {

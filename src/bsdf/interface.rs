@@ -14,7 +14,7 @@ use super::{Hero, LobeSample, SurfaceParameters};
 use crate::color::importance;
 
 /// Relative indices closer to 1 than this refract straight on: f32 half vectors vanish.
-const STRAIGHT_ETA: f32 = 1e-3;
+pub(crate) const STRAIGHT_ETA: f32 = 1e-3;
 
 /// Reflection and transmission at one microfacet.
 #[derive(Debug, Clone, Copy)]

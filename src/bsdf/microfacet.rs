@@ -10,7 +10,7 @@ use crate::math::sin_cos_turns;
 
 /// Below this GGX alpha a surface is taken as perfectly smooth: the lobe is narrower than any pixel
 /// of an environment map, and f32 half vectors no longer resolve it.
-pub(super) const SMOOTH_ALPHA: f32 = 1e-3;
+pub(crate) const SMOOTH_ALPHA: f32 = 1e-3;
 
 /// GGX of one width, or of two across each other.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -17,10 +17,10 @@
 //! transmission. The caller rejects a `wi` that lies on the other side of the geometric surface.
 
 pub(crate) mod albedo;
-mod coat;
+pub(crate) mod coat;
 mod diffuse;
 pub(crate) mod fresnel;
-mod interface;
+pub(crate) mod interface;
 pub(crate) mod iridescence;
 pub(crate) mod microfacet;
 pub(crate) mod sheen;

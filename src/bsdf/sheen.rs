@@ -14,14 +14,14 @@ use glam::{Vec2, Vec3};
 use super::SurfaceParameters;
 use crate::math::sin_cos_turns;
 
-const COSINES: usize = 32;
+pub(crate) const COSINES: usize = 32;
 const ROUGHNESSES: usize = 32;
 /// Steps of the quadrature in each direction: the table is within 0.01 of its limit, between nodes
 /// too.
 const STEPS: usize = 48;
 
 /// Below this perceptual roughness the lobe is narrower than its table resolves.
-const MIN_ROUGHNESS: f32 = 0.07;
+pub(crate) const MIN_ROUGHNESS: f32 = 0.07;
 
 /// Density per steradian of uniform directions above the surface.
 const UNIFORM: f32 = 1.0 / TAU;
@@ -63,7 +63,7 @@ impl Sheen {
     };
 
     /// Where light under a sheen mostly comes from, for estimates.
-    pub(super) const TYPICAL: Vec3 = Vec3::new(0.0, 0.76, 0.65);
+    pub(crate) const TYPICAL: Vec3 = Vec3::new(0.0, 0.76, 0.65);
 
     pub(crate) fn new(p: &SurfaceParameters, entering: bool) -> Self {
         if p.sheen_color == Vec3::ZERO {

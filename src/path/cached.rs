@@ -3,7 +3,7 @@
 use super::{Path, Scatterer, SurfaceScatterer, Vertex};
 
 /// Least GGX alpha of a surface that sends back much the same to all sides.
-const LEAST_ALPHA: f32 = 0.05;
+pub(crate) const LEAST_ALPHA: f32 = 0.05;
 
 impl SurfaceScatterer<'_> {
     /// Whether what it sends back may be kept in a cache.

@@ -11,17 +11,17 @@ use std::borrow::Cow;
 use glam::{Vec2, Vec3};
 
 pub mod background;
-mod cached;
+pub(crate) mod cached;
 pub mod camera;
 mod draw;
 pub mod framing;
 mod learn;
-mod light_tree;
+pub(crate) mod light_tree;
 mod lights;
 mod materials;
 mod ray_clock;
 pub mod sharing;
-mod train;
+pub(crate) mod train;
 mod world;
 
 pub use background::Background;
@@ -98,13 +98,13 @@ pub struct FirstHit {
 }
 
 /// Vertices after which Russian roulette may end a path.
-const ROULETTE_AFTER: u32 = 3;
+pub(crate) const ROULETTE_AFTER: u32 = 3;
 /// A path that carries less than one over this is ended in proportion: ending it as soon as it carries
 /// less than 1 saves a third of the rays of an office and doubles its error.
-const ROULETTE_MILDNESS: f32 = 3.0;
+pub(crate) const ROULETTE_MILDNESS: f32 = 3.0;
 
 /// Panes and leaves one ray may pass; only a scene that is broken has more.
-const MAX_PASSES: u32 = 1000;
+pub(crate) const MAX_PASSES: u32 = 1000;
 
 impl PathTracer<'_> {
     /// Radiance along a camera ray.

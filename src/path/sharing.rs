@@ -58,12 +58,12 @@ pub struct Start<'a> {
 }
 
 /// Least GGX alpha of a vertex that takes part: narrower reflections are not seen alike from two pixels.
-const LEAST_ALPHA: f32 = 0.01;
+pub(crate) const LEAST_ALPHA: f32 = 0.01;
 
 /// Keeps the places of tiles apart from other random numbers.
-const TILE_SEED: u32 = 0x7469_6c65;
+pub(crate) const TILE_SEED: u32 = 0x7469_6c65;
 /// Pairs of random numbers between those of two estimates behind one vertex: more than any takes.
-const PAIRS_OF_ESTIMATE: u32 = 1 << 24;
+pub(crate) const PAIRS_OF_ESTIMATE: u32 = 1 << 24;
 
 /// A first vertex that other pixels' second vertices are connected with.
 struct First<'v> {

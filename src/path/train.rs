@@ -13,9 +13,9 @@ pub(crate) const TRAINING_VERTICES: u32 = 3;
 /// An estimate so many times as bright as what is known of its cell counts as if it were just that: one
 /// path in a million would make a cell shine. Less costs light (1 % at 64, 5 % at 16, of a living room
 /// at sunset).
-const MOST_TIMES: f32 = 128.0;
+pub(crate) const MOST_TIMES: f32 = 128.0;
 /// A path that carries less of one channel than this share of the largest says too little about it.
-const LEAST_SHARE: f32 = 1e-3;
+pub(crate) const LEAST_SHARE: f32 = 1e-3;
 
 /// A vertex of a path that has not yet brought back all that the cache is to learn from it.
 struct TrainingVertex {

@@ -9,9 +9,9 @@ use crate::sampler::hash;
 /// Most doublings of cells.
 const MOST_LEVELS: u32 = 31;
 /// Marks the cells four times as large that others lean on.
-const PARENT: u32 = 1 << 8;
+pub(crate) const PARENT: u32 = 1 << 8;
 /// Keeps check words apart from places in the table.
-const CHECK_SEED: u32 = 0x6365_6c6c;
+pub(crate) const CHECK_SEED: u32 = 0x6365_6c6c;
 
 /// How surfaces are cut into cells.
 #[derive(Debug, Clone, Copy, PartialEq)]

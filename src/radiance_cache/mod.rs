@@ -16,8 +16,9 @@ use glam::Vec3;
 
 pub use cells::CacheCells;
 use cells::Key;
+pub(crate) use cells::{CHECK_SEED, PARENT};
 pub use sums::RadianceSums;
-pub(crate) use sums::{MOST_PATHS, WORDS};
+pub(crate) use sums::{ALBEDO_ONE, MOST_PATHS, WORDS};
 
 /// Slots of the table: a power of two.
 pub(crate) const SLOTS: usize = 1 << 16;

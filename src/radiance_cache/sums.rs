@@ -16,7 +16,7 @@ const COUNT_AT: usize = 2;
 const ALBEDO_AT: usize = 3;
 const RADIANCE_AT: usize = 6;
 /// An albedo of 1: 2^24 paths do not overflow a word.
-const ALBEDO_ONE: f32 = 255.0;
+pub(crate) const ALBEDO_ONE: f32 = 255.0;
 /// Units of the brightest radiance there is in the scene, and most of one estimate: so many times 2^24
 /// do not overflow two words.
 const BRIGHTEST: f32 = (1_u64 << 36) as f32;

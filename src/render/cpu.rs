@@ -17,10 +17,10 @@ use crate::radiance_cache::RadianceSums;
 use crate::sampler::Sampler;
 
 /// Seed offset that keeps learning's random numbers apart from rendering's.
-const LEARNING_SEED: u32 = 0x6c65_6172;
+pub(crate) const LEARNING_SEED: u32 = 0x6c65_6172;
 
 /// The same for training the radiance cache.
-const TRAINING_SEED: u32 = 0x7465_6163;
+pub(crate) const TRAINING_SEED: u32 = 0x7465_6163;
 
 /// Learning paths one task traces between two looks at `cancel`.
 const PATHS_PER_TASK: u64 = 512;

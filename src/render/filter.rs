@@ -43,7 +43,7 @@ impl PixelFilter {
 }
 
 /// Half width of the wide filters in pixels.
-const FILTER_RADIUS: f32 = 1.5;
+pub(crate) const FILTER_RADIUS: f32 = 1.5;
 
 fn gauss(x: f32) -> f32 {
     (-0.5 * (x / 0.45).powi(2)).exp()
@@ -55,7 +55,7 @@ fn blackman_harris(x: f32) -> f32 {
     0.35875 - 0.48829 * t.cos() + 0.14128 * (2.0 * t).cos() - 0.01168 * (3.0 * t).cos()
 }
 
-const STEPS: usize = 256;
+pub(crate) const STEPS: usize = 256;
 
 /// Running integral of a window over `[-FILTER_RADIUS, FILTER_RADIUS]`, from 0 to 1.
 type Cumulative = [f32; STEPS + 1];

@@ -10,11 +10,11 @@ use crate::math::Frame;
 
 /// A shading normal is bent until its cosine with the viewer is at least this share of the geometric
 /// normal's: a viewer in front of the surface is in front of its shading too.
-const MIN_COSINE_SHARE: f32 = 0.05;
+pub(crate) const MIN_COSINE_SHARE: f32 = 0.05;
 
 /// Least cosine with the geometric normal of the direction in which a mirror shows the viewer
 /// something (Cycles' `ensure_valid_specular_reflection`).
-const MIN_MIRROR_COSINE: f32 = 0.01;
+pub(crate) const MIN_MIRROR_COSINE: f32 = 0.01;
 
 /// Material at one point, textures already read. Colours are linear Rec.709.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

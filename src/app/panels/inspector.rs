@@ -288,7 +288,7 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
             line("Learned from", format!("{} tries", theme::count(tries as u64)));
         }
         if let Some(bytes) = inspected.memory_bytes {
-            line("Memory", format!("{} for this distribution", theme::bytes(bytes)));
+            line("Memory", theme::bytes(bytes));
         }
     });
 }
@@ -299,7 +299,7 @@ fn table(ui: &mut Ui, inspected: &Inspected, inspector: &Inspector) {
     tiles.sort_by(|a, b| inspected.probabilities[*b].total_cmp(&inspected.probabilities[*a]));
     let truth = inspector.truth();
     Grid::new("tiles").num_columns(5).spacing([14.0, 3.0]).striped(true).show(ui, |ui| {
-        for name in ["Tile", "Distribution", "Tries", "Ratio"] {
+        for name in ["Tile", "Share", "Tries", "Ratio"] {
             ui.label(theme::quiet(name));
         }
         if truth.is_some() {

@@ -20,10 +20,10 @@ use super::draw::{ALL, Draw, Interval, share_of};
 pub(crate) const LEAF: u32 = 1 << 31;
 
 /// Least cosine that lights are counted with: some of them shine where the mean does not.
-const LEAST_COSINE: f32 = 1.0 / 64.0;
+pub(crate) const LEAST_COSINE: f32 = 1.0 / 64.0;
 
 /// Squared distance in square metres below which lights are not nearer: keeps importance finite.
-const NEAREST_SQUARED: f32 = 1e-20;
+pub(crate) const NEAREST_SQUARED: f32 = 1e-20;
 
 /// Both the lights with a place and those without get at least an eighth of the samples, if there
 /// are any: power does not know which of them are seen.

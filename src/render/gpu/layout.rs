@@ -21,7 +21,7 @@ use crate::scene::{self, AlphaMode, PunctualKind, Scene, Wrap};
 /// No distribution of cells.
 pub(crate) const NO_ARRAY: u32 = u32::MAX;
 /// A material without this texture.
-const NO_TEXTURE: u32 = u32::MAX;
+pub(crate) const NO_TEXTURE: u32 = u32::MAX;
 
 /// Twin of `Work` in `globals.wgsl`.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
@@ -404,9 +404,11 @@ fn wrap_code(wrap: Wrap) -> u32 {
     }
 }
 
+/// Words of a light that is no triangle.
+pub(super) const PUNCTUAL_WORDS: usize = 16;
+
 /// Local lights as `light_tree.wgsl` and `lights.wgsl` read them; sets their numbers.
 pub(crate) fn light_words(world: &World, globals: &mut Globals) -> Vec<u32> {
-    const PUNCTUAL_WORDS: usize = 16;
     let (triangles, tree) = world.lights.arrays();
     globals.light_triangle_count = triangles.len() as u32;
     globals.distant_light_count = tree.distant.len() as u32;

@@ -7,6 +7,7 @@
 mod acceleration;
 mod buffers;
 mod cast;
+mod constants;
 mod device;
 mod facts;
 mod features;

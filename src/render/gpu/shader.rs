@@ -5,6 +5,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use super::constants;
 use super::kernel::Kernel;
 use crate::features::Features;
 use crate::path::TRAINING_VERTICES;
@@ -245,6 +246,7 @@ impl Program {
         if features.contains(Features::HARDWARE_RAYS) {
             source.push_str("enable wgpu_ray_query;\n");
         }
+        source.push_str(&constants::shared());
         let Constants {
             stack_size,
             shared_stack_size,

@@ -1,0 +1,105 @@
+//! Constants that shaders share with their Rust twins, which alone say what they are.
+
+use std::fmt::Write as _;
+
+use glam::Vec3;
+
+use super::layout::{NO_TEXTURE, PUNCTUAL_WORDS, material_flags as material, texture_flags};
+use crate::bsdf::{albedo, coat, interface, microfacet, sheen};
+use crate::light_grid::{WHOLE_MAP, cells, counters};
+use crate::path::{self, cached, light_tree, sharing, train};
+use crate::radiance_cache as cache;
+use crate::render::{cpu, filter};
+use crate::scene::surface;
+
+/// What a shader's constant can be.
+trait Constant: Copy {
+    fn wgsl(self) -> String;
+}
+
+impl Constant for u32 {
+    fn wgsl(self) -> String {
+        format!("{self}u")
+    }
+}
+
+impl Constant for usize {
+    fn wgsl(self) -> String {
+        format!("{self}u")
+    }
+}
+
+/// The shortest figures that give the same number back.
+impl Constant for f32 {
+    fn wgsl(self) -> String {
+        format!("{self:?}f")
+    }
+}
+
+impl Constant for Vec3 {
+    fn wgsl(self) -> String {
+        let [x, y, z] = self.to_array().map(Constant::wgsl);
+        format!("vec3f({x}, {y}, {z})")
+    }
+}
+
+macro_rules! constants {
+    ($($name:ident: $value:expr,)+) => {
+        /// All of them, in WGSL.
+        pub(super) fn shared() -> String {
+            let mut source = String::new();
+            $(let _ = writeln!(source, "const {} = {};", stringify!($name), $value.wgsl());)+
+            source
+        }
+    };
+}
+
+constants! {
+    ALBEDO_NODES: albedo::COSINES,
+    ALBEDO_ONE: cache::ALBEDO_ONE,
+    ALPHA_BLEND: material::ALPHA_BLEND,
+    ALPHA_MASK: material::ALPHA_MASK,
+    CACHE_CHECK_SEED: cache::CHECK_SEED,
+    CACHE_PARENT: cache::PARENT,
+    COAT_F0: coat::F0,
+    DOUBLE_SIDED: material::DOUBLE_SIDED,
+    FILTER_RADIUS: filter::FILTER_RADIUS,
+    FILTER_STEPS: filter::STEPS,
+    LEARNING_SEED: cpu::LEARNING_SEED,
+    LEAST_ALPHA: sharing::LEAST_ALPHA,
+    LEAST_CACHED_ALPHA: cached::LEAST_ALPHA,
+    LEAST_COMPONENT: crate::medium::LEAST_COMPONENT,
+    LEAST_COSINE: light_tree::LEAST_COSINE,
+    LEAST_SHARE: train::LEAST_SHARE,
+    LIGHT_LEAF: light_tree::LEAF,
+    MAX_PASSES: path::MAX_PASSES,
+    MAX_WEIGHT: counters::MAX_WEIGHT,
+    MEDIUM_FACE: cells::MEDIUM_FACE,
+    MIN_COSINE_SHARE: surface::MIN_COSINE_SHARE,
+    MIN_MIRROR_COSINE: surface::MIN_MIRROR_COSINE,
+    MIN_SHEEN_ROUGHNESS: sheen::MIN_ROUGHNESS,
+    MOST_TIMES: train::MOST_TIMES,
+    NEAREST: texture_flags::NEAREST,
+    NEAREST_SQUARED: light_tree::NEAREST_SQUARED,
+    NO_TEXTURE: NO_TEXTURE,
+    NORMAL_MAPPED: material::NORMAL_MAPPED,
+    PAIRS_OF_ESTIMATE: sharing::PAIRS_OF_ESTIMATE,
+    PARTIAL: material::PARTIAL,
+    PUNCTUAL_WORDS: PUNCTUAL_WORDS,
+    ROULETTE_AFTER: path::ROULETTE_AFTER,
+    ROULETTE_MILDNESS: path::ROULETTE_MILDNESS,
+    SHEEN_NODES: sheen::COSINES,
+    SHEEN_TYPICAL: sheen::Sheen::TYPICAL,
+    SECOND_UV_SET: texture_flags::SECOND_UV_SET,
+    SMOOTH_ALPHA: microfacet::SMOOTH_ALPHA,
+    SRGB: texture_flags::SRGB,
+    STRAIGHT_ETA: interface::STRAIGHT_ETA,
+    THIN: material::THIN,
+    TILE_SEED: sharing::TILE_SEED,
+    TRAINING_SEED: cpu::TRAINING_SEED,
+    UNLIT: material::UNLIT,
+    WEIGHT_ONE: counters::WEIGHT_ONE,
+    WHOLE_MAP: WHOLE_MAP,
+    WRAP_U_SHIFT: texture_flags::WRAP_U_SHIFT,
+    WRAP_V_SHIFT: texture_flags::WRAP_V_SHIFT,
+}
