@@ -32,6 +32,20 @@ fn look_at_map(path: ptr<function, Path>, vertex: Vertex) {
 //#end
 }
 
+// What gather.wgsl does in other kernels: nothing but looking.
+fn gather(path: ptr<function, Path>, vertex: Vertex) {
+//#if MEDIUM
+    if vertex.is_in_medium && is_in_solid(path) {
+        return;
+    }
+//#end
+    for (var i = 0u; i < globals.tries_per_vertex; i++) {
+        look_at_map(path, vertex);
+    }
+}
+
+fn add_lights(path: ptr<function, Path>) {}
+
 @compute @workgroup_size(64)
 fn learn(
     @builtin(workgroup_id) group: vec3u,

@@ -141,3 +141,13 @@ fn sample_punctual(index: u32, position: vec3f, probability: f32) -> LightSample
     return LightSample(direction, distance, irradiance / probability, F32_MAX);
 }
 //#end
+
+// Twin of `Vertex::receiver`. In a medium the frame is zero.
+fn receiver_of(vertex: Vertex) -> Receiver {
+    var transmits = vertex.point.parameters.transmission > 0.0;
+//#if DIFFUSE_TRANSMISSION
+    transmits = transmits || vertex.point.parameters.diffuse_transmission > 0.0;
+//#end
+    let normal = select(vertex.point.shading_frame.z, vec3f(0.0), transmits);
+    return Receiver(vertex.point.position, normal);
+}

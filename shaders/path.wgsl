@@ -49,25 +49,6 @@ struct Path {
 //#end
 }
 
-//#if SHADOW_RAYS
-// A ray towards a light. It waits until the path has chosen where to go on: so nothing of the vertex
-// takes registers while it is followed.
-struct Shadow {
-    // Its reach is 0 if there is none.
-    ray: Ray,
-    // What arrives if nothing is in the way, before its weight.
-    light: vec3f,
-    weight: f32,
-//#if SHADOW_MEDIA
-    // What media let through of it.
-    left: vec3f,
-//#end
-//#if COUNTING
-    visibility: Visibility,
-//#end
-}
-//#end
-
 struct FirstHit {
     albedo: vec3f,
     depth: f32,
@@ -90,54 +71,6 @@ struct Vertex {
     mean_cosine: f32,
 //#end
 }
-
-//#if SOLID_TRANSMISSION
-struct Body {
-//#if MEDIUM
-    interior: Interior,
-    is_solid: bool,
-//#else
-    absorption: vec3f,
-//#end
-    squared_index: f32,
-}
-
-fn body_air() -> Body {
-    var body: Body;
-    body.squared_index = 1.0;
-    return body;
-}
-
-//#if MEDIUM
-//#else
-fn body_transmittance(body: Body, distance: f32) -> vec3f {
-    if all(body.absorption == vec3f(0.0)) || distance >= F32_MAX {
-        return vec3f(1.0);
-    }
-    return exp(-body.absorption * distance);
-}
-//#end
-
-fn body_behind(point: SurfacePoint, before: Body) -> Body {
-    if point.parameters.thin {
-        return before;
-    }
-    var body = body_air();
-    if point.front_face {
-        let index = max(point.parameters.ior, 1.0);
-        body.squared_index = index * index;
-//#if MEDIUM
-        let inside = material_numbers(point.material, SCATTERING);
-        body.interior =
-            Interior(inside.xyz, inside.w, point.parameters.absorption + inside.xyz);
-        body.is_solid = true;
-//#else
-        body.absorption = point.parameters.absorption;
-//#end
-    }
-    return body;
-}
-//#end
 
 fn path_new(ray: Ray, sampler: Sampler) -> Path {
     var path: Path;
@@ -171,74 +104,12 @@ fn path_pair(path: ptr<function, Path>) -> vec2f {
     return vec2f(unit_from_bits(bits.x), unit_from_bits(bits.y));
 }
 
-//#if PARTIAL
-// Share of light that goes straight through a surface: what alpha does not cover, and what smooth
-// thin glass transmits.
-fn straight_through(point: SurfacePoint, direction: vec3f) -> vec3f {
-    if (material_flags(point.material) & PARTIAL) == 0u {
-        return vec3f(0.0);
-    }
-    var glass = vec3f(0.0);
-//#if TRANSMISSION
-    if point.parameters.transmission > 0.0 {
-        let bsdf = bsdf_new(point.parameters, point.front_face);
-        glass = bsdf_straight_transmittance(
-            bsdf, local_from_world(point.shading_frame, -direction));
-    }
-//#end
-    let covered = coverage(point);
-    return (1.0 - covered) + covered * glass;
-}
-
-fn coverage(point: SurfacePoint) -> f32 {
-    let blended = (material_flags(point.material) & ALPHA_BLEND) != 0u;
-    return select(1.0, saturate(point.parameters.alpha), blended);
-}
-//#end
-
-//#if FILTERED_HITS
-// Whether a path sees a hit: not where a mask cuts it out, nor, for camera rays, a back side.
-fn accepts(hit: Hit, from_camera: bool) -> bool {
-    if from_camera && (hit.flags & (DOUBLE_SIDED | FROM_BEHIND)) == FROM_BEHIND {
-        return false;
-    }
-//#if ALPHA_MASK
-    if (hit.flags & ALPHA_MASK) != 0u {
-        return alpha_at(hit.triangle, hit.barycentric) > 0.0;
-    }
-//#end
-    return true;
-}
-//#end
-
-//#if PASS_THROUGH
-// Share of light that a surface on a shadow ray's way lets through.
-fn passed(hit: Hit, direction: vec3f) -> vec3f {
-//#if PARTIAL
-    if (hit.flags & PARTIAL) != 0u {
-        return straight_through(surface_at(hit.triangle, hit.barycentric, direction), direction);
-    }
-//#end
-//#if ALPHA_MASK
-    if (hit.flags & ALPHA_MASK) != 0u {
-        return vec3f(1.0 - alpha_at(hit.triangle, hit.barycentric));
-    }
-//#end
-    return vec3f(0.0);
-}
-//#end
-
 // Follows the path along one ray, and the rays towards lights from where it arrives. `false` when it
 // has ended.
 fn path_step(path: ptr<function, Path>) -> bool {
     let hit = closest_hit((*path).ray, (*path).bounces == 0u);
     let goes_on = follow(path, hit);
-//#if LEARNING
-//#else
-//#if SHADOW_RAYS
     add_lights(path);
-//#end
-//#end
     return goes_on;
 }
 
@@ -298,80 +169,6 @@ fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
 fn has_faded(path: ptr<function, Path>) -> bool {
     return max_element((*path).throughput) < 1.17549435e-38;
 }
-
-//#if MEDIUM
-// What fills the way of a ray from where the path is.
-fn stretch_ahead(
-    path: ptr<function, Path>,
-    origin: vec3f,
-    direction: vec3f,
-    distance: f32,
-) -> Stretch {
-//#if SOLID_TRANSMISSION
-    return stretch_in((*path).body, origin, direction, distance);
-//#else
-    return fog_stretch(origin, direction, distance);
-//#end
-}
-
-//#if SOLID_TRANSMISSION
-// Twin of `Body::stretch`.
-fn stretch_in(body: Body, origin: vec3f, direction: vec3f, distance: f32) -> Stretch {
-    if !body.is_solid {
-        return fog_stretch(origin, direction, distance);
-    }
-    let fills = distance < F32_MAX && any(body.interior.extinction != vec3f(0.0));
-    return Stretch(body.interior, 0.0, select(0.0, distance, fills));
-}
-//#end
-
-fn is_in_solid(path: ptr<function, Path>) -> bool {
-//#if SOLID_TRANSMISSION
-    return (*path).body.is_solid;
-//#else
-    return false;
-//#end
-}
-
-fn medium_vertex(path: ptr<function, Path>, position: vec3f, mean_cosine: f32) -> Vertex {
-    var vertex: Vertex;
-    vertex.point.position = position;
-    vertex.is_in_medium = true;
-    vertex.mean_cosine = mean_cosine;
-    vertex.distribution = WHOLE_MAP;
-//#if LIGHT_GRID
-    // From inside of a solid the map is not seen anyway.
-    if !is_in_solid(path) {
-        vertex.cell = cell_in_medium(position);
-        vertex.distribution = distribution_of_cell(vertex.cell);
-    }
-//#end
-    return vertex;
-}
-//#end
-
-//#if PARTIAL
-fn passes(path: ptr<function, Path>, point: SurfacePoint) -> bool {
-    let through = straight_through(point, (*path).ray.direction);
-    let probability = min(max_element(through), 1.0);
-    if probability <= 0.0 {
-        return false;
-    }
-    var goes_on = probability >= 1.0;
-    if !goes_on {
-        goes_on = path_pair(path).x < probability;
-    }
-//#if SHARING
-    (*path).is_clear = (*path).is_clear && (!goes_on || all(through == vec3f(1.0)));
-//#end
-    if goes_on {
-        (*path).throughput *= through / probability;
-    } else {
-        (*path).throughput *= coverage(point) / (1.0 - probability);
-    }
-    return goes_on;
-}
-//#end
 
 // Makes the surface a vertex, unless it is unlit: then it is seen as it is.
 fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
@@ -449,23 +246,12 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
 //#end
 //#if MEDIUM
     gathers = gathers || vertex.is_in_medium;
-//#if LEARNING
-    gathers = gathers && !(vertex.is_in_medium && is_in_solid(path));
-//#end
 //#end
 //#if FINDING
     gathers = gathers && !waits;
 //#end
     if gathers {
-//#if LEARNING
-        for (var i = 0u; i < globals.tries_per_vertex; i++) {
-            look_at_map(path, vertex);
-        }
-//#else
-//#if SHADOW_RAYS
         gather(path, vertex);
-//#end
-//#end
     }
     if !scatter(path, vertex) {
         return false;
@@ -486,50 +272,6 @@ fn forget_arrival(path: ptr<function, Path>) {
     (*path).departure_receiver = Receiver();
 //#end
 }
-
-//#if SCENE_LIGHTS
-// Twin of `Vertex::receiver`. In a medium the frame is zero.
-fn receiver_of(vertex: Vertex) -> Receiver {
-    var transmits = vertex.point.parameters.transmission > 0.0;
-//#if DIFFUSE_TRANSMISSION
-    transmits = transmits || vertex.point.parameters.diffuse_transmission > 0.0;
-//#end
-    let normal = select(vertex.point.shading_frame.z, vec3f(0.0), transmits);
-    return Receiver(vertex.point.position, normal);
-}
-//#end
-
-//#if EMITTERS
-fn add_emitted(path: ptr<function, Path>, point: SurfacePoint) {
-    if point.parameters.unlit {
-        return;
-    }
-    let radiance = emitted(point);
-    if max_element(radiance) <= 0.0 {
-        return;
-    }
-    var weight = 1.0;
-    if (*path).departure_pdf_solid_angle < F32_MAX {
-        let receiver = (*path).departure_receiver;
-        let distance = length(receiver.position - point.position);
-        let nee =
-            local_light_pdf_solid_angle(point.triangle, receiver, (*path).ray.direction, distance);
-        weight = balance_heuristic((*path).departure_pdf_solid_angle, nee);
-    }
-    (*path).radiance += (*path).throughput * radiance * weight;
-}
-//#end
-
-//#if BACKGROUND_BLUR
-// Twin of `background::spread`.
-fn spread(direction: vec3f, concentration: f32, u: vec2f) -> vec3f {
-    let share = u.x + (1.0 - u.x) * exp(-2.0 * concentration);
-    let cosine = clamp(1.0 + log(max(share, 1e-30)) / concentration, -1.0, 1.0);
-    let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
-    let phi = sin_cos_turns(u.y);
-    return world_from_local(frame_from_z(direction), vec3f(sine * phi.y, sine * phi.x, cosine));
-}
-//#end
 
 // The ray leaves the scene: adds the map's radiance, or for the camera the background's.
 fn escape(path: ptr<function, Path>) {
@@ -579,224 +321,6 @@ fn scattered(path: ptr<function, Path>, vertex: Vertex, direction: vec3f) -> Eva
     }
     return bsdf_eval_pdf(vertex.bsdf, vertex.wo, wi);
 }
-
-//#if SHADOW_RAYS
-// A ray from the vertex towards a light so far away; its light is zero. There is none if media let
-// nothing through.
-fn shadow_towards(
-    path: ptr<function, Path>,
-    vertex: Vertex,
-    direction: vec3f,
-    distance: f32,
-) -> Shadow {
-    let normal = vertex.point.geometric_normal;
-    let is_above = dot(normal, direction) > 0.0;
-    var shadow: Shadow;
-    var origin = offset_origin(vertex.point.position, select(-normal, normal, is_above));
-//#if SHADOW_MEDIA
-    shadow.left = vec3f(1.0);
-//#if SOLID_TRANSMISSION
-    var body = (*path).body;
-//#if MEDIUM
-    let goes_behind = !is_above && !vertex.is_in_medium;
-//#else
-    let goes_behind = !is_above;
-//#end
-    if goes_behind {
-        body = body_behind(vertex.point, body);
-    }
-//#end
-//#if MEDIUM
-    if vertex.is_in_medium {
-        origin = vertex.point.position;
-    }
-//#if SOLID_TRANSMISSION
-    let stretch = stretch_in(body, origin, direction, distance);
-//#else
-    let stretch = fog_stretch(origin, direction, distance);
-//#end
-    if stretch.start < stretch.end {
-        shadow.left = exp(-stretch.interior.extinction * (stretch.end - stretch.start));
-    }
-//#else
-    shadow.left = body_transmittance(body, distance);
-//#end
-    if all(shadow.left == vec3f(0.0)) {
-        return shadow;
-    }
-//#end
-    // Stop short of the light's own surface.
-    shadow.ray = Ray(origin, direction, distance * (1.0 - 1e-4));
-    return shadow;
-}
-
-// Share of light that comes along a shadow ray, if there is one.
-fn follow_shadow(path: ptr<function, Path>, shadow: Shadow) -> vec3f {
-    if shadow.ray.t_max <= 0.0 {
-        return vec3f(0.0);
-    }
-    (*path).rays += 1u;
-    let visible = transmittance_along(shadow.ray);
-//#if SHADOW_MEDIA
-    return visible * shadow.left;
-//#else
-    return visible;
-//#end
-}
-
-//#if LEARNING
-//#else
-// Follows a shadow ray and adds what comes along it.
-fn add_light(path: ptr<function, Path>, shadow: Shadow) {
-    let visible = follow_shadow(path, shadow);
-    if any(visible != vec3f(0.0)) {
-//#if COUNTING
-        count_visible(shadow.visibility, visible);
-//#end
-        (*path).radiance += shadow.light * visible * shadow.weight;
-    }
-}
-
-// Follows the path's shadow rays, the map's first. They share the code, which is long where panes and
-// leaves let light through.
-fn add_lights(path: ptr<function, Path>) {
-//#if MAP_SAMPLING
-    var shadow = (*path).map_shadow;
-    (*path).map_shadow = Shadow();
-//#if LOCAL_LIGHTS
-    for (var i = 0u; i < 2u; i++) {
-        add_light(path, shadow);
-        shadow = (*path).lamp_shadow;
-        (*path).lamp_shadow = Shadow();
-    }
-//#else
-    add_light(path, shadow);
-//#end
-//#else
-    let shadow = (*path).lamp_shadow;
-    (*path).lamp_shadow = Shadow();
-    add_light(path, shadow);
-//#end
-}
-//#end
-//#end
-
-//#if LEARNING
-//#else
-//#if SHADOW_RAYS
-// Light that may reach a vertex from a direction.
-struct Arriving {
-    is_some: bool,
-    direction: vec3f,
-    distance: f32,
-    // Its radiance, or for lamps that over the density of the direction.
-    light: vec3f,
-    pdf_solid_angle: f32,
-    // For the map: what is divided by the sum of all densities.
-    weight: f32,
-//#if COUNTING
-    // Of the try; 0 if it has none.
-    counter: u32,
-//#end
-}
-
-// The ray towards it.
-fn shadow_of(
-    path: ptr<function, Path>,
-    vertex: Vertex,
-    arriving: Arriving,
-    is_of_map: bool,
-) -> Shadow {
-    if !arriving.is_some {
-        return Shadow();
-    }
-    let f = scattered(path, vertex, arriving.direction);
-    if max_element(f.value) <= 0.0 {
-        return Shadow();
-    }
-    var shadow = shadow_towards(path, vertex, arriving.direction, arriving.distance);
-    shadow.light = (*path).throughput * f.value * arriving.light;
-    if is_of_map {
-        let both_pdfs = arriving.pdf_solid_angle + f.pdf_solid_angle;
-        shadow.weight = select(0.0, arriving.weight / both_pdfs, both_pdfs > 0.0);
-    } else {
-        shadow.weight = balance_heuristic(arriving.pdf_solid_angle, f.pdf_solid_angle);
-    }
-//#if COUNTING
-    shadow.visibility = Visibility(
-        arriving.counter, visibility_share(vertex, arriving.direction, f.pdf_solid_angle));
-//#end
-    return shadow;
-}
-
-//#if MAP_SAMPLING
-fn light_of_map(path: ptr<function, Path>, vertex: Vertex) -> Arriving {
-    var arriving: Arriving;
-    let bits = path_pair_bits(path);
-    let choice = choose_tile(vertex.distribution, bits, globals.whole_map_share);
-    let sample = sample_in_tile(choice.tile, vec2u(choice.remainder, bits.y));
-    if sample.pdf_solid_angle > 0.0 {
-        arriving.is_some = true;
-        arriving.direction = sample.direction;
-        arriving.distance = F32_MAX;
-        arriving.light = sample.radiance;
-        arriving.pdf_solid_angle = choice.probability * sample.pdf_solid_angle;
-//#if SHARING
-        arriving.pdf_solid_angle *= (*path).map_samples;
-//#end
-        arriving.weight = sample.weight;
-//#if COUNTING
-        arriving.counter = count_try(path, vertex, choice.tile);
-//#end
-    }
-    return arriving;
-}
-//#end
-
-//#if LOCAL_LIGHTS
-fn light_of_lamps(path: ptr<function, Path>, vertex: Vertex) -> Arriving {
-    var arriving: Arriving;
-    let bits = path_pair_bits(path);
-    let sample = sample_local_light(receiver_of(vertex), bits);
-    if max_element(sample.radiance_over_pdf) > 0.0 {
-        arriving.is_some = true;
-        arriving.direction = sample.direction;
-        arriving.distance = sample.distance;
-        arriving.light = sample.radiance_over_pdf;
-        arriving.pdf_solid_angle = sample.pdf_solid_angle;
-    }
-    return arriving;
-}
-//#end
-
-// Chooses light that may reach a vertex, the map's first. Both share the code for what the vertex makes
-// of it, which is long.
-fn gather(path: ptr<function, Path>, vertex: Vertex) {
-//#if MAP_SAMPLING
-//#if LOCAL_LIGHTS
-    for (var i = 0u; i < 2u; i++) {
-        var arriving: Arriving;
-        if i == 0u {
-            arriving = light_of_map(path, vertex);
-        } else {
-            arriving = light_of_lamps(path, vertex);
-        }
-        let shadow = shadow_of(path, vertex, arriving, i == 0u);
-        if i == 0u {
-            (*path).map_shadow = shadow;
-        } else {
-            (*path).lamp_shadow = shadow;
-        }
-    }
-//#else
-    (*path).map_shadow = shadow_of(path, vertex, light_of_map(path, vertex), true);
-//#end
-//#else
-    (*path).lamp_shadow = shadow_of(path, vertex, light_of_lamps(path, vertex), false);
-//#end
-}
-//#end
-//#end
 
 // Chooses where the path goes on. `false` if it ends.
 fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {

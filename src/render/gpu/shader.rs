@@ -343,13 +343,14 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 46] {
+fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 54] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
         };
     }
     let samples_map = features.contains(Features::MAP_SAMPLING);
+    let has_shadow_rays = features.contains(Features::SHADOW_RAYS);
     [
         (wgsl!("globals"), true),
         (wgsl!("math"), true),
@@ -376,6 +377,14 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 46] {
         (wgsl!("ray_query"), features.contains(Features::HARDWARE_RAYS)),
         (wgsl!("camera"), true),
         (wgsl!("path"), true),
+        (wgsl!("body"), features.contains(Features::SOLID_TRANSMISSION)),
+        (wgsl!("path_medium"), features.contains(Features::MEDIUM)),
+        (wgsl!("passing"), features.contains(Features::FILTERED_OR_PASSED)),
+        (wgsl!("emitted"), features.contains(Features::EMITTERS)),
+        (wgsl!("background"), features.contains(Features::BACKGROUND_BLUR)),
+        (wgsl!("shadows"), has_shadow_rays),
+        (wgsl!("gather"), has_shadow_rays && kernel != Kernel::Learn),
+        (wgsl!("no_lights"), !has_shadow_rays && kernel != Kernel::Learn),
         (wgsl!("broad"), kernel.shares() || features.contains(Features::RADIANCE_CACHE)),
         (wgsl!("radiance_cache"), features.contains(Features::RADIANCE_CACHE)),
         (wgsl!("count"), features.contains(Features::COUNTING)),

@@ -1,0 +1,20 @@
+// Emissive triangles that a path meets: twin of `Path::add_emitted` in src/path/lights.rs.
+
+fn add_emitted(path: ptr<function, Path>, point: SurfacePoint) {
+    if point.parameters.unlit {
+        return;
+    }
+    let radiance = emitted(point);
+    if max_element(radiance) <= 0.0 {
+        return;
+    }
+    var weight = 1.0;
+    if (*path).departure_pdf_solid_angle < F32_MAX {
+        let receiver = (*path).departure_receiver;
+        let distance = length(receiver.position - point.position);
+        let nee =
+            local_light_pdf_solid_angle(point.triangle, receiver, (*path).ray.direction, distance);
+        weight = balance_heuristic((*path).departure_pdf_solid_angle, nee);
+    }
+    (*path).radiance += (*path).throughput * radiance * weight;
+}

@@ -1,0 +1,79 @@
+// Surfaces that a ray does not meet or goes straight through: twin of src/path/world.rs and of `Path::passes`.
+
+//#if PARTIAL
+// Share of light that goes straight through a surface: what alpha does not cover, and what smooth
+// thin glass transmits.
+fn straight_through(point: SurfacePoint, direction: vec3f) -> vec3f {
+    if (material_flags(point.material) & PARTIAL) == 0u {
+        return vec3f(0.0);
+    }
+    var glass = vec3f(0.0);
+//#if TRANSMISSION
+    if point.parameters.transmission > 0.0 {
+        let bsdf = bsdf_new(point.parameters, point.front_face);
+        glass = bsdf_straight_transmittance(
+            bsdf, local_from_world(point.shading_frame, -direction));
+    }
+//#end
+    let covered = coverage(point);
+    return (1.0 - covered) + covered * glass;
+}
+
+fn coverage(point: SurfacePoint) -> f32 {
+    let blended = (material_flags(point.material) & ALPHA_BLEND) != 0u;
+    return select(1.0, saturate(point.parameters.alpha), blended);
+}
+
+fn passes(path: ptr<function, Path>, point: SurfacePoint) -> bool {
+    let through = straight_through(point, (*path).ray.direction);
+    let probability = min(max_element(through), 1.0);
+    if probability <= 0.0 {
+        return false;
+    }
+    var goes_on = probability >= 1.0;
+    if !goes_on {
+        goes_on = path_pair(path).x < probability;
+    }
+//#if SHARING
+    (*path).is_clear = (*path).is_clear && (!goes_on || all(through == vec3f(1.0)));
+//#end
+    if goes_on {
+        (*path).throughput *= through / probability;
+    } else {
+        (*path).throughput *= coverage(point) / (1.0 - probability);
+    }
+    return goes_on;
+}
+//#end
+
+//#if FILTERED_HITS
+// Whether a path sees a hit: not where a mask cuts it out, nor, for camera rays, a back side.
+fn accepts(hit: Hit, from_camera: bool) -> bool {
+    if from_camera && (hit.flags & (DOUBLE_SIDED | FROM_BEHIND)) == FROM_BEHIND {
+        return false;
+    }
+//#if ALPHA_MASK
+    if (hit.flags & ALPHA_MASK) != 0u {
+        return alpha_at(hit.triangle, hit.barycentric) > 0.0;
+    }
+//#end
+    return true;
+}
+//#end
+
+//#if PASS_THROUGH
+// Share of light that a surface on a shadow ray's way lets through.
+fn passed(hit: Hit, direction: vec3f) -> vec3f {
+//#if PARTIAL
+    if (hit.flags & PARTIAL) != 0u {
+        return straight_through(surface_at(hit.triangle, hit.barycentric, direction), direction);
+    }
+//#end
+//#if ALPHA_MASK
+    if (hit.flags & ALPHA_MASK) != 0u {
+        return vec3f(1.0 - alpha_at(hit.triangle, hit.barycentric));
+    }
+//#end
+    return vec3f(0.0);
+}
+//#end
