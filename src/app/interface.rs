@@ -69,7 +69,7 @@ pub enum Tab {
 pub enum TileView {
     /// Share of the map's energy.
     Energy,
-    /// Share of what all cells together have learned to want.
+    /// Share of what all cells together have learned to sample.
     Learned,
     /// Tiles of equal energy, which are not used.
     EqualEnergy,

@@ -76,7 +76,7 @@ fn overlays_and_panels_look_as_they_did() {
     }
     // The sun's, which no cell sees.
     let state = Interface { overlay: Some(Overlay::Tile), tile: Some(41), ..inspect };
-    states.push(("overlay-wish-for-a-hidden-tile".to_owned(), state));
+    states.push(("overlay-probability-of-a-hidden-tile".to_owned(), state));
     let mut different = Vec::new();
     let mut pictures: Vec<Rgb8> = Vec::new();
     for (name, interface) in states {

@@ -79,7 +79,7 @@ impl Overlay {
             Self::BestTile => "Most important tile",
             Self::Entropy => "Entropy of the distribution",
             Self::Distance => "Distance from the whole map's distribution",
-            Self::Tile => "Wish for the chosen tile",
+            Self::Tile => "Probability of the chosen tile",
             Self::Samples => "Samples",
             Self::Error => "Estimated error",
             Self::Albedo => "Albedo",

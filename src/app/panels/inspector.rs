@@ -48,7 +48,7 @@ pub(in crate::app) fn show(
     if let Some(tile) = interface.tile {
         chosen_tile(ui, interface, size, tile, &shares(&energies));
     } else if interface.tiles != TileView::EqualEnergy {
-        ui.label(theme::quiet("Click a tile to see which cells want it."));
+        ui.label(theme::quiet("Click a tile to see which cells sample it."));
     }
     ui.checkbox(&mut interface.is_frozen, "Freeze learning").on_hover_text(
         "Go on with the distributions there are, around their old centre, when the camera or a setting \
@@ -79,7 +79,7 @@ pub(in crate::app) fn show(
 fn tile_views(ui: &mut Ui, interface: &mut Interface) {
     const VIEWS: [(TileView, &str, &str); 3] = [
         (TileView::Energy, "Energy", "Share of the map's energy in each tile"),
-        (TileView::Learned, "Learned", "What all cells together have learned to want"),
+        (TileView::Learned, "Learned", "What all cells together have learned to sample"),
         (
             TileView::EqualEnergy,
             "Equal energy",
@@ -200,7 +200,7 @@ fn chosen_tile(
     let place = format!("row {}, column {}", tile / columns, tile % columns);
     ui.label(format!("Tile {tile}, {place}: {} of the map", percent(share)));
     let is_shown = interface.overlay == Some(crate::app::overlays::Overlay::Tile);
-    if !is_shown && ui.button("Show which cells want it").clicked() {
+    if !is_shown && ui.button("Show which cells sample it").clicked() {
         interface.overlay = Some(crate::app::overlays::Overlay::Tile);
     }
 }
