@@ -27,7 +27,7 @@ mod real_files;
 #[cfg(feature = "report")]
 mod report;
 mod shared;
-#[cfg(all(feature = "window", feature = "report"))]
+#[cfg(feature = "report")]
 mod stability;
 #[cfg(feature = "window")]
 mod window;
