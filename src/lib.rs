@@ -17,7 +17,7 @@
 //!   smooths them, [`tone`] develops them, and `develop` does so on a GPU. [`stability`] tries all of it
 //!   on stiff and extreme cases, [`mod@bench`] measures a machine.
 //!
-//! Arrows point down: `cli -> {stability -> app, bench -> report} -> render -> path ->
+//! Arrows point down: `cli -> {app, stability, bench -> report} -> render -> path ->
 //! {light_grid, bsdf, medium, bvh} ->
 //! {scene, environment} -> {image, sampler, math, color, error}`.
 //!
@@ -67,7 +67,7 @@ pub mod report;
 pub mod sampler;
 pub mod scene;
 pub mod sources;
-#[cfg(all(feature = "window", feature = "report"))]
+#[cfg(feature = "report")]
 pub mod stability;
 mod terminal;
 pub mod tone;

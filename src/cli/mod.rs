@@ -25,7 +25,7 @@ mod report;
 mod sat;
 #[cfg(feature = "window")]
 mod screenshot;
-#[cfg(all(feature = "window", feature = "report"))]
+#[cfg(feature = "report")]
 mod stability;
 mod values;
 #[cfg(feature = "window")]
@@ -79,7 +79,7 @@ enum Command {
     /// Compare the importance tables' accuracy on maps (the talk's summed-area-table claim).
     Sat(sat::SatArguments),
     /// Try stiff and extreme cases on this machine; fails if one does.
-    #[cfg_attr(not(all(feature = "window", feature = "report")), command(hide = true))]
+    #[cfg_attr(not(feature = "report"), command(hide = true))]
     Stability(stability::StabilityArguments),
     /// Print what completes these commands in a shell.
     Completions(generate::CompletionsArguments),

@@ -9,7 +9,6 @@ use crate::error::{Error, Result};
 use crate::image::check_writable;
 use crate::output::record::write_json;
 use crate::render::gpu::Gpu;
-use crate::stability::fuzz::{self, Kind};
 use crate::stability::{Case, Report, Setting, Verdict, cases, run as run_case};
 use crate::terminal::print;
 
@@ -34,15 +33,6 @@ pub(super) struct StabilityArguments {
     /// Prints the names of the cases and runs none.
     #[arg(long)]
     list: bool,
-    /// Reads spoilt input of one kind in this process, as the cases under `fuzz` let a process do.
-    #[arg(long, hide = true, value_enum)]
-    fuzz: Option<Kind>,
-    /// First spoilt input.
-    #[arg(long, hide = true, default_value = "0", requires = "fuzz")]
-    first: u64,
-    /// Number of spoilt inputs.
-    #[arg(long, hide = true, default_value = "1", requires = "fuzz")]
-    count: u64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -55,9 +45,6 @@ enum Device {
 
 /// Runs the cases, prints a line for each; an error if one fails.
 pub(super) fn run(arguments: &StabilityArguments) -> Result<()> {
-    if let Some(kind) = arguments.fuzz {
-        return fuzz::work(kind, arguments.first, arguments.count, super::accepts);
-    }
     let chosen = choose(arguments)?;
     if arguments.list {
         return chosen.iter().try_for_each(|case| print(case.title()));
@@ -65,8 +52,6 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<()> {
     if let Some(file) = &arguments.json {
         check_writable(file)?;
     }
-    let binary = std::env::current_exe()
-        .map_err(|e| Error::new(format!("this program's own file cannot be found: {e}")))?;
     let gpu = match arguments.device {
         Device::Cpu if arguments.adapter.is_some() => {
             return Err(Error::new("--adapter and --device cpu exclude each other"));
@@ -75,7 +60,7 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<()> {
         Device::Gpu => Some(Gpu::open(arguments.adapter.as_deref())?),
     };
     let device = gpu.as_ref().map_or("CPU".to_owned(), |gpu| gpu.facts().name.clone());
-    let setting = Setting { gpu, nightly: arguments.nightly, binary, accepts: super::accepts };
+    let setting = Setting { gpu, nightly: arguments.nightly };
     let mut reports = Vec::new();
     for case in chosen {
         let report = run_case(case, &setting);

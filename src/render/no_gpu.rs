@@ -64,6 +64,11 @@ impl Gpu {
         match self {}
     }
 
+    /// Gives the device up.
+    pub fn lose(&self) {
+        match *self {}
+    }
+
     /// Whether its own ray queries find what rays hit.
     pub fn has_hardware_rays(&self) -> bool {
         match *self {}

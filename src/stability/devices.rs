@@ -1,4 +1,6 @@
-//! Devices against each other, and against f64.
+//! Devices against each other, against f64, lost, and too small.
+
+use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
@@ -12,7 +14,8 @@ use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::World;
 use crate::render::film::{Film, Pixel};
-use crate::render::{Sampling, View};
+use crate::render::gpu::{Gpu, UploadedScene};
+use crate::render::{Sampling, Session, View};
 use crate::scene::{Camera, Material};
 
 const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
@@ -24,6 +27,8 @@ pub(super) const CASES: &[Case] = &[
     case("gpu-against-cpu", On::Gpu, |s| against_cpu(s, room(0.7, 1.0, Vec3::ZERO))),
     case("gpu-against-cpu-glass", On::Gpu, |s| against_cpu(s, glasses())),
     case("gpu-against-cpu-textured", On::Gpu, |s| against_cpu(s, textured())),
+    case("device-lost", On::Gpu, device_lost),
+    case("out-of-gpu-memory", On::Gpu, out_of_gpu_memory),
 ];
 
 /// How far apart pixels are, relative to the pixel plus a thousandth of the picture's mean.
@@ -95,7 +100,7 @@ fn compare(
     environment: &Environment,
     view: View,
 ) -> Result<Outcome> {
-    let on_cpu = Setting { gpu: None, binary: setting.binary.clone(), ..*setting };
+    let on_cpu = Setting { gpu: None, ..*setting };
     let samples = setting.count(16, 256);
     let cpu = render(&on_cpu, world, environment, view.clone(), samples)?;
     let gpu = render(setting, world, environment, view, samples)?;
@@ -109,6 +114,62 @@ fn compare(
         .at_most("mean of the picture off, relative", (ratio - 1.0).abs(), 5e-3)
         .told("mean deviation of a pixel", found.mean)
         .told("worst deviation of a pixel", found.worst))
+}
+
+/// The work so far is kept and the CPU goes on. The device is one of its own: the others go on too.
+fn device_lost(setting: &Setting) -> Result<Outcome> {
+    let Some(known) = &setting.gpu else { return Ok(Outcome::skipped("needs --device gpu")) };
+    let gpu = Gpu::open(Some(&known.facts().name))?;
+    let (builder, camera) = room(0.7, 1.0, Vec3::ZERO);
+    let (world, environment) = (builder.build(), sky("day")?);
+    let never = AtomicBool::new(false);
+    let on_gpu = UploadedScene::new(&gpu, &world, &environment)?;
+    let view = view(camera, Sampling::Plain, 2);
+    let mut session = Session::on_gpu(&world, &environment, view, &on_gpu)?;
+    session.advance(4, &never)?;
+    let before = session.film().clone();
+    gpu.lose();
+    let failure = session.advance(2, &never).err().map(|e| e.to_string()).unwrap_or_default();
+    let kept = *session.film() == before;
+    session.continue_on_cpu();
+    session.advance(4, &never)?;
+    let named = failure.contains(&gpu.facts().name) && !failure.contains('\n');
+    let yes = |condition: bool| f64::from(u8::from(condition));
+    let goes_on = session.samples() == 8 && mean(session.film()).luminance > 0.0;
+    Ok(Outcome::new()
+        .sound(session.film())
+        .at_least("the loss is one sentence with the device's name", yes(named), 1.0)
+        .at_least("what was rendered is kept", yes(kept), 1.0)
+        .at_least("the CPU goes on", yes(goes_on), 1.0))
+}
+
+/// A picture that the device has no room for is refused with the numbers; a small one still works.
+fn out_of_gpu_memory(setting: &Setting) -> Result<Outcome> {
+    let Some(gpu) = &setting.gpu else { return Ok(Outcome::skipped("needs --device gpu")) };
+    let allowed = gpu.facts().storage_binding_bytes.min(gpu.facts().buffer_bytes);
+    // 16 bytes of a pixel in each of its buffers on the device, 48 in the film.
+    let side = ((allowed / 16 + 1) as f64).sqrt().ceil() as u32 + 1;
+    if side > 8192 {
+        let gibibytes = allowed >> 30;
+        return Ok(Outcome::skipped(format!(
+            "the device takes {gibibytes} GiB in one piece: the film in main memory would not fit first"
+        )));
+    }
+    let world = SceneBuilder::default().floor(&lambert(0.5), Vec3::ZERO, 1.0).build();
+    let environment = sky("day")?;
+    let uploaded = UploadedScene::new(gpu, &world, &environment)?;
+    let camera = Camera::look_at(Vec3::ONE, Vec3::ZERO, 0.5);
+    let small = view(camera, Sampling::Plain, 1);
+    let large = View { width: side, height: side, ..small.clone() };
+    let refusal = Session::on_gpu(&world, &environment, large, &uploaded).err();
+    let refusal = refusal.map(|e| e.to_string()).unwrap_or_default();
+    let clear = refusal.contains("MiB") && !refusal.contains('\n');
+    let mut session = Session::on_gpu(&world, &environment, small, &uploaded)?;
+    session.advance(1, &AtomicBool::new(false))?;
+    Ok(Outcome::new()
+        .at_least("refused with the numbers", f64::from(u8::from(clear)), 1.0)
+        .at_least("a small picture afterwards", mean(session.film()).luminance, 1e-3)
+        .remark(refusal))
 }
 
 /// Spheres of smooth and rough glass on the room's floor.

@@ -6,9 +6,7 @@
 //! take minutes (1e9 rays, maps of a gigabyte).
 
 mod devices;
-mod faults;
 mod film;
-pub mod fuzz;
 mod geometry;
 mod grid;
 mod maps;
@@ -17,11 +15,9 @@ mod outcome;
 mod random;
 mod reference;
 mod scenes;
-mod scratch;
 mod tables;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
 use std::time::Instant;
 
 use serde_json::{Value, json};
@@ -36,11 +32,6 @@ pub struct Setting {
     pub gpu: Option<Gpu>,
     /// The long counts.
     pub nightly: bool,
-    /// The `lightgrid` binary, for what needs a process of its own.
-    pub binary: PathBuf,
-    /// Whether a command line (without the program's name) would be accepted: the command line lies
-    /// above this module.
-    pub accepts: fn(&[String]) -> bool,
 }
 
 impl Setting {
@@ -94,8 +85,6 @@ pub fn cases() -> impl Iterator<Item = &'static Case> {
         materials::CASES,
         film::CASES,
         devices::CASES,
-        fuzz::CASES,
-        faults::CASES,
     ]
     .into_iter()
     .flatten()

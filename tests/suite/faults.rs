@@ -1,10 +1,15 @@
-//! What must not cost a picture: nobody who listens, full disks, hostile files, signals.
+//! What must not cost a picture: nobody who listens, full disks, hostile and vanishing files, signals.
 
 use std::fs;
 use std::process::{Output, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use lightgrid::image::{ExrPicture, Image, read_map, write_exr};
+use lightgrid::scene::gltf;
+
 use crate::cli::{Bench, text};
+use crate::shared::{SplitMix, count};
 
 /// As [`Bench::command`], a small picture of a built-in scene.
 const SMALL: &str = "render open --env sky:overcast@64x32 --device cpu --size 16x9 --spp 1";
@@ -15,6 +20,39 @@ fn sentence(output: &Output) -> String {
     let failures = says.lines().filter(|line| !line.starts_with("wrote "));
     assert_eq!(failures.count(), 1, "{says}");
     says
+}
+
+/// Without learning, and so that a large picture takes a while to write.
+#[cfg(unix)]
+const QUICK: &str =
+    "render open --env sky:overcast@64x32 --bounces 0 --sampling bsdf --device cpu --spp 1";
+
+/// What a process says that is done within a minute.
+#[cfg(unix)]
+fn finished(command: &mut std::process::Command) -> Output {
+    let command = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the process starts");
+    let start = Instant::now();
+    while child.try_wait().expect("a child").is_none() {
+        if start.elapsed() > Duration::from_secs(60) {
+            child.kill().expect("a child");
+            panic!(
+                "not done in 60 s: {}",
+                text(&child.wait_with_output().expect("it ends").stderr)
+            );
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    // What it says fits a pipe's buffer: a few sentences.
+    child.wait_with_output().expect("it ends")
+}
+
+/// A small picture to be replaced; its bytes.
+#[cfg(unix)]
+fn picture_from_before(bench: &Bench, name: &str) -> Vec<u8> {
+    let output = finished(&mut bench.command(&format!("{QUICK} --size 16x9 -o {name}")));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    fs::read(bench.path(name)).expect("written")
 }
 
 /// A triangle whose buffer is `uri`, with `rest` before its end.
@@ -282,6 +320,142 @@ fn short_memory_is_a_sentence_with_both_numbers() {
         assert!(says.contains(" needs ") && says.contains(" MB are left"), "{says}");
         assert!(!bench.path("a.png").exists());
     }
+}
+
+/// The picture from before, or all of a new one: never a part.
+#[cfg(unix)]
+#[test]
+fn killed_while_saving_there_is_the_old_picture_or_the_new_one() {
+    let bench = Bench::new();
+    let mut random = SplitMix(3);
+    let (mut caught, rounds) = (0, count(6, 100));
+    for round in 0..rounds {
+        let picture = if round % 2 == 0 { "a.exr" } else { "a.png" };
+        let before = picture_from_before(&bench, picture);
+        let mut command = bench.command(&format!("{QUICK} --size 1024x768 --seed 1 -o {picture}"));
+        let mut child = command.stdin(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let delay = Duration::from_micros(random.below(8000) as u64);
+        let is_saving = || {
+            let parts = bench.files().into_iter().filter(|name| name.ends_with(".part"));
+            parts.filter_map(|name| fs::metadata(bench.path(&name)).ok()).any(|m| m.len() > 0)
+        };
+        while child.try_wait().unwrap().is_none() && !is_saving() {
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        std::thread::sleep(delay);
+        // SIGKILL, as kill -9.
+        let _ = child.kill();
+        caught += u32::from(child.wait().unwrap().code().is_none());
+        let is_whole = || {
+            let new = lightgrid::image::read_picture(&bench.path(picture));
+            new.is_ok_and(|new| new.width == 1024)
+        };
+        let is_old = fs::read(bench.path(picture)).unwrap() == before;
+        assert!(is_old || is_whole(), "round {round}: neither the old nor the new one");
+    }
+    assert!(caught >= 1, "none of {rounds} processes was killed while it wrote");
+}
+
+/// No room after 64 KiB: the file limit of a shell stands for it.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_is_a_sentence_and_the_old_picture_stays() {
+    for picture in ["a.exr", "a.png"] {
+        let bench = Bench::new();
+        let before = (picture_from_before(&bench, picture), bench.files());
+        // Ignored, the signal becomes an error of the write, as ENOSPC would be.
+        let binary = env!("CARGO_BIN_EXE_lightgrid");
+        let line = format!("exec {binary} {QUICK} --size 640x480 -o {picture}");
+        let mut command = std::process::Command::new("sh");
+        command.args(["-c", &format!("trap '' XFSZ; ulimit -f 64; {line}")]);
+        let says = sentence(&finished(command.current_dir(bench.path(""))));
+        assert!(says.contains("cannot be written") && !says.contains("panicked"), "{says}");
+        let after = (fs::read(bench.path(picture)).unwrap(), bench.files());
+        assert!(after == before, "the picture from before is there, and no other file");
+    }
+    // The words for it, from the writer itself.
+    let bench = Bench::new();
+    let full = lightgrid::image::write_beside_and_rename(&bench.path("b"), |_| {
+        Err(std::io::Error::from(std::io::ErrorKind::StorageFull))
+    });
+    let says = full.unwrap_err().to_string();
+    assert!(says.contains("the disk is full"), "{says}");
+}
+
+/// Refused before the work, not after it. The superuser may write anywhere, so it hands over to a user
+/// who may not.
+#[cfg(unix)]
+#[test]
+fn a_read_only_folder_is_refused_before_the_work() {
+    use std::os::unix::fs::PermissionsExt as _;
+    use std::os::unix::process::CommandExt as _;
+    const NOBODY: u32 = 65_534;
+    let bench = Bench::new();
+    let allow = |mode: u32| {
+        fs::set_permissions(bench.path(""), fs::Permissions::from_mode(mode)).unwrap();
+    };
+    allow(0o555);
+    let line = format!("{QUICK} --size 640x480 -o a.exr").replace("--spp 1", "--spp 1000000");
+    let mut command = bench.command(&line);
+    if fs::write(bench.path("probe"), "").is_ok() {
+        fs::remove_file(bench.path("probe")).unwrap();
+        let asked = bench.command("--version").uid(NOBODY).output();
+        if !asked.is_ok_and(|output| output.status.success()) {
+            eprintln!("SKIPPED: run as the superuser, and nobody else may run this binary");
+            return;
+        }
+        command.uid(NOBODY);
+    }
+    let start = Instant::now();
+    let output = finished(&mut command);
+    allow(0o755);
+    let says = sentence(&output);
+    assert!(says.contains("a.exr") && !says.contains("panicked"), "{says}");
+    assert!(start.elapsed() < Duration::from_secs(10));
+}
+
+/// Files that are cut, emptied, removed and put back while they are read.
+#[test]
+fn files_that_vanish_while_they_are_read_are_refused_by_name() {
+    let bench = Bench::new();
+    let map = Image::filled(256, 128, [1.0; 3]);
+    let picture = ExrPicture { image: &map, layers: vec![], metadata: &[] };
+    write_exr(&bench.path("map.exr"), picture).unwrap();
+    let files = ["map.exr", "scene.bin"].map(|name| (name, fs::read(bench.path(name)).unwrap()));
+    let done = AtomicBool::new(false);
+    let (mut read, mut refusals) = (0, Vec::new());
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let mut random = SplitMix(9);
+            while !done.load(Ordering::Relaxed) {
+                for (name, bytes) in &files {
+                    let path = bench.path(name);
+                    let _ = match random.below(4) {
+                        0 => fs::remove_file(path),
+                        1 => fs::write(path, &bytes[..random.below(bytes.len())]),
+                        _ => fs::write(path, bytes),
+                    };
+                }
+                std::thread::sleep(Duration::from_micros(random.below(300) as u64));
+            }
+        });
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(count(2, 60)) {
+            let loaded = gltf::load(&bench.path("scene.gltf")).map(|_| ());
+            for result in [loaded, read_map(&bench.path("map.exr")).map(|_| ())] {
+                match result {
+                    Ok(()) => read += 1,
+                    Err(error) => refusals.push(error.to_string()),
+                }
+            }
+        }
+        done.store(true, Ordering::Relaxed);
+    });
+    for says in &refusals {
+        let is_named = says.contains("map.exr") || says.contains("scene.gltf");
+        assert!(is_named && !says.contains('\n'), "{says}");
+    }
+    assert!(read >= 1 && !refusals.is_empty(), "{read} reads of whole files, {refusals:?}");
 }
 
 #[cfg(unix)]

@@ -28,7 +28,7 @@ mod real_files;
 mod report;
 mod rooms;
 mod shared;
-#[cfg(all(feature = "window", feature = "report"))]
+#[cfg(feature = "report")]
 mod stability;
 #[cfg(feature = "window")]
 mod window;

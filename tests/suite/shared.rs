@@ -1,4 +1,4 @@
-//! Where the shared test data lies, how its absence is said, and random numbers for tests.
+//! Where the shared test data lies, how its absence is said, how much is tried, and random numbers for tests.
 
 use std::path::PathBuf;
 
@@ -16,6 +16,11 @@ pub(crate) fn shared(relative: &str) -> Option<PathBuf> {
     None
 }
 
+/// How much is tried: in seconds, or where `LIGHTGRID_NIGHTLY` is set as long as that takes.
+pub(crate) fn count(quick: u64, nightly: u64) -> u64 {
+    if std::env::var_os("LIGHTGRID_NIGHTLY").is_some() { nightly } else { quick }
+}
+
 /// SplitMix64: the same on every machine, and not the renderer's own sampler.
 pub(crate) struct SplitMix(pub(crate) u64);
 
@@ -27,6 +32,11 @@ impl SplitMix {
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
+    }
+
+    /// Below `count`, which is not 0.
+    pub(crate) fn below(&mut self, count: usize) -> usize {
+        ((u128::from(self.next_bits()) * count as u128) >> 64) as usize
     }
 
     /// The next f32 in `[0,1)`.

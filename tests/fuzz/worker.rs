@@ -1,22 +1,24 @@
 //! The process that reads spoilt input.
 
+use std::fs;
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use super::{ALLOWANCE_BYTES, Kind, Tally, bombs, corpus, mutate};
-use crate::app::document::PictureSize;
-use crate::app::settings_file::Settings;
-use crate::error::{Error, Result};
-use crate::image::read_map;
-use crate::path::{World, framing};
-use crate::render::{Sampling, Session, View};
-use crate::scene::{Scene, gltf};
-use crate::stability::random::Random;
-use crate::stability::scenes::{constant, view};
-use crate::stability::scratch::Scratch;
-use crate::terminal::{print, tell};
+use lightgrid::cli::accepts;
+use lightgrid::environment::{Environment, EnvironmentOptions};
+use lightgrid::image::{Image, read_map};
+use lightgrid::path::{PathLimits, World, framing};
+use lightgrid::render::filter::PixelFilter;
+use lightgrid::render::{Sampling, Session, View};
+use lightgrid::scene::{Scene, gltf};
+
+#[cfg(feature = "window")]
+use crate::settings;
+use crate::shared::SplitMix;
+use crate::{ALLOWANCE_BYTES, Kind, Tally, bombs, corpus, mutate};
 
 /// What an input turned out to be.
-enum Found {
+pub(crate) enum Found {
     /// Understood; it delivers this many bytes, and whether they are sound.
     Accepted { honest_bytes: u64, is_sound: bool },
     /// Refused with this sentence.
@@ -24,28 +26,28 @@ enum Found {
 }
 
 /// Reads inputs `first..first + count`, printing each number before it is read; then the tally as JSON.
-///
-/// # Errors
-/// If the corpus or a scratch file cannot be made.
-pub fn work(kind: Kind, first: u64, count: u64, accepts: fn(&[String]) -> bool) -> Result<()> {
-    let scratch = Scratch::new()?;
+pub(crate) fn work(kind: Kind, first: u64, count: u64) {
+    // The harness has begun a line.
+    println!();
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
     let entries = match kind {
         Kind::Gltf => corpus::gltf().into_iter().map(corpus::gltf_file).collect(),
-        Kind::Maps => corpus::maps()?,
-        Kind::Settings => corpus::settings()?,
+        #[cfg(feature = "window")]
+        Kind::Settings => settings::corpus(),
         Kind::CommandLines => Vec::new(),
-        Kind::Bombs => corpus::maps()?,
+        Kind::Maps | Kind::Bombs => corpus::maps(),
     };
     // Sound input first: thread pools, tables and the allocator's own growth are no input's doing.
     for entry in &entries {
-        if let Found::Refused(sentence) = read(kind, "warm", entry, &scratch)? {
-            return Err(Error::new(format!("the corpus is not sound: {sentence}")));
+        if let Found::Refused(sentence) = read(kind, "warm", entry, folder) {
+            panic!("the corpus is not sound: {sentence}");
         }
     }
     let mut tally = Tally { worst_excess_bytes: i64::MIN, ..Tally::default() };
     for number in first..first + count {
-        print(number)?;
-        let mut random = Random(number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        println!("{number}");
+        let mut random = SplitMix(number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let before = Memory::now();
         let (length, found) = match kind {
             Kind::CommandLines => {
@@ -60,30 +62,31 @@ pub fn work(kind: Kind, first: u64, count: u64, accepts: fn(&[String]) -> bool) 
             Kind::Bombs => {
                 let (name, bytes) = bombs::all().swap_remove(number as usize);
                 let kind = if name.contains(".gl") { Kind::Gltf } else { Kind::Maps };
-                (bytes.len(), read(kind, name, &bytes, &scratch)?)
+                (bytes.len(), read(kind, name, &bytes, folder))
             }
+            #[cfg(feature = "window")]
             Kind::Settings if random.below(4) > 0 => {
                 let bytes = mutate::numbers(&entries[random.below(entries.len())], &mut random);
-                (bytes.len(), read(kind, "spoilt", &bytes, &scratch)?)
+                (bytes.len(), read(kind, "spoilt", &bytes, folder))
             }
             Kind::Gltf if random.below(4) > 0 => {
                 let sources = corpus::gltf();
                 let source = &sources[random.below(sources.len())];
                 let bytes = corpus::gltf_file(mutate::gltf(source, &mut random));
-                (bytes.len(), read(kind, "spoilt", &bytes, &scratch)?)
+                (bytes.len(), read(kind, "spoilt", &bytes, folder))
             }
             _ => {
                 let bytes = mutate::bytes(&entries, &mut random);
-                (bytes.len(), read(kind, "spoilt", &bytes, &scratch)?)
+                (bytes.len(), read(kind, "spoilt", &bytes, folder))
             }
         };
         let grown = before.growth();
-        if grown as f64 > ALLOWANCE_BYTES {
-            tell(format_args!("input {number} took {grown} bytes"));
+        if grown > ALLOWANCE_BYTES {
+            eprintln!("input {number} took {grown} bytes");
         }
         count_in(&mut tally, number, grown, length as u64, &found);
     }
-    print(crate::output::record::to_value(&tally)?)
+    println!("{}", serde_json::to_string(&tally).expect("JSON"));
 }
 
 fn count_in(tally: &mut Tally, number: u64, grown: u64, length: u64, found: &Found) {
@@ -91,11 +94,17 @@ fn count_in(tally: &mut Tally, number: u64, grown: u64, length: u64, found: &Fou
         Found::Accepted { honest_bytes, is_sound } => {
             tally.accepted += 1;
             tally.unsound += u64::from(!is_sound);
+            if !is_sound {
+                eprintln!("input {number} is out of bounds");
+            }
             length.max(*honest_bytes)
         }
         Found::Refused(sentence) => {
             tally.refused += 1;
-            tally.unclear += u64::from(sentence.is_empty() || sentence.contains('\n'));
+            if sentence.is_empty() || sentence.contains('\n') {
+                tally.unclear += 1;
+                eprintln!("input {number} is refused with {sentence:?}");
+            }
             length
         }
     };
@@ -106,14 +115,20 @@ fn count_in(tally: &mut Tally, number: u64, grown: u64, length: u64, found: &Fou
 }
 
 /// Reads one input as its kind is read.
-fn read(kind: Kind, name: &str, bytes: &[u8], scratch: &Scratch) -> Result<Found> {
-    Ok(match kind {
+fn read(kind: Kind, name: &str, bytes: &[u8], folder: &Path) -> Found {
+    let written = |name: &str| {
+        let path = folder.join(name);
+        fs::write(&path, bytes).expect("written");
+        path
+    };
+    match kind {
         Kind::Gltf => match gltf::load_slice(bytes, None, name) {
-            Ok(scene) => of_scene(scene)?,
+            Ok(scene) => of_scene(scene),
             Err(error) => Found::Refused(error.to_string()),
         },
-        Kind::Settings => of_settings(&scratch.write("settings.json", bytes)?),
-        _ => match read_map(&scratch.write(name, bytes)?) {
+        #[cfg(feature = "window")]
+        Kind::Settings => settings::read(&written("settings.json")),
+        _ => match read_map(&written(name)) {
             Ok(map) => Found::Accepted {
                 honest_bytes: map.image.pixels.len() as u64 * 12,
                 is_sound: map
@@ -125,11 +140,11 @@ fn read(kind: Kind, name: &str, bytes: &[u8], scratch: &Scratch) -> Result<Found
             },
             Err(error) => Found::Refused(error.to_string()),
         },
-    })
+    }
 }
 
 /// A picture of it: whatever was loaded can be rendered.
-fn of_scene(scene: Scene) -> Result<Found> {
+fn of_scene(scene: Scene) -> Found {
     let texels: usize = scene.images.iter().map(|image| image.texels.len()).sum();
     let honest_bytes =
         (scene.positions.len() * 64 + scene.triangles.len() * 128 + texels * 4) as u64;
@@ -137,34 +152,20 @@ fn of_scene(scene: Scene) -> Result<Found> {
     let camera = scene.cameras.first().cloned();
     let world = World::new(scene);
     let camera = camera.unwrap_or_else(|| framing::frame(&world, 1.0));
-    let environment = constant(1.0)?;
-    let view = View { width: 4, height: 4, ..view(camera, Sampling::Plain, 4) };
+    let map = Image::filled(16, 8, [1.0; 3]);
+    let environment = Environment::new(map, &EnvironmentOptions::default()).expect("a map");
+    let view = View {
+        filter: PixelFilter::Box,
+        sampling: Sampling::Plain,
+        limits: PathLimits { bounces: 4, russian_roulette: false },
+        seed: 1,
+        learning_paths: 1 << 13,
+        ..View::new(camera, [4, 4])
+    };
     let mut session = Session::new(&world, &environment, view);
-    session.advance(1, &AtomicBool::new(false))?;
+    session.advance(1, &AtomicBool::new(false)).expect("a picture");
     let finite = session.film().pixels().iter().all(|p| p.mean().iter().all(|c| c.is_finite()));
-    Ok(Found::Accepted { honest_bytes, is_sound: is_sound && finite })
-}
-
-/// Settings must be such that a window can work with them.
-fn of_settings(path: &std::path::Path) -> Found {
-    match Settings::read(path) {
-        Ok(settings) => {
-            let size = match settings.size {
-                PictureSize::Viewport(divisor) => (1..=64).contains(&divisor),
-                PictureSize::Fixed(width, height) => {
-                    width > 0 && height > 0 && u64::from(width) * u64::from(height) <= 1 << 27
-                }
-            };
-            let look = settings.look.exposure_ev.is_finite()
-                && settings.look.white_balance.kelvin.is_finite();
-            let window = settings.window_size.iter().all(|side| (1.0..=1e5).contains(side));
-            Found::Accepted {
-                honest_bytes: 0,
-                is_sound: size && look && window && settings.light.bounces <= 100_000,
-            }
-        }
-        Err(error) => Found::Refused(error.to_string()),
-    }
+    Found::Accepted { honest_bytes, is_sound: is_sound && finite }
 }
 
 /// Address space of this process, where the system tells: what is asked for counts, not only what is
@@ -176,7 +177,7 @@ struct Memory {
 
 impl Memory {
     fn now() -> Self {
-        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
         let field = |name: &str| {
             let line = status.lines().find_map(|line| line.strip_prefix(name));
             let kilobytes =

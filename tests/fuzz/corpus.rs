@@ -2,14 +2,12 @@
 
 use std::io::Write as _;
 
-use crate::app::settings_file::Settings;
-use crate::error::Result;
-use crate::image::{ExrPicture, Image, Layer, Rgb8, write_exr, write_png};
-use crate::stability::random::Random;
-use crate::stability::scratch::Scratch;
+use lightgrid::image::{ExrPicture, Image, Layer, Rgb8, write_exr, write_png};
+
+use crate::shared::SplitMix;
 
 /// Command lines that are accepted.
-pub(super) const LINES: [&str; 14] = [
+pub(crate) const LINES: [&str; 14] = [
     "view",
     "view office --env sky:night",
     "screenshot living-room --overlay visits --panel inspect -o a.png",
@@ -27,25 +25,29 @@ pub(super) const LINES: [&str; 14] = [
 ];
 
 /// Maps of every kind that we write, and hand-made `.hdr` ones.
-pub(super) fn maps() -> Result<Vec<Vec<u8>>> {
-    let scratch = Scratch::new()?;
-    let mut random = Random(11);
-    let image = Image::from_fn(24, 12, |_, _| [0; 3].map(|_| random.unit() * 8.0));
+pub(crate) fn maps() -> Vec<Vec<u8>> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    let mut random = SplitMix(11);
+    let image = Image::from_fn(24, 12, |_, _| [0; 3].map(|_| random.next_f32() * 8.0));
     let count = image.pixels.len();
     let depth = Layer { name: "depth".into(), channels: vec![("Z".into(), vec![1.0; count])] };
     let metadata = [("lightgrid.scene".to_owned(), "office".to_owned())];
     let picture = ExrPicture { image: &image, layers: vec![depth], metadata: &metadata };
-    write_exr(&scratch.path("a.exr"), picture)?;
+    write_exr(&path("a.exr"), picture).expect("written");
     let plain = ExrPicture { image: &image, layers: Vec::new(), metadata: &[] };
-    write_exr(&scratch.path("b.exr"), plain)?;
-    let rgb =
-        Rgb8 { width: 16, height: 8, pixels: (0..128).map(|_| [random.bits() as u8; 3]).collect() };
-    write_png(&scratch.path("a.png"), &rgb, &metadata)?;
+    write_exr(&path("b.exr"), plain).expect("written");
+    let rgb = Rgb8 {
+        width: 16,
+        height: 8,
+        pixels: (0..128).map(|_| [random.next_bits() as u8; 3]).collect(),
+    };
+    write_png(&path("a.png"), &rgb, &metadata).expect("written");
     let mut files = vec![hdr(24, 12, false), hdr(24, 12, true), old_runs()];
     for name in ["a.exr", "b.exr", "a.png"] {
-        files.push(scratch.read(name)?);
+        files.push(std::fs::read(path(name)).expect("readable"));
     }
-    Ok(files)
+    files
 }
 
 fn hdr(width: u8, height: u8, runs: bool) -> Vec<u8> {
@@ -72,25 +74,13 @@ fn old_runs() -> Vec<u8> {
     bytes
 }
 
-/// The settings of a window that was used.
-pub(super) fn settings() -> Result<Vec<Vec<u8>>> {
-    let mut settings = Settings::default();
-    let plain = crate::output::record::to_json(&settings)?;
-    settings.recent_scene("kitchen.glb");
-    settings.recent_map("meadow.hdr");
-    settings.stop.noise = Some(0.05);
-    settings.stop.samples = Some(64);
-    settings.size = crate::app::document::PictureSize::Fixed(640, 360);
-    Ok(vec![plain.into_bytes(), crate::output::record::to_json(&settings)?.into_bytes()])
-}
-
 /// JSON and data of a GLB with most of what is read, and of a glTF with its data in itself.
-pub(super) fn gltf() -> Vec<(String, Vec<u8>)> {
+pub(crate) fn gltf() -> Vec<(String, Vec<u8>)> {
     vec![featured(), (embedded(), Vec::new())]
 }
 
 /// The bytes of a glTF file: a GLB if there is data beside the JSON.
-pub(super) fn gltf_file((json, data): (String, Vec<u8>)) -> Vec<u8> {
+pub(crate) fn gltf_file((json, data): (String, Vec<u8>)) -> Vec<u8> {
     if data.is_empty() { json.into_bytes() } else { container(json, data) }
 }
 
@@ -170,7 +160,7 @@ fn featured() -> (String, Vec<u8>) {
 }
 
 /// JSON and data in one GLB file.
-pub(super) fn container(json: String, mut data: Vec<u8>) -> Vec<u8> {
+pub(crate) fn container(json: String, mut data: Vec<u8>) -> Vec<u8> {
     let mut json = json.into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
     data.resize(data.len().next_multiple_of(4), 0);

@@ -1,10 +1,10 @@
 //! Small files that claim to be large. Each must be refused, and before anything of that size is
 //! allocated.
 
-use super::corpus::container;
+use crate::corpus::container;
 
 /// File name (whose extension says what it is) and content.
-pub(super) fn all() -> Vec<(&'static str, Vec<u8>)> {
+pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         // The issue's own: some hundred bytes, 1e9 pixels.
         ("pixels-1e9.hdr", hdr("-Y 31623 +X 31623", 40)),

@@ -1,6 +1,6 @@
 //! Spoils bytes and words, always in the same way for a number.
 
-use crate::stability::random::Random;
+use crate::shared::SplitMix;
 
 /// Sizes, counts and offsets that readers trip over.
 const NUMBERS: [u64; 16] = [
@@ -49,7 +49,7 @@ const WORDS: [&str; 22] = [
 ];
 
 /// Some to eight changes to one of the entries.
-pub(super) fn bytes(entries: &[Vec<u8>], random: &mut Random) -> Vec<u8> {
+pub(crate) fn bytes(entries: &[Vec<u8>], random: &mut SplitMix) -> Vec<u8> {
     let mut bytes = entries[random.below(entries.len())].clone();
     for _ in 0..1 + random.below(8) {
         if bytes.is_empty() {
@@ -60,7 +60,7 @@ pub(super) fn bytes(entries: &[Vec<u8>], random: &mut Random) -> Vec<u8> {
         let at = random.below(reach);
         match random.below(10) {
             0 => bytes[at] ^= 1 << random.below(8),
-            1 => bytes[at] = random.bits() as u8,
+            1 => bytes[at] = random.next_bits() as u8,
             2..=4 => overwrite(&mut bytes[at..], random),
             5 => {
                 let end = at + random.below((bytes.len() - at).min(64) + 1);
@@ -86,7 +86,7 @@ pub(super) fn bytes(entries: &[Vec<u8>], random: &mut Random) -> Vec<u8> {
 
 /// A glTF file whose container is whole: one to three numbers of its JSON exchanged, a few bytes of its
 /// data overwritten. So more of the reader is reached than by spoiling anything anywhere.
-pub(super) fn gltf((json, data): &(String, Vec<u8>), random: &mut Random) -> (String, Vec<u8>) {
+pub(crate) fn gltf((json, data): &(String, Vec<u8>), random: &mut SplitMix) -> (String, Vec<u8>) {
     let json = numbers(json.as_bytes(), random);
     let mut data = data.clone();
     for _ in 0..random.below(4) {
@@ -99,7 +99,7 @@ pub(super) fn gltf((json, data): &(String, Vec<u8>), random: &mut Random) -> (St
 }
 
 /// Text with one to three of its numbers exchanged.
-pub(super) fn numbers(text: &[u8], random: &mut Random) -> Vec<u8> {
+pub(crate) fn numbers(text: &[u8], random: &mut SplitMix) -> Vec<u8> {
     let mut text = text.to_vec();
     for _ in 0..1 + random.below(3) {
         let at = random.below(text.len());
@@ -109,7 +109,7 @@ pub(super) fn numbers(text: &[u8], random: &mut Random) -> Vec<u8> {
 }
 
 /// Writes a telling number of one to eight bytes, either end first.
-fn overwrite(bytes: &mut [u8], random: &mut Random) {
+fn overwrite(bytes: &mut [u8], random: &mut SplitMix) {
     let width = (1 << random.below(4)).min(bytes.len());
     let number = NUMBERS[random.below(NUMBERS.len())];
     let mut digits = number.to_le_bytes()[..width].to_vec();
@@ -120,7 +120,7 @@ fn overwrite(bytes: &mut [u8], random: &mut Random) {
 }
 
 /// Exchanges the decimal number next after `at` for another word.
-fn replace_number(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
+fn replace_number(bytes: &mut Vec<u8>, at: usize, random: &mut SplitMix) {
     let is_part = |b: &u8| b.is_ascii_digit() || matches!(*b, b'.' | b'-' | b'e' | b'E');
     let Some(start) = bytes[at..].iter().position(|b| b.is_ascii_digit()).map(|i| at + i) else {
         return;
@@ -130,8 +130,8 @@ fn replace_number(bytes: &mut Vec<u8>, at: usize, random: &mut Random) {
 }
 
 /// One of the command lines with words exchanged, doubled, left out, or spoilt.
-pub(super) fn words(lines: &[&str], random: &mut Random) -> Vec<String> {
-    let line = |random: &mut Random| -> Vec<String> {
+pub(crate) fn words(lines: &[&str], random: &mut SplitMix) -> Vec<String> {
+    let line = |random: &mut SplitMix| -> Vec<String> {
         lines[random.below(lines.len())].split_whitespace().map(str::to_owned).collect()
     };
     let mut words = line(random);
