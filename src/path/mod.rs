@@ -23,12 +23,14 @@ mod ray_clock;
 pub mod sharing;
 pub(crate) mod train;
 mod world;
+mod world_builder;
 
 pub use background::Background;
 pub use light_tree::Receiver;
 pub use lights::{LightSample, LocalLights};
 pub(crate) use train::TRAINING_VERTICES;
 pub use world::World;
+pub use world_builder::WorldBuilder;
 
 use crate::bsdf::{Bsdf, Hero};
 use crate::bvh::{Hit, Ray, offset_origin};

@@ -295,6 +295,17 @@ impl Default for Material {
 }
 
 impl Material {
+    /// Lambert's reflectance alone, grey, both sides alike.
+    pub fn lambert(albedo: f32) -> Self {
+        Self {
+            base_color: Vec3::splat(albedo).extend(1.0),
+            metallic: 0.0,
+            specular: 0.0,
+            double_sided: true,
+            ..Self::default()
+        }
+    }
+
     /// All textures, in the order in which `shaders/surface.wgsl` numbers them.
     pub fn textures(&self) -> [&Option<TextureRef>; 17] {
         [

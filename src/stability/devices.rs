@@ -7,12 +7,12 @@ use glam::Vec3;
 use super::maps::sun;
 use super::reference::Reference;
 use super::scenes::{
-    SceneBuilder, first_texture, glass, lambert, light, mean, render, room, sky, view,
+    first_texture, glass, lambert, light, mean, render, room, sky, view, with_texel,
 };
 use super::{Case, On, Outcome, Setting};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::path::World;
+use crate::path::{World, WorldBuilder};
 use crate::render::film::{Film, Pixel};
 use crate::render::gpu::{Gpu, UploadedScene};
 use crate::render::{Sampling, Session, View};
@@ -61,7 +61,7 @@ fn against_f64(setting: &Setting) -> Result<Outcome> {
     let mut outcome = Outcome::new();
     for (name, environment) in [("day", sky("day")?), ("sun of 1e5", light(sun(96, 48, 1e5))?)] {
         let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::new(0.0, 0.4, -1.0), 1.2);
-        let world = SceneBuilder::default().floor(&lambert(0.5), Vec3::ZERO, 1e4).build();
+        let world = WorldBuilder::default().floor(&lambert(0.5), Vec3::ZERO, 1e4).build();
         let reference = Reference::new(&environment, 0.5);
         let reference = reference.ok_or_else(|| Error::new("the sky is black"))?;
         for (side, samples) in [(setting.count(96, 512), 1), (16, setting.count(256, 4096))] {
@@ -88,7 +88,7 @@ fn against_f64(setting: &Setting) -> Result<Outcome> {
 }
 
 /// The same seed draws the same paths but for rounding; expectations are the same.
-fn against_cpu(setting: &Setting, (builder, camera): (SceneBuilder, Camera)) -> Result<Outcome> {
+fn against_cpu(setting: &Setting, (builder, camera): (WorldBuilder, Camera)) -> Result<Outcome> {
     let (world, environment) = (builder.build(), sky("day")?);
     let view = View { width: 32, height: 32, ..view(camera, Sampling::Plain, 3) };
     compare(setting, &world, &environment, view)
@@ -155,7 +155,7 @@ fn out_of_gpu_memory(setting: &Setting) -> Result<Outcome> {
             "the device takes {gibibytes} GiB in one piece: the film in main memory would not fit first"
         )));
     }
-    let world = SceneBuilder::default().floor(&lambert(0.5), Vec3::ZERO, 1.0).build();
+    let world = WorldBuilder::default().floor(&lambert(0.5), Vec3::ZERO, 1.0).build();
     let environment = sky("day")?;
     let uploaded = UploadedScene::new(gpu, &world, &environment)?;
     let camera = Camera::look_at(Vec3::ONE, Vec3::ZERO, 0.5);
@@ -173,7 +173,7 @@ fn out_of_gpu_memory(setting: &Setting) -> Result<Outcome> {
 }
 
 /// Spheres of smooth and rough glass on the room's floor.
-fn glasses() -> (SceneBuilder, Camera) {
+fn glasses() -> (WorldBuilder, Camera) {
     let (builder, camera) = room(0.7, 1.0, Vec3::ZERO);
     let smoked = Material {
         attenuation_color: Vec3::new(0.9, 0.5, 0.2),
@@ -189,10 +189,10 @@ fn glasses() -> (SceneBuilder, Camera) {
 }
 
 /// A floor with a normal map beside the room's block.
-fn textured() -> (SceneBuilder, Camera) {
+fn textured() -> (WorldBuilder, Camera) {
     let mapped =
         Material { normal_texture: first_texture(), metallic: 0.5, roughness: 0.4, ..lambert(0.8) };
     let builder =
-        SceneBuilder::default().floor(&mapped, Vec3::ZERO, 4.0).with_texel([170, 110, 220, 255]);
+        with_texel(WorldBuilder::default().floor(&mapped, Vec3::ZERO, 4.0), [170, 110, 220, 255]);
     (builder, Camera::look_at(Vec3::new(0.5, 1.5, 1.5), Vec3::ZERO, 0.8))
 }

@@ -5,10 +5,10 @@ use std::sync::atomic::AtomicBool;
 use glam::Vec3;
 
 use super::random::Random;
-use super::scenes::{SceneBuilder, constant, learned, view};
+use super::scenes::{constant, learned, view};
 use super::{Case, On, Outcome, Setting};
 use crate::error::Result;
-use crate::path::PathResult;
+use crate::path::{PathResult, WorldBuilder};
 use crate::render::film::Pixel;
 use crate::render::{Sampling, View};
 use crate::scene::Camera;
@@ -80,7 +80,7 @@ impl Compensated {
 
 /// One pixel that sees nothing but a map of one radiance.
 fn rendered(setting: &Setting, radiance: f32, samples: u32) -> Result<Outcome> {
-    let (world, environment) = (SceneBuilder::default().build(), constant(radiance)?);
+    let (world, environment) = (WorldBuilder::default().build(), constant(radiance)?);
     let camera = Camera::look_at(Vec3::ZERO, Vec3::X, 1.0);
     let view = View { width: 1, height: 1, ..view(camera, Sampling::Plain, 1) };
     let mut session = learned(setting, &world, &environment, view)?;

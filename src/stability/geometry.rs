@@ -5,13 +5,12 @@ use rayon::prelude::*;
 
 use super::random::Random;
 use super::scenes::{
-    Mean, SIGMAS, SceneBuilder, constant, deviation, difference, lambert, mean, render, room,
-    sealed, sky, view,
+    Mean, SIGMAS, constant, deviation, difference, lambert, mean, render, room, sealed, sky, view,
 };
 use super::{Case, On, Outcome, Setting};
 use crate::bvh::{Bvh, Ray, offset_origin};
 use crate::error::Result;
-use crate::path::World;
+use crate::path::{World, WorldBuilder};
 use crate::render::{Sampling, View};
 use crate::scene::Camera;
 
@@ -235,7 +234,7 @@ fn coplanar(setting: &Setting) -> Result<Outcome> {
     for tilt in [0.0, 0.3] {
         let (a, b) = (Vec3::new(4.0, tilt, 0.0), Vec3::new(0.0, 0.2, -4.0));
         let corner = Vec3::new(-2.0, 0.0, 2.0);
-        let world = SceneBuilder::default()
+        let world = WorldBuilder::default()
             .quad(&lambert(0.25), corner, a, b)
             .quad(&lambert(0.75), corner + 0.25 * a, a, b)
             .quad(&lambert(0.5), corner, b, a)
@@ -276,7 +275,7 @@ fn small_beside_large(setting: &Setting) -> Result<Outcome> {
     let environment = constant(1.0)?;
     let scale = 2.5e-4;
     let ground =
-        |builder: SceneBuilder| builder.floor(&lambert(0.2), Vec3::new(0.0, -scale, 0.0), 1e4);
+        |builder: WorldBuilder| builder.floor(&lambert(0.2), Vec3::new(0.0, -scale, 0.0), 1e4);
     let dark = {
         let (builder, camera) = room(0.8, scale, Vec3::ZERO);
         let low = Vec3::new(-2.0, 0.0, -1.5) * scale;

@@ -9,8 +9,8 @@ use glam::Vec3;
 
 use super::random::Random;
 use super::scenes::{
-    SIGMAS, SceneBuilder, constant, deviation, difference, lambert, learned, mean, render, room,
-    sealed, sky, view,
+    SIGMAS, constant, deviation, difference, lambert, learned, mean, render, room, sealed, sky,
+    view,
 };
 use super::{Case, On, Outcome, Setting};
 use crate::environment::Environment;
@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::counters::{Counters, MAX_RECORDS_PER_PASS, MAX_WEIGHT, Tally, WEIGHT_ONE};
 use crate::light_grid::{LightGrid, MEMORY_BUDGET_BYTES, WHOLE_MAP};
-use crate::path::World;
+use crate::path::{World, WorldBuilder};
 use crate::render::film::Film;
 use crate::render::{Sampling, View};
 use crate::scene::Camera;
@@ -165,12 +165,12 @@ fn crack(setting: &Setting, width: f32) -> Result<Outcome> {
     const LENGTH: f32 = 2.0;
     let black = lambert(0.0);
     let (half, end) = (0.5 * width, 0.5 * LENGTH);
-    let lid = |builder: SceneBuilder, x: [f32; 2], z: [f32; 2]| {
+    let lid = |builder: WorldBuilder, x: [f32; 2], z: [f32; 2]| {
         let corner = Vec3::new(x[0], 1.0, z[0]);
         builder.quad(&black, corner, Vec3::X * (x[1] - x[0]), Vec3::Z * (z[1] - z[0]))
     };
     let (low, high) = (Vec3::new(-2.0, 0.0, -2.0), Vec3::new(2.0, 1.0, 2.0));
-    let mut builder = SceneBuilder::default().faces(&black, low, high, [0, 1, 4, 5]);
+    let mut builder = WorldBuilder::default().faces(&black, low, high, [0, 1, 4, 5]);
     builder = builder.floor(&lambert(1.0), Vec3::ZERO, 4.0);
     builder = lid(builder, [-2.0, -half], [-2.0, 2.0]);
     builder = lid(builder, [half, 2.0], [-2.0, 2.0]);

@@ -7,13 +7,14 @@ use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::random::Random;
-use super::scenes::{SIGMAS, SceneBuilder, deviation, lambert, mean, render, view};
+use super::scenes::{SIGMAS, deviation, lambert, mean, render, view};
 use super::{Case, On, Outcome, Setting};
 use crate::environment::{Environment, EnvironmentOptions, sky};
 use crate::error::{Error, Notices, Result};
 use crate::image::{Image, sanitise};
 use crate::math::texel_solid_angle;
 use crate::metrics::hypothesis::chi_square_test;
+use crate::path::WorldBuilder;
 use crate::render::{Sampling, View};
 use crate::scene::Camera;
 
@@ -344,7 +345,7 @@ fn floor(
     environment: &Environment,
     samples: u32,
 ) -> Result<crate::render::film::Film> {
-    let world = SceneBuilder::default().floor(&lambert(1.0), Vec3::ZERO, 10.0).build();
+    let world = WorldBuilder::default().floor(&lambert(1.0), Vec3::ZERO, 10.0).build();
     let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::ZERO, 1e-3);
     let view = View { width: 8, height: 8, ..view(camera, Sampling::Plain, 1) };
     render(setting, &world, environment, view, samples)

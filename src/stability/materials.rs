@@ -6,12 +6,12 @@ use glam::Vec3;
 
 use super::random::Random;
 use super::scenes::{
-    Mean, SIGMAS, SceneBuilder, constant, deviation, first_texture, glass, lambert, learned, mean,
-    render, room, view,
+    Mean, SIGMAS, constant, deviation, first_texture, glass, lambert, learned, mean, render, room,
+    view, with_texel,
 };
 use super::{Case, On, Outcome, Setting};
 use crate::error::Result;
-use crate::path::World;
+use crate::path::{World, WorldBuilder};
 use crate::render::film::Film;
 use crate::render::{Sampling, View};
 use crate::scene::{Camera, Material, Medium};
@@ -53,7 +53,7 @@ fn pane(roughness: f32) -> Material {
 
 /// A ball of one metre and a camera that it fills.
 fn ball(material: &Material) -> (World, Camera) {
-    let world = SceneBuilder::default().sphere(material, Vec3::ZERO, 1.0).build();
+    let world = WorldBuilder::default().sphere(material, Vec3::ZERO, 1.0).build();
     (world, Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, 0.4))
 }
 
@@ -151,7 +151,7 @@ fn buried_normals(setting: &Setting) -> Result<Outcome> {
         for base in [lambert(1.0), metal(0.0), metal(0.5), plastic(0.2)] {
             let material = Material { normal_texture: first_texture(), ..base };
             let builder =
-                SceneBuilder::default().floor(&material, Vec3::ZERO, 100.0).with_texel(texel);
+                with_texel(WorldBuilder::default().floor(&material, Vec3::ZERO, 100.0), texel);
             let camera = Camera::look_at(Vec3::new(0.0, 1.0, 2.0), Vec3::ZERO, 0.4);
             furnaces.add(&furnace(setting, (builder.build(), camera), 16)?);
         }
@@ -166,7 +166,7 @@ fn grazing(setting: &Setting) -> Result<Outcome> {
         [lambert(1.0), metal(0.0), metal(0.3), plastic(0.0), plastic(0.6), pane(0.0), pane(0.3)]
     {
         for drop in [1e-2, 1e-5] {
-            let world = SceneBuilder::default().floor(&material, Vec3::ZERO, 1e4).build();
+            let world = WorldBuilder::default().floor(&material, Vec3::ZERO, 1e4).build();
             let eye = Vec3::new(0.3, 1e-3, 0.2);
             let camera = Camera::look_at(eye, eye + Vec3::new(1.0, -drop, 0.3), 1e-4);
             furnaces.add(&furnace(setting, (world, camera), 16)?);
@@ -181,7 +181,7 @@ fn nested(setting: &Setting) -> Result<Outcome> {
     let (outer, inner) = (glass(1.5, 0.0), glass(3.0, 0.0));
     for (center, radius) in [(Vec3::ZERO, 0.5), (Vec3::X * 0.8, 0.5), (Vec3::X * 0.5, 0.5)] {
         for material in [&inner, &outer, &glass(1.5, 0.3)] {
-            let builder = SceneBuilder::default()
+            let builder = WorldBuilder::default()
                 .sphere(&outer, Vec3::ZERO, 1.0)
                 .sphere(material, center, radius);
             let camera = Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, 0.5);
@@ -223,7 +223,7 @@ fn media(setting: &Setting) -> Result<Outcome> {
                 anisotropy,
                 bounds: Some([Vec3::splat(-2.0), Vec3::splat(2.0)]),
             };
-            let world = SceneBuilder::default().floor(&lambert(1.0), Vec3::ZERO, 3.0).build();
+            let world = WorldBuilder::default().floor(&lambert(1.0), Vec3::ZERO, 3.0).build();
             let view = View {
                 width: 12,
                 height: 12,
@@ -280,7 +280,7 @@ fn random_materials(setting: &Setting) -> Result<Outcome> {
 /// Light beyond what f32 holds: samples overflow, are left out, counted, and told.
 fn overflow(setting: &Setting) -> Result<Outcome> {
     let material = Material { emissive: Vec3::splat(f32::MAX), ..lambert(1.0) };
-    let world = SceneBuilder::default().floor(&material, Vec3::ZERO, 10.0).build();
+    let world = WorldBuilder::default().floor(&material, Vec3::ZERO, 10.0).build();
     let environment = constant(f32::MAX)?;
     let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::ZERO, 0.3);
     let mut session = learned(setting, &world, &environment, view(camera, Sampling::Plain, 2))?;

@@ -8,22 +8,16 @@ use super::{Outcome, Setting};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::Result;
 use crate::image::Image;
-use crate::path::{PathLimits, World};
+use crate::path::{PathLimits, World, WorldBuilder};
 use crate::render::film::{Film, Pixel};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::UploadedScene;
 use crate::render::{Phase, Sampling, Session, View};
-use crate::scene::{Camera, Material, Scene, Texture, TextureImage, TextureRef, Wrap};
+use crate::scene::{Camera, Material, Texture, TextureImage, TextureRef, Wrap};
 
-/// Lambert's reflectance alone, both sides alike.
+/// [`Material::lambert`].
 pub(super) fn lambert(albedo: f32) -> Material {
-    Material {
-        base_color: Vec3::splat(albedo).extend(1.0),
-        metallic: 0.0,
-        specular: 0.0,
-        double_sided: true,
-        ..Material::default()
-    }
+    Material::lambert(albedo)
 }
 
 /// Clear solid glass.
@@ -31,108 +25,18 @@ pub(super) fn glass(ior: f32, roughness: f32) -> Material {
     Material { transmission: 1.0, thickness: 1.0, specular: 1.0, ior, roughness, ..lambert(1.0) }
 }
 
-/// A scene being put together; every method returns it.
-#[derive(Default)]
-pub(super) struct SceneBuilder {
-    pub(super) scene: Scene,
-}
-
-impl SceneBuilder {
-    pub(super) fn build(self) -> World {
-        World::new(self.scene)
-    }
-
-    pub(super) fn material(&mut self, material: &Material) -> u32 {
-        let materials = &mut self.scene.materials;
-        let known = materials.iter().position(|m| m == material);
-        known.unwrap_or_else(|| {
-            materials.push(material.clone());
-            materials.len() - 1
-        }) as u32
-    }
-
-    /// Any triangles.
-    pub(super) fn triangles(mut self, material: &Material, corners: &[[Vec3; 3]]) -> Self {
-        let index = self.material(material);
-        for triangle in corners {
-            let first = self.scene.positions.len() as u32;
-            self.scene.positions.extend(triangle);
-            self.scene.triangles.push([first, first + 1, first + 2]);
-            self.scene.triangle_materials.push(index);
-        }
-        self
-    }
-
-    /// A parallelogram; its front is where `a cross b` points.
-    pub(super) fn quad(self, material: &Material, corner: Vec3, a: Vec3, b: Vec3) -> Self {
-        let corners = [corner, corner + a, corner + a + b, corner + b];
-        let [p, q, r, s] = corners;
-        self.triangles(material, &[[p, q, r], [p, r, s]])
-    }
-
-    /// A horizontal square of side `size` around `center`, front up.
-    pub(super) fn floor(self, material: &Material, center: Vec3, size: f32) -> Self {
-        let corner = center + Vec3::new(-0.5, 0.0, 0.5) * size;
-        self.quad(material, corner, Vec3::X * size, Vec3::NEG_Z * size)
-    }
-
-    /// Faces of a box, fronts outwards: 0 and 1 are +X and -X, then Y, then Z.
-    pub(super) fn faces(
-        self,
-        material: &Material,
-        low: Vec3,
-        high: Vec3,
-        faces: impl IntoIterator<Item = usize>,
-    ) -> Self {
-        let size = high - low;
-        let edge = |axis: usize| Vec3::AXES[axis % 3] * size[axis % 3];
-        faces.into_iter().fold(self, |builder, face| {
-            let axis = face / 2;
-            let (a, b) = (edge(axis + 1), edge(axis + 2));
-            if face.is_multiple_of(2) {
-                builder.quad(material, low + edge(axis), a, b)
-            } else {
-                builder.quad(material, low, b, a)
-            }
-        })
-    }
-
-    /// A closed sphere of flat faces.
-    pub(super) fn sphere(self, material: &Material, center: Vec3, radius: f32) -> Self {
-        const RINGS: u32 = 16;
-        let at = |i: u32, j: u32| {
-            // The same vertices from both sides of the seam: the sphere must be closed.
-            let uv =
-                Vec2::new((i % (2 * RINGS)) as f32 / (2 * RINGS) as f32, j as f32 / RINGS as f32);
-            let pole = if j == 0 { Some(Vec3::Y) } else { (j == RINGS).then_some(Vec3::NEG_Y) };
-            center + radius * pole.unwrap_or_else(|| crate::math::direction_from_uv(uv))
-        };
-        let mut corners = Vec::new();
-        for (i, j) in (0..2 * RINGS).flat_map(|i| (0..RINGS).map(move |j| (i, j))) {
-            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-            if j > 0 {
-                corners.push([a, b, c]);
-            }
-            if j + 1 < RINGS {
-                corners.push([a, c, d]);
-            }
-        }
-        self.triangles(material, &corners)
-    }
-
-    /// Gives everything so far tangents and texture coordinates along X, and a texture of one texel.
-    pub(super) fn with_texel(mut self, texel: [u8; 4]) -> Self {
-        let scene = &mut self.scene;
-        let count = scene.positions.len();
-        scene.uvs[0] = scene.positions.iter().map(|p| Vec2::new(p.x, -p.z)).collect();
-        scene.normals = vec![Vec3::Y; count];
-        scene.tangents = vec![Vec3::X.extend(1.0); count];
-        scene.images.push(TextureImage { width: 1, height: 1, texels: vec![texel] });
-        let wrap = Wrap::Repeat;
-        let texture = Texture { image: 0, wrap_u: wrap, wrap_v: wrap, nearest: true, srgb: false };
-        scene.textures.push(texture);
-        self
-    }
+/// Gives everything there is tangents and texture coordinates along X, and a texture of one texel.
+pub(super) fn with_texel(mut builder: WorldBuilder, texel: [u8; 4]) -> WorldBuilder {
+    let scene = &mut builder.scene;
+    let count = scene.positions.len();
+    scene.uvs[0] = scene.positions.iter().map(|p| Vec2::new(p.x, -p.z)).collect();
+    scene.normals = vec![Vec3::Y; count];
+    scene.tangents = vec![Vec3::X.extend(1.0); count];
+    scene.images.push(TextureImage { width: 1, height: 1, texels: vec![texel] });
+    let wrap = Wrap::Repeat;
+    let texture = Texture { image: 0, wrap_u: wrap, wrap_v: wrap, nearest: true, srgb: false };
+    scene.textures.push(texture);
+    builder
 }
 
 /// Texture 0 at the first texture coordinates.
@@ -142,15 +46,15 @@ pub(super) fn first_texture() -> Option<TextureRef> {
 
 /// A room of 4 x 2.5 x 3 units, `scale` metres each, around `center`, with a window in its +X wall
 /// and a block on the floor; a camera that looks at the block.
-pub(super) fn room(albedo: f32, scale: f32, center: Vec3) -> (SceneBuilder, Camera) {
+pub(super) fn room(albedo: f32, scale: f32, center: Vec3) -> (WorldBuilder, Camera) {
     let at = |x: f32, y: f32, z: f32| center + Vec3::new(x, y, z) * scale;
     let walls = lambert(albedo);
     let (low, high) = (at(-2.0, 0.0, -1.5), at(2.0, 2.5, 1.5));
-    let frame = |builder: SceneBuilder, y: [f32; 2], z: [f32; 2]| {
+    let frame = |builder: WorldBuilder, y: [f32; 2], z: [f32; 2]| {
         let (corner, top, side) = (at(2.0, y[0], z[0]), at(2.0, y[1], z[0]), at(2.0, y[0], z[1]));
         builder.quad(&walls, corner, top - corner, side - corner)
     };
-    let mut builder = SceneBuilder::default().faces(&walls, low, high, 1..6);
+    let mut builder = WorldBuilder::default().faces(&walls, low, high, 1..6);
     for (y, z) in [
         ([0.0, 0.75], [-1.5, 1.5]),
         ([2.25, 2.5], [-1.5, 1.5]),

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions, TableKind, sky};
 use lightgrid::metrics::hypothesis::{Means, z_test};
-use lightgrid::path::{Background, PathLimits, World, framing};
+use lightgrid::path::{Background, PathLimits, World, WorldBuilder, framing};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::gpu::{Gpu, UploadedScene};
@@ -198,10 +198,10 @@ fn every_feature_of_a_material_looks_the_same() {
         ("flint glass", Material { dispersion: 5.0, ior: 1.7, roughness: 0.0, ..solid }),
     ];
     let camera = Camera::look_at(Vec3::new(1.5, 1.6, 2.5), Vec3::new(0.0, 0.5, 0.0), 0.8);
-    let block = |builder: scenes::SceneBuilder, material: &Material, x: f32| {
+    let block = |builder: WorldBuilder, material: &Material, x: f32| {
         builder.faces(material, Vec3::new(x - 0.4, 0.1, -0.4), Vec3::new(x + 0.4, 0.9, 0.4), 0..6)
     };
-    let floor = || scenes::SceneBuilder::new().floor(&lambert(0.5));
+    let floor = || WorldBuilder::default().floor(&lambert(0.5), [0.0; 3], 10.0);
     let all = features.iter().zip(-4..).fold(floor(), |builder, ((_, material), place)| {
         block(builder, material, 0.9 * place as f32)
     });
@@ -233,7 +233,7 @@ fn fog_and_milk_look_the_same() {
         ..smoked_glass()
     };
     let lump = || {
-        scenes::SceneBuilder::new().floor(&lambert(0.5)).faces(
+        WorldBuilder::default().floor(&lambert(0.5), [0.0; 3], 10.0).faces(
             &milk,
             Vec3::new(-0.5, 0.1, -0.5),
             Vec3::new(0.5, 1.1, 0.5),

@@ -4,11 +4,11 @@ use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::image::Image;
 use lightgrid::light_grid::MEMORY_BUDGET_BYTES;
-use lightgrid::path::World;
+use lightgrid::path::{World, WorldBuilder};
 use lightgrid::render::{Sampling, View};
 use lightgrid::scene::{Camera, builtin};
 
-use super::scenes::{SceneBuilder, lambert, room};
+use super::scenes::{lambert, room};
 use super::{MODES, environment, expect, expect_same_mean, learned, mean, render, view};
 
 fn is_black(film: &lightgrid::render::film::Film) -> bool {
@@ -64,7 +64,7 @@ fn a_fine_grid_and_many_tiles_stay_within_the_budget() {
 #[test]
 fn a_sealed_room_learns_nothing_and_is_black() {
     let (low, high) = (Vec3::splat(-1.0), Vec3::ONE);
-    let world = SceneBuilder::new().faces(&lambert(0.8), low, high, 0..6).build();
+    let world = WorldBuilder::default().faces(&lambert(0.8), low, high, 0..6).build();
     let camera = Camera::look_at(Vec3::ZERO, Vec3::new(0.5, -0.2, -1.0), 1.0);
     let environment = environment(sky::build("day", 128, 64).expect("a sky"));
     for sampling in [Sampling::Talk, Sampling::Adaptive] {
@@ -116,7 +116,7 @@ fn the_smallest_maps_light_alike_in_every_mode() {
 
 #[test]
 fn one_pixel_maps_are_uniform_light() {
-    let world = SceneBuilder::new().sphere(&lambert(0.8), Vec3::ZERO, 1.0).build();
+    let world = WorldBuilder::default().sphere(&lambert(0.8), Vec3::ZERO, 1.0).build();
     let camera = Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, 0.3);
     let environment = environment(Image::filled(1, 1, [1.5; 3]));
     for mode in MODES {
@@ -127,7 +127,7 @@ fn one_pixel_maps_are_uniform_light() {
 
 #[test]
 fn an_empty_scene_shows_the_map() {
-    let world = SceneBuilder::new().build();
+    let world = WorldBuilder::default().build();
     let camera = Camera::look_at(Vec3::ZERO, Vec3::X, 1.0);
     for mode in MODES {
         let film = render(&world, &super::constant(0.5), view(camera.clone(), mode, 3), 4);

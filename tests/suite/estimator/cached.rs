@@ -4,12 +4,12 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 use lightgrid::environment::sky;
-use lightgrid::path::{Background, PathLimits, World};
+use lightgrid::path::{Background, PathLimits, World, WorldBuilder};
 use lightgrid::render::film::Film;
 use lightgrid::render::{Gi, Sampling, Session, Sharing, View};
 use lightgrid::scene::Camera;
 
-use super::scenes::{SceneBuilder, lambert, lamp, room};
+use super::scenes::{lambert, lamp, room};
 use super::{constant, environment, learned, mean, render, view};
 
 fn picture(camera: &Camera, gi: Gi, seed: u32) -> View {
@@ -59,7 +59,8 @@ fn a_room_is_as_bright_and_less_noisy() {
 #[test]
 fn a_glowing_box_is_as_bright_as_its_bounces_make_it() {
     let glow = lightgrid::scene::Material { emissive: Vec3::splat(0.3), ..lambert(0.5) };
-    let world = SceneBuilder::new().faces(&glow, Vec3::splat(-2.0), Vec3::splat(2.0), 0..6).build();
+    let world =
+        WorldBuilder::default().faces(&glow, Vec3::splat(-2.0), Vec3::splat(2.0), 0..6).build();
     let camera = Camera::look_at(Vec3::new(0.3, 0.2, 0.1), Vec3::new(1.0, 0.5, -2.0), 1.0);
     for bounces in [2, 3, 6] {
         let limits = PathLimits { bounces, russian_roulette: false };
@@ -84,7 +85,7 @@ fn closed_rooms_are_dark_and_thin_walls_hardly_leak() {
         (mirrored(near).min(mirrored(far)), mirrored(near).max(mirrored(far)))
     };
     let rooms = |with_lamp: bool| {
-        let mut builder = SceneBuilder::new();
+        let mut builder = WorldBuilder::default();
         for side in [-1.0, 1.0] {
             let (low, high) = half(side);
             // Fronts inside.

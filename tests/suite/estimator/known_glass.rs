@@ -5,14 +5,14 @@ use std::sync::atomic::AtomicBool;
 use glam::{Vec3, Vec4};
 use lightgrid::environment::{Environment, EnvironmentOptions, Lookup};
 use lightgrid::image::Image;
-use lightgrid::path::{PathLimits, World};
+use lightgrid::path::{PathLimits, World, WorldBuilder};
 use lightgrid::render::{Sampling, Session, View};
 use lightgrid::scene::{Camera, Material};
 
 use super::known_light::{at_the_origin, over_rectangle, shaft};
 use super::scenes::{
-    SceneBuilder, black, blended, half_masked, lambert, lamp, orthographic, pane, smoked_glass,
-    sunlight,
+    black, blended, half_masked, lambert, lamp, orthographic, pane, smoked_glass, sunlight,
+    with_half_texture,
 };
 use super::{MODES, constant, expect, mean, probe, render, view};
 
@@ -34,7 +34,7 @@ fn pane_transmittance(cosine: f64) -> f64 {
 }
 
 /// A wall facing the camera, ten metres wide.
-fn wall(builder: SceneBuilder, material: &Material, z: f32) -> SceneBuilder {
+fn wall(builder: WorldBuilder, material: &Material, z: f32) -> WorldBuilder {
     builder.quad(material, [-5.0, -5.0, z], [10.0, 0.0, 0.0], [0.0, 10.0, 0.0])
 }
 
@@ -56,7 +56,7 @@ fn a_camera_sees_through_panes_and_veils() {
         ("nothing", blended(black(), 0.0), 1, 1.0),
         ("half a pane", blended(pane(), 0.5), 1, 0.5 + 0.5 * t),
     ] {
-        let world = wall(wall(SceneBuilder::new(), &lamp(2.0), -2.0), &screen, -1.0).build();
+        let world = wall(wall(WorldBuilder::default(), &lamp(2.0), -2.0), &screen, -1.0).build();
         let film = render(&world, &constant(0.0), view(ahead(), Sampling::Plain, bounces), 1024);
         expect(what, &film, 2.0 * share, 0.01);
     }
@@ -64,10 +64,10 @@ fn a_camera_sees_through_panes_and_veils() {
 
 #[test]
 fn a_tinted_pane_colours_what_is_behind_once() {
-    let world = wall(wall(SceneBuilder::new(), &lamp(1.0), -2.0), &tinted(), -1.0).build();
+    let world = wall(wall(WorldBuilder::default(), &lamp(1.0), -2.0), &tinted(), -1.0).build();
     let seen = mean(&render(&world, &constant(0.0), view(ahead(), Sampling::Plain, 1), 1024));
-    let lit = SceneBuilder::new()
-        .floor(&lambert(1.0))
+    let lit = WorldBuilder::default()
+        .floor(&lambert(1.0), [0.0; 3], 10.0)
         .quad(&tinted(), [-5.0, 0.7, 5.0], [10.0, 0.0, 0.0], [0.0, 0.0, -10.0])
         .light(sunlight(Vec3::NEG_Y, std::f32::consts::PI));
     let view = view(probe([0.1, 0.5, 0.2], [0.0, 0.0, 0.3]), Sampling::Plain, 1);
@@ -83,7 +83,7 @@ fn a_tinted_pane_colours_what_is_behind_once() {
 
 #[test]
 fn a_pane_in_uniform_light_is_invisible() {
-    let world = wall(SceneBuilder::new(), &pane(), -1.0).build();
+    let world = wall(WorldBuilder::default(), &pane(), -1.0).build();
     let oblique = probe([0.0; 3], [0.9, 0.3, -1.0]);
     for mode in MODES {
         let film = render(&world, &constant(1.5), view(oblique.clone(), mode, 1), 16);
@@ -94,8 +94,8 @@ fn a_pane_in_uniform_light_is_invisible() {
 #[test]
 fn shadow_rays_pass_panes_and_veils() {
     let below = |screen: &Material| {
-        SceneBuilder::with_half_texture()
-            .floor(&lambert(0.6))
+        with_half_texture()
+            .floor(&lambert(0.6), [0.0; 3], 10.0)
             .quad(screen, [-5.0, 1.0, 5.0], [10.0, 0.0, 0.0], [0.0, 0.0, -10.0])
             .light(sunlight(Vec3::NEG_Y, 3.0))
             .build()
@@ -122,7 +122,7 @@ fn shadow_rays_pass_panes_and_veils() {
 
 #[test]
 fn a_mask_cuts_what_the_camera_sees() {
-    let builder = SceneBuilder::with_half_texture().quad(
+    let builder = with_half_texture().quad(
         &half_masked(black()),
         [-1.0, -1.0, -1.0],
         [2.0, 0.0, 0.0],
@@ -139,7 +139,7 @@ fn a_mask_cuts_what_the_camera_sees() {
 
 #[test]
 fn a_glazed_shaft_is_lit_alike_by_every_mode() {
-    let glazed = shaft(SceneBuilder::new(), 0.7, Some(&pane()));
+    let glazed = shaft(WorldBuilder::default(), 0.7, Some(&pane()));
     let expected = 0.7 * 2.0 * over_rectangle(|cosine, _| pane_transmittance(cosine));
     for mode in MODES {
         let film = render(&glazed, &constant(2.0), view(at_the_origin(), mode, 1), 1024);
@@ -156,7 +156,7 @@ fn the_sun_shines_through_a_pane_with_every_tile_distribution() {
     let edge = std::f64::consts::PI / 64.0;
     let irradiance = 1e5 * std::f64::consts::TAU / 128.0 * 0.5 * edge.sin().powi(2);
     let expected = 0.7 / std::f64::consts::PI * irradiance * pane_transmittance(1.0);
-    let glazed = shaft(SceneBuilder::new(), 0.7, Some(&pane()));
+    let glazed = shaft(WorldBuilder::default(), 0.7, Some(&pane()));
     for mode in [Sampling::Plain, Sampling::Talk, Sampling::Adaptive] {
         let film = render(&glazed, &environment, view(at_the_origin(), mode, 1), 256);
         expect(&format!("{mode:?}"), &film, expected, 0.01);
@@ -173,7 +173,7 @@ fn slab(a: f64) -> (f64, f64) {
 #[test]
 fn a_slab_of_smoked_glass_absorbs_and_reflects_inside() {
     let (low, high) = (Vec3::new(-5.0, -5.0, -1.5), Vec3::new(5.0, 5.0, -1.0));
-    let solid = || SceneBuilder::new().faces(&smoked_glass(), low, high, 0..6);
+    let solid = || WorldBuilder::default().faces(&smoked_glass(), low, high, 0..6);
     let (t, r) = slab(0.5_f64.sqrt());
     for russian_roulette in [false, true] {
         let limited = |mode| {
@@ -193,7 +193,7 @@ fn roulette_does_not_take_refraction_for_darkness() {
     // Inside of clear glass radiance is divided by the squared index; nothing is lost though.
     let clear = Material { attenuation_distance: f32::INFINITY, ..smoked_glass() };
     let (low, high) = (Vec3::splat(-1.0), Vec3::splat(1.0));
-    let world = SceneBuilder::new().faces(&clear, low, high, 0..6).build();
+    let world = WorldBuilder::default().faces(&clear, low, high, 0..6).build();
     let camera = Camera::look_at(Vec3::new(2.0, 2.5, 3.0), Vec3::ZERO, 0.4);
     let rays = [false, true].map(|russian_roulette| {
         let limits = PathLimits { bounces: 64, russian_roulette };
@@ -212,7 +212,8 @@ fn light_is_absorbed_on_its_way_inside_of_a_solid() {
     // A solid of index 1 neither bends nor reflects: it only absorbs. Floor and lamp lie in it.
     let smoke = Material { ior: 1.0, attenuation_distance: 0.4, ..smoked_glass() };
     let (low, high) = (Vec3::new(-2.0, -1.0, -2.0), Vec3::new(2.0, 1.5, 2.0));
-    let builder = SceneBuilder::new().faces(&smoke, low, high, 0..6).floor(&lambert(0.7));
+    let builder =
+        WorldBuilder::default().faces(&smoke, low, high, 0..6).floor(&lambert(0.7), [0.0; 3], 10.0);
     let (x, y, z) = (0.5, 0.7, 0.8);
     let world =
         builder.quad(&lamp(3.0), [-x, y, -z], [2.0 * x, 0.0, 0.0], [0.0, 0.0, 2.0 * z]).build();

@@ -5,11 +5,13 @@ use std::f64::consts::PI;
 use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions, Lookup, TableKind};
 use lightgrid::image::Image;
-use lightgrid::path::World;
+use lightgrid::path::{World, WorldBuilder};
 use lightgrid::render::Sampling;
 use lightgrid::scene::{Material, PunctualKind, PunctualLight};
 
-use super::scenes::{SceneBuilder, black, blended, half_masked, lambert, lamp, sunlight, unlit};
+use super::scenes::{
+    black, blended, half_masked, lambert, lamp, sunlight, unlit, with_half_texture,
+};
 use super::{MODES, constant, expect, probe, render, view};
 
 /// Half extents and height of the rectangle above the origin that lights the floor.
@@ -44,7 +46,7 @@ pub(super) fn over_rectangle(f: impl Fn(f64, f64) -> f64) -> f64 {
 
 /// The floor of a shaft: black walls up to the rectangle, which is of `top` if there is one, facing
 /// down.
-pub(super) fn shaft(builder: SceneBuilder, albedo: f32, top: Option<&Material>) -> World {
+pub(super) fn shaft(builder: WorldBuilder, albedo: f32, top: Option<&Material>) -> World {
     let high = Vec3::new(HALF_X as f32, HEIGHT as f32, HALF_Z as f32);
     let low = Vec3::new(-high.x, 0.0, -high.z);
     let builder =
@@ -70,7 +72,7 @@ fn the_rectangle_integral_is_the_catalogued_factor() {
 
 #[test]
 fn a_convex_sphere_in_uniform_light_shows_its_albedo() {
-    let world = SceneBuilder::new().sphere(&lambert(0.8), Vec3::ZERO, 1.0).build();
+    let world = WorldBuilder::default().sphere(&lambert(0.8), Vec3::ZERO, 1.0).build();
     let camera = lightgrid::scene::Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, 0.3);
     for mode in MODES {
         let film = render(&world, &constant(1.5), view(camera.clone(), mode, 1), 1024);
@@ -86,7 +88,7 @@ fn a_convex_sphere_in_uniform_light_shows_its_albedo() {
 
 #[test]
 fn a_shaft_gets_the_share_of_sky_that_its_mouth_shows() {
-    let world = shaft(SceneBuilder::new(), 0.7, None);
+    let world = shaft(WorldBuilder::default(), 0.7, None);
     for mode in MODES {
         let film = render(&world, &constant(2.0), view(at_the_origin(), mode, 1), 1024);
         expect(&format!("{mode:?}"), &film, 0.7 * 2.0 * rectangle_factor(), 0.01);
@@ -104,7 +106,7 @@ fn an_emissive_rectangle_lights_by_its_configuration_factor() {
         ("half cut out", half_masked(lamp(3.0)), 0.5 * full),
         ("unlit", unlit(0.9), 0.7 * 0.9 * rectangle_factor()),
     ] {
-        let world = shaft(SceneBuilder::with_half_texture(), 0.7, Some(&top));
+        let world = shaft(with_half_texture(), 0.7, Some(&top));
         for mode in [Sampling::Plain, Sampling::Bsdf] {
             let film = render(&world, &black_map(), view(at_the_origin(), mode, 1), 1024);
             expect(&format!("{what}, {mode:?}"), &film, expected, 0.01);
@@ -115,7 +117,7 @@ fn an_emissive_rectangle_lights_by_its_configuration_factor() {
 #[test]
 fn the_back_of_a_one_sided_lamp_is_dark_and_not_seen() {
     let lamp = Material { double_sided: false, ..lamp(3.0) };
-    let up = SceneBuilder::new().floor(&lambert(0.7)).quad(
+    let up = WorldBuilder::default().floor(&lambert(0.7), [0.0; 3], 10.0).quad(
         &lamp,
         [-1.0, 1.0, 1.0],
         [2.0, 0.0, 0.0],
@@ -139,7 +141,7 @@ fn the_back_of_a_one_sided_lamp_is_dark_and_not_seen() {
 #[test]
 fn emitters_behind_and_beside_share_with_the_map() {
     // Map and lamp at once: the sum of both, each seen through the same rectangle.
-    let world = shaft(SceneBuilder::new(), 0.7, Some(&blended(lamp(3.0), 0.5)));
+    let world = shaft(WorldBuilder::default(), 0.7, Some(&blended(lamp(3.0), 0.5)));
     for mode in MODES {
         let film = render(&world, &constant(2.0), view(at_the_origin(), mode, 1), 1024);
         let expected = 0.7 * (0.5 * 3.0 + 0.5 * 2.0) * rectangle_factor();
@@ -177,7 +179,9 @@ fn punctual_lights_follow_the_inverse_square_and_the_cone() {
     for (what, lights, expected) in cases {
         let world = lights
             .into_iter()
-            .fold(SceneBuilder::new().floor(&lambert(0.6)), |builder, light| builder.light(light))
+            .fold(WorldBuilder::default().floor(&lambert(0.6), [0.0; 3], 10.0), |builder, light| {
+                builder.light(light)
+            })
             .build();
         let film = render(
             &world,
@@ -187,7 +191,10 @@ fn punctual_lights_follow_the_inverse_square_and_the_cone() {
         );
         expect(what, &film, 0.6 / PI * expected, 0.02);
     }
-    let outside = SceneBuilder::new().floor(&lambert(0.6)).light(spot(0.1, angle - 0.05)).build();
+    let outside = WorldBuilder::default()
+        .floor(&lambert(0.6), [0.0; 3], 10.0)
+        .light(spot(0.1, angle - 0.05))
+        .build();
     let film = render(
         &outside,
         &black_map(),
@@ -217,7 +224,7 @@ fn sun_irradiance(map: &Image, [top, bottom]: [f64; 2], weight: impl Fn(f64) -> 
 
 #[test]
 fn a_sun_of_one_texel_gives_its_irradiance_with_every_table() {
-    let world = SceneBuilder::new().floor(&lambert(0.5)).build();
+    let world = WorldBuilder::default().floor(&lambert(0.5), [0.0; 3], 10.0).build();
     let (width, height, row) = (256, 128, 37);
     let map = sun_map(width, height, 200, row, 1e4);
     let center = f64::from(row) + 0.5;

@@ -7,12 +7,12 @@ use lightgrid::environment::{Environment, sky};
 use lightgrid::features::Features;
 use lightgrid::medium::Phase;
 use lightgrid::metrics::hypothesis::chi_square_test;
-use lightgrid::path::World;
+use lightgrid::path::{World, WorldBuilder};
 use lightgrid::render::film::Film;
 use lightgrid::render::{Sampling, View};
 use lightgrid::scene::{Medium, PunctualKind, PunctualLight};
 
-use super::scenes::{SceneBuilder, black, lamp, room, smoked_glass, sunlight, unlit};
+use super::scenes::{black, lamp, room, smoked_glass, sunlight, unlit};
 use super::unbiased::expect_agreement;
 use super::{MODES, constant, environment, expect, mean, probe, render, view};
 use crate::shared::SplitMix;
@@ -30,7 +30,7 @@ fn cube(scattering: f32, absorption: f32, anisotropy: f32) -> Medium {
 /// A wall behind the cube as seen by [`ahead`].
 fn wall(radiance: f32) -> World {
     let (corner, x, y) = ([-9.0, -9.0, -3.0], [18.0, 0.0, 0.0], [0.0, 18.0, 0.0]);
-    SceneBuilder::new().quad(&unlit(radiance), corner, x, y).build()
+    WorldBuilder::default().quad(&unlit(radiance), corner, x, y).build()
 }
 
 /// Straight through the cube, two metres of it.
@@ -95,7 +95,7 @@ fn single_scattering(
 fn single_scattering_matches_quadrature() {
     let lit = |light: PunctualLight| {
         let far = ([90.0, -1.0, -1.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]);
-        SceneBuilder::new().quad(&black(), far.0, far.1, far.2).light(light).build()
+        WorldBuilder::default().quad(&black(), far.0, far.1, far.2).light(light).build()
     };
     let sun = lit(sunlight(Vec3::NEG_Y, 3.0));
     let point = lit(PunctualLight {
@@ -127,7 +127,7 @@ fn single_scattering_matches_quadrature() {
 #[test]
 fn a_white_medium_in_uniform_light_is_invisible() {
     let far =
-        SceneBuilder::new().quad(&black(), [90.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]).build();
+        WorldBuilder::default().quad(&black(), [90.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]).build();
     for (scattering, g) in [(0.5, 0.0), (2.0, 0.6), (1e-6, -0.3)] {
         for mode in MODES {
             let view = ahead(mode, 400, cube(scattering, 0.0, g));
@@ -145,7 +145,8 @@ fn a_white_solid_in_uniform_light_is_invisible() {
         scatter_anisotropy: 0.4,
         ..smoked_glass()
     };
-    let world = SceneBuilder::new().faces(&milk, Vec3::splat(-0.5), Vec3::splat(0.5), 0..6).build();
+    let world =
+        WorldBuilder::default().faces(&milk, Vec3::splat(-0.5), Vec3::splat(0.5), 0..6).build();
     assert!(world.needs.has(Features::SCATTERING_SOLIDS));
     let camera = probe([1.0, 2.0, 3.0], [0.1, 0.2, 0.0]);
     for mode in MODES {
@@ -173,7 +174,7 @@ fn h_function(albedo: f64, mu: f64) -> f64 {
 #[test]
 fn a_dense_medium_reflects_like_a_half_space() {
     let far =
-        SceneBuilder::new().quad(&black(), [90.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]).build();
+        WorldBuilder::default().quad(&black(), [90.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]).build();
     for albedo in [0.3, 0.8] {
         // What uniform light makes of a half-space: 1 - H(mu) sqrt(1 - albedo).
         let expected = 1.0 - h_function(albedo, 1.0) * (1.0 - albedo).sqrt();
@@ -253,7 +254,7 @@ fn lamps_shine_alike_with_and_without_sampling_them() {
     // The same panel as a lamp and as unlit paint, which nothing samples.
     let (x, y) = ([1.2, 0.0, 0.0], [0.0, 0.0, -1.2]);
     let film = |panel, seed| {
-        let world = SceneBuilder::new().quad(&panel, [-0.6, 0.9, 0.6], x, y).build();
+        let world = WorldBuilder::default().quad(&panel, [-0.6, 0.9, 0.6], x, y).build();
         let view = ahead(Sampling::Plain, 3, cube(0.8, 0.1, 0.5));
         render(&world, &constant(0.1), View { seed, ..view }, 4096)
     };

@@ -4,17 +4,17 @@ use glam::{Vec2, Vec3};
 use lightgrid::environment::sky;
 use lightgrid::image::Image;
 use lightgrid::math::direction_from_uv;
-use lightgrid::path::{PathLimits, World};
+use lightgrid::path::{PathLimits, World, WorldBuilder};
 use lightgrid::render::{Sampling, View};
 use lightgrid::scene::{Camera, Material};
 
-use super::scenes::{SceneBuilder, lambert, room, unlit};
+use super::scenes::{lambert, room, unlit};
 use super::{MODES, constant, environment, expect, expect_same_mean, probe, render, view};
 
 #[test]
 fn a_white_corner_vanishes_in_uniform_light() {
     let (low, high) = (Vec3::ZERO, Vec3::ONE);
-    let world = SceneBuilder::new().faces(&lambert(1.0), low, high, [1, 3, 5]).build();
+    let world = WorldBuilder::default().faces(&lambert(1.0), low, high, [1, 3, 5]).build();
     let camera = Camera::look_at(Vec3::splat(2.0), Vec3::splat(0.2), 0.3);
     for mode in MODES {
         let film = render(&world, &constant(1.5), view(camera.clone(), mode, 500), 256);
@@ -26,7 +26,7 @@ fn a_white_corner_vanishes_in_uniform_light() {
 fn a_white_room_is_as_bright_as_what_its_window_shows() {
     let (low, high) = (Vec3::splat(-1.0), Vec3::ONE);
     // Half of a wall is missing.
-    let world = SceneBuilder::new()
+    let world = WorldBuilder::default()
         .faces(&lambert(1.0), low, high, 1..6)
         .quad(&lambert(1.0), [1.0, -1.0, -1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 2.0])
         .build();
@@ -41,7 +41,7 @@ fn a_white_room_is_as_bright_as_what_its_window_shows() {
 fn a_glowing_cavity_brightens_with_every_bounce() {
     let glowing = Material { emissive: Vec3::splat(0.5), ..lambert(0.6) };
     let (low, high) = (Vec3::new(-1.0, -0.8, -1.3), Vec3::new(1.2, 0.9, 1.0));
-    let world = SceneBuilder::new().faces(&glowing, low, high, 0..6).build();
+    let world = WorldBuilder::default().faces(&glowing, low, high, 0..6).build();
     let camera = Camera::look_at(Vec3::new(0.1, 0.2, 0.3), Vec3::new(-1.0, -0.7, -1.0), 1.0);
     for bounces in [0, 1, 2, 5, 40] {
         let series: f64 = (0..=bounces).map(|n| 0.6_f64.powi(n)).sum();
@@ -72,7 +72,7 @@ fn roulette_changes_the_noise_alone() {
 
 #[test]
 fn unlit_surfaces_show_their_colour_and_end_paths() {
-    let world = SceneBuilder::new().floor(&unlit(0.42)).build();
+    let world = WorldBuilder::default().floor(&unlit(0.42), [0.0; 3], 10.0).build();
     for bounces in [0, 3] {
         let camera = probe([0.3, 1.0, 0.2], [0.0; 3]);
         let film = render(&world, &constant(9.0), view(camera, Sampling::Plain, bounces), 4);
@@ -85,7 +85,7 @@ fn a_lens_keeps_what_lies_in_its_focal_plane() {
     // Each pixel of a striped, unlit wall; the lens takes its numbers after the pixel has.
     let striped = |distance: f32| -> World {
         (0..24)
-            .fold(SceneBuilder::new(), |builder, i| {
+            .fold(WorldBuilder::default(), |builder, i| {
                 let x = -3.0 + 0.25 * i as f32;
                 let wall = unlit(if i % 2 == 0 { 0.2 } else { 0.8 });
                 builder.quad(&wall, [x, -3.0, -distance], [0.25, 0.0, 0.0], [0.0, 6.0, 0.0])
@@ -129,7 +129,7 @@ fn the_background_is_the_bilinear_map() {
                 + fy * ((1.0 - fx) * value(0, 1) + fx * value(1, 1))
         })
     };
-    let world = SceneBuilder::new().build();
+    let world = WorldBuilder::default().build();
     let environment = environment(map.clone());
     for i in 0..400_u32 {
         let uv = Vec2::new((i as f32 * 0.618_034).fract(), (i as f32 + 0.5) / 400.0);

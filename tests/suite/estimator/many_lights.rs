@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use glam::Vec3;
-use lightgrid::path::World;
+use lightgrid::path::{World, WorldBuilder};
 use lightgrid::render::film::Pixel;
 use lightgrid::render::{Sampling, View};
 use lightgrid::scene::{Camera, Material, PunctualKind, PunctualLight};
 
-use super::scenes::{SceneBuilder, lambert, lamp, sunlight, unlit};
+use super::scenes::{lambert, lamp, sunlight, unlit};
 use super::unbiased::expect_agreement;
 use super::{constant, expect, probe, render, view};
 use crate::shared::SplitMix;
@@ -41,7 +41,7 @@ fn panel_irradiance(radiance: f64, corner: Vec3, a: Vec3, b: Vec3) -> f64 {
 fn lamps_of_all_kinds_light_by_their_sum() {
     let mut random = SplitMix(5);
     let mut between = |low: f32, high: f32| low + (high - low) * random.next_f32();
-    let floor = || SceneBuilder::new().floor(&lambert(0.6));
+    let floor = || WorldBuilder::default().floor(&lambert(0.6), [0.0; 3], 10.0);
     // The sun is overhead, where no lamp is.
     let mut stages = [floor(), floor().light(sunlight(Vec3::NEG_Y, 5.0))];
     let mut irradiance = 0.0;
@@ -51,7 +51,7 @@ fn lamps_of_all_kinds_light_by_their_sum() {
         let strength = 10.0_f32.powf(between(-2.0, 1.0));
         let point = PunctualLight { position: place, ..sunlight(-direction, strength) };
         let falloff = f64::from(strength * direction.y / (distance * distance));
-        let mut add = |to: &dyn Fn(SceneBuilder) -> SceneBuilder| {
+        let mut add = |to: &dyn Fn(WorldBuilder) -> WorldBuilder| {
             stages = std::mem::take(&mut stages).map(to);
         };
         match i % 6 {
@@ -94,7 +94,7 @@ fn sampled_lamps_agree_with_lamps_that_are_found() {
     let shiny = Material { metallic: 1.0, roughness: 0.4, ..lambert(0.8) };
     for (floor, precision) in [(lambert(0.6), 0.03), (shiny, 0.03)] {
         let film = |material: &Material, seed| {
-            let mut builder = SceneBuilder::new().floor(&floor);
+            let mut builder = WorldBuilder::default().floor(&floor, [0.0; 3], 10.0);
             for (i, direction) in over_hemisphere(80).enumerate() {
                 let a = 0.25 * direction.any_orthonormal_vector();
                 let b = a.cross(direction);
@@ -118,7 +118,7 @@ fn hall(lamps: u32) -> (World, Camera) {
     let mut random = SplitMix(lamps.into());
     let mut between = |low: f32, high: f32| low + (high - low) * random.next_f64() as f32;
     let (low, high) = (Vec3::new(-30.0, 0.0, -10.0), Vec3::new(30.0, 6.0, 10.0));
-    let mut builder = SceneBuilder::new().faces(&lambert(0.6), low, high, 2..6);
+    let mut builder = WorldBuilder::default().faces(&lambert(0.6), low, high, 2..6);
     for index in 0..lamps {
         let place = Vec3::new(between(-29.0, 29.0), between(4.5, 5.8), between(-9.5, 9.5));
         let power = 20_000.0 / lamps as f32 * 10.0_f32.powf(between(-2.0, 1.0));
