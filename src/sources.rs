@@ -29,11 +29,22 @@ pub fn scene(name: &str) -> Result<Scene> {
 /// As [`scene`].
 pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
     check_scene(name)?;
-    if builtin::names().contains(&name) {
-        builtin::build(name)
+    let mut scene = if builtin::names().contains(&name) {
+        builtin::build(name)?
     } else {
-        gltf::load_with(Path::new(name), options)
+        gltf::load_with(Path::new(name), options)?
+    };
+    for (material, edit) in &options.edits {
+        let mut is_there = false;
+        for changed in scene.materials.iter_mut().filter(|m| m.name == *material) {
+            *changed = edit.apply(changed);
+            is_there = true;
+        }
+        if !is_there {
+            return Err(Error::at(name, format!("no material is called {material}")));
+        }
     }
+    Ok(scene)
 }
 
 /// Whether a name stands for a scene rather than a map: by how its file begins, else by the name.

@@ -1,6 +1,8 @@
 //! What the window shows, as plain data: undo compares it, the settings file keeps part of it, the
 //! worker's request follows from it.
 
+use std::collections::BTreeMap;
+
 use glam::{Affine3A, Mat3A, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +13,7 @@ use crate::render::filter::PixelFilter;
 use crate::render::gpu::DeviceChoice;
 use crate::render::{Crop, Gi, Sampling, Sharing, StopRule, View};
 use crate::sampler::Points;
-use crate::scene::{Camera, Medium, Projection, builtin};
+use crate::scene::{Camera, MaterialEdit, Medium, Projection, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
 
 /// Everything a person sets about the picture.
@@ -43,6 +45,8 @@ pub struct Document {
     pub stop: StopRule,
     /// Kept viewpoints of this scene.
     pub bookmarks: Vec<Viewpoint>,
+    /// Changes to this scene's materials, by their number.
+    pub materials: BTreeMap<u32, MaterialEdit>,
 }
 
 /// How light is found.
@@ -120,6 +124,7 @@ impl Default for Document {
             region: None,
             stop: StopRule::default(),
             bookmarks: Vec::new(),
+            materials: BTreeMap::new(),
         }
     }
 }

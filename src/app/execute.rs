@@ -31,6 +31,8 @@ impl App {
                     self.document.scene = name;
                     self.document.viewpoint = None;
                     self.document.bookmarks.clear();
+                    self.document.materials.clear();
+                    interface.material = None;
                     self.document.region = None;
                     self.document.fog = None;
                     interface.pinned = None;

@@ -31,6 +31,8 @@ pub struct Interface {
     pub pointed: Option<Vec2>,
     /// Place the inspector stays at.
     pub pinned: Option<Vec2>,
+    /// The material that is looked at.
+    pub material: Option<u32>,
     /// Which picture of the history is compared.
     pub compared: Option<usize>,
     /// Where the wipe is, `[0,1]` across the picture.
@@ -124,6 +126,7 @@ impl Default for Interface {
             tile: None,
             pointed: None,
             pinned: None,
+            material: None,
             compared: None,
             wipe: 0.5,
             is_frozen: false,

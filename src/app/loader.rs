@@ -1,5 +1,6 @@
 //! Reads scenes and maps beside the window: a large file never holds it up.
 
+use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -11,7 +12,7 @@ use crate::error::{Error, Notices, Result};
 use crate::image::{Image, catch_panic};
 use crate::path::World;
 use crate::render::gpu::KernelFacts;
-use crate::scene::SceneOptions;
+use crate::scene::{Material, MaterialEdit, SceneOptions};
 use crate::sources;
 
 /// A scene ready for rays.
@@ -19,12 +20,30 @@ use crate::sources;
 pub struct LoadedScene {
     /// What was asked for.
     pub name: String,
-    /// The scene.
+    /// The scene, with these changes.
     pub world: Arc<World>,
+    /// Changes to its materials, by their number.
+    pub edits: BTreeMap<u32, MaterialEdit>,
+    /// Its materials without them.
+    pub materials: Arc<[Material]>,
     /// What a GPU's kernel for it holds.
     pub kernel: KernelFacts,
     /// Seconds of reading and of building the BVH.
     pub seconds: [f64; 2],
+}
+
+impl LoadedScene {
+    /// The same with these changes in place of those that there are.
+    fn edited(self, edits: BTreeMap<u32, MaterialEdit>) -> Self {
+        let mut materials = self.materials.to_vec();
+        for (number, edit) in &edits {
+            if let Some(material) = materials.get_mut(*number as usize) {
+                *material = edit.apply(material);
+            }
+        }
+        let world = Arc::new(self.world.with_materials(materials));
+        Self { kernel: KernelFacts::of_scene(&world), world, edits, ..self }
+    }
 }
 
 /// A map ready to be sampled, not turned, at intensity 1.
@@ -50,6 +69,8 @@ pub struct LoadedMap {
 pub enum Loaded {
     /// A scene, or why not.
     Scene(String, Result<LoadedScene>),
+    /// The scene that is there with other materials.
+    Edited(LoadedScene),
     /// A map, or why not.
     Map(String, Result<LoadedMap>),
 }
@@ -79,6 +100,13 @@ impl Loader {
         self.start(0, name, move |name| Loaded::Scene(name.to_owned(), load_scene(name, &options)));
     }
 
+    /// Starts to change the materials of a scene that is there, unless something is being done to it.
+    pub fn edit_scene(&mut self, scene: &LoadedScene, edits: &BTreeMap<u32, MaterialEdit>) {
+        let (scene, edits) = (scene.clone(), edits.clone());
+        let name = scene.name.clone();
+        self.start(0, &name, move |_| Loaded::Edited(scene.edited(edits)));
+    }
+
     /// Starts to load a map unless it is being loaded.
     pub fn load_map(&mut self, name: &str) {
         self.start(1, name, |name| Loaded::Map(name.to_owned(), load_map(name)));
@@ -94,7 +122,7 @@ impl Loader {
         let mut results = Vec::new();
         for loaded in self.receiver.try_iter() {
             let (kind, name) = match &loaded {
-                Loaded::Scene(name, _) => (0, name),
+                Loaded::Scene(name, _) | Loaded::Edited(LoadedScene { name, .. }) => (0, name),
                 Loaded::Map(name, _) => (1, name),
             };
             if self.in_flight[kind].as_ref() == Some(name) {
@@ -142,7 +170,9 @@ fn load_scene(name: &str, options: &SceneOptions) -> Result<LoadedScene> {
     let world = Arc::new(World::new(scene));
     let seconds = [read, start.elapsed().as_secs_f64() - read];
     let kernel = KernelFacts::of_scene(&world);
-    Ok(LoadedScene { name: name.to_owned(), world, kernel, seconds })
+    let materials = world.scene.materials.clone().into();
+    let edits = BTreeMap::new();
+    Ok(LoadedScene { name: name.to_owned(), world, edits, materials, kernel, seconds })
 }
 
 fn load_map(name: &str) -> Result<LoadedMap> {

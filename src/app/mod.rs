@@ -236,7 +236,9 @@ impl App {
     pub fn is_settled(&self) -> bool {
         let is_done =
             |s: &Arc<Snapshot>| s.activity == Activity::Done && self.worker.has_answered(s);
-        self.snapshot.as_ref().is_some_and(is_done)
+        let is_edited = |scene: &LoadedScene| scene.edits == self.document.materials;
+        self.scene.as_ref().is_some_and(is_edited)
+            && self.snapshot.as_ref().is_some_and(is_done)
             && self.shown.is_some()
             && self.presenter.is_settled()
             && !self.inspector.is_busy()
@@ -398,6 +400,10 @@ impl App {
         for loaded in self.loader.take() {
             match loaded {
                 Loaded::Scene(_, Ok(scene)) => self.take_scene(scene),
+                Loaded::Edited(scene) => {
+                    self.scene = Some(scene);
+                    self.inspector.forget();
+                }
                 Loaded::Map(_, Ok(map)) => {
                     map.notices.iter().for_each(|sentence| self.messages.notice(sentence));
                     self.settings.recent_map(&map.name);
@@ -488,6 +494,7 @@ impl App {
             self.document.viewpoint.clone_from(&before.viewpoint);
             self.document.bookmarks.clone_from(&before.bookmarks);
             (self.document.region, self.document.fog) = (before.region, before.fog);
+            self.document.materials.clone_from(&before.materials);
         } else {
             // Somebody went back to a file that is no longer there.
             self.document.scene.clone_from(&scene.name);
@@ -511,6 +518,10 @@ impl App {
     fn send_down(&mut self, context: &egui::Context) {
         if self.scene.as_ref().is_none_or(|scene| scene.name != self.document.scene) {
             self.loader.load_scene(&self.document.scene);
+        } else if let Some(scene) = &self.scene
+            && scene.edits != self.document.materials
+        {
+            self.loader.edit_scene(scene, &self.document.materials);
         }
         if self.map.as_ref().is_none_or(|map| map.name != self.document.map) {
             self.loader.load_map(&self.document.map);

@@ -61,6 +61,15 @@ pub(super) fn picture(path: &Path, picture: &Picture) -> Result<()> {
     write_picture(path, &options, record.film, record.metadata())
 }
 
+/// Changes to materials, as `--material` reads them.
+fn edits(picture: &Picture) -> Vec<String> {
+    let LoadedScene { edits, materials, .. } = &picture.scene;
+    let named = edits
+        .iter()
+        .filter_map(|(number, edit)| Some(edit.to_text(&materials.get(*number as usize)?.name)));
+    named.collect()
+}
+
 fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
     let view = &picture.snapshot.request.view;
     let document = &picture.document;
@@ -76,6 +85,7 @@ fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
         ("env_intensity", json!(document.intensity)),
         ("background", json!(view.background)),
         ("region", json!(view.crop.map(|crop| [crop.corner, [view.width, view.height]].concat()))),
+        ("materials", json!(edits(picture))),
         ("seed", json!(view.seed)),
         ("white_balance_kelvin", json!(document.look.white_balance.kelvin)),
         ("camera_eye", json!(camera.map(|c| c.eye))),

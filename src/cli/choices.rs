@@ -12,7 +12,7 @@ use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
 use crate::render::{Gi, Sampling, Sharing};
 #[cfg(feature = "report")]
 use crate::report::Device;
-use crate::scene::{Outlines, SceneOptions};
+use crate::scene::{MaterialEdit, Outlines, SceneOptions};
 
 /// What is asked of a scene's file.
 #[derive(Debug, Clone, Default, PartialEq, clap::Args)]
@@ -31,12 +31,21 @@ pub(super) struct SceneArguments {
     /// Leaves out all that is of the material of this name; may be given several times.
     #[arg(long, value_name = "NAME")]
     hide: Vec<String>,
+    /// Changes all materials of a name: color=#rrggbb, roughness=0..1, metalness=0..1 (each multiplies its
+    /// texture), or hidden; may be given several times.
+    #[arg(long = "material", value_name = "NAME:CHANGES", value_parser = MaterialEdit::parse)]
+    edits: Vec<(String, MaterialEdit)>,
 }
 
 impl SceneArguments {
+    /// Changes to materials, as they were typed.
+    pub(super) fn edits(&self) -> Vec<String> {
+        self.edits.iter().map(|(name, edit)| edit.to_text(name)).collect()
+    }
+
     pub(super) fn options(&self) -> SceneOptions {
-        let Self { allow_outside, variant, outlines, hide } = self.clone();
-        SceneOptions { allow_outside, variant, outlines, hide }
+        let Self { allow_outside, variant, outlines, hide, edits } = self.clone();
+        SceneOptions { allow_outside, variant, outlines, hide, edits }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::features::Features;
 use crate::huge_pages::on_huge_pages;
 use crate::scene::needs::SceneNeeds;
 use crate::scene::surface::{SurfacePoint, alpha_at};
-use crate::scene::{AlphaMode, Scene, TextureImage};
+use crate::scene::{AlphaMode, Material, Scene, TextureImage};
 
 /// Everything about the scene that paths ask for.
 pub struct World {
@@ -35,6 +35,16 @@ impl World {
         let materials = scene.materials.iter().map(ReadyMaterial::new).collect();
         let lights = LocalLights::new(&scene, bvh.bounds());
         Self { needs: SceneNeeds::of(&scene), scene, bvh, lights, materials, clock: None }
+    }
+
+    /// The same scene with other materials, as many as it has.
+    #[must_use]
+    pub fn with_materials(&self, materials: Vec<Material>) -> Self {
+        let scene = Scene { materials, ..self.scene.clone() };
+        let ready = scene.materials.iter().map(ReadyMaterial::new).collect();
+        let lights = LocalLights::new(&scene, self.bvh.bounds());
+        let (needs, bvh) = (SceneNeeds::of(&scene), self.bvh.clone());
+        Self { needs, scene: with_huge_pages(scene), bvh, lights, materials: ready, clock: None }
     }
 
     /// About the largest radiance of the map and of lamps; 0 without any.

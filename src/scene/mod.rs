@@ -3,6 +3,7 @@
 pub mod builtin;
 pub mod camera_path;
 pub mod gltf;
+mod material_edit;
 pub mod needs;
 mod outlines;
 pub mod surface;
@@ -12,6 +13,7 @@ use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
 
 use crate::error::Notices;
 use camera_path::CameraPath;
+pub use material_edit::MaterialEdit;
 
 /// What is asked of a scene's file.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -25,6 +27,8 @@ pub struct SceneOptions {
     pub outlines: Outlines,
     /// Leaves out all that is of the material of this name; may be given several times.
     pub hide: Vec<String>,
+    /// Changes to all materials of a name, in order.
+    pub edits: Vec<(String, MaterialEdit)>,
 }
 
 /// What happens to inverted hulls.

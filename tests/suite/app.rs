@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use lightgrid::app::Start;
 use lightgrid::app::document::{Document, Light, Look, PictureSize};
 use lightgrid::app::interface::{Dock, Interface, Tab, TileView};
@@ -13,6 +13,7 @@ use lightgrid::app::screenshot::{Shot, Studio};
 use lightgrid::image::{Rgb8, read_picture, write_png};
 use lightgrid::render::StopRule;
 use lightgrid::render::gpu::DeviceChoice;
+use lightgrid::scene::{MaterialEdit, builtin};
 
 /// Mean absolute difference of 8-bit levels that a snapshot may have: drivers and processors differ
 /// in rounding, and samples of a path tracer with them.
@@ -89,6 +90,31 @@ fn overlays_and_panels_look_as_they_did() {
         pictures.push(picture);
     }
     assert!(different.is_empty(), "{different:#?}");
+}
+
+/// The walls painted red, their panel, and the room without them.
+#[test]
+fn a_material_is_changed_and_hidden() {
+    let office = builtin::build("office").expect("built in");
+    let number = office.materials.iter().position(|material| material.name == "wall");
+    let number = number.expect("it has walls") as u32;
+    let with = |edit: MaterialEdit| {
+        let mut start = start();
+        start.document.materials = [(number, edit)].into();
+        start
+    };
+    let red = Some(Vec3::new(0.8, 0.05, 0.04));
+    let painted = with(MaterialEdit { color: red, ..MaterialEdit::default() });
+    let Some(mut studio) = studio(painted, (1000, 760)) else { return };
+    let panel = Interface { material: Some(number), ..Interface::default() };
+    studio.arrange(panel.clone());
+    let picture = studio.take().expect("drawn");
+    compare("panel-material", &picture).expect("as it was");
+    let hidden = with(MaterialEdit { hidden: true, ..MaterialEdit::default() });
+    let mut studio = self::studio(hidden, (1000, 760)).expect("as before");
+    studio.arrange(panel);
+    let without = studio.take().expect("drawn");
+    compare("panel-material-hidden", &without).expect("as it was");
 }
 
 /// What a cell knows and what is true there, in a window high enough for both.

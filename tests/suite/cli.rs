@@ -109,6 +109,38 @@ pub(crate) fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
+/// What is changed on the command line is what is changed in the window.
+#[test]
+fn materials_are_changed_by_name() {
+    let bench = Bench::new();
+    let mean = |name: &str| {
+        let picture = read_picture(&bench.path(name)).expect("a picture");
+        let sum: Vec<f64> = picture.pixels.iter().fold(vec![0.0; 3], |sum, pixel| {
+            sum.iter().zip(pixel).map(|(s, p)| s + f64::from(*p)).collect()
+        });
+        [sum[0], sum[1], sum[2]]
+    };
+    let line =
+        |rest: &str| format!("render office --env sky:overcast@64x32 --size 32x18 --spp 4 {rest}");
+    let run = |rest: &str| {
+        let output = bench.run(&line(rest));
+        assert!(output.status.success(), "{rest}: {}", text(&output.stderr));
+    };
+    run("-o plain.exr");
+    run("-o red.exr --material wall:color=#ff0000,roughness=0.4 --json red.json");
+    let ([r, _, b], [red, _, blue]) = (mean("plain.exr"), mean("red.exr"));
+    assert!(red / blue > 1.5 * r / b, "{red} {blue} {r} {b}");
+    assert_eq!(bench.json("red.json")["materials"][0], "wall:color=#ff0000,roughness=0.4");
+    run("-o without.exr --material wall:hidden");
+    let [without, ..] = mean("without.exr");
+    assert!(without > 2.0 * r, "the sky comes in: {without} {r}");
+    let refusal = |rest: &str, status| bench.refusal(&line(rest), status);
+    let says = refusal("-o a.exr --material marble:roughness=1", 1);
+    assert!(says.contains("office: no material is called marble"), "{says}");
+    let says = refusal("-o a.exr --material wall:shine=1", 2);
+    assert!(says.contains("shine is not color, roughness, metalness or hidden"), "{says}");
+}
+
 #[test]
 fn distributions_are_exported_as_tables() {
     let bench = Bench::new();

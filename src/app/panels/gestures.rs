@@ -76,6 +76,10 @@ fn point(rect: Rect, response: &Response, modifiers: Modifiers, scope: &mut Scop
         let place = response.interact_pointer_pos().map(|at| place_of(rect, at));
         let is_inspecting = scope.interface.tab == Tab::Inspect;
         scope.interface.pinned = place.filter(|_| is_inspecting);
+        let spot = place.zip(scope.snapshot).and_then(|(place, snapshot)| {
+            look_at_place(&snapshot.request.world, &snapshot.request.view, place)
+        });
+        scope.interface.material = spot.map(|spot| spot.material);
     }
 }
 

@@ -1,10 +1,10 @@
-//! The left panel: scene, cameras, environment.
+//! The left panel: scene, cameras, environment, fog, material.
 
 use egui::{Margin, Panel, RichText, ScrollArea, Slider, Ui};
 
 use glam::Vec3;
 
-use super::map_view;
+use super::{map_view, material};
 use crate::app::commands::Command;
 use crate::app::document::{Document, Viewpoint};
 use crate::app::interface::Interface;
@@ -53,6 +53,9 @@ pub(in crate::app) fn show(
             ui.add_space(4.0);
             ui.separator();
             fog(ui, &mut document.fog, sources.scene);
+            ui.add_space(4.0);
+            ui.separator();
+            material::show(ui, document, interface, sources.scene);
         });
     });
 }

@@ -8,6 +8,7 @@ pub(super) mod history;
 pub(super) mod inspector;
 pub(super) mod left;
 mod map_view;
+mod material;
 pub(super) mod messages;
 pub(super) mod method;
 pub(super) mod needs;

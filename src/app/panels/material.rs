@@ -1,0 +1,91 @@
+//! The material that was clicked: its colour, roughness and metalness, and whether it is there at all.
+
+use egui::{ComboBox, RichText, Slider, Ui};
+use glam::Vec3;
+
+use crate::app::document::Document;
+use crate::app::interface::Interface;
+use crate::app::loader::LoadedScene;
+use crate::app::theme;
+use crate::scene::{Material, MaterialEdit};
+
+/// Draws the section.
+pub(super) fn show(
+    ui: &mut Ui,
+    document: &mut Document,
+    interface: &mut Interface,
+    scene: Option<&LoadedScene>,
+) {
+    theme::heading(ui, "MATERIAL");
+    let Some(scene) = scene else { return };
+    let title = |number: u32, material: &Material| {
+        let name = match material.name.as_str() {
+            "" => format!("Material {}", number + 1),
+            name => name.to_owned(),
+        };
+        match document.materials.get(&number) {
+            Some(edit) if edit.hidden => format!("{name} (hidden)"),
+            Some(_) => format!("{name} (changed)"),
+            None => name,
+        }
+    };
+    let chosen = interface.material.and_then(|number| scene.materials.get(number as usize));
+    let text = match (interface.material, chosen) {
+        (Some(number), Some(material)) => title(number, material),
+        _ => "Click a surface".to_owned(),
+    };
+    ComboBox::from_id_salt("material").width(ui.available_width()).selected_text(text).show_ui(
+        ui,
+        |ui| {
+            for (number, material) in (0..).zip(scene.materials.iter()) {
+                let is_chosen = interface.material == Some(number);
+                if ui.selectable_label(is_chosen, title(number, material)).clicked() {
+                    interface.material = Some(number);
+                }
+            }
+        },
+    );
+    let (Some(number), Some(material)) = (interface.material, chosen) else { return };
+    let before = document.materials.get(&number).copied().unwrap_or_default();
+    let mut edit = before;
+    change(ui, &mut edit, material);
+    if edit == MaterialEdit::default() {
+        document.materials.remove(&number);
+    } else if edit != before {
+        document.materials.insert(number, edit);
+    }
+    if edit != before {
+        interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
+    }
+}
+
+fn change(ui: &mut Ui, edit: &mut MaterialEdit, material: &Material) {
+    let has = |texture: bool| if texture { "Its texture is multiplied by this" } else { "" };
+    theme::row(ui, "Colour", has(material.base_color_texture.is_some()), |ui| {
+        let mut rgb = edit.color.unwrap_or(material.base_color.truncate()).to_array();
+        if ui.color_edit_button_rgb(&mut rgb).changed() {
+            edit.color = Some(Vec3::from(rgb));
+        }
+    });
+    let of_texture = has(material.metallic_roughness_texture.is_some());
+    let share = |ui: &mut Ui, value: &mut Option<f32>, own: f32| {
+        let mut now = value.unwrap_or(own);
+        if ui.add(Slider::new(&mut now, 0.0..=1.0).fixed_decimals(2)).changed() {
+            *value = Some(now);
+        }
+    };
+    theme::row(ui, "Roughness", of_texture, |ui| {
+        share(ui, &mut edit.roughness, material.roughness);
+    });
+    theme::row(ui, "Metalness", of_texture, |ui| {
+        share(ui, &mut edit.metalness, material.metallic);
+    });
+    ui.horizontal(|ui| {
+        ui.checkbox(&mut edit.hidden, "Hide")
+            .on_hover_text("Neither light nor the camera meets it");
+        let text = RichText::new("As it was").size(12.0);
+        if *edit != MaterialEdit::default() && ui.button(text).clicked() {
+            *edit = MaterialEdit::default();
+        }
+    });
+}
