@@ -111,8 +111,7 @@ fn decode<R: Read + Seek>(
         to_rec709: rec709_conversion(&header, selection.channels, &mut notices),
     };
     let (width, height) = (placement.width, placement.height);
-    let pixels = memory::filled(u64::from(width) * u64::from(height), [0.0; 3])?;
-    let mut image = Image { width, height, pixels };
+    let mut image = Image { width, height, pixels: Vec::new() };
     let mut chunks = reader
         .filter_chunks(false, |_, tile, block| {
             block.layer == selection.part && tile.is_largest_resolution_level()
@@ -126,13 +125,17 @@ fn decode<R: Read + Seek>(
             .take(batch_size)
             .collect::<exr::error::Result<_>>()
             .map_err(|e| decode_cause(&e))?;
-        if batch.is_empty() {
-            break;
-        }
         let blocks: Vec<Block> = batch
             .into_par_iter()
             .map(|chunk| block_decoder.decode(chunk, &meta))
             .collect::<Decoded<_>>()?;
+        // Not before there is something to show: a small file may claim a large display window.
+        if image.pixels.is_empty() {
+            image.pixels = memory::filled(u64::from(width) * u64::from(height), [0.0; 3])?;
+        }
+        if blocks.is_empty() {
+            break;
+        }
         blocks.iter().for_each(|block| placement.copy(block, &mut image));
     }
     if block_decoder.sampling.is_some() {

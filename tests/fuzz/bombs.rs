@@ -17,8 +17,10 @@ pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
         ("16000x16000.png", png(16_000, 16_000, 64)),
         ("16000x16000-in-64-kb.png", png(16_000, 16_000, 65_536)),
         ("a-bit-a-pixel.png", png_of([1, 0], 32_767, 32_767, 65_536)),
-        ("pixels-1e9.exr", exr(31_622, 31_622)),
-        ("16000x16000.exr", exr(15_999, 15_999)),
+        ("pixels-1e9.exr", exr([31_622; 2], [31_622; 2], 0)),
+        ("16000x16000.exr", exr([15_999; 2], [15_999; 2], 0)),
+        // What is seen may be larger than what there is data for, and then is black.
+        ("16000x16000-around-24x12-in-64-kb.exr", exr([23, 11], [15_999; 2], 65_536)),
         ("pixels-1e9.bmp", bmp(31_623)),
         ("16000x16000.bmp", bmp(16_000)),
         ("60000x60000.tga", tga(60_000)),
@@ -78,8 +80,9 @@ fn crc32(bytes: &[u8]) -> u32 {
     })
 }
 
-/// Scan lines of half floats, uncompressed, with no data after the header.
-fn exr(last_x: u32, last_y: u32) -> Vec<u8> {
+/// Scan lines of half floats, uncompressed, with zeros after the header. The windows of data and of what is
+/// seen end at these pixels.
+fn exr(data: [u32; 2], display: [u32; 2], zeros: usize) -> Vec<u8> {
     let mut file = vec![0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
     let mut attribute = |name: &str, kind: &str, value: &[u8]| {
         file.extend(name.bytes().chain([0]).chain(kind.bytes()).chain([0]));
@@ -93,15 +96,15 @@ fn exr(last_x: u32, last_y: u32) -> Vec<u8> {
     channels.push(0);
     attribute("channels", "chlist", &channels);
     attribute("compression", "compression", &[0]);
-    let corner = [last_x.to_le_bytes(), last_y.to_le_bytes()].concat();
-    let window = [&[0; 8][..], &corner].concat();
-    attribute("dataWindow", "box2i", &window);
-    attribute("displayWindow", "box2i", &window);
+    let window =
+        |last: [u32; 2]| [[0; 4], [0; 4], last[0].to_le_bytes(), last[1].to_le_bytes()].concat();
+    attribute("dataWindow", "box2i", &window(data));
+    attribute("displayWindow", "box2i", &window(display));
     attribute("lineOrder", "lineOrder", &[0]);
     attribute("pixelAspectRatio", "float", &1.0_f32.to_le_bytes());
     attribute("screenWindowCenter", "v2f", &[0; 8]);
     attribute("screenWindowWidth", "float", &1.0_f32.to_le_bytes());
-    file.push(0);
+    file.resize(file.len() + 1 + zeros, 0);
     file
 }
 
