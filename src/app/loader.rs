@@ -34,15 +34,18 @@ pub struct LoadedScene {
 
 impl LoadedScene {
     /// The same with these changes in place of those that there are.
-    fn edited(self, edits: BTreeMap<u32, MaterialEdit>) -> Self {
+    fn edited(self, edits: BTreeMap<u32, MaterialEdit>) -> Result<Self> {
         let mut materials = self.materials.to_vec();
         for (number, edit) in &edits {
             if let Some(material) = materials.get_mut(*number as usize) {
                 *material = edit.apply(material);
             }
         }
-        let world = Arc::new(self.world.with_materials(materials));
-        Self { kernel: KernelFacts::of_scene(&world), world, edits, ..self }
+        let world = self.world.with_materials(materials);
+        let world =
+            world.map_err(|cause| Error::at(&self.name, format!("to change it {cause}")))?;
+        let world = Arc::new(world);
+        Ok(Self { kernel: KernelFacts::of_scene(&world), world, edits, ..self })
     }
 }
 
@@ -69,8 +72,8 @@ pub struct LoadedMap {
 pub enum Loaded {
     /// A scene, or why not.
     Scene(String, Result<LoadedScene>),
-    /// The scene that is there with other materials.
-    Edited(LoadedScene),
+    /// The scene that is there with other materials, or why not.
+    Edited(String, Result<LoadedScene>),
     /// A map, or why not.
     Map(String, Result<LoadedMap>),
 }
@@ -104,7 +107,7 @@ impl Loader {
     pub fn edit_scene(&mut self, scene: &LoadedScene, edits: &BTreeMap<u32, MaterialEdit>) {
         let (scene, edits) = (scene.clone(), edits.clone());
         let name = scene.name.clone();
-        self.start(0, &name, move |_| Loaded::Edited(scene.edited(edits)));
+        self.start(0, &name, move |name| Loaded::Edited(name.to_owned(), scene.edited(edits)));
     }
 
     /// Starts to load a map unless it is being loaded.
@@ -122,7 +125,7 @@ impl Loader {
         let mut results = Vec::new();
         for loaded in self.receiver.try_iter() {
             let (kind, name) = match &loaded {
-                Loaded::Scene(name, _) | Loaded::Edited(LoadedScene { name, .. }) => (0, name),
+                Loaded::Scene(name, _) | Loaded::Edited(name, _) => (0, name),
                 Loaded::Map(name, _) => (1, name),
             };
             if self.in_flight[kind].as_ref() == Some(name) {

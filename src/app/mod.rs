@@ -400,9 +400,14 @@ impl App {
         for loaded in self.loader.take() {
             match loaded {
                 Loaded::Scene(_, Ok(scene)) => self.take_scene(scene),
-                Loaded::Edited(scene) => {
+                Loaded::Edited(_, Ok(scene)) => {
                     self.scene = Some(scene);
                     self.inspector.forget();
+                }
+                Loaded::Edited(_, Err(error)) => {
+                    self.messages.error(error.to_string());
+                    self.document.materials =
+                        self.scene.as_ref().map(|scene| scene.edits.clone()).unwrap_or_default();
                 }
                 Loaded::Map(_, Ok(map)) => {
                     map.notices.iter().for_each(|sentence| self.messages.notice(sentence));

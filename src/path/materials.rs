@@ -74,11 +74,11 @@ mod tests {
     use glam::{Affine2, Vec2, Vec3, Vec4};
 
     use super::*;
-    use crate::bvh::Hit;
+    use crate::bvh::{Hit, Ray};
     use crate::path::World;
     use crate::sampler::Sampler;
     use crate::scene::surface::SurfaceParameters;
-    use crate::scene::{Scene, Texture, TextureImage, TextureRef, Wrap, builtin};
+    use crate::scene::{MaterialEdit, Scene, Texture, TextureImage, TextureRef, Wrap, builtin};
 
     /// Asserts that points of triangles, seen from both sides, are those that know nothing of what is
     /// ready; returns how many of them have parameters of their own.
@@ -223,5 +223,37 @@ mod tests {
             SurfaceParameters { anisotropy_axis, ..*point.parameters }
         });
         assert_eq!(textured, plain);
+    }
+
+    /// A world with changed materials is the one that is loaded with them.
+    #[test]
+    fn materials_are_exchanged_as_if_they_had_been_loaded() {
+        let scene = builtin::build("office").expect("built in");
+        let hidden = MaterialEdit { hidden: true, ..MaterialEdit::default() };
+        let dull = MaterialEdit { roughness: Some(1.0), ..MaterialEdit::default() };
+        let change = |material: &Material| match material.name.as_str() {
+            "wall" => hidden.apply(material),
+            "oak" => dull.apply(material),
+            _ => material.clone(),
+        };
+        let materials: Vec<Material> = scene.materials.iter().map(change).collect();
+        let loaded = World::new(Scene { materials: materials.clone(), ..scene.clone() });
+        let before = World::new(scene);
+        let changed = before.with_materials(materials).expect("there is memory");
+        assert_eq!(changed.needs, loaded.needs);
+        assert_ne!(changed.needs, before.needs, "nothing was cut out before");
+        let mut sees_more = 0;
+        for index in 0..2000 {
+            let mut sampler = Sampler::new(7, 0, index);
+            let (a, b) = (sampler.next_pair(), sampler.next_pair());
+            let direction = Vec3::new(a[0] - 0.5, a[1] - 0.5, b[0] - 0.5).normalize();
+            let origin = Vec3::new(0.0, 1.2, 0.0);
+            let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
+            let hit = changed.closest_hit(&ray, true).map(|hit| (hit.t, hit.triangle));
+            assert_eq!(hit, loaded.closest_hit(&ray, true).map(|hit| (hit.t, hit.triangle)));
+            assert_eq!(changed.transmittance(&ray), loaded.transmittance(&ray));
+            sees_more += u32::from(changed.transmittance(&ray) != before.transmittance(&ray));
+        }
+        assert!(sees_more > 100, "{sees_more} of 2000 rays leave where the walls were");
     }
 }

@@ -7,8 +7,10 @@ use super::materials::ReadyMaterial;
 use super::ray_clock::RayClock;
 use crate::bvh::{Bvh, Hit, Ray};
 use crate::environment::Environment;
+use crate::error::Decoded;
 use crate::features::Features;
 use crate::huge_pages::on_huge_pages;
+use crate::memory;
 use crate::scene::needs::SceneNeeds;
 use crate::scene::surface::{SurfacePoint, alpha_at};
 use crate::scene::{AlphaMode, Material, Scene, TextureImage};
@@ -38,13 +40,33 @@ impl World {
     }
 
     /// The same scene with other materials, as many as it has.
-    #[must_use]
-    pub fn with_materials(&self, materials: Vec<Material>) -> Self {
+    ///
+    /// # Errors
+    /// If there is no memory for another copy of it: the cause.
+    pub(crate) fn with_materials(&self, materials: Vec<Material>) -> Decoded<Self> {
+        memory::check(self.memory_bytes())?;
         let scene = Scene { materials, ..self.scene.clone() };
         let ready = scene.materials.iter().map(ReadyMaterial::new).collect();
         let lights = LocalLights::new(&scene, self.bvh.bounds());
         let (needs, bvh) = (SceneNeeds::of(&scene), self.bvh.clone());
-        Self { needs, scene: with_huge_pages(scene), bvh, lights, materials: ready, clock: None }
+        let scene = with_huge_pages(scene);
+        Ok(Self { needs, scene, bvh, lights, materials: ready, clock: None })
+    }
+
+    /// About what it holds: geometry, textures and tree.
+    fn memory_bytes(&self) -> u64 {
+        let scene = &self.scene;
+        let texels: usize = scene.images.iter().map(|image| image.texels.len()).sum();
+        let bytes = size_of_val(&scene.positions[..])
+            + size_of_val(&scene.normals[..])
+            + size_of_val(&scene.tangents[..])
+            + scene.uvs.iter().map(|uvs| size_of_val(&uvs[..])).sum::<usize>()
+            + size_of_val(&scene.colors[..])
+            + size_of_val(&scene.triangles[..])
+            + size_of_val(&scene.triangle_materials[..])
+            + texels * size_of::<[u8; 4]>()
+            + self.bvh.memory_bytes();
+        bytes as u64
     }
 
     /// About the largest radiance of the map and of lamps; 0 without any.

@@ -130,7 +130,10 @@ fn materials_are_changed_by_name() {
     run("-o red.exr --material wall:color=#ff0000,roughness=0.4 --json red.json");
     let ([r, _, b], [red, _, blue]) = (mean("plain.exr"), mean("red.exr"));
     assert!(red / blue > 1.5 * r / b, "{red} {blue} {r} {b}");
-    assert_eq!(bench.json("red.json")["materials"][0], "wall:color=#ff0000,roughness=0.4");
+    assert_eq!(
+        bench.json("red.json")["settings"]["materials"][0],
+        "wall:color=#ff0000,roughness=0.4"
+    );
     run("-o without.exr --material wall:hidden");
     let [without, ..] = mean("without.exr");
     assert!(without > 2.0 * r, "the sky comes in: {without} {r}");
