@@ -33,6 +33,8 @@ pub struct Interface {
     pub pinned: Option<Vec2>,
     /// The material that is looked at.
     pub material: Option<u32>,
+    /// Whether it was just clicked: its settings are to come into sight.
+    pub is_material_new: bool,
     /// Which picture of the history is compared.
     pub compared: Option<usize>,
     /// Where the wipe is, `[0,1]` across the picture.
@@ -127,6 +129,7 @@ impl Default for Interface {
             pointed: None,
             pinned: None,
             material: None,
+            is_material_new: false,
             compared: None,
             wipe: 0.5,
             is_frozen: false,

@@ -105,13 +105,13 @@ fn a_material_is_changed_and_hidden() {
     };
     let red = Some(Vec3::new(0.8, 0.05, 0.04));
     let painted = with(MaterialEdit { color: red, ..MaterialEdit::default() });
-    let Some(mut studio) = studio(painted, (1000, 760)) else { return };
+    let Some(mut studio) = studio(painted, (1000, 1000)) else { return };
     let panel = Interface { material: Some(number), ..Interface::default() };
     studio.arrange(panel.clone());
     let picture = studio.take().expect("drawn");
     compare("panel-material", &picture).expect("as it was");
     let hidden = with(MaterialEdit { hidden: true, ..MaterialEdit::default() });
-    let mut studio = self::studio(hidden, (1000, 760)).expect("as before");
+    let mut studio = self::studio(hidden, (1000, 1000)).expect("as before");
     studio.arrange(panel);
     let without = studio.take().expect("drawn");
     compare("panel-material-hidden", &without).expect("as it was");

@@ -80,6 +80,7 @@ fn point(rect: Rect, response: &Response, modifiers: Modifiers, scope: &mut Scop
             look_at_place(&snapshot.request.world, &snapshot.request.view, place)
         });
         scope.interface.material = spot.map(|spot| spot.material);
+        scope.interface.is_material_new = spot.is_some();
     }
 }
 

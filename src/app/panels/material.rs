@@ -1,6 +1,6 @@
 //! The material that was clicked: its colour, roughness and metalness, and whether it is there at all.
 
-use egui::{ComboBox, RichText, Slider, Ui};
+use egui::{Align, ComboBox, RichText, Slider, Ui};
 use glam::Vec3;
 
 use crate::app::document::Document;
@@ -49,6 +49,9 @@ pub(super) fn show(
     let before = document.materials.get(&number).copied().unwrap_or_default();
     let mut edit = before;
     change(ui, &mut edit, material);
+    if std::mem::take(&mut interface.is_material_new) {
+        ui.scroll_to_cursor(Some(Align::BOTTOM));
+    }
     if edit == MaterialEdit::default() {
         document.materials.remove(&number);
     } else if edit != before {
