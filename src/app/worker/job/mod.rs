@@ -278,5 +278,6 @@ fn learned_share(session: &Session<'_>) -> f32 {
 /// Grows with whatever a session does.
 fn progress(session: &Session<'_>) -> u64 {
     let figures = session.figures();
-    figures.learning_paths + figures.samples
+    // A radiance cache is trained out of sight, but that learning is over is to be seen.
+    figures.learning_paths + figures.samples + u64::from(figures.training_paths > 0)
 }
