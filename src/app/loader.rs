@@ -86,15 +86,16 @@ pub struct Loader {
     in_flight: [Option<String>; 2],
     /// What is asked of scenes.
     options: SceneOptions,
-    /// One file at a time: two large ones together may not fit into memory.
-    turn: Arc<Mutex<()>>,
+    /// One scene and one map at a time, side by side as on the command line: two large scenes together
+    /// may not fit into memory.
+    turns: [Arc<Mutex<()>>; 2],
 }
 
 impl Loader {
     /// `wake` is called when something has been loaded.
     pub fn new(wake: Wake, options: SceneOptions) -> Self {
         let (sender, receiver) = channel();
-        Self { sender, receiver, wake, in_flight: [None, None], options, turn: Arc::default() }
+        Self { sender, receiver, wake, in_flight: [None, None], options, turns: Default::default() }
     }
 
     /// Starts to load a scene unless it is being loaded.
@@ -146,7 +147,8 @@ impl Loader {
             return;
         }
         self.in_flight[kind] = Some(name.to_owned());
-        let (sender, wake, turn) = (self.sender.clone(), self.wake.clone(), self.turn.clone());
+        let (sender, wake) = (self.sender.clone(), self.wake.clone());
+        let turn = Arc::clone(&self.turns[kind]);
         let name = name.to_owned();
         let thread = std::thread::Builder::new().name("load".to_owned()).spawn(move || {
             let _turn = turn.lock().unwrap_or_else(PoisonError::into_inner);

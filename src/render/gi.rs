@@ -69,10 +69,12 @@ impl CacheTraining {
         Some(Self { sums, paths: 0, wanted: 0, cache: None, brightest })
     }
 
-    /// Decides how many paths are to have trained before the next pass, where each pixel has so many
-    /// samples: all there are double each time. What was begun is brought to its end first.
-    pub(super) fn begin(&mut self, view: &View, samples: u32) {
-        let pixels = u64::from(view.width) * u64::from(view.height);
+    /// Decides how many paths are to have trained before the next pass, which is about every `every`-th
+    /// pixel of every `every`-th row, where each has so many samples: all there are double each time.
+    /// What was begun is brought to its end first.
+    pub(super) fn begin(&mut self, view: &View, samples: u32, every: u32) {
+        let pixels = [view.width, view.height].map(|length| u64::from(length.div_ceil(every)));
+        let pixels: u64 = pixels.iter().product();
         let wanted = pixels * (u64::from(samples) + 1) / TRAINING_SHARE;
         let wanted = wanted.clamp(LEAST_PATHS, MOST_PATHS);
         // Where passes end between powers of two is a matter of time.
@@ -213,7 +215,7 @@ pub(super) mod tests {
         let edge = training.sums.cells().edge;
         let cells = CacheCells { edge: edge / 64.0, ..*training.sums.cells() };
         training.sums = RadianceSums::new(cells, 1.0);
-        training.begin(&view, 0);
+        training.begin(&view, 0, 1);
         let mut places = 0;
         while let Some(range) = training.next() {
             // In a square so large that the smallest cells do not suffice for it.

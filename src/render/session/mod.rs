@@ -128,7 +128,7 @@ impl<'a> Session<'a> {
                 result
             }
             Phase::Rendering => {
-                self.train(cancel)?;
+                self.train(1, cancel)?;
                 let start = Instant::now();
                 let result = self.render(self.samples.saturating_add(samples), 1, cancel);
                 let distributions = self.figures.distribution_seconds - distribution_seconds;
@@ -141,11 +141,11 @@ impl<'a> Session<'a> {
 
     /// Gives every `every`-th pixel of every `every`-th row its first sample: a picture can be made of
     /// so few that shows the whole view. It is the sample that [`Self::advance`] would take, which
-    /// goes on with the others. Does nothing on a GPU, whose first samples come all at once.
+    /// goes on with the others; but a radiance cache is trained by so many fewer paths. Does nothing on a GPU, whose first samples come all at once.
     pub fn begin(&mut self, every: u32, cancel: &AtomicBool) {
         if self.samples == 0 && !self.is_on_gpu() {
             // Only a GPU fails, and distributions are made of whole passes.
-            let _ = self.train(cancel);
+            let _ = self.train(every.max(1), cancel);
             let start = Instant::now();
             let _ = self.render(1, every.max(1), cancel);
             self.figures.render_seconds += start.elapsed().as_secs_f64();
@@ -426,10 +426,10 @@ impl<'a> Session<'a> {
 
     /// Trains the radiance cache what it is to know before the next pass, if there is one. What has been
     /// cut short goes on at the next call.
-    fn train(&mut self, cancel: &AtomicBool) -> Result<()> {
+    fn train(&mut self, every: u32, cancel: &AtomicBool) -> Result<()> {
         let start = Instant::now();
         if let Some(training) = &mut self.training {
-            training.begin(&self.view, self.samples);
+            training.begin(&self.view, self.samples, every);
         }
         while let Some(training) = &self.training
             && let Some(paths) = training.next()
