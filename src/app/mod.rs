@@ -504,6 +504,7 @@ impl App {
             // Somebody went back to a file that is no longer there.
             self.document.scene.clone_from(&scene.name);
             self.document.viewpoint = Some(first_viewpoint(scene));
+            self.document.materials.clone_from(&scene.edits);
             self.undo.amend(&self.document);
         }
     }

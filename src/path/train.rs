@@ -8,7 +8,7 @@ use crate::color::luminance;
 use crate::radiance_cache::{RadianceCache, RadianceSums};
 use crate::sampler::Sampler;
 
-/// First vertices of a path that train.
+/// First vertices of a path that train the radiance cache.
 pub(crate) const TRAINING_VERTICES: u32 = 3;
 /// An estimate so many times as bright as what is known of its cell counts as if it were just that: one
 /// path in a million would make a cell shine. Less costs light (1 % at 64, 5 % at 16, of a living room

@@ -23,7 +23,7 @@ const BRIGHTEST: f32 = (1_u64 << 36) as f32;
 const MOST: f32 = (1_u64 << 40) as f32;
 /// Share of slots in use beyond which cells no longer find one for sure.
 const FULL: f64 = 0.75;
-/// Most paths that may train in all.
+/// Most paths that may train it in all.
 pub(crate) const MOST_PATHS: u64 = 1 << 22;
 
 /// Sums of what paths have brought back, cell by cell.

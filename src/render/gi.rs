@@ -1,4 +1,4 @@
-//! How light that has met several surfaces is found, and what the radiance cache is trained when.
+//! How light that has met several surfaces is found, and when the radiance cache is trained.
 
 use std::ops::Range;
 
@@ -26,9 +26,9 @@ pub enum Gi {
 /// One training path for this many paths rendered; it takes about twice as long as one of them. With
 /// twice as many, means of 8x8 pixels are better for their time by day, pixels worse.
 const TRAINING_SHARE: u64 = 8;
-/// Paths that find out how bright it is about where, before others train.
+/// Paths that find out how bright it is about where, before others train it.
 const PILOT_PATHS: u64 = 1 << 12;
-/// Fewest paths that train.
+/// Fewest paths that train it.
 const LEAST_PATHS: u64 = 1 << 14;
 /// Paths that the CPU traces between two looks at whether to stop.
 pub(super) const PATHS_AT_A_TIME: u64 = 1 << 12;
@@ -39,10 +39,10 @@ const EDGE: f32 = 0.025;
 /// A radiance cache in the making. It outlives the picture, for it lies in the world.
 pub(crate) struct CacheTraining {
     sums: RadianceSums,
-    /// Paths that have trained, and that are to before the next pass.
+    /// Paths that have trained it, and that are to have before the next pass.
     paths: u64,
     wanted: u64,
-    /// Until others have trained, what a few have found.
+    /// Until others have trained it, what a few have found.
     cache: Option<RadianceCache>,
     brightest: f32,
 }
@@ -69,7 +69,7 @@ impl CacheTraining {
         Some(Self { sums, paths: 0, wanted: 0, cache: None, brightest })
     }
 
-    /// Decides how many paths are to have trained before the next pass, which is about every `every`-th
+    /// Decides how many paths are to have trained it before the next pass, which is about every `every`-th
     /// pixel of every `every`-th row, where each has so many samples: all there are double each time.
     /// What was begun is brought to its end first.
     pub(super) fn begin(&mut self, view: &View, samples: u32, every: u32) {

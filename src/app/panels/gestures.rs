@@ -11,7 +11,7 @@ use crate::app::document::Viewpoint;
 use crate::app::drag::{Drag, Step};
 use crate::app::interface::Tab;
 use crate::app::loader::LoadedScene;
-use crate::app::surface_map::look_at_place;
+use crate::app::surface_map::{Spot, look_at_place};
 use crate::app::theme;
 use crate::bvh::Ray;
 
@@ -76,9 +76,7 @@ fn point(rect: Rect, response: &Response, modifiers: Modifiers, scope: &mut Scop
         let place = response.interact_pointer_pos().map(|at| place_of(rect, at));
         let is_inspecting = scope.interface.tab == Tab::Inspect;
         scope.interface.pinned = place.filter(|_| is_inspecting);
-        let spot = place.zip(scope.snapshot).and_then(|(place, snapshot)| {
-            look_at_place(&snapshot.request.world, &snapshot.request.view, place)
-        });
+        let spot = clicked_spot(rect, response, scope);
         scope.interface.material = spot.map(|spot| spot.material);
         scope.interface.is_material_new = spot.is_some();
     }
@@ -147,13 +145,16 @@ fn orbit(viewpoint: &mut Viewpoint, drag: glam::Vec2, scene: Option<&LoadedScene
     }
 }
 
+/// The surface under a click.
+fn clicked_spot(rect: Rect, response: &Response, scope: &Scope<'_>) -> Option<Spot> {
+    let place = place_of(rect, response.interact_pointer_pos()?);
+    let request = &scope.snapshot?.request;
+    look_at_place(&request.world, &request.view, place)
+}
+
 /// Does something with the surface under a click.
 fn pick(rect: Rect, response: &Response, scope: &mut Scope<'_>, act: fn(&mut Viewpoint, Vec3)) {
-    let (Some(at), Some(snapshot)) = (response.interact_pointer_pos(), scope.snapshot) else {
-        return;
-    };
-    let request = &snapshot.request;
-    let spot = look_at_place(&request.world, &request.view, place_of(rect, at));
+    let spot = clicked_spot(rect, response, scope);
     if let (Some(spot), Some(viewpoint)) = (spot, &mut scope.document.viewpoint) {
         let mut moved = viewpoint.clone();
         act(&mut moved, spot.position);

@@ -115,8 +115,8 @@ pub(in crate::cli) struct RenderArguments {
     #[arg(long, default_value = "adaptive", value_enum, help_heading = "Light")]
     pub(super) sampling: Sampling,
     /// Whether the pixels of a tile share what their paths find behind the second vertex: less noise at
-    /// each pixel, but coarser. `auto` is 8x8 for adaptive sampling in clear air from 64x64 pixels on
-    /// that are not denoised.
+    /// each pixel, but coarser. `auto` shares with adaptive sampling in clear air, from 64x64 pixels on
+    /// that are not denoised: 8x8 inside, 4x4 outside, nothing in the open.
     #[arg(
         long,
         default_value = "auto",

@@ -8,9 +8,7 @@ use std::fmt::Write as _;
 use super::constants;
 use super::kernel::Kernel;
 use crate::features::Features;
-use crate::path::TRAINING_VERTICES;
 use crate::path::sharing::SharedTile;
-use crate::radiance_cache;
 
 /// Numbers of a shader that are known when it is built.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -247,6 +245,11 @@ impl Program {
             source.push_str("enable wgpu_ray_query;\n");
         }
         source.push_str(&constants::shared());
+        let mut declare = |constants: &[(&str, u32)]| {
+            for (name, value) in constants {
+                let _ = writeln!(source, "const {name} = {value}u;");
+            }
+        };
         let Constants {
             stack_size,
             shared_stack_size,
@@ -258,7 +261,7 @@ impl Program {
             rows_at,
             shared_tile,
         } = *constants;
-        for (name, value) in [
+        declare(&[
             ("STACK_SIZE", stack_size),
             ("SHARED_STACK_SIZE", shared_stack_size),
             ("VERTEX_TEXELS", vertex.count),
@@ -270,44 +273,28 @@ impl Program {
             ("SHEEN_AT", sheen_at),
             ("FILTER_AT", filter_at),
             ("ROWS_AT", rows_at),
-        ] {
-            let _ = writeln!(source, "const {name} = {value}u;");
-        }
+        ]);
         if kernel.is_of_queue() {
             let SlotTexels { count, receiver, body, first_hit, map_shadow, lamp_shadow } =
                 SlotTexels::of(features);
-            for (name, value) in [
+            declare(&[
                 ("SLOT_TEXELS", count),
                 ("RECEIVER_TEXEL", receiver),
                 ("BODY_TEXEL", body),
                 ("FIRST_HIT_TEXEL", first_hit),
                 ("MAP_SHADOW_TEXEL", map_shadow),
                 ("LAMP_SHADOW_TEXEL", lamp_shadow),
-            ] {
-                let _ = writeln!(source, "const {name} = {value}u;");
-            }
+            ]);
         }
         if kernel.shares() {
             let SharedTile { side, owner_side, continuations, map_samples } =
                 shared_tile.unwrap_or(SharedTile::LARGE);
-            for (name, value) in [
+            declare(&[
                 ("TILE_SIDE", side),
                 ("OWNER_SIDE", owner_side),
                 ("CONTINUATIONS", continuations),
                 ("MAP_SAMPLES", map_samples),
-            ] {
-                let _ = writeln!(source, "const {name} = {value}u;");
-            }
-        }
-        if features.contains(Features::RADIANCE_CACHE) {
-            for (name, value) in [
-                ("CACHE_SLOTS", radiance_cache::SLOTS as u32),
-                ("CACHE_PROBES", radiance_cache::MOST_PROBES as u32),
-                ("CACHE_WORDS", radiance_cache::WORDS as u32),
-                ("TRAINING_VERTICES", TRAINING_VERTICES),
-            ] {
-                let _ = writeln!(source, "const {name} = {value}u;");
-            }
+            ]);
         }
         for (index, binding) in bindings.iter().enumerate() {
             let array = match binding {

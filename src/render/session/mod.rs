@@ -141,13 +141,15 @@ impl<'a> Session<'a> {
 
     /// Gives every `every`-th pixel of every `every`-th row its first sample: a picture can be made of
     /// so few that shows the whole view. It is the sample that [`Self::advance`] would take, which
-    /// goes on with the others; but a radiance cache is trained by so many fewer paths. Does nothing on a GPU, whose first samples come all at once.
+    /// goes on with the others; but a radiance cache is trained by so many fewer paths. Does nothing on
+    /// a GPU, whose first samples come all at once.
     pub fn begin(&mut self, every: u32, cancel: &AtomicBool) {
         if self.samples == 0 && !self.is_on_gpu() {
+            let every = every.max(1);
             // Only a GPU fails, and distributions are made of whole passes.
-            let _ = self.train(every.max(1), cancel);
+            let _ = self.train(every, cancel);
             let start = Instant::now();
-            let _ = self.render(1, every.max(1), cancel);
+            let _ = self.render(1, every, cancel);
             self.figures.render_seconds += start.elapsed().as_secs_f64();
         }
     }
@@ -279,7 +281,7 @@ impl<'a> Session<'a> {
         self.take_up_distributions()
     }
 
-    /// Goes on with what paths have trained the radiance cache before, in the same world with the same
+    /// Goes on with a radiance cache that paths have trained before, in the same world with the same
     /// light. It is to suit the camera ([`CacheTraining::suits`]).
     ///
     /// # Errors
@@ -292,7 +294,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// What paths have trained the radiance cache, for another session; this one follows all paths to
+    /// The training of the radiance cache so far, for another session; this one follows all paths to
     /// their end from now on.
     pub(crate) fn take_training(&mut self) -> Option<CacheTraining> {
         self.training.take()
@@ -424,8 +426,8 @@ impl<'a> Session<'a> {
         PathTracer { counts, cache, ..tracer }
     }
 
-    /// Trains the radiance cache what it is to know before the next pass, if there is one. What has been
-    /// cut short goes on at the next call.
+    /// Trains the radiance cache, if there is one, as far as it is to be before the next pass, which is about
+    /// every `every`-th pixel of every `every`-th row. What has been cut short goes on at the next call.
     fn train(&mut self, every: u32, cancel: &AtomicBool) -> Result<()> {
         let start = Instant::now();
         if let Some(training) = &mut self.training {

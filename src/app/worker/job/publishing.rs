@@ -36,7 +36,7 @@ pub(super) struct Reading {
 
 impl Job<'_> {
     /// A film of this view from before, if there is one.
-    pub(super) fn backdrop(&self) -> Option<Arc<Film>> {
+    fn backdrop(&self) -> Option<Arc<Film>> {
         let (request, film) = self.kept.backdrop.as_ref()?;
         let aspect = |view: &View| f64::from(view.width) / f64::from(view.height);
         let is_as_wide = 1.02 * aspect(&request.view) >= aspect(&self.request.view);
@@ -97,7 +97,7 @@ impl Job<'_> {
 
     /// What is shown together with the session's own film: the calm one once it has more to say than
     /// what was seen before.
-    pub(super) fn shown_backdrop(
+    fn shown_backdrop(
         &mut self,
         main: &Session<'_>,
         calm: Option<&Session<'_>>,
@@ -133,7 +133,7 @@ impl Job<'_> {
     }
 
     /// The session's picture, and what reading a film that is shown in place took of the time.
-    pub(super) fn session_snapshot(
+    fn session_snapshot(
         &mut self,
         session: &Session<'_>,
         is_final: bool,
@@ -173,14 +173,14 @@ impl Job<'_> {
     }
 
     /// The session's film; before the first sample, one of the same view from before.
-    pub(super) fn film_of(&self, session: &Session<'_>) -> Arc<Film> {
+    fn film_of(&self, session: &Session<'_>) -> Arc<Film> {
         let before = if session.figures().samples == 0 { self.backdrop() } else { None };
         before.unwrap_or_else(|| Arc::new(session.film().clone()))
     }
 
     /// The session's film if the window shows it in every frame without its being read. Small ones are
     /// filtered on the CPU, and software does not draw so often.
-    pub(super) fn in_place(&self, session: &Session<'_>) -> Option<(Gpu, DeviceFilm)> {
+    fn in_place(&self, session: &Session<'_>) -> Option<(Gpu, DeviceFilm)> {
         let (gpu, film) = session.film_on_device()?;
         let is_small = film.width < self.request.view.width;
         let is_live = !gpu.facts().is_software() && gpu.is_same(&lock(&self.shared.screen));
@@ -188,7 +188,7 @@ impl Job<'_> {
     }
 
     /// The last reading of a film, unless it is too old.
-    pub(super) fn reading(&self, of: Option<&(Gpu, DeviceFilm)>) -> Option<&Reading> {
+    fn reading(&self, of: Option<&(Gpu, DeviceFilm)>) -> Option<&Reading> {
         let of = of?;
         self.readings.iter().find(|r| is_same(&r.of, of) && r.at.elapsed() < r.gap)
     }

@@ -86,7 +86,7 @@ impl Job<'_> {
     }
 
     /// By what a moving picture's sides are divided.
-    pub(super) fn shrink(&self, view: &View) -> u32 {
+    fn shrink(&self, view: &View) -> u32 {
         let pixels = f64::from(view.width) * f64::from(view.height);
         let seconds_per_path = self.kept.seconds_per_path.unwrap_or(LIKELY_SECONDS_PER_PATH);
         let shrink = (pixels * seconds_per_path / MOVING_SECONDS).sqrt().ceil();
@@ -165,7 +165,7 @@ impl Job<'_> {
         }
     }
 
-    pub(super) fn tell_failure(&mut self) {
+    fn tell_failure(&mut self) {
         if let Some(sentence) = self.kept.device.take_failure() {
             lock(&self.shared.failures).push(sentence);
             (self.shared.wake)();
