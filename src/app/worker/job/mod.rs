@@ -109,6 +109,8 @@ impl<'a> Job<'a> {
             Session::new(world, environment, View { sampling: Sampling::Plain, ..view.clone() })
         });
         let mut calm = None;
+        // Of the calm picture, one after the other.
+        let mut turns = 0;
         while let Some(activity) = self.next_activity(&main) {
             let wants_calm = self.is_calm(&main);
             if !wants_calm {
@@ -146,10 +148,14 @@ impl<'a> Job<'a> {
                     Some(plain) if plain.elapsed_seconds() < main.elapsed_seconds() => {
                         self.advance(plain, None, true);
                     }
-                    _ if let Some(calm) = calm.as_mut().filter(|calm| goes_first(calm, &main)) => {
+                    _ if let Some(calm) =
+                        calm.as_mut().filter(|calm| goes_first(calm, &main, turns)) =>
+                    {
                         self.advance(calm, None, true);
+                        turns += 1;
                     }
                     _ => {
+                        turns = 0;
                         let distribution_paths = main.figures().distribution_paths;
                         self.advance(&mut main, Some(self.request.rule), self.request.previews);
                         self.measure(&main);
@@ -265,9 +271,12 @@ impl<'a> Job<'a> {
     }
 }
 
-/// Whether the calm picture gets its next sample before the exact one: a few of them for each.
-fn goes_first(calm: &Session<'_>, main: &Session<'_>) -> bool {
-    calm.samples() < CALM_SAMPLES.min(2 + 4 * main.samples())
+/// Whether the calm picture gets its next sample before the exact one: a few of them for each. Until it
+/// has one the exact one has every third turn, for what is shown must not stand still while the cache is
+/// trained.
+fn goes_first(calm: &Session<'_>, main: &Session<'_>, turns: u32) -> bool {
+    let is_shown = calm.samples() > 0;
+    calm.samples() < CALM_SAMPLES.min(2 + 4 * main.samples()) && (is_shown || turns < 2)
 }
 
 fn learned_share(session: &Session<'_>) -> f32 {
