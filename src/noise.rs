@@ -1,6 +1,6 @@
 //! Deterministic hashes and smooth noise for procedural textures and skies.
 
-use glam::{IVec2, IVec3, Vec2, Vec3};
+use glam::{IVec2, Vec2, Vec3};
 
 use crate::sampler::{hash, unit_from_bits};
 
@@ -78,15 +78,15 @@ pub fn solid(p: Vec3, seed: u32) -> f32 {
     let t = p - cell;
     let t = t * t * (Vec3::splat(3.0) - 2.0 * t);
     let c = cell.as_ivec3();
-    let corner = |d: IVec3| {
-        let q = c + d;
-        unit(hash(hash(q.x as u32 ^ seed).wrapping_add(q.y as u32)).wrapping_add(q.z as u32))
-    };
     let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
+    // What corners side by side have in common is hashed once.
+    let columns = [0, 1].map(|x| {
+        let x = hash((c.x + x) as u32 ^ seed);
+        [0, 1].map(|y| hash(x.wrapping_add((c.y + y) as u32)))
+    });
     let face = |z: i32| {
-        let bottom = mix(corner(IVec3::new(0, 0, z)), corner(IVec3::new(1, 0, z)), t.x);
-        let top = mix(corner(IVec3::new(0, 1, z)), corner(IVec3::new(1, 1, z)), t.x);
-        mix(bottom, top, t.y)
+        let corner = |x: usize, y: usize| unit(columns[x][y].wrapping_add((c.z + z) as u32));
+        mix(mix(corner(0, 0), corner(1, 0), t.x), mix(corner(0, 1), corner(1, 1), t.x), t.y)
     };
     mix(face(0), face(1), t.z)
 }

@@ -12,12 +12,7 @@ pub(crate) fn prefetch<T>(value: &T) {
     let _ = value;
 }
 
-/// The same for a few cache lines of numbers; what is longer is better left to the search.
-pub(crate) fn prefetch_all<T>(values: &[T]) {
-    const LINE: usize = 64;
-    const MOST_LINES: usize = 6;
-    let per_line = (LINE / size_of::<T>().max(1)).max(1);
-    if values.len() <= MOST_LINES * per_line {
-        values.chunks(per_line).for_each(|line| prefetch(&line[0]));
-    }
+/// The same for numbers of about a cache line, which may lie in two.
+pub(crate) fn prefetch_ends<T>(values: &[T]) {
+    values.first().into_iter().chain(values.last()).for_each(prefetch);
 }

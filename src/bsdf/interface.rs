@@ -219,7 +219,9 @@ impl Interface {
 
     /// Probability of reflecting at a facet; delta refraction is chosen before the facet is.
     fn reflection_probability(&self, facet: Facet, wo: Vec3) -> f32 {
-        if self.glass > 0.0 && self.transmits_delta() {
+        if self.glass == 0.0 {
+            1.0
+        } else if self.transmits_delta() {
             self.scattering_facet(wo.z).reflection_probability()
         } else {
             facet.reflection_probability()
@@ -307,13 +309,12 @@ impl Interface {
 
     /// Estimate of all that [`Self::sample`] carries, given the albedo terms at `wo`.
     pub(super) fn albedo(&self, cos: f32, terms: Vec2) -> Vec3 {
-        let glass = Self {
-            f0: Vec3::ZERO,
-            f90: 0.0,
-            under_film: self.under_film.map(|(f0, _)| (f0, 0.0)),
-            ..*self
+        let passing = if self.glass > 0.0 {
+            let under_film = self.under_film.map(|(f0, _)| (f0, 0.0));
+            Self { f0: Vec3::ZERO, f90: 0.0, under_film, ..*self }.scattering_facet(cos)
+        } else {
+            Facet::BLACK
         };
-        let passing = if self.glass > 0.0 { glass.scattering_facet(cos) } else { Facet::BLACK };
         let opaque = if self.film.is_absent() {
             self.f0 * terms.x + self.f90 * terms.y
         } else {

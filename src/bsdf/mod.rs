@@ -94,6 +94,15 @@ pub struct Bsdf {
     is_lambert: bool,
 }
 
+/// The scattering towards one direction: what depends on that alone is known.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ViewedBsdf<'a> {
+    bsdf: &'a Bsdf,
+    wo: Vec3,
+    /// `None` if nothing is scattered there; Lambert's needs none.
+    out: Option<Outgoing>,
+}
+
 /// What depends on `wo` alone: what the interface leaves for the body, and the probability of each
 /// lobe, in proportion to its albedo.
 #[derive(Debug, Clone, Copy)]
@@ -136,35 +145,13 @@ impl Bsdf {
     /// A direction to continue in from three uniform numbers in `[0,1)`: the first chooses the lobe,
     /// the others the direction. `None` is absorption: the sample counts as zero.
     pub fn sample(&self, wo: Vec3, u: Vec3) -> Option<BsdfSample> {
-        let direction = Vec2::new(u.y, u.z);
-        if self.is_lambert {
-            let wi = cosine_hemisphere(direction);
-            return spread_sample(wi, self.eval_pdf(wo, wi));
-        }
-        let out = self.outgoing(wo)?;
-        let choice = u.x - out.coat_probability;
-        let lobe = if choice < 0.0 {
-            self.coat.sample(wo, direction, out.coat_probability)?
-        } else if choice < out.interface_probability {
-            let choice = (choice / out.interface_probability).min(1.0 - f32::EPSILON);
-            self.interface.sample(wo, choice, direction)?
-        } else {
-            let choice = choice - out.interface_probability;
-            if choice < out.sheen_probability {
-                LobeSample::Spread(Sheen::sample(direction))
-            } else {
-                let choice = (choice - out.sheen_probability) / out.diffuse_probability;
-                LobeSample::Spread(self.diffuse.sample(choice, direction))
-            }
-        };
-        match lobe {
-            LobeSample::Spread(wi) => spread_sample(wi, self.eval_pdf_with(wo, wi, &out)),
-            LobeSample::Coat(wi, weight) => delta_sample(wi, weight),
-            LobeSample::Interface(wi, weight) => {
-                let left = self.left_by_layers(wo, wi);
-                delta_sample(wi, weight * (left / out.interface_probability))
-            }
-        }
+        self.viewed_from(wo).sample(u)
+    }
+
+    /// The scattering towards `wo`, for whoever asks for it more than once.
+    pub(crate) fn viewed_from(&self, wo: Vec3) -> ViewedBsdf<'_> {
+        let out = if self.is_lambert { None } else { self.outgoing(wo) };
+        ViewedBsdf { bsdf: self, wo, out }
     }
 
     /// Density per steradian of [`Self::sample`] at `wi`, perfect reflection and refraction left out;
@@ -175,10 +162,7 @@ impl Bsdf {
 
     /// [`Self::eval`] and [`Self::pdf_solid_angle`] at once.
     pub fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
-        if self.is_lambert {
-            return if wo.z > 0.0 { self.diffuse.lambert(wi) } else { (Vec3::ZERO, 0.0) };
-        }
-        self.outgoing(wo).map_or((Vec3::ZERO, 0.0), |out| self.eval_pdf_with(wo, wi, &out))
+        self.viewed_from(wo).eval_pdf(wi)
     }
 
     /// Whether what is scattered looks the same from everywhere in front.
@@ -295,6 +279,61 @@ impl Bsdf {
             sheen_probability: sheen / sum,
             diffuse_probability: diffuse / sum,
         })
+    }
+}
+
+impl<'a> ViewedBsdf<'a> {
+    /// The scattering towards everywhere.
+    pub(crate) fn bsdf(&self) -> &'a Bsdf {
+        self.bsdf
+    }
+
+    /// See [`Bsdf::eval`].
+    pub(crate) fn eval(&self, wi: Vec3) -> Vec3 {
+        self.eval_pdf(wi).0
+    }
+
+    /// See [`Bsdf::eval_pdf`].
+    pub(crate) fn eval_pdf(&self, wi: Vec3) -> (Vec3, f32) {
+        let Self { bsdf, wo, out } = self;
+        if bsdf.is_lambert {
+            return if wo.z > 0.0 { bsdf.diffuse.lambert(wi) } else { (Vec3::ZERO, 0.0) };
+        }
+        out.as_ref().map_or((Vec3::ZERO, 0.0), |out| bsdf.eval_pdf_with(*wo, wi, out))
+    }
+
+    /// See [`Bsdf::sample`].
+    pub(crate) fn sample(&self, u: Vec3) -> Option<BsdfSample> {
+        let Self { bsdf, wo, out } = *self;
+        let direction = Vec2::new(u.y, u.z);
+        if bsdf.is_lambert {
+            let wi = cosine_hemisphere(direction);
+            return spread_sample(wi, self.eval_pdf(wi));
+        }
+        let out = out?;
+        let choice = u.x - out.coat_probability;
+        let lobe = if choice < 0.0 {
+            bsdf.coat.sample(wo, direction, out.coat_probability)?
+        } else if choice < out.interface_probability {
+            let choice = (choice / out.interface_probability).min(1.0 - f32::EPSILON);
+            bsdf.interface.sample(wo, choice, direction)?
+        } else {
+            let choice = choice - out.interface_probability;
+            if choice < out.sheen_probability {
+                LobeSample::Spread(Sheen::sample(direction))
+            } else {
+                let choice = (choice - out.sheen_probability) / out.diffuse_probability;
+                LobeSample::Spread(bsdf.diffuse.sample(choice, direction))
+            }
+        };
+        match lobe {
+            LobeSample::Spread(wi) => spread_sample(wi, bsdf.eval_pdf_with(wo, wi, &out)),
+            LobeSample::Coat(wi, weight) => delta_sample(wi, weight),
+            LobeSample::Interface(wi, weight) => {
+                let left = bsdf.left_by_layers(wo, wi);
+                delta_sample(wi, weight * (left / out.interface_probability))
+            }
+        }
     }
 }
 

@@ -23,6 +23,7 @@ mod weights;
 
 use std::borrow::Cow;
 use std::f64::consts::TAU;
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
@@ -31,7 +32,7 @@ use rayon::prelude::*;
 pub use self::options::{EnvironmentOptions, Lookup, TableKind};
 use self::patches::{PatchRows, sample_linear};
 pub use self::sat_report::{SatReport, SatReportRow, sat_report};
-use self::table::Table;
+use self::table::{Search, Table};
 use self::tiles::TileGrid;
 use self::weights::Weights;
 use crate::color::importance;
@@ -39,7 +40,7 @@ use crate::error::{Error, Result};
 use crate::huge_pages::zeros_on_huge_pages;
 use crate::image::Image;
 use crate::math::{direction_from_uv, sin_cos_turns, uv_from_direction};
-use crate::prefetch::prefetch_all;
+use crate::prefetch::prefetch;
 use crate::sampler::hash;
 
 /// A lat-long map of radiance that can be looked up and sampled. Clones share pixels and table.
@@ -101,6 +102,13 @@ pub(crate) struct MapPoint {
 
 /// What there is at the corners of a patch: left to right, then down.
 type Corners<T> = [T; 4];
+
+/// A direction that is being drawn from a tile.
+#[derive(Debug, Clone)]
+pub(crate) struct TileSearch {
+    tile: u32,
+    search: Search,
+}
 
 impl Environment {
     /// Takes a map (finite, not negative) and builds its importance table.
@@ -206,8 +214,24 @@ impl Environment {
     /// then a place in it by the importance interpolated there. `None` if the tile is black, or
     /// darker than f32 can tell from black beside the brightest pixel.
     pub fn sample_in_tile(&self, tile: u32, u: [u32; 2]) -> Option<EnvironmentSample> {
-        let expect_row = |row| self.prefetch_importances(tile, row);
-        let patch = self.table.sample(&self.grid, tile, refine(u), expect_row)?;
+        self.finish_sample(&self.search_tile(tile, u)?)
+    }
+
+    /// Begins [`Self::sample_in_tile`]. Maps are large and memory is far: what the rest will read is
+    /// fetched while something else is done.
+    pub(crate) fn search_tile(&self, tile: u32, u: [u32; 2]) -> Option<TileSearch> {
+        let search = self.table.search(&self.grid, tile, refine(u))?;
+        if let Search::TileLocal(search) = &search {
+            let (row, columns) = search.among();
+            self.prefetch_importances(row, columns);
+        }
+        Some(TileSearch { tile, search })
+    }
+
+    /// Draws the direction that was searched for.
+    pub(crate) fn finish_sample(&self, search: &TileSearch) -> Option<EnvironmentSample> {
+        let tile = search.tile;
+        let patch = self.table.finish(&self.grid, tile, &search.search)?;
         let corners @ [a, b, c, d] = self.importances(patch.x, patch.y);
         let down = sample_linear(a + b, c + d, patch.within.y);
         let (left, right) = (a + down * (c - a), b + down * (d - b));
@@ -390,12 +414,12 @@ impl Environment {
         self.corner_pixels(column, row).map(|pixel| self.importances[pixel])
     }
 
-    /// Has the importance along a row of a tile's patches fetched.
-    fn prefetch_importances(&self, tile: u32, row: u32) {
-        let columns = self.grid.patches(tile).x.clone();
-        let [_, above, _, below] = self.corner_pixels(columns.start, row);
-        for first in [above, below] {
-            prefetch_all(&self.importances[first..][..columns.len()]);
+    /// Has the importance at the corners of a few patches of a row fetched.
+    fn prefetch_importances(&self, row: u32, columns: Range<u32>) {
+        let [left_above, _, left_below, _] = self.corner_pixels(columns.start, row);
+        let [_, right_above, _, right_below] = self.corner_pixels(columns.end - 1, row);
+        for corner in [left_above, right_above, left_below, right_below] {
+            prefetch(&self.importances[corner]);
         }
     }
 

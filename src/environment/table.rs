@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::TableKind;
 use super::patches::PatchSample;
 use super::summed_area::{RectangleTable, SummedArea};
-use super::tile_local::TileLocal;
+use super::tile_local::{self, TileLocal};
 use super::tiles::TileGrid;
 use super::weights::Weights;
 
@@ -17,6 +17,13 @@ use super::weights::Weights;
 pub(crate) enum Table {
     TileLocal(TileLocal),
     SummedArea(Arc<dyn RectangleTable>),
+}
+
+/// A patch that is being chosen.
+#[derive(Debug, Clone)]
+pub(crate) enum Search {
+    TileLocal(tile_local::Search),
+    SummedArea([u64; 2]),
 }
 
 impl Table {
@@ -39,26 +46,33 @@ impl Table {
         (Self::SummedArea(table), energies)
     }
 
-    /// Chooses a patch of a tile by 64-bit fractions of one; `None` where the table has no mass. The
-    /// row may be told before the column is searched.
-    pub(crate) fn sample(
+    /// Begins to choose a patch of a tile by 64-bit fractions of one; `None` where the table has no mass.
+    pub(crate) fn search(&self, grid: &TileGrid, tile: u32, u: [u64; 2]) -> Option<Search> {
+        match self {
+            Self::TileLocal(table) => table.search(grid, tile, u).map(Search::TileLocal),
+            Self::SummedArea(_) => Some(Search::SummedArea(u)),
+        }
+    }
+
+    /// Chooses the patch that was searched for in a tile; `None` where the table has no mass.
+    pub(crate) fn finish(
         &self,
         grid: &TileGrid,
         tile: u32,
-        u: [u64; 2],
-        expect_row: impl Fn(u32),
+        search: &Search,
     ) -> Option<PatchSample> {
-        match self {
-            Self::TileLocal(table) => table.sample(grid, tile, u, expect_row),
-            Self::SummedArea(table) => {
+        match (self, search) {
+            (Self::TileLocal(table), Search::TileLocal(search)) => Some(table.finish(search)),
+            (Self::SummedArea(table), Search::SummedArea(u)) => {
                 // As many bits as a GPU has for it.
                 let [x, y] = u.map(|u| (u >> 16) as f64 * (1.0 / (1_u64 << 48) as f64));
                 table.sample(grid.patches(tile), DVec2::new(x, y))
             }
+            _ => None,
         }
     }
 
-    /// Probability of [`Self::sample`] to choose patch `(x, y)` of the tile it lies in.
+    /// Probability of [`Self::finish`] to choose patch `(x, y)` of the tile it lies in.
     pub(crate) fn sample_probability(&self, grid: &TileGrid, tile: u32, x: u32, y: u32) -> f64 {
         match self {
             Self::TileLocal(table) => table.sample_probability(grid, tile, x, y),

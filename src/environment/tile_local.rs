@@ -7,6 +7,8 @@
 //! tiles do not share the 32 bits. The idea to quantise before adding up is our answer to the
 //! rounded summed-area table of the talk, see [`super::summed_area`].
 
+use std::ops::Range;
+
 use glam::Vec2;
 use rayon::prelude::*;
 
@@ -14,7 +16,10 @@ use super::patches::PatchSample;
 use super::tiles::{TileGrid, TilePatches};
 use super::weights::Weights;
 use crate::huge_pages::zeros_on_huge_pages;
-use crate::prefetch::prefetch_all;
+use crate::prefetch::prefetch_ends;
+
+/// Sums of a row that a search ends with: a cache line of them.
+const GROUP: usize = 16;
 
 /// Exact integer prefix sums, tile by tile.
 #[derive(Debug, Clone)]
@@ -22,6 +27,9 @@ pub(crate) struct TileLocal {
     /// Tile after tile (see [`TileGrid::first_patch`]), row after row in a tile: sums along the
     /// row, this patch included. Wrapping cannot happen: a tile's total is below 2^32.
     row_sums: Vec<u32>,
+    /// The last of every [`GROUP`] of `row_sums`, row after row of tiles in the same order: few enough to
+    /// stay near the processor, so that a search waits for far memory once.
+    group_sums: Vec<u32>,
     /// Per tile: sums over whole rows, this row included; [`Self::first_row`] finds a tile's.
     tile_sums: Vec<u32>,
 }
@@ -52,40 +60,53 @@ impl TileLocal {
                 quantise(tile_weights, *energy, patches.width(), row_sums, tile_sums);
             },
         );
-        (Self { row_sums, tile_sums }, energies)
+        let group_sums = group_sums(&row_sums, grid);
+        (Self { row_sums, group_sums, tile_sums }, energies)
     }
 
-    /// Chooses a patch of the tile: first a row by the second number, then a column by the first, both
-    /// 64-bit fractions of one. Monotone in both. `None` if the tile is black. The row is told as soon
-    /// as it is known, for memory to be fetched while the column is searched.
-    pub(crate) fn sample(
-        &self,
-        grid: &TileGrid,
-        tile: u32,
-        u: [u64; 2],
-        expect_row: impl Fn(u32),
-    ) -> Option<PatchSample> {
+    /// Begins to choose a patch of the tile: a row by the second number and, by the first, some columns,
+    /// among which [`Self::finish`] chooses; both are 64-bit fractions of one. Monotone in both. What the
+    /// rest will read is fetched meanwhile. `None` if the tile is black.
+    pub(crate) fn search(&self, grid: &TileGrid, tile: u32, u: [u64; 2]) -> Option<Search> {
         let patches = grid.patches(tile);
         let rows = self.rows_of(grid, tile);
         let total = rows[rows.len() - 1];
         if total == 0 {
             return None;
         }
-        let row = choose(rows, total, u[1]);
-        let columns = self.columns_of(grid, patches, row.index);
+        let row = Target::new(total, u[1]).find(rows, 0);
         // A row's total is known without reading its last sum.
-        prefetch_all(columns);
-        expect_row(patches.y.start + row.index as u32);
-        let column = choose(columns, row.mass, u[0]);
-        Some(PatchSample {
-            x: patches.x.start + column.index as u32,
+        let target = Target::new(row.mass, u[0]);
+        let groups = self.groups_of(grid, tile, row.index);
+        let first = GROUP * groups.partition_point(target.is_past());
+        let last = (first + GROUP).min(patches.width() as usize);
+        let width = patches.width() as usize;
+        let sums_at = grid.first_patch(patches) + row.index * width;
+        prefetch_ends(&self.row_sums[sums_at + first..sums_at + last]);
+        Some(Search {
             y: patches.y.start + row.index as u32,
-            within: Vec2::new(column.fraction, row.fraction),
-            probability: column.mass as f32 / total as f32,
+            x: patches.x.start,
+            group: first..last,
+            sums_at,
+            target,
+            down: row.fraction,
+            total,
         })
     }
 
-    /// Probability of [`Self::sample`] to choose this patch of the tile it lies in.
+    /// Chooses the patch that was searched for.
+    pub(crate) fn finish(&self, search: &Search) -> PatchSample {
+        let Range { start, end } = search.group;
+        let column = search.target.find(&self.row_sums[search.sums_at..][..end], start);
+        PatchSample {
+            x: search.x + column.index as u32,
+            y: search.y,
+            within: Vec2::new(column.fraction, search.down),
+            probability: column.mass as f32 / search.total as f32,
+        }
+    }
+
+    /// Probability of [`Self::finish`] to choose this patch of the tile it lies in.
     pub(crate) fn sample_probability(&self, grid: &TileGrid, tile: u32, x: u32, y: u32) -> f64 {
         let patches = grid.patches(tile);
         let rows = self.rows_of(grid, tile);
@@ -104,23 +125,80 @@ impl TileLocal {
         [&self.row_sums, &self.tile_sums]
     }
 
-    /// Bytes of both arrays.
+    /// Bytes of all arrays.
     pub(crate) fn memory_bytes(&self) -> usize {
-        (self.row_sums.len() + self.tile_sums.len()) * size_of::<u32>()
+        (self.row_sums.len() + self.group_sums.len() + self.tile_sums.len()) * size_of::<u32>()
     }
 
-    /// Rows of tiles lie one after another, and each tile of one has as many rows as the others.
+    /// Sums of a tile's rows.
     fn rows_of(&self, grid: &TileGrid, tile: u32) -> &[u32] {
-        let (patches, (columns, _)) = (grid.patches(tile), grid.size());
-        let (before, height) = (patches.y.start as usize, patches.height() as usize);
-        let first = before * columns as usize + grid.column_of(tile) as usize * height;
-        &self.tile_sums[first..][..height]
+        &self.tile_sums[first_row(grid, tile)..][..grid.patches(tile).height() as usize]
     }
 
     fn columns_of(&self, grid: &TileGrid, patches: &TilePatches, row: usize) -> &[u32] {
         let width = patches.width() as usize;
         &self.row_sums[grid.first_patch(patches) + row * width..][..width]
     }
+
+    fn groups_of(&self, grid: &TileGrid, tile: u32, row: usize) -> &[u32] {
+        let groups = groups_per_row(grid);
+        &self.group_sums[(first_row(grid, tile) + row) * groups..][..groups]
+    }
+}
+
+/// Where a tile's rows begin when those of all tiles are counted: rows of tiles lie one after another, and
+/// each tile of one has as many rows as the others.
+fn first_row(grid: &TileGrid, tile: u32) -> usize {
+    let (patches, (columns, _)) = (grid.patches(tile), grid.size());
+    let (before, height) = (patches.y.start as usize, patches.height() as usize);
+    before * columns as usize + grid.column_of(tile) as usize * height
+}
+
+/// As many as the widest tile needs.
+fn groups_per_row(grid: &TileGrid) -> usize {
+    grid.widest().div_ceil(GROUP as u32) as usize
+}
+
+/// The last sum of each group of each row, tile after tile; after a row's last group, its total.
+fn group_sums(row_sums: &[u32], grid: &TileGrid) -> Vec<u32> {
+    let groups = groups_per_row(grid);
+    let of_row =
+        move |row: &[u32]| (1..=groups).map(|end| row[(GROUP * end).min(row.len()) - 1]).collect();
+    let of_tile = |tile| -> Vec<u32> {
+        let patches = grid.patches(tile);
+        let tile = &row_sums[grid.first_patch(patches)..][..patches.len()];
+        tile.chunks_exact(patches.width() as usize).flat_map::<Vec<u32>, _>(of_row).collect()
+    };
+    (0..grid.count()).into_par_iter().flat_map_iter(of_tile).collect()
+}
+
+/// A patch that is being chosen.
+#[derive(Debug, Clone)]
+pub(crate) struct Search {
+    y: u32,
+    /// First column of the tile.
+    x: u32,
+    /// Columns of the tile, one of which it will be.
+    group: Range<usize>,
+    /// Where the row's sums begin.
+    sums_at: usize,
+    target: Target,
+    down: f32,
+    total: u32,
+}
+
+impl Search {
+    /// Row and columns among which the patch will be.
+    pub(crate) fn among(&self) -> (u32, Range<u32>) {
+        (self.y, self.x + self.group.start as u32..self.x + self.group.end as u32)
+    }
+}
+
+/// What is searched: a 64-bit fraction of a positive total.
+#[derive(Debug, Clone, Copy)]
+struct Target {
+    whole: u32,
+    part: u32,
 }
 
 /// Where a search ended.
@@ -131,15 +209,25 @@ struct Choice {
     fraction: f32,
 }
 
-/// Finds the entry of inclusive prefix sums that holds a 64-bit fraction of their (positive) total.
-fn choose(sums: &[u32], total: u32, u: u64) -> Choice {
-    let target = u128::from(u) * u128::from(total);
-    let (whole, part) = ((target >> 64) as u32, (target >> 32) as u32);
-    let index = sums.partition_point(|&sum| sum <= whole);
-    let before = if index == 0 { 0 } else { sums[index - 1] };
-    let mass = sums[index] - before;
-    let into = (whole - before) as f32 + part as f32 * (1.0 / 4_294_967_296.0);
-    Choice { index, mass, fraction: (into / mass as f32).min(1.0) }
+impl Target {
+    fn new(total: u32, u: u64) -> Self {
+        let target = u128::from(u) * u128::from(total);
+        Self { whole: (target >> 64) as u32, part: (target >> 32) as u32 }
+    }
+
+    /// Whether the target lies past the entry that an inclusive sum belongs to.
+    fn is_past(self) -> impl Fn(&u32) -> bool {
+        move |sum| *sum <= self.whole
+    }
+
+    /// Finds the entry of inclusive prefix sums that holds it, which is not before `first`.
+    fn find(self, sums: &[u32], first: usize) -> Choice {
+        let index = first + sums[first..].partition_point(self.is_past());
+        let before = if index == 0 { 0 } else { sums[index - 1] };
+        let mass = sums[index] - before;
+        let into = (self.whole - before) as f32 + self.part as f32 * (1.0 / 4_294_967_296.0);
+        Choice { index, mass, fraction: (into / mass as f32).min(1.0) }
+    }
 }
 
 fn fill_weights(
@@ -204,7 +292,8 @@ mod tests {
         let mut counts = [0; 5];
         let mut last = (0, 0.0);
         for i in 0..1000 {
-            let choice = choose(&sums, 10, (u64::MAX / 1000) * i + u64::MAX / 2000);
+            let u = (u64::MAX / 1000) * i + u64::MAX / 2000;
+            let choice = Target::new(10, u).find(&sums, 0);
             assert!((0.0..=1.0).contains(&choice.fraction));
             assert!((choice.index, choice.fraction) > last);
             last = (choice.index, choice.fraction);

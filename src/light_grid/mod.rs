@@ -16,7 +16,8 @@ mod transfer;
 
 use crate::sampler::hash;
 use cells::SphericalGrid;
-use tile_distributions::{TileChoice, TileDistributions};
+pub use tile_distributions::TileChoice;
+use tile_distributions::TileDistributions;
 
 pub use learning::LearningGrid;
 pub use options::{DistributionOptions, Recording};

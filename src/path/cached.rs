@@ -33,7 +33,7 @@ impl Path<'_> {
             && surface.is_cacheable();
         if is_known {
             let radiance = cache.radiance_over_albedo(vertex.position, surface.geometric_normal);
-            self.radiance += self.throughput * surface.bsdf.albedo() * radiance;
+            self.radiance += self.throughput * surface.bsdf().albedo() * radiance;
         }
         is_known
     }

@@ -32,12 +32,13 @@ pub(crate) use train::TRAINING_VERTICES;
 pub use world::World;
 pub use world_builder::WorldBuilder;
 
-use crate::bsdf::{Bsdf, Hero};
+use self::sharing::SharedTile;
+use crate::bsdf::{Bsdf, Hero, ViewedBsdf};
 use crate::bvh::{Hit, Ray, offset_origin};
-use crate::environment::Environment;
+use crate::environment::{Environment, TileSearch};
 use crate::features::Features;
 use crate::light_grid::cells::SphericalGrid;
-use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
+use crate::light_grid::{LearningGrid, LightGrid, TileChoice, WHOLE_MAP};
 use crate::math::{Frame, balance_heuristic};
 use crate::medium::{Fog, Interior, Phase};
 use crate::radiance_cache::RadianceCache;
@@ -163,9 +164,8 @@ enum Scatterer<'v> {
 struct SurfaceScatterer<'v> {
     geometric_normal: Vec3,
     shading_frame: Frame,
-    bsdf: &'v Bsdf,
-    /// Direction to where the path came from, in the shading frame.
-    wo: Vec3,
+    /// Towards where the path came from, in the shading frame.
+    bsdf: ViewedBsdf<'v>,
     /// What lies behind the surface; `None` if it is what lies before it.
     behind: Option<&'v Body>,
     /// Whether light comes through the surface.
@@ -176,28 +176,60 @@ impl Scatterer<'_> {
     /// Whether no light that NEE may find is scattered towards the path.
     fn is_delta_only(&self) -> bool {
         match self {
-            Self::Surface(surface) => surface.bsdf.is_delta_only(),
+            Self::Surface(surface) => surface.bsdf().is_delta_only(),
             Self::Medium(_) => false,
         }
     }
 }
 
-impl SurfaceScatterer<'_> {
+impl<'v> SurfaceScatterer<'v> {
+    /// The scattering towards everywhere.
+    fn bsdf(&self) -> &'v Bsdf {
+        self.bsdf.bsdf()
+    }
+
     /// Whether it scatters much the same to and from places side by side, all on one side: no reflection
     /// narrower than GGX makes it with this alpha.
     fn is_broad(&self, least_alpha: f32) -> bool {
-        !self.transmits && !self.bsdf.is_delta_only() && self.bsdf.is_broad(least_alpha)
+        let bsdf = self.bsdf();
+        !self.transmits && !bsdf.is_delta_only() && bsdf.is_broad(least_alpha)
     }
 
     /// BSDF times cosine and the BSDF's density for light from `direction`; `None` where it is
     /// black, or where shading and geometric normal disagree about the side.
     fn scattered(&self, direction: Vec3) -> Option<(Vec3, f32)> {
         let wi = self.shading_frame.local_from_world(direction);
-        if (wi.z > 0.0) != (self.geometric_normal.dot(direction) > 0.0) {
+        if (wi.z > 0.0) != self.is_above(direction) {
             return None;
         }
-        let (f, pdf_solid_angle) = self.bsdf.eval_pdf(self.wo, wi);
+        let (f, pdf_solid_angle) = self.bsdf.eval_pdf(wi);
         (f.max_element() > 0.0).then_some((f, pdf_solid_angle))
+    }
+
+    /// Where a path goes on by three uniform numbers; `None` if it ends, as where shading and geometric
+    /// normal disagree about the side.
+    fn onward(&self, u: Vec3) -> Option<Onward> {
+        let sample = self.bsdf.sample(u)?;
+        let direction = self.shading_frame.world_from_local(sample.wi).normalize();
+        let is_through = sample.is_transmission;
+        let pdf_solid_angle = if sample.is_delta { f32::INFINITY } else { sample.pdf_solid_angle };
+        (self.is_above(direction) != is_through).then_some(Onward {
+            direction,
+            weight: sample.weight,
+            pdf_solid_angle,
+            is_through,
+        })
+    }
+
+    /// Whether a direction points to the side that the path came from.
+    fn is_above(&self, direction: Vec3) -> bool {
+        self.geometric_normal.dot(direction) > 0.0
+    }
+
+    /// Where a ray from `position` in this direction begins.
+    fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
+        let normal = self.geometric_normal;
+        offset_origin(position, if self.is_above(direction) { normal } else { -normal })
     }
 }
 
@@ -232,6 +264,27 @@ impl Body {
             }),
         }
     }
+}
+
+/// What next event estimation has chosen to look at.
+#[derive(Default)]
+struct ChosenLights {
+    /// Tiles of the map, and where in them.
+    of_map: [Option<(TileChoice, TileSearch)>; SharedTile::MOST_MAP_SAMPLES],
+    /// By which numbers a lamp will be chosen.
+    of_lamps: Option<[u32; 2]>,
+}
+
+/// Where a path goes on.
+struct Onward {
+    /// Unit.
+    direction: Vec3,
+    /// BSDF times cosine over density; 1 in a medium.
+    weight: Vec3,
+    /// Infinite if no NEE competes with it.
+    pdf_solid_angle: f32,
+    /// Whether it goes through the surface.
+    is_through: bool,
 }
 
 /// Light that next event estimation has found.
@@ -325,8 +378,11 @@ impl<'a> Path<'a> {
             return false;
         }
         self.bounces += 1;
-        self.gather(vertex);
-        self.scatter(vertex) && self.survives()
+        let lights = self.choose_lights(vertex);
+        // Meanwhile memory is fetched.
+        let onward = self.choose_onward(vertex);
+        self.gather(vertex, &lights);
+        onward.is_some_and(|onward| self.go_on(vertex, &onward)) && self.survives()
     }
 
     /// What it brought back.
@@ -461,8 +517,7 @@ impl<'a> Path<'a> {
         let scatterer = Scatterer::Surface(SurfaceScatterer {
             geometric_normal: point.geometric_normal,
             shading_frame: point.shading_frame,
-            bsdf,
-            wo,
+            bsdf: bsdf.viewed_from(wo),
             behind: material.behind(point),
             transmits: parameters.transmission > 0.0 || parameters.diffuse_transmission > 0.0,
         });
@@ -517,33 +572,56 @@ impl<'a> Path<'a> {
     }
 
     /// Next event estimation from the map and, if there are any, one local light.
-    fn gather(&mut self, vertex: &Vertex<'_>) {
+    fn gather(&mut self, vertex: &Vertex<'_>, lights: &ChosenLights) {
         let mut sum = Vec3::ZERO;
-        self.for_arriving(vertex, |arriving| sum += arriving.f * arriving.light);
+        self.for_arriving(vertex, lights, |arriving| sum += arriving.f * arriving.light);
         self.radiance += self.throughput * sum;
     }
 
-    /// Calls `take` with the light that next event estimation finds.
-    fn for_arriving(&mut self, vertex: &Vertex<'_>, mut take: impl FnMut(Arriving)) {
+    /// Draws the random numbers of next event estimation, and chooses tiles of the map by them.
+    fn choose_lights(&mut self, vertex: &Vertex<'_>) -> ChosenLights {
+        let mut chosen = ChosenLights::default();
         if vertex.scatterer.is_delta_only() {
-            return;
+            return chosen;
         }
         if let Some(grid) = self.tracer.grid {
-            for _ in 0..self.map_samples {
-                self.light_of_map(vertex, grid).map(&mut take);
+            for of_map in chosen.of_map.iter_mut().take(self.map_samples as usize) {
+                let bits = self.sampler.next_pair_bits();
+                let choice = grid.sample(vertex.distribution, bits);
+                self.expect_count(vertex, choice.tile);
+                let u = [choice.remainder, bits[1]];
+                let search = self.tracer.environment.search_tile(choice.tile, u);
+                *of_map = search.map(|search| (choice, search));
             }
         }
         if !self.tracer.world.lights.is_empty() {
-            self.light_of_lamps(vertex).map(&mut take);
+            chosen.of_lamps = Some(self.sampler.next_pair_bits());
+        }
+        chosen
+    }
+
+    /// Calls `take` with the light that next event estimation finds.
+    fn for_arriving(
+        &mut self,
+        vertex: &Vertex<'_>,
+        lights: &ChosenLights,
+        mut take: impl FnMut(Arriving),
+    ) {
+        for (choice, search) in lights.of_map.iter().flatten() {
+            self.light_of_map(vertex, choice, search).map(&mut take);
+        }
+        if let Some(bits) = lights.of_lamps {
+            self.light_of_lamps(vertex, bits).map(&mut take);
         }
     }
 
-    fn light_of_map(&mut self, vertex: &Vertex<'_>, grid: &LightGrid) -> Option<Arriving> {
-        let bits = self.sampler.next_pair_bits();
-        let choice = grid.sample(vertex.distribution, bits);
-        self.expect_count(vertex, choice.tile);
-        let u = [choice.remainder, bits[1]];
-        let sample = self.tracer.environment.sample_in_tile(choice.tile, u)?;
+    fn light_of_map(
+        &mut self,
+        vertex: &Vertex<'_>,
+        choice: &TileChoice,
+        search: &TileSearch,
+    ) -> Option<Arriving> {
+        let sample = self.tracer.environment.finish_sample(search)?;
         let pdf = choice.probability * sample.pdf_solid_angle;
         let Some((f, own_pdf)) = self.scattered(vertex, sample.direction) else {
             self.count(vertex, choice.tile, 0.0);
@@ -564,8 +642,7 @@ impl<'a> Path<'a> {
         Some(Arriving { direction: sample.direction, f, light })
     }
 
-    fn light_of_lamps(&mut self, vertex: &Vertex<'_>) -> Option<Arriving> {
-        let bits = self.sampler.next_pair_bits();
+    fn light_of_lamps(&mut self, vertex: &Vertex<'_>, bits: [u32; 2]) -> Option<Arriving> {
         let world = self.tracer.world;
         let sample = world.lights.sample(&world.scene, &vertex.receiver(), bits)?;
         let (f, own_pdf) = self.scattered(vertex, sample.direction)?;
@@ -594,11 +671,9 @@ impl<'a> Path<'a> {
     fn transmittance(&mut self, vertex: &Vertex<'_>, direction: Vec3, distance: f32) -> Vec3 {
         let (origin, body) = match &vertex.scatterer {
             Scatterer::Surface(surface) => {
-                let normal = surface.geometric_normal;
-                let is_above = normal.dot(direction) > 0.0;
-                let behind = surface.behind.filter(|_| !is_above);
+                let behind = surface.behind.filter(|_| !surface.is_above(direction));
                 let body = behind.copied().unwrap_or(self.body);
-                (offset_origin(vertex.position, if is_above { normal } else { -normal }), body)
+                (surface.origin_toward(vertex.position, direction), body)
             }
             Scatterer::Medium(_) => (vertex.position, self.body),
         };
@@ -614,42 +689,44 @@ impl<'a> Path<'a> {
         self.tracer.world.transmittance(&ray) * left
     }
 
-    /// Chooses where the path goes on. `false` if it ends.
+    /// Chooses where the path goes on, and goes there. `false` if it ends.
     fn scatter(&mut self, vertex: &Vertex<'_>) -> bool {
+        self.choose_onward(vertex).is_some_and(|onward| self.go_on(vertex, &onward))
+    }
+
+    /// Chooses where the path goes on; `None` if it ends.
+    fn choose_onward(&mut self, vertex: &Vertex<'_>) -> Option<Onward> {
         match &vertex.scatterer {
-            Scatterer::Surface(surface) => self.scatter_at_surface(vertex, surface),
+            Scatterer::Surface(surface) => {
+                let [lobe, _] = self.sampler.next_pair();
+                let [x, y] = self.sampler.next_pair();
+                surface.onward(Vec3::new(lobe, x, y))
+            }
             Scatterer::Medium(phase) => {
                 let u = Vec2::from(self.sampler.next_pair());
                 let direction = phase.sample(self.ray.direction, u).normalize();
                 let pdf_solid_angle = phase.pdf_solid_angle(self.ray.direction.dot(direction));
-                self.depart(vertex, vertex.position, direction, pdf_solid_angle);
-                true
+                Some(Onward { direction, weight: Vec3::ONE, pdf_solid_angle, is_through: false })
             }
         }
     }
 
-    fn scatter_at_surface(&mut self, vertex: &Vertex<'_>, surface: &SurfaceScatterer<'_>) -> bool {
-        let [lobe, _] = self.sampler.next_pair();
-        let [x, y] = self.sampler.next_pair();
-        let Some(sample) = surface.bsdf.sample(surface.wo, Vec3::new(lobe, x, y)) else {
-            return false;
-        };
-        let direction = surface.shading_frame.world_from_local(sample.wi).normalize();
-        let normal = surface.geometric_normal;
-        let above = normal.dot(direction) > 0.0;
-        if above == sample.is_transmission {
-            return false;
-        }
-        self.throughput *= sample.weight;
+    /// Goes where was chosen. `false` if nothing goes on.
+    fn go_on(&mut self, vertex: &Vertex<'_>, onward: &Onward) -> bool {
+        self.throughput *= onward.weight;
         if self.throughput.max_element() <= 0.0 || !self.throughput.is_finite() {
             return false;
         }
-        if sample.is_transmission {
-            self.body = surface.behind.copied().unwrap_or(self.body);
-        }
-        let pdf = if sample.is_delta { f32::INFINITY } else { sample.pdf_solid_angle };
-        let origin = offset_origin(vertex.position, if above { normal } else { -normal });
-        self.depart(vertex, origin, direction, pdf);
+        let origin = match &vertex.scatterer {
+            Scatterer::Surface(surface) => {
+                if onward.is_through {
+                    self.body = surface.behind.copied().unwrap_or(self.body);
+                }
+                surface.origin_toward(vertex.position, onward.direction)
+            }
+            Scatterer::Medium(_) => vertex.position,
+        };
+        self.depart(vertex, origin, onward.direction, onward.pdf_solid_angle);
         true
     }
 

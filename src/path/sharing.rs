@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use super::{Path, PathResult, PathTracer, Scatterer, SurfaceScatterer, Vertex};
+use super::{Arriving, Path, PathResult, PathTracer, Scatterer, SurfaceScatterer, Vertex};
 use crate::bsdf::Bsdf;
 use crate::bvh::{Ray, offset_origin};
 use crate::sampler::{Sampler, hash};
@@ -35,9 +35,22 @@ pub struct SharedTile {
 
 impl SharedTile {
     /// One pixel in four keeps its own, which gets four estimates: most for the time.
-    pub const LARGE: Self = Self { side: 8, owner_side: 2, continuations: 4, map_samples: 3 };
+    pub const LARGE: Self = Self {
+        side: 8,
+        owner_side: 2,
+        continuations: 4,
+        map_samples: Self::MOST_MAP_SAMPLES as u32,
+    };
     /// All keep their own: less noise is shared.
-    pub const SMALL: Self = Self { side: 4, owner_side: 1, continuations: 1, map_samples: 3 };
+    pub const SMALL: Self = Self {
+        side: 4,
+        owner_side: 1,
+        continuations: 1,
+        map_samples: Self::MOST_MAP_SAMPLES as u32,
+    };
+
+    /// Most samples of the map at one vertex.
+    pub(super) const MOST_MAP_SAMPLES: usize = 3;
 
     /// Most samples of the map that one path takes, with `bounces` vertices.
     pub fn most_map_samples(&self, bounces: u32) -> u32 {
@@ -306,9 +319,7 @@ impl Second<'_, '_> {
 impl First<'_> {
     /// Whether nothing at all is between this vertex and `target`, in about this direction.
     fn sees(&self, target: Vec3, direction: Vec3, tracer: &PathTracer<'_>) -> bool {
-        let normal = self.surface.geometric_normal;
-        let is_above = normal.dot(direction) > 0.0;
-        let origin = offset_origin(self.position, if is_above { normal } else { -normal });
+        let origin = self.surface.origin_toward(self.position, direction);
         let way = target - origin;
         let distance = way.length();
         let t_max = distance * (1.0 - 1e-4);
@@ -319,11 +330,12 @@ impl First<'_> {
 
 impl<'v> Outgoing<'v> {
     fn new(surface: &SurfaceScatterer<'v>, incident: Vec<Incident>) -> Self {
-        if !surface.bsdf.is_lambert() {
-            return Self::Directed(surface.bsdf, incident);
+        let bsdf = surface.bsdf();
+        if !bsdf.is_lambert() {
+            return Self::Directed(bsdf, incident);
         }
-        let up = Vec3::Z;
-        let reflected = |i: &Incident| surface.bsdf.eval(up, i.wi) * i.light;
+        let upward = bsdf.viewed_from(Vec3::Z);
+        let reflected = |i: &Incident| upward.eval(i.wi) * i.light;
         Self::Lambert(incident.iter().map(reflected).sum())
     }
 
@@ -333,7 +345,8 @@ impl<'v> Outgoing<'v> {
             Self::Lambert(radiance) => *radiance,
             Self::Directed(bsdf, incident) => {
                 let wo = surface.shading_frame.local_from_world(direction);
-                incident.iter().map(|i| bsdf.eval(wo, i.wi) * i.light).sum()
+                let viewed = bsdf.viewed_from(wo);
+                incident.iter().map(|i| viewed.eval(i.wi) * i.light).sum()
             }
         }
     }
@@ -352,7 +365,7 @@ impl Path<'_> {
         let mut incident = Vec::with_capacity(3 * times as usize);
         let mut add = |direction: Vec3, light: Vec3| {
             let wi = surface.shading_frame.local_from_world(direction);
-            let agrees = (wi.z > 0.0) == (surface.geometric_normal.dot(direction) > 0.0);
+            let agrees = (wi.z > 0.0) == surface.is_above(direction);
             if agrees && light != Vec3::ZERO {
                 incident.push(Incident { wi, light });
             }
@@ -365,8 +378,11 @@ impl Path<'_> {
         for time in 0..times {
             *self = Self { rays: self.rays, ..arrived.clone() };
             self.sampler.skip(time * PAIRS_OF_ESTIMATE);
-            self.for_arriving(vertex, |arriving| add(arriving.direction, arriving.light * share));
-            if !self.scatter(vertex) {
+            let lights = self.choose_lights(vertex);
+            let onward = self.choose_onward(vertex);
+            let mut take = |arriving: Arriving| add(arriving.direction, arriving.light * share);
+            self.for_arriving(vertex, &lights, &mut take);
+            if !onward.is_some_and(|onward| self.go_on(vertex, &onward)) {
                 continue;
             }
             let density = self.departure.pdf_solid_angle;

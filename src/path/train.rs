@@ -69,7 +69,7 @@ impl TrainingVertex {
             vertex: path.bounces,
             position: vertex.position,
             normal: surface.geometric_normal,
-            albedo: surface.bsdf.albedo(),
+            albedo: surface.bsdf().albedo(),
             throughput,
             radiance_before: path.radiance,
         })
