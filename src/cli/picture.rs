@@ -79,7 +79,7 @@ impl PictureArguments {
         match self.exposure {
             Exposure::Stops(stops) => Exposure::Stops(stops),
             Exposure::Auto => {
-                let image = self.white.unwrap_or_default().apply(film.image());
+                let image = self.white.unwrap_or_default().apply(film.without_gaps().image());
                 Exposure::Stops(auto_exposure_ev(&image))
             }
         }

@@ -15,6 +15,7 @@ use super::progress::Progress;
 use crate::alarm::Alarm;
 use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
+use crate::light_grid::LearningGrid;
 use crate::memory;
 use crate::output::record::{Phases, Record};
 use crate::output::{self, Exposure};
@@ -62,9 +63,20 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     )?;
     let job = Job { world: &world, environment: &environment, phases, notices, gpu, interrupt };
     match frames {
-        None => job.render(arguments, camera, &Progress::start("learning")).map(|_| ()),
+        None => {
+            let progress = Progress::start("learning");
+            job.render(arguments, camera, &mut Known::default(), &progress)
+        }
         Some(frames) => job.render_frames(arguments, &frames, &camera),
     }
+}
+
+/// What a picture leaves to the next.
+#[derive(Default)]
+struct Known {
+    exposure: Option<Exposure>,
+    /// What its paths have seen.
+    counted: Option<LearningGrid>,
 }
 
 /// What all pictures of a command have in common.
@@ -78,13 +90,15 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Renders and writes one picture; returns the exposure that suits the next, if there may be one.
+    /// Renders and writes one picture. `before` is what was known when it was begun, and then what the next
+    /// one may begin with.
     fn render(
         &self,
         arguments: &RenderArguments,
         camera: Camera,
+        before: &mut Known,
         progress: &Progress,
-    ) -> Result<Exposure> {
+    ) -> Result<()> {
         let Self { world, environment, .. } = *self;
         let mut notices = self.notices.clone();
         let view = arguments.view(world, camera);
@@ -94,12 +108,16 @@ impl Job<'_> {
         let gpu = self.gpu.as_ref();
         let mut session =
             device::start(arguments.device, gpu, world, environment, view, &mut notices)?;
-        let outcome =
-            work(&mut session, &mut share, &self.interrupt, progress, arguments, &mut notices);
+        let mut cpu = TakeOver { device: arguments.device, notices: &mut notices };
+        let begun = before.counted.as_ref().map_or(Ok(()), |counted| {
+            let known = session.continue_learning(counted);
+            cpu.goes_on(&mut session, known).map(|_| ())
+        });
+        let outcome = begun
+            .and_then(|()| work(&mut session, &mut share, &self.interrupt, progress, &mut cpu));
         progress.finish();
         if !share.has_samples(&session) {
-            outcome?;
-            return Ok(Exposure::Auto);
+            return outcome;
         }
         let film = share.film(&session);
         let remarks = output::remarks(&film, environment);
@@ -123,11 +141,13 @@ impl Job<'_> {
         remarks.iter().for_each(notice);
         failures.extend(outcome.err());
         Error::all(failures)?;
-        Ok(arguments.picture.exposure_of(&film))
+        before.exposure = Some(arguments.picture.exposure_of(&film));
+        before.counted = session.counters().map(LearningGrid::snapshot);
+        Ok(())
     }
 
-    /// Renders one picture after another, each with what it learned itself: cells lie around the camera.
-    /// The first one's exposure is that of all.
+    /// Renders one picture after another; while the camera stays near, they go on learning what those before
+    /// them have learned. The first one's exposure is that of all.
     fn render_frames(
         &self,
         arguments: &RenderArguments,
@@ -139,6 +159,7 @@ impl Job<'_> {
             arguments.outputs.iter().partition(|path| frames::is_video(path));
         let mut reel = if videos.is_empty() { None } else { Some(Reel::new()?) };
         let mut failures = Vec::new();
+        let mut known = Known::default();
         for number in frames.numbers() {
             let name = |path: &PathBuf| frames::numbered(path, number);
             of_frame.outputs = pictures.iter().map(|path| name(path)).collect();
@@ -147,13 +168,12 @@ impl Job<'_> {
             of_frame.frame_of_video = reel.as_mut().map(Reel::next);
             self.interrupt.go_on();
             let progress = Progress::of_frame(number, *frames.numbers().end());
-            match self.render(&of_frame, frames.camera(number, camera), &progress) {
-                Ok(exposure) => of_frame.picture.set_exposure(exposure),
-                Err(failure) => {
-                    failures.push(failure);
-                    break;
-                }
+            let camera = frames.camera(number, camera);
+            if let Err(failure) = self.render(&of_frame, camera, &mut known, &progress) {
+                failures.push(failure);
+                break;
             }
+            known.exposure.take().into_iter().for_each(|ev| of_frame.picture.set_exposure(ev));
             if self.interrupt.was_signalled() {
                 notice(format_args!("frame {number} was ended early and is the last"));
                 break;
@@ -201,28 +221,41 @@ pub(super) fn start_threads(threads: u16) -> Result<()> {
         .map_err(|e| Error::new(format!("{threads} threads cannot be started: {e}")))
 }
 
-/// Runs the session until a rule or the user says stop; at least one sample is taken. When the seconds
-/// are over, the pass under way ends with what it has. If a GPU that was not asked for by name fails,
-/// the CPU takes over.
+/// Lets the CPU take over from a GPU that fails, unless that was asked for by name.
+struct TakeOver<'a> {
+    device: DeviceChoice,
+    notices: &'a mut Notices,
+}
+
+impl TakeOver<'_> {
+    /// `None` if the CPU has to go on in place of this outcome.
+    fn goes_on<T>(&mut self, session: &mut Session<'_>, outcome: Result<T>) -> Result<Option<T>> {
+        match outcome {
+            Err(failure) if self.device == DeviceChoice::Auto => {
+                device::say(self.notices, format!("{failure}; the CPU goes on"));
+                session.continue_on_cpu();
+                Ok(None)
+            }
+            outcome => outcome.map(Some),
+        }
+    }
+}
+
+/// Runs the session until a rule or the user says stop. When the seconds are over, the pass under way ends
+/// with what it has.
 fn work(
     session: &mut Session<'_>,
     share: &mut Share,
     interrupt: &Interrupt,
     progress: &Progress,
-    arguments: &RenderArguments,
-    notices: &mut Notices,
+    cpu: &mut TakeOver<'_>,
 ) -> Result<()> {
     let alarm = Alarm::start(Arc::clone(interrupt.asked()));
     loop {
         progress.show(session, share.rule());
-        match share.step(session, interrupt, &alarm, notices) {
-            Ok(true) => return Ok(()),
-            Ok(false) => {}
-            Err(failure) if arguments.device != DeviceChoice::Auto => return Err(failure),
-            Err(failure) => {
-                device::say(notices, format!("{failure}; the CPU goes on"));
-                session.continue_on_cpu();
-            }
+        let step = share.step(session, interrupt, &alarm, cpu.notices);
+        if cpu.goes_on(session, step)? == Some(true) {
+            return Ok(());
         }
     }
 }

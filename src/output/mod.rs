@@ -87,6 +87,13 @@ pub fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
         remarks
             .push(format!("{} samples were not finite and were left out", film.invalid_samples()));
     }
+    let coverage = film.coverage();
+    if coverage < 1.0 {
+        remarks.push(format!(
+            "the time was over when {:.0} % of the pixels had a sample: the others show one beside them",
+            100.0 * coverage
+        ));
+    }
     let mean =
         film.pixels().iter().map(Pixel::mean_luminance).sum::<f64>() / film.pixels().len() as f64;
     if mean <= BLACK_SHARE * f64::from(luminance(environment.mean_radiance())) {
@@ -111,13 +118,14 @@ pub fn write_picture(
     mut metadata: Vec<(String, String)>,
 ) -> Result<()> {
     check_extension(path)?;
-    let image = film.image();
+    let whole = film.without_gaps();
+    let image = whole.image();
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
-        let layers = layers(film, &options.layers);
+        let layers = layers(film, &whole, &options.layers);
         return write_exr(path, ExrPicture { image: &image, layers, metadata: &metadata });
     }
     let image = match options.denoiser {
-        Some(denoiser) => denoiser.denoise(film)?,
+        Some(denoiser) => denoiser.denoise(&whole)?,
         None => image,
     };
     let image = options.white_balance.apply(image);
@@ -133,13 +141,14 @@ pub fn write_picture(
     write_png(path, &display_rgb8(&image, stops, options.tone_curve), &metadata)
 }
 
-fn layers(film: &Film, names: &[LayerName]) -> Vec<Layer> {
+/// What surfaces look like is that of the film without gaps.
+fn layers(film: &Film, whole: &Film, names: &[LayerName]) -> Vec<Layer> {
     let wanted = |name| names.contains(&name) || names.contains(&LayerName::All);
     let mut layers = Vec::new();
     let mut add = |name: &str, channels: Vec<(String, Vec<f32>)>| {
         layers.push(Layer { name: name.to_owned(), channels });
     };
-    if let Some(surface) = film.surface_layers() {
+    if let Some(surface) = whole.surface_layers() {
         if wanted(LayerName::Albedo) {
             add("albedo", split(&surface.albedo, ["R", "G", "B"]));
         }

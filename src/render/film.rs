@@ -1,5 +1,7 @@
 //! What the samples add up to.
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -119,6 +121,9 @@ impl Surface {
     }
 }
 
+/// A film begins with every so-manyth pixel of every so-manyth row.
+pub(crate) const BEGINNINGS: [u32; 3] = [8, 4, 2];
+
 impl Film {
     /// A black film; `layers` asks for albedo, normal and depth too.
     pub fn new(width: u32, height: u32, layers: bool) -> Self {
@@ -153,6 +158,33 @@ impl Film {
         let mut film = self.clone();
         film.pixels.iter_mut().for_each(|pixel| pixel.samples -= skipped);
         film
+    }
+
+    /// Share of its pixels that have a sample.
+    pub(crate) fn coverage(&self) -> f64 {
+        let covered = self.pixels.iter().filter(|pixel| pixel.samples > 0).count();
+        covered as f64 / self.pixels.len().max(1) as f64
+    }
+
+    /// A film that was only begun, to be looked at: pixels without samples show the nearest of those above
+    /// and left of them that it began with.
+    pub(crate) fn without_gaps(&self) -> Cow<'_, Self> {
+        if self.min_samples() > 0 {
+            return Cow::Borrowed(self);
+        }
+        let mut film = self.clone();
+        for (y, x) in (0..self.height).flat_map(|y| (0..self.width).map(move |x| (y, x))) {
+            let index = |every: u32| ((y - y % every) * self.width + x - x % every) as usize;
+            let has_samples = |at: &usize| self.pixels[*at].samples > 0;
+            let nearest = [1].iter().chain(BEGINNINGS.iter().rev()).map(|every| index(*every));
+            if let Some(from) = nearest.into_iter().find(has_samples) {
+                film.pixels[index(1)] = self.pixels[from];
+                if let Some(surface) = self.surfaces.get(from) {
+                    film.surfaces[index(1)] = *surface;
+                }
+            }
+        }
+        Cow::Owned(film)
     }
 
     /// Whether another film has the same size and the same layers.

@@ -282,6 +282,25 @@ fn a_black_picture_is_remarked() {
     assert!(text(&output.stderr).contains("the picture is black"), "{}", text(&output.stderr));
 }
 
+/// Where the time is over before every pixel has a sample, a few of them all over the picture have.
+#[test]
+fn a_moment_is_enough_for_a_whole_picture() {
+    let bench = Bench::new();
+    let output = bench.render("--size 640x360 --seconds 1e-6 --device cpu -o hasty.exr");
+    assert!(
+        text(&output.stderr).contains("of the pixels had a sample"),
+        "{}",
+        text(&output.stderr)
+    );
+    let picture = read_picture(&bench.path("hasty.exr")).expect("a picture");
+    // The map is bright everywhere, and the camera sees it or what it lights.
+    assert!(picture.pixels.iter().all(|pixel| pixel[1] > 0.0));
+    let of_lattice = |x: usize, y: usize| picture.pixels[(y - y % 8) * 640 + x - x % 8];
+    let pixels = (0..360).flat_map(|y| (0..640).map(move |x| (x, y)));
+    let alike = pixels.filter(|&(x, y)| picture.pixels[y * 640 + x] == of_lattice(x, y)).count();
+    assert!(alike >= 640 * 360 / 2, "{alike} pixels show one of those it begins with");
+}
+
 #[test]
 fn odd_but_sound_settings_render() {
     let bench = Bench::new();

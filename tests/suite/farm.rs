@@ -210,6 +210,24 @@ fn frames_are_the_pictures_from_where_the_camera_is_then() {
     assert!(difference("path.04.exr", "turn.01.exr") < 1e-3, "an eighth of a turn");
     assert!(difference("turn.00.exr", "side.exr") > 0.05);
 
+    // What one frame learns the next one goes on from.
+    let line =
+        "scene.gltf --eye 0,0.4,2 --target 0,0.4,0 --turntable 400 --frames 0..1 -o near.#.exr";
+    let learning =
+        "--env map.exr --size 32x18 --spp 4 --learning-paths 500 --device cpu --json near.#.json";
+    let output = bench.run(&format!("render {line} {learning}"));
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let session = |frame: u32| {
+        let file = std::fs::read(bench.path(&format!("near.{frame}.json"))).expect("written");
+        serde_json::from_slice::<serde_json::Value>(&file).expect("JSON")["session"].clone()
+    };
+    let [first, second] = [session(0), session(1)];
+    assert_eq!((&first["learning_paths"], &second["learning_paths"]), (&500.into(), &0.into()));
+    assert!(
+        second["learned_cells"].as_u64() >= first["learned_cells"].as_u64(),
+        "{first} {second}"
+    );
+
     for (rest, status, sentence) in [
         (
             "moving.gltf --frames 0..1 -o a.png",

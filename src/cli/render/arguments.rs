@@ -104,7 +104,8 @@ pub(in crate::cli) struct RenderArguments {
     /// Stop at this many samples per pixel (256 if no stop rule is given).
     #[arg(long, visible_alias = "samples", value_parser = clap::value_parser!(u32).range(1..), value_name = "N", help_heading = "Stop")]
     pub(super) spp: Option<u32>,
-    /// Stop after this many seconds of learning and rendering.
+    /// Stop after this many seconds of learning and rendering; if they do not suffice for a sample of every
+    /// pixel, a CPU makes a coarser picture.
     #[arg(long, value_parser = values::positive, value_name = "S", help_heading = "Stop")]
     pub(super) seconds: Option<f64>,
     /// Stop when the estimated relative RMS error falls below this, e.g. 0.05.

@@ -74,12 +74,13 @@ impl Learning {
 impl Session<'_> {
     /// Goes on from what paths have counted before in the same world under the same map, for another
     /// camera near by: it is rendered with what they know, and rendered paths add to it. `false` if it
-    /// does not suit, and nothing has changed.
+    /// does not suit, as where rendered paths add nothing, and nothing has changed.
     ///
     /// # Errors
     /// If it does not fit on the GPU.
     pub(crate) fn continue_learning(&mut self, counted: &LearningGrid) -> Result<bool> {
-        let Some(learning) = &mut self.learning else { return Ok(false) };
+        let goes_on = self.view.distribution_options().is_some_and(|options| options.goes_on());
+        let Some(learning) = self.learning.as_mut().filter(|_| goes_on) else { return Ok(false) };
         let moved = self.rays.position().distance(counted.grid.center);
         let is_near = middle_distance(self.world, [self.view.width, self.view.height], &self.rays)
             .is_some_and(|distance| moved <= MOST_MOVED * distance);

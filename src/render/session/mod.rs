@@ -13,7 +13,7 @@ mod learning;
 
 use learning::{Learning, Stage};
 
-use super::film::Film;
+use super::film::{BEGINNINGS, Film};
 use super::gi::{CacheTraining, PATHS_AT_A_TIME};
 use super::pass::Pass;
 use super::{Figures, Phase, Sampling, StopRule, View, cpu, gpu};
@@ -152,6 +152,22 @@ impl<'a> Session<'a> {
             let _ = self.render(1, every, cancel);
             self.figures.render_seconds += start.elapsed().as_secs_f64();
         }
+    }
+
+    /// How far apart the pixels are that [`Self::begin`] should give their first sample next: nearer and
+    /// nearer, once what is to be learned is learned. `None` when enough have one to go on with all, and
+    /// on a GPU.
+    pub fn next_beginning(&self) -> Option<u32> {
+        if self.samples > 0 || self.is_on_gpu() {
+            return None;
+        }
+        let pixels = |every| {
+            let [columns, rows] = [self.view.width, self.view.height].map(|n| n.div_ceil(every));
+            u64::from(columns) * u64::from(rows)
+        };
+        let is_learning = self.phase() == Phase::Learning;
+        let stages = &BEGINNINGS[..if is_learning { 1 } else { BEGINNINGS.len() }];
+        stages.iter().copied().find(|every| self.figures.samples < pixels(*every))
     }
 
     /// Waits for what a GPU is still at work on and reads its film, so that film and figures are those

@@ -16,8 +16,6 @@ pub(super) const SLICE: Duration = Duration::from_millis(120);
 const MOVING_SECONDS: f64 = 0.07;
 /// What a camera path takes, until it has been measured.
 const LIKELY_SECONDS_PER_PATH: f64 = 1e-5;
-/// A film begins with every so-manyth pixel of every so-manyth row.
-const BEGINNINGS: [u32; 3] = [8, 4, 2];
 
 impl Job<'_> {
     /// A session for a picture so small that a pass takes a moment, with what was learned before.
@@ -118,19 +116,8 @@ impl Job<'_> {
     /// How far apart the pixels are that the film is to begin with now; `None` once it has begun, and
     /// for moving pictures, which are small.
     pub(super) fn beginning(&self, session: &Session<'_>) -> Option<u32> {
-        if !self.request.previews
-            || self.request.moving
-            || session.samples() > 0
-            || session.is_on_gpu()
-        {
-            return None;
-        }
-        let (view, samples) = (session.view(), session.figures().samples);
-        let pixels =
-            |every| u64::from(view.width.div_ceil(every)) * u64::from(view.height.div_ceil(every));
-        let is_learning = session.phase() == Phase::Learning;
-        let stages = &BEGINNINGS[..if is_learning { 1 } else { BEGINNINGS.len() }];
-        stages.iter().copied().find(|every| samples < pixels(*every))
+        let begins = self.request.previews && !self.request.moving;
+        if begins { session.next_beginning() } else { None }
     }
 
     /// Lets the session run on the device that is asked for now.
