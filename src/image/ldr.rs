@@ -1,7 +1,8 @@
-//! 8-bit pictures (PNG, JPEG, WebP and whatever else the library is built with).
+//! 8-bit pictures (PNG, JPEG, WebP, KTX 2 and whatever else the library is built with).
 
 use std::io::Cursor;
 
+use super::ktx2;
 use crate::error::{Error, Result};
 use crate::memory;
 
@@ -39,6 +40,8 @@ pub struct LdrImage {
     pub height: u32,
     /// `width * height` RGBA values, row after row; alpha is 255 where the file has none.
     pub pixels: Vec<[u8; 4]>,
+    /// Whether the file says that colours are multiplied by alpha; they are left so.
+    pub is_premultiplied: bool,
 }
 
 /// Width and height as the header claims them, without decoding.
@@ -46,10 +49,14 @@ pub struct LdrImage {
 /// # Errors
 /// When the format is not recognised or the header is damaged; the sentence begins with `name`.
 pub fn ldr_size(bytes: &[u8], name: &str) -> Result<(u32, u32)> {
+    if ktx2::is_ktx2(bytes) {
+        return ktx2::size(bytes).map_err(|cause| Error::at(name, cause));
+    }
     reader(bytes, name)?.into_dimensions().map_err(|cause| damaged(name, &cause))
 }
 
-/// Decodes a picture whose format is told by its content; deeper channels are rounded to 8 bits.
+/// Decodes a picture whose format is told by its content; deeper channels are rounded to 8 bits, of mip
+/// levels the largest is taken.
 ///
 /// # Errors
 /// When the format is not recognised, the data is damaged, or the picture would take more than
@@ -60,6 +67,11 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
     if width > MAX_SIDE || height > MAX_SIDE || pixels > MAX_PIXELS {
         let cause = format!("claims {width} x {height} pixels, more than lightgrid reads");
         return Err(Error::at(name, cause));
+    }
+    if ktx2::is_ktx2(bytes) {
+        let (pixels, is_premultiplied) =
+            ktx2::decode(bytes).map_err(|cause| Error::at(name, cause))?;
+        return Ok(LdrImage { width, height, pixels, is_premultiplied });
     }
     // What the decoder makes, of up to four channels of its own depth, and what is made of it.
     memory::check(8 * pixels).map_err(|cause| Error::at(name, cause))?;
@@ -76,7 +88,7 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
     let (width, height) = rgba.dimensions();
     let pixels = bytemuck::allocation::try_cast_vec(rgba.into_raw())
         .unwrap_or_else(|(_, raw)| raw.as_chunks::<4>().0.to_vec());
-    Ok(LdrImage { width, height, pixels })
+    Ok(LdrImage { width, height, pixels, is_premultiplied: false })
 }
 
 fn reader<'a>(bytes: &'a [u8], name: &str) -> Result<image::ImageReader<Cursor<&'a [u8]>>> {
@@ -84,7 +96,7 @@ fn reader<'a>(bytes: &'a [u8], name: &str) -> Result<image::ImageReader<Cursor<&
         .with_guessed_format()
         .map_err(|cause| Error::at(name, cause))?;
     if reader.format().is_none() {
-        return Err(Error::at(name, "not a picture in a known format (PNG, JPEG, WebP)"));
+        return Err(Error::at(name, "not a picture in a known format (PNG, JPEG, WebP, KTX 2)"));
     }
     Ok(reader)
 }

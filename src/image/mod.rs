@@ -11,6 +11,7 @@ mod exr_write;
 mod file;
 mod guard;
 mod hdr;
+mod ktx2;
 mod map;
 mod png;
 mod primaries;

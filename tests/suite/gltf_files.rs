@@ -1,7 +1,8 @@
-//! glTF files: real ones, malformed ones, spoilt ones, and (in `features`) one for each feature.
+//! glTF files: real ones, malformed ones, spoilt ones, and (in `features`) one for each feature; KTX 2 textures.
 
 mod builder;
 mod features;
+mod ktx2;
 
 use std::path::Path;
 

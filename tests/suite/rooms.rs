@@ -22,7 +22,8 @@ const FLOORS: [&[&str]; 13] = [
 ];
 
 /// Crates and where alone they are named: rooms, or parts of one. Any other is named anywhere.
-const CRATES: [(&str, &[&str]); 25] = [
+const CRATES: [(&str, &[&str]); 27] = [
+    ("basisu", &["image/ktx2"]),
     ("bevy_mikktspace", &["scene/gltf/tangents"]),
     ("bitflags", &["features"]),
     ("clap", &["cli"]),
@@ -45,6 +46,7 @@ const CRATES: [(&str, &[&str]); 25] = [
     ("png", &["image"]),
     ("pollster", &["app", "render/gpu"]),
     ("rfd", &["app/execute"]),
+    ("ruzstd", &["image/ktx2"]),
     ("signal_hook", &["app/window", "cli/interrupt"]),
     ("wgpu", &["app", "develop", "render/gpu"]),
     ("winit", &["app/window"]),

@@ -7,13 +7,12 @@ use gltf::json;
 use json::texture::{MagFilter, WrappingMode};
 use json::validation::Checked;
 use rayon::prelude::*;
-use serde_json::Value;
 
 use super::Fallible;
 use super::buffers::{File, find};
 use super::uri::{self, Place};
 use crate::error::Notices;
-use crate::image::ldr;
+use crate::image::ldr::{self, LdrImage};
 use crate::memory;
 use crate::scene::{Texture, TextureImage, Wrap};
 
@@ -31,6 +30,8 @@ const NO_IMAGE: u32 = u32::MAX;
 #[derive(Default)]
 pub(super) struct Wanted {
     textures: Vec<Texture>,
+    /// Images by which others are replaced that cannot be read.
+    fallbacks: BTreeMap<u32, u32>,
 }
 
 /// Decoded textures and images, and where each wanted texture went (`None`: it cannot be read).
@@ -53,8 +54,13 @@ impl Wanted {
             Some(sampler) => Some(find(&root.samplers, sampler, "sampler")?),
             None => None,
         };
+        let plain = u32::try_from(texture.source.value()).unwrap_or(NO_IMAGE);
+        let image = image_of(texture).unwrap_or(plain);
+        if image != plain && plain != NO_IMAGE {
+            self.fallbacks.entry(image).or_insert(plain);
+        }
         let wanted = Texture {
-            image: image_of(texture),
+            image,
             wrap_u: sampler.map_or(Wrap::Repeat, |sampler| wrap(sampler.wrap_s)),
             wrap_v: sampler.map_or(Wrap::Repeat, |sampler| wrap(sampler.wrap_t)),
             nearest: sampler.and_then(|sampler| sampler.mag_filter)
@@ -71,50 +77,47 @@ impl Wanted {
 
     /// Decodes the images in parallel. One that cannot be read is named in a notice.
     pub(super) fn decode(self, file: &File<'_>, notices: &mut Notices) -> Decoded {
-        let mut wanted: Vec<u32> = self.textures.iter().map(|texture| texture.image).collect();
-        wanted.sort_unstable();
-        wanted.dedup();
-        // What several images of the file have in common is read and decoded once.
-        let sources: Vec<Fallible<Source<'_>>> =
-            wanted.iter().map(|&image| source(file, image)).collect();
-        let mut distinct: Vec<&Source<'_>> = sources.iter().flatten().collect();
-        distinct.sort_unstable();
-        distinct.dedup();
-        let encoded: Vec<_> = distinct.iter().map(|source| source.read(file)).collect();
-        let decoded: Vec<Fallible<TextureImage>> =
-            within_limit(encoded).into_par_iter().map(|bytes| decode(&bytes?)).collect();
-        let mut images = Vec::new();
-        let places: Vec<Fallible<u32>> = decoded
-            .into_iter()
-            .map(|result| {
-                images.push(result?);
-                Ok(images.len() as u32 - 1)
-            })
-            .collect();
+        let mut numbers: Vec<u32> = self.textures.iter().map(|texture| texture.image).collect();
+        let mut shelf = Shelf::default();
+        shelf.read(file, &mut numbers);
+        let unread = |number: &u32| !shelf.places.get(number).is_some_and(Result::is_ok);
+        let failed = numbers.iter().filter(|number| unread(number));
+        let mut instead: Vec<u32> =
+            failed.filter_map(|number| self.fallbacks.get(number)).copied().collect();
+        shelf.read(file, &mut instead);
+        let Shelf { images, places, premultiplied, .. } = shelf;
+
         let mut image_map = BTreeMap::new();
-        let mut failures = 0;
-        for (&number, source) in wanted.iter().zip(&sources) {
-            let place = source.as_ref().map_err(String::clone).and_then(|source| {
-                let found = distinct.binary_search(&source).expect("all sources are in it");
-                places[found].clone()
-            });
-            match place {
-                Ok(place) => {
-                    image_map.insert(number, place);
-                }
-                Err(cause) => {
-                    failures += 1;
-                    if failures <= MOST_FAILURES {
-                        let name = image_name(&file.root, number);
+        let mut failures = Vec::new();
+        for number in numbers {
+            let name = image_name(&file.root, number);
+            let fallback = self.fallbacks.get(&number);
+            let other =
+                fallback.and_then(|other| Some((*other, *places.get(other)?.as_ref().ok()?)));
+            match (&places[&number], other) {
+                (Ok(place), _) => {
+                    image_map.insert(number, *place);
+                    if premultiplied.contains(place) {
                         notices.add(format!(
-                            "{name} cannot be used: {cause}; materials do without it"
+                            "{name} has colours multiplied by their opacity, which glTF does not know; \
+                             they are used as they are"
                         ));
                     }
                 }
+                (Err(cause), Some((other, place))) => {
+                    image_map.insert(number, place);
+                    let other = image_name(&file.root, other);
+                    failures
+                        .push(format!("{name} cannot be used: {cause}; {other} is used instead"));
+                }
+                (Err(cause), None) => failures
+                    .push(format!("{name} cannot be used: {cause}; materials do without it")),
             }
         }
-        if failures > MOST_FAILURES {
-            notices.add(format!("{} more images cannot be used", failures - MOST_FAILURES));
+        let unnamed = failures.len().saturating_sub(MOST_FAILURES);
+        failures.into_iter().take(MOST_FAILURES).for_each(|failure| notices.add(failure));
+        if unnamed > 0 {
+            notices.add(format!("{unnamed} more images cannot be used"));
         }
         let mut textures = Vec::new();
         let place = |texture: &Texture| {
@@ -127,13 +130,62 @@ impl Wanted {
     }
 }
 
-/// Number of the image of a texture, WebP preferred, or [`NO_IMAGE`].
-fn image_of(texture: &json::Texture) -> u32 {
-    let extension = texture.extensions.as_ref();
-    let webp = extension.and_then(|all| all.others.get("EXT_texture_webp"));
-    let webp = webp.and_then(|webp| webp.get("source")).and_then(Value::as_u64);
-    webp.and_then(|image| u32::try_from(image).ok())
-        .unwrap_or_else(|| u32::try_from(texture.source.value()).unwrap_or(NO_IMAGE))
+/// Images that were read.
+#[derive(Default)]
+struct Shelf {
+    images: Vec<TextureImage>,
+    /// Where the images of the file went, by their number there.
+    places: BTreeMap<u32, Fallible<u32>>,
+    /// Places of those whose colours are multiplied by their opacity.
+    premultiplied: Vec<u32>,
+    /// Of all images together, as their headers say.
+    texels: u64,
+}
+
+impl Shelf {
+    /// Reads images of these numbers, which are put in order, that are not there yet.
+    fn read(&mut self, file: &File<'_>, numbers: &mut Vec<u32>) {
+        numbers.sort_unstable();
+        numbers.dedup();
+        let new: Vec<u32> =
+            numbers.iter().copied().filter(|number| !self.places.contains_key(number)).collect();
+        // What several images of the file have in common is read and decoded once.
+        let sources: Vec<Fallible<Source<'_>>> =
+            new.iter().map(|&number| source(file, number)).collect();
+        let mut distinct: Vec<&Source<'_>> = sources.iter().flatten().collect();
+        distinct.sort_unstable();
+        distinct.dedup();
+        let mut encoded: Vec<_> = distinct.iter().map(|source| source.read(file)).collect();
+        within_limit(&mut encoded, &mut self.texels);
+        let decoded: Vec<Fallible<LdrImage>> =
+            encoded.into_par_iter().map(|bytes| decode(&bytes?)).collect();
+        let places: Vec<Fallible<u32>> = decoded
+            .into_iter()
+            .map(|result| {
+                let LdrImage { width, height, pixels, is_premultiplied } = result?;
+                let place = self.images.len() as u32;
+                self.images.push(TextureImage { width, height, texels: pixels });
+                if is_premultiplied {
+                    self.premultiplied.push(place);
+                }
+                Ok(place)
+            })
+            .collect();
+        for (number, source) in new.into_iter().zip(&sources) {
+            let place = source.as_ref().map_err(String::clone).and_then(|source| {
+                let found = distinct.binary_search(&source).expect("all sources are in it");
+                places[found].clone()
+            });
+            self.places.insert(number, place);
+        }
+    }
+}
+
+/// Number of the image that an extension prefers to the texture's own.
+fn image_of(texture: &json::Texture) -> Option<u32> {
+    let all = &texture.extensions.as_ref()?.others;
+    let source = |name| u32::try_from(all.get(name)?.get("source")?.as_u64()?).ok();
+    source("KHR_texture_basisu").or_else(|| source("EXT_texture_webp"))
 }
 
 fn wrap(mode: Checked<WrappingMode>) -> Wrap {
@@ -183,10 +235,10 @@ impl Source<'_> {
     }
 }
 
-/// Refuses images, by the sizes in their headers, from where all together become too large.
-fn within_limit(mut images: Vec<Fallible<Cow<'_, [u8]>>>) -> Vec<Fallible<Cow<'_, [u8]>>> {
-    let mut texels = 0_u64;
-    for image in &mut images {
+/// Refuses images, by the sizes in their headers, from where all together become too large; `texels` is how
+/// large they are.
+fn within_limit(images: &mut [Fallible<Cow<'_, [u8]>>], texels: &mut u64) {
+    for image in images {
         let Ok(bytes) = image else { continue };
         let checked = ldr::ldr_size(bytes, "its data").map_err(|cause| cause.to_string());
         let checked = checked.and_then(|(width, height)| {
@@ -196,17 +248,15 @@ fn within_limit(mut images: Vec<Fallible<Cow<'_, [u8]>>>) -> Vec<Fallible<Cow<'_
             }
             // Twice: decoders keep their own copy for a while.
             memory::check(8 * more)?;
-            texels = more;
+            *texels = more;
             Ok(())
         });
         if let Err(cause) = checked {
             *image = Err(cause);
         }
     }
-    images
 }
 
-fn decode(bytes: &[u8]) -> Fallible<TextureImage> {
-    let image = ldr::decode_ldr(bytes, "its data").map_err(|cause| cause.to_string())?;
-    Ok(TextureImage { width: image.width, height: image.height, texels: image.pixels })
+fn decode(bytes: &[u8]) -> Fallible<LdrImage> {
+    ldr::decode_ldr(bytes, "its data").map_err(|cause| cause.to_string())
 }
