@@ -3,13 +3,14 @@
 //! Of the library that knows Basis Universal only the two decoders to pixels are used: it has the whole way
 //! to the formats of graphics cards, too, with megabytes of tables.
 
-use std::io::Read;
+use std::io::{self, Read};
 
 use basisu::basislz::etc1s::Etc1sTranscoder;
 use basisu::uastc::unpack::unpack_uastc;
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
 
 use super::guard::catch_panic;
+use super::ldr::decoder_bytes;
 use crate::error::Decoded;
 use crate::memory;
 
@@ -30,9 +31,6 @@ const UASTC_RED_GREEN: u8 = 5;
 
 /// Bytes that a picture of any file may take: 4096 x 4096. One colour, so large, is a file of some kilobytes.
 const ALWAYS: u64 = 64 << 20;
-
-/// Bytes that are got without a look at what there is to fill them.
-const SMALL: u64 = 16 << 20;
 
 /// A frame of Zstandard may look back so far, whatever it makes: what all its readers must bear.
 const LEAST_WINDOW: u64 = 8 << 20;
@@ -95,6 +93,8 @@ struct File<'a> {
     scheme: u32,
     model: u8,
     is_premultiplied: bool,
+    /// Whether so short a file may well have nothing to fill its pixels with. Then that is tried first.
+    is_doubtful: bool,
     /// What the channels of the descriptor hold.
     channels: Vec<u8>,
     levels: usize,
@@ -120,7 +120,7 @@ impl<'a> File<'a> {
         if pixel_bytes > ALWAYS + 1100 * file_bytes {
             return Err(format!("claims more pixels than its {file_bytes} bytes can hold"));
         }
-        // The pixels while their list grows, and what Zstandard looks back at.
+        // The pixels, what they are made of, and what Zstandard looks back at.
         memory::check(4 * pixel_bytes)?;
         let cut = || format!("is cut off: it refers to more than its {file_bytes} bytes");
         let part = |offset: u64, length: u64| {
@@ -138,6 +138,7 @@ impl<'a> File<'a> {
             scheme: header(44)?,
             model: byte(descriptor, 12),
             is_premultiplied: byte(descriptor, 15) & 1 == 1,
+            is_doubtful: pixel_bytes > decoder_bytes(file_bytes),
             channels: descriptor
                 .get(28..)
                 .unwrap_or_default()
@@ -150,6 +151,11 @@ impl<'a> File<'a> {
             orientation: value(metadata, b"KTXorientation"),
             swizzle: value(metadata, b"KTXswizzle"),
         })
+    }
+
+    /// How many pixels there are.
+    fn count(&self) -> u64 {
+        self.width as u64 * self.height as u64
     }
 
     fn etc1s(&self) -> Decoded<Vec<[u8; 4]>> {
@@ -181,9 +187,8 @@ impl<'a> File<'a> {
         };
         let [width, height] = [self.width, self.height].map(|side| side as u32);
         let [columns, rows] = [width, height].map(|side| side.div_ceil(4));
-        let count = self.width * self.height;
-        if 4 * count as u64 > SMALL {
-            // A short file may stand for so many pixels or for none: blocks that take an eighth tell.
+        if self.is_doubtful {
+            // Blocks take an eighth of what pixels do.
             let mut blocks = vec![0; 8 * columns as usize * rows as usize];
             for slice in [Some(color), second].into_iter().flatten() {
                 decoder
@@ -191,7 +196,7 @@ impl<'a> File<'a> {
                     .ok_or(DAMAGED)?;
             }
         }
-        let mut pixels = memory::filled(count as u64, [0; 4])?;
+        let mut pixels = memory::filled(self.count(), [0; 4])?;
         let out = pixels.as_flattened_mut();
         match second {
             Some(second) => decoder
@@ -207,13 +212,14 @@ impl<'a> File<'a> {
 
     fn uastc(&self) -> Decoded<Vec<[u8; 4]>> {
         let mut blocks = vec![[0_u8; 16]; self.width.div_ceil(4)];
-        let mut pixels = self.by_rows(4, |source, rows, out| {
+        let bytes = 16 * blocks.len() * self.height.div_ceil(4);
+        let mut pixels = self.by_rows(bytes, 4, |source, rows, out| {
             source.read_exact(blocks.as_flattened_mut())?;
             let start = out.len();
             out.resize(start + rows * self.width, [0; 4]);
             for (column, block) in blocks.iter().enumerate() {
                 let texels = unpack_uastc(block, false)
-                    .ok_or_else(|| std::io::Error::other("a block of no kind"))?;
+                    .ok_or_else(|| io::Error::other("a block of no kind"))?;
                 let from = 4 * column;
                 let to = self.width.min(from + 4);
                 for (row, texels) in texels.as_chunks::<4>().0[..rows].iter().enumerate() {
@@ -247,7 +253,7 @@ impl<'a> File<'a> {
             }
         };
         let mut row = vec![0; self.width * order.len()];
-        self.by_rows(1, |source, _, out| {
+        self.by_rows(row.len() * self.height, 1, |source, _, out| {
             source.read_exact(&mut row)?;
             out.extend(row.chunks_exact(order.len()).map(|stored| {
                 let mut pixel = [0, 0, 0, 255];
@@ -258,30 +264,44 @@ impl<'a> File<'a> {
         })
     }
 
-    /// Pixels, so many rows at a time read by `read` to the end of a list. It grows only as there are bytes.
+    /// Pixels made of so many bytes, so many rows at a time read by `read` to the end of a list.
     fn by_rows(
         &self,
+        bytes: usize,
         step: usize,
-        mut read: impl FnMut(&mut dyn Read, usize, &mut Vec<[u8; 4]>) -> std::io::Result<()>,
+        mut read: impl FnMut(&mut dyn Read, usize, &mut Vec<[u8; 4]>) -> io::Result<()>,
     ) -> Decoded<Vec<[u8; 4]>> {
         let damaged = |_| format!("holds damaged pixels, or too few for {} rows", self.height);
-        let mut plain = self.level;
-        let mut unpacked;
-        let source: &mut dyn Read = if self.scheme == ZSTANDARD {
+        let unpacked = || {
             let mut decoder = FrameDecoder::new();
-            let most = 4 * (self.width as u64 + 3) * (self.height as u64 + 3);
-            decoder.set_max_window_size(most.max(LEAST_WINDOW));
-            unpacked = StreamingDecoder::new_with_decoder(plain, decoder)
-                .map_err(|cause| format!("holds no Zstandard data ({cause})"))?;
-            &mut unpacked
+            decoder.set_max_window_size((bytes as u64).max(LEAST_WINDOW));
+            StreamingDecoder::new_with_decoder(self.level, decoder)
+                .map_err(|cause| format!("holds no Zstandard data ({cause})"))
+        };
+        let is_packed = self.scheme == ZSTANDARD;
+        let there = match (is_packed, self.is_doubtful) {
+            (false, _) => self.level.len() as u64,
+            (true, true) => {
+                let mut first = unpacked()?.take(bytes as u64);
+                io::copy(&mut first, &mut io::sink()).map_err(damaged)?
+            }
+            (true, false) => bytes as u64,
+        };
+        if there < bytes as u64 {
+            return Err(format!("holds too few pixels for {} rows", self.height));
+        }
+        let mut pixels = memory::reserved(self.count())?;
+        let (mut plain, mut packed);
+        let source: &mut dyn Read = if is_packed {
+            packed = unpacked()?;
+            &mut packed
         } else {
+            plain = self.level;
             &mut plain
         };
-        let mut pixels = Vec::new();
         for row in (0..self.height).step_by(step) {
             read(source, step.min(self.height - row), &mut pixels).map_err(damaged)?;
         }
-        pixels.shrink_to_fit();
         Ok(pixels)
     }
 

@@ -25,6 +25,9 @@ pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
         ("16000x16000.bmp", bmp(16_000)),
         ("60000x60000.tga", tga(60_000)),
         ("16000x16000.tga", tga(16_000)),
+        ("16000x16000.ktx2", ktx2(16_000, 0, &[])),
+        ("16000x16000-in-64-kb.ktx2", ktx2(16_000, 2, &runs(16_000))),
+        ("too-few-runs.ktx2", ktx2(4096, 2, &runs(100))),
         ("vertices-1e9.gltf", gltf(1_000_000_000, "", "")),
         ("vertices-1e9-of-zeros.gltf", gltf_zeros()),
         ("buffer-1e18.gltf", gltf(3, "", r#","byteLength":1000000000000000000"#)),
@@ -106,6 +109,52 @@ fn exr(data: [u32; 2], display: [u32; 2], zeros: usize) -> Vec<u8> {
     attribute("screenWindowWidth", "float", &1.0_f32.to_le_bytes());
     file.resize(file.len() + 1 + zeros, 0);
     file
+}
+
+/// UASTC, whose pixels are so packed (0: as they are, 2: by Zstandard).
+fn ktx2(side: u32, scheme: u32, level: &[u8]) -> Vec<u8> {
+    let words = [
+        0,
+        1,
+        side,
+        side,
+        0,
+        0,
+        1,
+        1,
+        scheme,
+        104,
+        44,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        148,
+        0,
+        level.len() as u32,
+        0,
+    ];
+    let mut file = b"\xabKTX 20\xbb\r\n\x1a\n".to_vec();
+    words.iter().for_each(|word: &u32| file.extend(word.to_le_bytes()));
+    file.resize(104, 0);
+    let mut descriptor = [0; 44];
+    descriptor[12] = 166;
+    file.extend(descriptor);
+    file.extend(level);
+    file
+}
+
+/// A frame of Zstandard with runs of zeros, 128 kB for four bytes.
+fn runs(count: usize) -> Vec<u8> {
+    let mut frame = vec![0x28, 0xb5, 0x2f, 0xfd, 0, 13 << 3];
+    for i in 1..=count {
+        let header = (131_072 << 3) | (1 << 1) | u32::from(i == count);
+        frame.extend(&header.to_le_bytes()[..3]);
+        frame.push(0);
+    }
+    frame
 }
 
 fn bmp(side: u32) -> Vec<u8> {

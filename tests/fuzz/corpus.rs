@@ -50,6 +50,17 @@ pub(crate) fn maps() -> Vec<Vec<u8>> {
     files
 }
 
+/// KTX 2 files of Basis Universal and of plain pixels, and a PNG.
+pub(crate) fn textures() -> Vec<Vec<u8>> {
+    let mut files: Vec<_> = KTX2.iter().map(|file| file.to_vec()).collect();
+    // The level's 192 bytes as Vulkan's RGBA.
+    let mut plain = KTX2[0].to_vec();
+    (plain[12], plain[20], plain[24]) = (37, 4, 12);
+    files.push(plain);
+    files.extend(maps().pop());
+    files
+}
+
 fn hdr(width: u8, height: u8, runs: bool) -> Vec<u8> {
     let mut bytes = b"#?RADIANCE\nEXPOSURE=2\nFORMAT=32-bit_rle_rgbe\n\n".to_vec();
     let _ = writeln!(bytes, "-Y {height} +X {width}");
@@ -83,6 +94,15 @@ pub(crate) fn gltf() -> Vec<(String, Vec<u8>)> {
 pub(crate) fn gltf_file((json, data): (String, Vec<u8>)) -> Vec<u8> {
     if data.is_empty() { json.into_bytes() } else { container(json, data) }
 }
+
+/// The last is of ETC1S with opacity.
+const KTX2: [&[u8]; 5] = [
+    include_bytes!("../ktx2/uastc-rgba-14x9.ktx2"),
+    include_bytes!("../ktx2/uastc-rgba-14x9-zstd.ktx2"),
+    include_bytes!("../ktx2/uastc-rgb-13x10-mips-zstd.ktx2"),
+    include_bytes!("../ktx2/etc1s-rgb-13x10-mips.ktx2"),
+    include_bytes!("../ktx2/etc1s-rgba-14x9.ktx2"),
+];
 
 /// A PNG of one red pixel.
 const PNG: &str =
@@ -124,6 +144,13 @@ fn featured() -> (String, Vec<u8>) {
     add(&[1., 0., 0., 1., 1., 0., 0., 1., 1., 0., 0., 1., 1., 0., 0., 1.]);
     views.push(format!(r#"{{"buffer":0,"byteOffset":{},"byteLength":12}}"#, data.len()));
     data.extend([0, 0, 1, 0, 2, 0, 0, 0, 2, 0, 3, 0]);
+    let picture = KTX2[4];
+    views.push(format!(
+        r#"{{"buffer":0,"byteOffset":{},"byteLength":{}}}"#,
+        data.len(),
+        picture.len()
+    ));
+    data.extend(picture);
     let float = |view: u32, kind: &str, count: u32| {
         format!(r#"{{"bufferView":{view},"componentType":5126,"type":"{kind}","count":{count}}}"#)
     };
@@ -149,8 +176,9 @@ fn featured() -> (String, Vec<u8>) {
         "KHR_materials_anisotropy":{{"anisotropyStrength":0.5,"anisotropyRotation":1,"anisotropyTexture":{{"index":0}}}},
         "KHR_materials_sheen":{{"sheenColorFactor":[1,0.5,0],"sheenRoughnessFactor":0.5}},
         "KHR_materials_iridescence":{{"iridescenceFactor":1,"iridescenceThicknessMaximum":300}}}}}}],
-        "textures":[{{"source":0,"sampler":0}}],"samplers":[{{"wrapS":33071}}],
-        "images":[{{"uri":"data:image/png;base64,{PNG}"}}],"buffers":[{{"byteLength":{}}}],
+        "textures":[{{"source":0,"sampler":0,"extensions":{{"KHR_texture_basisu":{{"source":1}}}}}}],
+        "samplers":[{{"wrapS":33071}}],
+        "images":[{{"uri":"data:image/png;base64,{PNG}"}},{{"bufferView":5,"mimeType":"image/ktx2"}}],"buffers":[{{"byteLength":{}}}],
         "bufferViews":[{}],"accessors":[{}]}}"#,
         data.len(),
         views.join(","),

@@ -43,6 +43,8 @@ enum Kind {
     Gltf,
     /// `.hdr`, `.exr` and `.png`, read as maps.
     Maps,
+    /// `.ktx2` and `.png`, read as textures.
+    Textures,
     /// Words after the program's name.
     CommandLines,
     /// The window's settings.
@@ -56,6 +58,7 @@ impl Kind {
     const ALL: &[Self] = &[
         Self::Gltf,
         Self::Maps,
+        Self::Textures,
         Self::CommandLines,
         #[cfg(feature = "window")]
         Self::Settings,
@@ -66,6 +69,7 @@ impl Kind {
         match self {
             Self::Gltf => "gltf",
             Self::Maps => "maps",
+            Self::Textures => "textures",
             Self::CommandLines => "command-lines",
             #[cfg(feature = "window")]
             Self::Settings => "settings",
@@ -100,6 +104,11 @@ fn gltf() {
 #[test]
 fn maps() {
     spoilt(Kind::Maps, count(4000, 400_000));
+}
+
+#[test]
+fn textures() {
+    spoilt(Kind::Textures, count(4000, 400_000));
 }
 
 #[test]

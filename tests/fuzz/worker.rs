@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use lightgrid::cli::accepts;
 use lightgrid::environment::{Environment, EnvironmentOptions};
+use lightgrid::image::ldr::decode_ldr;
 use lightgrid::image::{Image, read_map};
 use lightgrid::path::{PathLimits, World, framing};
 use lightgrid::render::filter::PixelFilter;
@@ -36,6 +37,7 @@ pub(crate) fn work(kind: Kind, first: u64, count: u64) {
         #[cfg(feature = "window")]
         Kind::Settings => settings::corpus(),
         Kind::CommandLines => Vec::new(),
+        Kind::Textures => corpus::textures(),
         Kind::Maps | Kind::Bombs => corpus::maps(),
     };
     // Sound input first: thread pools, tables and the allocator's own growth are no input's doing.
@@ -61,7 +63,11 @@ pub(crate) fn work(kind: Kind, first: u64, count: u64) {
             }
             Kind::Bombs => {
                 let (name, bytes) = bombs::all().swap_remove(number as usize);
-                let kind = if name.contains(".gl") { Kind::Gltf } else { Kind::Maps };
+                let kind = match name {
+                    _ if name.contains(".gl") => Kind::Gltf,
+                    _ if name.ends_with(".ktx2") => Kind::Textures,
+                    _ => Kind::Maps,
+                };
                 (bytes.len(), read(kind, name, &bytes, folder))
             }
             #[cfg(feature = "window")]
@@ -124,6 +130,13 @@ fn read(kind: Kind, name: &str, bytes: &[u8], folder: &Path) -> Found {
     match kind {
         Kind::Gltf => match gltf::load_slice(bytes, None, name) {
             Ok(scene) => of_scene(scene),
+            Err(error) => Found::Refused(error.to_string()),
+        },
+        Kind::Textures => match decode_ldr(bytes, name) {
+            Ok(image) => Found::Accepted {
+                honest_bytes: 4 * image.pixels.len() as u64,
+                is_sound: image.pixels.len() == image.width as usize * image.height as usize,
+            },
             Err(error) => Found::Refused(error.to_string()),
         },
         #[cfg(feature = "window")]

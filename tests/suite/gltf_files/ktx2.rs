@@ -202,7 +202,7 @@ fn what_cannot_be_read_is_said() {
     let found = Made { format: 0, model: 167, ..sound.clone() }.cause();
     assert!(found.contains("colour model 167 in scheme 0"), "{found}");
     let found = Made { size: [2, 4], ..sound.clone() }.cause();
-    assert!(found.contains("too few for 4 rows"), "{found}");
+    assert!(found.contains("too few pixels for 4 rows"), "{found}");
     let found = Made { size: [0, 4], ..sound.clone() }.cause();
     assert!(found.contains("no pixels"), "{found}");
     let found = Made { size: [16_000, 16_000], ..sound.clone() }.cause();
