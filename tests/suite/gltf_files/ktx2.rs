@@ -1,7 +1,7 @@
 //! KTX 2 pictures and the textures that are made of them.
 //!
 //! The files of `tests/ktx2` hold [`pattern`], encoded by Basis Universal 2.50 (ETC1S at quality 255, UASTC at
-//! level 3, sRGB, not perceptual); the others are made here.
+//! level 3, sRGB, not perceptual), and one of them a single colour; the others are made here.
 
 use std::fs;
 use std::path::Path;
@@ -164,6 +164,30 @@ fn plain_pictures_have_their_bytes() {
     let packed = |level| Made { header: [0, 0, 1, 1, 2], level, ..sound.clone() };
     assert_eq!(packed(zstandard(&sound.level, None)).decoded().pixels, upright);
     assert_eq!(packed(zstandard(&[5], Some(24))).decoded().pixels, [[5; 4]; 6]);
+}
+
+/// A file may be so short that whether it has pixels at all is tried first.
+#[test]
+fn one_colour_may_fill_a_large_picture() {
+    let bytes = encoded("etc1s-one-colour-4096x2048");
+    let decoded = decode_ldr(&bytes, "one").expect("a sound file");
+    assert_eq!((decoded.width, decoded.height), (4096, 2048));
+    // ETC1S has five bits a channel.
+    let expected = vec![[200, 100, 50, 255]; 4096 * 2048];
+    assert!(differences(&decoded.pixels, &expected).0 <= 8, "{:?}", decoded.pixels[0]);
+
+    // 160 runs of 128 kB.
+    let run = |i| [u8::from(i == 159) | (1 << 1), 0, 16, 7];
+    let frame = [0x28, 0xb5, 0x2f, 0xfd, 0, 7 << 3].into_iter().chain((0..160).flat_map(run));
+    let large = Made {
+        size: [2048, 2560],
+        header: [0, 0, 1, 1, 2],
+        level: frame.collect(),
+        ..Made::rgba()
+    };
+    assert_eq!(large.decoded().pixels, vec![[7; 4]; 2048 * 2560]);
+    let found = Made { size: [2048, 2561], ..large }.cause();
+    assert!(found.contains("holds too few pixels for 2561 rows"), "{found}");
 }
 
 #[test]
