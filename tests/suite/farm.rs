@@ -218,7 +218,7 @@ fn frames_are_the_pictures_from_where_the_camera_is_then() {
     let output = bench.run(&format!("render {line} {learning}"));
     assert!(output.status.success(), "{}", text(&output.stderr));
     let session = |frame: u32| {
-        let file = std::fs::read(bench.path(&format!("near.{frame}.json"))).expect("written");
+        let file = fs::read(bench.path(&format!("near.{frame}.json"))).expect("written");
         serde_json::from_slice::<serde_json::Value>(&file).expect("JSON")["session"].clone()
     };
     let [first, second] = [session(0), session(1)];
