@@ -12,7 +12,9 @@ pub(crate) fn prefetch<T>(value: &T) {
     let _ = value;
 }
 
-/// The same for numbers of about a cache line, which may lie in two.
-pub(crate) fn prefetch_ends<T>(values: &[T]) {
-    values.first().into_iter().chain(values.last()).for_each(prefetch);
+/// The same for a few cache lines of numbers.
+pub(crate) fn prefetch_all<T>(values: &[T]) {
+    const LINE: usize = 64;
+    values.chunks((LINE / size_of::<T>().max(1)).max(1)).for_each(|line| prefetch(&line[0]));
+    values.last().into_iter().for_each(prefetch);
 }

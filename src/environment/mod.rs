@@ -177,6 +177,12 @@ impl Environment {
         self.radiance_at(&sample.point)
     }
 
+    /// Has what [`Self::sampled_radiance`] reads fetched.
+    pub(crate) fn prefetch_radiance(&self, sample: &EnvironmentSample) {
+        let [_, above, _, below] = self.corner_pixels(sample.point.column, sample.point.row);
+        [above, below].iter().for_each(|pixel| prefetch(&self.map.pixels[*pixel]));
+    }
+
     /// Number of tiles.
     pub fn tile_count(&self) -> u32 {
         self.grid.count()

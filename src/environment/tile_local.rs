@@ -16,7 +16,7 @@ use super::patches::PatchSample;
 use super::tiles::{TileGrid, TilePatches};
 use super::weights::Weights;
 use crate::huge_pages::zeros_on_huge_pages;
-use crate::prefetch::prefetch_ends;
+use crate::prefetch::prefetch_all;
 
 /// Sums of a row that a search ends with: a cache line of them.
 const GROUP: usize = 16;
@@ -82,7 +82,7 @@ impl TileLocal {
         let last = (first + GROUP).min(patches.width() as usize);
         let width = patches.width() as usize;
         let sums_at = grid.first_patch(patches) + row.index * width;
-        prefetch_ends(&self.row_sums[sums_at + first..sums_at + last]);
+        prefetch_all(&self.row_sums[sums_at + first..sums_at + last]);
         Some(Search {
             y: patches.y.start + row.index as u32,
             x: patches.x.start,

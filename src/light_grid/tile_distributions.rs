@@ -1,5 +1,6 @@
 //! Probability distributions over tiles, sparse and exact.
 
+use crate::prefetch::prefetch_all;
 use crate::sampler::unit_from_bits;
 
 /// The chosen tile, its probability, and what is left of the random number.
@@ -166,6 +167,13 @@ impl TileDistributions {
         self.tiles.extend_from_slice(&other.tiles);
         self.last.extend_from_slice(&other.last);
         first
+    }
+
+    /// Has what [`Self::sample`] searches fetched.
+    pub(crate) fn prefetch(&self, distribution: u32) {
+        let (start, end) = self.range(distribution);
+        prefetch_all(&self.last[start..end]);
+        prefetch_all(&self.tiles[start..end]);
     }
 
     /// Chooses a tile of distribution `distribution` with a uniform 32-bit number. `finer` is the bits below

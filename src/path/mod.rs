@@ -122,15 +122,12 @@ impl PathTracer<'_> {
         self.counts.map(|counts| &counts.grid).or(self.grid.and_then(LightGrid::grid))
     }
 
-    fn vertex<'v>(
-        &self,
-        position: Vec3,
-        cell: Option<u32>,
-        scatterer: Scatterer<'v>,
-    ) -> Vertex<'v> {
-        let distribution =
-            self.grid.zip(cell).map_or(WHOLE_MAP, |(grid, cell)| grid.distribution_of_cell(cell));
-        Vertex { position, cell, distribution, scatterer }
+    /// Tile distribution of NEE in a cell; it is fetched.
+    fn distribution(&self, cell: Option<u32>) -> u32 {
+        let Some((grid, cell)) = self.grid.zip(cell) else { return WHOLE_MAP };
+        let distribution = grid.distribution_of_cell(cell);
+        grid.distributions().prefetch(distribution);
+        distribution
     }
 }
 
@@ -461,7 +458,8 @@ impl<'a> Path<'a> {
         // From inside of a solid the map is not seen: its vertices would spoil what fog learns.
         let cells = self.tracer.cells().filter(|_| self.is_in_air());
         let cell = cells.map(|cells| cells.cell_in_medium(position));
-        Some(self.tracer.vertex(position, cell, Scatterer::Medium(interior.phase)))
+        let distribution = self.tracer.distribution(cell);
+        Some(Vertex { position, cell, distribution, scatterer: Scatterer::Medium(interior.phase) })
     }
 
     /// Decides whether the ray goes straight through the surface, and weighs the path accordingly.
@@ -492,6 +490,9 @@ impl<'a> Path<'a> {
         'a: 'v,
     {
         let (world, parameters) = (self.tracer.world, &point.parameters);
+        let cells = self.tracer.cells();
+        let cell = cells.map(|cells| cells.cell_of(point.position, point.geometric_normal));
+        let distribution = self.tracer.distribution(cell);
         let material = world.material(point.material);
         let mut bsdf = material.bsdf(point);
         if parameters.dispersion > 0.0 {
@@ -511,8 +512,6 @@ impl<'a> Path<'a> {
             self.radiance += self.throughput * parameters.emissive;
             return None;
         }
-        let cells = self.tracer.cells();
-        let cell = cells.map(|cells| cells.cell_of(point.position, point.geometric_normal));
         let wo = point.shading_frame.local_from_world(-self.ray.direction);
         let scatterer = Scatterer::Surface(SurfaceScatterer {
             geometric_normal: point.geometric_normal,
@@ -521,7 +520,7 @@ impl<'a> Path<'a> {
             behind: material.behind(point),
             transmits: parameters.transmission > 0.0 || parameters.diffuse_transmission > 0.0,
         });
-        Some(self.tracer.vertex(point.position, cell, scatterer))
+        Some(Vertex { position: point.position, cell, distribution, scatterer })
     }
 
     /// Adds what a surface emits, whether the ray then passes it or not.
@@ -627,6 +626,7 @@ impl<'a> Path<'a> {
             self.count(vertex, choice.tile, 0.0);
             return None;
         };
+        self.tracer.environment.prefetch_radiance(&sample);
         let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
         if self.tracer.counts.is_some() {
             let weight = self.visibility(vertex, sample.direction, own_pdf, transmittance);

@@ -11,7 +11,8 @@ use crate::error::Result;
 
 /// What naga adds to the kernels so that they cannot do harm, whatever they read. Counters that end
 /// loops and guards of divisions, of which there are many, cost registers and up to a third of the
-/// instructions.
+/// instructions. Checked indices stay: drivers check those of buffers themselves, and without the others
+/// kernels for a Radeon have 0.1 % fewer instructions and as many registers.
 const RUNTIME_CHECKS: wgpu::ShaderRuntimeChecks = wgpu::ShaderRuntimeChecks {
     force_loop_bounding: false,
     int_div_checks: false,

@@ -42,6 +42,8 @@ const COLUMNS: [&str; 6] = [
     "Scratch size",
     "Instructions",
 ];
+/// Follows the names of kernels for paths that end in the radiance cache.
+const CACHED: &str = "_cached";
 /// The column of waves.
 const WAVES: usize = 1;
 /// Columns that are held against the table. (Scalar registers are spilled to vector registers.)
@@ -122,10 +124,14 @@ fn compile() {
             continue;
         }
         let world = World::new(builtin::build(name).expect("built in"));
-        let all = [Kernel::Render, Kernel::Learn].into_iter().chain(Kernel::OF_QUEUE);
-        for kernel in all.chain(Kernel::OF_SHARING) {
-            let found = driver.statistics(kernel, &program_of(&world, kernel));
-            let mut line = format!("{name:12} {:15}", kernel.name());
+        let exact = Features::by_default(&world);
+        let cached = exact | Features::RADIANCE_CACHE;
+        let of_exact = [Kernel::Render, Kernel::Learn].into_iter().chain(Kernel::OF_QUEUE);
+        let of_exact = of_exact.chain(Kernel::OF_SHARING).map(|kernel| (kernel, exact, ""));
+        let of_cached = [Kernel::Render, Kernel::Train].map(|kernel| (kernel, cached, CACHED));
+        for (kernel, features, suffix) in of_exact.chain(of_cached) {
+            let found = driver.statistics(kernel, &program_of(&world, kernel, features));
+            let mut line = format!("{name:12} {:15}", format!("{}{suffix}", kernel.name()));
             for column in COLUMNS {
                 let _ = write!(line, " {:6}", found.get(column).copied().unwrap_or(u64::MAX));
             }
@@ -149,8 +155,7 @@ fn a_queue_is_for_kernels_of_few_waves() {
 }
 
 /// A scene's kernel, with arrays where GPUs have them.
-fn program_of(world: &World, kernel: Kernel) -> Program {
-    let features = Features::by_default(world);
+fn program_of(world: &World, kernel: Kernel, features: Features) -> Program {
     // Where the tables begin is of no account, nor is how deep the tree is: none here is deeper.
     let constants = Constants {
         stack_size: SHARED_STACK_SIZE,
