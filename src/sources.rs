@@ -30,7 +30,9 @@ pub fn scene(name: &str) -> Result<Scene> {
 pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
     check_scene(name)?;
     let mut scene = if builtin::names().contains(&name) {
-        builtin::build(name)?
+        let mut scene = builtin::build(name)?;
+        scene.hide(&options.hide).map_err(|cause| Error::at(name, cause))?;
+        scene
     } else {
         gltf::load_with(Path::new(name), options)?
     };

@@ -5,6 +5,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{AlphaMode, Material, Scene};
+use crate::error::Decoded;
 
 /// Triangles of a material that are looked at.
 const SAMPLES: usize = 256;
@@ -78,6 +79,25 @@ impl Scene {
             .filter(|(number, material)| may_be(material) && is_hull(self, *number))
             .map(|(number, _)| number)
             .collect()
+    }
+
+    /// Leaves out all that is of materials of these names.
+    ///
+    /// # Errors
+    /// The cause: a name is no material's, or nothing would be left.
+    pub(crate) fn hide(&mut self, names: &[String]) -> Decoded<()> {
+        for name in names {
+            let named = (0..).zip(&self.materials).filter(|(_, material)| material.name == *name);
+            let hidden: Vec<u32> = named.map(|(number, _)| number).collect();
+            if hidden.is_empty() {
+                return Err(format!("no material to hide is called {name}"));
+            }
+            self.remove_triangles_of(&hidden);
+        }
+        match self.triangles.is_empty() {
+            true => Err("all of it is hidden, so there is nothing to render".into()),
+            false => Ok(()),
+        }
     }
 
     /// Removes the triangles of some materials; the materials stay, unused.

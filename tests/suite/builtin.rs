@@ -9,7 +9,8 @@ use lightgrid::bvh::{Bvh, Ray};
 use lightgrid::environment::sky;
 use lightgrid::math::{direction_from_uv, texel_solid_angle};
 use lightgrid::noise::Stream;
-use lightgrid::scene::{Projection, Scene, builtin};
+use lightgrid::scene::{Projection, Scene, SceneOptions, builtin};
+use lightgrid::sources;
 
 fn corners(scene: &Scene, triangle: usize) -> [Vec3; 3] {
     scene.triangles[triangle].map(|i| scene.positions[i as usize])
@@ -286,4 +287,18 @@ fn the_day_sun_is_where_and_as_strong_as_it_should_be() {
     );
     assert!(sum.normalize().dot(sun) > 0.1_f32.to_radians().cos(), "{}", sum.normalize());
     assert!((flux - 3.0).abs() < 0.06, "normal irradiance {flux}");
+}
+
+/// Built-in scenes are files, as far as their options go.
+#[test]
+fn a_material_of_a_built_in_scene_can_be_left_out() {
+    let load = |name: &str| {
+        let options = SceneOptions { hide: vec![name.to_owned()], ..SceneOptions::default() };
+        sources::scene_with("office", &options)
+    };
+    let all = sources::scene("office").expect("built in").triangles.len();
+    let without = load("wall").expect("there are walls").triangles.len();
+    assert!(without < all, "{without} of {all} triangles");
+    let says = load("cheese").err().expect("there is none").to_string();
+    assert!(says.contains("office: no material to hide is called cheese"), "{says}");
 }

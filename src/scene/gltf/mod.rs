@@ -41,7 +41,7 @@ use gltf::json;
 
 use crate::error::{Error, Notices, Result};
 use crate::image::{looks_like_picture, read_file};
-use crate::scene::{Material, Outlines, Scene, SceneOptions};
+use crate::scene::{Outlines, Scene, SceneOptions};
 
 use buffers::{File, find};
 use geometry::Needs;
@@ -138,30 +138,21 @@ fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallib
 
 /// Removes what is not to be shown: hidden materials, and hulls that would shut out the light.
 fn leave_out(scene: &mut Scene, options: &SceneOptions, notices: &mut Notices) -> Fallible<()> {
-    for name in &options.hide {
-        let named = |(_, material): &(u32, &Material)| material.name == *name;
-        let hidden: Vec<u32> =
-            (0..).zip(&scene.materials).filter(named).map(|(number, _)| number).collect();
-        if hidden.is_empty() {
-            return Err(format!("no material to hide is called {name}"));
-        }
-        scene.remove_triangles_of(&hidden);
+    scene.hide(&options.hide)?;
+    if options.outlines == Outlines::Keep {
+        return Ok(());
     }
-    if options.outlines == Outlines::Remove {
-        let hulls = scene.hulls();
-        for &hull in &hulls {
-            notices.add(format!(
-                "{} is an outline, a copy around the model that faces inwards and would shut out all \
-                 light; it is left out (--outlines keep shows it)",
-                scene.materials[hull as usize].name
-            ));
-        }
-        scene.remove_triangles_of(&hulls);
+    let hulls = scene.hulls();
+    for &hull in &hulls {
+        notices.add(format!(
+            "{} is an outline, a copy around the model that faces inwards and would shut out all \
+             light; it is left out (--outlines keep shows it)",
+            scene.materials[hull as usize].name
+        ));
     }
-    match scene.triangles.is_empty() {
-        true => Err("all of it is hidden, so there is nothing to render".into()),
-        false => Ok(()),
-    }
+    scene.remove_triangles_of(&hulls);
+    // A hull that was all there was.
+    scene.hide(&[])
 }
 
 /// A node that shows a mesh.
