@@ -299,6 +299,6 @@ fn a_material_of_a_built_in_scene_can_be_left_out() {
     let all = sources::scene("office").expect("built in").triangles.len();
     let without = load("wall").expect("there are walls").triangles.len();
     assert!(without < all, "{without} of {all} triangles");
-    let says = load("cheese").err().expect("there is none").to_string();
+    let says = load("cheese").expect_err("there is none").to_string();
     assert!(says.contains("office: no material to hide is called cheese"), "{says}");
 }
