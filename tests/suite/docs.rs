@@ -391,19 +391,23 @@ fn the_readme_and_pictures_are_small() {
     assert!(total < DOCS_BYTES, "docs has {total} bytes");
 }
 
-/// Every picture in `docs/pictures` is shown, and comes from a command beside it or from `docs/strip.sh`.
+/// Every picture in `docs/pictures` is shown, and comes from a command beside it or from a script.
 #[test]
 fn every_picture_is_shown_and_has_its_command() {
     let shown: Vec<String> = pages().iter().flat_map(|page| targets(&split(page).1)).collect();
     let commands = all_shown().into_iter().filter(|shown| shown.kind == Kind::Picture);
     let made: Vec<String> = commands.filter_map(|shown| shown.words.last().cloned()).collect();
-    let strip = fs::read_to_string(root().join("docs/strip.sh")).expect("there");
+    let scripts = ["docs/strip.sh", "docs/relearn.sh"]
+        .map(|script| fs::read_to_string(root().join(script)).expect("there"));
     for entry in fs::read_dir(root().join("docs/pictures")).expect("a folder") {
         let name = entry.expect("readable").file_name().into_string().expect("UTF-8");
         let is_it = |target: &String| target.ends_with(&format!("pictures/{name}"));
         assert!(shown.iter().any(is_it), "{name} is not shown");
         let written = format!("docs/pictures/{}", name.replace(".jpg", ".png"));
-        assert!(made.contains(&written) || strip.contains(&name), "{name}: by which command?");
+        assert!(
+            made.contains(&written) || scripts.iter().any(|script| script.contains(&name)),
+            "{name}: by which command?"
+        );
     }
     for written in made {
         let kept = root().join(written.replace(".png", ".jpg"));
