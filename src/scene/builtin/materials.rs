@@ -20,6 +20,11 @@ pub(super) fn textured(name: &str, texture: TextureRef, roughness: f32) -> Mater
     Material { base_color_texture: Some(texture), ..matte(name, [1.0; 3], roughness) }
 }
 
+/// A material with a normal map; its scene needs tangents.
+pub(super) fn embossed(material: Material, normals: TextureRef) -> Material {
+    Material { normal_texture: Some(normals), ..material }
+}
+
 /// A thin cloth or leaf, seen from both sides.
 pub(super) fn two_sided(material: Material) -> Material {
     Material { double_sided: true, ..material }

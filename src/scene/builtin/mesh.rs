@@ -45,6 +45,15 @@ impl Builder {
 
     /// Adds a colour image that covers `size_metres` and repeats.
     pub(super) fn texture(&mut self, image: TextureImage, size_metres: Vec2) -> TextureRef {
+        self.image(image, size_metres, true)
+    }
+
+    /// Adds an image of data, like a normal map, that covers `size_metres` and repeats.
+    pub(super) fn data(&mut self, image: TextureImage, size_metres: Vec2) -> TextureRef {
+        self.image(image, size_metres, false)
+    }
+
+    fn image(&mut self, image: TextureImage, size_metres: Vec2, srgb: bool) -> TextureRef {
         let index = self.scene.images.len() as u32;
         self.scene.images.push(image);
         self.scene.textures.push(Texture {
@@ -52,7 +61,7 @@ impl Builder {
             wrap_u: Wrap::Repeat,
             wrap_v: Wrap::Repeat,
             nearest: false,
-            srgb: true,
+            srgb,
         });
         let transform = glam::Affine2::from_scale(size_metres.recip());
         TextureRef { texture: index, uv_set: 0, transform }
@@ -86,6 +95,17 @@ impl Builder {
     pub(super) fn standing(&mut self, at: Vec3, yaw_degrees: f32, build: impl FnOnce(&mut Self)) {
         let turn = Quat::from_rotation_y(yaw_degrees.to_radians());
         self.part(Affine3A::from_rotation_translation(turn, at + Vec3::Y * LIFT), build);
+    }
+
+    /// Builds a part that stands at `at`, turned by `yaw_degrees` about +Y and `scale` times as large.
+    pub(super) fn scaled(
+        &mut self,
+        at: Vec3,
+        yaw_degrees: f32,
+        scale: f32,
+        build: impl FnOnce(&mut Self),
+    ) {
+        self.standing(at, yaw_degrees, |b| b.part(Affine3A::from_scale(Vec3::splat(scale)), build));
     }
 
     /// Builds a part whose vertex colour is multiplied by linear `rgb`.

@@ -8,7 +8,7 @@
 //! | `exterior` | a street with arcade, trees and a café | the sky, partly occluded |
 //! | `fog` | the same street along its lamps, in mist | as `exterior`, scattered on its way |
 //! | `open` | sculptures on a terrace | the whole sky, nothing occludes |
-//! | `materials` | spheres of different materials | the whole sky |
+//! | `materials` | a still life with every kind of material | the sky, a wall behind |
 //! | `crack` | brick store room | a slit of 1.5 m x 2 cm |
 
 mod crack;
@@ -25,10 +25,13 @@ mod objects;
 mod office;
 mod open;
 mod plants;
+mod reliefs;
 mod room;
-mod samples;
 mod seating;
+mod still_life;
 mod street;
+mod tableware;
+mod tangents;
 mod textures;
 
 use crate::error::{Error, Result};
@@ -61,7 +64,7 @@ pub fn build(name: &str) -> Result<Scene> {
         "exterior" => Ok(street::exterior()),
         "fog" => Ok(street::fog()),
         "open" => Ok(open::build()),
-        "materials" => Ok(samples::build()),
+        "materials" => Ok(still_life::build()),
         "crack" => Ok(crack::build()),
         _ => Err(Error::new(format!(
             "there is no built-in scene called \"{name}\"; there are {}",

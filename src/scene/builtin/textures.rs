@@ -31,15 +31,25 @@ fn paint(width: u32, height: u32, f: impl Fn(Vec2) -> Vec3 + Sync) -> TextureIma
     TextureImage { width, height, texels }
 }
 
+/// Tells the wood of `timber` apart.
+pub(super) const TIMBER: u32 = 11;
+
+/// Fibres of wood along u, and how much of a pore there is, both in `[0,1]`.
+pub(super) fn fibres(uv: Vec2, seed: u32) -> (f32, f32) {
+    let shift = unit(seed) * 8.0;
+    let fibre = tiling(uv * Vec2::new(20.0, 300.0) + shift, IVec2::new(20, 300), seed ^ 5);
+    let pores =
+        smoothstep(0.62, 0.8, tiling(uv * Vec2::new(40.0, 400.0), IVec2::new(40, 400), seed ^ 9));
+    (fibre, pores)
+}
+
 /// Wood of base colour `tone` with its grain along u; `seed` tells planks apart.
 fn grain(uv: Vec2, tone: Vec3, seed: u32) -> Vec3 {
     let shift = unit(seed) * 8.0;
     let warp = tiling_fbm(uv * Vec2::new(4.0, 8.0) + shift, IVec2::new(4, 8), 2, seed);
     let rings = uv.y * 14.0 + 3.2 * warp + shift;
     let ring = 0.5 + 0.5 * (rings * std::f32::consts::TAU).sin();
-    let fibre = tiling(uv * Vec2::new(20.0, 300.0) + shift, IVec2::new(20, 300), seed ^ 5);
-    let pores =
-        smoothstep(0.62, 0.8, tiling(uv * Vec2::new(40.0, 400.0), IVec2::new(40, 400), seed ^ 9));
+    let (fibre, pores) = fibres(uv, seed);
     let light = 0.80 + 0.13 * ring + 0.34 * (fibre - 0.5) - 0.12 * pores + 0.15 * (warp - 0.5);
     // Darker wood is also redder.
     tone * light * (Vec3::ONE + Vec3::new(0.2, 0.0, -0.25) * (1.0 - light))
@@ -48,7 +58,7 @@ fn grain(uv: Vec2, tone: Vec3, seed: u32) -> Vec3 {
 /// Timber for furniture, grain along u.
 pub(super) fn timber(tone: [f32; 3]) -> TextureImage {
     let tone = Vec3::from(tone);
-    paint(512, 384, |uv| grain(uv, tone, 11))
+    paint(512, 384, |uv| grain(uv, tone, TIMBER))
 }
 
 /// Floor boards along u: `rows` of them, each of `boards` pieces, with staggered ends.
@@ -105,17 +115,41 @@ pub(super) fn plaster(tone: [f32; 3], roughness: f32) -> TextureImage {
     })
 }
 
+/// The thread of a plain weave that lies on top at a place.
+pub(super) struct Thread {
+    number: u32,
+    /// Place across it in `[0,1)`.
+    across: f32,
+    /// Place in `[0,1)` along it between the two threads under which it goes.
+    pub(super) along: f32,
+}
+
+impl Thread {
+    /// That of `threads` across the texture each way.
+    pub(super) fn at(uv: Vec2, threads: i32) -> Self {
+        let p = uv * threads as f32;
+        let (x, y) = (p.x.fract(), p.y.fract());
+        if (p.x as i32 + p.y as i32) & 1 == 0 {
+            Self { number: p.y as u32, across: y, along: x }
+        } else {
+            Self { number: 977 + p.x as u32, across: x, along: y }
+        }
+    }
+
+    /// 1 along its middle, 0 at its sides.
+    pub(super) fn roundness(&self) -> f32 {
+        1.0 - (2.0 * self.across - 1.0).powi(2)
+    }
+}
+
 /// Plain weave with uneven threads, `threads` across the texture.
 pub(super) fn weave(tone: [f32; 3], threads: i32) -> TextureImage {
     let tone = Vec3::from(tone);
     paint(256, 256, |uv| {
-        let p = uv * threads as f32;
-        let over = (p.x as i32 + p.y as i32) & 1 == 0;
-        let (across, thread) =
-            if over { (p.y.fract(), p.y as u32) } else { (p.x.fract(), 977 + p.x as u32) };
-        let round = 1.0 - (2.0 * across - 1.0).powi(2);
+        let thread = Thread::at(uv, threads);
         let slub = tiling_fbm(uv * Vec2::splat(12.0), IVec2::splat(12), 3, 31) - 0.5;
-        tone * (0.74 + 0.24 * round + 0.16 * (unit(thread) - 0.5) + 0.22 * slub)
+        let shade = 0.16 * (unit(thread.number) - 0.5) + 0.22 * slub;
+        tone * (0.74 + 0.24 * thread.roundness() + shade)
     })
 }
 
