@@ -15,7 +15,8 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use super::{Arriving, Path, PathResult, PathTracer, Scatterer, SurfaceScatterer, Vertex};
+use super::gather::Arriving;
+use super::{Path, PathResult, PathTracer, Scatterer, SurfaceScatterer, Vertex};
 use crate::bsdf::Bsdf;
 use crate::bvh::{Ray, offset_origin};
 use crate::sampler::{Sampler, hash};

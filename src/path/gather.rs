@@ -1,0 +1,116 @@
+//! Next event estimation: light from the map and from lamps at a vertex.
+
+use glam::Vec3;
+
+use super::sharing::SharedTile;
+use super::{Path, Vertex};
+use crate::environment::TileSearch;
+use crate::light_grid::TileChoice;
+use crate::math::balance_heuristic;
+
+/// What next event estimation has chosen to look at.
+#[derive(Default)]
+pub(super) struct ChosenLights {
+    /// Tiles of the map, and where in them.
+    of_map: [Option<(TileChoice, TileSearch)>; SharedTile::MOST_MAP_SAMPLES],
+    /// By which numbers a lamp will be chosen.
+    of_lamps: Option<[u32; 2]>,
+}
+
+/// Light that next event estimation has found.
+pub(super) struct Arriving {
+    /// Unit, to where it comes from.
+    pub(super) direction: Vec3,
+    /// What of it goes on along the path: BSDF times cosine, or phase function.
+    pub(super) f: Vec3,
+    /// Its radiance over the sum of all densities that it may be found with.
+    pub(super) light: Vec3,
+}
+
+impl Path<'_> {
+    /// Next event estimation from the map and, if there are any, one local light.
+    pub(super) fn gather(&mut self, vertex: &Vertex<'_>, lights: &ChosenLights) {
+        let mut sum = Vec3::ZERO;
+        self.for_arriving(vertex, lights, |arriving| sum += arriving.f * arriving.light);
+        self.radiance += self.throughput * sum;
+    }
+
+    /// Draws the random numbers of next event estimation, and chooses tiles of the map by them.
+    pub(super) fn choose_lights(&mut self, vertex: &Vertex<'_>) -> ChosenLights {
+        let mut chosen = ChosenLights::default();
+        if vertex.scatterer.is_delta_only() {
+            return chosen;
+        }
+        debug_assert!(self.map_samples as usize <= chosen.of_map.len(), "all are drawn");
+        if let Some(grid) = self.tracer.grid {
+            for of_map in chosen.of_map.iter_mut().take(self.map_samples as usize) {
+                let bits = self.sampler.next_pair_bits();
+                let choice = grid.sample(vertex.distribution, bits);
+                self.expect_count(vertex, choice.tile);
+                let u = [choice.remainder, bits[1]];
+                let search = self.tracer.environment.search_tile(choice.tile, u);
+                *of_map = search.map(|search| (choice, search));
+            }
+        }
+        if !self.tracer.world.lights.is_empty() {
+            chosen.of_lamps = Some(self.sampler.next_pair_bits());
+        }
+        chosen
+    }
+
+    /// Calls `take` with the light that next event estimation finds.
+    pub(super) fn for_arriving(
+        &mut self,
+        vertex: &Vertex<'_>,
+        lights: &ChosenLights,
+        mut take: impl FnMut(Arriving),
+    ) {
+        for (choice, search) in lights.of_map.iter().flatten() {
+            self.light_of_map(vertex, choice, search).map(&mut take);
+        }
+        if let Some(bits) = lights.of_lamps {
+            self.light_of_lamps(vertex, bits).map(&mut take);
+        }
+    }
+
+    fn light_of_map(
+        &mut self,
+        vertex: &Vertex<'_>,
+        choice: &TileChoice,
+        search: &TileSearch,
+    ) -> Option<Arriving> {
+        let sample = self.tracer.environment.finish_sample(search)?;
+        let pdf = choice.probability * sample.pdf_solid_angle;
+        let Some((f, own_pdf)) = self.scattered(vertex, sample.direction) else {
+            self.count(vertex, choice.tile, 0.0);
+            return None;
+        };
+        self.tracer.environment.prefetch_radiance(&sample);
+        let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
+        if self.tracer.counts.is_some() {
+            let weight = self.visibility(vertex, sample.direction, own_pdf, transmittance);
+            self.count(vertex, choice.tile, weight);
+        }
+        let all_pdfs = self.map_samples as f32 * pdf + own_pdf;
+        if transmittance == Vec3::ZERO || all_pdfs <= 0.0 {
+            return None;
+        }
+        // Balance heuristic over the density; `weight` is what integers drew it with.
+        let radiance = self.tracer.environment.sampled_radiance(&sample);
+        let light = radiance * transmittance * (sample.weight / all_pdfs);
+        Some(Arriving { direction: sample.direction, f, light })
+    }
+
+    fn light_of_lamps(&mut self, vertex: &Vertex<'_>, bits: [u32; 2]) -> Option<Arriving> {
+        let world = self.tracer.world;
+        let sample = world.lights.sample(&world.scene, &vertex.receiver(), bits)?;
+        let (f, own_pdf) = self.scattered(vertex, sample.direction)?;
+        let transmittance = self.transmittance(vertex, sample.direction, sample.distance);
+        if transmittance == Vec3::ZERO {
+            return None;
+        }
+        let weight = balance_heuristic(sample.pdf_solid_angle, own_pdf);
+        let light = sample.radiance_over_pdf * transmittance * weight;
+        Some(Arriving { direction: sample.direction, f, light })
+    }
+}
