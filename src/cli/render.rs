@@ -65,7 +65,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     match frames {
         None => {
             let progress = Progress::start("learning");
-            job.render(arguments, camera, &mut Known::default(), &progress)
+            job.render(arguments, camera, None, &progress)
         }
         Some(frames) => job.render_frames(arguments, &frames, &camera),
     }
@@ -90,13 +90,13 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Renders and writes one picture. `before` is what was known when it was begun, and then what the next
-    /// one may begin with.
+    /// Renders and writes one picture. `known` is what those before it have left, and then what it leaves to
+    /// the next, if there may be one.
     fn render(
         &self,
         arguments: &RenderArguments,
         camera: Camera,
-        before: &mut Known,
+        known: Option<&mut Known>,
         progress: &Progress,
     ) -> Result<()> {
         let Self { world, environment, .. } = *self;
@@ -109,9 +109,10 @@ impl Job<'_> {
         let mut session =
             device::start(arguments.device, gpu, world, environment, view, &mut notices)?;
         let mut cpu = TakeOver { device: arguments.device, notices: &mut notices };
-        let begun = before.counted.as_ref().map_or(Ok(()), |counted| {
-            let known = session.continue_learning(counted);
-            cpu.goes_on(&mut session, known).map(|_| ())
+        let counted = known.as_ref().and_then(|known| known.counted.as_ref());
+        let begun = counted.map_or(Ok(()), |counted| {
+            let taken_up = session.continue_learning(counted);
+            cpu.goes_on(&mut session, taken_up).map(|_| ())
         });
         let outcome = begun
             .and_then(|()| work(&mut session, &mut share, &self.interrupt, progress, &mut cpu));
@@ -141,8 +142,10 @@ impl Job<'_> {
         remarks.iter().for_each(notice);
         failures.extend(outcome.err());
         Error::all(failures)?;
-        before.exposure = Some(arguments.picture.exposure_of(&film));
-        before.counted = session.counters().map(LearningGrid::snapshot);
+        if let Some(known) = known {
+            known.exposure = Some(arguments.picture.exposure_of(&film));
+            known.counted = session.counters().map(LearningGrid::snapshot);
+        }
         Ok(())
     }
 
@@ -169,7 +172,7 @@ impl Job<'_> {
             self.interrupt.go_on();
             let progress = Progress::of_frame(number, *frames.numbers().end());
             let camera = frames.camera(number, camera);
-            if let Err(failure) = self.render(&of_frame, camera, &mut known, &progress) {
+            if let Err(failure) = self.render(&of_frame, camera, Some(&mut known), &progress) {
                 failures.push(failure);
                 break;
             }

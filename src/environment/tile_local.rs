@@ -78,9 +78,9 @@ impl TileLocal {
         // A row's total is known without reading its last sum.
         let target = Target::new(row.mass, u[0]);
         let groups = self.groups_of(grid, tile, row.index);
-        let first = GROUP * groups.partition_point(target.is_past());
-        let last = (first + GROUP).min(patches.width() as usize);
         let width = patches.width() as usize;
+        let first = GROUP * groups.partition_point(target.is_past());
+        let last = (first + GROUP).min(width);
         let sums_at = grid.first_patch(patches) + row.index * width;
         prefetch_all(&self.row_sums[sums_at + first..sums_at + last]);
         Some(Search {
@@ -162,12 +162,11 @@ fn groups_per_row(grid: &TileGrid) -> usize {
 /// The last sum of each group of each row, tile after tile; after a row's last group, its total.
 fn group_sums(row_sums: &[u32], grid: &TileGrid) -> Vec<u32> {
     let groups = groups_per_row(grid);
-    let of_row =
-        move |row: &[u32]| (1..=groups).map(|end| row[(GROUP * end).min(row.len()) - 1]).collect();
-    let of_tile = |tile| -> Vec<u32> {
+    let of_tile = |tile| {
         let patches = grid.patches(tile);
         let tile = &row_sums[grid.first_patch(patches)..][..patches.len()];
-        tile.chunks_exact(patches.width() as usize).flat_map::<Vec<u32>, _>(of_row).collect()
+        let rows = tile.chunks_exact(patches.width() as usize);
+        rows.flat_map(move |row| (1..=groups).map(|end| row[(GROUP * end).min(row.len()) - 1]))
     };
     (0..grid.count()).into_par_iter().flat_map_iter(of_tile).collect()
 }

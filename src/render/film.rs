@@ -160,6 +160,14 @@ impl Film {
         film
     }
 
+    /// Whether all pixels have a sample that a film begins with.
+    pub(crate) fn is_begun(&self) -> bool {
+        let every = BEGINNINGS[0] as usize;
+        let rows = self.pixels.chunks(self.width.max(1) as usize).step_by(every);
+        !self.pixels.is_empty()
+            && rows.flat_map(|row| row.iter().step_by(every)).all(|pixel| pixel.samples > 0)
+    }
+
     /// Share of its pixels that have a sample.
     pub(crate) fn coverage(&self) -> f64 {
         let covered = self.pixels.iter().filter(|pixel| pixel.samples > 0).count();

@@ -94,6 +94,14 @@ impl Scene {
             }
             self.remove_triangles_of(&hidden);
         }
+        self.check_shown()
+    }
+
+    /// Whether anything was left to be shown.
+    ///
+    /// # Errors
+    /// The cause, if nothing was.
+    pub(super) fn check_shown(&self) -> Decoded<()> {
         match self.triangles.is_empty() {
             true => Err("all of it is hidden, so there is nothing to render".into()),
             false => Ok(()),

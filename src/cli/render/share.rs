@@ -19,7 +19,7 @@ use crate::error::{Error, Notices, Result};
 use crate::output::film_file::{FilmFacts, Part, read_film, write_film};
 use crate::output::record::Record;
 use crate::path::World;
-use crate::render::film::{BEGINNINGS, Film};
+use crate::render::film::Film;
 use crate::render::{Figures, Gi, Phase, Session, StopRule, View};
 use crate::scene::builtin;
 
@@ -161,20 +161,14 @@ impl Share {
 
     /// Whether there is a picture of this share's own samples.
     pub(super) fn has_samples(&self, session: &Session<'_>) -> bool {
-        self.awaited.is_none() && (session.samples() > self.first || self.is_begun(session))
+        self.awaited.is_none()
+            && (session.samples() > self.first || self.is_hasty() && session.is_begun())
     }
 
     /// Whether seconds may be over before every pixel has a sample: a picture is then begun with a few of
     /// them. Parts and checkpoints want whole samples.
     fn is_hasty(&self) -> bool {
         self.rule.seconds.is_some() && self.part == Part::WHOLE && self.checkpoint.is_none()
-    }
-
-    /// Whether a few pixels all over the picture have a sample.
-    fn is_begun(&self, session: &Session<'_>) -> bool {
-        self.is_hasty()
-            && session.figures().samples > 0
-            && session.next_beginning() != Some(BEGINNINGS[0])
     }
 
     /// This share's own samples.

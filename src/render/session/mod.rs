@@ -170,6 +170,12 @@ impl<'a> Session<'a> {
         stages.iter().copied().find(|every| self.figures.samples < pixels(*every))
     }
 
+    /// Whether pixels all over the picture have a sample: those that [`Self::begin`] begins with or, on a
+    /// GPU, all.
+    pub fn is_begun(&self) -> bool {
+        self.samples > 0 || (!self.is_on_gpu() && self.film().is_begun())
+    }
+
     /// Waits for what a GPU is still at work on and reads its film, so that film and figures are those
     /// of now.
     ///

@@ -151,8 +151,7 @@ fn leave_out(scene: &mut Scene, options: &SceneOptions, notices: &mut Notices) -
         ));
     }
     scene.remove_triangles_of(&hulls);
-    // A hull that was all there was.
-    scene.hide(&[])
+    scene.check_shown()
 }
 
 /// A node that shows a mesh.
