@@ -1,6 +1,7 @@
 //! Where a path may end: in what the radiance cache knows of a surface.
 
-use super::{Path, Scatterer, SurfaceScatterer, Vertex};
+use super::Path;
+use super::vertex::{Scatterer, SurfaceScatterer, Vertex};
 
 /// Least GGX alpha of a surface that sends back much the same to all sides.
 pub(crate) const LEAST_ALPHA: f32 = 0.05;

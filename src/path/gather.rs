@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
+use super::Path;
 use super::sharing::SharedTile;
-use super::{Path, Vertex};
+use super::vertex::Vertex;
 use crate::environment::TileSearch;
 use crate::light_grid::TileChoice;
 use crate::math::balance_heuristic;

@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::{Path, PathTracer, Scatterer, Vertex};
+use super::vertex::{Scatterer, Vertex};
+use super::{Path, PathTracer};
 use crate::bvh::Ray;
 use crate::color::{importance, luminance};
 use crate::light_grid::LearningGrid;

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::Body;
+use super::body::Body;
 use crate::bsdf::Bsdf;
 use crate::medium::Interior;
 use crate::scene::surface::{SharedParameters, SurfacePoint};

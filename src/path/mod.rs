@@ -11,6 +11,7 @@ use std::borrow::Cow;
 use glam::{Vec2, Vec3};
 
 pub mod background;
+mod body;
 pub(crate) mod cached;
 pub mod camera;
 mod draw;
@@ -23,6 +24,7 @@ mod materials;
 mod ray_clock;
 pub mod sharing;
 pub(crate) mod train;
+mod vertex;
 mod world;
 mod world_builder;
 
@@ -33,14 +35,16 @@ pub(crate) use train::TRAINING_VERTICES;
 pub use world::World;
 pub use world_builder::WorldBuilder;
 
-use crate::bsdf::{Bsdf, Hero, ViewedBsdf};
+use self::body::Body;
+use self::vertex::{Onward, Scatterer, SurfaceScatterer, Vertex};
+use crate::bsdf::{Bsdf, Hero};
 use crate::bvh::{Hit, Ray, offset_origin};
 use crate::environment::Environment;
 use crate::features::Features;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
-use crate::math::{Frame, balance_heuristic};
-use crate::medium::{Fog, Interior, Phase};
+use crate::math::balance_heuristic;
+use crate::medium::Fog;
 use crate::radiance_cache::RadianceCache;
 use crate::sampler::Sampler;
 use crate::scene::surface::SurfacePoint;
@@ -129,150 +133,6 @@ impl PathTracer<'_> {
         grid.distributions().prefetch(distribution);
         distribution
     }
-}
-
-/// A place at which light is scattered.
-struct Vertex<'v> {
-    position: Vec3,
-    /// Cell of the Light Grid it lies in; `None` without one.
-    cell: Option<u32>,
-    /// Tile distribution of NEE here.
-    distribution: u32,
-    scatterer: Scatterer<'v>,
-}
-
-impl Vertex<'_> {
-    /// What lights are chosen for. What lets light through is lit from behind as well.
-    fn receiver(&self) -> Receiver {
-        let normal = match &self.scatterer {
-            Scatterer::Surface(surface) if !surface.transmits => surface.shading_frame.z,
-            _ => Vec3::ZERO,
-        };
-        Receiver { position: self.position, normal }
-    }
-}
-
-/// What scatters light at a vertex.
-enum Scatterer<'v> {
-    Surface(SurfaceScatterer<'v>),
-    Medium(Phase),
-}
-
-struct SurfaceScatterer<'v> {
-    geometric_normal: Vec3,
-    shading_frame: Frame,
-    /// Towards where the path came from, in the shading frame.
-    bsdf: ViewedBsdf<'v>,
-    /// What lies behind the surface; `None` if it is what lies before it.
-    behind: Option<&'v Body>,
-    /// Whether light comes through the surface.
-    transmits: bool,
-}
-
-impl Scatterer<'_> {
-    /// Whether no light that NEE may find is scattered towards the path.
-    fn is_delta_only(&self) -> bool {
-        match self {
-            Self::Surface(surface) => surface.bsdf().is_delta_only(),
-            Self::Medium(_) => false,
-        }
-    }
-}
-
-impl<'v> SurfaceScatterer<'v> {
-    /// The scattering towards everywhere.
-    fn bsdf(&self) -> &'v Bsdf {
-        self.bsdf.bsdf()
-    }
-
-    /// Whether it scatters much the same to and from places side by side, all on one side: no reflection
-    /// narrower than GGX makes it with this alpha.
-    fn is_broad(&self, least_alpha: f32) -> bool {
-        let bsdf = self.bsdf();
-        !self.transmits && !bsdf.is_delta_only() && bsdf.is_broad(least_alpha)
-    }
-
-    /// BSDF times cosine and the BSDF's density for light from `direction`; `None` where it is
-    /// black, or where shading and geometric normal disagree about the side.
-    fn scattered(&self, direction: Vec3) -> Option<(Vec3, f32)> {
-        let wi = self.shading_frame.local_from_world(direction);
-        if (wi.z > 0.0) != self.is_above(direction) {
-            return None;
-        }
-        let (f, pdf_solid_angle) = self.bsdf.eval_pdf(wi);
-        (f.max_element() > 0.0).then_some((f, pdf_solid_angle))
-    }
-
-    /// Where a path goes on by three uniform numbers; `None` if it ends, as where shading and geometric
-    /// normal disagree about the side.
-    fn onward(&self, u: Vec3) -> Option<Onward> {
-        let sample = self.bsdf.sample(u)?;
-        let direction = self.shading_frame.world_from_local(sample.wi).normalize();
-        let is_through = sample.is_transmission;
-        let pdf_solid_angle = if sample.is_delta { f32::INFINITY } else { sample.pdf_solid_angle };
-        (self.is_above(direction) != is_through).then_some(Onward {
-            direction,
-            weight: sample.weight,
-            pdf_solid_angle,
-            is_through,
-        })
-    }
-
-    /// Whether a direction points to the side that the path came from.
-    fn is_above(&self, direction: Vec3) -> bool {
-        self.geometric_normal.dot(direction) > 0.0
-    }
-
-    /// Where a ray from `position` in this direction begins.
-    fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
-        let normal = self.geometric_normal;
-        offset_origin(position, if self.is_above(direction) { normal } else { -normal })
-    }
-}
-
-/// What a ray is in.
-#[derive(Clone, Copy)]
-struct Body {
-    /// What a solid is filled with; `None` outside of solids.
-    interior: Option<Interior>,
-    /// Squared index of refraction, by which radiance, hence throughput, is smaller than in air.
-    squared_index: f32,
-}
-
-impl Body {
-    const AIR: Self = Self { interior: None, squared_index: 1.0 };
-
-    /// What fills the first `distance` metres of a ray, and where. Rays that leave the scene from
-    /// inside of a body have met a mesh with holes: nothing is absorbed on their infinite way.
-    fn stretch(
-        &self,
-        fog: Option<&Fog>,
-        origin: Vec3,
-        direction: Vec3,
-        distance: f32,
-    ) -> Option<(Interior, f32, f32)> {
-        match self.interior {
-            Some(interior) => {
-                (!interior.is_clear() && distance.is_finite()).then_some((interior, 0.0, distance))
-            }
-            None => fog.and_then(|fog| {
-                let (from, to) = fog.stretch(origin, direction, distance)?;
-                Some((fog.interior, from, to))
-            }),
-        }
-    }
-}
-
-/// Where a path goes on.
-struct Onward {
-    /// Unit.
-    direction: Vec3,
-    /// BSDF times cosine over density; 1 in a medium.
-    weight: Vec3,
-    /// Infinite if no NEE competes with it.
-    pdf_solid_angle: f32,
-    /// Whether it goes through the surface.
-    is_through: bool,
 }
 
 /// The vertex a ray left from, as far as MIS asks.

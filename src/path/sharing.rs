@@ -16,7 +16,8 @@ use std::ops::Range;
 use glam::Vec3;
 
 use super::gather::Arriving;
-use super::{Path, PathResult, PathTracer, Scatterer, SurfaceScatterer, Vertex};
+use super::vertex::{Scatterer, SurfaceScatterer, Vertex};
+use super::{Path, PathResult, PathTracer};
 use crate::bsdf::Bsdf;
 use crate::bvh::{Ray, offset_origin};
 use crate::sampler::{Sampler, hash};

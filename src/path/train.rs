@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::{Path, PathLimits, PathTracer, Scatterer, Vertex};
+use super::vertex::{Scatterer, Vertex};
+use super::{Path, PathLimits, PathTracer};
 use crate::bvh::Ray;
 use crate::color::luminance;
 use crate::radiance_cache::{RadianceCache, RadianceSums};

@@ -1,0 +1,121 @@
+//! Places at which paths scatter light.
+
+use glam::Vec3;
+
+use super::body::Body;
+use super::light_tree::Receiver;
+use crate::bsdf::{Bsdf, ViewedBsdf};
+use crate::bvh::offset_origin;
+use crate::math::Frame;
+use crate::medium::Phase;
+
+/// A place at which light is scattered.
+pub(super) struct Vertex<'v> {
+    pub(super) position: Vec3,
+    /// Cell of the Light Grid it lies in; `None` without one.
+    pub(super) cell: Option<u32>,
+    /// Tile distribution of NEE here.
+    pub(super) distribution: u32,
+    pub(super) scatterer: Scatterer<'v>,
+}
+
+impl Vertex<'_> {
+    /// What lights are chosen for. What lets light through is lit from behind as well.
+    pub(super) fn receiver(&self) -> Receiver {
+        let normal = match &self.scatterer {
+            Scatterer::Surface(surface) if !surface.transmits => surface.shading_frame.z,
+            _ => Vec3::ZERO,
+        };
+        Receiver { position: self.position, normal }
+    }
+}
+
+/// What scatters light at a vertex.
+pub(super) enum Scatterer<'v> {
+    Surface(SurfaceScatterer<'v>),
+    Medium(Phase),
+}
+
+pub(super) struct SurfaceScatterer<'v> {
+    pub(super) geometric_normal: Vec3,
+    pub(super) shading_frame: Frame,
+    /// Towards where the path came from, in the shading frame.
+    pub(super) bsdf: ViewedBsdf<'v>,
+    /// What lies behind the surface; `None` if it is what lies before it.
+    pub(super) behind: Option<&'v Body>,
+    /// Whether light comes through the surface.
+    pub(super) transmits: bool,
+}
+
+impl Scatterer<'_> {
+    /// Whether no light that NEE may find is scattered towards the path.
+    pub(super) fn is_delta_only(&self) -> bool {
+        match self {
+            Self::Surface(surface) => surface.bsdf().is_delta_only(),
+            Self::Medium(_) => false,
+        }
+    }
+}
+
+impl<'v> SurfaceScatterer<'v> {
+    /// The scattering towards everywhere.
+    pub(super) fn bsdf(&self) -> &'v Bsdf {
+        self.bsdf.bsdf()
+    }
+
+    /// Whether it scatters much the same to and from places side by side, all on one side: no reflection
+    /// narrower than GGX makes it with this alpha.
+    pub(super) fn is_broad(&self, least_alpha: f32) -> bool {
+        let bsdf = self.bsdf();
+        !self.transmits && !bsdf.is_delta_only() && bsdf.is_broad(least_alpha)
+    }
+
+    /// BSDF times cosine and the BSDF's density for light from `direction`; `None` where it is
+    /// black, or where shading and geometric normal disagree about the side.
+    pub(super) fn scattered(&self, direction: Vec3) -> Option<(Vec3, f32)> {
+        let wi = self.shading_frame.local_from_world(direction);
+        if (wi.z > 0.0) != self.is_above(direction) {
+            return None;
+        }
+        let (f, pdf_solid_angle) = self.bsdf.eval_pdf(wi);
+        (f.max_element() > 0.0).then_some((f, pdf_solid_angle))
+    }
+
+    /// Where a path goes on by three uniform numbers; `None` if it ends, as where shading and geometric
+    /// normal disagree about the side.
+    pub(super) fn onward(&self, u: Vec3) -> Option<Onward> {
+        let sample = self.bsdf.sample(u)?;
+        let direction = self.shading_frame.world_from_local(sample.wi).normalize();
+        let is_through = sample.is_transmission;
+        let pdf_solid_angle = if sample.is_delta { f32::INFINITY } else { sample.pdf_solid_angle };
+        (self.is_above(direction) != is_through).then_some(Onward {
+            direction,
+            weight: sample.weight,
+            pdf_solid_angle,
+            is_through,
+        })
+    }
+
+    /// Whether a direction points to the side that the path came from.
+    pub(super) fn is_above(&self, direction: Vec3) -> bool {
+        self.geometric_normal.dot(direction) > 0.0
+    }
+
+    /// Where a ray from `position` in this direction begins.
+    pub(super) fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
+        let normal = self.geometric_normal;
+        offset_origin(position, if self.is_above(direction) { normal } else { -normal })
+    }
+}
+
+/// Where a path goes on.
+pub(super) struct Onward {
+    /// Unit.
+    pub(super) direction: Vec3,
+    /// BSDF times cosine over density; 1 in a medium.
+    pub(super) weight: Vec3,
+    /// Infinite if no NEE competes with it.
+    pub(super) pdf_solid_angle: f32,
+    /// Whether it goes through the surface.
+    pub(super) is_through: bool,
+}
