@@ -155,8 +155,7 @@ impl<'a> Session<'a> {
     }
 
     /// How far apart the pixels are that [`Self::begin`] should give their first sample next: nearer and
-    /// nearer, once what is to be learned is learned. `None` when enough have one to go on with all, and
-    /// on a GPU.
+    /// nearer. `None` when enough have one to go on with all, and on a GPU.
     pub fn next_beginning(&self) -> Option<u32> {
         if self.samples > 0 || self.is_on_gpu() {
             return None;
@@ -165,9 +164,7 @@ impl<'a> Session<'a> {
             let [columns, rows] = [self.view.width, self.view.height].map(|n| n.div_ceil(every));
             u64::from(columns) * u64::from(rows)
         };
-        let is_learning = self.phase() == Phase::Learning;
-        let stages = &BEGINNINGS[..if is_learning { 1 } else { BEGINNINGS.len() }];
-        stages.iter().copied().find(|every| self.figures.samples < pixels(*every))
+        BEGINNINGS.into_iter().find(|every| self.figures.samples < pixels(*every))
     }
 
     /// Whether pixels all over the picture have a sample: those that [`Self::begin`] begins with or, on a

@@ -4,11 +4,12 @@
 use glam::{Vec2, Vec3};
 
 use super::furniture as piece;
-use super::materials::{self as make, matte, textured, two_sided, varnished};
+use super::materials::{self as make, embossed, matte, textured, two_sided, varnished};
 use super::mesh::placed;
 use super::mesh::{Builder, LIFT, Mat};
 use super::objects as thing;
 use super::plants;
+use super::reliefs as relief;
 use super::room::{self, Hole, Shell};
 use super::textures as paint;
 use super::{fittings, lamps, seating};
@@ -54,13 +55,23 @@ struct Palette {
 
 impl Palette {
     fn new(b: &mut Builder, lamps: [f32; 3]) -> Self {
-        let parquet = b.texture(paint::herringbone([0.46, 0.29, 0.16]), Vec2::splat(1.9));
-        let oak = b.texture(paint::timber([0.50, 0.34, 0.19]), Vec2::new(1.4, 0.7));
-        let walnut = b.texture(paint::timber([0.23, 0.13, 0.075]), Vec2::new(1.4, 0.7));
-        let plaster = b.texture(paint::plaster([0.78, 0.75, 0.69], 0.10), Vec2::splat(2.5));
-        let accent = b.texture(paint::plaster([0.24, 0.33, 0.30], 0.16), Vec2::splat(2.5));
-        let velvet = b.texture(paint::weave([0.52, 0.20, 0.085], 64), Vec2::splat(0.20));
-        let boucle = b.texture(paint::weave([0.74, 0.69, 0.60], 32), Vec2::splat(0.16));
+        let size = Vec2::splat(1.9);
+        let parquet = b.texture(paint::herringbone([0.46, 0.29, 0.16]), size);
+        let blocks = b.data(relief::herringbone(size), size);
+        let size = Vec2::new(1.4, 0.7);
+        let oak = b.texture(paint::timber([0.50, 0.34, 0.19]), size);
+        let walnut = b.texture(paint::timber([0.23, 0.13, 0.075]), size);
+        let grain = b.data(relief::timber(size), size);
+        let size = Vec2::splat(2.5);
+        let plaster = b.texture(paint::plaster([0.78, 0.75, 0.69], 0.10), size);
+        let accent = b.texture(paint::plaster([0.24, 0.33, 0.30], 0.16), size);
+        let trowel = b.data(relief::plaster(size), size);
+        let size = Vec2::splat(0.20);
+        let velvet = b.texture(paint::weave([0.52, 0.20, 0.085], 64), size);
+        let pile = b.data(relief::weave(size, 64), size);
+        let size = Vec2::splat(0.16);
+        let boucle = b.texture(paint::weave([0.74, 0.69, 0.60], 32), size);
+        let loops = b.data(relief::weave(size, 32), size);
         let linen = b.texture(paint::weave([0.72, 0.66, 0.56], 128), Vec2::splat(0.30));
         let ochre = b.texture(paint::weave([0.58, 0.45, 0.27], 128), Vec2::splat(0.30));
         let rug = b.texture(
@@ -72,15 +83,19 @@ impl Palette {
             b.material(textured("painting", art, 0.55))
         });
         Self {
-            wall: b.material(textured("wall", plaster, 0.85)),
-            accent: b.material(textured("green wall", accent, 0.8)),
+            wall: b.material(embossed(textured("wall", plaster, 0.85), trowel)),
+            accent: b.material(embossed(textured("green wall", accent, 0.8), trowel)),
             ceiling: b.material(matte("ceiling", [0.80, 0.79, 0.77], 0.9)),
-            parquet: b.material(varnished(textured("parquet", parquet, 0.55), 0.35, 0.22)),
+            parquet: b.material(embossed(
+                varnished(textured("parquet", parquet, 0.55), 0.35, 0.22),
+                blocks,
+            )),
             white: b.material(matte("white paint", [0.78, 0.77, 0.74], 0.35)),
-            oak: b.material(textured("oak", oak, 0.5)),
-            walnut: b.material(varnished(textured("walnut", walnut, 0.5), 0.6, 0.15)),
-            velvet: b.material(textured("velvet", velvet, 0.9)),
-            boucle: b.material(textured("boucle", boucle, 0.95)),
+            oak: b.material(embossed(textured("oak", oak, 0.5), grain)),
+            walnut: b
+                .material(embossed(varnished(textured("walnut", walnut, 0.5), 0.6, 0.15), grain)),
+            velvet: b.material(embossed(textured("velvet", velvet, 0.9), pile)),
+            boucle: b.material(embossed(textured("boucle", boucle, 0.95), loops)),
             linen: b.material(two_sided(textured("linen", linen, 0.9))),
             shade: b.material(Material {
                 emissive: WARM * lamps[0],
@@ -90,7 +105,7 @@ impl Palette {
                 let white = matte(name, [0.78, 0.77, 0.74], 0.35);
                 b.material(Material { emissive: WARM * radiance, ..white })
             }),
-            cotton: b.material(textured("cotton", boucle, 0.9)),
+            cotton: b.material(embossed(textured("cotton", boucle, 0.9), loops)),
             curtain: b.material(two_sided(textured("ochre linen", ochre, 0.9))),
             rug: b.material(two_sided(textured("rug", rug, 0.95))),
             brass: b.material(make::brass()),

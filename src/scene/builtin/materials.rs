@@ -20,7 +20,7 @@ pub(super) fn textured(name: &str, texture: TextureRef, roughness: f32) -> Mater
     Material { base_color_texture: Some(texture), ..matte(name, [1.0; 3], roughness) }
 }
 
-/// A material with a normal map; its scene needs tangents.
+/// A material with a normal map.
 pub(super) fn embossed(material: Material, normals: TextureRef) -> Material {
     Material { normal_texture: Some(normals), ..material }
 }

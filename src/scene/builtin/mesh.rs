@@ -32,8 +32,11 @@ impl Builder {
         }
     }
 
-    /// The scene as built.
-    pub(super) fn finish(self) -> Scene {
+    /// The scene as built, with tangents if it has normal maps.
+    pub(super) fn finish(mut self) -> Scene {
+        if self.scene.materials.iter().any(|material| material.normal_texture.is_some()) {
+            self.add_tangents();
+        }
         self.scene
     }
 

@@ -4,11 +4,12 @@
 use glam::{Vec2, Vec3};
 
 use super::furniture as piece;
-use super::materials::{self as make, matte, metal, textured, two_sided, varnished};
+use super::materials::{self as make, embossed, matte, metal, textured, two_sided, varnished};
 use super::mesh::placed;
 use super::mesh::{Builder, Mat};
 use super::objects as thing;
 use super::plants;
+use super::reliefs as relief;
 use super::room::{self, Hole, Shell};
 use super::textures as paint;
 use super::{desktop, fittings, lamps, seating};
@@ -48,12 +49,20 @@ struct Palette {
 
 impl Palette {
     fn new(b: &mut Builder) -> Self {
-        let boards = b.texture(paint::planks([0.40, 0.27, 0.16], 10, 2), Vec2::new(2.6, 1.6));
-        let oak = b.texture(paint::timber([0.52, 0.36, 0.21]), Vec2::new(1.4, 0.7));
-        let plaster = b.texture(paint::plaster([0.76, 0.74, 0.70], 0.10), Vec2::splat(2.5));
-        let feature = b.texture(paint::plaster([0.60, 0.41, 0.31], 0.14), Vec2::splat(2.5));
-        let blue = b.texture(paint::weave([0.16, 0.24, 0.36], 64), Vec2::splat(0.18));
-        let grey = b.texture(paint::weave([0.44, 0.43, 0.41], 64), Vec2::splat(0.2));
+        let size = Vec2::new(2.6, 1.6);
+        let boards = b.texture(paint::planks([0.40, 0.27, 0.16], 10, 2), size);
+        let joints = b.data(relief::planks(size, 10, 2), size);
+        let size = Vec2::new(1.4, 0.7);
+        let oak = b.texture(paint::timber([0.52, 0.36, 0.21]), size);
+        let grain = b.data(relief::timber(size), size);
+        let size = Vec2::splat(2.5);
+        let plaster = b.texture(paint::plaster([0.76, 0.74, 0.70], 0.10), size);
+        let feature = b.texture(paint::plaster([0.60, 0.41, 0.31], 0.14), size);
+        let trowel = b.data(relief::plaster(size), size);
+        let size = Vec2::splat(0.19);
+        let blue = b.texture(paint::weave([0.16, 0.24, 0.36], 64), size);
+        let grey = b.texture(paint::weave([0.44, 0.43, 0.41], 64), size);
+        let threads = b.data(relief::weave(size, 64), size);
         let linen = b.texture(paint::weave([0.62, 0.55, 0.44], 128), Vec2::splat(0.3));
         let rug = b.texture(
             paint::rug([0.55, 0.52, 0.47], [0.14, 0.20, 0.28], [0.62, 0.42, 0.16]),
@@ -64,14 +73,17 @@ impl Palette {
             b.material(textured("painting", art, 0.55))
         });
         Self {
-            wall: b.material(textured("wall", plaster, 0.85)),
-            feature: b.material(textured("clay wall", feature, 0.85)),
+            wall: b.material(embossed(textured("wall", plaster, 0.85), trowel)),
+            feature: b.material(embossed(textured("clay wall", feature, 0.85), trowel)),
             ceiling: b.material(matte("ceiling", [0.80, 0.79, 0.78], 0.9)),
-            boards: b.material(varnished(textured("floor boards", boards, 0.55), 0.35, 0.25)),
+            boards: b.material(embossed(
+                varnished(textured("floor boards", boards, 0.55), 0.35, 0.25),
+                joints,
+            )),
             white: b.material(matte("white paint", [0.78, 0.77, 0.75], 0.35)),
-            oak: b.material(varnished(textured("oak", oak, 0.5), 0.4, 0.25)),
-            cloth: b.material(two_sided(textured("blue cloth", blue, 0.9))),
-            sofa: b.material(textured("grey cloth", grey, 0.9)),
+            oak: b.material(embossed(varnished(textured("oak", oak, 0.5), 0.4, 0.25), grain)),
+            cloth: b.material(embossed(two_sided(textured("blue cloth", blue, 0.9)), threads)),
+            sofa: b.material(embossed(textured("grey cloth", grey, 0.9), threads)),
             curtain: b.material(two_sided(textured("curtain", linen, 0.9))),
             rug: b.material(two_sided(textured("rug", rug, 0.95))),
             fringe: b.material(matte("fringe", [0.62, 0.58, 0.5], 0.95)),

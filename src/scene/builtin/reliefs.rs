@@ -3,7 +3,7 @@
 use glam::{IVec2, Vec2};
 use rayon::prelude::*;
 
-use super::textures::{TIMBER, Thread, fibres};
+use super::textures::{Board, TIMBER, Thread, fibres};
 use crate::noise::tiling_fbm;
 use crate::scene::TextureImage;
 
@@ -40,12 +40,33 @@ fn relief(
     TextureImage { width, height, texels }
 }
 
-/// Of `textures::timber`: open pores and raised fibres.
+/// Open pores and raised fibres.
+fn grain(uv: Vec2, seed: u32) -> f32 {
+    let (fibre, pore) = fibres(uv, seed);
+    1.2e-4 * fibre - 2.2e-4 * pore
+}
+
+/// Of `textures::timber`.
 pub(super) fn timber(size: Vec2) -> TextureImage {
-    relief(512, 384, size, |uv| {
-        let (fibre, pore) = fibres(uv, TIMBER);
-        1.2e-4 * fibre - 2.2e-4 * pore
+    relief(512, 384, size, |uv| grain(uv, TIMBER))
+}
+
+/// Of a floor of boards, whose joints are half a millimetre deep.
+fn floor(size: Vec2, board: impl Fn(Vec2) -> Board + Sync) -> TextureImage {
+    relief(1024, 1024, size, |uv| {
+        let board = board(uv);
+        5e-4 * board.top + grain(board.wood, board.seed)
     })
+}
+
+/// Of `textures::planks`.
+pub(super) fn planks(size: Vec2, rows: u32, boards: u32) -> TextureImage {
+    floor(size, |uv| Board::of_planks(uv, rows, boards))
+}
+
+/// Of `textures::herringbone`.
+pub(super) fn herringbone(size: Vec2) -> TextureImage {
+    floor(size, Board::of_herringbone)
 }
 
 /// Of `textures::plaster`: traces of the trowel.

@@ -35,7 +35,6 @@ pub(super) fn build() -> Scene {
             translucent(b);
         });
     });
-    b.add_tangents();
     let place = |p: [f32; 3]| {
         let turn = glam::Quat::from_rotation_y(TURN.to_radians());
         (turn * Vec3::from(p)).to_array()

@@ -1,6 +1,6 @@
 //! Procedural colour textures, deterministic and tileable.
 
-use glam::{IVec2, Vec2, Vec3};
+use glam::{FloatExt, IVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::color::srgb_from_linear;
@@ -61,28 +61,38 @@ pub(super) fn timber(tone: [f32; 3]) -> TextureImage {
     paint(512, 384, |uv| grain(uv, tone, TIMBER))
 }
 
-/// Floor boards along u: `rows` of them, each of `boards` pieces, with staggered ends.
-pub(super) fn planks(tone: [f32; 3], rows: u32, boards: u32) -> TextureImage {
-    let tone = Vec3::from(tone);
-    paint(1024, 1024, |uv| {
+/// A piece of a wooden floor at a place of it.
+pub(super) struct Board {
+    /// Tells its grain apart.
+    pub(super) seed: u32,
+    /// Place in the wood that it is cut from.
+    pub(super) wood: Vec2,
+    /// 0 in the middle of a joint, 1 away from it.
+    pub(super) top: f32,
+    shade: f32,
+}
+
+impl Board {
+    /// One of `rows` of boards along u, each of `boards` pieces, with staggered ends.
+    pub(super) fn of_planks(uv: Vec2, rows: u32, boards: u32) -> Self {
         let v = uv.y * rows as f32;
         let row = v as u32;
         let u = (uv.x * boards as f32 + unit(row * 7 + 3)).rem_euclid(boards as f32);
         let id = hash(row * 131 + u as u32);
-        let shade = 0.78 + 0.44 * unit(id);
         let edge = (v.fract().min(1.0 - v.fract()) / rows as f32)
             .min(u.fract().min(1.0 - u.fract()) / boards as f32);
-        let gap = smoothstep(0.0004, 0.0022, edge);
-        grain(uv + Vec2::new(unit(id), unit(id ^ 1)), tone * shade, id) * (0.35 + 0.65 * gap)
-    })
-}
+        Self {
+            seed: id,
+            wood: uv + Vec2::new(unit(id), unit(id ^ 1)),
+            top: smoothstep(0.0004, 0.0022, edge),
+            shade: 0.78 + 0.44 * unit(id),
+        }
+    }
 
-/// Herringbone parquet; the texture covers 24 x 24 block widths of blocks 1 x 6.
-pub(super) fn herringbone(tone: [f32; 3]) -> TextureImage {
-    const LENGTH: i32 = 6;
-    const CELLS: i32 = 24;
-    let tone = Vec3::from(tone);
-    paint(1024, 1024, |uv| {
+    /// A block of herringbone: the texture covers 24 x 24 widths of blocks 1 x 6.
+    pub(super) fn of_herringbone(uv: Vec2) -> Self {
+        const LENGTH: i32 = 6;
+        const CELLS: i32 = 24;
         let p = uv * CELLS as f32;
         let cell = p.as_ivec2();
         let d = (cell.x - cell.y).rem_euclid(2 * LENGTH);
@@ -98,11 +108,30 @@ pub(super) fn herringbone(tone: [f32; 3]) -> TextureImage {
         let start = start.rem_euclid(IVec2::splat(CELLS));
         let id = hash((start.x * 64 + start.y * 2 + i32::from(lying)) as u32);
         let edge = across.min(1.0 - across).min(along).min(LENGTH as f32 - along);
-        let gap = smoothstep(0.0, 0.045, edge);
-        let wood = Vec2::new(along / 24.0 + unit(id), across / 24.0 + unit(id ^ 3));
-        let shade = 0.76 + 0.42 * unit(id ^ 7);
-        grain(wood, tone * shade, 40 + (id & 7)) * (0.45 + 0.55 * gap)
-    })
+        Self {
+            seed: 40 + (id & 7),
+            wood: Vec2::new(along / 24.0 + unit(id), across / 24.0 + unit(id ^ 3)),
+            top: smoothstep(0.0, 0.045, edge),
+            shade: 0.76 + 0.42 * unit(id ^ 7),
+        }
+    }
+
+    /// Its colour, its joints in this much of it.
+    fn color(&self, tone: Vec3, joint: f32) -> Vec3 {
+        grain(self.wood, tone * self.shade, self.seed) * joint.lerp(1.0, self.top)
+    }
+}
+
+/// Floor boards along u: `rows` of them, each of `boards` pieces.
+pub(super) fn planks(tone: [f32; 3], rows: u32, boards: u32) -> TextureImage {
+    let tone = Vec3::from(tone);
+    paint(1024, 1024, |uv| Board::of_planks(uv, rows, boards).color(tone, 0.35))
+}
+
+/// Herringbone parquet, 24 widths of a block each way.
+pub(super) fn herringbone(tone: [f32; 3]) -> TextureImage {
+    let tone = Vec3::from(tone);
+    paint(1024, 1024, |uv| Board::of_herringbone(uv).color(tone, 0.45))
 }
 
 /// Wall paint over plaster: nearly even, a little cloudy.

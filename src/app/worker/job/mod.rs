@@ -21,6 +21,8 @@ use crate::render::{Gi, Phase, Sampling, Session, View};
 /// Samples a pixel of the calm picture, which is rendered before the exact one: with them it is as good,
 /// denoised, as the exact one with twice as many, in half the time.
 const CALM_SAMPLES: u32 = 16;
+/// While there is much to learn the picture goes on a little this often.
+const STANDSTILL: Duration = Duration::from_millis(400);
 
 pub(super) struct Job<'a> {
     shared: &'a Shared,
@@ -111,6 +113,8 @@ impl<'a> Job<'a> {
         let mut calm = None;
         // Of the calm picture, one after the other.
         let mut turns = 0;
+        // When the picture went on last.
+        let mut went_on = Instant::now();
         while let Some(activity) = self.next_activity(&main) {
             let wants_calm = self.is_calm(&main);
             if !wants_calm {
@@ -137,10 +141,14 @@ impl<'a> Job<'a> {
                     self.rest();
                     continue;
                 }
-                // A picture first.
-                Activity::Learning(_) if self.beginning(&main).is_some() => {
+                // A picture first, and one that goes on.
+                Activity::Learning(_)
+                    if self.beginning(&main).is_some()
+                        && (!main.is_begun() || went_on.elapsed() >= STANDSTILL) =>
+                {
                     self.advance(&mut main, None, true);
                     self.measure(&main);
+                    went_on = Instant::now();
                 }
                 Activity::Learning(_) => self.learn(&mut main),
                 Activity::Rendering | Activity::Moving => match &mut plain {

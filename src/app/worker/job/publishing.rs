@@ -95,8 +95,8 @@ impl Job<'_> {
         self.publish_gap = gap_after(cost);
     }
 
-    /// What is shown together with the session's own film: the calm one once it has more to say than
-    /// what was seen before.
+    /// What is shown together with the session's own film: the calm one once it has clearly more to say
+    /// than what was seen before, as chance and gaps between its first pixels count against it.
     fn shown_backdrop(
         &mut self,
         main: &Session<'_>,
@@ -104,7 +104,8 @@ impl Job<'_> {
     ) -> Option<Backdrop> {
         let before = self.backdrop().map(|film| Backdrop { film, worth: 1.0, is_cached: false });
         let seen = before.as_ref().map_or(0, |backdrop| backdrop.film.total_samples());
-        let Some(calm) = calm.filter(|calm| calm.figures().samples > seen) else { return before };
+        let says_more = |calm: &&Session<'_>| 2 * calm.figures().samples > 3 * seen;
+        let Some(calm) = calm.filter(says_more) else { return before };
         // It is megabytes and is soon complete.
         let samples = calm.figures().samples;
         let kept = self.calm_film.take().filter(|(of, _)| *of == samples);
