@@ -62,6 +62,8 @@ pub enum Command {
     CloseSheets,
     /// Keep the present picture for comparison.
     KeepPicture,
+    /// Set everything as it was for a kept picture.
+    SetAsKept(usize),
     /// Compute the true visible energy at the inspected point.
     MeasureTruth,
     /// Ask where to write the inspected cell's distribution.

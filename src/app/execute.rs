@@ -4,17 +4,18 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
-use egui::{Color32, ColorImage};
-
 use super::commands::Command;
 use super::document::Viewpoint;
-use super::interface::{Dock, Interface, Prompt, Purpose, Tab};
+use super::history::{self, Kept};
+use super::interface::{Chosen, Dock, Interface, Prompt, Purpose, Tab};
+use super::screen::color_image;
 use super::worker::Reference;
 use super::{App, Later, convergence, save, surface_map, theme};
 use crate::error::{Error, Result};
-use crate::image::{Rgb8, read_picture};
+use crate::image::read_picture;
 use crate::render::gpu::DeviceChoice;
 use crate::scene::builtin;
+use crate::tone::display_rgb8;
 
 impl App {
     pub(super) fn execute(&mut self, command: Command, context: &egui::Context) {
@@ -102,6 +103,11 @@ impl App {
             Command::ToggleShortcuts => interface.shortcuts = !interface.shortcuts,
             Command::CloseSheets => (interface.shortcuts, interface.is_marking) = (false, false),
             Command::KeepPicture => self.keep(),
+            Command::SetAsKept(index) => {
+                if let Some(kept) = self.history.get(index) {
+                    self.document = kept.document.clone();
+                }
+            }
             Command::Quit => self.is_closing = true,
             Command::MeasureTruth => {
                 if let Some(snapshot) = &self.snapshot {
@@ -127,8 +133,23 @@ impl App {
             snapshot.main.film.min_samples(),
             self.document.scene
         );
-        self.history.keep(snapshot, summary);
-        self.interface.compared = Some(self.history.list().len() - 1);
+        let shown =
+            self.shown.as_ref().filter(|shown| shown.order.snapshot.number == snapshot.number);
+        let image = shown.and_then(|shown| shown.image.clone());
+        let image = image.unwrap_or_else(|| Arc::new(snapshot.main.film.image()));
+        let look = &self.document.look;
+        let small = look.white_balance.apply(image.shrunk(history::SMALL_WIDTH));
+        let exposure_ev = self.exposure_ev().unwrap_or_default();
+        self.history.keep(Kept {
+            name: String::new(),
+            summary,
+            small: color_image(&display_rgb8(&small, exposure_ev, look.curve)),
+            image,
+            document: self.document.clone(),
+            texture: None,
+        });
+        self.interface.compared =
+            Chosen { left: Some(self.history.list_mut().len() - 1), ..Chosen::default() };
         self.interface.tab = Tab::Picture;
     }
 
@@ -316,12 +337,6 @@ impl App {
             Err(error) => self.messages.notice(format!("The picture cannot be copied: {error}")),
         }
     }
-}
-
-/// The picture as egui wants it.
-fn color_image(picture: &Rgb8) -> ColorImage {
-    let pixels = picture.pixels.iter().map(|[r, g, b]| Color32::from_rgb(*r, *g, *b)).collect();
-    ColorImage::new([picture.width as usize, picture.height as usize], pixels)
 }
 
 /// A person takes longer to close a file dialogue.

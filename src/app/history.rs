@@ -2,11 +2,16 @@
 
 use std::sync::Arc;
 
-use super::worker::Snapshot;
+use egui::{ColorImage, TextureHandle};
+
+use super::document::Document;
 use crate::image::Image;
 
 /// Most pictures kept.
 const MOST: usize = 12;
+
+/// Width in pixels at which they are shown in the list.
+pub const SMALL_WIDTH: u32 = 128;
 
 /// A kept picture.
 pub struct Kept {
@@ -14,8 +19,14 @@ pub struct Kept {
     pub name: String,
     /// What was done for it.
     pub summary: String,
-    /// Linear radiance.
+    /// Linear radiance, as it was shown.
     pub image: Arc<Image>,
+    /// The settings that made it.
+    pub document: Document,
+    /// It in small.
+    pub small: ColorImage,
+    /// The same on the device, once it was drawn.
+    pub texture: Option<TextureHandle>,
 }
 
 /// Kept pictures, oldest first.
@@ -26,11 +37,10 @@ pub struct History {
 }
 
 impl History {
-    /// Keeps what is rendered now.
-    pub fn keep(&mut self, snapshot: &Snapshot, summary: String) {
+    /// Keeps a picture, which it names.
+    pub fn keep(&mut self, kept: Kept) {
         self.count += 1;
-        let image = Arc::new(snapshot.main.film.image());
-        self.list.push(Kept { name: format!("Picture {}", self.count), summary, image });
+        self.list.push(Kept { name: format!("Picture {}", self.count), ..kept });
         if self.list.len() > MOST {
             self.list.remove(0);
         }
@@ -42,8 +52,8 @@ impl History {
     }
 
     /// All of them.
-    pub fn list(&self) -> &[Kept] {
-        &self.list
+    pub fn list_mut(&mut self) -> &mut [Kept] {
+        &mut self.list
     }
 
     /// Drops one.

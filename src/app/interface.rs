@@ -35,8 +35,8 @@ pub struct Interface {
     pub material: Option<u32>,
     /// Whether it was just clicked: its settings are to come into sight.
     pub is_material_new: bool,
-    /// Which picture of the history is compared.
-    pub compared: Option<usize>,
+    /// What of the history is compared.
+    pub compared: Chosen,
     /// Where the wipe is, `[0,1]` across the picture.
     pub wipe: f32,
     /// Whether what was learned is kept as it is.
@@ -57,6 +57,17 @@ pub struct Interface {
     pub moving_until: f64,
     /// Keys held that fly the camera.
     pub flying: Vec<egui::Key>,
+}
+
+/// Pictures of the history, by their number, that are compared.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Chosen {
+    /// The one at the left; `None` compares nothing.
+    pub left: Option<usize>,
+    /// The one at the right; `None` is what is rendered.
+    pub right: Option<usize>,
+    /// Whether their difference is shown, and not one beside the other.
+    pub is_difference: bool,
 }
 
 /// What the right panel shows.
@@ -130,7 +141,7 @@ impl Default for Interface {
             pinned: None,
             material: None,
             is_material_new: false,
-            compared: None,
+            compared: Chosen::default(),
             wipe: 0.5,
             is_frozen: false,
             is_marking: false,

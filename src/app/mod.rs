@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::Vec2;
 
 pub mod commands;
+mod comparison;
 pub mod convergence;
 pub mod document;
 pub mod drag;
@@ -45,6 +46,7 @@ use crate::path::framing;
 use crate::render::gpu::{DeviceChoice, RayChoice};
 
 use commands::Command;
+use comparison::Comparison;
 use convergence::Convergence;
 use document::{Document, PictureSize, Viewpoint};
 use history::History;
@@ -334,7 +336,7 @@ impl App {
         panels::right::show(ui, &mut self.interface, |ui, interface| match interface.tab {
             interface::Tab::Picture => {
                 panels::picture::show(ui, &mut self.document, exposure_ev, commands);
-                panels::history::show(ui, &mut self.history, interface, commands);
+                panels::history::show(ui, &mut self.history, &mut interface.compared, commands);
             }
             interface::Tab::Inspect => {
                 panels::method::show(ui, &mut self.document.light);
@@ -369,14 +371,27 @@ impl App {
         });
     }
 
-    /// The kept picture that is compared; kept pictures are whole ones.
-    fn past(&self) -> Option<&history::Kept> {
-        let index = self.interface.compared.filter(|_| self.document.region.is_none())?;
-        self.history.get(index)
+    /// The kept pictures that are compared, the right one only where it is another than what is rendered;
+    /// they are whole ones.
+    fn compared(&self) -> Option<[Option<&history::Kept>; 2]> {
+        let chosen = self.interface.compared;
+        let left = chosen.left.filter(|_| self.document.region.is_none())?;
+        Some([self.history.get(left), chosen.right.and_then(|right| self.history.get(right))])
+    }
+
+    fn comparison(&self) -> Option<Comparison> {
+        let [left, right] = self.compared()?.map(|kept| kept.map(|kept| Arc::clone(&kept.image)));
+        Some(Comparison {
+            left: left?,
+            right,
+            is_difference: self.interface.compared.is_difference,
+        })
     }
 
     fn viewport(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
-        let past = self.past().map(|kept| kept.name.clone());
+        let names = self
+            .compared()
+            .map(|both| both.map(|kept| kept.map_or_else(|| "Now".to_owned(), |k| k.name.clone())));
         let settings = self.develop_settings();
         let mut scope = panels::scope::Scope {
             document: &mut self.document,
@@ -387,7 +402,7 @@ impl App {
             settings,
             snapshot: self.snapshot.as_deref(),
             speed_up: self.speed_up.filter(|_| !self.is_repeatable),
-            past: past.as_deref(),
+            compared: names,
             scene: self.scene.as_ref(),
             loading: self.loader.busy_with().next().is_some(),
             commands,
@@ -540,7 +555,7 @@ impl App {
             self.worker.submit(request);
         }
         if let Some(snapshot) = self.snapshot.as_ref().filter(|s| s.has_picture()) {
-            let past = self.past().map(|kept| Arc::clone(&kept.image));
+            let compared = self.comparison();
             let look = &self.document.look;
             self.presenter.order(Order {
                 developer: Arc::clone(&self.screen.developer),
@@ -549,7 +564,7 @@ impl App {
                 metered: look.auto_exposure.then_some(look.white_balance),
                 overlay: self.interface.overlay,
                 tile: self.interface.tile,
-                past,
+                compared,
             });
         }
     }

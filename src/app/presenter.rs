@@ -6,6 +6,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::Wake;
+use super::comparison::{Compared, Comparison};
 use super::overlays::{CellFacts, Label, Legend, Overlay, Sources};
 use super::surface_map::SurfaceMap;
 use super::worker::{Activity, Backdrop, Request, SessionSnapshot, Snapshot};
@@ -32,8 +33,8 @@ pub struct Order {
     pub overlay: Option<Overlay>,
     /// The tile chosen on the map.
     pub tile: Option<u32>,
-    /// A picture of the history to wipe against.
-    pub past: Option<Arc<Image>>,
+    /// Kept pictures that are compared.
+    pub compared: Option<Comparison>,
 }
 
 impl PartialEq for Order {
@@ -44,7 +45,7 @@ impl PartialEq for Order {
             && self.metered == other.metered
             && self.overlay == other.overlay
             && self.tile == other.tile
-            && address(self.past.as_ref()) == address(other.past.as_ref())
+            && self.compared == other.compared
     }
 }
 
@@ -61,16 +62,14 @@ impl Order {
 /// cores, it takes a twentieth of the machine.
 const REST: u32 = 9;
 
-fn address(image: Option<&Arc<Image>>) -> Option<usize> {
-    image.map(|image| Arc::as_ptr(image).addr())
-}
-
 /// What the screen is developed from.
 pub struct Shown {
     /// What was ordered.
     pub order: Order,
     /// The picture.
     pub(super) picture: LinearPicture,
+    /// It as it was made on the host, unless it was made on the device.
+    pub(super) image: Option<Arc<Image>>,
     /// What the wipe uncovers: the plain picture or one of the history.
     pub(super) other: Option<LinearPicture>,
     /// Stops that bring the picture to middle grey; 0 unless measured.
@@ -232,8 +231,26 @@ impl<K: PartialEq, V: Clone> Last<K, V> {
     }
 }
 
-/// A picture on the device, and why its noise was not taken out as was wished.
-type Prepared = (LinearPicture, Option<String>);
+/// A picture on the device.
+#[derive(Clone)]
+struct Prepared {
+    picture: LinearPicture,
+    /// The same, if it was made on the host.
+    image: Option<Arc<Image>>,
+    /// Why its noise was not taken out as was wished.
+    failure: Option<String>,
+}
+
+impl Prepared {
+    fn of(developer: &Developer, image: Image) -> Self {
+        let picture = developer.upload_image(&image);
+        Self { picture, image: Some(Arc::new(image)), failure: None }
+    }
+
+    fn on_device(picture: LinearPicture) -> Self {
+        Self { picture, image: None, failure: None }
+    }
+}
 
 /// What can be used again for the next order.
 #[derive(Default)]
@@ -249,8 +266,8 @@ struct Uploads {
     developer: Option<Arc<Developer>>,
     picture: Last<Source, Prepared>,
     plain: Last<Source, Prepared>,
-    /// By the picture's address, which stays its own for as long as it is kept.
-    past: Last<Option<usize>, (LinearPicture, Arc<Image>)>,
+    /// By the picture that is rendered, too, where that is compared.
+    compared: Last<(Comparison, Option<Source>), Compared>,
     metered: Last<(Source, WhiteBalance), f32>,
     /// By snapshot, overlay and tile.
     overlay: Last<(u64, Overlay, Option<u32>), Option<Painted>>,
@@ -274,8 +291,8 @@ impl Memory {
         }
         let source = Source::main(&order);
         let prepare = || Ok(source.prepare(&developer));
-        let (picture, failure) = self.uploads.picture.or_make(source.clone(), prepare)?;
-        let (other, other_failure) = self.other(&order)?.unzip();
+        let Prepared { mut picture, image, mut failure } =
+            self.uploads.picture.or_make(source.clone(), prepare)?;
         let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
             let meter = || developer.auto_exposure_ev(&picture, white_balance);
             self.uploads.metered.or_make((source.clone(), white_balance), meter)
@@ -287,6 +304,19 @@ impl Memory {
             self.uploads.overlay = last;
             painted
         })?;
+        let mut other = None;
+        if let Some(comparison) = &order.compared {
+            let now = || image.clone().unwrap_or_else(|| Arc::new(source.session.film.image()));
+            let of = comparison.shows_now().then(|| source.clone());
+            let compare = || Ok(comparison.prepare(&developer, now));
+            let compared = self.uploads.compared.or_make((comparison.clone(), of), compare)?;
+            picture = compared.picture.unwrap_or(picture);
+            (other, failure) = (compared.other, failure.or(compared.failure));
+        } else if let Some(source) = Source::plain(&order) {
+            let prepare = || Ok(source.prepare(&developer));
+            let plain = self.uploads.plain.or_make(source.clone(), prepare)?;
+            (other, failure) = (Some(plain.picture), failure.or(plain.failure));
+        }
         developer.gpu().check()?;
         let facts = self.facts.as_ref().map(|(_, _, facts)| Arc::clone(facts));
         let (overlay, words) =
@@ -295,27 +325,15 @@ impl Memory {
         Ok(Shown {
             order,
             picture,
+            image,
             other,
             automatic_ev,
             overlay,
             legend,
             labels: labels.unwrap_or_default(),
-            failure: failure.or(other_failure.flatten()),
+            failure,
             facts,
         })
-    }
-
-    /// What the wipe uncovers.
-    fn other(&mut self, order: &Order) -> Result<Option<Prepared>> {
-        let developer = &order.developer;
-        if let Some(past) = &order.past {
-            let upload = || Ok((developer.upload_image(past), Arc::clone(past)));
-            let (picture, _) = self.uploads.past.or_make(address(Some(past)), upload)?;
-            return Ok(Some((picture, None)));
-        }
-        let Some(source) = Source::plain(order) else { return Ok(None) };
-        let prepare = || Ok(source.prepare(developer));
-        self.uploads.plain.or_make(source.clone(), prepare).map(Some)
     }
 
     fn paint(
@@ -419,22 +437,22 @@ impl Source {
         };
         let blended = || {
             let backdrop = self.backdrop.as_ref().map(|backdrop| (&*backdrop.film, backdrop.worth));
-            developer.upload_image(&blend(film, backdrop))
+            Prepared::of(developer, blend(film, backdrop))
         };
         let is_calmed = self.backdrop.as_ref().is_some_and(|backdrop| backdrop.is_cached);
         match self.denoiser {
             // A picture with holes or in other pixels is there to see where one is going.
-            _ if !self.is_whole => (blended(), None),
-            Some(_) if is_calmed => (blended(), None),
-            None => (noisy(false), None),
+            _ if !self.is_whole => blended(),
+            Some(_) if is_calmed => blended(),
+            None => Prepared::on_device(noisy(false)),
             Some(Denoiser::ATrous) if developer.can_denoise(film.width, film.height) => {
-                (developer.denoised(&noisy(true)), None)
+                Prepared::on_device(developer.denoised(&noisy(true)))
             }
             // Where that takes seconds, what takes a twentieth of it will do.
-            Some(Denoiser::ATrous) => (blended(), None),
+            Some(Denoiser::ATrous) => blended(),
             Some(Denoiser::Oidn) => match Denoiser::Oidn.denoise(film) {
-                Ok(image) => (developer.upload_image(&image), None),
-                Err(failure) => (blended(), Some(failure.to_string())),
+                Ok(image) => Prepared::of(developer, image),
+                Err(failure) => Prepared { failure: Some(failure.to_string()), ..blended() },
             },
         }
     }
@@ -469,7 +487,7 @@ mod tests {
         let is_live = |developer: &Developer, session: &SessionSnapshot, denoiser| {
             let session = session.clone();
             let source = Source { session, backdrop: None, denoiser, is_whole: true };
-            source.prepare(developer).0.is_live()
+            source.prepare(developer).picture.is_live()
         };
         assert!(!is_live(&developer, &session, None));
         let uploaded = developer.upload_film(&session.film, true);

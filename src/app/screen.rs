@@ -6,11 +6,12 @@ use std::sync::Arc;
 
 use egui::epaint::{ImageData, ImageDelta};
 use egui::mutex::RwLock;
-use egui::{TextureId, TexturesDelta};
+use egui::{Color32, ColorImage, TextureId, TexturesDelta};
 use egui_wgpu::Renderer;
 
 use crate::develop::{DevelopSettings, Developer, DisplayTexture, LinearPicture, OverlayTexture};
 use crate::error::Result;
+use crate::image::Rgb8;
 use crate::render::gpu::Gpu;
 
 /// The device and what draws there; clones share it.
@@ -33,6 +34,12 @@ impl Screen {
     pub(super) fn gpu(&self) -> &Gpu {
         self.developer.gpu()
     }
+}
+
+/// A picture as egui wants it.
+pub(super) fn color_image(picture: &Rgb8) -> ColorImage {
+    let pixels = picture.pixels.iter().map(|[r, g, b]| Color32::from_rgb(*r, *g, *b)).collect();
+    ColorImage::new([picture.width as usize, picture.height as usize], pixels)
 }
 
 /// What a developed picture was made from.
@@ -147,7 +154,7 @@ fn paste(whole: &mut ImageDelta, patch: &ImageData, [left, top]: [usize; 2]) {
 
 #[cfg(test)]
 mod tests {
-    use egui::{Color32, ColorImage, TextureOptions};
+    use egui::TextureOptions;
 
     use super::*;
 

@@ -11,11 +11,13 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::LEAST_ALBEDO;
 use crate::color::luminance;
 use crate::image::Image;
 use crate::render::film::{Film, Pixel, Surface};
 
+/// Albedo below which surfaces count as this bright: what they mirror, divided by theirs, would shine on
+/// what is beside them.
+const LEAST_ALBEDO: f32 = 0.1;
 /// The coarsest scale's cells are 2^7 pixels wide.
 const SCALES: usize = 8;
 /// What neighbours on another surface count, so that somebody always does.
@@ -26,6 +28,9 @@ const DEPTH_TOLERANCE: f32 = 0.02;
 const LEAST_SCALE_OF_CHANCE: usize = 3;
 /// The spread around a cell counts as much as so many samples of its own, at least.
 const SPREAD_SAMPLES: f32 = 2.0;
+/// Squared means over their variance from which, and up to which, a cell is more and more believed that it is
+/// brighter than all around. One bright sample among any number of dark ones has 1.
+const BELIEVED: [f32; 2] = [3.0, 20.0];
 /// Neighbours that are no more alike than this say nothing of each other's spread.
 const ALIKE: f32 = 0.3;
 
@@ -206,6 +211,20 @@ impl Cell {
         sum
     }
 
+    /// What share of its light a cell has for itself where it should have `most`; of more only what its
+    /// samples agree on. The rest goes to all around: coarser scales know of it.
+    fn believed(&self, most: f32) -> f32 {
+        let mean = luminance(self.light) / self.samples;
+        if mean <= most {
+            return 1.0;
+        }
+        let squares = self.deviation / (self.freedom * self.samples);
+        let certainty = if self.freedom >= 1.0 { mean * mean / squares.max(1e-30) } else { 0.0 };
+        let [from, to] = BELIEVED;
+        let share = ((certainty - from) / (to - from)).clamp(0.0, 1.0);
+        (most + (mean - most) * share) / mean
+    }
+
     fn guide(&self) -> Guide {
         Guide {
             normal: self.normal.normalize_or_zero(),
@@ -268,6 +287,23 @@ impl Scale<Cell> {
         Self { width, height, cells }
     }
 
+    /// Luminance of the second brightest cell around one, so that no lone bright sample vouches for another;
+    /// `None` where too few have samples.
+    fn brightness_around(&self, (x, y): (usize, usize)) -> Option<f32> {
+        let (mut first, mut second, mut count) = (0.0_f32, 0.0_f32, 0);
+        for v in y.saturating_sub(1)..(y + 2).min(self.height) {
+            for u in x.saturating_sub(1)..(x + 2).min(self.width) {
+                let cell = &self.cells[v * self.width + u];
+                if (u, v) != (x, y) && cell.samples > 0.0 {
+                    let own = luminance(cell.light) / cell.samples;
+                    (first, second) = (first.max(own), second.max(own.min(first)));
+                    count += 1;
+                }
+            }
+        }
+        (count > 2).then_some(second)
+    }
+
     /// Adds the samples of another picture. The field of view is vertical: pictures of different
     /// shapes share their middle.
     fn add(&mut self, other: &Self, worth: f32) {
@@ -325,7 +361,9 @@ fn refined(
             // A pixel that has met little light is too dark and sure of it.
             estimate.variance = estimate.spread.max(expected) / cell.samples;
             if coarser.is_some() {
-                estimate.detail = mean - estimate.light;
+                let around = cells.brightness_around((i % width, i / width));
+                let most = around.unwrap_or(luminance(estimate.light));
+                estimate.detail = mean * cell.believed(most) - estimate.light;
             } else {
                 estimate.light = mean;
             }
@@ -474,7 +512,26 @@ mod tests {
         };
         let image = blend(&film([40, 30], 1, 2, light), None);
         let brightest = image.pixels.iter().map(|p| p[0]).fold(0.0, f32::max);
-        assert!(brightest < 25.0, "{brightest}");
+        assert!(brightest < 3.0, "{brightest}");
+        let mean = image.pixels.iter().map(|p| p[0]).sum::<f32>() / (40.0 * 30.0);
+        assert!((mean - 1.2).abs() < 0.1, "nothing is lost: {mean}");
+    }
+
+    #[test]
+    fn a_small_lamp_that_all_samples_see_stays_small_and_bright() {
+        let lamp = |x: u32, y: u32| if (x, y) == (20, 11) { 500.0 } else { 1.0 };
+        let image = blend(&film([40, 30], 1, 4, |x, y, _| lamp(x, y)), None);
+        assert!(error(&image, lamp) < 1e-3);
+    }
+
+    #[test]
+    fn many_lone_bright_samples_leave_no_dots() {
+        let light = |x, y, sample| if noise(x, y, sample) < 0.04 { 25.0 } else { 0.5 };
+        for every in [2, 1] {
+            let image = blend(&film([96, 96], every, 1, light), None);
+            let brightest = image.pixels.iter().map(|p| p[0]).fold(0.0, f32::max);
+            assert!(brightest < 6.0, "{brightest} where 1 is right, every {every}");
+        }
     }
 
     /// A window's edge while a pass is under way, when part of the rows has one sample more.

@@ -1,35 +1,78 @@
 //! Kept pictures.
 
-use egui::Ui;
+use egui::{Image, Sense, TextureOptions, Ui, Vec2};
 
 use crate::app::commands::Command;
-use crate::app::history::History;
-use crate::app::interface::Interface;
+use crate::app::history::{History, Kept};
+use crate::app::interface::Chosen;
 use crate::app::theme;
 
-/// Draws the list: one can be chosen to wipe against.
+/// Height of a small picture in points.
+const HEIGHT: f32 = 48.0;
+
+/// Draws the list: two can be chosen to be compared, or one and what is rendered.
 pub(in crate::app) fn show(
     ui: &mut Ui,
     history: &mut History,
-    interface: &mut Interface,
-    _commands: &mut [Command],
+    chosen: &mut Chosen,
+    commands: &mut Vec<Command>,
 ) {
-    let mut removed = None;
-    for (i, kept) in history.list().iter().enumerate() {
+    if chosen.left.is_some() {
         ui.horizontal(|ui| {
-            let is_chosen = interface.compared == Some(i);
-            let label = ui.selectable_label(is_chosen, &kept.name).on_hover_text(&kept.summary);
-            if label.clicked() {
-                interface.compared = (!is_chosen).then_some(i);
-            }
-            if ui.small_button("×").on_hover_text("Forget this picture").clicked() {
-                removed = Some(i);
-            }
+            let mut way = |is_difference, name, hint| {
+                ui.selectable_value(&mut chosen.is_difference, is_difference, name)
+                    .on_hover_text(hint);
+            };
+            way(false, "Wipe", "One beside the other, with a line that can be dragged");
+            way(true, "Difference", "How far apart they are, four times as bright");
         });
-        ui.label(theme::quiet(&kept.summary));
+    }
+    let mut removed = None;
+    for (i, kept) in history.list_mut().iter_mut().enumerate() {
+        ui.horizontal(|ui| {
+            if small(ui, kept).clicked() {
+                chosen.left = (chosen.left != Some(i)).then_some(i);
+            }
+            ui.vertical(|ui| {
+                ui.spacing_mut().item_spacing.y = 2.0;
+                ui.label(&kept.name);
+                ui.label(theme::quiet(&kept.summary));
+                ui.horizontal(|ui| {
+                    ui.spacing_mut().item_spacing.x = 4.0;
+                    side(ui, &mut chosen.left, i, "Left");
+                    let has_left = chosen.left.is_some();
+                    ui.add_enabled_ui(has_left, |ui| side(ui, &mut chosen.right, i, "Right"));
+                    let hint = "Set scene, map, camera and everything else as they were for it";
+                    if ui.small_button("As then").on_hover_text(hint).clicked() {
+                        commands.push(Command::SetAsKept(i));
+                    }
+                    if ui.small_button("×").on_hover_text("Forget this picture").clicked() {
+                        removed = Some(i);
+                    }
+                });
+            });
+        });
     }
     if let Some(index) = removed {
         history.remove(index);
-        interface.compared = None;
+        *chosen = Chosen::default();
     }
+}
+
+/// Chooses a picture for one side, or gives that back.
+fn side(ui: &mut Ui, chosen: &mut Option<usize>, index: usize, name: &str) {
+    let is_chosen = *chosen == Some(index);
+    let hint = format!("Compare it, at the {}", name.to_lowercase());
+    if ui.add(egui::Button::selectable(is_chosen, name).small()).on_hover_text(hint).clicked() {
+        *chosen = (!is_chosen).then_some(index);
+    }
+}
+
+fn small(ui: &mut Ui, kept: &mut Kept) -> egui::Response {
+    let texture = kept.texture.get_or_insert_with(|| {
+        ui.ctx().load_texture(&kept.name, kept.small.clone(), TextureOptions::LINEAR)
+    });
+    let size = Vec2::new(HEIGHT * texture.aspect_ratio(), HEIGHT).min(Vec2::new(96.0, HEIGHT));
+    let image = Image::new((texture.id(), size)).sense(Sense::click());
+    ui.add(image).on_hover_text("Compare it with what is rendered, or no longer")
 }

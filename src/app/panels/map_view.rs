@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
-use egui::{
-    Color32, ColorImage, Pos2, Rect, Response, Sense, TextureHandle, TextureOptions, Ui, Vec2,
-};
+use egui::{Color32, Pos2, Rect, Response, Sense, TextureHandle, TextureOptions, Ui, Vec2};
 
 use crate::app::loader::LoadedMap;
+use crate::app::screen::color_image;
 use crate::image::Image;
 use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
 
@@ -63,9 +62,7 @@ fn texture(ui: &Ui, image: &Arc<Image>) -> TextureHandle {
         return texture;
     }
     let rgb = display_rgb8(image, auto_exposure_ev(image) + 0.5, ToneCurve::Agx);
-    let pixels = rgb.pixels.iter().map(|[r, g, b]| Color32::from_rgb(*r, *g, *b)).collect();
-    let picture = ColorImage::new([rgb.width as usize, rgb.height as usize], pixels);
-    let texture = ui.ctx().load_texture("map", picture, TextureOptions::LINEAR);
+    let texture = ui.ctx().load_texture("map", color_image(&rgb), TextureOptions::LINEAR);
     // The image is kept too, so that its address stays its own.
     ui.ctx().data_mut(|data| data.insert_temp(id, (texture.clone(), Arc::clone(image))));
     texture

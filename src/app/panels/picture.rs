@@ -43,7 +43,7 @@ pub(in crate::app) fn show(
     theme::heading(ui, "COMPARE");
     if ui
         .button("Keep this picture")
-        .on_hover_text("Wipe between it and what is rendered next (K)")
+        .on_hover_text("For comparing it with others and with what is rendered next (K)")
         .clicked()
     {
         commands.push(Command::KeepPicture);

@@ -7,6 +7,7 @@ use egui::{
 
 use super::gestures;
 use super::scope::Scope;
+use crate::app::comparison::AMPLIFIED;
 use crate::app::interface::{Interface, Tab};
 use crate::app::presenter::Shown;
 use crate::app::screen::{Developed, Recipe};
@@ -38,6 +39,12 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
             let texture =
                 Developed::update(&mut scope.textures.other, scope.screen, recipe, changes);
             handle = wipe(ui, rect, texture, scope);
+        } else if let Some([left, right]) =
+            scope.compared.as_ref().filter(|_| scope.interface.compared.is_difference)
+        {
+            let text = format!("{left} and {right}: difference × {AMPLIFIED:.0}");
+            let at = Pos2::new(rect.center().x, rect.top() + 14.0);
+            theme::badge(ui, at, Align2::CENTER_TOP, &text, theme::TEXT);
         }
         gestures::show(ui, (whole, rect), &response, handle, scope);
         pin(ui, rect, scope.interface);
@@ -165,8 +172,8 @@ fn wipe_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
     };
     let noise =
         |noise: f64, samples: u32| format!("{samples} samples, noise {:.1} %", 100.0 * noise);
-    let (left, right) = match (scope.past, scope.snapshot) {
-        (Some(name), _) => (name.to_owned(), "Now".to_owned()),
+    let (left, right) = match (&scope.compared, scope.snapshot) {
+        (Some([left, right]), _) => (left.clone(), right.clone()),
         (None, Some(snapshot)) => {
             let take = &snapshot.main;
             let name = crate::app::convergence::name_of(take.sampling);
@@ -179,7 +186,7 @@ fn wipe_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
     };
     corner(rect.left() + 14.0, Align2::LEFT_TOP, &left);
     corner(rect.right() - 14.0, Align2::RIGHT_TOP, &right);
-    if let Some(speed_up) = scope.speed_up.filter(|_| scope.past.is_none()) {
+    if let Some(speed_up) = scope.speed_up.filter(|_| scope.compared.is_none()) {
         let text = format!(
             "{:.2} × as fast ({:.2} to {:.2})",
             speed_up.ratio,

@@ -1,0 +1,105 @@
+//! Kept pictures beside each other, or what tells them apart.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::develop::{Developer, LinearPicture};
+use crate::image::Image;
+
+/// Differences are shown so many times as bright as they are.
+pub(super) const AMPLIFIED: f32 = 4.0;
+
+/// What is compared; equal ones are of the very same pictures.
+#[derive(Clone)]
+pub struct Comparison {
+    /// A kept picture.
+    pub left: Arc<Image>,
+    /// Another one, or `None` for what is rendered now.
+    pub right: Option<Arc<Image>>,
+    /// Whether their difference is shown, and not one beside the other.
+    pub is_difference: bool,
+}
+
+impl PartialEq for Comparison {
+    fn eq(&self, other: &Self) -> bool {
+        let address = |image: &Option<Arc<Image>>| image.as_ref().map(Arc::as_ptr);
+        Arc::ptr_eq(&self.left, &other.left)
+            && address(&self.right) == address(&other.right)
+            && self.is_difference == other.is_difference
+    }
+}
+
+/// A comparison on the device.
+#[derive(Clone)]
+pub(super) struct Compared {
+    /// What is shown in place of the picture that is rendered.
+    pub(super) picture: Option<LinearPicture>,
+    /// What the wipe uncovers.
+    pub(super) other: Option<LinearPicture>,
+    /// Why it is not what was asked for.
+    pub(super) failure: Option<String>,
+}
+
+impl Comparison {
+    /// Whether it changes with the picture that is rendered.
+    pub(super) fn shows_now(&self) -> bool {
+        self.is_difference && self.right.is_none()
+    }
+
+    /// Makes it ready; `now` is the picture that is rendered.
+    pub(super) fn prepare(
+        &self,
+        developer: &Developer,
+        now: impl FnOnce() -> Arc<Image>,
+    ) -> Compared {
+        let mut failure = None;
+        if self.is_difference {
+            let right = self.right.clone().unwrap_or_else(now);
+            match difference(&self.left, &right) {
+                Ok(image) => {
+                    let picture = Some(developer.upload_image(&image));
+                    return Compared { picture, other: None, failure: None };
+                }
+                Err(sentence) => failure = Some(sentence),
+            }
+        }
+        let upload = |image: &Arc<Image>| developer.upload_image(image);
+        Compared {
+            picture: self.right.as_ref().map(upload),
+            other: Some(upload(&self.left)),
+            failure,
+        }
+    }
+}
+
+/// How far apart the pixels of two pictures are, amplified; or why that cannot be said.
+fn difference(a: &Image, b: &Image) -> Result<Image, String> {
+    if (a.width, a.height) != (b.width, b.height) {
+        return Err(format!(
+            "a picture of {} x {} and one of {} x {} have no difference that can be shown",
+            a.width, a.height, b.width, b.height
+        ));
+    }
+    let apart = |(a, b): (&[f32; 3], &[f32; 3])| {
+        std::array::from_fn(|channel| AMPLIFIED * (a[channel] - b[channel]).abs())
+    };
+    let pixels = a.pixels.par_iter().zip(&b.pixels).map(apart).collect();
+    Ok(Image { width: a.width, height: a.height, pixels })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_pictures_differ_by_nothing_and_others_by_what_they_do() {
+        let grey = |level: f32| Image::filled(3, 2, [level, 1.0, 0.0]);
+        let black = difference(&grey(0.5), &grey(0.5)).expect("of one size");
+        assert!(black.pixels.iter().all(|pixel| *pixel == [0.0; 3]));
+        let found = difference(&grey(0.5), &grey(0.25)).expect("of one size");
+        assert!(found.pixels.iter().all(|pixel| *pixel == [AMPLIFIED * 0.25, 0.0, 0.0]));
+        let failure = difference(&grey(0.5), &Image::filled(2, 2, [0.0; 3])).expect_err("smaller");
+        assert!(failure.contains("3 x 2") && failure.contains("2 x 2"), "{failure}");
+    }
+}
