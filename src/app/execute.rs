@@ -125,18 +125,17 @@ impl App {
         paths.iter().map(|path| open_command(path)).collect()
     }
 
+    /// Keeps what is on the screen, without overlays.
     fn keep(&mut self) {
-        let Some(snapshot) = &self.snapshot else { return };
+        let Some(shown) = &self.shown else { return };
+        let main = &shown.order.snapshot.main;
+        let image = shown.image.clone().unwrap_or_else(|| Arc::new(main.film.image()));
         let summary = format!(
             "{}, {} samples, {}",
-            convergence::name_of(snapshot.main.sampling),
-            snapshot.main.film.min_samples(),
+            convergence::name_of(main.sampling),
+            main.film.min_samples(),
             self.document.scene
         );
-        let shown =
-            self.shown.as_ref().filter(|shown| shown.order.snapshot.number == snapshot.number);
-        let image = shown.and_then(|shown| shown.image.clone());
-        let image = image.unwrap_or_else(|| Arc::new(snapshot.main.film.image()));
         let look = &self.document.look;
         let small = look.white_balance.apply(image.shrunk(history::SMALL_WIDTH));
         let exposure_ev = self.exposure_ev().unwrap_or_default();

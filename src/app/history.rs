@@ -61,3 +61,27 @@ impl History {
         self.list.remove(index);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_oldest_picture_goes_and_names_are_not_given_again() {
+        let mut history = History::default();
+        for _ in 0..=MOST {
+            history.keep(Kept {
+                name: String::new(),
+                summary: String::new(),
+                image: Arc::new(Image::filled(1, 1, [0.0; 3])),
+                document: Document::default(),
+                small: ColorImage::default(),
+                texture: None,
+            });
+        }
+        assert_eq!(history.list_mut().len(), MOST);
+        assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 2"));
+        history.remove(0);
+        assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 3"));
+    }
+}

@@ -165,6 +165,19 @@ impl Cell {
         self.chance += other.chance * times;
     }
 
+    /// Takes note how far apart the means of two pictures are, of which so many samples are to be added: one
+    /// may have met what the other has not. Where neither knows of its spread, their neighbours know better.
+    fn doubt(&mut self, other: &Self, times: f32) {
+        let theirs = other.samples * times;
+        let knows = self.freedom + other.freedom >= 1.0;
+        if knows && self.samples > 0.0 && theirs > 0.0 {
+            let means = [self, other].map(|cell| luminance(cell.light) / cell.samples);
+            let weight = self.samples * theirs / (self.samples + theirs);
+            self.deviation += (means[0] - means[1]).powi(2) * weight;
+            self.freedom += 1.0;
+        }
+    }
+
     /// By what light is multiplied again, and the share of the samples that met a surface. Where fog
     /// decides that by chance, it is drawn to what is around.
     fn dress(&self, around: f32, chance: f32) -> (Vec3, f32) {
@@ -319,7 +332,9 @@ impl Scale<Cell> {
                 let (tx, ty) = (x - x.floor(), y - y.floor());
                 let share = |t: f32, d: isize| if d == 0 { 1.0 - t } else { t };
                 let near = other.at(x.floor() as isize + dx, y.floor() as isize + dy);
-                cell.add_worth(near, share(tx, dx) * share(ty, dy) * step * step, worth);
+                let times = share(tx, dx) * share(ty, dy) * step * step;
+                cell.doubt(near, times * worth);
+                cell.add_worth(near, times, worth);
             }
         });
     }
@@ -522,6 +537,15 @@ mod tests {
         let lamp = |x: u32, y: u32| if (x, y) == (20, 11) { 500.0 } else { 1.0 };
         let image = blend(&film([40, 30], 1, 4, |x, y, _| lamp(x, y)), None);
         assert!(error(&image, lamp) < 1e-3);
+    }
+
+    #[test]
+    fn a_bright_sample_that_the_other_picture_has_not_met_is_shared_out() {
+        let light = |x, y, _| if (x, y) == (20, 11) { 500.0 } else { 1.0 };
+        let calm = film([40, 30], 1, 4, |_, _, _| 1.0);
+        let image = blend(&film([40, 30], 1, 1, light), Some((&calm, 4.0)));
+        let brightest = image.pixels.iter().map(|p| p[0]).fold(0.0, f32::max);
+        assert!(brightest < 2.0, "{brightest}");
     }
 
     #[test]
