@@ -27,6 +27,8 @@ pub struct Document {
     pub rotation_degrees: f32,
     /// Factor on the map's radiance.
     pub intensity: f32,
+    /// Factor on the radiance of the map's sun alone.
+    pub sun: f32,
     /// What the camera sees of the map.
     pub background: Background,
     /// Fog in place of the scene's own; `None` keeps that.
@@ -102,6 +104,7 @@ impl Default for Document {
             map: "sky:day".to_owned(),
             rotation_degrees: 0.0,
             intensity: 1.0,
+            sun: 1.0,
             background: Background::default(),
             fog: None,
             viewpoint: None,

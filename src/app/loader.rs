@@ -54,6 +54,8 @@ impl LoadedScene {
 pub struct LoadedMap {
     /// What was asked for.
     pub name: String,
+    /// Factor on its sun.
+    pub sun_factor: f32,
     /// The map.
     pub environment: Arc<Environment>,
     /// A small copy for the panel.
@@ -112,8 +114,8 @@ impl Loader {
     }
 
     /// Starts to load a map unless it is being loaded.
-    pub fn load_map(&mut self, name: &str) {
-        self.start(1, name, |name| Loaded::Map(name.to_owned(), load_map(name)));
+    pub fn load_map(&mut self, name: &str, sun_factor: f32) {
+        self.start(1, name, move |name| Loaded::Map(name.to_owned(), load_map(name, sun_factor)));
     }
 
     /// What is being loaded.
@@ -180,18 +182,18 @@ fn load_scene(name: &str, options: &SceneOptions) -> Result<LoadedScene> {
     Ok(LoadedScene { name: name.to_owned(), world, edits, materials, kernel, seconds })
 }
 
-fn load_map(name: &str) -> Result<LoadedMap> {
+fn load_map(name: &str, sun_factor: f32) -> Result<LoadedMap> {
     let start = Instant::now();
     let (map, notices) = sources::map(name)?;
     let read = start.elapsed().as_secs_f64();
     let preview = Arc::new(map.shrunk(256));
     let sun = Sun::of(&map);
-    let environment = Environment::new(map, &EnvironmentOptions::default())
-        .map_err(|cause| Error::at(name, cause))?;
+    let options = EnvironmentOptions { sun: sun_factor, ..EnvironmentOptions::default() };
+    let environment = Environment::new(map, &options).map_err(|cause| Error::at(name, cause))?;
     let seconds = [read, start.elapsed().as_secs_f64() - read];
     let environment = Arc::new(environment);
     let count = environment.tile_count() as usize;
     let equal_energy = equal_energy_tiles(&preview, count).into();
     let name = name.to_owned();
-    Ok(LoadedMap { name, environment, preview, sun, equal_energy, notices, seconds })
+    Ok(LoadedMap { name, sun_factor, environment, preview, sun, equal_energy, notices, seconds })
 }

@@ -425,7 +425,9 @@ impl App {
                         self.scene.as_ref().map(|scene| scene.edits.clone()).unwrap_or_default();
                 }
                 Loaded::Map(_, Ok(map)) => {
-                    map.notices.iter().for_each(|sentence| self.messages.notice(sentence));
+                    if self.map.as_ref().is_none_or(|old| old.name != map.name) {
+                        map.notices.iter().for_each(|sentence| self.messages.notice(sentence));
+                    }
                     self.settings.recent_map(&map.name);
                     self.map = Some(map);
                 }
@@ -438,10 +440,11 @@ impl App {
                 Loaded::Map(_, Err(error)) => {
                     self.messages.error(error.to_string());
                     self.save_nothing();
-                    self.document.map = match &self.map {
-                        Some(map) => map.name.clone(),
+                    let Document { map, sun, .. } = Document::default();
+                    (self.document.map, self.document.sun) = match &self.map {
+                        Some(map) => (map.name.clone(), map.sun_factor),
                         // At the start there is none: the built-in one is always there.
-                        None => Document::default().map,
+                        None => (map, sun),
                     };
                 }
             }
@@ -544,8 +547,9 @@ impl App {
         {
             self.loader.edit_scene(scene, &self.document.materials);
         }
-        if self.map.as_ref().is_none_or(|map| map.name != self.document.map) {
-            self.loader.load_map(&self.document.map);
+        let (name, sun) = (&self.document.map, self.document.sun);
+        if self.map.as_ref().is_none_or(|map| map.name != *name || map.sun_factor != sun) {
+            self.loader.load_map(name, sun);
         }
         if let Some(request) = self.request(context.time()) {
             if request.moving {

@@ -83,6 +83,7 @@ fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
         ("filter", json!(view.filter)),
         ("env_rotation_degrees", json!(document.rotation_degrees)),
         ("env_intensity", json!(document.intensity)),
+        ("env_sun", json!(document.sun)),
         ("background", json!(view.background)),
         ("region", json!(view.crop.map(|crop| [crop.corner, [view.width, view.height]].concat()))),
         ("materials", json!(edits(picture))),

@@ -90,6 +90,9 @@ pub(super) struct ScreenshotArguments {
     /// Turns the map about the vertical, in degrees.
     #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG")]
     env_rotation: f64,
+    /// Multiplies the light of the map's sun, and not its sky.
+    #[arg(long, default_value = "1", value_parser = values::not_negative, value_name = "X")]
+    env_sun: f32,
     /// Seed of the random numbers.
     #[arg(long, default_value = "0", value_name = "N")]
     seed: u32,
@@ -121,6 +124,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
         scene: arguments.scene.clone(),
         map: arguments.env.clone().unwrap_or_else(|| builtin::sky(&arguments.scene).to_owned()),
         rotation_degrees: arguments.env_rotation.rem_euclid(360.0) as f32,
+        sun: arguments.env_sun,
         light: Light {
             device: arguments.device,
             sampling: arguments.sampling,

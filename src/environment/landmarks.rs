@@ -1,5 +1,7 @@
 //! What stands out on a map: where it is brightest, and how tiles of equal energy would lie.
 
+use glam::{DVec3, Vec3};
+
 use crate::color::luminance;
 use crate::image::Image;
 use crate::math::texel_solid_angle;
@@ -45,25 +47,17 @@ impl Sun {
         if total <= 0.0 {
             return None;
         }
-        let azimuth = |x: u32| ((f64::from(x) + 0.5) / f64::from(width) - 0.5) * 360.0;
-        let elevation = |y: u32| 90.0 - (f64::from(y) + 0.5) / f64::from(height) * 180.0;
         let [x, y] = brightest.1;
-        let (azimuth_degrees, elevation_degrees) = (azimuth(x), elevation(y));
-        let (sin, cos) = elevation_degrees.to_radians().sin_cos();
-        let least_cosine = SUN_RADIUS_DEGREES.to_radians().cos();
-        let mut inside = 0.0;
-        for (row, y) in rows() {
-            let (row_sin, row_cos) = elevation(y).to_radians().sin_cos();
-            if sin * row_sin + cos * row_cos < least_cosine {
-                continue;
-            }
-            let near = row.iter().zip(0_u32..).filter(|(_, x)| {
-                let turn = (azimuth(*x) - azimuth_degrees).to_radians().cos();
-                sin * row_sin + cos * row_cos * turn >= least_cosine
-            });
-            inside += near.map(|(rgb, _)| f64::from(luminance((*rgb).into()))).sum::<f64>()
-                * texel_solid_angle(width, height, y);
-        }
+        let cone = Cone::new(map, [x, y]);
+        let inside: f64 = (0..height)
+            .map(|y| {
+                let row = &map.pixels[(y * width) as usize..][..width as usize];
+                let near = cone.row(y, SUN_RADIUS_DEGREES);
+                let light = near.map(|x| f64::from(luminance(row[x as usize].into())));
+                light.sum::<f64>() * texel_solid_angle(width, height, y)
+            })
+            .sum();
+        let [azimuth_degrees, elevation_degrees] = cone.axis_degrees;
         Some(Self {
             texel: [x, y],
             azimuth_degrees,
@@ -71,6 +65,75 @@ impl Sun {
             energy_share: inside / total,
             max_luminance: brightest.0,
             mean_luminance: total / (4.0 * std::f64::consts::PI),
+        })
+    }
+}
+
+/// The map with `factor` times the light of its sun: what within 2.5 degrees of its brightest texel is
+/// brighter than the sky around, whose mean is taken up to twice as far. Black maps stay as they are.
+pub(crate) fn with_sun(mut map: Image, factor: f32) -> Image {
+    let Some(sun) = Sun::of(&map) else { return map };
+    let cone = Cone::new(&map, sun.texel);
+    let (mut around, mut weight) = (DVec3::ZERO, 0.0);
+    for y in 0..map.height {
+        let each = texel_solid_angle(map.width, map.height, y);
+        let sum = |degrees| {
+            let zero = (DVec3::ZERO, 0.0);
+            cone.row(y, degrees).fold(zero, |(sum, count), x| {
+                (sum + Vec3::from(map.at(x, y)).as_dvec3(), count + 1.0)
+            })
+        };
+        let ((wide, all), (narrow, inner)) =
+            (sum(2.0 * SUN_RADIUS_DEGREES), sum(SUN_RADIUS_DEGREES));
+        around += (wide - narrow) * each;
+        weight += (all - inner) * each;
+    }
+    let sky = if weight > 0.0 { (around / weight).as_vec3().max(Vec3::ZERO) } else { Vec3::ZERO };
+    for y in 0..map.height {
+        for x in cone.row(y, SUN_RADIUS_DEGREES) {
+            let pixel = &mut map.pixels[(y * map.width + x) as usize];
+            let light = Vec3::from(*pixel);
+            let own = (light - sky).max(Vec3::ZERO);
+            *pixel = (light - own + own * factor).min(Vec3::MAX).to_array();
+        }
+    }
+    map
+}
+
+/// Texels around one of a map.
+struct Cone {
+    width: u32,
+    height: u32,
+    /// Azimuth and elevation.
+    axis_degrees: [f64; 2],
+}
+
+impl Cone {
+    fn new(map: &Image, [x, y]: [u32; 2]) -> Self {
+        let mut cone = Self { width: map.width, height: map.height, axis_degrees: [0.0; 2] };
+        cone.axis_degrees = [cone.azimuth(x), cone.elevation(y)];
+        cone
+    }
+
+    fn azimuth(&self, x: u32) -> f64 {
+        ((f64::from(x) + 0.5) / f64::from(self.width) - 0.5) * 360.0
+    }
+
+    fn elevation(&self, y: u32) -> f64 {
+        90.0 - (f64::from(y) + 0.5) / f64::from(self.height) * 180.0
+    }
+
+    /// Columns of a row within so many degrees of the axis.
+    fn row(&self, y: u32, degrees: f64) -> impl Iterator<Item = u32> {
+        let [azimuth, elevation] = self.axis_degrees;
+        let (sin, cos) = elevation.to_radians().sin_cos();
+        let (row_sin, row_cos) = self.elevation(y).to_radians().sin_cos();
+        let least_cosine = degrees.to_radians().cos();
+        let is_near_row = sin * row_sin + cos * row_cos >= least_cosine;
+        let columns = if is_near_row { self.width } else { 0 };
+        (0..columns).filter(move |x| {
+            let turn = (self.azimuth(*x) - azimuth).to_radians().cos();
+            sin * row_sin + cos * row_cos * turn >= least_cosine
         })
     }
 }
@@ -156,6 +219,31 @@ mod tests {
         let expected = 1e4 * solid_angle / (1e4 * solid_angle + 4.0 * std::f64::consts::PI);
         assert!((sun.energy_share - expected).abs() < 1e-3, "{sun:?}");
         assert_eq!(Sun::of(&map(|_, _| 0.0)), None);
+    }
+
+    #[test]
+    fn a_sun_is_made_weaker_and_the_sky_stays() {
+        let disc = |x: u32, y: u32| x.abs_diff(200) < 3 && y.abs_diff(40) < 2;
+        let sky = |y: u32| 1.0 + 0.01 * y as f32;
+        let light = |i: u32| {
+            let (x, y) = (i % 512, i / 512);
+            if disc(x, y) { 4e3 } else { sky(y) }
+        };
+        let map = Image {
+            width: 512,
+            height: 256,
+            pixels: (0..512 * 256).map(|i| [light(i); 3]).collect(),
+        };
+        let half = with_sun(map.clone(), 0.5);
+        for (i, (pixel, before)) in (0..).zip(half.pixels.iter().zip(&map.pixels)) {
+            let (x, y) = (i % 512, i / 512);
+            let expected = if disc(x, y) { 2e3 } else { before[0] };
+            assert!((pixel[0] / expected - 1.0).abs() < 0.01, "{x} {y}: {pixel:?}");
+        }
+        let none = with_sun(map.clone(), 0.0);
+        assert!(none.pixels.iter().all(|pixel| pixel[0] < 4.0), "only the sky is left");
+        assert_eq!(with_sun(map.clone(), 1.0).pixels, map.pixels);
+        assert_eq!(with_sun(Image::filled(8, 4, [0.0; 3]), 3.0), Image::filled(8, 4, [0.0; 3]));
     }
 
     #[test]

@@ -119,6 +119,7 @@ impl Environment {
     pub fn new(map: Image, options: &EnvironmentOptions) -> Result<Self> {
         options.check()?;
         check_size(&map)?;
+        let map = if options.sun == 1.0 { map } else { landmarks::with_sun(map, options.sun) };
         let statistics = Statistics::of(&map, options.lookup)?;
         let weights = Weights::new(&map, options.lookup);
         let (columns, rows) = weights.size();
@@ -313,7 +314,7 @@ impl Environment {
         (self.map_mean * self.intensity).min(Vec3::MAX)
     }
 
-    /// The map as it was given: not turned, at intensity 1.
+    /// The map as it was given but for its sun: not turned, at intensity 1.
     pub fn map(&self) -> &Image {
         &self.map
     }

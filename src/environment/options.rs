@@ -95,6 +95,8 @@ pub struct EnvironmentOptions {
     pub rotation_radians: f32,
     /// Factor on all radiance, at least 0.
     pub intensity: f32,
+    /// Factor on the light of the sun alone, at least 0; the map is changed accordingly.
+    pub sun: f32,
 }
 
 impl Default for EnvironmentOptions {
@@ -106,6 +108,7 @@ impl Default for EnvironmentOptions {
             tile_rows: 8,
             rotation_radians: 0.0,
             intensity: 1.0,
+            sun: 1.0,
         }
     }
 }
@@ -119,6 +122,8 @@ impl EnvironmentOptions {
             "the rotation of the environment map is not a finite number"
         } else if !(0.0..=f32::MAX).contains(&self.intensity) {
             "the intensity of the environment map is negative or not a finite number"
+        } else if !(0.0..=f32::MAX).contains(&self.sun) {
+            "the factor on the sun is negative or not a finite number"
         } else {
             return Ok(());
         };

@@ -340,6 +340,7 @@ fn wrong_values_are_refused_with_the_reason() {
         ("--seconds nan", "expected a number"),
         ("--noise -1", "must be above 0"),
         ("--env-intensity -1", "must not be negative"),
+        ("--env-sun -1", "must not be negative"),
         ("--threads 1000000", "is not in 0..=1024"),
         ("--tiles 257x1", "at most 256x256"),
         ("--grid 1", "1 is not in 2..=512"),

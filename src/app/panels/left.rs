@@ -229,13 +229,32 @@ fn environment(
             interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
         }
     });
+    sun(ui, &mut document.sun);
     background(ui, &mut document.background);
-    if document.rotation_degrees != 0.0 || document.intensity != 1.0 {
-        let text = RichText::new("Reset rotation and intensity").size(12.0);
+    if (document.rotation_degrees, document.intensity, document.sun) != (0.0, 1.0, 1.0) {
+        let text = RichText::new("Reset rotation, intensity and sun").size(12.0);
         if ui.button(text).clicked() {
-            (document.rotation_degrees, document.intensity) = (0.0, 1.0);
+            (document.rotation_degrees, document.intensity, document.sun) = (0.0, 1.0, 1.0);
         }
     }
+}
+
+/// The sun's light is taken up when the slider is let go: the map is read again.
+fn sun(ui: &mut Ui, sun: &mut f32) {
+    let hint = "Multiplies the light of the map's sun, and not that of its sky";
+    theme::row(ui, "Sun", hint, |ui| {
+        let id = ui.scope_id().with("sun");
+        let mut value = ui.data(|data| data.get_temp(id)).unwrap_or(*sun);
+        let slider = Slider::new(&mut value, 0.0..=10.0).logarithmic(true);
+        let slider = slider.smallest_positive(0.01).fixed_decimals(2).prefix("× ");
+        let response = ui.add(slider);
+        if response.dragged() || response.has_focus() {
+            ui.data_mut(|data| data.insert_temp(id, value));
+        } else {
+            ui.data_mut(|data| data.remove::<f32>(id));
+            *sun = value;
+        }
+    });
 }
 
 /// What the camera sees of the map; surfaces are lit by it in any case.

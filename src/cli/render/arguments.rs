@@ -55,6 +55,10 @@ pub(in crate::cli) struct RenderArguments {
     /// Multiplies the map's radiance.
     #[arg(long, default_value = "1", value_parser = values::not_negative, value_name = "X", help_heading = "Environment")]
     pub(super) env_intensity: f32,
+    /// Multiplies the light of the map's sun, and not its sky: what within 2.5 degrees of the brightest
+    /// place is brighter than around.
+    #[arg(long, default_value = "1", value_parser = values::not_negative, value_name = "X", help_heading = "Environment")]
+    pub(super) env_sun: f32,
 
     /// Fog: scattering per metre, one number or R,G,B; 0.02 halves what is seen over 35 metres. In
     /// place of the scene's own fog; 0 clears the air.
@@ -242,6 +246,7 @@ impl RenderArguments {
             env: Some(map.to_owned()),
             env_rotation: 0.0,
             env_intensity: 1.0,
+            env_sun: 1.0,
             background: None,
             region: None,
             fog: None,
@@ -295,6 +300,7 @@ impl RenderArguments {
             tile_rows: self.tiles.1,
             rotation_radians: self.env_rotation.to_radians() as f32,
             intensity: self.env_intensity,
+            sun: self.env_sun,
             ..EnvironmentOptions::default()
         }
     }

@@ -113,6 +113,7 @@ pub(super) fn settings(
         ("background", serde_json::json!(arguments.background.unwrap_or_default())),
         ("env_rotation_degrees", serde_json::json!(arguments.env_rotation)),
         ("env_intensity", serde_json::json!(arguments.env_intensity)),
+        ("env_sun", serde_json::json!(arguments.env_sun)),
         ("materials", serde_json::json!(arguments.of_scene.edits())),
         ("seed", serde_json::json!(arguments.seed)),
     ]

@@ -144,6 +144,7 @@ fn environment((width, height): (u32, u32), table: TableKind, lookup: Lookup) ->
         tile_rows: 5,
         rotation_radians: 2.0,
         intensity: 1.7,
+        sun: 1.0,
     };
     Environment::new(map, &options).expect("a sound map")
 }
