@@ -14,7 +14,6 @@ use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::path::World;
-use crate::scene::Scene;
 
 /// Deepest tree a traversal's stack is made for.
 const MAX_DEPTH: u32 = 96;
@@ -90,7 +89,7 @@ fn upload_world(
         buffers.tree = Some(tree.tlas);
         0
     } else {
-        upload_tree(buffers, scene, flags_of)?
+        upload_tree(buffers, world, flags_of)?
     };
     let vertex = VertexTexels::of(features);
     put_array(buffers, "triangles", "the scene's geometry", &layout::triangles(scene))?;
@@ -118,8 +117,10 @@ fn upload_world(
 }
 
 /// Uploads the tree that kernels walk; returns how many groups of nodes a walk has to remember.
-fn upload_tree(buffers: &mut Buffers, scene: &Scene, flags_of: impl Fn(u32) -> u32) -> Result<u32> {
-    let tree = CompressedTree::build(&scene.positions, &scene.triangles, flags_of);
+fn upload_tree(buffers: &mut Buffers, world: &World, flags_of: impl Fn(u32) -> u32) -> Result<u32> {
+    let (scene, bvh) = (&world.scene, &world.bvh);
+    let meshes = scene.instances.meshes();
+    let tree = CompressedTree::build(&scene.positions, &scene.triangles, meshes, bvh, flags_of);
     if tree.depth > MAX_DEPTH {
         return Err(Error::new(format!(
             "the scene's tree is {} levels deep; a GPU walks at most {MAX_DEPTH}",
