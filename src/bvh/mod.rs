@@ -20,8 +20,9 @@ use std::mem::size_of_val;
 use crate::huge_pages::on_huge_pages;
 use glam::{IVec3, Vec2, Vec3};
 
+pub(crate) use instance::InstanceWords;
+use instance::Placed;
 pub use instance::{Instance, Shared};
-use instance::{InstanceWords, Placed};
 use lanes::Portable;
 use traverse::TreeRef;
 use wide::{Block, Node, Reference};

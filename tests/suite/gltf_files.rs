@@ -1,6 +1,6 @@
 //! glTF files: real ones, malformed ones, spoilt ones, and (in `features`) one for each feature; KTX 2 textures.
 
-mod builder;
+pub(crate) mod builder;
 mod features;
 mod ktx2;
 

@@ -11,6 +11,7 @@ use lightgrid::render::{Sampling, Session, Sharing, View};
 use lightgrid::scene::needs::is_emitter;
 use lightgrid::scene::{Camera, Instance, Instances, Material, Placing, Scene, builtin};
 
+use super::gltf_files::builder::Builder;
 use super::shared::SplitMix;
 
 /// Maps that turn, scale unevenly, mirror and shear, at places up to `far` metres away.
@@ -34,7 +35,7 @@ pub(crate) fn placings(count: usize, far: f64) -> Vec<Placing> {
 
 /// The built-in scene of a name without its lamps, halved into two meshes that are shown in turn, on a
 /// floor of its own.
-fn many(name: &str, placings: &[Placing]) -> Scene {
+pub(crate) fn many(name: &str, placings: &[Placing]) -> Scene {
     let mut scene = builtin::build(name).expect("built in");
     let first = scene.positions.len() as u32;
     let corners = [(-9.0, -9.0), (-9.0, 9.0), (9.0, 9.0), (9.0, -9.0)];
@@ -239,4 +240,61 @@ fn a_tree_of_many_instances_is_small() {
         assert!((here.x - above.x).abs() < 1e-3 && (here.z - above.z).abs() < 1e-3, "{here}");
         last = hit.triangle;
     }
+}
+
+/// A grid of triangles and a lamp on it in a file, with so many instances of both.
+fn file(instances: usize, places: &[f32], scales: &[f32]) -> Scene {
+    let mut builder = Builder::default();
+    let corner = |x: u16, y: u16| [f32::from(x), f32::from(y), 0.0];
+    let corners = (0..25).flat_map(|y| (0..25).map(move |x| corner(x, y)));
+    builder.floats("VEC3", corners.collect::<Vec<_>>().as_flattened());
+    let quads = (0..24).flat_map(|y| (0..24).map(move |x| 25 * y + x));
+    let indices: Vec<u16> = quads.flat_map(|i| [i, i + 1, i + 26, i, i + 26, i + 25]).collect();
+    builder.indices(&indices);
+    builder.indices(&[0, 1, 25]);
+    let translation = builder.floats("VEC3", places);
+    let scale = builder.floats("VEC3", scales);
+    assert_eq!(places.len(), 3 * instances);
+    builder.load(&format!(
+        r#""extensionsUsed":["EXT_mesh_gpu_instancing"],
+        "materials":[{{"name":"grid"}},{{"name":"lamp","emissiveFactor":[1,1,1]}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,"material":0}},
+        {{"attributes":{{"POSITION":0}},"indices":2,"material":1}}]}}],
+        "nodes":[{{"mesh":0,"translation":[0,0,-5]}},{{"mesh":0,"translation":[0,1,0],"scale":[1,-1,1],"extensions":
+        {{"EXT_mesh_gpu_instancing":{{"attributes":{{"TRANSLATION":{translation},"SCALE":{scale}}}}}}}}}]"#
+    ))
+}
+
+/// All but lamps and what is flattened, of nodes and of the extension, wherever that spares much.
+#[test]
+fn a_mesh_that_a_file_shows_often_is_held_once() {
+    let places: Vec<f32> = (0..1000).flat_map(|i| [30.0 * i as f32, 0.0, 1.0]).collect();
+    let mut scales = vec![1.0; 3000];
+    scales[5] = 0.0;
+    let scene = file(1000, &places, &scales);
+    // 1152 triangles of the grid are shared, and baked once where they are flattened, and 1001 lamps.
+    assert_eq!((scene.instances.len(), scene.triangles.len()), (1000, 1152 + 1152 + 1001));
+    assert_eq!(scene.shown_triangles(), 1001 * 1153);
+    let world = World::new(scene);
+    assert_eq!(world.lights.triangle_count(), 1001);
+    let look = |x: f32, y: f32| {
+        let origin = Vec3::new(x, y, 9.0);
+        let ray = Ray { origin, direction: Vec3::NEG_Z, t_min: 0.0, t_max: f32::INFINITY };
+        let hit = world.closest_hit(&ray, false).expect("a grid is there");
+        (hit.t, world.point(&hit, ray.direction).front_face, world.scene.material_of(hit.triangle))
+    };
+    // The node's own, then two of the extension, which are mirrored and turned around with that.
+    assert_eq!(look(12.25, 20.5), (14.0, true, 0));
+    assert_eq!(look(30.0 * 500.0 + 12.25, -20.5), (8.0, true, 0));
+    assert_eq!(look(30.0 * 999.0 + 0.25, 0.5), (8.0, true, 1));
+    let (low, high) = world.bvh.bounds();
+    assert!(low.abs_diff_eq(Vec3::new(0.0, -23.0, -5.0), 0.1), "{low}");
+    assert!(high.abs_diff_eq(Vec3::new(30.0 * 999.0 + 24.0, 24.0, 1.0), 0.1), "{high}");
+    assert!(world.bvh.memory_bytes() < 2_000_000, "{}", world.bvh.memory_bytes());
+
+    // Where that spares less than a million, all are copies.
+    let few = file(800, &places[..2400], &scales[..2400]);
+    assert!(few.instances.is_empty());
+    assert_eq!(few.triangles.len() as u64, few.shown_triangles());
+    assert_eq!(few.shown_triangles(), 801 * 1153);
 }
