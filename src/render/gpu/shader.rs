@@ -332,7 +332,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 55] {
+fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 56] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -364,6 +364,7 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 55] {
         (wgsl!("lights"), features.contains(Features::SCENE_LIGHTS)),
         (wgsl!("medium"), features.contains(Features::MEDIUM)),
         (wgsl!("bvh"), true),
+        (wgsl!("levels"), features.contains(Features::INSTANCES | Features::SOFTWARE_WALK)),
         (wgsl!("ray_query"), features.contains(Features::HARDWARE_RAYS)),
         (wgsl!("camera"), true),
         (wgsl!("path"), true),

@@ -86,7 +86,7 @@ pub(super) fn all() -> [Fixture; 7] {
 }
 
 /// Two thirds of the triangles as two meshes, placed by maps that turn, mirror and shear.
-fn instanced(scene: Scene) -> Scene {
+pub(in super::super) fn instanced(scene: Scene) -> Scene {
     let mut random = Random::default();
     let all = scene.triangles.len() as u32;
     let meshes = vec![all / 3..all / 2, all / 2..all];
