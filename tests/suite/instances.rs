@@ -220,7 +220,7 @@ fn a_tree_of_many_instances_is_small() {
         triangles,
         triangle_materials: vec![0; 1000],
         materials: vec![Material::lambert(0.5)],
-        instances: Instances::new(vec![0..1000], instances.collect()),
+        instances: Instances::new(std::iter::once(0..1000).collect(), instances.collect()),
         ..Scene::default()
     };
     assert_eq!(scene.shown_triangles(), 100_000_000);

@@ -23,15 +23,9 @@ pub(super) fn append_instances(
     Ok(())
 }
 
-/// Appends a part as it is, for all its instances, of which there are so many by now.
-pub(super) fn append_shared(
-    scene: &mut Scene,
-    part: &Part,
-    instances: usize,
-    tally: &mut Tally,
-) -> Fallible<()> {
+/// Appends a part as it is, for all its instances.
+pub(super) fn append_shared(scene: &mut Scene, part: &Part, tally: &mut Tally) -> Fallible<()> {
     check_limits(scene, part, 1)?;
-    memory::check(INSTANCE_BYTES * instances as u64)?;
     let first = append_vertices(scene, part);
     append_triangles(scene, part, first, |corners| corners, tally);
     Ok(())
@@ -71,8 +65,6 @@ pub(super) fn append_skinned(
 /// is asked for at once.
 const TRIANGLE_BYTES: u64 = 250;
 const VERTEX_BYTES: u64 = 72;
-/// Bytes of an instance of what is shared, in the scene and in the tree while that is built.
-const INSTANCE_BYTES: u64 = 800;
 const STEP: u64 = 1 << 26;
 
 fn check_limits(scene: &Scene, part: &Part, copies: usize) -> Fallible<()> {

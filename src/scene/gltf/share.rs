@@ -15,6 +15,7 @@ use json::validation::Checked;
 use super::part::{Part, Tally};
 use super::{Fallible, Placement, bake};
 use crate::bvh;
+use crate::memory;
 use crate::scene::{Instance, Instances, MAX_SHOWN, Placing, Scene};
 
 /// Meshes are shared if that spares so many triangles, 0.3 GB of them, and half of all.
@@ -23,6 +24,9 @@ const LEAST_SPARED: u64 = 1 << 20;
 /// Triangles of a mesh that is shared: an instance takes the memory of a few, and entering it the time
 /// of many.
 const LEAST_TRIANGLES: u64 = 64;
+
+/// Bytes of an instance, in the scene and in the tree while that is built.
+const INSTANCE_BYTES: u64 = 800;
 
 /// The meshes that are shared, as far as they have been read.
 #[derive(Default)]
@@ -75,12 +79,14 @@ impl Sharing {
     ) -> Fallible<()> {
         let extent = extent(parts);
         let places = placements.iter().flat_map(|placement| &placement.instances);
+        memory::check(INSTANCE_BYTES * places.clone().count() as u64)?;
         let places = places.filter(|place| can_share(**place, extent));
         let mesh = self.meshes.len() as u32;
-        self.instances.extend(places.map(|&place| Instance { mesh, placing: Placing::new(place) }));
+        let instance = |&place: &DAffine3| Instance { mesh, placing: Placing::new(place) };
+        self.instances.extend(places.map(instance));
         let first = scene.triangles.len();
         for part in parts {
-            bake::append_shared(scene, part, self.instances.len(), tally)?;
+            bake::append_shared(scene, part, tally)?;
         }
         let triangles = scene.triangles.split_off(first);
         self.meshes.push((triangles, scene.triangle_materials.split_off(first)));
