@@ -41,7 +41,7 @@ pub struct Instance {
 }
 
 /// Most that `|M| |M^-1|` may be (the norm of largest row sums). Rounding makes boxes larger by this
-/// times `2^-19` of the way to them, here half a per cent.
+/// times `2^-19` of the way to them, less than a per cent.
 const MOST_CONDITION: f64 = 4096.0;
 
 /// Largest coordinates of a map's matrix, and the inverse of the least: their squares stay within f32.

@@ -207,6 +207,7 @@ impl<'a> SurfacePoint<'a> {
     }
 
     /// The same, given what all points of the triangle's material have in common.
+    #[inline]
     pub fn with_shared(
         scene: &Scene,
         shared: &'a SharedParameters,
