@@ -75,7 +75,12 @@ struct Shear {
     origin: vec3f,
 }
 
+//#if INSTANCES
+fn box_ray_new(ray: Ray, extent: f32, slack: vec3f) -> BoxRay {
+//#else
 fn box_ray_new(ray: Ray) -> BoxRay {
+    let extent = globals.scene_extent;
+//#end
     let size = abs(ray.direction);
     let least = max_element(size) * 8.6736174e-19; // 2^-60
     let inverse = 1.0 / vec3f(
@@ -83,10 +88,13 @@ fn box_ray_new(ray: Ray) -> BoxRay {
         copysign(max(size.y, least), ray.direction.y),
         copysign(max(size.z, least), ray.direction.z),
     );
-    let reach = max_element(abs(ray.origin)) + globals.scene_extent;
+    let reach = max_element(abs(ray.origin)) + extent;
     let pad = reach * 9.536743e-7 + 1.1754944e-38; // 16 * 2^-24
     let negative = inverse < vec3f(0.0);
-    let toward = select(vec3f(pad), vec3f(-pad), negative);
+    var toward = select(vec3f(pad), vec3f(-pad), negative);
+//#if INSTANCES
+    toward += select(slack, -slack, negative);
+//#end
     let octant = select(4u, 0u, negative.x) | select(2u, 0u, negative.y) | select(1u, 0u, negative.z);
     return BoxRay(inverse, ray.origin + toward, ray.origin - toward, negative, octant * 0x01010101u);
 }
@@ -124,10 +132,18 @@ fn edge(a: vec3f, b: vec3f) -> f32 {
 // Distance to the plane of a triangle that is far larger than the distance `rough`, whose error then
 // is per cents. The CPU's twin is in f64; in f32 this is exact for planes that face an axis, as
 // grounds do.
+//#if INSTANCES
+fn plane_distance(index: u32, shear: Shear, rough: f32, placement: Placement) -> f32 {
+    let corners = tree_corners(index, placement);
+    let a = along_axis(corners[0], shear.axis);
+    let b = along_axis(corners[1], shear.axis);
+    let c = along_axis(corners[2], shear.axis);
+//#else
 fn plane_distance(index: u32, shear: Shear, rough: f32) -> f32 {
     let a = along_axis(bitcast<vec3f>(bvh_triangles(3u * index).xyz), shear.axis);
     let b = along_axis(bitcast<vec3f>(bvh_triangles(3u * index + 1u).xyz), shear.axis);
     let c = along_axis(bitcast<vec3f>(bvh_triangles(3u * index + 2u).xyz), shear.axis);
+//#end
     let normal = cross(b - a, c - a);
     let approach = dot(normal, vec3f(shear.factors.xy, 1.0));
     if approach == 0.0 {
@@ -137,12 +153,25 @@ fn plane_distance(index: u32, shear: Shear, rough: f32) -> f32 {
 }
 
 // The hit of one triangle of the tree, MISS if there is none within `t_max`.
+//#if INSTANCES
+fn intersect_triangle(index: u32, shear: Shear, t_max: f32, instance: u32) -> Hit {
+    let placement = placement_of(instance);
+    let corners = tree_corners(index, placement);
+    let number = bvh_triangles(3u * index).w + placement.shift;
+    let tag = bvh_triangles(3u * index + 1u).w;
+    let a = sheared(corners[0], shear);
+    let b = sheared(corners[1], shear);
+    let c = sheared(corners[2], shear);
+//#else
 fn intersect_triangle(index: u32, shear: Shear, t_max: f32) -> Hit {
     let v0 = bvh_triangles(3u * index);
     let v1 = bvh_triangles(3u * index + 1u);
     let a = sheared(bitcast<vec3f>(v0.xyz), shear);
     let b = sheared(bitcast<vec3f>(v1.xyz), shear);
     let c = sheared(bitcast<vec3f>(bvh_triangles(3u * index + 2u).xyz), shear);
+    let number = v0.w;
+    let tag = v1.w;
+//#end
     let edges = vec3f(edge(c, b), edge(a, c), edge(b, a));
     let none = Hit(MISS, 0u, vec2f(0.0), 0u);
     if any(edges < vec3f(0.0)) && any(edges > vec3f(0.0)) {
@@ -155,13 +184,17 @@ fn intersect_triangle(index: u32, shear: Shear, t_max: f32) -> Hit {
     var t = (edges.x * a.z + edges.y * b.z + edges.z * c.z) * shear.factors.z / determinant;
     let reach = max(max(abs(a.z), abs(b.z)), abs(c.z)) * abs(shear.factors.z);
     if abs(t) <= reach * 6.1035156e-5 { // 2^-14
+//#if INSTANCES
+        t = plane_distance(index, shear, t, placement);
+//#else
         t = plane_distance(index, shear, t);
+//#end
     }
     if !(t >= 0.0 && t <= t_max) {
         return none;
     }
     let side = select(0u, FROM_BEHIND, determinant * shear.factors.z < 0.0);
-    return Hit(t, v0.w, edges.yz / determinant, v1.w | side);
+    return Hit(t, number, edges.yz / determinant, tag | side);
 }
 
 // Four of a node's eight boxes; bits for the hit mask.
@@ -241,9 +274,14 @@ fn take_child(group: ptr<function, vec2u>, octant: u32) -> u32 {
     return (*group).x + countOneBits(inner & ~(0xffffffffu << slot));
 }
 
-// Nearest surface along a ray; of equally near ones that with the lowest index.
+// Nearest surface along a ray; of equally near ones that with the lowest number.
 fn closest_hit(ray: Ray, from_camera: bool) -> Hit {
+//#if INSTANCES
+    var level = Level(NO_INSTANCE, 0u);
+    var boxes = boxes_of(NO_INSTANCE, ray);
+//#else
     let boxes = box_ray_new(ray);
+//#end
     let shear = shear_new(ray);
     var best = Hit(MISS, 0xffffffffu, vec2f(0.0), 0u);
     var t_max = ray.t_max;
@@ -256,11 +294,20 @@ fn closest_hit(ray: Ray, from_camera: bool) -> Hit {
             height += 1u;
         }
         let entered = enter_node(node, boxes, t_max);
+//#if INSTANCES
+        var triangles = without_instances(entered, level, &height);
+//#else
         var triangles = entered.triangles;
+//#end
         while triangles != 0u {
             let bit = firstTrailingBit(triangles);
             triangles &= triangles - 1u;
+//#if INSTANCES
+            let hit = intersect_triangle(
+                entered.triangle_base + bit, shear, t_max, level.instance);
+//#else
             let hit = intersect_triangle(entered.triangle_base + bit, shear, t_max);
+//#end
             let nearer = hit.t < best.t || (hit.t == best.t && hit.triangle < best.triangle);
             if hit.t < MISS && nearer {
 //#if FILTERED_HITS
@@ -274,11 +321,17 @@ fn closest_hit(ray: Ray, from_camera: bool) -> Hit {
         }
         group = vec2u(entered.child_base, entered.inner);
         if group.y <= 0x00ffffffu {
+//#if INSTANCES
+            if !next_group(&group, &height, &level, &boxes, ray) {
+                break;
+            }
+//#else
             if height == 0u {
                 break;
             }
             height -= 1u;
             group = stack_at(height);
+//#end
         }
     }
     return best;
@@ -290,12 +343,28 @@ struct Walk {
     group: vec2u,
     waiting: u32,
     triangles: vec2u,
+//#if INSTANCES
+    level: Level,
+//#end
+}
+
+fn walk_new() -> Walk {
+//#if INSTANCES
+    return Walk(vec2u(0u, 0x80000000u), 0u, vec2u(0u), Level(NO_INSTANCE, 0u));
+//#else
+    return Walk(vec2u(0u, 0x80000000u), 0u, vec2u(0u));
+//#end
 }
 
 // The next hit of a walk, in no order; MISS at its end. What boxes and triangles want of the ray is
 // made anew: kept, it would take registers while materials are looked at.
 fn next_hit(walk: ptr<function, Walk>, ray: Ray) -> Hit {
+//#if INSTANCES
+    var level = (*walk).level;
+    var boxes = boxes_of(level.instance, ray);
+//#else
     let boxes = box_ray_new(ray);
+//#end
     let shear = shear_new(ray);
     var group = (*walk).group;
     var height = (*walk).waiting;
@@ -305,17 +374,27 @@ fn next_hit(walk: ptr<function, Walk>, ray: Ray) -> Hit {
         while triangles.y != 0u && hit.t >= MISS {
             let bit = firstTrailingBit(triangles.y);
             triangles.y &= triangles.y - 1u;
+//#if INSTANCES
+            hit = intersect_triangle(triangles.x + bit, shear, ray.t_max, level.instance);
+//#else
             hit = intersect_triangle(triangles.x + bit, shear, ray.t_max);
+//#end
         }
         if hit.t < MISS {
             break;
         }
         if group.y <= 0x00ffffffu {
+//#if INSTANCES
+            if !next_group(&group, &height, &level, &boxes, ray) {
+                break;
+            }
+//#else
             if height == 0u {
                 break;
             }
             height -= 1u;
             group = stack_at(height);
+//#end
         }
         let node = take_child(&group, boxes.octant);
         if group.y > 0x00ffffffu {
@@ -323,17 +402,25 @@ fn next_hit(walk: ptr<function, Walk>, ray: Ray) -> Hit {
             height += 1u;
         }
         let entered = enter_node(node, boxes, ray.t_max);
+//#if INSTANCES
+        triangles = vec2u(entered.triangle_base, without_instances(entered, level, &height));
+//#else
         triangles = vec2u(entered.triangle_base, entered.triangles);
+//#end
         group = vec2u(entered.child_base, entered.inner);
     }
+//#if INSTANCES
+    *walk = Walk(group, height, triangles, level);
+//#else
     *walk = Walk(group, height, triangles);
+//#end
     return hit;
 }
 
 // Share of light that arrives along a shadow ray: zero if a surface scatters it all. Materials are
 // looked at outside of the walk, where lanes that have not found any do not wait for them.
 fn transmittance_along(ray: Ray) -> vec3f {
-    var walk = Walk(vec2u(0u, 0x80000000u), 0u, vec2u(0u));
+    var walk = walk_new();
     var transmittance = vec3f(1.0);
     loop {
         let hit = next_hit(&walk, ray);

@@ -93,4 +93,9 @@ struct Globals {
     cache_edge: f32,
     cache_mean: vec3f,
     cache_least_distance: f32,
+    // Number of the first triangle of instances, and of how many numbers a slot has the logarithm.
+    first_of_instances: u32,
+    slot_log2: u32,
+    padding_0: u32,
+    padding_1: u32,
 }

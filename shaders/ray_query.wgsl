@@ -5,24 +5,47 @@
 // What a query has found, as the walk would tell it.
 fn queried_hit(found: RayIntersection, direction: vec3f) -> Hit {
     var place = found.primitive_index;
-    if found.geometry_index != 0u {
-        place += globals.opaque_triangles;
+    var opaque = globals.opaque_triangles;
+    var barycentric = found.barycentrics;
+//#if INSTANCES
+    // Zero is what lies in the world.
+    let instance = found.instance_custom_data - 1u;
+    let placement = placement_of(instance);
+    if instance != NO_INSTANCE {
+        let list = instance_words(instance, INSTANCE_LIST);
+        place += list.x;
+        opaque = list.w;
     }
-    let triangle = query_triangles(place).x;
+    if placement.mirrors {
+        barycentric = barycentric.yx;
+    }
+//#end
+    if found.geometry_index != 0u {
+        place += opaque;
+    }
+    let listed = query_triangles(place).x;
+    var triangle = listed;
     var flags = 0u;
 //#if FILTERED_OR_PASSED
-    let corners = triangles(triangle);
+    let corners = triangles(listed);
     flags = material_flags(corners.w);
 //#if SINGLE_SIDED
-    let a = vertex_texel(corners.x, 0u).xyz;
-    let b = vertex_texel(corners.y, 0u).xyz;
-    let c = vertex_texel(corners.z, 0u).xyz;
-    if dot(cross(b - a, c - a), direction) > 0.0 {
+    let a = vertex_position(corners.x);
+    let b = vertex_position(corners.y);
+    let c = vertex_position(corners.z);
+    var normal = cross(b - a, c - a);
+//#if INSTANCES
+    normal = normal_in_world(placement, normal);
+//#end
+    if dot(normal, direction) > 0.0 {
         flags |= FROM_BEHIND;
     }
 //#end
 //#end
-    return Hit(found.t, triangle, found.barycentrics, flags);
+//#if INSTANCES
+    triangle += placement.shift;
+//#end
+    return Hit(found.t, triangle, barycentric, flags);
 }
 
 // Whether a query may be asked about a ray at all.

@@ -97,12 +97,22 @@ struct Corner {
     vertices: vec3u,
     weights: vec3f,
     material: u32,
+//#if INSTANCES
+    placement: Placement,
+//#end
 }
 
 fn corner_new(triangle: u32, barycentric: vec2f) -> Corner {
-    let record = triangles(triangle);
     let weights = vec3f(1.0 - barycentric.x - barycentric.y, barycentric);
+//#if INSTANCES
+    let placement = placement_of(instance_of(triangle));
+    let listed = triangles(triangle - placement.shift);
+    let record = select(listed, listed.xzyw, placement.mirrors);
+    return Corner(record.xyz, weights, record.w, placement);
+//#else
+    let record = triangles(triangle);
     return Corner(record.xyz, weights, record.w);
+//#end
 }
 
 fn material_words(material: u32, texel: u32) -> vec4u {
@@ -215,13 +225,29 @@ fn corner_base_color(corner: Corner, texture: vec4f) -> vec4f {
     return color;
 }
 
+//#if TANGENTS
+// Interpolated tangent, and the handedness of the first corner's.
+fn corner_tangent(corner: Corner) -> vec4f {
+//#if INSTANCES
+    let a = tangent_in_world(corner.placement, vertex_texel(corner.vertices.x, TANGENT_TEXEL));
+    let b = tangent_in_world(corner.placement, vertex_texel(corner.vertices.y, TANGENT_TEXEL));
+    let c = tangent_in_world(corner.placement, vertex_texel(corner.vertices.z, TANGENT_TEXEL));
+    let w = corner.weights;
+    return vec4f(a.xyz * w.x + b.xyz * w.y + c.xyz * w.z, a.w);
+//#else
+    let first = vertex_texel(corner.vertices.x, TANGENT_TEXEL);
+    return vec4f(interpolate(corner, TANGENT_TEXEL).xyz, first.w);
+//#end
+}
+//#end
+
 // The normal a tangent-space map makes of `normal`, not of unit length (see `Corner::mapped`).
 fn mapped_normal(corner: Corner, normal: vec3f, slot: u32, texture: vec4f, scale: f32) -> vec3f {
 //#if NORMAL_MAPS
     if texture_of(corner.material, slot) != NO_TEXTURE {
-        let first = vertex_texel(corner.vertices.x, TANGENT_TEXEL);
-        let tangent = interpolate(corner, TANGENT_TEXEL).xyz;
-        let bitangent = cross(normal, tangent) * first.w;
+        let found = corner_tangent(corner);
+        let tangent = found.xyz;
+        let bitangent = cross(normal, tangent) * found.w;
         let map = texture.xyz * 2.0 - 1.0;
         return tangent * (map.x * scale) + bitangent * (map.y * scale) + normal * map.z;
     }
@@ -232,9 +258,9 @@ fn mapped_normal(corner: Corner, normal: vec3f, slot: u32, texture: vec4f, scale
 //#if ANISOTROPY
 // Twin of `Corner::anisotropy_direction`.
 fn anisotropy_direction(corner: Corner, normal: vec3f, texture: vec4f) -> vec3f {
-    let first = vertex_texel(corner.vertices.x, TANGENT_TEXEL);
-    let tangent = interpolate(corner, TANGENT_TEXEL).xyz;
-    let bitangent = cross(normal, tangent) * first.w;
+    let found = corner_tangent(corner);
+    let tangent = found.xyz;
+    let bitangent = cross(normal, tangent) * found.w;
     var direction = vec2f(1.0, 0.0);
     if texture_of(corner.material, ANISOTROPY_MAP) != NO_TEXTURE {
         direction = texture.xy * 2.0 - 1.0;
@@ -339,9 +365,23 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
     let a1 = vertex_texel(corner.vertices.x, 1u);
     let b1 = vertex_texel(corner.vertices.y, 1u);
     let c1 = vertex_texel(corner.vertices.z, 1u);
-    let front_normal = normalize_or(cross(b0.xyz - a0.xyz, c0.xyz - a0.xyz), -ray_direction);
+    var normals = mat3x3f(vec3f(a0.w, a1.xy), vec3f(b0.w, b1.xy), vec3f(c0.w, c1.xy));
+//#if INSTANCES
+    let placement = corner.placement;
+    let a = in_world(placement, a0.xyz);
+    let b = in_world(placement, b0.xyz);
+    let c = in_world(placement, c0.xyz);
+    normals[0] = normal_in_world(placement, normals[0]);
+    normals[1] = normal_in_world(placement, normals[1]);
+    normals[2] = normal_in_world(placement, normals[2]);
+//#else
+    let a = a0.xyz;
+    let b = b0.xyz;
+    let c = c0.xyz;
+//#end
+    let front_normal = normalize_or(cross(b - a, c - a), -ray_direction);
     var point: SurfacePoint;
-    point.position = a0.xyz * w.x + b0.xyz * w.y + c0.xyz * w.z;
+    point.position = a * w.x + b * w.y + c * w.z;
     point.front_face = dot(ray_direction, front_normal) < 0.0;
     point.geometric_normal = select(-front_normal, front_normal, point.front_face);
     point.triangle = triangle;
@@ -351,8 +391,7 @@ fn surface_at(triangle: u32, barycentric: vec2f, ray_direction: vec3f) -> Surfac
     point.parameters = corner_parameters(corner, textures);
 
     let to_viewer = -ray_direction;
-    let unmapped = smooth_normal(
-        mat3x3f(vec3f(a0.w, a1.xy), vec3f(b0.w, b1.xy), vec3f(c0.w, c1.xy)), w, front_normal);
+    let unmapped = smooth_normal(normals, w, front_normal);
     let scales = material_numbers(corner.material, SCALES_FLAGS);
     var normal = mapped_normal(corner, unmapped, NORMAL, textures[NORMAL], scales.y);
     normal = turned(normal, unmapped, point.geometric_normal, to_viewer);

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::image::Image;
-use crate::scene::Scene;
+use crate::scene::{Instances, Scene};
 
 /// A running 64-bit digest; not for secrets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,8 +47,19 @@ impl Digest {
             .debug(&scene.textures)
             .debug(&scene.lights)
             .debug(&scene.medium);
+        let digest = digest.instances(&scene.instances);
         let texels = scene.images.iter().map(|image| image.texels.as_flattened());
         texels.fold(digest, Self::bytes)
+    }
+
+    /// Takes in what is shared; nothing if nothing is.
+    fn instances(self, instances: &Instances) -> Self {
+        if instances.is_empty() {
+            return self;
+        }
+        instances
+            .iter()
+            .fold(self.debug(&instances.meshes()), |digest, instance| digest.debug(instance))
     }
 
     /// Takes in a map.

@@ -136,6 +136,9 @@ bitflags::bitflags! {
         const TRANSMISSION = 1 << 61;
         /// Textures that few materials have.
         const UNCOMMON_TEXTURES = 1 << 62;
+        // Of the scene, again.
+        /// Meshes that instances share.
+        const INSTANCES = 1 << 63;
     }
 }
 

@@ -171,12 +171,7 @@ impl App {
         let request = &self.snapshot.as_ref()?.request;
         let scene = &request.world.scene;
         let spot = surface_map::look_at_place(&request.world, &request.view, place)?;
-        let corners = scene
-            .triangles
-            .iter()
-            .zip(&scene.triangle_materials)
-            .filter(|(_, material)| **material == spot.material)
-            .flat_map(|(triangle, _)| triangle.map(|v| scene.positions[v as usize]));
+        let corners = scene.hull_points(|material| material == spot.material);
         Some(
             corners
                 .fold((spot.position, spot.position), |(low, high), p| (low.min(p), high.max(p))),

@@ -217,7 +217,7 @@ impl Place<'_> {
     fn measure(&self) -> (SceneFigures, Result<Compared>) {
         let mut figures = SceneFigures {
             scene: self.subject.name.clone(),
-            triangles: self.subject.world.scene.triangles.len(),
+            triangles: self.subject.world.scene.shown_triangles() as usize,
             failure: None,
             rays: Vec::new(),
             paths: None,

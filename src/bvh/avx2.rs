@@ -90,16 +90,20 @@ impl Lanes for Avx2 {
 
 /// [`traverse::closest_hit`] on AVX2 lanes. Call only if [`is_available`].
 #[target_feature(enable = "avx2,fma")]
-pub(super) fn closest_hit(
+pub(super) fn closest_hit<const LEVELS: usize>(
     tree: TreeRef<'_>,
     ray: &Ray,
     accept: impl Fn(&Hit) -> bool,
 ) -> Option<Hit> {
-    traverse::closest_hit::<Avx2>(tree, ray, accept)
+    traverse::closest_hit::<Avx2, LEVELS>(tree, ray, accept)
 }
 
 /// [`traverse::any_hit`] on AVX2 lanes. Call only if [`is_available`].
 #[target_feature(enable = "avx2,fma")]
-pub(super) fn any_hit(tree: TreeRef<'_>, ray: &Ray, blocks: impl FnMut(&Hit) -> bool) -> bool {
-    traverse::any_hit::<Avx2>(tree, ray, blocks)
+pub(super) fn any_hit<const LEVELS: usize>(
+    tree: TreeRef<'_>,
+    ray: &Ray,
+    blocks: impl FnMut(&Hit) -> bool,
+) -> bool {
+    traverse::any_hit::<Avx2, LEVELS>(tree, ray, blocks)
 }

@@ -1,19 +1,18 @@
-//! Builds a binary tree with obvhs and collapses it into the eight-wide tree of least cost.
+//! Collapses binary trees into eight-wide trees of least cost.
 
-use std::time::Duration;
-
-use glam::{Vec3, Vec3A};
-use obvhs::BvhBuildParams;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, builder::build_bvh2};
+use glam::Vec3;
+use obvhs::bvh2::Bvh2;
 use rayon::prelude::*;
 
-use crate::sampler::{hash, unit_from_bits};
-
-use super::wide::{Block, LEAF, MAX_DEPTH, Node, Reference, WIDTH};
+use super::instance::{Instance, Placed, Shared};
+use super::items::{Item, Items, Sources};
+use super::wide::{Block, INSTANCE, LEAF, MAX_DEPTH, Node, Reference, WIDTH};
 
 /// Cost of testing one block of triangles, relative to one node.
 const BLOCK_COST: f32 = 1.5;
+
+/// Cost of entering an instance, relative to one node: a ray is brought there, and meets a few nodes.
+const INSTANCE_COST: f32 = 4.0;
 
 /// Depth from which subtrees are halved by count instead of by cost. `u32` counts fall to one block
 /// within `ceil(32 / 3)` further levels, so [`MAX_DEPTH`] holds for every input.
@@ -23,101 +22,28 @@ const BALANCED_FROM_DEPTH: usize = MAX_DEPTH - 12;
 pub(super) struct Tree {
     pub(super) nodes: Vec<Node>,
     pub(super) blocks: Vec<Block>,
+    pub(super) placed: Vec<Placed>,
+    pub(super) root: Reference,
     pub(super) bounds: (Vec3, Vec3),
 }
 
-/// Builds over all triangles that have an area; `nodes[0]` is the root, even of an empty scene.
-pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Tree {
-    let Some((kept, binary)) = binary(positions, triangles) else {
-        return Tree {
-            nodes: vec![Node::EMPTY],
-            blocks: Vec::new(),
-            bounds: (Vec3::ZERO, Vec3::ZERO),
-        };
-    };
-    let costs = subtree_costs(&binary);
-    let mut collapse = Collapse {
-        sources: Sources { positions, triangles },
-        kept: &kept,
-        binary: &binary,
-        costs: &costs,
-        nodes: Vec::with_capacity(kept.len() / 24),
-        blocks: Vec::with_capacity(kept.len() / 4),
-    };
-    collapse.root();
-    let bounds = bounds(&binary, 0);
-    Tree { nodes: collapse.nodes, blocks: collapse.blocks, bounds }
-}
-
-/// The triangles that have an area and the binary tree over them; `None` if there are none.
-pub(super) fn binary(positions: &[Vec3], triangles: &[[u32; 3]]) -> Option<(Vec<u32>, Bvh2)> {
+/// Builds over all triangles that have an area, a tree for each mesh and one above them. There is a
+/// root even of an empty scene.
+pub(super) fn build(positions: &[Vec3], triangles: &[[u32; 3]], shared: Shared<'_>) -> Tree {
     let sources = Sources { positions, triangles };
-    let kept: Vec<u32> = (0..u32::try_from(triangles.len()).unwrap_or(u32::MAX))
-        .into_par_iter()
-        .filter(|&triangle| sources.has_area(triangle))
-        .collect();
-    if kept.is_empty() {
-        return None;
-    }
-    let boxes: Vec<Aabb> = kept
-        .par_iter()
-        .map(|&triangle| Aabb::from_points(&sources.vertices(triangle).map(Vec3A::from)))
-        .collect();
-    // One triangle a leaf: the collapse below forms the leaves. Without pre-splits (which
-    // `build_bvh2` never does) each triangle is referenced once, as `any_hit` promises.
-    let parameters = BvhBuildParams {
-        max_prims_per_leaf: 1,
-        post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
-        ..BvhBuildParams::medium_build()
+    let mut written = Written::default();
+    let meshes = shared.meshes.iter();
+    let roots: Vec<Reference> =
+        meshes.map(|mesh| written.collapse(&Items::new(sources, mesh.clone(), &[])).0).collect();
+    let place = |instance: &Instance| {
+        let mesh = instance.mesh as usize;
+        let root = roots[mesh];
+        Placed::new(instance, &shared.meshes[mesh], root, &written.nodes[root as usize])
     };
-    let loosened: Vec<Aabb> =
-        boxes.par_iter().zip(0..kept.len() as u32).map(|(tight, i)| loosened(tight, i)).collect();
-    let mut binary = build_bvh2(&loosened, parameters, &mut Duration::default());
-    let (nodes, primitives) = (&mut binary.nodes, &binary.primitive_indices);
-    for node in nodes.iter_mut().filter(|node| node.is_leaf()) {
-        node.set_aabb(boxes[primitives[node.first_index as usize] as usize]);
-    }
-    binary.refit_all();
-    Some((kept, binary))
-}
-
-/// A box made larger by a hair that is another one for every triangle. obvhs merges boxes that are each
-/// other's best partner, and takes the last of equally good ones: among coincident or evenly stacked
-/// triangles only one pair is merged a pass, which makes the passes quadratic. The hairs are exponentially
-/// distributed, so that boxes of many merged ones differ by as much as those of two.
-fn loosened(tight: &Aabb, number: u32) -> Aabb {
-    const HAIR: f32 = 64.0 * f32::EPSILON;
-    let hair = |side: u32| {
-        let uniform = unit_from_bits(hash(number.wrapping_mul(6).wrapping_add(side)));
-        -(1.0 - uniform).ln() * HAIR
-    };
-    let hairs = |first: u32| Vec3A::from_array([0, 1, 2].map(|axis| hair(first + axis)));
-    let size = tight.min.abs().max(tight.max.abs());
-    Aabb { min: tight.min - size * hairs(0), max: tight.max + size * hairs(3) }
-}
-
-/// The scene as the caller gave it.
-#[derive(Clone, Copy)]
-struct Sources<'a> {
-    positions: &'a [Vec3],
-    triangles: &'a [[u32; 3]],
-}
-
-impl Sources<'_> {
-    /// False for triangles that name no vertex, are not finite or have no area.
-    fn has_area(&self, triangle: u32) -> bool {
-        let indices = self.triangles[triangle as usize];
-        if indices.iter().any(|&index| index as usize >= self.positions.len()) {
-            return false;
-        }
-        let [a, b, c] = self.vertices(triangle);
-        let normal = (b - a).cross(c - a);
-        normal.is_finite() && normal != Vec3::ZERO
-    }
-
-    fn vertices(&self, triangle: u32) -> [Vec3; 3] {
-        self.triangles[triangle as usize].map(|index| self.positions[index as usize])
-    }
+    let placed: Vec<Placed> = shared.instances.par_iter().map(place).collect();
+    let own = shared.own(triangles.len()) as u32;
+    let (root, bounds) = written.collapse(&Items::new(sources, 0..own, &placed));
+    Tree { nodes: written.nodes, blocks: written.blocks, placed, root, bounds }
 }
 
 /// Least costs of one subtree (Ylitie, Karras, Laine, *Efficient Incoherent Ray Traversal on GPUs
@@ -126,7 +52,7 @@ impl Sources<'_> {
 struct SubtreeCosts {
     /// `forest[i]`: the subtree as at most `i + 1` children of a wide node.
     forest: [f32; WIDTH - 1],
-    /// Triangles in the subtree.
+    /// Triangles in the subtree; more than a block has where there are instances.
     count: u32,
 }
 
@@ -141,7 +67,7 @@ impl SubtreeCosts {
 }
 
 /// Costs of all nodes of the binary tree, children before parents.
-fn subtree_costs(binary: &Bvh2) -> Vec<SubtreeCosts> {
+fn subtree_costs(items: &Items<'_>, binary: &Bvh2) -> Vec<SubtreeCosts> {
     let mut order = vec![0_u32];
     let mut next = 0;
     while let Some(&index) = order.get(next) {
@@ -156,7 +82,10 @@ fn subtree_costs(binary: &Bvh2) -> Vec<SubtreeCosts> {
     for &index in order.iter().rev() {
         let node = &binary.nodes[index as usize];
         let area = node.aabb().half_area();
-        costs[index as usize] = if node.is_leaf() {
+        costs[index as usize] = if items.instance_of(binary, index).is_some() {
+            // Too many for a block.
+            SubtreeCosts { forest: [area * INSTANCE_COST; WIDTH - 1], count: WIDTH as u32 + 1 }
+        } else if node.is_leaf() {
             SubtreeCosts { forest: [area * BLOCK_COST; WIDTH - 1], count: node.prim_count }
         } else {
             let children = node.first_index as usize;
@@ -182,29 +111,46 @@ fn bounds(binary: &Bvh2, index: u32) -> (Vec3, Vec3) {
     (bounds.min.into(), bounds.max.into())
 }
 
-/// Writes the wide tree.
-struct Collapse<'a> {
-    sources: Sources<'a>,
-    /// Triangle index of each primitive of the binary tree.
-    kept: &'a [u32],
-    binary: &'a Bvh2,
-    costs: &'a [SubtreeCosts],
+/// Wide trees, one after the other.
+#[derive(Default)]
+struct Written {
     nodes: Vec<Node>,
     blocks: Vec<Block>,
 }
 
-impl Collapse<'_> {
-    fn root(&mut self) {
-        let root = self.costs[0];
-        if root.count as usize <= WIDTH {
-            let mut node = Node::EMPTY;
+impl Written {
+    /// Appends the tree over some items; its root and the box around it.
+    fn collapse(&mut self, items: &Items<'_>) -> (Reference, (Vec3, Vec3)) {
+        let Some(binary) = items.binary() else {
             self.nodes.push(Node::EMPTY);
-            let block = self.block_of(0);
-            node.set_child(0, bounds(self.binary, 0), block);
-            self.nodes[0] = node;
-        } else {
-            self.node(0, 0);
+            return (self.nodes.len() as Reference - 1, (Vec3::ZERO, Vec3::ZERO));
+        };
+        let costs = subtree_costs(items, &binary);
+        self.nodes.reserve(items.triangles.len() / 24);
+        self.blocks.reserve(items.triangles.len() / 4);
+        let mut collapse = Collapse { items, binary: &binary, costs: &costs, written: self };
+        (collapse.root(), bounds(&binary, 0))
+    }
+}
+
+/// Writes a wide tree.
+struct Collapse<'a> {
+    items: &'a Items<'a>,
+    binary: &'a Bvh2,
+    costs: &'a [SubtreeCosts],
+    written: &'a mut Written,
+}
+
+impl Collapse<'_> {
+    fn root(&mut self) -> Reference {
+        let instance = self.items.instance_of(self.binary, 0);
+        if instance.is_none() && self.costs[0].count as usize > WIDTH {
+            return self.node(0, 0);
         }
+        let reference = self.reserve();
+        let child = instance.unwrap_or_else(|| self.block_of(0));
+        self.written.nodes[reference as usize].set_child(0, bounds(self.binary, 0), child);
+        reference
     }
 
     /// Emits the node that stands for the binary inner node `index`.
@@ -219,14 +165,16 @@ impl Collapse<'_> {
         self.sort_by_blocking(&mut children);
         let mut node = Node::EMPTY;
         for (lane, &child) in children.iter().enumerate() {
-            let target = if self.is_block(child) {
+            let target = if let Some(instance) = self.items.instance_of(self.binary, child) {
+                instance
+            } else if self.is_block(child) {
                 self.block_of(child)
             } else {
                 self.node(child, depth + 1)
             };
             node.set_child(lane, bounds(self.binary, child), target);
         }
-        self.nodes[reference as usize] = node;
+        self.written.nodes[reference as usize] = node;
         reference
     }
 
@@ -276,8 +224,15 @@ impl Collapse<'_> {
     /// Emits a tree of least depth over `primitives`, in their order along the binary tree.
     fn balanced(&mut self, primitives: &[u32], depth: usize) -> ((Vec3, Vec3), Reference) {
         assert!(depth < MAX_DEPTH, "eight-way splits of a u32 count end within 12 levels");
-        if primitives.len() <= WIDTH {
-            return (self.primitive_bounds(primitives), self.block(primitives));
+        let bounds = self.primitive_bounds(primitives);
+        if let [one] = primitives
+            && let Item::Instance(number) = self.items.get(*one)
+        {
+            return (bounds, INSTANCE | number);
+        }
+        let is_triangle = |one: &u32| matches!(self.items.get(*one), Item::Triangle(_));
+        if primitives.len() <= WIDTH && primitives.iter().all(is_triangle) {
+            return (bounds, self.block(primitives));
         }
         let reference = self.reserve();
         let mut node = Node::EMPTY;
@@ -285,23 +240,25 @@ impl Collapse<'_> {
             let (bounds, child) = self.balanced(chunk, depth + 1);
             node.set_child(lane, bounds, child);
         }
-        self.nodes[reference as usize] = node;
-        (self.primitive_bounds(primitives), reference)
+        self.written.nodes[reference as usize] = node;
+        (bounds, reference)
     }
 
     fn reserve(&mut self) -> Reference {
-        self.nodes.push(Node::EMPTY);
-        Reference::try_from(self.nodes.len() - 1).expect("fewer nodes than triangles")
+        let nodes = &mut self.written.nodes;
+        nodes.push(Node::EMPTY);
+        Reference::try_from(nodes.len() - 1).expect("fewer nodes than triangles")
     }
 
     fn block(&mut self, primitives: &[u32]) -> Reference {
         let mut block = Block::EMPTY;
         for (lane, &primitive) in primitives.iter().enumerate() {
-            let triangle = self.kept[primitive as usize];
-            block.set_triangle(lane, self.sources.vertices(triangle), triangle);
+            let triangle = self.items.triangles[primitive as usize];
+            block.set_triangle(lane, self.items.sources.vertices(triangle), triangle);
         }
-        self.blocks.push(block);
-        Reference::try_from(self.blocks.len() - 1).expect("fewer blocks than triangles") | LEAF
+        let blocks = &mut self.written.blocks;
+        blocks.push(block);
+        Reference::try_from(blocks.len() - 1).expect("fewer blocks than triangles") | LEAF
     }
 
     /// The primitives below a node of the binary tree, left to right.
@@ -322,12 +279,9 @@ impl Collapse<'_> {
     }
 
     fn primitive_bounds(&self, primitives: &[u32]) -> (Vec3, Vec3) {
-        let vertices = primitives
-            .iter()
-            .flat_map(|&primitive| self.sources.vertices(self.kept[primitive as usize]));
-        vertices.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lower, upper), vertex| {
-            (lower.min(vertex), upper.max(vertex))
-        })
+        let boxes = primitives.iter().map(|&primitive| self.items.aabb(primitive));
+        let all = boxes.reduce(|a, b| a.union(&b)).expect("some primitives");
+        (all.min.into(), all.max.into())
     }
 }
 
@@ -367,7 +321,7 @@ mod tests {
     }
 
     fn check(positions: &[Vec3], triangles: &[[u32; 3]]) -> usize {
-        let tree = build(positions, triangles);
+        let tree = build(positions, triangles, Shared::default());
         let mut uses = vec![0; triangles.len()];
         let depth = depth(&tree, 0, &mut uses, &mut Vec::new());
         assert!(uses.iter().all(|&count| count == 1));

@@ -1,10 +1,12 @@
-//! What a ray hits: an eight-wide bounding volume hierarchy over triangles.
+//! What a ray hits: an eight-wide bounding volume hierarchy over triangles and instances.
 //!
 //! Watertight: a ray that starts inside a closed mesh of shared vertices hits it. Hits are the same
 //! bits on all machines: neither the vector instructions in use nor the shape of the tree matters.
 
 mod build;
 pub(crate) mod compressed;
+mod instance;
+mod items;
 mod lanes;
 mod traverse;
 mod triangle;
@@ -18,9 +20,12 @@ use std::mem::size_of_val;
 use crate::huge_pages::on_huge_pages;
 use glam::{IVec3, Vec2, Vec3};
 
+pub(crate) use instance::InstanceWords;
+use instance::Placed;
+pub use instance::{Instance, Shared};
 use lanes::Portable;
 use traverse::TreeRef;
-use wide::{Block, Node};
+use wide::{Block, Node, Reference};
 
 /// Points `origin + t * direction` with `t_min <= t <= t_max`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,7 +45,7 @@ pub struct Ray {
 pub struct Hit {
     /// Distance in lengths of the ray's direction.
     pub t: f32,
-    /// Index in the triangle list the tree was built from.
+    /// Index in the triangle list the tree was built from; of an instance's triangles their number.
     pub triangle: u32,
     /// Weights of vertices 1 and 2; vertex 0 has the rest. Each in `[0,1]` up to rounding.
     pub barycentric: Vec2,
@@ -69,6 +74,8 @@ impl Simd {
 pub struct Bvh {
     nodes: Vec<Node>,
     blocks: Vec<Block>,
+    placed: Vec<Placed>,
+    root: Reference,
     bounds: (Vec3, Vec3),
     extent: f32,
     simd: Simd,
@@ -80,11 +87,20 @@ impl Bvh {
     /// Triangles with indices out of range, coordinates that are not finite or no area (their edges'
     /// cross product is zero in f32) are left out: no ray hits them.
     pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
-        let build::Tree { nodes, blocks, bounds } = build::build(positions, triangles);
+        Self::with_instances(positions, triangles, Shared::default())
+    }
+
+    /// The same with meshes among the triangles that are met where their instances are, and a tree for
+    /// each of them. Two levels are walked more slowly than one over copies of the triangles.
+    pub fn with_instances(positions: &[Vec3], triangles: &[[u32; 3]], shared: Shared<'_>) -> Self {
+        let build::Tree { nodes, blocks, placed, root, bounds } =
+            build::build(positions, triangles, shared);
         let extent = bounds.0.abs().max(bounds.1.abs()).max_element();
         Self {
             nodes: on_huge_pages(nodes),
             blocks: on_huge_pages(blocks),
+            placed,
+            root,
             bounds,
             extent,
             simd: Simd::detect(),
@@ -103,11 +119,10 @@ impl Bvh {
     /// Triangles have no back side: culling, like alpha masks, is up to `accept`.
     #[inline]
     pub fn closest_hit(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
-        match self.simd {
-            Simd::Portable => traverse::closest_hit::<Portable>(self.tree(), ray, accept),
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
-            Simd::Avx2 => unsafe { avx2::closest_hit(self.tree(), ray, accept) },
+        if self.placed.is_empty() {
+            self.closest_of::<1>(ray, accept)
+        } else {
+            self.closest_of::<2>(ray, accept)
         }
     }
 
@@ -116,22 +131,53 @@ impl Bvh {
     /// Every hit is offered to `blocks` exactly once, in no particular order, until it returns true.
     #[inline]
     pub fn any_hit(&self, ray: &Ray, blocks: impl FnMut(&Hit) -> bool) -> bool {
-        match self.simd {
-            Simd::Portable => traverse::any_hit::<Portable>(self.tree(), ray, blocks),
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
-            Simd::Avx2 => unsafe { avx2::any_hit(self.tree(), ray, blocks) },
+        if self.placed.is_empty() {
+            self.any_of::<1>(ray, blocks)
+        } else {
+            self.any_of::<2>(ray, blocks)
         }
     }
 
-    /// Lower and upper corner of the box around all triangles; both zero if there are none.
+    #[inline(always)]
+    fn closest_of<const LEVELS: usize>(
+        &self,
+        ray: &Ray,
+        accept: impl Fn(&Hit) -> bool,
+    ) -> Option<Hit> {
+        match self.simd {
+            Simd::Portable => traverse::closest_hit::<Portable, LEVELS>(self.tree(), ray, accept),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
+            Simd::Avx2 => unsafe { avx2::closest_hit::<LEVELS>(self.tree(), ray, accept) },
+        }
+    }
+
+    #[inline(always)]
+    fn any_of<const LEVELS: usize>(&self, ray: &Ray, blocks: impl FnMut(&Hit) -> bool) -> bool {
+        match self.simd {
+            Simd::Portable => traverse::any_hit::<Portable, LEVELS>(self.tree(), ray, blocks),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
+            Simd::Avx2 => unsafe { avx2::any_hit::<LEVELS>(self.tree(), ray, blocks) },
+        }
+    }
+
+    /// Lower and upper corner of the box around all triangles (for instances, around boxes of parts
+    /// of them); both zero if there are none.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         self.bounds
     }
 
     /// Bytes of the tree and its copy of the triangles.
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(self.nodes.as_slice()) + size_of_val(self.blocks.as_slice())
+        size_of_val(self.nodes.as_slice())
+            + size_of_val(self.blocks.as_slice())
+            + size_of_val(self.placed.as_slice())
+    }
+
+    /// Its instances as a GPU reads them; `root_of` tells where the root of a mesh's tree is there.
+    pub(crate) fn instance_words(&self, root_of: impl Fn(u32) -> u32) -> Vec<InstanceWords> {
+        self.placed.iter().map(|placed| placed.words(root_of(placed.mesh))).collect()
     }
 
     /// Name of the instructions in use, for logs.
@@ -145,7 +191,13 @@ impl Bvh {
 
     #[inline(always)]
     fn tree(&self) -> TreeRef<'_> {
-        TreeRef { nodes: &self.nodes, blocks: &self.blocks, extent: self.extent }
+        TreeRef {
+            nodes: &self.nodes,
+            blocks: &self.blocks,
+            placed: &self.placed,
+            root: self.root,
+            extent: self.extent,
+        }
     }
 }
 

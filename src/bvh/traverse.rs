@@ -4,9 +4,10 @@ use std::mem::MaybeUninit;
 
 use glam::Vec3;
 
+use super::instance::Placed;
 use super::lanes::{Bits, Lanes};
 use super::triangle::{self, BlockHits, Shear};
-use super::wide::{Block, LEAF, Node, Reference, STACK_CAPACITY, WIDTH};
+use super::wide::{Block, INSTANCE, LEAF, Node, Reference, STACK_CAPACITY, WIDTH};
 use super::{Hit, Ray};
 
 /// A borrowed tree.
@@ -14,6 +15,8 @@ use super::{Hit, Ray};
 pub(super) struct TreeRef<'a> {
     pub(super) nodes: &'a [Node],
     pub(super) blocks: &'a [Block],
+    pub(super) placed: &'a [Placed],
+    pub(super) root: Reference,
     /// Largest absolute coordinate of the scene.
     pub(super) extent: f32,
 }
@@ -33,8 +36,9 @@ struct BoxRay {
 }
 
 impl BoxRay {
+    /// `extent` is the largest coordinate of the boxes, `slack` what they are to be larger by on top.
     #[inline(always)]
-    fn new(ray: &Ray, extent: f32) -> Self {
+    fn new(ray: &Ray, extent: f32, slack: Vec3) -> Self {
         let longest = ray.direction.abs().max_element();
         // A direction of 2^-60 is as good as zero and keeps `0 * inf` out.
         let least = longest * (0.5_f32).powi(60);
@@ -49,7 +53,7 @@ impl BoxRay {
         for axis in 0..3 {
             let direction = ray.direction[axis];
             let inverse = 1.0 / direction.abs().max(least).copysign(direction);
-            let toward = pad.copysign(direction);
+            let toward = (pad + slack[axis]).copysign(direction);
             result.inverse[axis] = inverse;
             result.near_offset[axis] = -(ray.origin[axis] + toward) * inverse;
             result.far_offset[axis] = -(ray.origin[axis] - toward) * inverse;
@@ -79,20 +83,26 @@ impl BoxRay {
 
 /// Nodes still to be visited, each with its distance: distance bits above, reference below. The
 /// bits of floats that are not negative sort as the floats do.
-struct Stack {
-    entries: [MaybeUninit<u64>; STACK_CAPACITY],
+struct Stack<const LEVELS: usize> {
+    entries: [[MaybeUninit<u64>; STACK_CAPACITY]; LEVELS],
     length: usize,
 }
 
-impl Stack {
+impl<const LEVELS: usize> Stack<LEVELS> {
     #[inline(always)]
     fn new() -> Self {
-        Self { entries: [const { MaybeUninit::uninit() }; STACK_CAPACITY], length: 0 }
+        let entries = [const { [const { MaybeUninit::uninit() }; STACK_CAPACITY] }; LEVELS];
+        Self { entries, length: 0 }
+    }
+
+    #[inline(always)]
+    fn entry(&mut self, at: usize) -> &mut MaybeUninit<u64> {
+        &mut self.entries.as_flattened_mut()[at]
     }
 
     #[inline(always)]
     fn push(&mut self, entry: u64) {
-        self.entries[self.length].write(entry);
+        self.entry(self.length).write(entry);
         self.length += 1;
     }
 
@@ -100,7 +110,7 @@ impl Stack {
     fn pop(&mut self) -> Option<u64> {
         self.length = self.length.checked_sub(1)?;
         // SAFETY: all entries below the previous length were written by `push`.
-        Some(unsafe { self.entries[self.length].assume_init() })
+        Some(unsafe { self.entry(self.length).assume_init() })
     }
 
     /// Pushes the children of `node` in the lanes of `mask`, which is not zero, far ones first, save
@@ -139,14 +149,14 @@ impl Stack {
         let mut at = self.length - 1;
         while at > base {
             // SAFETY: `at` and `at - 1` lie below the length, so both were written.
-            let before = unsafe { self.entries[at - 1].assume_init() };
+            let before = unsafe { self.entry(at - 1).assume_init() };
             if before >= entry {
                 break;
             }
-            self.entries[at].write(before);
+            self.entry(at).write(before);
             at -= 1;
         }
-        self.entries[at].write(entry);
+        self.entry(at).write(entry);
     }
 }
 
@@ -166,8 +176,10 @@ fn distance(entry: u64) -> f32 {
 /// `visit` gets the hits of a block and returns how far to go on, or `None` to end the walk. No
 /// lanes may be handled in closures: those are not always inlined, and are not compiled for the
 /// vector instructions of the function around.
+///
+/// A tree of one of `LEVELS` has no instances.
 #[inline(always)]
-fn walk<L: Lanes, const NEAREST_FIRST: bool>(
+fn walk<L: Lanes, const LEVELS: usize, const NEAREST_FIRST: bool>(
     tree: TreeRef<'_>,
     ray: &Ray,
     mut visit: impl FnMut(&Block, &BlockHits) -> Option<f32>,
@@ -176,15 +188,30 @@ fn walk<L: Lanes, const NEAREST_FIRST: bool>(
     if !usable || !ray.origin.is_finite() {
         return;
     }
-    let box_ray = BoxRay::new(ray, tree.extent);
+    let world = BoxRay::new(ray, tree.extent, Vec3::ZERO);
     let shear = Shear::new(ray);
     let t_min = ray.t_min.max(0.0);
     let mut t_max = ray.t_max;
-    let mut stack = Stack::new();
-    let mut current: Reference = 0;
+    let mut stack = Stack::<LEVELS>::new();
+    let mut current = tree.root;
+    // The instance that is walked, the ray in its space, and what waits below.
+    let mut inside: Option<(&Placed, BoxRay, usize)> = None;
     loop {
+        if LEVELS > 1 && current & INSTANCE == INSTANCE {
+            let placed = &tree.placed[(current & !INSTANCE) as usize];
+            let (there, slack) = placed.brought(ray, tree.extent);
+            inside = Some((placed, BoxRay::new(&there, placed.extent, slack), stack.length));
+            current = placed.root;
+        }
         if current & LEAF != 0 {
-            let block = &tree.blocks[(current & !LEAF) as usize];
+            let mut block = &tree.blocks[(current & !LEAF) as usize];
+            let in_world;
+            if LEVELS > 1
+                && let Some((placed, ..)) = &inside
+            {
+                in_world = placed.block::<L>(block);
+                block = &in_world;
+            }
             let hits = triangle::intersect::<L>(block, &shear, t_min, t_max);
             if hits.mask != 0 {
                 match visit(block, &hits) {
@@ -194,7 +221,13 @@ fn walk<L: Lanes, const NEAREST_FIRST: bool>(
             }
         } else {
             let node = &tree.nodes[current as usize];
-            let (mask, near) = box_ray.enter::<L>(node, t_min, t_max);
+            let mut boxes = &world;
+            if LEVELS > 1
+                && let Some((_, there, _)) = &inside
+            {
+                boxes = there;
+            }
+            let (mask, near) = boxes.enter::<L>(node, t_min, t_max);
             if mask != 0 {
                 current = if NEAREST_FIRST {
                     stack.descend(node, mask, &near)
@@ -205,6 +238,9 @@ fn walk<L: Lanes, const NEAREST_FIRST: bool>(
             }
         }
         loop {
+            if LEVELS > 1 && inside.as_ref().is_some_and(|(.., below)| stack.length == *below) {
+                inside = None;
+            }
             let Some(entry) = stack.pop() else { return };
             if distance(entry) <= t_max {
                 current = entry as Reference;
@@ -216,13 +252,13 @@ fn walk<L: Lanes, const NEAREST_FIRST: bool>(
 
 /// See [`super::Bvh::closest_hit`].
 #[inline(always)]
-pub(super) fn closest_hit<L: Lanes>(
+pub(super) fn closest_hit<L: Lanes, const LEVELS: usize>(
     tree: TreeRef<'_>,
     ray: &Ray,
     accept: impl Fn(&Hit) -> bool,
 ) -> Option<Hit> {
     let mut closest = Hit { t: ray.t_max, triangle: u32::MAX, ..Hit::default() };
-    walk::<L, true>(tree, ray, |block, hits| {
+    walk::<L, LEVELS, true>(tree, ray, |block, hits| {
         for lane in Bits(hits.mask) {
             let hit = hits.hit(block, lane);
             // The lower index wins ties, so that hits do not depend on the shape of the tree.
@@ -239,13 +275,13 @@ pub(super) fn closest_hit<L: Lanes>(
 
 /// See [`super::Bvh::any_hit`].
 #[inline(always)]
-pub(super) fn any_hit<L: Lanes>(
+pub(super) fn any_hit<L: Lanes, const LEVELS: usize>(
     tree: TreeRef<'_>,
     ray: &Ray,
     mut blocks: impl FnMut(&Hit) -> bool,
 ) -> bool {
     let mut blocked = false;
-    walk::<L, false>(tree, ray, |block, hits| {
+    walk::<L, LEVELS, false>(tree, ray, |block, hits| {
         for lane in Bits(hits.mask) {
             let hit = hits.hit(block, lane);
             if blocks(&hit) {

@@ -11,11 +11,14 @@ pub(super) const MAX_DEPTH: usize = 36;
 /// A node leaves at most `WIDTH - 1` children waiting while the walk descends into the other one.
 pub(super) const STACK_CAPACITY: usize = MAX_DEPTH * (WIDTH - 1);
 
-/// Reference to a node, or to a leaf block when [`LEAF`] is set.
+/// Reference to a node, or to a leaf block when [`LEAF`] is set, or to an instance with [`INSTANCE`].
 pub(super) type Reference = u32;
 
 /// Marks a [`Reference`] to a leaf block.
 pub(super) const LEAF: Reference = 1 << 31;
+
+/// Marks, both bits set, a [`Reference`] to an instance.
+pub(super) const INSTANCE: Reference = LEAF | 1 << 30;
 
 /// Boxes of up to eight children, one lane each, those last that likely block a ray. A lane without
 /// child holds an empty box.
@@ -34,6 +37,15 @@ impl Node {
         let (lower, upper) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
         Self { planes: [lower, upper, lower, upper, lower, upper], children: [0; WIDTH] }
     };
+
+    /// Boxes of its children.
+    pub(super) fn boxes(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
+        let corner = |lane: usize, side: usize| {
+            Vec3::from_array([0, 1, 2].map(|axis| self.planes[2 * axis + side][lane]))
+        };
+        let boxes = (0..WIDTH).map(move |lane| (corner(lane, 0), corner(lane, 1)));
+        boxes.filter(|(lower, _)| lower.x.is_finite())
+    }
 
     /// Puts a child into lane `lane`.
     pub(super) fn set_child(&mut self, lane: usize, bounds: (Vec3, Vec3), child: Reference) {

@@ -48,7 +48,9 @@ fn scene_facts(name: &str, scene: Scene) -> Value {
     let textures: usize = scene.images.iter().map(|i| i.texels.len() * 4).sum();
     json!({
         "scene": name,
-        "triangles": scene.triangles.len(),
+        "triangles": scene.shown_triangles(),
+        "triangles_in_memory": scene.triangles.len(),
+        "instances": scene.instances.len(),
         "vertices": scene.positions.len(),
         "materials": scene.materials.len(),
         "textures": scene.textures.len(),

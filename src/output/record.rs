@@ -94,7 +94,7 @@ impl Record<'_> {
             "size": [film.width, film.height],
             "settings": self.options.iter().cloned().map(|(k, v)| (k.to_owned(), v))
                 .collect::<serde_json::Map<_, _>>(),
-            "triangles": self.world.scene.triangles.len(),
+            "triangles": self.world.scene.shown_triangles(),
             "samples_per_pixel": film.min_samples(),
             "noise": noise.is_finite().then_some(noise),
             "invalid_samples": film.invalid_samples(),

@@ -40,7 +40,7 @@ fn look(world: &World, origin: Vec3, direction: Vec3) -> Option<Sight> {
     let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
     let hit = world.bvh.closest_hit(&ray, |_| true)?;
     let scene = &world.scene;
-    let [a, b, c] = scene.triangles[hit.triangle as usize].map(|v| scene.positions[v as usize]);
+    let [a, b, c] = scene.corners(hit.triangle);
     let from_front = (b - a).cross(c - a).dot(direction) < 0.0;
     Some(Sight { distance: hit.t, from_front })
 }
@@ -143,8 +143,8 @@ fn fitting_eye(world: &World, centre: Vec3, axes: Mat3A, aspect: f32) -> Vec3 {
     let horizontal = vertical * aspect;
     let camera_from_world = axes.transpose();
     let mut tightest = [f32::MIN; 4];
-    for &vertex in world.scene.triangles.iter().flatten() {
-        let corner = Vec3A::from(world.scene.positions[vertex as usize] - centre);
+    for point in world.scene.hull_points(|_| true) {
+        let corner = Vec3A::from(point - centre);
         let p = camera_from_world * corner;
         let (across, along) = (horizontal * p.z, vertical * p.z);
         let bounds = [across + p.x, across - p.x, along + p.y, along - p.y];

@@ -50,7 +50,9 @@ impl LocalLights {
         let mut lights = Vec::new();
         let mut distant = Vec::new();
         let mut total = 0.0;
-        for (triangle, &material) in scene.triangle_materials.iter().enumerate() {
+        // Instances share no lamps: the tree of lights holds places in the world.
+        let own = scene.instances.meshes().first().map_or(usize::MAX, |mesh| mesh.start as usize);
+        for (triangle, &material) in scene.triangle_materials.iter().enumerate().take(own) {
             if emits[material as usize]
                 && let Some((moments, power)) = triangle_moments(scene, triangle as u32)
             {
@@ -104,7 +106,7 @@ impl LocalLights {
             let light = &scene.lights[choice.light as usize - self.triangles.len()];
             return sample_punctual(light, receiver.position, probability);
         };
-        let corners = corners(scene, triangle);
+        let corners = scene.corners(triangle);
         let u = Vec2::new(choice.remainder, unit_from_bits(bits[1]));
         let barycentric = sample_triangle(u);
         let target = corners[0]
@@ -136,7 +138,7 @@ impl LocalLights {
         distance: f32,
     ) -> f32 {
         let Ok(index) = self.triangles.binary_search(&triangle) else { return 0.0 };
-        let corners = corners(scene, triangle);
+        let corners = scene.corners(triangle);
         area_to_solid_angle(&corners, direction, distance * distance)
             .map_or(0.0, |density| self.tree.probability(receiver, index as u32) * density)
     }
@@ -153,8 +155,7 @@ fn relate(lights: &mut [Light]) {
 
 /// Radiance a surface point sends towards its viewer: as much as alpha covers it.
 pub(super) fn emitted(scene: &Scene, point: &SurfacePoint<'_>) -> Vec3 {
-    let material = scene.triangle_materials[point.triangle as usize];
-    if point.front_face || scene.materials[material as usize].double_sided {
+    if point.front_face || scene.materials[point.material as usize].double_sided {
         point.parameters.emissive * point.parameters.alpha
     } else {
         Vec3::ZERO
@@ -176,13 +177,9 @@ fn area_to_solid_angle(corners: &[Vec3; 3], direction: Vec3, squared: f32) -> Op
     (density.is_finite() && density > 0.0).then_some(density)
 }
 
-fn corners(scene: &Scene, triangle: u32) -> [Vec3; 3] {
-    scene.triangles[triangle as usize].map(|v| scene.positions[v as usize])
-}
-
 /// Moments and power of an emissive triangle; `None` if nothing comes from it.
 fn triangle_moments(scene: &Scene, triangle: u32) -> Option<(Moments, f32)> {
-    let corners = corners(scene, triangle);
+    let corners = scene.corners(triangle);
     let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
     let area = 0.5 * normal.length();
     let material = &scene.materials[scene.triangle_materials[triangle as usize] as usize];

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::lights::LocalLights;
 use super::materials::ReadyMaterial;
 use super::ray_clock::RayClock;
-use crate::bvh::{Bvh, Hit, Ray};
+use crate::bvh::{Bvh, Hit, Ray, Shared};
 use crate::environment::Environment;
 use crate::error::Decoded;
 use crate::features::Features;
@@ -33,7 +33,9 @@ impl World {
     /// Builds the BVH and the light tables.
     pub fn new(scene: Scene) -> Self {
         let scene = with_huge_pages(scene);
-        let bvh = Bvh::build(&scene.positions, &scene.triangles);
+        let instances = scene.instances.for_tree();
+        let shared = Shared { meshes: scene.instances.meshes(), instances: &instances };
+        let bvh = Bvh::with_instances(&scene.positions, &scene.triangles, shared);
         let materials = scene.materials.iter().map(ReadyMaterial::new).collect();
         let lights = LocalLights::new(&scene, bvh.bounds());
         Self { needs: SceneNeeds::of(&scene), scene, bvh, lights, materials, clock: None }
@@ -64,6 +66,7 @@ impl World {
             + size_of_val(&scene.colors[..])
             + size_of_val(&scene.triangles[..])
             + size_of_val(&scene.triangle_materials[..])
+            + scene.instances.memory_bytes()
             + texels * size_of::<[u8; 4]>()
             + self.bvh.memory_bytes();
         bytes as u64
@@ -120,6 +123,7 @@ impl World {
     }
 
     /// The surface that a ray along `direction` has hit.
+    #[inline]
     pub fn point(&self, hit: &Hit, direction: Vec3) -> SurfacePoint<'_> {
         let shared = &self.material_of(hit).shared;
         SurfacePoint::with_shared(&self.scene, shared, hit.triangle, hit.barycentric, direction)
@@ -160,14 +164,14 @@ impl World {
     }
 
     fn material_of(&self, hit: &Hit) -> &ReadyMaterial {
-        self.material(self.scene.triangle_materials[hit.triangle as usize])
+        self.material(self.scene.material_of(hit.triangle))
     }
 
     fn is_covered(&self, hit: &Hit) -> bool {
         if !self.material_of(hit).passing.masked {
             return true;
         }
-        let material = self.scene.triangle_materials[hit.triangle as usize];
+        let material = self.scene.material_of(hit.triangle);
         match self.scene.materials[material as usize].alpha_mode {
             AlphaMode::Mask { cutoff } => {
                 alpha_at(&self.scene, hit.triangle, hit.barycentric) >= cutoff
@@ -180,8 +184,7 @@ impl World {
         if !self.material_of(hit).passing.single_sided {
             return true;
         }
-        let [a, b, c] =
-            self.scene.triangles[hit.triangle as usize].map(|v| self.scene.positions[v as usize]);
+        let [a, b, c] = self.scene.corners(hit.triangle);
         (b - a).cross(c - a).dot(ray.direction) <= 0.0
     }
 }

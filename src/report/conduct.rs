@@ -115,7 +115,7 @@ impl Conductor<'_> {
         let report = RowReport {
             row: row.clone(),
             notices: prepared.notices.iter().map(str::to_owned).collect(),
-            triangles: prepared.world.scene.triangles.len(),
+            triangles: prepared.world.scene.shown_triangles() as usize,
             map_size: prepared.map_size,
             reference: None,
             devices: Vec::new(),

@@ -1,11 +1,14 @@
-//! The scene: flat arrays and `u32` indices, everything in world space (metres, +Y up).
+//! The scene: flat arrays and `u32` indices, everything in world space (metres, +Y up), but for meshes
+//! that instances share.
 
 pub mod builtin;
 pub mod camera_path;
 pub mod gltf;
+mod instances;
 mod material_edit;
 pub mod needs;
 mod outlines;
+mod placing;
 pub mod surface;
 pub mod texture;
 
@@ -13,7 +16,9 @@ use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
 
 use crate::error::Notices;
 use camera_path::CameraPath;
+pub use instances::{Instance, Instances, MAX_SHOWN};
 pub use material_edit::MaterialEdit;
+pub use placing::Placing;
 
 /// What is asked of a scene's file.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -41,14 +46,15 @@ pub enum Outlines {
     Keep,
 }
 
-/// All that can be rendered, ready for a BVH: instances are baked into world space.
+/// All that can be rendered, ready for a BVH: in world space, but for meshes that instances share.
 ///
 /// Per-vertex arrays are either empty (nothing in the scene has it) or as long as `positions`.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
     /// What to call it: the file name or the built-in's name.
     pub name: String,
-    /// World-space vertex positions in metres.
+    /// World-space vertex positions in metres; of shared meshes in their own space, as are normals and
+    /// tangents.
     pub positions: Vec<Vec3>,
     /// World-space unit normals; zero where the triangle is to be shaded flat.
     pub normals: Vec<Vec3>,
@@ -62,6 +68,8 @@ pub struct Scene {
     pub triangles: Vec<[u32; 3]>,
     /// Index into `materials` for each triangle.
     pub triangle_materials: Vec<u32>,
+    /// Meshes, the last of the triangles, that are held once and shown in several places.
+    pub instances: Instances,
     /// Materials; never empty once loaded.
     pub materials: Vec<Material>,
     /// Textures: an image and how it is sampled.

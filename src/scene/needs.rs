@@ -17,7 +17,7 @@ pub struct SceneNeeds {
 }
 
 /// A feature of scenes, what it is called, and what is left out without it, with the reason.
-const WORDS: [(Features, &str, Option<&str>); 22] = [
+const WORDS: [(Features, &str, Option<&str>); 23] = [
     (Features::TEXTURES, "Textures", Some("texture reads: no material has a texture")),
     (Features::NORMAL_MAPS, "Normal maps", Some("tangent frames: no material has a normal map")),
     (
@@ -72,6 +72,7 @@ const WORDS: [(Features, &str, Option<&str>); 22] = [
         "Point, spot or directional lights",
         Some("punctual lights: the scene has none"),
     ),
+    (Features::INSTANCES, "Meshes shared by instances", None),
 ];
 
 impl SceneNeeds {
@@ -85,6 +86,7 @@ impl SceneNeeds {
         needs.features.set(Features::VERTEX_COLORS, !scene.colors.is_empty());
         needs.features.set(Features::PUNCTUAL_LIGHTS, !scene.lights.is_empty());
         needs.features.set(Features::FOG, scene.medium.is_some());
+        needs.features.set(Features::INSTANCES, !scene.instances.is_empty());
         for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
             needs.add(material);
         }

@@ -4,6 +4,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::instances::Surface;
 use super::{AlphaMode, Material, Scene};
 use crate::error::Decoded;
 
@@ -15,21 +16,22 @@ const SHARE: f32 = 0.8;
 const DISTANCE: f32 = 0.05;
 
 /// A triangle's centre and its normal, as long as twice its area.
-fn facing(scene: &Scene, triangle: usize) -> (Vec3, Vec3) {
-    let [a, b, c] = scene.triangles[triangle].map(|vertex| scene.positions[vertex as usize]);
+fn facing(scene: &Scene, surface: Surface<'_>) -> (Vec3, Vec3) {
+    let [a, b, c] = scene.corners_at(surface);
     ((a + b + c) / 3.0, (b - a).cross(c - a))
 }
 
 fn is_hull(scene: &Scene, material: u32) -> bool {
+    // A mesh that instances share has its outline with it: one of them tells.
     let of = |own: bool| {
-        let materials = scene.triangle_materials.iter().enumerate();
-        materials.filter(move |(_, m)| (**m == material) == own).map(|(triangle, _)| triangle)
+        let is_of = move |place: usize| (scene.triangle_materials[place] == material) == own;
+        scene.each_once().filter(move |(place, _)| is_of(*place))
     };
-    let own: Vec<usize> = of(true).collect();
-    if own.is_empty() || own.len() == scene.triangles.len() {
+    let own: Vec<Surface<'_>> = of(true).collect();
+    if own.is_empty() || of(false).next().is_none() {
         return false;
     }
-    let corners = own.iter().flat_map(|&t| scene.triangles[t]).map(|v| scene.positions[v as usize]);
+    let corners = own.iter().flat_map(|surface| scene.corners_at(*surface));
     let (low, high) = corners.fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(p), h.max(p)));
     let (middle, reach) = (0.5 * (low + high), DISTANCE * (high - low).length());
     // Six times the volume that the triangles enclose, negative where they face inwards.
@@ -51,7 +53,7 @@ fn is_hull(scene: &Scene, material: u32) -> bool {
         })
         .collect();
     let step = own.len().div_ceil(SAMPLES);
-    let samples: Vec<usize> = own.into_iter().step_by(step).collect();
+    let samples: Vec<Surface<'_>> = own.into_iter().step_by(step).collect();
     let covering = samples
         .par_iter()
         .filter(|&&triangle| {
@@ -110,6 +112,8 @@ impl Scene {
 
     /// Removes the triangles of some materials; the materials stay, unused.
     pub(super) fn remove_triangles_of(&mut self, materials: &[u32]) {
+        let keeps = |place: u32| !materials.contains(&self.triangle_materials[place as usize]);
+        self.instances = std::mem::take(&mut self.instances).retained(keeps);
         let mut keep = self.triangle_materials.iter().map(|m| !materials.contains(m));
         self.triangles.retain(|_| keep.next().unwrap_or(true));
         self.triangle_materials.retain(|m| !materials.contains(m));

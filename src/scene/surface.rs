@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
 
 use super::texture::sample_texture;
-use super::{AlphaMode, Material, Scene, TextureRef};
+use super::{AlphaMode, Material, Placing, Scene, TextureRef};
 use crate::math::Frame;
 
 /// A shading normal is bent until its cosine with the viewer is at least this share of the geometric
@@ -177,7 +177,7 @@ impl SurfaceParameters {
 /// A point on a triangle as a ray sees it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfacePoint<'a> {
-    /// Index of the triangle.
+    /// Number of the triangle.
     pub triangle: u32,
     /// Index of its material.
     pub material: u32,
@@ -207,6 +207,7 @@ impl<'a> SurfacePoint<'a> {
     }
 
     /// The same, given what all points of the triangle's material have in common.
+    #[inline]
     pub fn with_shared(
         scene: &Scene,
         shared: &'a SharedParameters,
@@ -224,9 +225,9 @@ impl<'a> SurfacePoint<'a> {
         mut parameters: Cow<'a, SurfaceParameters>,
         ray_direction: Vec3,
     ) -> Self {
-        let (scene, material) = (corner.scene, corner.material());
-        let [a, b, c] = corner.vertices.map(|i| scene.positions[i]);
-        let position = corner.interpolate(&scene.positions);
+        let material = corner.material();
+        let [a, b, c] = corner.positions();
+        let position = corner.blend([a, b, c]);
         let front_normal = (b - a).cross(c - a).try_normalize().unwrap_or(-ray_direction);
         let front_face = ray_direction.dot(front_normal) < 0.0;
         let geometric_normal = if front_face { front_normal } else { -front_normal };
@@ -252,7 +253,7 @@ impl<'a> SurfacePoint<'a> {
             parameters.to_mut().clearcoat_normal = local;
         }
         Self {
-            triangle: corner.triangle as u32,
+            triangle: corner.triangle,
             material: corner.material,
             position,
             geometric_normal,
@@ -286,19 +287,22 @@ fn has_normal_map(material: &Material) -> bool {
 /// A point of a triangle, ready to interpolate what its corners have.
 struct Corner<'a> {
     scene: &'a Scene,
-    triangle: usize,
+    triangle: u32,
     material: u32,
     vertices: [usize; 3],
     weights: Vec3,
+    /// Where an instance's triangle is. Its corners are what they would be had it been baked.
+    placing: Option<&'a Placing>,
 }
 
 impl<'a> Corner<'a> {
     fn new(scene: &'a Scene, triangle: u32, barycentric: Vec2) -> Self {
-        let triangle = triangle as usize;
+        let (place, placing) = scene.instances.find(triangle);
         let weights = Vec3::new(1.0 - barycentric.x - barycentric.y, barycentric.x, barycentric.y);
-        let vertices = scene.triangles[triangle].map(|i| i as usize);
-        let material = scene.triangle_materials[triangle];
-        Self { scene, triangle, material, vertices, weights }
+        let vertices = scene.triangles[place].map(|i| i as usize);
+        let vertices = placing.map_or(vertices, |placing| placing.turned(vertices));
+        let material = scene.triangle_materials[place];
+        Self { scene, triangle, material, vertices, weights, placing }
     }
 
     fn material(&self) -> &'a Material {
@@ -309,8 +313,31 @@ impl<'a> Corner<'a> {
     where
         T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>,
     {
-        let [a, b, c] = self.vertices.map(|i| values[i]);
+        self.blend(self.vertices.map(|i| values[i]))
+    }
+
+    fn blend<T>(&self, [a, b, c]: [T; 3]) -> T
+    where
+        T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>,
+    {
         a * self.weights.x + b * self.weights.y + c * self.weights.z
+    }
+
+    /// World positions of the triangle's corners.
+    fn positions(&self) -> [Vec3; 3] {
+        let positions = self.vertices.map(|i| self.scene.positions[i]);
+        self.placing.map_or(positions, |placing| positions.map(|p| placing.position(p)))
+    }
+
+    /// Interpolated tangent, and the handedness of the first corner's; `None` where the scene has none.
+    fn tangent(&self) -> Option<(Vec3, f32)> {
+        if self.scene.tangents.is_empty() {
+            return None;
+        }
+        let tangents = self.vertices.map(|i| self.scene.tangents[i]);
+        let tangents =
+            self.placing.map_or(tangents, |placing| tangents.map(|t| placing.tangent(t)));
+        Some((self.blend(tangents).xyz(), tangents[0].w))
     }
 
     fn uv(&self, set: u8) -> Vec2 {
@@ -341,17 +368,15 @@ impl<'a> Corner<'a> {
         if normals.contains(&Vec3::ZERO) {
             return None;
         }
-        Some(self.interpolate(&self.scene.normals)).filter(|n| n.length_squared() > 1e-12)
+        let normals = self.placing.map_or(normals, |placing| normals.map(|n| placing.normal(n)));
+        Some(self.blend(normals)).filter(|n| n.length_squared() > 1e-12)
     }
 
     /// The normal a tangent-space map makes of `normal`, not of unit length. Neither normal nor
     /// tangent is normalised in between, as MikkTSpace demands; without tangents the map is ignored.
     fn mapped(&self, normal: Vec3, texture: Option<TextureRef>, scale: f32) -> Vec3 {
-        let Some(texture) = texture.filter(|_| !self.scene.tangents.is_empty()) else {
-            return normal;
-        };
-        let tangent = self.interpolate(&self.scene.tangents).xyz();
-        let handedness = self.scene.tangents[self.vertices[0]].w;
+        let Some(texture) = texture else { return normal };
+        let Some((tangent, handedness)) = self.tangent() else { return normal };
         let bitangent = normal.cross(tangent) * handedness;
         let map = self.read(Some(texture)).xyz() * 2.0 - 1.0;
         tangent * (map.x * scale) + bitangent * (map.y * scale) + normal * map.z
@@ -359,12 +384,9 @@ impl<'a> Corner<'a> {
 
     /// World direction in which reflections are wide, not of unit length; zero without tangents.
     fn anisotropy_direction(&self, normal: Vec3) -> Vec3 {
-        if self.scene.tangents.is_empty() {
-            return Vec3::ZERO;
-        }
+        let Some((tangent, handedness)) = self.tangent() else { return Vec3::ZERO };
         let m = self.material();
-        let tangent = self.interpolate(&self.scene.tangents).xyz();
-        let bitangent = normal.cross(tangent) * self.scene.tangents[self.vertices[0]].w;
+        let bitangent = normal.cross(tangent) * handedness;
         let read = |t| self.read(Some(t)).xy() * 2.0 - 1.0;
         let direction = m.anisotropy_texture.map_or(Vec2::X, read);
         let direction = Vec2::from_angle(m.anisotropy_rotation).rotate(direction);

@@ -18,6 +18,7 @@ use lightgrid::scene::{Camera, Material, Medium, builtin, gltf};
 
 use crate::estimator::scenes::{self, lambert, lamp, room, smoked_glass};
 use crate::estimator::{MODES, mean, render, view};
+use crate::instances::{many, placings};
 use crate::shared::shared;
 
 /// Chance that a sound pair of devices fails one comparison.
@@ -365,6 +366,25 @@ fn paths_end_in_the_same_cache() {
         }
         let share = difference_over_noise(session.film(), &same);
         assert!(share < 0.1, "{name}, taken over: {share}");
+    }
+}
+
+#[test]
+fn instances_look_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let world = World::new(many("living-room", &placings(9, 1.5)));
+    let environment = sky_map("day");
+    let camera = Camera::look_at(Vec3::new(0.5, 1.5, 4.0), Vec3::ZERO, 0.9);
+    let of = |sampling| View { width: 36, height: 24, ..view(camera.clone(), sampling, 4) };
+    compare_views(&gpu, "instances", &world, &environment, of(Sampling::Plain));
+    compare_views(&gpu, "instances", &world, &environment, of(Sampling::Adaptive));
+    for (sharing, gi) in [(Sharing::Small, Gi::Exact), (Sharing::Off, Gi::Cached)] {
+        let view = View { sharing, gi, ..of(Sampling::Plain) };
+        let gpu_film = finish(on_gpu(&world, &environment, view.clone(), &gpu), 16);
+        let same = render(&world, &environment, view, 16);
+        let share = difference_over_noise(&gpu_film, &same);
+        eprintln!("{sharing:?}, {gi:?}: differences are {share:.4} of the noise");
+        assert!(share < 0.1, "{sharing:?}, {gi:?}: {share}");
     }
 }
 

@@ -21,6 +21,7 @@ mod gltf_files;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod image_files;
+mod instances;
 mod metrics;
 mod peers;
 mod real_files;

@@ -86,7 +86,7 @@ fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut 
         let size = high - low;
         let text = format!(
             "{} triangles, {:.1} x {:.1} x {:.1} m",
-            theme::count(scene.world.scene.triangles.len() as u64),
+            theme::count(scene.world.scene.shown_triangles()),
             size.x,
             size.y,
             size.z

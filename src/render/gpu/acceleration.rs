@@ -1,4 +1,4 @@
-//! The scene's triangles in a tree of the driver's own, for the device's ray queries.
+//! The scene's triangles and instances in a tree of the driver's own, for the device's ray queries.
 
 use wgpu::util::DeviceExt as _;
 use wgpu::{
@@ -9,44 +9,79 @@ use wgpu::{
 
 use super::device::Gpu;
 use super::layout::material_flags::{ALPHA_MASK, PARTIAL};
+use crate::bvh::InstanceWords;
 use crate::error::{Error, Result};
+use crate::path::World;
 use crate::scene::Scene;
 
 /// A tree on the device.
 pub(super) struct Acceleration {
     pub(super) tlas: wgpu::Tlas,
-    /// The scene's triangles in the order in which queries count them: first those that end every ray.
+    /// The scene's triangles in the order in which queries count them: those in the world, then those of
+    /// each mesh, each time first those that end every ray.
     pub(super) triangles: Vec<u32>,
-    /// How many end every ray; the others' materials are asked.
+    /// How many in the world end every ray; the others' materials are asked.
     pub(super) opaque: u32,
+    /// The instances, with what tells of their triangles in place of the root and the extent.
+    pub(super) instances: Vec<InstanceWords>,
+}
+
+/// Triangles of a lower tree: where they begin in the list, how many there are and how many of them end
+/// every ray.
+struct Lower {
+    first: u32,
+    count: u32,
+    opaque: u32,
 }
 
 const BYTES_OF_POSITION: u64 = 12;
+
+/// Most that a number in an instance may be, one more than which it is.
+const MOST_INSTANCES: usize = (1 << 24) - 2;
 
 impl Acceleration {
     /// Builds the tree; `flags_of` are those of a triangle's material.
     ///
     /// # Errors
-    /// If the device takes fewer triangles, or has no room.
-    pub(super) fn build(gpu: &Gpu, scene: &Scene, flags_of: impl Fn(u32) -> u32) -> Result<Self> {
+    /// If the device takes fewer triangles or instances, or has no room.
+    pub(super) fn build(gpu: &Gpu, world: &World, flags_of: impl Fn(u32) -> u32) -> Result<Self> {
+        let scene = &world.scene;
+        let name = &gpu.facts().name;
+        let meshes = scene.instances.meshes();
+        let own = meshes.first().map_or(scene.triangles.len() as u32, |mesh| mesh.start);
+        let is_opaque = |triangle: &u32| flags_of(*triangle) & (ALPHA_MASK | PARTIAL) == 0;
+        let mut triangles = Vec::with_capacity(scene.triangles.len());
+        let mut lower = Vec::with_capacity(1 + meshes.len());
+        for mesh in std::iter::once(0..own).chain(meshes.iter().cloned()) {
+            let (first, count) = (triangles.len() as u32, mesh.len() as u32);
+            let (opaque, asked): (Vec<u32>, Vec<u32>) = mesh.partition(is_opaque);
+            lower.push(Lower { first, count, opaque: opaque.len() as u32 });
+            triangles.extend(opaque);
+            triangles.extend(asked);
+        }
         let most = gpu.limits.max_blas_primitive_count;
-        let count = scene.triangles.len() as u32;
-        if count > most {
-            let name = &gpu.facts().name;
+        if let Some(Lower { count, .. }) = lower.iter().find(|lower| lower.count > most) {
             let sentence = format!("{count} triangles: {name}'s ray queries take {most}");
             return Err(Error::new(sentence));
         }
-        let is_opaque = |triangle: &u32| flags_of(*triangle) & (ALPHA_MASK | PARTIAL) == 0;
-        let (mut triangles, asked): (Vec<u32>, Vec<u32>) = (0..count).partition(is_opaque);
-        let opaque = triangles.len() as u32;
-        triangles.extend(asked);
-        let tlas = build(gpu, scene, &triangles, opaque);
+        let count = scene.instances.len();
+        let most = MOST_INSTANCES.min(gpu.limits.max_tlas_instance_count as usize - 1);
+        if count > most {
+            let sentence = format!("{count} instances: {name}'s ray queries take {most}");
+            return Err(Error::new(sentence));
+        }
+        let of_mesh = |mesh: u32| &lower[mesh as usize + 1];
+        let mut instances = world.bvh.instance_words(|mesh| of_mesh(mesh).first);
+        for (words, instance) in instances.iter_mut().zip(scene.instances.iter()) {
+            words[7][3] = of_mesh(instance.mesh).opaque;
+        }
+        let tlas = build(gpu, scene, &triangles, &lower);
         gpu.check()?;
-        Ok(Self { tlas, triangles, opaque })
+        Ok(Self { tlas, triangles, opaque: lower[0].opaque, instances })
     }
 }
 
-fn build(gpu: &Gpu, scene: &Scene, triangles: &[u32], opaque: u32) -> wgpu::Tlas {
+fn build(gpu: &Gpu, scene: &Scene, triangles: &[u32], lower: &[Lower]) -> wgpu::Tlas {
     let device = &gpu.device;
     let corners = triangles.iter().map(|triangle| scene.triangles[*triangle as usize]);
     let indices: Vec<[u32; 3]> = corners.collect();
@@ -59,48 +94,71 @@ fn build(gpu: &Gpu, scene: &Scene, triangles: &[u32], opaque: u32) -> wgpu::Tlas
     };
     let vertex_buffer = buffer("positions", bytemuck::cast_slice(&scene.positions));
     let index_buffer = buffer("triangles", bytemuck::cast_slice(&indices));
-    let all = triangles.len() as u32;
-    let parts = [
-        (0, opaque, AccelerationStructureGeometryFlags::OPAQUE),
-        (opaque, all - opaque, AccelerationStructureGeometryFlags::NO_DUPLICATE_ANY_HIT_INVOCATION),
-    ];
-    let sizes = parts.map(|(_, count, flags)| BlasTriangleGeometrySizeDescriptor {
-        vertex_format: wgpu::VertexFormat::Float32x3,
-        vertex_count: scene.positions.len() as u32,
-        index_format: Some(wgpu::IndexFormat::Uint32),
-        index_count: Some(3 * count),
-        flags,
-    });
     let flags = AccelerationStructureFlags::PREFER_FAST_TRACE;
     let update_mode = AccelerationStructureUpdateMode::Build;
-    let blas = device.create_blas(
-        &wgpu::CreateBlasDescriptor { label: Some("scene"), flags, update_mode },
-        BlasGeometrySizeDescriptors::Triangles { descriptors: sizes.to_vec() },
-    );
+    let parts = lower.iter().map(|&Lower { first, count, opaque }| {
+        let asked = AccelerationStructureGeometryFlags::NO_DUPLICATE_ANY_HIT_INVOCATION;
+        [
+            (first, opaque, AccelerationStructureGeometryFlags::OPAQUE),
+            (first + opaque, count - opaque, asked),
+        ]
+    });
+    let parts: Vec<_> = parts.collect();
+    let sizes: Vec<_> = parts
+        .iter()
+        .map(|parts| {
+            parts.map(|(_, count, flags)| BlasTriangleGeometrySizeDescriptor {
+                vertex_format: wgpu::VertexFormat::Float32x3,
+                vertex_count: scene.positions.len() as u32,
+                index_format: Some(wgpu::IndexFormat::Uint32),
+                index_count: Some(3 * count),
+                flags,
+            })
+        })
+        .collect();
+    let trees: Vec<_> = sizes
+        .iter()
+        .map(|sizes| {
+            device.create_blas(
+                &wgpu::CreateBlasDescriptor { label: Some("scene"), flags, update_mode },
+                BlasGeometrySizeDescriptors::Triangles { descriptors: sizes.to_vec() },
+            )
+        })
+        .collect();
     let mut tlas = device.create_tlas(&wgpu::CreateTlasDescriptor {
         label: Some("scene"),
-        max_instances: 1,
+        max_instances: 1 + scene.instances.len() as u32,
         flags,
         update_mode,
     });
     const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-    tlas[0] = Some(wgpu::TlasInstance::new(&blas, IDENTITY, 0, 0xff));
-    let geometry = parts.iter().zip(&sizes).map(|((first, ..), size)| BlasTriangleGeometry {
-        size,
-        vertex_buffer: &vertex_buffer,
-        first_vertex: 0,
-        vertex_stride: BYTES_OF_POSITION,
-        index_buffer: Some(&index_buffer),
-        first_index: Some(3 * first),
-        transform_buffer: None,
-        transform_buffer_offset: None,
+    tlas[0] = Some(wgpu::TlasInstance::new(&trees[0], IDENTITY, 0, 0xff));
+    for (number, instance) in (1..).zip(scene.instances.iter()) {
+        let map = instance.placing.affine();
+        let row = |axis: usize| {
+            let m = map.matrix3;
+            [m.x_axis[axis], m.y_axis[axis], m.z_axis[axis], map.translation[axis]]
+        };
+        let rows = [row(0), row(1), row(2)].as_flattened().try_into().unwrap_or(IDENTITY);
+        let tree = &trees[instance.mesh as usize + 1];
+        tlas[number as usize] = Some(wgpu::TlasInstance::new(tree, rows, number, 0xff));
+    }
+    let entries = trees.iter().zip(&parts).zip(&sizes).map(|((blas, parts), sizes)| {
+        let geometry = parts.iter().zip(sizes).map(|((first, ..), size)| BlasTriangleGeometry {
+            size,
+            vertex_buffer: &vertex_buffer,
+            first_vertex: 0,
+            vertex_stride: BYTES_OF_POSITION,
+            index_buffer: Some(&index_buffer),
+            first_index: Some(3 * first),
+            transform_buffer: None,
+            transform_buffer_offset: None,
+        });
+        BlasBuildEntry { blas, geometry: BlasGeometries::TriangleGeometries(geometry.collect()) }
     });
-    let entry = BlasBuildEntry {
-        blas: &blas,
-        geometry: BlasGeometries::TriangleGeometries(geometry.collect()),
-    };
+    let entries: Vec<_> = entries.collect();
     let mut commands = device.create_command_encoder(&Default::default());
-    commands.build_acceleration_structures([&entry], [&tlas]);
+    commands.build_acceleration_structures(&entries, [&tlas]);
     gpu.queue.submit([commands.finish()]);
     tlas
 }

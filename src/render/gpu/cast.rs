@@ -120,7 +120,7 @@ mod tests {
         })
     }
 
-    /// Panes, leaves cut out of textures and ten thousands of triangles.
+    /// Panes, leaves cut out of textures and ten thousands of triangles; the same in instances.
     #[test]
     fn a_device_hits_what_the_cpu_hits() {
         let gpu = match Gpu::open(None) {
@@ -135,8 +135,14 @@ mod tests {
                     continue;
                 }
             };
-            for name in ["living-room", "exterior", "crack"] {
-                let world = World::new(builtin::build(name).expect("built in"));
+            let scene = |name: &str| builtin::build(name).expect("built in");
+            for (name, scene) in [
+                ("living-room", scene("living-room")),
+                ("exterior", scene("exterior")),
+                ("crack", scene("crack")),
+                ("instances", fixture::instanced(scene("living-room"))),
+            ] {
+                let world = World::new(scene);
                 let [hits, shares] = apart(&gpu, &world, &rays(&world, 50_000));
                 eprintln!("{name}, {choice:?}: {hits:e} of hits and {shares:e} of shares differ");
                 assert!(hits < 1e-4 && shares < 2e-4, "{name}, {choice:?}: {hits} {shares}");

@@ -98,6 +98,10 @@ pub(crate) struct Globals {
     pub(crate) cache_edge: f32,
     pub(crate) cache_mean: Vec3,
     pub(crate) cache_least_distance: f32,
+    pub(crate) first_of_instances: u32,
+    pub(crate) slot_log2: u32,
+    pub(crate) padding_0: u32,
+    pub(crate) padding_1: u32,
 }
 
 /// Twin of `Material` in `surface.wgsl`.

@@ -191,6 +191,8 @@ mod tests {
         let Some(gpus) = devices() else { return };
         let fixture = fixture::foggy_one();
         assert_same("everything", &gpus, (&fixture.world, &fixture.environment, &fixture.view));
+        let fixture = fixture::instanced_one();
+        assert_same("instances", &gpus, (&fixture.world, &fixture.environment, &fixture.view));
         let sky = crate::environment::sky::build("sunset", 128, 64).expect("a sky");
         let sky = Environment::new(sky, &EnvironmentOptions::default()).expect("sound");
         for (name, sampling) in [

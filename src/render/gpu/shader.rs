@@ -155,7 +155,7 @@ impl TexelFormat {
 }
 
 /// All arrays.
-pub(crate) const ARRAYS: [ArrayKind; 15] = {
+pub(crate) const ARRAYS: [ArrayKind; 17] = {
     use TexelFormat::{Bytes4, Floats4, Words1, Words2, Words4};
     const fn array(name: &'static str, format: TexelFormat, features: Features) -> ArrayKind {
         ArrayKind { name, format, features }
@@ -166,6 +166,8 @@ pub(crate) const ARRAYS: [ArrayKind; 15] = {
         array("query_triangles", Words1, Features::HARDWARE_RAYS),
         array("triangles", Words4, Features::empty()),
         array("vertices", Words4, Features::empty()),
+        array("instances", Words4, Features::INSTANCES),
+        array("instance_slots", Words1, Features::INSTANCES),
         array("materials", Words4, Features::empty()),
         array("tables", Floats4, Features::empty()),
         array("texture_refs", Words4, Features::TEXTURES),
@@ -330,7 +332,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 54] {
+fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 56] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -343,6 +345,7 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 54] {
         (wgsl!("math"), true),
         (wgsl!("sampler"), true),
         (wgsl!("texture"), features.contains(Features::TEXTURES)),
+        (wgsl!("instances"), features.contains(Features::INSTANCES)),
         (wgsl!("surface"), true),
         (wgsl!("fresnel"), true),
         (wgsl!("microfacet"), true),
@@ -361,6 +364,7 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 54] {
         (wgsl!("lights"), features.contains(Features::SCENE_LIGHTS)),
         (wgsl!("medium"), features.contains(Features::MEDIUM)),
         (wgsl!("bvh"), true),
+        (wgsl!("levels"), features.contains(Features::INSTANCES | Features::SOFTWARE_WALK)),
         (wgsl!("ray_query"), features.contains(Features::HARDWARE_RAYS)),
         (wgsl!("camera"), true),
         (wgsl!("path"), true),

@@ -9,12 +9,12 @@ use super::buffers::Buffers;
 use super::device::Gpu;
 use super::layout::{self, Globals};
 use super::shader::{self, Constants, SHARED_STACK_SIZE, VertexTexels};
+use crate::bvh::InstanceWords;
 use crate::bvh::compressed::CompressedTree;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::path::World;
-use crate::scene::Scene;
 
 /// Deepest tree a traversal's stack is made for.
 const MAX_DEPTH: u32 = 96;
@@ -84,13 +84,14 @@ fn upload_world(
     let flags_of =
         |triangle: u32| materials[scene.triangle_materials[triangle as usize] as usize].flags;
     let stack_size = if gpu.has_hardware_rays() {
-        let tree = Acceleration::build(gpu, scene, flags_of)?;
+        let tree = Acceleration::build(gpu, world, flags_of)?;
         globals.opaque_triangles = tree.opaque;
+        put_instances(buffers, globals, world, &tree.instances)?;
         put_array(buffers, "query_triangles", "the scene's geometry", &tree.triangles)?;
         buffers.tree = Some(tree.tlas);
         0
     } else {
-        upload_tree(buffers, scene, flags_of)?
+        upload_tree(buffers, globals, world, flags_of)?
     };
     let vertex = VertexTexels::of(features);
     put_array(buffers, "triangles", "the scene's geometry", &layout::triangles(scene))?;
@@ -118,8 +119,15 @@ fn upload_world(
 }
 
 /// Uploads the tree that kernels walk; returns how many groups of nodes a walk has to remember.
-fn upload_tree(buffers: &mut Buffers, scene: &Scene, flags_of: impl Fn(u32) -> u32) -> Result<u32> {
-    let tree = CompressedTree::build(&scene.positions, &scene.triangles, flags_of);
+fn upload_tree(
+    buffers: &mut Buffers,
+    globals: &mut Globals,
+    world: &World,
+    flags_of: impl Fn(u32) -> u32,
+) -> Result<u32> {
+    let (scene, bvh) = (&world.scene, &world.bvh);
+    let meshes = scene.instances.meshes();
+    let tree = CompressedTree::build(&scene.positions, &scene.triangles, meshes, bvh, flags_of);
     if tree.depth > MAX_DEPTH {
         return Err(Error::new(format!(
             "the scene's tree is {} levels deep; a GPU walks at most {MAX_DEPTH}",
@@ -128,8 +136,25 @@ fn upload_tree(buffers: &mut Buffers, scene: &Scene, flags_of: impl Fn(u32) -> u
     }
     put_array(buffers, "bvh_nodes", "the scene's tree", tree.nodes.as_flattened())?;
     put_array(buffers, "bvh_triangles", "the scene's geometry", tree.triangles.as_flattened())?;
+    put_instances(buffers, globals, world, &tree.instances)?;
     // One of each level but the root's.
     Ok(tree.depth.max(2) - 1)
+}
+
+/// Uploads the instances, if there are any.
+fn put_instances(
+    buffers: &mut Buffers,
+    globals: &mut Globals,
+    world: &World,
+    instances: &[InstanceWords],
+) -> Result<()> {
+    if !world.needs.has(Features::INSTANCES) {
+        return Ok(());
+    }
+    let (first, slot_log2, slots) = world.scene.instances.slots();
+    (globals.first_of_instances, globals.slot_log2) = (first, slot_log2);
+    put_array(buffers, "instance_slots", "the list of instances", slots)?;
+    put_array(buffers, "instances", "the list of instances", instances.as_flattened())
 }
 
 /// Makes an array of values that take whole texels or parts of one.

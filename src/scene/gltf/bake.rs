@@ -3,11 +3,10 @@
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 
 use super::part::{Part, Tally};
-use super::pose::Placing;
 use super::tangents::NO_TANGENT;
 use super::{Fallible, MAX_TRIANGLES};
 use crate::memory;
-use crate::scene::Scene;
+use crate::scene::{Placing, Scene};
 
 /// Appends a part once for each instance. Memory is reserved only after the limits are checked.
 pub(super) fn append_instances(
@@ -21,6 +20,14 @@ pub(super) fn append_instances(
         let placing = Placing::new(world_from_mesh);
         append(scene, part, |_| placing, placing.mirrors(), tally);
     }
+    Ok(())
+}
+
+/// Appends a part as it is, for all its instances.
+pub(super) fn append_shared(scene: &mut Scene, part: &Part, tally: &mut Tally) -> Fallible<()> {
+    check_limits(scene, part, 1)?;
+    let first = append_vertices(scene, part);
+    append_triangles(scene, part, first, |corners| corners, tally);
     Ok(())
 }
 
@@ -85,13 +92,8 @@ fn check_limits(scene: &Scene, part: &Part, copies: usize) -> Fallible<()> {
     Ok(())
 }
 
-fn append(
-    scene: &mut Scene,
-    part: &Part,
-    placing: impl Fn(usize) -> Placing,
-    mirrors: bool,
-    tally: &mut Tally,
-) {
+/// Appends vertices as they are; the number of the first.
+fn append_vertices(scene: &mut Scene, part: &Part) -> usize {
     let first = scene.positions.len();
     extend(&mut scene.normals, first, part.normals.iter().copied(), Vec3::ZERO);
     extend(&mut scene.tangents, first, part.tangents.iter().copied(), NO_TANGENT);
@@ -99,6 +101,17 @@ fn append(
     extend(&mut scene.uvs[1], first, part.uvs[1].iter().copied(), Vec2::ZERO);
     extend(&mut scene.colors, first, part.colors.iter().copied(), Vec4::ONE);
     scene.positions.extend_from_slice(&part.positions);
+    first
+}
+
+fn append(
+    scene: &mut Scene,
+    part: &Part,
+    placing: impl Fn(usize) -> Placing,
+    mirrors: bool,
+    tally: &mut Tally,
+) {
+    let first = append_vertices(scene, part);
     for vertex in 0..part.positions.len() {
         let placing = placing(vertex);
         let position = &mut scene.positions[first + vertex];
@@ -112,9 +125,19 @@ fn append(
             *tangent = placing.tangent(*tangent);
         }
     }
-    for &[a, b, c] in &part.triangles {
-        let [a, b, c] = [a, b, c].map(|vertex| first as u32 + vertex);
-        let triangle = if mirrors { [a, c, b] } else { [a, b, c] };
+    let turned = |[a, b, c]: [u32; 3]| if mirrors { [a, c, b] } else { [a, b, c] };
+    append_triangles(scene, part, first, turned, tally);
+}
+
+fn append_triangles(
+    scene: &mut Scene,
+    part: &Part,
+    first: usize,
+    turned: impl Fn([u32; 3]) -> [u32; 3],
+    tally: &mut Tally,
+) {
+    for corners in &part.triangles {
+        let triangle = turned(corners.map(|vertex| first as u32 + vertex));
         if is_sound(triangle.map(|vertex| scene.positions[vertex as usize])) {
             scene.triangles.push(triangle);
             scene.triangle_materials.push(part.material);
@@ -163,7 +186,7 @@ pub(super) fn finish(scene: &mut Scene) {
 const FARTHEST: f32 = 1e18;
 
 /// Whether a position is finite and then some.
-fn is_near(position: Vec3) -> bool {
+pub(super) fn is_near(position: Vec3) -> bool {
     position.abs().max_element() <= FARTHEST && !position.is_nan()
 }
 

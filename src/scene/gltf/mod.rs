@@ -9,7 +9,7 @@
 //! unpack them, `pose` places nodes
 //! and joints, `animation` moves cameras, `materials`, `variants`, `textures` and `medium` read the look, `primitive`, `geometry` and `tangents` read
 //! triangles,
-//! `bake` puts them into the world.
+//! `share` says which are held once for all their instances, `bake` puts the others into the world.
 
 mod accessor;
 mod animation;
@@ -27,6 +27,7 @@ mod newer;
 mod part;
 mod pose;
 mod primitive;
+mod share;
 mod tangents;
 mod textures;
 mod uri;
@@ -41,6 +42,7 @@ use gltf::json;
 
 use crate::error::{Error, Notices, Result};
 use crate::image::{looks_like_picture, read_file};
+use crate::scene::needs::is_emitter;
 use crate::scene::{Outlines, Scene, SceneOptions};
 
 use buffers::{File, find};
@@ -48,10 +50,11 @@ use geometry::Needs;
 use materials::Materials;
 use part::{Part, Tally};
 use pose::Nodes;
+use share::Sharing;
 use uri::Folder;
 use variants::Look;
 
-/// Most triangles a scene may have, instances counted one by one.
+/// Most triangles a scene may hold, baked instances counted one by one.
 const MAX_TRIANGLES: u64 = 200_000_000;
 
 /// A result whose error is the cause alone; the file's name is put before it in one place.
@@ -112,13 +115,21 @@ fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallib
     let used = used_materials(&file.root, &placements, &look)?;
     let materials = Materials::load(&file, &used, &mut notices)?;
     let mut tally = Tally::default();
+    let is_lamp = |primitive: &json::mesh::Primitive| {
+        let material = materials.places[&look.material(&file.root, primitive)?];
+        Ok(is_emitter(&materials.materials[material as usize]))
+    };
+    let mut sharing = Sharing::choose(&file.root, &placements, is_lamp)?;
+    let reading = Reading { file: &file, nodes: &nodes, look: &look, materials: &materials };
     for (&mesh, placements) in &placements {
-        append_mesh(&file, (&nodes, &look), mesh, placements, &materials, &mut scene, &mut tally)
-            .map_err(|cause| match &file.root.meshes[mesh].name {
-            Some(name) => format!("mesh {mesh} ({name}): {cause}"),
-            None => format!("mesh {mesh}: {cause}"),
-        })?;
+        reading.append_mesh(mesh, placements, &mut scene, &mut sharing, &mut tally).map_err(
+            |cause| match &file.root.meshes[mesh].name {
+                Some(name) => format!("mesh {mesh} ({name}): {cause}"),
+                None => format!("mesh {mesh}: {cause}"),
+            },
+        )?;
     }
+    sharing.finish(&mut scene)?;
     if scene.triangles.is_empty() {
         let reasons = repairs(&tally).join(", ");
         let reasons = if reasons.is_empty() { reasons } else { format!(" ({reasons})") };
@@ -189,59 +200,81 @@ fn used_materials(
     primitives.map(|primitive| look.material(root, primitive)).collect()
 }
 
-/// Appends all placements of one mesh, reading it again only where morph weights differ.
-fn append_mesh(
-    file: &File<'_>,
-    (nodes, look): (&Nodes, &Look),
-    mesh: usize,
-    placements: &[Placement<'_>],
-    materials: &Materials,
-    scene: &mut Scene,
-    tally: &mut Tally,
-) -> Fallible<()> {
-    let mesh = &file.root.meshes[mesh];
-    let mut read: Option<(&[f32], Vec<Part>)> = None;
-    for placement in placements {
-        let weights = placement.node.weights.as_deref().or(mesh.weights.as_deref());
-        let weights = weights.unwrap_or_default();
-        let parts = match read.take() {
-            Some((known, parts)) if known == weights => parts,
-            _ => read_parts(file, look, mesh, weights, materials, tally)?,
-        };
-        let joints = match placement.node.skin {
-            Some(skin) => Some(pose::joint_transforms(file, nodes, skin)?),
-            None => None,
-        };
-        for part in &parts {
-            match &joints {
-                Some(joints) if part.influences_per_vertex > 0 => {
-                    bake::append_skinned(scene, part, joints, tally)?;
-                }
-                _ => bake::append_instances(scene, part, &placement.instances, tally)?,
-            }
-        }
-        read = Some((weights, parts));
-    }
-    Ok(())
+/// What meshes are read with.
+struct Reading<'a> {
+    file: &'a File<'a>,
+    nodes: &'a Nodes,
+    look: &'a Look,
+    materials: &'a Materials,
 }
 
-fn read_parts(
-    file: &File<'_>,
-    look: &Look,
-    mesh: &json::Mesh,
-    weights: &[f32],
-    materials: &Materials,
-    tally: &mut Tally,
-) -> Fallible<Vec<Part>> {
-    let mut parts = Vec::new();
-    for (number, primitive) in mesh.primitives.iter().enumerate() {
-        let material = materials.places[&look.material(&file.root, primitive)?];
-        let needs = Needs::of(&materials.materials[material as usize]);
-        let part = geometry::read_part(file, primitive, weights, material, &needs, tally)
-            .map_err(|cause| format!("primitive {number}: {cause}"))?;
-        parts.extend(part);
+impl Reading<'_> {
+    /// Appends all placements of one mesh, reading it again only where morph weights differ.
+    fn append_mesh(
+        &self,
+        number: usize,
+        placements: &[Placement<'_>],
+        scene: &mut Scene,
+        sharing: &mut Sharing,
+        tally: &mut Tally,
+    ) -> Fallible<()> {
+        let mesh = &self.file.root.meshes[number];
+        let mut read: Option<(&[f32], Vec<Part>)> = None;
+        for (place, placement) in placements.iter().enumerate() {
+            let weights = placement.node.weights.as_deref().or(mesh.weights.as_deref());
+            let weights = weights.unwrap_or_default();
+            let parts = match read.take() {
+                Some((known, parts)) if known == weights => parts,
+                _ => self.read_parts(mesh, weights, tally)?,
+            };
+            let joints = match placement.node.skin {
+                Some(skin) => Some(pose::joint_transforms(self.file, self.nodes, skin)?),
+                None => None,
+            };
+            let is_shared = |part: &&Part| {
+                let material = &self.materials.materials[part.material as usize];
+                sharing.wants(number) && !is_emitter(material)
+            };
+            let shared: Vec<&Part> = parts.iter().filter(is_shared).collect();
+            let extent = share::extent(&shared);
+            for part in &parts {
+                match &joints {
+                    Some(joints) if part.influences_per_vertex > 0 => {
+                        bake::append_skinned(scene, part, joints, tally)?;
+                    }
+                    _ if is_shared(&part) => {
+                        let cannot = |at: &DAffine3| !share::can_share(*at, extent);
+                        let rest = placement.instances.iter().copied().filter(cannot);
+                        bake::append_instances(scene, part, &rest.collect::<Vec<_>>(), tally)?;
+                    }
+                    _ => bake::append_instances(scene, part, &placement.instances, tally)?,
+                }
+            }
+            if place == 0 && sharing.wants(number) {
+                sharing.add(scene, &shared, placements, tally)?;
+            }
+            read = Some((weights, parts));
+        }
+        Ok(())
     }
-    Ok(parts)
+
+    fn read_parts(
+        &self,
+        mesh: &json::Mesh,
+        weights: &[f32],
+        tally: &mut Tally,
+    ) -> Fallible<Vec<Part>> {
+        let mut parts = Vec::new();
+        for (number, primitive) in mesh.primitives.iter().enumerate() {
+            let material =
+                self.materials.places[&self.look.material(&self.file.root, primitive)?];
+            let needs = Needs::of(&self.materials.materials[material as usize]);
+            let part = geometry::read_part(self.file, primitive, weights, material, &needs, tally)
+                .map_err(|cause| format!("primitive {number}: {cause}"))?;
+            parts.extend(part);
+        }
+        Ok(parts)
+    }
 }
 
 /// A clause for each kind of repair that was needed.

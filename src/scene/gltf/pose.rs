@@ -1,6 +1,6 @@
 //! The node hierarchy at rest: what is in the shown scene, and where.
 
-use glam::{Affine3A, DAffine3, DMat3, DQuat, DVec3, Mat3A, Vec3, Vec3A, Vec4};
+use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use gltf::json;
 use json::accessor::Type;
 use serde_json::Value;
@@ -174,60 +174,4 @@ pub(super) fn joint_transforms(
         Ok(nodes.world[node.value()] * bind)
     };
     joints.iter().enumerate().map(transform).collect()
-}
-
-/// How positions, normals and tangents go from a mesh's space to the world.
-#[derive(Clone, Copy)]
-pub(super) struct Placing {
-    affine: Affine3A,
-    /// Cofactors of the linear part with the sign of its determinant: the inverse transpose up to
-    /// a positive factor, and still right where one axis is scaled to zero.
-    normal: Mat3A,
-    /// -1 where handedness is mirrored, else 1.
-    handedness: f32,
-}
-
-impl Placing {
-    /// From world-from-mesh.
-    pub(super) fn new(world_from_mesh: DAffine3) -> Self {
-        let m = world_from_mesh.matrix3;
-        let handedness = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
-        let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
-        // Scaled to unit size first: the cofactors of tiny or huge objects would leave f32.
-        let scale = m.to_cols_array().iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
-        let [x, y, z] = [x, y, z].map(|axis| if scale > 0.0 { axis / scale } else { axis });
-        let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * handedness;
-        Self {
-            affine: world_from_mesh.as_affine3a(),
-            normal: Mat3A::from(cofactors.as_mat3()),
-            handedness: handedness as f32,
-        }
-    }
-
-    /// Whether triangles change their winding.
-    pub(super) fn mirrors(&self) -> bool {
-        self.handedness < 0.0
-    }
-
-    /// World position.
-    pub(super) fn position(&self, position: Vec3) -> Vec3 {
-        self.affine.transform_point3(position)
-    }
-
-    /// Unit world normal; zero stays zero.
-    pub(super) fn normal(&self, normal: Vec3) -> Vec3 {
-        unit(Vec3::from(self.normal * Vec3A::from(normal)))
-    }
-
-    /// Unit world tangent with its handedness.
-    pub(super) fn tangent(&self, tangent: Vec4) -> Vec4 {
-        let direction = unit(self.affine.transform_vector3(tangent.truncate()));
-        let direction = if direction == Vec3::ZERO { Vec3::X } else { direction };
-        direction.extend(tangent.w * self.handedness)
-    }
-}
-
-/// Unit vector, zero if there is none; in f64, where the squares of tiny values do not vanish.
-pub(super) fn unit(vector: Vec3) -> Vec3 {
-    vector.as_dvec3().normalize_or_zero().as_vec3()
 }

@@ -10,8 +10,8 @@ use super::accessor::Elements;
 use super::buffers::{File, find};
 use super::draco::Unpacked;
 use super::part::{Part, Tally};
-use super::pose::unit;
 use super::{Fallible, MAX_TRIANGLES};
+use crate::scene::placing::unit;
 
 /// A triangle primitive whose accessors are checked as they are read.
 pub(super) struct Source<'a> {

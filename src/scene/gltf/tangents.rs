@@ -4,8 +4,8 @@ use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 use glam::{Affine2, Vec2, Vec3, Vec4};
 
 use super::part::Part;
-use super::pose::unit;
 use crate::math::Frame;
+use crate::scene::placing::unit;
 
 /// Stands where no tangent is read: a unit vector all the same.
 pub(super) const NO_TANGENT: Vec4 = Vec4::new(1.0, 0.0, 0.0, 1.0);

@@ -468,16 +468,23 @@ fn huge_claims_are_refused_before_memory_is_taken() {
     let rest = ONE_MESH.replace(r#""nodes":[{"mesh":0}]"#, "");
     let scene = square().load(&format!(r#"{rest}"nodes":[{},{{"mesh":0}}]"#, chain.join(",")));
     assert_eq!(scene.triangles.len(), 2);
-    // Ten thousand instances of thirty thousand triangles.
-    let mut builder = square();
-    let translation = builder.floats("VEC3", &[0.0; 30_000]);
-    let node = format!(
-        r#"{{"mesh":0,"extensions":{{"EXT_mesh_gpu_instancing":{{"attributes":{{"TRANSLATION":{translation}}}}}}}}}"#
-    );
-    let large = builder.indices(&[0, 1, 2].repeat(30_000));
-    let mesh = ONE_MESH.replace(r#""indices":1"#, &format!(r#""indices":{large}"#));
-    let error = builder.error(&mesh.replace(r#"{"mesh":0}"#, &node));
-    assert!(error.contains("more than 200 million triangles"), "{error}");
+    // Ten thousand lamps of thirty thousand triangles, and a hundred thousand of what can be shared.
+    for (count, material, most) in [
+        (10_000, r#""emissiveFactor":[1,1,1]"#, "more than 200 million triangles"),
+        (100_000, "", "more than 2147 million triangles"),
+    ] {
+        let mut builder = square();
+        let translation = builder.floats("VEC3", &vec![0.0; 3 * count]);
+        let node = format!(
+            r#"{{"mesh":0,"extensions":{{"EXT_mesh_gpu_instancing":{{"attributes":{{"TRANSLATION":{translation}}}}}}}}}"#
+        );
+        let large = builder.indices(&[0, 1, 2].repeat(30_000));
+        let mesh =
+            ONE_MESH.replace(r#""indices":1"#, &format!(r#""indices":{large},"material":0"#));
+        let mesh = mesh.replace(r#"{"mesh":0}"#, &node);
+        let error = builder.error(&format!(r#""materials":[{{{material}}}],{mesh}"#));
+        assert!(error.contains(most), "{error}");
+    }
 }
 
 #[test]

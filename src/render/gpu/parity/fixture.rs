@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use glam::{Affine2, Quat, UVec2, Vec2, Vec3, Vec4};
+use glam::{Affine2, DAffine3, DMat3, DQuat, DVec3, Quat, UVec2, Vec2, Vec3, Vec4};
 
 use super::cases::Random;
 use crate::bvh::Ray;
@@ -17,8 +17,8 @@ use crate::render::gpu::layout::{pack_radiance, unpack_radiance};
 use crate::render::{Sampling, Sharing, View};
 use crate::sampler::Sampler;
 use crate::scene::{
-    AlphaMode, Camera, Material, Medium, Projection, PunctualKind, PunctualLight, Scene, Texture,
-    TextureImage, TextureRef, Wrap,
+    AlphaMode, Camera, Instance, Instances, Material, Medium, Placing, Projection, PunctualKind,
+    PunctualLight, Scene, Texture, TextureImage, TextureRef, Wrap,
 };
 
 /// A scene, a map, a view and distributions.
@@ -36,9 +36,16 @@ pub(in super::super) fn foggy_one() -> Fixture {
     fixture
 }
 
+/// The one with everything, most of it in instances.
+pub(in super::super) fn instanced_one() -> Fixture {
+    let [.., fixture] = all();
+    fixture
+}
+
 /// First the one with everything, whose map has tile-local sums; then one for each other table, with
-/// other look-ups, cameras, filters and cells; then the widest and the tallest map.
-pub(super) fn all() -> [Fixture; 6] {
+/// other look-ups, cameras, filters and cells; then the widest and the tallest map; then the first one
+/// with instances.
+pub(super) fn all() -> [Fixture; 7] {
     use PixelFilter::{BlackmanHarris, Box, Gauss};
     use Sampling::{Adaptive, Plain, Talk};
     use TableKind::{F32, F64, TileLocal, U32};
@@ -74,7 +81,26 @@ pub(super) fn all() -> [Fixture; 6] {
         fixture(scene(1), map(F64), camera(), Gauss, Plain),
         fixture(scene(1), large((16384, 8)), camera(), Box, Plain),
         fixture(scene(1), large((8, 8192)), camera(), Box, Plain),
+        fixture(foggy(instanced(scene(300))), map(TileLocal), camera(), BlackmanHarris, Adaptive),
     ]
+}
+
+/// Two thirds of the triangles as two meshes, placed by maps that turn, mirror and shear.
+pub(in super::super) fn instanced(scene: Scene) -> Scene {
+    let mut random = Random::default();
+    let all = scene.triangles.len() as u32;
+    let meshes = vec![all / 3..all / 2, all / 2..all];
+    let instances = (0..9).map(|number| {
+        let turn = DQuat::from_rotation_y(f64::from(random.between(0.0, 6.0)));
+        let side = if number % 2 == 0 { 0.4 } else { -0.6 };
+        let size = DMat3::from_diagonal(DVec3::new(side, 0.5, 0.3));
+        let shear = DMat3::from_cols(DVec3::X, DVec3::new(0.3, 1.0, 0.0), DVec3::Z);
+        let place = (2.5 * random.in_cube()).as_dvec3();
+        let map = DMat3::from_quat(turn) * size * shear;
+        let placing = Placing::new(DAffine3::from_mat3_translation(map, place));
+        Instance { mesh: number % 2, placing }
+    });
+    Scene { instances: Instances::new(meshes, instances.collect()), ..scene }
 }
 
 impl Fixture {

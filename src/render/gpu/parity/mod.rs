@@ -210,8 +210,11 @@ fn groups(fixtures: &[Fixture]) -> Vec<Group<'_>> {
         (&fixtures[0], &[], media::probes(&fixtures[0])),
     ];
     groups.extend(fixtures[..4].iter().map(|fixture| (fixture, &[][..], map::probes(fixture))));
-    let large = fixtures[4..].iter();
+    let large = fixtures[4..6].iter();
     groups.extend(large.map(|fixture| (fixture, &[][..], map::samples(&fixture.environment))));
+    let prelude = &[scattering::PRELUDE];
+    groups.push((&fixtures[6], prelude, surfaces::probes(&fixtures[6])));
+    groups.push((&fixtures[6], &[], surfaces::path_probes(&fixtures[6])));
     groups
 }
 
@@ -241,6 +244,9 @@ run_group! {
     // These two read all arrays.
     surfaces_lights_and_hits_in_other_places: 2, Other;
     map_in_other_places: 5, Other;
+    instances: 11, Usual;
+    instances_in_other_places: 11, Other;
+    whole_paths_among_instances: 12, Usual;
 }
 
 /// The source of a fixture's kernel; the numbers in it do not matter here.

@@ -1,0 +1,215 @@
+//! Meshes that a scene shows several times but holds once.
+//!
+//! Triangles have numbers. Those in the world have their place in [`Scene::triangles`]; those of
+//! instances have the numbers after them, in the order of instances, with gaps: numbers are given away
+//! in slots of equal size, so that a number tells the instance without a search.
+
+use std::ops::Range;
+
+use glam::Vec3;
+
+use super::Scene;
+use super::placing::Placing;
+use crate::bvh;
+
+/// Most triangles a scene may show, instances counted one by one: their numbers fit into 32 bits.
+pub const MAX_SHOWN: u64 = 1 << 31;
+
+/// Slots there are for each instance at most, on average.
+const SLOTS: u64 = 4;
+
+/// A mesh in a place.
+#[derive(Debug, Clone, Copy)]
+pub struct Instance {
+    /// Which of [`Instances::meshes`].
+    pub mesh: u32,
+    /// Where it is.
+    pub placing: Placing,
+}
+
+/// A triangle's place in [`Scene::triangles`], and that of the instance it is of, if it is.
+pub(super) type Surface<'a> = (usize, Option<&'a Placing>);
+
+/// All shared meshes of a scene and where they are shown.
+#[derive(Debug, Clone)]
+pub struct Instances {
+    meshes: Vec<Range<u32>>,
+    all: Vec<Instance>,
+    /// Number of the first triangle of instances; beyond all without meshes.
+    first: u32,
+    /// A slot has two to the power of so many numbers.
+    slot_log2: u32,
+    /// Which instance each slot is of.
+    slots: Vec<u32>,
+    /// What is taken from the number of an instance's triangle to get its place.
+    shifts: Vec<u32>,
+}
+
+impl Default for Instances {
+    fn default() -> Self {
+        Self::new(Vec::new(), Vec::new())
+    }
+}
+
+impl Instances {
+    /// Numbers the triangles of instances. `meshes` are ranges of [`Scene::triangles`], in its space
+    /// each: its last triangles, in order.
+    ///
+    /// At most [`MAX_SHOWN`] triangles are shown.
+    pub fn new(meshes: Vec<Range<u32>>, mut all: Vec<Instance>) -> Self {
+        all.retain(|instance| !meshes[instance.mesh as usize].is_empty());
+        let first = meshes.first().map_or(u32::MAX, |mesh| mesh.start);
+        let slots_of = |instance: &Instance, log2: u32| {
+            (meshes[instance.mesh as usize].len() as u64).div_ceil(1 << log2)
+        };
+        let enough = SLOTS * all.len() as u64;
+        let are_few = |log2: &u32| all.iter().map(|i| slots_of(i, *log2)).sum::<u64>() <= enough;
+        // With 2^31 in a slot, each has one.
+        let slot_log2 = (0..31).find(are_few).unwrap_or(31);
+        let (mut slots, mut shifts) = (Vec::new(), Vec::with_capacity(all.len()));
+        for (number, instance) in (0..).zip(&all) {
+            let start = first + ((slots.len() as u32) << slot_log2);
+            shifts.push(start.wrapping_sub(meshes[instance.mesh as usize].start));
+            slots.extend((0..slots_of(instance, slot_log2)).map(|_| number));
+        }
+        Self { meshes, all, first, slot_log2, slots, shifts }
+    }
+
+    /// Whether nothing is shared.
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// Number of instances.
+    pub fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Triangles of each mesh: ranges of [`Scene::triangles`].
+    pub fn meshes(&self) -> &[Range<u32>] {
+        &self.meshes
+    }
+
+    /// The instances.
+    pub fn iter(&self) -> std::slice::Iter<'_, Instance> {
+        self.all.iter()
+    }
+
+    /// Number of the first triangle of instances, how many numbers a slot has (as a power of two), and
+    /// which instance each slot is of.
+    pub(crate) fn slots(&self) -> (u32, u32, &[u32]) {
+        (self.first, self.slot_log2, &self.slots)
+    }
+
+    /// Bytes that they take, without the meshes.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(&self.all[..]) + size_of_val(&self.slots[..]) + size_of_val(&self.shifts[..])
+    }
+
+    /// The triangle of a number.
+    #[inline]
+    pub(super) fn find(&self, triangle: u32) -> Surface<'_> {
+        if triangle < self.first {
+            return (triangle as usize, None);
+        }
+        let instance = self.slots[((triangle - self.first) >> self.slot_log2) as usize] as usize;
+        let place = triangle.wrapping_sub(self.shifts[instance]);
+        (place as usize, Some(&self.all[instance].placing))
+    }
+
+    /// As the tree wants them.
+    pub(crate) fn for_tree(&self) -> Vec<bvh::Instance> {
+        let mesh_start = |mesh: u32| self.meshes[mesh as usize].start;
+        let all = self.all.iter().zip(&self.shifts);
+        all.map(|(&Instance { mesh, placing }, shift)| bvh::Instance {
+            mesh,
+            world_from_mesh: placing.affine(),
+            first: mesh_start(mesh).wrapping_add(*shift),
+        })
+        .collect()
+    }
+
+    /// With only those triangles left of which `keeps` is true.
+    pub(super) fn retained(self, keeps: impl Fn(u32) -> bool) -> Self {
+        let Some(first) = self.meshes.first().map(|mesh| mesh.start) else { return self };
+        let mut next = (0..first).filter(|&triangle| keeps(triangle)).count() as u32;
+        let meshes = self.meshes.into_iter().map(|mesh| {
+            let start = next;
+            next += mesh.filter(|&triangle| keeps(triangle)).count() as u32;
+            start..next
+        });
+        Self::new(meshes.collect(), self.all)
+    }
+}
+
+impl Scene {
+    /// How many triangles are shown, those of instances counted one by one.
+    pub fn shown_triangles(&self) -> u64 {
+        let instances = &self.instances;
+        let of_mesh = |mesh: u32| instances.meshes[mesh as usize].len() as u64;
+        let shared: u64 = instances.meshes.iter().map(|mesh| mesh.len() as u64).sum();
+        let shown: u64 = instances.iter().map(|instance| of_mesh(instance.mesh)).sum();
+        self.triangles.len() as u64 - shared + shown
+    }
+
+    /// World positions of the corners of a triangle, given its number.
+    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        self.corners_at(self.instances.find(triangle))
+    }
+
+    pub(super) fn corners_at(&self, (place, placing): Surface<'_>) -> [Vec3; 3] {
+        let corners = self.triangles[place].map(|vertex| self.positions[vertex as usize]);
+        placing.map_or(corners, |placing| placing.turned(corners.map(|p| placing.position(p))))
+    }
+
+    /// Index of the material of a triangle, given its number.
+    #[inline]
+    pub fn material_of(&self, triangle: u32) -> u32 {
+        self.triangle_materials[self.instances.find(triangle).0]
+    }
+
+    /// The triangles in the world, and those of each mesh once, where its first instance is.
+    pub(super) fn each_once(&self) -> impl Iterator<Item = Surface<'_>> {
+        let own = self.instances.first.min(self.triangles.len() as u32) as usize;
+        let mut placings = vec![None; self.instances.meshes.len()];
+        for instance in self.instances.iter().rev() {
+            placings[instance.mesh as usize] = Some(&instance.placing);
+        }
+        let shown = self.instances.meshes.iter().cloned().zip(placings);
+        let shown = shown.filter(|(_, placing)| placing.is_some());
+        let of_meshes =
+            shown.flat_map(|(mesh, placing)| mesh.map(move |at| (at as usize, placing)));
+        (0..own).map(|place| (place, None)).chain(of_meshes)
+    }
+
+    /// World points whose hull holds all triangles of some materials: their corners, and those of boxes
+    /// around instances.
+    pub fn hull_points(&self, is_wanted: impl Fn(u32) -> bool) -> impl Iterator<Item = Vec3> {
+        let corners = |place: usize| self.triangles[place].map(|v| self.positions[v as usize]);
+        let is_wanted = move |place: &usize| is_wanted(self.triangle_materials[*place]);
+        let boxes: Vec<_> = self
+            .instances
+            .meshes
+            .iter()
+            .map(|mesh| {
+                let mesh = (mesh.start as usize..mesh.end as usize).filter(&is_wanted);
+                let points = mesh.flat_map(corners);
+                points.fold(None, |found: Option<(Vec3, Vec3)>, point| {
+                    let (low, high) = found.unwrap_or((point, point));
+                    Some((low.min(point), high.max(point)))
+                })
+            })
+            .collect();
+        let of_instances = self.instances.iter().flat_map(move |instance| {
+            let around = boxes[instance.mesh as usize].into_iter();
+            around.flat_map(move |(low, high)| {
+                (0..8).map(move |corner| {
+                    let at = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
+                    instance.placing.position(Vec3::new(at(0), at(1), at(2)))
+                })
+            })
+        });
+        let own = self.instances.first.min(self.triangles.len() as u32) as usize;
+        (0..own).filter(is_wanted).flat_map(corners).chain(of_instances)
+    }
+}
