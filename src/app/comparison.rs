@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::history::History;
+use super::interface::Chosen;
 use crate::develop::{Developer, LinearPicture};
 use crate::image::Image;
 
@@ -13,6 +15,8 @@ pub(super) const AMPLIFIED: f32 = 4.0;
 /// What is compared; equal ones are of the very same pictures.
 #[derive(Clone)]
 pub struct Comparison {
+    /// What to call the left and the right picture.
+    pub names: [String; 2],
     /// A kept picture.
     pub left: Arc<Image>,
     /// Another one, or `None` for what is rendered now.
@@ -42,6 +46,19 @@ pub(super) struct Compared {
 }
 
 impl Comparison {
+    /// Of what was chosen of the kept pictures, if anything.
+    pub(super) fn new(chosen: Chosen, history: &History) -> Option<Self> {
+        let left = history.get(chosen.left?)?;
+        let right = chosen.right.and_then(|right| history.get(right));
+        let name = right.map_or("Now", |kept| &kept.name).to_owned();
+        Some(Self {
+            names: [left.name.clone(), name],
+            left: Arc::clone(&left.image),
+            right: right.map(|kept| Arc::clone(&kept.image)),
+            is_difference: chosen.is_difference,
+        })
+    }
+
     /// Whether it changes with the picture that is rendered.
     pub(super) fn shows_now(&self) -> bool {
         self.is_difference && self.right.is_none()

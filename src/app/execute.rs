@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::commands::Command;
 use super::document::Viewpoint;
-use super::history::{self, Kept};
+use super::history;
 use super::interface::{Chosen, Dock, Interface, Prompt, Purpose, Tab};
 use super::screen::color_image;
 use super::worker::Reference;
@@ -139,16 +139,9 @@ impl App {
         let look = &self.document.look;
         let small = look.white_balance.apply(image.shrunk(history::SMALL_WIDTH));
         let exposure_ev = self.exposure_ev().unwrap_or_default();
-        self.history.keep(Kept {
-            name: String::new(),
-            summary,
-            small: color_image(&display_rgb8(&small, exposure_ev, look.curve)),
-            image,
-            document: self.document.clone(),
-            texture: None,
-        });
-        self.interface.compared =
-            Chosen { left: Some(self.history.list_mut().len() - 1), ..Chosen::default() };
+        let small = color_image(&display_rgb8(&small, exposure_ev, look.curve));
+        let index = self.history.keep(summary, image, self.document.clone(), small);
+        self.interface.compared = Chosen { left: Some(index), ..Chosen::default() };
         self.interface.tab = Tab::Picture;
     }
 

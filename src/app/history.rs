@@ -37,13 +37,21 @@ pub struct History {
 }
 
 impl History {
-    /// Keeps a picture, which it names.
-    pub fn keep(&mut self, kept: Kept) {
+    /// Keeps a picture under a new name; its place in the list. `small` is it in small, for the list.
+    pub fn keep(
+        &mut self,
+        summary: String,
+        image: Arc<Image>,
+        document: Document,
+        small: ColorImage,
+    ) -> usize {
         self.count += 1;
-        self.list.push(Kept { name: format!("Picture {}", self.count), ..kept });
+        let name = format!("Picture {}", self.count);
+        self.list.push(Kept { name, summary, image, document, small, texture: None });
         if self.list.len() > MOST {
             self.list.remove(0);
         }
+        self.list.len() - 1
     }
 
     /// One of them.
@@ -70,14 +78,8 @@ mod tests {
     fn the_oldest_picture_goes_and_names_are_not_given_again() {
         let mut history = History::default();
         for _ in 0..=MOST {
-            history.keep(Kept {
-                name: String::new(),
-                summary: String::new(),
-                image: Arc::new(Image::filled(1, 1, [0.0; 3])),
-                document: Document::default(),
-                small: ColorImage::default(),
-                texture: None,
-            });
+            let image = Arc::new(Image::filled(1, 1, [0.0; 3]));
+            history.keep(String::new(), image, Document::default(), ColorImage::default());
         }
         assert_eq!(history.list_mut().len(), MOST);
         assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 2"));

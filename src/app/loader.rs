@@ -186,12 +186,12 @@ fn load_map(name: &str, sun_factor: f32) -> Result<LoadedMap> {
     let start = Instant::now();
     let (map, notices) = sources::map(name)?;
     let read = start.elapsed().as_secs_f64();
-    let preview = Arc::new(map.shrunk(256));
-    let sun = Sun::of(&map);
     let options = EnvironmentOptions { sun: sun_factor, ..EnvironmentOptions::default() };
     let environment = Environment::new(map, &options).map_err(|cause| Error::at(name, cause))?;
     let seconds = [read, start.elapsed().as_secs_f64() - read];
     let environment = Arc::new(environment);
+    let preview = Arc::new(environment.map().shrunk(256));
+    let sun = Sun::of(environment.map());
     let count = environment.tile_count() as usize;
     let equal_energy = equal_energy_tiles(&preview, count).into();
     let name = name.to_owned();

@@ -371,27 +371,7 @@ impl App {
         });
     }
 
-    /// The kept pictures that are compared, the right one only where it is another than what is rendered;
-    /// they are whole ones.
-    fn compared(&self) -> Option<[Option<&history::Kept>; 2]> {
-        let chosen = self.interface.compared;
-        let left = chosen.left.filter(|_| self.document.region.is_none())?;
-        Some([self.history.get(left), chosen.right.and_then(|right| self.history.get(right))])
-    }
-
-    fn comparison(&self) -> Option<Comparison> {
-        let [left, right] = self.compared()?.map(|kept| kept.map(|kept| Arc::clone(&kept.image)));
-        Some(Comparison {
-            left: left?,
-            right,
-            is_difference: self.interface.compared.is_difference,
-        })
-    }
-
     fn viewport(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
-        let names = self
-            .compared()
-            .map(|both| both.map(|kept| kept.map_or_else(|| "Now".to_owned(), |k| k.name.clone())));
         let settings = self.develop_settings();
         let mut scope = panels::scope::Scope {
             document: &mut self.document,
@@ -402,7 +382,6 @@ impl App {
             settings,
             snapshot: self.snapshot.as_deref(),
             speed_up: self.speed_up.filter(|_| !self.is_repeatable),
-            compared: names,
             scene: self.scene.as_ref(),
             loading: self.loader.busy_with().next().is_some(),
             commands,
@@ -559,7 +538,9 @@ impl App {
             self.worker.submit(request);
         }
         if let Some(snapshot) = self.snapshot.as_ref().filter(|s| s.has_picture()) {
-            let compared = self.comparison();
+            // Kept pictures are whole ones.
+            let is_whole = self.document.region.is_none();
+            let compared = Comparison::new(self.interface.compared, &self.history);
             let look = &self.document.look;
             self.presenter.order(Order {
                 developer: Arc::clone(&self.screen.developer),
@@ -568,7 +549,7 @@ impl App {
                 metered: look.auto_exposure.then_some(look.white_balance),
                 overlay: self.interface.overlay,
                 tile: self.interface.tile,
-                compared,
+                compared: compared.filter(|_| is_whole),
             });
         }
     }

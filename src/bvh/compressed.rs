@@ -8,7 +8,7 @@ use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 
 use super::Bvh;
-use super::instance::InstanceWords;
+use super::instance::{InstanceWords, Shared};
 use super::items::{Item, Items, Sources};
 
 /// Nodes and triangles as `shaders/bvh.wgsl` reads them.
@@ -40,7 +40,7 @@ impl CompressedTree {
     ) -> Self {
         let sources = Sources { positions, triangles };
         let mut tree = Self::default();
-        let own = meshes.first().map_or(triangles.len() as u32, |mesh| mesh.start);
+        let own = Shared { meshes, instances: &[] }.own(triangles.len()) as u32;
         let top = tree.append(&Items::new(sources, 0..own, &bvh.placed), &tag).1;
         let (roots, depths): (Vec<u32>, Vec<u32>) = meshes
             .iter()

@@ -9,11 +9,12 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::LEAST_ALBEDO;
 use crate::color::luminance;
 use crate::image::Image;
 use crate::render::film::{Film, Pixel};
 
+/// Albedo that counts as none: black surfaces and the sky are smoothed as they are.
+const LEAST_ALBEDO: f32 = 0.02;
 /// Filter passes; the last one reaches 2^5 pixels.
 const PASSES: u32 = 5;
 /// Luminance differences are tolerated up to this many of their standard errors.

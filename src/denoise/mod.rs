@@ -1,6 +1,7 @@
 //! Taking out what noise is left, for looking at pictures, not for measuring them.
 
 mod a_trous;
+mod cell;
 mod oidn;
 mod scales;
 
@@ -10,9 +11,6 @@ use serde::{Deserialize, Serialize};
 use crate::error::Result;
 use crate::image::Image;
 use crate::render::film::Film;
-
-/// Albedo that counts as none: black surfaces and the sky are smoothed as they are.
-const LEAST_ALBEDO: f32 = 0.02;
 
 /// What takes noise out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

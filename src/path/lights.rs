@@ -51,13 +51,12 @@ impl LocalLights {
         let mut distant = Vec::new();
         let mut total = 0.0;
         // Instances share no lamps: the tree of lights holds places in the world.
-        let own = scene.instances.meshes().first().map_or(usize::MAX, |mesh| mesh.start as usize);
-        for (triangle, &material) in scene.triangle_materials.iter().enumerate().take(own) {
-            if emits[material as usize]
-                && let Some((moments, power)) = triangle_moments(scene, triangle as u32)
+        for triangle in scene.own_triangles() {
+            if emits[scene.triangle_materials[triangle as usize] as usize]
+                && let Some((moments, power)) = triangle_moments(scene, triangle)
             {
                 lights.push(Light { index: triangles.len() as u32, moments });
-                triangles.push(triangle as u32);
+                triangles.push(triangle);
                 total += f64::from(power);
             }
         }

@@ -143,6 +143,11 @@ impl Instances {
 }
 
 impl Scene {
+    /// Triangles that are not of meshes but lie in the world: places in [`Self::triangles`].
+    pub fn own_triangles(&self) -> Range<u32> {
+        0..self.instances.first.min(self.triangles.len() as u32)
+    }
+
     /// How many triangles are shown, those of instances counted one by one.
     pub fn shown_triangles(&self) -> u64 {
         let instances = &self.instances;
@@ -170,7 +175,6 @@ impl Scene {
 
     /// The triangles in the world, and those of each mesh once, where its first instance is.
     pub(super) fn each_once(&self) -> impl Iterator<Item = Surface<'_>> {
-        let own = self.instances.first.min(self.triangles.len() as u32) as usize;
         let mut placings = vec![None; self.instances.meshes.len()];
         for instance in self.instances.iter().rev() {
             placings[instance.mesh as usize] = Some(&instance.placing);
@@ -179,7 +183,7 @@ impl Scene {
         let shown = shown.filter(|(_, placing)| placing.is_some());
         let of_meshes =
             shown.flat_map(|(mesh, placing)| mesh.map(move |at| (at as usize, placing)));
-        (0..own).map(|place| (place, None)).chain(of_meshes)
+        self.own_triangles().map(|place| (place as usize, None)).chain(of_meshes)
     }
 
     /// World points whose hull holds all triangles of some materials: their corners, and those of boxes
@@ -209,7 +213,7 @@ impl Scene {
                 })
             })
         });
-        let own = self.instances.first.min(self.triangles.len() as u32) as usize;
-        (0..own).filter(is_wanted).flat_map(corners).chain(of_instances)
+        let own = self.own_triangles().map(|place| place as usize);
+        own.filter(is_wanted).flat_map(corners).chain(of_instances)
     }
 }

@@ -39,8 +39,6 @@ pub(in crate::app) struct Scope<'a> {
     pub(in crate::app) settings: Option<DevelopSettings>,
     pub(in crate::app) snapshot: Option<&'a Snapshot>,
     pub(in crate::app) speed_up: Option<SpeedUp>,
-    /// Names of what is compared of the history.
-    pub(in crate::app) compared: Option<[String; 2]>,
     pub(in crate::app) scene: Option<&'a LoadedScene>,
     pub(in crate::app) loading: bool,
     pub(in crate::app) commands: &'a mut Vec<Command>,

@@ -12,7 +12,7 @@ use crate::app::interface::{Interface, Tab};
 use crate::app::presenter::Shown;
 use crate::app::screen::{Developed, Recipe};
 use crate::app::theme;
-use crate::app::worker::{Activity, Snapshot};
+use crate::app::worker::{Activity, SessionSnapshot, Snapshot};
 use crate::develop::{DevelopSettings, LinearPicture};
 use crate::render::View;
 
@@ -38,10 +38,15 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
             let changes = changes(ui, other, scope);
             let texture =
                 Developed::update(&mut scope.textures.other, scope.screen, recipe, changes);
-            handle = wipe(ui, rect, texture, scope);
-        } else if let Some([left, right]) =
-            scope.compared.as_ref().filter(|_| scope.interface.compared.is_difference)
+            handle = wipe(ui, rect, texture, scope.interface);
+            match &shown.order.compared {
+                Some(compared) => wipe_labels(ui, rect, &compared.names),
+                None => split_labels(ui, rect, scope),
+            }
+        } else if let Some(compared) =
+            shown.order.compared.as_ref().filter(|compared| compared.is_difference)
         {
+            let [left, right] = &compared.names;
             let text = format!("{left} and {right}: difference × {AMPLIFIED:.0}");
             let at = Pos2::new(rect.center().x, rect.top() + 14.0);
             theme::badge(ui, at, Align2::CENTER_TOP, &text, theme::TEXT);
@@ -143,16 +148,16 @@ fn waiting(ui: &Ui, area: Rect, is_loading: bool) {
 }
 
 /// The other picture left of a line that can be dragged; where that can be taken hold of.
-fn wipe(ui: &Ui, rect: Rect, texture: TextureId, scope: &mut Scope<'_>) -> Rect {
-    let x = rect.left() + rect.width() * scope.interface.wipe;
+fn wipe(ui: &Ui, rect: Rect, texture: TextureId, interface: &mut Interface) -> Rect {
+    let x = rect.left() + rect.width() * interface.wipe;
     let left = Rect::from_min_max(rect.min, Pos2::new(x, rect.bottom()));
-    let uv = Rect::from_min_max(Pos2::ZERO, Pos2::new(scope.interface.wipe, 1.0));
+    let uv = Rect::from_min_max(Pos2::ZERO, Pos2::new(interface.wipe, 1.0));
     ui.painter().image(texture, left, uv, Color32::WHITE);
     let handle =
         Rect::from_center_size(Pos2::new(x, rect.center().y), Vec2::new(14.0, rect.height()));
     let response = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());
     if let Some(at) = response.interact_pointer_pos().filter(|_| response.dragged()) {
-        scope.interface.wipe = ((at.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
+        interface.wipe = ((at.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
     }
     let is_active = response.hovered() || response.dragged();
     if is_active {
@@ -162,31 +167,28 @@ fn wipe(ui: &Ui, rect: Rect, texture: TextureId, scope: &mut Scope<'_>) -> Rect 
     let color = if is_active { theme::ACCENT } else { Color32::from_white_alpha(200) };
     ui.painter().line_segment(line, Stroke::new(1.5, color));
     ui.painter().circle_filled(Pos2::new(x, rect.center().y), 6.0, color);
-    wipe_labels(ui, rect, scope);
     handle
 }
 
-fn wipe_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
+fn wipe_labels(ui: &Ui, rect: Rect, [left, right]: &[String; 2]) {
     let corner = |x: f32, align: Align2, text: &str| {
         theme::badge(ui, Pos2::new(x, rect.top() + 14.0), align, text, theme::TEXT);
     };
-    let noise =
-        |noise: f64, samples: u32| format!("{samples} samples, noise {:.1} %", 100.0 * noise);
-    let (left, right) = match (&scope.compared, scope.snapshot) {
-        (Some([left, right]), _) => (left.clone(), right.clone()),
-        (None, Some(snapshot)) => {
-            let take = &snapshot.main;
-            let name = crate::app::convergence::name_of(take.sampling);
-            let plain = snapshot.plain.as_ref().map_or_else(String::new, |plain| {
-                format!("plain: {}", noise(plain.noise, plain.film.min_samples()))
-            });
-            (plain, format!("{name}: {}", noise(take.noise, take.film.min_samples())))
-        }
-        (None, None) => return,
+    corner(rect.left() + 14.0, Align2::LEFT_TOP, left);
+    corner(rect.right() - 14.0, Align2::RIGHT_TOP, right);
+}
+
+/// How far the plain method and the chosen one have come.
+fn split_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
+    let Some(snapshot) = scope.snapshot else { return };
+    let label = |name: &str, take: &SessionSnapshot| {
+        let (samples, noise) = (take.film.min_samples(), 100.0 * take.noise);
+        format!("{name}: {samples} samples, noise {noise:.1} %")
     };
-    corner(rect.left() + 14.0, Align2::LEFT_TOP, &left);
-    corner(rect.right() - 14.0, Align2::RIGHT_TOP, &right);
-    if let Some(speed_up) = scope.speed_up.filter(|_| scope.compared.is_none()) {
+    let plain = snapshot.plain.as_ref().map_or_else(String::new, |plain| label("plain", plain));
+    let name = crate::app::convergence::name_of(snapshot.main.sampling);
+    wipe_labels(ui, rect, &[plain, label(name, &snapshot.main)]);
+    if let Some(speed_up) = scope.speed_up {
         let text = format!(
             "{:.2} × as fast ({:.2} to {:.2})",
             speed_up.ratio,

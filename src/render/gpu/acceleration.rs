@@ -48,11 +48,10 @@ impl Acceleration {
         let scene = &world.scene;
         let name = &gpu.facts().name;
         let meshes = scene.instances.meshes();
-        let own = meshes.first().map_or(scene.triangles.len() as u32, |mesh| mesh.start);
         let is_opaque = |triangle: &u32| flags_of(*triangle) & (ALPHA_MASK | PARTIAL) == 0;
         let mut triangles = Vec::with_capacity(scene.triangles.len());
         let mut lower = Vec::with_capacity(1 + meshes.len());
-        for mesh in std::iter::once(0..own).chain(meshes.iter().cloned()) {
+        for mesh in std::iter::once(scene.own_triangles()).chain(meshes.iter().cloned()) {
             let (first, count) = (triangles.len() as u32, mesh.len() as u32);
             let (opaque, asked): (Vec<u32>, Vec<u32>) = mesh.partition(is_opaque);
             lower.push(Lower { first, count, opaque: opaque.len() as u32 });

@@ -81,15 +81,16 @@ fn structs_are_laid_out_as_the_host_writes_them() {
     let work = fields!(Work: first first_high count samples end_sample stride sample padding);
     assert_same(&module, "Work", work);
     let globals = fields!(Globals:
-        work camera_position lens_radius camera_right focus_distance camera_up half_width
-        camera_forward half_height grid_center grid_columns distribution_starts_at distribution_masks_at distribution_ranks_at
-        distribution_tiles_at distribution_last_at distribution_of_cell_at words_per_distribution grid_rows map_width map_height
-        tile_columns tile_rows rotation_turns intensity tile_sums_at
-        distant_light_count light_triangle_count width height seed bounces russian_roulette orthographic scene_extent
-        mean_contribution zero grid_medium whole_map_share fog_low fog_mean_cosine fog_high tries_per_vertex
-        fog_scattering importance_scale fog_extinction first_of_sequence background background_concentration film_scale opaque_triangles
-            cache_is_known cache_scale cache_center cache_edge cache_mean cache_least_distance
-     first_of_instances slot_log2 padding_0 padding_1);
+        work camera_position lens_radius camera_right focus_distance camera_up half_width camera_forward
+        half_height grid_center grid_columns distribution_starts_at distribution_masks_at
+        distribution_ranks_at distribution_tiles_at distribution_last_at distribution_of_cell_at
+        words_per_distribution grid_rows map_width map_height tile_columns tile_rows rotation_turns
+        intensity tile_sums_at distant_light_count light_triangle_count width height seed bounces
+        russian_roulette orthographic scene_extent mean_contribution zero grid_medium whole_map_share
+        fog_low fog_mean_cosine fog_high tries_per_vertex fog_scattering importance_scale fog_extinction
+        first_of_sequence background background_concentration film_scale opaque_triangles cache_is_known
+        cache_scale cache_center cache_edge cache_mean cache_least_distance first_of_instances slot_log2
+        padding_0 padding_1);
     assert_same(&module, "Globals", globals);
     let ray = fields!(CastRay: origin t_max direction padding);
     assert_same(&module_of(Kernel::ClosestHits), "CastRay", ray);

@@ -28,7 +28,7 @@ fn place(r: &mut Random, scene: &Scene) -> (u32, Vec2) {
     let barycentric = if u.x + u.y < 1.0 { u } else { 1.0 - u };
     let instances = scene.instances.for_tree();
     if instances.is_empty() || r.below(3) == 0 {
-        return (r.below(own_triangles(scene)), barycentric);
+        return (r.below(scene.own_triangles().end), barycentric);
     }
     let instance = &instances[r.below(instances.len() as u32) as usize];
     let triangles = scene.instances.meshes()[instance.mesh as usize].len() as u32;
@@ -79,12 +79,6 @@ fn height([a, b, c]: [Vec3; 3]) -> f32 {
     (b - a).cross(c - a).length() / (b - a).length().max((c - a).length())
 }
 
-/// How many triangles lie in the world.
-fn own_triangles(scene: &Scene) -> u32 {
-    let meshes = scene.instances.meshes();
-    meshes.first().map_or(scene.triangles.len() as u32, |mesh| mesh.start)
-}
-
 fn points(fixture: &Fixture) -> Vec<Probe<'_>> {
     let scene = &fixture.world.scene;
     let case_of = |r: &mut Random| {
@@ -93,7 +87,7 @@ fn points(fixture: &Fixture) -> Vec<Probe<'_>> {
     };
     let corners = [Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::splat(0.5)];
     let last = scene.triangles.len() as u32 - 1;
-    let own = own_triangles(scene);
+    let own = scene.own_triangles().end;
     let edges = || {
         [0, 5, last].into_iter().flat_map(move |triangle| {
             corners.map(move |barycentric| case(&[&triangle, &barycentric, &Vec3::NEG_Y]))
