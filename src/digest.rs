@@ -48,7 +48,7 @@ impl Digest {
             .debug(&scene.lights)
             .debug(&scene.medium);
         let digest = digest.instances(&scene.instances);
-        let texels = scene.images.iter().map(|image| image.texels.as_flattened());
+        let texels = scene.images.iter().map(|image| image.texels.bytes());
         texels.fold(digest, Self::bytes)
     }
 

@@ -45,7 +45,7 @@ fn scene_facts(name: &str, scene: Scene) -> Value {
     let world = World::new(scene);
     let scene = &world.scene;
     let (low, high) = world.bvh.bounds();
-    let textures: usize = scene.images.iter().map(|i| i.texels.len() * 4).sum();
+    let textures: usize = scene.images.iter().map(|i| i.texels.bytes().len()).sum();
     json!({
         "scene": name,
         "triangles": scene.shown_triangles(),

@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use super::ktx2;
+use super::{Texels, ktx2};
 use crate::error::{Error, Result};
 use crate::memory;
 
@@ -31,15 +31,15 @@ pub(crate) fn decoder_cause(cause: &image::ImageError, file_bytes: u64) -> Strin
     }
 }
 
-/// 8-bit RGBA picture as it is stored (usually sRGB-encoded), row 0 at the top.
+/// 8-bit picture as it is stored (usually sRGB-encoded), row 0 at the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LdrImage {
     /// Pixels per row.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// `width * height` RGBA values, row after row; alpha is 255 where the file has none.
-    pub pixels: Vec<[u8; 4]>,
+    /// `width * height` of them, row after row, with the file's channels but an alpha that says nothing.
+    pub pixels: Texels,
     /// Whether the file says that colours are multiplied by alpha; they are left so.
     pub is_premultiplied: bool,
 }
@@ -71,6 +71,7 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
     if ktx2::is_ktx2(bytes) {
         let (pixels, is_premultiplied) =
             ktx2::decode(bytes).map_err(|cause| Error::at(name, cause))?;
+        let pixels = Texels::from(pixels).without_opaque_alpha();
         return Ok(LdrImage { width, height, pixels, is_premultiplied });
     }
     // What the decoder makes, of up to four channels of its own depth, and what is made of it.
@@ -83,11 +84,15 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
     limits.max_alloc = Some(MAX_BYTES.min(decoder_bytes(file_bytes)));
     reader.limits(limits);
     let decoded = reader.decode();
-    let rgba =
-        decoded.map_err(|cause| Error::at(name, decoder_cause(&cause, file_bytes)))?.into_rgba8();
-    let (width, height) = rgba.dimensions();
-    let pixels = bytemuck::allocation::try_cast_vec(rgba.into_raw())
-        .unwrap_or_else(|(_, raw)| raw.as_chunks::<4>().0.to_vec());
+    let decoded = decoded.map_err(|cause| Error::at(name, decoder_cause(&cause, file_bytes)))?;
+    let (width, height) = (decoded.width(), decoded.height());
+    let pixels = match decoded.color().channel_count() {
+        1 => Texels::new(1, decoded.into_luma8().into_raw()),
+        2 => Texels::new(2, decoded.into_luma_alpha8().into_raw()),
+        3 => Texels::new(3, decoded.into_rgb8().into_raw()),
+        _ => Texels::new(4, decoded.into_rgba8().into_raw()),
+    };
+    let pixels = pixels.without_opaque_alpha();
     Ok(LdrImage { width, height, pixels, is_premultiplied: false })
 }
 
@@ -117,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn sixteen_bit_grey_becomes_eight_bit_rgba() {
+    fn sixteen_bit_grey_becomes_eight_bit_grey() {
         let bytes = png(image::ImageBuffer::<image::Luma<u16>, _>::from_raw(
             2,
             1,
@@ -126,7 +131,7 @@ mod tests {
         .unwrap());
         let decoded = decode_ldr(&bytes, "grey").unwrap();
         assert_eq!((decoded.width, decoded.height), (2, 1));
-        assert_eq!(decoded.pixels, [[255, 255, 255, 255], [128, 128, 128, 255]]);
+        assert_eq!((decoded.pixels.channels(), decoded.pixels.bytes()), (1, &[255, 128][..]));
     }
 
     #[test]
@@ -149,7 +154,7 @@ mod tests {
             assert_eq!(ldr_size(&bytes, "red").unwrap(), (8, 4));
             let decoded = decode_ldr(&bytes, "red").unwrap();
             assert_eq!((decoded.width, decoded.height, decoded.pixels.len()), (8, 4, 32));
-            let [r, g, b, a] = decoded.pixels[31];
+            let [r, g, b, a] = decoded.pixels.rgba()[31];
             assert!(r > 250 && g < 5 && b < 5 && a == 255, "{format:?}");
         }
     }

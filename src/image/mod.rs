@@ -15,6 +15,7 @@ mod ktx2;
 mod map;
 mod png;
 mod primaries;
+mod texels;
 
 pub use exr_read::read_exr_metadata;
 pub use exr_write::{ExrPicture, Layer, write_exr};
@@ -24,6 +25,7 @@ pub(crate) use guard::catch_panic;
 pub use map::{LoadedMap, is_linear, read_map, read_picture, sanitise};
 pub(crate) use map::{looks_like_picture, looks_like_scene};
 pub use png::{encode_png, write_png};
+pub use texels::Texels;
 
 pub mod ldr;
 

@@ -122,7 +122,11 @@ mod tests {
             triangle_materials: vec![0],
             materials: vec![material],
             textures: vec![Texture { image: 0, wrap_u, wrap_v, nearest: false, srgb: false }],
-            images: vec![TextureImage { width: 1, height: 1, texels: vec![[51, 102, 153, 204]] }],
+            images: vec![TextureImage {
+                width: 1,
+                height: 1,
+                texels: vec![[51, 102, 153, 204]].into(),
+            }],
             ..Scene::default()
         }
     }

@@ -58,7 +58,7 @@ impl World {
     /// About what it holds: geometry, textures and tree.
     fn memory_bytes(&self) -> u64 {
         let scene = &self.scene;
-        let texels: usize = scene.images.iter().map(|image| image.texels.len()).sum();
+        let texels: usize = scene.images.iter().map(|image| image.texels.bytes().len()).sum();
         let bytes = size_of_val(&scene.positions[..])
             + size_of_val(&scene.normals[..])
             + size_of_val(&scene.tangents[..])
@@ -67,7 +67,7 @@ impl World {
             + size_of_val(&scene.triangles[..])
             + size_of_val(&scene.triangle_materials[..])
             + scene.instances.memory_bytes()
-            + texels * size_of::<[u8; 4]>()
+            + texels
             + self.bvh.memory_bytes();
         bytes as u64
     }
@@ -192,7 +192,7 @@ impl World {
 /// The scene with its large arrays where rays, which hit here and there, find them soonest.
 fn with_huge_pages(scene: Scene) -> Scene {
     let texels_too =
-        |image: TextureImage| TextureImage { texels: on_huge_pages(image.texels), ..image };
+        |image: TextureImage| TextureImage { texels: image.texels.moved(on_huge_pages), ..image };
     Scene {
         positions: on_huge_pages(scene.positions),
         normals: on_huge_pages(scene.normals),

@@ -15,6 +15,7 @@ pub mod texture;
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
 
 use crate::error::Notices;
+use crate::image::Texels;
 use camera_path::CameraPath;
 pub use instances::{Instance, Instances, MAX_SHOWN};
 pub use material_edit::MaterialEdit;
@@ -369,15 +370,15 @@ pub struct Texture {
     pub srgb: bool,
 }
 
-/// 8-bit RGBA image, row 0 at v = 0.
+/// 8-bit image, row 0 at v = 0.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TextureImage {
     /// Pixels per row.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// `width * height` RGBA texels.
-    pub texels: Vec<[u8; 4]>,
+    /// `width * height` of them, row after row.
+    pub texels: Texels,
 }
 
 /// What a camera does with distance.

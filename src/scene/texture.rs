@@ -3,9 +3,9 @@
 use std::array;
 use std::sync::LazyLock;
 
-use glam::{Vec2, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 
-use super::{Scene, TextureImage, TextureRef, Wrap};
+use super::{Scene, TextureRef, Wrap};
 use crate::color::linear_from_srgb;
 
 static LINEAR_FROM_SRGB_BYTE: LazyLock<[f32; 256]> =
@@ -30,20 +30,38 @@ pub fn sample_texture(scene: &Scene, texture_ref: &TextureRef, uv: Vec2) -> Vec4
     let y = Axis { size: image.height, wrap: texture.wrap_v }.footprint(uv.y);
     let unit = &*UNIT_FROM_BYTE;
     let color = if texture.srgb { &*LINEAR_FROM_SRGB_BYTE } else { unit };
-    let read = |x, y| {
-        let [r, g, b, a] = texel(image, x, y).map(usize::from);
-        Vec4::new(color[r], color[g], color[b], unit[a])
-    };
-    if texture.nearest {
-        return read(x.nearest, y.nearest);
+    let (color, unit) = (|byte| color[usize::from(byte)], |byte| unit[usize::from(byte)]);
+    let texels = &image.texels;
+    let filter = Filter { x, y, width: image.width, nearest: texture.nearest };
+    match texels.channels() {
+        1 => filter.read(texels.chunks(), |[l]| Vec3::splat(color(l)).extend(1.0)),
+        2 => filter.read(texels.chunks(), |[l, a]| Vec3::splat(color(l)).extend(unit(a))),
+        3 => filter.read(texels.chunks(), |[r, g, b]| Vec4::new(color(r), color(g), color(b), 1.0)),
+        _ => filter
+            .read(texels.chunks(), |[r, g, b, a]| Vec4::new(color(r), color(g), color(b), unit(a))),
     }
-    let top = read(x.low, y.low).lerp(read(x.high, y.low), x.fraction);
-    let bottom = read(x.low, y.high).lerp(read(x.high, y.high), x.fraction);
-    top.lerp(bottom, y.fraction)
 }
 
-fn texel(image: &TextureImage, x: u32, y: u32) -> [u8; 4] {
-    image.texels[y as usize * image.width as usize + x as usize]
+/// Which texels of an image count how much.
+struct Filter {
+    x: Footprint,
+    y: Footprint,
+    width: u32,
+    nearest: bool,
+}
+
+impl Filter {
+    #[inline]
+    fn read<T: Copy>(&self, texels: &[T], value: impl Fn(T) -> Vec4) -> Vec4 {
+        let read = |x, y| value(texels[y as usize * self.width as usize + x as usize]);
+        let (x, y) = (&self.x, &self.y);
+        if self.nearest {
+            return read(x.nearest, y.nearest);
+        }
+        let top = read(x.low, y.low).lerp(read(x.high, y.low), x.fraction);
+        let bottom = read(x.low, y.high).lerp(read(x.high, y.high), x.fraction);
+        top.lerp(bottom, y.fraction)
+    }
 }
 
 /// One axis of an image.

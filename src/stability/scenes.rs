@@ -32,7 +32,7 @@ pub(super) fn with_texel(mut builder: WorldBuilder, texel: [u8; 4]) -> WorldBuil
     scene.uvs[0] = scene.positions.iter().map(|p| Vec2::new(p.x, -p.z)).collect();
     scene.normals = vec![Vec3::Y; count];
     scene.tangents = vec![Vec3::X.extend(1.0); count];
-    scene.images.push(TextureImage { width: 1, height: 1, texels: vec![texel] });
+    scene.images.push(TextureImage { width: 1, height: 1, texels: vec![texel].into() });
     let wrap = Wrap::Repeat;
     let texture = Texture { image: 0, wrap_u: wrap, wrap_v: wrap, nearest: true, srgb: false };
     scene.textures.push(texture);

@@ -134,7 +134,7 @@ fn read(kind: Kind, name: &str, bytes: &[u8], folder: &Path) -> Found {
         },
         Kind::Textures => match decode_ldr(bytes, name) {
             Ok(image) => Found::Accepted {
-                honest_bytes: 4 * image.pixels.len() as u64,
+                honest_bytes: image.pixels.bytes().len() as u64,
                 is_sound: image.pixels.len() == image.width as usize * image.height as usize,
             },
             Err(error) => Found::Refused(error.to_string()),
@@ -158,9 +158,8 @@ fn read(kind: Kind, name: &str, bytes: &[u8], folder: &Path) -> Found {
 
 /// A picture of it: whatever was loaded can be rendered.
 fn of_scene(scene: Scene) -> Found {
-    let texels: usize = scene.images.iter().map(|image| image.texels.len()).sum();
-    let honest_bytes =
-        (scene.positions.len() * 64 + scene.triangles.len() * 128 + texels * 4) as u64;
+    let texels: usize = scene.images.iter().map(|image| image.texels.bytes().len()).sum();
+    let honest_bytes = (scene.positions.len() * 64 + scene.triangles.len() * 128 + texels) as u64;
     let is_sound = scene.positions.iter().all(|p| p.is_finite());
     let camera = scene.cameras.first().cloned();
     let world = World::new(scene);

@@ -100,8 +100,11 @@ fn upload_world(
     if features.contains(Features::TEXTURES) {
         put_array(buffers, "texture_refs", "the list of textures", &texture_refs)?;
         let texels = scene.images.iter().map(|image| image.texels.len() as u64).sum();
-        let images = scene.images.iter().map(|image| bytemuck::cast_slice(&image.texels));
-        buffers.put_array("texels", "the set of textures", texels, images.map(Cow::Borrowed))?;
+        let images = scene.images.iter().map(|image| match image.texels.rgba() {
+            Cow::Borrowed(texels) => Cow::Borrowed(bytemuck::cast_slice(texels)),
+            Cow::Owned(texels) => Cow::Owned(texels.into_flattened()),
+        });
+        buffers.put_array("texels", "the set of textures", texels, images)?;
     }
     if features.contains(Features::SCENE_LIGHTS) {
         let lights = layout::light_words(world, globals);

@@ -33,11 +33,11 @@ fn relief(
                 let along = at(x + width - 1, y) - at(x + 1, y);
                 let across = at(x, y + height - 1) - at(x, y + 1);
                 let n = (Vec2::new(along, across) * scale).extend(1.0).normalize();
-                [byte(n.x), byte(n.y), byte(n.z), 255]
+                [byte(n.x), byte(n.y), byte(n.z)]
             })
         })
-        .collect();
-    TextureImage { width, height, texels }
+        .collect::<Vec<_>>();
+    TextureImage { width, height, texels: texels.into() }
 }
 
 /// Open pores and raised fibres.
@@ -99,7 +99,7 @@ mod tests {
         let image =
             relief(256, 4, Vec2::new(2.0, 1.0), |uv| 0.1 * (std::f32::consts::TAU * uv.x).sin());
         let normal = |x: usize| {
-            let [r, g, b, _] = image.texels[x];
+            let [r, g, b, _] = image.texels.rgba()[x];
             Vec3::new(r.into(), g.into(), b.into()) / 127.5 - 1.0
         };
         let expected = Vec3::new(-0.1 * std::f32::consts::PI, 0.0, 1.0).normalize();

@@ -24,11 +24,11 @@ fn paint(width: u32, height: u32, f: impl Fn(Vec2) -> Vec3 + Sync) -> TextureIma
                 let uv =
                     Vec2::new((x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32);
                 let c = f(uv);
-                [byte(c.x), byte(c.y), byte(c.z), 255]
+                [byte(c.x), byte(c.y), byte(c.z)]
             })
         })
-        .collect();
-    TextureImage { width, height, texels }
+        .collect::<Vec<_>>();
+    TextureImage { width, height, texels: texels.into() }
 }
 
 /// Tells the wood of `timber` apart.

@@ -25,7 +25,7 @@ fn triangle(material: Material) -> Scene {
 
 /// Adds a texture of one texel.
 fn add_texel(scene: &mut Scene, texel: [u8; 4], srgb: bool) -> TextureRef {
-    scene.images.push(TextureImage { width: 1, height: 1, texels: vec![texel] });
+    scene.images.push(TextureImage { width: 1, height: 1, texels: vec![texel].into() });
     let image = scene.images.len() as u32 - 1;
     let (wrap_u, wrap_v) = (Wrap::Repeat, Wrap::Repeat);
     scene.textures.push(Texture { image, wrap_u, wrap_v, nearest: false, srgb });
@@ -115,7 +115,7 @@ fn shading_never_turns_away() {
         scene.normals = (0..3).map(|_| random.direction()).collect();
         scene.tangents = (0..3).map(|_| random.direction().extend(1.0)).collect();
         let texel = random.next_vec3() * 255.0;
-        scene.images[0].texels[0] = [texel.x as u8, texel.y as u8, texel.z as u8, 255];
+        scene.images[0].texels = vec![[texel.x, texel.y, texel.z].map(|x| x as u8)].into();
         scene.positions = (0..3).map(|_| random.direction()).collect();
         let direction = random.direction();
         let barycentric = random.next_vec2() * 0.5;

@@ -1,12 +1,13 @@
 //! Wrap modes, filtering and colour decoding.
 
 use glam::{Affine2, Vec2, Vec4};
+use lightgrid::image::Texels;
 use lightgrid::scene::texture::sample_texture;
 use lightgrid::scene::{Scene, Texture, TextureImage, TextureRef, Wrap};
 
 /// A row of texels with red 0, 100, 200 in a scene with one texture.
 fn row(wrap: Wrap, nearest: bool) -> Scene {
-    let texels = [0, 100, 200].map(|r| [r, 0, 0, 255]).to_vec();
+    let texels = [0, 100, 200].map(|r| [r, 0, 0, 255]).to_vec().into();
     Scene {
         images: vec![TextureImage { width: 3, height: 1, texels }],
         textures: vec![Texture { image: 0, wrap_u: wrap, wrap_v: wrap, nearest, srgb: false }],
@@ -68,11 +69,37 @@ fn nearest_does_not_mix() {
 fn colours_are_decoded_before_filtering_and_alpha_is_not() {
     let mut scene = row(Wrap::ClampToEdge, false);
     scene.textures[0].srgb = true;
-    scene.images[0].texels = vec![[0, 188, 255, 0], [255, 188, 0, 128], [0, 0, 0, 0]];
+    scene.images[0].texels = vec![[0, 188, 255, 0], [255, 188, 0, 128], [0, 0, 0, 0]].into();
     let value = sample_texture(&scene, &REFERENCE, Vec2::new(1.0 / 3.0, 0.5));
     // 188 is half of white in linear light (within a byte).
     let expected = Vec4::new(0.5, 0.502_886_5, 0.5, 64.0 / 255.0);
     assert!((value - expected).abs().max_element() < 1e-5, "{value}");
+}
+
+#[test]
+fn texels_of_fewer_channels_are_the_same_values() {
+    for (srgb, nearest) in [(false, false), (true, false), (true, true)] {
+        let mut scene = row(Wrap::Repeat, nearest);
+        scene.textures[0].srgb = srgb;
+        let grey_alpha = [[10, 77], [120, 0], [250, 255]];
+        let grey = grey_alpha.map(|[l, _]| [l]);
+        let rgb = [[10, 20, 30], [120, 0, 255], [250, 249, 248]];
+        let pairs: [(Texels, Texels); 3] = [
+            (grey.to_vec().into(), grey.map(|[l]| [l, l, l, 255]).to_vec().into()),
+            (grey_alpha.to_vec().into(), grey_alpha.map(|[l, a]| [l, l, l, a]).to_vec().into()),
+            (rgb.to_vec().into(), rgb.map(|[r, g, b]| [r, g, b, 255]).to_vec().into()),
+        ];
+        for both in pairs {
+            for at in 0..40 {
+                let uv = Vec2::new(at as f32 / 40.0, 0.5);
+                let [own, whole] = [&both.0, &both.1].map(|texels| {
+                    scene.images[0].texels = texels.clone();
+                    sample_texture(&scene, &REFERENCE, uv)
+                });
+                assert_eq!(own, whole, "{} channels at {uv}", both.0.channels());
+            }
+        }
+    }
 }
 
 #[test]
@@ -95,7 +122,8 @@ fn wild_coordinates_and_empty_images_are_harmless() {
                 let value = sample_texture(&scene, &REFERENCE, Vec2::new(u, v));
                 assert!(value.is_finite() && value.w == 1.0, "{u} {v}: {value}");
             }
-            scene.images[0] = TextureImage { width: 0, height: 0, texels: Vec::new() };
+            scene.images[0] =
+                TextureImage { width: 0, height: 0, texels: Vec::<[u8; 4]>::new().into() };
             assert_eq!(sample_texture(&scene, &REFERENCE, Vec2::ZERO), Vec4::ONE);
         }
     }

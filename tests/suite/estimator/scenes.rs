@@ -80,7 +80,7 @@ pub(crate) fn orthographic(eye: Vec3) -> Camera {
 /// A world to be whose texture 0 is opaque white where `u < 1/2`, clear elsewhere.
 pub(crate) fn with_half_texture() -> WorldBuilder {
     let mut builder = WorldBuilder::default();
-    let texels = vec![[255; 4], [255, 255, 255, 0]];
+    let texels = vec![[255; 4], [255, 255, 255, 0]].into();
     builder.scene.images.push(TextureImage { width: 2, height: 1, texels });
     let wrap = Wrap::ClampToEdge;
     let texture = Texture { image: 0, wrap_u: wrap, wrap_v: wrap, nearest: true, srgb: true };

@@ -159,7 +159,7 @@ fn texture_transform_sampler_and_double_use_of_an_image() {
     assert_eq!((texture.wrap_u, texture.wrap_v), (Wrap::ClampToEdge, Wrap::MirroredRepeat));
     let data = material.metallic_roughness_texture.unwrap();
     assert!(!scene.textures[data.texture as usize].srgb);
-    assert_eq!(scene.images[0].texels, [[255, 0, 0, 255]]);
+    assert_eq!(scene.images[0].texels.rgba()[..], [[255, 0, 0, 255]]);
     assert_eq!((scene.uvs[0].len(), scene.uvs[1].len()), (0, 4));
 }
 

@@ -7,7 +7,7 @@ use glam::{Affine2, DAffine3, DMat3, DQuat, DVec3, Quat, UVec2, Vec2, Vec3, Vec4
 use super::cases::Random;
 use crate::bvh::Ray;
 use crate::environment::{Environment, EnvironmentOptions, Lookup, TableKind};
-use crate::image::Image;
+use crate::image::{Image, Texels};
 use crate::light_grid::LightGrid;
 use crate::light_grid::cells::SphericalGrid;
 use crate::path::camera::CameraRays;
@@ -267,8 +267,9 @@ fn materials() -> Vec<Material> {
 
 /// Images down to none, every wrap mode, and a texture in every other place of every material.
 fn add_textures(scene: &mut Scene, random: &mut Random) {
-    for (width, height) in [(8, 5), (1, 1), (0, 0), (3, 7)] {
-        let texels = (0..width * height).map(|_| random.word().to_le_bytes()).collect();
+    for (width, height, channels) in [(8, 5, 4), (1, 1, 1), (0, 0, 4), (3, 7, 3)] {
+        let bytes = (0..width * height * channels).map(|_| random.word() as u8).collect();
+        let texels = Texels::new(channels as usize, bytes);
         scene.images.push(TextureImage { width, height, texels });
     }
     let wraps = [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::ClampToEdge];
