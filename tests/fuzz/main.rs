@@ -10,6 +10,7 @@
 mod bombs;
 mod corpus;
 mod mutate;
+mod read;
 #[cfg(feature = "window")]
 mod settings;
 #[path = "../suite/shared.rs"]

@@ -6,7 +6,7 @@ use lightgrid::app::document::PictureSize;
 use lightgrid::app::settings_file::Settings;
 use lightgrid::output::record::to_json;
 
-use crate::worker::Found;
+use crate::read::Found;
 
 /// Those of a new window, and of one that was used.
 pub(crate) fn corpus() -> Vec<Vec<u8>> {

@@ -6,25 +6,17 @@ use std::sync::atomic::AtomicBool;
 
 use lightgrid::cli::accepts;
 use lightgrid::environment::{Environment, EnvironmentOptions};
-use lightgrid::image::ldr::decode_ldr;
-use lightgrid::image::{Image, read_map};
+use lightgrid::image::Image;
 use lightgrid::path::{PathLimits, World, framing};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Sampling, Session, View};
 use lightgrid::scene::{Scene, gltf};
 
+use crate::read::{self, Found};
 #[cfg(feature = "window")]
 use crate::settings;
 use crate::shared::SplitMix;
 use crate::{ALLOWANCE_BYTES, Kind, Tally, bombs, corpus, mutate};
-
-/// What an input turned out to be.
-pub(crate) enum Found {
-    /// Understood; it delivers this many bytes, and whether they are sound.
-    Accepted { honest_bytes: u64, is_sound: bool },
-    /// Refused with this sentence.
-    Refused(String),
-}
 
 /// Reads inputs `first..first + count`, printing each number before it is read; then the tally as JSON.
 pub(crate) fn work(kind: Kind, first: u64, count: u64) {
@@ -132,35 +124,18 @@ fn read(kind: Kind, name: &str, bytes: &[u8], folder: &Path) -> Found {
             Ok(scene) => of_scene(scene),
             Err(error) => Found::Refused(error.to_string()),
         },
-        Kind::Textures => match decode_ldr(bytes, name) {
-            Ok(image) => Found::Accepted {
-                honest_bytes: image.pixels.bytes().len() as u64,
-                is_sound: image.pixels.len() == image.width as usize * image.height as usize,
-            },
-            Err(error) => Found::Refused(error.to_string()),
-        },
+        Kind::Textures => read::texture(bytes, name),
         #[cfg(feature = "window")]
         Kind::Settings => settings::read(&written("settings.json")),
-        _ => match read_map(&written(name)) {
-            Ok(map) => Found::Accepted {
-                honest_bytes: map.image.pixels.len() as u64 * 12,
-                is_sound: map
-                    .image
-                    .pixels
-                    .as_flattened()
-                    .iter()
-                    .all(|v| v.is_finite() && *v >= 0.0),
-            },
-            Err(error) => Found::Refused(error.to_string()),
-        },
+        _ => read::map(&written(name)),
     }
 }
 
 /// A picture of it: whatever was loaded can be rendered.
 fn of_scene(scene: Scene) -> Found {
-    let texels: usize = scene.images.iter().map(|image| image.texels.bytes().len()).sum();
-    let honest_bytes = (scene.positions.len() * 64 + scene.triangles.len() * 128 + texels) as u64;
-    let is_sound = scene.positions.iter().all(|p| p.is_finite());
+    let Found::Accepted { honest_bytes, is_sound } = read::scene(&scene) else {
+        unreachable!("it was loaded");
+    };
     let camera = scene.cameras.first().cloned();
     let world = World::new(scene);
     let camera = camera.unwrap_or_else(|| framing::frame(&world, 1.0));

@@ -1,0 +1,77 @@
+//! What the coverage-guided targets share. Inputs are read and judged by the code of `tests/fuzz`.
+
+#[path = "../../fuzz/corpus.rs"]
+#[allow(dead_code, reason = "command lines are no target")]
+mod corpus;
+#[cfg(target_arch = "x86_64")]
+mod cpp;
+mod gltf;
+mod memory;
+#[path = "../../fuzz/mutate.rs"]
+#[allow(dead_code, reason = "most is left to libFuzzer")]
+mod mutate;
+#[path = "../../fuzz/read.rs"]
+mod read;
+mod seeds;
+#[cfg(feature = "window")]
+#[path = "../../fuzz/settings.rs"]
+mod settings;
+#[path = "../../suite/shared.rs"]
+#[allow(dead_code, reason = "only random numbers are needed")]
+mod shared;
+mod targets;
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+pub use gltf::mutate_gltf;
+use read::Found;
+
+/// Memory an input may take beside four times its honest size, as in `tests/fuzz`.
+const ALLOWANCE_BYTES: u64 = 64 << 20;
+
+/// A folder in memory, where there is one: some targets read files.
+static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
+    let memory = PathBuf::from("/dev/shm");
+    let above = if memory.is_dir() { memory } else { std::env::temp_dir() };
+    let folder = above.join(format!("lightgrid-guided-{}", std::process::id()));
+    fs::create_dir_all(&folder).expect("a folder");
+    folder
+});
+
+/// Fills a target's empty corpus before it is read.
+pub fn begin(target: &str) {
+    // All work on this thread: what an input takes is then known, and nobody waits for others.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+    pool.build_global().expect("the first pool");
+    let corpus = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
+    fs::create_dir_all(&corpus).expect("a folder");
+    if fs::read_dir(&corpus).expect("a folder").next().is_none() {
+        for (number, seed) in seeds::of(target).iter().enumerate() {
+            fs::write(corpus.join(format!("seed-{number}")), seed).expect("written");
+        }
+    }
+}
+
+/// Reads an input. Whatever is wrong with what comes of it is a panic.
+pub fn judge(target: &str, bytes: &[u8]) {
+    let before = memory::watch();
+    let found = targets::read(target, bytes, &FOLDER).expect("a target");
+    let taken = memory::peak().saturating_sub(before);
+    let length = bytes.len() as u64;
+    let honest = match found {
+        Found::Accepted { honest_bytes, is_sound } => {
+            assert!(is_sound, "accepted, but out of bounds");
+            length.max(honest_bytes)
+        }
+        Found::Refused(sentence) => {
+            assert!(!sentence.is_empty() && !sentence.contains('\n'), "refused with {sentence:?}");
+            length
+        }
+    };
+    assert!(
+        taken <= 4 * honest + ALLOWANCE_BYTES,
+        "took {taken} bytes, and its honest size is {honest}"
+    );
+}
