@@ -2,7 +2,8 @@
 
 use std::io::Cursor;
 
-use super::{Texels, ktx2};
+use super::guard::catch_panic;
+use super::{Texels, ktx2, tiff};
 use crate::error::{Error, Result};
 use crate::memory;
 
@@ -52,6 +53,7 @@ pub fn ldr_size(bytes: &[u8], name: &str) -> Result<(u32, u32)> {
     if ktx2::is_ktx2(bytes) {
         return ktx2::size(bytes).map_err(|cause| Error::at(name, cause));
     }
+    tiff::check(bytes).map_err(|cause| Error::at(name, cause))?;
     reader(bytes, name)?.into_dimensions().map_err(|cause| damaged(name, &cause))
 }
 
@@ -83,7 +85,8 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
     let file_bytes = bytes.len() as u64;
     limits.max_alloc = Some(MAX_BYTES.min(decoder_bytes(file_bytes)));
     reader.limits(limits);
-    let decoded = reader.decode();
+    let decoded = catch_panic(|| reader.decode())
+        .ok_or_else(|| Error::at(name, "is damaged: its decoder failed"))?;
     let decoded = decoded.map_err(|cause| Error::at(name, decoder_cause(&cause, file_bytes)))?;
     let (width, height) = (decoded.width(), decoded.height());
     let pixels = match decoded.color().channel_count() {
@@ -157,6 +160,26 @@ mod tests {
             let [r, g, b, a] = decoded.pixels.rgba()[31];
             assert!(r > 250 && g < 5 && b < 5 && a == 255, "{format:?}");
         }
+    }
+
+    /// Some panic in the decoder.
+    #[test]
+    fn odd_samplings_of_jpeg_are_a_sentence_or_a_picture() {
+        let mut bytes = Cursor::new(Vec::new());
+        let green = image::RgbImage::from_pixel(11, 7, image::Rgb([9, 200, 30]));
+        green.write_to(&mut bytes, image::ImageFormat::Jpeg).unwrap();
+        let bytes = bytes.into_inner();
+        let frame = bytes.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
+        let mut refused = 0;
+        for (component, sampling) in (0..3).flat_map(|c| (0..=255).map(move |s| (c, s))) {
+            let mut spoilt = bytes.clone();
+            spoilt[frame + 11 + 3 * component] = sampling;
+            if let Err(error) = decode_ldr(&spoilt, "odd.jpg") {
+                assert!(error.to_string().starts_with("odd.jpg: "), "{error}");
+                refused += 1;
+            }
+        }
+        assert!((1..768).contains(&refused), "{refused}");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::file::{open_file, read_cause, read_file};
 use super::guard::catch_panic;
 use super::hdr::decode_hdr;
 use super::ldr::{decoder_bytes, decoder_cause};
-use super::{Image, MAX_PIXELS, MAX_SIDE, check_size};
+use super::{Image, MAX_PIXELS, MAX_SIDE, check_size, tiff};
 use crate::color::linear_from_srgb;
 use crate::error::{Decoded, Error, Notices, Result};
 
@@ -227,6 +227,7 @@ fn decode_ldr_file(path: &Path) -> Decoded<image::DynamicImage> {
                     TGA)"
             .into());
     }
+    tiff::check(&bytes)?;
     let cause = |e| format!("cannot be decoded: {}", decoder_cause(&e, file_bytes));
     let (width, height) = reader()?.into_dimensions().map_err(cause)?;
     check_size(u64::from(width), u64::from(height))?;

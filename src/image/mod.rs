@@ -16,6 +16,7 @@ mod map;
 mod png;
 mod primaries;
 mod texels;
+mod tiff;
 
 pub use exr_read::read_exr_metadata;
 pub use exr_write::{ExrPicture, Layer, write_exr};

@@ -28,10 +28,14 @@ pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
         ("16000x16000.ktx2", ktx2(16_000, 0, &[])),
         ("16000x16000-in-64-kb.ktx2", ktx2(16_000, 2, &runs(16_000))),
         ("too-few-runs.ktx2", ktx2(4096, 2, &runs(100))),
+        ("values-3e6.tif", tiff(3_000_000)),
+        ("values-4e9.tif", tiff(u32::MAX)),
         ("vertices-1e9.gltf", gltf(1_000_000_000, "", "")),
         ("vertices-1e9-of-zeros.gltf", gltf_zeros()),
         ("buffer-1e18.gltf", gltf(3, "", r#","byteLength":1000000000000000000"#)),
         ("instances-1e9.gltf", instances()),
+        ("packed-triangles-1e8-of-1.glb", draco(100_000_000, 3)),
+        ("packed-triangles-1e9-as-promised.glb", draco(1_000_000_000, 3_000_000_000)),
         ("chunk-4e9.glb", chunk()),
     ]
 }
@@ -172,6 +176,49 @@ fn tga(side: u16) -> Vec<u8> {
     file.extend(side.to_le_bytes());
     file.extend([24, 0x20, 1, 2, 3, 4, 5, 6]);
     file
+}
+
+/// So many bits per sample, of which there are three.
+fn tiff(count: u32) -> Vec<u8> {
+    let mut file = b"II*\0\x08\0\0\0\x08\0".to_vec();
+    let one = |tag: u16, value: u32| (tag, 1, value);
+    let entries = [
+        one(256, 2),
+        one(257, 2),
+        (258, count, 106),
+        one(259, 1),
+        one(262, 2),
+        one(273, 112),
+        one(277, 3),
+        one(279, 12),
+    ];
+    for (tag, count, value) in entries {
+        file.extend([tag, 3].map(u16::to_le_bytes).as_flattened());
+        file.extend([count, value].map(u32::to_le_bytes).as_flattened());
+    }
+    file.resize(124, 8);
+    file
+}
+
+/// A Draco stream that claims so many triangles, for an accessor of so many corners.
+fn draco(triangles: u64, corners: u64) -> Vec<u8> {
+    let mut stream = b"DRACO\x02\x02\x01\x01\0\0\0\x03".to_vec();
+    let mut rest = triangles;
+    while rest > 0x7f {
+        stream.push(rest as u8 | 0x80);
+        rest >>= 7;
+    }
+    stream.extend([rest as u8, 0, 1, 0, 0, 0, 0, 0, 0]);
+    let length = stream.len();
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":
+        {{"POSITION":0}},"indices":1,"extensions":{{"KHR_draco_mesh_compression":{{"bufferView":0,
+        "attributes":{{"POSITION":0}}}}}}}}]}}],"extensionsUsed":["KHR_draco_mesh_compression"],
+        "accessors":[{{"componentType":5126,"type":"VEC3","count":3}},
+        {{"componentType":5125,"type":"SCALAR","count":{corners}}}],
+        "bufferViews":[{{"buffer":0,"byteLength":{length}}}],"buffers":[{{"byteLength":{length}}}]}}"#
+    );
+    container(json, stream)
 }
 
 fn gltf(count: u64, accessor: &str, buffer: &str) -> Vec<u8> {

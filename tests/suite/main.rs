@@ -23,6 +23,7 @@ mod gpu;
 mod image_files;
 mod instances;
 mod metrics;
+mod packed;
 mod peers;
 mod real_files;
 #[cfg(feature = "report")]

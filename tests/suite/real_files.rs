@@ -7,6 +7,7 @@ use lightgrid::scene::gltf;
 use lightgrid::scene::{Scene, SceneOptions};
 
 use crate::cli::{Bench, text};
+use crate::packed;
 use crate::shared::shared;
 
 /// One triangle with what comes `before` and `after` in the file, its corners as given.
@@ -301,5 +302,69 @@ fn meshes_packed_by_draco_are_unpacked() {
         let mut spoilt = bytes.clone();
         spoilt[at] ^= 0x3c;
         let _ = load(&file(&spoilt, 7), &plain);
+    }
+}
+
+/// Packed in each of Draco's ways, a mesh is what it was, to what its numbers were rounded to.
+#[test]
+fn every_way_of_draco_gives_the_same_mesh() {
+    let (vertices, triangles) = packed::hills();
+    let middle =
+        |corners: [[f32; 3]; 3]| [0, 1, 2].map(|k| corners.iter().map(|p| p[k] / 3.0).sum());
+    let middles: Vec<[f32; 3]> =
+        triangles.iter().map(|t| middle(t.map(|v| vertices[v as usize].position))).collect();
+    let far =
+        |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    // Texture coordinates are read where there is a texture.
+    let pixel = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNkYAAAAAYAAjCB0C8AAAAASUVORK5CYII=";
+    for level in [0, 4, 7, 10] {
+        let bytes = packed::draco(level);
+        let data: String = bytes.iter().map(|byte| format!("%{byte:02x}")).collect();
+        let (length, points, corners) = (bytes.len(), vertices.len(), 3 * triangles.len());
+        let names = r#""POSITION":0,"NORMAL":1,"TEXCOORD_0":2"#;
+        let json = format!(
+            r#"{{"asset":{{"version":"2.0"}},"extensionsRequired":["KHR_draco_mesh_compression"],
+            "nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":{{{names}}},"indices":3,"material":0,
+            "extensions":{{"KHR_draco_mesh_compression":{{"bufferView":0,"attributes":{{{names}}}}}}}}}]}}],
+            "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],
+            "textures":[{{"source":0}}],"images":[{{"uri":"data:image/png;base64,{pixel}"}}],
+            "accessors":[{{"componentType":5126,"count":{points},"type":"VEC3"}},
+            {{"componentType":5126,"count":{points},"type":"VEC3"}},
+            {{"componentType":5126,"count":{points},"type":"VEC2"}},
+            {{"componentType":5125,"count":{corners},"type":"SCALAR"}}],
+            "bufferViews":[{{"buffer":0,"byteLength":{length}}}],
+            "buffers":[{{"uri":"data:,{data}","byteLength":{length}}}]}}"#
+        );
+        let scene = load(&json, &SceneOptions::default()).expect("a scene");
+        assert_eq!(scene.triangles.len(), triangles.len(), "level {level}");
+        let mut seen = vec![false; triangles.len()];
+        for found in &scene.triangles {
+            let at = middle(found.map(|v| scene.positions[v as usize].to_array()));
+            let (nearest, _) = middles
+                .iter()
+                .enumerate()
+                .min_by(|(_, a), (_, b)| far(*a, &at).total_cmp(&far(*b, &at)))
+                .expect("triangles");
+            assert!(
+                !std::mem::replace(&mut seen[nearest], true),
+                "level {level}: {at:?} is there twice"
+            );
+            for &corner in found {
+                let corner = corner as usize;
+                let position = scene.positions[corner].to_array();
+                let expected = triangles[nearest].map(|v| &vertices[v as usize]);
+                let expected = expected
+                    .iter()
+                    .min_by(|a, b| {
+                        far(&a.position, &position).total_cmp(&far(&b.position, &position))
+                    })
+                    .expect("corners");
+                assert!(far(&expected.position, &position) < 1e-4, "level {level}: {position:?}");
+                let normal = scene.normals[corner].to_array();
+                assert!(far(&expected.normal, &normal) < 0.01, "level {level}: {normal:?}");
+                let uv = scene.uvs[0][corner].to_array();
+                assert!(far(&expected.uv, &uv) < 1e-3, "level {level}: {uv:?}");
+            }
+        }
     }
 }

@@ -22,15 +22,14 @@ const FLOORS: [&[&str]; 13] = [
 ];
 
 /// Crates and where alone they are named: rooms, or parts of one. Any other is named anywhere.
-const CRATES: [(&str, &[&str]); 27] = [
+const CRATES: [(&str, &[&str]); 26] = [
     ("basisu", &["image/ktx2"]),
     ("bevy_mikktspace", &["scene/gltf/tangents"]),
     ("bitflags", &["features"]),
     ("clap", &["cli"]),
     ("clap_complete", &["cli/generate"]),
     ("clap_mangen", &["cli/generate"]),
-    ("draco_oxide_core", &["scene/gltf/draco"]),
-    ("draco_oxide_decoder", &["scene/gltf/draco"]),
+    ("draco_core", &["scene/gltf/draco"]),
     ("egui", &["app"]),
     ("egui_plot", &["app/panels/convergence"]),
     ("egui_wgpu", &["app"]),

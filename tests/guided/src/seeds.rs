@@ -8,7 +8,7 @@ use exr::prelude::{
 };
 use image::{DynamicImage, ImageFormat, Rgba, RgbaImage};
 
-use crate::{corpus, targets};
+use crate::{corpus, packed, targets};
 
 /// The seeds of a target.
 pub(crate) fn of(target: &str) -> Vec<Vec<u8>> {
@@ -181,14 +181,16 @@ fn meshopt() -> Vec<Vec<u8>> {
     .into()
 }
 
-/// Two triangles packed plainly: the sequential method, indices and values uncompressed.
+/// Two triangles packed plainly (the sequential method, indices and values uncompressed), and a mesh packed
+/// in the other ways, with all its attributes promised.
 fn draco() -> Vec<Vec<u8>> {
     let corners: [[f32; 3]; 4] = [[0.0; 3], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [0.0, 1.0, 0.5]];
     let mut bytes = b"\0DRACO\x02\x02\x01\x00\x00\x00".to_vec();
     bytes.extend([2, 4, 1, 0, 1, 2, 0, 2, 3]);
     bytes.extend([1, 1, 0, 9, 3, 0, 0, 0]);
     bytes.extend(corners.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
-    vec![bytes]
+    let hills = [0, 4, 7, 10].map(|level| [vec![0b110], packed::draco(level)].concat());
+    [vec![bytes], hills.into()].concat()
 }
 
 /// Cameras that move, a skin, variants, fog and the rest of what materials can be.

@@ -89,13 +89,13 @@ pub(crate) fn draco_file(bytes: &[u8]) -> Option<Vec<u8>> {
         .filter(|(_, number)| promised >> number & 1 == 1)
         .map(|(name, number)| format!(r#","{name}":{number}"#))
         .collect();
-    let float = |kind: &str| format!(r#"{{"componentType":5126,"type":"{kind}","count":3}}"#);
+    let float = |kind: &str| format!(r#"{{"componentType":5126,"type":"{kind}","count":1024}}"#);
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"extensionsUsed":["KHR_draco_mesh_compression"],
         "nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0{names}}},
         "indices":4,"extensions":{{"KHR_draco_mesh_compression":{{"bufferView":0,"attributes":
         {{"POSITION":0{names}}}}}}}}}]}}],"accessors":[{0},{0},{1},{2},
-        {{"componentType":5125,"type":"SCALAR","count":3}}],
+        {{"componentType":5125,"type":"SCALAR","count":3072}}],
         "bufferViews":[{{"buffer":0,"byteLength":{3}}}],"buffers":[{{"byteLength":{3}}}]}}"#,
         float("VEC3"),
         float("VEC2"),
