@@ -86,3 +86,7 @@ impl Notices {
         self.sentences.is_empty()
     }
 }
+/// A library's words on one line.
+pub(crate) fn one_line(words: &impl fmt::Display) -> String {
+    words.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
+}

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::history::History;
 use super::interface::Chosen;
+use super::kept::Pixels;
 use crate::develop::{Developer, LinearPicture};
 use crate::image::Image;
 
@@ -18,16 +19,16 @@ pub struct Comparison {
     /// What to call the left and the right picture.
     pub names: [String; 2],
     /// A kept picture.
-    pub left: Arc<Image>,
+    pub left: Arc<Pixels>,
     /// Another one, or `None` for what is rendered now.
-    pub right: Option<Arc<Image>>,
+    pub right: Option<Arc<Pixels>>,
     /// Whether their difference is shown, and not one beside the other.
     pub is_difference: bool,
 }
 
 impl PartialEq for Comparison {
     fn eq(&self, other: &Self) -> bool {
-        let address = |image: &Option<Arc<Image>>| image.as_ref().map(Arc::as_ptr);
+        let address = |pixels: &Option<Arc<Pixels>>| pixels.as_ref().map(Arc::as_ptr);
         Arc::ptr_eq(&self.left, &other.left)
             && address(&self.right) == address(&other.right)
             && self.is_difference == other.is_difference
@@ -53,8 +54,8 @@ impl Comparison {
         let name = right.map_or("Now", |kept| &kept.name).to_owned();
         Some(Self {
             names: [left.name.clone(), name],
-            left: Arc::clone(&left.image),
-            right: right.map(|kept| Arc::clone(&kept.image)),
+            left: Arc::clone(&left.pixels),
+            right: right.map(|kept| Arc::clone(&kept.pixels)),
             is_difference: chosen.is_difference,
         })
     }
@@ -70,23 +71,26 @@ impl Comparison {
         developer: &Developer,
         now: impl FnOnce() -> Arc<Image>,
     ) -> Compared {
-        let mut failure = None;
+        let mut compared = Compared { picture: None, other: None, failure: None };
+        let right = self.right.as_ref().map(|pixels| pixels.get()).transpose();
+        let (left, right) = match (self.left.get(), right) {
+            (Ok(left), Ok(right)) => (left, right),
+            (Err(failure), _) | (_, Err(failure)) => {
+                return Compared { failure: Some(failure), ..compared };
+            }
+        };
         if self.is_difference {
-            let right = self.right.clone().unwrap_or_else(now);
-            match difference(&self.left, &right) {
+            match difference(&left, &right.clone().unwrap_or_else(now)) {
                 Ok(image) => {
                     let picture = Some(developer.upload_image(&image));
-                    return Compared { picture, other: None, failure: None };
+                    return Compared { picture, ..compared };
                 }
-                Err(sentence) => failure = Some(sentence),
+                Err(sentence) => compared.failure = Some(sentence),
             }
         }
-        let upload = |image: &Arc<Image>| developer.upload_image(image);
-        Compared {
-            picture: self.right.as_ref().map(upload),
-            other: Some(upload(&self.left)),
-            failure,
-        }
+        compared.picture = right.map(|image| developer.upload_image(&image));
+        compared.other = Some(developer.upload_image(&left));
+        compared
     }
 }
 

@@ -17,7 +17,8 @@ use crate::scene::{Camera, MaterialEdit, Medium, Projection, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
 
 /// Everything a person sets about the picture.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Document {
     /// Scene file or built-in scene.
     pub scene: String,
@@ -133,6 +134,23 @@ impl Default for Document {
 }
 
 impl Document {
+    /// Whether all numbers of it that no settings file has are in range: it may come from a file.
+    pub fn is_sound(&self) -> bool {
+        let radiance = |x: &f32| x.is_finite() && *x >= 0.0;
+        let background = match self.background {
+            Background::Map => true,
+            Background::Blurred(radians) => radiance(&radians),
+            Background::Color(color) => color.iter().all(radiance),
+        };
+        background
+            && (0.0..360.0).contains(&self.rotation_degrees)
+            && [self.intensity, self.sun].iter().all(radiance)
+            && self.fog.is_none_or(|fog| fog.is_sound())
+            && self.viewpoint.iter().chain(&self.bookmarks).all(Viewpoint::is_sound)
+            && self.region.iter().flatten().all(|share| (0.0..=1.0).contains(share))
+            && self.materials.values().all(MaterialEdit::is_sound)
+    }
+
     /// So few that the first picture does not wait for them: rendered paths teach the rest.
     fn learning_paths(&self, size: [u32; 2]) -> u64 {
         let paths = View::suitable_learning_paths(self.light.sampling, size, self.stop.samples);
@@ -207,6 +225,17 @@ pub struct Viewpoint {
 }
 
 impl Viewpoint {
+    /// Whether all numbers are in range.
+    fn is_sound(&self) -> bool {
+        let lengths = [self.pivot_distance, self.half_height, self.focus_distance];
+        self.eye.iter().all(|x| x.is_finite())
+            && self.rotation().is_normalized()
+            && lengths.iter().all(|length| *length > 0.0 && length.is_finite())
+            && self.lens_radius >= 0.0
+            && self.lens_radius.is_finite()
+            && self.fov_y_degrees.is_none_or(|degrees| degrees > 0.0 && degrees < 180.0)
+    }
+
     /// Of a scene's camera; `pivot_distance` in metres.
     pub fn of(camera: &Camera, pivot_distance: f32) -> Self {
         let axes = camera.world_from_camera.matrix3;

@@ -139,8 +139,11 @@ impl App {
         let look = &self.document.look;
         let small = look.white_balance.apply(image.shrunk(history::SMALL_WIDTH));
         let exposure_ev = self.exposure_ev().unwrap_or_default();
-        let small = color_image(&display_rgb8(&small, exposure_ev, look.curve));
-        let index = self.history.keep(summary, image, self.document.clone(), small);
+        let small = display_rgb8(&small, exposure_ev, look.curve);
+        let (index, failure) = self.history.keep(summary, &image, self.document.clone(), &small);
+        if let Err(error) = failure {
+            self.messages.error(error.to_string());
+        }
         self.interface.compared = Chosen { left: Some(index), ..Chosen::default() };
         self.interface.tab = Tab::Picture;
     }

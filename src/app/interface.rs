@@ -70,6 +70,15 @@ pub struct Chosen {
     pub is_difference: bool,
 }
 
+impl Chosen {
+    /// Keeps to the same pictures when so many come before them.
+    pub(super) fn shift(&mut self, count: usize) {
+        for index in self.left.iter_mut().chain(&mut self.right) {
+            *index += count;
+        }
+    }
+}
+
 /// What the right panel shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Tab {

@@ -12,6 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::Vec2;
 
+mod album;
 pub mod commands;
 mod comparison;
 pub mod convergence;
@@ -21,6 +22,7 @@ mod execute;
 pub mod history;
 mod inspect;
 pub mod interface;
+pub mod kept;
 pub mod loader;
 pub mod messages;
 mod navigation;
@@ -52,6 +54,7 @@ use document::{Document, PictureSize, Viewpoint};
 use history::History;
 use inspect::Inspector;
 use interface::Interface;
+use kept::Kept;
 use loader::{Loaded, LoadedMap, LoadedScene, Loader};
 use messages::Messages;
 use presenter::{Order, Presenter, Shown};
@@ -88,6 +91,8 @@ pub struct Start {
     pub adapter: Option<String>,
     /// What finds the surfaces that rays hit on it.
     pub rays: RayChoice,
+    /// Where kept pictures are for the next window, if they are to be.
+    pub pictures: Option<std::path::PathBuf>,
     /// For screenshots: no previews on the way, and no figures that depend on the clock.
     pub is_repeatable: bool,
 }
@@ -145,6 +150,8 @@ enum Later {
     Done(String),
     /// Something failed.
     Failed(String),
+    /// Pictures that earlier windows kept.
+    Kept(Vec<Kept>),
 }
 
 impl App {
@@ -160,6 +167,19 @@ impl App {
     ) -> Result<Self> {
         let Wakes { draw: wake, relay } = wakes;
         theme::apply(context);
+        let later = channel();
+        let history = match start.pictures {
+            Some(folder) => {
+                let (sender, wake): (Sender<Later>, _) = (later.0.clone(), wake.clone());
+                History::of_folder(folder, move |found| {
+                    let later = found.map_or_else(|e| Later::Failed(e.to_string()), Later::Kept);
+                    // The window may have gone meanwhile.
+                    let _ = sender.send(later);
+                    wake();
+                })?
+            }
+            None => History::default(),
+        };
         Ok(Self {
             undo: Undo::new(start.document.clone()),
             start: start.document.clone(),
@@ -167,7 +187,7 @@ impl App {
             interface: start.interface,
             settings: start.settings,
             messages: Messages::default(),
-            history: History::default(),
+            history,
             convergence: Convergence::default(),
             inspector: Inspector::new(wake.clone()),
             loader: Loader::new(wake.clone(), start.of_scene.clone()),
@@ -183,7 +203,7 @@ impl App {
             textures: panels::scope::Textures::default(),
             reference: None,
             arriving: Arc::default(),
-            later: channel(),
+            later,
             wake,
             waiting_save: None,
             is_repeatable: start.is_repeatable,
@@ -436,6 +456,10 @@ impl App {
                 }
                 Later::Done(sentence) => self.messages.notice(sentence),
                 Later::Failed(sentence) => self.messages.error(sentence),
+                Later::Kept(earlier) => {
+                    let count = self.history.take_over(earlier);
+                    self.interface.compared.shift(count);
+                }
             }
         }
         let arrived = self.arriving.lock().unwrap_or_else(PoisonError::into_inner).take();

@@ -65,17 +65,14 @@ impl Default for Settings {
 impl Settings {
     /// Where they are kept: under the user's folder for configuration; `None` if there is none.
     pub fn default_path() -> Option<PathBuf> {
-        let folder = |variable: &str| std::env::var_os(variable).map(PathBuf::from);
-        let folder = if cfg!(windows) {
-            folder("APPDATA")
-        } else if cfg!(target_os = "macos") {
-            folder("HOME").map(|home| home.join("Library/Application Support"))
-        } else {
-            folder("XDG_CONFIG_HOME")
-                .filter(|path| path.is_absolute())
-                .or_else(|| folder("HOME").map(|home| home.join(".config")))
-        };
-        Some(folder?.join("lightgrid").join("window.json"))
+        Some(user_folder("XDG_CONFIG_HOME", ".config")?.join("window.json"))
+    }
+
+    /// Where kept pictures are: beside a settings file that was named, else under the user's folder for
+    /// data; `None` if there is none.
+    pub fn pictures_folder(file: Option<&Path>) -> Option<PathBuf> {
+        let usual = || Some(user_folder("XDG_DATA_HOME", ".local/share")?.join("pictures"));
+        file.map(|file| file.with_extension("pictures")).or_else(usual)
     }
 
     /// Reads them; a file that is not there gives the defaults.
@@ -208,6 +205,29 @@ impl Settings {
             put_first(&mut self.recent_maps, name);
         }
     }
+}
+
+/// lightgrid's folder in that of a variable, or in one of the user's home (systems that are not Unix have
+/// one for everything).
+fn user_folder(variable: &str, of_home: &str) -> Option<PathBuf> {
+    let folder = |variable: &str| std::env::var_os(variable).map(PathBuf::from);
+    let folder = if cfg!(windows) {
+        folder("APPDATA")
+    } else if cfg!(target_os = "macos") {
+        folder("HOME").map(|home| home.join("Library/Application Support"))
+    } else {
+        folder(variable)
+            .filter(|path| path.is_absolute())
+            .or_else(|| folder("HOME").map(|home| home.join(of_home)))
+    };
+    Some(folder?.join("lightgrid"))
+}
+
+/// Whether what a document shares with the settings are values a window can work with.
+pub(super) fn is_within_bounds(document: &Document) -> bool {
+    let Document { look, light, size, stop, .. } = *document;
+    let settings = Settings { look, light, size, stop, ..Settings::default() };
+    settings == settings.clone().within_bounds()
 }
 
 /// Sets what of `found` fits into the settings below a place in them, field by field.

@@ -49,7 +49,7 @@ pub(super) struct ViewArguments {
     /// Stop at this many samples per pixel.
     #[arg(long, visible_alias = "spp", value_parser = clap::value_parser!(u32).range(1..), value_name = "N")]
     samples: Option<u32>,
-    /// Settings file of the window; without it, the user's own.
+    /// Settings file of the window, with its kept pictures beside it (FILE.pictures); without it, the user's own.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     /// Where the picture is written if there is no display.
@@ -96,6 +96,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
         of_scene: arguments.of_scene.options(),
         adapter: arguments.adapter.clone(),
         rays: arguments.rays,
+        pictures: Settings::pictures_folder(arguments.settings.as_deref()),
         is_repeatable: false,
     };
     match window::run(start, notice.into_iter().collect(), path) {

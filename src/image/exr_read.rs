@@ -10,7 +10,7 @@ use exr::compression::Compression;
 use exr::math::Vec2;
 use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, ChannelList, IntegerBounds, SampleType};
-use exr::meta::header::Header;
+use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::f16;
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
@@ -20,7 +20,7 @@ use super::exr_patch::patch;
 use super::file::{open_file, read_cause, read_file};
 use super::guard::catch_panic;
 use super::primaries::rec709_conversion;
-use super::{Image, check_size};
+use super::{Image, Rgb8, check_size};
 use crate::error::{Decoded, Error, Notices, Result};
 use crate::memory;
 
@@ -73,13 +73,8 @@ fn is_patched(failure: &exr::error::Error) -> bool {
 /// # Errors
 /// If the file is missing or its header is damaged.
 pub fn read_exr_metadata(path: &Path) -> Result<Vec<(String, String)>> {
-    let (file, _) = open_file(path).map_err(|cause| Error::at(path, cause))?;
-    let meta = catch_panic(|| MetaData::read_from_buffered(BufReader::new(file), false))
-        .ok_or_else(|| Error::at(path, "is damaged: its decoder failed"))?
-        .map_err(|e| Error::at(path, decode_cause(&e)))?;
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    let mut found: Vec<(String, String)> = meta.headers[0]
-        .own_attributes
+    let mut found: Vec<(String, String)> = own_attributes(path)?
         .other
         .iter()
         .filter_map(|(name, value)| match value {
@@ -89,6 +84,32 @@ pub fn read_exr_metadata(path: &Path) -> Result<Vec<(String, String)>> {
         .collect();
     found.sort();
     Ok(found)
+}
+
+/// The small picture in the header of an OpenEXR file's first part, if there is one.
+///
+/// # Errors
+/// If the file is missing or its header is damaged.
+pub fn read_exr_preview(path: &Path) -> Result<Option<Rgb8>> {
+    let Some(preview) = own_attributes(path)?.preview else { return Ok(None) };
+    let byte = |value: i8| value.cast_unsigned();
+    let (pixels, _) = preview.pixel_data.as_chunks();
+    let pixels: Vec<_> = pixels.iter().map(|&[r, g, b, _]| [r, g, b].map(byte)).collect();
+    let Vec2(width, height) = preview.size;
+    let is_whole = width.checked_mul(height) == Some(pixels.len());
+    let small = Rgb8 { width: width as u32, height: height as u32, pixels };
+    Ok((is_whole && !small.pixels.is_empty()).then_some(small))
+}
+
+/// What the first part of a file says beside what its pixels need.
+fn own_attributes(path: &Path) -> Result<LayerAttributes> {
+    let (file, _) = open_file(path).map_err(|cause| Error::at(path, cause))?;
+    let meta = catch_panic(|| MetaData::read_from_buffered(BufReader::new(file), false))
+        .ok_or_else(|| Error::at(path, "is damaged: its decoder failed"))?
+        .map_err(|e| Error::at(path, decode_cause(&e)))?;
+    let mut headers = meta.headers.into_iter();
+    let first = headers.next().ok_or_else(|| Error::at(path, "has no pictures"))?;
+    Ok(first.own_attributes)
 }
 
 /// `sampling` is that of the first part's channels if they may differ from a sample a pixel.

@@ -3,6 +3,7 @@
 use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::Path;
 
+use exr::meta::attribute::Preview;
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples,
     Image as ExrImage, Layer as ExrLayer, LayerAttributes, LineOrder, SmallVec, Text, Vec2,
@@ -10,7 +11,7 @@ use exr::prelude::{
 };
 
 use super::exr_patch::sort_attributes;
-use super::{Image, write_beside_and_rename};
+use super::{Image, Rgb8, write_beside_and_rename};
 use crate::error::{Error, Result};
 
 /// What goes into one OpenEXR file.
@@ -23,6 +24,8 @@ pub struct ExrPicture<'a> {
     /// Stored as text attributes of these names; see
     /// [`read_exr_metadata`](super::read_exr_metadata).
     pub metadata: &'a [(String, String)],
+    /// It in small, for lists of files.
+    pub preview: Option<&'a Rgb8>,
 }
 
 /// A named group of channels, stored as `name.channel` in the part of the picture itself, which is
@@ -41,7 +44,7 @@ pub struct Layer {
 /// If a layer is not of the picture's size, two channels or attributes share a name, or the file
 /// cannot be written.
 pub fn write_exr(path: &Path, picture: ExrPicture<'_>) -> Result<()> {
-    let ExrPicture { image, layers, metadata } = picture;
+    let ExrPicture { image, layers, metadata, preview } = picture;
     let size = Vec2(image.width as usize, image.height as usize);
     let mut channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::new();
     for (i, name) in ["R", "G", "B"].into_iter().enumerate() {
@@ -69,6 +72,15 @@ pub fn write_exr(path: &Path, picture: ExrPicture<'_>) -> Result<()> {
     for (name, value) in metadata {
         attributes.other.insert(text(name), AttributeValue::Text(text(value)));
     }
+    attributes.preview = preview.map(|small| Preview {
+        size: Vec2(small.width as usize, small.height as usize),
+        pixel_data: small
+            .pixels
+            .iter()
+            .flat_map(|&[r, g, b]| [r, g, b, 255])
+            .map(u8::cast_signed)
+            .collect(),
+    });
     let encoding = Encoding {
         compression: Compression::ZIP16,
         blocks: Blocks::ScanLines,

@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use super::guard::catch_panic;
 use super::{Texels, ktx2, tiff};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
 use crate::memory;
 
 /// Widest and highest picture that is decoded.
@@ -28,7 +28,7 @@ pub(crate) fn decoder_cause(cause: &image::ImageError, file_bytes: u64) -> Strin
         image::ImageError::Limits(_) => {
             format!("claims more pixels than its {file_bytes} bytes can hold or lightgrid reads")
         }
-        other => other.to_string().replace('\n', " "),
+        other => one_line(other),
     }
 }
 
@@ -54,7 +54,7 @@ pub fn ldr_size(bytes: &[u8], name: &str) -> Result<(u32, u32)> {
         return ktx2::size(bytes).map_err(|cause| Error::at(name, cause));
     }
     tiff::check(bytes).map_err(|cause| Error::at(name, cause))?;
-    reader(bytes, name)?.into_dimensions().map_err(|cause| damaged(name, &cause))
+    reader(bytes, name)?.into_dimensions().map_err(|cause| Error::at(name, one_line(&cause)))
 }
 
 /// Decodes a picture whose format is told by its content; deeper channels are rounded to 8 bits, of mip
@@ -107,11 +107,6 @@ fn reader<'a>(bytes: &'a [u8], name: &str) -> Result<image::ImageReader<Cursor<&
         return Err(Error::at(name, "not a picture in a known format (PNG, JPEG, WebP, KTX 2)"));
     }
     Ok(reader)
-}
-
-/// The library's words on one line.
-fn damaged(name: &str, cause: &image::ImageError) -> Error {
-    Error::at(name, cause.to_string().replace('\n', " "))
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ mod primaries;
 mod texels;
 mod tiff;
 
-pub use exr_read::read_exr_metadata;
+pub use exr_read::{read_exr_metadata, read_exr_preview};
 pub use exr_write::{ExrPicture, Layer, write_exr};
 pub use file::{check_writable, is_same_file, write_beside_and_rename};
 pub(crate) use file::{open_file, read_cause, read_file};

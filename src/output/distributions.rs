@@ -57,7 +57,10 @@ pub fn write_distributions(path: &Path, grid: &LightGrid) -> Result<()> {
             };
             let layer =
                 Layer { name: "distribution".to_owned(), channels: vec![("p".to_owned(), values)] };
-            write_exr(path, ExrPicture { image: &image, layers: vec![layer], metadata: &[] })
+            write_exr(
+                path,
+                ExrPicture { image: &image, layers: vec![layer], metadata: &[], preview: None },
+            )
         }
         _ => check_distributions_extension(path),
     }

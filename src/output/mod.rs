@@ -122,7 +122,10 @@ pub fn write_picture(
     let image = whole.image();
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
         let layers = layers(film, &whole, &options.layers);
-        return write_exr(path, ExrPicture { image: &image, layers, metadata: &metadata });
+        return write_exr(
+            path,
+            ExrPicture { image: &image, layers, metadata: &metadata, preview: None },
+        );
     }
     let image = match options.denoiser {
         Some(denoiser) => denoiser.denoise(&whole)?,

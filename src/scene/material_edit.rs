@@ -1,12 +1,14 @@
 //! Changes to materials after loading: what a person tries, without touching the file.
 
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 use super::{AlphaMode, Material};
 use crate::color;
 
 /// A change to a material; what is `None` stays as it is.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
 pub struct MaterialEdit {
     /// Whether neither light nor the camera meets it.
     pub hidden: bool,
@@ -41,6 +43,12 @@ impl MaterialEdit {
             };
         }
         changed
+    }
+
+    /// Whether all numbers are in range.
+    pub fn is_sound(&self) -> bool {
+        let color = self.color.iter().flat_map(Vec3::to_array);
+        color.chain(self.roughness).chain(self.metalness).all(|x| (0.0..=1.0).contains(&x))
     }
 
     /// Reads `NAME:KEY=VALUE,...` with the keys `color` (`#rrggbb`, sRGB), `roughness` and `metalness`,

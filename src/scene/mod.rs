@@ -13,6 +13,7 @@ pub mod surface;
 pub mod texture;
 
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
+use serde::{Deserialize, Serialize};
 
 use crate::error::Notices;
 use crate::image::Texels;
@@ -91,7 +92,7 @@ pub struct Scene {
 
 /// A homogeneous medium, like fog: the same everywhere in its box, and outside of solid bodies.
 /// All zero is clear air.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Medium {
     /// Scattering coefficient per metre, linear RGB, not negative: one over the mean way of light
     /// between two scatterings.

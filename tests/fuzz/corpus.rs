@@ -33,9 +33,10 @@ pub(crate) fn maps() -> Vec<Vec<u8>> {
     let count = image.pixels.len();
     let depth = Layer { name: "depth".into(), channels: vec![("Z".into(), vec![1.0; count])] };
     let metadata = [("lightgrid.scene".to_owned(), "office".to_owned())];
-    let picture = ExrPicture { image: &image, layers: vec![depth], metadata: &metadata };
+    let picture =
+        ExrPicture { image: &image, layers: vec![depth], metadata: &metadata, preview: None };
     write_exr(&path("a.exr"), picture).expect("written");
-    let plain = ExrPicture { image: &image, layers: Vec::new(), metadata: &[] };
+    let plain = ExrPicture { image: &image, layers: Vec::new(), metadata: &[], preview: None };
     write_exr(&path("b.exr"), plain).expect("written");
     let rgb = Rgb8 {
         width: 16,

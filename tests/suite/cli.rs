@@ -43,7 +43,7 @@ impl Bench {
         fs::write(folder.path().join("scene.gltf"), SCENE).expect("written");
         let mut map = Image::filled(32, 16, [0.5, 0.6, 0.8]);
         map.pixels[3 * 32 + 7] = [900.0, 800.0, 700.0];
-        let picture = ExrPicture { image: &map, layers: vec![], metadata: &[] };
+        let picture = ExrPicture { image: &map, layers: vec![], metadata: &[], preview: None };
         write_exr(&folder.path().join("map.exr"), picture).expect("written");
         Self { folder }
     }

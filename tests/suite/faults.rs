@@ -419,7 +419,7 @@ fn a_read_only_folder_is_refused_before_the_work() {
 fn files_that_vanish_while_they_are_read_are_refused_by_name() {
     let bench = Bench::new();
     let map = Image::filled(256, 128, [1.0; 3]);
-    let picture = ExrPicture { image: &map, layers: vec![], metadata: &[] };
+    let picture = ExrPicture { image: &map, layers: vec![], metadata: &[], preview: None };
     write_exr(&bench.path("map.exr"), picture).unwrap();
     let files = ["map.exr", "scene.bin"].map(|name| (name, fs::read(bench.path(name)).unwrap()));
     let done = AtomicBool::new(false);

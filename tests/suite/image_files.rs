@@ -303,7 +303,8 @@ fn exr_round_trip_keeps_every_bit_and_word() {
             channels: ["R", "G", "B"].map(|c| (c.into(), vec![0.5; 37 * 21])).into(),
         },
     ];
-    write_exr(&path, ExrPicture { image: &image, layers, metadata: &metadata }).unwrap();
+    write_exr(&path, ExrPicture { image: &image, layers, metadata: &metadata, preview: None })
+        .unwrap();
     assert_eq!(read_picture(&path).unwrap(), image);
     assert_eq!(read_exr_metadata(&path).unwrap(), metadata);
     // The extra layers are channels of the same part, by the names other programs look for.
@@ -312,7 +313,7 @@ fn exr_round_trip_keeps_every_bit_and_word() {
         assert!(bytes.windows(name.len()).any(|w| w == name.as_bytes()), "{name:?}");
     }
     let short = Layer { name: "depth".into(), channels: vec![("Z".into(), vec![0.0])] };
-    let picture = ExrPicture { image: &image, layers: vec![short], metadata: &[] };
+    let picture = ExrPicture { image: &image, layers: vec![short], metadata: &[], preview: None };
     let error = write_exr(&path, picture).unwrap_err().to_string();
     assert!(error.contains("depth.Z has 1 values for 777 pixels"), "{error}");
     assert_eq!(read_picture(&path).unwrap(), image);
@@ -375,7 +376,11 @@ fn where_a_picture_cannot_be_written_is_said() {
 fn damaged_files_never_panic() {
     let (_folder, path) = temporary("damaged");
     let exr = path.with_extension("exr");
-    write_exr(&exr, ExrPicture { image: &test_picture(), layers: vec![], metadata: &[] }).unwrap();
+    write_exr(
+        &exr,
+        ExrPicture { image: &test_picture(), layers: vec![], metadata: &[], preview: None },
+    )
+    .unwrap();
     let mut originals = vec![fs::read(&exr).unwrap()];
     originals.push(flat_hdr("#?RADIANCE\nEXPOSURE=1\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n"));
     for name in [

@@ -168,7 +168,8 @@ fn exr_channels_need_not_be_sorted() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("map.exr");
     let image = Image::from_fn(32, 16, |x, y| [x as f32, y as f32, 0.5]);
-    write_exr(&path, ExrPicture { image: &image, layers: vec![], metadata: &[] }).unwrap();
+    write_exr(&path, ExrPicture { image: &image, layers: vec![], metadata: &[], preview: None })
+        .unwrap();
     let mut bytes = fs::read(&path).unwrap();
     let list = bytes.windows(7).position(|w| w == b"chlist\0").unwrap() + 7 + 4;
     assert_eq!([bytes[list], bytes[list + 18], bytes[list + 36]], *b"BGR");

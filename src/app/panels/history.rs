@@ -3,8 +3,9 @@
 use egui::{Image, Sense, TextureOptions, Ui, Vec2};
 
 use crate::app::commands::Command;
-use crate::app::history::{History, Kept};
+use crate::app::history::History;
 use crate::app::interface::Chosen;
+use crate::app::kept::Kept;
 use crate::app::theme;
 
 /// Height of a small picture in points.

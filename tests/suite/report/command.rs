@@ -165,7 +165,7 @@ fn a_given_reference_is_judged_by_the_runs() {
     let good = read_picture(&bench.path("good.exr")).expect("a picture");
     let mut wrong = good.clone();
     wrong.pixels.iter_mut().for_each(|rgb| *rgb = rgb.map(|v| 1.3 * v));
-    let picture = ExrPicture { image: &wrong, layers: vec![], metadata: &[] };
+    let picture = ExrPicture { image: &wrong, layers: vec![], metadata: &[], preview: None };
     write_exr(&bench.path("wrong.exr"), picture).expect("written");
     let share = |file: &str| {
         succeed(&bench, &format!("{LINE}-{file} --reference {file}"));
@@ -184,7 +184,7 @@ fn a_given_reference_is_judged_by_the_runs() {
 fn what_cannot_be_reported_is_refused_at_once() {
     let bench = Bench::new();
     let picture = lightgrid::image::Image::filled(8, 8, [1.0; 3]);
-    let picture = ExrPicture { image: &picture, layers: vec![], metadata: &[] };
+    let picture = ExrPicture { image: &picture, layers: vec![], metadata: &[], preview: None };
     write_exr(&bench.path("small.exr"), picture).expect("written");
     let out = |rest: &str| format!("report {rest} -o out");
     for (line, reason) in [
