@@ -21,9 +21,11 @@ impl Error {
         Self { message: message.into() }
     }
 
-    /// An error about a file: reads `PATH: cause`.
+    /// An error about a file: reads `PATH: cause`, the cause on one line.
     pub fn at(path: impl AsRef<Path>, cause: impl fmt::Display) -> Self {
-        Self::new(format!("{}: {cause}", path.as_ref().display()))
+        let cause = cause.to_string();
+        let lines: Vec<&str> = cause.lines().map(str::trim).collect();
+        Self::new(format!("{}: {}", path.as_ref().display(), lines.join(" ")))
     }
 }
 
@@ -86,7 +88,14 @@ impl Notices {
         self.sentences.is_empty()
     }
 }
-/// A library's words on one line.
-pub(crate) fn one_line(words: &impl fmt::Display) -> String {
-    words.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cause_is_one_line() {
+        let error = Error::at("a.glb", "too many points,\n   more than  fit");
+        assert_eq!(error.to_string(), "a.glb: too many points, more than  fit");
+    }
 }

@@ -130,10 +130,11 @@ impl App {
         let Some(shown) = &self.shown else { return };
         let main = &shown.order.snapshot.main;
         let image = shown.image.clone().unwrap_or_else(|| Arc::new(main.film.image()));
+        let samples = main.film.min_samples();
         let summary = format!(
-            "{}, {} samples, {}",
+            "{}, {samples} sample{}, {}",
             convergence::name_of(main.sampling),
-            main.film.min_samples(),
+            if samples == 1 { "" } else { "s" },
             self.document.scene
         );
         let look = &self.document.look;

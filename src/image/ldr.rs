@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use super::guard::catch_panic;
 use super::{Texels, ktx2, tiff};
-use crate::error::{Error, Result, one_line};
+use crate::error::{Error, Result};
 use crate::memory;
 
 /// Widest and highest picture that is decoded.
@@ -22,13 +22,13 @@ pub(crate) fn decoder_bytes(file_bytes: u64) -> u64 {
     (16 << 20) + file_bytes.saturating_mul(1100)
 }
 
-/// A decoder's complaint on one line.
+/// A decoder's complaint.
 pub(crate) fn decoder_cause(cause: &image::ImageError, file_bytes: u64) -> String {
     match cause {
         image::ImageError::Limits(_) => {
             format!("claims more pixels than its {file_bytes} bytes can hold or lightgrid reads")
         }
-        other => one_line(other),
+        other => other.to_string(),
     }
 }
 
@@ -54,7 +54,7 @@ pub fn ldr_size(bytes: &[u8], name: &str) -> Result<(u32, u32)> {
         return ktx2::size(bytes).map_err(|cause| Error::at(name, cause));
     }
     tiff::check(bytes).map_err(|cause| Error::at(name, cause))?;
-    reader(bytes, name)?.into_dimensions().map_err(|cause| Error::at(name, one_line(&cause)))
+    reader(bytes, name)?.into_dimensions().map_err(|cause| Error::at(name, cause))
 }
 
 /// Decodes a picture whose format is told by its content; deeper channels are rounded to 8 bits, of mip

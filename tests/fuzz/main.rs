@@ -9,6 +9,8 @@
 
 mod bombs;
 mod corpus;
+#[path = "../guided/src/kept.rs"]
+mod kept;
 mod mutate;
 mod read;
 #[cfg(feature = "window")]
@@ -16,6 +18,8 @@ mod settings;
 #[path = "../suite/shared.rs"]
 #[allow(dead_code, reason = "the suite uses the rest")]
 mod shared;
+#[path = "../guided/src/targets.rs"]
+mod targets;
 mod worker;
 
 use std::io::{BufRead, BufReader};
@@ -53,6 +57,8 @@ enum Kind {
     Settings,
     /// Files that claim far more than they hold; not spoilt.
     Bombs,
+    /// What a fuzzer guided by coverage (`tests/guided`) has kept.
+    Kept,
 }
 
 impl Kind {
@@ -64,6 +70,7 @@ impl Kind {
         #[cfg(feature = "window")]
         Self::Settings,
         Self::Bombs,
+        Self::Kept,
     ];
 
     fn name(self) -> &'static str {
@@ -75,6 +82,7 @@ impl Kind {
             #[cfg(feature = "window")]
             Self::Settings => "settings",
             Self::Bombs => "bombs",
+            Self::Kept => "kept",
         }
     }
 }
@@ -127,6 +135,12 @@ fn settings_files() {
 fn bombs_are_refused() {
     let count = bombs::all().len() as u64;
     assert_eq!(judged(Kind::Bombs, count).refused, count, "false claims refused");
+}
+
+#[test]
+fn what_was_kept_is_read_or_refused() {
+    let tally = judged(Kind::Kept, kept::all().len() as u64);
+    assert!(tally.accepted > 0, "{tally:?}");
 }
 
 /// The process that reads: [`read_by_worker`] starts it, or a person who wants an input again.

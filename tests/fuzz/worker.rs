@@ -16,7 +16,7 @@ use crate::read::{self, Found};
 #[cfg(feature = "window")]
 use crate::settings;
 use crate::shared::SplitMix;
-use crate::{ALLOWANCE_BYTES, Kind, Tally, bombs, corpus, mutate};
+use crate::{ALLOWANCE_BYTES, Kind, Tally, bombs, corpus, kept, mutate, targets};
 
 /// Reads inputs `first..first + count`, printing each number before it is read; then the tally as JSON.
 pub(crate) fn work(kind: Kind, first: u64, count: u64) {
@@ -30,7 +30,7 @@ pub(crate) fn work(kind: Kind, first: u64, count: u64) {
         Kind::Settings => settings::corpus(),
         Kind::CommandLines => Vec::new(),
         Kind::Textures => corpus::textures(),
-        Kind::Maps | Kind::Bombs => corpus::maps(),
+        Kind::Maps | Kind::Bombs | Kind::Kept => corpus::maps(),
     };
     // Sound input first: thread pools, tables and the allocator's own growth are no input's doing.
     for entry in &entries {
@@ -61,6 +61,13 @@ pub(crate) fn work(kind: Kind, first: u64, count: u64) {
                     _ => Kind::Maps,
                 };
                 (bytes.len(), read(kind, name, &bytes, folder))
+            }
+            Kind::Kept => {
+                let (target, bytes) = kept::all().swap_remove(number as usize);
+                // Without a window there are no settings.
+                let nothing = || Found::Refused("no such target".to_owned());
+                let found = targets::read(target, bytes, folder).unwrap_or_else(nothing);
+                (bytes.len(), found)
             }
             #[cfg(feature = "window")]
             Kind::Settings if random.below(4) > 0 => {

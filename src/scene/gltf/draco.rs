@@ -13,7 +13,6 @@ use serde::Deserialize;
 use super::accessor::Elements;
 use super::buffers::{File, find};
 use super::{Fallible, MAX_TRIANGLES};
-use crate::error::one_line;
 use crate::image::catch_panic;
 use crate::memory;
 
@@ -75,7 +74,7 @@ impl Unpacked {
             MeshDecoder::new().decode(&mut buffer, &mut mesh)
         })
         .ok_or("its Draco data are damaged: their decoder failed")?
-        .map_err(|cause| format!("its Draco data cannot be read: {}", one_line(&cause)))?;
+        .map_err(|cause| format!("its Draco data cannot be read: {cause}"))?;
         let corners = mesh.faces().as_flattened().iter();
         let points = corners.map(|point| point.0 as usize + 1).max().unwrap_or(0);
         Ok(Some(Self { mesh, points, attributes }))

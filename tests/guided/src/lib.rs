@@ -6,6 +6,7 @@ mod corpus;
 #[cfg(target_arch = "x86_64")]
 mod cpp;
 mod gltf;
+mod kept;
 mod memory;
 #[path = "../../fuzz/mutate.rs"]
 #[allow(dead_code, reason = "most is left to libFuzzer")]
@@ -51,8 +52,10 @@ pub fn begin(target: &str) {
     let corpus = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
     fs::create_dir_all(&corpus).expect("a folder");
     if fs::read_dir(&corpus).expect("a folder").next().is_none() {
-        for (number, seed) in seeds::of(target).iter().enumerate() {
-            fs::write(corpus.join(format!("seed-{number}")), seed).expect("written");
+        let kept = kept::all().into_iter().filter(|(of, _)| *of == target);
+        let inputs = seeds::of(target).into_iter().chain(kept.map(|(_, input)| input.to_vec()));
+        for (number, input) in inputs.enumerate() {
+            fs::write(corpus.join(format!("seed-{number}")), input).expect("written");
         }
     }
 }
