@@ -54,7 +54,7 @@ pub(crate) fn meshopt_file(bytes: &[u8]) -> Option<Vec<u8>> {
     let data = [bytemuck::cast_slice(&points), packed].concat();
     let (plain, length, total) = (data.len() - packed.len(), packed.len(), data.len());
     // A view's own stride is for vertices, and of some size.
-    let view_stride = if mode == "ATTRIBUTES" && stride >= 12 && stride < 253 {
+    let view_stride = if mode == "ATTRIBUTES" && (12..253).contains(&stride) {
         format!(r#""byteStride":{stride},"#)
     } else {
         String::new()
