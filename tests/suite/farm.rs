@@ -117,7 +117,8 @@ mod killed {
             let command = format!("{line} --checkpoint film.checkpoint -o {output}");
             let checkpoint = bench.path("film.checkpoint");
             let written = || fs::metadata(&checkpoint).and_then(|facts| facts.modified()).ok();
-            for _ in 0..2 {
+            // On a busy machine one may end before this thread sees its checkpoint: that is tried again.
+            let is_killed = || {
                 let before = written();
                 let mut child = bench
                     .command(&render_line(&format!("{command} --checkpoint-every 0.03")))
@@ -129,7 +130,10 @@ mod killed {
                 }
                 child.kill().expect("killed");
                 child.wait().expect("it ends");
-                assert!(!bench.path(output).exists(), "{rule}: killed before the end");
+                fs::remove_file(bench.path(output)).is_err()
+            };
+            for _ in 0..2 {
+                assert!((0..20).any(|_| is_killed()), "{rule}: always done before it is killed");
             }
             let says = text(&bench.render(&command).stderr);
             assert!(says.contains("film.checkpoint: goes on from "), "{rule}: {says}");
