@@ -19,7 +19,8 @@ struct Develop {
     unscale: f32,
 }
 
-@group(0) @binding(0) var<uniform> settings: Develop;
+// Not a uniform: software Vulkan compiles a shader anew for each value that it branches on, and keeps that.
+@group(0) @binding(0) var<storage, read> settings: Develop;
 @group(0) @binding(1) var<storage, read> sum: array<vec4f>;
 @group(0) @binding(2) var<storage, read> counts: array<vec4u>;
 @group(0) @binding(4) var overlay: texture_2d<f32>;

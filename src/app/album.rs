@@ -9,21 +9,26 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use egui::{Color32, ColorImage};
+
 use super::document::Document;
-use super::kept::{Kept, Pixels};
+use super::history::{MOST, SMALL_WIDTH};
+use super::kept_picture::{KeptPicture, Pixels};
 use super::screen::color_image;
 use super::settings_file;
 use crate::error::{Error, Result};
 use crate::image::{ExrPicture, Image, Rgb8, read_exr_metadata, read_exr_preview, write_exr};
-use crate::scene::builtin;
+use crate::output::record::to_json;
+use crate::scene::{SceneOptions, builtin};
 
 /// Names of the header's attributes.
 const NAME: &str = "lightgrid.kept.name";
 const SUMMARY: &str = "lightgrid.kept.summary";
 const DOCUMENT: &str = "lightgrid.kept.document";
+const OF_SCENE: &str = "lightgrid.kept.scene-options";
 
-/// Most pictures that are read: no window keeps as many.
-const MOST_READ: usize = 64;
+/// Most files that are looked at for those that can be read.
+const MOST_TRIED: usize = 64;
 
 /// The folder of kept pictures.
 pub(super) struct Album {
@@ -39,21 +44,22 @@ enum Job {
 }
 
 impl Album {
-    /// Begins to read a folder, which need not be there. `report` is told all that is in it, and later what
-    /// fails.
+    /// Begins to read a folder, which need not be there. `report` is told the newest that are in it, and
+    /// later what fails.
     pub(super) fn open(
         folder: PathBuf,
-        report: impl Fn(Result<Vec<Kept>>) + Send + 'static,
+        report: impl Fn(Result<Vec<KeptPicture>>) + Send + 'static,
     ) -> Result<Self> {
         let (jobs, orders) = channel();
         let place = folder.clone();
         let thread = std::thread::Builder::new()
             .name("kept pictures".to_owned())
             .spawn(move || {
-                let (found, failures): (Vec<_>, Vec<_>) =
-                    files(&place).iter().map(|file| read(file)).partition(Result::is_ok);
-                report(Ok(found.into_iter().filter_map(Result::ok).collect()));
-                failures.into_iter().filter_map(Result::err).for_each(|error| report(Err(error)));
+                let (found, failures) = read_all(&place);
+                report(Ok(found));
+                if let Some(sentence) = failures {
+                    report(Err(sentence));
+                }
                 for job in orders {
                     if let Err(error) = carry_out(job) {
                         report(Err(error));
@@ -67,24 +73,28 @@ impl Album {
     /// Writes a picture, one day soon; where.
     pub(super) fn write(
         &mut self,
-        [name, summary]: [&str; 2],
+        kept: &KeptPicture,
         picture: &Arc<Image>,
-        document: &Document,
         small: &Rgb8,
     ) -> Result<PathBuf> {
         // In the order of time, and never that of another window.
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let (time, process) = (since.as_millis(), std::process::id());
-        let file = self.folder.join(format!("{time:015}-{process}-{}.exr", self.written));
+        let file = self.folder.join(format!("{time:015}-{process}-{:04}.exr", self.written));
         self.written += 1;
+        let document = &kept.document;
         let lasting = Document {
             scene: lasting(&document.scene, builtin::names().contains(&document.scene.as_str())),
             map: lasting(&document.map, document.map.starts_with("sky:")),
             ..document.clone()
         };
-        let document = crate::output::record::to_json(&lasting)?;
-        let texts = [(NAME, name), (SUMMARY, summary), (DOCUMENT, &document)]
-            .map(|(key, text)| (key.to_owned(), text.to_owned()));
+        let texts = [
+            (NAME, kept.name.clone()),
+            (SUMMARY, kept.summary.clone()),
+            (DOCUMENT, to_json(&lasting)?),
+            (OF_SCENE, to_json(&kept.of_scene)?),
+        ];
+        let texts = texts.map(|(key, text)| (key.to_owned(), text));
         let (picture, small) = (Arc::clone(picture), small.clone());
         self.send(Job::Write { file: file.clone(), picture, texts: texts.into(), small });
         Ok(file)
@@ -141,6 +151,29 @@ fn carry_out(job: Job) -> Result<()> {
     }
 }
 
+/// The newest pictures of a folder, oldest first, and what to say of files that are none.
+fn read_all(folder: &Path) -> (Vec<KeptPicture>, Option<Error>) {
+    let (mut found, mut failures) = (Vec::new(), Vec::new());
+    for file in files(folder).iter().rev() {
+        match read(file) {
+            Ok(kept) => found.push(kept),
+            Err(error) => failures.push(error),
+        }
+        if found.len() == MOST {
+            break;
+        }
+    }
+    found.reverse();
+    let count = failures.len();
+    let sentence = failures.into_iter().next().map(|first| match count {
+        1 => first,
+        _ => {
+            Error::at(folder, format!("{count} kept pictures cannot be read; the newest: {first}"))
+        }
+    });
+    (found, sentence)
+}
+
 /// The newest files of a folder, oldest first.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
@@ -149,11 +182,11 @@ fn files(folder: &Path) -> Vec<PathBuf> {
         .filter(|path| path.extension().is_some_and(|extension| extension == "exr"))
         .collect();
     files.sort();
-    files.split_off(files.len().saturating_sub(MOST_READ))
+    files.split_off(files.len().saturating_sub(MOST_TRIED))
 }
 
 /// A kept picture but its pixels, which are read when they are needed.
-fn read(file: &Path) -> Result<Kept> {
+fn read(file: &Path) -> Result<KeptPicture> {
     let texts = read_exr_metadata(file)?;
     let text = |key: &str| {
         let found = texts.iter().find(|(name, _)| name == key).map(|(_, text)| text.as_str());
@@ -164,13 +197,22 @@ fn read(file: &Path) -> Result<Kept> {
     if !(document.is_sound() && settings_file::is_within_bounds(&document)) {
         return Err(Error::at(file, "its settings are out of bounds"));
     }
-    let small = read_exr_preview(file)?;
-    Ok(Kept {
+    let of_scene = match text(OF_SCENE) {
+        Ok(text) => serde_json::from_str(text)
+            .map_err(|error| Error::at(file, format!("settings not understood: {error}")))?,
+        Err(_) => SceneOptions::default(),
+    };
+    // A program that has had the file in its hands may have left none, or a large one.
+    let is_small = |small: &Rgb8| small.width.max(small.height) <= 8 * SMALL_WIDTH;
+    let small = read_exr_preview(file)?.filter(is_small).as_ref().map(color_image);
+    let none = || ColorImage::filled([1, 1], Color32::GRAY);
+    Ok(KeptPicture {
         name: text(NAME)?.to_owned(),
         summary: text(SUMMARY)?.to_owned(),
         pixels: Arc::new(Pixels::of_file(file.to_owned())),
         document,
-        small: small.as_ref().map(color_image).unwrap_or_default(),
+        of_scene,
+        small: small.filter(|small| !small.pixels.is_empty()).unwrap_or_else(none),
         texture: None,
         file: Some(file.to_owned()),
     })
@@ -186,7 +228,7 @@ mod tests {
     use crate::app::document::Viewpoint;
     use crate::scene::{Camera, MaterialEdit, Medium};
 
-    type Report = Receiver<Result<Vec<Kept>>>;
+    type Report = Receiver<Result<Vec<KeptPicture>>>;
 
     fn open(folder: &Path) -> (Album, Report) {
         let (sender, report) = channel();
@@ -196,7 +238,7 @@ mod tests {
         (album.expect("a thread"), report)
     }
 
-    fn next(report: &Report) -> Result<Vec<Kept>> {
+    fn next(report: &Report) -> Result<Vec<KeptPicture>> {
         report.recv_timeout(Duration::from_secs(60)).expect("an answer")
     }
 
@@ -222,6 +264,22 @@ mod tests {
         document
     }
 
+    /// Gives a picture with these settings to an album.
+    fn write(album: &mut Album, name: &str, document: Document) -> PathBuf {
+        let (image, small) = picture();
+        let kept = KeptPicture {
+            name: name.to_owned(),
+            summary: "plain, 3 samples".to_owned(),
+            pixels: Arc::new(Pixels::Here(Arc::clone(&image))),
+            document,
+            of_scene: SceneOptions { hide: vec!["glass".to_owned()], ..SceneOptions::default() },
+            small: color_image(&small),
+            texture: None,
+            file: None,
+        };
+        album.write(&kept, &image, &small).expect("told")
+    }
+
     #[test]
     fn the_next_window_finds_what_was_kept() {
         let temporary = tempfile::tempdir().expect("a folder");
@@ -230,7 +288,7 @@ mod tests {
         assert_eq!(next(&report).expect("nothing yet").len(), 0);
         let (image, small) = picture();
         for name in ["Picture 1", "Picture 2"] {
-            album.write([name, "plain, 3 samples"], &image, &document(), &small).expect("told");
+            write(&mut album, name, document());
         }
         // The last picture before the window is closed is not lost.
         drop(album);
@@ -242,9 +300,17 @@ mod tests {
         let expected = Document { scene: scene.display().to_string(), ..document() };
         assert_eq!(kept[1].document, expected);
         assert_eq!(kept[1].summary, "plain, 3 samples");
+        assert_eq!(kept[1].of_scene.hide, ["glass"]);
         assert_eq!(kept[1].small, color_image(&small));
         assert_eq!(kept[1].pixels.get(), Ok(image));
-        album.remove(kept[0].file.clone().expect("a file"));
+        let first = kept[0].file.clone().expect("a file");
+        let taken_away = folder.join("away");
+        fs::rename(&first, &taken_away).expect("renamed");
+        let sentence = kept[0].pixels.get().expect_err("it is not there");
+        assert!(sentence.contains(&first.display().to_string()), "{sentence}");
+        fs::rename(&taken_away, &first).expect("renamed");
+        assert!(kept[0].pixels.get().is_ok(), "what failed once is tried again");
+        album.remove(first);
         drop(album);
         assert_eq!(files(&folder), [kept[1].file.clone().expect("a file")]);
     }
@@ -253,13 +319,10 @@ mod tests {
     fn what_cannot_be_read_is_told_and_left_alone() {
         let temporary = tempfile::tempdir().expect("a folder");
         let folder = temporary.path();
-        let (image, small) = picture();
+        let (image, _) = picture();
         let (mut album, _report) = open(folder);
-        let mut file = |document: &Document| {
-            album.write(["Picture 1", ""], &image, document, &small).expect("told")
-        };
-        let sound = file(&document());
-        let unsound = file(&Document { intensity: -1.0, ..document() });
+        let sound = write(&mut album, "Picture 1", document());
+        let unsound = write(&mut album, "Picture 2", Document { intensity: -1.0, ..document() });
         drop(album);
         fs::write(folder.join("0-noise.exr"), b"noise").expect("written");
         let plain = folder.join("1-plain.exr");
@@ -268,19 +331,38 @@ mod tests {
         let (album, report) = open(folder);
         let found: Vec<_> = next(&report).expect("read").iter().map(|k| k.file.clone()).collect();
         assert_eq!(found, [Some(sound)]);
-        let sentences: Vec<_> = (0..3)
-            .map(|_| next(&report).err().map(|error| error.to_string()).expect("a sentence"))
-            .collect();
-        assert!(sentences[0].contains("0-noise.exr: "), "{sentences:?}");
-        assert!(sentences[2].ends_with("1-plain.exr: is no kept picture"), "{sentences:?}");
-        assert!(sentences[1].ends_with("its settings are out of bounds"), "{sentences:?}");
+        let sentence = next(&report).err().expect("a sentence").to_string();
+        assert!(sentence.contains("3 kept pictures cannot be read"), "{sentence}");
+        assert!(sentence.ends_with("its settings are out of bounds"), "{sentence}");
         drop(album);
         assert!(unsound.exists() && plain.exists());
         // Where nothing can be written, that is said.
         let (mut album, report) = open(&plain);
         assert_eq!(next(&report).expect("nothing").len(), 0);
-        album.write(["Picture 1", ""], &image, &document(), &small).expect("told");
+        write(&mut album, "Picture 1", document());
         let sentence = next(&report).err().expect("a sentence").to_string();
         assert!(sentence.contains("1-plain.exr"), "{sentence}");
+    }
+    #[test]
+    fn the_newest_dozen_is_listed_and_a_file_without_a_small_picture_has_a_grey_one() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let folder = temporary.path();
+        let (mut album, _report) = open(folder);
+        let files: Vec<_> = (0..MOST + 2)
+            .map(|number| write(&mut album, &format!("Picture {number}"), document()))
+            .collect();
+        drop(album);
+        let last = files.last().expect("some");
+        let texts = read_exr_metadata(last).expect("read");
+        let (image, _) = picture();
+        let bare = ExrPicture { image: &image, layers: vec![], metadata: &texts, preview: None };
+        write_exr(last, bare).expect("written");
+        let (_album, report) = open(folder);
+        let kept = next(&report).expect("read");
+        let names: Vec<_> = kept.iter().map(|kept| kept.name.clone()).collect();
+        let newest: Vec<_> = (2..MOST + 2).map(|number| format!("Picture {number}")).collect();
+        assert_eq!(names, newest);
+        assert_eq!(kept[MOST - 1].small.size, [1, 1]);
+        assert!(files.iter().all(|file| file.exists()), "nothing of others is removed");
     }
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::history::History;
 use super::interface::Chosen;
-use super::kept::Pixels;
+use super::kept_picture::Pixels;
 use crate::develop::{Developer, LinearPicture};
 use crate::image::Image;
 

@@ -24,7 +24,7 @@ pub struct Document {
     pub scene: String,
     /// Map file or built-in sky.
     pub map: String,
-    /// Turn of the map in degrees, `[0, 360)`.
+    /// Turn of the map in degrees, `[0, 360]`.
     pub rotation_degrees: f32,
     /// Factor on the map's radiance.
     pub intensity: f32,
@@ -143,7 +143,7 @@ impl Document {
             Background::Color(color) => color.iter().all(radiance),
         };
         background
-            && (0.0..360.0).contains(&self.rotation_degrees)
+            && (0.0..=360.0).contains(&self.rotation_degrees)
             && [self.intensity, self.sun].iter().all(radiance)
             && self.fog.is_none_or(|fog| fog.is_sound())
             && self.viewpoint.iter().chain(&self.bookmarks).all(Viewpoint::is_sound)
@@ -239,11 +239,10 @@ impl Viewpoint {
     /// Of a scene's camera; `pivot_distance` in metres.
     pub fn of(camera: &Camera, pivot_distance: f32) -> Self {
         let axes = camera.world_from_camera.matrix3;
-        let rotation = Quat::from_mat3a(&Mat3A::from_cols(
-            axes.x_axis.normalize_or(glam::Vec3A::X),
-            axes.y_axis.normalize_or(glam::Vec3A::Y),
-            axes.z_axis.normalize_or(glam::Vec3A::Z),
-        ));
+        // A node above may mirror or shear it.
+        let back = axes.z_axis.normalize_or(glam::Vec3A::Z);
+        let right = axes.y_axis.cross(back).normalize_or(back.any_orthonormal_vector());
+        let rotation = Quat::from_mat3a(&Mat3A::from_cols(right, back.cross(right), back));
         let (fov_y_degrees, half_height) = match camera.projection {
             Projection::Perspective { fov_y_radians } => (Some(fov_y_radians.to_degrees()), 1.0),
             Projection::Orthographic { half_height } => (None, half_height),

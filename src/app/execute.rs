@@ -106,6 +106,13 @@ impl App {
             Command::SetAsKept(index) => {
                 if let Some(kept) = self.history.get(index) {
                     self.document = kept.document.clone();
+                    if self.history.is_of_other_options(kept) {
+                        self.messages.notice(format!(
+                            "{}: its scene was opened with other options than now (--variant, --outlines, \
+                             --hide, --material), which only the command line gives",
+                            kept.name
+                        ));
+                    }
                 }
             }
             Command::Quit => self.is_closing = true,

@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use super::album::Album;
 use super::document::Document;
-use super::kept::{Kept, Pixels};
+use super::kept_picture::{KeptPicture, Pixels};
 use super::screen::color_image;
 use crate::error::Result;
 use crate::image::{Image, Rgb8};
+use crate::scene::SceneOptions;
 
 /// Most pictures kept.
-const MOST: usize = 12;
+pub(super) const MOST: usize = 12;
 
 /// Width in pixels at which they are shown in the list.
 pub const SMALL_WIDTH: u32 = 128;
@@ -19,29 +20,46 @@ pub const SMALL_WIDTH: u32 = 128;
 /// Kept pictures, oldest first.
 #[derive(Default)]
 pub struct History {
-    list: Vec<Kept>,
+    list: Vec<KeptPicture>,
     count: u32,
     album: Option<Album>,
+    /// What is asked of the files of scenes.
+    of_scene: SceneOptions,
 }
 
 impl History {
+    /// Of a window in which so much is asked of the files of scenes.
+    pub fn new(of_scene: SceneOptions) -> Self {
+        Self { of_scene, ..Self::default() }
+    }
+
     /// With a folder for the next window's sake; `report` is told what earlier ones left there, for
     /// [`Self::take_over`], and later what fails.
     ///
     /// # Errors
     /// If the system gives no thread.
     pub fn of_folder(
+        self,
         folder: PathBuf,
-        report: impl Fn(Result<Vec<Kept>>) + Send + 'static,
+        report: impl Fn(Result<Vec<KeptPicture>>) + Send + 'static,
     ) -> Result<Self> {
-        Ok(Self { album: Some(Album::open(folder, report)?), ..Self::default() })
+        Ok(Self { album: Some(Album::open(folder, report)?), ..self })
+    }
+
+    /// Waits until everything is written.
+    pub fn finish(&mut self) {
+        self.album = None;
     }
 
     /// Takes over what earlier windows left; how many those are.
-    pub fn take_over(&mut self, mut earlier: Vec<Kept>) -> usize {
-        let number = |kept: &Kept| kept.name.rsplit(' ').next()?.parse().ok();
+    pub fn take_over(&mut self, mut earlier: Vec<KeptPicture>) -> usize {
+        let number = |kept: &KeptPicture| kept.name.rsplit(' ').next()?.parse().ok();
         self.count = earlier.iter().filter_map(number).fold(self.count, u32::max);
         let count = earlier.len();
+        for kept in &mut self.list {
+            self.count = self.count.saturating_add(1);
+            kept.name = format!("Picture {}", self.count);
+        }
         earlier.append(&mut self.list);
         self.list = earlier;
         count
@@ -60,27 +78,43 @@ impl History {
     ) -> (usize, Result<()>) {
         self.count = self.count.saturating_add(1);
         let name = format!("Picture {}", self.count);
-        let mut write = |album: &mut Album| album.write([&name, &summary], image, &document, small);
+        let pixels = Arc::new(Pixels::Here(Arc::clone(image)));
+        let of_scene = self.of_scene.clone();
+        let (preview, texture, file) = (color_image(small), None, None);
+        let kept = KeptPicture {
+            name,
+            summary,
+            pixels,
+            document,
+            of_scene,
+            small: preview,
+            texture,
+            file,
+        };
+        let mut write = |album: &mut Album| album.write(&kept, image, small);
         let (file, failure) = match self.album.as_mut().map(&mut write).transpose() {
             Ok(file) => (file, Ok(())),
             Err(error) => (None, Err(error)),
         };
-        let pixels = Arc::new(Pixels::of(Arc::clone(image)));
-        let small = color_image(small);
-        self.list.push(Kept { name, summary, pixels, document, small, texture: None, file });
+        self.list.push(KeptPicture { file, ..kept });
         while self.list.len() > MOST {
             self.remove(0);
         }
         (self.list.len() - 1, failure)
     }
 
+    /// Whether something else was asked of a picture's scene than in this window.
+    pub fn is_of_other_options(&self, kept: &KeptPicture) -> bool {
+        kept.of_scene != self.of_scene
+    }
+
     /// One of them.
-    pub fn get(&self, index: usize) -> Option<&Kept> {
+    pub fn get(&self, index: usize) -> Option<&KeptPicture> {
         self.list.get(index)
     }
 
     /// All of them.
-    pub fn list_mut(&mut self) -> &mut [Kept] {
+    pub fn list_mut(&mut self) -> &mut [KeptPicture] {
         &mut self.list
     }
 
@@ -109,5 +143,40 @@ mod tests {
         assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 2"));
         history.remove(0);
         assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 3"));
+    }
+    #[test]
+    fn what_earlier_windows_kept_comes_first_and_the_oldest_file_goes() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let open = || {
+            let (sender, found) = std::sync::mpsc::channel();
+            let report = move |kept| {
+                let _ = sender.send(kept);
+            };
+            let history = History::default().of_folder(temporary.path().to_owned(), report);
+            let minute = std::time::Duration::from_secs(60);
+            let earlier = found.recv_timeout(minute).expect("an answer").expect("read");
+            (history.expect("a thread"), earlier)
+        };
+        let keep = |history: &mut History| {
+            let image = Arc::new(Image::filled(1, 1, [0.5; 3]));
+            let small = Rgb8 { width: 1, height: 1, pixels: vec![[0; 3]] };
+            history.keep(String::new(), &image, Document::default(), &small).1.expect("kept");
+        };
+        let (mut history, earlier) = open();
+        assert!(earlier.is_empty());
+        (0..MOST).for_each(|_| keep(&mut history));
+        history.finish();
+        let (mut history, earlier) = open();
+        // Before the earlier ones are taken over.
+        keep(&mut history);
+        assert_eq!(history.take_over(earlier), MOST);
+        assert_eq!(history.list_mut().len(), MOST + 1);
+        keep(&mut history);
+        let names: Vec<_> = history.list_mut().iter().map(|kept| kept.name.clone()).collect();
+        assert_eq!(names[0], "Picture 3");
+        assert_eq!(names[MOST - 1], format!("Picture {}", MOST + 2));
+        history.finish();
+        assert_eq!(open().1.len(), MOST);
+        assert_eq!(std::fs::read_dir(temporary.path()).expect("a folder").count(), MOST);
     }
 }

@@ -82,6 +82,8 @@ impl Chosen {
 /// What the right panel shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Tab {
+    /// What the left panel shows where there is room for one.
+    Scene,
     /// Settings of the picture.
     Picture,
     /// Overlays and inspector.
@@ -176,6 +178,12 @@ impl Interface {
     /// It lasts for some frames, so that it does not flicker where frames take long.
     pub fn keep_moving(&mut self, now: f64, frame_seconds: f32) {
         self.moving_until = now + f64::from((3.0 * frame_seconds).clamp(0.18, 1.0));
+    }
+
+    /// Looks at a material, whose settings come into sight, or at none.
+    pub fn choose_material(&mut self, number: Option<u32>) {
+        self.material = number;
+        self.is_material_new = number.is_some();
     }
 
     /// Whether a dialogue has the keyboard.

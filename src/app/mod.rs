@@ -22,7 +22,7 @@ mod execute;
 pub mod history;
 mod inspect;
 pub mod interface;
-pub mod kept;
+pub mod kept_picture;
 pub mod loader;
 pub mod messages;
 mod navigation;
@@ -53,8 +53,8 @@ use convergence::Convergence;
 use document::{Document, PictureSize, Viewpoint};
 use history::History;
 use inspect::Inspector;
-use interface::Interface;
-use kept::Kept;
+use interface::{Chosen, Interface};
+use kept_picture::KeptPicture;
 use loader::{Loaded, LoadedMap, LoadedScene, Loader};
 use messages::Messages;
 use presenter::{Order, Presenter, Shown};
@@ -151,7 +151,7 @@ enum Later {
     /// Something failed.
     Failed(String),
     /// Pictures that earlier windows kept.
-    Kept(Vec<Kept>),
+    Kept(Vec<KeptPicture>),
 }
 
 impl App {
@@ -168,17 +168,18 @@ impl App {
         let Wakes { draw: wake, relay } = wakes;
         theme::apply(context);
         let later = channel();
+        let history = History::new(start.of_scene.clone());
         let history = match start.pictures {
             Some(folder) => {
                 let (sender, wake): (Sender<Later>, _) = (later.0.clone(), wake.clone());
-                History::of_folder(folder, move |found| {
+                history.of_folder(folder, move |found| {
                     let later = found.map_or_else(|e| Later::Failed(e.to_string()), Later::Kept);
                     // The window may have gone meanwhile.
                     let _ = sender.send(later);
                     wake();
                 })?
             }
-            None => History::default(),
+            None => history,
         };
         Ok(Self {
             undo: Undo::new(start.document.clone()),
@@ -276,6 +277,16 @@ impl App {
         self.messages.first_error()
     }
 
+    /// Waits until all kept pictures are written; what has failed of that and was not yet told.
+    pub fn finish(&mut self) -> Vec<String> {
+        self.history.finish();
+        let failed = |later| match later {
+            Later::Failed(sentence) => Some(sentence),
+            _ => None,
+        };
+        self.later.1.try_iter().filter_map(failed).collect()
+    }
+
     /// What is to be kept for the next window.
     pub fn settings(&self) -> Settings {
         let mut settings = self.settings.clone();
@@ -309,18 +320,7 @@ impl App {
                 hides_clock: self.is_repeatable,
             };
             panels::status::show(ui, &status);
-            panels::left::show(
-                ui,
-                &mut self.document,
-                &mut self.interface,
-                panels::left::Sources {
-                    scene: self.scene.as_ref(),
-                    map: self.map.as_ref(),
-                    settings: &self.settings,
-                },
-                commands,
-            );
-            self.right(ui, commands);
+            self.sides(ui, commands);
             self.dock(ui, commands);
         }
         self.viewport(ui, commands);
@@ -349,11 +349,24 @@ impl App {
         })
     }
 
-    fn right(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
+    /// The panels beside the picture.
+    fn sides(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
+        let sources = panels::left::Sources {
+            scene: self.scene.as_ref(),
+            map: self.map.as_ref(),
+            settings: &self.settings,
+        };
+        if !theme::is_small(ui) {
+            let (document, interface) = (&mut self.document, &mut self.interface);
+            panels::left::show(ui, document, interface, sources, commands);
+        }
         let exposure_ev = self.exposure_ev();
         let shown = self.shown.as_deref();
         let snapshot = self.snapshot.as_deref();
         panels::right::show(ui, &mut self.interface, |ui, interface| match interface.tab {
+            interface::Tab::Scene => {
+                panels::left::sections(ui, &mut self.document, interface, sources, commands);
+            }
             interface::Tab::Picture => {
                 panels::picture::show(ui, &mut self.document, exposure_ev, commands);
                 panels::history::show(ui, &mut self.history, &mut interface.compared, commands);
@@ -485,10 +498,17 @@ impl App {
             |shown: &Arc<Shown>| Arc::ptr_eq(&shown.order.developer, &self.screen.developer);
         self.shown = self.presenter.shown().filter(is_here);
         self.save_when_whole();
-        if let Some(failure) = self.shown.as_ref().and_then(|shown| shown.failure.clone()) {
+        let shown = self.shown.as_deref();
+        if let Some(failure) = shown.and_then(|shown| shown.failure.clone()) {
             self.messages.error(failure);
             self.document.look.denoiser = Denoiser::default();
             self.undo.amend(&self.document);
+        }
+        // Said once: what cannot be compared is compared no longer.
+        let uncompared = shown.and_then(|shown| shown.uncompared.clone());
+        if let Some(failure) = uncompared.filter(|_| self.interface.compared.left.is_some()) {
+            self.messages.error(failure);
+            self.interface.compared = Chosen::default();
         }
     }
 
@@ -597,7 +617,7 @@ impl App {
             moving: self.interface.is_moving(now) && !self.is_repeatable,
             previews: !self.is_repeatable,
             device: self.document.light.device,
-            is_calm: self.document.look.denoise && !self.is_repeatable,
+            is_calm: self.document.look.denoise,
             rule: self.document.stop,
             is_frozen: self.interface.is_frozen,
             reference: self.reference.clone(),

@@ -82,6 +82,8 @@ pub struct Shown {
     pub labels: Vec<Label>,
     /// Why the denoiser did not do its work.
     pub failure: Option<String>,
+    /// Why two pictures cannot be compared.
+    pub uncompared: Option<String>,
     /// Facts about the grid's cells, when the overlay asked for them.
     pub facts: Option<Arc<CellFacts>>,
 }
@@ -304,14 +306,14 @@ impl Memory {
             self.uploads.overlay = last;
             painted
         })?;
-        let mut other = None;
+        let (mut other, mut uncompared) = (None, None);
         if let Some(comparison) = &order.compared {
             let now = || image.clone().unwrap_or_else(|| Arc::new(source.session.film.image()));
             let of = comparison.shows_now().then(|| source.clone());
             let compare = || Ok(comparison.prepare(&developer, now));
             let compared = self.uploads.compared.or_make((comparison.clone(), of), compare)?;
             picture = compared.picture.unwrap_or(picture);
-            (other, failure) = (compared.other, failure.or(compared.failure));
+            (other, uncompared) = (compared.other, compared.failure);
         } else if let Some(source) = Source::plain(&order) {
             let prepare = || Ok(source.prepare(&developer));
             let plain = self.uploads.plain.or_make(source.clone(), prepare)?;
@@ -327,6 +329,7 @@ impl Memory {
             picture,
             image,
             other,
+            uncompared,
             automatic_ev,
             overlay,
             legend,

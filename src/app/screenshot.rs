@@ -77,6 +77,21 @@ impl Studio {
         Ok(())
     }
 
+    /// Chooses the first material of this name, as a click on one of its surfaces would.
+    ///
+    /// # Errors
+    /// If the scene cannot be read or has no such material.
+    pub fn choose_material(&mut self, name: &str) -> Result<()> {
+        self.settle()?;
+        let scene = self.app.scene.iter();
+        let number = scene.flat_map(|scene| scene.materials.iter()).position(|m| m.name == name);
+        let number = number.ok_or_else(|| {
+            Error::at(&self.app.document.scene, format!("no material is called {name}"))
+        })?;
+        self.app.interface.choose_material(Some(number as u32));
+        Ok(())
+    }
+
     /// Renders until the stop rule is met, draws, reads back.
     ///
     /// # Errors

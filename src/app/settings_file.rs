@@ -72,7 +72,8 @@ impl Settings {
     /// data; `None` if there is none.
     pub fn pictures_folder(file: Option<&Path>) -> Option<PathBuf> {
         let usual = || Some(user_folder("XDG_DATA_HOME", ".local/share")?.join("pictures"));
-        file.map(|file| file.with_extension("pictures")).or_else(usual)
+        let beside = |file: &Path| with_suffix(file, ".pictures");
+        file.map(beside).or_else(usual)
     }
 
     /// Reads them; a file that is not there gives the defaults.
@@ -99,10 +100,9 @@ impl Settings {
             Ok(settings) => return (settings, None),
             Err(failure) => failure,
         };
-        let mut aside = path.as_os_str().to_owned();
-        aside.push(".bak");
+        let aside = with_suffix(path, ".bak");
         let notice = match std::fs::copy(path, &aside) {
-            Ok(_) => format!("{failure}; it is kept as {}", Path::new(&aside).display()),
+            Ok(_) => format!("{failure}; it is kept as {}", aside.display()),
             Err(error) => format!("{failure}; it cannot be kept aside: {error}"),
         };
         let found = read_file(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
@@ -205,6 +205,13 @@ impl Settings {
             put_first(&mut self.recent_maps, name);
         }
     }
+}
+
+/// The path of something beside a file.
+fn with_suffix(file: &Path, suffix: &str) -> PathBuf {
+    let mut path = file.as_os_str().to_owned();
+    path.push(suffix);
+    path.into()
 }
 
 /// lightgrid's folder in that of a variable, or in one of the user's home (systems that are not Unix have

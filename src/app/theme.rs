@@ -120,6 +120,11 @@ pub(super) fn is_narrow(ui: &Ui) -> bool {
     ui.ctx().content_rect().width() < 1260.0
 }
 
+/// Whether there is no room for two panels and a picture between them.
+pub(super) fn is_small(ui: &Ui) -> bool {
+    ui.ctx().content_rect().width() < 860.0
+}
+
 /// Text that explains.
 pub(super) fn quiet(text: impl Into<String>) -> RichText {
     RichText::new(text).color(QUIET).size(12.0)

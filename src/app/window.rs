@@ -228,6 +228,9 @@ impl Runner {
                 crate::terminal::notice(error);
             }
         }
+        if let Some(running) = &mut self.running {
+            running.app.finish().iter().for_each(crate::terminal::notice);
+        }
         self.running = None;
         event_loop.exit();
     }

@@ -81,6 +81,9 @@ pub(super) struct ScreenshotArguments {
     /// The place to inspect, X,Y in [0,1] of the picture, with its brute-force truth.
     #[arg(long, value_parser = place, allow_hyphen_values = true, value_name = "X,Y")]
     inspect: Option<Vec2>,
+    /// The material whose settings are shown, by its name.
+    #[arg(long, value_name = "MATERIAL")]
+    select: Option<String>,
     /// The tile chosen on the map, for the overlay `tile`.
     #[arg(long, value_name = "N")]
     tile: Option<u32>,
@@ -146,6 +149,9 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
         size: arguments.size,
         patience: Duration::from_secs_f64(arguments.patience.min(1e9)),
     })?;
+    if let Some(material) = &arguments.select {
+        studio.choose_material(material)?;
+    }
     if arguments.inspect.is_some() {
         studio.measure_truth()?;
     }

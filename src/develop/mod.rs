@@ -98,7 +98,7 @@ pub(crate) struct DevelopSettings {
 /// Twin of `Develop` in `develop.wgsl`.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Uniforms {
+struct DeviceSettings {
     matrix: [[f32; 4]; 3],
     size: [u32; 2],
     small_size: [u32; 2],
@@ -111,7 +111,7 @@ struct Uniforms {
     padding: u32,
 }
 
-impl Uniforms {
+impl DeviceSettings {
     fn new(picture: &LinearPicture, settings: &DevelopSettings) -> Self {
         let matrix = settings.white_balance.matrix();
         Self {
@@ -200,9 +200,11 @@ impl Developer {
             curve: ToneCurve::None,
             opacity: [0.0; 2],
         };
-        let uniforms =
-            Uniforms { small_size: [width, height], ..Uniforms::new(picture, &settings) };
-        let uniforms = self.uniforms(&uniforms);
+        let settings = DeviceSettings {
+            small_size: [width, height],
+            ..DeviceSettings::new(picture, &settings)
+        };
+        let settings = self.buffer(bytemuck::bytes_of(&settings));
         let bytes = u64::from(width) * u64::from(height) * size_of::<[f32; 4]>() as u64;
         let small = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("small picture"),
@@ -210,7 +212,7 @@ impl Developer {
             usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
-        let entries = [self.inputs(picture, &uniforms).as_slice(), &[entry(6, &small)]].concat();
+        let entries = [self.inputs(picture, &settings).as_slice(), &[entry(6, &small)]].concat();
         let mut commands = self.gpu.device.create_command_encoder(&Default::default());
         dispatch(&self.gpu, &mut commands, &self.shrink, &entries, [width, height]);
         self.gpu.queue.submit([commands.finish()]);
@@ -247,13 +249,13 @@ impl Developer {
         display: &DisplayTexture,
     ) {
         let has_overlay = overlay.is_some().into();
-        let uniforms = Uniforms { has_overlay, ..Uniforms::new(picture, settings) };
-        let uniforms = self.uniforms(&uniforms);
+        let settings = DeviceSettings { has_overlay, ..DeviceSettings::new(picture, settings) };
+        let settings = self.buffer(bytemuck::bytes_of(&settings));
         let OverlayTexture(overlay) = overlay.unwrap_or(&self.no_overlay);
         let textures = [(4, overlay), (5, &display.view)].map(|(binding, view)| {
             wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::TextureView(view) }
         });
-        let entries = [self.inputs(picture, &uniforms).as_slice(), &textures].concat();
+        let entries = [self.inputs(picture, &settings).as_slice(), &textures].concat();
         let mut commands = self.gpu.device.create_command_encoder(&Default::default());
         dispatch(&self.gpu, &mut commands, &self.develop, &entries, picture.size());
         self.gpu.queue.submit([commands.finish()]);
@@ -267,18 +269,14 @@ impl Developer {
         self.gpu.read_texture(&display.texture)
     }
 
-    fn uniforms(&self, uniforms: &Uniforms) -> wgpu::Buffer {
-        filled(&self.gpu, wgpu::BufferUsages::UNIFORM, bytemuck::bytes_of(uniforms))
-    }
-
     /// What both entry points read.
     fn inputs<'a>(
         &'a self,
         picture: &'a LinearPicture,
-        uniforms: &'a wgpu::Buffer,
+        settings: &'a wgpu::Buffer,
     ) -> [wgpu::BindGroupEntry<'a>; 3] {
         let film = &picture.film;
-        [entry(0, uniforms), entry(1, &film.sum), entry(2, &film.counts)]
+        [entry(0, settings), entry(1, &film.sum), entry(2, &film.counts)]
     }
 }
 

@@ -95,7 +95,7 @@ impl Developer {
         self.buffer(bytemuck::cast_slice(&pixels))
     }
 
-    fn buffer(&self, bytes: &[u8]) -> wgpu::Buffer {
+    pub(super) fn buffer(&self, bytes: &[u8]) -> wgpu::Buffer {
         filled(&self.gpu, wgpu::BufferUsages::STORAGE, bytes)
     }
 }

@@ -23,7 +23,8 @@ pub use material_edit::MaterialEdit;
 pub use placing::Placing;
 
 /// What is asked of a scene's file.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct SceneOptions {
     /// Reads files that the scene names outside of its folder, too.
     pub allow_outside: bool,
@@ -39,7 +40,8 @@ pub struct SceneOptions {
 }
 
 /// What happens to inverted hulls.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Outlines {
     /// They are left out, and it is said.
     #[default]

@@ -34,8 +34,9 @@ pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
         ("vertices-1e9-of-zeros.gltf", gltf_zeros()),
         ("buffer-1e18.gltf", gltf(3, "", r#","byteLength":1000000000000000000"#)),
         ("instances-1e9.gltf", instances()),
-        ("packed-triangles-1e8-of-1.glb", draco(100_000_000, 3)),
-        ("packed-triangles-1e9-as-promised.glb", draco(1_000_000_000, 3_000_000_000)),
+        ("packed-triangles-1e8-of-1.glb", draco(100_000_000, 3, 3)),
+        ("packed-triangles-1e9-as-promised.glb", draco(1_000_000_000, 3_000_000_000, 3)),
+        ("packed-points-4e9.glb", draco(1, 3, 4_000_000_000)),
         ("chunk-4e9.glb", chunk()),
     ]
 }
@@ -200,8 +201,8 @@ fn tiff(count: u32) -> Vec<u8> {
     file
 }
 
-/// A Draco stream that claims so many triangles, for an accessor of so many corners.
-fn draco(triangles: u64, corners: u64) -> Vec<u8> {
+/// A Draco stream that claims so many triangles, for accessors of so many corners and vertices.
+fn draco(triangles: u64, corners: u64, vertices: u64) -> Vec<u8> {
     let mut stream = b"DRACO\x02\x02\x01\x01\0\0\0\x03".to_vec();
     let mut rest = triangles;
     while rest > 0x7f {
@@ -214,7 +215,7 @@ fn draco(triangles: u64, corners: u64) -> Vec<u8> {
         r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":
         {{"POSITION":0}},"indices":1,"extensions":{{"KHR_draco_mesh_compression":{{"bufferView":0,
         "attributes":{{"POSITION":0}}}}}}}}]}}],"extensionsUsed":["KHR_draco_mesh_compression"],
-        "accessors":[{{"componentType":5126,"type":"VEC3","count":3}},
+        "accessors":[{{"componentType":5126,"type":"VEC3","count":{vertices}}},
         {{"componentType":5125,"type":"SCALAR","count":{corners}}}],
         "bufferViews":[{{"buffer":0,"byteLength":{length}}}],"buffers":[{{"byteLength":{length}}}]}}"#
     );

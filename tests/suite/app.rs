@@ -117,6 +117,22 @@ fn a_material_is_changed_and_hidden() {
     compare("panel-material-hidden", &without).expect("as it was");
 }
 
+/// Where there is no room for two panels, the right one has what is in the left one elsewhere.
+#[test]
+fn a_small_window_has_one_panel() {
+    let Some(mut studio) = studio(start(), (720, 480)) else { return };
+    for (name, tab) in [("small-picture", Tab::Picture), ("small-scene", Tab::Scene)] {
+        studio.arrange(Interface { tab, ..Interface::default() });
+        compare(name, &studio.take().expect("drawn")).expect("as it was");
+    }
+    studio.arrange(Interface::default());
+    studio.choose_material("wall").expect("the office has it");
+    compare("small-material", &studio.take().expect("drawn"))
+        .expect("its settings come into sight");
+    let error = studio.choose_material("ivory").expect_err("the office has none").to_string();
+    assert!(error.contains("office: no material is called ivory"), "{error}");
+}
+
 /// What a cell knows and what is true there, in a window high enough for both.
 #[test]
 fn the_inspector_shows_distribution_and_truth() {

@@ -11,7 +11,7 @@ pub(in crate::app) fn show(
     interface: &mut Interface,
     content: impl FnOnce(&mut Ui, Dock),
 ) {
-    if interface.dock.is_none() && interface.tab == Tab::Picture {
+    if interface.dock.is_none() && interface.tab != Tab::Inspect {
         return;
     }
     let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 6));

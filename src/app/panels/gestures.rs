@@ -77,8 +77,7 @@ fn point(rect: Rect, response: &Response, modifiers: Modifiers, scope: &mut Scop
         let is_inspecting = scope.interface.tab == Tab::Inspect;
         scope.interface.pinned = place.filter(|_| is_inspecting);
         let spot = clicked_spot(rect, response, scope);
-        scope.interface.material = spot.map(|spot| spot.material);
-        scope.interface.is_material_new = spot.is_some();
+        scope.interface.choose_material(spot.map(|spot| spot.material));
     }
 }
 

@@ -5,7 +5,7 @@ use egui::{Image, Sense, TextureOptions, Ui, Vec2};
 use crate::app::commands::Command;
 use crate::app::history::History;
 use crate::app::interface::Chosen;
-use crate::app::kept::Kept;
+use crate::app::kept_picture::KeptPicture;
 use crate::app::theme;
 
 /// Height of a small picture in points.
@@ -69,7 +69,7 @@ fn side(ui: &mut Ui, chosen: &mut Option<usize>, index: usize, name: &str) {
     }
 }
 
-fn small(ui: &mut Ui, kept: &mut Kept) -> egui::Response {
+fn small(ui: &mut Ui, kept: &mut KeptPicture) -> egui::Response {
     let texture = kept.texture.get_or_insert_with(|| {
         ui.ctx().load_texture(&kept.name, kept.small.clone(), TextureOptions::LINEAR)
     });

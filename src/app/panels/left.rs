@@ -1,4 +1,5 @@
-//! The left panel: scene, cameras, environment, fog, material.
+//! The left panel: scene, cameras, environment, fog, material. Where there is no room for it, the right one
+//! shows the same.
 
 use egui::{Margin, Panel, RichText, ScrollArea, Slider, Ui};
 
@@ -41,23 +42,34 @@ pub(in crate::app) fn show(
         if is_narrow {
             ui.spacing_mut().slider_width = 66.0;
         }
-        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            theme::heading(ui, "SCENE");
-            scene(ui, document, sources, commands);
-            theme::heading(ui, "CAMERA");
-            cameras(ui, document, sources.scene, commands);
-            ui.add_space(4.0);
-            ui.separator();
-            theme::heading(ui, "ENVIRONMENT");
-            environment(ui, document, interface, sources, commands);
-            ui.add_space(4.0);
-            ui.separator();
-            fog(ui, &mut document.fog, sources.scene);
-            ui.add_space(4.0);
-            ui.separator();
-            material::show(ui, document, interface, sources.scene);
-        });
+        ScrollArea::vertical()
+            .auto_shrink(false)
+            .show(ui, |ui| sections(ui, document, interface, sources, commands));
     });
+}
+
+/// Draws what is in the panel.
+pub(in crate::app) fn sections(
+    ui: &mut Ui,
+    document: &mut Document,
+    interface: &mut Interface,
+    sources: Sources<'_>,
+    commands: &mut Vec<Command>,
+) {
+    theme::heading(ui, "SCENE");
+    scene(ui, document, sources, commands);
+    theme::heading(ui, "CAMERA");
+    cameras(ui, document, sources.scene, commands);
+    ui.add_space(4.0);
+    ui.separator();
+    theme::heading(ui, "ENVIRONMENT");
+    environment(ui, document, interface, sources, commands);
+    ui.add_space(4.0);
+    ui.separator();
+    fog(ui, &mut document.fog, sources.scene);
+    ui.add_space(4.0);
+    ui.separator();
+    material::show(ui, document, interface, sources.scene);
 }
 
 fn short(name: &str) -> String {

@@ -1,19 +1,29 @@
-//! The right panel: two tabs over what is passed in.
+//! The right panel: tabs over what is passed in.
 
 use egui::{Margin, Panel, ScrollArea, Ui};
 
 use crate::app::interface::{Interface, Tab};
 use crate::app::theme;
 
-/// Draws the tabs and, below, what `content` draws for the chosen one.
+/// Draws the tabs and, below, what `content` draws for the chosen one; the scene has one where there is no
+/// left panel.
 pub(in crate::app) fn show(
     ui: &mut Ui,
     interface: &mut Interface,
     content: impl FnOnce(&mut Ui, &mut Interface),
 ) {
+    let has_scene = theme::is_small(ui);
+    if !has_scene && interface.tab == Tab::Scene {
+        interface.tab = Tab::Picture;
+    } else if has_scene && interface.is_material_new && interface.tab == Tab::Picture {
+        interface.tab = Tab::Scene;
+    }
     let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 8));
     Panel::right("right").frame(frame).exact_size(300.0).show(ui, |ui| {
         ui.horizontal(|ui| {
+            if has_scene {
+                ui.selectable_value(&mut interface.tab, Tab::Scene, "Scene");
+            }
             ui.selectable_value(&mut interface.tab, Tab::Picture, "Picture");
             ui.selectable_value(&mut interface.tab, Tab::Inspect, "Inspect");
         });

@@ -97,8 +97,8 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
     };
     number(ui, &samples, "samples", "Mean samples per pixel");
     if !hides_clock {
-        let seconds = session.figures.elapsed_seconds();
-        number(ui, &theme::clock(seconds), "", "Learning and rendering");
+        let seconds = session.figures.elapsed_seconds() + snapshot.calm_seconds;
+        number(ui, &theme::clock(seconds), "", "Learning and rendering, fast light included");
         let rate = session.figures.rays as f64 / session.figures.render_seconds.max(1e-9);
         number(ui, &theme::figure(rate), "rays/s", "Rays, shadow rays included, while rendering");
     }

@@ -177,6 +177,8 @@ pub struct Snapshot {
     pub curves: [Vec<Point>; 2],
     /// Another film of the same view; its samples help where `main` has few.
     pub backdrop: Option<Backdrop>,
+    /// Seconds spent on a backdrop whose light comes from a radiance cache, which are none of `main`'s.
+    pub calm_seconds: f64,
 }
 
 /// A film that is shown together with the picture's own, and never saved.

@@ -7,6 +7,7 @@ use draco_core::{
 };
 use gltf::json;
 use json::accessor::{ComponentType, Type};
+use json::mesh::Mode;
 use json::validation::Checked;
 use serde::Deserialize;
 
@@ -16,8 +17,12 @@ use super::{Fallible, MAX_TRIANGLES};
 use crate::image::catch_panic;
 use crate::memory;
 
-/// Most bytes that all attributes of a vertex take: sixteen of four floats.
-const MAX_VERTEX_BYTES: u64 = 256;
+/// Bytes that a corner takes while triangles are unpacked.
+const CORNER_BYTES: u64 = 40;
+/// Bytes of a vertex that attributes may take of which glTF knows nothing.
+const OTHER_BYTES: u64 = 64;
+/// Bytes of one component of an attribute: quantised first, then as it is.
+const COMPONENT_BYTES: u64 = 8;
 
 /// What the extension says of a primitive.
 #[derive(Deserialize)]
@@ -49,24 +54,7 @@ impl Unpacked {
         };
         let Packed { buffer_view, attributes } = Packed::deserialize(extension)
             .map_err(|cause| format!("its Draco compression makes no sense ({cause})"))?;
-        // No more is unpacked than the accessors promise.
-        let promised = |accessor: Option<json::Index<json::Accessor>>| {
-            let found = accessor.map(|index| find(&file.root.accessors, index, "accessor"));
-            found.transpose().map(|accessor| accessor.map(|accessor| accessor.count.0))
-        };
-        let corners = promised(primitive.indices)?;
-        memory::check(corners.unwrap_or(0).saturating_mul(40))?;
-        let corners = corners.unwrap_or(3 * MAX_TRIANGLES);
-        if corners > 3 * MAX_TRIANGLES {
-            return Err("it has too many triangles".into());
-        }
-        let positions = Checked::Valid(json::mesh::Semantic::Positions);
-        let vertices = promised(primitive.attributes.get(&positions).copied())?.unwrap_or(0);
-        let most = vertices.max(corners);
-        let limits = DecodeLimits::default()
-            .with_max_faces(corners / 3)
-            .with_max_points(most)
-            .with_max_decoded_bytes(most.saturating_mul(MAX_VERTEX_BYTES));
+        let limits = limits(file, primitive)?;
         let (bytes, _) = file.view(json::Index::new(buffer_view))?;
         let mut mesh = Mesh::new();
         catch_panic(|| {
@@ -127,4 +115,36 @@ impl Unpacked {
         }
         Ok(bytes)
     }
+}
+
+/// No more is unpacked than the accessors promise, and memory has room for.
+fn limits(file: &File<'_>, primitive: &json::mesh::Primitive) -> Fallible<DecodeLimits> {
+    let accessor = |index| find(&file.root.accessors, index, "accessor");
+    let positions = Checked::Valid(json::mesh::Semantic::Positions);
+    let vertices = match primitive.attributes.get(&positions) {
+        Some(positions) => accessor(*positions)?.count.0,
+        None => 0,
+    };
+    let triangles = match primitive.indices.map(accessor).transpose()? {
+        Some(indices) if primitive.mode == Checked::Valid(Mode::Triangles) => indices.count.0 / 3,
+        // A strip's.
+        Some(indices) => indices.count.0,
+        // A closed mesh has two of them for each vertex.
+        None => vertices.saturating_mul(2),
+    };
+    if triangles.max(vertices / 3) > MAX_TRIANGLES {
+        let millions = MAX_TRIANGLES / 1_000_000;
+        return Err(format!("it has more than {millions} million triangles"));
+    }
+    let mut vertex_bytes = OTHER_BYTES;
+    for index in primitive.attributes.values() {
+        if let Checked::Valid(kind) = accessor(*index)?.type_ {
+            vertex_bytes += COMPONENT_BYTES * kind.multiplicity() as u64;
+        }
+    }
+    // Where normals differ, one place may have a few values.
+    let values = vertices.max((3 * triangles).min(vertices.saturating_mul(4)));
+    let bytes = values.saturating_mul(vertex_bytes);
+    memory::check(bytes.saturating_add(3 * triangles * CORNER_BYTES))?;
+    Ok(DecodeLimits::default().with_max_faces(triangles).with_max_decoded_bytes(bytes))
 }

@@ -16,7 +16,7 @@ use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::render::film::Film;
-use crate::render::{Gi, Phase, Sampling, Session, View};
+use crate::render::{Gi, Phase, Sampling, Session, StopRule, View};
 
 /// Samples a pixel of the calm picture, which is rendered before the exact one: with them it is as good,
 /// denoised, as the exact one with twice as many, in half the time.
@@ -40,6 +40,8 @@ pub(super) struct Job<'a> {
     distributions: Option<((usize, u64), Arc<LightGrid>)>,
     /// The calm film published last, of so many samples in all.
     calm_film: Option<(u64, Arc<Film>)>,
+    /// Seconds spent on the calm picture.
+    calm_seconds: f64,
     /// How the error of the main and of the plain picture fell.
     curves: [Vec<Point>; 2],
 }
@@ -63,6 +65,7 @@ impl<'a> Job<'a> {
             readings: Vec::new(),
             distributions: None,
             calm_film: None,
+            calm_seconds: 0.0,
             curves: [Vec::new(), Vec::new()],
         }
     }
@@ -159,13 +162,15 @@ impl<'a> Job<'a> {
                     _ if let Some(calm) =
                         calm.as_mut().filter(|calm| goes_first(calm, &main, turns)) =>
                     {
-                        self.advance(calm, None, true);
+                        let start = Instant::now();
+                        self.advance(calm, None, self.request.previews);
+                        self.calm_seconds += start.elapsed().as_secs_f64();
                         turns += 1;
                     }
                     _ => {
                         turns = 0;
                         let distribution_paths = main.figures().distribution_paths;
-                        self.advance(&mut main, Some(self.request.rule), self.request.previews);
+                        self.advance(&mut main, Some(self.rule()), self.request.previews);
                         self.measure(&main);
                         if main.figures().distribution_paths > distribution_paths {
                             self.keep_distributions(&main, true);
@@ -212,6 +217,13 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// When the main picture is done: what the calm one took counts.
+    fn rule(&self) -> StopRule {
+        let StopRule { seconds, .. } = self.request.rule;
+        let seconds = seconds.map(|seconds| seconds - self.calm_seconds);
+        StopRule { seconds, ..self.request.rule }
+    }
+
     /// What is to be done next; `None` when something else is asked for.
     fn next_activity(&mut self, main: &Session<'_>) -> Option<Activity> {
         {
@@ -231,7 +243,7 @@ impl<'a> Job<'a> {
             Activity::Paused
         } else if main.phase() == Phase::Learning {
             Activity::Learning(learned_share(main))
-        } else if main.samples() > 0 && main.is_done(&self.request.rule) {
+        } else if main.samples() > 0 && main.is_done(&self.rule()) {
             Activity::Done
         } else {
             Activity::Rendering

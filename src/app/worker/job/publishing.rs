@@ -86,6 +86,7 @@ impl Job<'_> {
             plain: plain_snapshot.map(|(snapshot, _)| snapshot),
             counters: self.counters.clone(),
             backdrop: self.shown_backdrop(main, calm),
+            calm_seconds: self.calm_seconds,
             curves: self.curves.clone(),
         };
         *lock(&self.shared.snapshot) = Some(Arc::new(snapshot));
