@@ -332,8 +332,11 @@ mod tests {
         let found: Vec<_> = next(&report).expect("read").iter().map(|k| k.file.clone()).collect();
         assert_eq!(found, [Some(sound)]);
         let sentence = next(&report).err().expect("a sentence").to_string();
-        assert!(sentence.contains("3 kept pictures cannot be read"), "{sentence}");
-        assert!(sentence.ends_with("its settings are out of bounds"), "{sentence}");
+        assert!(sentence.contains(": 3 kept pictures cannot be read; the newest: "), "{sentence}");
+        assert!(sentence.ends_with("1-plain.exr: is no kept picture"), "{sentence}");
+        let refused = |file: &Path| read(file).err().expect("refused").to_string();
+        assert!(refused(&unsound).ends_with("its settings are out of bounds"));
+        assert!(refused(&folder.join("0-noise.exr")).contains("0-noise.exr: "));
         drop(album);
         assert!(unsound.exists() && plain.exists());
         // Where nothing can be written, that is said.
