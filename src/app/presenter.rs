@@ -291,6 +291,7 @@ impl Memory {
             let developer = Some(Arc::clone(&developer));
             self.uploads = Uploads { developer, ..Uploads::default() };
         }
+        self.leave_what_is_not_in(&order);
         let source = Source::main(&order);
         let prepare = || Ok(source.prepare(&developer));
         let Prepared { mut picture, image, mut failure } =
@@ -337,6 +338,22 @@ impl Memory {
             failure,
             facts,
         })
+    }
+
+    /// Lets go of what the order does not ask for: each holds a film, or a scene.
+    fn leave_what_is_not_in(&mut self, order: &Order) {
+        if order.compared.is_none() {
+            self.uploads.compared = Last::default();
+        }
+        if order.compared.is_some() || order.snapshot.plain.is_none() {
+            self.uploads.plain = Last::default();
+        }
+        if order.metered.is_none() {
+            self.uploads.metered = Last::default();
+        }
+        if order.overlay.is_none() {
+            (self.uploads.overlay, self.surfaces, self.facts) = (Last::default(), None, None);
+        }
     }
 
     fn paint(

@@ -130,6 +130,15 @@ pub(super) fn quiet(text: impl Into<String>) -> RichText {
     RichText::new(text).color(QUIET).size(12.0)
 }
 
+/// Samples a pixel, in the mean.
+pub(super) fn samples(mean: f64) -> String {
+    match mean {
+        ..1.0 => format!("{mean:.2}"),
+        ..10.0 => format!("{mean:.1}"),
+        _ => count(mean as u64),
+    }
+}
+
 /// A number with as many digits as help: 1.23, 45.6, 789, 12.3 k, 4.5 M.
 pub(super) fn figure(value: f64) -> String {
     let (value, suffix) = match value.abs() {

@@ -1,6 +1,7 @@
 //! Texels of pictures with 8 bits a channel.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 /// 8-bit texels with the channels that a picture has: grey, grey and alpha, RGB, or RGBA.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -74,11 +75,19 @@ impl Texels {
 
     /// All texels as RGBA; alpha is 255 where there is none.
     pub fn rgba(&self) -> Cow<'_, [[u8; 4]]> {
+        self.rgba_of(0..self.len())
+    }
+
+    /// A range of texels as RGBA.
+    ///
+    /// # Panics
+    /// If there are fewer.
+    pub fn rgba_of(&self, range: Range<usize>) -> Cow<'_, [[u8; 4]]> {
         match self.channels {
-            1 => self.chunks().iter().map(|&[l]| [l, l, l, 255]).collect(),
-            2 => self.chunks().iter().map(|&[l, a]| [l, l, l, a]).collect(),
-            3 => self.chunks().iter().map(|&[r, g, b]| [r, g, b, 255]).collect(),
-            _ => Cow::Borrowed(self.chunks()),
+            1 => self.chunks()[range].iter().map(|&[l]| [l, l, l, 255]).collect(),
+            2 => self.chunks()[range].iter().map(|&[l, a]| [l, l, l, a]).collect(),
+            3 => self.chunks()[range].iter().map(|&[r, g, b]| [r, g, b, 255]).collect(),
+            _ => Cow::Borrowed(&self.chunks()[range]),
         }
     }
 
@@ -99,13 +108,15 @@ mod tests {
         assert_eq!(read(vec![[7, 1], [9, 2]].into()), [[7, 7, 7, 1], [9, 9, 9, 2]]);
         assert_eq!(read(vec![[1, 2, 3], [4, 5, 6]].into()), [[1, 2, 3, 255], [4, 5, 6, 255]]);
         assert_eq!(read(vec![[1, 2, 3, 4]].into()), [[1, 2, 3, 4]]);
+        let texels = Texels::from(vec![[1, 2, 3], [4, 5, 6], [7, 8, 9]]);
+        assert_eq!(*texels.rgba_of(1..2), [[4, 5, 6, 255]]);
     }
 
     #[test]
     fn only_an_alpha_that_says_nothing_is_left_out() {
         let opaque = Texels::from(vec![[1, 2, 3, 255], [4, 5, 6, 255], [7, 8, 9, 255]]);
-        let (before, after) = (opaque.rgba().into_owned(), opaque.clone().without_opaque_alpha());
-        assert_eq!((after.channels(), after.rgba().into_owned()), (3, before));
+        let (before, after) = (opaque.rgba(), opaque.clone().without_opaque_alpha());
+        assert_eq!((after.channels(), after.rgba()), (3, before));
         let grey = Texels::from(vec![[7, 255], [9, 255]]).without_opaque_alpha();
         assert_eq!((grey.channels(), grey.bytes()), (1, &[7, 9][..]));
         for some in [Texels::from(vec![[1, 2, 3, 255], [4, 5, 6, 254]]), vec![[1, 255, 255]].into()]

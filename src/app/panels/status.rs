@@ -88,14 +88,7 @@ fn word(ui: &mut Ui, text: &str, color: Color32, hint: &str) {
 
 fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
     let session = &snapshot.main;
-    let [width, height] = size(snapshot);
-    let mean = session.figures.samples as f64 / (f64::from(width) * f64::from(height));
-    let samples = match mean {
-        ..1.0 => format!("{mean:.2}"),
-        ..10.0 => format!("{mean:.1}"),
-        _ => theme::count(mean as u64),
-    };
-    number(ui, &samples, "samples", "Mean samples per pixel");
+    number(ui, &theme::samples(session.mean_samples()), "samples", "Mean samples per pixel");
     if !hides_clock {
         let seconds = session.figures.elapsed_seconds() + snapshot.calm_seconds;
         number(ui, &theme::clock(seconds), "", "Learning and rendering, fast light included");

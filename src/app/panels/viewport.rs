@@ -182,8 +182,9 @@ fn wipe_labels(ui: &Ui, rect: Rect, [left, right]: &[String; 2]) {
 fn split_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
     let Some(snapshot) = scope.snapshot else { return };
     let label = |name: &str, take: &SessionSnapshot| {
-        let (samples, noise) = (take.film.min_samples(), 100.0 * take.noise);
-        format!("{name}: {samples} samples, noise {noise:.1} %")
+        let (samples, noise) = (theme::samples(take.mean_samples()), 100.0 * take.noise);
+        let noise = if noise.is_finite() { format!(", noise {noise:.1} %") } else { String::new() };
+        format!("{name}: {samples} samples{noise}")
     };
     let plain = snapshot.plain.as_ref().map_or_else(String::new, |plain| label("plain", plain));
     let name = crate::app::convergence::name_of(snapshot.main.sampling);

@@ -47,6 +47,17 @@ impl Kept {
         }
     }
 
+    /// Lets go of all that is of another scene, which is large.
+    pub(super) fn leave_other_worlds(&mut self, request: &Request) {
+        let is_other = |of: &Request| !Arc::ptr_eq(&of.world, &request.world);
+        self.counted.take_if(|(_, of)| is_other(of));
+        self.backdrop.take_if(|(of, _)| is_other(of));
+        self.training.take_if(|(_, of)| is_other(of));
+        if !self.is_of_world(request) {
+            (self.world, self.learned, self.is_complete) = (None, None, false);
+        }
+    }
+
     /// Whether learning has come to its end in this scene.
     pub(super) fn has_learned_in(&self, request: &Request) -> bool {
         self.is_complete && self.is_of_world(request)

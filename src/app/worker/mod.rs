@@ -158,6 +158,13 @@ pub struct SessionSnapshot {
     pub(crate) on_device: Option<(Gpu, DeviceFilm)>,
 }
 
+impl SessionSnapshot {
+    /// Samples a pixel, in the mean.
+    pub fn mean_samples(&self) -> f64 {
+        self.figures.samples as f64 / self.film.pixels().len().max(1) as f64
+    }
+}
+
 /// The latest picture.
 #[derive(Clone)]
 pub struct Snapshot {
@@ -376,6 +383,7 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: (Option<String>, Ray
         };
         let world = Arc::clone(&request.world);
         let environment = Arc::clone(&request.environment);
+        kept.leave_other_worlds(&request);
         let mut job = Job::new(shared, &alarm, &mut kept, request);
         pool.install(|| {
             if job.is_moving() {

@@ -199,6 +199,8 @@ impl Gpu {
             required_features: adapter.features() & wanted,
             experimental_features,
             required_limits: limits.clone(),
+            // What is on a device is few and large: shared blocks would be filled with holes.
+            memory_hints: wgpu::MemoryHints::MemoryUsage,
             ..wgpu::DeviceDescriptor::default()
         }))
         .map_err(|e| Error::new(format!("{} cannot be opened: {e}", facts.name)))?;

@@ -18,6 +18,8 @@ use crate::path::World;
 
 /// Deepest tree a traversal's stack is made for.
 const MAX_DEPTH: u32 = 96;
+/// Texels of a texture that are uploaded at a time.
+const PART: usize = 1 << 16;
 
 /// A scene and a map uploaded once for any number of views.
 pub struct UploadedScene {
@@ -100,11 +102,16 @@ fn upload_world(
     if features.contains(Features::TEXTURES) {
         put_array(buffers, "texture_refs", "the list of textures", &texture_refs)?;
         let texels = scene.images.iter().map(|image| image.texels.len() as u64).sum();
-        let images = scene.images.iter().map(|image| match image.texels.rgba() {
+        // Part by part: those of fewer channels are copied.
+        let parts = scene.images.iter().flat_map(|image| {
+            let part = |start| image.texels.rgba_of(start..image.texels.len().min(start + PART));
+            (0..image.texels.len()).step_by(PART).map(part)
+        });
+        let parts = parts.map(|part| match part {
             Cow::Borrowed(texels) => Cow::Borrowed(bytemuck::cast_slice(texels)),
             Cow::Owned(texels) => Cow::Owned(texels.into_flattened()),
         });
-        buffers.put_array("texels", "the set of textures", texels, images)?;
+        buffers.put_array("texels", "the set of textures", texels, parts)?;
     }
     if features.contains(Features::SCENE_LIGHTS) {
         let lights = layout::light_words(world, globals);

@@ -2,7 +2,7 @@
 //! failed. `examples/keep.rs` writes them; each stands behind its length, four bytes with the lowest first.
 
 /// Targets and what is kept of them.
-const FILES: [(&str, &[u8]); 8] = [
+pub(crate) const FILES: [(&str, &[u8]); 8] = [
     ("gltf", include_bytes!("../kept/gltf")),
     ("meshopt", include_bytes!("../kept/meshopt")),
     ("draco", include_bytes!("../kept/draco")),

@@ -26,7 +26,7 @@ mod shared;
 mod targets;
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 pub use gltf::mutate_gltf;
@@ -39,10 +39,26 @@ const ALLOWANCE_BYTES: u64 = 64 << 20;
 static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
     let memory = PathBuf::from("/dev/shm");
     let above = if memory.is_dir() { memory } else { std::env::temp_dir() };
-    let folder = above.join(format!("lightgrid-guided-{}", std::process::id()));
+    remove_left_over(&above);
+    let folder = above.join(format!("{FOLDER_NAME}{}", std::process::id()));
     fs::create_dir_all(&folder).expect("a folder");
     folder
 });
+
+const FOLDER_NAME: &str = "lightgrid-guided-";
+
+/// Removes folders of processes that are gone: libFuzzer ends its own without a word.
+fn remove_left_over(above: &Path) {
+    let entries = fs::read_dir(above).into_iter().flatten().flatten();
+    for folder in entries.map(|entry| entry.path()) {
+        let name = folder.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        let Some(process) = name.strip_prefix(FOLDER_NAME) else { continue };
+        if Path::new("/proc/self").exists() && !Path::new("/proc").join(process).exists() {
+            // Another may have been faster.
+            let _ = fs::remove_dir_all(&folder);
+        }
+    }
+}
 
 /// Fills a target's empty corpus before it is read.
 pub fn begin(target: &str) {
