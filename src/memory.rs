@@ -47,6 +47,18 @@ pub(crate) fn filled<T: Clone>(count: u64, value: T) -> Decoded<Vec<T>> {
     Ok(list)
 }
 
+/// Has large arrays, such as films, given back to the system as soon as they are freed. The GNU allocator
+/// would take the first one as a sign to keep those of up to 32 MiB, two to an arena, which then is seldom
+/// empty.
+#[cfg(feature = "window")]
+pub(crate) fn return_large_arrays() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: a number for the allocator, which may be set at any time.
+    unsafe {
+        libc::mallopt(libc::M_MMAP_THRESHOLD, SMALL as libc::c_int);
+    }
+}
+
 /// Bytes in the largest unit that leaves a whole number of some size.
 fn in_units(bytes: u64) -> String {
     match bytes {

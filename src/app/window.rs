@@ -23,6 +23,7 @@ use winit::window::{Window, WindowId};
 use super::screen::{Screen, TextureCopies};
 use super::{App, Start, Wake, Wakes, theme};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::render::gpu::Gpu;
 
 /// What other threads ask the event loop for.
@@ -57,6 +58,7 @@ pub fn run(
     notices: Vec<String>,
     settings_path: Option<PathBuf>,
 ) -> Result<Option<Error>> {
+    memory::return_large_arrays();
     let no_display = |e: &dyn std::fmt::Display| {
         let text = e.to_string();
         // The toolkit puts the place in its own source before the cause.

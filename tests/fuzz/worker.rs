@@ -64,8 +64,10 @@ pub(crate) fn work(kind: Kind, first: u64, count: u64) {
             }
             Kind::Kept => {
                 let (target, bytes) = kept::all().swap_remove(number as usize);
-                // Without a window there are no settings.
-                let nothing = || Found::Refused("no such target".to_owned());
+                let nothing = || {
+                    assert_eq!(target, "settings", "without a window there are none of them alone");
+                    Found::Refused("no such target".to_owned())
+                };
                 let found = targets::read(target, bytes, folder).unwrap_or_else(nothing);
                 (bytes.len(), found)
             }
