@@ -47,15 +47,20 @@ pub(crate) fn filled<T: Clone>(count: u64, value: T) -> Decoded<Vec<T>> {
     Ok(list)
 }
 
+/// Arenas of the GNU allocator: what works on pixels seldom asks it for memory.
+#[cfg(all(feature = "window", target_os = "linux", target_env = "gnu"))]
+const MOST_ARENAS: libc::c_int = 2;
+
 /// Has large arrays, such as films, given back to the system as soon as they are freed. The GNU allocator
 /// would take the first one as a sign to keep those of up to 32 MiB, two to an arena, which then is seldom
-/// empty.
+/// empty; and there would be up to eight arenas for each core.
 #[cfg(feature = "window")]
 pub(crate) fn return_large_arrays() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    // SAFETY: a number for the allocator, which may be set at any time.
+    // SAFETY: numbers for the allocator, which may be set at any time.
     unsafe {
         libc::mallopt(libc::M_MMAP_THRESHOLD, SMALL as libc::c_int);
+        libc::mallopt(libc::M_ARENA_MAX, MOST_ARENAS);
     }
 }
 
