@@ -107,9 +107,9 @@ mod killed {
     #[test]
     fn what_a_checkpoint_goes_on_from_ends_as_the_file_of_one_process() {
         for (output, rule) in [
-            ("a.exr", "--spp 300 --size 66x64"),
-            ("a.exr", "--noise 0.03 --sampling talk"),
-            ("a.part", "--spp 400 --size 66x64 --part 2/2"),
+            ("a.exr", "--spp 800 --size 66x64"),
+            ("a.exr", "--noise 0.03 --spp 99999 --sampling talk"),
+            ("a.part", "--spp 1000 --size 66x64 --part 2/2"),
         ] {
             let bench = Bench::new();
             let line = format!("{rule} --reproducible --device cpu");
@@ -117,9 +117,10 @@ mod killed {
             let command = format!("{line} --checkpoint film.checkpoint -o {output}");
             let checkpoint = bench.path("film.checkpoint");
             let written = || fs::metadata(&checkpoint).and_then(|facts| facts.modified()).ok();
-            // On a busy machine one may end before this thread sees its checkpoint: that is tried again.
+            // On a busy machine one may end before this thread sees its checkpoint, which is then a whole
+            // picture's: that is tried again from the one before.
             let is_killed = || {
-                let before = written();
+                let (kept, before) = (fs::read(&checkpoint).ok(), written());
                 let mut child = bench
                     .command(&render_line(&format!("{command} --checkpoint-every 0.03")))
                     .stderr(Stdio::null())
@@ -130,7 +131,13 @@ mod killed {
                 }
                 child.kill().expect("killed");
                 child.wait().expect("it ends");
-                fs::remove_file(bench.path(output)).is_err()
+                let was_done = fs::remove_file(bench.path(output)).is_ok();
+                match kept {
+                    _ if !was_done => {}
+                    Some(bytes) => fs::write(&checkpoint, bytes).expect("put back"),
+                    None => fs::remove_file(&checkpoint).expect("removed"),
+                }
+                !was_done
             };
             for _ in 0..2 {
                 assert!((0..20).any(|_| is_killed()), "{rule}: always done before it is killed");
