@@ -23,19 +23,24 @@ fn sample_texture(reference: u32, mesh_uvs: vec4f) -> vec4f {
     let uv = matrix.xy * mesh_uv.x + matrix.zw * mesh_uv.y + translation;
     let x = footprint(uv.x, head.y, (flags >> WRAP_U_SHIFT) & 3u);
     let y = footprint(uv.y, head.z, (flags >> WRAP_V_SHIFT) & 3u);
-    let srgb = (flags & SRGB) != 0u;
     if (flags & NEAREST) != 0u {
-        return texel(head.x + y.nearest * head.y + x.nearest, srgb);
+        return texel(head.x + y.nearest * head.y + x.nearest, head);
     }
     let upper = head.x + y.low * head.y;
     let lower = head.x + y.high * head.y;
-    let top = mix(texel(upper + x.low, srgb), texel(upper + x.high, srgb), x.fraction);
-    let bottom = mix(texel(lower + x.low, srgb), texel(lower + x.high, srgb), x.fraction);
+    let top = mix(texel(upper + x.low, head), texel(upper + x.high, head), x.fraction);
+    let bottom = mix(texel(lower + x.low, head), texel(lower + x.high, head), x.fraction);
     return mix(top, bottom, y.fraction);
 }
 
-fn texel(index: u32, srgb: bool) -> vec4f {
-    let encoded = texels(index);
+fn texel(index: u32, head: vec4u) -> vec4f {
+    let flags = head.w;
+    var encoded = texels(index);
+    if (flags & DEEP) != 0u {
+        // After all high bytes come all low ones.
+        encoded = mix(texels(index + head.y * head.z), encoded, 256.0 / 257.0);
+    }
+    let srgb = (flags & SRGB) != 0u;
     let x = encoded.xyz;
     let linear = select(
         pow((x + 0.055) / 1.055, vec3f(2.4)),

@@ -17,7 +17,7 @@ use super::kept_picture::{KeptPicture, Pixels};
 use super::screen::color_image;
 use super::settings_file;
 use crate::error::{Error, Result};
-use crate::image::{ExrPicture, Image, Rgb8, read_exr_metadata, read_exr_preview, write_exr};
+use crate::image::{ExrPicture, Rgb8, read_exr_metadata, read_exr_preview, write_exr};
 use crate::output::record::to_json;
 use crate::scene::{SceneOptions, builtin};
 
@@ -39,7 +39,7 @@ pub(super) struct Album {
 }
 
 enum Job {
-    Write { file: PathBuf, picture: Arc<Image>, texts: Vec<(String, String)>, small: Rgb8 },
+    Write { file: PathBuf, pixels: Arc<Pixels>, texts: Vec<(String, String)>, small: Rgb8 },
     Remove(PathBuf),
 }
 
@@ -70,13 +70,8 @@ impl Album {
         Ok(Self { folder, jobs: Some(jobs), thread: Some(thread), written: 0 })
     }
 
-    /// Writes a picture, one day soon; where.
-    pub(super) fn write(
-        &mut self,
-        kept: &KeptPicture,
-        picture: &Arc<Image>,
-        small: &Rgb8,
-    ) -> Result<PathBuf> {
+    /// Writes a picture, one day soon; where. From then on its pixels are there and no more in memory.
+    pub(super) fn write(&mut self, kept: &KeptPicture, small: &Rgb8) -> Result<PathBuf> {
         // In the order of time, and never that of another window.
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let (time, process) = (since.as_millis(), std::process::id());
@@ -95,8 +90,8 @@ impl Album {
             (OF_SCENE, to_json(&kept.of_scene)?),
         ];
         let texts = texts.map(|(key, text)| (key.to_owned(), text));
-        let (picture, small) = (Arc::clone(picture), small.clone());
-        self.send(Job::Write { file: file.clone(), picture, texts: texts.into(), small });
+        let (pixels, small) = (Arc::clone(&kept.pixels), small.clone());
+        self.send(Job::Write { file: file.clone(), pixels, texts: texts.into(), small });
         Ok(file)
     }
 
@@ -132,17 +127,20 @@ fn lasting(name: &str, is_builtin: bool) -> String {
 
 fn carry_out(job: Job) -> Result<()> {
     match job {
-        Job::Write { file, picture, texts, small } => {
+        Job::Write { file, pixels, texts, small } => {
             if let Some(folder) = file.parent() {
                 std::fs::create_dir_all(folder).map_err(|e| Error::at(folder, e))?;
             }
+            let image = pixels.get().map_err(Error::new)?;
             let picture = ExrPicture {
-                image: &picture,
+                image: &image,
                 layers: Vec::new(),
                 metadata: &texts,
                 preview: Some(&small),
             };
-            write_exr(&file, picture)
+            write_exr(&file, picture)?;
+            pixels.leave_to(file);
+            Ok(())
         }
         Job::Remove(file) => match std::fs::remove_file(&file) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::at(&file, e)),
@@ -226,6 +224,7 @@ mod tests {
 
     use super::*;
     use crate::app::document::Viewpoint;
+    use crate::image::Image;
     use crate::scene::{Camera, MaterialEdit, Medium};
 
     type Report = Receiver<Result<Vec<KeptPicture>>>;
@@ -264,20 +263,24 @@ mod tests {
         document
     }
 
-    /// Gives a picture with these settings to an album.
-    fn write(album: &mut Album, name: &str, document: Document) -> PathBuf {
+    /// A picture with these settings that is in no file.
+    fn kept(name: &str, document: Document) -> KeptPicture {
         let (image, small) = picture();
-        let kept = KeptPicture {
+        KeptPicture {
             name: name.to_owned(),
             summary: "plain, 3 samples".to_owned(),
-            pixels: Arc::new(Pixels::Here(Arc::clone(&image))),
+            pixels: Arc::new(Pixels::new(image)),
             document,
             of_scene: SceneOptions { hide: vec!["glass".to_owned()], ..SceneOptions::default() },
             small: color_image(&small),
             texture: None,
             file: None,
-        };
-        album.write(&kept, &image, &small).expect("told")
+        }
+    }
+
+    /// Gives a picture with these settings to an album.
+    fn write(album: &mut Album, name: &str, document: Document) -> PathBuf {
+        album.write(&kept(name, document), &picture().1).expect("told")
     }
 
     #[test]
@@ -290,8 +293,12 @@ mod tests {
         for name in ["Picture 1", "Picture 2"] {
             write(&mut album, name, document());
         }
+        let third = kept("Picture 3", document());
+        let last = album.write(&third, &small).expect("told");
         // The last picture before the window is closed is not lost.
         drop(album);
+        fs::remove_file(&last).expect("it is there");
+        assert!(third.pixels.get().is_err(), "it was there alone");
         let (album, report) = open(&folder);
         let kept = next(&report).expect("read");
         let names: Vec<_> = kept.iter().map(|kept| kept.name.as_str()).collect();

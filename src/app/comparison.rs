@@ -42,6 +42,8 @@ pub(super) struct Compared {
     pub(super) picture: Option<LinearPicture>,
     /// What the wipe uncovers.
     pub(super) other: Option<LinearPicture>,
+    /// What was read for it, lest it be read again.
+    read: Vec<Arc<Image>>,
     /// Why it is not what was asked for.
     pub(super) failure: Option<String>,
 }
@@ -71,7 +73,7 @@ impl Comparison {
         developer: &Developer,
         now: impl FnOnce() -> Arc<Image>,
     ) -> Compared {
-        let mut compared = Compared { picture: None, other: None, failure: None };
+        let mut compared = Compared { picture: None, other: None, read: Vec::new(), failure: None };
         let right = self.right.as_ref().map(|pixels| pixels.get()).transpose();
         let (left, right) = match (self.left.get(), right) {
             (Ok(left), Ok(right)) => (left, right),
@@ -79,6 +81,7 @@ impl Comparison {
                 return Compared { failure: Some(failure), ..compared };
             }
         };
+        compared.read = right.iter().chain([&left]).cloned().collect();
         if self.is_difference {
             match difference(&left, &right.clone().unwrap_or_else(now)) {
                 Ok(image) => {

@@ -78,7 +78,7 @@ impl History {
     ) -> (usize, Result<()>) {
         self.count = self.count.saturating_add(1);
         let name = format!("Picture {}", self.count);
-        let pixels = Arc::new(Pixels::Here(Arc::clone(image)));
+        let pixels = Arc::new(Pixels::new(Arc::clone(image)));
         let of_scene = self.of_scene.clone();
         let (preview, texture, file) = (color_image(small), None, None);
         let kept = KeptPicture {
@@ -91,7 +91,7 @@ impl History {
             texture,
             file,
         };
-        let mut write = |album: &mut Album| album.write(&kept, image, small);
+        let mut write = |album: &mut Album| album.write(&kept, small);
         let (file, failure) = match self.album.as_mut().map(&mut write).transpose() {
             Ok(file) => (file, Ok(())),
             Err(error) => (None, Err(error)),

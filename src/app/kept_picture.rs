@@ -1,7 +1,7 @@
 //! A picture that was kept.
 
 use std::path::PathBuf;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use egui::{ColorImage, TextureHandle};
 
@@ -30,35 +30,80 @@ pub struct KeptPicture {
     pub file: Option<PathBuf>,
 }
 
-/// Linear radiance of a kept picture.
-pub enum Pixels {
-    /// It was made in this window.
+/// Linear radiance of a kept picture: in memory until it is in a file, then where somebody looks at it.
+pub struct Pixels(Mutex<Source>);
+
+enum Source {
     Here(Arc<Image>),
-    /// It is of an earlier window and is read when it is first needed.
-    InFile(PathBuf, OnceLock<Arc<Image>>),
+    InFile(PathBuf, Weak<Image>),
 }
 
 impl Pixels {
-    /// Those of a file.
-    pub fn of_file(file: PathBuf) -> Self {
-        Self::InFile(file, OnceLock::new())
+    /// Those of a picture that is in no file.
+    pub fn new(image: Arc<Image>) -> Self {
+        Self(Mutex::new(Source::Here(image)))
     }
 
-    /// They.
+    /// Those of a file.
+    pub fn of_file(file: PathBuf) -> Self {
+        Self(Mutex::new(Source::InFile(file, Weak::new())))
+    }
+
+    /// Leaves them to a file that they were written to.
+    pub fn leave_to(&self, file: PathBuf) {
+        let mut source = self.source();
+        if let Source::Here(image) = &*source {
+            let known = Arc::downgrade(image);
+            *source = Source::InFile(file, known);
+        }
+    }
+
+    /// They; read again if nobody looks at them.
     ///
     /// # Errors
     /// If their file cannot be read.
     pub fn get(&self) -> Decoded<Arc<Image>> {
-        match self {
-            Self::Here(image) => Ok(Arc::clone(image)),
-            // What failed once, as where memory was short, may work later.
-            Self::InFile(file, known) => match known.get() {
-                Some(image) => Ok(Arc::clone(image)),
-                None => {
-                    let image = read_picture(file).map_err(|error| error.to_string())?;
-                    Ok(Arc::clone(known.get_or_init(|| Arc::new(image))))
+        match &mut *self.source() {
+            Source::Here(image) => Ok(Arc::clone(image)),
+            Source::InFile(file, known) => {
+                if let Some(image) = known.upgrade() {
+                    return Ok(image);
                 }
-            },
+                let image = read_picture(file).map_err(|error| error.to_string())?;
+                let image = Arc::new(image);
+                *known = Arc::downgrade(&image);
+                Ok(image)
+            }
         }
+    }
+
+    fn source(&self) -> MutexGuard<'_, Source> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{ExrPicture, write_exr};
+
+    #[test]
+    fn pixels_in_a_file_are_in_memory_while_somebody_looks_at_them() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let file = temporary.path().join("kept.exr");
+        let image = Arc::new(Image::filled(3, 2, [0.25, 1e-3, 700.0]));
+        let (expected, held) = ((*image).clone(), Arc::downgrade(&image));
+        let picture = ExrPicture { image: &image, layers: vec![], metadata: &[], preview: None };
+        write_exr(&file, picture).expect("written");
+        let pixels = Pixels::new(image);
+        assert!(held.upgrade().is_some());
+        pixels.leave_to(file.clone());
+        assert!(held.upgrade().is_none(), "nobody looks at it");
+        let (first, second) = (pixels.get().expect("read"), pixels.get().expect("known"));
+        assert!(Arc::ptr_eq(&first, &second) && *first == expected);
+        std::fs::remove_file(&file).expect("removed");
+        assert!(pixels.get().is_ok(), "still looked at");
+        drop((first, second));
+        assert!(pixels.get().expect_err("it is gone").contains("kept.exr"));
     }
 }

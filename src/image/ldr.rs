@@ -1,6 +1,8 @@
-//! 8-bit pictures (PNG, JPEG, WebP, KTX 2 and whatever else the library is built with).
+//! Pictures of 8 or 16 bits a channel (PNG, JPEG, WebP, KTX 2 and whatever else the library is built with).
 
 use std::io::Cursor;
+
+use image::ImageDecoder;
 
 use super::guard::catch_panic;
 use super::{Texels, ktx2, tiff};
@@ -32,7 +34,7 @@ pub(crate) fn decoder_cause(cause: &image::ImageError, file_bytes: u64) -> Strin
     }
 }
 
-/// 8-bit picture as it is stored (usually sRGB-encoded), row 0 at the top.
+/// Picture as it is stored (usually sRGB-encoded), row 0 at the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LdrImage {
     /// Pixels per row.
@@ -45,28 +47,55 @@ pub struct LdrImage {
     pub is_premultiplied: bool,
 }
 
-/// Width and height as the header claims them, without decoding.
-///
-/// # Errors
-/// When the format is not recognised or the header is damaged; the sentence begins with `name`.
-pub fn ldr_size(bytes: &[u8], name: &str) -> Result<(u32, u32)> {
-    if ktx2::is_ktx2(bytes) {
-        return ktx2::size(bytes).map_err(|cause| Error::at(name, cause));
-    }
-    tiff::check(bytes).map_err(|cause| Error::at(name, cause))?;
-    reader(bytes, name)?.into_dimensions().map_err(|cause| Error::at(name, cause))
+/// What a picture's header claims.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LdrHeader {
+    /// Pixels per row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Of one pixel once it is decoded.
+    pub bytes_per_pixel: u8,
 }
 
-/// Decodes a picture whose format is told by its content; deeper channels are rounded to 8 bits, of mip
+impl LdrHeader {
+    /// That of a picture in a file, without decoding more than it.
+    ///
+    /// # Errors
+    /// When the format is not recognised or the header is damaged; the sentence begins with `name`.
+    pub fn of(bytes: &[u8], name: &str) -> Result<Self> {
+        if ktx2::is_ktx2(bytes) {
+            let (width, height) = ktx2::size(bytes).map_err(|cause| Error::at(name, cause))?;
+            return Ok(Self { width, height, bytes_per_pixel: 4 });
+        }
+        tiff::check(bytes).map_err(|cause| Error::at(name, cause))?;
+        let decoder = reader(bytes, name)?.into_decoder();
+        let decoder = decoder.map_err(|cause| Error::at(name, cause))?;
+        let (width, height) = decoder.dimensions();
+        Ok(Self { width, height, bytes_per_pixel: decoder.color_type().bytes_per_pixel() })
+    }
+
+    /// Pixels of the whole picture.
+    pub fn pixels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+
+    /// Most bytes that decoding it takes: what the decoder makes, and what is made of that.
+    pub fn decoding_bytes(&self) -> u64 {
+        2 * u64::from(self.bytes_per_pixel) * self.pixels()
+    }
+}
+
+/// Decodes a picture whose format is told by its content; channels of more than 8 bits have 16, of mip
 /// levels the largest is taken.
 ///
 /// # Errors
 /// When the format is not recognised, the data is damaged, or the picture would take more than
 /// 1 GiB or is wider or higher than 32768 pixels, or memory is short; the sentence begins with `name`.
 pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
-    let (width, height) = ldr_size(bytes, name)?;
-    let pixels = u64::from(width) * u64::from(height);
-    if width > MAX_SIDE || height > MAX_SIDE || pixels > MAX_PIXELS {
+    let header = LdrHeader::of(bytes, name)?;
+    let LdrHeader { width, height, .. } = header;
+    if width > MAX_SIDE || height > MAX_SIDE || header.pixels() > MAX_PIXELS {
         let cause = format!("claims {width} x {height} pixels, more than lightgrid reads");
         return Err(Error::at(name, cause));
     }
@@ -76,8 +105,7 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
         let pixels = Texels::from(pixels).without_opaque_alpha();
         return Ok(LdrImage { width, height, pixels, is_premultiplied });
     }
-    // What the decoder makes, of up to four channels of its own depth, and what is made of it.
-    memory::check(8 * pixels).map_err(|cause| Error::at(name, cause))?;
+    memory::check(header.decoding_bytes()).map_err(|cause| Error::at(name, cause))?;
     let mut reader = reader(bytes, name)?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
@@ -89,11 +117,17 @@ pub fn decode_ldr(bytes: &[u8], name: &str) -> Result<LdrImage> {
         .ok_or_else(|| Error::at(name, "is damaged: its decoder failed"))?;
     let decoded = decoded.map_err(|cause| Error::at(name, decoder_cause(&cause, file_bytes)))?;
     let (width, height) = (decoded.width(), decoded.height());
-    let pixels = match decoded.color().channel_count() {
-        1 => Texels::new(1, decoded.into_luma8().into_raw()),
-        2 => Texels::new(2, decoded.into_luma_alpha8().into_raw()),
-        3 => Texels::new(3, decoded.into_rgb8().into_raw()),
-        _ => Texels::new(4, decoded.into_rgba8().into_raw()),
+    let color = decoded.color();
+    let channels = color.channel_count();
+    let pixels = match (channels, color.bytes_per_pixel() > channels) {
+        (1, false) => Texels::new(1, decoded.into_luma8().into_raw()),
+        (2, false) => Texels::new(2, decoded.into_luma_alpha8().into_raw()),
+        (3, false) => Texels::new(3, decoded.into_rgb8().into_raw()),
+        (_, false) => Texels::new(4, decoded.into_rgba8().into_raw()),
+        (1, true) => Texels::deep(1, &decoded.into_luma16()),
+        (2, true) => Texels::deep(2, &decoded.into_luma_alpha16()),
+        (3, true) => Texels::deep(3, &decoded.into_rgb16()),
+        (_, true) => Texels::deep(4, &decoded.into_rgba16()),
     };
     let pixels = pixels.without_opaque_alpha();
     Ok(LdrImage { width, height, pixels, is_premultiplied: false })
@@ -120,16 +154,23 @@ mod tests {
     }
 
     #[test]
-    fn sixteen_bit_grey_becomes_eight_bit_grey() {
-        let bytes = png(image::ImageBuffer::<image::Luma<u16>, _>::from_raw(
-            2,
-            1,
-            vec![0xffff_u16, 0x8080],
-        )
-        .unwrap());
-        let decoded = decode_ldr(&bytes, "grey").unwrap();
+    fn pictures_keep_their_channels_and_depth() {
+        let grey = |values: Vec<u16>| {
+            let buffer = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, values);
+            decode_ldr(&png(buffer.unwrap()), "grey").unwrap().pixels
+        };
+        assert_eq!(grey(vec![0xffff, 0x8080]), vec![[255], [128]].into());
+        assert_eq!(grey(vec![0xffff, 0x8081]), Texels::deep(1, &[0xffff, 0x8081]));
+
+        let values = vec![1_u16, 2, 3, 0xffff, 4, 5, 6, 0xffff];
+        let color = image::ImageBuffer::<image::Rgba<u16>, _>::from_raw(2, 1, values).unwrap();
+        let decoded = decode_ldr(&png(color), "color").unwrap();
         assert_eq!((decoded.width, decoded.height), (2, 1));
-        assert_eq!((decoded.pixels.channels(), decoded.pixels.bytes()), (1, &[255, 128][..]));
+        assert_eq!(decoded.pixels, Texels::deep(3, &[1, 2, 3, 4, 5, 6]));
+
+        let bytes = png(image::RgbImage::from_pixel(2, 1, image::Rgb([1, 2, 3])));
+        let pixels = decode_ldr(&bytes, "color").unwrap().pixels;
+        assert_eq!(pixels, vec![[1, 2, 3]; 2].into());
     }
 
     #[test]
@@ -149,7 +190,8 @@ mod tests {
             let mut bytes = Cursor::new(Vec::new());
             red.write_to(&mut bytes, format).unwrap();
             let bytes = bytes.into_inner();
-            assert_eq!(ldr_size(&bytes, "red").unwrap(), (8, 4));
+            let header = LdrHeader { width: 8, height: 4, bytes_per_pixel: 3 };
+            assert_eq!(LdrHeader::of(&bytes, "red").unwrap(), header);
             let decoded = decode_ldr(&bytes, "red").unwrap();
             assert_eq!((decoded.width, decoded.height, decoded.pixels.len()), (8, 4, 32));
             let [r, g, b, a] = decoded.pixels.rgba()[31];

@@ -78,7 +78,7 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Textures: an image and how it is sampled.
     pub textures: Vec<Texture>,
-    /// Decoded 8-bit images.
+    /// Decoded images.
     pub images: Vec<TextureImage>,
     /// Cameras in file order.
     pub cameras: Vec<Camera>,
@@ -373,7 +373,7 @@ pub struct Texture {
     pub srgb: bool,
 }
 
-/// 8-bit image, row 0 at v = 0.
+/// An image of 8 or 16 bits a channel, row 0 at v = 0.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TextureImage {
     /// Pixels per row.

@@ -34,12 +34,21 @@ pub fn sample_texture(scene: &Scene, texture_ref: &TextureRef, uv: Vec2) -> Vec4
     let texels = &image.texels;
     let filter = Filter { x, y, width: image.width, nearest: texture.nearest };
     match texels.channels() {
+        _ if texels.is_deep() => {
+            filter.filtered(|at| deep_value(texels.deep_rgba(at), texture.srgb))
+        }
         1 => filter.read(texels.chunks(), |[l]| Vec3::splat(color(l)).extend(1.0)),
         2 => filter.read(texels.chunks(), |[l, a]| Vec3::splat(color(l)).extend(unit(a))),
         3 => filter.read(texels.chunks(), |[r, g, b]| Vec4::new(color(r), color(g), color(b), 1.0)),
         _ => filter
             .read(texels.chunks(), |[r, g, b, a]| Vec4::new(color(r), color(g), color(b), unit(a))),
     }
+}
+
+/// The value of a texel of 16 bits a channel.
+fn deep_value(texel: [u16; 4], srgb: bool) -> Vec4 {
+    let value = Vec4::from(texel.map(f32::from)) / f32::from(u16::MAX);
+    if srgb { value.truncate().map(linear_from_srgb).extend(value.w) } else { value }
 }
 
 /// Which texels of an image count how much.
@@ -53,7 +62,13 @@ struct Filter {
 impl Filter {
     #[inline]
     fn read<T: Copy>(&self, texels: &[T], value: impl Fn(T) -> Vec4) -> Vec4 {
-        let read = |x, y| value(texels[y as usize * self.width as usize + x as usize]);
+        self.filtered(|at| value(texels[at]))
+    }
+
+    /// Of the values of texels by their index.
+    #[inline]
+    fn filtered(&self, value: impl Fn(usize) -> Vec4) -> Vec4 {
+        let read = |x, y| value(y as usize * self.width as usize + x as usize);
         let (x, y) = (&self.x, &self.y);
         if self.nearest {
             return read(x.nearest, y.nearest);

@@ -65,6 +65,7 @@ constants! {
     CACHE_SLOTS: cache::SLOTS,
     CACHE_WORDS: cache::WORDS,
     COAT_F0: coat::F0,
+    DEEP: texture_flags::DEEP,
     DOUBLE_SIDED: material::DOUBLE_SIDED,
     FILTER_RADIUS: filter::FILTER_RADIUS,
     FILTER_STEPS: filter::STEPS,

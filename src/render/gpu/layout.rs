@@ -168,6 +168,7 @@ pub(super) mod texture_flags {
     pub(in super::super) const SECOND_UV_SET: u32 = 1;
     pub(in super::super) const NEAREST: u32 = 2;
     pub(in super::super) const SRGB: u32 = 4;
+    pub(in super::super) const DEEP: u32 = 8;
     pub(in super::super) const WRAP_U_SHIFT: u32 = 4;
     pub(in super::super) const WRAP_V_SHIFT: u32 = 6;
 }
@@ -306,7 +307,7 @@ pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
     let mut texels = 0_u64;
     for image in &scene.images {
         first_texels.push(u32::try_from(texels).unwrap_or(u32::MAX));
-        texels += image.texels.len() as u64;
+        texels += image.texels.stored_len() as u64;
     }
     let mut refs = Vec::new();
     let mut reference = |texture: &Option<scene::TextureRef>| match texture {
@@ -374,7 +375,7 @@ fn flags(m: &scene::Material, partial: bool) -> u32 {
 }
 
 fn texture_ref(scene: &Scene, first_texels: &[u32], reference: &scene::TextureRef) -> TextureRef {
-    use texture_flags::{NEAREST, SECOND_UV_SET, SRGB, WRAP_U_SHIFT, WRAP_V_SHIFT};
+    use texture_flags::{DEEP, NEAREST, SECOND_UV_SET, SRGB, WRAP_U_SHIFT, WRAP_V_SHIFT};
     let texture = &scene.textures[reference.texture as usize];
     let image = &scene.images[texture.image as usize];
     let is_empty = image.texels.is_empty();
@@ -384,6 +385,7 @@ fn texture_ref(scene: &Scene, first_texels: &[u32], reference: &scene::TextureRe
     flags |= if reference.uv_set == 1 { SECOND_UV_SET } else { 0 };
     flags |= if texture.nearest { NEAREST } else { 0 };
     flags |= if texture.srgb { SRGB } else { 0 };
+    flags |= if image.texels.is_deep() { DEEP } else { 0 };
     TextureRef {
         first_texel: first_texels[texture.image as usize],
         width: if is_empty { 0 } else { image.width },

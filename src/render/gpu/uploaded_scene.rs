@@ -101,11 +101,12 @@ fn upload_world(
     put_array(buffers, "materials", "the list of materials", &materials)?;
     if features.contains(Features::TEXTURES) {
         put_array(buffers, "texture_refs", "the list of textures", &texture_refs)?;
-        let texels = scene.images.iter().map(|image| image.texels.len() as u64).sum();
+        let texels = scene.images.iter().map(|image| image.texels.stored_len() as u64).sum();
         // Part by part: those of fewer channels are copied.
         let parts = scene.images.iter().flat_map(|image| {
-            let part = |start| image.texels.rgba_of(start..image.texels.len().min(start + PART));
-            (0..image.texels.len()).step_by(PART).map(part)
+            let count = image.texels.stored_len();
+            let part = move |start| image.texels.rgba_of(start..count.min(start + PART));
+            (0..count).step_by(PART).map(part)
         });
         let parts = parts.map(|part| match part {
             Cow::Borrowed(texels) => Cow::Borrowed(bytemuck::cast_slice(texels)),

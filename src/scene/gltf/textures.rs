@@ -12,11 +12,11 @@ use super::Fallible;
 use super::buffers::{File, find};
 use super::uri::{self, Place};
 use crate::error::Notices;
-use crate::image::ldr::{self, LdrImage};
+use crate::image::ldr::{LdrHeader, LdrImage, decode_ldr};
 use crate::memory;
 use crate::scene::{Texture, TextureImage, Wrap};
 
-/// Most texels all images may have together: 4 GiB.
+/// Most texels all images may have together: 4 GiB of 8 bits a channel.
 const MAX_TEXELS: u64 = 1 << 30;
 
 /// So many images that cannot be used are named.
@@ -238,17 +238,18 @@ impl Source<'_> {
 /// Refuses images, by the sizes in their headers, from where all together become too large; `texels` is how
 /// large they are.
 fn within_limit(images: &mut [Fallible<Cow<'_, [u8]>>], texels: &mut u64) {
+    let mut decoding_bytes = 0_u64;
     for image in images {
         let Ok(bytes) = image else { continue };
-        let checked = ldr::ldr_size(bytes, "its data").map_err(|cause| cause.to_string());
-        let checked = checked.and_then(|(width, height)| {
-            let more = texels.saturating_add(u64::from(width) * u64::from(height));
+        let header = LdrHeader::of(bytes, "its data").map_err(|cause| cause.to_string());
+        let checked = header.and_then(|header| {
+            let more = texels.saturating_add(header.pixels());
             if more > MAX_TEXELS {
                 return Err("all images together take more than 4 GiB".into());
             }
-            // Twice: decoders keep their own copy for a while.
-            memory::check(8 * more)?;
-            *texels = more;
+            let more_bytes = decoding_bytes.saturating_add(header.decoding_bytes());
+            memory::check(more_bytes)?;
+            (*texels, decoding_bytes) = (more, more_bytes);
             Ok(())
         });
         if let Err(cause) = checked {
@@ -258,5 +259,5 @@ fn within_limit(images: &mut [Fallible<Cow<'_, [u8]>>], texels: &mut u64) {
 }
 
 fn decode(bytes: &[u8]) -> Fallible<LdrImage> {
-    ldr::decode_ldr(bytes, "its data").map_err(|cause| cause.to_string())
+    decode_ldr(bytes, "its data").map_err(|cause| cause.to_string())
 }

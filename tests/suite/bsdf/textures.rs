@@ -103,6 +103,34 @@ fn texels_of_fewer_channels_are_the_same_values() {
 }
 
 #[test]
+fn sixteen_bits_are_read_to_the_last() {
+    let values = [[300_u16, 5], [25_900, 40_001], [65_535, 65_534]];
+    let unit = |value: u16| f64::from(value) / 65_535.0;
+    let linear = |value: u16| ((unit(value) + 0.055) / 1.055).powf(2.4);
+    for srgb in [false, true] {
+        let mut scene = row(Wrap::Repeat, false);
+        scene.textures[0].srgb = srgb;
+        scene.images[0].texels = Texels::deep(2, values.as_flattened());
+        assert!(scene.images[0].texels.is_deep());
+        let color = |value| match srgb {
+            true if unit(value) <= 0.040_45 => unit(value) / 12.92,
+            true => linear(value),
+            false => unit(value),
+        };
+        for (at, low, high, share) in [(0.5, 0, 0, 0.0), (1.75, 1, 2, 0.25), (2.5, 2, 2, 0.0)] {
+            let value = sample_texture(&scene, &REFERENCE, Vec2::new(at / 3.0, 0.5)).as_dvec4();
+            let mix = |a: f64, b: f64| a + (b - a) * share;
+            let [[grey, alpha], [next_grey, next_alpha]] = [values[low], values[high]];
+            let expected = [mix(color(grey), color(next_grey)), mix(unit(alpha), unit(next_alpha))];
+            let found = [value.x, value.w];
+            // A level of 16 bits is 1.5e-5.
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{value} {at}");
+            assert!(value.x == value.y && value.y == value.z, "grey");
+        }
+    }
+}
+
+#[test]
 fn the_reference_moves_coordinates() {
     let scene = row(Wrap::Repeat, true);
     let transform =

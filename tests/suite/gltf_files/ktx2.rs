@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::Path;
 
-use lightgrid::image::ldr::{LdrImage, decode_ldr, ldr_size};
+use lightgrid::image::ldr::{LdrHeader, LdrImage, decode_ldr};
 use lightgrid::scene::{Scene, Wrap, gltf};
 
 use super::builder::{Builder, ONE_MESH, square};
@@ -50,7 +50,8 @@ fn fnv(bytes: &[u8]) -> u64 {
 fn basis_pictures_have_their_pixels() {
     for (stem, width, height, has_opacity, hash, most, mean) in ENCODED {
         let bytes = encoded(stem);
-        assert_eq!(ldr_size(&bytes, stem), Ok((width, height)), "{stem}");
+        let header = LdrHeader { width, height, bytes_per_pixel: 4 };
+        assert_eq!(LdrHeader::of(&bytes, stem), Ok(header), "{stem}");
         let decoded = decode_ldr(&bytes, stem).expect(stem);
         let found = (decoded.width, decoded.height, decoded.is_premultiplied);
         assert_eq!(found, (width, height, false), "{stem}");

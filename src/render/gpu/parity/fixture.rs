@@ -265,18 +265,24 @@ fn materials() -> Vec<Material> {
     ]
 }
 
-/// Images down to none, every wrap mode, and a texture in every other place of every material.
+/// Images down to none and of both depths, every wrap mode, and a texture in every other place of every material.
 fn add_textures(scene: &mut Scene, random: &mut Random) {
     for (width, height, channels) in [(8, 5, 4), (1, 1, 1), (0, 0, 4), (3, 7, 3)] {
         let bytes = (0..width * height * channels).map(|_| random.word() as u8).collect();
         let texels = Texels::new(channels as usize, bytes);
         scene.images.push(TextureImage { width, height, texels });
     }
+    let values: Vec<u16> = (0..5 * 4 * 4).map(|_| random.word() as u16).collect();
+    scene.images.push(TextureImage { width: 5, height: 4, texels: Texels::deep(4, &values) });
     let wraps = [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::ClampToEdge];
     for index in 0..18_u32 {
         let wrap = |i: u32| wraps[i as usize % 3];
         scene.textures.push(Texture {
-            image: if index % 6 == 5 { index / 6 } else { 3 * (index % 2) },
+            image: if index % 6 == 5 {
+                index / 6
+            } else {
+                [0, 3, 4][(index + index / 3) as usize % 3]
+            },
             wrap_u: wrap(index),
             wrap_v: wrap(index / 3),
             nearest: index % 5 == 0,

@@ -210,6 +210,7 @@ fn flags_are_the_same_bits() {
         ("SECOND_UV_SET", t::SECOND_UV_SET),
         ("NEAREST", t::NEAREST),
         ("SRGB", t::SRGB),
+        ("DEEP", t::DEEP),
         ("WRAP_U_SHIFT", t::WRAP_U_SHIFT),
         ("WRAP_V_SHIFT", t::WRAP_V_SHIFT),
     ] {
