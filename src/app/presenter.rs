@@ -15,6 +15,7 @@ use crate::develop::{Developer, LinearPicture, OverlayTexture};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::light_grid::LightGrid;
+use crate::memory;
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::tone::WhiteBalance;
 
@@ -61,6 +62,9 @@ impl Order {
 /// After a picture of work that goes on it rests so many times as long as that took: with half of the
 /// cores, it takes a twentieth of the machine.
 const REST: u32 = 9;
+
+/// Memory that was freed is given back so often, while pictures come: old ones, and their scenes, are gone then.
+const RETURN: Duration = Duration::from_secs(10);
 
 /// What the screen is developed from.
 pub struct Shown {
@@ -176,6 +180,7 @@ fn run(shared: &Shared) {
     let mut memory = Memory::default();
     // The last order, and until when one that only follows it waits.
     let mut last: Option<(Order, Instant)> = None;
+    let mut returned = Instant::now();
     loop {
         let order = {
             let mut slot = lock(&shared.slot);
@@ -210,6 +215,10 @@ fn run(shared: &Shared) {
         }
         last = Some((kept, Instant::now() + REST * start.elapsed()));
         (shared.wake)();
+        if returned.elapsed() > RETURN {
+            memory::return_freed();
+            returned = Instant::now();
+        }
     }
 }
 
