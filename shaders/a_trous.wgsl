@@ -36,7 +36,7 @@ struct Guide {
 @group(0) @binding(7) var<storage, read_write> result_counts: array<vec4u>;
 
 const LEAST_ALIKE = 3.0;
-const RELAXED_PASSES = 2u;
+const STRICT_STEP = 4u;
 const ERRORS_TOLERATED = 1.5;
 const REACH = 3;
 const LEAST_ALBEDO = 0.02;
@@ -179,9 +179,8 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     let guide = guides[index];
     let own = light[index];
     let own_luminance = luminance(own.xyz);
-    // Later passes reach other edges.
-    let is_relaxed = settings.step < (1u << RELAXED_PASSES);
-    let strictness = select(1.0, guide.strictness, is_relaxed);
+    // Larger steps reach other edges.
+    let strictness = select(1.0, guide.strictness, settings.step < STRICT_STEP);
     var rgb = vec3f();
     var variance = 0.0;
     var total = 0.0;

@@ -15,8 +15,9 @@ use crate::render::film::{Film, Pixel};
 
 /// Albedo that counts as none: black surfaces and the sky are smoothed as they are.
 const LEAST_ALBEDO: f32 = 0.02;
-/// Filter passes; the last one reaches 2^5 pixels.
-const PASSES: u32 = 5;
+/// Pixels between two taps of each pass. Where guides or light stop what the first passes should spread, later
+/// ones put it at their taps alone, a lattice: the last two fill it.
+pub(crate) const STEPS: [u32; 7] = [1, 2, 4, 8, 16, 3, 1];
 /// Luminance differences are tolerated up to this many of their standard errors.
 const ERRORS_TOLERATED: f32 = 1.5;
 /// Pixels around one that share its error.
@@ -30,8 +31,8 @@ const NORMAL_POWER: i32 = 64;
 const STRICTNESS: [f32; 3] = [1.0, 1.0 / 4.0, 1.0 / 16.0];
 /// Of the 24 pixels around one so many are its like.
 const LEAST_ALIKE: f32 = 3.0;
-/// Passes in which a pixel is compared less strictly; later ones reach other edges.
-const RELAXED_PASSES: u32 = 2;
+/// A pixel is compared less strictly in passes of smaller steps than this; others reach other edges.
+const STRICT_STEP: u32 = 4;
 
 /// What tells surfaces apart.
 #[derive(Clone, Copy)]
@@ -53,7 +54,7 @@ struct Light {
 /// The film's picture, filtered. Without layers on the film it is the film's picture as it is.
 pub(super) fn denoise(film: &Film) -> Image {
     let Some(layers) = film.surface_layers() else { return film.image() };
-    let mut guides: Vec<Guide> = layers
+    let strict: Vec<Guide> = layers
         .albedo
         .iter()
         .zip(&layers.normal)
@@ -64,16 +65,14 @@ pub(super) fn denoise(film: &Film) -> Image {
             Guide { albedo: seen.max(Vec3::splat(LEAST_ALBEDO)), normal, depth, strictness: 1.0 }
         })
         .collect();
-    relax(&mut guides, film.width as usize);
-    let mut light: Vec<Light> = film.pixels().iter().zip(&guides).map(undressed).collect();
-    share_errors(&mut light, &guides, film.width as usize);
-    for pass in 0..PASSES {
-        if pass == RELAXED_PASSES {
-            guides.iter_mut().for_each(|guide| guide.strictness = 1.0);
-        }
-        light = filtered(&light, &guides, film.width as usize, 1 << pass);
+    let relaxed = relaxed(&strict, film.width as usize);
+    let mut light: Vec<Light> = film.pixels().iter().zip(&strict).map(undressed).collect();
+    share_errors(&mut light, &relaxed, film.width as usize);
+    for step in STEPS {
+        let guides = if step < STRICT_STEP { &relaxed } else { &strict };
+        light = filtered(&light, guides, film.width as usize, step as i32);
     }
-    let pixels = light.iter().zip(&guides).map(|(l, g)| (l.rgb * g.albedo).to_array()).collect();
+    let pixels = light.iter().zip(&strict).map(|(l, g)| (l.rgb * g.albedo).to_array()).collect();
     Image { width: film.width, height: film.height, pixels }
 }
 
@@ -85,8 +84,8 @@ fn undressed((pixel, guide): (&Pixel, &Guide)) -> Light {
     Light { rgb: mean / guide.albedo, variance: variance * scale * scale }
 }
 
-/// Finds out how strictly each pixel is to be compared.
-fn relax(guides: &mut [Guide], width: usize) {
+/// The guides with how strictly each pixel is to be compared.
+fn relaxed(guides: &[Guide], width: usize) -> Vec<Guide> {
     let height = guides.len() / width.max(1);
     let strictness_of = |index: usize| {
         let mut alike = [0.0; STRICTNESS.len()];
@@ -99,8 +98,8 @@ fn relax(guides: &mut [Guide], width: usize) {
         let first = alike.iter().position(|sum| *sum >= LEAST_ALIKE);
         STRICTNESS[first.unwrap_or(STRICTNESS.len() - 1)]
     };
-    let found: Vec<f32> = (0..guides.len()).into_par_iter().map(strictness_of).collect();
-    guides.iter_mut().zip(found).for_each(|(guide, strictness)| guide.strictness = strictness);
+    let relaxed = |index: usize| Guide { strictness: strictness_of(index), ..guides[index] };
+    (0..guides.len()).into_par_iter().map(relaxed).collect()
 }
 
 /// The pixels up to `reach` columns and rows from one, itself among them.

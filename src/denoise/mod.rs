@@ -1,6 +1,6 @@
 //! Taking out what noise is left, for looking at pictures, not for measuring them.
 
-mod a_trous;
+pub(crate) mod a_trous;
 mod cell;
 mod oidn;
 mod scales;

@@ -1,10 +1,9 @@
 //! The à-trous filter of [`crate::denoise`] as compute passes.
 
 use super::{dispatch, entry, filled, pipeline};
+use crate::denoise::a_trous::STEPS;
 use crate::render::gpu::{DeviceFilm, Gpu};
 
-/// Filter passes; the last one reaches 2^5 pixels.
-const PASSES: u32 = 5;
 /// Bytes of a pixel's `Guide` and of its `FirstHit`.
 const GUIDE_BYTES: u64 = 32;
 /// Bytes of a pixel's light.
@@ -83,8 +82,8 @@ impl Passes {
             std::mem::swap(&mut light, &mut result);
         };
         pass(&self.share_errors, &one);
-        for number in 0..PASSES {
-            pass(&self.smooth_light, &settings(1 << number));
+        for step in STEPS {
+            pass(&self.smooth_light, &settings(step));
         }
         let entries = [
             entry(0, &one),

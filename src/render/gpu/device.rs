@@ -1,13 +1,12 @@
 //! Adapters: what there is, which one to take, and a connection to it.
 
-use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
 use wgpu::wgt::WgpuHasDisplayHandle;
 use wgpu::{Adapter, Backends, DeviceType, Features, Instance, InstanceDescriptor, Limits};
 use wgpu::{PollType, SubmissionIndex, Surface};
 
-use super::pipeline::Pipeline;
+use super::pipeline::Pipelines;
 use crate::error::{Error, Result};
 use crate::render::gpu_facts::{AdapterFacts, RayChoice, Schedule};
 
@@ -108,8 +107,7 @@ pub struct Gpu {
     /// Whether frames of a window are drawn on it too.
     pub(super) has_window: bool,
     hardware_rays: bool,
-    /// Kernels compiled so far, by their source.
-    pub(super) pipelines: Arc<Mutex<HashMap<String, Arc<Pipeline>>>>,
+    pub(super) pipelines: Arc<Mutex<Pipelines>>,
     /// Whether read-only arrays lie in storage buffers.
     prefers_buffers: bool,
     /// How kernels share the work, whatever suits it.

@@ -82,19 +82,49 @@ impl Pipeline {
     }
 }
 
+/// Most kernels that are kept for those who may want them again: those of some two scenes. Each is a megabyte
+/// or so where software runs it.
+const MOST_UNUSED: usize = 16;
+
+/// Kernels that were compiled, the last one used at the end.
+#[derive(Default)]
+pub(super) struct Pipelines(Vec<Arc<Pipeline>>);
+
+impl Pipelines {
+    /// The kernel of this source, if there is one.
+    fn find(&mut self, source: &str) -> Option<Arc<Pipeline>> {
+        let at = self.0.iter().position(|pipeline| pipeline.program.source == source)?;
+        let found = self.0.remove(at);
+        self.0.push(Arc::clone(&found));
+        Some(found)
+    }
+
+    /// Keeps another one, and of those that nobody uses the last ones.
+    fn keep(&mut self, pipeline: Arc<Pipeline>) {
+        let is_unused = |pipeline: &Arc<Pipeline>| Arc::strong_count(pipeline) == 1;
+        self.0.push(pipeline);
+        let unused = self.0.iter().filter(|pipeline| is_unused(pipeline)).count();
+        let mut excess = unused.saturating_sub(MOST_UNUSED);
+        self.0.retain(|pipeline| {
+            let stays = excess == 0 || !is_unused(pipeline);
+            excess -= usize::from(!stays);
+            stays
+        });
+    }
+}
+
 impl Gpu {
-    /// A kernel, compiled unless this device has run it before.
+    /// A kernel, compiled unless this device ran it lately.
     ///
     /// # Errors
     /// If the driver refuses it.
     pub(super) fn pipeline(&self, kernel: Kernel, program: Program) -> Result<Arc<Pipeline>> {
         let mut known = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(pipeline) = known.get(&program.source) {
-            return Ok(Arc::clone(pipeline));
+        if let Some(pipeline) = known.find(&program.source) {
+            return Ok(pipeline);
         }
-        let source = program.source.clone();
         let pipeline = Pipeline::new(self, kernel.name(), program)?;
-        known.insert(source, Arc::clone(&pipeline));
+        known.keep(Arc::clone(&pipeline));
         Ok(pipeline)
     }
 }
@@ -116,5 +146,34 @@ fn binding_type(binding: &Binding) -> wgpu::BindingType {
             view_dimension: wgpu::TextureViewDimension::D2,
             multisampled: false,
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kernels_in_use_and_the_last_others_are_kept() {
+        let gpu = match Gpu::open(None) {
+            Ok(gpu) => gpu,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let kernel = |number: usize| {
+            let source =
+                format!("// {number}\n@compute @workgroup_size(1) fn render() {{ return; }}");
+            let program = Program { source, bindings: Vec::new() };
+            gpu.pipeline(Kernel::Render, program).expect("compiled")
+        };
+        let in_use = kernel(0);
+        let first = Arc::downgrade(&kernel(1));
+        let second = Arc::downgrade(&kernel(2));
+        assert!(Arc::ptr_eq(&in_use, &kernel(0)), "not compiled again");
+        (3..=MOST_UNUSED).for_each(|number| drop(kernel(number)));
+        drop(kernel(1));
+        // Those are counted that nobody used when another one was made.
+        (100..102).for_each(|number| drop(kernel(number)));
+        assert!(second.upgrade().is_none(), "the longest unused");
+        assert!(first.upgrade().is_some() && Arc::ptr_eq(&in_use, &kernel(0)));
     }
 }
