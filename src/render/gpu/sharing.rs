@@ -33,7 +33,7 @@ impl Sharing {
         tile: SharedTile,
         size: [u32; 2],
     ) -> Result<Self> {
-        // Tiles fixture out of the picture on all sides.
+        // Tiles stick out of the picture on all sides.
         let tiles = size.map(|pixels| u64::from(pixels.div_ceil(tile.side)) + 1);
         let most_groups = (tiles[0] * tiles[1]).div_ceil(tiles_of_group(tile)).min(MOST_GROUPS);
         let first_texels = if features.contains(Features::LAYERS) { 5 } else { 3 };
