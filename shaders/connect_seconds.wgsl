@@ -26,22 +26,26 @@ fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32
     let to_second = position - vertex.point.position;
     let squared = dot(to_second, to_second);
     let direction = to_second / sqrt(squared);
-    let cosine = -dot(normal, direction);
+    let cosine = select(-dot(normal, direction), 1.0, is_kept_in_medium(what));
     if what == 0u || !(cosine > 0.0 && squared > 0.0) {
         return vec4f(0.0);
     }
+    let is_in_medium = is_kept_in_medium(what);
     let f = scattered(path, vertex, direction);
-    if max_element(f.value) <= 0.0 {
+    let carried = (*path).throughput * f.value;
+    if max_element(carried) <= 0.0 {
         return vec4f(0.0);
     }
     if (what & 63u) != member {
-        if !is_true_from(batch[index].shading_frame.z, normal, -direction) {
+        if !is_in_medium && !is_true_from(batch[index].shading_frame.z, normal, -direction) {
             return vec4f(0.0);
         }
-        let own_normal = vertex.point.geometric_normal;
-        let side = select(-own_normal, own_normal, dot(own_normal, direction) > 0.0);
-        let origin = offset_origin(vertex.point.position, side);
-        let way = offset_origin(position, normal) - origin;
+        let origin = origin_toward(vertex, direction);
+        var target_ = position;
+        if !is_in_medium {
+            target_ = offset_origin(position, normal);
+        }
+        let way = target_ - origin;
         let distance = length(way);
         (*path).rays += 1u;
         let visible = transmittance_along(Ray(origin, way / distance, distance * (1.0 - 1e-4)));
@@ -51,17 +55,45 @@ fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32
     }
     let area = cosine / squared;
     let density = f.pdf_solid_angle * area / f32(OWNER_SIDE * OWNER_SIDE);
-    return vec4f((*path).throughput * f.value * area, density);
+//#if MEDIUM
+    let way = fog_stretch(vertex.point.position, direction, sqrt(squared));
+    let flown = crossing(way.interior, carried, max(way.end - way.start, 0.0), is_in_medium);
+    return vec4f(carried * area * flown.weight, density * flown.density);
+//#else
+    return vec4f(carried * area, density);
+//#end
+}
+
+// Where a ray from a vertex in this direction begins.
+fn origin_toward(vertex: Vertex, direction: vec3f) -> vec3f {
+//#if MEDIUM
+    if vertex.is_in_medium {
+        return vertex.point.position;
+    }
+//#end
+    let normal = vertex.point.geometric_normal;
+    return offset_origin(
+        vertex.point.position, select(-normal, normal, dot(normal, direction) > 0.0));
 }
 
 // Radiance of second vertex `index` of the batch towards a first one.
 fn radiance_from(index: u32, at: u32, position: vec3f) -> vec3f {
     let direction = normalize(position - batch[index].position);
+    var radiance = vec3f(0.0);
+//#if MEDIUM
+    if is_kept_in_medium(batch[index].what) {
+        for (var i = 0u; i < CONTINUATIONS * INCIDENTS; i++) {
+            let from_ = float3(seconds[at + 2u * i + 2u]);
+            let turned = phase_pdf_solid_angle(globals.fog_mean_cosine, -dot(from_, direction));
+            radiance += turned * float3(seconds[at + 2u * i + 3u]);
+        }
+        return radiance;
+    }
+//#end
     let frame = batch[index].shading_frame;
     let bsdf = batch[index].bsdf;
     let wo = local_from_world(frame, direction);
     let out = bsdf_outgoing(bsdf, wo);
-    var radiance = vec3f(0.0);
     for (var i = 0u; i < CONTINUATIONS * INCIDENTS; i++) {
         let light = float3(seconds[at + 2u * i + 3u]);
         if any(light != vec3f(0.0)) {
@@ -96,8 +128,8 @@ fn connect_seconds(
         path.bounces = 1u;
     }
     if shares {
-        vertex = vertex_at(hit, path.ray.direction);
-        path.sampler.pair = hit.w >> 2u;
+        vertex = vertex_at(&path, hit, path.ray.direction);
+        path.sampler.pair = pair_in(hit.w, 2u);
         path.map_samples = f32(MAP_SAMPLES);
 //#if COUNTING
         path.is_counted = (hit.w & IS_COUNTED_FIRST) != 0u;
@@ -118,11 +150,13 @@ fn connect_seconds(
             let second_at_ =
                 second_at(group.x, lane / BATCH * MEMBERS, first_of_batch + lane % BATCH);
             let found = seconds[second_at_];
-            batch[lane].what = 0u;
-            if (found.w & IS_FOUND) != 0u {
+            batch[lane].what = found.w;
+            batch[lane].position = float3(found);
+            if (found.w & IS_FOUND) == 0u {
+                batch[lane].what = 0u;
+            } else if !is_kept_in_medium(found.w) {
                 let point =
                     surface_at(found.x, bitcast<vec2f>(found.yz), float3(seconds[second_at_ + 1u]));
-                batch[lane].what = found.w;
                 batch[lane].position = point.position;
                 batch[lane].geometric_normal = point.geometric_normal;
                 batch[lane].shading_frame = point.shading_frame;

@@ -7,9 +7,40 @@ var<private> first: array<vec4u, 2>;
 // The second one, as `seconds` keeps it; there is none if the last word of the first texel is 0.
 var<private> second: array<vec4u, 2>;
 
+// Twin of `Scatterer::is_alike_nearby`.
+fn is_alike_nearby(vertex: Vertex) -> bool {
+//#if MEDIUM
+    if vertex.is_in_medium {
+        return true;
+    }
+//#end
+    return is_broad(vertex, LEAST_ALPHA);
+}
+
+// The vertex that the path is at, as it is kept.
+fn packed_vertex(vertex: Vertex, what: u32) -> vec4u {
+//#if MEDIUM
+    if vertex.is_in_medium {
+        return packed(vertex.point.position, what | IS_IN_MEDIUM);
+    }
+//#end
+    return packed_hit(arrival.triangle, arrival.barycentric, what);
+}
+
+// Twin of `Scatterer::is_true_from`.
+fn is_vertex_true_from(vertex: Vertex, to_viewer: vec3f) -> bool {
+//#if MEDIUM
+    if vertex.is_in_medium {
+        return true;
+    }
+//#end
+    return is_true_from(
+        vertex.point.shading_frame.z, vertex.point.geometric_normal, to_viewer);
+}
+
 // At the first vertex: whether its light is gathered later, by `connect_seconds`.
 fn meet_first(path: ptr<function, Path>, vertex: Vertex) -> bool {
-    if !is_broad(vertex, LEAST_ALPHA) || !is_in_air(path) {
+    if !is_alike_nearby(vertex) || !is_in_air(path) {
         return false;
     }
     let pair = (*path).sampler.pair;
@@ -17,7 +48,7 @@ fn meet_first(path: ptr<function, Path>, vertex: Vertex) -> bool {
 //#if COUNTING
     what |= select(0u, IS_COUNTED_FIRST, (*path).is_counted);
 //#end
-    first[0] = packed_hit(arrival.triangle, arrival.barycentric, what);
+    first[0] = packed_vertex(vertex, what);
     first[1] = packed((*path).throughput, 0u);
     var pairs = 0u;
 //#if MAP_SAMPLING
@@ -36,15 +67,14 @@ fn meet_second(path: ptr<function, Path>, vertex: Vertex) -> bool {
     let shares = (first[0].w & IS_SHARED) != 0u
         && (*path).is_clear
         && (*path).departure_pdf_solid_angle < F32_MAX
-        && is_broad(vertex, LEAST_ALPHA)
-        && is_true_from(
-            vertex.point.shading_frame.z, vertex.point.geometric_normal, -(*path).ray.direction);
+        && is_alike_nearby(vertex)
+        && is_vertex_true_from(vertex, -(*path).ray.direction);
     if shares {
         var what = IS_FOUND | ((*path).sampler.pair << 8u);
 //#if COUNTING
         what |= select(0u, IS_COUNTED_SECOND, (*path).is_counted);
 //#end
-        second[0] = packed_hit(arrival.triangle, arrival.barycentric, what);
+        second[0] = packed_vertex(vertex, what);
         let carried = max_element((*path).throughput);
         second[1] = packed((*path).ray.direction, bitcast<u32>(carried));
     }

@@ -70,14 +70,14 @@ fn light_seconds(
     let pixel = member.place.y * globals.width + member.place.x;
     var sampler =
         sampler_new(globals.seed, pixel, globals.work.sample - globals.first_of_sequence);
-    sampler.pair = (hit.w >> 8u) + estimate * PAIRS_OF_ESTIMATE;
+    sampler.pair = pair_in(hit.w, 8u) + estimate * PAIRS_OF_ESTIMATE;
     var path = path_new(Ray(vec3f(0.0), direction, F32_MAX), sampler);
     path.bounces = 2u;
     path.throughput_before = bitcast<f32>(arrived.w);
 //#if COUNTING
     path.is_counted = (hit.w & IS_COUNTED_SECOND) != 0u;
 //#end
-    let vertex = vertex_at(hit, direction);
+    let vertex = vertex_at(&path, hit, direction);
     var put_at = at + 2u + 2u * INCIDENTS * estimate;
 //#if MAP_SAMPLING
     let map_shadow = unscattered_shadow(&path, vertex, light_of_map(&path, vertex), true);

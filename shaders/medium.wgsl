@@ -81,3 +81,21 @@ fn fog_stretch(origin: vec3f, direction: vec3f, distance: f32) -> Stretch {
         Interior(globals.fog_scattering, globals.fog_mean_cosine, globals.fog_extinction);
     return Stretch(interior, start, end);
 }
+
+// A straight way, as one of those that `fly_through` chooses from: what is left at its end, and how likely
+// it is.
+struct Crossing {
+    weight: vec3f,
+    density: f32,
+}
+
+// Twin of `Interior::crossing`.
+fn crossing(interior: Interior, throughput: vec3f, distance: f32, is_scattered: bool) -> Crossing {
+    let left = exp(-interior.extinction * distance);
+    let choice = throughput / (throughput.x + throughput.y + throughput.z);
+    if is_scattered {
+        return Crossing(interior.scattering * left, dot(choice, interior.extinction * left));
+    }
+    let scatters = any(interior.scattering != vec3f(0.0));
+    return Crossing(left, select(1.0, dot(choice, left), scatters));
+}

@@ -334,6 +334,10 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
 //#if EMITTERS
         (*path).departure_receiver = receiver_of(vertex);
 //#end
+//#if SHARING
+        (*path).departure_map_samples = (*path).map_samples;
+        (*path).map_samples = 1.0;
+//#end
         (*path).ray = Ray(vertex.point.position, turned_, F32_MAX);
         return true;
     }

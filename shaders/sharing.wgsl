@@ -46,6 +46,11 @@ fn lane_member(group: u32, lane: u32) -> Member {
 // path; the radiance that path brought back on its own. Then what the surface looks like.
 const IS_SHARED = 1u;
 const IS_COUNTED_FIRST = 2u;
+//#if MEDIUM
+// Of first and second vertices alike: one in fog, of which the position is kept in place of triangle and
+// barycentric coordinates.
+const IS_IN_MEDIUM = 0x80000000u;
+//#end
 //#if LAYERS
 const FIRST_TEXELS = 5u;
 //#else
@@ -87,8 +92,31 @@ fn packed_hit(triangle: u32, barycentric: vec2f, what: u32) -> vec4u {
     return vec4u(triangle, bitcast<vec2u>(barycentric), what);
 }
 
-// The vertex at a point of a triangle that a ray along `direction` has hit.
-fn vertex_at(hit: vec4u, direction: vec3f) -> Vertex {
+// Whether a vertex that is kept so lies in fog.
+fn is_kept_in_medium(what: u32) -> bool {
+//#if MEDIUM
+    return (what & IS_IN_MEDIUM) != 0u;
+//#else
+    return false;
+//#end
+}
+
+// What comes with a vertex that is kept: the number of its next random numbers.
+fn pair_in(what: u32, shift: u32) -> u32 {
+//#if MEDIUM
+    return (what & ~IS_IN_MEDIUM) >> shift;
+//#else
+    return what >> shift;
+//#end
+}
+
+// The vertex where a ray along `direction` has hit a triangle or was scattered in fog.
+fn vertex_at(path: ptr<function, Path>, hit: vec4u, direction: vec3f) -> Vertex {
+//#if MEDIUM
+    if is_kept_in_medium(hit.w) {
+        return medium_vertex(path, float3(hit), globals.fog_mean_cosine);
+    }
+//#end
     var vertex: Vertex;
     vertex.point = surface_at(hit.x, bitcast<vec2f>(hit.yz), direction);
     vertex.bsdf = bsdf_new(vertex.point.parameters, vertex.point.front_face);

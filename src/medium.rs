@@ -79,6 +79,34 @@ impl Interior {
         };
         Flight { scattered_at: scatters.then_some(distance), weight }
     }
+
+    /// The first `distance` metres of the way of a ray that carries `throughput`, which may not be black: to
+    /// where it is scattered, or else to where the medium ends. In a medium that scatters nothing all rays
+    /// come through.
+    pub fn crossing(&self, throughput: Vec3, distance: f32, is_scattered: bool) -> Crossing {
+        let left = self.transmittance(distance);
+        let choice = throughput / throughput.element_sum();
+        if is_scattered {
+            let density = choice.dot(self.extinction * left);
+            return Crossing { weight: self.scattering * left, density };
+        }
+        Crossing { weight: left, density: if self.scatters() { choice.dot(left) } else { 1.0 } }
+    }
+}
+
+/// A straight way, as one of those that [`Interior::fly`] chooses from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// Share of light that is left at its end; if that lies in the medium, times what is scattered there, per
+    /// metre.
+    pub weight: Vec3,
+    /// Probability that light comes to its end or, per metre, is scattered there.
+    pub density: f32,
+}
+
+impl Crossing {
+    /// Through clear air.
+    pub const CLEAR: Self = Self { weight: Vec3::ONE, density: 1.0 };
 }
 
 /// What happened to light on its way through a medium.
@@ -208,6 +236,34 @@ mod tests {
         assert_eq!(at([-3.0, 0.0, 0.0], [-1.0, 0.0, 0.0], 9.0), None);
         assert_eq!(at([0.5, 0.0, 0.0], [0.0, 0.0, -1.0], 9.0), Some((0.0, 1.0)));
         assert_eq!(at([0.0, 1.5, 0.0], [0.0, 0.0, -1.0], 9.0), None);
+    }
+
+    #[test]
+    fn crossings_have_the_weights_and_densities_of_flights() {
+        let extinction = Vec3::new(0.25, 1.0, 0.5);
+        let scattering = extinction * Vec3::new(0.9, 0.5, 1.0);
+        let interior = Interior { scattering, extinction, phase: Phase::default() };
+        let throughput = Vec3::new(1.0, 0.5, 0.8);
+        let mut sampler = crate::sampler::Sampler::new(3, 9, 0);
+        for _ in 0..100 {
+            let flight = interior.fly(throughput, 2.0, sampler.next_pair_bits());
+            let (distance, is_scattered) =
+                flight.scattered_at.map_or((2.0, false), |distance| (distance, true));
+            let crossing = interior.crossing(throughput, distance, is_scattered);
+            let weight = crossing.weight / crossing.density;
+            assert!((weight - flight.weight).abs().max_element() < 1e-5, "{flight:?} {crossing:?}");
+        }
+        // Light is scattered somewhere or comes through.
+        const STEPS: u32 = 10_000;
+        let density = |i: u32| {
+            interior.crossing(throughput, (i as f32 + 0.5) * 2.0 / STEPS as f32, true).density
+        };
+        let scattered =
+            (0..STEPS).map(density).map(f64::from).sum::<f64>() * 2.0 / f64::from(STEPS);
+        let through = f64::from(interior.crossing(throughput, 2.0, false).density);
+        assert!((scattered + through - 1.0).abs() < 1e-5, "{scattered} {through}");
+        let absorbing = Interior { scattering: Vec3::ZERO, ..interior };
+        assert_eq!(absorbing.crossing(throughput, 2.0, false).density, 1.0);
     }
 
     #[test]

@@ -54,11 +54,12 @@ struct Scale<T> {
 /// The film's picture, whole from the first samples on; `under` is a film of the same view, of any
 /// size, whose samples count as well, each as much as so many of the film's own.
 pub fn blend(film: &Film, under: Option<(&Film, f32)>) -> Image {
-    let scales = scales(film, under);
+    let mut scales = scales(film, under);
     let mut coarser: Option<(Scale<Guide>, Scale<Filtered>)> = None;
-    for (number, cells) in scales.iter().enumerate().rev() {
+    // What was used goes: together they are larger than the film.
+    while let Some(cells) = scales.pop() {
         let guides = cells.guides();
-        let estimates = refined(cells, &guides, coarser.as_ref(), number);
+        let estimates = refined(&cells, &guides, coarser.as_ref(), scales.len());
         coarser = Some((guides, estimates));
     }
     let finest = coarser.map_or_else(Vec::new, |(_, finest)| finest.cells);
@@ -221,23 +222,15 @@ fn refined(
         estimate
     };
     let estimates = (0..width * height).into_par_iter().map(expected).collect();
-    let estimates = Scale { width, height, cells: estimates };
-    if coarser.is_none() {
-        return estimates;
+    let mut estimates = Scale { width, height, cells: estimates };
+    if coarser.is_some() {
+        let share = |i| wieners_share(&estimates, (i % width, i / width));
+        let shares: Vec<f32> = (0..width * height).into_par_iter().map(share).collect();
+        let take =
+            |(estimate, share): (&mut Filtered, f32)| estimate.light += estimate.detail * share;
+        estimates.cells.par_iter_mut().zip(shares).for_each(take);
     }
-    let cells = estimates
-        .cells
-        .par_iter()
-        .enumerate()
-        .map(|(i, estimate)| {
-            if estimate.detail == Vec3::ZERO {
-                return *estimate;
-            }
-            let share = wieners_share(&estimates, (i % width, i / width), estimate.variance);
-            Filtered { light: estimate.light + estimate.detail * share, ..*estimate }
-        })
-        .collect();
-    Scale { width, height, cells }
+    estimates
 }
 
 /// What the four nearest cells of the coarser scale say of a cell.
@@ -276,19 +269,23 @@ fn from_parents(
 
 /// The energy of the details around a cell over that and the noise's. The strongest one does not
 /// count: a lone bright sample is no detail.
-fn wieners_share(estimates: &Scale<Filtered>, (x, y): (usize, usize), variance: f32) -> f32 {
+fn wieners_share(estimates: &Scale<Filtered>, (x, y): (usize, usize)) -> f32 {
+    let own = estimates.at(x as isize, y as isize);
+    if own.detail == Vec3::ZERO {
+        return 0.0;
+    }
     let (mut energy, mut noise, mut strongest) = (0.0, 0.0, 0.0_f32);
     for row in y.saturating_sub(1)..(y + 2).min(estimates.height) {
         let row = &estimates.cells[row * estimates.width..][..estimates.width];
         for near in &row[x.saturating_sub(1)..(x + 2).min(estimates.width)] {
-            let own = luminance(near.detail).powi(2);
-            energy += own;
+            let detail = luminance(near.detail).powi(2);
+            energy += detail;
             noise += near.variance;
-            strongest = strongest.max(own);
+            strongest = strongest.max(detail);
         }
     }
     let signal = (energy - strongest - noise).max(0.0) / 8.0;
-    if signal > 0.0 { signal / (signal + variance) } else { 0.0 }
+    if signal > 0.0 { signal / (signal + own.variance) } else { 0.0 }
 }
 
 #[cfg(test)]

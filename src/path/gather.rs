@@ -82,7 +82,7 @@ impl Path<'_> {
     ) -> Option<Arriving> {
         let sample = self.tracer.environment.finish_sample(search)?;
         let pdf = choice.probability * sample.pdf_solid_angle;
-        let Some((f, own_pdf)) = self.scattered(vertex, sample.direction) else {
+        let Some((f, own_pdf)) = vertex.scatterer.scattered(sample.direction) else {
             self.count(vertex, choice.tile, 0.0);
             return None;
         };
@@ -105,7 +105,7 @@ impl Path<'_> {
     fn light_of_lamps(&mut self, vertex: &Vertex<'_>, bits: [u32; 2]) -> Option<Arriving> {
         let world = self.tracer.world;
         let sample = world.lights.sample(&world.scene, &vertex.receiver(), bits)?;
-        let (f, own_pdf) = self.scattered(vertex, sample.direction)?;
+        let (f, own_pdf) = vertex.scatterer.scattered(sample.direction)?;
         let transmittance = self.transmittance(vertex, sample.direction, sample.distance);
         if transmittance == Vec3::ZERO {
             return None;

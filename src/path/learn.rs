@@ -83,7 +83,7 @@ impl Path<'_> {
         self.expect_count(vertex, choice.tile);
         let u = [choice.remainder, bits[1]];
         let Some(sample) = self.tracer.environment.sample_in_tile(choice.tile, u) else { return };
-        let weight = match self.scattered(vertex, sample.direction) {
+        let weight = match vertex.scatterer.scattered(sample.direction) {
             None => 0.0,
             Some((f, own_pdf)) => {
                 let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);

@@ -36,7 +36,7 @@ pub use world::World;
 pub use world_builder::WorldBuilder;
 
 use self::body::Body;
-use self::vertex::{Onward, Scatterer, SurfaceScatterer, Vertex};
+use self::vertex::{MediumScatterer, Onward, Scatterer, SurfaceScatterer, Vertex};
 use crate::bsdf::{Bsdf, Hero};
 use crate::bvh::{Hit, Ray, offset_origin};
 use crate::environment::Environment;
@@ -300,7 +300,8 @@ impl<'a> Path<'a> {
         let cells = self.tracer.cells().filter(|_| self.is_in_air());
         let cell = cells.map(|cells| cells.cell_in_medium(position));
         let distribution = self.tracer.distribution(cell);
-        Some(Vertex { position, cell, distribution, scatterer: Scatterer::Medium(interior.phase) })
+        let medium = MediumScatterer { phase: interior.phase, travel: direction };
+        Some(Vertex { position, cell, distribution, scatterer: Scatterer::Medium(medium) })
     }
 
     /// Decides whether the ray goes straight through the surface, and weighs the path accordingly.
@@ -411,28 +412,14 @@ impl<'a> Path<'a> {
         self.radiance += self.throughput * radiance * balance_heuristic(from.pdf_solid_angle, nee);
     }
 
-    /// What share of light from `direction` goes on along the path, and the density with which
-    /// [`Self::scatter`] chooses that direction; `None` if it is no light.
-    fn scattered(&self, vertex: &Vertex<'_>, direction: Vec3) -> Option<(Vec3, f32)> {
-        match &vertex.scatterer {
-            Scatterer::Surface(surface) => surface.scattered(direction),
-            Scatterer::Medium(phase) => {
-                let density = phase.pdf_solid_angle(self.ray.direction.dot(direction));
-                Some((Vec3::splat(density), density))
-            }
-        }
-    }
-
     /// Share of light that arrives at a vertex from `distance` metres away.
     fn transmittance(&mut self, vertex: &Vertex<'_>, direction: Vec3, distance: f32) -> Vec3 {
-        let (origin, body) = match &vertex.scatterer {
-            Scatterer::Surface(surface) => {
-                let behind = surface.behind.filter(|_| !surface.is_above(direction));
-                let body = behind.copied().unwrap_or(self.body);
-                (surface.origin_toward(vertex.position, direction), body)
-            }
-            Scatterer::Medium(_) => (vertex.position, self.body),
+        let behind = match &vertex.scatterer {
+            Scatterer::Surface(surface) => surface.behind.filter(|_| !surface.is_above(direction)),
+            Scatterer::Medium(_) => None,
         };
+        let body = behind.copied().unwrap_or(self.body);
+        let origin = vertex.scatterer.origin_toward(vertex.position, direction);
         let stretch = body.stretch(self.tracer.fog.as_ref(), origin, direction, distance);
         let left =
             stretch.map_or(Vec3::ONE, |(interior, from, to)| interior.transmittance(to - from));
@@ -458,12 +445,7 @@ impl<'a> Path<'a> {
                 let [x, y] = self.sampler.next_pair();
                 surface.onward(Vec3::new(lobe, x, y))
             }
-            Scatterer::Medium(phase) => {
-                let u = Vec2::from(self.sampler.next_pair());
-                let direction = phase.sample(self.ray.direction, u).normalize();
-                let pdf_solid_angle = phase.pdf_solid_angle(self.ray.direction.dot(direction));
-                Some(Onward { direction, weight: Vec3::ONE, pdf_solid_angle, is_through: false })
-            }
+            Scatterer::Medium(medium) => Some(medium.onward(Vec2::from(self.sampler.next_pair()))),
         }
     }
 
@@ -473,15 +455,12 @@ impl<'a> Path<'a> {
         if self.throughput.max_element() <= 0.0 || !self.throughput.is_finite() {
             return false;
         }
-        let origin = match &vertex.scatterer {
-            Scatterer::Surface(surface) => {
-                if onward.is_through {
-                    self.body = surface.behind.copied().unwrap_or(self.body);
-                }
-                surface.origin_toward(vertex.position, onward.direction)
-            }
-            Scatterer::Medium(_) => vertex.position,
-        };
+        if onward.is_through
+            && let Scatterer::Surface(surface) = &vertex.scatterer
+        {
+            self.body = surface.behind.copied().unwrap_or(self.body);
+        }
+        let origin = vertex.scatterer.origin_toward(vertex.position, onward.direction);
         self.depart(vertex, origin, onward.direction, onward.pdf_solid_angle);
         true
     }

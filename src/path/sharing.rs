@@ -6,7 +6,8 @@
 //! *Accelerating Path Tracing by Re-Using Paths*, EGRW 2002).
 //!
 //! A second vertex y is drawn by pixel k with the density `q_k p_k(y) V_k(y)`: the probability that the
-//! pixel keeps its own, the density per area of its BSDF, and whether nothing is in the way. All pixels
+//! pixel keeps its own, the density per area of its BSDF, and whether nothing is in the way; in fog, with
+//! the density of flying so far, per volume if y lies in the fog ([`Crossing`]). All pixels
 //! are weighted by the sum of that over the tile, so each gets the integral it would get alone. That
 //! holds if it depends on x_k, the lobe, the segment and y alone whether a pair takes part, the same for
 //! all pixels; whatever does not goes on as a path of its own.
@@ -20,6 +21,7 @@ use super::vertex::{Scatterer, SurfaceScatterer, Vertex};
 use super::{Path, PathResult, PathTracer};
 use crate::bsdf::Bsdf;
 use crate::bvh::{Ray, offset_origin};
+use crate::medium::{Crossing, Phase};
 use crate::sampler::{Sampler, hash};
 
 /// How the pixels of a tile share.
@@ -82,8 +84,7 @@ pub(crate) const PAIRS_OF_ESTIMATE: u32 = 1 << 24;
 
 /// A first vertex that other pixels' second vertices are connected with.
 struct First<'v> {
-    position: Vec3,
-    surface: SurfaceScatterer<'v>,
+    vertex: Vertex<'v>,
     throughput: Vec3,
 }
 
@@ -97,7 +98,7 @@ struct Second<'a, 'v> {
 
 /// Radiance that arrives at a second vertex, divided by its density.
 struct Incident {
-    /// Unit, in the shading frame.
+    /// Unit, in the shading frame of a surface, else in the world.
     wi: Vec3,
     light: Vec3,
 }
@@ -106,11 +107,12 @@ struct Incident {
 enum Outgoing<'v> {
     /// The same everywhere.
     Lambert(Vec3),
-    Directed(&'v Bsdf, Vec<Incident>),
+    Directed(&'v SurfaceScatterer<'v>, Vec<Incident>),
+    InMedium(Phase, Vec<Incident>),
 }
 
 /// One sample of each pixel of a tile, in the order of `starts`. `seed` chooses whose second vertices
-/// are kept. There must be no fog.
+/// are kept.
 pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Vec<PathResult> {
     let mut bsdfs: Vec<[Option<Bsdf>; 2]> = Vec::new();
     bsdfs.resize_with(starts.len(), Default::default);
@@ -137,7 +139,7 @@ pub fn radiance_of_tile(tile: SharedTile, seed: u32, starts: &[Start<'_>]) -> Ve
                     seconds.push(Second { owner, vertex: second, path: path.clone() });
                 }
             }
-            first = First::new(vertex, throughput).filter(|_| shares);
+            first = shares.then_some(First { vertex, throughput });
         }
         results.push(path.result());
         firsts.push(first);
@@ -212,30 +214,32 @@ impl SharedTile {
     }
 }
 
-impl<'v> First<'v> {
-    /// `None` of a vertex in a medium.
-    fn new(vertex: Vertex<'v>, throughput: Vec3) -> Option<Self> {
-        let Scatterer::Surface(surface) = vertex.scatterer else { return None };
-        Some(Self { position: vertex.position, surface, throughput })
-    }
-}
-
 impl Scatterer<'_> {
     /// Whether it scatters much the same to and from places side by side.
     fn is_alike_nearby(&self) -> bool {
-        matches!(self, Self::Surface(surface) if surface.is_broad(LEAST_ALPHA))
+        match self {
+            Self::Surface(surface) => surface.is_broad(LEAST_ALPHA),
+            Self::Medium(_) => true,
+        }
+    }
+
+    /// Whether a viewer in this direction sees it as all do.
+    fn is_true_from(&self, to_viewer: Vec3) -> bool {
+        match self {
+            Self::Surface(surface) => surface.is_true_from(to_viewer),
+            Self::Medium(_) => true,
+        }
     }
 }
 
 impl Path<'_> {
     /// Whether the vertex that the path has arrived at is found by other pixels in the same way.
     fn is_found_alike(&self, vertex: &Vertex<'_>) -> bool {
-        let Scatterer::Surface(surface) = &vertex.scatterer else { return false };
         self.is_clear
             && self.departure.pdf_solid_angle.is_finite()
             && self.bounces < self.tracer.limits.bounces
             && vertex.scatterer.is_alike_nearby()
-            && surface.is_true_from(-self.ray.direction)
+            && vertex.scatterer.is_true_from(-self.ray.direction)
     }
 }
 
@@ -272,47 +276,65 @@ impl Second<'_, '_> {
         connections: &mut Vec<Connection>,
         results: &mut [PathResult],
     ) {
-        let Scatterer::Surface(surface) = &self.vertex.scatterer else { return };
-        let incident = self.path.incident(&self.vertex, surface, tile.continuations);
+        let scatterer = &self.vertex.scatterer;
+        let incident = self.path.incident(&self.vertex, tile.continuations);
         results[self.owner].rays += self.path.rays;
-        let outgoing = Outgoing::new(surface, incident);
+        let outgoing = Outgoing::new(scatterer, incident);
+        let tracer = self.path.tracer;
 
         connections.clear();
-        let normal = surface.geometric_normal;
-        let target = offset_origin(self.vertex.position, normal);
+        let position = self.vertex.position;
+        let target = match scatterer {
+            Scatterer::Surface(surface) => offset_origin(position, surface.geometric_normal),
+            Scatterer::Medium(_) => position,
+        };
         let mut density = 0.0;
         for (pixel, first) in firsts.iter().enumerate() {
             let Some(first) = first else { continue };
-            let to_second = self.vertex.position - first.position;
+            let to_second = position - first.vertex.position;
             let squared = to_second.length_squared();
             let direction = to_second / squared.sqrt();
-            let cosine = -normal.dot(direction);
+            let cosine = match scatterer {
+                Scatterer::Surface(surface) => -surface.geometric_normal.dot(direction),
+                Scatterer::Medium(_) => 1.0,
+            };
             if !(cosine > 0.0 && squared > 0.0) {
                 continue;
             }
-            let Some((f, pdf_solid_angle)) = first.surface.scattered(direction) else { continue };
+            let scattered = first.vertex.scatterer.scattered(direction);
+            let Some((f, pdf_solid_angle)) = scattered else { continue };
+            let carried = first.throughput * f;
+            if carried.max_element() <= 0.0 {
+                continue;
+            }
             if pixel != self.owner {
-                if !surface.is_true_from(-direction) {
+                if !scatterer.is_true_from(-direction) {
                     continue;
                 }
                 results[pixel].rays += 1;
-                if !first.sees(target, direction, self.path.tracer) {
+                if !first.sees(target, direction, tracer) {
                     continue;
                 }
             }
+            let is_in_medium = matches!(scatterer, Scatterer::Medium(_));
+            let crossing = tracer.fog.as_ref().map_or(Crossing::CLEAR, |fog| {
+                let stretch = fog.stretch(first.vertex.position, direction, squared.sqrt());
+                let length = stretch.map_or(0.0, |(from, to)| to - from);
+                fog.interior.crossing(carried, length, is_in_medium)
+            });
             let area = cosine / squared;
-            density += tile.owner_probability() * pdf_solid_angle * area;
+            density += tile.owner_probability() * pdf_solid_angle * area * crossing.density;
             connections.push(Connection {
                 pixel,
                 direction: -direction,
-                weight: first.throughput * f * area,
+                weight: carried * area * crossing.weight,
             });
         }
         if density <= 0.0 {
             return;
         }
         for connection in connections.iter() {
-            let radiance = outgoing.radiance(surface, connection.direction);
+            let radiance = outgoing.radiance(connection.direction);
             results[connection.pixel].add(connection.weight * radiance / density);
         }
     }
@@ -321,7 +343,7 @@ impl Second<'_, '_> {
 impl First<'_> {
     /// Whether nothing at all is between this vertex and `target`, in about this direction.
     fn sees(&self, target: Vec3, direction: Vec3, tracer: &PathTracer<'_>) -> bool {
-        let origin = self.surface.origin_toward(self.position, direction);
+        let origin = self.vertex.scatterer.origin_toward(self.vertex.position, direction);
         let way = target - origin;
         let distance = way.length();
         let t_max = distance * (1.0 - 1e-4);
@@ -331,10 +353,14 @@ impl First<'_> {
 }
 
 impl<'v> Outgoing<'v> {
-    fn new(surface: &SurfaceScatterer<'v>, incident: Vec<Incident>) -> Self {
+    fn new(scatterer: &'v Scatterer<'v>, incident: Vec<Incident>) -> Self {
+        let surface = match scatterer {
+            Scatterer::Medium(medium) => return Self::InMedium(medium.phase, incident),
+            Scatterer::Surface(surface) => surface,
+        };
         let bsdf = surface.bsdf();
         if !bsdf.is_lambert() {
-            return Self::Directed(bsdf, incident);
+            return Self::Directed(surface, incident);
         }
         let upward = bsdf.viewed_from(Vec3::Z);
         let reflected = |i: &Incident| upward.eval(i.wi) * i.light;
@@ -342,13 +368,17 @@ impl<'v> Outgoing<'v> {
     }
 
     /// Radiance towards a world direction.
-    fn radiance(&self, surface: &SurfaceScatterer<'_>, direction: Vec3) -> Vec3 {
+    fn radiance(&self, direction: Vec3) -> Vec3 {
         match self {
             Self::Lambert(radiance) => *radiance,
-            Self::Directed(bsdf, incident) => {
+            Self::Directed(surface, incident) => {
                 let wo = surface.shading_frame.local_from_world(direction);
-                let viewed = bsdf.viewed_from(wo);
+                let viewed = surface.bsdf().viewed_from(wo);
                 incident.iter().map(|i| viewed.eval(i.wi) * i.light).sum()
+            }
+            Self::InMedium(phase, incident) => {
+                let turned = |i: &Incident| phase.pdf_solid_angle(-i.wi.dot(direction));
+                incident.iter().map(|i| turned(i) * i.light).sum()
             }
         }
     }
@@ -357,17 +387,17 @@ impl<'v> Outgoing<'v> {
 impl Path<'_> {
     /// Estimates what arrives at the vertex, `times` times over. Its perfect reflections, which no other
     /// pixel sees, are none.
-    fn incident(
-        &mut self,
-        vertex: &Vertex<'_>,
-        surface: &SurfaceScatterer<'_>,
-        times: u32,
-    ) -> Vec<Incident> {
+    fn incident(&mut self, vertex: &Vertex<'_>, times: u32) -> Vec<Incident> {
         let share = 1.0 / times as f32;
         let mut incident = Vec::with_capacity(3 * times as usize);
         let mut add = |direction: Vec3, light: Vec3| {
-            let wi = surface.shading_frame.local_from_world(direction);
-            let agrees = (wi.z > 0.0) == surface.is_above(direction);
+            let (wi, agrees) = match &vertex.scatterer {
+                Scatterer::Surface(surface) => {
+                    let wi = surface.shading_frame.local_from_world(direction);
+                    (wi, (wi.z > 0.0) == surface.is_above(direction))
+                }
+                Scatterer::Medium(_) => (direction, true),
+            };
             if agrees && light != Vec3::ZERO {
                 incident.push(Incident { wi, light });
             }

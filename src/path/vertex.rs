@@ -1,6 +1,6 @@
 //! Places at which paths scatter light.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::body::Body;
 use super::light_tree::Receiver;
@@ -33,7 +33,14 @@ impl Vertex<'_> {
 /// What scatters light at a vertex.
 pub(super) enum Scatterer<'v> {
     Surface(SurfaceScatterer<'v>),
-    Medium(Phase),
+    Medium(MediumScatterer),
+}
+
+#[derive(Clone, Copy)]
+pub(super) struct MediumScatterer {
+    pub(super) phase: Phase,
+    /// In which direction the path came, unit.
+    pub(super) travel: Vec3,
 }
 
 pub(super) struct SurfaceScatterer<'v> {
@@ -54,6 +61,39 @@ impl Scatterer<'_> {
             Self::Surface(surface) => surface.bsdf().is_delta_only(),
             Self::Medium(_) => false,
         }
+    }
+
+    /// What share of light from `direction` goes on along the path, and the density with which
+    /// [`Self::onward`] chooses that direction; `None` if it is no light.
+    pub(super) fn scattered(&self, direction: Vec3) -> Option<(Vec3, f32)> {
+        match self {
+            Self::Surface(surface) => surface.scattered(direction),
+            Self::Medium(medium) => {
+                let density = medium.pdf_solid_angle(direction);
+                Some((Vec3::splat(density), density))
+            }
+        }
+    }
+
+    /// Where a ray from `position` in this direction begins.
+    pub(super) fn origin_toward(&self, position: Vec3, direction: Vec3) -> Vec3 {
+        match self {
+            Self::Surface(surface) => surface.origin_toward(position, direction),
+            Self::Medium(_) => position,
+        }
+    }
+}
+
+impl MediumScatterer {
+    /// Where a path goes on by two uniform numbers.
+    pub(super) fn onward(&self, u: Vec2) -> Onward {
+        let direction = self.phase.sample(self.travel, u).normalize();
+        let pdf_solid_angle = self.pdf_solid_angle(direction);
+        Onward { direction, weight: Vec3::ONE, pdf_solid_angle, is_through: false }
+    }
+
+    fn pdf_solid_angle(&self, direction: Vec3) -> f32 {
+        self.phase.pdf_solid_angle(self.travel.dot(direction))
     }
 }
 

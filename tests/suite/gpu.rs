@@ -304,6 +304,7 @@ fn pixels_share_the_same_vertices() {
     for (name, map, sampling, sharing) in [
         ("evening", "sunset", Sampling::Adaptive, Sharing::Large),
         ("exterior", "overcast", Sampling::Plain, Sharing::Small),
+        ("fog", "sunset", Sampling::Adaptive, Sharing::Small),
     ] {
         let world = World::new(builtin::build(name).expect("built in"));
         let environment = sky_map(map);

@@ -9,7 +9,7 @@ use lightgrid::path::{PathLimits, World};
 use lightgrid::render::film::Film;
 use lightgrid::render::{Sampling, Sharing, View};
 use lightgrid::sampler::{hash, unit_from_bits};
-use lightgrid::scene::{AlphaMode, Camera, Material, Scene, builtin};
+use lightgrid::scene::{AlphaMode, Camera, Material, Medium, Scene, builtin};
 use rayon::prelude::*;
 
 use super::scenes::{black, blended, lambert, lamp, pane, room};
@@ -162,10 +162,35 @@ fn with_a_lamp_and_wires() {
 }
 
 #[test]
+fn in_fog_of_all_kinds() {
+    let (world, camera) = room(0.7, None);
+    let below = Some([Vec3::splat(-9.0), Vec3::new(9.0, 1.3, 9.0)]);
+    let haze = Medium { scattering: Vec3::splat(0.3), anisotropy: 0.6, ..Medium::default() };
+    let smoke = Medium {
+        scattering: Vec3::ZERO,
+        absorption: Vec3::new(0.1, 0.3, 0.9),
+        ..Medium::default()
+    };
+    let coloured = Medium {
+        scattering: Vec3::new(0.1, 0.4, 1.2),
+        absorption: Vec3::new(0.3, 0.0, 0.1),
+        anisotropy: -0.4,
+        bounds: below,
+    };
+    for (what, medium) in [("haze", haze), ("smoke", smoke), ("coloured, below", coloured)] {
+        let world = changed(&world, |scene| scene.medium = Some(medium));
+        expect_unbiased(what, &world, &overcast(), &camera, 0.01);
+    }
+}
+
+#[test]
 fn in_scenes_of_all_kinds() {
-    for (name, map) in
-        [("materials", "overcast"), ("living-room", "overcast"), ("exterior", "sunset")]
-    {
+    for (name, map) in [
+        ("materials", "overcast"),
+        ("living-room", "overcast"),
+        ("exterior", "sunset"),
+        ("fog", "day"),
+    ] {
         let world = World::new(builtin::build(name).expect("a scene"));
         let map = sky::build(map, 256, 128).expect("a sky");
         let map = Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");

@@ -62,6 +62,30 @@ pub(super) fn probes(fixture: &Fixture) -> Vec<Probe<'_>> {
         )
         .flips(1000),
         Probe::new(
+            "crossing",
+            "let extinction = take3(); let scattering = extinction * take();
+            let way = crossing(Interior(scattering, 0.0, extinction), take3(), take(), take() > 0.5);
+            put3(way.weight); put(way.density);",
+            cases([], |r| {
+                let extinction = r.unit3() * r.magnitude(1e-6, 1e2);
+                let albedo = [0.0, 0.7][r.word() as usize % 2];
+                let throughput = r.unit3() + Vec3::splat(1e-3);
+                let (distance, is_scattered) = (r.magnitude(1e-3, 1e2), r.unit());
+                case(&[&extinction, &albedo, &throughput, &distance, &is_scattered])
+            }),
+            |t| {
+                let extinction = t.take3();
+                let scattering = extinction * t.take();
+                let interior = Interior { scattering, extinction, phase: Phase::new(0.0) };
+                let (throughput, distance) = (t.take3(), t.take());
+                let way = interior.crossing(throughput, distance, t.take() > 0.5);
+                let depth = extinction.max_element() * distance;
+                let largest = way.weight.max_element().max(way.density);
+                t.near(way.weight, ulps(32.0 + 8.0 * depth).of(largest));
+                t.near(way.density, ulps(32.0 + 8.0 * depth).of(largest));
+            },
+        ),
+        Probe::new(
             "sample_phase, phase_pdf_solid_angle",
             "let g = take(); let direction = take3(); let to = sample_phase(g, direction, take2());
             put3(to); put(phase_pdf_solid_angle(g, dot(direction, to)));",
