@@ -63,6 +63,9 @@ impl Order {
 /// cores, it takes a twentieth of the machine.
 const REST: u32 = 9;
 
+/// No picture takes longer to be made ready.
+const LONGEST: Duration = Duration::from_secs(60);
+
 /// Memory that was freed is given back so often, while pictures come: old ones, and their scenes, are gone then.
 const RETURN: Duration = Duration::from_secs(10);
 
@@ -209,11 +212,14 @@ fn run(shared: &Shared) {
             }
         };
         let (start, kept) = (Instant::now(), order.clone());
+        order.snapshot.rest.set_end(start + LONGEST);
         // Where the device is lost, the window orders again on another.
         if let Ok(shown) = memory.present(order) {
             *lock(&shared.shown) = Some(Arc::new(shown));
         }
-        last = Some((kept, Instant::now() + REST * start.elapsed()));
+        let end = Instant::now() + REST * start.elapsed();
+        kept.snapshot.rest.set_end(end);
+        last = Some((kept, end));
         (shared.wake)();
         if returned.elapsed() > RETURN {
             memory::return_freed();

@@ -60,7 +60,7 @@ fn phase(ui: &mut Ui, status: &Status<'_>) {
     match snapshot.activity {
         Activity::Moving => word(ui, "Moving", theme::SECOND, "A small picture while it moves"),
         Activity::Learning(share) => {
-            let learning = &snapshot.main.figures;
+            let learning = &snapshot.now;
             let all = snapshot.request.view.learning_paths;
             let text = format!(
                 "Learning {} / {} paths",
@@ -88,11 +88,11 @@ fn word(ui: &mut Ui, text: &str, color: Color32, hint: &str) {
 
 fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
     let session = &snapshot.main;
-    number(ui, &theme::samples(session.mean_samples()), "samples", "Mean samples per pixel");
+    number(ui, &theme::samples(snapshot.mean_samples()), "samples", "Mean samples per pixel");
     if !hides_clock {
-        let seconds = session.figures.elapsed_seconds() + snapshot.calm_seconds;
+        let seconds = snapshot.now.elapsed_seconds() + snapshot.calm_seconds;
         number(ui, &theme::clock(seconds), "", "Learning and rendering, fast light included");
-        let rate = session.figures.rays as f64 / session.figures.render_seconds.max(1e-9);
+        let rate = snapshot.now.rays as f64 / snapshot.now.render_seconds.max(1e-9);
         number(ui, &theme::figure(rate), "rays/s", "Rays, shadow rays included, while rendering");
     }
     if let Some(backdrop) = snapshot.backdrop.as_ref().filter(|backdrop| backdrop.is_cached) {

@@ -8,6 +8,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 mod device;
 mod job;
@@ -141,8 +142,9 @@ pub struct Point {
 pub struct SessionSnapshot {
     /// How the map was sampled.
     pub sampling: Sampling,
-    /// The sums. Where the window shows those on its own device in every frame, they are as they were
-    /// read last: at most a few seconds ago, and the last ones when nothing is rendered.
+    /// The sums. While the window shows those on its own device in every frame, or shows no newer ones for
+    /// now, they are as they were read last: at most a few seconds ago, and the last ones when nothing is
+    /// rendered.
     pub film: Arc<Film>,
     /// Fewest samples of any of its pixels.
     pub samples: u32,
@@ -176,6 +178,8 @@ pub struct Snapshot {
     pub activity: Activity,
     /// The picture.
     pub main: SessionSnapshot,
+    /// What has been done for it by now; its own figures are those of its film.
+    pub now: Figures,
     /// The plain picture of a split view.
     pub plain: Option<SessionSnapshot>,
     /// What learning counted, once it has ended.
@@ -186,6 +190,27 @@ pub struct Snapshot {
     pub backdrop: Option<Backdrop>,
     /// Seconds spent on a backdrop whose light comes from a radiance cache, which are none of `main`'s.
     pub calm_seconds: f64,
+    /// Whoever shows it says here when the next one will be wanted.
+    pub(super) rest: Arc<Rest>,
+}
+
+/// How long no newer picture will be shown: films are large, and none is copied for nothing.
+pub(super) struct Rest(Mutex<Instant>);
+
+impl Rest {
+    fn new() -> Self {
+        Self(Mutex::new(Instant::now()))
+    }
+
+    /// No newer picture will be shown before this.
+    pub(super) fn set_end(&self, end: Instant) {
+        *lock(&self.0) = end;
+    }
+
+    /// Whether it lasts for longer than this.
+    fn lasts(&self, time: Duration) -> bool {
+        *lock(&self.0) > Instant::now() + time
+    }
 }
 
 /// A film that is shown together with the picture's own, and never saved.
@@ -217,6 +242,11 @@ impl PartialEq for Backdrop {
 }
 
 impl Snapshot {
+    /// Samples a pixel of the picture by now, in the mean.
+    pub fn mean_samples(&self) -> f64 {
+        self.now.samples as f64 / self.main.film.pixels().len().max(1) as f64
+    }
+
     /// Whether the picture has its full size and every pixel a sample: it has not at first and while
     /// the camera moves.
     pub fn is_whole(&self) -> bool {
@@ -234,6 +264,7 @@ struct Shared {
     changed: Condvar,
     cancel: Arc<AtomicBool>,
     snapshot: Mutex<Option<Arc<Snapshot>>>,
+    rest: Arc<Rest>,
     is_preparing: AtomicBool,
     failures: Mutex<Vec<String>>,
     /// The device the window is drawn on.
@@ -279,6 +310,7 @@ impl Worker {
             changed: Condvar::new(),
             cancel: Arc::default(),
             snapshot: Mutex::default(),
+            rest: Arc::new(Rest::new()),
             is_preparing: AtomicBool::default(),
             failures: Mutex::default(),
             screen: Arc::new(Mutex::new(screen)),
@@ -393,5 +425,71 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: (Option<String>, Ray
             }
         });
         done = Some(job.into_request());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::{EnvironmentOptions, sky};
+    use crate::scene::builtin;
+
+    /// Waits until a snapshot is as it should be.
+    fn wait_for(worker: &Worker, is_right: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
+        let start = Instant::now();
+        loop {
+            if let Some(snapshot) = worker.snapshot().filter(|snapshot| is_right(snapshot)) {
+                return snapshot;
+            }
+            assert!(start.elapsed() < Duration::from_secs(120), "it never comes");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    #[test]
+    fn films_are_copied_when_they_are_wanted() {
+        let gpu = match Gpu::open(None) {
+            Ok(gpu) => gpu,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let world = World::new(builtin::build("open").expect("built in"));
+        let map = sky::build("overcast", 64, 32).expect("a sky");
+        let environment =
+            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let view = View::new(world.scene.cameras[0].clone(), [64, 48]);
+        let worker = Worker::start(Arc::new(|| ()), (None, RayChoice::default()), gpu)
+            .expect("threads can be had");
+        let request = Request {
+            world: Arc::new(world),
+            environment: Arc::new(environment),
+            view,
+            split: false,
+            moving: false,
+            previews: true,
+            device: DeviceChoice::Cpu,
+            is_calm: false,
+            rule: StopRule::default(),
+            is_frozen: false,
+            reference: None,
+            paused: false,
+            run: 0,
+        };
+        worker.submit(request.clone());
+        let first = wait_for(&worker, |snapshot| snapshot.main.samples > 1);
+        first.rest.set_end(Instant::now() + Duration::from_secs(600));
+        // One may have been under way.
+        let number = first.number + 1;
+        let resting = wait_for(&worker, |snapshot| snapshot.number > number);
+        let later = wait_for(&worker, |now| now.now.samples > 2 * resting.now.samples);
+        assert!(Arc::ptr_eq(&later.main.film, &resting.main.film), "nobody wants another");
+        assert_eq!(later.main.figures.samples, resting.main.figures.samples, "its own figures");
+        first.rest.set_end(Instant::now());
+        let awake = wait_for(&worker, |now| now.main.film.total_samples() >= later.now.samples);
+        assert_eq!(awake.main.figures.samples, awake.main.film.total_samples());
+        // Whoever pauses sees the last of it.
+        awake.rest.set_end(Instant::now() + Duration::from_secs(600));
+        worker.submit(Request { paused: true, ..request });
+        let last = wait_for(&worker, |snapshot| snapshot.activity == Activity::Paused);
+        assert_eq!(last.main.film.total_samples(), last.now.samples);
     }
 }

@@ -4,7 +4,7 @@ mod publishing;
 mod sessions;
 
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, PoisonError};
+use std::sync::{Arc, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use publishing::{Reading, calm_worth};
@@ -34,8 +34,10 @@ pub(super) struct Job<'a> {
     published: Instant,
     last: Option<(Activity, u64)>,
     publish_gap: Duration,
-    /// Films that the window shows in place, as they were read last; they go with the request.
-    readings: Vec<Reading>,
+    /// The films of the main and the plain picture, as they were read last; they go with the request.
+    readings: [Option<Reading>; 2],
+    /// Copies of films that somebody still has.
+    films: Vec<Weak<Film>>,
     /// The distributions published last, with what tells whether they are still those in use.
     distributions: Option<((usize, u64), Arc<LightGrid>)>,
     /// The calm film published last, of so many samples in all.
@@ -62,7 +64,8 @@ impl<'a> Job<'a> {
             published: Instant::now(),
             last: None,
             publish_gap: Duration::ZERO,
-            readings: Vec::new(),
+            readings: [None, None],
+            films: Vec::new(),
             distributions: None,
             calm_film: None,
             calm_seconds: 0.0,

@@ -14,6 +14,8 @@ use crate::render::{Figures, Session, View};
 
 /// A film that is shown in place is read back this seldom.
 const READING_GAP: Duration = Duration::from_millis(250);
+/// A film that is copied for being shown is replaced when it is so old, whoever still has others.
+const OLDEST: Duration = Duration::from_secs(2);
 /// Publishing may take at most about one part in this of the time.
 const PUBLISH_SHARE: u32 = 40;
 /// But a picture that changes is shown at least so often.
@@ -22,11 +24,18 @@ const LONGEST_GAP: Duration = Duration::from_millis(800);
 /// falls no further.)
 const CALM_WORTH: f32 = 4.0;
 
-/// A film read back from the window's device, where it is shown in place meanwhile.
+/// Sessions by what they are for.
+const MAIN: usize = 0;
+const PLAIN: usize = 1;
+
+/// A film as it was copied, or read back from the window's device, last.
+#[derive(Clone)]
 pub(super) struct Reading {
-    of: (Gpu, DeviceFilm),
+    /// Where it is shown in place meanwhile.
+    of: Option<(Gpu, DeviceFilm)>,
     film: Arc<Film>,
-    /// Of the moment it was read, so that both belong together.
+    /// Of the moment it was read, so that all belong together.
+    samples: u32,
     figures: Figures,
     noise: f64,
     at: Instant,
@@ -75,25 +84,31 @@ impl Job<'_> {
         let start = Instant::now();
         self.kept.snapshots += 1;
         let is_final = matches!(activity, Activity::Paused | Activity::Done);
-        let (main_snapshot, main_cost) = self.session_snapshot(main, is_final);
-        let plain_snapshot = plain.map(|session| self.session_snapshot(session, is_final));
+        let rests = !is_final && (self.shared.rest.lasts(LONGEST_GAP) || self.is_ahead());
+        let (main_snapshot, main_cost) = self.session_snapshot(MAIN, main, is_final, rests);
+        let plain_snapshot =
+            plain.map(|session| self.session_snapshot(PLAIN, session, is_final, rests));
         let reading = main_cost + plain_snapshot.as_ref().map_or(Duration::ZERO, |(_, cost)| *cost);
         let snapshot = Snapshot {
             number: self.kept.snapshots,
             request: Arc::clone(&self.request),
             activity,
             main: main_snapshot,
+            now: main.figures(),
             plain: plain_snapshot.map(|(snapshot, _)| snapshot),
             counters: self.counters.clone(),
-            backdrop: self.shown_backdrop(main, calm),
+            backdrop: self.shown_backdrop(main, calm, rests),
             calm_seconds: self.calm_seconds,
             curves: self.curves.clone(),
+            rest: Arc::clone(&self.shared.rest),
         };
         *lock(&self.shared.snapshot) = Some(Arc::new(snapshot));
         (self.shared.wake)();
         self.published = Instant::now();
-        let cost = (self.published - start).saturating_sub(reading);
-        self.publish_gap = gap_after(cost);
+        if !rests {
+            let cost = (self.published - start).saturating_sub(reading);
+            self.publish_gap = gap_after(cost);
+        }
     }
 
     /// What is shown together with the session's own film: the calm one once it has clearly more to say
@@ -102,6 +117,7 @@ impl Job<'_> {
         &mut self,
         main: &Session<'_>,
         calm: Option<&Session<'_>>,
+        rests: bool,
     ) -> Option<Backdrop> {
         let before = self.backdrop().map(|film| Backdrop { film, worth: 1.0, is_cached: false });
         let seen = before.as_ref().map_or(0, |backdrop| backdrop.film.total_samples());
@@ -109,7 +125,7 @@ impl Job<'_> {
         let Some(calm) = calm.filter(says_more) else { return before };
         // It is megabytes and is soon complete.
         let samples = calm.figures().samples;
-        let kept = self.calm_film.take().filter(|(of, _)| *of == samples);
+        let kept = self.calm_film.take().filter(|(of, _)| rests || *of == samples);
         let kept = kept.unwrap_or_else(|| (samples, Arc::new(calm.film().clone())));
         let film = Arc::clone(&self.calm_film.insert(kept).1);
         Some(Backdrop { film, worth: calm_worth(main.samples()), is_cached: true })
@@ -137,38 +153,40 @@ impl Job<'_> {
     /// The session's picture, and what reading a film that is shown in place took of the time.
     fn session_snapshot(
         &mut self,
+        role: usize,
         session: &Session<'_>,
         is_final: bool,
+        rests: bool,
     ) -> (SessionSnapshot, Duration) {
-        let on_device = session.film_on_device();
         let in_place = self.in_place(session);
-        let kept = self.reading(in_place.as_ref()).filter(|_| !is_final);
-        let (film, figures, noise, cost) = match kept {
-            Some(reading) => {
-                (Arc::clone(&reading.film), reading.figures, reading.noise, Duration::ZERO)
-            }
+        let is_in_place = in_place.is_some();
+        let kept = self.reading(role, in_place.as_ref(), rests).filter(|_| !is_final).cloned();
+        let (reading, cost) = match kept {
+            Some(reading) => (reading, Duration::ZERO),
             None => {
                 let start = Instant::now();
                 let film = self.film_of(session);
                 let (noise, figures) = (session.noise(), session.figures());
-                let cost = in_place.as_ref().map_or(Duration::ZERO, |_| start.elapsed());
-                if let Some(of) = in_place {
-                    let (at, gap) = (Instant::now(), gap_after(cost).max(READING_GAP));
-                    self.readings.retain(|reading| !is_same(&reading.of, &of));
-                    let film = Arc::clone(&film);
-                    self.readings.push(Reading { of, film, figures, noise, at, gap });
+                let cost = if is_in_place { start.elapsed() } else { Duration::ZERO };
+                let (at, gap) = (Instant::now(), gap_after(cost).max(READING_GAP));
+                let (of, samples) = (in_place, session.samples());
+                let reading = Reading { of, film, samples, figures, noise, at, gap };
+                self.readings[role] = Some(reading.clone());
+                if session.figures().samples > 0 {
+                    self.films.push(Arc::downgrade(&reading.film));
                 }
-                (film, figures, noise, cost)
+                (reading, cost)
             }
         };
         let snapshot = SessionSnapshot {
-            samples: session.samples(),
+            // Of what is shown.
+            samples: if is_in_place { session.samples() } else { reading.samples },
             sampling: session.view().sampling,
-            noise,
-            film,
-            figures,
+            noise: reading.noise,
+            film: reading.film,
+            figures: reading.figures,
             gpu: session.gpu_figures().map(Arc::new),
-            on_device,
+            on_device: session.film_on_device(),
             grid: self.distributions_of(session),
         };
         (snapshot, cost)
@@ -189,15 +207,34 @@ impl Job<'_> {
         (is_live && !is_small).then_some((gpu, film))
     }
 
-    /// The last reading of a film, unless it is too old.
-    fn reading(&self, of: Option<&(Gpu, DeviceFilm)>) -> Option<&Reading> {
-        let of = of?;
-        self.readings.iter().find(|r| is_same(&r.of, of) && r.at.elapsed() < r.gap)
+    /// Whether those who show films have one that they have not come to yet: a third would only take memory.
+    fn is_ahead(&mut self) -> bool {
+        self.films.retain(|film| film.strong_count() > 0);
+        let of_session = self.readings.iter().flatten().count().max(1);
+        let is_fresh = |reading: &Reading| reading.at.elapsed() < OLDEST;
+        self.films.len() > of_session && self.readings.iter().flatten().any(is_fresh)
+    }
+
+    /// The last reading of a film, unless a newer one is wanted: by its age where it is shown in place,
+    /// else when it will be shown.
+    fn reading(
+        &self,
+        role: usize,
+        of: Option<&(Gpu, DeviceFilm)>,
+        rests: bool,
+    ) -> Option<&Reading> {
+        self.readings[role].as_ref().filter(|reading| match (&reading.of, of) {
+            (Some(read), Some(of)) => is_same(read, of) && reading.at.elapsed() < reading.gap,
+            // Before the first sample it was another picture.
+            (None, None) => rests && reading.figures.samples > 0,
+            _ => false,
+        })
     }
 
     /// Whether figures that need the film are to be taken anew.
     pub(super) fn is_reading_due(&self, session: &Session<'_>) -> bool {
-        session.samples() > 0 && self.reading(self.in_place(session).as_ref()).is_none()
+        session.samples() > 0
+            && self.reading(MAIN, self.in_place(session).as_ref(), false).is_none()
     }
 }
 
