@@ -31,6 +31,23 @@ pub(crate) fn notice(text: impl Display) {
     tell(format_args!("notice: {text}"));
 }
 
+/// The signal of a terminal that is closed, unless it is ignored already: then somebody wants the process to
+/// outlive its terminal, as `nohup` does.
+pub(crate) fn hang_up() -> Option<i32> {
+    #[cfg(unix)]
+    {
+        // SAFETY: all zero is such a structure, and the call writes no more than that.
+        let ignored = unsafe {
+            let mut action: libc::sigaction = std::mem::zeroed();
+            libc::sigaction(libc::SIGHUP, std::ptr::null(), &raw mut action) == 0
+                && action.sa_sigaction == libc::SIG_IGN
+        };
+        (!ignored).then_some(libc::SIGHUP)
+    }
+    #[cfg(not(unix))]
+    None
+}
+
 /// Names come from files, and some characters command a terminal or turn the text around: these become
 /// escapes (in JSON's way, so that JSON stays what it is).
 fn shown(text: &str) -> String {

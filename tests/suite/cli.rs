@@ -461,11 +461,24 @@ mod signals {
 
     use super::*;
 
-    fn start(bench: &Bench, rest: &str) -> std::process::Child {
+    /// Starts a render to which a closed terminal does what is said, whatever it does to the tests.
+    fn start_with(bench: &Bench, rest: &str, hang_up: libc::sighandler_t) -> std::process::Child {
+        use std::os::unix::process::CommandExt as _;
         let mut command = bench.command(&render_line(rest));
+        // SAFETY: setting a signal's disposition is allowed between fork and exec.
+        unsafe {
+            command.pre_exec(move || {
+                libc::signal(libc::SIGHUP, hang_up);
+                Ok(())
+            });
+        }
         let child = command.stderr(Stdio::piped()).spawn().expect("the binary starts");
         std::thread::sleep(Duration::from_millis(700));
         child
+    }
+
+    fn start(bench: &Bench, rest: &str) -> std::process::Child {
+        start_with(bench, rest, libc::SIG_DFL)
     }
 
     fn send(child: &std::process::Child, signal: &str) {
@@ -495,6 +508,31 @@ mod signals {
             ["a.json", "a.png", "map.exr", "scene.bin", "scene.gltf"],
             "no half-written file"
         );
+    }
+
+    /// The shell in it often tells its commands once more.
+    #[test]
+    fn a_closed_terminal_writes_the_picture_so_far_and_nohup_goes_on() {
+        let bench = Bench::new();
+        let outputs = [1, 4, 20].map(Duration::from_secs).into_iter().map(|more| {
+            let child = start(&bench, "-o a.png --spp 100000000 --json a.json");
+            std::thread::sleep(more);
+            send(&child, "-HUP");
+            std::thread::sleep(Duration::from_millis(60));
+            // It may be done already.
+            let _ = Command::new("kill").args(["-HUP", &child.id().to_string()]).output();
+            child.wait_with_output().expect("it ends")
+        });
+        let too_early = |output: &Output| output.status.code() == Some(129);
+        let output = { outputs }.find(|output| !too_early(output)).expect("a first pass");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(bench.json("a.json")["samples_per_pixel"].as_u64().expect("a count") > 0);
+
+        let child = start_with(&bench, "-o b.png --spp 1000000 --seconds 3", libc::SIG_IGN);
+        send(&child, "-HUP");
+        let output = child.wait_with_output().expect("it ends");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert_eq!(text(&output.stderr).matches("stopping").count(), 0);
     }
 
     #[test]
