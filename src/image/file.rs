@@ -57,6 +57,22 @@ pub fn check_writable(path: &Path) -> Result<()> {
     Ok(())
 }
 
+/// Makes a folder and those above it, if they are not there.
+///
+/// # Errors
+/// If something else is there, or it may not be made.
+pub(crate) fn make_folder(path: &Path) -> Result<()> {
+    fs::create_dir_all(path).map_err(|error| {
+        let cause = match error.kind() {
+            io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => {
+                "cannot be a folder: something else is there".into()
+            }
+            _ => format!("cannot be made: {error}"),
+        };
+        Error::at(path, cause)
+    })
+}
+
 /// Whether two paths name the same file, there already or yet to be written.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let place = |path: &Path| {
