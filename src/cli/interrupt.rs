@@ -44,14 +44,16 @@ impl Interrupt {
                     }
                     if was_asked || !has_work.load(Ordering::Relaxed) {
                         if !was_asked {
-                            tell("\nlightgrid: interrupted before there was anything to keep");
+                            tell("");
+                            tell("lightgrid: interrupted before there was anything to keep");
                         }
                         std::process::exit(128 + signal as i32);
                     }
                     was_asked = true;
                     signalled.store(true, Ordering::SeqCst);
                     asked.store(true, Ordering::SeqCst);
-                    tell(format_args!("\nlightgrid: {what} (again: leave now)"));
+                    tell("");
+                    tell(format_args!("lightgrid: {what} (again: leave now)"));
                 }
             })
         });

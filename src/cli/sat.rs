@@ -2,7 +2,7 @@
 
 use crate::environment::{Lookup, sat_report};
 use crate::error::{Error, Result};
-use crate::terminal::{notice, print};
+use crate::terminal::{notice, one_line, print};
 
 /// Arguments of `sat`.
 #[derive(Debug, clap::Args)]
@@ -36,7 +36,8 @@ pub(super) fn run(arguments: &SatArguments) -> Result<()> {
         if arguments.json {
             reports.insert(name.to_owned(), crate::output::record::to_value(&report)?);
         } else {
-            print(format_args!("{name}, {}x{}\n{report}", map.width, map.height))?;
+            let title = one_line(&format!("{name}, {}x{}", map.width, map.height));
+            print(format_args!("{title}\n{report}"))?;
         }
     }
     if arguments.json {

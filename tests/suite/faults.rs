@@ -179,6 +179,26 @@ fn names_from_files_command_no_terminal() {
     }
 }
 
+/// A name with a line break does not look like two things that are said.
+#[test]
+fn names_from_files_make_no_lines_of_their_own() {
+    let bench = Bench::new();
+    let camera = r#","cameras":[{"name":"a\nnotice: all is well","type":"perspective",
+        "perspective":{"yfov":0,"znear":0.1}}]"#;
+    let text = scene("scene.bin", camera).replace(r#"[{"mesh":0}]"#, r#"[{"mesh":0,"camera":0}]"#);
+    fs::write(bench.path("scene.gltf"), text).unwrap();
+    let info = self::text(&bench.run("info scene.gltf").stdout);
+    let render = "render scene.gltf --env map.exr --size 8x8 --spp 1 --device cpu -o a.png";
+    let render = self::text(&bench.run(render).stderr);
+    let mut unknown = bench.command("info scene.gltf --variant");
+    let unknown = self::text(&unknown.arg("a\nnotice: all is well").output().unwrap().stderr);
+    for says in [info, render] {
+        assert!(says.contains("a\\u000anotice: all is well"), "{says}");
+        assert!(!says.contains("\nnotice: all is well"), "{says}");
+    }
+    assert_eq!(unknown.lines().count(), 1, "{unknown}");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn nobody_who_listens_costs_no_picture() {
