@@ -292,6 +292,35 @@ fn what_killed_processes_left_is_removed_when_it_is_old() {
     assert!(bench.path(".lightgrid-1-1.part").exists() && bench.path("own.part").exists());
 }
 
+/// As for one whose target is there, which is written anew.
+#[cfg(unix)]
+#[test]
+fn a_link_to_what_is_not_there_yet_is_followed() {
+    let bench = Bench::new();
+    fs::create_dir_all(bench.path("store/deep")).unwrap();
+    std::os::unix::fs::symlink("store/next.png", bench.path("a.png")).unwrap();
+    std::os::unix::fs::symlink("deep/b.png", bench.path("store/next.png")).unwrap();
+    for _ in 0..2 {
+        let output = bench.run(&format!("{SMALL} -o a.png"));
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        for link in ["a.png", "store/next.png"] {
+            assert!(fs::symlink_metadata(bench.path(link)).unwrap().is_symlink(), "{link}");
+        }
+        assert!(bench.path("store/deep/b.png").is_file());
+    }
+    let says = sentence(&bench.run(&format!("{SMALL} -o a.png -o store/deep/b.png")));
+    assert!(says.contains("two outputs"), "{says}");
+    fs::remove_file(bench.path("store/deep/b.png")).unwrap();
+    let says = sentence(&bench.run(&format!("{SMALL} -o a.png -o store/deep/b.png")));
+    assert!(says.contains("two outputs"), "{says}");
+    std::os::unix::fs::symlink("gone/c.png", bench.path("c.png")).unwrap();
+    let says = sentence(&bench.run(&format!("{SMALL} -o c.png")));
+    assert!(says.contains("c.png: cannot be written: there is no folder gone"), "{says}");
+    std::os::unix::fs::symlink("d.png", bench.path("d.png")).unwrap();
+    let says = sentence(&bench.run(&format!("{SMALL} -o d.png")));
+    assert!(says.contains("d.png: cannot be written"), "{says}");
+}
+
 /// A picture of a bit a pixel that is small as a file: the sizes are looked at first.
 #[test]
 fn a_bomb_of_a_picture_is_refused_before_it_goes_off() {
