@@ -5,7 +5,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::instances::Surface;
-use super::{AlphaMode, Material, Scene};
+use super::{AlphaMode, Material, MaterialEdit, Scene};
 use crate::error::Decoded;
 
 /// Triangles of a material that are looked at.
@@ -172,12 +172,13 @@ impl Scene {
         self.check_shown()
     }
 
-    /// Whether anything was left to be shown.
+    /// Whether anything is left to be shown: something that is not of a hidden material.
     ///
     /// # Errors
-    /// The cause, if nothing was.
-    pub(super) fn check_shown(&self) -> Decoded<()> {
-        match self.triangles.is_empty() {
+    /// The cause, if nothing is.
+    pub(crate) fn check_shown(&self) -> Decoded<()> {
+        let is_hidden: Vec<bool> = self.materials.iter().map(MaterialEdit::has_hidden).collect();
+        match self.triangle_materials.iter().all(|&material| is_hidden[material as usize]) {
             true => Err("all of it is hidden, so there is nothing to render".into()),
             false => Ok(()),
         }

@@ -140,6 +140,13 @@ fn materials_are_changed_by_name() {
     let refusal = |rest: &str, status| bench.refusal(&line(rest), status);
     let says = refusal("-o a.exr --material marble:roughness=1", 1);
     assert!(says.contains("office: no material is called marble"), "{says}");
+    let painted = SCENE.replace("\"POSITION\": 0}", "\"POSITION\": 0}, \"material\": 0");
+    let painted = painted.replace("\"asset\"", "\"materials\": [{\"name\": \"paint\"}], \"asset\"");
+    fs::write(bench.path("painted.gltf"), painted).expect("written");
+    for options in ["--hide paint", "--material paint:hidden"] {
+        let says = bench.refusal(&format!("render painted.gltf -o a.exr {options}"), 1);
+        assert!(says.contains("all of it is hidden, so there is nothing to render"), "{says}");
+    }
     let says = refusal("-o a.exr --material wall:shine=1", 2);
     assert!(says.contains("shine is not color, roughness, metalness or hidden"), "{says}");
 }
@@ -387,6 +394,7 @@ fn what_cannot_be_done_is_one_sentence_and_status_1() {
             "scene.gltf: is a glTF scene, where a map",
         ),
         ("render scene.gltf -o a.png --env sky:mars".into(), "no built-in sky called \"mars\""),
+        ("render open -o a.png --variant red".into(), "open: there is no variant red: it has none"),
         ("compare map.exr none.exr".into(), "none.exr: there is no such file"),
         ("info none.exr".into(), "none.exr: there is no such file"),
     ] {
