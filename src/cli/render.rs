@@ -7,6 +7,7 @@ mod share;
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::device;
@@ -217,11 +218,16 @@ fn lap(start: Instant) -> f64 {
 }
 
 pub(super) fn start_threads(threads: u16) -> Result<()> {
+    static STARTED: AtomicBool = AtomicBool::new(false);
+    if STARTED.swap(true, Ordering::Relaxed) {
+        return Ok(());
+    }
+    let count = if threads == 0 { String::new() } else { format!("{threads} ") };
     rayon::ThreadPoolBuilder::new()
         .num_threads(usize::from(threads))
         .thread_name(|i| format!("render {i}"))
         .build_global()
-        .map_err(|e| Error::new(format!("{threads} threads cannot be started: {e}")))
+        .map_err(|e| Error::new(format!("{count}threads cannot be started: {e}")))
 }
 
 /// Lets the CPU take over from a GPU that fails, unless that was asked for by name.

@@ -290,6 +290,7 @@ fn estimate(plan: &Plan) -> String {
 
 /// The table of importance tables.
 fn tables(arguments: &SatArguments) -> Result<()> {
+    super::render::start_threads(0)?;
     let cancel = kept("stopping after this map");
     let progress = Progress::start("starting");
     let measured = sat::measure_all(

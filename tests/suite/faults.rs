@@ -371,6 +371,54 @@ fn short_memory_is_a_sentence_with_both_numbers() {
     }
 }
 
+/// What runs under a limit on the address space, in kilobytes.
+#[cfg(target_os = "linux")]
+fn with_memory(bench: &Bench, kilobytes: u32, line: &str) -> Output {
+    let binary = env!("CARGO_BIN_EXE_lightgrid");
+    std::process::Command::new("sh")
+        .args(["-c", &format!("ulimit -v {kilobytes}; exec {binary} {line}")])
+        .current_dir(bench.path(""))
+        .output()
+        .expect("a shell")
+}
+
+/// A large JSON needs several times its size, and that is known before it is read.
+#[cfg(target_os = "linux")]
+#[test]
+fn short_memory_for_objects_is_a_sentence_with_both_numbers() {
+    let bench = Bench::new();
+    let nodes = r#"{"children":[1]},"#.repeat(3_000_000);
+    let text = format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{nodes}{{}}]}}"#);
+    fs::write(bench.path("scene.gltf"), text).unwrap();
+    let says = sentence(&with_memory(&bench, 1_000_000, "info scene.gltf"));
+    assert!(says.contains("scene.gltf: needs 1203 MB of memory, and "), "{says}");
+}
+
+/// Where nobody has asked first, it is said all the same, and the process ends as for any other cause.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_that_is_refused_is_no_abort() {
+    let bench = Bench::new();
+    // Small as text, and large as materials.
+    let materials = "{},".repeat(3_000_000);
+    let text = format!(r#"{{"asset":{{"version":"2.0"}},"materials":[{materials}{{}}]}}"#);
+    fs::write(bench.path("scene.gltf"), text).unwrap();
+    let output = with_memory(&bench, 1_500_000, "info scene.gltf");
+    let says = self::text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{says}");
+    assert!(says.starts_with("memory allocation of "), "{says}");
+}
+
+/// Threads that cannot be had are no panic.
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_that_are_refused_are_a_sentence() {
+    let bench = Bench::new();
+    let says =
+        sentence(&with_memory(&bench, 1_500_000, &format!("{SMALL} --threads 1024 -o a.png")));
+    assert!(says.contains("1024 threads cannot be started: "), "{says}");
+}
+
 /// The picture from before, or all of a new one: never a part.
 #[cfg(unix)]
 #[test]
