@@ -47,7 +47,7 @@ pub(super) struct ViewArguments {
     #[arg(long, value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
     size: Option<(u32, u32)>,
     /// Stop at this many samples per pixel.
-    #[arg(long, visible_alias = "spp", value_parser = clap::value_parser!(u32).range(1..), value_name = "N")]
+    #[arg(long, visible_alias = "spp", value_parser = values::whole::<u32>(1..=u32::MAX), value_name = "N")]
     samples: Option<u32>,
     /// Settings file of the window, with its kept pictures beside it (FILE.pictures); without it, the user's own.
     #[arg(long, value_name = "FILE")]
