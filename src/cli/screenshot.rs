@@ -152,6 +152,9 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     if let Some(material) = &arguments.select {
         studio.choose_material(material)?;
     }
+    if let Some(tile) = arguments.tile {
+        studio.check_tile(tile)?;
+    }
     if arguments.inspect.is_some() {
         studio.measure_truth()?;
     }
