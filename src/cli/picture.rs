@@ -117,7 +117,7 @@ impl PictureArguments {
             Ok(()) => {
                 Error::new(format!("{failure}; the picture is kept as {}", rescued.display()))
             }
-            Err(_) => failure,
+            Err(second) => Error::new(format!("{failure}; nor can the picture be kept: {second}")),
         })
     }
 }

@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     match frames {
         None => {
             let progress = Progress::start("learning");
-            job.render(arguments, camera, None, &progress)
+            job.render(arguments, camera, None, &progress).and_then(Error::all)
         }
         Some(frames) => job.render_frames(arguments, &frames, &camera),
     }
@@ -91,15 +91,15 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Renders and writes one picture. `known` is what those before it have left, and then what it leaves to
-    /// the next, if there may be one.
+    /// Renders and writes one picture; returns what could not be written. `known` is what those before it
+    /// have left, and then what it leaves to the next, if there may be one.
     fn render(
         &self,
         arguments: &RenderArguments,
         camera: Camera,
         known: Option<&mut Known>,
         progress: &Progress,
-    ) -> Result<()> {
+    ) -> Result<Vec<Error>> {
         let Self { world, environment, .. } = *self;
         let mut notices = self.notices.clone();
         let view = arguments.view(world, camera);
@@ -119,7 +119,7 @@ impl Job<'_> {
             .and_then(|()| work(&mut session, &mut share, &self.interrupt, progress, &mut cpu));
         progress.finish();
         if !share.has_samples(&session) {
-            return outcome;
+            return outcome.map(|()| Vec::new());
         }
         let film = share.film(&session);
         let remarks = output::remarks(&film, environment);
@@ -141,13 +141,15 @@ impl Job<'_> {
         let mut failures = outputs::write(arguments, &share, &record, session.grid());
         failures.extend(share.keep(&session).err());
         remarks.iter().for_each(notice);
-        failures.extend(outcome.err());
-        Error::all(failures)?;
+        if let Err(failure) = outcome {
+            failures.push(failure);
+            return Error::all(failures).map(|()| Vec::new());
+        }
         if let Some(known) = known {
             known.exposure = Some(arguments.picture.exposure_of(&film));
             known.counted = session.counters().map(LearningGrid::snapshot);
         }
-        Ok(())
+        Ok(failures)
     }
 
     /// Renders one picture after another; while the camera stays near, they go on learning what those before
@@ -173,9 +175,13 @@ impl Job<'_> {
             self.interrupt.go_on();
             let progress = Progress::of_frame(number, *frames.numbers().end());
             let camera = frames.camera(number, camera);
-            if let Err(failure) = self.render(&of_frame, camera, Some(&mut known), &progress) {
-                failures.push(failure);
-                break;
+            // What one frame cannot be written to may take the next.
+            match self.render(&of_frame, camera, Some(&mut known), &progress) {
+                Ok(unwritten) => failures.extend(unwritten),
+                Err(failure) => {
+                    failures.push(failure);
+                    break;
+                }
             }
             known.exposure.take().into_iter().for_each(|ev| of_frame.picture.set_exposure(ev));
             if self.interrupt.was_signalled() {

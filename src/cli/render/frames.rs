@@ -192,9 +192,12 @@ impl Reel {
         Ok(Self { folder, count: 0 })
     }
 
-    /// Where the next frame is to be written.
+    /// Where the next frame is to be written: in the place of the last if that could not be, for videos are
+    /// made of frames without gaps.
     pub(super) fn next(&mut self) -> PathBuf {
-        self.count += 1;
+        if self.count == 0 || self.frame(self.count - 1).exists() {
+            self.count += 1;
+        }
         self.frame(self.count - 1)
     }
 
