@@ -16,7 +16,7 @@ use super::progress::Progress;
 use crate::alarm::Alarm;
 use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
-use crate::light_grid::LearningGrid;
+use crate::light_grid::{LearningGrid, LightGrid};
 use crate::memory;
 use crate::output::record::{Phases, Record};
 use crate::output::{self, Exposure};
@@ -43,6 +43,11 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     let (world, light) = rayon::join(|| load_world(arguments), || load_environment(arguments));
     let (world, load_scene_seconds, build_bvh_seconds) = world?;
     let (environment, map_notices, load_map_seconds, build_table_seconds) = light?;
+    if let Some(path) = &arguments.distributions
+        && LightGrid::whole_map(environment.tile_energies()).is_none()
+    {
+        return Err(outputs::without_distributions(path));
+    }
     let phases =
         Phases { load_scene_seconds, build_bvh_seconds, load_map_seconds, build_table_seconds };
 
@@ -223,6 +228,8 @@ fn lap(start: Instant) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
+/// Starts the threads that share all work, of which there are so many once and for all; 0 is one for each
+/// core. Started when they are first needed, they would panic where the system gives none.
 pub(super) fn start_threads(threads: u16) -> Result<()> {
     static STARTED: AtomicBool = AtomicBool::new(false);
     if STARTED.swap(true, Ordering::Relaxed) {

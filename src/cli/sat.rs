@@ -1,5 +1,6 @@
 //! `lightgrid sat`.
 
+use crate::environment::landmarks::Sun;
 use crate::environment::{Lookup, sat_report};
 use crate::error::{Error, Result};
 use crate::terminal::{notice, one_line, print};
@@ -32,6 +33,9 @@ pub(super) fn run(arguments: &SatArguments) -> Result<()> {
     for name in maps {
         let (map, notices) = crate::sources::map(name)?;
         notices.iter().for_each(|sentence| notice(format_args!("{name}: {sentence}")));
+        if Sun::of(&map).is_none() {
+            notice(format_args!("{name}: the map is black, so there is nothing to be sampled"));
+        }
         let report = sat_report(&map, Lookup::Bilinear, SAMPLES).map_err(|e| Error::at(name, e))?;
         if arguments.json {
             reports.insert(name.to_owned(), crate::output::record::to_value(&report)?);

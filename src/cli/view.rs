@@ -99,9 +99,10 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
         pictures: Settings::pictures_folder(arguments.settings.as_deref()),
         is_repeatable: false,
     };
-    match window::run(start, notice.into_iter().collect(), path) {
+    match window::run(start, notice.clone().into_iter().collect(), path) {
         Ok(closed_by) => closed_by.map_or(Ok(()), Err),
         Err(error) => {
+            notice.iter().for_each(crate::terminal::notice);
             let picture = arguments.output.display();
             let error = error.to_string();
             let error = error.trim_end_matches('.');

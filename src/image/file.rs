@@ -106,6 +106,10 @@ fn check_target(target: &Path) -> std::result::Result<(), String> {
     if target.file_name().is_none() {
         return Err("cannot be written: it does not name a file".into());
     }
+    let last = target.as_os_str().as_encoded_bytes().last();
+    if last.is_some_and(|&byte| std::path::is_separator(char::from(byte))) {
+        return Err("cannot be written: its name is that of a folder".into());
+    }
     let folder = folder_of(target);
     if !folder.is_dir() {
         return Err(format!("cannot be written: there is no folder {}", folder.display()));

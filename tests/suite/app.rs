@@ -269,7 +269,8 @@ fn without_a_display_the_picture_is_rendered_into_a_file() {
     for (what, file) in
         [("crack --env sky:day@64x32", "lightgrid.png"), ("lightgrid.png -o lit.png", "lit.png")]
     {
-        let line = format!("view {what} --size 32x18 --samples 1");
+        std::fs::write(folder.path().join("settings.json"), "garbage").expect("written");
+        let line = format!("view {what} --size 32x18 --samples 1 --settings settings.json");
         let output = Command::new(env!("CARGO_BIN_EXE_lightgrid"))
             .current_dir(folder.path())
             .args(line.split_whitespace())
@@ -284,6 +285,7 @@ fn without_a_display_the_picture_is_rendered_into_a_file() {
             assert!(message.contains("no window can be opened"), "{message}");
             assert!(message.contains(&format!("; rendering into {file} instead")), "{message}");
             assert!(!message.contains(".;"), "{message}");
+            assert!(message.contains("settings.json.bak"), "{message}");
             let picture = read_picture(&folder.path().join(file)).expect("a picture");
             assert_eq!((picture.width, picture.height), (32, 18));
         }

@@ -284,6 +284,27 @@ fn extent(numbers: impl Iterator<Item = usize> + Clone) -> usize {
 }
 
 #[test]
+fn layers_that_no_picture_holds_are_remarked() {
+    let bench = Bench::new();
+    let says = |rest: &str| text(&bench.render(rest).stderr).contains("--layers adds nothing");
+    assert!(says("-o a.png --layers depth"));
+    assert!(!says("-o a.png -o a.exr --layers depth"));
+}
+
+#[test]
+fn a_black_map_has_no_tables_worth_reading_and_no_distributions() {
+    let bench = Bench::new();
+    let black = Image::filled(8, 4, [f32::NAN, 0.0, -1.0]);
+    let picture = ExrPicture { image: &black, layers: vec![], metadata: &[], preview: None };
+    write_exr(&bench.path("black.exr"), picture).expect("written");
+    let says = text(&bench.run("sat black.exr").stderr);
+    assert!(says.contains("notice: black.exr: pixels of the map were repaired"), "{says}");
+    assert!(says.contains("notice: black.exr: the map is black"), "{says}");
+    let says = bench.refusal("render open --env black.exr -o a.png --distributions d.csv", 1);
+    assert!(says.contains("d.csv: not written: this map"), "{says}");
+}
+
+#[test]
 fn a_black_picture_is_remarked() {
     let output = Bench::new().render("-o a.png --env-intensity 0");
     assert!(text(&output.stderr).contains("the picture is black"), "{}", text(&output.stderr));
@@ -388,6 +409,11 @@ fn what_cannot_be_done_is_one_sentence_and_status_1() {
         (line("-o a.jpg"), "a.jpg: pictures are written as .png or .exr"),
         (line("-o none/a.png"), "there is no folder none"),
         (line("-o a.png -o ./a.png"), "./a.png: two outputs"),
+        (line("-o a.png/"), "a.png/: cannot be written: its name is that of a folder"),
+        (
+            line("-o a.png --sampling bsdf --distributions d.csv"),
+            "d.csv: not written: this map and sampling have no distributions",
+        ),
         (line("-o a.png --json a.png"), "a.png: two outputs"),
         ("render none.glb -o a.png".into(), "none.glb: there is no such file"),
         ("render none -o a.png".into(), "neither a file nor a built-in scene"),
