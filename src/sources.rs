@@ -30,6 +30,9 @@ pub fn scene(name: &str) -> Result<Scene> {
 pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
     check_scene(name)?;
     let mut scene = if builtin::names().contains(&name) {
+        if let Some(variant) = &options.variant {
+            return Err(Error::at(name, format!("there is no variant {variant}: it has none")));
+        }
         let mut scene = builtin::build(name)?;
         scene.hide(&options.hide).map_err(|cause| Error::at(name, cause))?;
         scene
@@ -45,6 +48,9 @@ pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
         if !is_there {
             return Err(Error::at(name, format!("no material is called {material}")));
         }
+    }
+    if options.edits.iter().any(|(_, edit)| edit.hidden) {
+        scene.check_shown().map_err(|cause| Error::at(name, cause))?;
     }
     Ok(scene)
 }

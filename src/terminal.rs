@@ -21,9 +21,10 @@ pub(crate) fn print(text: impl Display) -> Result<()> {
     }
 }
 
-/// Says a line on stderr, if anybody is there to be told.
+/// Says a line on stderr, if anybody is there to be told. It stays one, whatever names are in it.
 pub(crate) fn tell(text: impl Display) {
-    let _ = io::stderr().lock().write_all(shown(&format!("{text}\n")).as_bytes());
+    let line = one_line(&text.to_string()) + "\n";
+    let _ = io::stderr().lock().write_all(line.as_bytes());
 }
 
 /// Says what a person should know, though nothing failed.
@@ -31,13 +32,40 @@ pub(crate) fn notice(text: impl Display) {
     tell(format_args!("notice: {text}"));
 }
 
+/// The signal of a terminal that is closed, unless it is ignored already: then somebody wants the process to
+/// outlive its terminal, as `nohup` does.
+pub(crate) fn hang_up() -> Option<i32> {
+    #[cfg(unix)]
+    {
+        // SAFETY: all zero is such a structure, and the call writes no more than that.
+        let ignored = unsafe {
+            let mut action: libc::sigaction = std::mem::zeroed();
+            libc::sigaction(libc::SIGHUP, std::ptr::null(), &raw mut action) == 0
+                && action.sa_sigaction == libc::SIG_IGN
+        };
+        (!ignored).then_some(libc::SIGHUP)
+    }
+    #[cfg(not(unix))]
+    None
+}
+
 /// Names come from files, and some characters command a terminal or turn the text around: these become
 /// escapes (in JSON's way, so that JSON stays what it is).
 fn shown(text: &str) -> String {
+    let is_layout = |c| matches!(c, '\n' | '\t');
+    escaped(text, |c| c.is_control() && !is_layout(c))
+}
+
+/// As [`print`] and [`tell`] show text, with line breaks as escapes, too: a name must not look like a line
+/// of ours.
+pub(crate) fn one_line(text: &str) -> String {
+    escaped(text, |c| c.is_control() && c != '\t')
+}
+
+fn escaped(text: &str, commands: impl Fn(char) -> bool) -> String {
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {
-        let commands = c.is_control() && !matches!(c, '\n' | '\t');
-        if commands || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}') {
+        if commands(c) || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}') {
             shown.push_str(&format!("\\u{:04x}", u32::from(c)));
         } else {
             shown.push(c);
@@ -48,11 +76,12 @@ fn shown(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::shown;
+    use super::{one_line, shown};
 
     #[test]
     fn what_commands_a_terminal_is_shown_and_the_rest_is_kept() {
         assert_eq!(shown("a\u{1b}[31mb\u{9b}c\r\u{202e}d"), "a\\u001b[31mb\\u009bc\\u000d\\u202ed");
         assert_eq!(shown("größe\t日本\n🎨"), "größe\t日本\n🎨");
+        assert_eq!(one_line("größe\t日本\n🎨\u{2028}"), "größe\t日本\\u000a🎨\\u2028");
     }
 }

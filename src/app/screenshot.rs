@@ -46,9 +46,16 @@ impl Studio {
     /// Starts the application without a display.
     ///
     /// # Errors
-    /// If there is no graphics device; software Vulkan suffices.
+    /// If there is no graphics device, for which software Vulkan suffices, or it draws nothing of this size.
     pub fn open(shot: Shot) -> Result<Self> {
         let gpu = open(shot.start.adapter.as_deref())?;
+        let ((width, height), most) = (shot.size, gpu.limits.max_texture_dimension_2d);
+        if width.max(height) > most {
+            return Err(Error::new(format!(
+                "a window of {width}x{height} pixels cannot be drawn: {} draws at most {most} a side",
+                gpu.facts().name
+            )));
+        }
         let canvas = Canvas::new(gpu, shot.size, TextureCopies::default());
         let screen = Screen::new(&canvas.gpu, Arc::clone(&canvas.renderer))?;
         let context = egui::Context::default();
@@ -90,6 +97,20 @@ impl Studio {
         })?;
         self.app.interface.choose_material(Some(number as u32));
         Ok(())
+    }
+
+    /// Refuses a tile that the map does not have.
+    ///
+    /// # Errors
+    /// If the map cannot be read or has fewer tiles.
+    pub fn check_tile(&mut self, tile: u32) -> Result<()> {
+        self.settle()?;
+        let count = self.app.lit.as_ref().map_or(0, |lit| lit.environment.tile_count());
+        if tile < count {
+            return Ok(());
+        }
+        let cause = format!("there is no tile {tile}: it has {count}, counted from 0");
+        Err(Error::at(&self.app.document.map, cause))
     }
 
     /// Renders until the stop rule is met, draws, reads back.

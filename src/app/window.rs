@@ -96,13 +96,15 @@ struct Runner {
     asked: Arc<AtomicBool>,
 }
 
-/// Lets Ctrl-C and requests to end close the window as a person would; a second one leaves at once.
+/// Lets Ctrl-C, requests to end and closed terminals close the window as a person would; a second one leaves at once.
 fn close_on_signals(asked: &Arc<AtomicBool>, proxy: EventLoopProxy<Call>) {
     for signal in [SIGINT, SIGTERM] {
         // Where signals cannot be caught they end the process, as ever.
         let _ = flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(asked));
         let _ = flag::register(signal, Arc::clone(asked));
     }
+    // The terminal that it was started from may be closed; its shell may say so twice.
+    let _ = crate::terminal::hang_up().map(|signal| flag::register(signal, Arc::clone(asked)));
     let asked = Arc::clone(asked);
     let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
         while !asked.load(Ordering::Relaxed) {

@@ -54,7 +54,7 @@ pub(super) struct BenchArguments {
     #[arg(long, default_value = "3", value_parser = values::positive, value_name = "S")]
     seconds: f64,
     /// Threads; 0 uses every core.
-    #[arg(long, default_value = "0", value_parser = clap::value_parser!(u16).range(0..=1024), value_name = "N")]
+    #[arg(long, default_value = "0", value_parser = values::whole::<u16>(0..=1024), value_name = "N")]
     threads: u16,
     /// Writes every figure as JSON.
     #[arg(long, value_name = "FILE")]

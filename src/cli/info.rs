@@ -9,7 +9,7 @@ use crate::image::Image;
 use crate::path::World;
 use crate::render::gpu::KernelFacts;
 use crate::scene::{Projection, Scene};
-use crate::terminal::print;
+use crate::terminal::{one_line, print};
 
 /// Arguments of `info`.
 #[derive(Debug, clap::Args)]
@@ -106,7 +106,7 @@ fn list_facts(facts: &Value, indent: usize, lines: &mut Vec<String>) {
             Value::Array(texts) if texts.iter().any(Value::is_string) => {
                 lines.push(format!("{:indent$}{label}:", ""));
                 for text in texts.iter().filter_map(Value::as_str) {
-                    lines.push(format!("{:indent$}  - {text}", ""));
+                    lines.push(format!("{:indent$}  - {}", "", one_line(text)));
                 }
             }
             Value::Array(numbers) if !numbers.is_empty() => {
@@ -126,7 +126,7 @@ fn list_facts(facts: &Value, indent: usize, lines: &mut Vec<String>) {
 
 fn number(value: &Value) -> String {
     match (value.as_str(), value.as_u64(), value.as_f64()) {
-        (Some(text), _, _) => text.to_owned(),
+        (Some(text), _, _) => one_line(text),
         (_, Some(whole), _) => whole.to_string(),
         (_, _, Some(x)) if x != 0.0 && !(1e-3..1e6).contains(&x.abs()) => format!("{x:.4e}"),
         (_, _, Some(x)) => format!("{x:.4}"),

@@ -1,5 +1,5 @@
-//! Ctrl-C and requests to end: at once while there is nothing to keep, then once to finish early and
-//! keep what is done, twice to leave at once.
+//! Ctrl-C, requests to end and closed terminals: at once while there is nothing to keep, then once to finish early and
+//! keep what is done, twice to leave at once. A closed terminal is no hurry: its shell may say so again.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -8,7 +8,7 @@ use std::time::Duration;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::register_usize;
 
-use crate::terminal::tell;
+use crate::terminal::{hang_up, tell};
 
 /// How often signals are looked for: sooner than anybody notices.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
@@ -29,7 +29,9 @@ impl Interrupt {
         let register = |signal| register_usize(signal, Arc::clone(&caught), signal as usize);
         let flags = [&asked, &signalled, &has_work].map(Arc::clone);
         let inside = (flags, Arc::clone(&caught));
-        let watching = [SIGINT, SIGTERM].into_iter().try_for_each(|s| register(s).map(|_| ()));
+        let hang_up = hang_up();
+        let mut signals = [SIGINT, SIGTERM].into_iter().chain(hang_up);
+        let watching = signals.try_for_each(|s| register(s).map(|_| ()));
         let watching = watching.and_then(|()| {
             std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
                 let ([asked, signalled, has_work], caught) = inside;
@@ -37,19 +39,21 @@ impl Interrupt {
                 loop {
                     std::thread::sleep(LOOK_EVERY);
                     let signal = caught.swap(0, Ordering::Relaxed);
-                    if signal == 0 {
+                    if signal == 0 || (was_asked && hang_up == Some(signal as i32)) {
                         continue;
                     }
                     if was_asked || !has_work.load(Ordering::Relaxed) {
                         if !was_asked {
-                            tell("\nlightgrid: interrupted before there was anything to keep");
+                            tell("");
+                            tell("lightgrid: interrupted before there was anything to keep");
                         }
                         std::process::exit(128 + signal as i32);
                     }
                     was_asked = true;
                     signalled.store(true, Ordering::SeqCst);
                     asked.store(true, Ordering::SeqCst);
-                    tell(format_args!("\nlightgrid: {what} (again: leave now)"));
+                    tell("");
+                    tell(format_args!("lightgrid: {what} (again: leave now)"));
                 }
             })
         });

@@ -45,6 +45,7 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<()> {
         }
         check_writable(output)?;
     }
+    picture.say_unused(outputs.iter());
     let progress = Progress::start("looking at the parts");
     let parts = belonging_together(parts)?;
     let mut missing = missing_parts(&parts);

@@ -100,6 +100,20 @@ pub fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<()> {
     let command = arguments.command.unwrap_or_else(|| Command::View(view::ViewArguments::plain()));
+    // Others start as many as they are told, or need none.
+    let takes_all = matches!(
+        command,
+        Command::View(_)
+            | Command::Screenshot(_)
+            | Command::Merge(_)
+            | Command::Compare(_)
+            | Command::Info(_)
+            | Command::Sat(_)
+            | Command::Stability(_)
+    );
+    if takes_all {
+        render::start_threads(0)?;
+    }
     match &command {
         Command::View(arguments) => view::run(arguments),
         Command::Screenshot(arguments) => screenshot::run(arguments),

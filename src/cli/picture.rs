@@ -7,7 +7,7 @@ use crate::denoise::Denoiser;
 use crate::error::{Error, Result};
 use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::render::film::Film;
-use crate::terminal::tell;
+use crate::terminal::{notice, tell};
 use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev};
 
 /// How pictures are written.
@@ -68,6 +68,16 @@ impl PictureArguments {
         self.denoise.map_or(Ok(()), Denoiser::check)
     }
 
+    /// Says what was asked for that none of these pictures holds.
+    pub(super) fn say_unused<'a>(&self, mut pictures: impl Iterator<Item = &'a PathBuf>) {
+        let has_layers = |path: &PathBuf| {
+            path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
+        };
+        if !self.layers.is_empty() && !pictures.any(has_layers) {
+            notice("--layers adds nothing: they are written into .exr pictures alone");
+        }
+    }
+
     /// Whether albedo, normal and depth are wanted.
     pub(super) fn wants_surfaces(&self) -> bool {
         let is_surface = |l: &LayerName| !matches!(l, LayerName::Samples | LayerName::Variance);
@@ -117,7 +127,7 @@ impl PictureArguments {
             Ok(()) => {
                 Error::new(format!("{failure}; the picture is kept as {}", rescued.display()))
             }
-            Err(_) => failure,
+            Err(second) => Error::new(format!("{failure}; nor can the picture be kept: {second}")),
         })
     }
 }

@@ -60,9 +60,9 @@ impl Progress {
         noise
     }
 
-    /// Leaves a sentence on stderr, above the line.
-    pub(super) fn tell(&self, sentence: &str) {
-        self.bar.suspend(|| tell(sentence));
+    /// Leaves lines on stderr, above the line.
+    pub(super) fn tell(&self, lines: &str) {
+        self.bar.suspend(|| lines.lines().for_each(tell));
     }
 
     /// Removes the line.

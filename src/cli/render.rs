@@ -7,6 +7,7 @@ mod share;
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::device;
@@ -15,7 +16,7 @@ use super::progress::Progress;
 use crate::alarm::Alarm;
 use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
-use crate::light_grid::LearningGrid;
+use crate::light_grid::{LearningGrid, LightGrid};
 use crate::memory;
 use crate::output::record::{Phases, Record};
 use crate::output::{self, Exposure};
@@ -42,6 +43,11 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     let (world, light) = rayon::join(|| load_world(arguments), || load_environment(arguments));
     let (world, load_scene_seconds, build_bvh_seconds) = world?;
     let (environment, map_notices, load_map_seconds, build_table_seconds) = light?;
+    if let Some(path) = &arguments.distributions
+        && LightGrid::whole_map(environment.tile_energies()).is_none()
+    {
+        return Err(outputs::without_distributions(path));
+    }
     let phases =
         Phases { load_scene_seconds, build_bvh_seconds, load_map_seconds, build_table_seconds };
 
@@ -65,7 +71,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     match frames {
         None => {
             let progress = Progress::start("learning");
-            job.render(arguments, camera, None, &progress)
+            job.render(arguments, camera, None, &progress).and_then(Error::all)
         }
         Some(frames) => job.render_frames(arguments, &frames, &camera),
     }
@@ -90,15 +96,15 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Renders and writes one picture. `known` is what those before it have left, and then what it leaves to
-    /// the next, if there may be one.
+    /// Renders and writes one picture; returns what could not be written. `known` is what those before it
+    /// have left, and then what it leaves to the next, if there may be one.
     fn render(
         &self,
         arguments: &RenderArguments,
         camera: Camera,
         known: Option<&mut Known>,
         progress: &Progress,
-    ) -> Result<()> {
+    ) -> Result<Vec<Error>> {
         let Self { world, environment, .. } = *self;
         let mut notices = self.notices.clone();
         let view = arguments.view(world, camera);
@@ -118,7 +124,7 @@ impl Job<'_> {
             .and_then(|()| work(&mut session, &mut share, &self.interrupt, progress, &mut cpu));
         progress.finish();
         if !share.has_samples(&session) {
-            return outcome;
+            return outcome.map(|()| Vec::new());
         }
         let film = share.film(&session);
         let remarks = output::remarks(&film, environment);
@@ -140,13 +146,15 @@ impl Job<'_> {
         let mut failures = outputs::write(arguments, &share, &record, session.grid());
         failures.extend(share.keep(&session).err());
         remarks.iter().for_each(notice);
-        failures.extend(outcome.err());
-        Error::all(failures)?;
+        if let Err(failure) = outcome {
+            failures.push(failure);
+            return Error::all(failures).map(|()| Vec::new());
+        }
         if let Some(known) = known {
             known.exposure = Some(arguments.picture.exposure_of(&film));
             known.counted = session.counters().map(LearningGrid::snapshot);
         }
-        Ok(())
+        Ok(failures)
     }
 
     /// Renders one picture after another; while the camera stays near, they go on learning what those before
@@ -172,9 +180,13 @@ impl Job<'_> {
             self.interrupt.go_on();
             let progress = Progress::of_frame(number, *frames.numbers().end());
             let camera = frames.camera(number, camera);
-            if let Err(failure) = self.render(&of_frame, camera, Some(&mut known), &progress) {
-                failures.push(failure);
-                break;
+            // What one frame cannot be written to may take the next.
+            match self.render(&of_frame, camera, Some(&mut known), &progress) {
+                Ok(unwritten) => failures.extend(unwritten),
+                Err(failure) => {
+                    failures.push(failure);
+                    break;
+                }
             }
             known.exposure.take().into_iter().for_each(|ev| of_frame.picture.set_exposure(ev));
             if self.interrupt.was_signalled() {
@@ -216,12 +228,19 @@ fn lap(start: Instant) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
+/// Starts the threads that share all work, of which there are so many once and for all; 0 is one for each
+/// core. Started when they are first needed, they would panic where the system gives none.
 pub(super) fn start_threads(threads: u16) -> Result<()> {
+    static STARTED: AtomicBool = AtomicBool::new(false);
+    if STARTED.swap(true, Ordering::Relaxed) {
+        return Ok(());
+    }
+    let count = if threads == 0 { String::new() } else { format!("{threads} ") };
     rayon::ThreadPoolBuilder::new()
         .num_threads(usize::from(threads))
         .thread_name(|i| format!("render {i}"))
         .build_global()
-        .map_err(|e| Error::new(format!("{threads} threads cannot be started: {e}")))
+        .map_err(|e| Error::new(format!("{count}threads cannot be started: {e}")))
 }
 
 /// Lets the CPU take over from a GPU that fails, unless that was asked for by name.

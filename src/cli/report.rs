@@ -101,13 +101,13 @@ struct EffortArguments {
     #[arg(long, default_value = "30", value_parser = values::positive, allow_hyphen_values = true, value_name = "S")]
     seconds: f64,
     /// Independent runs of every combination; intervals need two and are worth something from four on.
-    #[arg(long, default_value = "6", value_parser = clap::value_parser!(u32).range(1..=10_000), value_name = "N")]
+    #[arg(long, default_value = "6", value_parser = values::whole::<u32>(1..=10_000), value_name = "N")]
     seeds: u32,
     /// Picture size in pixels.
     #[arg(long, default_value = "240x135", value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
     size: (u32, u32),
     /// Surface vertices at which a path gathers light; 1 is direct light only.
-    #[arg(long, default_value = "5", value_parser = clap::value_parser!(u32).range(1..=1000), value_name = "N")]
+    #[arg(long, default_value = "5", value_parser = values::whole::<u32>(1..=1000), value_name = "N")]
     bounces: u32,
     /// The reference is rendered until its noise is this share of the smallest error.
     #[arg(long, default_value = "0.05", value_parser = share, allow_hyphen_values = true, value_name = "X")]
@@ -117,7 +117,7 @@ struct EffortArguments {
     #[arg(long, value_name = "DIR")]
     references: Option<PathBuf>,
     /// Threads; 0 uses every core.
-    #[arg(long, default_value = "0", value_parser = clap::value_parser!(u16).range(0..=1024), value_name = "N")]
+    #[arg(long, default_value = "0", value_parser = values::whole::<u16>(0..=1024), value_name = "N")]
     threads: u16,
 }
 
@@ -290,6 +290,7 @@ fn estimate(plan: &Plan) -> String {
 
 /// The table of importance tables.
 fn tables(arguments: &SatArguments) -> Result<()> {
+    super::render::start_threads(0)?;
     let cancel = kept("stopping after this map");
     let progress = Progress::start("starting");
     let measured = sat::measure_all(

@@ -1,8 +1,9 @@
 //! `lightgrid sat`.
 
+use crate::environment::landmarks::Sun;
 use crate::environment::{Lookup, sat_report};
 use crate::error::{Error, Result};
-use crate::terminal::{notice, print};
+use crate::terminal::{notice, one_line, print};
 
 /// Arguments of `sat`.
 #[derive(Debug, clap::Args)]
@@ -32,11 +33,15 @@ pub(super) fn run(arguments: &SatArguments) -> Result<()> {
     for name in maps {
         let (map, notices) = crate::sources::map(name)?;
         notices.iter().for_each(|sentence| notice(format_args!("{name}: {sentence}")));
+        if Sun::of(&map).is_none() {
+            notice(format_args!("{name}: the map is black, so there is nothing to be sampled"));
+        }
         let report = sat_report(&map, Lookup::Bilinear, SAMPLES).map_err(|e| Error::at(name, e))?;
         if arguments.json {
             reports.insert(name.to_owned(), crate::output::record::to_value(&report)?);
         } else {
-            print(format_args!("{name}, {}x{}\n{report}", map.width, map.height))?;
+            let title = one_line(&format!("{name}, {}x{}", map.width, map.height));
+            print(format_args!("{title}\n{report}"))?;
         }
     }
     if arguments.json {

@@ -61,7 +61,7 @@ pub(super) struct ScreenshotArguments {
     #[arg(long, value_enum, value_name = "NAME")]
     panel: Vec<PanelName>,
     /// Samples per pixel.
-    #[arg(long, visible_alias = "spp", default_value = "16", value_parser = clap::value_parser!(u32).range(1..), value_name = "N")]
+    #[arg(long, visible_alias = "spp", default_value = "16", value_parser = values::whole::<u32>(1..=u32::MAX), value_name = "N")]
     samples: u32,
     /// Size of the window in pixels.
     #[arg(long, default_value = "1440x900", value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
@@ -85,7 +85,7 @@ pub(super) struct ScreenshotArguments {
     #[arg(long, value_name = "MATERIAL")]
     select: Option<String>,
     /// The tile chosen on the map, for the overlay `tile`.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_parser = values::whole::<u32>(0..=u32::MAX), value_name = "N")]
     tile: Option<u32>,
     /// What the map of tiles shows.
     #[arg(long, value_enum, value_name = "WHAT")]
@@ -97,7 +97,7 @@ pub(super) struct ScreenshotArguments {
     #[arg(long, default_value = "1", value_parser = values::not_negative, value_name = "X")]
     env_sun: f32,
     /// Seed of the random numbers.
-    #[arg(long, default_value = "0", value_name = "N")]
+    #[arg(long, default_value = "0", value_parser = values::whole::<u32>(0..=u32::MAX), value_name = "N")]
     seed: u32,
     /// Give up after this many seconds.
     #[arg(long, default_value = "600", value_parser = values::positive, value_name = "S")]
@@ -151,6 +151,9 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     })?;
     if let Some(material) = &arguments.select {
         studio.choose_material(material)?;
+    }
+    if let Some(tile) = arguments.tile {
+        studio.check_tile(tile)?;
     }
     if arguments.inspect.is_some() {
         studio.measure_truth()?;

@@ -109,6 +109,23 @@ pub(super) fn corners(text: &str) -> Result<[Vec3; 2], String> {
     }
 }
 
+/// A whole number in a range.
+pub(super) fn whole<T: TryFrom<u32>>(
+    range: RangeInclusive<u32>,
+) -> impl Fn(&str) -> Result<T, String> + Clone {
+    move |text| {
+        let (least, most) = (range.start(), range.end());
+        let Ok(number) = text.trim().parse::<i128>() else {
+            return Err(format!("expected a whole number from {least} to {most}"));
+        };
+        u32::try_from(number)
+            .ok()
+            .filter(|number| range.contains(number))
+            .and_then(|number| T::try_from(number).ok())
+            .ok_or_else(|| format!("{number} is not in {least}..={most}"))
+    }
+}
+
 /// A finite number above zero.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     let x = finite(text)?;

@@ -47,7 +47,7 @@ pub(super) struct ViewArguments {
     #[arg(long, value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
     size: Option<(u32, u32)>,
     /// Stop at this many samples per pixel.
-    #[arg(long, visible_alias = "spp", value_parser = clap::value_parser!(u32).range(1..), value_name = "N")]
+    #[arg(long, visible_alias = "spp", value_parser = values::whole::<u32>(1..=u32::MAX), value_name = "N")]
     samples: Option<u32>,
     /// Settings file of the window, with its kept pictures beside it (FILE.pictures); without it, the user's own.
     #[arg(long, value_name = "FILE")]
@@ -99,9 +99,10 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
         pictures: Settings::pictures_folder(arguments.settings.as_deref()),
         is_repeatable: false,
     };
-    match window::run(start, notice.into_iter().collect(), path) {
+    match window::run(start, notice.clone().into_iter().collect(), path) {
         Ok(closed_by) => closed_by.map_or(Ok(()), Err),
         Err(error) => {
+            notice.iter().for_each(crate::terminal::notice);
             let picture = arguments.output.display();
             let error = error.to_string();
             let error = error.trim_end_matches('.');

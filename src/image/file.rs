@@ -19,7 +19,7 @@ pub fn write_beside_and_rename(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<()> {
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let target = followed(path);
     check_target(&target).map_err(|cause| Error::at(path, cause))?;
     remove_leftovers(folder_of(&target));
     let temporary = Temporary::beside(&target);
@@ -50,16 +50,33 @@ pub fn write_beside_and_rename(
 /// # Errors
 /// As for writing.
 pub fn check_writable(path: &Path) -> Result<()> {
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let target = followed(path);
     check_target(&target).map_err(|cause| Error::at(path, cause))?;
     let temporary = Temporary::beside(&target);
     temporary.create().map_err(|error| Error::at(path, write_cause(&error)))?;
     Ok(())
 }
 
+/// Makes a folder and those above it, if they are not there.
+///
+/// # Errors
+/// If something else is there, or it may not be made.
+pub(crate) fn make_folder(path: &Path) -> Result<()> {
+    fs::create_dir_all(path).map_err(|error| {
+        let cause = match error.kind() {
+            io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => {
+                "cannot be a folder: something else is there".into()
+            }
+            _ => format!("cannot be made: {error}"),
+        };
+        Error::at(path, cause)
+    })
+}
+
 /// Whether two paths name the same file, there already or yet to be written.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let place = |path: &Path| {
+        let path = &followed(path);
         fs::canonicalize(path).or_else(|_| {
             let folder = fs::canonicalize(folder_of(path))?;
             Ok::<_, io::Error>(folder.join(path.file_name().unwrap_or_default()))
@@ -68,10 +85,30 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     matches!((place(a), place(b)), (Ok(a), Ok(b)) if a == b)
 }
 
+/// Links one after another that are followed, as many as systems do.
+const MOST_LINKS: usize = 40;
+
+/// The file that a path means, be it there or yet to be written: symbolic links are followed.
+fn followed(path: &Path) -> PathBuf {
+    if let Ok(target) = fs::canonicalize(path) {
+        return target;
+    }
+    let mut target = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        let Ok(next) = fs::read_link(&target) else { break };
+        target = target.with_file_name(next);
+    }
+    target
+}
+
 /// Why `target` cannot be written, as far as can be known before trying.
 fn check_target(target: &Path) -> std::result::Result<(), String> {
     if target.file_name().is_none() {
         return Err("cannot be written: it does not name a file".into());
+    }
+    let last = target.as_os_str().as_encoded_bytes().last();
+    if last.is_some_and(|&byte| std::path::is_separator(char::from(byte))) {
+        return Err("cannot be written: its name is that of a folder".into());
     }
     let folder = folder_of(target);
     if !folder.is_dir() {

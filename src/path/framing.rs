@@ -1,6 +1,7 @@
 //! A sensible view of a scene that brings no camera.
 
 use glam::{Mat3A, Vec3, Vec3A};
+use rayon::prelude::*;
 
 use super::World;
 use crate::bvh::Ray;
@@ -14,10 +15,15 @@ const FILL: f32 = 0.9;
 /// A scene is a room if from places in it at least this share of directions shows it from inside.
 const ROOM_ENCLOSURE: f32 = 0.6;
 
+/// Triangles that rays from the middle may cross: some 150 each. Where surfaces lie on one another by the
+/// thousand each ray takes long, and no place is better than another.
+const MOST_CROSSINGS: u32 = 1 << 19;
+
 /// Frames the scene for a picture of `aspect` (width over height): a room from inside, anything else
 /// from outside, a little from above and the right, filling the picture.
 pub fn frame(world: &World, aspect: f32) -> Camera {
-    if enclosure(world) > ROOM_ENCLOSURE { inside(world) } else { outside(world, aspect) }
+    let is_room = !is_dense(world) && enclosure(world) > ROOM_ENCLOSURE;
+    if is_room { inside(world) } else { outside(world, aspect) }
 }
 
 /// Directions that cover the sphere about evenly.
@@ -45,16 +51,35 @@ fn look(world: &World, origin: Vec3, direction: Vec3) -> Option<Sight> {
     Some(Sight { distance: hit.t, from_front })
 }
 
+/// Whether looking around would take too long. Crossings are counted rather than seconds, in no order: the
+/// same scene is framed alike on all machines.
+fn is_dense(world: &World) -> bool {
+    let mut crossings = 0;
+    middle_places(world).any(|origin| {
+        directions(128).any(|direction| {
+            let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
+            world.bvh.any_hit(&ray, |_| {
+                crossings += 1;
+                crossings > MOST_CROSSINGS
+            })
+        })
+    })
+}
+
+/// Places spread through the middle of the scene.
+fn middle_places(world: &World) -> impl Iterator<Item = Vec3> {
+    let (low, high) = world.bvh.bounds();
+    (0..27).map(move |i| {
+        let at = Vec3::new((i % 3) as f32, (i / 3 % 3) as f32, (i / 9) as f32);
+        low + (high - low) * (0.3 + 0.2 * at)
+    })
+}
+
 /// Median share, over places spread through the middle of the scene, of [`enclosure_at`]: furniture and
 /// pillars have an inside too.
 fn enclosure(world: &World) -> f32 {
-    let (low, high) = world.bvh.bounds();
-    let mut shares: Vec<f32> = (0..27)
-        .map(|i| {
-            let at = Vec3::new((i % 3) as f32, (i / 3 % 3) as f32, (i / 9) as f32);
-            enclosure_at(world, low + (high - low) * (0.3 + 0.2 * at))
-        })
-        .collect();
+    let places: Vec<Vec3> = middle_places(world).collect();
+    let mut shares: Vec<f32> = places.par_iter().map(|place| enclosure_at(world, *place)).collect();
     shares.sort_by(f32::total_cmp);
     shares[shares.len() / 2]
 }
@@ -90,14 +115,16 @@ fn inside(world: &World) -> Camera {
     let (low, high) = world.bvh.bounds();
     let size = high - low;
     let eye_height = low.y + (0.5 * size.y).min(0.45 * size.y.max(3.2));
-    let mut best = (f32::MIN, 0.5 * (low + high), Vec3::NEG_Z);
-    for (x, z) in (0..49).map(|i| ((i % 7) as f32 / 6.0, (i / 7) as f32 / 6.0)) {
+    // The best view from each place; of places, the first of those as good.
+    let view_from = |place: u32| {
+        let (x, z) = ((place % 7) as f32 / 6.0, (place / 7) as f32 / 6.0);
         let spread = |t: f32| 0.12 + 0.76 * t;
         let eye = Vec3::new(low.x + size.x * spread(x), eye_height, low.z + size.z * spread(z));
         let nearest = directions(64)
             .filter_map(|d| look(world, eye, d))
             .map(|sight| sight.distance)
             .fold(f32::INFINITY, f32::min);
+        let mut best = (f32::MIN, eye, Vec3::NEG_Z);
         let crowded = if nearest < 0.04 * size.min_element() { 0.3 } else { 1.0 };
         for step in 0..16 {
             let angle = step as f32 * std::f32::consts::TAU / 16.0;
@@ -112,7 +139,11 @@ fn inside(world: &World) -> Camera {
                 best = (score * crowded, eye, forward);
             }
         }
-    }
+        best
+    };
+    let views: Vec<(f32, Vec3, Vec3)> = (0..49).into_par_iter().map(view_from).collect();
+    let best = views.into_iter().reduce(|best, view| if view.0 > best.0 { view } else { best });
+    let best = best.unwrap_or((0.0, 0.5 * (low + high), Vec3::NEG_Z));
     Camera::look_at(best.1, best.1 + best.2 * 0.3 * size.length(), FOV_Y_RADIANS)
 }
 
@@ -155,4 +186,38 @@ fn fitting_eye(world: &World, centre: Vec3, axes: Mat3A, aspect: f32) -> Vec3 {
     let y = 0.5 * (top - bottom);
     let z = (0.5 * (right + left) / horizontal).max(0.5 * (top + bottom) / vertical);
     (axes * Vec3A::new(x, y, z)).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Material, Scene};
+
+    /// A room whose walls are there so many times.
+    fn room(layers: usize) -> World {
+        let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
+        let walls =
+            [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let triangles = walls.iter().flat_map(|&[a, b, c, d]| [[a, c, b], [a, d, c]]);
+        let triangles: Vec<[u32; 3]> = triangles.collect();
+        let triangles = triangles.repeat(layers);
+        World::new(Scene {
+            positions: (0..8).map(|i| 4.0 * corner(i)).collect(),
+            triangle_materials: vec![0; triangles.len()],
+            triangles,
+            materials: vec![Material::default()],
+            ..Scene::default()
+        })
+    }
+
+    #[test]
+    fn a_room_is_seen_from_inside_unless_each_ray_would_take_long() {
+        let eye = |layers| {
+            let world = room(layers);
+            let eye = Vec3::from(frame(&world, 1.0).world_from_camera.translation);
+            (eye.cmpge(Vec3::ZERO) & eye.cmple(Vec3::splat(4.0))).all()
+        };
+        assert!(eye(1) && eye(50));
+        assert!(!eye(500));
+    }
 }

@@ -14,7 +14,7 @@ use super::measure::Place;
 use super::plan::{LEAST_PICTURES, Settings};
 use crate::digest::Digest;
 use crate::error::{Error, Result};
-use crate::image::{Image, read_picture, write_beside_and_rename};
+use crate::image::{Image, is_linear, read_picture, write_beside_and_rename};
 use crate::metrics::{REL_MSE_EPSILON, trimmed_mean};
 use crate::render::film::Film;
 use crate::render::{Sampling, StopRule};
@@ -188,6 +188,11 @@ impl Reference {
         Image { width, height, pixels }
     }
 
+    /// Whether all its pictures are black, with which nothing can be compared.
+    pub(super) fn is_black(&self) -> bool {
+        self.facts.pictures > 0 && self.sums.as_flattened().iter().all(|sum| *sum <= 0.0)
+    }
+
     /// Its expected squared error, from the spread of the pictures; infinite below two.
     pub(super) fn noise(&self) -> Noise {
         if self.facts.pictures < 2 {
@@ -227,8 +232,13 @@ impl Reference {
 /// A picture that somebody else made, of the size of the runs.
 ///
 /// # Errors
-/// If it cannot be read, has another size, or is not finite.
+/// If it cannot be read, is not linear, has another size, or is black.
 pub(super) fn read_reference(path: &Path, size: (u32, u32)) -> Result<Image> {
+    if !is_linear(path)? {
+        let cause =
+            "is developed for a display, and errors are those of linear light: give an .exr";
+        return Err(Error::at(path, cause));
+    }
     let image = read_picture(path)?;
     if (image.width, image.height) != size {
         return Err(Error::at(
@@ -238,6 +248,9 @@ pub(super) fn read_reference(path: &Path, size: (u32, u32)) -> Result<Image> {
                 image.width, image.height, size.0, size.1, image.width, image.height
             ),
         ));
+    }
+    if crate::metrics::mean(&image) <= 0.0 {
+        return Err(Error::at(path, "is black: errors relative to it have no meaning"));
     }
     Ok(image)
 }

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::error::{Error, Result};
-use crate::image::{Image, write_beside_and_rename};
+use crate::error::Result;
+use crate::image::{Image, make_folder, write_beside_and_rename};
 use crate::output::record::{to_value, write_json};
 
 /// A report's folder: pages at the top, runs and references below.
@@ -26,8 +26,7 @@ impl Store {
     pub(super) fn open(root: &Path, references: Option<&Path>) -> Result<Self> {
         let references = references.map_or_else(|| root.join("references"), Path::to_owned);
         for folder in [root, &root.join("runs"), &references] {
-            fs::create_dir_all(folder)
-                .map_err(|e| Error::at(folder, format!("cannot be made: {e}")))?;
+            make_folder(folder)?;
             crate::image::check_writable(&folder.join("test"))?;
         }
         Ok(Self { root: root.to_owned(), references })

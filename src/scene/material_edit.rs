@@ -45,6 +45,11 @@ impl MaterialEdit {
         changed
     }
 
+    /// Whether a material is one that was hidden.
+    pub(super) fn has_hidden(material: &Material) -> bool {
+        material.alpha_mode == AlphaMode::Mask { cutoff: ALL }
+    }
+
     /// Whether all numbers are in range.
     pub fn is_sound(&self) -> bool {
         let color = self.color.iter().flat_map(Vec3::to_array);

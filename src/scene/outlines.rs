@@ -5,7 +5,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::instances::Surface;
-use super::{AlphaMode, Material, Scene};
+use super::{AlphaMode, Material, MaterialEdit, Scene};
 use crate::error::Decoded;
 
 /// Triangles of a material that are looked at.
@@ -15,71 +15,144 @@ const SHARE: f32 = 0.8;
 /// How far a hull lies from what it outlines, at most: a share of its own size.
 const DISTANCE: f32 = 0.05;
 
-/// A triangle's centre and its normal, as long as twice its area.
-fn facing(scene: &Scene, surface: Surface<'_>) -> (Vec3, Vec3) {
-    let [a, b, c] = scene.corners_at(surface);
-    ((a + b + c) / 3.0, (b - a).cross(c - a))
+/// A triangle, as far as outlines are told by it.
+#[derive(Clone, Copy)]
+struct Facing {
+    centre: Vec3,
+    /// As long as twice its area.
+    normal: Vec3,
+    material: u32,
 }
 
-fn is_hull(scene: &Scene, material: u32) -> bool {
-    // A mesh that instances share has its outline with it: one of them tells.
-    let of = |own: bool| {
-        let is_of = move |place: usize| (scene.triangle_materials[place] == material) == own;
-        scene.each_once().filter(move |(place, _)| is_of(*place))
+fn facing(scene: &Scene, surface: Surface<'_>) -> Facing {
+    let [a, b, c] = scene.corners_at(surface);
+    let material = scene.triangle_materials[surface.0];
+    Facing { centre: (a + b + c) / 3.0, normal: (b - a).cross(c - a), material }
+}
+
+/// All triangles of a material.
+struct Shape {
+    low: Vec3,
+    high: Vec3,
+    count: usize,
+    /// Six times the volume that they enclose, negative where they face inwards.
+    volume: f64,
+}
+
+/// The materials that may be hulls and face inwards. Each pass goes over the triangles once, however many
+/// materials there are.
+fn inward_shapes(scene: &Scene) -> Vec<Option<Shape>> {
+    let shape = |material: &Material| {
+        let may_be = !material.double_sided && material.alpha_mode == AlphaMode::Opaque;
+        may_be.then_some(Shape { low: Vec3::MAX, high: Vec3::MIN, count: 0, volume: 0.0 })
     };
-    let own: Vec<Surface<'_>> = of(true).collect();
-    if own.is_empty() || of(false).next().is_none() {
-        return false;
+    let mut shapes: Vec<Option<Shape>> = scene.materials.iter().map(shape).collect();
+    if shapes.iter().all(Option::is_none) {
+        return shapes;
     }
-    let corners = own.iter().flat_map(|surface| scene.corners_at(*surface));
-    let (low, high) = corners.fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(p), h.max(p)));
-    let (middle, reach) = (0.5 * (low + high), DISTANCE * (high - low).length());
-    // Six times the volume that the triangles enclose, negative where they face inwards.
-    let volume: f64 = own
-        .iter()
-        .map(|&triangle| {
-            let (centre, normal) = facing(scene, triangle);
-            (centre - middle).as_dvec3().dot(normal.as_dvec3())
-        })
-        .sum();
-    if volume >= 0.0 {
-        return false;
+    for surface in scene.each_once() {
+        if let Some(shape) = &mut shapes[scene.triangle_materials[surface.0] as usize] {
+            shape.count += 1;
+            for corner in scene.corners_at(surface) {
+                (shape.low, shape.high) = (shape.low.min(corner), shape.high.max(corner));
+            }
+        }
     }
-    // Only what is near the hull can lie below it.
-    let others: Vec<(Vec3, Vec3)> = of(false)
-        .map(|triangle| facing(scene, triangle))
-        .filter(|(at, _)| {
-            at.cmpge(low - Vec3::splat(reach)).all() && at.cmple(high + Vec3::splat(reach)).all()
-        })
-        .collect();
-    let step = own.len().div_ceil(SAMPLES);
-    let samples: Vec<Surface<'_>> = own.into_iter().step_by(step).collect();
-    let covering = samples
-        .par_iter()
-        .filter(|&&triangle| {
-            let (centre, normal) = facing(scene, triangle);
-            let distance = |other: &&(Vec3, Vec3)| other.0.distance_squared(centre);
-            let below = others.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            below.is_some_and(|&(at, other)| {
-                let towards = normal.normalize_or_zero().dot(other.normalize_or_zero());
-                at.distance(centre) <= reach && towards < -0.5 && (centre - at).dot(other) > 0.0
-            })
-        })
-        .count();
-    covering as f32 >= SHARE * samples.len() as f32
+    for surface in scene.each_once() {
+        if let Some(shape) = &mut shapes[scene.triangle_materials[surface.0] as usize] {
+            let Facing { centre, normal, .. } = facing(scene, surface);
+            let middle = 0.5 * (shape.low + shape.high);
+            shape.volume += (centre - middle).as_dvec3().dot(normal.as_dvec3());
+        }
+    }
+    shapes.into_iter().map(|shape| shape.filter(|shape| shape.volume < 0.0)).collect()
+}
+
+/// All triangles in order along the axis in which they spread most.
+struct Row {
+    axis: usize,
+    facings: Vec<Facing>,
+}
+
+impl Row {
+    fn new(mut facings: Vec<Facing>) -> Self {
+        let bounds = (Vec3::MAX, Vec3::MIN);
+        let (low, high) =
+            facings.iter().fold(bounds, |(l, h), f| (l.min(f.centre), h.max(f.centre)));
+        let axis = (high - low).max_position();
+        // Stable: of two in one place, the first in the file comes first.
+        facings.par_sort_by(|a, b| a.centre[axis].total_cmp(&b.centre[axis]));
+        Self { axis, facings }
+    }
+
+    /// The nearest triangle of another material that is at most `reach` away; the first of those as near.
+    fn nearest(&self, of: &Facing, reach: f32) -> Option<&Facing> {
+        let along = |other: &Facing| other.centre[self.axis] - of.centre[self.axis];
+        let (before, after) =
+            self.facings.split_at(self.facings.partition_point(|other| along(other) < 0.0));
+        let mut nearest = (reach * reach, None);
+        for other in before.iter().rev() {
+            if along(other).powi(2) > nearest.0 {
+                break;
+            }
+            let distance = of.centre.distance_squared(other.centre);
+            if other.material != of.material && distance <= nearest.0 {
+                nearest = (distance, Some(other));
+            }
+        }
+        for other in after {
+            if along(other).powi(2) >= nearest.0 {
+                break;
+            }
+            let distance = of.centre.distance_squared(other.centre);
+            if other.material != of.material && distance < nearest.0 {
+                nearest = (distance, Some(other));
+            }
+        }
+        nearest.1
+    }
+}
+
+/// Whether a hull's triangle lies over a surface that faces as it would from outside.
+fn covers(triangle: &Facing, row: &Row, reach: f32) -> bool {
+    row.nearest(triangle, reach).is_some_and(|other| {
+        let towards = triangle.normal.normalize_or_zero().dot(other.normal.normalize_or_zero());
+        towards < -0.5 && (triangle.centre - other.centre).dot(other.normal) > 0.0
+    })
 }
 
 impl Scene {
     /// Numbers of the materials whose triangles are a hull around others: single-sided, inside out as a
     /// whole, and close over other surfaces that face the other way.
     pub(super) fn hulls(&self) -> Vec<u32> {
-        let may_be = |material: &Material| {
-            !material.double_sided && material.alpha_mode == AlphaMode::Opaque
+        let shapes = inward_shapes(self);
+        if shapes.iter().all(Option::is_none) {
+            return Vec::new();
+        }
+        // A mesh that instances share has its outline with it: one of them tells.
+        let facings: Vec<Facing> = self.each_once().map(|surface| facing(self, surface)).collect();
+        let mut seen = vec![0_usize; shapes.len()];
+        let mut samples = vec![Vec::new(); shapes.len()];
+        for triangle in &facings {
+            let material = triangle.material as usize;
+            if let Some(shape) = &shapes[material] {
+                if seen[material].is_multiple_of(shape.count.div_ceil(SAMPLES)) {
+                    samples[material].push(*triangle);
+                }
+                seen[material] += 1;
+            }
+        }
+        let row = Row::new(facings);
+        let is_hull = |shape: &Shape, samples: &[Facing]| {
+            let reach = DISTANCE * (shape.high - shape.low).length();
+            let covering = samples.par_iter().filter(|sample| covers(sample, &row, reach)).count();
+            covering as f32 >= SHARE * samples.len() as f32
         };
         (0..)
-            .zip(&self.materials)
-            .filter(|(number, material)| may_be(material) && is_hull(self, *number))
-            .map(|(number, _)| number)
+            .zip(shapes.iter().zip(&samples))
+            .filter_map(|(number, (shape, samples))| {
+                shape.as_ref().filter(|shape| is_hull(shape, samples)).map(|_| number)
+            })
             .collect()
     }
 
@@ -99,12 +172,13 @@ impl Scene {
         self.check_shown()
     }
 
-    /// Whether anything was left to be shown.
+    /// Whether anything is left to be shown: something that is not of a hidden material.
     ///
     /// # Errors
-    /// The cause, if nothing was.
-    pub(super) fn check_shown(&self) -> Decoded<()> {
-        match self.triangles.is_empty() {
+    /// The cause, if nothing is.
+    pub(crate) fn check_shown(&self) -> Decoded<()> {
+        let is_hidden: Vec<bool> = self.materials.iter().map(MaterialEdit::has_hidden).collect();
+        match self.triangle_materials.iter().all(|&material| is_hidden[material as usize]) {
             true => Err("all of it is hidden, so there is nothing to render".into()),
             false => Ok(()),
         }
@@ -112,11 +186,14 @@ impl Scene {
 
     /// Removes the triangles of some materials; the materials stay, unused.
     pub(super) fn remove_triangles_of(&mut self, materials: &[u32]) {
-        let keeps = |place: u32| !materials.contains(&self.triangle_materials[place as usize]);
-        self.instances = std::mem::take(&mut self.instances).retained(keeps);
-        let mut keep = self.triangle_materials.iter().map(|m| !materials.contains(m));
+        let mut is_gone = vec![false; self.materials.len()];
+        materials.iter().for_each(|&material| is_gone[material as usize] = true);
+        let keeps = |material: &u32| !is_gone[*material as usize];
+        let of = |place: u32| self.triangle_materials[place as usize];
+        self.instances = std::mem::take(&mut self.instances).retained(|at| keeps(&of(at)));
+        let mut keep = self.triangle_materials.iter().map(keeps);
         self.triangles.retain(|_| keep.next().unwrap_or(true));
-        self.triangle_materials.retain(|m| !materials.contains(m));
+        self.triangle_materials.retain(keeps);
     }
 }
 
@@ -167,5 +244,30 @@ mod tests {
             let scene = two_spheres(radius, inwards, double_sided);
             assert!(scene.hulls().is_empty(), "{radius} {inwards} {double_sided}");
         }
+    }
+
+    /// Inward flakes side by side, each of its own material: none lies over another.
+    #[test]
+    fn as_many_materials_as_triangles_are_told_in_a_moment() {
+        const COUNT: u32 = 100_000;
+        let mut scene =
+            Scene { materials: vec![Material::default(); COUNT as usize], ..Scene::default() };
+        for material in 0..COUNT {
+            let at = Vec3::new((material % 300) as f32, 0.0, (material / 300) as f32);
+            let first = scene.positions.len() as u32;
+            let corners = [Vec3::ZERO, 0.5 * Vec3::X, 0.5 * Vec3::Y, 0.5 * Vec3::Z];
+            scene.positions.extend(corners.map(|corner| at + corner));
+            for [a, b, c] in [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]] {
+                scene.triangles.push([a, b, c].map(|corner| first + corner));
+                scene.triangle_materials.push(material);
+            }
+        }
+        let start = std::time::Instant::now();
+        assert!(scene.hulls().is_empty());
+        let odd: Vec<u32> = (0..COUNT).filter(|material| material % 2 == 1).collect();
+        scene.remove_triangles_of(&odd);
+        assert_eq!(scene.triangles.len(), 2 * COUNT as usize);
+        assert!(scene.triangle_materials.iter().all(|material| material % 2 == 0));
+        assert!(start.elapsed() < std::time::Duration::from_secs(10));
     }
 }

@@ -225,9 +225,9 @@ fn shrunk(picture: &Rgb8) -> Rgb8 {
 fn a_screenshot_is_repeatable_and_says_what_is_wrong() {
     let folder = tempfile::tempdir().expect("a folder");
     let shoot = |rest: &str| {
-        let line = format!(
-            "screenshot crack --env sky:day@64x32 --size 640x400 --samples 1 {rest} -o a.png"
-        );
+        let size = if rest.contains("--size") { "" } else { "--size 640x400" };
+        let line =
+            format!("screenshot crack --env sky:day@64x32 {size} --samples 1 {rest} -o a.png");
         let mut command = Command::new(env!("CARGO_BIN_EXE_lightgrid"));
         let output = command.current_dir(folder.path()).args(line.split_whitespace()).output();
         output.expect("the binary starts")
@@ -252,6 +252,14 @@ fn a_screenshot_is_repeatable_and_says_what_is_wrong() {
         .expect("the binary starts");
     assert_eq!(missing.status.code(), Some(1));
     assert!(says(&missing).contains("none.glb: there is no such file"), "{}", says(&missing));
+    for (rest, reason) in [
+        ("--tile 99999", "sky:day@64x32: there is no tile 99999: it has 128, counted from 0"),
+        ("--size 200000x10", "a window of 200000x10 pixels cannot be drawn: "),
+    ] {
+        let refused = shoot(rest);
+        assert_eq!(refused.status.code(), Some(1), "{}", says(&refused));
+        assert!(says(&refused).contains(reason), "{}", says(&refused));
+    }
 }
 
 #[test]
@@ -261,7 +269,8 @@ fn without_a_display_the_picture_is_rendered_into_a_file() {
     for (what, file) in
         [("crack --env sky:day@64x32", "lightgrid.png"), ("lightgrid.png -o lit.png", "lit.png")]
     {
-        let line = format!("view {what} --size 32x18 --samples 1");
+        std::fs::write(folder.path().join("settings.json"), "garbage").expect("written");
+        let line = format!("view {what} --size 32x18 --samples 1 --settings settings.json");
         let output = Command::new(env!("CARGO_BIN_EXE_lightgrid"))
             .current_dir(folder.path())
             .args(line.split_whitespace())
@@ -276,6 +285,7 @@ fn without_a_display_the_picture_is_rendered_into_a_file() {
             assert!(message.contains("no window can be opened"), "{message}");
             assert!(message.contains(&format!("; rendering into {file} instead")), "{message}");
             assert!(!message.contains(".;"), "{message}");
+            assert!(message.contains("settings.json.bak"), "{message}");
             let picture = read_picture(&folder.path().join(file)).expect("a picture");
             assert_eq!((picture.width, picture.height), (32, 18));
         }

@@ -140,6 +140,13 @@ fn materials_are_changed_by_name() {
     let refusal = |rest: &str, status| bench.refusal(&line(rest), status);
     let says = refusal("-o a.exr --material marble:roughness=1", 1);
     assert!(says.contains("office: no material is called marble"), "{says}");
+    let painted = SCENE.replace("\"POSITION\": 0}", "\"POSITION\": 0}, \"material\": 0");
+    let painted = painted.replace("\"asset\"", "\"materials\": [{\"name\": \"paint\"}], \"asset\"");
+    fs::write(bench.path("painted.gltf"), painted).expect("written");
+    for options in ["--hide paint", "--material paint:hidden"] {
+        let says = bench.refusal(&format!("render painted.gltf -o a.exr {options}"), 1);
+        assert!(says.contains("all of it is hidden, so there is nothing to render"), "{says}");
+    }
     let says = refusal("-o a.exr --material wall:shine=1", 2);
     assert!(says.contains("shine is not color, roughness, metalness or hidden"), "{says}");
 }
@@ -277,6 +284,27 @@ fn extent(numbers: impl Iterator<Item = usize> + Clone) -> usize {
 }
 
 #[test]
+fn layers_that_no_picture_holds_are_remarked() {
+    let bench = Bench::new();
+    let says = |rest: &str| text(&bench.render(rest).stderr).contains("--layers adds nothing");
+    assert!(says("-o a.png --layers depth"));
+    assert!(!says("-o a.png -o a.exr --layers depth"));
+}
+
+#[test]
+fn a_black_map_has_no_tables_worth_reading_and_no_distributions() {
+    let bench = Bench::new();
+    let black = Image::filled(8, 4, [f32::NAN, 0.0, -1.0]);
+    let picture = ExrPicture { image: &black, layers: vec![], metadata: &[], preview: None };
+    write_exr(&bench.path("black.exr"), picture).expect("written");
+    let says = text(&bench.run("sat black.exr").stderr);
+    assert!(says.contains("notice: black.exr: pixels of the map were repaired"), "{says}");
+    assert!(says.contains("notice: black.exr: the map is black"), "{says}");
+    let says = bench.refusal("render open --env black.exr -o a.png --distributions d.csv", 1);
+    assert!(says.contains("d.csv: not written: this map"), "{says}");
+}
+
+#[test]
 fn a_black_picture_is_remarked() {
     let output = Bench::new().render("-o a.png --env-intensity 0");
     assert!(text(&output.stderr).contains("the picture is black"), "{}", text(&output.stderr));
@@ -350,6 +378,10 @@ fn wrong_values_are_refused_with_the_reason() {
         ("--env-intensity -1", "must not be negative"),
         ("--env-sun -1", "must not be negative"),
         ("--threads 1000000", "is not in 0..=1024"),
+        ("--spp 1.5", "expected a whole number from 1 to 4294967295"),
+        ("--camera -1", "-1 is not in 0..=4294967295"),
+        ("--camera 1.5", "expected a whole number from 0 to 4294967295"),
+        ("--seed 18446744073709551615", "18446744073709551615 is not in 0..=4294967295"),
         ("--tiles 257x1", "at most 256x256"),
         ("--grid 1", "1 is not in 2..=512"),
         ("--eye nan,0,0 --target 0,0,0", "three numbers"),
@@ -377,6 +409,11 @@ fn what_cannot_be_done_is_one_sentence_and_status_1() {
         (line("-o a.jpg"), "a.jpg: pictures are written as .png or .exr"),
         (line("-o none/a.png"), "there is no folder none"),
         (line("-o a.png -o ./a.png"), "./a.png: two outputs"),
+        (line("-o a.png/"), "a.png/: cannot be written: its name is that of a folder"),
+        (
+            line("-o a.png --sampling bsdf --distributions d.csv"),
+            "d.csv: not written: this map and sampling have no distributions",
+        ),
         (line("-o a.png --json a.png"), "a.png: two outputs"),
         ("render none.glb -o a.png".into(), "none.glb: there is no such file"),
         ("render none -o a.png".into(), "neither a file nor a built-in scene"),
@@ -387,6 +424,7 @@ fn what_cannot_be_done_is_one_sentence_and_status_1() {
             "scene.gltf: is a glTF scene, where a map",
         ),
         ("render scene.gltf -o a.png --env sky:mars".into(), "no built-in sky called \"mars\""),
+        ("render open -o a.png --variant red".into(), "open: there is no variant red: it has none"),
         ("compare map.exr none.exr".into(), "none.exr: there is no such file"),
         ("info none.exr".into(), "none.exr: there is no such file"),
     ] {
@@ -461,11 +499,24 @@ mod signals {
 
     use super::*;
 
-    fn start(bench: &Bench, rest: &str) -> std::process::Child {
+    /// Starts a render to which a closed terminal does what is said, whatever it does to the tests.
+    fn start_with(bench: &Bench, rest: &str, hang_up: libc::sighandler_t) -> std::process::Child {
+        use std::os::unix::process::CommandExt as _;
         let mut command = bench.command(&render_line(rest));
+        // SAFETY: setting a signal's disposition is allowed between fork and exec.
+        unsafe {
+            command.pre_exec(move || {
+                libc::signal(libc::SIGHUP, hang_up);
+                Ok(())
+            });
+        }
         let child = command.stderr(Stdio::piped()).spawn().expect("the binary starts");
         std::thread::sleep(Duration::from_millis(700));
         child
+    }
+
+    fn start(bench: &Bench, rest: &str) -> std::process::Child {
+        start_with(bench, rest, libc::SIG_DFL)
     }
 
     fn send(child: &std::process::Child, signal: &str) {
@@ -495,6 +546,31 @@ mod signals {
             ["a.json", "a.png", "map.exr", "scene.bin", "scene.gltf"],
             "no half-written file"
         );
+    }
+
+    /// The shell in it often tells its commands once more.
+    #[test]
+    fn a_closed_terminal_writes_the_picture_so_far_and_nohup_goes_on() {
+        let bench = Bench::new();
+        let outputs = [1, 4, 20].map(Duration::from_secs).into_iter().map(|more| {
+            let child = start(&bench, "-o a.png --spp 100000000 --json a.json");
+            std::thread::sleep(more);
+            send(&child, "-HUP");
+            std::thread::sleep(Duration::from_millis(60));
+            // It may be done already.
+            let _ = Command::new("kill").args(["-HUP", &child.id().to_string()]).output();
+            child.wait_with_output().expect("it ends")
+        });
+        let too_early = |output: &Output| output.status.code() == Some(129);
+        let output = { outputs }.find(|output| !too_early(output)).expect("a first pass");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(bench.json("a.json")["samples_per_pixel"].as_u64().expect("a count") > 0);
+
+        let child = start_with(&bench, "-o b.png --spp 1000000 --seconds 3", libc::SIG_IGN);
+        send(&child, "-HUP");
+        let output = child.wait_with_output().expect("it ends");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert_eq!(text(&output.stderr).matches("stopping").count(), 0);
     }
 
     #[test]

@@ -6,6 +6,20 @@ use lightgrid::image::read_picture;
 
 use crate::cli::{Bench, render_line, text};
 
+#[test]
+fn a_frame_that_cannot_be_written_takes_no_other_with_it() {
+    let bench = Bench::new();
+    fs::create_dir(bench.path("f.1.exr")).expect("made");
+    let line = render_line("--turntable 3 -o f.#.exr --device cpu");
+    let output = bench.command(&line).env("TMPDIR", bench.path("none")).output();
+    let output = output.expect("the binary starts");
+    let says = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{says}");
+    assert!(bench.path("f.0.exr").is_file() && bench.path("f.2.exr").is_file(), "{says}");
+    assert!(says.contains("f.1.exr: cannot be written: it is a folder"), "{says}");
+    assert!(says.contains("nor can the picture be kept: "), "{says}");
+}
+
 /// Learned modes, too, render the very samples that one process would.
 #[test]
 fn parts_join_into_the_file_that_one_process_writes() {

@@ -179,6 +179,26 @@ fn names_from_files_command_no_terminal() {
     }
 }
 
+/// A name with a line break does not look like two things that are said.
+#[test]
+fn names_from_files_make_no_lines_of_their_own() {
+    let bench = Bench::new();
+    let camera = r#","cameras":[{"name":"a\nnotice: all is well","type":"perspective",
+        "perspective":{"yfov":0,"znear":0.1}}]"#;
+    let text = scene("scene.bin", camera).replace(r#"[{"mesh":0}]"#, r#"[{"mesh":0,"camera":0}]"#);
+    fs::write(bench.path("scene.gltf"), text).unwrap();
+    let info = self::text(&bench.run("info scene.gltf").stdout);
+    let render = "render scene.gltf --env map.exr --size 8x8 --spp 1 --device cpu -o a.png";
+    let render = self::text(&bench.run(render).stderr);
+    let mut unknown = bench.command("info scene.gltf --variant");
+    let unknown = self::text(&unknown.arg("a\nnotice: all is well").output().unwrap().stderr);
+    for says in [info, render] {
+        assert!(says.contains("a\\u000anotice: all is well"), "{says}");
+        assert!(!says.contains("\nnotice: all is well"), "{says}");
+    }
+    assert_eq!(unknown.lines().count(), 1, "{unknown}");
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn nobody_who_listens_costs_no_picture() {
@@ -272,6 +292,35 @@ fn what_killed_processes_left_is_removed_when_it_is_old() {
     assert!(bench.path(".lightgrid-1-1.part").exists() && bench.path("own.part").exists());
 }
 
+/// As for one whose target is there, which is written anew.
+#[cfg(unix)]
+#[test]
+fn a_link_to_what_is_not_there_yet_is_followed() {
+    let bench = Bench::new();
+    fs::create_dir_all(bench.path("store/deep")).unwrap();
+    std::os::unix::fs::symlink("store/next.png", bench.path("a.png")).unwrap();
+    std::os::unix::fs::symlink("deep/b.png", bench.path("store/next.png")).unwrap();
+    for _ in 0..2 {
+        let output = bench.run(&format!("{SMALL} -o a.png"));
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        for link in ["a.png", "store/next.png"] {
+            assert!(fs::symlink_metadata(bench.path(link)).unwrap().is_symlink(), "{link}");
+        }
+        assert!(bench.path("store/deep/b.png").is_file());
+    }
+    let says = sentence(&bench.run(&format!("{SMALL} -o a.png -o store/deep/b.png")));
+    assert!(says.contains("two outputs"), "{says}");
+    fs::remove_file(bench.path("store/deep/b.png")).unwrap();
+    let says = sentence(&bench.run(&format!("{SMALL} -o a.png -o store/deep/b.png")));
+    assert!(says.contains("two outputs"), "{says}");
+    std::os::unix::fs::symlink("gone/c.png", bench.path("c.png")).unwrap();
+    let says = sentence(&bench.run(&format!("{SMALL} -o c.png")));
+    assert!(says.contains("c.png: cannot be written: there is no folder gone"), "{says}");
+    std::os::unix::fs::symlink("d.png", bench.path("d.png")).unwrap();
+    let says = sentence(&bench.run(&format!("{SMALL} -o d.png")));
+    assert!(says.contains("d.png: cannot be written"), "{says}");
+}
+
 /// A picture of a bit a pixel that is small as a file: the sizes are looked at first.
 #[test]
 fn a_bomb_of_a_picture_is_refused_before_it_goes_off() {
@@ -320,6 +369,54 @@ fn short_memory_is_a_sentence_with_both_numbers() {
         assert!(says.contains(" needs ") && says.contains(" MB are left"), "{says}");
         assert!(!bench.path("a.png").exists());
     }
+}
+
+/// What runs under a limit on the address space, in kilobytes.
+#[cfg(target_os = "linux")]
+fn with_memory(bench: &Bench, kilobytes: u32, line: &str) -> Output {
+    let binary = env!("CARGO_BIN_EXE_lightgrid");
+    std::process::Command::new("sh")
+        .args(["-c", &format!("ulimit -v {kilobytes}; exec {binary} {line}")])
+        .current_dir(bench.path(""))
+        .output()
+        .expect("a shell")
+}
+
+/// A large JSON needs several times its size, and that is known before it is read.
+#[cfg(target_os = "linux")]
+#[test]
+fn short_memory_for_objects_is_a_sentence_with_both_numbers() {
+    let bench = Bench::new();
+    let nodes = r#"{"children":[1]},"#.repeat(3_000_000);
+    let text = format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{nodes}{{}}]}}"#);
+    fs::write(bench.path("scene.gltf"), text).unwrap();
+    let says = sentence(&with_memory(&bench, 1_000_000, "info scene.gltf"));
+    assert!(says.contains("scene.gltf: needs 1203 MB of memory, and "), "{says}");
+}
+
+/// Where nobody has asked first, it is said all the same, and the process ends as for any other cause.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_that_is_refused_is_no_abort() {
+    let bench = Bench::new();
+    // Small as text, and large as materials.
+    let materials = "{},".repeat(3_000_000);
+    let text = format!(r#"{{"asset":{{"version":"2.0"}},"materials":[{materials}{{}}]}}"#);
+    fs::write(bench.path("scene.gltf"), text).unwrap();
+    let output = with_memory(&bench, 1_500_000, "info scene.gltf");
+    let says = self::text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{says}");
+    assert!(says.starts_with("memory allocation of "), "{says}");
+}
+
+/// Threads that cannot be had are no panic.
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_that_are_refused_are_a_sentence() {
+    let bench = Bench::new();
+    let says =
+        sentence(&with_memory(&bench, 1_500_000, &format!("{SMALL} --threads 1024 -o a.png")));
+    assert!(says.contains("1024 threads cannot be started: "), "{says}");
 }
 
 /// The picture from before, or all of a new one: never a part.

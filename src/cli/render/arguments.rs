@@ -75,7 +75,7 @@ pub(in crate::cli) struct RenderArguments {
     pub(super) fog_box: Option<[Vec3; 2]>,
 
     /// Which of the file's cameras, counted from 0.
-    #[arg(long, value_name = "N", help_heading = "Camera")]
+    #[arg(long, value_parser = values::whole::<usize>(0..=u32::MAX), value_name = "N", help_heading = "Camera")]
     pub(super) camera: Option<usize>,
     /// Camera position in metres, instead of a camera of the file.
     #[arg(long, value_parser = values::vector, requires = "target", allow_hyphen_values = true, value_name = "X,Y,Z", help_heading = "Camera")]
@@ -106,7 +106,7 @@ pub(in crate::cli) struct RenderArguments {
     pub(super) picture: PictureArguments,
 
     /// Stop at this many samples per pixel (256 if no stop rule is given).
-    #[arg(long, visible_alias = "samples", value_parser = clap::value_parser!(u32).range(1..), value_name = "N", help_heading = "Stop")]
+    #[arg(long, visible_alias = "samples", value_parser = values::whole::<u32>(1..=u32::MAX), value_name = "N", help_heading = "Stop")]
     pub(super) spp: Option<u32>,
     /// Stop after this many seconds of learning and rendering; if they do not suffice for a sample of every
     /// pixel, a CPU makes a coarser picture.
@@ -143,7 +143,7 @@ pub(in crate::cli) struct RenderArguments {
     #[arg(long, default_value = "tile-local", value_name = "KIND", help_heading = "Light")]
     pub(super) table: TableKind,
     /// Surface vertices at which a path gathers light; 1 is direct light only.
-    #[arg(long, default_value = "8", value_parser = clap::value_parser!(u32).range(0..=100_000), value_name = "N", help_heading = "Light")]
+    #[arg(long, default_value = "8", value_parser = values::whole::<u32>(0..=100_000), value_name = "N", help_heading = "Light")]
     pub(super) bounces: u32,
     /// Never end dim paths at random.
     #[arg(long, help_heading = "Light")]
@@ -152,15 +152,15 @@ pub(in crate::cli) struct RenderArguments {
     #[arg(long, default_value = "16x8", value_parser = tile_grid, allow_hyphen_values = true, value_name = "CxR", help_heading = "Light")]
     pub(super) tiles: (u32, u32),
     /// Light Grid cells around the horizon; half as many from top to bottom.
-    #[arg(long, default_value = "64", value_parser = clap::value_parser!(u32).range(2..=512), value_name = "N", help_heading = "Light")]
+    #[arg(long, default_value = "64", value_parser = values::whole::<u32>(2..=512), value_name = "N", help_heading = "Light")]
     pub(super) grid: u32,
     /// Camera paths to learn from before rendering, which goes on learning; without it, as many as
     /// suit the picture.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000), value_name = "N", help_heading = "Light")]
+    #[arg(long, value_parser = values::whole::<u64>(1..=1_000_000_000), value_name = "N", help_heading = "Light")]
     pub(super) learning_paths: Option<u64>,
 
     /// Seed of the random numbers; the same seed gives the same picture.
-    #[arg(long, default_value = "0", value_name = "N", help_heading = "Run")]
+    #[arg(long, default_value = "0", value_parser = values::whole::<u32>(0..=u32::MAX), value_name = "N", help_heading = "Run")]
     pub(super) seed: u32,
     /// Where to render: auto takes a GPU if there is a real one and everything fits on it.
     #[arg(long, default_value = "auto", value_enum, help_heading = "Run")]
@@ -176,7 +176,7 @@ pub(in crate::cli) struct RenderArguments {
     #[arg(long, value_enum, help_heading = "Run")]
     pub(super) schedule: Option<Schedule>,
     /// Threads; 0 uses every core.
-    #[arg(long, default_value = "0", value_parser = clap::value_parser!(u16).range(0..=1024), value_name = "N", help_heading = "Run")]
+    #[arg(long, default_value = "0", value_parser = values::whole::<u16>(0..=1024), value_name = "N", help_heading = "Run")]
     pub(super) threads: u16,
     /// Leaves times out of what pictures say about themselves: equal pictures are equal files.
     #[arg(long, help_heading = "Run")]
@@ -205,7 +205,7 @@ pub(in crate::cli) struct RenderArguments {
     pub(super) frames: Option<RangeInclusive<u32>>,
     /// Turns the camera once in so many frames about the vertical through --target; without it, through
     /// what the middle of the picture shows or, in a room, the camera itself.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000), value_name = "N", help_heading = "Frames")]
+    #[arg(long, value_parser = values::whole::<u32>(1..=100_000), value_name = "N", help_heading = "Frames")]
     pub(super) turntable: Option<u32>,
     /// Frames per second.
     #[arg(long, default_value = "24", value_parser = values::positive, value_name = "F", help_heading = "Frames")]

@@ -11,7 +11,7 @@ use glam::{Affine3A, Vec3};
 use super::RenderArguments;
 use crate::cli::picture::say_written;
 use crate::error::{Error, Result};
-use crate::image::write_beside_and_rename;
+use crate::image::{make_folder, write_beside_and_rename};
 use crate::path::{World, framing};
 use crate::scene::Camera;
 use crate::scene::camera_path::CameraPath;
@@ -188,14 +188,16 @@ impl Reel {
     /// If it cannot be made.
     pub(super) fn new() -> Result<Self> {
         let folder = std::env::temp_dir().join(format!("lightgrid-{}-frames", std::process::id()));
-        fs::create_dir_all(&folder)
-            .map_err(|e| Error::at(&folder, format!("cannot be made: {e}")))?;
+        make_folder(&folder)?;
         Ok(Self { folder, count: 0 })
     }
 
-    /// Where the next frame is to be written.
+    /// Where the next frame is to be written: in the place of the last if that could not be, for videos are
+    /// made of frames without gaps.
     pub(super) fn next(&mut self) -> PathBuf {
-        self.count += 1;
+        if self.count == 0 || self.frame(self.count - 1).exists() {
+            self.count += 1;
+        }
         self.frame(self.count - 1)
     }
 

@@ -1,6 +1,6 @@
 //! What `lightgrid render` writes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::share::Share;
 use super::{RenderArguments, frames};
@@ -12,7 +12,7 @@ use crate::medium::Fog;
 use crate::output::distributions::{check_distributions_extension, write_distributions};
 use crate::output::record::{self, Record};
 use crate::path::World;
-use crate::render::View;
+use crate::render::{Sampling, View};
 
 /// Refuses outputs before the work rather than after it.
 pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
@@ -34,6 +34,9 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
     }
     if let Some(distributions) = &arguments.distributions {
         check_distributions_extension(distributions)?;
+        if arguments.sampling == Sampling::Bsdf {
+            return Err(without_distributions(distributions));
+        }
     }
     let (width, height) = arguments.size;
     if let Some([left, top, w, h]) = arguments.region
@@ -52,7 +55,15 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
         }
         check_writable(file)?;
     }
+    if arguments.part.is_none() {
+        arguments.picture.say_unused(outputs.iter());
+    }
     Ok(())
+}
+
+/// Why there is nothing to be written as distributions: of a black map, or where none is sampled.
+pub(super) fn without_distributions(path: &Path) -> Error {
+    Error::at(path, "not written: this map and sampling have no distributions")
 }
 
 /// Writes all that was asked for: one that cannot be written must not take the others with it. Returns what
@@ -76,7 +87,7 @@ pub(super) fn write(
         failures.extend(written.map(|()| say_written(path)).err());
     }
     if let Some(path) = &arguments.distributions {
-        let none = || Error::at(path, "not written: this map and sampling have no distributions");
+        let none = || without_distributions(path);
         let written = grid.ok_or_else(none).and_then(|grid| write_distributions(path, grid));
         failures.extend(written.map(|()| say_written(path)).err());
     }

@@ -8,7 +8,7 @@ use super::super::reference::Noise;
 use super::super::shares::shares;
 use super::super::summary::{Measure, ReferenceReport};
 use super::{Conductor, Work};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::metrics::compare;
 use crate::render::Sampling;
@@ -48,6 +48,12 @@ impl Conductor<'_> {
             is_whole =
                 reference.add_picture(&place, &self.devices[fastest].name, seconds, cancel)?
                     && !self.is_cancelled();
+            if reference.is_black() {
+                return Err(Error::new(format!(
+                    "{}: the picture is black, and errors relative to it have no meaning",
+                    work.prepared.title
+                )));
+            }
         }
         work.reference = Some(reference);
         Ok(is_whole)

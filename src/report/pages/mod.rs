@@ -1,7 +1,6 @@
 //! What a report leaves behind: `report.html`, `report.csv`, `report.json`, and the plots as SVG.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
@@ -18,8 +17,8 @@ mod words;
 pub use words::{duration, markdown_table, row_sentence};
 
 use super::summary::{Measure, Report};
-use crate::error::{Error, Result};
-use crate::image::write_beside_and_rename;
+use crate::error::Result;
+use crate::image::{make_folder, write_beside_and_rename};
 use crate::output::record::{to_value, write_json};
 
 /// Writes all files of a report into a folder.
@@ -27,7 +26,7 @@ pub(super) fn write(report: &Report, folder: &Path) -> Result<()> {
     write_json(&folder.join("report.json"), &to_value(report)?)?;
     write_text(&folder.join("report.csv"), &csv(report))?;
     let plots = folder.join("plots");
-    fs::create_dir_all(&plots).map_err(|e| Error::at(&plots, format!("cannot be made: {e}")))?;
+    make_folder(&plots)?;
     if let Some(plot) = overview::overview_plot(report) {
         write_text(&plots.join("speed-ups.svg"), &plot)?;
     }

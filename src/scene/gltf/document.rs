@@ -7,10 +7,14 @@ use serde_json::Value;
 
 use super::{Fallible, extensions, lenient};
 use crate::error::Notices;
+use crate::memory;
 
 /// GLB chunk types (glTF 2.0, section 4.4.3).
 const JSON_CHUNK: &[u8] = b"JSON";
 const BIN_CHUNK: &[u8] = b"BIN\0";
+
+/// What a value of the JSON takes as an object of glTF, beside its text: a node of three takes some 400 bytes.
+const BYTES_OF_VALUE: u64 = 128;
 
 /// What decides whether the rest can be read.
 #[derive(Deserialize)]
@@ -46,7 +50,8 @@ pub(super) fn parse<'a>(
     // Some writers pad the JSON chunk with zeros instead of spaces.
     let padding = text.iter().rev().take_while(|&&byte| byte == 0).count();
     let text = &text[..text.len() - padding];
-    lenient::check_indices(text)?;
+    let values = lenient::check_indices(text)?;
+    memory::check(text.len() as u64 + values.saturating_mul(BYTES_OF_VALUE))?;
     // Sound files take the short way: a tree of values takes some twenty times their size.
     let tree = || -> Fallible<Value> {
         let mut tree: Value = serde_json::from_slice(text).map_err(|e| e.to_string())?;

@@ -1,6 +1,7 @@
 //! What real writers do that the types do not allow, and what the types allow though it is wrong.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::fmt;
 
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
@@ -35,12 +36,14 @@ const INDICES: &[&str] = &[
 ];
 
 /// Refuses text that is no JSON, and indices of more than 32 bits: the types would cut them to others.
-/// Nothing is kept of the text.
-pub(super) fn check_indices(text: &[u8]) -> Fallible<()> {
+/// Nothing is kept of the text; returns how many values are in it.
+pub(super) fn check_indices(text: &[u8]) -> Fallible<u64> {
     let mut reader = serde_json::Deserializer::from_slice(text);
-    Check { is_index: false, of_objects: false }
+    let values = Cell::new(0);
+    Check { is_index: false, of_objects: false, values: &values }
         .deserialize(&mut reader)
         .and_then(|()| reader.end())
+        .map(|()| values.get())
         .map_err(|cause| match cause.is_data() {
             true => cause.to_string(),
             false => format!("it is neither GLB nor valid glTF JSON ({cause})"),
@@ -49,21 +52,24 @@ pub(super) fn check_indices(text: &[u8]) -> Fallible<()> {
 
 /// Looks at a value: are the numbers in it indices?
 #[derive(Clone, Copy)]
-struct Check {
+struct Check<'c> {
     is_index: bool,
     /// The same for the values of objects in it, whatever their keys.
     of_objects: bool,
+    /// Counts them.
+    values: &'c Cell<u64>,
 }
 
-impl<'de> DeserializeSeed<'de> for Check {
+impl<'de> DeserializeSeed<'de> for Check<'_> {
     type Value = ();
 
     fn deserialize<D: Deserializer<'de>>(self, reader: D) -> Result<(), D::Error> {
+        self.values.set(self.values.get() + 1);
         reader.deserialize_any(self)
     }
 }
 
-impl<'de> Visitor<'de> for Check {
+impl<'de> Visitor<'de> for Check<'_> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -112,7 +118,7 @@ impl<'de> Visitor<'de> for Check {
             } else {
                 let is_index = self.of_objects || INDICES.contains(&&*key);
                 let of_objects = matches!(&*key, "attributes" | "targets");
-                object.next_value_seed(Self { is_index, of_objects })?;
+                object.next_value_seed(Self { is_index, of_objects, ..self })?;
             }
         }
         Ok(())
@@ -160,7 +166,7 @@ mod tests {
 
     #[test]
     fn indices_have_32_bits_and_other_numbers_what_they_want() {
-        let check = |value: Value| check_indices(value.to_string().as_bytes());
+        let check = |value: Value| check_indices(value.to_string().as_bytes()).map(|_| ());
         let large = 1_u64 << 32;
         assert_eq!(
             check(json!({"nodes": [{"translation": [large, 0, 0], "children": [1]}]})),
@@ -176,6 +182,7 @@ mod tests {
         ] {
             assert!(check(wrong.clone()).unwrap_err().contains("more than 32 bits"), "{wrong}");
         }
+        assert_eq!(check_indices(br#"{"a": [1, {"b": "c"}], "extras": [1, 2]}"#), Ok(5));
         assert!(check_indices(b"{} {}").unwrap_err().contains("valid glTF JSON"));
     }
 

@@ -16,7 +16,7 @@ use crate::error::Notices;
 use crate::scene::{AlphaMode, Material, Texture, TextureImage, TextureRef};
 
 /// Largest radiance a surface may emit: its square is far from overflow.
-const BRIGHTEST: f32 = 1e12;
+pub(super) const BRIGHTEST: f32 = 1e12;
 
 /// The materials that primitives use, with their textures.
 pub(super) struct Materials {

@@ -10,6 +10,7 @@ use json::validation::Checked;
 use super::Fallible;
 use super::animation::Channels;
 use super::buffers::{File, find};
+use super::materials::BRIGHTEST;
 use super::pose::Nodes;
 use crate::error::Notices;
 use crate::scene::camera_path::CameraPath;
@@ -111,7 +112,7 @@ pub(super) fn lights(
         let source = find(sources, reference.light, "light")?;
         let name = source.name.clone().or_else(|| node.name.clone());
         let name = name.unwrap_or_else(|| format!("light {}", reference.light));
-        match light(source, &name, nodes.world[number]) {
+        match light(source, &name, nodes.world[number], notices) {
             Some(light) => lights.push(light),
             None => notices.add(format!("light {name} is damaged and left out")),
         }
@@ -119,26 +120,47 @@ pub(super) fn lights(
     Ok(lights)
 }
 
-fn light(source: &Light, name: &str, world_from_light: DAffine3) -> Option<PunctualLight> {
+fn light(
+    source: &Light,
+    name: &str,
+    world_from_light: DAffine3,
+    notices: &mut Notices,
+) -> Option<PunctualLight> {
     let Checked::Valid(kind) = source.type_ else { return None };
+    let mut is_sound = true;
+    let mut within = |value: f32, least: f32, most: f32| {
+        is_sound &= (least..=most).contains(&value);
+        value.clamp(least, most)
+    };
     let kind = match kind {
         Type::Directional => PunctualKind::Directional,
         Type::Point => PunctualKind::Point,
         Type::Spot => {
             let spot = source.spot.as_ref()?;
-            let outer_radians = spot.outer_cone_angle.clamp(0.0, FRAC_PI_2);
-            let inner_radians = spot.inner_cone_angle.clamp(0.0, outer_radians);
+            let outer_radians = within(spot.outer_cone_angle, 0.0, FRAC_PI_2);
+            let inner_radians = within(spot.inner_cone_angle, 0.0, outer_radians);
             PunctualKind::Spot { inner_radians, outer_radians }
         }
     };
+    let color = source.color.map(|channel| within(channel, 0.0, BRIGHTEST));
+    let intensity = Vec3::from_array(color) * within(source.intensity, 0.0, BRIGHTEST);
+    let intensity = Vec3::from_array(intensity.to_array().map(|x| within(x, 0.0, BRIGHTEST)));
+    let range = source.range.map(|range| within(range, f32::MIN_POSITIVE, f32::INFINITY));
     let direction = -world_from_light.matrix3.z_axis.as_vec3();
     let light = PunctualLight {
         name: name.to_owned(),
         kind,
         position: world_from_light.translation.as_vec3(),
         direction: direction.normalize_or(Vec3::NEG_Z),
-        intensity: Vec3::from_array(source.color).max(Vec3::ZERO) * source.intensity.max(0.0),
-        range: source.range.filter(|&range| range > 0.0).unwrap_or(f32::INFINITY),
+        intensity,
+        // Without one it reaches everything.
+        range: range.filter(|&range| range > f32::MIN_POSITIVE).unwrap_or(f32::INFINITY),
     };
-    (light.position.is_finite() && light.intensity.is_finite()).then_some(light)
+    if !(light.position.is_finite() && light.intensity.is_finite()) {
+        return None;
+    }
+    if !is_sound {
+        notices.add(format!("light {name} has values outside their range, which are replaced"));
+    }
+    Some(light)
 }

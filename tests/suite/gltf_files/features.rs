@@ -414,6 +414,41 @@ fn cameras_and_lights() {
 }
 
 #[test]
+fn lights_outside_their_range_are_brought_into_it_and_it_is_said() {
+    let scene = square().load(
+        r#""extensionsUsed":["KHR_lights_punctual"],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+        "extensions":{"KHR_lights_punctual":{"lights":[
+        {"type":"spot","name":"wide","spot":{"innerConeAngle":1,"outerConeAngle":2}},
+        {"type":"spot","name":"inside out","spot":{"innerConeAngle":1,"outerConeAngle":0.5}},
+        {"type":"point","name":"negative","intensity":-3},
+        {"type":"point","name":"blue","color":[-1,0,1]},
+        {"type":"point","name":"near","range":-2},
+        {"type":"point","name":"bright","intensity":1e38},
+        {"type":"spot","name":"sound","range":3,"spot":{"innerConeAngle":0.25,"outerConeAngle":0.5}}]}},
+        "nodes":[{"mesh":0},
+        {"extensions":{"KHR_lights_punctual":{"light":0}}},{"extensions":{"KHR_lights_punctual":{"light":1}}},
+        {"extensions":{"KHR_lights_punctual":{"light":2}}},{"extensions":{"KHR_lights_punctual":{"light":3}}},
+        {"extensions":{"KHR_lights_punctual":{"light":4}}},{"extensions":{"KHR_lights_punctual":{"light":5}}},
+        {"extensions":{"KHR_lights_punctual":{"light":6}}}]"#,
+    );
+    let notices: Vec<&str> = scene.notices.iter().collect();
+    let expected = ["wide", "inside out", "negative", "blue", "near", "bright"]
+        .map(|name| format!("light {name} has values outside their range, which are replaced"));
+    assert_eq!(notices, expected);
+    let [wide, inside_out, negative, blue, near, bright, sound] = &scene.lights[..] else {
+        panic!("seven lights")
+    };
+    let outer_radians = std::f32::consts::FRAC_PI_2;
+    assert_eq!(wide.kind, PunctualKind::Spot { inner_radians: 1.0, outer_radians });
+    let narrow = PunctualKind::Spot { inner_radians: 0.5, outer_radians: 0.5 };
+    assert_eq!(inside_out.kind, narrow);
+    assert_eq!((negative.intensity, blue.intensity), (Vec3::ZERO, Vec3::Z));
+    assert_eq!((near.range, sound.range), (f32::INFINITY, 3.0));
+    assert_eq!(bright.intensity, Vec3::splat(1e12));
+}
+
+#[test]
 fn external_files_data_uris_and_missing_images() {
     let builder = square();
     let folder = tempfile::tempdir().unwrap();

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use lightgrid::image::{ExrPicture, read_picture, write_exr};
+use lightgrid::image::{ExrPicture, Rgb8, read_picture, write_exr, write_png};
 use serde_json::Value;
 
 use crate::cli::{Bench, text};
@@ -186,6 +186,11 @@ fn what_cannot_be_reported_is_refused_at_once() {
     let picture = lightgrid::image::Image::filled(8, 8, [1.0; 3]);
     let picture = ExrPicture { image: &picture, layers: vec![], metadata: &[], preview: None };
     write_exr(&bench.path("small.exr"), picture).expect("written");
+    let black = lightgrid::image::Image::filled(8, 8, [0.0; 3]);
+    let picture = ExrPicture { image: &black, layers: vec![], metadata: &[], preview: None };
+    write_exr(&bench.path("black.exr"), picture).expect("written");
+    let developed = Rgb8 { width: 8, height: 8, pixels: vec![[90; 3]; 64] };
+    write_png(&bench.path("small.png"), &developed, &[]).expect("written");
     let out = |rest: &str| format!("report {rest} -o out");
     for (line, reason) in [
         (out("none"), "neither a file nor a built-in scene"),
@@ -195,6 +200,12 @@ fn what_cannot_be_reported_is_refused_at_once() {
         (out("office open --reference small.exr"), "one of each"),
         (out("talk --device cpu --adapter x").replace("out", "map.exr"), "map.exr"),
         (out("scene.gltf --reference small.exr"), "is 8x8 pixels, the runs are 240x135"),
+        (
+            out("scene.gltf --size 8x8 --reference small.png"),
+            "small.png: is developed for a display",
+        ),
+        (out("scene.gltf --size 8x8 --reference black.exr"), "black.exr: is black"),
+        ("report office -o map.exr".to_owned(), "map.exr: cannot be a folder: something else is"),
         ("report ablations --only xyz -o out".to_owned(), "MIS compensation"),
     ] {
         let message = bench.refusal(&line, 1);
@@ -214,6 +225,19 @@ fn what_cannot_be_reported_is_refused_at_once() {
         let message = bench.refusal(&line, 2);
         assert!(message.contains(reason), "{line}: {message}");
     }
+}
+
+#[test]
+fn a_black_picture_is_refused_as_a_reference_by_its_names() {
+    let bench = Bench::new();
+    let black = lightgrid::image::Image::filled(8, 8, [0.0; 3]);
+    let picture = ExrPicture { image: &black, layers: vec![], metadata: &[], preview: None };
+    write_exr(&bench.path("black.exr"), picture).expect("written");
+    let line = "report scene.gltf --env black.exr --size 8x8 --seconds 0.1 --seeds 1 -o out";
+    let output = bench.run(line);
+    let says = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{says}");
+    assert!(says.contains("scene.gltf / black.exr: the picture is black"), "{says}");
 }
 
 #[test]
