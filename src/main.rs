@@ -6,6 +6,7 @@ mod refused {
     //! refused and aborts. That is no fault of the program, which then ends as it does for any other cause.
 
     use std::alloc::{GlobalAlloc, Layout, System};
+    use std::io::Write;
     use std::sync::atomic::{AtomicBool, Ordering};
 
     /// Whether the system has refused memory.
@@ -17,28 +18,48 @@ mod refused {
     #[global_allocator]
     static ALLOCATOR: Noting = Noting;
 
-    fn noted(memory: *mut u8) -> *mut u8 {
+    /// Who asks for less takes no refusal for an answer.
+    const SMALL: usize = 64 << 10;
+
+    fn noted(memory: *mut u8, size: usize) -> *mut u8 {
         if memory.is_null() {
             REFUSED.store(true, Ordering::Relaxed);
+            // Telling of a fault takes memory too, and under a lock, for which a second fault would wait.
+            if size < SMALL || std::thread::panicking() {
+                end(size);
+            }
         }
         memory
+    }
+
+    /// Ends the process as an error, in words that take no memory.
+    fn end(size: usize) -> ! {
+        let mut words = [0; 80];
+        let mut rest = &mut words[..];
+        let _ = writeln!(rest, "lightgrid: memory is short: {size} bytes more cannot be had");
+        let length = 80 - rest.len();
+        // SAFETY: so much of `words` is there. Nobody can be told if it cannot be written.
+        unsafe {
+            let _ = libc::write(libc::STDERR_FILENO, words.as_ptr().cast(), length);
+            libc::_exit(1)
+        }
     }
 
     // SAFETY: all is left to the system's allocator, and noting takes no memory.
     unsafe impl GlobalAlloc for Noting {
         unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
             // SAFETY: as the caller promises.
-            noted(unsafe { System.alloc(layout) })
+            noted(unsafe { System.alloc(layout) }, layout.size())
         }
 
         unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
             // SAFETY: as the caller promises.
-            noted(unsafe { System.alloc_zeroed(layout) })
+            noted(unsafe { System.alloc_zeroed(layout) }, layout.size())
         }
 
         unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
             // SAFETY: as the caller promises.
-            noted(unsafe { System.realloc(memory, layout, size) })
+            noted(unsafe { System.realloc(memory, layout, size) }, size)
         }
 
         unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {

@@ -228,6 +228,9 @@ fn lap(start: Instant) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
+/// What the standard library gives a thread for its stack.
+const STACK_BYTES: u64 = 2 << 20;
+
 /// Starts the threads that share all work, of which there are so many once and for all; 0 is one for each
 /// core. Started when they are first needed, they would panic where the system gives none.
 pub(super) fn start_threads(threads: u16) -> Result<()> {
@@ -236,11 +239,16 @@ pub(super) fn start_threads(threads: u16) -> Result<()> {
         return Ok(());
     }
     let count = if threads == 0 { String::new() } else { format!("{threads} ") };
+    let cannot = |cause: &dyn std::fmt::Display| {
+        Error::new(format!("{count}threads cannot be started: {cause}"))
+    };
+    // A thread that finds no room for what comes with its stack aborts.
+    memory::check(u64::from(threads) * STACK_BYTES).map_err(|cause| cannot(&cause))?;
     rayon::ThreadPoolBuilder::new()
         .num_threads(usize::from(threads))
         .thread_name(|i| format!("render {i}"))
         .build_global()
-        .map_err(|e| Error::new(format!("{count}threads cannot be started: {e}")))
+        .map_err(|e| cannot(&e))
 }
 
 /// Lets the CPU take over from a GPU that fails, unless that was asked for by name.

@@ -1,7 +1,7 @@
 //! What must not cost a picture: nobody who listens, full disks, hostile and vanishing files, signals.
 
 use std::fs;
-use std::process::{Output, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -29,7 +29,7 @@ const QUICK: &str =
 
 /// What a process says that is done within a minute.
 #[cfg(unix)]
-fn finished(command: &mut std::process::Command) -> Output {
+fn finished(command: &mut Command) -> Output {
     let command = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
     let mut child = command.spawn().expect("the process starts");
     let start = Instant::now();
@@ -99,7 +99,7 @@ fn links_out_of_the_folder_pipes_and_devices_are_not_read() {
     let bench = Bench::new();
     fs::create_dir(bench.path("sub")).unwrap();
     std::os::unix::fs::symlink("../scene.bin", bench.path("sub/link.bin")).unwrap();
-    let made = std::process::Command::new("mkfifo").arg(bench.path("sub/pipe.hdr")).status();
+    let made = Command::new("mkfifo").arg(bench.path("sub/pipe.hdr")).status();
     assert!(made.unwrap().success());
     for (uri, options, reason) in [
         ("link.bin", "", "`link.bin` lies outside"),
@@ -207,10 +207,7 @@ fn nobody_who_listens_costs_no_picture() {
         let binary = env!("CARGO_BIN_EXE_lightgrid");
         // Without light there is something to remark.
         let line = format!("exec {binary} {SMALL} --env-intensity 0 -o a.png {to}");
-        let status = std::process::Command::new("sh")
-            .args(["-c", &line])
-            .current_dir(bench.path(""))
-            .status();
+        let status = Command::new("sh").args(["-c", &line]).current_dir(bench.path("")).status();
         assert_eq!(status.unwrap().code(), Some(0), "{to}");
         assert!(bench.path("a.png").exists(), "{to}");
     }
@@ -360,7 +357,7 @@ fn short_memory_is_a_sentence_with_both_numbers() {
     ] {
         let bench = Bench::new();
         let binary = env!("CARGO_BIN_EXE_lightgrid");
-        let output = std::process::Command::new("sh")
+        let output = Command::new("sh")
             .args(["-c", &format!("ulimit -v 1500000; exec {binary} {line}")])
             .current_dir(bench.path(""))
             .output()
@@ -375,7 +372,7 @@ fn short_memory_is_a_sentence_with_both_numbers() {
 #[cfg(target_os = "linux")]
 fn with_memory(bench: &Bench, kilobytes: u32, line: &str) -> Output {
     let binary = env!("CARGO_BIN_EXE_lightgrid");
-    std::process::Command::new("sh")
+    Command::new("sh")
         .args(["-c", &format!("ulimit -v {kilobytes}; exec {binary} {line}")])
         .current_dir(bench.path(""))
         .output()
@@ -407,6 +404,26 @@ fn memory_that_is_refused_is_no_abort() {
     let says = self::text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{says}");
     assert!(says.starts_with("memory allocation of "), "{says}");
+}
+
+/// A fault is told with a backtrace, which takes memory too, under a lock: that must not wait for itself.
+#[cfg(target_os = "linux")]
+#[test]
+fn telling_of_short_memory_ends() {
+    let bench = Bench::new();
+    let binary = env!("CARGO_BIN_EXE_lightgrid");
+    let line = SMALL.replace("open", "living-room");
+    for kilobytes in (110_000..130_000).step_by(2_000) {
+        let line = format!("ulimit -v {kilobytes}; exec timeout 60 {binary} {line} -o a.png");
+        let status = Command::new("sh")
+            .current_dir(bench.path(""))
+            .env("RUST_BACKTRACE", "1")
+            .args(["-c", &line])
+            .stderr(Stdio::null())
+            .status()
+            .expect("sh starts");
+        assert!(status.code().is_some_and(|code| code != 124), "{kilobytes}: {status}");
+    }
 }
 
 /// Threads that cannot be had are no panic.
@@ -463,7 +480,7 @@ fn a_full_disk_is_a_sentence_and_the_old_picture_stays() {
         // Ignored, the signal becomes an error of the write, as ENOSPC would be.
         let binary = env!("CARGO_BIN_EXE_lightgrid");
         let line = format!("exec {binary} {QUICK} --size 640x480 -o {picture}");
-        let mut command = std::process::Command::new("sh");
+        let mut command = Command::new("sh");
         command.args(["-c", &format!("trap '' XFSZ; ulimit -f 64; {line}")]);
         let says = sentence(&finished(command.current_dir(bench.path(""))));
         assert!(says.contains("cannot be written") && !says.contains("panicked"), "{says}");
@@ -562,11 +579,7 @@ mod signals {
     fn send(child: &std::process::Child, signal: &str) {
         let id = child.id().to_string();
         assert!(
-            std::process::Command::new("kill")
-                .args([signal, &id])
-                .status()
-                .expect("kill is there")
-                .success()
+            Command::new("kill").args([signal, &id]).status().expect("kill is there").success()
         );
     }
 
