@@ -37,10 +37,10 @@ mod refused {
         let mut words = [0; 80];
         let mut rest = &mut words[..];
         let _ = writeln!(rest, "lightgrid: memory is short: {size} bytes more cannot be had");
-        let length = 80 - rest.len();
+        let left = rest.len();
         // SAFETY: so much of `words` is there. Nobody can be told if it cannot be written.
         unsafe {
-            let _ = libc::write(libc::STDERR_FILENO, words.as_ptr().cast(), length);
+            let _ = libc::write(libc::STDERR_FILENO, words.as_ptr().cast(), words.len() - left);
             libc::_exit(1)
         }
     }

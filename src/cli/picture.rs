@@ -70,10 +70,7 @@ impl PictureArguments {
 
     /// Says what was asked for that none of these pictures holds.
     pub(super) fn say_unused<'a>(&self, mut pictures: impl Iterator<Item = &'a PathBuf>) {
-        let has_layers = |path: &PathBuf| {
-            path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
-        };
-        if !self.layers.is_empty() && !pictures.any(has_layers) {
+        if !self.layers.is_empty() && !pictures.any(|path| output::holds_layers(path)) {
             notice("--layers adds nothing: they are written into .exr pictures alone");
         }
     }

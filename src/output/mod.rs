@@ -80,6 +80,11 @@ pub fn check_extension(path: &Path) -> Result<()> {
     }
 }
 
+/// Whether a picture's file has room for layers: OpenEXR's has.
+pub fn holds_layers(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
+}
+
 /// What a person should know about a finished picture.
 pub fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
     let mut remarks = Vec::new();
@@ -120,7 +125,7 @@ pub fn write_picture(
     check_extension(path)?;
     let whole = film.without_gaps();
     let image = whole.image();
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
+    if holds_layers(path) {
         let layers = layers(film, &whole, &options.layers);
         return write_exr(
             path,

@@ -288,6 +288,7 @@ impl Second<'_, '_> {
             Scatterer::Surface(surface) => offset_origin(position, surface.geometric_normal),
             Scatterer::Medium(_) => position,
         };
+        let is_in_medium = matches!(scatterer, Scatterer::Medium(_));
         let mut density = 0.0;
         for (pixel, first) in firsts.iter().enumerate() {
             let Some(first) = first else { continue };
@@ -316,7 +317,6 @@ impl Second<'_, '_> {
                     continue;
                 }
             }
-            let is_in_medium = matches!(scatterer, Scatterer::Medium(_));
             let crossing = tracer.fog.as_ref().map_or(Crossing::CLEAR, |fog| {
                 let stretch = fog.stretch(first.vertex.position, direction, squared.sqrt());
                 let length = stretch.map_or(0.0, |(from, to)| to - from);

@@ -64,7 +64,7 @@ impl Scatterer<'_> {
     }
 
     /// What share of light from `direction` goes on along the path, and the density with which
-    /// [`Self::onward`] chooses that direction; `None` if it is no light.
+    /// the path chooses that direction; `None` if it is no light.
     pub(super) fn scattered(&self, direction: Vec3) -> Option<(Vec3, f32)> {
         match self {
             Self::Surface(surface) => surface.scattered(direction),
