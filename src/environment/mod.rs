@@ -26,7 +26,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
 pub use self::options::{EnvironmentOptions, Lookup, TableKind};
@@ -196,13 +196,20 @@ impl Environment {
 
     /// Unit world direction of a place in a tile, `within` in `[0,1]`^2 of its extent in u and v.
     pub fn direction_in_tile(&self, tile: u32, within: Vec2) -> Vec3 {
+        let [u, v] = self.extent_of_tile(tile);
+        let at = |range: Range<f64>, t| range.start + f64::from(t) * (range.end - range.start);
+        direction_from_uv(DVec2::new(at(u, within.x), at(v, within.y)).as_vec2())
+    }
+
+    /// What a tile spans of lat-long u, which may pass 1, and v of world directions.
+    pub(crate) fn extent_of_tile(&self, tile: u32) -> [Range<f64>; 2] {
         let patches = self.grid.patches(tile);
-        let size = Vec2::new(self.map.width as f32, self.map.height as f32);
-        let first = Vec2::new(patches.x.start as f32, patches.y.start as f32);
-        let extent = Vec2::new(patches.width() as f32, patches.height() as f32);
-        let uv = (first + within * extent - self.patches.shift()) / size;
-        let uv = Vec2::new(uv.x, uv.y.clamp(0.0, 1.0));
-        direction_from_uv(Vec2::new(uv.x + self.rotation_turns, uv.y))
+        let shift = f64::from(self.patches.shift());
+        let u = |x| (f64::from(x) - shift) / f64::from(self.map.width);
+        let turned = |x| u(x) + f64::from(self.rotation_turns);
+        // The rows at the poles are half as high.
+        let v = |y| ((f64::from(y) - shift) / f64::from(self.map.height)).clamp(0.0, 1.0);
+        [turned(patches.x.start)..turned(patches.x.end), v(patches.y.start)..v(patches.y.end)]
     }
 
     /// The tile seen in a unit world direction.

@@ -1,6 +1,8 @@
 //! Distributions of all cells from their counters, on all threads.
 
 use std::collections::BTreeMap;
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -219,22 +221,80 @@ fn fitting(supports: &[usize], room: usize, tile_count: u32) -> usize {
 }
 
 /// For each face axis, the share of a Lambertian's density that falls into each tile, and at last that
-/// of even scattering in a medium, by summing a Fibonacci lattice of directions.
+/// of even scattering in a medium.
 fn diffuse_shares(environment: &Environment) -> Vec<Vec<f64>> {
-    const DIRECTIONS: u32 = 1 << 15;
-    let mut shares = vec![vec![0.0; environment.tile_count() as usize]; MEDIUM_FACE as usize + 1];
-    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-    for i in 0..DIRECTIONS {
-        let y = 1.0 - (f64::from(i) + 0.5) * 2.0 / f64::from(DIRECTIONS);
-        let radius = (1.0 - y * y).sqrt();
-        let (sin, cos) = (golden * f64::from(i)).sin_cos();
-        let direction = glam::DVec3::new(radius * cos, y, radius * sin).as_vec3();
-        let tile = environment.tile_of(direction) as usize;
-        shares[MEDIUM_FACE as usize][tile] += 1.0 / f64::from(DIRECTIONS);
-        for (face, shares) in shares.iter_mut().take(6).enumerate() {
-            let cosine = f64::from(direction.dot(face_axis(face as u32)).max(0.0));
-            shares[tile] += cosine * 4.0 / f64::from(DIRECTIONS);
+    let tiles = 0..environment.tile_count();
+    let share = |face| tiles.clone().map(move |tile| diffuse_share(environment, face, tile));
+    (0..=MEDIUM_FACE).map(|face| share(face).collect()).collect()
+}
+
+/// Integral over a tile of the cosine with a face's axis over pi, or of an even density: of rectangles in
+/// longitude and polar angle there are closed forms.
+fn diffuse_share(environment: &Environment, face: u32, tile: u32) -> f64 {
+    let [u, v] = environment.extent_of_tile(tile);
+    let azimuths = (u.start - 0.5) * TAU..(u.end - 0.5) * TAU;
+    let thetas = v.start * PI..v.end * PI;
+    let over = |range: &Range<f64>, integral: &dyn Fn(f64) -> f64| {
+        integral(range.end) - integral(range.start)
+    };
+    let width = azimuths.end - azimuths.start;
+    if face == MEDIUM_FACE {
+        return width * over(&thetas, &|theta| -theta.cos()) / (4.0 * PI);
+    }
+    let axis = face_axis(face);
+    if axis.y != 0.0 {
+        let sine_squared = |theta: f64| 0.5 * theta.sin().powi(2);
+        return width / PI
+            * if axis.y > 0.0 {
+                over(&thetas, &|theta| sine_squared(theta.min(FRAC_PI_2)))
+            } else {
+                over(&thetas, &|theta| -sine_squared(theta.max(FRAC_PI_2)))
+            };
+    }
+    let toward = f64::from(axis.z).atan2(f64::from(axis.x));
+    // The integral of the cosine where it is positive, from where it begins to be.
+    let lit = |azimuth: f64| {
+        let from_edge = azimuth - toward + FRAC_PI_2;
+        let rest = from_edge.rem_euclid(TAU);
+        2.0 * from_edge.div_euclid(TAU) + if rest < PI { 1.0 - rest.cos() } else { 2.0 }
+    };
+    let heights = over(&thetas, &|theta| 0.5 * (theta - theta.sin() * theta.cos()));
+    over(&azimuths, &lit) * heights / PI
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::{EnvironmentOptions, sky};
+
+    #[test]
+    fn diffuse_shares_are_those_of_directions_spread_evenly() {
+        const DIRECTIONS: u32 = 1 << 18;
+        for rotation_radians in [0.0, 1.3, 6.0] {
+            let map = sky::build("overcast", 130, 61).expect("a sky");
+            let options = EnvironmentOptions { rotation_radians, ..EnvironmentOptions::default() };
+            let environment = Environment::new(map, &options).expect("a sound map");
+            let found = diffuse_shares(&environment);
+            let mut expected = vec![vec![0.0; environment.tile_count() as usize]; found.len()];
+            let golden = PI * (3.0 - 5.0_f64.sqrt());
+            for i in 0..DIRECTIONS {
+                let y = 1.0 - (f64::from(i) + 0.5) * 2.0 / f64::from(DIRECTIONS);
+                let radius = (1.0 - y * y).sqrt();
+                let (sin, cos) = (golden * f64::from(i)).sin_cos();
+                let direction = glam::DVec3::new(radius * cos, y, radius * sin).as_vec3();
+                let tile = environment.tile_of(direction) as usize;
+                expected[MEDIUM_FACE as usize][tile] += 1.0 / f64::from(DIRECTIONS);
+                for (face, shares) in expected.iter_mut().take(MEDIUM_FACE as usize).enumerate() {
+                    let cosine = f64::from(direction.dot(face_axis(face as u32)).max(0.0));
+                    shares[tile] += cosine * 4.0 / f64::from(DIRECTIONS);
+                }
+            }
+            for (found, expected) in found.iter().zip(&expected) {
+                assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+                for (found, expected) in found.iter().zip(expected) {
+                    assert!((found - expected).abs() < 1e-4, "{found} {expected}");
+                }
+            }
         }
     }
-    shares
 }

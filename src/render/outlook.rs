@@ -24,6 +24,9 @@ pub(super) fn middle_distance(world: &World, size: [u32; 2], rays: &CameraRays) 
     distances.get(distances.len() / 2).copied().filter(|distance| *distance > 0.0)
 }
 
+/// Least [`enclosure`] of a room.
+pub(super) const ROOM_ENCLOSURE: f32 = 0.9;
+
 /// How far what the camera sees is enclosed: the mean share of the cosine-weighted hemisphere over it that
 /// surfaces take up, panes as far as they let no light through. 0 where it sees no surface.
 pub(super) fn enclosure(world: &World, size: [u32; 2], rays: &CameraRays) -> f32 {

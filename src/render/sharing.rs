@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::outlook::enclosure;
+use super::outlook::{ROOM_ENCLOSURE, enclosure};
 use super::{Gi, Sampling, View};
 use crate::path::World;
 use crate::path::camera::CameraRays;
@@ -33,7 +33,7 @@ const LEAST_SIZE: u32 = 64;
 const LEAST_ENCLOSURE: f32 = 0.5;
 /// The same for large tiles: small ones have 1.25 times their efficiency where it is 0.54 to 0.83, and 0.74
 /// to 0.97 of it where it is 0.94 to 0.99.
-const LARGE_ENCLOSURE: f32 = 0.9;
+const LARGE_ENCLOSURE: f32 = ROOM_ENCLOSURE;
 
 impl Sharing {
     /// What this comes to for a view: nothing where paths end in the radiance cache.

@@ -10,7 +10,7 @@ use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::path::camera::CameraRays;
-use crate::render::outlook::middle_distance;
+use crate::render::outlook::{ROOM_ENCLOSURE, enclosure, middle_distance};
 use crate::render::{View, cpu};
 
 /// Learning under way, or over.
@@ -20,6 +20,10 @@ pub(super) struct Learning {
     /// Paths counted since the counters were last looked through.
     paths_of_pass: u64,
     pub(super) stage: Stage,
+    /// Whether rendered paths count when learning paths have been traced. Outside of rooms they do not:
+    /// there is little left to learn, and what new distributions gain is less than a new sequence costs.
+    /// Counting for four samples makes 1.02 to 1.27 times the error there, in rooms 0.88 to 1.07.
+    pub(super) counts_rendered: bool,
 }
 
 /// How far learning is.
@@ -67,7 +71,12 @@ impl Learning {
             medium: view.fog(world).is_some(),
         };
         let grid = LearningGrid::new(grid, environment.tile_count(), options);
-        Some(Self { grid, pass: 0, paths_of_pass: 0, stage: Stage::Tracing })
+        let [width, height] = view.whole_size();
+        let counts_rendered = options.goes_on() && {
+            let rays = CameraRays::new(&view.camera, width, height);
+            enclosure(world, [width, height], &rays) >= ROOM_ENCLOSURE
+        };
+        Some(Self { grid, pass: 0, paths_of_pass: 0, stage: Stage::Tracing, counts_rendered })
     }
 }
 
@@ -88,7 +97,7 @@ impl Session<'_> {
             return Ok(false);
         }
         learning.grid = counted.snapshot();
-        self.finish_learning();
+        learning.stage = Stage::Counting;
         self.update_distributions();
         self.take_up_distributions()?;
         Ok(true)

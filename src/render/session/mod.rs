@@ -284,9 +284,8 @@ impl<'a> Session<'a> {
 
     /// Goes over to rendering with what was learned so far.
     pub fn finish_learning(&mut self) {
-        let goes_on = self.view.distribution_options().is_some_and(|options| options.goes_on());
-        if let Some(Learning { stage: stage @ Stage::Tracing, .. }) = &mut self.learning {
-            *stage = if goes_on { Stage::Counting } else { Stage::Over };
+        if let Some(learning) = self.learning.as_mut().filter(|l| l.stage == Stage::Tracing) {
+            learning.stage = if learning.counts_rendered { Stage::Counting } else { Stage::Over };
         }
     }
 

@@ -185,6 +185,7 @@ fn distributions_made_of_a_pixel_s_own_samples_do_not_bias_it() {
         let learning = |seed| {
             let mut session = learned(&world, &environment, view_of(Sampling::Adaptive, seed));
             let light = finish(&mut session);
+            assert!(session.figures().counted_paths > 0, "rendered paths count in a room");
             (light, session.grid().cloned().expect("it has learned"))
         };
         let plain = over_seeds(seeds, |seed| {
