@@ -236,7 +236,7 @@ fn sample_in_tile(tile: u32, u: vec2u) -> EnvironmentSample {
 
     let x = f32(chosen.at.x) + across - MAP_SHIFT;
     let world_turns = x / f32(globals.map_width) + globals.rotation_turns - 0.5;
-    let sin_cos_phi = sin_cos_turns(world_turns - round(world_turns));
+    let sin_cos_phi = sin_cos_turns(world_turns);
     let distance = row.x + down * row.y;
     let cos_theta = select(distance - 1.0, 1.0 - distance, is_upper_row(chosen.at.y));
     let sin_theta = sqrt(max(distance * (2.0 - distance), 0.0));

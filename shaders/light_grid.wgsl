@@ -40,8 +40,7 @@ fn cell_in_medium(position: vec3f) -> u32 {
 //#end
 
 fn cell_on_face(position: vec3f, face: u32) -> u32 {
-    let direction = normalize_or(position - globals.grid_center, vec3f(0.0, 1.0, 0.0));
-    let uv = uv_from_direction(direction);
+    let uv = uv_from_direction(position - globals.grid_center);
     let column = min(u32(max(uv.x, 0.0) * f32(globals.grid_columns)), globals.grid_columns - 1u);
     let row = min(u32(max(uv.y, 0.0) * f32(globals.grid_rows)), globals.grid_rows - 1u);
     return (face * globals.grid_rows + row) * globals.grid_columns + column;

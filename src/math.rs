@@ -43,7 +43,7 @@ impl Frame {
     }
 }
 
-/// Lat-long coordinates in `[0,1)` x `[0,1]` of a direction.
+/// Lat-long coordinates in `[0,1)` x `[0,1]` of a direction of any length.
 ///
 /// The polar angle comes from an arc tangent: near a pole `acos(y)` is off by up to 3e-4 radian,
 /// which is more than a row of a large map.

@@ -282,7 +282,7 @@ impl Environment {
     pub fn direction_in_patch(&self, (column, row): (u32, u32), within: Vec2) -> Vec3 {
         let x = column as f32 + within.x - self.patches.shift();
         let world_turns = x / self.map.width as f32 + self.rotation_turns - 0.5;
-        let (sin_phi, cos_phi) = sin_cos_turns(world_turns - world_turns.round_ties_even());
+        let (sin_phi, cos_phi) = sin_cos_turns(world_turns);
         let (sin_theta, cos_theta) = self.patches.polar_angle(row, within.y);
         Vec3::new(sin_theta * cos_phi, cos_theta, sin_theta * sin_phi)
     }
@@ -400,15 +400,16 @@ impl Environment {
         let u = if turned < 0.0 { turned + 1.0 } else { turned };
         let (width, shift) = (self.map.width, self.patches.shift());
         let x = u * width as f32 + shift;
-        let left = x.floor();
+        // Never negative; `floor` is a call where a machine need not have the instruction.
+        let left = x as u32;
         let rows = self.patches.rows().len() as u32;
         let row = ((uv.y * self.map.height as f32 + shift) as u32).min(rows - 1);
         let squared_sine = direction.x * direction.x + direction.z * direction.z;
         MapPoint {
             // The last half texel before the seam belongs to the patch across it.
-            column: if left as u32 >= width { 0 } else { left as u32 },
+            column: if left >= width { 0 } else { left },
             row,
-            across: x - left,
+            across: x - left as f32,
             down: self.patches.down(row, squared_sine, direction.y),
         }
     }

@@ -49,8 +49,8 @@ impl SphericalGrid {
     }
 
     fn cell_on_face(&self, position: Vec3, face: u32) -> u32 {
-        let direction = (position - self.center).try_normalize().unwrap_or(Vec3::Y);
-        let uv = uv_from_direction(direction);
+        // Of any length: only angles are asked for.
+        let uv = uv_from_direction(position - self.center);
         // `as` saturates, so that rounding (or a NaN position) can never leave the grid.
         let column = ((uv.x * self.columns as f32) as u32).min(self.columns - 1);
         let row = ((uv.y * self.rows as f32) as u32).min(self.rows - 1);
