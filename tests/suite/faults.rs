@@ -258,6 +258,21 @@ fn every_output_is_tried_every_failure_told_and_the_picture_rescued() {
     lightgrid::image::read_picture(&kept[0]).expect("a whole picture");
 }
 
+#[test]
+fn what_is_rendered_is_not_written_over() {
+    let bench = Bench::new();
+    let before = ["scene.gltf", "map.exr"].map(|name| fs::read(bench.path(name)).expect("a file"));
+    let render = "render scene.gltf --env map.exr --device cpu --size 16x9 --spp 1";
+    for outputs in
+        ["-o a.png --json ./scene.gltf", "-o map.exr", "-o a.exr --distributions map.exr"]
+    {
+        let says = bench.refusal(&format!("{render} {outputs}"), 1);
+        assert!(says.ends_with(": would be written over the scene or the map\n"), "{says}");
+    }
+    let after = ["scene.gltf", "map.exr"].map(|name| fs::read(bench.path(name)).expect("a file"));
+    assert!(before == after);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_file_written_anew_keeps_its_mode_and_long_names_are_written() {
