@@ -434,7 +434,7 @@ fn short_memory_of_any_size_is_a_sentence_or_a_picture() {
     let starts = |kilobytes: &u32| with_memory(&bench, *kilobytes, "--version").status.success();
     let least = (20_000..).step_by(1_000).find(starts).expect("it starts");
     let (mut sentences, mut pictures) = (0, 0);
-    for kilobytes in (least..1_000_000).step_by(3_000) {
+    for kilobytes in (least..1_000_000).step_by(6_000) {
         let line = format!("ulimit -v {kilobytes}; exec timeout 60 {binary} {line} -o a.png");
         let output = Command::new("sh")
             .current_dir(bench.path(""))
