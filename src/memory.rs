@@ -1,9 +1,31 @@
 //! Asking for memory before taking it: a program that is refused memory ends, one that asks can say so.
 
+use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use crate::error::Decoded;
 
 /// What is got without asking.
 const SMALL: u64 = 16 << 20;
+
+/// Whether memory that is refused ends the process, unless somebody asks.
+static REFUSAL_ENDS: AtomicBool = AtomicBool::new(false);
+
+thread_local! {
+    /// Whether this thread takes a refusal for an answer.
+    static ASKS: Cell<bool> = const { Cell::new(false) };
+}
+
+/// From now on memory that is refused ends the process, unless it is asked for by [`reserved`]. Some libraries
+/// panic at a refusal, others abort, and a command has nothing to go on with, as a window has.
+pub(crate) fn refusal_ends() {
+    REFUSAL_ENDS.store(true, Ordering::Relaxed);
+}
+
+/// Whether nobody would take a refusal of memory for an answer. Takes none itself.
+pub(crate) fn is_refusal_the_end() -> bool {
+    REFUSAL_ENDS.load(Ordering::Relaxed) && !ASKS.get()
+}
 
 /// Whether so many more bytes can be had, as far as the system says.
 ///
@@ -30,9 +52,11 @@ pub(crate) fn reserved<T>(count: u64) -> Decoded<Vec<T>> {
     let bytes = count.saturating_mul(size_of::<T>() as u64);
     check(bytes)?;
     let mut list = Vec::new();
-    usize::try_from(count)
-        .ok()
-        .and_then(|count| list.try_reserve_exact(count).ok())
+    ASKS.set(true);
+    let reserved = usize::try_from(count).ok().map(|count| list.try_reserve_exact(count));
+    ASKS.set(false);
+    reserved
+        .and_then(Result::ok)
         .ok_or_else(|| format!("needs {} of memory, which cannot be had", in_units(bytes)))?;
     Ok(list)
 }

@@ -8,7 +8,8 @@ use std::time::Duration;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::register_usize;
 
-use crate::terminal::{hang_up, tell};
+use crate::image::remove_unfinished;
+use crate::terminal::{hang_up, notice, tell};
 
 /// How often signals are looked for: sooner than anybody notices.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
@@ -47,6 +48,7 @@ impl Interrupt {
                             tell("");
                             tell("lightgrid: interrupted before there was anything to keep");
                         }
+                        remove_unfinished();
                         std::process::exit(128 + signal as i32);
                     }
                     was_asked = true;
@@ -58,7 +60,7 @@ impl Interrupt {
             })
         });
         if watching.is_err() {
-            tell("lightgrid: Ctrl-C cannot be caught here and will end the process at once");
+            notice("Ctrl-C cannot be caught here and will end the process at once");
         }
         Self { asked, signalled, has_work }
     }

@@ -5,6 +5,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::error::Result;
+use crate::image;
+use crate::memory;
 
 #[cfg(not(all(feature = "window", feature = "report")))]
 mod absent;
@@ -98,8 +100,22 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// Whether memory that is refused must end the process: nobody asked for it, and there is nothing to go on with.
+/// For the binary's allocator; takes no memory.
+pub fn is_refusal_the_end() -> bool {
+    memory::is_refusal_the_end()
+}
+
+/// Removes what is being written, where the process ends without another word. For the binary; takes no memory.
+pub fn remove_unfinished() {
+    image::remove_unfinished();
+}
+
 fn run(arguments: Arguments) -> Result<()> {
     let command = arguments.command.unwrap_or_else(|| Command::View(view::ViewArguments::plain()));
+    if !matches!(command, Command::View(_)) {
+        memory::refusal_ends();
+    }
     // Others start as many as they are told, or need none.
     let takes_all = matches!(
         command,

@@ -28,7 +28,10 @@ impl Progress {
             bar.set_style(style);
         }
         bar.set_message(message.to_owned());
-        bar.enable_steady_tick(Duration::from_millis(200));
+        // Its thread would panic where the system gives none, and be for nobody.
+        if !bar.is_hidden() {
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
         Self { bar, prefix: String::new(), noise: Cell::default() }
     }
 

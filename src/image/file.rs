@@ -1,9 +1,15 @@
 //! Writing a file so that it is either the old one or the whole new one.
 
+#[cfg(unix)]
+use std::ffi::CString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Read, Write};
+#[cfg(unix)]
+use std::os::unix::ffi::OsStrExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+#[cfg(unix)]
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crate::error::{Decoded, Error, Result};
@@ -152,6 +158,27 @@ struct Temporary {
 /// a name can be.
 const TEMPORARY: [&str; 2] = [".lightgrid-", ".part"];
 
+/// Temporary files under way, as the system takes names: where they are removed in haste there may be no
+/// memory to make these.
+#[cfg(unix)]
+static UNDER_WAY: Mutex<Vec<CString>> = Mutex::new(Vec::new());
+
+/// Removes what is being written, for the process ends at once. Takes no memory and waits for nobody.
+pub(crate) fn remove_unfinished() {
+    #[cfg(unix)]
+    if let Ok(names) = UNDER_WAY.try_lock() {
+        for name in names.iter() {
+            // SAFETY: it is a name. Nothing is left to do if it cannot be removed.
+            unsafe { libc::unlink(name.as_ptr()) };
+        }
+    }
+}
+
+#[cfg(unix)]
+fn under_way() -> MutexGuard<'static, Vec<CString>> {
+    UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 impl Temporary {
     fn beside(target: &Path) -> Self {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
@@ -165,6 +192,8 @@ impl Temporary {
     }
 
     fn create(&self) -> io::Result<File> {
+        #[cfg(unix)]
+        under_way().push(CString::new(self.path.as_os_str().as_bytes())?);
         OpenOptions::new().write(true).read(true).create_new(true).open(&self.path)
     }
 }
@@ -190,6 +219,8 @@ fn remove_leftovers(folder: &Path) {
 impl Drop for Temporary {
     fn drop(&mut self) {
         let _ = fs::remove_file(&self.path);
+        #[cfg(unix)]
+        under_way().retain(|name| name.as_bytes() != self.path.as_os_str().as_bytes());
     }
 }
 

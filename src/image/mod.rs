@@ -21,7 +21,7 @@ mod tiff;
 pub use exr_read::{read_exr_metadata, read_exr_preview};
 pub use exr_write::{ExrPicture, Layer, write_exr};
 pub use file::{check_writable, is_same_file, write_beside_and_rename};
-pub(crate) use file::{make_folder, open_file, read_cause, read_file};
+pub(crate) use file::{make_folder, open_file, read_cause, read_file, remove_unfinished};
 pub(crate) use guard::catch_panic;
 pub use map::{LoadedMap, is_linear, read_map, read_picture, sanitise};
 pub(crate) use map::{looks_like_picture, looks_like_scene};

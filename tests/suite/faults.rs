@@ -258,6 +258,21 @@ fn every_output_is_tried_every_failure_told_and_the_picture_rescued() {
     lightgrid::image::read_picture(&kept[0]).expect("a whole picture");
 }
 
+#[test]
+fn what_is_rendered_is_not_written_over() {
+    let bench = Bench::new();
+    let before = ["scene.gltf", "map.exr"].map(|name| fs::read(bench.path(name)).expect("a file"));
+    let render = "render scene.gltf --env map.exr --device cpu --size 16x9 --spp 1";
+    for outputs in
+        ["-o a.png --json ./scene.gltf", "-o map.exr", "-o a.exr --distributions map.exr"]
+    {
+        let says = bench.refusal(&format!("{render} {outputs}"), 1);
+        assert!(says.ends_with(": would be written over the scene or the map\n"), "{says}");
+    }
+    let after = ["scene.gltf", "map.exr"].map(|name| fs::read(bench.path(name)).expect("a file"));
+    assert!(before == after);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_file_written_anew_keeps_its_mode_and_long_names_are_written() {
@@ -400,30 +415,59 @@ fn memory_that_is_refused_is_no_abort() {
     let materials = "{},".repeat(3_000_000);
     let text = format!(r#"{{"asset":{{"version":"2.0"}},"materials":[{materials}{{}}]}}"#);
     fs::write(bench.path("scene.gltf"), text).unwrap();
-    let output = with_memory(&bench, 1_500_000, "info scene.gltf");
-    let says = self::text(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{says}");
-    assert!(says.starts_with("memory allocation of "), "{says}");
+    let says = sentence(&with_memory(&bench, 1_500_000, "info scene.gltf"));
+    assert!(says.starts_with("lightgrid: memory is short: "), "{says}");
+    assert!(says.ends_with(" bytes more cannot be had\n"), "{says}");
 }
 
-/// A fault is told with a backtrace, which takes memory too, under a lock: that must not wait for itself.
+/// From what the process needs to start to what a picture needs there is nothing between a sentence and the
+/// picture: no panic of a library or of a thread without a stack, no words of the allocator, and no wait for
+/// a lock under which a backtrace takes memory.
 #[cfg(target_os = "linux")]
 #[test]
-fn telling_of_short_memory_ends() {
+fn short_memory_of_any_size_is_a_sentence_or_a_picture() {
     let bench = Bench::new();
     let binary = env!("CARGO_BIN_EXE_lightgrid");
-    let line = SMALL.replace("open", "living-room");
-    for kilobytes in (110_000..130_000).step_by(2_000) {
+    let line = SMALL.replace("open", "living-room --threads 2");
+    let files = bench.files();
+    // Below, what loads the libraries has no room.
+    let starts = |kilobytes: &u32| with_memory(&bench, *kilobytes, "--version").status.success();
+    let least = (20_000..).step_by(1_000).find(starts).expect("it starts");
+    let (mut sentences, mut pictures) = (0, 0);
+    for kilobytes in (least..1_000_000).step_by(6_000) {
         let line = format!("ulimit -v {kilobytes}; exec timeout 60 {binary} {line} -o a.png");
-        let status = Command::new("sh")
+        let output = Command::new("sh")
             .current_dir(bench.path(""))
             .env("RUST_BACKTRACE", "1")
             .args(["-c", &line])
-            .stderr(Stdio::null())
-            .status()
+            .output()
             .expect("sh starts");
-        assert!(status.code().is_some_and(|code| code != 124), "{kilobytes}: {status}");
+        let says = text(&output.stderr);
+        let is_there = fs::remove_file(bench.path("a.png")).is_ok();
+        match output.status.code() {
+            Some(0) => {
+                assert!(is_there, "{kilobytes}: {says}");
+                pictures += 1;
+                if pictures == 3 {
+                    break;
+                }
+            }
+            _ => {
+                assert_eq!(output.status.code(), Some(1), "{kilobytes}: {says}");
+                // The C library cannot be kept from its own words where it has no room for a thread.
+                let others = ["notice: ", "Fatal glibc error: "];
+                let is_ours = |line: &&str| !others.iter().any(|other| line.starts_with(other));
+                let said: Vec<&str> = says.lines().filter(is_ours).collect();
+                // Two threads may be refused at once.
+                let are_ours = said.iter().all(|one| one.starts_with("lightgrid: "));
+                assert!(are_ours && said.len() <= 2 && !says.is_empty(), "{kilobytes}: {says}");
+                assert!(!is_there, "{kilobytes}");
+                assert_eq!(bench.files(), files, "{kilobytes}");
+                sentences += 1;
+            }
+        }
     }
+    assert!(sentences > 0 && pictures == 3, "{sentences} sentences, {pictures} pictures");
 }
 
 /// Threads that cannot be had are no panic.

@@ -1,5 +1,6 @@
 //! What `lightgrid render` writes.
 
+use std::iter;
 use std::path::{Path, PathBuf};
 
 use super::share::Share;
@@ -52,6 +53,10 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
     for (i, file) in files.iter().enumerate() {
         if files[..i].iter().any(|other| is_same_file(other, file)) {
             return Err(Error::at(file, "two outputs would be written to this one file"));
+        }
+        let mut read = iter::once(&arguments.scene).chain(&arguments.env).map(Path::new);
+        if read.any(|other| is_same_file(other, file)) {
+            return Err(Error::at(file, "would be written over the scene or the map"));
         }
         check_writable(file)?;
     }

@@ -116,12 +116,13 @@ fn affine_from_columns(m: &[f64; 16]) -> DAffine3 {
 pub(super) fn instances(file: &File<'_>, node: &json::Node) -> Fallible<Option<Vec<DAffine3>>> {
     let extension = node.extensions.as_ref();
     let extension = extension.and_then(|all| all.others.get("EXT_mesh_gpu_instancing"));
-    let Some(attributes) = extension.and_then(|extension| extension.get("attributes")) else {
-        return Ok(None);
-    };
-    let open = |name: &str, kind| match attributes.get(name).and_then(Value::as_u64) {
+    let Some(extension) = extension else { return Ok(None) };
+    let nonsense = || "its instances make no sense".to_owned();
+    let attributes = extension.get("attributes").and_then(Value::as_object).ok_or_else(nonsense)?;
+    let open = |name: &str, kind| match attributes.get(name) {
         None => Ok(None),
         Some(index) => {
+            let index = index.as_u64().ok_or_else(nonsense)?;
             let index = json::Index::new(u32::try_from(index).unwrap_or(u32::MAX));
             Elements::open(file, index, &[kind]).map(Some)
         }

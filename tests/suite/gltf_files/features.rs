@@ -573,3 +573,22 @@ fn fog_is_read_from_the_scene_a_node_and_a_material() {
         assert!(scene.notices.iter().any(|n| n.contains("fog of the scene")), "{bad}");
     }
 }
+
+/// As if nothing were written there a mesh would stand alone where many were meant.
+#[test]
+fn instances_that_make_no_sense_are_refused() {
+    let builder = square();
+    let error = |extension: &str| {
+        let node = ONE_MESH.replace(
+            r#""nodes":[{"mesh":0"#,
+            &format!(
+                r#""nodes":[{{"mesh":0,"extensions":{{"EXT_mesh_gpu_instancing":{extension}}}"#
+            ),
+        );
+        builder.error(&node)
+    };
+    for nonsense in ["[]", "{}", r#"{"attributes":[0]}"#, r#"{"attributes":{"TRANSLATION":-1}}"#] {
+        assert_eq!(error(nonsense), "made.glb: node 0: its instances make no sense", "{nonsense}");
+    }
+    assert!(error(r#"{"attributes":{"SCALE":9}}"#).contains("accessor 9 is referred to"));
+}
