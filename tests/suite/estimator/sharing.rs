@@ -232,7 +232,7 @@ fn the_error_has_no_floor() {
             samples,
         );
         let pixels = film.pixels().iter().zip(reference.pixels());
-        let of = |(a, b): (&lightgrid::render::film::Pixel, &lightgrid::render::film::Pixel)| {
+        let of = |(a, b): (&Pixel, &Pixel)| {
             let difference =
                 (a.mean_luminance() - b.mean_luminance()).powi(2) - b.variance_of_mean();
             difference / b.mean_luminance().powi(2)
