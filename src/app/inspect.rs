@@ -16,6 +16,7 @@ use crate::light_grid::counters::Tally;
 use crate::light_grid::tile_distributions::TileDistributions;
 use crate::light_grid::{LightGrid, WHOLE_MAP};
 use crate::path::World;
+use crate::radiance_cache::KnownCell;
 
 /// Directions per tile for the truth: a standard error of some per cent for tiles half seen.
 const TRUTH_SAMPLES: u32 = 256;
@@ -39,6 +40,8 @@ pub(super) struct Inspected {
     pub(super) probabilities: Vec<f32>,
     /// What learning counted for each tile; empty where nothing was.
     pub(super) tallies: Vec<Tally>,
+    /// The cell of the radiance cache, if there is one.
+    pub(super) cached: Option<KnownCell>,
 }
 
 /// True visible energy of each tile at a point, normalised to 1.
@@ -187,6 +190,7 @@ fn inspect(snapshot: &Snapshot, place: Vec2) -> Option<Inspected> {
         memory_bytes: None,
         probabilities: Vec::new(),
         tallies: Vec::new(),
+        cached: snapshot.cache.as_ref().ok().map(|cache| cache.cell_at(spot.position, spot.normal)),
     };
     let Some(grid) = &snapshot.main.grid else { return Some(inspected) };
     let cell = grid.grid().map(|cells| cells.cell_of(spot.position, spot.normal));

@@ -191,6 +191,11 @@ impl Interface {
         self.prompt.is_some()
     }
 
+    /// Whether anything tells what is in the radiance cache.
+    pub fn inspects_cache(&self) -> bool {
+        self.overlay.is_some_and(Overlay::is_of_cache) || (self.panels && self.tab == Tab::Inspect)
+    }
+
     /// The place that is inspected.
     pub fn inspected(&self) -> Option<Vec2> {
         self.pinned.or(self.pointed)

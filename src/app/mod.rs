@@ -592,6 +592,7 @@ impl App {
                 denoiser: look.denoise.then_some(look.denoiser),
                 metered: look.auto_exposure.then_some(look.white_balance),
                 overlay: self.interface.overlay,
+                look: self.interface.overlay.filter(|o| o.is_developed()).map(|_| *look),
                 tile: self.interface.tile,
                 compared: compared.filter(|_| is_whole),
             });
@@ -618,6 +619,7 @@ impl App {
             previews: !self.is_repeatable,
             device: self.document.light.device,
             is_calm: self.document.look.denoise,
+            inspects_cache: self.interface.inspects_cache(),
             rule: self.document.stop,
             is_frozen: self.interface.is_frozen,
             reference: self.reference.clone(),

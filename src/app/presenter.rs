@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::Wake;
 use super::comparison::{Compared, Comparison};
+use super::document::Look;
 use super::overlays::{CellFacts, Label, Legend, Overlay, Sources};
 use super::surface_map::SurfaceMap;
 use super::worker::{Activity, Backdrop, Request, SessionSnapshot, Snapshot};
@@ -32,6 +33,8 @@ pub struct Order {
     pub metered: Option<WhiteBalance>,
     /// What is drawn over it.
     pub overlay: Option<Overlay>,
+    /// How the overlay is developed, if it shows light.
+    pub look: Option<Look>,
     /// The tile chosen on the map.
     pub tile: Option<u32>,
     /// Kept pictures that are compared.
@@ -45,6 +48,7 @@ impl PartialEq for Order {
             && self.denoiser == other.denoiser
             && self.metered == other.metered
             && self.overlay == other.overlay
+            && self.look == other.look
             && self.tile == other.tile
             && self.compared == other.compared
     }
@@ -277,6 +281,9 @@ struct Memory {
     uploads: Uploads,
 }
 
+/// Snapshot, overlay, tile, and how light is developed: what an overlay is painted from.
+type OverlayKey = (u64, Overlay, Option<u32>, Option<(Look, f32)>);
+
 /// What is on one device.
 #[derive(Default)]
 struct Uploads {
@@ -286,8 +293,7 @@ struct Uploads {
     /// By the picture that is rendered, too, where that is compared.
     compared: Last<(Comparison, Option<Source>), Compared>,
     metered: Last<(Source, WhiteBalance), f32>,
-    /// By snapshot, overlay and tile.
-    overlay: Last<(u64, Overlay, Option<u32>), Option<Painted>>,
+    overlay: Last<OverlayKey, Option<Painted>>,
 }
 
 /// An overlay on the device.
@@ -317,8 +323,9 @@ impl Memory {
         })?;
         let painted = order.overlay.map_or(Ok(None), |overlay| {
             let mut last = std::mem::take(&mut self.uploads.overlay);
-            let key = (order.snapshot.number, overlay, order.tile);
-            let painted = last.or_make(key, || Ok(self.paint(&order, overlay, &picture)));
+            let look = order.look.map(|look| (look, automatic_ev));
+            let key = (order.snapshot.number, overlay, order.tile, look);
+            let painted = last.or_make(key, || Ok(self.paint(&order, overlay, look, &picture)));
             self.uploads.overlay = last;
             painted
         })?;
@@ -375,6 +382,7 @@ impl Memory {
         &mut self,
         order: &Order,
         overlay: Overlay,
+        look: Option<(Look, f32)>,
         picture: &LinearPicture,
     ) -> Option<Painted> {
         let snapshot = &order.snapshot;
@@ -389,6 +397,8 @@ impl Memory {
             counters: snapshot.counters.as_deref(),
             surfaces: self.surfaces.as_ref().map(|(_, surfaces)| surfaces),
             facts: self.facts.as_ref().map(|(_, _, facts)| &**facts),
+            cache: snapshot.cache.as_deref().ok(),
+            look,
             tile: order.tile,
         };
         let painted = sources.paint(overlay)?;

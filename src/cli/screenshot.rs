@@ -122,6 +122,12 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
         return Err(Error::at(path, "screenshots are written as .png"));
     }
     check_writable(path)?;
+    let shows_cache = arguments.overlay.is_some_and(Overlay::is_of_cache);
+    if shows_cache && (!arguments.denoise || arguments.split) {
+        return Err(Error::new(
+            "the radiance cache is trained for fast light: overlays of it need --denoise, and no --split",
+        ));
+    }
     let defaults = Document::default();
     let document = Document {
         scene: arguments.scene.clone(),

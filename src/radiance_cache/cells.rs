@@ -72,6 +72,16 @@ impl Cell {
         Self { coordinates: self.coordinates.map(|at| at >> 2), kind: self.kind | PARENT }
     }
 
+    /// How often its edge was doubled.
+    pub(super) fn level(self) -> u32 {
+        (self.kind & (PARENT - 1)) >> 3
+    }
+
+    /// The axis that its surfaces face.
+    pub(super) fn face(self) -> u32 {
+        self.kind & 7
+    }
+
     pub(super) fn key(self) -> Key {
         let mixed = |seed: u32| {
             self.coordinates.iter().fold(hash(seed), |mixed, at| hash(mixed ^ *at as u32))

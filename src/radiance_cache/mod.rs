@@ -10,6 +10,7 @@
 //! the [`RadianceSums`] that it was made of go on.
 
 mod cells;
+mod facts;
 mod sums;
 
 use glam::Vec3;
@@ -17,6 +18,7 @@ use glam::Vec3;
 pub use cells::CacheCells;
 use cells::Key;
 pub(crate) use cells::{CHECK_SEED, PARENT};
+pub use facts::{CacheFacts, KnownCell};
 pub use sums::RadianceSums;
 pub(crate) use sums::{ALBEDO_ONE, MOST_PATHS, WORDS};
 
@@ -61,10 +63,13 @@ impl RadianceCache {
     }
 
     fn find(&self, key: Key) -> Option<Vec3> {
-        let slots = key.probes().map(|slot| self.slots[slot]);
-        let [check, rgb @ ..] =
-            slots.into_iter().find(|[check, ..]| [0, key.check].contains(check))?;
-        (check != 0).then(|| Vec3::from_array(rgb.map(f32::from_bits)))
+        let [_, rgb @ ..] = self.slots[self.slot_of(key)?];
+        Some(Vec3::from_array(rgb.map(f32::from_bits)))
+    }
+
+    fn slot_of(&self, key: Key) -> Option<usize> {
+        let slot = key.probes().find(|slot| [0, key.check].contains(&self.slots[*slot][0]))?;
+        (self.slots[slot][0] != 0).then_some(slot)
     }
 
     /// Number of slots in use, those of parents included.

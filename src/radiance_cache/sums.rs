@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use glam::{DVec3, Vec3};
 
 use super::cells::{CacheCells, Key};
+use super::facts::{CacheFacts, Training};
 use super::{LEAST_ALBEDO, PARENTS_PATHS, PATHS_OF_ALL, RadianceCache, SLOTS};
 use crate::sampler::{hash, unit_from_bits};
 
@@ -118,6 +119,27 @@ impl RadianceSums {
     /// What has been learned so far; `None` if there are more cells than the table has room for: then
     /// which of them have found a slot is a matter of chance.
     pub fn cache(&self) -> Option<RadianceCache> {
+        self.tallies().map(|(tallies, all)| self.cache_of(&tallies, &all))
+    }
+
+    /// The same with how sure its cells are; `None` before the first path, too.
+    pub fn facts(&self) -> Option<CacheFacts> {
+        let (tallies, all) = self.tallies().filter(|(_, all)| all.count > 0)?;
+        let training = tallies.iter().map(|tally| {
+            let times = (tally.count as f32 * ALBEDO_ONE).max(1.0);
+            let albedo = Vec3::from_array(tally.albedo.map(|sum| sum as f32 / times));
+            Training { paths: tally.count, albedo }
+        });
+        Some(CacheFacts {
+            cache: self.cache_of(&tallies, &all),
+            training: training.collect(),
+            cell_count: tallies.iter().filter(|tally| tally.parent.is_some()).count(),
+            paths: all.count,
+        })
+    }
+
+    /// What each slot holds, parents what all their cells do, and all together.
+    fn tallies(&self) -> Option<(Vec<Tally>, Tally)> {
         let mut tallies: Vec<Tally> = self.words.chunks_exact(WORDS).map(Tally::new).collect();
         let used = tallies.iter().filter(|tally| tally.check != 0).count();
         if used as f64 > FULL * SLOTS as f64 {
@@ -131,6 +153,10 @@ impl RadianceSums {
                 all.add(&tally);
             }
         }
+        Some((tallies, all))
+    }
+
+    fn cache_of(&self, tallies: &[Tally], all: &Tally) -> RadianceCache {
         let scale = f64::from(self.scale);
         let mean = all.radiance_over_albedo(scale).unwrap_or_default();
         let of_all = |tally: &Tally| tally.leaning(mean, PATHS_OF_ALL, scale);
@@ -142,11 +168,11 @@ impl RadianceSums {
             let [r, g, b] = radiance.as_vec3().to_array().map(f32::to_bits);
             if tally.check == 0 { [0; 4] } else { [tally.check, r, g, b] }
         };
-        Some(RadianceCache {
+        RadianceCache {
             cells: self.cells,
             slots: tallies.iter().map(slot_of).collect(),
             mean: mean.as_vec3(),
-        })
+        }
     }
 }
 

@@ -10,7 +10,7 @@ use super::outlook::middle_distance;
 use crate::environment::Environment;
 use crate::path::World;
 use crate::path::camera::CameraRays;
-use crate::radiance_cache::{CacheCells, MOST_PATHS, RadianceCache, RadianceSums};
+use crate::radiance_cache::{CacheCells, CacheFacts, MOST_PATHS, RadianceCache, RadianceSums};
 
 /// How light that has met several surfaces is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -125,6 +125,16 @@ impl CacheTraining {
     pub(crate) fn suits(&self, position: Vec3) -> bool {
         let cells = self.sums.cells();
         position.distance(cells.center) < cells.least_distance
+    }
+
+    /// What is known by now of each cell.
+    pub(crate) fn facts(&self) -> Option<CacheFacts> {
+        self.sums.facts()
+    }
+
+    /// Tells what [`Self::facts`] are of: paths that have trained it, and edge of the smallest cells.
+    pub(crate) fn state(&self) -> (u64, f32) {
+        (self.paths, self.sums.cells().edge)
     }
 
     /// What is known so far.

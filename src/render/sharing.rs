@@ -76,6 +76,7 @@ impl View {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::metrics::hypothesis::chi_square_test;
     use crate::scene::{Medium, builtin};
 
     /// What is left open comes to, for a view of a built-in scene.
@@ -117,6 +118,23 @@ mod tests {
         };
         assert_eq!(decided("open", foggy), Sharing::Small);
         assert_eq!(decided("office", foggy), Sharing::Large);
+    }
+
+    /// So no edge of a tile shows.
+    #[test]
+    fn tiles_begin_elsewhere_for_each_sample() {
+        const SAMPLES: u32 = 1 << 14;
+        for tile in [SharedTile::SMALL, SharedTile::LARGE] {
+            let places = tile.side * tile.side;
+            let mut counts = vec![0.0; places as usize];
+            for sample in 0..SAMPLES {
+                let [x, y] = tile.tiling([160, 90], 3, sample).before;
+                counts[(y * tile.side + x) as usize] += 1.0;
+            }
+            let expected = vec![f64::from(SAMPLES / places); places as usize];
+            let test = chi_square_test(&counts, &expected, 1e-3).expect("enough samples");
+            assert!(test.passed, "{tile:?}: {test:?}");
+        }
     }
 
     #[test]

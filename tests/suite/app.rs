@@ -255,6 +255,11 @@ fn a_screenshot_is_repeatable_and_says_what_is_wrong() {
     for (rest, reason) in [
         ("--tile 99999", "sky:day@64x32: there is no tile 99999: it has 128, counted from 0"),
         ("--size 200000x10", "a window of 200000x10 pixels cannot be drawn: "),
+        ("--overlay cache-cells", "overlays of it need --denoise, and no --split"),
+        (
+            "--overlay cache-samples --denoise --split",
+            "the radiance cache is trained for fast light",
+        ),
     ] {
         let refused = shoot(rest);
         assert_eq!(refused.status.code(), Some(1), "{}", says(&refused));

@@ -22,6 +22,7 @@ mod gltf_files;
 mod gpu;
 mod image_files;
 mod instances;
+mod long_renders;
 mod metrics;
 mod packed;
 mod peers;

@@ -14,10 +14,14 @@ use lightgrid::scene::gltf;
 use crate::estimator::{mean, render, view};
 use crate::shared::shared;
 
+/// Scenes and maps that there are references of.
+pub(crate) const PEERS: [&str; 6] =
+    ["exterior day", "living day", "living sunset", "office day", "office night", "open day"];
+
 /// A scene, a map, and the picture they make.
-struct Peer {
-    world: World,
-    environment: Environment,
+pub(crate) struct Peer {
+    pub(crate) world: World,
+    pub(crate) environment: Environment,
     reference: Image,
     /// relMSE of the reference itself.
     reference_noise: f64,
@@ -25,7 +29,7 @@ struct Peer {
 
 impl Peer {
     /// `None`, said on stderr, where the shared data is absent.
-    fn load(scene: &str, map: &str) -> Option<Self> {
+    pub(crate) fn load(scene: &str, map: &str) -> Option<Self> {
         let glb = shared(&format!("peers/{scene}.glb"))?;
         let exr = shared(&format!("peers/{map}.exr"))?;
         let picture = shared(&format!("peers/ref/{scene}_{map}.exr"))?;
@@ -41,6 +45,18 @@ impl Peer {
         })
     }
 
+    /// Luminance of each pixel of the reference.
+    fn luminances(&self) -> Vec<f64> {
+        let of = |pixel: &[f32; 3]| f64::from(luminance((*pixel).into()));
+        self.reference.pixels.iter().map(of).collect()
+    }
+
+    /// Mean luminance of the reference.
+    pub(crate) fn reference_mean(&self) -> f64 {
+        let luminances = self.luminances();
+        luminances.iter().sum::<f64>() / luminances.len() as f64
+    }
+
     fn render(&self, sampling: Sampling, samples: u32) -> Film {
         let view = View {
             width: self.reference.width,
@@ -52,9 +68,7 @@ impl Peer {
     }
 
     fn compare(&self, film: &Film) -> Report {
-        let of_reference = |p: &[f32; 3]| f64::from(luminance((*p).into()));
-        let reference: Vec<f64> = self.reference.pixels.iter().map(of_reference).collect();
-        let reference_mean = reference.iter().sum::<f64>() / reference.len() as f64;
+        let (reference, reference_mean) = (self.luminances(), self.reference_mean());
         let relative = |squared_error: &dyn Fn(&Pixel, f64) -> f64| {
             let floor = 0.01 * reference_mean * reference_mean;
             let pixels = film.pixels().iter().zip(&reference);
@@ -120,9 +134,7 @@ fn pictures_are_as_near_to_the_references_as_their_noise_says() {
 #[ignore = "an hour of CPU time; run it in release"]
 fn long_renders_converge_to_the_references() {
     let mut failures = Vec::new();
-    for name in
-        ["exterior day", "living day", "living sunset", "office day", "office night", "open day"]
-    {
+    for name in PEERS {
         let (scene, map) = name.split_once(' ').expect("scene and map");
         let Some(peer) = Peer::load(scene, map) else { return };
         for sampling in [Sampling::Plain, Sampling::Talk, Sampling::Adaptive] {

@@ -5,14 +5,18 @@ use std::sync::Arc;
 use crate::environment::Environment;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
+use crate::radiance_cache::CacheFacts;
 use crate::render::film::{Film, Pixel};
 
+use super::document::Look;
 use super::surface_map::{Spot, SurfaceMap};
 
+mod cache;
 mod cell_facts;
 mod labels;
 pub mod palette;
 
+pub use cache::length;
 pub use cell_facts::CellFacts;
 pub use labels::Label;
 
@@ -37,6 +41,12 @@ pub enum Overlay {
     Distance,
     /// Each cell's probability of the tile chosen on the map.
     Tile,
+    /// Cells of the radiance cache.
+    CacheCells,
+    /// Radiance of the cache's cells.
+    CacheRadiance,
+    /// What has trained the cache's cells.
+    CacheSamples,
     /// Samples of each pixel.
     Samples,
     /// Estimated error of each pixel.
@@ -51,7 +61,7 @@ pub enum Overlay {
 
 impl Overlay {
     /// All of them, in the order they are offered.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 17] = [
         Self::Cells,
         Self::Faces,
         Self::Learned,
@@ -61,6 +71,9 @@ impl Overlay {
         Self::Entropy,
         Self::Distance,
         Self::Tile,
+        Self::CacheCells,
+        Self::CacheRadiance,
+        Self::CacheSamples,
         Self::Samples,
         Self::Error,
         Self::Albedo,
@@ -80,6 +93,9 @@ impl Overlay {
             Self::Entropy => "Entropy of the distribution",
             Self::Distance => "Distance from the whole map's distribution",
             Self::Tile => "Probability of the chosen tile",
+            Self::CacheCells => "Cells of the radiance cache",
+            Self::CacheRadiance => "Radiance of the cache",
+            Self::CacheSamples => "Training of the cache",
             Self::Samples => "Samples",
             Self::Error => "Estimated error",
             Self::Albedo => "Albedo",
@@ -110,6 +126,18 @@ impl Overlay {
                 "Total variation between the cell's distribution and the whole map's: 0 equal, 1 disjoint."
             }
             Self::Tile => "Probability with which each cell samples the tile chosen on the map.",
+            Self::CacheCells => {
+                "Cells of the radiance cache, which fast light is taken from; hue is how often a cell's edge \
+                 was doubled, dark is what nothing has trained, glossy surfaces among it."
+            }
+            Self::CacheRadiance => {
+                "What each cell of the cache sends back, at the mean albedo of what is in it, developed as \
+                 the picture is."
+            }
+            Self::CacheSamples => {
+                "Estimates that have trained each cell of the cache; dark where a cell four times as large \
+                 or the mean of all speaks for it."
+            }
             Self::Samples => "Samples each pixel has.",
             Self::Error => "Standard error of a pixel's luminance over its luminance.",
             Self::Albedo => "Directional albedo of the first surface.",
@@ -125,7 +153,17 @@ impl Overlay {
 
     /// Whether it replaces the picture rather than tinting it.
     pub fn is_opaque(self) -> bool {
-        matches!(self, Self::Albedo | Self::Normal | Self::Depth)
+        matches!(self, Self::CacheRadiance | Self::Albedo | Self::Normal | Self::Depth)
+    }
+
+    /// Whether it is about the radiance cache.
+    pub fn is_of_cache(self) -> bool {
+        matches!(self, Self::CacheCells | Self::CacheRadiance | Self::CacheSamples)
+    }
+
+    /// Whether it shows light, which is developed.
+    pub fn is_developed(self) -> bool {
+        self == Self::CacheRadiance
     }
 }
 
@@ -183,6 +221,10 @@ pub struct Sources<'a> {
     pub surfaces: Option<&'a SurfaceMap>,
     /// Facts of the cells of `grid`.
     pub facts: Option<&'a CellFacts>,
+    /// What is in the radiance cache.
+    pub cache: Option<&'a CacheFacts>,
+    /// How light is developed, and the stops that are found out.
+    pub look: Option<(Look, f32)>,
     /// The tile chosen on the map.
     pub tile: Option<u32>,
 }
@@ -202,6 +244,9 @@ impl Sources<'_> {
                 "of the luminance",
             )),
             Overlay::Albedo | Overlay::Normal | Overlay::Depth => self.layer(overlay),
+            _ if overlay.is_of_cache() => {
+                Some(cache::paint(overlay, self.cache?, self.surfaces?, self.look))
+            }
             _ => self.cells(overlay),
         }
     }

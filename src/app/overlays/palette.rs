@@ -34,6 +34,24 @@ pub fn of_number(number: u32) -> [u8; 3] {
     hsv(unit(0), 0.35 + 0.3 * unit(8), 0.65 + 0.3 * unit(16))
 }
 
+/// The colour of a number of a group: its hue is near the group's.
+pub fn of_number_in_group(number: u32, group: u32) -> [u8; 3] {
+    let hash = crate::sampler::hash(number.wrapping_add(0x51ed));
+    let unit = |shift: u32| (hash >> shift & 0xff) as f32 / 255.0;
+    let hue = hue_of_group(group) + 0.12 * (unit(0) - 0.5);
+    hsv(hue, 0.3 + 0.5 * unit(8), 0.45 + 0.55 * unit(16))
+}
+
+/// The colour that stands for a group.
+pub fn of_group(group: u32) -> [u8; 3] {
+    hsv(hue_of_group(group), 0.55, 0.8)
+}
+
+/// Neighbours are far apart, for the golden section divides the circle.
+fn hue_of_group(group: u32) -> f32 {
+    0.58 + 0.381_966 * group as f32
+}
+
 /// The colour of a place on the map: hue around the horizon, brighter towards the zenith.
 pub fn of_map_place(u: f32, v: f32) -> [u8; 3] {
     hsv(u, 0.35 + 0.5 * v.clamp(0.0, 1.0), 1.0 - 0.65 * v.clamp(0.0, 1.0))

@@ -2,16 +2,18 @@
 
 use egui::{Color32, Grid, Rect, RichText, Stroke, StrokeKind, Ui, Vec2};
 
-use super::{color_bar, map_view};
+use super::{color_bar, map_view, overlay};
 use crate::app::commands::Command;
 use crate::app::inspect::{Inspected, Inspector};
 use crate::app::interface::{Interface, TileView};
 use crate::app::loader::LoadedMap;
-use crate::app::overlays::palette;
+use crate::app::overlays::{length, palette};
 use crate::app::theme;
 use crate::app::worker::Snapshot;
 use crate::environment::landmarks::Sun;
 
+/// Axes that surfaces face.
+const FACES: [&str; 6] = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
 /// Tiles listed in the table.
 const LISTED: usize = 6;
 
@@ -58,7 +60,11 @@ pub(in crate::app) fn show(
     ui.separator();
     theme::heading(ui, "CELL UNDER THE POINTER");
     match inspector.inspected() {
-        Some(inspected) => cell(ui, interface, inspector, inspected, (map, size), commands),
+        Some(inspected) => {
+            facts(ui, inspected);
+            cached(ui, inspected, snapshot);
+            cell(ui, interface, inspector, inspected, (map, size), commands);
+        }
         None if interface.pinned.is_some() => {
             ui.label(theme::quiet("There is no surface here, only the map; click elsewhere."));
         }
@@ -213,7 +219,6 @@ fn cell(
     (map, size): (&LoadedMap, (u32, u32)),
     commands: &mut Vec<Command>,
 ) {
-    facts(ui, inspected);
     let truth = inspector.truth();
     // One scale for both, so that they can be compared.
     let most = truth.map_or(0.0, |truth| largest(&truth.shares));
@@ -257,8 +262,7 @@ fn cell(
 fn facts(ui: &mut Ui, inspected: &Inspected) {
     let p = inspected.spot.position;
     let [face, row, column] = inspected.coordinates;
-    let faces = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
-    let face = faces.get(face as usize).copied().unwrap_or("all");
+    let face = FACES.get(face as usize).copied().unwrap_or("all");
     let cell = match inspected.cell {
         Some(cell) => format!("{cell}: row {row}, column {column}, face {face}"),
         None => "no grid: the whole map everywhere".to_owned(),
@@ -290,6 +294,40 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
         if let Some(bytes) = inspected.memory_bytes {
             line("Memory", theme::bytes(bytes));
         }
+    });
+}
+
+/// What the radiance cache knows there.
+fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
+    let Some(snapshot) = snapshot else { return };
+    let (cell, cache) = match (&inspected.cached, &snapshot.cache) {
+        (Some(cell), Ok(cache)) => (cell, cache),
+        (_, Err(missing)) => {
+            ui.label(theme::quiet(overlay::no_cache(*missing)));
+            return;
+        }
+        (None, Ok(_)) => return,
+    };
+    let face = FACES.get(cell.face as usize).copied().unwrap_or("all");
+    let [r, g, b] = cell.radiance.to_array();
+    let trained = match (cell.samples, cell.samples_around) {
+        (0, 0) => "nothing: the mean of all speaks for it".to_owned(),
+        (0, around) => format!("nothing: {} around speak for it", theme::count(around)),
+        (own, around) => format!("{} samples, {} around", theme::count(own), theme::count(around)),
+    };
+    Grid::new("cached").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
+        let mut line = |name: &str, value: String| {
+            ui.label(theme::quiet(name));
+            ui.label(RichText::new(value).size(12.5));
+            ui.end_row();
+        };
+        line(
+            "Cache cell",
+            format!("level {}, edge {}, face {face}", cell.level, length(cell.edge)),
+        );
+        line("Trained by", trained);
+        line("Radiance", format!("{r:.3}  {g:.3}  {b:.3}"));
+        line("Cache", overlay::cache_size(cache));
     });
 }
 

@@ -7,6 +7,8 @@ use crate::app::interface::Interface;
 use crate::app::overlays::{Legend, Overlay, palette};
 use crate::app::presenter::Shown;
 use crate::app::theme;
+use crate::app::worker::NoCache;
+use crate::radiance_cache::CacheFacts;
 
 /// Draws the choice and the legend.
 pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option<&Shown>) {
@@ -29,9 +31,13 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
             ui.add(Slider::new(&mut interface.overlay_opacity, 0.0..=1.0).fixed_decimals(2));
         });
     }
-    let is_shown = shown.is_some_and(|s| s.order.overlay == Some(overlay));
-    match shown.filter(|_| is_shown).and_then(|s| s.legend.as_ref()) {
+    let shown = shown.filter(|s| s.order.overlay == Some(overlay));
+    let cache = shown.filter(|_| overlay.is_of_cache()).map(|s| &s.order.snapshot.cache);
+    match shown.and_then(|s| s.legend.as_ref()) {
         Some(shown) => legend(ui, shown),
+        None if let Some(Err(missing)) = cache => {
+            ui.label(theme::quiet(no_cache(*missing)));
+        }
         None if overlay == Overlay::Tile && interface.tile.is_none() => {
             ui.label(theme::quiet("Choose a tile on the map below."));
         }
@@ -39,6 +45,33 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
             ui.label(theme::quiet("Waiting for a grid with cells."));
         }
     }
+    if let Some(Ok(cache)) = cache {
+        ui.label(theme::quiet(format!("The whole cache: {}", cache_size(cache))));
+    }
+}
+
+/// Why there is nothing to be said of a radiance cache.
+pub(in crate::app) fn no_cache(missing: NoCache) -> &'static str {
+    match missing {
+        NoCache::NotDenoised => {
+            "There is no radiance cache: it is trained for fast light, with Denoise."
+        }
+        NoCache::Split => "There is no radiance cache: a split view shows no fast light.",
+        NoCache::QuickDevice => {
+            "There is no radiance cache: this GPU is quick enough without fast light."
+        }
+        NoCache::OneBounce => {
+            "There is no radiance cache: light that has met one surface needs none."
+        }
+        NoCache::Unasked | NoCache::Untrained => "Nothing has trained the radiance cache yet.",
+    }
+}
+
+/// How large the cache is.
+pub(in crate::app) fn cache_size(cache: &CacheFacts) -> String {
+    let [cells, samples] = [cache.cell_count() as u64, cache.samples()].map(theme::count);
+    let memory = theme::bytes(CacheFacts::memory_bytes()).replace(' ', "\u{a0}");
+    format!("{cells} cells of {samples} samples, {memory}")
 }
 
 fn legend(ui: &mut Ui, legend: &Legend) {

@@ -103,3 +103,77 @@ impl Kept {
         self.world.as_ref().is_some_and(|world| Arc::ptr_eq(world, &request.world))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3A;
+
+    use super::*;
+    use crate::environment::{EnvironmentOptions, sky};
+    use crate::render::gpu::DeviceChoice;
+    use crate::render::{Gi, StopRule, View};
+    use crate::scene::{Medium, builtin};
+
+    fn lit(sky_name: &str) -> Arc<Environment> {
+        let map = sky::build(sky_name, 64, 32).expect("a sky");
+        Arc::new(Environment::new(map, &EnvironmentOptions::default()).expect("a sound map"))
+    }
+
+    #[test]
+    fn the_radiance_cache_is_kept_for_the_same_light_on_the_same_scene_near_by() {
+        let gpu = match Gpu::open(None) {
+            Ok(gpu) => gpu,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let world = Arc::new(World::new(builtin::build("office").expect("built in")));
+        let view = View::new(world.scene.cameras[0].clone(), [16, 9]);
+        let request = Request {
+            world: Arc::clone(&world),
+            environment: lit("overcast"),
+            view: View { gi: Gi::Cached, ..view },
+            split: false,
+            moving: false,
+            previews: true,
+            device: DeviceChoice::Cpu,
+            is_calm: true,
+            inspects_cache: false,
+            rule: StopRule::default(),
+            is_frozen: false,
+            reference: None,
+            paused: false,
+            run: 0,
+        };
+        let mut kept = Kept::new((None, RayChoice::default()), Arc::new(Mutex::new(gpu)));
+        let mut session = Session::new(&world, &request.environment, request.view.clone());
+        kept.keep_training(&mut session, &Arc::new(request.clone()));
+        let serves = |change: &dyn Fn(&mut Request)| {
+            let mut other = request.clone();
+            change(&mut other);
+            kept.has_training_for(&other)
+        };
+        let moved = |metres: f32| {
+            move |request: &mut Request| {
+                let eye = &mut request.view.camera.world_from_camera.translation;
+                *eye += Vec3A::new(0.0, metres, 0.0);
+            }
+        };
+        assert!(serves(&|_| ()));
+        assert!(serves(&moved(0.2)), "a step aside");
+        assert!(serves(&|request| (request.view.width, request.view.seed) = (32, 7)));
+        assert!(!serves(&moved(20.0)), "its cells would have other sizes");
+        assert!(
+            !serves(&|request| request.environment = lit("day")),
+            "another map, or a turned one"
+        );
+        let fog = Some(Medium { scattering: glam::Vec3::ONE, ..Medium::default() });
+        assert!(!serves(&|request| request.view.medium = fog));
+        assert!(!serves(&|request| request.view.limits.bounces += 1));
+        // A changed material makes the world anew.
+        let changed = Arc::new(World::new(world.scene.clone()));
+        assert!(!serves(&|request| request.world = Arc::clone(&changed)));
+
+        let other = Request { world: changed, ..request.clone() };
+        kept.leave_other_worlds(&other);
+        assert!(!kept.has_training_for(&request), "it is large, and nobody will want it");
+    }
+}

@@ -24,6 +24,7 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
+use crate::radiance_cache::CacheFacts;
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceChoice, DeviceFilm, Gpu, GpuFigures, RayChoice};
 use crate::render::{Figures, Sampling, StopRule, View};
@@ -47,6 +48,8 @@ pub struct Request {
     pub device: DeviceChoice,
     /// Show light from a radiance cache while there is little of what is asked for.
     pub is_calm: bool,
+    /// Tell what is in that cache.
+    pub inspects_cache: bool,
     /// When to stop.
     pub rule: StopRule,
     /// Render with what was learned before rather than learn anew.
@@ -95,6 +98,7 @@ impl Request {
             && self.device == new.device
             && self.is_frozen == new.is_frozen
             && self.is_calm == new.is_calm
+            && self.inspects_cache == new.inspects_cache
             && self.reference.as_ref().map(Arc::as_ptr) == new.reference.as_ref().map(Arc::as_ptr)
             && self.rule == new.rule
             && self.paused == new.paused
@@ -167,6 +171,23 @@ impl SessionSnapshot {
     }
 }
 
+/// Why there is no radiance cache to be looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoCache {
+    /// Nobody has asked for it.
+    Unasked,
+    /// It is there for fast light, which only denoised pictures show.
+    NotDenoised,
+    /// A split view compares pictures, and shows no fast light.
+    Split,
+    /// The device has many samples before a cache would be trained.
+    QuickDevice,
+    /// Light that has met one surface needs none.
+    OneBounce,
+    /// It will be.
+    Untrained,
+}
+
 /// The latest picture.
 #[derive(Clone)]
 pub struct Snapshot {
@@ -184,6 +205,8 @@ pub struct Snapshot {
     pub plain: Option<SessionSnapshot>,
     /// What learning counted, once it has ended.
     pub counters: Option<Arc<LearningGrid>>,
+    /// What is in the radiance cache of fast light.
+    pub cache: std::result::Result<Arc<CacheFacts>, NoCache>,
     /// How the error of `main` and of `plain` fell.
     pub curves: [Vec<Point>; 2],
     /// Another film of the same view; its samples help where `main` has few.
@@ -468,6 +491,7 @@ mod tests {
             previews: true,
             device: DeviceChoice::Cpu,
             is_calm: false,
+            inspects_cache: false,
             rule: StopRule::default(),
             is_frozen: false,
             reference: None,

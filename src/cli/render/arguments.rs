@@ -120,8 +120,8 @@ pub(in crate::cli) struct RenderArguments {
     #[arg(long, default_value = "adaptive", value_enum, help_heading = "Light")]
     pub(super) sampling: Sampling,
     /// Whether the pixels of a tile share what their paths find behind the second vertex: less noise at
-    /// each pixel, but coarser. `auto` shares with adaptive sampling in clear air, from 64x64 pixels on
-    /// that are not denoised: 8x8 inside, 4x4 outside, nothing in the open.
+    /// each pixel, but coarser. `auto` shares with adaptive sampling, from 64x64 pixels on that are not
+    /// denoised: 8x8 inside, 4x4 outside and in fog, nothing in the open.
     #[arg(
         long,
         default_value = "auto",
@@ -423,5 +423,36 @@ impl RenderArguments {
         camera.lens_radius = self.lens_radius.unwrap_or(camera.lens_radius);
         camera.focus_distance = self.focus.map_or(camera.focus_distance, |f| f as f32);
         Ok(camera)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        arguments: RenderArguments,
+    }
+
+    #[test]
+    fn a_denoised_picture_shares_nothing_unasked() {
+        let sharing = |line: &str| {
+            let words = format!("render office -o office.png {line}");
+            let line = Line::try_parse_from(words.split_whitespace());
+            line.map(|line| line.arguments.sharing()).ok()
+        };
+        assert_eq!(sharing(""), Some(Sharing::Auto));
+        assert_eq!(sharing("--denoise"), Some(Sharing::Off));
+        for (name, asked) in
+            [("off", Sharing::Off), ("4x4", Sharing::Small), ("8x8", Sharing::Large)]
+        {
+            assert_eq!(sharing(&format!("--sharing {name}")), Some(asked));
+            assert_eq!(sharing(&format!("--sharing {name} --denoise")), Some(asked));
+        }
+        assert_eq!(sharing("--sharing 5x5"), None);
     }
 }

@@ -318,6 +318,11 @@ impl<'a> Session<'a> {
         self.training.take()
     }
 
+    /// The radiance cache in the making, for inspection.
+    pub(crate) fn training(&self) -> Option<&CacheTraining> {
+        self.training.as_ref()
+    }
+
     /// Whether no samples to come change what is sampled by: each is then a matter of its pixel and its
     /// index alone.
     pub fn has_final_distributions(&self) -> bool {

@@ -4,10 +4,12 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
+use lightgrid::light_grid::LightGrid;
+use lightgrid::light_grid::cells::SphericalGrid;
 use lightgrid::metrics::hypothesis::{Means, z_test};
 use lightgrid::path::{PathLimits, World};
-use lightgrid::render::film::Film;
-use lightgrid::render::{Sampling, Sharing, View};
+use lightgrid::render::film::{Film, Pixel};
+use lightgrid::render::{Sampling, Session, Sharing, View};
 use lightgrid::sampler::{hash, unit_from_bits};
 use lightgrid::scene::{AlphaMode, Camera, Material, Medium, Scene, builtin};
 use rayon::prelude::*;
@@ -230,7 +232,7 @@ fn the_error_has_no_floor() {
             samples,
         );
         let pixels = film.pixels().iter().zip(reference.pixels());
-        let of = |(a, b): (&lightgrid::render::film::Pixel, &lightgrid::render::film::Pixel)| {
+        let of = |(a, b): (&Pixel, &Pixel)| {
             let difference =
                 (a.mean_luminance() - b.mean_luminance()).powi(2) - b.variance_of_mean();
             difference / b.mean_luminance().powi(2)
@@ -240,4 +242,65 @@ fn the_error_has_no_floor() {
     let (few, many) = (error(64), error(2048));
     eprintln!("error {few:.2e} of 64 samples, {many:.2e} of 2048");
     assert!(many * 2048.0 < 1.5 * few * 64.0, "{many} of 2048 samples, {few} of 64");
+}
+
+/// What was learned does not matter for what is shared either.
+#[test]
+fn with_garbage_in_place_of_what_was_learned() {
+    let (world, camera) = room(0.7, Some(&pane()));
+    let map = overcast();
+    let garbage = |seed| {
+        let center = camera.world_from_camera.translation.into();
+        let grid = SphericalGrid { center, columns: 32, rows: 16, faces: true, medium: false };
+        LightGrid::with_garbage_distributions(grid, map.tile_energies(), seed).expect("light")
+    };
+    let means = |sharing, first: u32, is_garbage: bool| {
+        over_seeds(|seed| {
+            let view = picture(&camera, Sampling::Plain, sharing, first + seed);
+            let mut session = Session::new(&world, &map, view);
+            if is_garbage {
+                session.set_grid(garbage(first + seed)).expect("the CPU does not fail");
+            }
+            session.advance(32, &AtomicBool::new(false)).expect("the CPU does not fail");
+            mean(session.film()).luminance
+        })
+    };
+    let (alone, error_alone) = means(Sharing::Off, 1000, false);
+    for (first, sharing) in (2..).map(|i| 1000 * i).zip(SHARED) {
+        let (found, error) = means(sharing, first, true);
+        let (off, noise) = (found / alone - 1.0, error.hypot(error_alone) / alone);
+        eprintln!("{sharing:?}: {:+.3} % +- {:.3}", 100.0 * off, 100.0 * noise);
+        assert!(noise < 0.01, "{sharing:?}: {noise} is too noisy to tell");
+        assert!(off.abs() < 4.0 * noise, "{sharing:?}: {off} +- {noise}");
+    }
+}
+
+/// Pixels that share vary together; each pixel's own samples do not, and they tell its noise.
+#[test]
+fn the_noise_is_told_as_it_is() {
+    let (world, camera) = room(0.7, Some(&pane()));
+    let environment = overcast();
+    let film = |sharing, seed, samples| {
+        let view = picture(&camera, Sampling::Plain, sharing, seed);
+        render(&world, &environment, view, samples)
+    };
+    let truth = film(Sharing::Off, 1, 1 << 13);
+    let floor = 0.01 * mean(&truth).luminance.powi(2);
+    let error = |film: &Film| {
+        let pixels = film.pixels().iter().zip(truth.pixels());
+        let of = |(a, b): (&Pixel, &Pixel)| {
+            (a.mean_luminance() - b.mean_luminance()).powi(2) / (b.mean_luminance().powi(2) + floor)
+        };
+        pixels.map(of).sum::<f64>() / film.pixels().len() as f64
+    };
+    for sharing in [Sharing::Off, Sharing::Small, Sharing::Large] {
+        let films: Vec<Film> = (10..26).map(|seed| film(sharing, seed, 32)).collect();
+        let root = |of: &dyn Fn(&Film) -> f64| {
+            (films.iter().map(of).sum::<f64>() / films.len() as f64).sqrt()
+        };
+        let (told, found) = (root(&|film| film.noise().powi(2)), root(&error));
+        eprintln!("{sharing:?}: {told:.4} told, {found:.4} found");
+        // Points of a sequence avoid each other: there is less noise than the samples' spread tells.
+        assert!(found < 1.05 * told && told < 1.6 * found, "{sharing:?}: {told} for {found}");
+    }
 }

@@ -15,6 +15,7 @@ use crate::alarm::Alarm;
 use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
+use crate::radiance_cache::CacheFacts;
 use crate::render::film::Film;
 use crate::render::{Gi, Phase, Sampling, Session, StopRule, View};
 
@@ -44,6 +45,8 @@ pub(super) struct Job<'a> {
     calm_film: Option<(u64, Arc<Film>)>,
     /// Seconds spent on the calm picture.
     calm_seconds: f64,
+    /// What is known of the radiance cache, with what tells of which.
+    cache: Option<((u64, f32), Arc<CacheFacts>)>,
     /// How the error of the main and of the plain picture fell.
     curves: [Vec<Point>; 2],
 }
@@ -69,6 +72,7 @@ impl<'a> Job<'a> {
             distributions: None,
             calm_film: None,
             calm_seconds: 0.0,
+            cache: None,
             curves: [Vec::new(), Vec::new()],
         }
     }

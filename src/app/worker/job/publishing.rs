@@ -5,9 +5,10 @@ use std::time::{Duration, Instant};
 
 use super::sessions::SLICE;
 use super::{CALM_SAMPLES, Job};
-use crate::app::worker::{Activity, Backdrop, Point, SessionSnapshot, Snapshot, lock};
+use crate::app::worker::{Activity, Backdrop, NoCache, Point, SessionSnapshot, Snapshot, lock};
 use crate::light_grid::LightGrid;
 use crate::metrics;
+use crate::radiance_cache::CacheFacts;
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::render::{Figures, Session, View};
@@ -99,6 +100,7 @@ impl Job<'_> {
             counters: self.counters.clone(),
             backdrop: self.shown_backdrop(main, calm, rests),
             calm_seconds: self.calm_seconds,
+            cache: self.cache_facts(calm.unwrap_or(main)),
             curves: self.curves.clone(),
             rest: Arc::clone(&self.shared.rest),
         };
@@ -109,6 +111,35 @@ impl Job<'_> {
             let cost = (self.published - start).saturating_sub(reading);
             self.publish_gap = gap_after(cost);
         }
+    }
+
+    /// What is in the radiance cache that `session` trains or, if it trains none, that was trained before.
+    fn cache_facts(&mut self, session: &Session<'_>) -> Result<Arc<CacheFacts>, NoCache> {
+        let request = &self.request;
+        if !request.inspects_cache {
+            return Err(NoCache::Unasked);
+        }
+        let is_kept = self.kept.has_training_for(request);
+        let kept = self.kept.training.as_ref().filter(|_| is_kept).map(|(training, _)| training);
+        let missing = if request.view.limits.bounces < 2 {
+            NoCache::OneBounce
+        } else if !request.is_calm {
+            NoCache::NotDenoised
+        } else if request.split {
+            NoCache::Split
+        } else if self.kept.device.is_quick(request) {
+            NoCache::QuickDevice
+        } else {
+            NoCache::Untrained
+        };
+        let training = session.training().or(kept).ok_or(missing)?;
+        let state = training.state();
+        if let Some((_, facts)) = self.cache.as_ref().filter(|(of, _)| *of == state) {
+            return Ok(Arc::clone(facts));
+        }
+        let facts = Arc::new(training.facts().ok_or(missing)?);
+        self.cache = Some((state, Arc::clone(&facts)));
+        Ok(facts)
     }
 
     /// What is shown together with the session's own film: the calm one once it has clearly more to say
