@@ -1,6 +1,6 @@
 #!/bin/sh
-# Makes docs/pictures/strip-split.jpg anew: a split view with its speed-up, which goes by the clock, so that screenshots
-# leave it out. Needs Xvfb, xdotool, ImageMagick, and `lightgrid` on the PATH or in LIGHTGRID:
+# Makes docs/pictures/strip-split.jpg anew: a split view with its speed-up after a time, where screenshots count samples.
+# Needs Xvfb, xdotool, ImageMagick, and `lightgrid` on the PATH or in LIGHTGRID:
 #
 #     sh docs/strip.sh [SECONDS]
 #

@@ -137,13 +137,13 @@ impl App {
         let Some(shown) = &self.shown else { return };
         let main = &shown.order.snapshot.main;
         let image = shown.image.clone().unwrap_or_else(|| Arc::new(main.film.image()));
-        let samples = main.film.min_samples();
-        let summary = format!(
-            "{}, {samples} sample{}, {}",
-            convergence::name_of(main.sampling),
-            if samples == 1 { "" } else { "s" },
-            self.document.scene
-        );
+        let samples = match main.film.min_samples() {
+            0 => format!("{} samples", theme::samples(main.mean_samples())),
+            1 => "1 sample".to_owned(),
+            all => format!("{all} samples"),
+        };
+        let summary =
+            format!("{}, {samples}, {}", convergence::name_of(main.sampling), self.document.scene);
         let look = &self.document.look;
         let small = look.white_balance.apply(image.shrunk(history::SMALL_WIDTH));
         let exposure_ev = self.exposure_ev().unwrap_or_default();

@@ -414,7 +414,7 @@ impl App {
             shown: self.shown.as_deref(),
             settings,
             snapshot: self.snapshot.as_deref(),
-            speed_up: self.speed_up.filter(|_| !self.is_repeatable),
+            speed_up: self.speed_up,
             scene: self.scene.as_ref(),
             loading: self.loader.busy_with().next().is_some(),
             commands,
@@ -583,7 +583,7 @@ impl App {
         }
         if let Some(snapshot) = self.snapshot.as_ref().filter(|s| s.has_picture()) {
             // Kept pictures are whole ones.
-            let is_whole = self.document.region.is_none();
+            let is_whole = self.document.region.is_none() && snapshot.request.view.crop.is_none();
             let compared = Comparison::new(self.interface.compared, &self.history);
             let look = &self.document.look;
             self.presenter.order(Order {

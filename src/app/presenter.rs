@@ -67,6 +67,41 @@ impl Order {
 /// cores, it takes a twentieth of the machine.
 const REST: u32 = 9;
 
+/// What a picture took, for its rest. By the clock that would be far too long where other programs take the
+/// cores (a picture stood still for half a minute), by this thread's time at work far too short for the
+/// renderer, which gets as little: it is the geometric mean of both.
+struct Work(Option<Duration>);
+
+impl Work {
+    fn start() -> Self {
+        Self(time_at_work())
+    }
+
+    /// What it took, of so much by the clock.
+    fn time(&self, elapsed: Duration) -> Duration {
+        let worked = time_at_work().zip(self.0).map(|(now, start)| now.saturating_sub(start));
+        worked.map_or(elapsed, |worked| between(worked.min(elapsed), elapsed))
+    }
+}
+
+fn between(worked: Duration, elapsed: Duration) -> Duration {
+    Duration::from_secs_f64((worked.as_secs_f64() * elapsed.as_secs_f64()).sqrt())
+}
+
+/// Of this thread, where the system tells.
+fn time_at_work() -> Option<Duration> {
+    #[cfg(target_os = "linux")]
+    {
+        let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+        // SAFETY: plain system call, which writes into what it is given.
+        let outcome = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
+        let seconds = u64::try_from(time.tv_sec).ok().filter(|_| outcome == 0)?;
+        Some(Duration::new(seconds, u32::try_from(time.tv_nsec).ok()?))
+    }
+    #[cfg(not(target_os = "linux"))]
+    None
+}
+
 /// No picture takes longer to be made ready.
 const LONGEST: Duration = Duration::from_secs(60);
 
@@ -216,12 +251,13 @@ fn run(shared: &Shared) {
             }
         };
         let (start, kept) = (Instant::now(), order.clone());
+        let work = Work::start();
         order.snapshot.rest.set_end(start + LONGEST);
         // Where the device is lost, the window orders again on another.
         if let Ok(shown) = memory.present(order) {
             *lock(&shared.shown) = Some(Arc::new(shown));
         }
-        let end = Instant::now() + REST * start.elapsed();
+        let end = Instant::now() + REST * work.time(start.elapsed());
         kept.snapshot.rest.set_end(end);
         last = Some((kept, end));
         (shared.wake)();
@@ -510,6 +546,19 @@ mod tests {
     use super::*;
     use crate::render::film::Film;
     use crate::render::{Figures, Sampling};
+
+    #[test]
+    fn a_rest_is_shorter_where_others_take_the_cores() {
+        let seconds = Duration::from_secs_f64;
+        assert_eq!(between(seconds(0.5), seconds(0.5)), seconds(0.5));
+        assert_eq!(between(seconds(0.25), seconds(4.0)), seconds(1.0));
+        // Who sleeps is not at work.
+        if let Some(before) = time_at_work() {
+            std::thread::sleep(Duration::from_millis(200));
+            let worked = time_at_work().expect("it told before") - before;
+            assert!(worked < Duration::from_millis(200), "{worked:?}");
+        }
+    }
 
     #[test]
     fn a_film_on_the_same_device_is_shown_as_it_is_and_others_are_uploaded() {

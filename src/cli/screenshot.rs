@@ -40,7 +40,7 @@ enum PanelName {
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,
-    after_help = "Figures that depend on the clock are left out: a seed gives the same \
+    after_help = "Figures that depend on the clock are left out, but for --split's: a seed gives the same \
                         screenshot on the same machine. No display is needed, but a graphics \
                         device is; software Vulkan will do."
 )]

@@ -7,7 +7,7 @@ pub mod film_file;
 pub mod record;
 
 use crate::color::luminance;
-use crate::denoise::Denoiser;
+use crate::denoise::{Denoiser, blend};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::image::{ExrPicture, Layer, write_exr, write_png};
@@ -133,6 +133,8 @@ pub fn write_picture(
         );
     }
     let image = match options.denoiser {
+        // Filters would take the copies that fill gaps for samples that agree.
+        Some(_) if film.min_samples() == 0 => blend(film, None),
         Some(denoiser) => denoiser.denoise(&whole)?,
         None => image,
     };

@@ -229,6 +229,26 @@ mod tests {
         assert_eq!(textured, plain);
     }
 
+    #[test]
+    fn what_is_seen_stays_when_colours_change() {
+        let mut scene = builtin::build("office").expect("built in");
+        let oak = scene.materials.iter_mut().find(|m| m.name == "oak").expect("the floor's");
+        oak.transmission = 0.5;
+        let before = World::new(scene);
+        let changed = |name: &str, edit: MaterialEdit| {
+            let materials = before.scene.materials.iter();
+            let change = |m: &Material| if m.name == name { edit.apply(m) } else { m.clone() };
+            let world = before.with_materials(materials.map(change).collect());
+            world.expect("there is memory").is_seen_through_like(&before)
+        };
+        let red = MaterialEdit { color: Some(Vec3::X), ..MaterialEdit::default() };
+        let hidden = MaterialEdit { hidden: true, ..MaterialEdit::default() };
+        assert!(changed("wall", red) && !changed("wall", hidden));
+        assert!(!changed("oak", red), "light gets through, now as glass");
+        let other = World::new(builtin::build("office").expect("built in"));
+        assert!(!other.is_seen_through_like(&before), "nobody knows that it is the same");
+    }
+
     /// A world with changed materials is the one that is loaded with them.
     #[test]
     fn materials_are_exchanged_as_if_they_had_been_loaded() {

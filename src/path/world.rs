@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use std::sync::Arc;
+
 use super::lights::LocalLights;
 use super::materials::ReadyMaterial;
 use super::ray_clock::RayClock;
@@ -26,6 +28,8 @@ pub struct World {
     /// Emissive triangles and punctual lights.
     pub lights: LocalLights,
     materials: Vec<ReadyMaterial>,
+    /// The same one in all worlds of the same geometry.
+    geometry: Arc<()>,
     clock: Option<RayClock>,
 }
 
@@ -38,7 +42,8 @@ impl World {
         let bvh = Bvh::with_instances(&scene.positions, &scene.triangles, shared);
         let materials = scene.materials.iter().map(ReadyMaterial::new).collect();
         let lights = LocalLights::new(&scene, bvh.bounds());
-        Self { needs: SceneNeeds::of(&scene), scene, bvh, lights, materials, clock: None }
+        let (needs, geometry) = (SceneNeeds::of(&scene), Arc::default());
+        Self { needs, scene, bvh, lights, materials, geometry, clock: None }
     }
 
     /// The same scene with other materials, as many as it has.
@@ -52,7 +57,16 @@ impl World {
         let lights = LocalLights::new(&scene, self.bvh.bounds());
         let (needs, bvh) = (SceneNeeds::of(&scene), self.bvh.clone());
         let scene = with_huge_pages(scene);
-        Ok(Self { needs, scene, bvh, lights, materials: ready, clock: None })
+        let geometry = Arc::clone(&self.geometry);
+        Ok(Self { needs, scene, bvh, lights, materials: ready, geometry, clock: None })
+    }
+
+    /// Whether rays meet the same in both worlds, and as much light gets through: they were made of one
+    /// another, and only what surfaces scatter differs.
+    pub(crate) fn is_seen_through_like(&self, other: &Self) -> bool {
+        let materials = self.scene.materials.iter().zip(&other.scene.materials);
+        Arc::ptr_eq(&self.geometry, &other.geometry)
+            && materials.into_iter().all(|(a, b)| a.lets_pass_like(b))
     }
 
     /// About what it holds: geometry, textures and tree.

@@ -115,8 +115,7 @@ pub(super) fn render(
     let without_counts = PathTracer { counts: None, ..*tracer };
     let task = Task { tracers: [&without_counts, tracer], rays, view, pass, cancel };
     let add = |a: (u64, u64), b: (u64, u64)| (a.0 + b.0, a.1 + b.1);
-    let is_whole = pass.every == 1;
-    let Some(tile) = view.shared_tile().filter(|_| is_whole) else {
+    let Some(tile) = view.shared_tile().filter(|_| pass.shares) else {
         let rows = film.tiles(film.width, 1, [0, 0]).into_iter().enumerate();
         let mut rows: Vec<_> = rows.step_by(pass.every as usize).collect();
         // Multiples of the golden ratio lie evenly.
@@ -206,6 +205,9 @@ impl Task<'_> {
             if pixel.samples() == sample {
                 pixel.add(result);
                 samples += 1;
+            } else if sample == 0 && pixel.samples() == 1 {
+                // The film was begun with a sample of its own, which would stand out of the tile.
+                pixel.replace(result);
             }
         }
         (samples, ray_count)

@@ -9,6 +9,8 @@ pub(super) struct Pass {
     pub(super) target: u32,
     /// It is about every so-manyth pixel of every so-manyth row; on a GPU about all.
     pub(super) every: u32,
+    /// Whether pixels share second vertices if the view says so; on a GPU they do.
+    pub(super) shares: bool,
     /// Of so many samples one is counted, lest a counter wrap.
     pub(super) stride: u32,
     /// Which points its samples are.

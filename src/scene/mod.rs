@@ -322,6 +322,18 @@ impl Material {
         }
     }
 
+    /// Whether as much light goes straight through as through another one with the same textures, and as much
+    /// is emitted: the colour of glass counts, that of a wall does not.
+    pub(crate) fn lets_pass_like(&self, other: &Self) -> bool {
+        let opacity =
+            |m: &Self| (m.alpha_mode, m.base_color.w, m.double_sided, m.transmission, m.thickness);
+        let glass = |m: &Self| (m.base_color, m.metallic, m.roughness);
+        opacity(self) == opacity(other)
+            && (self.emissive, self.unlit) == (other.emissive, other.unlit)
+            && self.diffuse_transmission == other.diffuse_transmission
+            && (self.transmission == 0.0 || glass(self) == glass(other))
+    }
+
     /// All textures, in the order in which `shaders/surface.wgsl` numbers them.
     pub fn textures(&self) -> [&Option<TextureRef>; 17] {
         [

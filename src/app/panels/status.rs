@@ -121,6 +121,10 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
             "Samples that were NaN or infinite: they are left out of the picture and counted as black",
         );
     }
+    // There is no room for what says least.
+    if theme::is_small(ui) {
+        return;
+    }
     let grid = session.grid.as_ref().map_or(0, |grid| grid.memory_bytes());
     let map = snapshot.request.environment.memory_bytes();
     number(

@@ -47,13 +47,20 @@ impl Kept {
         }
     }
 
-    /// Lets go of all that is of another scene, which is large.
+    /// Lets go of all that is of another scene, which is large. What is seen from where stays right when
+    /// surfaces get another colour; what they look like does not.
     pub(super) fn leave_other_worlds(&mut self, request: &Request) {
-        let is_other = |of: &Request| !Arc::ptr_eq(&of.world, &request.world);
-        self.counted.take_if(|(_, of)| is_other(of));
+        let world = &request.world;
+        let is_other = |of: &Request| !Arc::ptr_eq(&of.world, world);
         self.backdrop.take_if(|(of, _)| is_other(of));
         self.training.take_if(|(_, of)| is_other(of));
-        if !self.is_of_world(request) {
+        self.counted.take_if(|(_, of)| !of.world.is_seen_through_like(world));
+        if let Some((_, of)) = self.counted.as_mut().filter(|(_, of)| is_other(of)) {
+            *of = Arc::new(Request { world: Arc::clone(world), ..(**of).clone() });
+        }
+        if self.world.as_ref().is_some_and(|learned_in| learned_in.is_seen_through_like(world)) {
+            self.world = Some(Arc::clone(world));
+        } else {
             (self.world, self.learned, self.is_complete) = (None, None, false);
         }
     }
@@ -68,6 +75,7 @@ impl Kept {
         let position = request.view.camera.world_from_camera.translation.into();
         self.training
             .as_ref()
+            .filter(|(_, of)| Arc::ptr_eq(&of.world, &request.world))
             .is_some_and(|(training, of)| of.is_lit_like(request) && training.suits(position))
     }
 

@@ -74,9 +74,9 @@ impl Request {
             || self.run != new.run
     }
 
-    /// Whether the same light falls on the same scene.
+    /// Whether the same light falls on the same scene, whatever its surfaces make of it.
     fn is_lit_like(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.world, &other.world)
+        self.world.is_seen_through_like(&other.world)
             && Arc::ptr_eq(&self.environment, &other.environment)
             && (self.view.medium, self.view.limits) == (other.view.medium, other.view.limits)
     }
@@ -467,6 +467,54 @@ mod tests {
             assert!(start.elapsed() < Duration::from_secs(120), "it never comes");
             std::thread::sleep(Duration::from_millis(10));
         }
+    }
+
+    #[test]
+    fn what_was_learned_outlives_a_change_of_colour() {
+        let gpu = match Gpu::open(None) {
+            Ok(gpu) => gpu,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let world = World::new(builtin::build("crack").expect("built in"));
+        let map = sky::build("overcast", 64, 32).expect("a sky");
+        let environment =
+            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let view = View::new(world.scene.cameras[0].clone(), [32, 24]);
+        let worker = Worker::start(Arc::new(|| ()), (None, RayChoice::default()), gpu)
+            .expect("threads can be had");
+        let request = Request {
+            world: Arc::new(world),
+            environment: Arc::new(environment),
+            view,
+            split: false,
+            moving: false,
+            previews: false,
+            device: DeviceChoice::Cpu,
+            is_calm: false,
+            rule: StopRule { samples: Some(2), ..StopRule::default() },
+            is_frozen: false,
+            reference: None,
+            paused: false,
+            run: 0,
+        };
+        let done = |world: &Arc<World>| {
+            worker.submit(Request { world: Arc::clone(world), ..request.clone() });
+            let is_done = |snapshot: &Snapshot| snapshot.activity == Activity::Done;
+            wait_for(&worker, |now| is_done(now) && Arc::ptr_eq(&now.request.world, world))
+        };
+        let changed = |change: &dyn Fn(&mut crate::scene::Material)| {
+            let mut materials = request.world.scene.materials.clone();
+            materials.iter_mut().for_each(change);
+            Arc::new(request.world.with_materials(materials).expect("there is memory"))
+        };
+        assert!(done(&request.world).now.learning_paths > 0);
+        let darker =
+            changed(&|material| material.base_color *= glam::Vec4::new(0.5, 0.5, 0.5, 1.0));
+        let after = done(&darker);
+        assert_eq!(after.now.learning_paths, 0, "it goes on with what was learned");
+        assert!(after.now.learned_cells > 0);
+        let open = changed(&|material| material.transmission = 0.9);
+        assert!(done(&open).now.learning_paths > 0, "more light comes in");
     }
 
     #[test]

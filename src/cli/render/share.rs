@@ -23,6 +23,10 @@ use crate::render::film::Film;
 use crate::render::{Figures, Gi, Phase, Session, StopRule, View};
 use crate::scene::builtin;
 
+/// A first sample that pixels share is begun where so many times as long is left as all would take of their
+/// own, as far as the first of those tell: it takes 1.3 to 1.7 times as long, and half a one is worth little.
+const RESERVE: f64 = 2.0;
+
 /// What one process renders of a picture.
 pub(super) struct Share {
     part: Part,
@@ -40,6 +44,8 @@ pub(super) struct Share {
     checkpoint: Option<Checkpoint>,
     /// Whether what was learned is wanted for its own sake.
     wants_distributions: bool,
+    /// Whether the samples so far are pixels' own, for want of time.
+    is_alone: bool,
     /// See [`FilmFacts::picture`].
     picture: Vec<(String, String)>,
 }
@@ -94,6 +100,7 @@ impl Share {
             deadline: None,
             checkpoint: None,
             wants_distributions: arguments.distributions.is_some(),
+            is_alone: false,
             // It takes a look at all of the scene and the map.
             picture: match is_kept {
                 true => identity(arguments, world, environment, view),
@@ -210,13 +217,36 @@ impl Share {
         }
         let never = AtomicBool::new(false);
         let cancel = if stopped { &never } else { &**interrupt.asked() };
-        let is_rendering = session.phase() == Phase::Rendering;
-        let beginning = session.next_beginning().filter(|_| self.is_hasty() && is_rendering);
-        match beginning {
+        match self.beginning(session) {
             Some(every) => session.begin(every, cancel),
             None => session.advance(self.next_pass(session), cancel)?,
         }
         Ok(false)
+    }
+
+    /// How far apart the pixels are that the picture is to be begun with now, if it is.
+    fn beginning(&mut self, session: &Session<'_>) -> Option<u32> {
+        if !self.is_hasty() || session.phase() != Phase::Rendering {
+            return None;
+        }
+        let next = session.next_beginning();
+        if session.view().shared_tile().is_none() {
+            return next;
+        }
+        // Some tiles beside pixels of their own would be seen: there are tiles everywhere or nowhere.
+        let is_new = session.samples() == 0 || self.is_alone;
+        self.is_alone = is_new && !session.is_on_gpu() && !self.has_time_for_all(session);
+        self.is_alone.then(|| next.unwrap_or(1))
+    }
+
+    /// Whether a sample of every pixel is likely to be done in time, from what those that it was begun with
+    /// have taken.
+    fn has_time_for_all(&self, session: &Session<'_>) -> bool {
+        let figures = session.figures();
+        let pixels = f64::from(session.view().width) * f64::from(session.view().height);
+        let seconds = figures.render_seconds / figures.samples as f64 * pixels;
+        let left = self.rule.seconds.unwrap_or(f64::INFINITY) - session.elapsed_seconds();
+        figures.samples > 0 && RESERVE * seconds < left
     }
 
     /// Whether the session has learned what belongs to the film that awaits it.

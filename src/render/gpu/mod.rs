@@ -682,7 +682,13 @@ pub(super) mod tests {
         let mut traced = 0;
         for paths in [Some(0..4096), Some(4096..16384), None] {
             let mut film = Film::new(view.width, view.height, false);
-            let pass = Pass { target: 4, every: 1, stride: 3, sequence: Sequence::default() };
+            let pass = Pass {
+                target: 4,
+                every: 1,
+                shares: true,
+                stride: 3,
+                sequence: Sequence::default(),
+            };
             let rendered = recording.goes_on().then_some(pass);
             traced += match (&mut renderer, paths) {
                 (Some(renderer), paths) => {
@@ -748,7 +754,8 @@ pub(super) mod tests {
             renderer
         };
         let mut films = [true, false].map(|_| Film::new(view.width, view.height, false));
-        let pass = Pass { target: 3, every: 1, stride: 1, sequence: Sequence::default() };
+        let pass =
+            Pass { target: 3, every: 1, shares: true, stride: 1, sequence: Sequence::default() };
         let mut at_once = begin();
         let done = at_once.render(pass, None, &AtomicBool::new(false)).expect("rendered");
         at_once.read_film(&mut films[0]).expect("read");

@@ -169,7 +169,8 @@ mod tests {
         let mut film = Film::new(view.width, view.height, view.layers);
         let pixels = u64::from(view.width * view.height);
         for (target, samples) in [(4, 4), (6, 2)] {
-            let pass = Pass { target, every: 1, stride: 1, sequence: Sequence::default() };
+            let pass =
+                Pass { target, every: 1, shares: true, stride: 1, sequence: Sequence::default() };
             let done = renderer.render(pass, None, &AtomicBool::new(false)).expect("it runs");
             assert_eq!(done, Advance { samples: samples * pixels, least: target });
         }

@@ -219,6 +219,37 @@ mod tests {
         crate::metrics::mean(&session.film().image())
     }
 
+    /// Where pixels share, a picture that was begun with pixels of their own is the same as one that was
+    /// not, and nothing of those is left.
+    #[test]
+    fn what_a_picture_was_begun_with_makes_room_for_tiles() {
+        let world = World::new(builtin::build("office").expect("built in"));
+        let map = sky::build("overcast", 128, 64).expect("a sky");
+        let environment =
+            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let view = View {
+            sampling: Sampling::Plain,
+            sharing: crate::render::Sharing::Large,
+            ..view(&world, DistributionOptions::ADAPTIVE)
+        };
+        let never = AtomicBool::new(false);
+        let films = [false, true].map(|is_begun| {
+            let mut session = Session::new(&world, &environment, view.clone());
+            if is_begun {
+                session.begin(8, &never);
+                assert_eq!(session.film().total_samples(), 8 * 5);
+                session.begin(1, &never);
+                assert_eq!(session.samples(), 1, "whole, but not shared");
+                session = Session::new(&world, &environment, view.clone());
+                session.begin(2, &never);
+            }
+            session.advance(1, &never).expect("the CPU does not fail");
+            assert_eq!(session.figures().samples, 64 * 36);
+            session.film().clone()
+        });
+        assert_eq!(films[0], films[1]);
+    }
+
     #[test]
     fn a_camera_near_by_goes_on_with_what_was_counted() {
         let world = World::new(builtin::build("office").expect("built in"));

@@ -130,7 +130,7 @@ impl<'a> Session<'a> {
             Phase::Rendering => {
                 self.train(1, cancel)?;
                 let start = Instant::now();
-                let result = self.render(self.samples.saturating_add(samples), 1, cancel);
+                let result = self.render(self.samples.saturating_add(samples), (1, true), cancel);
                 let distributions = self.figures.distribution_seconds - distribution_seconds;
                 self.figures.learning_seconds += distributions;
                 self.figures.render_seconds += start.elapsed().as_secs_f64() - distributions;
@@ -141,15 +141,16 @@ impl<'a> Session<'a> {
 
     /// Gives every `every`-th pixel of every `every`-th row its first sample: a picture can be made of
     /// so few that shows the whole view. It is the sample that [`Self::advance`] would take, which
-    /// goes on with the others; but a radiance cache is trained by so many fewer paths. Does nothing on
-    /// a GPU, whose first samples come all at once.
+    /// goes on with the others; but a radiance cache is trained by so many fewer paths, and no pixels share:
+    /// where they do, [`Self::advance`] takes samples in place of these. With an `every` of 1 it gives each
+    /// pixel its next one alone. Does nothing on a GPU, whose first samples come all at once.
     pub fn begin(&mut self, every: u32, cancel: &AtomicBool) {
-        if self.samples == 0 && !self.is_on_gpu() {
-            let every = every.max(1);
+        let every = every.max(1);
+        if (self.samples == 0 || every == 1) && !self.is_on_gpu() {
             // Only a GPU fails, and distributions are made of whole passes.
             let _ = self.train(every, cancel);
             let start = Instant::now();
-            let _ = self.render(1, every, cancel);
+            let _ = self.render(self.samples.saturating_add(1), (every, false), cancel);
             self.figures.render_seconds += start.elapsed().as_secs_f64();
         }
     }
@@ -379,6 +380,12 @@ impl<'a> Session<'a> {
         self.film.get_or_init(|| self.newest_film().0)
     }
 
+    /// The film, of which nobody needs a copy then.
+    pub(crate) fn into_film(mut self) -> Film {
+        let film = self.film.take();
+        film.unwrap_or_else(|| self.newest_film().0)
+    }
+
     /// [`Film::noise`] of [`Self::film`], which looks at every pixel once; infinite if some of its
     /// samples are others'.
     pub fn noise(&self) -> f64 {
@@ -498,9 +505,14 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn render(&mut self, target: u32, every: u32, cancel: &AtomicBool) -> Result<()> {
+    fn render(
+        &mut self,
+        target: u32,
+        (every, shares): (u32, bool),
+        cancel: &AtomicBool,
+    ) -> Result<()> {
         let stride = self.prepare_counting(target - self.samples);
-        let pass = Pass { target, every, stride, sequence: self.sequence };
+        let pass = Pass { target, every, shares, stride, sequence: self.sequence };
         let film_before = self.film_before.get_mut().unwrap_or_else(PoisonError::into_inner);
         if let Some(film) = self.film.take() {
             *film_before = film;

@@ -3,6 +3,7 @@
 mod publishing;
 mod sessions;
 
+use std::borrow::Cow;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError, Weak};
 use std::time::{Duration, Instant};
@@ -43,6 +44,8 @@ pub(super) struct Job<'a> {
     distributions: Option<((usize, u64), Arc<LightGrid>)>,
     /// The calm film published last, of so many samples in all.
     calm_film: Option<(u64, Arc<Film>)>,
+    /// Whether that is all of it.
+    has_calm: bool,
     /// Seconds spent on the calm picture.
     calm_seconds: f64,
     /// What is known of the radiance cache, with what tells of which.
@@ -71,6 +74,7 @@ impl<'a> Job<'a> {
             films: Vec::new(),
             distributions: None,
             calm_film: None,
+            has_calm: false,
             calm_seconds: 0.0,
             cache: None,
             curves: [Vec::new(), Vec::new()],
@@ -98,7 +102,7 @@ impl<'a> Job<'a> {
                 break;
             }
             self.measure(&session);
-            self.keep_backdrop(&session);
+            self.keep_backdrop(Cow::Borrowed(session.film()));
             self.publish(Activity::Moving, &session, [None, None]);
             if session.samples() >= 64 {
                 self.rest();
@@ -129,7 +133,7 @@ impl<'a> Job<'a> {
             let wants_calm = self.is_calm(&main);
             if !wants_calm {
                 self.end_calm(&mut calm);
-            } else if calm.is_none() && main.phase() == Phase::Rendering {
+            } else if calm.is_none() && !self.has_calm && main.phase() == Phase::Rendering {
                 let view = View { gi: Gi::Cached, ..view.clone() };
                 calm = Some(self.experienced_session(world, environment, view));
             }
@@ -185,6 +189,9 @@ impl<'a> Job<'a> {
                     }
                 },
             }
+            if let Some(complete) = calm.take_if(|calm| is_complete(calm)) {
+                self.complete_calm(complete);
+            }
             let due = self.published.elapsed() >= self.publish_gap;
             let is_reading_due = due && self.is_reading_due(&main);
             if due && self.request.previews && !self.is_superseded() {
@@ -204,7 +211,7 @@ impl<'a> Job<'a> {
         }
         self.end_calm(&mut calm);
         if self.request.previews {
-            self.keep_backdrop(&main);
+            self.keep_backdrop(Cow::Owned(main.into_film()));
         }
     }
 
@@ -218,8 +225,8 @@ impl<'a> Job<'a> {
     }
 
     fn end_calm(&mut self, calm: &mut Option<Session<'_>>) {
+        (self.calm_film, self.has_calm) = (None, false);
         if let Some(mut calm) = calm.take() {
-            self.calm_film = None;
             self.kept.keep_training(&mut calm, &self.request);
         }
     }
@@ -304,6 +311,10 @@ impl<'a> Job<'a> {
 fn goes_first(calm: &Session<'_>, main: &Session<'_>, turns: u32) -> bool {
     let is_shown = calm.samples() > 0;
     calm.samples() < CALM_SAMPLES.min(2 + 4 * main.samples()) && (is_shown || turns < 2)
+}
+
+fn is_complete(calm: &Session<'_>) -> bool {
+    calm.samples() >= CALM_SAMPLES
 }
 
 fn learned_share(session: &Session<'_>) -> f32 {

@@ -1,5 +1,6 @@
 //! What the window gets of a job.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -54,12 +55,22 @@ impl Job<'_> {
     }
 
     /// Keeps the film for the next one's first moments, unless there is a better one of the same view.
-    pub(super) fn keep_backdrop(&mut self, session: &Session<'_>) {
+    pub(super) fn keep_backdrop(&mut self, film: Cow<'_, Film>) {
         let known = self.backdrop().map_or(0, |film| film.total_samples());
-        let film = session.film();
         if film.min_samples() > 0 && film.total_samples() > known {
-            self.kept.backdrop = Some((Arc::clone(&self.request), Arc::new(film.clone())));
+            let film = Arc::new(film.into_owned());
+            self.kept.backdrop = Some((Arc::clone(&self.request), film));
         }
+    }
+
+    /// Ends a calm picture that is complete: its film is shown from then on, and no copy of it.
+    pub(super) fn complete_calm(&mut self, mut calm: Session<'_>) {
+        self.kept.keep_training(&mut calm, &self.request);
+        let samples = calm.figures().samples;
+        // What was published goes first: both together are large.
+        self.calm_film = None;
+        self.calm_film = Some((samples, Arc::new(calm.into_film())));
+        self.has_calm = true;
     }
 
     /// The distributions in use. They are megabytes and seldom change: they are copied once.
@@ -152,13 +163,21 @@ impl Job<'_> {
     ) -> Option<Backdrop> {
         let before = self.backdrop().map(|film| Backdrop { film, worth: 1.0, is_cached: false });
         let seen = before.as_ref().map_or(0, |backdrop| backdrop.film.total_samples());
-        let says_more = |calm: &&Session<'_>| 2 * calm.figures().samples > 3 * seen;
-        let Some(calm) = calm.filter(says_more) else { return before };
-        // It is megabytes and is soon complete.
-        let samples = calm.figures().samples;
-        let kept = self.calm_film.take().filter(|(of, _)| rests || *of == samples);
-        let kept = kept.unwrap_or_else(|| (samples, Arc::new(calm.film().clone())));
-        let film = Arc::clone(&self.calm_film.insert(kept).1);
+        let says_more = |samples: u64| 2 * samples > 3 * seen;
+        let film = match calm {
+            Some(calm) if says_more(calm.figures().samples) => {
+                // It is megabytes and is soon complete.
+                let samples = calm.figures().samples;
+                let kept = self.calm_film.take().filter(|(of, _)| rests || *of == samples);
+                let kept = kept.unwrap_or_else(|| (samples, Arc::new(calm.film().clone())));
+                Arc::clone(&self.calm_film.insert(kept).1)
+            }
+            None if self.has_calm => match &self.calm_film {
+                Some((samples, film)) if says_more(*samples) => Arc::clone(film),
+                _ => return before,
+            },
+            _ => return before,
+        };
         Some(Backdrop { film, worth: calm_worth(main.samples()), is_cached: true })
     }
 
