@@ -491,6 +491,7 @@ mod tests {
             previews: false,
             device: DeviceChoice::Cpu,
             is_calm: false,
+            inspects_cache: false,
             rule: StopRule { samples: Some(2), ..StopRule::default() },
             is_frozen: false,
             reference: None,
