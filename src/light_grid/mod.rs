@@ -20,7 +20,7 @@ pub use tile_distributions::TileChoice;
 use tile_distributions::TileDistributions;
 
 pub use learning::LearningGrid;
-pub use options::{DistributionOptions, Recording};
+pub use options::{DistributionOptions, Recording, RenderedPaths};
 
 /// Index of the distribution proportional to the whole map's tile energies.
 pub const WHOLE_MAP: u32 = 0;

@@ -56,8 +56,22 @@ pub struct DistributionOptions {
     /// Samples of the map that each vertex of a learning path tries: another shadow ray is cheaper
     /// than another path. A rendered path tries one.
     pub tries_per_vertex: u32,
-    /// Whether rendered paths count too, until the distributions hardly get better.
-    pub while_rendering: bool,
+    /// Where rendered paths count too, until the distributions hardly get better.
+    pub rendered_paths: RenderedPaths,
+}
+
+/// Where rendered paths count as learning paths do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RenderedPaths {
+    /// Nowhere: distributions are those of learning paths.
+    Nowhere,
+    /// Where what the camera sees is enclosed. Outside little is left to learn, and what better distributions
+    /// gain is less than a new sequence of points costs: counting for four samples makes 1.09 times the
+    /// error there (0.89 to 1.27), 0.96 times in rooms (0.79 to 1.07).
+    InRooms,
+    /// In every scene.
+    Everywhere,
 }
 
 impl DistributionOptions {
@@ -70,7 +84,7 @@ impl DistributionOptions {
         whole_map_share: 32,
         compensation: 0.5,
         tries_per_vertex: 8,
-        while_rendering: true,
+        rendered_paths: RenderedPaths::InRooms,
     };
 
     /// The talk's: proportional to the visible contribution, nothing else.
@@ -82,12 +96,12 @@ impl DistributionOptions {
         whole_map_share: 0,
         compensation: 0.0,
         tries_per_vertex: 1,
-        while_rendering: false,
+        rendered_paths: RenderedPaths::Nowhere,
     };
 
-    /// Whether rendered paths count too. Their samples of the map follow the distributions, so only ratios
-    /// can be counted.
+    /// Whether rendered paths may count too. Their samples of the map follow the distributions, so only
+    /// ratios can be counted.
     pub fn goes_on(&self) -> bool {
-        self.while_rendering && self.recording.is_ratio()
+        self.rendered_paths != RenderedPaths::Nowhere && self.recording.is_ratio()
     }
 }

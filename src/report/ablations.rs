@@ -2,7 +2,7 @@
 
 use super::plan::{Effort, Method, Plan, Row, Settings};
 use crate::environment::TableKind;
-use crate::light_grid::{DistributionOptions, Recording};
+use crate::light_grid::{DistributionOptions, Recording, RenderedPaths};
 use crate::render::{Gi, Sampling, Sharing};
 use crate::sampler::Points;
 
@@ -123,7 +123,12 @@ fn distributions(add: &mut Add<'_>) {
         add(group, &format!("whole map {share}/256"), &|s| s.distributions.whole_map_share = share);
     }
     let group = "learning from rendered paths";
-    add(group, "traced paths only", &|s| s.distributions.while_rendering = false);
+    for (name, rendered_paths) in [
+        ("traced paths only", RenderedPaths::Nowhere),
+        ("rendered paths everywhere", RenderedPaths::Everywhere),
+    ] {
+        add(group, name, &|s| s.distributions.rendered_paths = rendered_paths);
+    }
 }
 
 fn sizes(add: &mut Add<'_>) {

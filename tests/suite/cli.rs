@@ -606,7 +606,7 @@ fn a_region_is_that_part_of_the_picture_and_the_background_is_the_cameras_alone(
     assert_eq!((part.width, part.height), (9, 5));
     assert_eq!(whole.at(0, 0), [0.5, 1.0, 0.25], "a corner sees past the scene");
     assert_eq!(part.at(0, 0), whole.at(0, 0));
-    let map = render("--background map", "map.exr");
+    let map = render("--background map", "before-the-map.exr");
     assert_ne!(map.at(0, 0), whole.at(0, 0));
     // What surfaces reflect has not changed.
     let lit = (0..512).filter(|i| whole.pixels[*i] == map.pixels[*i]).count();

@@ -102,7 +102,8 @@ fn parts_that_do_not_belong_together_are_refused_by_name() {
         ("--part 1/2 --noise 0.1 -o c.part", 2, "cannot be used with"),
         ("-o c.part", 1, "c.part: pictures are written as .png or .exr"),
         ("-o c.exr --checkpoint a.part --spp 3", 1, "a.part: is the checkpoint of part 1 of 2"),
-        ("-o c.exr --checkpoint map.exr", 1, "map.exr: is neither a part of a picture nor"),
+        ("-o c.exr --checkpoint c.png", 1, "c.png: is neither a part of a picture nor"),
+        ("-o c.exr --checkpoint map.exr", 1, "map.exr: would be written over the scene or the map"),
         ("-o c.exr --checkpoint c.exr", 1, "two outputs would be written to this one file"),
     ] {
         let message = bench.refusal(&render_line(rest), status);
