@@ -2,6 +2,7 @@
 
 use glam::Vec2;
 
+use super::View;
 use crate::bsdf::cosine_hemisphere;
 use crate::bvh::{Hit, Ray, offset_origin};
 use crate::math::Frame;
@@ -28,10 +29,13 @@ pub(super) fn middle_distance(world: &World, size: [u32; 2], rays: &CameraRays) 
 pub(super) const ROOM_ENCLOSURE: f32 = 0.9;
 
 /// How far what the camera sees is enclosed: the mean share of the cosine-weighted hemisphere over it that
-/// surfaces take up, panes as far as they let no light through. 0 where it sees no surface.
-pub(super) fn enclosure(world: &World, size: [u32; 2], rays: &CameraRays) -> f32 {
+/// surfaces take up, panes as far as they let no light through. 0 where it sees no surface. Of a part of a picture
+/// it is the whole's.
+pub(super) fn enclosure(world: &World, view: &View) -> f32 {
+    let size @ [width, height] = view.whole_size();
+    let rays = CameraRays::new(&view.camera, width, height);
     let (mut enclosed, mut all) = (0.0, 0);
-    for (index, (ray, hit)) in looks(world, size, rays).enumerate() {
+    for (index, (ray, hit)) in looks(world, size, &rays).enumerate() {
         let point = world.point(&hit, ray.direction);
         let normal = point.geometric_normal;
         let frame = Frame::from_z(normal);

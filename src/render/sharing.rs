@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 use super::outlook::{ROOM_ENCLOSURE, enclosure};
 use super::{Gi, Sampling, View};
 use crate::path::World;
-use crate::path::camera::CameraRays;
 use crate::path::sharing::SharedTile;
 
 /// Whether neighbouring pixels share their second vertices ([`crate::path::sharing`]).
@@ -51,8 +50,7 @@ impl Sharing {
         if !suits {
             return Self::Off;
         }
-        let rays = CameraRays::new(&view.camera, width, height);
-        match enclosure(world, [width, height], &rays) {
+        match enclosure(world, view) {
             LARGE_ENCLOSURE.. => Self::Large,
             LEAST_ENCLOSURE.. => Self::Small,
             // Light comes from all sides: 0.97 to 2 times the efficiency where it is 0.4, by how thick it is.

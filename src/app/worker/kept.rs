@@ -117,9 +117,9 @@ mod tests {
     use glam::Vec3A;
 
     use super::*;
+    use crate::app::worker::tests::request;
     use crate::environment::{EnvironmentOptions, sky};
-    use crate::render::gpu::DeviceChoice;
-    use crate::render::{Gi, StopRule, View};
+    use crate::render::{Gi, View};
     use crate::scene::{Medium, builtin};
 
     fn lit(sky_name: &str) -> Arc<Environment> {
@@ -134,23 +134,9 @@ mod tests {
             Err(reason) => return eprintln!("SKIPPED: {reason}"),
         };
         let world = Arc::new(World::new(builtin::build("office").expect("built in")));
-        let view = View::new(world.scene.cameras[0].clone(), [16, 9]);
-        let request = Request {
-            world: Arc::clone(&world),
-            environment: lit("overcast"),
-            view: View { gi: Gi::Cached, ..view },
-            split: false,
-            moving: false,
-            previews: true,
-            device: DeviceChoice::Cpu,
-            is_calm: true,
-            inspects_cache: false,
-            rule: StopRule::default(),
-            is_frozen: false,
-            reference: None,
-            paused: false,
-            run: 0,
-        };
+        let request = request(Arc::clone(&world), lit("overcast"), [16, 9]);
+        let view = View { gi: Gi::Cached, ..request.view.clone() };
+        let request = Request { view, is_calm: true, ..request };
         let mut kept = Kept::new((None, RayChoice::default()), Arc::new(Mutex::new(gpu)));
         let mut session = Session::new(&world, &request.environment, request.view.clone());
         kept.keep_training(&mut session, &Arc::new(request.clone()));

@@ -457,6 +457,38 @@ mod tests {
     use crate::environment::{EnvironmentOptions, sky};
     use crate::scene::builtin;
 
+    /// What a window asks for that has just opened.
+    pub(super) fn request(
+        world: Arc<World>,
+        environment: Arc<Environment>,
+        size: [u32; 2],
+    ) -> Request {
+        Request {
+            view: View::new(world.scene.cameras[0].clone(), size),
+            world,
+            environment,
+            split: false,
+            moving: false,
+            previews: true,
+            device: DeviceChoice::Cpu,
+            is_calm: false,
+            inspects_cache: false,
+            rule: StopRule::default(),
+            is_frozen: false,
+            reference: None,
+            paused: false,
+            run: 0,
+        }
+    }
+
+    /// The same for a built-in scene under a soft sky.
+    fn request_of(scene: &str, size: [u32; 2]) -> Request {
+        let map = sky::build("overcast", 64, 32).expect("a sky");
+        let environment = Environment::new(map, &EnvironmentOptions::default());
+        let world = World::new(builtin::build(scene).expect("built in"));
+        request(Arc::new(world), Arc::new(environment.expect("a sound map")), size)
+    }
+
     /// Waits until a snapshot is as it should be.
     fn wait_for(worker: &Worker, is_right: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
         let start = Instant::now();
@@ -475,28 +507,12 @@ mod tests {
             Ok(gpu) => gpu,
             Err(reason) => return eprintln!("SKIPPED: {reason}"),
         };
-        let world = World::new(builtin::build("crack").expect("built in"));
-        let map = sky::build("overcast", 64, 32).expect("a sky");
-        let environment =
-            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
-        let view = View::new(world.scene.cameras[0].clone(), [32, 24]);
         let worker = Worker::start(Arc::new(|| ()), (None, RayChoice::default()), gpu)
             .expect("threads can be had");
         let request = Request {
-            world: Arc::new(world),
-            environment: Arc::new(environment),
-            view,
-            split: false,
-            moving: false,
             previews: false,
-            device: DeviceChoice::Cpu,
-            is_calm: false,
-            inspects_cache: false,
             rule: StopRule { samples: Some(2), ..StopRule::default() },
-            is_frozen: false,
-            reference: None,
-            paused: false,
-            run: 0,
+            ..request_of("crack", [32, 24])
         };
         let done = |world: &Arc<World>| {
             worker.submit(Request { world: Arc::clone(world), ..request.clone() });
@@ -524,29 +540,9 @@ mod tests {
             Ok(gpu) => gpu,
             Err(reason) => return eprintln!("SKIPPED: {reason}"),
         };
-        let world = World::new(builtin::build("open").expect("built in"));
-        let map = sky::build("overcast", 64, 32).expect("a sky");
-        let environment =
-            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
-        let view = View::new(world.scene.cameras[0].clone(), [64, 48]);
         let worker = Worker::start(Arc::new(|| ()), (None, RayChoice::default()), gpu)
             .expect("threads can be had");
-        let request = Request {
-            world: Arc::new(world),
-            environment: Arc::new(environment),
-            view,
-            split: false,
-            moving: false,
-            previews: true,
-            device: DeviceChoice::Cpu,
-            is_calm: false,
-            inspects_cache: false,
-            rule: StopRule::default(),
-            is_frozen: false,
-            reference: None,
-            paused: false,
-            run: 0,
-        };
+        let request = request_of("open", [64, 48]);
         worker.submit(request.clone());
         let first = wait_for(&worker, |snapshot| snapshot.main.samples > 1);
         first.rest.set_end(Instant::now() + Duration::from_secs(600));

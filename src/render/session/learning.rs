@@ -20,8 +20,6 @@ pub(super) struct Learning {
     /// Paths counted since the counters were last looked through.
     paths_of_pass: u64,
     pub(super) stage: Stage,
-    /// Whether rendered paths count when learning paths have been traced.
-    pub(super) counts_rendered: bool,
 }
 
 /// How far learning is.
@@ -69,14 +67,7 @@ impl Learning {
             medium: view.fog(world).is_some(),
         };
         let grid = LearningGrid::new(grid, environment.tile_count(), options);
-        let [width, height] = view.whole_size();
-        let is_room = || {
-            let rays = CameraRays::new(&view.camera, width, height);
-            enclosure(world, [width, height], &rays) >= ROOM_ENCLOSURE
-        };
-        let counts_rendered =
-            options.goes_on() && (options.rendered_paths == RenderedPaths::Everywhere || is_room());
-        Some(Self { grid, pass: 0, paths_of_pass: 0, stage: Stage::Tracing, counts_rendered })
+        Some(Self { grid, pass: 0, paths_of_pass: 0, stage: Stage::Tracing })
     }
 }
 
@@ -101,6 +92,15 @@ impl Session<'_> {
         self.update_distributions();
         self.take_up_distributions()?;
         Ok(true)
+    }
+
+    /// Whether rendered paths count when learning paths have been traced.
+    pub(super) fn counts_rendered(&self) -> bool {
+        self.view.distribution_options().is_some_and(|options| {
+            let is_everywhere = options.rendered_paths == RenderedPaths::Everywhere;
+            let is_room = || enclosure(self.world, &self.view) >= ROOM_ENCLOSURE;
+            options.goes_on() && (is_everywhere || is_room())
+        })
     }
 
     /// One learning pass.
@@ -207,6 +207,13 @@ mod tests {
     use crate::render::{Phase, Sampling};
     use crate::scene::builtin;
 
+    fn office() -> (World, Environment) {
+        let map = sky::build("overcast", 128, 64).expect("a sky");
+        let environment = Environment::new(map, &EnvironmentOptions::default());
+        let world = World::new(builtin::build("office").expect("built in"));
+        (world, environment.expect("a sound map"))
+    }
+
     fn moved(view: &View, by: Vec3, seed: u32) -> View {
         let mut view = View { seed, ..view.clone() };
         view.camera.world_from_camera.translation += glam::Vec3A::from(by);
@@ -222,10 +229,7 @@ mod tests {
     /// not, and nothing of those is left.
     #[test]
     fn what_a_picture_was_begun_with_makes_room_for_tiles() {
-        let world = World::new(builtin::build("office").expect("built in"));
-        let map = sky::build("overcast", 128, 64).expect("a sky");
-        let environment =
-            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let (world, environment) = office();
         let view = View {
             sampling: Sampling::Plain,
             sharing: crate::render::Sharing::Large,
@@ -251,10 +255,7 @@ mod tests {
 
     #[test]
     fn a_camera_near_by_goes_on_with_what_was_counted() {
-        let world = World::new(builtin::build("office").expect("built in"));
-        let map = sky::build("overcast", 128, 64).expect("a sky");
-        let environment =
-            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let (world, environment) = office();
         let view = view(&world, DistributionOptions::ADAPTIVE);
         let session = |view: View| Session::new(&world, &environment, view);
         let mut first = session(view.clone());

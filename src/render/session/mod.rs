@@ -285,8 +285,12 @@ impl<'a> Session<'a> {
 
     /// Goes over to rendering with what was learned so far.
     pub fn finish_learning(&mut self) {
-        if let Some(learning) = self.learning.as_mut().filter(|l| l.stage == Stage::Tracing) {
-            learning.stage = if learning.counts_rendered { Stage::Counting } else { Stage::Over };
+        if self.phase() == Phase::Rendering {
+            return;
+        }
+        let stage = if self.counts_rendered() { Stage::Counting } else { Stage::Over };
+        if let Some(learning) = &mut self.learning {
+            learning.stage = stage;
         }
     }
 
