@@ -104,7 +104,7 @@ pub(crate) struct MapPoint {
 type Corners<T> = [T; 4];
 
 /// A direction that is being drawn from a tile.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct TileSearch {
     tile: u32,
     search: Search,
@@ -234,7 +234,7 @@ impl Environment {
     /// Begins [`Self::sample_in_tile`]. Maps are large and memory is far: what the rest will read is
     /// fetched while something else is done.
     pub(crate) fn search_tile(&self, tile: u32, u: [u32; 2]) -> Option<TileSearch> {
-        let search = self.table.search(&self.grid, tile, refine(u))?;
+        let search = self.table.search(tile, refine(u))?;
         if let Search::TileLocal(search) = &search {
             let (row, columns) = search.among();
             self.prefetch_importances(row, columns);

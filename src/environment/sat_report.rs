@@ -196,7 +196,7 @@ impl<'a> Distribution<'a> {
             Self::TileLocal { table, grid, tile_probabilities } => (grid.whole().x)
                 .map(|x| {
                     let tile = grid.tile_of_patch(x, y);
-                    tile_probabilities[tile as usize] * table.sample_probability(grid, tile, x, y)
+                    tile_probabilities[tile as usize] * table.sample_probability(tile, x, y)
                 })
                 .collect(),
             Self::SummedArea { table, whole, .. } => {
@@ -231,7 +231,7 @@ fn time_samples(table: &Table, grid: &TileGrid, energies: &[f64], samples: u32) 
         u = [u[0].wrapping_add(steps[0]), u[1].wrapping_add(steps[1])];
         // A stride without a common factor with the power of two visits the tiles out of order.
         let tile = tiles[(sample as usize * 1597) % tiles.len()];
-        black_box(table.search(grid, tile, u).map(|search| table.finish(grid, tile, &search)));
+        black_box(table.search(tile, u).map(|search| table.finish(grid, tile, &search)));
     }
     start.elapsed().as_secs_f64() * 1e9 / f64::from(samples)
 }

@@ -20,7 +20,7 @@ pub(crate) enum Table {
 }
 
 /// A patch that is being chosen.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) enum Search {
     TileLocal(tile_local::Search),
     SummedArea([u64; 2]),
@@ -47,14 +47,16 @@ impl Table {
     }
 
     /// Begins to choose a patch of a tile by 64-bit fractions of one; `None` where the table has no mass.
-    pub(crate) fn search(&self, grid: &TileGrid, tile: u32, u: [u64; 2]) -> Option<Search> {
+    #[inline]
+    pub(crate) fn search(&self, tile: u32, u: [u64; 2]) -> Option<Search> {
         match self {
-            Self::TileLocal(table) => table.search(grid, tile, u).map(Search::TileLocal),
+            Self::TileLocal(table) => table.search(tile, u).map(Search::TileLocal),
             Self::SummedArea(_) => Some(Search::SummedArea(u)),
         }
     }
 
     /// Chooses the patch that was searched for in a tile; `None` where the table has no mass.
+    #[inline]
     pub(crate) fn finish(
         &self,
         grid: &TileGrid,
@@ -75,7 +77,7 @@ impl Table {
     /// Probability of [`Self::finish`] to choose patch `(x, y)` of the tile it lies in.
     pub(crate) fn sample_probability(&self, grid: &TileGrid, tile: u32, x: u32, y: u32) -> f64 {
         match self {
-            Self::TileLocal(table) => table.sample_probability(grid, tile, x, y),
+            Self::TileLocal(table) => table.sample_probability(tile, x, y),
             Self::SummedArea(table) => table.sample_probability(grid.patches(tile), x, y),
         }
     }

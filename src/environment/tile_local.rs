@@ -16,7 +16,7 @@ use super::patches::PatchSample;
 use super::tiles::{TileGrid, TilePatches};
 use super::weights::Weights;
 use crate::huge_pages::zeros_on_huge_pages;
-use crate::prefetch::prefetch_all;
+use crate::prefetch::prefetch;
 
 /// Sums of a row that a search ends with: a cache line of them.
 const GROUP: usize = 16;
@@ -24,14 +24,41 @@ const GROUP: usize = 16;
 /// Exact integer prefix sums, tile by tile.
 #[derive(Debug, Clone)]
 pub(crate) struct TileLocal {
+    /// Where each tile's sums are: all that a search asks for, in a cache line.
+    places: Vec<Place>,
     /// Tile after tile (see [`TileGrid::first_patch`]), row after row in a tile: sums along the
     /// row, this patch included. Wrapping cannot happen: a tile's total is below 2^32.
     row_sums: Vec<u32>,
-    /// The last of every [`GROUP`] of `row_sums`, row after row of tiles in the same order: few enough to
-    /// stay near the processor, so that a search waits for far memory once.
-    group_sums: Vec<u32>,
-    /// Per tile: sums over whole rows, this row included; [`Self::first_row`] finds a tile's.
+    /// Their groups, row after row of tiles in the same order: few enough to stay near the processor, so
+    /// that a search waits for far memory once.
+    row_groups: Groups,
+    /// Per tile: sums over whole rows, this row included.
     tile_sums: Vec<u32>,
+    /// Their groups, tile after tile.
+    tile_groups: Groups,
+}
+
+/// The last of every [`GROUP`] of sums, so many for each run of sums that is searched; after a run's last
+/// group, its total.
+#[derive(Debug, Clone)]
+struct Groups {
+    lasts: Vec<u32>,
+    per_run: usize,
+}
+
+/// Where a tile's patches and its sums are.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    /// Its first patch's column and row.
+    corner: [u32; 2],
+    /// Patches a row, and rows.
+    size: [u32; 2],
+    /// The first of its `tile_sums`; rows of tiles lie one after another there.
+    first_row: usize,
+    /// The first of its `row_sums`.
+    first_patch: usize,
+    /// The last of its `tile_sums`.
+    total: u32,
 }
 
 impl TileLocal {
@@ -60,64 +87,77 @@ impl TileLocal {
                 quantise(tile_weights, *energy, patches.width(), row_sums, tile_sums);
             },
         );
-        let group_sums = group_sums(&row_sums, grid);
-        (Self { row_sums, group_sums, tile_sums }, energies)
+        let places = places(&tile_sums, grid);
+        let row_runs = places.par_iter().flat_map_iter(|place| {
+            let length = place.size[0] as usize;
+            row_sums[place.first_patch..][..length * place.size[1] as usize].chunks_exact(length)
+        });
+        let longest = |axis: usize| places.iter().map(|place| place.size[axis]).max();
+        let row_groups = Groups::of(row_runs, longest(0));
+        let tile_runs = places.par_iter().map(|place| place.rows(&tile_sums));
+        let tile_groups = Groups::of(tile_runs, longest(1));
+        (Self { places, row_sums, row_groups, tile_sums, tile_groups }, energies)
     }
 
     /// Begins to choose a patch of the tile: a row by the second number and, by the first, some columns,
     /// among which [`Self::finish`] chooses; both are 64-bit fractions of one. Monotone in both. What the
     /// rest will read is fetched meanwhile. `None` if the tile is black.
-    pub(crate) fn search(&self, grid: &TileGrid, tile: u32, u: [u64; 2]) -> Option<Search> {
-        let patches = grid.patches(tile);
-        let rows = self.rows_of(grid, tile);
-        let total = rows[rows.len() - 1];
-        if total == 0 {
+    #[inline]
+    pub(crate) fn search(&self, tile: u32, u: [u64; 2]) -> Option<Search> {
+        let place = &self.places[tile as usize];
+        if place.total == 0 {
             return None;
         }
-        let row = Target::new(total, u[1]).find(rows, 0);
+        let target = Target::new(place.total, u[1]);
+        let (first, before) = self.tile_groups.find(tile as usize, target);
+        let rows = &place.rows(&self.tile_sums)[first..];
+        let row = target.find(&rows[..GROUP.min(rows.len())], before);
+        let row_index = first + row.index;
         // A row's total is known without reading its last sum.
         let target = Target::new(row.mass, u[0]);
-        let groups = self.groups_of(grid, tile, row.index);
-        let width = patches.width() as usize;
-        let first = GROUP * groups.partition_point(target.is_past());
-        let last = (first + GROUP).min(width);
-        let sums_at = grid.first_patch(patches) + row.index * width;
-        prefetch_all(&self.row_sums[sums_at + first..sums_at + last]);
+        let (first, before) = self.row_groups.find(place.first_row + row_index, target);
+        let width = place.size[0] as usize;
+        let sums = place.first_patch + row_index * width + first;
+        let length = GROUP.min(width - first);
+        prefetch(&self.row_sums[sums]);
+        prefetch(&self.row_sums[sums + length - 1]);
         Some(Search {
-            y: patches.y.start + row.index as u32,
-            x: patches.x.start,
-            group: first..last,
-            sums_at,
+            row: place.corner[1] + row_index as u32,
+            column: place.corner[0] + first as u32,
+            length: length as u32,
+            sums,
+            before,
             target,
             down: row.fraction,
-            total,
+            total: place.total,
         })
     }
 
     /// Chooses the patch that was searched for.
+    #[inline]
     pub(crate) fn finish(&self, search: &Search) -> PatchSample {
-        let Range { start, end } = search.group;
-        let column = search.target.find(&self.row_sums[search.sums_at..][..end], start);
+        let sums = &self.row_sums[search.sums..][..search.length as usize];
+        let column = search.target.find(sums, search.before);
         PatchSample {
-            x: search.x + column.index as u32,
-            y: search.y,
+            x: search.column + column.index as u32,
+            y: search.row,
             within: Vec2::new(column.fraction, search.down),
             probability: column.mass as f32 / search.total as f32,
         }
     }
 
-    /// Probability of [`Self::finish`] to choose this patch of the tile it lies in.
-    pub(crate) fn sample_probability(&self, grid: &TileGrid, tile: u32, x: u32, y: u32) -> f64 {
-        let patches = grid.patches(tile);
-        let rows = self.rows_of(grid, tile);
-        let total = rows[rows.len() - 1];
-        if total == 0 {
+    /// Probability of [`Self::finish`] to choose this patch of the tile.
+    pub(crate) fn sample_probability(&self, tile: u32, x: u32, y: u32) -> f64 {
+        let place = &self.places[tile as usize];
+        if place.total == 0 {
             return 0.0;
         }
-        let columns = self.columns_of(grid, patches, (y - patches.y.start) as usize);
-        let column = (x - patches.x.start) as usize;
+        let width = place.size[0] as usize;
+        let row = (y - place.corner[1]) as usize;
+        let columns = &self.row_sums[place.first_patch + row * width..][..width];
+        let column = (x - place.corner[0]) as usize;
         let before = if column == 0 { 0 } else { columns[column - 1] };
-        f64::from(columns[column] - before) / f64::from(total)
+        f64::from(columns[column] - before) / f64::from(place.total)
     }
 
     /// Sums along the rows of tiles, and down the tiles.
@@ -127,60 +167,67 @@ impl TileLocal {
 
     /// Bytes of all arrays.
     pub(crate) fn memory_bytes(&self) -> usize {
-        (self.row_sums.len() + self.group_sums.len() + self.tile_sums.len()) * size_of::<u32>()
-    }
-
-    /// Sums of a tile's rows.
-    fn rows_of(&self, grid: &TileGrid, tile: u32) -> &[u32] {
-        &self.tile_sums[first_row(grid, tile)..][..grid.patches(tile).height() as usize]
-    }
-
-    fn columns_of(&self, grid: &TileGrid, patches: &TilePatches, row: usize) -> &[u32] {
-        let width = patches.width() as usize;
-        &self.row_sums[grid.first_patch(patches) + row * width..][..width]
-    }
-
-    fn groups_of(&self, grid: &TileGrid, tile: u32, row: usize) -> &[u32] {
-        let groups = groups_per_row(grid);
-        &self.group_sums[(first_row(grid, tile) + row) * groups..][..groups]
+        let groups = self.row_groups.lasts.len() + self.tile_groups.lasts.len();
+        let sums = self.row_sums.len() + self.tile_sums.len() + groups;
+        sums * size_of::<u32>() + size_of_val(&self.places[..])
     }
 }
 
-/// Where a tile's rows begin when those of all tiles are counted: rows of tiles lie one after another, and
-/// each tile of one has as many rows as the others.
-fn first_row(grid: &TileGrid, tile: u32) -> usize {
-    let (patches, (columns, _)) = (grid.patches(tile), grid.size());
-    let (before, height) = (patches.y.start as usize, patches.height() as usize);
-    before * columns as usize + grid.column_of(tile) as usize * height
+impl Place {
+    /// Sums of the tile's rows.
+    fn rows<'a>(&self, tile_sums: &'a [u32]) -> &'a [u32] {
+        &tile_sums[self.first_row..][..self.size[1] as usize]
+    }
 }
 
-/// As many as the widest tile needs.
-fn groups_per_row(grid: &TileGrid) -> usize {
-    grid.widest().div_ceil(GROUP as u32) as usize
+impl Groups {
+    /// Of runs of sums, of which the longest has so many.
+    fn of<'a>(runs: impl ParallelIterator<Item = &'a [u32]>, longest: Option<u32>) -> Self {
+        let per_run = longest.unwrap_or(0).div_ceil(GROUP as u32) as usize;
+        let ends = (1..=per_run).map(|end| GROUP * end);
+        let lasts_of = |run: &'a [u32]| ends.clone().map(|end| run[end.min(run.len()) - 1]);
+        Self { lasts: runs.flat_map_iter(lasts_of).collect(), per_run }
+    }
+
+    /// Where in a run the group begins that holds the target, and the sum before it.
+    #[inline]
+    fn find(&self, run: usize, target: Target) -> (usize, u32) {
+        let lasts = &self.lasts[run * self.per_run..][..self.per_run];
+        let group = lasts.partition_point(target.is_past());
+        (GROUP * group, if group == 0 { 0 } else { lasts[group - 1] })
+    }
 }
 
-/// The last sum of each group of each row, tile after tile; after a row's last group, its total.
-fn group_sums(row_sums: &[u32], grid: &TileGrid) -> Vec<u32> {
-    let groups = groups_per_row(grid);
-    let of_tile = |tile| {
+fn places(tile_sums: &[u32], grid: &TileGrid) -> Vec<Place> {
+    let (columns, _) = grid.size();
+    let place = |tile: u32| {
         let patches = grid.patches(tile);
-        let tile = &row_sums[grid.first_patch(patches)..][..patches.len()];
-        let rows = tile.chunks_exact(patches.width() as usize);
-        rows.flat_map(move |row| (1..=groups).map(|end| row[(GROUP * end).min(row.len()) - 1]))
+        let [width, height] = [patches.width(), patches.height()];
+        // Each tile of a row of them has as many rows as the others.
+        let before = patches.y.start as usize * columns as usize;
+        let first_row = before + (tile % columns) as usize * height as usize;
+        Place {
+            corner: [patches.x.start, patches.y.start],
+            size: [width, height],
+            first_row,
+            first_patch: grid.first_patch(patches),
+            total: tile_sums[first_row + height as usize - 1],
+        }
     };
-    (0..grid.count()).into_par_iter().flat_map_iter(of_tile).collect()
+    (0..grid.count()).map(place).collect()
 }
 
 /// A patch that is being chosen.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Search {
-    y: u32,
-    /// First column of the tile.
-    x: u32,
-    /// Columns of the tile, one of which it will be.
-    group: Range<usize>,
-    /// Where the row's sums begin.
-    sums_at: usize,
+    row: u32,
+    /// First of some columns, one of which it will be, and how many they are.
+    column: u32,
+    length: u32,
+    /// Where their sums begin.
+    sums: usize,
+    /// The sum before them.
+    before: u32,
     target: Target,
     down: f32,
     total: u32,
@@ -189,12 +236,12 @@ pub(crate) struct Search {
 impl Search {
     /// Row and columns among which the patch will be.
     pub(crate) fn among(&self) -> (u32, Range<u32>) {
-        (self.y, self.x + self.group.start as u32..self.x + self.group.end as u32)
+        (self.row, self.column..self.column + self.length)
     }
 }
 
 /// What is searched: a 64-bit fraction of a positive total.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Target {
     whole: u32,
     part: u32,
@@ -219,10 +266,11 @@ impl Target {
         move |sum| *sum <= self.whole
     }
 
-    /// Finds the entry of inclusive prefix sums that holds it, which is not before `first`.
-    fn find(self, sums: &[u32], first: usize) -> Choice {
-        let index = first + sums[first..].partition_point(self.is_past());
-        let before = if index == 0 { 0 } else { sums[index - 1] };
+    /// Finds the entry of inclusive prefix sums that holds it, given the sum before them.
+    #[inline]
+    fn find(self, sums: &[u32], before: u32) -> Choice {
+        let index = sums.partition_point(self.is_past());
+        let before = if index == 0 { before } else { sums[index - 1] };
         let mass = sums[index] - before;
         let into = (self.whole - before) as f32 + self.part as f32 * (1.0 / 4_294_967_296.0);
         Choice { index, mass, fraction: (into / mass as f32).min(1.0) }

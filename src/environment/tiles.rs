@@ -57,16 +57,6 @@ impl TileGrid {
         &self.tiles[tile as usize]
     }
 
-    /// Columns of patches of the widest tile.
-    pub(crate) fn widest(&self) -> u32 {
-        self.width.div_ceil(self.columns)
-    }
-
-    /// Column of tiles that a tile is in.
-    pub(crate) fn column_of(&self, tile: u32) -> u32 {
-        self.column_of_patch[self.patches(tile).x.start as usize]
-    }
-
     /// All patches of the map.
     pub(crate) fn whole(&self) -> TilePatches {
         TilePatches { x: 0..self.width, y: 0..self.row_of_patch.len() as u32 }

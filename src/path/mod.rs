@@ -78,6 +78,8 @@ pub struct PathTracer<'a> {
     pub background: Background,
     /// When paths end.
     pub limits: PathLimits,
+    /// Whether it is asked for what the camera sees first ([`PathResult::first_hit`]).
+    pub layers: bool,
 }
 
 /// What one camera path brought back.
@@ -89,7 +91,7 @@ pub struct PathResult {
     pub rays: u32,
     /// Whether the radiance was not finite and therefore left out.
     pub was_invalid: bool,
-    /// The first surface, if any was hit.
+    /// The first surface, if any was hit and it is asked for.
     pub first_hit: Option<FirstHit>,
 }
 
@@ -345,7 +347,7 @@ impl<'a> Path<'a> {
             Cow::Borrowed(ready) => ready,
             Cow::Owned(own) => own_bsdf.insert(own),
         };
-        if self.bounces == 0 {
+        if self.bounces == 0 && self.tracer.layers {
             let albedo = if parameters.unlit { parameters.base_color } else { bsdf.albedo() };
             self.first_hit =
                 Some(FirstHit { albedo, normal: point.shading_frame.z, depth: self.travelled });

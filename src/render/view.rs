@@ -163,6 +163,7 @@ impl View {
             fog: self.fog(world),
             background: self.background,
             limits: self.limits,
+            layers: self.layers,
         }
     }
 

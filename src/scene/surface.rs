@@ -236,9 +236,11 @@ impl<'a> SurfacePoint<'a> {
         let unmapped = corner.smooth_normal().unwrap_or(front_normal);
         corner.vary(variations, &mut parameters);
         let normal = corner.mapped(unmapped, material.normal_texture, material.normal_scale);
-        let normal = facing.turned(normal, unmapped);
+        let mut normal = facing.turned(normal, unmapped);
         // What is not metal hardly needs its reflection, but its diffuse light needs the slope.
-        let normal = normal.lerp(facing.mirroring(normal), parameters.metallic);
+        if parameters.metallic > 0.0 {
+            normal = normal.lerp(facing.mirroring(normal), parameters.metallic);
+        }
         let shading_frame = Frame::from_z(normal.normalize());
         if parameters.anisotropy > 0.0 {
             let world = corner.anisotropy_direction(unmapped);

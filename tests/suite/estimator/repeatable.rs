@@ -128,6 +128,7 @@ fn counters_do_not_depend_on_the_threads() {
                 fog: None,
                 background: Background::Map,
                 limits: view.limits,
+                layers: false,
             };
             with_threads(threads, || {
                 (0..4096_u32).into_par_iter().for_each(|path| {
