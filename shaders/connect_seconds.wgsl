@@ -136,8 +136,11 @@ fn connect_seconds(
 //#end
 //#if MAP_SAMPLING
         for (var i = 0u; i < MAP_SAMPLES; i++) {
-            add_light(&path, shadow_of(&path, vertex, light_of_map(&path, vertex), true));
+            var stream = sampler_of_estimate(path.sampler, MAP_SAMPLES, i);
+            let of_map = light_of_map(&path, vertex, next_pair_bits(&stream));
+            add_light(&path, shadow_of(&path, vertex, of_map, true));
         }
+        path.sampler.pair += 1u;
 //#end
 //#if LOCAL_LIGHTS
         add_light(&path, shadow_of(&path, vertex, light_of_lamps(&path, vertex), false));

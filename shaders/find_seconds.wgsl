@@ -52,7 +52,7 @@ fn meet_first(path: ptr<function, Path>, vertex: Vertex) -> bool {
     first[1] = packed((*path).throughput, 0u);
     var pairs = 0u;
 //#if MAP_SAMPLING
-    pairs += MAP_SAMPLES;
+    pairs += 1u;
 //#end
 //#if LOCAL_LIGHTS
     pairs += 1u;

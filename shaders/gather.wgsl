@@ -17,9 +17,8 @@ struct Arriving {
 }
 
 //#if MAP_SAMPLING
-fn light_of_map(path: ptr<function, Path>, vertex: Vertex) -> Arriving {
+fn light_of_map(path: ptr<function, Path>, vertex: Vertex, bits: vec2u) -> Arriving {
     var arriving: Arriving;
-    let bits = path_pair_bits(path);
     let choice = choose_tile(vertex.distribution, bits, globals.whole_map_share);
     let sample = sample_in_tile(choice.tile, vec2u(choice.remainder, bits.y));
     if sample.pdf_solid_angle > 0.0 {
@@ -93,7 +92,7 @@ fn gather(path: ptr<function, Path>, vertex: Vertex) {
     for (var i = 0u; i < 2u; i++) {
         var arriving: Arriving;
         if i == 0u {
-            arriving = light_of_map(path, vertex);
+            arriving = light_of_map(path, vertex, path_pair_bits(path));
         } else {
             arriving = light_of_lamps(path, vertex);
         }
@@ -105,7 +104,8 @@ fn gather(path: ptr<function, Path>, vertex: Vertex) {
         }
     }
 //#else
-    (*path).map_shadow = shadow_of(path, vertex, light_of_map(path, vertex), true);
+    let of_map = light_of_map(path, vertex, path_pair_bits(path));
+    (*path).map_shadow = shadow_of(path, vertex, of_map, true);
 //#end
 //#else
     (*path).lamp_shadow = shadow_of(path, vertex, light_of_lamps(path, vertex), false);

@@ -7,8 +7,7 @@ const WHOLE_MAP_SHARE = 256u;
 //#end
 
 // Samples the map to see what is visible of it.
-fn look_at_map(path: ptr<function, Path>, vertex: Vertex) {
-    let bits = path_pair_bits(path);
+fn look_at_map(path: ptr<function, Path>, vertex: Vertex, bits: vec2u) {
     let choice = choose_tile(vertex.distribution, bits, WHOLE_MAP_SHARE);
     let sample = sample_in_tile(choice.tile, vec2u(choice.remainder, bits.y));
     if sample.pdf_solid_angle <= 0.0 {
@@ -39,9 +38,12 @@ fn gather(path: ptr<function, Path>, vertex: Vertex) {
         return;
     }
 //#end
-    for (var i = 0u; i < globals.tries_per_vertex; i++) {
-        look_at_map(path, vertex);
+    let tries = globals.tries_per_vertex;
+    for (var i = 0u; i < tries; i++) {
+        var stream = sampler_of_estimate((*path).sampler, tries, i);
+        look_at_map(path, vertex, next_pair_bits(&stream));
     }
+    (*path).sampler.pair += 1u;
 }
 
 fn add_lights(path: ptr<function, Path>) {}

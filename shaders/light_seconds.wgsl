@@ -70,7 +70,8 @@ fn light_seconds(
     let pixel = member.place.y * globals.width + member.place.x;
     var sampler =
         sampler_new(globals.seed, pixel, globals.work.sample - globals.first_of_sequence);
-    sampler.pair = pair_in(hit.w, 8u) + estimate * PAIRS_OF_ESTIMATE;
+    sampler.pair = pair_in(hit.w, 8u);
+    sampler = sampler_of_estimate(sampler, CONTINUATIONS, estimate);
     var path = path_new(Ray(vec3f(0.0), direction, F32_MAX), sampler);
     path.bounces = 2u;
     path.throughput_before = bitcast<f32>(arrived.w);
@@ -80,7 +81,8 @@ fn light_seconds(
     let vertex = vertex_at(&path, hit, direction);
     var put_at = at + 2u + 2u * INCIDENTS * estimate;
 //#if MAP_SAMPLING
-    let map_shadow = unscattered_shadow(&path, vertex, light_of_map(&path, vertex), true);
+    let of_map = light_of_map(&path, vertex, path_pair_bits(&path));
+    let map_shadow = unscattered_shadow(&path, vertex, of_map, true);
 //#end
 //#if LOCAL_LIGHTS
     let lamp_shadow = unscattered_shadow(&path, vertex, light_of_lamps(&path, vertex), false);

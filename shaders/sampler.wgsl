@@ -15,6 +15,17 @@ fn sampler_new(seed: u32, pixel: u32, index: u32) -> Sampler {
 //#end
 }
 
+// The stream of one of `count` estimates that the sample makes of the same thing.
+fn sampler_of_estimate(sampler: Sampler, count: u32, estimate: u32) -> Sampler {
+    let pair = sampler.pair + (count - 1u) * PAIRS_OF_ESTIMATES;
+//#if INDEPENDENT_POINTS
+    return Sampler(0u, hash(sampler.pixel_seed ^ estimate), pair);
+//#else
+    let index = reverseBits(sampler.reversed_index) * count + estimate;
+    return Sampler(reverseBits(index), sampler.pixel_seed, pair);
+//#end
+}
+
 fn next_pair_bits(sampler: ptr<function, Sampler>) -> vec2u {
     let seed = hash((*sampler).pixel_seed + (*sampler).pair * 0x9e3779b9u);
     (*sampler).pair += 1u;

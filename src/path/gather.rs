@@ -44,14 +44,16 @@ impl Path<'_> {
         }
         debug_assert!(self.map_samples as usize <= chosen.of_map.len(), "all are drawn");
         if let Some(grid) = self.tracer.grid {
-            for of_map in chosen.of_map.iter_mut().take(self.map_samples as usize) {
-                let bits = self.sampler.next_pair_bits();
+            let count = self.map_samples;
+            for (of_map, estimate) in chosen.of_map.iter_mut().zip(0..count) {
+                let bits = self.sampler.of_estimate(count, estimate).next_pair_bits();
                 let choice = grid.sample(vertex.distribution, bits);
                 self.expect_count(vertex, choice.tile);
                 let u = [choice.remainder, bits[1]];
                 let search = self.tracer.environment.search_tile(choice.tile, u);
                 *of_map = search.map(|search| (choice, search));
             }
+            self.sampler.skip(1);
         }
         if !self.tracer.world.lights.is_empty() {
             chosen.of_lamps = Some(self.sampler.next_pair_bits());

@@ -24,9 +24,11 @@ impl PathTracer<'_> {
             }
             path.bounces += 1;
             if !vertex.scatterer.is_delta_only() && vertex.cell.is_some() {
-                for _ in 0..tries {
-                    path.look_at_map(&vertex);
+                for number in 0..tries {
+                    let bits = path.sampler.of_estimate(tries, number).next_pair_bits();
+                    path.look_at_map(&vertex, bits);
                 }
+                path.sampler.skip(1);
             }
             if !path.scatter(&vertex) || !path.survives() {
                 break;
@@ -74,10 +76,9 @@ impl Path<'_> {
     }
 
     /// Samples the map to see what is visible of it.
-    fn look_at_map(&mut self, vertex: &Vertex<'_>) {
+    fn look_at_map(&mut self, vertex: &Vertex<'_>, bits: [u32; 2]) {
         let (Some(grid), Some(learning)) = (self.tracer.grid, self.tracer.counts) else { return };
         let is_ratio = learning.recording().is_ratio();
-        let bits = self.sampler.next_pair_bits();
         let whole_map_share = if is_ratio { 128 } else { 256 };
         let choice = grid.sample_sharing(vertex.distribution, bits, whole_map_share);
         self.expect_count(vertex, choice.tile);

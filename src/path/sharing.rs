@@ -79,8 +79,6 @@ pub(crate) const LEAST_ALPHA: f32 = 0.01;
 
 /// Keeps the places of tiles apart from other random numbers.
 pub(crate) const TILE_SEED: u32 = 0x7469_6c65;
-/// Pairs of random numbers between those of two estimates behind one vertex: more than any takes.
-pub(crate) const PAIRS_OF_ESTIMATE: u32 = 1 << 24;
 
 /// A first vertex that other pixels' second vertices are connected with.
 struct First<'v> {
@@ -409,7 +407,7 @@ impl Path<'_> {
         let arrived = self.clone();
         for time in 0..times {
             *self = Self { rays: self.rays, ..arrived.clone() };
-            self.sampler.skip(time * PAIRS_OF_ESTIMATE);
+            self.sampler = arrived.sampler.of_estimate(times, time);
             let lights = self.choose_lights(vertex);
             let onward = self.choose_onward(vertex);
             let mut take = |arriving: Arriving| add(arriving.direction, arriving.light * share);

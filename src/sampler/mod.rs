@@ -13,7 +13,12 @@ pub struct Sampler {
     reversed_index: u32,
     pixel_seed: u32,
     pair: u32,
+    points: Points,
 }
+
+/// Pairs of numbers between those of samples and those of estimates of which a sample makes several: more
+/// than any takes.
+pub(crate) const PAIRS_OF_ESTIMATES: u32 = 1 << 24;
 
 /// The random numbers of a picture from one sample on: a scramble of their own for each generation of
 /// tile distributions.
@@ -61,9 +66,7 @@ impl Points {
         match self {
             Self::Sobol => even,
             // The first point of a scrambled sequence of its own is anywhere with equal chance.
-            Self::Independent => {
-                Sampler { reversed_index: 0, pixel_seed: hash(even.pixel_seed ^ index), pair: 0 }
-            }
+            Self::Independent => Sampler { points: self, ..even.independent(index) },
         }
     }
 }
@@ -73,7 +76,29 @@ impl Sampler {
     pub fn new(seed: u32, pixel: u32, index: u32) -> Self {
         // Were it a bitwise sum, another seed would give all pixels each other's numbers.
         let pixel_seed = hash(hash(pixel).wrapping_add(hash(seed)));
-        Self { reversed_index: index.reverse_bits(), pixel_seed, pair: 0 }
+        let points = Points::Sobol;
+        Self { reversed_index: index.reverse_bits(), pixel_seed, pair: 0, points }
+    }
+
+    /// The stream of one of `count` estimates that the sample makes of the same thing: the numbers of all
+    /// estimates of all samples are the points of one sequence, so that those of one sample are even, too.
+    /// Of a single one it is the sample's own.
+    pub(crate) fn of_estimate(&self, count: u32, estimate: u32) -> Self {
+        let pair = self.pair.wrapping_add((count - 1).wrapping_mul(PAIRS_OF_ESTIMATES));
+        let stream = Self { pair, ..self.clone() };
+        match self.points {
+            Points::Sobol => {
+                let index = self.reversed_index.reverse_bits();
+                let index = index.wrapping_mul(count).wrapping_add(estimate);
+                Self { reversed_index: index.reverse_bits(), ..stream }
+            }
+            Points::Independent => stream.independent(estimate),
+        }
+    }
+
+    /// The stream of a scrambled sequence of its own.
+    fn independent(self, index: u32) -> Self {
+        Self { reversed_index: 0, pixel_seed: hash(self.pixel_seed ^ index), ..self }
     }
 
     /// The next pair as 32-bit fractions of one.
@@ -82,10 +107,11 @@ impl Sampler {
         self.pair += 1;
         let shuffled = owen_scramble_reversed(self.reversed_index, seed).reverse_bits();
         let [x, y] = sobol_reversed(shuffled);
-        [
-            owen_scramble_reversed(x, hash(seed ^ 0x5851_f42d)).reverse_bits(),
-            owen_scramble_reversed(y, hash(seed ^ 0x1405_7b7e)).reverse_bits(),
-        ]
+        let x = owen_scramble_reversed(x, hash(seed ^ 0x5851_f42d));
+        let y = owen_scramble_reversed(y, hash(seed ^ 0x1405_7b7e));
+        // Both turned round at once.
+        let both = (u64::from(y) << 32 | u64::from(x)).reverse_bits();
+        [(both >> 32) as u32, both as u32]
     }
 
     /// Leaves out so many pairs.
@@ -170,6 +196,37 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Of points that begin a sequence, or go on where a power of two ended, each interval has as many.
+    #[test]
+    fn estimates_of_all_samples_are_even_together_and_those_of_one_among_themselves() {
+        for (count, columns) in [(4, 2), (4, 1), (4, 4), (8, 4), (2, 1)] {
+            let mut seen = std::collections::HashSet::new();
+            for index in 0..64 / count {
+                let sampler = Sampler::new(3, 5, index);
+                let mut seen_of_sample = std::collections::HashSet::new();
+                for estimate in 0..count {
+                    let [x, y] = sampler.of_estimate(count, estimate).next_pair_bits();
+                    let rows = count / columns;
+                    let cell = |x: u32, parts: u32| (u64::from(x) * u64::from(parts)) >> 32;
+                    assert!(seen_of_sample.insert((cell(x, columns), cell(y, rows))));
+                    assert!(seen.insert((cell(x, 8), cell(y, 8))));
+                }
+            }
+        }
+        let sampler = Sampler::new(3, 5, 9);
+        let [own, single] = [sampler.clone(), sampler.of_estimate(1, 0)];
+        assert_eq!(own.clone().next_pair_bits(), single.clone().next_pair_bits());
+        // Independent ones fall into the same half as often as not.
+        let halves = (0..1000).filter(|index| {
+            let sampler = Points::Independent.sampler(3, 5, *index);
+            let [a, b] =
+                [0, 1].map(|estimate| sampler.of_estimate(2, estimate).next_pair_bits()[0]);
+            (a ^ b) >> 31 == 0
+        });
+        let same = halves.count();
+        assert!((420..580).contains(&same), "{same} of 1000");
     }
 
     #[test]

@@ -10,6 +10,7 @@ use crate::light_grid::{WHOLE_MAP, cells, counters};
 use crate::path::{self, cached, light_tree, sharing, train};
 use crate::radiance_cache as cache;
 use crate::render::{cpu, filter};
+use crate::sampler;
 use crate::scene::surface;
 
 /// What a shader's constant can be.
@@ -87,7 +88,7 @@ constants! {
     NEAREST_SQUARED: light_tree::NEAREST_SQUARED,
     NO_TEXTURE: NO_TEXTURE,
     NORMAL_MAPPED: material::NORMAL_MAPPED,
-    PAIRS_OF_ESTIMATE: sharing::PAIRS_OF_ESTIMATE,
+    PAIRS_OF_ESTIMATES: sampler::PAIRS_OF_ESTIMATES,
     PARTIAL: material::PARTIAL,
     PUNCTUAL_WORDS: PUNCTUAL_WORDS,
     ROULETTE_AFTER: path::ROULETTE_AFTER,

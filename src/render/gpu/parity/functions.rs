@@ -216,7 +216,11 @@ fn random_points() -> Vec<Probe<'static>> {
             for (var i = 0; i < 3; i++) {
                 let bits = next_pair_bits(&sampler); put_word(bits.x); put_word(bits.y);
             }
-            put2(next_pair(&sampler)); put2(lens_point(&sampler));",
+            put2(next_pair(&sampler)); put2(lens_point(&sampler));
+            var estimate = sampler_of_estimate(sampler, 3u, 2u);
+            put_word(next_pair_bits(&estimate).y);
+            estimate = sampler_of_estimate(sampler, 1u, 0u);
+            put_word(next_pair_bits(&estimate).y);",
             cases(indices, |r| case(&[&r.word(), &r.word(), &(r.word() >> r.below(32))])),
             |t| {
                 let mut sampler = Sampler::new(t.take_word(), t.take_word(), t.take_word());
@@ -225,6 +229,8 @@ fn random_points() -> Vec<Probe<'static>> {
                 }
                 t.near(Vec2::from(sampler.next_pair()), EXACT);
                 t.near(Vec2::from(sampler.next_pair()), EXACT);
+                t.same(sampler.of_estimate(3, 2).next_pair_bits()[1]);
+                t.same(sampler.of_estimate(1, 0).next_pair_bits()[1]);
             },
         ),
         Probe::new(
