@@ -1,4 +1,5 @@
-// The edge-avoiding filter in passes. Twin of `src/denoise/a_trous.rs`, which says what and why.
+// The edge-avoiding filter in passes. Twin of `src/denoise/a_trous.rs`, `guides.rs` and `edges.rs`, which say what
+// and why.
 
 struct Pass {
     size: vec2u,
@@ -19,10 +20,16 @@ struct FirstHit {
 // What tells surfaces apart.
 struct Guide {
     albedo: vec3f,
-    depth: f32,
+    coverage: f32,
     normal: vec3f,
-    // How strictly others are compared with it: a power of their likeness.
-    strictness: f32,
+    nearness: f32,
+    // Variances of the normal and, where it is chance, of the coverage.
+    doubt: f32,
+    chance: f32,
+    // How much the nearness changes from pixel to pixel.
+    slope: f32,
+    // How many of the 24 pixels around are like it.
+    support: f32,
 }
 
 @group(0) @binding(0) var<uniform> settings: Pass;
@@ -30,40 +37,75 @@ struct Guide {
 @group(0) @binding(2) var<storage, read> counts: array<vec4u>;
 @group(0) @binding(3) var<storage, read> surfaces: array<FirstHit>;
 @group(0) @binding(4) var<storage, read_write> guides: array<Guide>;
-// Light without albedo, and the variance of its luminance.
+// Light without albedo, and the variance of its luminance: negative where it is not known.
 @group(0) @binding(5) var<storage, read_write> light: array<vec4f>;
 @group(0) @binding(6) var<storage, read_write> result: array<vec4f>;
 @group(0) @binding(7) var<storage, read_write> result_counts: array<vec4u>;
 
-const LEAST_ALIKE = 3.0;
-const STRICT_STEP = 4u;
-const ERRORS_TOLERATED = 1.5;
-const REACH = 3;
 const LEAST_ALBEDO = 0.02;
-// No variance is larger, so that sums of variances are finite.
+const ALBEDO_TOLERANCE = 0.5;
+const NORMAL_TOLERANCE = 0.06;
+const NORMAL_VARIANCES = 2.0;
+const COVERAGE_TOLERANCE = 0.002;
+const CHANCES = 4.0;
+const DEPTH_TOLERANCE = 0.007;
+const DEPTH_GROWTH = 0.25;
+const SLOPE_TOLERANCE = 0.8;
+const LEAST_NEARNESS = 1e-9;
+const ERRORS_TOLERATED = 4.0;
+const LEAST_VARIANCE = 1e-12;
 const LARGEST_VARIANCE = 1e30;
+const LARGEST_LUMINANCE = 1e15;
+const REACH = 2;
+const LEAST_LIKENESS = 0.05;
+const LEAST_SPREAD = 0.1;
+const SINGLE = 3.0;
+const LEAST_ALIKE = 8.0;
+const WHOLE = 18.0;
+const RELATIVE_ERROR = 0.1;
+const RIDGE = 1e-3;
+const DEPTH_SCALE = 0.1;
+const TERMS = 6;
+const TINY = 1.1754944e-38;
 
 fn luminance(rgb: vec3f) -> f32 {
     return dot(rgb, vec3f(0.2126, 0.7152, 0.0722));
 }
 
-// How much two pixels belong to one surface, 1 for the same.
-fn likeness(a: Guide, b: Guide, step: f32) -> f32 {
-    let difference = a.albedo - b.albedo;
-    let albedo = exp(-dot(difference, difference) / 0.01);
-    let a_is_sky = all(a.normal == vec3f());
-    let b_is_sky = all(b.normal == vec3f());
-    if a_is_sky || b_is_sky {
-        return select(0.0, albedo, a_is_sky && b_is_sky);
-    }
-    // To the power of 64.
-    var normal = max(dot(a.normal, b.normal), 0.0);
-    for (var i = 0; i < 6; i++) {
-        normal *= normal;
-    }
-    let nearer = max(min(a.depth, b.depth), 1e-3);
-    let depth = exp(-abs(a.depth - b.depth) / (0.02 * nearer * step));
-    return albedo * normal * depth;
+fn compared_luminance(rgb: vec3f) -> f32 {
+    return min(luminance(rgb), LARGEST_LUMINANCE);
+}
+
+// Tukey's biweight.
+fn falling(squared: f32) -> f32 {
+    let rest = max(1.0 - squared, 0.0);
+    return rest * rest;
+}
+
+fn index_of(place: vec2i) -> u32 {
+    return u32(place.y) * settings.size.x + u32(place.x);
+}
+
+fn is_inside(place: vec2i) -> bool {
+    return all(place >= vec2i()) && all(place < vec2i(settings.size));
+}
+
+// How much two pixels so far apart belong to one surface, from 1 to 0.
+fn likeness(a: Guide, b: Guide, offset: vec2i) -> f32 {
+    let distance = vec2f(abs(offset));
+    let growth = DEPTH_TOLERANCE * (1.0 + DEPTH_GROWTH * (distance.x + distance.y));
+    let slopes = SLOPE_TOLERANCE * (1.0 + max(distance.x, distance.y));
+    let albedo = a.albedo - b.albedo;
+    let normal = a.normal - b.normal;
+    let doubts = NORMAL_VARIANCES * (a.doubt + b.doubt);
+    let covered = a.coverage - b.coverage;
+    let chances = CHANCES * (a.chance + b.chance);
+    let depth = (a.nearness - b.nearness)
+        / (growth * max(a.nearness, b.nearness) + slopes * max(a.slope, b.slope) + LEAST_NEARNESS);
+    return falling(dot(albedo, albedo) * (1.0 / ALBEDO_TOLERANCE))
+        * falling(dot(normal, normal) / (NORMAL_TOLERANCE + doubts))
+        * falling(covered * covered / (COVERAGE_TOLERANCE + chances))
+        * falling(depth * depth);
 }
 
 @compute @workgroup_size(8, 8)
@@ -71,69 +113,77 @@ fn undress(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= settings.size) {
         return;
     }
-    let index = id.y * settings.size.x + id.x;
+    let index = index_of(vec2i(id.xy));
     let samples = f32(max(counts[index].x, 1u));
     let hit = surfaces[index];
     var guide = Guide();
-    guide.depth = hit.depth / max(hit.hits, 1.0);
-    let length_squared = dot(hit.normal, hit.normal);
-    if length_squared > 0.0 {
-        guide.normal = hit.normal * inverseSqrt(length_squared);
+    guide.coverage = hit.hits / samples;
+    let albedo = hit.albedo / samples + (1.0 - guide.coverage);
+    guide.albedo = max(albedo, vec3f(LEAST_ALBEDO));
+    guide.normal = hit.normal / samples;
+    if hit.depth > 0.0 {
+        guide.nearness = guide.coverage * hit.hits / hit.depth;
     }
-    let seen = select(vec3f(1.0), hit.albedo / samples, length_squared > 0.0);
-    guide.albedo = max(seen, vec3f(LEAST_ALBEDO));
+    let squared_normal = dot(guide.normal, guide.normal) / max(guide.coverage, TINY);
+    guide.doubt = max(guide.coverage - squared_normal, 0.0) / max(samples - 1.0, 1.0);
     guides[index] = guide;
 
     let mean = sum[index].xyz / samples * settings.unscale;
-    let brightness = luminance(mean);
-    // One sample says nothing about its error: then anything goes.
-    var variance = brightness * brightness + 1.0;
+    var variance = -1.0;
     if counts[index].x > 1u {
+        let brightness = luminance(mean);
         let squared = sum[index].w / samples * settings.unscale * settings.unscale;
         let spread = max(squared - brightness * brightness, 0.0);
-        variance = min(variance, spread / (samples - 1.0));
+        let scale = 1.0 / luminance(guide.albedo);
+        variance = min(spread / (samples - 1.0) * scale * scale, LARGEST_VARIANCE);
     }
-    let scale = 1.0 / luminance(guide.albedo);
-    light[index] = vec4f(mean / guide.albedo, min(variance * scale * scale, LARGEST_VARIANCE));
+    light[index] = vec4f(mean / guide.albedo, variance);
 }
 
-// What another pixel counts for one that compares so strictly.
-fn weight_of(guide: Guide, other: Guide, step: f32, strictness: f32) -> f32 {
-    let alike = likeness(guide, other, step);
-    if strictness == 1.0 {
-        return alike;
-    }
-    return select(0.0, pow(alike, strictness), alike > 0.0);
+// Nearness of the pixel before, itself and the one after.
+fn slope_of(before: f32, own: f32, after: f32) -> f32 {
+    let steps = vec2f(own - before, after - own);
+    return select(0.0, min(abs(steps.x), abs(steps.y)), steps.x * steps.y > 0.0);
 }
 
-// Finds out how strictly a pixel is to be compared. Nobody asks another pixel how strict it is.
+// What the guides around a pixel say of its own.
 @compute @workgroup_size(8, 8)
-fn relax(@builtin(global_invocation_id) id: vec3u) {
+fn survey(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= settings.size) {
         return;
     }
-    let index = id.y * settings.size.x + id.x;
     let centre = vec2i(id.xy);
-    let low = max(centre - 2, vec2i());
-    let high = min(centre + 2, vec2i(settings.size) - 1);
-    var alike = vec3f();
+    let index = index_of(centre);
+    let low = max(centre - 1, vec2i());
+    let high = min(centre + 1, vec2i(settings.size) - 1);
+    var chance = 1.0;
+    var normals = vec4f();
     for (var y = low.y; y <= high.y; y++) {
         for (var x = low.x; x <= high.x; x++) {
-            let other = u32(y) * settings.size.x + u32(x);
-            if other != index {
-                let one = likeness(guides[index], guides[other], 1.0);
-                let fourth = sqrt(sqrt(one));
-                alike += vec3f(one, fourth, sqrt(sqrt(fourth)));
-            }
+            let other = index_of(vec2i(x, y));
+            let coverage = guides[other].coverage;
+            let others = max(f32(max(counts[other].x, 1u)) - 1.0, 1.0);
+            chance = min(chance, coverage * (1.0 - coverage) / others);
+            let normal = guides[other].normal;
+            normals += select(vec4f(), vec4f(normal, 1.0), any(normal != vec3f()));
         }
     }
-    var strictness = 1.0 / 16.0;
-    if alike.x >= LEAST_ALIKE {
-        strictness = 1.0;
-    } else if alike.y >= LEAST_ALIKE {
-        strictness = 1.0 / 4.0;
+    guides[index].chance = chance;
+    if counts[index].x < 2u && normals.w > 0.0 {
+        let mean = normals.xyz / normals.w;
+        guides[index].doubt = max(1.0 - dot(mean, mean), 0.0);
     }
-    guides[index].strictness = strictness;
+    let own = guides[index].nearness;
+    let last = vec2i(settings.size) - 1;
+    var slope = 0.0;
+    if centre.x > 0 && centre.x < last.x {
+        slope += slope_of(guides[index - 1u].nearness, own, guides[index + 1u].nearness);
+    }
+    if centre.y > 0 && centre.y < last.y {
+        let row = settings.size.x;
+        slope += slope_of(guides[index - row].nearness, own, guides[index + row].nearness);
+    }
+    guides[index].slope = slope;
 }
 
 @compute @workgroup_size(8, 8)
@@ -141,24 +191,45 @@ fn share_errors(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= settings.size) {
         return;
     }
-    let index = id.y * settings.size.x + id.x;
     let centre = vec2i(id.xy);
-    let low = max(centre - REACH, vec2i());
-    let high = min(centre + REACH, vec2i(settings.size) - 1);
+    let index = index_of(centre);
     let guide = guides[index];
-    var variance = 0.0;
-    var total = 0.0;
-    for (var y = low.y; y <= high.y; y++) {
-        for (var x = low.x; x <= high.x; x++) {
-            let other = u32(y) * settings.size.x + u32(x);
-            let weight = weight_of(guide, guides[other], 1.0, guide.strictness);
-            variance += weight * light[other].w;
-            total += weight;
+    // Weights of those whose errors are known, and their errors.
+    var known = vec2f();
+    // Weights of all, and moments of their luminance.
+    var all_weights = 0.0;
+    var moments = vec2f();
+    var support = 0.0;
+    for (var dy = -REACH; dy <= REACH; dy++) {
+        for (var dx = -REACH; dx <= REACH; dx++) {
+            let place = centre + vec2i(dx, dy);
+            if !is_inside(place) {
+                continue;
+            }
+            let other = index_of(place);
+            let alike = likeness(guide, guides[other], vec2i(dx, dy));
+            let weight = alike + LEAST_LIKENESS;
+            let there = light[other];
+            if there.w >= 0.0 {
+                known += weight * vec2f(1.0, there.w);
+            }
+            let brightness = compared_luminance(there.xyz);
+            all_weights += weight;
+            moments += weight * vec2f(brightness, brightness * brightness);
+            support += alike;
         }
     }
-    // The pixel itself always counts.
     let own = light[index];
-    result[index] = vec4f(own.xyz, max(own.w, variance / total));
+    var variance = max(own.w, known.y / max(known.x, TINY));
+    if own.w < 0.0 {
+        let mean = moments.x / all_weights;
+        let spread = max(moments.y / all_weights - mean * mean, LEAST_SPREAD * mean * mean);
+        let off = compared_luminance(own.xyz) - mean;
+        variance = min(SINGLE * max(spread, off * off), LARGEST_VARIANCE);
+    }
+    result[index] = vec4f(own.xyz, variance);
+    // The pixel itself is its like.
+    guides[index].support = support - 1.0;
 }
 
 // B3 spline.
@@ -175,27 +246,30 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= settings.size) {
         return;
     }
-    let index = id.y * settings.size.x + id.x;
+    let index = index_of(vec2i(id.xy));
     let guide = guides[index];
     let own = light[index];
-    let own_luminance = luminance(own.xyz);
-    // Larger steps reach other edges.
-    let strictness = select(1.0, guide.strictness, settings.step < STRICT_STEP);
+    let own_luminance = compared_luminance(own.xyz);
     var rgb = vec3f();
     var variance = 0.0;
     var total = 0.0;
     for (var dy = -2; dy <= 2; dy++) {
         for (var dx = -2; dx <= 2; dx++) {
-            let place = vec2i(id.xy) + vec2i(dx, dy) * i32(settings.step);
-            if any(place < vec2i()) || any(place >= vec2i(settings.size)) {
+            let offset = vec2i(dx, dy) * i32(settings.step);
+            let place = vec2i(id.xy) + offset;
+            if !is_inside(place) {
                 continue;
             }
-            let other = u32(place.y) * settings.size.x + u32(place.x);
+            let other = index_of(place);
             let there = light[other];
-            let tolerance = ERRORS_TOLERATED * sqrt(max(own.w + there.w, 0.0)) + 1e-6;
-            let weight = kernel(dx) * kernel(dy)
-                * weight_of(guide, guides[other], f32(settings.step), strictness)
-                * exp(-abs(luminance(there.xyz) - own_luminance) / tolerance);
+            var weight = kernel(dx) * kernel(dy);
+            if other != index {
+                let difference = compared_luminance(there.xyz) - own_luminance;
+                let tolerance = own.w + there.w + LEAST_VARIANCE;
+                weight *= likeness(guide, guides[other], offset) * falling(
+                    difference * difference * (1.0 / (ERRORS_TOLERATED * ERRORS_TOLERATED)) / tolerance
+                );
+            }
             rgb += there.xyz * weight;
             variance += there.w * weight * weight;
             total += weight;
@@ -205,13 +279,134 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
     result[index] = vec4f(rgb / total, variance / (total * total));
 }
 
-// The filtered picture as a film of one sample a pixel where there are any.
+// A pixel of those that tell another's light.
+struct Witness {
+    weight: f32,
+    terms: array<f32, TERMS>,
+    rgb: vec3f,
+}
+
+fn witness(own: Guide, own_light: f32, index: u32, offset: vec2i) -> Witness {
+    let guide = guides[index];
+    let there = light[index];
+    var witness = Witness();
+    witness.rgb = there.xyz * guide.albedo;
+    let near = 1.0 - f32(dot(offset, offset)) / f32((REACH + 1) * (REACH + 1));
+    let bright = compared_luminance(witness.rgb);
+    let relative = RELATIVE_ERROR * RELATIVE_ERROR * (bright * bright + own_light * own_light);
+    let dressed = luminance(guide.albedo);
+    witness.weight = near / (there.w * dressed * dressed + relative + LEAST_VARIANCE);
+    let normal = guide.normal - own.normal;
+    let nearness = (guide.nearness - own.nearness)
+        / max(DEPTH_SCALE * max(own.nearness, guide.nearness), TINY);
+    let albedo = luminance(guide.albedo - own.albedo);
+    witness.terms = array(1.0, albedo, normal.x, normal.y, normal.z, nearness);
+    return witness;
+}
+
+// What the pixels around one say it shows, blended with what it shows. Leaves radiance.
+@compute @workgroup_size(8, 8)
+fn mend(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= settings.size) {
+        return;
+    }
+    let centre = vec2i(id.xy);
+    let index = index_of(centre);
+    let own = guides[index];
+    let shown = light[index].xyz * own.albedo;
+    if own.support >= LEAST_ALIKE {
+        result[index] = vec4f(shown, 0.0);
+        return;
+    }
+    let own_light = compared_luminance(shown);
+    let low = max(centre - REACH, vec2i());
+    let high = min(centre + REACH, vec2i(settings.size) - 1);
+    var system = array<array<f32, TERMS>, TERMS>();
+    var sides = array<vec3f, TERMS>();
+    for (var y = low.y; y <= high.y; y++) {
+        for (var x = low.x; x <= high.x; x++) {
+            let place = vec2i(x, y);
+            let other = witness(own, own_light, index_of(place), place - centre);
+            for (var row = 0; row < TERMS; row++) {
+                let weighted = other.weight * other.terms[row];
+                for (var column = 0; column <= row; column++) {
+                    system[row][column] += weighted * other.terms[column];
+                }
+                sides[row] += other.rgb * weighted;
+            }
+        }
+    }
+    let total = system[0][0];
+    for (var term = 1; term < TERMS; term++) {
+        system[term][term] += RIDGE * total;
+    }
+    // By LDL^T.
+    let least = 1e-9 * total;
+    for (var row = 0; row < TERMS; row++) {
+        for (var column = 0; column <= row; column++) {
+            var rest = system[row][column];
+            for (var k = 0; k < column; k++) {
+                rest -= system[row][k] * system[column][k] * system[k][k];
+            }
+            if column < row {
+                system[row][column] = rest / system[column][column];
+            } else {
+                system[row][column] = max(rest, least);
+            }
+        }
+        for (var k = 0; k < row; k++) {
+            sides[row] -= sides[k] * system[row][k];
+        }
+    }
+    for (var row = TERMS - 1; row >= 0; row--) {
+        sides[row] /= system[row][row];
+        for (var k = row + 1; k < TERMS; k++) {
+            sides[row] -= sides[k] * system[k][row];
+        }
+    }
+    var error = 0.0;
+    for (var y = low.y; y <= high.y; y++) {
+        for (var x = low.x; x <= high.x; x++) {
+            let place = vec2i(x, y);
+            let other = witness(own, own_light, index_of(place), place - centre);
+            var fitted = vec3f();
+            for (var term = 0; term < TERMS; term++) {
+                fitted += sides[term] * other.terms[term];
+            }
+            let off = luminance(fitted - other.rgb);
+            error += other.weight * off * off;
+        }
+    }
+    error /= total;
+    let dressed = luminance(own.albedo);
+    let share = error / max(error + light[index].w * dressed * dressed, TINY);
+    result[index] = vec4f(mix(max(sides[0], vec3f()), shown, share), 0.0);
+}
+
+// The filtered picture, edges as wide as the pixel filter draws them, as a film of one sample a pixel where there
+// are any.
 @compute @workgroup_size(8, 8)
 fn dress(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= settings.size) {
         return;
     }
-    let index = id.y * settings.size.x + id.x;
-    result[index] = vec4f(light[index].xyz * guides[index].albedo, 0.0);
+    let centre = vec2i(id.xy);
+    let index = index_of(centre);
+    let own = light[index].xyz;
+    var shown = own;
+    if guides[index].support < WHOLE {
+        var around = vec4f();
+        for (var dy = -1; dy <= 1; dy++) {
+            for (var dx = -1; dx <= 1; dx++) {
+                let place = centre + vec2i(dx, dy);
+                if is_inside(place) {
+                    let weight = f32((2 - abs(dx)) * (2 - abs(dy)));
+                    around += weight * vec4f(light[index_of(place)].xyz, 1.0);
+                }
+            }
+        }
+        shown = mix(own, around.xyz / around.w, 1.0 / f32(max(counts[index].x, 1u)));
+    }
+    result[index] = vec4f(shown, 0.0);
     result_counts[index] = vec4u(min(counts[index].x, 1u), 0u, 0u, 0u);
 }

@@ -17,6 +17,7 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::light_grid::LightGrid;
 use crate::memory;
+use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::tone::WhiteBalance;
 
@@ -64,8 +65,8 @@ impl Order {
 }
 
 /// After a picture of work that goes on it rests so many times as long as that took: with half of the
-/// cores, it takes a twentieth of the machine.
-const REST: u32 = 9;
+/// cores, it takes a fourteenth of the machine.
+const REST: u32 = 6;
 
 /// What a picture took, for its rest. By the clock that would be far too long where other programs take the
 /// cores (a picture stood still for half a minute), by this thread's time at work far too short for the
@@ -473,6 +474,9 @@ impl Memory {
     }
 }
 
+/// A filtered picture is as good as the blend of so many times its samples.
+const FILTER_WORTH: u64 = 4;
+
 /// What a linear picture is made from; equal ones give the same picture.
 #[derive(Clone)]
 struct Source {
@@ -516,22 +520,29 @@ impl Source {
             Some((_, on_device)) => LinearPicture::live(on_device.clone()),
             None => developer.upload_film(film, layers),
         };
-        let blended = || {
-            let backdrop = self.backdrop.as_ref().map(|backdrop| (&*backdrop.film, backdrop.worth));
-            Prepared::of(developer, blend(film, backdrop))
-        };
-        let is_calmed = self.backdrop.as_ref().is_some_and(|backdrop| backdrop.is_cached);
+        let backdrop = self.backdrop.as_ref().map(|backdrop| (&*backdrop.film, backdrop.worth));
+        let blended = || Prepared::of(developer, blend(film, backdrop));
+        // Filters take whole films of one size.
+        let other = backdrop.filter(|(other, worth)| {
+            film.is_alike(other) && other.min_samples() > 0 && *worth > 0.0
+        });
+        let is_calmed = other.is_some() && self.backdrop.as_ref().is_some_and(|b| b.is_cached);
+        let samples = |film: &Film| film.total_samples();
+        let is_surpassed = |(other, _)| samples(other) <= FILTER_WORTH * samples(film);
+        let can_filter = other.is_some() || (self.is_whole && backdrop.is_none_or(is_surpassed));
         match self.denoiser {
-            // A picture with holes or in other pixels is there to see where one is going.
-            _ if !self.is_whole => blended(),
-            Some(_) if is_calmed => blended(),
-            None => Prepared::on_device(noisy(false)),
-            Some(Denoiser::ATrous) if developer.can_denoise(film.width, film.height) => {
+            None if self.is_whole => Prepared::on_device(noisy(false)),
+            Some(Denoiser::ATrous)
+                if self.is_whole
+                    && !is_calmed
+                    && developer.can_denoise(film.width, film.height) =>
+            {
                 Prepared::on_device(developer.denoised(&noisy(true)))
             }
-            // Where that takes seconds, what takes a twentieth of it will do.
-            Some(Denoiser::ATrous) => blended(),
-            Some(Denoiser::Oidn) => match Denoiser::Oidn.denoise(film) {
+            // A picture with holes or in other pixels is there to see where one is going.
+            None => blended(),
+            Some(_) if !can_filter => blended(),
+            Some(denoiser) => match denoiser.denoise(film, other) {
                 Ok(image) => Prepared::of(developer, image),
                 Err(failure) => Prepared { failure: Some(failure.to_string()), ..blended() },
             },
@@ -543,8 +554,11 @@ impl Source {
 mod tests {
     use std::sync::Arc;
 
+    use glam::Vec3;
+
     use super::*;
-    use crate::render::film::Film;
+    use crate::denoise::quick;
+    use crate::path::{FirstHit, PathResult};
     use crate::render::{Figures, Sampling};
 
     #[test]
@@ -560,15 +574,8 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_film_on_the_same_device_is_shown_as_it_is_and_others_are_uploaded() {
-        let opened = || Gpu::open(None).and_then(|gpu| Developer::new(&gpu));
-        let (developer, other) = match opened().and_then(|one| Ok((one, opened()?))) {
-            Ok(both) => both,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
-        let film = Film::new(6, 4, true);
-        let mut session = SessionSnapshot {
+    fn session(film: Film) -> SessionSnapshot {
+        SessionSnapshot {
             samples: 1,
             sampling: Sampling::Plain,
             film: Arc::new(film),
@@ -577,7 +584,54 @@ mod tests {
             grid: None,
             gpu: None,
             on_device: None,
+        }
+    }
+
+    /// A wall with light that is the pixel's own, in every so-manyth column.
+    fn film(width: u32, every: u32, samples: u32) -> Film {
+        let mut film = Film::new(width, 8, true);
+        for (y, x) in (0..8).flat_map(|y| (0..width).step_by(every as usize).map(move |x| (y, x))) {
+            for sample in 0..samples {
+                let radiance = Vec3::splat(((x * 7 + y * 5 + sample * 3) % 11) as f32);
+                let (albedo, normal, depth) = (Vec3::splat(0.5), Vec3::Z, 1.0);
+                let first_hit = Some(FirstHit { albedo, normal, depth });
+                film.add(x, y, &PathResult { radiance, first_hit, ..PathResult::default() });
+            }
+        }
+        film
+    }
+
+    #[test]
+    fn a_calm_picture_of_all_pixels_is_filtered_with_what_there_is_of_the_exact_one() {
+        let developer = match Gpu::open(None).and_then(|gpu| Developer::new(&gpu)) {
+            Ok(developer) => developer,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
         };
+        let prepared = |own: Film, other: Film, is_whole| {
+            let backdrop = Some(Backdrop { film: Arc::new(other), worth: 4.0, is_cached: true });
+            let (session, denoiser) = (session(own), Some(Denoiser::ATrous));
+            let prepared = Source { session, backdrop, denoiser, is_whole }.prepare(&developer);
+            prepared.image.expect("made on the host").pixels.clone()
+        };
+        let (holes, whole, calm, large) =
+            (film(12, 2, 1), film(12, 1, 1), film(12, 1, 2), film(16, 1, 9));
+        let filtered = |film, other| quick(film, Some((other, 4.0))).pixels;
+        let blended = |film, other| blend(film, Some((other, 4.0))).pixels;
+        assert_eq!(prepared(whole.clone(), calm.clone(), true), filtered(&whole, &calm));
+        assert_eq!(prepared(holes.clone(), calm.clone(), false), filtered(&holes, &calm));
+        // The calm one has holes, is larger and says more.
+        assert_eq!(prepared(holes.clone(), holes.clone(), false), blended(&holes, &holes));
+        assert_eq!(prepared(whole.clone(), large.clone(), true), blended(&whole, &large));
+    }
+
+    #[test]
+    fn a_film_on_the_same_device_is_shown_as_it_is_and_others_are_uploaded() {
+        let opened = || Gpu::open(None).and_then(|gpu| Developer::new(&gpu));
+        let (developer, other) = match opened().and_then(|one| Ok((one, opened()?))) {
+            Ok(both) => both,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let mut session = session(Film::new(6, 4, true));
         let is_live = |developer: &Developer, session: &SessionSnapshot, denoiser| {
             let session = session.clone();
             let source = Source { session, backdrop: None, denoiser, is_whole: true };

@@ -2,9 +2,13 @@
 
 pub(crate) mod a_trous;
 mod cell;
+mod edges;
+mod guides;
 mod oidn;
+mod samples;
 mod scales;
 
+use samples::Samples;
 pub use scales::blend;
 use serde::{Deserialize, Serialize};
 
@@ -43,20 +47,23 @@ impl Denoiser {
         }
     }
 
-    /// The film's picture without noise. Without layers on the film the à-trous filter leaves it as
-    /// it is.
+    /// The film's picture without noise. Samples of `other`, a film of the same view, size and layers, count as well,
+    /// each as so many of the film's own. Without layers on the film the à-trous filter leaves it as it is.
     ///
     /// # Errors
     /// If the library is missing or fails.
-    pub fn denoise(self, film: &Film) -> Result<Image> {
+    pub fn denoise(self, film: &Film, other: Option<(&Film, f32)>) -> Result<Image> {
         match self {
-            Self::ATrous => Ok(quick(film)),
-            Self::Oidn => oidn::denoise(film),
+            Self::ATrous => Ok(quick(film, other)),
+            Self::Oidn => oidn::denoise(&Samples { film, other }),
         }
     }
 }
 
-/// The film's picture through the filter that is always there.
-pub fn quick(film: &Film) -> Image {
-    a_trous::denoise(film)
+/// The film's picture through the filter that is always there, as by [`Denoiser::denoise`].
+pub fn quick(film: &Film, other: Option<(&Film, f32)>) -> Image {
+    if !film.has_layers() {
+        return film.image();
+    }
+    a_trous::denoise(&Samples { film, other })
 }

@@ -7,9 +7,9 @@ use std::sync::OnceLock;
 
 use libloading::{Library, Symbol};
 
+use super::samples::Samples;
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::render::film::Film;
 
 /// Names the library has, the newest first.
 const NAMES: &[&str] = if cfg!(windows) {
@@ -78,8 +78,8 @@ impl Drop for Owned {
     }
 }
 
-/// Denoises the film's radiance, guided by albedo and normals if the film has them.
-pub(super) fn denoise(film: &Film) -> Result<Image> {
+/// Denoises radiance, guided by albedo and normals if there are layers.
+pub(super) fn denoise(samples: &Samples<'_>) -> Result<Image> {
     let library = library()?;
     let new_device = function::<NewDevice>(library, "oidnNewDevice")?;
     let commit_device = function::<OfHandle>(library, "oidnCommitDevice")?;
@@ -91,14 +91,14 @@ pub(super) fn denoise(film: &Film) -> Result<Image> {
         .or_else(|_| function::<SetBool>(library, "oidnSetFilter1b"))?;
     let get_error = function::<GetError>(library, "oidnGetDeviceError")?;
 
-    let mut color = film.image();
+    let mut color = samples.image();
     let size = (color.width as usize, color.height as usize);
     let mut output = Image {
         width: color.width,
         height: color.height,
         pixels: vec![[0.0; 3]; color.pixels.len()],
     };
-    let mut layers = film.surface_layers();
+    let mut layers = samples.layers();
     // SAFETY: the calls follow the documentation; every image is a tight array of three floats a
     // pixel of the given size, and outlives the filter, which is dropped before the device.
     unsafe {
@@ -122,9 +122,9 @@ pub(super) fn denoise(film: &Film) -> Result<Image> {
             set_image(filter.handle, name.as_ptr(), at, format, size.0, size.1, 0, 0, 0);
         };
         give(c"color", &mut color.pixels);
-        if let Some(layers) = &mut layers {
-            give(c"albedo", &mut layers.albedo);
-            give(c"normal", &mut layers.normal);
+        if let Some([albedo, normal]) = &mut layers {
+            give(c"albedo", albedo);
+            give(c"normal", normal);
         }
         give(c"output", &mut output.pixels);
         set_bool(filter.handle, c"hdr".as_ptr(), true);

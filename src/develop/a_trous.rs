@@ -4,16 +4,17 @@ use super::{dispatch, entry, filled, pipeline};
 use crate::denoise::a_trous::STEPS;
 use crate::render::gpu::{DeviceFilm, Gpu};
 
-/// Bytes of a pixel's `Guide` and of its `FirstHit`.
-const GUIDE_BYTES: u64 = 32;
+/// Bytes of a pixel's `Guide`.
+const GUIDE_BYTES: u64 = 48;
 /// Bytes of a pixel's light.
 const LIGHT_BYTES: u64 = 16;
 
 pub(super) struct Passes {
     undress: wgpu::ComputePipeline,
-    relax: wgpu::ComputePipeline,
+    survey: wgpu::ComputePipeline,
     share_errors: wgpu::ComputePipeline,
     smooth_light: wgpu::ComputePipeline,
+    mend: wgpu::ComputePipeline,
     dress: wgpu::ComputePipeline,
 }
 
@@ -25,9 +26,10 @@ impl Passes {
         });
         Self {
             undress: pipeline(gpu, &shader, "undress"),
-            relax: pipeline(gpu, &shader, "relax"),
+            survey: pipeline(gpu, &shader, "survey"),
             share_errors: pipeline(gpu, &shader, "share_errors"),
             smooth_light: pipeline(gpu, &shader, "smooth_light"),
+            mend: pipeline(gpu, &shader, "mend"),
             dress: pipeline(gpu, &shader, "dress"),
         }
     }
@@ -73,8 +75,8 @@ impl Passes {
             entry(5, &light),
         ];
         dispatch(gpu, &mut commands, &self.undress, &entries, size);
-        let entries = [entry(0, &one), entry(4, &guides)];
-        dispatch(gpu, &mut commands, &self.relax, &entries, size);
+        let entries = [entry(0, &one), entry(2, &film.counts), entry(4, &guides)];
+        dispatch(gpu, &mut commands, &self.survey, &entries, size);
         let mut pass = |pipeline, settings: &wgpu::Buffer| {
             let entries =
                 [entry(0, settings), entry(4, &guides), entry(5, &light), entry(6, &result)];
@@ -85,6 +87,7 @@ impl Passes {
         for step in STEPS {
             pass(&self.smooth_light, &settings(step));
         }
+        pass(&self.mend, &one);
         let entries = [
             entry(0, &one),
             entry(2, &film.counts),

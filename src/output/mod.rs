@@ -135,7 +135,7 @@ pub fn write_picture(
     let image = match options.denoiser {
         // Filters would take the copies that fill gaps for samples that agree.
         Some(_) if film.min_samples() == 0 => blend(film, None),
-        Some(denoiser) => denoiser.denoise(&whole)?,
+        Some(denoiser) => denoiser.denoise(&whole, None)?,
         None => image,
     };
     let image = options.white_balance.apply(image);

@@ -210,7 +210,7 @@ pub(super) fn measure(
         denoised_flip: None,
         reference_pictures: None,
     };
-    let denoised = quick(session.film());
+    let denoised = quick(session.film(), None);
     Ok(Some(Finished { run, films, denoised, grid: session.grid().cloned() }))
 }
 

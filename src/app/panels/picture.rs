@@ -53,9 +53,13 @@ pub(in crate::app) fn show(
 fn denoiser(ui: &mut Ui, document: &mut Document) {
     ui.horizontal(|ui| {
         ui.checkbox(&mut document.look.denoise, "Denoise")
-            .on_hover_text("Noise is shared out by how sure each pixel is; without it every sample is shown as it is. For display and .png: .exr files keep what was rendered (N)");
+            .on_hover_text("Noise is averaged over pixels of like surfaces and light; without it every sample is shown as it is. For display and .png: .exr files keep what was rendered (N)");
+        if !document.look.denoise {
+            return;
+        }
         // The library is looked for once.
-        if !document.look.denoise || Denoiser::Oidn.check().is_err() {
+        if Denoiser::Oidn.check().is_err() {
+            ui.weak("no Open Image Denoise").on_hover_text("Intel's trained filter is smoother. Get its library from openimagedenoise.org, name its folder in LD_LIBRARY_PATH (PATH on Windows), and start again: then it can be chosen here");
             return;
         }
         let chosen = &mut document.look.denoiser;

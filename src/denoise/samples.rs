@@ -1,0 +1,109 @@
+//! What the filter is given: a film or, of the same view, two.
+
+use glam::Vec3;
+
+use crate::image::Image;
+use crate::render::film::{Film, Pixel, Surface};
+
+/// A film and, perhaps, another one of its size and with its layers, each of whose samples counts as so many of the
+/// film's own.
+#[derive(Clone, Copy)]
+pub(super) struct Samples<'a> {
+    pub(super) film: &'a Film,
+    pub(super) other: Option<(&'a Film, f32)>,
+}
+
+/// What is known of a pixel's light.
+pub(super) struct Mean {
+    pub(super) rgb: Vec3,
+    /// Variance of its luminance; `None` of a single sample.
+    pub(super) variance: Option<f32>,
+}
+
+impl Samples<'_> {
+    /// Samples of a pixel of both films, all alike.
+    pub(super) fn count(&self, index: usize) -> u32 {
+        let other = self.other.map_or(0, |(film, _)| film.pixels()[index].samples());
+        self.film.pixels()[index].samples().saturating_add(other)
+    }
+
+    /// Sums over the first hits of a pixel's samples.
+    pub(super) fn first_hits(&self, index: usize) -> [f32; 8] {
+        let mut sums = self.film.surfaces()[index].sums();
+        let other = self.other.map(|(film, _)| film.surfaces()[index]);
+        for (sum, more) in sums.iter_mut().zip(other.as_ref().map_or([0.0; 8], Surface::sums)) {
+            *sum += more;
+        }
+        sums.map(|sum| sum as f32)
+    }
+
+    /// The picture as it is.
+    pub(super) fn image(&self) -> Image {
+        let Film { width, height, .. } = *self.film;
+        let pixels = (0..self.film.pixels().len()).map(|index| self.mean(index).rgb.to_array());
+        Image { width, height, pixels: pixels.collect() }
+    }
+
+    /// Mean albedo and unit normal of each pixel's first hits, zero where nothing was hit; `None` without layers.
+    pub(super) fn layers(&self) -> Option<[Vec<[f32; 3]>; 2]> {
+        let layers = |index: usize| {
+            let [r, g, b, _, x, y, z, _] = self.first_hits(index);
+            let albedo = Vec3::new(r, g, b) / self.count(index).max(1) as f32;
+            (albedo.to_array(), Vec3::new(x, y, z).normalize_or_zero().to_array())
+        };
+        let pixels = 0..self.film.pixels().len();
+        self.film.has_layers().then(|| pixels.map(layers).unzip()).map(|(a, n)| [a, n])
+    }
+
+    pub(super) fn mean(&self, index: usize) -> Mean {
+        let own = &self.film.pixels()[index];
+        let vec3 = |pixel: &Pixel| Vec3::from(pixel.mean().map(|c| c as f32));
+        let Some((film, worth)) = self.other else {
+            let variance = (own.samples() > 1).then(|| own.variance_of_mean() as f32);
+            return Mean { rgb: vec3(own), variance };
+        };
+        let other = &film.pixels()[index];
+        let [n, m] = [own, other].map(|pixel| pixel.samples() as f32);
+        let total = (n + worth * m).max(f32::MIN_POSITIVE);
+        let rgb = (vec3(own) * n + vec3(other) * (worth * m)) / total;
+        // Both tell of the spread of one sample.
+        let known = [own, other].into_iter().filter(|pixel| pixel.samples() > 1);
+        let (squares, freedom) = known.fold((0.0, 0.0), |(squares, freedom), pixel| {
+            let (count, others) = (f64::from(pixel.samples()), f64::from(pixel.samples() - 1));
+            (squares + pixel.variance_of_mean() * others * count, freedom + others)
+        });
+        let per_sample = (n + worth * worth * m) / (total * total);
+        let variance = (freedom > 0.0).then(|| (squares / freedom) as f32 * per_sample);
+        Mean { rgb, variance }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::path::PathResult;
+
+    #[test]
+    fn samples_of_two_films_count_as_they_are_worth() {
+        let film = |lights: &[f32]| {
+            let mut film = Film::new(1, 1, true);
+            for light in lights {
+                let radiance = Vec3::splat(*light);
+                film.add(0, 0, &PathResult { radiance, ..PathResult::default() });
+            }
+            film
+        };
+        let (own, other) = (film(&[1.0, 3.0]), film(&[4.0, 6.0, 5.0, 5.0]));
+        let mean = |worth| Samples { film: &own, other: Some((&other, worth)) }.mean(0);
+        assert_eq!(mean(1.0).rgb, Vec3::splat(4.0));
+        assert!((mean(4.0).rgb - Vec3::splat(84.0 / 18.0)).length() < 1e-6);
+        // Squared deviations 2 and 2, of which four are free.
+        assert!((mean(1.0).variance.expect("known") - 1.0 / 6.0).abs() < 1e-6);
+        assert!((mean(4.0).variance.expect("known") - 66.0 / (18.0 * 18.0)).abs() < 1e-6);
+        let single = film(&[2.0]);
+        assert_eq!(Samples { film: &single, other: None }.mean(0).variance, None);
+        let both = Samples { film: &single, other: Some((&film(&[4.0]), 1.0)) };
+        assert_eq!((both.mean(0).rgb, both.mean(0).variance), (Vec3::splat(3.0), None));
+        assert_eq!(both.count(0), 2);
+    }
+}
