@@ -19,7 +19,8 @@ fn sampler_new(seed: u32, pixel: u32, index: u32) -> Sampler {
 fn sampler_of_estimate(sampler: Sampler, count: u32, estimate: u32) -> Sampler {
     let pair = sampler.pair + (count - 1u) * PAIRS_OF_ESTIMATES;
 //#if INDEPENDENT_POINTS
-    return Sampler(0u, hash(sampler.pixel_seed ^ estimate), pair);
+    let seed = select(sampler.pixel_seed, hash(sampler.pixel_seed ^ estimate), count > 1u);
+    return Sampler(0u, seed, pair);
 //#else
     let index = reverseBits(sampler.reversed_index) * count + estimate;
     return Sampler(reverseBits(index), sampler.pixel_seed, pair);

@@ -92,7 +92,8 @@ impl Sampler {
                 let index = index.wrapping_mul(count).wrapping_add(estimate);
                 Self { reversed_index: index.reverse_bits(), ..stream }
             }
-            Points::Independent => stream.independent(estimate),
+            Points::Independent if count > 1 => stream.independent(estimate),
+            Points::Independent => stream,
         }
     }
 
@@ -215,9 +216,11 @@ mod tests {
                 }
             }
         }
-        let sampler = Sampler::new(3, 5, 9);
-        let [own, single] = [sampler.clone(), sampler.of_estimate(1, 0)];
-        assert_eq!(own.clone().next_pair_bits(), single.clone().next_pair_bits());
+        for points in [Points::Sobol, Points::Independent] {
+            let mut sampler = points.sampler(3, 5, 9);
+            let mut single = sampler.of_estimate(1, 0);
+            assert_eq!(sampler.next_pair_bits(), single.next_pair_bits());
+        }
         // Independent ones fall into the same half as often as not.
         let halves = (0..1000).filter(|index| {
             let sampler = Points::Independent.sampler(3, 5, *index);
