@@ -40,9 +40,8 @@ mod refused {
 
     /// Ends the process as an error, in words that take no memory.
     fn end(size: usize) -> ! {
-        static ENDS: AtomicBool = AtomicBool::new(false);
         // Other threads may have been refused memory, too: one of them says so.
-        while ENDS.swap(true, Ordering::Relaxed) {
+        while !lightgrid::cli::has_last_word() {
             // SAFETY: it only waits.
             unsafe { libc::pause() };
         }

@@ -1,7 +1,7 @@
 //! Asking for memory before taking it: a program that is refused memory ends, one that asks can say so.
 
 use std::cell::Cell;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use crate::error::Decoded;
 
@@ -25,6 +25,18 @@ pub(crate) fn refusal_ends() {
 /// Whether nobody would take a refusal of memory for an answer. Takes none itself.
 pub(crate) fn is_refusal_the_end() -> bool {
     REFUSAL_ENDS.load(Ordering::Relaxed) && !ASKS.get()
+}
+
+/// Whether this thread says why the process ends: the first that asks. Others may have failed for the same cause, and
+/// have nothing to add. Takes no memory.
+pub(crate) fn has_last_word() -> bool {
+    /// Where something lies that the speaker alone has.
+    static SPEAKER: AtomicUsize = AtomicUsize::new(0);
+    let own = ASKS.with(|asks| std::ptr::from_ref(asks).addr());
+    match SPEAKER.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
+        Ok(_) => true,
+        Err(speaker) => speaker == own,
+    }
 }
 
 /// Whether so many more bytes can be had, as far as the system says.
@@ -162,5 +174,23 @@ mod tests {
         assert!(refusal.ends_with(" are left"), "{refusal}");
         assert_eq!(filled(3, 7), Ok(vec![7; 3]));
         assert!(reserved::<u64>(u64::MAX).is_err());
+    }
+
+    #[test]
+    fn one_thread_has_the_last_word() {
+        let all = std::sync::Barrier::new(8);
+        let asked_twice = || {
+            let answers = [has_last_word(), has_last_word()];
+            // Nobody leaves before: where one thread lay another could lie.
+            all.wait();
+            answers
+        };
+        let answers = std::thread::scope(|scope| {
+            let threads = [0; 8].map(|_| scope.spawn(asked_twice));
+            threads.map(|thread| thread.join().expect("no panic"))
+        });
+        let spoke = answers.iter().filter(|answers| **answers == [true; 2]).count();
+        assert_eq!(spoke, 1, "{answers:?}");
+        assert!(answers.iter().all(|[first, second]| first == second));
     }
 }

@@ -1,5 +1,7 @@
 //! What the command line calls the choices that there are, with a line of help for each.
 
+use std::path::PathBuf;
+
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
@@ -44,8 +46,13 @@ impl SceneArguments {
     }
 
     pub(super) fn options(&self) -> SceneOptions {
+        self.options_beside(Vec::new())
+    }
+
+    /// The same where these files will be written.
+    pub(super) fn options_beside(&self, outputs: Vec<PathBuf>) -> SceneOptions {
         let Self { allow_outside, variant, outlines, hide, edits } = self.clone();
-        SceneOptions { allow_outside, variant, outlines, hide, edits }
+        SceneOptions { allow_outside, variant, outlines, hide, edits, outputs }
     }
 }
 

@@ -1,16 +1,17 @@
 //! `lightgrid compare`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::image::{is_linear, read_picture};
+use crate::image::{Image, is_film, is_linear, read_picture};
 use crate::metrics::{Comparison, compare};
+use crate::output::film_file::read_film;
 use crate::terminal::print;
 
 /// Arguments of `compare`.
 #[derive(Debug, clap::Args)]
 pub(super) struct CompareArguments {
-    /// The picture to judge.
+    /// The picture to judge; a part of one (.part) or a checkpoint will do.
     picture: PathBuf,
     /// The reference it is held against.
     reference: PathBuf,
@@ -22,7 +23,7 @@ pub(super) struct CompareArguments {
 /// Prints the errors of a picture against a reference.
 pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
     let [is_linear_picture, is_linear_reference] =
-        [is_linear(&arguments.picture)?, is_linear(&arguments.reference)?];
+        [is_as_rendered(&arguments.picture)?, is_as_rendered(&arguments.reference)?];
     if is_linear_picture != is_linear_reference {
         let (developed, linear) = match is_linear_picture {
             true => (&arguments.reference, &arguments.picture),
@@ -33,8 +34,8 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
             format!("is developed for a display and {linear} is linear: that is no comparison");
         return Err(Error::at(developed, cause));
     }
-    let picture = read_picture(&arguments.picture)?;
-    let reference = read_picture(&arguments.reference)?;
+    let picture = read(&arguments.picture)?;
+    let reference = read(&arguments.reference)?;
     let comparison = compare(&picture, &reference).map_err(|e| Error::at(&arguments.picture, e))?;
     if arguments.json {
         return print(crate::output::record::to_json(&comparison)?);
@@ -50,4 +51,14 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
         Some(flip) => print(format_args!("FLIP              {flip:.4}")),
         None => print("FLIP              not built in (feature `flip`)"),
     }
+}
+
+/// Whether a file has radiance, as films have.
+fn is_as_rendered(path: &Path) -> Result<bool> {
+    if is_film(path) { Ok(true) } else { is_linear(path) }
+}
+
+/// The picture in a file, or that of the film in it.
+fn read(path: &Path) -> Result<Image> {
+    if is_film(path) { Ok(read_film(path)?.1.image()) } else { read_picture(path) }
 }

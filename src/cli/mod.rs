@@ -94,6 +94,10 @@ pub fn main() -> ExitCode {
     match run(Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
+            // Else another thread is about to end the process.
+            while !memory::has_last_word() {
+                std::thread::park();
+            }
             crate::terminal::tell(format_args!("lightgrid: {error}"));
             ExitCode::FAILURE
         }
@@ -104,6 +108,11 @@ pub fn main() -> ExitCode {
 /// For the binary's allocator; takes no memory.
 pub fn is_refusal_the_end() -> bool {
     memory::is_refusal_the_end()
+}
+
+/// Whether this thread is the one to say why the process ends. For the binary; takes no memory.
+pub fn has_last_word() -> bool {
+    memory::has_last_word()
 }
 
 /// Removes what is being written, where the process ends without another word. For the binary; takes no memory.

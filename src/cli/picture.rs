@@ -1,10 +1,12 @@
 //! How a picture is made of a film and written, wherever the film comes from.
 
+use std::iter;
 use std::path::{Path, PathBuf};
 
 use super::values;
 use crate::denoise::Denoiser;
 use crate::error::{Error, Result};
+use crate::image::is_same_file;
 use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::render::film::Film;
 use crate::terminal::{notice, tell};
@@ -126,6 +128,15 @@ impl PictureArguments {
             }
             Err(second) => Error::new(format!("{failure}; nor can the picture be kept: {second}")),
         })
+    }
+}
+
+/// Refuses to write over the scene or the map.
+pub(super) fn check_kept(output: &Path, scene: &str, map: Option<&String>) -> Result<()> {
+    let mut read = iter::once(scene).chain(map.map(String::as_str)).map(Path::new);
+    match read.any(|other| is_same_file(other, output)) {
+        true => Err(Error::at(output, "would be written over the scene or the map")),
+        false => Ok(()),
     }
 }
 

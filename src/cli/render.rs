@@ -29,9 +29,13 @@ pub(super) use arguments::RenderArguments;
 use frames::{Frames, Reel};
 use share::Share;
 
-/// Bytes of a pixel in the film and in what is made of it to be written; and with layers.
-const BYTES_OF_PIXEL: u64 = 72;
-const BYTES_WITH_LAYERS: u64 = 140;
+/// Bytes of a pixel in the film, and in what is made of it to be written.
+const BYTES_OF_PIXEL: [u64; 2] = [40, 40];
+/// The same with layers.
+const BYTES_WITH_LAYERS: [u64; 2] = [104, 72];
+
+/// Bytes that encoders take for themselves.
+const BYTES_OF_ENCODERS: u64 = 8 << 20;
 
 /// Loads, learns, renders, writes.
 pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
@@ -55,10 +59,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     notices.extend(&map_notices);
     let camera = arguments.camera(&world, &mut notices)?;
     let frames = Frames::plan(arguments, &world, &camera)?;
-    let ([width, height], has_layers) = (arguments.size(), arguments.picture.wants_surfaces());
-    let bytes = if has_layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
-    memory::check(u64::from(width) * u64::from(height) * bytes)
-        .map_err(|cause| Error::new(format!("a picture of this size {cause}")))?;
+    let [of_film, of_writing] = needed_bytes(arguments);
+    memory::check(of_film + of_writing).map_err(too_large)?;
     progress.finish();
     notices.iter().for_each(notice);
     let gpu = device::open(
@@ -75,6 +77,19 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         }
         Some(frames) => job.render_frames(arguments, &frames, &camera),
     }
+}
+
+/// What the film takes, and what writing it does: pixels, encoders and the stacks of their threads.
+fn needed_bytes(arguments: &RenderArguments) -> [u64; 2] {
+    let [width, height] = arguments.size();
+    let has_layers = arguments.picture.wants_surfaces();
+    let of_pixel = if has_layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
+    let [film, writing] = of_pixel.map(|bytes| u64::from(width) * u64::from(height) * bytes);
+    [film, writing + BYTES_OF_ENCODERS + rayon::current_num_threads() as u64 * STACK_BYTES]
+}
+
+fn too_large(cause: String) -> Error {
+    Error::new(format!("a picture of this size {cause}"))
 }
 
 /// What a picture leaves to the next.
@@ -107,6 +122,8 @@ impl Job<'_> {
     ) -> Result<Vec<Error>> {
         let Self { world, environment, .. } = *self;
         let mut notices = self.notices.clone();
+        // Were there no memory any more when it is finished, the picture would be lost.
+        let spare: Vec<u8> = memory::reserved(needed_bytes(arguments)[1]).map_err(too_large)?;
         let view = arguments.view(world, camera);
         let rule = arguments.stop_rule();
         let mut share = Share::open(arguments, rule, (world, environment), &view)?;
@@ -126,6 +143,7 @@ impl Job<'_> {
         if !share.has_samples(&session) {
             return outcome.map(|()| Vec::new());
         }
+        drop(spare);
         let film = share.film(&session);
         let remarks = output::remarks(&film, environment);
         remarks.iter().for_each(|sentence| notices.add(sentence));
@@ -205,7 +223,8 @@ impl Job<'_> {
 /// The scene made ready for rays, and the seconds of loading and of building.
 fn load_world(arguments: &RenderArguments) -> Result<(World, f64, f64)> {
     let start = Instant::now();
-    let scene = crate::sources::scene_with(&arguments.scene, &arguments.of_scene.options())?;
+    let options = arguments.of_scene.options_beside(outputs::overwritten(arguments));
+    let scene = crate::sources::scene_with(&arguments.scene, &options)?;
     let load_seconds = lap(start);
     let start = Instant::now();
     let world = World::new(scene);

@@ -6,7 +6,7 @@ use std::time::Duration;
 use glam::Vec2;
 
 use super::choices::SceneArguments;
-use super::picture::say_written;
+use super::picture::{check_kept, say_written};
 use super::values;
 use crate::app::Start;
 use crate::app::document::{Document, Light};
@@ -121,6 +121,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         return Err(Error::at(path, "screenshots are written as .png"));
     }
+    check_kept(path, &arguments.scene, arguments.env.as_ref())?;
     check_writable(path)?;
     let shows_cache = arguments.overlay.is_some_and(Overlay::is_of_cache);
     if shows_cache && (!arguments.denoise || arguments.split) {
@@ -149,7 +150,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
         start: Start {
             document,
             interface: interface(arguments),
-            of_scene: arguments.of_scene.options(),
+            of_scene: arguments.of_scene.options_beside(vec![arguments.output.clone()]),
             ..Start::default()
         },
         size: arguments.size,

@@ -1,5 +1,6 @@
 //! Environment maps and pictures from files of any format we read.
 
+use std::fs::File;
 use std::io::{self, Cursor, Read};
 use std::path::Path;
 
@@ -76,6 +77,25 @@ pub fn is_linear(path: &Path) -> Result<bool> {
 pub(crate) fn looks_like_scene(bytes: &[u8]) -> bool {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     bytes.starts_with(b"glTF") || text.trim_ascii_start().starts_with(b"{")
+}
+
+/// How a film in a file begins: a part of a picture, or a checkpoint.
+const FILM: &[u8] = b"{\"lightgrid_film\"";
+
+/// What is said of one where something else is expected.
+pub(crate) const IS_A_FILM: &str =
+    "is a part of a picture, or a checkpoint, of which `lightgrid merge` makes a picture";
+
+/// Whether these are the first bytes of a film in a file.
+pub(crate) fn looks_like_film(bytes: &[u8]) -> bool {
+    bytes.starts_with(FILM)
+}
+
+/// Whether a file begins as a film does.
+pub(crate) fn is_film(path: &Path) -> bool {
+    let mut start = [0; FILM.len()];
+    let read = |(mut file, _): (File, u64)| file.read_exact(&mut start).is_ok();
+    open_file(path).is_ok_and(read) && looks_like_film(&start)
 }
 
 /// Whether these are the first bytes of a picture.
@@ -166,6 +186,9 @@ fn format_of(path: &Path) -> Result<Format> {
         Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => false,
         Err(e) => return Err(Error::at(path, read_cause(&e))),
     };
+    if known && is_film(path) {
+        return Err(Error::at(path, IS_A_FILM));
+    }
     if known && looks_like_scene(&magic) {
         return Err(Error::at(path, "is a glTF scene, where a map or a picture is expected"));
     }

@@ -23,8 +23,8 @@ pub use exr_write::{ExrPicture, Layer, write_exr};
 pub use file::{check_writable, is_same_file, write_beside_and_rename};
 pub(crate) use file::{make_folder, open_file, read_cause, read_file, remove_unfinished};
 pub(crate) use guard::catch_panic;
+pub(crate) use map::{IS_A_FILM, is_film, looks_like_film, looks_like_picture, looks_like_scene};
 pub use map::{LoadedMap, is_linear, read_map, read_picture, sanitise};
-pub(crate) use map::{looks_like_picture, looks_like_scene};
 pub use png::{encode_png, write_png};
 pub use texels::Texels;
 

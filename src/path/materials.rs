@@ -12,9 +12,10 @@ use crate::scene::{AlphaMode, Material};
 pub(super) struct ReadyMaterial {
     /// What the parameters of its points have in common.
     pub(super) shared: SharedParameters,
-    /// The scattering of points that have the shared parameters, seen from the back and from the
-    /// front.
-    bsdfs: [Bsdf; 2],
+    /// The scattering of points that have the shared parameters, seen from the front.
+    front: Bsdf,
+    /// That seen from the back, if it is another one.
+    back: Option<Box<Bsdf>>,
     /// What lies behind the front of a solid; `None` for thin walls.
     inside: Option<Body>,
     pub(super) passing: Passing,
@@ -38,8 +39,10 @@ impl ReadyMaterial {
             let interior = Interior::of_body(material, parameters.absorption);
             Body { interior: Some(interior), squared_index: index * index }
         });
+        let [back, front] = [false, true].map(|front| Bsdf::new(parameters, front));
         Self {
-            bsdfs: [false, true].map(|front| Bsdf::new(parameters, front)),
+            front,
+            back: (back != front).then(|| Box::new(back)),
             inside,
             passing: Passing {
                 single_sided: !material.double_sided,
@@ -57,7 +60,8 @@ impl ReadyMaterial {
     /// parameters of its own.
     pub(super) fn bsdf(&self, point: &SurfacePoint<'_>) -> Cow<'_, Bsdf> {
         match &point.parameters {
-            Cow::Borrowed(_) => Cow::Borrowed(&self.bsdfs[usize::from(point.front_face)]),
+            Cow::Borrowed(_) if point.front_face => Cow::Borrowed(&self.front),
+            Cow::Borrowed(_) => Cow::Borrowed(self.back.as_deref().unwrap_or(&self.front)),
             Cow::Owned(own) => Cow::Owned(Bsdf::new(own, point.front_face)),
         }
     }
@@ -159,38 +163,40 @@ mod tests {
         let own = |scene| own_points(&World::new(scene));
         assert_eq!(own(triangle(rich())), 0);
         assert_eq!(own(triangle(Material { clearcoat: 0.5, ..rich() })), 0);
-        let texture = Some(TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY });
+        let texture = TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY };
+        let texture = || Some(texture.into());
         // A normal map turns the frame, but no parameter unless there is a coat.
-        assert_eq!(own(triangle(Material { normal_texture: texture, ..rich() })), 0);
-        let coat = Material { normal_texture: texture, clearcoat: 0.5, ..rich() };
+        assert_eq!(own(triangle(Material { normal_texture: texture(), ..rich() })), 0);
+        let coat = Material { normal_texture: texture(), clearcoat: 0.5, ..rich() };
         assert_eq!(own(triangle(coat)), 2);
         assert_eq!(own(triangle(Material { anisotropy: 0.5, ..rich() })), 2);
         assert_eq!(own(Scene { colors: vec![Vec4::ONE; 3], ..triangle(rich()) }), 2);
-        assert_eq!(own(triangle(Material { base_color_texture: texture, ..rich() })), 2);
-        assert_eq!(own(triangle(Material { emissive_texture: texture, ..rich() })), 2);
+        assert_eq!(own(triangle(Material { base_color_texture: texture(), ..rich() })), 2);
+        assert_eq!(own(triangle(Material { emissive_texture: texture(), ..rich() })), 2);
     }
 
     #[test]
     fn a_texture_of_one_colour_is_a_factor() {
-        let texture = Some(TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY });
+        let texture = TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY };
+        let texture = || Some(texture.into());
         let textured = Material {
-            base_color_texture: texture,
-            metallic_roughness_texture: texture,
-            emissive_texture: texture,
-            specular_texture: texture,
-            specular_color_texture: texture,
-            transmission_texture: texture,
-            diffuse_transmission_texture: texture,
-            diffuse_transmission_color_texture: texture,
-            anisotropy_texture: texture,
+            base_color_texture: texture(),
+            metallic_roughness_texture: texture(),
+            emissive_texture: texture(),
+            specular_texture: texture(),
+            specular_color_texture: texture(),
+            transmission_texture: texture(),
+            diffuse_transmission_texture: texture(),
+            diffuse_transmission_color_texture: texture(),
+            anisotropy_texture: texture(),
             anisotropy: 0.5,
-            iridescence_texture: texture,
-            iridescence_thickness_texture: texture,
-            sheen_color_texture: texture,
-            sheen_roughness_texture: texture,
-            clearcoat_texture: texture,
+            iridescence_texture: texture(),
+            iridescence_thickness_texture: texture(),
+            sheen_color_texture: texture(),
+            sheen_roughness_texture: texture(),
+            clearcoat_texture: texture(),
             clearcoat: 0.5,
-            clearcoat_roughness_texture: texture,
+            clearcoat_roughness_texture: texture(),
             clearcoat_roughness: 0.5,
             ..rich()
         };

@@ -3,6 +3,7 @@
 
 pub mod builtin;
 pub mod camera_path;
+mod copies;
 pub mod gltf;
 mod instances;
 mod material_edit;
@@ -11,6 +12,8 @@ mod outlines;
 mod placing;
 pub mod surface;
 pub mod texture;
+
+use std::path::PathBuf;
 
 use glam::{Affine2, Affine3A, Vec2, Vec3, Vec4};
 use serde::{Deserialize, Serialize};
@@ -37,6 +40,9 @@ pub struct SceneOptions {
     pub hide: Vec<String>,
     /// Changes to all materials of a name, in order.
     pub edits: Vec<(String, MaterialEdit)>,
+    /// Files that will be written: a scene that names one of them as its own data is refused.
+    #[serde(skip)]
+    pub outputs: Vec<PathBuf>,
 }
 
 /// What happens to inverted hulls.
@@ -147,7 +153,8 @@ pub struct TextureRef {
     pub transform: Affine2,
 }
 
-/// glTF metallic-roughness material with the extensions lightgrid renders. Factors are linear.
+/// glTF metallic-roughness material with the extensions lightgrid renders. Factors are linear. Textures, of
+/// which most materials have few or none, are boxed: a file may have a million materials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     /// Name in the file, for messages and overlays.
@@ -155,21 +162,21 @@ pub struct Material {
     /// Base colour factor, linear RGB and alpha.
     pub base_color: Vec4,
     /// RGB is base colour (sRGB), A is alpha.
-    pub base_color_texture: Option<TextureRef>,
+    pub base_color_texture: Option<Box<TextureRef>>,
     /// Metalness in `[0,1]`.
     pub metallic: f32,
     /// Perceptual roughness in `[0,1]`; GGX alpha is its square.
     pub roughness: f32,
     /// G is roughness, B is metalness.
-    pub metallic_roughness_texture: Option<TextureRef>,
+    pub metallic_roughness_texture: Option<Box<TextureRef>>,
     /// Tangent-space normal map.
-    pub normal_texture: Option<TextureRef>,
+    pub normal_texture: Option<Box<TextureRef>>,
     /// Scale of the normal map's x and y.
     pub normal_scale: f32,
     /// Emitted radiance, linear, `KHR_materials_emissive_strength` included.
     pub emissive: Vec3,
     /// RGB multiplies `emissive` (sRGB).
-    pub emissive_texture: Option<TextureRef>,
+    pub emissive_texture: Option<Box<TextureRef>>,
     /// How alpha is used.
     pub alpha_mode: AlphaMode,
     /// Whether camera rays see the back too. All other rays meet both sides of every surface: a wall
@@ -182,24 +189,24 @@ pub struct Material {
     /// `KHR_materials_specular` strength in `[0,1]`.
     pub specular: f32,
     /// A multiplies `specular`.
-    pub specular_texture: Option<TextureRef>,
+    pub specular_texture: Option<Box<TextureRef>>,
     /// F0 tint, linear.
     pub specular_color: Vec3,
     /// RGB multiplies `specular_color` (sRGB).
-    pub specular_color_texture: Option<TextureRef>,
+    pub specular_color_texture: Option<Box<TextureRef>>,
     /// `KHR_materials_transmission` in `[0,1]`.
     pub transmission: f32,
     /// R multiplies `transmission`.
-    pub transmission_texture: Option<TextureRef>,
+    pub transmission_texture: Option<Box<TextureRef>>,
     /// `KHR_materials_diffuse_transmission`: share in `[0,1]` of the body's light that comes through
     /// instead of back.
     pub diffuse_transmission: f32,
     /// A multiplies `diffuse_transmission`.
-    pub diffuse_transmission_texture: Option<TextureRef>,
+    pub diffuse_transmission_texture: Option<Box<TextureRef>>,
     /// Colour of what comes through, linear, in `[0,1]`.
     pub diffuse_transmission_color: Vec3,
     /// RGB multiplies `diffuse_transmission_color` (sRGB).
-    pub diffuse_transmission_color_texture: Option<TextureRef>,
+    pub diffuse_transmission_color_texture: Option<Box<TextureRef>>,
     /// `KHR_materials_volume` thickness; 0 is a thin wall, more is a solid body with an inside.
     pub thickness: f32,
     /// Colour that white light becomes after `attenuation_distance` inside the body.
@@ -217,39 +224,39 @@ pub struct Material {
     pub anisotropy_rotation: f32,
     /// RG is the direction before rotation in `[-1,1]`, along tangent and bitangent; B multiplies
     /// `anisotropy`.
-    pub anisotropy_texture: Option<TextureRef>,
+    pub anisotropy_texture: Option<Box<TextureRef>>,
     /// `KHR_materials_iridescence`: share in `[0,1]` of the surface that a thin film covers.
     pub iridescence: f32,
     /// R multiplies `iridescence`.
-    pub iridescence_texture: Option<TextureRef>,
+    pub iridescence_texture: Option<Box<TextureRef>>,
     /// Index of refraction of the film, at least 1.
     pub iridescence_ior: f32,
     /// Thickness of the film in nanometres where the texture is 0 and where it is 1; without a
     /// texture it is the second.
     pub iridescence_thickness: [f32; 2],
     /// G says where between the two the thickness lies.
-    pub iridescence_thickness_texture: Option<TextureRef>,
+    pub iridescence_thickness_texture: Option<Box<TextureRef>>,
     /// `KHR_materials_dispersion`: 20 over the Abbe number of a solid body, not negative; 0 bends all
     /// colours alike.
     pub dispersion: f32,
     /// `KHR_materials_sheen` colour, linear, in `[0,1]`; black is none.
     pub sheen_color: Vec3,
     /// RGB multiplies `sheen_color` (sRGB).
-    pub sheen_color_texture: Option<TextureRef>,
+    pub sheen_color_texture: Option<Box<TextureRef>>,
     /// Perceptual roughness of the sheen in `[0,1]`.
     pub sheen_roughness: f32,
     /// A multiplies `sheen_roughness`.
-    pub sheen_roughness_texture: Option<TextureRef>,
+    pub sheen_roughness_texture: Option<Box<TextureRef>>,
     /// `KHR_materials_clearcoat` strength in `[0,1]`.
     pub clearcoat: f32,
     /// R multiplies `clearcoat`.
-    pub clearcoat_texture: Option<TextureRef>,
+    pub clearcoat_texture: Option<Box<TextureRef>>,
     /// Perceptual roughness of the coat.
     pub clearcoat_roughness: f32,
     /// G multiplies `clearcoat_roughness`.
-    pub clearcoat_roughness_texture: Option<TextureRef>,
+    pub clearcoat_roughness_texture: Option<Box<TextureRef>>,
     /// Normal map of the coat; without one the coat follows the geometric shading normal.
-    pub clearcoat_normal_texture: Option<TextureRef>,
+    pub clearcoat_normal_texture: Option<Box<TextureRef>>,
     /// Scale of the coat normal map's x and y.
     pub clearcoat_normal_scale: f32,
 }
@@ -335,7 +342,7 @@ impl Material {
     }
 
     /// All textures, in the order in which `shaders/surface.wgsl` numbers them.
-    pub fn textures(&self) -> [&Option<TextureRef>; 17] {
+    pub fn textures(&self) -> [Option<&TextureRef>; 17] {
         [
             &self.base_color_texture,
             &self.metallic_roughness_texture,
@@ -355,11 +362,12 @@ impl Material {
             &self.iridescence_texture,
             &self.iridescence_thickness_texture,
         ]
+        .map(|texture| texture.as_deref())
     }
 }
 
 /// What happens to texture coordinates outside `[0,1]`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Wrap {
     /// Tiles.
     #[default]
@@ -371,7 +379,7 @@ pub enum Wrap {
 }
 
 /// An image and how it is sampled (level 0 only: a path tracer filters by sampling).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Texture {
     /// Index into [`Scene::images`].
     pub image: u32,

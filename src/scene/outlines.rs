@@ -189,11 +189,8 @@ impl Scene {
         let mut is_gone = vec![false; self.materials.len()];
         materials.iter().for_each(|&material| is_gone[material as usize] = true);
         let keeps = |material: &u32| !is_gone[*material as usize];
-        let of = |place: u32| self.triangle_materials[place as usize];
-        self.instances = std::mem::take(&mut self.instances).retained(|at| keeps(&of(at)));
-        let mut keep = self.triangle_materials.iter().map(keeps);
-        self.triangles.retain(|_| keep.next().unwrap_or(true));
-        self.triangle_materials.retain(keeps);
+        let keeps: Vec<bool> = self.triangle_materials.iter().map(keeps).collect();
+        self.retain_triangles(|place| keeps[place]);
     }
 }
 

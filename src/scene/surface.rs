@@ -75,20 +75,20 @@ pub struct SurfaceParameters {
 type Variation = fn(&mut SurfaceParameters, &Material, Vec4);
 
 /// A texture that a material may have, and what it varies.
-type Slot = (fn(&Material) -> Option<TextureRef>, Variation);
+type Slot = (fn(&Material) -> &Option<Box<TextureRef>>, Variation);
 
 /// The textures that vary parameters; base colour, which vertices have too, apart. A texture that is
 /// not there reads as ones.
 const SLOTS: [Slot; 14] = [
     (
-        |m| m.metallic_roughness_texture,
+        |m| &m.metallic_roughness_texture,
         |p, m, value| {
             p.metallic = unit(m.metallic * value.z);
             p.roughness = unit(m.roughness * value.y);
         },
     ),
     (
-        |m| m.emissive_texture,
+        |m| &m.emissive_texture,
         |p, m, value| {
             // What is unlit shows its base colour.
             if !m.unlit {
@@ -96,36 +96,39 @@ const SLOTS: [Slot; 14] = [
             }
         },
     ),
-    (|m| m.specular_texture, |p, m, value| p.specular = unit(m.specular * value.w)),
-    (|m| m.specular_color_texture, |p, m, value| p.specular_color = m.specular_color * value.xyz()),
-    (|m| m.transmission_texture, |p, m, value| p.transmission = unit(m.transmission * value.x)),
+    (|m| &m.specular_texture, |p, m, value| p.specular = unit(m.specular * value.w)),
     (
-        |m| m.diffuse_transmission_texture,
+        |m| &m.specular_color_texture,
+        |p, m, value| p.specular_color = m.specular_color * value.xyz(),
+    ),
+    (|m| &m.transmission_texture, |p, m, value| p.transmission = unit(m.transmission * value.x)),
+    (
+        |m| &m.diffuse_transmission_texture,
         |p, m, value| p.diffuse_transmission = unit(m.diffuse_transmission * value.w),
     ),
     (
-        |m| m.diffuse_transmission_color_texture,
+        |m| &m.diffuse_transmission_color_texture,
         |p, m, value| {
             p.diffuse_transmission_color = m.diffuse_transmission_color * value.xyz();
         },
     ),
-    (|m| m.anisotropy_texture, |p, m, value| p.anisotropy = unit(m.anisotropy * value.z)),
-    (|m| m.iridescence_texture, |p, m, value| p.iridescence = unit(m.iridescence * value.x)),
+    (|m| &m.anisotropy_texture, |p, m, value| p.anisotropy = unit(m.anisotropy * value.z)),
+    (|m| &m.iridescence_texture, |p, m, value| p.iridescence = unit(m.iridescence * value.x)),
     (
-        |m| m.iridescence_thickness_texture,
+        |m| &m.iridescence_thickness_texture,
         |p, m, value| {
             let [thinnest, thickest] = m.iridescence_thickness;
             p.iridescence_thickness = thinnest + (thickest - thinnest) * value.y;
         },
     ),
-    (|m| m.sheen_color_texture, |p, m, value| p.sheen_color = m.sheen_color * value.xyz()),
+    (|m| &m.sheen_color_texture, |p, m, value| p.sheen_color = m.sheen_color * value.xyz()),
     (
-        |m| m.sheen_roughness_texture,
+        |m| &m.sheen_roughness_texture,
         |p, m, value| p.sheen_roughness = unit(m.sheen_roughness * value.w),
     ),
-    (|m| m.clearcoat_texture, |p, m, value| p.clearcoat = unit(m.clearcoat * value.x)),
+    (|m| &m.clearcoat_texture, |p, m, value| p.clearcoat = unit(m.clearcoat * value.x)),
     (
-        |m| m.clearcoat_roughness_texture,
+        |m| &m.clearcoat_roughness_texture,
         |p, m, value| p.clearcoat_roughness = unit(m.clearcoat_roughness * value.y),
     ),
 ];
@@ -159,7 +162,7 @@ impl SharedParameters {
         for (_, vary) in SLOTS {
             vary(&mut parameters, material, Vec4::ONE);
         }
-        let present = |(texture, vary): Slot| Some((texture(material)?, vary));
+        let present = |(texture, vary): Slot| Some((*texture(material).as_deref()?, vary));
         Self { parameters, variations: SLOTS.into_iter().filter_map(present).collect() }
     }
 }
@@ -235,8 +238,8 @@ impl<'a> SurfacePoint<'a> {
         let facing = Facing { geometric_normal, to_viewer: -ray_direction };
         let unmapped = corner.smooth_normal().unwrap_or(front_normal);
         corner.vary(variations, &mut parameters);
-        let normal = corner.mapped(unmapped, material.normal_texture, material.normal_scale);
-        let mut normal = facing.turned(normal, unmapped);
+        let (texture, scale) = (material.normal_texture.as_deref(), material.normal_scale);
+        let mut normal = facing.turned(corner.mapped(unmapped, texture, scale), unmapped);
         // What is not metal hardly needs its reflection, but its diffuse light needs the slope.
         if parameters.metallic > 0.0 {
             normal = normal.lerp(facing.mirroring(normal), parameters.metallic);
@@ -249,7 +252,7 @@ impl<'a> SurfacePoint<'a> {
         }
         if parameters.clearcoat > 0.0 && has_normal_map(material) {
             let (texture, scale) =
-                (material.clearcoat_normal_texture, material.clearcoat_normal_scale);
+                (material.clearcoat_normal_texture.as_deref(), material.clearcoat_normal_scale);
             let coat = facing.turned(corner.mapped(unmapped, texture, scale), unmapped);
             let local = shading_frame.local_from_world(facing.mirroring(coat));
             parameters.to_mut().clearcoat_normal = local;
@@ -348,13 +351,13 @@ impl<'a> Corner<'a> {
     }
 
     /// The texture's value here, ones without a texture.
-    fn read(&self, texture: Option<TextureRef>) -> Vec4 {
-        texture.map_or(Vec4::ONE, |t| sample_texture(self.scene, &t, self.uv(t.uv_set)))
+    fn read(&self, texture: Option<&TextureRef>) -> Vec4 {
+        texture.map_or(Vec4::ONE, |t| sample_texture(self.scene, t, self.uv(t.uv_set)))
     }
 
     fn base_color(&self) -> Vec4 {
         let material = self.material();
-        let color = material.base_color * self.read(material.base_color_texture);
+        let color = material.base_color * self.read(material.base_color_texture.as_deref());
         if self.scene.colors.is_empty() {
             return color;
         }
@@ -376,7 +379,7 @@ impl<'a> Corner<'a> {
 
     /// The normal a tangent-space map makes of `normal`, not of unit length. Neither normal nor
     /// tangent is normalised in between, as MikkTSpace demands; without tangents the map is ignored.
-    fn mapped(&self, normal: Vec3, texture: Option<TextureRef>, scale: f32) -> Vec3 {
+    fn mapped(&self, normal: Vec3, texture: Option<&TextureRef>, scale: f32) -> Vec3 {
         let Some(texture) = texture else { return normal };
         let Some((tangent, handedness)) = self.tangent() else { return normal };
         let bitangent = normal.cross(tangent) * handedness;
@@ -390,7 +393,7 @@ impl<'a> Corner<'a> {
         let m = self.material();
         let bitangent = normal.cross(tangent) * handedness;
         let read = |t| self.read(Some(t)).xy() * 2.0 - 1.0;
-        let direction = m.anisotropy_texture.map_or(Vec2::X, read);
+        let direction = m.anisotropy_texture.as_deref().map_or(Vec2::X, read);
         let direction = Vec2::from_angle(m.anisotropy_rotation).rotate(direction);
         tangent * direction.x + bitangent * direction.y
     }
@@ -406,7 +409,7 @@ impl<'a> Corner<'a> {
             parameters.to_mut().set_base_color(m, self.base_color());
         }
         for (texture, vary) in variations {
-            vary(parameters.to_mut(), m, self.read(Some(*texture)));
+            vary(parameters.to_mut(), m, self.read(Some(texture)));
         }
     }
 }

@@ -11,6 +11,7 @@ mod bombs;
 mod corpus;
 #[path = "../guided/src/kept.rs"]
 mod kept;
+mod lists;
 mod mutate;
 mod read;
 #[cfg(feature = "window")]
@@ -23,6 +24,7 @@ mod targets;
 mod worker;
 
 use std::io::{BufRead, BufReader};
+use std::ops::Range;
 use std::process::{Command, Stdio};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
@@ -57,6 +59,8 @@ enum Kind {
     Settings,
     /// Files that claim far more than they hold; not spoilt.
     Bombs,
+    /// Sound files of many small objects; not spoilt.
+    Lists,
     /// What a fuzzer guided by coverage (`tests/guided`) has kept.
     Kept,
 }
@@ -70,6 +74,7 @@ impl Kind {
         #[cfg(feature = "window")]
         Self::Settings,
         Self::Bombs,
+        Self::Lists,
         Self::Kept,
     ];
 
@@ -82,6 +87,7 @@ impl Kind {
             #[cfg(feature = "window")]
             Self::Settings => "settings",
             Self::Bombs => "bombs",
+            Self::Lists => "lists",
             Self::Kept => "kept",
         }
     }
@@ -134,7 +140,15 @@ fn settings_files() {
 #[test]
 fn bombs_are_refused() {
     let count = bombs::all().len() as u64;
-    assert_eq!(judged(Kind::Bombs, count).refused, count, "false claims refused");
+    assert_eq!(judged(Kind::Bombs, 0..count).refused, count, "false claims refused");
+}
+
+#[test]
+fn long_lists_take_no_more_than_their_due() {
+    // Each in a process of its own: what one takes would hide what the next does.
+    for number in 0..lists::FILES.len() as u64 {
+        assert_eq!(judged(Kind::Lists, number..number + 1).accepted, 1, "a sound file");
+    }
 }
 
 #[test]
@@ -143,7 +157,7 @@ fn what_was_kept_is_read_or_refused() {
     for (target, _) in kept::FILES {
         assert!(kept.iter().any(|(of, _)| *of == target), "nothing is kept of {target}");
     }
-    let tally = judged(Kind::Kept, kept.len() as u64);
+    let tally = judged(Kind::Kept, 0..kept.len() as u64);
     assert!(tally.accepted > 0, "{tally:?}");
 }
 
@@ -162,7 +176,7 @@ fn worker_process() {
 }
 
 fn spoilt(kind: Kind, count: u64) {
-    let tally = judged(kind, count);
+    let tally = judged(kind, 0..count);
     // Both outcomes are met often, or the test would show little.
     for (what, found) in [("accepted", tally.accepted), ("refused", tally.refused)] {
         let share = found as f64 / count as f64;
@@ -170,9 +184,10 @@ fn spoilt(kind: Kind, count: u64) {
     }
 }
 
-/// What a worker says of inputs `0..count`, after the checks that all kinds share.
-fn judged(kind: Kind, count: u64) -> Tally {
-    let (tally, said) = read_by_worker(kind, count);
+/// What a worker says of some inputs, after the checks that all kinds share.
+fn judged(kind: Kind, inputs: Range<u64>) -> Tally {
+    let count = inputs.end - inputs.start;
+    let (tally, said) = read_by_worker(kind, inputs);
     eprintln!("{}: {tally:?}", kind.name());
     assert_eq!(tally.accepted + tally.refused, count, "panics and hangs: {said}");
     assert!(
@@ -196,15 +211,15 @@ fn again(kind: Kind, number: u64) -> String {
     )
 }
 
-/// Runs a worker over inputs `0..count`; what it found, and what it said on stderr. It fails with the
+/// Runs a worker over some inputs; what it found, and what it said on stderr. It fails with the
 /// number of an input that ends or stops the process.
-fn read_by_worker(kind: Kind, count: u64) -> (Tally, String) {
+fn read_by_worker(kind: Kind, inputs: Range<u64>) -> (Tally, String) {
     let folder = tempfile::tempdir().expect("a folder");
     // A panic's words may be more than a pipe holds.
     let complaints = folder.path().join("stderr");
     let mut child = guarded()
         .args(["worker_process", "--exact", "--ignored", "--nocapture"])
-        .env(TASK, format!("{}:0:{count}", kind.name()))
+        .env(TASK, format!("{}:{}:{}", kind.name(), inputs.start, inputs.end - inputs.start))
         // One thread and one arena: what memory grows by is then the input's doing.
         .env("RAYON_NUM_THREADS", "1")
         .env("MALLOC_ARENA_MAX", "1")

@@ -16,7 +16,7 @@ use crate::read::{self, Found};
 #[cfg(feature = "window")]
 use crate::settings;
 use crate::shared::SplitMix;
-use crate::{ALLOWANCE_BYTES, Kind, Tally, bombs, corpus, kept, mutate, targets};
+use crate::{ALLOWANCE_BYTES, Kind, Tally, bombs, corpus, kept, lists, mutate, targets};
 
 /// Reads inputs `first..first + count`, printing each number before it is read; then the tally as JSON.
 pub(crate) fn work(kind: Kind, first: u64, count: u64) {
@@ -31,6 +31,7 @@ pub(crate) fn work(kind: Kind, first: u64, count: u64) {
         Kind::CommandLines => Vec::new(),
         Kind::Textures => corpus::textures(),
         Kind::Maps | Kind::Bombs | Kind::Kept => corpus::maps(),
+        Kind::Lists => vec![corpus::gltf_file(corpus::gltf().swap_remove(0))],
     };
     // Sound input first: thread pools, tables and the allocator's own growth are no input's doing.
     for entry in &entries {
@@ -38,9 +39,15 @@ pub(crate) fn work(kind: Kind, first: u64, count: u64) {
             panic!("the corpus is not sound: {sentence}");
         }
     }
+    // Taken before anything is measured.
+    let mut text = String::with_capacity(if kind == Kind::Lists { lists::MOST_BYTES } else { 0 });
     let mut tally = Tally { worst_excess_bytes: i64::MIN, ..Tally::default() };
     for number in first..first + count {
         println!("{number}");
+        if kind == Kind::Lists {
+            text.clear();
+            lists::write(&mut text, lists::FILES[number as usize].1).expect("written");
+        }
         let mut random = SplitMix(number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let before = Memory::now();
         let (length, found) = match kind {
@@ -61,6 +68,10 @@ pub(crate) fn work(kind: Kind, first: u64, count: u64) {
                     _ => Kind::Maps,
                 };
                 (bytes.len(), read(kind, name, &bytes, folder))
+            }
+            Kind::Lists => {
+                let (name, _) = lists::FILES[number as usize];
+                (text.len(), read(Kind::Gltf, name, text.as_bytes(), folder))
             }
             Kind::Kept => {
                 let (target, bytes) = kept::all().swap_remove(number as usize);
@@ -129,7 +140,7 @@ fn read(kind: Kind, name: &str, bytes: &[u8], folder: &Path) -> Found {
         path
     };
     match kind {
-        Kind::Gltf => match gltf::load_slice(bytes, None, name) {
+        Kind::Gltf | Kind::Lists => match gltf::load_slice(bytes, None, name) {
             Ok(scene) => of_scene(scene),
             Err(error) => Found::Refused(error.to_string()),
         },

@@ -45,7 +45,7 @@ fn scenes_are_complete_and_well_formed() {
                 "{name}: {} is not used",
                 material.name
             );
-            if let Some(texture) = material.base_color_texture {
+            if let Some(texture) = &material.base_color_texture {
                 let image = scene.textures[texture.texture as usize].image;
                 assert!(scene.images[image as usize].width <= 1024);
             } else if material.metallic == 0.0 && material.transmission == 0.0 {

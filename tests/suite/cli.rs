@@ -449,6 +449,28 @@ fn comparing_tells_equal_pictures_from_others() {
     assert!(message.contains("differ in size: 32 x 18 and 16 x 16"), "{message}");
 }
 
+/// A part is compared as the picture that it is of, and told from scenes where no picture will do.
+#[test]
+fn a_part_is_compared_as_its_picture() {
+    let bench = Bench::new();
+    bench.render("-o a.exr --checkpoint c.film");
+    bench.render("--part 1/1 -o a.part");
+    for film in ["a.part", "c.film"] {
+        let output = bench.run(&format!("compare {film} a.exr --json"));
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let figures: Value = serde_json::from_slice(&output.stdout).expect("JSON on stdout");
+        assert_eq!(figures["mse"], 0.0, "{film}");
+    }
+    let is_a_film = "a.part: is a part of a picture, or a checkpoint, of which `lightgrid merge`";
+    for line in ["info a.part", "render open --env a.part -o b.png", "render a.part -o b.png"] {
+        let says = bench.refusal(line, 1);
+        assert!(says.contains(is_a_film), "{line}: {says}");
+    }
+    fs::write(bench.path("a.part"), r#"{"lightgrid_film":1,"si"#).unwrap();
+    let says = bench.refusal("compare a.part a.exr", 1);
+    assert!(says.contains("a.part: is neither a part of a picture nor a checkpoint"), "{says}");
+}
+
 #[test]
 fn info_and_sat_print_facts() {
     let bench = Bench::new();

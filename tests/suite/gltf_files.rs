@@ -1,6 +1,7 @@
 //! glTF files: real ones, malformed ones, spoilt ones, and (in `features`) one for each feature; KTX 2 textures.
 
 pub(crate) mod builder;
+mod copies;
 mod features;
 mod ktx2;
 
@@ -110,7 +111,7 @@ fn made_tangents_agree_with_the_files_own() {
         own.triangles.iter().zip(&made.triangles).enumerate()
     {
         let material = &own.materials[own.triangle_materials[index] as usize];
-        if material.normal_texture.or(material.clearcoat_normal_texture).is_some() {
+        if material.normal_texture.is_some() || material.clearcoat_normal_texture.is_some() {
             mapped += 1;
             for (&a, &b) in own_corners.iter().zip(made_corners) {
                 let (a, b) = (own.tangents[a as usize], made.tangents[b as usize]);
@@ -149,7 +150,7 @@ fn spoilt_files_never_panic() {
         "WEIGHTS_0":{weights}}},"indices":1,"material":0,"mode":4,"targets":[{{"POSITION":2}}]}}]}}],{}"#,
         textured_material(r#""normalTexture":{"index":0,"scale":1}"#, "{}")
     ));
-    assert_eq!(gltf::load_slice(&sound, None, "sound").unwrap().triangles.len(), 10);
+    assert_eq!(gltf::load_slice(&sound, None, "sound").unwrap().triangles.len(), 4);
     let binary = sound.windows(4).position(|it| it == b"BIN\0").unwrap();
     // Numbers and binary data: spoiling them keeps the JSON whole and reaches further.
     let values: Vec<usize> =

@@ -1,11 +1,10 @@
 //! What `lightgrid render` writes.
 
-use std::iter;
 use std::path::{Path, PathBuf};
 
 use super::share::Share;
 use super::{RenderArguments, frames};
-use crate::cli::picture::say_written;
+use crate::cli::picture::{check_kept, say_written};
 use crate::error::{Error, Result};
 use crate::image::{check_writable, is_same_file};
 use crate::light_grid::LightGrid;
@@ -47,23 +46,38 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
             "--region {left},{top},{w},{h} is not inside the picture of {width}x{height} pixels"
         )));
     }
-    let RenderArguments { outputs, json, distributions, checkpoint, .. } = arguments;
-    let files: Vec<&PathBuf> =
-        outputs.iter().chain(json).chain(distributions).chain(checkpoint).collect();
+    let files: Vec<&PathBuf> = files(arguments).collect();
     for (i, file) in files.iter().enumerate() {
         if files[..i].iter().any(|other| is_same_file(other, file)) {
             return Err(Error::at(file, "two outputs would be written to this one file"));
         }
-        let mut read = iter::once(&arguments.scene).chain(&arguments.env).map(Path::new);
-        if read.any(|other| is_same_file(other, file)) {
-            return Err(Error::at(file, "would be written over the scene or the map"));
-        }
+        check_kept(file, &arguments.scene, arguments.env.as_ref())?;
         check_writable(file)?;
     }
     if arguments.part.is_none() {
-        arguments.picture.say_unused(outputs.iter());
+        arguments.picture.say_unused(arguments.outputs.iter());
     }
     Ok(())
+}
+
+/// All that is to be written, frames without their numbers.
+fn files(arguments: &RenderArguments) -> impl Iterator<Item = &PathBuf> {
+    let RenderArguments { outputs, json, distributions, checkpoint, .. } = arguments;
+    outputs.iter().chain(json).chain(distributions).chain(checkpoint)
+}
+
+/// Files that are there already and would be written over, each frame's among them.
+pub(super) fn overwritten(arguments: &RenderArguments) -> Vec<PathBuf> {
+    let turn = arguments.turntable.map(|count| 0..=count - 1);
+    let numbers = arguments.frames.clone().or(turn);
+    let of_frames = |path: &PathBuf| match &numbers {
+        Some(numbers) => {
+            let name = |number| frames::numbered(path, number);
+            numbers.clone().map(name).filter(|path| path.exists()).collect()
+        }
+        None => vec![path.clone()],
+    };
+    files(arguments).flat_map(of_frames).collect()
 }
 
 /// Why there is nothing to be written as distributions: of a black map, or where none is sampled.

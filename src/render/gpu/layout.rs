@@ -310,7 +310,7 @@ pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
         texels += image.texels.stored_len() as u64;
     }
     let mut refs = Vec::new();
-    let mut reference = |texture: &Option<scene::TextureRef>| match texture {
+    let mut reference = |texture: Option<&scene::TextureRef>| match texture {
         None => NO_TEXTURE,
         Some(texture) => {
             refs.push(texture_ref(scene, &first_texels, texture));

@@ -17,12 +17,12 @@ pub(super) fn matte(name: &str, rgb: [f32; 3], roughness: f32) -> Material {
 
 /// A dielectric whose albedo comes from a texture.
 pub(super) fn textured(name: &str, texture: TextureRef, roughness: f32) -> Material {
-    Material { base_color_texture: Some(texture), ..matte(name, [1.0; 3], roughness) }
+    Material { base_color_texture: Some(texture.into()), ..matte(name, [1.0; 3], roughness) }
 }
 
 /// A material with a normal map.
 pub(super) fn embossed(material: Material, normals: TextureRef) -> Material {
-    Material { normal_texture: Some(normals), ..material }
+    Material { normal_texture: Some(normals.into()), ..material }
 }
 
 /// A thin cloth or leaf, seen from both sides.

@@ -7,7 +7,7 @@ use json::accessor::{ComponentType, Type};
 use json::validation::{Checked, USize64};
 
 use super::Fallible;
-use super::buffers::{File, find};
+use super::buffers::File;
 
 /// The elements of one accessor. All reads are in bounds once this is built, and nothing is
 /// allocated but the indices of sparse accessors.
@@ -42,8 +42,8 @@ impl<'a> Elements<'a> {
         index: json::Index<json::Accessor>,
         types: &[Type],
     ) -> Fallible<Self> {
-        let accessor = find(&file.root.accessors, index, "accessor")?;
-        Self::of(file, accessor, types).map_err(|cause| format!("accessor {index}: {cause}"))
+        let accessor = file.document.accessors.get(index)?;
+        Self::of(file, &accessor, types).map_err(|cause| format!("accessor {index}: {cause}"))
     }
 
     fn of(file: &'a File<'_>, accessor: &json::Accessor, types: &[Type]) -> Fallible<Self> {

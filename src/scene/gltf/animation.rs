@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DAffine3;
 use gltf::json;
+use json::Index;
 use json::accessor::Type;
 use json::animation::{Interpolation as Written, Property, Sampler};
 use json::validation::Checked;
@@ -18,19 +19,29 @@ use crate::scene::camera_path::{CameraPath, Interpolation, Link, Track};
 pub(super) struct Channels<'a> {
     file: &'a File<'a>,
     /// Of each node and property, by the first animation that has it.
-    samplers: BTreeMap<(usize, u8), &'a Sampler>,
+    samplers: BTreeMap<(u32, u8), Keys>,
+}
+
+/// Where the keys of a property are, and what happens between them.
+#[derive(Clone, Copy)]
+struct Keys {
+    times: Index<json::Accessor>,
+    values: Index<json::Accessor>,
+    interpolation: Checked<Written>,
 }
 
 impl<'a> Channels<'a> {
-    /// Of all animations together. What refers to nothing is passed over.
+    /// Of all animations together. What refers to nothing, or is newer than the types, is passed over.
     pub(super) fn new(file: &'a File<'a>) -> Self {
         let mut samplers = BTreeMap::new();
-        for animation in &file.root.animations {
+        let animations = &file.document.animations;
+        for animation in animations.indices().filter_map(|index| animations.get(index).ok()) {
             for channel in &animation.channels {
                 let Checked::Valid(property) = channel.target.path else { continue };
                 if let Some(sampler) = animation.samplers.get(channel.sampler.value()) {
-                    let target = (channel.target.node.value(), property as u8);
-                    samplers.entry(target).or_insert(sampler);
+                    let target = (channel.target.node.value() as u32, property as u8);
+                    let &Sampler { input: times, output: values, interpolation, .. } = sampler;
+                    samplers.entry(target).or_insert(Keys { times, values, interpolation });
                 }
             }
         }
@@ -38,17 +49,22 @@ impl<'a> Channels<'a> {
     }
 
     /// The movement of a camera at a node; `None` if it stands still.
-    pub(super) fn camera_path(&self, nodes: &Nodes, node: usize) -> Fallible<Option<CameraPath>> {
+    pub(super) fn camera_path(
+        &self,
+        nodes: &Nodes,
+        node: Index<json::Node>,
+    ) -> Fallible<Option<CameraPath>> {
         let mut links = Vec::new();
         // Nodes at rest below the last one that moves.
         let mut fixed = DAffine3::IDENTITY;
         let mut next = Some(node);
         while let Some(node) = next {
-            match self.moving(node)? {
-                None => fixed = local_transform(&self.file.root.nodes[node]) * fixed,
+            let at_rest = self.file.document.nodes.get(node)?;
+            match self.moving(node, &at_rest)? {
+                None => fixed = local_transform(&at_rest) * fixed,
                 Some(link) => links.extend([Link::Fixed(std::mem::take(&mut fixed)), link]),
             }
-            next = nodes.parents[node];
+            next = nodes.parent(node);
         }
         links.push(Link::Fixed(fixed));
         links.reverse();
@@ -56,8 +72,7 @@ impl<'a> Channels<'a> {
     }
 
     /// A node of which something is animated.
-    fn moving(&self, number: usize) -> Fallible<Option<Link>> {
-        let node = &self.file.root.nodes[number];
+    fn moving(&self, number: Index<json::Node>, node: &json::Node) -> Fallible<Option<Link>> {
         let translation = self.track::<3>(number, Property::Translation)?;
         let rotation = self.track::<4>(number, Property::Rotation)?;
         let scale = self.track::<3>(number, Property::Scale)?;
@@ -77,16 +92,21 @@ impl<'a> Channels<'a> {
     }
 
     /// The keys of one property of a node, if it is animated.
-    fn track<const N: usize>(&self, node: usize, property: Property) -> Fallible<Option<Track<N>>> {
-        let Some(sampler) = self.samplers.get(&(node, property as u8)) else { return Ok(None) };
-        let interpolation = match sampler.interpolation {
+    fn track<const N: usize>(
+        &self,
+        node: Index<json::Node>,
+        property: Property,
+    ) -> Fallible<Option<Track<N>>> {
+        let target = (node.value() as u32, property as u8);
+        let Some(keys) = self.samplers.get(&target) else { return Ok(None) };
+        let interpolation = match keys.interpolation {
             Checked::Valid(Written::Linear) => Interpolation::Linear,
             Checked::Valid(Written::Step) => Interpolation::Step,
             Checked::Valid(Written::CubicSpline) => Interpolation::Cubic,
             Checked::Invalid => return Err("its interpolation is unknown to glTF 2.0".into()),
         };
-        let times = Elements::open(self.file, sampler.input, &[Type::Scalar])?;
-        let values = Elements::open(self.file, sampler.output, &[Type::Vec3, Type::Vec4])?;
+        let times = Elements::open(self.file, keys.times, &[Type::Scalar])?;
+        let values = Elements::open(self.file, keys.values, &[Type::Vec3, Type::Vec4])?;
         let times = (0..times.count).map(|key| times.floats::<1>(key)[0].into()).collect();
         let values = (0..values.count).map(|key| values.floats::<N>(key).map(f64::from)).collect();
         let track = Track::new(times, values, interpolation);

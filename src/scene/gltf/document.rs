@@ -1,10 +1,11 @@
-//! From bytes to glTF's JSON objects: the GLB container, the version, the extensions asked for.
+//! From bytes to glTF's JSON: the GLB container, the version, the extensions asked for, the lists of objects.
 
 use gltf::json;
+use json::extensions::scene::khr_lights_punctual::Light;
 use serde::Deserialize;
-use serde::de::IgnoredAny;
-use serde_json::Value;
 
+use super::objects::{Objects, members, not_gltf, read};
+use super::variants::{self, Variant};
 use super::{Fallible, extensions, lenient};
 use crate::error::Notices;
 use crate::memory;
@@ -13,19 +14,50 @@ use crate::memory;
 const JSON_CHUNK: &[u8] = b"JSON";
 const BIN_CHUNK: &[u8] = b"BIN\0";
 
-/// What a value of the JSON takes as an object of glTF, beside its text: a node of three takes some 400 bytes.
-const BYTES_OF_VALUE: u64 = 128;
+/// What an object takes until something is made of it.
+const BYTES_OF_OBJECT: u64 = 16;
 
-/// What decides whether the rest can be read.
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Head {
-    asset: Option<Asset>,
-    #[serde(default)]
-    extensions_used: Vec<String>,
-    #[serde(default)]
-    extensions_required: Vec<String>,
-    animations: Option<IgnoredAny>,
+/// Members of the outermost object that are read.
+const MEMBERS: [&str; 18] = [
+    "accessors",
+    "animations",
+    "asset",
+    "bufferViews",
+    "buffers",
+    "cameras",
+    "extensions",
+    "extensionsRequired",
+    "extensionsUsed",
+    "images",
+    "materials",
+    "meshes",
+    "nodes",
+    "samplers",
+    "scene",
+    "scenes",
+    "skins",
+    "textures",
+];
+
+/// What the JSON has. Only what is asked for is read, and validated where it is followed.
+pub(super) struct Document<'a> {
+    pub(super) accessors: Objects<'a, json::Accessor>,
+    pub(super) animations: Objects<'a, json::Animation>,
+    pub(super) buffers: Objects<'a, json::Buffer>,
+    pub(super) buffer_views: Objects<'a, json::buffer::View>,
+    pub(super) cameras: Objects<'a, json::Camera>,
+    pub(super) images: Objects<'a, json::Image>,
+    pub(super) lights: Objects<'a, Light>,
+    pub(super) materials: Objects<'a, json::Material>,
+    pub(super) meshes: Objects<'a, json::Mesh>,
+    pub(super) nodes: Objects<'a, json::Node>,
+    pub(super) samplers: Objects<'a, json::texture::Sampler>,
+    /// The one that is shown, if one is named.
+    pub(super) scene: Option<json::Index<json::Scene>>,
+    pub(super) scenes: Objects<'a, json::Scene>,
+    pub(super) skins: Objects<'a, json::Skin>,
+    pub(super) textures: Objects<'a, json::Texture>,
+    pub(super) variants: Objects<'a, Variant>,
 }
 
 #[derive(Deserialize)]
@@ -35,13 +67,52 @@ struct Asset {
     min_version: Option<String>,
 }
 
-/// Parses the objects of a `.gltf` or `.glb`; the second part is the GLB's binary chunk.
-///
-/// The objects are not validated: whoever follows an index checks it.
-pub(super) fn parse<'a>(
-    bytes: &'a [u8],
-    notices: &mut Notices,
-) -> Fallible<(json::Root, Option<&'a [u8]>)> {
+impl<'a> Document<'a> {
+    /// Finds the objects in the text of a `.gltf` or of a `.glb`'s JSON.
+    pub(super) fn new(text: &'a str, notices: &mut Notices) -> Fallible<Self> {
+        if text.len() > u32::MAX as usize {
+            return Err("its JSON has more than 4 GiB".into());
+        }
+        let values = lenient::check_indices(text)?;
+        memory::check(values.saturating_mul(BYTES_OF_OBJECT))?;
+        let found = members(text, MEMBERS)?;
+        let of = |name: &str| MEMBERS.iter().position(|it| *it == name).and_then(|at| found[at]);
+        check_version(of("asset"))?;
+        let names = |list| Objects::new(of(list), "extension");
+        extensions::check(&names("extensionsUsed")?, &names("extensionsRequired")?, notices)?;
+        let [lights, variants] = members(
+            of("extensions").unwrap_or("{}"),
+            ["KHR_lights_punctual", variants::EXTENSION],
+        )?;
+        let [lights] = members(lights.unwrap_or("{}"), ["lights"])?;
+        let [variants] = members(variants.unwrap_or("{}"), ["variants"])?;
+        if of("animations").is_some() {
+            notices.add("the file has animations; its rest pose is shown");
+        }
+        let scene = of("scene").map(read).transpose();
+        Ok(Self {
+            accessors: Objects::new(of("accessors"), "accessor")?,
+            animations: Objects::new(of("animations"), "animation")?,
+            buffers: Objects::new(of("buffers"), "buffer")?,
+            buffer_views: Objects::new(of("bufferViews"), "buffer view")?,
+            cameras: Objects::new(of("cameras"), "camera")?,
+            images: Objects::new(of("images"), "image")?,
+            lights: Objects::new(lights, "light")?,
+            materials: Objects::new(of("materials"), "material")?,
+            meshes: Objects::new(of("meshes"), "mesh")?,
+            nodes: Objects::new(of("nodes"), "node")?,
+            samplers: Objects::new(of("samplers"), "sampler")?,
+            scene: scene.map_err(|cause| not_gltf(&format!("its scene: {cause}")))?,
+            scenes: Objects::new(of("scenes"), "scene")?,
+            skins: Objects::new(of("skins"), "skin")?,
+            textures: Objects::new(of("textures"), "texture")?,
+            variants: Objects::new(variants, "variant")?,
+        })
+    }
+}
+
+/// The text of a `.gltf` or of a `.glb`'s JSON, and the GLB's binary chunk.
+pub(super) fn split(bytes: &[u8]) -> Fallible<(&[u8], Option<&[u8]>)> {
     if bytes.is_empty() {
         return Err("the file is empty".into());
     }
@@ -49,34 +120,12 @@ pub(super) fn parse<'a>(
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     // Some writers pad the JSON chunk with zeros instead of spaces.
     let padding = text.iter().rev().take_while(|&&byte| byte == 0).count();
-    let text = &text[..text.len() - padding];
-    let values = lenient::check_indices(text)?;
-    memory::check(text.len() as u64 + values.saturating_mul(BYTES_OF_VALUE))?;
-    // Sound files take the short way: a tree of values takes some twenty times their size.
-    let tree = || -> Fallible<Value> {
-        let mut tree: Value = serde_json::from_slice(text).map_err(|e| e.to_string())?;
-        lenient::repair(&mut tree);
-        Ok(tree)
-    };
-    let other = |cause| format!("its JSON does not describe glTF 2.0 ({cause})");
-    let head: Head = match serde_json::from_slice(text) {
-        Ok(head) => head,
-        Err(_) => serde_json::from_value(tree()?).map_err(other)?,
-    };
-    check_version(head.asset.as_ref())?;
-    extensions::check(&head.extensions_used, &head.extensions_required, notices)?;
-    let root: json::Root = match json::deserialize::from_slice(text) {
-        Ok(root) => root,
-        Err(_) => json::deserialize::from_value(tree()?).map_err(other)?,
-    };
-    if head.animations.is_some() {
-        notices.add("the file has animations; its rest pose is shown");
-    }
-    Ok((root, binary))
+    Ok((&text[..text.len() - padding], binary))
 }
 
-fn check_version(asset: Option<&Asset>) -> Fallible<()> {
+fn check_version(asset: Option<&str>) -> Fallible<()> {
     let asset = asset.ok_or("its JSON has no `asset`, so it is not glTF")?;
+    let asset: Asset = read(asset).map_err(|cause| not_gltf(&format!("its asset: {cause}")))?;
     let version = asset.version.as_deref().unwrap_or("?");
     if version.split('.').next() != Some("2") {
         return Err(format!("it is glTF version {version}; only 2.0 can be read"));

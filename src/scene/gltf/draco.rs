@@ -12,7 +12,7 @@ use json::validation::Checked;
 use serde::Deserialize;
 
 use super::accessor::Elements;
-use super::buffers::{File, find};
+use super::buffers::File;
 use super::{Fallible, MAX_TRIANGLES};
 use crate::image::catch_panic;
 use crate::memory;
@@ -119,7 +119,7 @@ impl Unpacked {
 
 /// No more is unpacked than the accessors promise, and memory has room for.
 fn limits(file: &File<'_>, primitive: &json::mesh::Primitive) -> Fallible<DecodeLimits> {
-    let accessor = |index| find(&file.root.accessors, index, "accessor");
+    let accessor = |index| file.document.accessors.get(index);
     let positions = Checked::Valid(json::mesh::Semantic::Positions);
     let vertices = match primitive.attributes.get(&positions) {
         Some(positions) => accessor(*positions)?.count.0,

@@ -1,6 +1,7 @@
 //! Which extensions are honoured, and what is said about the others.
 
 use super::Fallible;
+use super::objects::Objects;
 use crate::error::Notices;
 
 /// Extensions that are rendered, wholly or (specular-glossiness) nearly.
@@ -30,20 +31,31 @@ const SUPPORTED: &[&str] = &[
     "KHR_texture_transform",
 ];
 
+/// So many that are not supported are named.
+const MOST_NAMED: usize = 10;
+
 /// Refuses a file that requires what is not supported; a notice where it is only used.
-pub(super) fn check(used: &[String], required: &[String], notices: &mut Notices) -> Fallible<()> {
-    let missing = unsupported(required);
+pub(super) fn check(
+    used: &Objects<'_, String>,
+    required: &Objects<'_, String>,
+    notices: &mut Notices,
+) -> Fallible<()> {
+    let missing = unsupported(required)?;
     if !missing.is_empty() {
         let plural = if missing.len() > 1 { "s" } else { "" };
         let names = missing.join(", ");
         return Err(format!("it requires the extension{plural} {names}, not supported here"));
     }
-    for name in unsupported(used) {
+    for name in unsupported(used)? {
         notices.add(format!("the extension {name} is not supported; what it adds is left out"));
     }
     Ok(())
 }
 
-fn unsupported(names: &[String]) -> Vec<&str> {
-    names.iter().map(String::as_str).filter(|name| !SUPPORTED.contains(name)).collect()
+/// The first of them.
+fn unsupported(names: &Objects<'_, String>) -> Fallible<Vec<String>> {
+    let names = names.indices().map(|index| names.get(index));
+    let is_unknown =
+        |name: &Fallible<String>| name.as_ref().map_or(true, |it| !SUPPORTED.contains(&&**it));
+    names.filter(is_unknown).take(MOST_NAMED).collect()
 }

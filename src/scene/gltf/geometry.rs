@@ -22,13 +22,13 @@ pub(super) struct Needs {
 impl Needs {
     /// Looks through the texture slots.
     pub(super) fn of(material: &Material) -> Self {
-        let mut material = material.clone();
         let mut uv_sets = [false; 2];
-        for reference in super::materials::slots(&mut material).into_iter().flatten() {
+        for reference in material.textures().into_iter().flatten() {
             uv_sets[usize::from(reference.uv_set)] = true;
         }
-        let normal_map = material.normal_texture.or(material.clearcoat_normal_texture);
-        let tangent_map = normal_map.or(material.anisotropy_texture);
+        let normal_map =
+            material.normal_texture.as_deref().or(material.clearcoat_normal_texture.as_deref());
+        let tangent_map = normal_map.or(material.anisotropy_texture.as_deref()).copied();
         let tangents = normal_map.is_some() || material.anisotropy > 0.0;
         uv_sets[0] |= tangents && tangent_map.is_none();
         Self { uv_sets, tangents, tangent_map }

@@ -37,8 +37,8 @@ const INDICES: &[&str] = &[
 
 /// Refuses text that is no JSON, and indices of more than 32 bits: the types would cut them to others.
 /// Nothing is kept of the text; returns how many values are in it.
-pub(super) fn check_indices(text: &[u8]) -> Fallible<u64> {
-    let mut reader = serde_json::Deserializer::from_slice(text);
+pub(super) fn check_indices(text: &str) -> Fallible<u64> {
+    let mut reader = serde_json::Deserializer::from_str(text);
     let values = Cell::new(0);
     Check { is_index: false, of_objects: false, values: &values }
         .deserialize(&mut reader)
@@ -125,22 +125,8 @@ impl<'de> Visitor<'de> for Check<'_> {
     }
 }
 
-/// Makes a tree of values fit the types: whole numbers that are written `4.0`, scenes that show nothing
-/// and do not say so, and without animations, which are not shown and of which newer extensions are
-/// unknown to the types.
-pub(super) fn repair(tree: &mut Value) {
-    if let Some(root) = tree.as_object_mut() {
-        root.remove("animations");
-        for scene in root.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
-            if let Some(scene) = scene.as_object_mut() {
-                scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
-            }
-        }
-    }
-    make_whole(tree);
-}
-
-fn make_whole(value: &mut Value) {
+/// Makes whole numbers that are written `4.0` whole, but for those in what others keep there.
+pub(super) fn make_whole(value: &mut Value) {
     /// Beyond this, not every whole number is an `f64`.
     const EXACT: f64 = (1_u64 << 53) as f64;
     match value {
@@ -166,7 +152,7 @@ mod tests {
 
     #[test]
     fn indices_have_32_bits_and_other_numbers_what_they_want() {
-        let check = |value: Value| check_indices(value.to_string().as_bytes()).map(|_| ());
+        let check = |value: Value| check_indices(&value.to_string()).map(|_| ());
         let large = 1_u64 << 32;
         assert_eq!(
             check(json!({"nodes": [{"translation": [large, 0, 0], "children": [1]}]})),
@@ -182,17 +168,15 @@ mod tests {
         ] {
             assert!(check(wrong.clone()).unwrap_err().contains("more than 32 bits"), "{wrong}");
         }
-        assert_eq!(check_indices(br#"{"a": [1, {"b": "c"}], "extras": [1, 2]}"#), Ok(5));
-        assert!(check_indices(b"{} {}").unwrap_err().contains("valid glTF JSON"));
+        assert_eq!(check_indices(r#"{"a": [1, {"b": "c"}], "extras": [1, 2]}"#), Ok(5));
+        assert!(check_indices("{} {}").unwrap_err().contains("valid glTF JSON"));
     }
 
     #[test]
     fn whole_numbers_become_so_but_not_in_what_others_keep_there() {
-        let mut tree = json!({"scenes": [{"name": "a"}], "animations": [], "n": [4.0, 0.5, 1e300],
-            "extras": {"n": 4.0}});
-        repair(&mut tree);
-        let expected = json!({"scenes": [{"name": "a", "nodes": []}], "n": [4, 0.5, 1e300],
-            "extras": {"n": 4.0}});
+        let mut tree = json!({"n": [4.0, 0.5, 1e300], "extras": {"n": 4.0}});
+        make_whole(&mut tree);
+        let expected = json!({"n": [4, 0.5, 1e300], "extras": {"n": 4.0}});
         assert_eq!(tree, expected);
     }
 }

@@ -9,7 +9,8 @@ use json::validation::Checked;
 use serde_json::{Map, Value};
 
 use super::Fallible;
-use super::buffers::{File, find};
+use super::buffers::File;
+use super::document::Document;
 use super::medium;
 use super::textures::Wanted;
 use crate::error::Notices;
@@ -24,38 +25,37 @@ pub(super) struct Materials {
     pub(super) textures: Vec<Texture>,
     pub(super) images: Vec<TextureImage>,
     /// Place in `materials` by number in the file (`None`: the default material).
-    pub(super) places: BTreeMap<Option<usize>, u32>,
+    pub(super) places: BTreeMap<Option<u32>, u32>,
 }
 
 impl Materials {
     /// Reads the used materials and decodes the images they need.
     pub(super) fn load(
         file: &File<'_>,
-        used: &BTreeSet<Option<usize>>,
+        used: &BTreeSet<Option<u32>>,
         notices: &mut Notices,
     ) -> Fallible<Self> {
         let mut wanted = Wanted::default();
-        let mut materials = Vec::with_capacity(used.len());
+        let mut materials: Vec<Material> = Vec::with_capacity(used.len());
         let mut places = BTreeMap::new();
         for &number in used {
             places.insert(number, materials.len() as u32);
             materials.push(match number {
                 None => Material::default(),
                 Some(number) => {
-                    let index = json::Index::new(number as u32);
-                    let source = find(&file.root.materials, index, "material")?;
-                    let mut reader = Reader::new(file, source, number, &mut wanted, notices);
+                    let source = file.document.materials.get(json::Index::new(number))?;
+                    let mut reader = Reader::new(file, &source, number, &mut wanted, notices);
                     reader
-                        .material(source)
+                        .material(&source)
                         .map_err(|cause| format!("material {number} ({}): {cause}", reader.name))?
                 }
             });
         }
         let decoded = wanted.decode(file, notices);
         for slot in materials.iter_mut().flat_map(slots) {
-            *slot = slot.and_then(|reference| {
+            *slot = slot.take().and_then(|reference| {
                 let texture = decoded.texture_map[reference.texture as usize]?;
-                Some(TextureRef { texture, ..reference })
+                Some(Box::new(TextureRef { texture, ..*reference }))
             });
         }
         Ok(Self { materials, textures: decoded.textures, images: decoded.images, places })
@@ -63,7 +63,7 @@ impl Materials {
 }
 
 /// Every texture slot of a material.
-pub(super) fn slots(material: &mut Material) -> [&mut Option<TextureRef>; 17] {
+fn slots(material: &mut Material) -> [&mut Option<Box<TextureRef>>; 17] {
     [
         &mut material.base_color_texture,
         &mut material.metallic_roughness_texture,
@@ -115,7 +115,7 @@ fn parsed<T: for<'de> serde::Deserialize<'de>>(value: &Value) -> Option<T> {
 
 /// Reads one material.
 pub(super) struct Reader<'a> {
-    root: &'a json::Root,
+    document: &'a Document<'a>,
     name: String,
     wanted: &'a mut Wanted,
     notices: &'a mut Notices,
@@ -125,12 +125,12 @@ impl<'a> Reader<'a> {
     fn new(
         file: &'a File<'_>,
         source: &json::Material,
-        number: usize,
+        number: u32,
         wanted: &'a mut Wanted,
         notices: &'a mut Notices,
     ) -> Self {
         let name = source.name.clone().unwrap_or_else(|| format!("material {number}"));
-        Self { root: &file.root, name, wanted, notices }
+        Self { document: &file.document, name, wanted, notices }
     }
 
     fn material(&mut self, source: &json::Material) -> Fallible<Material> {
@@ -269,16 +269,22 @@ impl<'a> Reader<'a> {
     }
 
     /// A texture whose RGB is sRGB-encoded.
-    pub(super) fn colour(&mut self, info: Option<impl Into<Info>>) -> Fallible<Option<TextureRef>> {
+    pub(super) fn colour(
+        &mut self,
+        info: Option<impl Into<Info>>,
+    ) -> Fallible<Option<Box<TextureRef>>> {
         info.map_or(Ok(None), |info| self.texture(&info.into(), true))
     }
 
     /// A texture of plain numbers.
-    pub(super) fn data(&mut self, info: Option<impl Into<Info>>) -> Fallible<Option<TextureRef>> {
+    pub(super) fn data(
+        &mut self,
+        info: Option<impl Into<Info>>,
+    ) -> Fallible<Option<Box<TextureRef>>> {
         info.map_or(Ok(None), |info| self.texture(&info.into(), false))
     }
 
-    fn texture(&mut self, info: &Info, srgb: bool) -> Fallible<Option<TextureRef>> {
+    fn texture(&mut self, info: &Info, srgb: bool) -> Fallible<Option<Box<TextureRef>>> {
         let transform = info.transform.as_ref();
         let uv_set = transform.and_then(|it| it.tex_coord).unwrap_or(info.tex_coord);
         if uv_set > 1 {
@@ -288,11 +294,11 @@ impl<'a> Reader<'a> {
             ));
             return Ok(None);
         }
-        Ok(Some(TextureRef {
-            texture: self.wanted.add(self.root, info.index, srgb)?,
+        Ok(Some(Box::new(TextureRef {
+            texture: self.wanted.add(self.document, info.index, srgb)?,
             uv_set: uv_set as u8,
             transform: transform.map_or(Affine2::IDENTITY, uv_transform),
-        }))
+        })))
     }
 
     /// A factor clamped to `[0,1]`.

@@ -14,22 +14,29 @@ use glam::{DVec3, Vec3};
 use gltf::json;
 use serde_json::{Map, Value};
 
-use super::pose::Nodes;
+use super::Fallible;
+use super::document::Document;
+use super::pose::{EXTRAS, Nodes, Tops};
 use crate::error::Notices;
 use crate::scene::Medium;
 
 /// The medium of the shown scene or, without one, of its first node that has one.
-pub(super) fn medium(root: &json::Root, nodes: &Nodes, notices: &mut Notices) -> Option<Medium> {
-    let scene = root.scene.map_or(0, |index| index.value());
-    let of_scene = root.scenes.get(scene).and_then(|scene| fog(&scene.extras));
+pub(super) fn medium(
+    document: &Document<'_>,
+    nodes: &Nodes,
+    notices: &mut Notices,
+) -> Fallible<Option<Medium>> {
+    let scene = document.scene.unwrap_or(json::Index::new(0));
     let mut media = Vec::new();
-    if let Some(keys) = of_scene {
-        media.extend(read(&keys, "the scene", notices));
+    if document.scenes.len() > 0 {
+        let scene: Tops = document.scenes.get_as(scene)?;
+        let medium = fog(&scene.extras).and_then(|keys| read(&keys, "the scene", notices));
+        media.extend(medium);
     }
-    for &number in &nodes.shown {
-        let Some(keys) = fog(&root.nodes[number].extras) else { continue };
-        let Some(medium) = read(&keys, &format!("node {number}"), notices) else { continue };
-        let world = nodes.world[number];
+    for node in nodes.showing(EXTRAS) {
+        let Some(keys) = fog(&document.nodes.get(node)?.extras) else { continue };
+        let Some(medium) = read(&keys, &format!("node {node}"), notices) else { continue };
+        let world = nodes.world(node);
         let corners = (0..8).map(|corner| {
             let sign = |bit: u32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
             world.transform_point3(DVec3::new(sign(0), sign(1), sign(2))).as_vec3()
@@ -42,7 +49,7 @@ pub(super) fn medium(root: &json::Root, nodes: &Nodes, notices: &mut Notices) ->
     if media.len() > 1 {
         notices.add(format!("the file has {} media; only the first is rendered", media.len()));
     }
-    media.first().copied()
+    Ok(media.first().copied())
 }
 
 /// Scattering coefficient and anisotropy inside of a material's body.

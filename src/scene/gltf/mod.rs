@@ -5,7 +5,7 @@
 //! backed by data. What cannot be rendered is left out with a notice; what makes the geometry
 //! meaningless is an error.
 //!
-//! `document` and `lenient` parse, `buffers`, `uri` and `accessor` give access to the data, `meshopt` and `draco`
+//! `document`, `objects` and `lenient` parse, `buffers`, `uri` and `accessor` give access to the data, `meshopt` and `draco`
 //! unpack them, `pose` places nodes
 //! and joints, `animation` moves cameras, `materials`, `variants`, `textures` and `medium` read the look, `primitive`, `geometry` and `tangents` read
 //! triangles,
@@ -24,6 +24,7 @@ mod materials;
 mod medium;
 mod meshopt;
 mod newer;
+mod objects;
 mod part;
 mod pose;
 mod primitive;
@@ -41,15 +42,18 @@ use glam::DAffine3;
 use gltf::json;
 
 use crate::error::{Error, Notices, Result};
-use crate::image::{looks_like_picture, read_file};
+use crate::image::{IS_A_FILM, looks_like_film, looks_like_picture, read_file};
+use crate::scene::copies::{copies, hash_of};
 use crate::scene::needs::is_emitter;
 use crate::scene::{Outlines, Scene, SceneOptions};
 
-use buffers::{File, find};
+use buffers::File;
+use document::Document;
 use geometry::Needs;
 use materials::Materials;
 use part::{Part, Tally};
-use pose::Nodes;
+use pose::{MESH, Nodes};
+use primitive::Mesh;
 use share::Sharing;
 use uri::Folder;
 use variants::Look;
@@ -78,6 +82,9 @@ pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
     if looks_like_picture(&bytes) {
         return Err(Error::at(path, "is a picture, where a scene is expected; --env takes a map"));
     }
+    if looks_like_film(&bytes) {
+        return Err(Error::at(path, IS_A_FILM));
+    }
     let base_dir = path.parent().unwrap_or(Path::new(""));
     let mut scene =
         read(&bytes, Some(base_dir), options).map_err(|cause| Error::at(path, cause))?;
@@ -98,36 +105,42 @@ pub fn load_slice(bytes: &[u8], base_dir: Option<&Path>, name: &str) -> Result<S
 
 fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallible<Scene> {
     let mut notices = Notices::default();
-    let (root, binary) = document::parse(bytes, &mut notices)?;
+    let (text, binary) = document::split(bytes)?;
+    // Names in other encodings are no reason to refuse a file.
+    let text = String::from_utf8_lossy(text);
+    let document = Document::new(&text, &mut notices)?;
     let folder = Folder { path: base_dir, allow_outside: options.allow_outside };
-    let file = File::new(root, binary, folder);
-    let nodes = Nodes::new(&file.root, &mut notices)?;
+    let file = File::new(document, binary, folder);
+    file.check_outputs(&options.outputs)?;
+    let document = &file.document;
+    let nodes = Nodes::new(document, &mut notices)?;
     let (cameras, camera_paths) = viewpoints::cameras(&file, &nodes, &mut notices)?;
     let mut scene = Scene {
         cameras,
         camera_paths,
-        lights: viewpoints::lights(&file.root, &nodes, &mut notices)?,
-        medium: medium::medium(&file.root, &nodes, &mut notices),
+        lights: viewpoints::lights(document, &nodes, &mut notices)?,
+        medium: medium::medium(document, &nodes, &mut notices)?,
         ..Scene::default()
     };
-    let placements = placements(&file, &nodes)?;
-    let look = Look::choose(&file.root, options.variant.as_deref(), &mut notices)?;
-    let used = used_materials(&file.root, &placements, &look)?;
+    let mut placements = placements(&file, &nodes)?;
+    let mut tally = Tally { copied_instances: drop_copies(&mut placements), ..Tally::default() };
+    let look = Look::choose(document, options.variant.as_deref(), &mut notices)?;
+    let used = used_materials(document, &placements, &look)?;
     let materials = Materials::load(&file, &used, &mut notices)?;
-    let mut tally = Tally::default();
     let is_lamp = |primitive: &json::mesh::Primitive| {
-        let material = materials.places[&look.material(&file.root, primitive)?];
-        Ok(is_emitter(&materials.materials[material as usize]))
+        let material = materials.places[&look.material(primitive)];
+        is_emitter(&materials.materials[material as usize])
     };
-    let mut sharing = Sharing::choose(&file.root, &placements, is_lamp)?;
+    let mut sharing = Sharing::choose(document, &placements, is_lamp)?;
     let reading = Reading { file: &file, nodes: &nodes, look: &look, materials: &materials };
-    for (&mesh, placements) in &placements {
-        reading.append_mesh(mesh, placements, &mut scene, &mut sharing, &mut tally).map_err(
-            |cause| match &file.root.meshes[mesh].name {
-                Some(name) => format!("mesh {mesh} ({name}): {cause}"),
-                None => format!("mesh {mesh}: {cause}"),
-            },
-        )?;
+    for (&number, placements) in &placements {
+        let mesh: Mesh = document.meshes.get_as(json::Index::new(number))?;
+        reading
+            .append_mesh(number, &mesh, placements, &mut scene, &mut sharing, &mut tally)
+            .map_err(|cause| match &mesh.name {
+                Some(name) => format!("mesh {number} ({name}): {cause}"),
+                None => format!("mesh {number}: {cause}"),
+            })?;
     }
     sharing.finish(&mut scene)?;
     if scene.triangles.is_empty() {
@@ -135,13 +148,14 @@ fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallib
         let reasons = if reasons.is_empty() { reasons } else { format!(" ({reasons})") };
         return Err(format!("it shows no triangles, so there is nothing to render{reasons}"));
     }
-    for repair in repairs(&tally) {
-        notices.add(repair);
-    }
     bake::finish(&mut scene);
     scene.materials = materials.materials;
     scene.textures = materials.textures;
     scene.images = materials.images;
+    tally.copied_triangles = scene.remove_copies();
+    for repair in repairs(&tally) {
+        notices.add(repair);
+    }
     leave_out(&mut scene, options, &mut notices)?;
     scene.notices = notices;
     Ok(scene)
@@ -166,38 +180,82 @@ fn leave_out(scene: &mut Scene, options: &SceneOptions, notices: &mut Notices) -
 }
 
 /// A node that shows a mesh.
-struct Placement<'a> {
-    node: &'a json::Node,
+struct Placement {
+    skin: Option<json::Index<json::Skin>>,
+    /// Of morph targets, if the mesh's own do not hold.
+    weights: Option<Vec<f32>>,
     /// World from mesh, one for each instance.
     instances: Vec<DAffine3>,
 }
 
 /// The shown nodes with meshes, by mesh, so that each mesh is read once.
-fn placements<'a>(
-    file: &'a File<'_>,
-    nodes: &Nodes,
-) -> Fallible<BTreeMap<usize, Vec<Placement<'a>>>> {
-    let mut placements: BTreeMap<usize, Vec<Placement<'a>>> = BTreeMap::new();
-    for &number in &nodes.shown {
-        let node = &file.root.nodes[number];
+fn placements(file: &File<'_>, nodes: &Nodes) -> Fallible<BTreeMap<u32, Vec<Placement>>> {
+    let mut placements: BTreeMap<u32, Vec<Placement>> = BTreeMap::new();
+    for number in nodes.showing(MESH) {
+        let node = file.document.nodes.get(number)?;
         let Some(mesh) = node.mesh else { continue };
-        find(&file.root.meshes, mesh, "mesh")?;
-        let world = nodes.world[number];
-        let instances = pose::instances(file, node)
+        file.document.meshes.text(mesh)?;
+        let world = nodes.world(number);
+        let instances = pose::instances(file, &node)
             .map_err(|cause| format!("node {number}: {cause}"))?
             .map_or_else(|| vec![world], |all| all.iter().map(|&one| world * one).collect());
-        placements.entry(mesh.value()).or_default().push(Placement { node, instances });
+        let placement = Placement { skin: node.skin, weights: node.weights, instances };
+        placements.entry(mesh.value() as u32).or_default().push(placement);
     }
     Ok(placements)
 }
 
+/// Leaves out instances of a mesh in the place of another one, as after a doubled import; how many there were.
+fn drop_copies(placements: &mut BTreeMap<u32, Vec<Placement>>) -> usize {
+    let mut dropped = 0;
+    for placements in placements.values_mut() {
+        let numbers = |(number, placement): (usize, &Placement)| {
+            (0..placement.instances.len()).map(move |instance| (number, instance))
+        };
+        let all: Vec<_> = placements.iter().enumerate().flat_map(numbers).collect();
+        let place = |at: usize| {
+            let (placement, instance) = all[at];
+            let cells = placements[placement].instances[instance].to_cols_array();
+            cells.map(|cell| (cell + 0.0).to_bits())
+        };
+        // What has a skin has a shape of its own.
+        let is_copy = |first: usize, second: usize| {
+            let [first_of, second_of] = [first, second].map(|at| &placements[all[at].0]);
+            place(first) == place(second)
+                && first_of.skin.is_none()
+                && second_of.skin.is_none()
+                && first_of.weights == second_of.weights
+        };
+        let copies = copies(all.len(), |at| hash_of(place(at)), is_copy);
+        if copies.is_empty() {
+            continue;
+        }
+        dropped += copies.len();
+        let mut keep = vec![true; all.len()];
+        copies.into_iter().for_each(|copy| keep[copy] = false);
+        let mut keep = keep.into_iter();
+        for placement in placements.iter_mut() {
+            placement.instances.retain(|_| keep.next().unwrap_or(true));
+        }
+        placements.retain(|placement| !placement.instances.is_empty());
+    }
+    dropped
+}
+
+/// Numbers of the materials that are shown; `None` is the default one.
 fn used_materials(
-    root: &json::Root,
-    placements: &BTreeMap<usize, Vec<Placement<'_>>>,
+    document: &Document<'_>,
+    placements: &BTreeMap<u32, Vec<Placement>>,
     look: &Look,
-) -> Fallible<BTreeSet<Option<usize>>> {
-    let primitives = placements.keys().flat_map(|&mesh| &root.meshes[mesh].primitives);
-    primitives.map(|primitive| look.material(root, primitive)).collect()
+) -> Fallible<BTreeSet<Option<u32>>> {
+    let mut used = BTreeSet::new();
+    for &mesh in placements.keys() {
+        let mesh: Mesh = document.meshes.get_as(json::Index::new(mesh))?;
+        for primitive in mesh.primitives() {
+            used.insert(look.material(&primitive?));
+        }
+    }
+    Ok(used)
 }
 
 /// What meshes are read with.
@@ -212,23 +270,31 @@ impl Reading<'_> {
     /// Appends all placements of one mesh, reading it again only where morph weights differ.
     fn append_mesh(
         &self,
-        number: usize,
-        placements: &[Placement<'_>],
+        number: u32,
+        mesh: &Mesh,
+        placements: &[Placement],
         scene: &mut Scene,
         sharing: &mut Sharing,
         tally: &mut Tally,
     ) -> Fallible<()> {
-        let mesh = &self.file.root.meshes[number];
         let mut read: Option<(&[f32], Vec<Part>)> = None;
+        let mut posed: Option<(json::Index<json::Skin>, Vec<DAffine3>)> = None;
         for (place, placement) in placements.iter().enumerate() {
-            let weights = placement.node.weights.as_deref().or(mesh.weights.as_deref());
+            let weights = placement.weights.as_deref().or(mesh.weights.as_deref());
             let weights = weights.unwrap_or_default();
             let parts = match read.take() {
                 Some((known, parts)) if known == weights => parts,
                 _ => self.read_parts(mesh, weights, tally)?,
             };
-            let joints = match placement.node.skin {
-                Some(skin) => Some(pose::joint_transforms(self.file, self.nodes, skin)?),
+            let joints = match placement.skin {
+                Some(skin) => {
+                    // Many nodes may show one mesh with one skin.
+                    let transforms = match posed.take() {
+                        Some((known, transforms)) if known == skin => transforms,
+                        _ => pose::joint_transforms(self.file, self.nodes, skin)?,
+                    };
+                    Some(&posed.insert((skin, transforms)).1)
+                }
                 None => None,
             };
             let is_shared = |part: &&Part| {
@@ -238,7 +304,7 @@ impl Reading<'_> {
             let shared: Vec<&Part> = parts.iter().filter(is_shared).collect();
             let extent = share::extent(&shared);
             for part in &parts {
-                match &joints {
+                match joints {
                     Some(joints) if part.influences_per_vertex > 0 => {
                         bake::append_skinned(scene, part, joints, tally)?;
                     }
@@ -258,18 +324,13 @@ impl Reading<'_> {
         Ok(())
     }
 
-    fn read_parts(
-        &self,
-        mesh: &json::Mesh,
-        weights: &[f32],
-        tally: &mut Tally,
-    ) -> Fallible<Vec<Part>> {
+    fn read_parts(&self, mesh: &Mesh, weights: &[f32], tally: &mut Tally) -> Fallible<Vec<Part>> {
         let mut parts = Vec::new();
-        for (number, primitive) in mesh.primitives.iter().enumerate() {
-            let material =
-                self.materials.places[&self.look.material(&self.file.root, primitive)?];
+        for (number, primitive) in mesh.primitives().enumerate() {
+            let primitive = primitive?;
+            let material = self.materials.places[&self.look.material(&primitive)];
             let needs = Needs::of(&self.materials.materials[material as usize]);
-            let part = geometry::read_part(self.file, primitive, weights, material, &needs, tally)
+            let part = geometry::read_part(self.file, &primitive, weights, material, &needs, tally)
                 .map_err(|cause| format!("primitive {number}: {cause}"))?;
             parts.extend(part);
         }
@@ -279,8 +340,16 @@ impl Reading<'_> {
 
 /// A clause for each kind of repair that was needed.
 fn repairs(tally: &Tally) -> Vec<String> {
-    let Tally { points, lines, without_positions, dropped_triangles, bad_normals, bad_values } =
-        tally;
+    let Tally {
+        points,
+        lines,
+        without_positions,
+        dropped_triangles,
+        bad_normals,
+        bad_values,
+        copied_instances,
+        copied_triangles,
+    } = tally;
     let mut repairs = Vec::new();
     if points + lines > 0 {
         repairs.push(format!(
@@ -295,6 +364,11 @@ fn repairs(tally: &Tally) -> Vec<String> {
         ),
         (bad_normals, "unusable vertex normals were ignored: shading is flat there"),
         (bad_values, "texture coordinates or colours that are not finite were replaced"),
+        (copied_instances, "instances were left out: each is a copy of another in the same place"),
+        (
+            copied_triangles,
+            "triangles were left out: each is a copy of another in the same place, of the same material",
+        ),
     ] {
         if *count > 0 {
             repairs.push(format!("{count} {what}"));

@@ -1,93 +1,251 @@
 //! The node hierarchy at rest: what is in the shown scene, and where.
 
+use std::collections::BTreeSet;
+
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use gltf::json;
+use json::Index;
 use json::accessor::Type;
+use serde::Deserialize;
 use serde_json::Value;
 
 use super::Fallible;
 use super::accessor::Elements;
-use super::buffers::{File, find};
+use super::buffers::File;
+use super::document::Document;
+use super::objects::Objects;
 use crate::error::Notices;
 
-/// The nodes of the shown scene and the world transforms of all nodes.
+/// In place of a node that is not there.
+const NONE: u32 = u32::MAX;
+
+/// What a node shows, and what else is asked of one.
+pub(super) const MESH: u8 = 1;
+pub(super) const CAMERA: u8 = 2;
+pub(super) const LIGHT: u8 = 4;
+pub(super) const EXTRAS: u8 = 8;
+const ANYTHING: u8 = MESH | CAMERA | LIGHT | EXTRAS;
+const IS_SHOWN: u8 = 16;
+const IS_JOINT: u8 = 32;
+
+/// The nodes of the shown scene and where they are. Little is kept of those that show nothing.
 pub(super) struct Nodes {
-    /// World from node for every node of the file, in f64: far-away parents cancel exactly enough.
-    pub(super) world: Vec<DAffine3>,
-    /// Nodes of the shown scene, parents before children, in file order.
-    pub(super) shown: Vec<usize>,
-    /// Each node's parent.
-    pub(super) parents: Vec<Option<usize>>,
+    hierarchy: Hierarchy,
+    /// World from node of the nodes that show something and of joints, by their numbers; in f64: far-away
+    /// parents cancel exactly enough.
+    places: Vec<(u32, DAffine3)>,
+    /// Nodes of the shown scene that show something, and what; parents before children, in file order.
+    shown: Vec<(u32, u8)>,
+}
+
+/// Who is below whom.
+struct Hierarchy {
+    parents: Vec<u32>,
+    /// Where each node's children begin, and at last where those of the last one end.
+    first_child: Vec<u32>,
+    children: Vec<u32>,
+}
+
+/// What the hierarchy is made of.
+#[derive(Deserialize)]
+struct Below {
+    #[serde(default)]
+    children: Option<Vec<Index<json::Node>>>,
+    #[serde(default)]
+    skin: Option<Index<json::Skin>>,
+}
+
+/// The nodes at the top of a scene, and what others keep there.
+#[derive(Deserialize)]
+pub(super) struct Tops {
+    #[serde(default)]
+    nodes: Vec<Index<json::Node>>,
+    #[serde(default)]
+    pub(super) extras: json::Extras,
+}
+
+/// Members of a skin.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Skin {
+    joints: Vec<Index<json::Node>>,
+    inverse_bind_matrices: Option<Index<json::Accessor>>,
 }
 
 impl Nodes {
     /// Walks the hierarchy; loops, shared children and missing nodes are errors.
-    pub(super) fn new(root: &json::Root, notices: &mut Notices) -> Fallible<Self> {
-        let parents = parents(root)?;
-        let count = root.nodes.len();
-        let tops: Vec<usize> = (0..count).filter(|&node| parents[node].is_none()).collect();
-        let mut world = vec![DAffine3::IDENTITY; count];
-        let below_tops = descend(root, &tops);
-        if below_tops.len() < count {
-            let looping = count - below_tops.len();
-            return Err(format!("its nodes form a loop: {looping} of them have no root above"));
+    pub(super) fn new(document: &Document<'_>, notices: &mut Notices) -> Fallible<Self> {
+        let (hierarchy, skins) = Hierarchy::new(&document.nodes)?;
+        let count = document.nodes.len();
+        let mut marks = vec![0; count];
+        for skin in skins {
+            for node in document.skins.get_as::<Skin>(skin)?.joints {
+                document.nodes.text(node)?;
+                marks[node.value()] = IS_JOINT;
+            }
         }
-        for node in below_tops {
-            let local = local_transform(&root.nodes[node]);
-            world[node] = parents[node].map_or(local, |parent| world[parent] * local);
-        }
-        let shown = match scene_roots(root, notices)? {
-            Some(roots) => descend(root, &roots),
-            None => descend(root, &tops),
+        let roots = match scene_roots(document, notices)? {
+            Some(roots) => roots,
+            None => hierarchy.tops().map(Index::new).collect(),
         };
-        Ok(Self { world, shown, parents })
+        for root in &roots {
+            hierarchy.walk(root.value() as u32, |node, _| {
+                let is_new = marks[node] & IS_SHOWN == 0;
+                marks[node] |= IS_SHOWN;
+                is_new
+            });
+        }
+        let places = places(document, &hierarchy, &mut marks)?;
+        let mut shown = Vec::new();
+        for root in &roots {
+            hierarchy.walk(root.value() as u32, |node, _| {
+                let is_new = marks[node] & IS_SHOWN != 0;
+                marks[node] &= !IS_SHOWN;
+                if is_new && marks[node] & ANYTHING != 0 {
+                    shown.push((node as u32, marks[node]));
+                }
+                is_new
+            });
+        }
+        Ok(Self { hierarchy, places, shown })
+    }
+
+    /// The nodes of the shown scene that show one of these.
+    pub(super) fn showing(&self, what: u8) -> impl Iterator<Item = Index<json::Node>> {
+        let nodes = self.shown.iter().filter(move |(_, shows)| shows & what != 0);
+        nodes.map(|&(node, _)| Index::new(node))
+    }
+
+    /// World from node, if it shows something or is a joint of a skin in use.
+    pub(super) fn world(&self, node: Index<json::Node>) -> DAffine3 {
+        let found = self.places.binary_search_by_key(&(node.value() as u32), |place| place.0);
+        found.map_or(DAffine3::IDENTITY, |found| self.places[found].1)
+    }
+
+    /// The node above.
+    pub(super) fn parent(&self, node: Index<json::Node>) -> Option<Index<json::Node>> {
+        let parent = self.hierarchy.parents[node.value()];
+        (parent != NONE).then(|| Index::new(parent))
     }
 }
 
-/// Each node's parent. A node may have one only, so what hangs below a root is a tree.
-fn parents(root: &json::Root) -> Fallible<Vec<Option<usize>>> {
-    let mut parents = vec![None; root.nodes.len()];
-    for (parent, node) in root.nodes.iter().enumerate() {
-        for &child in node.children.iter().flatten() {
-            find(&root.nodes, child, "node")?;
-            if let Some(other) = parents[child.value()].replace(parent) {
-                return Err(format!("node {child} has two parents, nodes {other} and {parent}"));
+impl Hierarchy {
+    /// Reads it; and which skins are in use. A node may have one parent only, so what hangs below a root is a tree.
+    fn new(nodes: &Objects<'_, json::Node>) -> Fallible<(Self, BTreeSet<Index<json::Skin>>)> {
+        let mut parents = vec![NONE; nodes.len()];
+        let mut first_child = Vec::with_capacity(nodes.len() + 1);
+        let (mut children, mut skins) = (Vec::new(), BTreeSet::new());
+        for parent in nodes.indices() {
+            first_child.push(children.len() as u32);
+            let below: Below = nodes.get_as(parent)?;
+            skins.extend(below.skin);
+            for child in below.children.into_iter().flatten() {
+                nodes.text(child)?;
+                let other = std::mem::replace(&mut parents[child.value()], parent.value() as u32);
+                if other != NONE {
+                    return Err(format!(
+                        "node {child} has two parents, nodes {other} and {parent}"
+                    ));
+                }
+                children.push(child.value() as u32);
+            }
+        }
+        first_child.push(children.len() as u32);
+        Ok((Self { parents, first_child, children }, skins))
+    }
+
+    /// Nodes without parents.
+    fn tops(&self) -> impl Iterator<Item = u32> {
+        (0..self.parents.len() as u32).filter(|node| self.parents[*node as usize] == NONE)
+    }
+
+    /// Visits the nodes at and below one with their depths below it, depth first without recursion; `visit` says
+    /// whether to go on below a node.
+    fn walk(&self, root: u32, mut visit: impl FnMut(usize, usize) -> bool) {
+        let mut stack = vec![(root, 0_u32)];
+        while let Some((node, depth)) = stack.pop() {
+            let node = node as usize;
+            if visit(node, depth as usize) {
+                let range = self.first_child[node] as usize..self.first_child[node + 1] as usize;
+                stack.extend(self.children[range].iter().rev().map(|&child| (child, depth + 1)));
             }
         }
     }
-    Ok(parents)
 }
 
-/// The nodes at and below some roots, depth first without recursion, each once.
-fn descend(root: &json::Root, roots: &[usize]) -> Vec<usize> {
-    let mut seen = vec![false; root.nodes.len()];
-    let mut stack: Vec<usize> = roots.iter().rev().copied().collect();
-    let mut order = Vec::new();
-    while let Some(node) = stack.pop() {
-        if !std::mem::replace(&mut seen[node], true) {
-            order.push(node);
-            let children = root.nodes[node].children.iter().flatten();
-            stack.extend(children.rev().map(json::Index::value));
-        }
+/// Where the shown nodes that show something are, and joints; notes what nodes show.
+fn places(
+    document: &Document<'_>,
+    hierarchy: &Hierarchy,
+    marks: &mut [u8],
+) -> Fallible<Vec<(u32, DAffine3)>> {
+    let (mut places, mut visited) = (Vec::new(), 0);
+    // World from node of those above, from the top down.
+    let mut above: Vec<DAffine3> = Vec::new();
+    let mut failure = None;
+    for top in hierarchy.tops() {
+        hierarchy.walk(top, |number, depth| {
+            visited += 1;
+            let node = match document.nodes.get(Index::new(number as u32)) {
+                Ok(node) => node,
+                Err(cause) => {
+                    failure.get_or_insert(cause);
+                    return false;
+                }
+            };
+            above.truncate(depth);
+            let local = local_transform(&node);
+            let world = above.last().map_or(local, |parent| *parent * local);
+            above.push(world);
+            let mark = &mut marks[number];
+            *mark |= shows(&node);
+            if *mark & IS_JOINT != 0 || (*mark & IS_SHOWN != 0 && *mark & ANYTHING != 0) {
+                places.push((number as u32, world));
+            }
+            true
+        });
     }
-    order
+    if let Some(cause) = failure {
+        return Err(cause);
+    }
+    let looping = document.nodes.len() - visited;
+    if looping > 0 {
+        return Err(format!("its nodes form a loop: {looping} of them have no root above"));
+    }
+    places.sort_unstable_by_key(|place| place.0);
+    Ok(places)
+}
+
+/// What there is at a node.
+fn shows(node: &json::Node) -> u8 {
+    let lights = node.extensions.as_ref().and_then(|all| all.khr_lights_punctual.as_ref());
+    let there = [
+        (MESH, node.mesh.is_some()),
+        (CAMERA, node.camera.is_some()),
+        (LIGHT, lights.is_some()),
+        (EXTRAS, node.extras.is_some()),
+    ];
+    there.iter().filter(|(_, is_there)| *is_there).map(|(what, _)| what).sum()
 }
 
 /// Roots of the default scene, else of the first one; `None` if the file has no scenes.
-fn scene_roots(root: &json::Root, notices: &mut Notices) -> Fallible<Option<Vec<usize>>> {
-    let scene = match (root.scene, root.scenes.first()) {
-        (Some(index), _) => find(&root.scenes, index, "scene")?,
-        (None, Some(first)) => first,
-        (None, None) => return Ok(None),
+fn scene_roots(
+    document: &Document<'_>,
+    notices: &mut Notices,
+) -> Fallible<Option<Vec<Index<json::Node>>>> {
+    let scenes = &document.scenes;
+    let (None, 0) = (document.scene, scenes.len()) else {
+        let shown = document.scene.unwrap_or(Index::new(0));
+        let scene: Tops = scenes.get_as(shown)?;
+        if scenes.len() > 1 {
+            notices.add(format!("the file has {} scenes; scene {shown} is shown", scenes.len()));
+        }
+        for &node in &scene.nodes {
+            document.nodes.text(node)?;
+        }
+        return Ok(Some(scene.nodes));
     };
-    if root.scenes.len() > 1 {
-        let shown = root.scene.map_or(0, |index| index.value());
-        notices.add(format!("the file has {} scenes; scene {shown} is shown", root.scenes.len()));
-    }
-    for &node in &scene.nodes {
-        find(&root.nodes, node, "node")?;
-    }
-    Ok(Some(scene.nodes.iter().map(json::Index::value).collect()))
+    Ok(None)
 }
 
 /// Parent from node, at rest.
@@ -123,7 +281,7 @@ pub(super) fn instances(file: &File<'_>, node: &json::Node) -> Fallible<Option<V
         None => Ok(None),
         Some(index) => {
             let index = index.as_u64().ok_or_else(nonsense)?;
-            let index = json::Index::new(u32::try_from(index).unwrap_or(u32::MAX));
+            let index = Index::new(u32::try_from(index).unwrap_or(u32::MAX));
             Elements::open(file, index, &[kind]).map(Some)
         }
     };
@@ -151,10 +309,11 @@ pub(super) fn instances(file: &File<'_>, node: &json::Node) -> Fallible<Option<V
 pub(super) fn joint_transforms(
     file: &File<'_>,
     nodes: &Nodes,
-    skin: json::Index<json::Skin>,
+    index: Index<json::Skin>,
 ) -> Fallible<Vec<DAffine3>> {
-    let joints = &find(&file.root.skins, skin, "skin")?.joints;
-    let inverse_bind = match file.root.skins[skin.value()].inverse_bind_matrices {
+    let skin: Skin = file.document.skins.get_as(index)?;
+    let joints = &skin.joints;
+    let inverse_bind = match skin.inverse_bind_matrices {
         Some(accessor) => Some(Elements::open(file, accessor, &[Type::Mat4])?),
         None => None,
     };
@@ -162,17 +321,16 @@ pub(super) fn joint_transforms(
         && matrices.count < joints.len()
     {
         return Err(format!(
-            "skin {skin} has {} joints but only {} inverse bind matrices",
+            "skin {index} has {} joints but only {} inverse bind matrices",
             joints.len(),
             matrices.count
         ));
     }
-    let transform = |(joint, &node): (usize, &json::Index<json::Node>)| {
-        find(&file.root.nodes, node, "node")?;
+    let transform = |(joint, &node): (usize, &Index<json::Node>)| {
         let bind = inverse_bind.as_ref().map_or(DAffine3::IDENTITY, |matrices| {
             affine_from_columns(&matrices.floats::<16>(joint).map(f64::from))
         });
-        Ok(nodes.world[node.value()] * bind)
+        nodes.world(node) * bind
     };
-    joints.iter().enumerate().map(transform).collect()
+    Ok(joints.iter().enumerate().map(transform).collect())
 }

@@ -5,13 +5,32 @@ use gltf::json;
 use json::accessor::Type;
 use json::mesh::{Mode, Semantic};
 use json::validation::Checked;
+use serde::Deserialize;
+use serde_json::value::RawValue;
 
 use super::accessor::Elements;
-use super::buffers::{File, find};
+use super::buffers::File;
 use super::draco::Unpacked;
+use super::objects::{not_gltf, read};
 use super::part::{Part, Tally};
 use super::{Fallible, MAX_TRIANGLES};
 use crate::scene::placing::unit;
+
+/// What a mesh has. Its primitives are read one by one.
+#[derive(Deserialize)]
+pub(super) struct Mesh {
+    pub(super) name: Option<String>,
+    pub(super) weights: Option<Vec<f32>>,
+    primitives: Vec<Box<RawValue>>,
+}
+
+impl Mesh {
+    pub(super) fn primitives(&self) -> impl Iterator<Item = Fallible<json::mesh::Primitive>> {
+        self.primitives.iter().enumerate().map(|(number, text)| {
+            read(text.get()).map_err(|cause| not_gltf(&format!("primitive {number}: {cause}")))
+        })
+    }
+}
 
 /// A triangle primitive whose accessors are checked as they are read.
 pub(super) struct Source<'a> {
@@ -250,8 +269,8 @@ fn open<'a>(
     types: &[Type],
 ) -> Fallible<Elements<'a>> {
     if let Some(draco) = draco {
-        let promised = find(&file.root.accessors, accessor, "accessor")?;
-        if let Some(elements) = draco.attribute(&semantic.to_string(), promised, types)? {
+        let promised = file.document.accessors.get(accessor)?;
+        if let Some(elements) = draco.attribute(&semantic.to_string(), &promised, types)? {
             return Ok(elements);
         }
     }

@@ -12,7 +12,9 @@ use gltf::json;
 use json::mesh::Mode;
 use json::validation::Checked;
 
+use super::document::Document;
 use super::part::{Part, Tally};
+use super::primitive::Mesh;
 use super::{Fallible, Placement, bake};
 use crate::bvh;
 use crate::memory;
@@ -31,7 +33,7 @@ const INSTANCE_BYTES: u64 = 800;
 /// The meshes that are shared, as far as they have been read.
 #[derive(Default)]
 pub(super) struct Sharing {
-    wanted: BTreeSet<usize>,
+    wanted: BTreeSet<u32>,
     /// Triangles and materials of each mesh.
     meshes: Vec<(Vec<[u32; 3]>, Vec<u32>)>,
     instances: Vec<Instance>,
@@ -40,22 +42,23 @@ pub(super) struct Sharing {
 impl Sharing {
     /// Chooses them by what the file says it has; `is_lamp` tells of a primitive whether it shines.
     pub(super) fn choose(
-        root: &json::Root,
-        placements: &BTreeMap<usize, Vec<Placement<'_>>>,
-        is_lamp: impl Fn(&json::mesh::Primitive) -> Fallible<bool>,
+        document: &Document<'_>,
+        placements: &BTreeMap<u32, Vec<Placement>>,
+        is_lamp: impl Fn(&json::mesh::Primitive) -> bool,
     ) -> Fallible<Self> {
         let (mut wanted, mut spared, mut all) = (BTreeSet::new(), 0_u64, 0_u64);
         for (&number, placements) in placements {
             let mut triangles = 0;
-            for primitive in &root.meshes[number].primitives {
-                triangles += if is_lamp(primitive)? { 0 } else { count(root, primitive) };
+            let mesh: Mesh = document.meshes.get_as(json::Index::new(number))?;
+            for primitive in mesh.primitives() {
+                let primitive = primitive?;
+                triangles += if is_lamp(&primitive) { 0 } else { count(document, &primitive) };
             }
             let instances = placements.iter().map(|placement| placement.instances.len() as u64);
             let instances: u64 = instances.sum();
             all = all.saturating_add(triangles.saturating_mul(instances));
-            let first = placements[0].node;
-            let is_alike =
-                |one: &Placement<'_>| one.node.skin.is_none() && one.node.weights == first.weights;
+            let weights = &placements[0].weights;
+            let is_alike = |one: &Placement| one.skin.is_none() && one.weights == *weights;
             if instances > 1 && triangles >= LEAST_TRIANGLES && placements.iter().all(is_alike) {
                 spared = spared.saturating_add(triangles.saturating_mul(instances - 1));
                 wanted.insert(number);
@@ -65,7 +68,7 @@ impl Sharing {
         Ok(Self { wanted: if pays { wanted } else { BTreeSet::new() }, ..Self::default() })
     }
 
-    pub(super) fn wants(&self, mesh: usize) -> bool {
+    pub(super) fn wants(&self, mesh: u32) -> bool {
         self.wanted.contains(&mesh)
     }
 
@@ -74,7 +77,7 @@ impl Sharing {
         &mut self,
         scene: &mut Scene,
         parts: &[&Part],
-        placements: &[Placement<'_>],
+        placements: &[Placement],
         tally: &mut Tally,
     ) -> Fallible<()> {
         let extent = extent(parts);
@@ -132,10 +135,10 @@ pub(super) fn can_share(place: DAffine3, extent: f32) -> bool {
 }
 
 /// Triangles that a primitive says it has; 0 of what is not drawn as triangles.
-fn count(root: &json::Root, primitive: &json::mesh::Primitive) -> u64 {
+fn count(document: &Document<'_>, primitive: &json::mesh::Primitive) -> u64 {
     let positions = Checked::Valid(json::mesh::Semantic::Positions);
     let accessor = primitive.indices.or(primitive.attributes.get(&positions).copied());
-    let accessor = accessor.and_then(|accessor| root.accessors.get(accessor.value()));
+    let accessor = accessor.and_then(|accessor| document.accessors.get(accessor).ok());
     let corners = accessor.map_or(0, |accessor| accessor.count.0);
     match primitive.mode {
         Checked::Valid(Mode::Triangles) => corners / 3,

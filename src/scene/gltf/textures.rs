@@ -1,15 +1,17 @@
 //! Textures that materials ask for, and the images behind them.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use gltf::json;
 use json::texture::{MagFilter, WrappingMode};
 use json::validation::Checked;
 use rayon::prelude::*;
+use serde::Deserialize;
 
 use super::Fallible;
-use super::buffers::{File, find};
+use super::buffers::{File, uri_of};
+use super::document::Document;
 use super::uri::{self, Place};
 use crate::error::Notices;
 use crate::image::ldr::{LdrHeader, LdrImage, decode_ldr};
@@ -30,6 +32,8 @@ const NO_IMAGE: u32 = u32::MAX;
 #[derive(Default)]
 pub(super) struct Wanted {
     textures: Vec<Texture>,
+    /// Where in the list each is.
+    places: HashMap<Texture, u32>,
     /// Images by which others are replaced that cannot be read.
     fallbacks: BTreeMap<u32, u32>,
 }
@@ -45,34 +49,29 @@ impl Wanted {
     /// Notes a texture of the file as colour (`srgb`) or data; the same one is kept once.
     pub(super) fn add(
         &mut self,
-        root: &json::Root,
+        document: &Document<'_>,
         index: json::Index<json::Texture>,
         srgb: bool,
     ) -> Fallible<u32> {
-        let texture = find(&root.textures, index, "texture")?;
-        let sampler = match texture.sampler {
-            Some(sampler) => Some(find(&root.samplers, sampler, "sampler")?),
-            None => None,
-        };
+        let texture = document.textures.get(index)?;
+        let sampler = texture.sampler.map(|sampler| document.samplers.get(sampler)).transpose()?;
         let plain = u32::try_from(texture.source.value()).unwrap_or(NO_IMAGE);
-        let image = image_of(texture).unwrap_or(plain);
+        let image = image_of(&texture).unwrap_or(plain);
         if image != plain && plain != NO_IMAGE {
             self.fallbacks.entry(image).or_insert(plain);
         }
         let wanted = Texture {
             image,
-            wrap_u: sampler.map_or(Wrap::Repeat, |sampler| wrap(sampler.wrap_s)),
-            wrap_v: sampler.map_or(Wrap::Repeat, |sampler| wrap(sampler.wrap_t)),
+            wrap_u: sampler.as_ref().map_or(Wrap::Repeat, |sampler| wrap(sampler.wrap_s)),
+            wrap_v: sampler.as_ref().map_or(Wrap::Repeat, |sampler| wrap(sampler.wrap_t)),
             nearest: sampler.and_then(|sampler| sampler.mag_filter)
                 == Some(Checked::Valid(MagFilter::Nearest)),
             srgb,
         };
-        let known = self.textures.iter().position(|other| *other == wanted);
-        let position = known.unwrap_or_else(|| {
+        Ok(*self.places.entry(wanted).or_insert_with(|| {
             self.textures.push(wanted);
-            self.textures.len() - 1
-        });
-        Ok(position as u32)
+            self.textures.len() as u32 - 1
+        }))
     }
 
     /// Decodes the images in parallel. One that cannot be read is named in a notice.
@@ -90,7 +89,7 @@ impl Wanted {
         let mut image_map = BTreeMap::new();
         let mut failures = Vec::new();
         for number in numbers {
-            let name = image_name(&file.root, number);
+            let name = image_name(&file.document, number);
             let fallback = self.fallbacks.get(&number);
             let other =
                 fallback.and_then(|other| Some((*other, *places.get(other)?.as_ref().ok()?)));
@@ -106,7 +105,7 @@ impl Wanted {
                 }
                 (Err(cause), Some((other, place))) => {
                     image_map.insert(number, place);
-                    let other = image_name(&file.root, other);
+                    let other = image_name(&file.document, other);
                     failures
                         .push(format!("{name} cannot be used: {cause}; {other} is used instead"));
                 }
@@ -196,14 +195,30 @@ fn wrap(mode: Checked<WrappingMode>) -> Wrap {
     }
 }
 
-fn image_name(root: &json::Root, number: u32) -> String {
-    let image = root.images.get(number as usize);
-    let name = image.and_then(|image| image.name.as_deref().or(image.uri.as_deref()));
-    match name {
-        Some(name) => format!("Image {number} ({})", uri::shown(name)),
-        None if number == NO_IMAGE => "The image of a texture".into(),
+fn image_name(document: &Document<'_>, number: u32) -> String {
+    if number == NO_IMAGE {
+        return "The image of a texture".into();
+    }
+    let index = json::Index::new(number);
+    let name = document.images.get_as::<Label>(index).ok().and_then(|label| label.name);
+    let uri = || document.images.text(index).and_then(uri_of).ok().flatten();
+    match name.map(Cow::Owned).or_else(uri) {
+        Some(name) => format!("Image {number} ({})", uri::shown(&name)),
         None => format!("Image {number}"),
     }
+}
+
+/// What an image is called.
+#[derive(Deserialize)]
+struct Label {
+    name: Option<String>,
+}
+
+/// The view that an image is in, if it is.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct InView {
+    buffer_view: Option<json::Index<json::buffer::View>>,
 }
 
 /// Where the bytes of an image are.
@@ -217,11 +232,13 @@ fn source<'a>(file: &'a File<'_>, number: u32) -> Fallible<Source<'a>> {
     if number == NO_IMAGE {
         return Err("it has none in a supported format".into());
     }
-    let image = file.root.images.get(number as usize).ok_or("it is not in the file")?;
-    match (image.buffer_view, &image.uri) {
-        (Some(view), _) => Ok(Source::View(view.value() as u32)),
-        (None, Some(uri)) => file.folder.place(uri).map(Source::Uri),
-        (None, None) => Err("it has no data".into()),
+    let index = json::Index::new(number);
+    if let Some(view) = file.document.images.get_as::<InView>(index)?.buffer_view {
+        return Ok(Source::View(view.value() as u32));
+    }
+    match uri_of(file.document.images.text(index)?)? {
+        Some(uri) => file.folder.place(uri).map(Source::Uri),
+        None => Err("it has no data".into()),
     }
 }
 

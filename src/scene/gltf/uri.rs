@@ -1,10 +1,14 @@
 //! URIs of buffers and images: `data:` and relative paths.
 
+use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::Fallible;
 use crate::image::{read_cause, read_file};
+
+/// How a URI begins that is data itself.
+const DATA: &str = "data:";
 
 /// The folder that URIs are looked up in.
 #[derive(Clone, Copy)]
@@ -18,8 +22,8 @@ pub(super) struct Folder<'a> {
 /// What a URI stands for.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Place<'u> {
-    /// What follows `data:`.
-    Embedded(&'u str),
+    /// In the URI itself, which is a `data:` one.
+    Embedded(Cow<'u, str>),
     /// A file, by its one name without links.
     File(PathBuf),
 }
@@ -27,12 +31,13 @@ pub(super) enum Place<'u> {
 impl Folder<'_> {
     /// Where the data of a URI are. A file must lie in the folder or below it, links followed: a scene
     /// that somebody sent must not make a picture of what is private.
-    pub(super) fn place<'u>(self, uri: &'u str) -> Fallible<Place<'u>> {
-        if let Some(data) = uri.strip_prefix("data:") {
-            return Ok(Place::Embedded(data));
+    pub(super) fn place(self, uri: Cow<'_, str>) -> Fallible<Place<'_>> {
+        if uri.starts_with(DATA) {
+            return Ok(Place::Embedded(uri));
         }
-        let path = percent_decoded(uri);
-        let path = String::from_utf8(path).map_err(|_| format!("`{}` is not UTF-8", shown(uri)))?;
+        let path = percent_decoded(&uri);
+        let path =
+            String::from_utf8(path).map_err(|_| format!("`{}` is not UTF-8", shown(&uri)))?;
         let name = shown(&path);
         if path.contains("://") {
             return Err(format!("`{name}` is not a file beside it, and nothing is fetched"));
@@ -58,7 +63,7 @@ impl Place<'_> {
     /// The bytes there.
     pub(super) fn read(&self) -> Fallible<Vec<u8>> {
         match self {
-            Self::Embedded(data) => read_data_uri(data),
+            Self::Embedded(uri) => read_data_uri(uri),
             Self::File(path) => read_file(path).map_err(|cause| {
                 let name = path.file_name().unwrap_or_default().to_string_lossy();
                 format!("`{name}` {cause}")
@@ -70,7 +75,7 @@ impl Place<'_> {
 /// A URI as it is shown to a person: data URIs, and some others, would fill pages.
 pub(super) fn shown(uri: &str) -> String {
     const MOST: usize = 100;
-    if uri.starts_with("data:") {
+    if uri.starts_with(DATA) {
         return "data URI".to_owned();
     }
     match uri.char_indices().nth(MOST) {
@@ -79,8 +84,8 @@ pub(super) fn shown(uri: &str) -> String {
     }
 }
 
-fn read_data_uri(data: &str) -> Fallible<Vec<u8>> {
-    let (kind, payload) = data.split_once(',').ok_or("a data URI has no comma before its data")?;
+fn read_data_uri(uri: &str) -> Fallible<Vec<u8>> {
+    let (kind, payload) = uri.split_once(',').ok_or("a data URI has no comma before its data")?;
     if kind.ends_with(";base64") {
         base64_decoded(payload.as_bytes()).ok_or_else(|| "a data URI is not valid base64".into())
     } else {
@@ -173,7 +178,7 @@ mod tests {
     #[test]
     fn data_uris_may_be_plain_text() {
         let nowhere = Folder { path: None, allow_outside: false };
-        let read = |uri| nowhere.place(uri).and_then(|place| place.read());
+        let read = |uri: &'static str| nowhere.place(uri.into()).and_then(|place| place.read());
         assert_eq!(read("data:text/plain,a%00b").unwrap(), b"a\0b");
         assert!(read("data:nothing").unwrap_err().contains("comma"));
         assert!(read("https://example.org/a.bin").unwrap_err().contains("nothing is fetched"));

@@ -1,13 +1,24 @@
 //! `KHR_materials_variants`: looks of one model, chosen by name.
 
 use gltf::json;
+use serde::Deserialize;
 use serde_json::Value;
 
 use super::Fallible;
-use super::buffers::find;
+use super::document::Document;
 use crate::error::Notices;
 
-const EXTENSION: &str = "KHR_materials_variants";
+pub(super) const EXTENSION: &str = "KHR_materials_variants";
+
+/// So many looks are named.
+const MOST_NAMED: usize = 50;
+
+/// A look of a model.
+#[derive(Deserialize)]
+pub(super) struct Variant {
+    #[serde(default)]
+    name: String,
+}
 
 /// Which of the file's looks is shown.
 pub(super) struct Look {
@@ -18,47 +29,41 @@ pub(super) struct Look {
 impl Look {
     /// The look of a name, else the default one.
     pub(super) fn choose(
-        root: &json::Root,
+        document: &Document<'_>,
         name: Option<&str>,
         notices: &mut Notices,
     ) -> Fallible<Self> {
-        let extension = root.extensions.as_ref().and_then(|all| all.others.get(EXTENSION));
-        let variants = extension.and_then(|all| all.get("variants")).and_then(Value::as_array);
-        let names: Vec<&str> = variants
-            .into_iter()
-            .flatten()
-            .map(|variant| variant.get("name").and_then(Value::as_str).unwrap_or_default())
-            .collect();
+        let variants = &document.variants;
+        let names = || variants.indices().map(|index| variants.get(index).map(|it| it.name));
+        let list = || {
+            let first = names().take(MOST_NAMED).collect::<Fallible<Vec<String>>>()?.join(", ");
+            Fallible::Ok(match variants.len().saturating_sub(MOST_NAMED) {
+                0 => first,
+                more => format!("{first} and {more} more"),
+            })
+        };
         let Some(name) = name else {
-            if !names.is_empty() {
-                let names = names.join(", ");
+            if variants.len() > 0 {
                 notices.add(format!(
-                    "the file has the variants {names}; its default look is shown (--variant NAME)"
+                    "the file has the variants {}; its default look is shown (--variant NAME)",
+                    list()?
                 ));
             }
             return Ok(Self { variant: None });
         };
-        match names.iter().position(|other| *other == name) {
+        match names().position(|other| other.is_ok_and(|other| other == name)) {
             Some(number) => Ok(Self { variant: Some(number as u64) }),
-            None if names.is_empty() => Err(format!("there is no variant {name}: it has none")),
-            None => Err(format!("there is no variant {name} but {}", names.join(", "))),
+            None if variants.len() == 0 => Err(format!("there is no variant {name}: it has none")),
+            None => Err(format!("there is no variant {name} but {}", list()?)),
         }
     }
 
     /// Number of a primitive's material; `None` is the default one.
-    pub(super) fn material(
-        &self,
-        root: &json::Root,
-        primitive: &json::mesh::Primitive,
-    ) -> Fallible<Option<usize>> {
-        let material = match self.variant.and_then(|variant| mapped(primitive, variant)) {
-            Some(number) => Some(json::Index::new(u32::try_from(number).unwrap_or(u32::MAX))),
-            None => primitive.material,
-        };
-        if let Some(material) = material {
-            find(&root.materials, material, "material")?;
+    pub(super) fn material(&self, primitive: &json::mesh::Primitive) -> Option<u32> {
+        match self.variant.and_then(|variant| mapped(primitive, variant)) {
+            Some(number) => Some(u32::try_from(number).unwrap_or(u32::MAX)),
+            None => primitive.material.map(|material| material.value() as u32),
         }
-        Ok(material.map(|material| material.value()))
     }
 }
 

@@ -9,9 +9,10 @@ use json::validation::Checked;
 
 use super::Fallible;
 use super::animation::Channels;
-use super::buffers::{File, find};
+use super::buffers::File;
+use super::document::Document;
 use super::materials::BRIGHTEST;
-use super::pose::Nodes;
+use super::pose::{CAMERA, LIGHT, Nodes};
 use crate::error::Notices;
 use crate::scene::camera_path::CameraPath;
 use crate::scene::{Camera, Projection, PunctualKind, PunctualLight};
@@ -28,25 +29,24 @@ pub(super) fn cameras(
     nodes: &Nodes,
     notices: &mut Notices,
 ) -> Fallible<(Vec<Camera>, Vec<Option<CameraPath>>)> {
-    let root = &file.root;
-    let channels = Channels::new(file);
+    let document = &file.document;
+    let mut channels = None;
     let mut cameras = Vec::new();
-    for &number in &nodes.shown {
-        let node = &root.nodes[number];
-        if let Some(index) = node.camera {
-            let source = find(&root.cameras, index, "camera")?;
-            let name = source.name.clone().or_else(|| node.name.clone());
-            let name = name.unwrap_or_else(|| format!("camera {index}"));
-            let path = match cameras.len() < MOST_MOVING {
-                true => channels.camera_path(nodes, number),
-                false => Ok(None),
-            };
-            let path = path.unwrap_or_else(|cause| {
-                notices.add(format!("the movement of camera {name} is left out: {cause}"));
-                None
-            });
-            cameras.push((index.value(), camera(source, name, nodes.world[number], notices), path));
-        }
+    for number in nodes.showing(CAMERA) {
+        let node = document.nodes.get(number)?;
+        let Some(index) = node.camera else { continue };
+        let source = document.cameras.get(index)?;
+        let name = source.name.clone().or_else(|| node.name.clone());
+        let name = name.unwrap_or_else(|| format!("camera {index}"));
+        let path = match cameras.len() < MOST_MOVING {
+            true => channels.get_or_insert_with(|| Channels::new(file)).camera_path(nodes, number),
+            false => Ok(None),
+        };
+        let path = path.unwrap_or_else(|cause| {
+            notices.add(format!("the movement of camera {name} is left out: {cause}"));
+            None
+        });
+        cameras.push((index.value(), camera(&source, name, nodes.world(number), notices), path));
     }
     cameras.sort_by_key(|&(index, ..)| index);
     Ok(cameras.into_iter().map(|(_, camera, path)| (camera, path)).unzip())
@@ -95,24 +95,21 @@ fn camera(
 /// `KHR_lights_punctual` lights of the shown nodes. Candela and lux are taken as the renderer's
 /// units: HDR maps are not calibrated either, so any other factor would be a guess.
 pub(super) fn lights(
-    root: &json::Root,
+    document: &Document<'_>,
     nodes: &Nodes,
     notices: &mut Notices,
 ) -> Fallible<Vec<PunctualLight>> {
-    let extension = root.extensions.as_ref();
-    let sources = extension.and_then(|all| all.khr_lights_punctual.as_ref());
-    let sources = sources.map_or(&[][..], |extension| &extension.lights);
     let mut lights = Vec::new();
-    for &number in &nodes.shown {
-        let node = &root.nodes[number];
+    for number in nodes.showing(LIGHT) {
+        let node = document.nodes.get(number)?;
         let extension = node.extensions.as_ref();
         let Some(reference) = extension.and_then(|all| all.khr_lights_punctual.as_ref()) else {
             continue;
         };
-        let source = find(sources, reference.light, "light")?;
+        let source = document.lights.get(reference.light)?;
         let name = source.name.clone().or_else(|| node.name.clone());
         let name = name.unwrap_or_else(|| format!("light {}", reference.light));
-        match light(source, &name, nodes.world[number], notices) {
+        match light(&source, &name, nodes.world(number), notices) {
             Some(light) => lights.push(light),
             None => notices.add(format!("light {name} is damaged and left out")),
         }

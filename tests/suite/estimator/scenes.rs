@@ -46,7 +46,7 @@ pub(crate) fn smoked_glass() -> Material {
 pub(crate) fn half_masked(material: Material) -> Material {
     let texture = TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY };
     Material {
-        base_color_texture: Some(texture),
+        base_color_texture: Some(texture.into()),
         alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
         ..material
     }

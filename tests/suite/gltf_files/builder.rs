@@ -141,7 +141,7 @@ pub(crate) fn check_consistency(scene: &Scene) {
         assert!((tangent.truncate().length() - 1.0).abs() < 1e-4 && tangent.w.abs() == 1.0);
     }
     for material in &scene.materials {
-        for reference in [material.base_color_texture, material.normal_texture] {
+        for reference in material.textures() {
             assert!(reference.is_none_or(|it| (it.texture as usize) < scene.textures.len()));
         }
     }

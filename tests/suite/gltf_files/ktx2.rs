@@ -281,7 +281,7 @@ fn textures_are_of_basis_pictures() {
     let expected = decode_ldr(&encoded("uastc-rgba-14x9"), "it").expect("a sound file");
     assert_eq!((scene.images[0].width, scene.images[0].height), (14, 9));
     assert_eq!(scene.images[0].texels, expected.pixels);
-    let placed = scene.materials[0].base_color_texture.expect("a texture").transform;
+    let placed = scene.materials[0].base_color_texture.as_ref().expect("a texture").transform;
     assert_eq!(placed.transform_point2(glam::Vec2::ONE), glam::Vec2::new(2.0, 3.0));
 }
 

@@ -293,7 +293,7 @@ fn add_textures(scene: &mut Scene, random: &mut Random) {
         let (texture, uv_set) = (random.below(18), random.below(2) as u8);
         let (scale, angle) = (random.unit2() + 0.5, random.between(-PI, PI));
         let transform = Affine2::from_scale_angle_translation(scale, angle, random.unit2());
-        random.below(2).eq(&0).then_some(TextureRef { texture, uv_set, transform })
+        random.below(2).eq(&0).then_some(TextureRef { texture, uv_set, transform }.into())
     };
     for m in &mut scene.materials {
         for texture in [
