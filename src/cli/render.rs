@@ -60,7 +60,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     let camera = arguments.camera(&world, &mut notices)?;
     let frames = Frames::plan(arguments, &world, &camera)?;
     let [of_film, of_writing] = needed_bytes(arguments);
-    memory::check(of_film + of_writing).map_err(too_large)?;
+    memory::check(of_film + of_writing).map_err(|cause| too_large(&cause))?;
     progress.finish();
     notices.iter().for_each(notice);
     let gpu = device::open(
@@ -88,7 +88,7 @@ fn needed_bytes(arguments: &RenderArguments) -> [u64; 2] {
     [film, writing + BYTES_OF_ENCODERS + rayon::current_num_threads() as u64 * STACK_BYTES]
 }
 
-fn too_large(cause: String) -> Error {
+fn too_large(cause: &str) -> Error {
     Error::new(format!("a picture of this size {cause}"))
 }
 
@@ -123,7 +123,8 @@ impl Job<'_> {
         let Self { world, environment, .. } = *self;
         let mut notices = self.notices.clone();
         // Were there no memory any more when it is finished, the picture would be lost.
-        let spare: Vec<u8> = memory::reserved(needed_bytes(arguments)[1]).map_err(too_large)?;
+        let spare: Vec<u8> =
+            memory::reserved(needed_bytes(arguments)[1]).map_err(|cause| too_large(&cause))?;
         let view = arguments.view(world, camera);
         let rule = arguments.stop_rule();
         let mut share = Share::open(arguments, rule, (world, environment), &view)?;

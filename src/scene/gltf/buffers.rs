@@ -56,11 +56,11 @@ struct Buffer {
     bytes: Arc<Vec<u8>>,
 }
 
-/// What a buffer promises.
+/// What a buffer promises, if it does.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Length {
-    byte_length: USize64,
+    byte_length: Option<USize64>,
 }
 
 /// Where an object's data are.
@@ -122,7 +122,8 @@ impl<'a> File<'a> {
             let uri = uri_of(text)?;
             let bytes = uri.as_deref().map(|uri| self.read(uri)).transpose()?.unwrap_or_default();
             let name = uri.as_deref().map(uri::shown);
-            Ok(Buffer { promised: length.byte_length.0, name, bytes })
+            let promised = length.byte_length.map_or(0, |length| length.0);
+            Ok(Buffer { promised, name, bytes })
         };
         let buffer = self.buffers.get(index.value(), count, read);
         let Buffer { promised, name, bytes } =

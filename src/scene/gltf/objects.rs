@@ -31,7 +31,7 @@ impl<'a, T> Objects<'a, T> {
         let text = list.unwrap_or("[]");
         let starts = serde_json::Deserializer::from_str(text)
             .deserialize_seq(Starts { base: text.as_ptr().addr() })
-            .map_err(|cause| not_gltf(&format!("the {kind}s are no list: {cause}")))?;
+            .map_err(|cause| not_gltf(&format!("its {kind} list: {cause}")))?;
         Ok(Self { text, starts, kind, read: PhantomData })
     }
 

@@ -534,6 +534,16 @@ fn odd_objects_that_are_not_used_are_no_fault() {
     bytes[at] = 0xfc;
     let scene = gltf::load_slice(&bytes, None, "latin-1.glb").expect("it is shown");
     assert_eq!(scene.triangles.len(), 2);
+    // A buffer that promises nothing has what it has.
+    let text = square().json(
+        &ONE_MESH.replace(r#","indices":1"#, ""),
+        r#","uri":"data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA""#,
+    );
+    let text = text.replacen(r#""byteLength":60,"#, "", 1);
+    let text = text.replace(r#""byteLength":48"#, r#""byteLength":36"#);
+    let text = text.replace(r#""count":4"#, r#""count":3"#);
+    let scene = gltf::load_slice(text.as_bytes(), None, "unpromised.gltf").expect("it is shown");
+    assert_eq!(scene.triangles, [[0, 1, 2]]);
     let error = square().error(&ONE_MESH.replace(r#""mesh":0"#, r#""mesh":true"#));
     assert!(error.contains("its JSON does not describe glTF 2.0 (node 0: "), "{error}");
 }
