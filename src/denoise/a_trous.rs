@@ -334,6 +334,21 @@ mod tests {
         }
     }
 
+    /// Beside a bright slit pixels show one sample of it or none.
+    #[test]
+    fn a_slit_makes_no_glow_on_the_wall_around() {
+        let film = film([48, 48], 64, |x, y, [part, _, _]| {
+            let seen = if y.abs_diff(24) == 1 && part < 0.02 { None } else { Some(WALL) };
+            let is_slit = y == 24 && (8..40).contains(&x);
+            if is_slit || seen.is_none() { (1000.0, None) } else { (1.0, Some(WALL)) }
+        });
+        let image = quick(&film, None);
+        for y in (0..20).chain(29..48) {
+            let row = &image.pixels[y * 48..(y + 1) * 48];
+            assert!(row.iter().all(|rgb| (rgb[0] - 0.5).abs() < 0.005), "{y}: {row:?}");
+        }
+    }
+
     /// Of a single sample a pixel cannot tell its error.
     #[test]
     fn a_shadow_keeps_its_edge_with_one_sample() {

@@ -18,7 +18,7 @@ const NORMAL_TOLERANCE: f32 = 0.06;
 const NORMAL_VARIANCES: f32 = 2.0;
 /// Squared difference of coverages at which pixels have nothing in common, without chance: what is behind all surfaces
 /// may be a thousand times as bright.
-const COVERAGE_TOLERANCE: f32 = 0.002;
+const COVERAGE_TOLERANCE: f32 = 1e-6;
 /// Variances of both coverages that are tolerated as well.
 const CHANCES: f32 = 4.0;
 /// Relative difference of depths at which pixels have nothing in common, on what faces the camera.

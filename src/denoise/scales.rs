@@ -165,6 +165,49 @@ impl Scale<Cell> {
     }
 }
 
+impl Scale<Filtered> {
+    /// Gives cells of the coarsest scale that have no samples the mean of those that have, the nearer the more.
+    fn fill_gaps(&mut self, cells: &Scale<Cell>) {
+        let has_samples = |index: &usize| cells.cells[*index].samples > 0.0;
+        let known: Vec<usize> = (0..cells.cells.len()).filter(has_samples).collect();
+        for index in (0..cells.cells.len()).filter(|index| !has_samples(index)) {
+            let place = |index: usize| [index % self.width, index / self.width];
+            let ([x, y], mut sum, mut total) = (place(index), Filtered::default(), 0.0);
+            for other in &known {
+                let [u, v] = place(*other);
+                let weight = 1.0 / (u.abs_diff(x).pow(2) + v.abs_diff(y).pow(2)) as f32;
+                sum.add(&self.cells[*other], weight);
+                total += weight;
+            }
+            if total > 0.0 {
+                self.cells[index] = sum.over(total);
+            }
+        }
+    }
+}
+
+impl Filtered {
+    /// Adds what is told to finer scales.
+    fn add(&mut self, other: &Self, weight: f32) {
+        self.light += other.light * weight;
+        self.albedo += other.albedo * weight;
+        self.coverage += other.coverage * weight;
+        self.chance += other.chance * weight;
+        self.spread += other.spread * weight;
+    }
+
+    fn over(self, total: f32) -> Self {
+        Self {
+            light: self.light / total,
+            albedo: self.albedo / total,
+            coverage: self.coverage / total,
+            chance: self.chance / total,
+            spread: self.spread / total,
+            ..self
+        }
+    }
+}
+
 /// Median luminance of the pixels that have met any light.
 fn usual_luminance(pixels: &[Pixel]) -> f32 {
     let mean = |pixel: &Pixel| luminance(Vec3::from(pixel.mean().map(|channel| channel as f32)));
@@ -223,7 +266,9 @@ fn refined(
     };
     let estimates = (0..width * height).into_par_iter().map(expected).collect();
     let mut estimates = Scale { width, height, cells: estimates };
-    if coarser.is_some() {
+    if coarser.is_none() {
+        estimates.fill_gaps(cells);
+    } else {
         let share = |i| wieners_share(&estimates, (i % width, i / width));
         let shares: Vec<f32> = (0..width * height).into_par_iter().map(share).collect();
         let take =
@@ -249,22 +294,10 @@ fn from_parents(
     let mut total = 0.0;
     for (x, y, share) in [(px, py, 9.0), (qx, py, 3.0), (px, qy, 3.0), (qx, qy, 1.0)] {
         let weight = share * (LEAST_LIKENESS + guide.likeness(guides.at(x, y), 2.0 * pixels));
-        let estimate = estimates.at(x, y);
-        sum.light += estimate.light * weight;
-        sum.albedo += estimate.albedo * weight;
-        sum.coverage += estimate.coverage * weight;
-        sum.chance += estimate.chance * weight;
-        sum.spread += estimate.spread * weight;
+        sum.add(estimates.at(x, y), weight);
         total += weight;
     }
-    Filtered {
-        light: sum.light / total,
-        albedo: sum.albedo / total,
-        coverage: sum.coverage / total,
-        chance: sum.chance / total,
-        spread: sum.spread / total,
-        ..sum
-    }
+    sum.over(total)
 }
 
 /// The energy of the details around a cell over that and the noise's. The strongest one does not
@@ -453,6 +486,16 @@ mod tests {
         assert!(brightest < 1.1, "no halo: {brightest}");
         let (found, noisy) = (error(&image, truth), error(&film.image(), truth));
         assert!(found < 0.45 * noisy, "{found} {noisy}");
+    }
+
+    #[test]
+    fn what_has_no_samples_for_hundreds_of_pixels_is_not_black() {
+        let mut begun = Film::new(40, 600, false);
+        let radiance = Vec3::splat(2.0);
+        for x in (0..40).step_by(8) {
+            begun.add(x, 8, &PathResult { radiance, ..PathResult::default() });
+        }
+        assert!(error(&blend(&begun, None), |_, _| 2.0) < 1e-4);
     }
 
     #[test]
