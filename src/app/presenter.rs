@@ -527,8 +527,8 @@ impl Source {
             film.is_alike(other) && other.min_samples() > 0 && *worth > 0.0
         });
         let is_calmed = other.is_some() && self.backdrop.as_ref().is_some_and(|b| b.is_cached);
-        let samples = |film: &Film| film.total_samples();
-        let is_surpassed = |(other, _)| samples(other) <= FILTER_WORTH * samples(film);
+        let is_surpassed =
+            |(other, _): (&Film, f32)| other.total_samples() <= FILTER_WORTH * film.total_samples();
         let can_filter = other.is_some() || (self.is_whole && backdrop.is_none_or(is_surpassed));
         match self.denoiser {
             None if self.is_whole => Prepared::on_device(noisy(false)),

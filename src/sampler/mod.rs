@@ -84,6 +84,9 @@ impl Sampler {
     /// estimates of all samples are the points of one sequence, so that those of one sample are even, too.
     /// Of a single one it is the sample's own.
     pub(crate) fn of_estimate(&self, count: u32, estimate: u32) -> Self {
+        if count == 1 {
+            return self.clone();
+        }
         let pair = self.pair.wrapping_add((count - 1).wrapping_mul(PAIRS_OF_ESTIMATES));
         let stream = Self { pair, ..self.clone() };
         match self.points {
@@ -92,8 +95,7 @@ impl Sampler {
                 let index = index.wrapping_mul(count).wrapping_add(estimate);
                 Self { reversed_index: index.reverse_bits(), ..stream }
             }
-            Points::Independent if count > 1 => stream.independent(estimate),
-            Points::Independent => stream,
+            Points::Independent => stream.independent(estimate),
         }
     }
 
