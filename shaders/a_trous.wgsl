@@ -1,5 +1,5 @@
 // The edge-avoiding filter in passes. Twin of `src/denoise/a_trous.rs`, `guides.rs` and `edges.rs`, which say what
-// and why.
+// and why, and whose constants stand before it.
 
 struct Pass {
     size: vec2u,
@@ -42,29 +42,7 @@ struct Guide {
 @group(0) @binding(6) var<storage, read_write> result: array<vec4f>;
 @group(0) @binding(7) var<storage, read_write> result_counts: array<vec4u>;
 
-const LEAST_ALBEDO = 0.02;
-const ALBEDO_TOLERANCE = 0.5;
-const NORMAL_TOLERANCE = 0.06;
-const NORMAL_VARIANCES = 2.0;
-const COVERAGE_TOLERANCE = 1e-6;
-const CHANCES = 4.0;
-const DEPTH_TOLERANCE = 0.007;
-const DEPTH_GROWTH = 0.25;
-const SLOPE_TOLERANCE = 0.8;
-const LEAST_NEARNESS = 1e-9;
-const ERRORS_TOLERATED = 4.0;
-const LEAST_VARIANCE = 1e-12;
-const LARGEST_VARIANCE = 1e30;
-const LARGEST_LUMINANCE = 1e15;
 const REACH = 2;
-const LEAST_LIKENESS = 0.05;
-const LEAST_SPREAD = 0.1;
-const SINGLE = 3.0;
-const LEAST_ALIKE = 8.0;
-const WHOLE = 18.0;
-const RELATIVE_ERROR = 0.1;
-const RIDGE = 1e-3;
-const DEPTH_SCALE = 0.1;
 const TERMS = 6;
 const TINY = 1.1754944e-38;
 
@@ -220,13 +198,15 @@ fn share_errors(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     let own = light[index];
-    var variance = max(own.w, known.y / max(known.x, TINY));
+    let mean = moments.x / all_weights;
+    let off = compared_luminance(own.xyz) - mean;
+    let chance = SINGLE * pow(FEWER, f32(max(counts[index].x, 1u) - 1u)) * off * off;
+    var variance = max(max(own.w, known.y / max(known.x, TINY)), chance);
     if own.w < 0.0 {
-        let mean = moments.x / all_weights;
         let spread = max(moments.y / all_weights - mean * mean, LEAST_SPREAD * mean * mean);
-        let off = compared_luminance(own.xyz) - mean;
-        variance = min(SINGLE * max(spread, off * off), LARGEST_VARIANCE);
+        variance = SINGLE * max(spread, off * off);
     }
+    variance = min(variance, LARGEST_VARIANCE);
     result[index] = vec4f(own.xyz, variance);
     // The pixel itself is its like.
     guides[index].support = support - 1.0;

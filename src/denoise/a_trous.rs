@@ -20,23 +20,26 @@ use crate::image::Image;
 /// ones put it at their taps alone, a lattice: the last two fill it.
 pub(crate) const STEPS: [u32; 7] = [1, 2, 4, 8, 16, 3, 1];
 /// Luminances have nothing in common that are so many of their standard errors apart.
-const ERRORS_TOLERATED: f32 = 4.0;
+pub(crate) const ERRORS_TOLERATED: f32 = 4.0;
 /// The same of no variance: not zero.
-const LEAST_VARIANCE: f32 = 1e-12;
+pub(crate) const LEAST_VARIANCE: f32 = 1e-12;
 /// No variance and no luminance that is compared is larger, so that sums of them are finite.
-const LARGEST_VARIANCE: f32 = 1e30;
-const LARGEST_LUMINANCE: f32 = 1e15;
+pub(crate) const LARGEST_VARIANCE: f32 = 1e30;
+pub(crate) const LARGEST_LUMINANCE: f32 = 1e15;
 /// Columns and rows around a pixel that share its error.
 const REACH: isize = 2;
 /// What a pixel on another surface counts there, so that somebody always does: one that has met no light and has
 /// no like knows nothing of its error.
-const LEAST_LIKENESS: f32 = 0.05;
+pub(crate) const LEAST_LIKENESS: f32 = 0.05;
 /// Squared light of which a single sample's variance is so much at least.
-const LEAST_SPREAD: f32 = 0.1;
+pub(crate) const LEAST_SPREAD: f32 = 0.1;
 /// The variance of a single sample.
 const UNKNOWN: f32 = -1.0;
 /// By how much more a variance is tolerated that is known of one sample only by those around it.
-const SINGLE: f32 = 3.0;
+pub(crate) const SINGLE: f32 = 3.0;
+/// How much less likely one sample more makes it that all of a pixel's are off its surroundings by chance: two
+/// that are bright by chance, and agree, seem sure.
+pub(crate) const FEWER: f32 = 0.2;
 /// Weights of a B3 spline.
 const KERNEL: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 
@@ -58,7 +61,7 @@ struct Row<'a> {
 pub(super) fn denoise(samples: &Samples<'_>) -> Image {
     let guides = Guides::of(samples);
     let mut light = Light::of(samples, &guides);
-    let support = share_errors(&mut light, &guides);
+    let support = share_errors(&mut light, &guides, samples);
     for step in STEPS {
         light = filtered(&light, &guides, step as isize);
     }
@@ -120,7 +123,7 @@ struct Around {
 /// has met no light yet knows nothing of its error. One that has met too much knows: so its neighbours
 /// take their part of it. Of a single sample the spread of those around it tells, and how far it is off itself.
 /// Returns how many of the 24 pixels around each are its like.
-fn share_errors(light: &mut Light, guides: &Guides) -> Vec<f32> {
+fn share_errors(light: &mut Light, guides: &Guides, samples: &Samples<'_>) -> Vec<f32> {
     let width = guides.width;
     let told = |y: usize| {
         let mut likeness = vec![0.0; width];
@@ -142,10 +145,10 @@ fn share_errors(light: &mut Light, guides: &Guides) -> Vec<f32> {
             }
         }
         let own = y * width..(y + 1) * width;
-        let own = light.variance[own.clone()].iter().zip(&light.luminance[own]);
-        let told = |(around, (variance, luminance)): (Around, (&f32, &f32))| {
+        let own = own.map(|i| (light.variance[i], light.luminance[i], samples.count(i)));
+        let told = |(around, (variance, luminance, count)): (Around, (f32, f32, u32))| {
             // The pixel itself is its like.
-            (around.variance_for(*variance, *luminance), around.support - 1.0)
+            (around.variance_for(variance, luminance, count), around.support - 1.0)
         };
         sums.into_iter().zip(own).map(told).collect::<Vec<_>>()
     };
@@ -155,14 +158,18 @@ fn share_errors(light: &mut Light, guides: &Guides) -> Vec<f32> {
 }
 
 impl Around {
-    /// The variance of a pixel of this luminance that knows of so much itself.
-    fn variance_for(&self, own: f32, luminance: f32) -> f32 {
-        if own >= 0.0 {
-            return own.max(self.variance / self.known);
-        }
+    /// The variance of a pixel of this luminance, of so many samples, that knows of so much itself.
+    fn variance_for(&self, own: f32, luminance: f32, samples: u32) -> f32 {
         let mean = self.first / self.all;
-        let spread = (self.second / self.all - mean * mean).max(LEAST_SPREAD * mean * mean);
-        (SINGLE * spread.max((luminance - mean).powi(2))).min(LARGEST_VARIANCE)
+        let off = (luminance - mean).powi(2);
+        let variance = if own < 0.0 {
+            let spread = self.second / self.all - mean * mean;
+            SINGLE * spread.max(LEAST_SPREAD * mean * mean).max(off)
+        } else {
+            let chance = SINGLE * FEWER.powf(samples.max(1) as f32 - 1.0) * off;
+            own.max(self.variance / self.known).max(chance)
+        };
+        variance.min(LARGEST_VARIANCE)
     }
 }
 
@@ -362,6 +369,18 @@ mod tests {
             let off = (mean / expected - 1.0).abs() + spread / expected;
             assert!(off < 0.15, "column {x}: {mean} {spread}");
         }
+    }
+
+    /// Of two bright samples the spread says nothing.
+    #[test]
+    fn two_bright_samples_that_agree_leave_no_dot() {
+        let film = film([64, 48], 2, |_, _, [chance, light, _]| {
+            (if chance < 0.02 { 20.0 } else { 0.5 + light }, Some(WALL))
+        });
+        let has_met = |pixel: &[f32; 3]| (pixel[0] - 10.0).abs() < 1.0;
+        assert!(film.image().pixels.iter().any(has_met), "none has met two");
+        let brightest = quick(&film, None).pixels.iter().map(|p| p[0]).fold(0.0, f32::max);
+        assert!(brightest < 2.0, "{brightest} where 0.7 is right");
     }
 
     /// Normals of a rough cloth: each sample's own.

@@ -15,20 +15,20 @@ use crate::color::luminance;
 use crate::image::Image;
 
 /// With fewer like pixels than this, of 24, a pixel's light is taken from a regression.
-const LEAST_ALIKE: f32 = 8.0;
+pub(crate) const LEAST_ALIKE: f32 = 8.0;
 /// With fewer than this it is on an edge.
-const WHOLE: f32 = 18.0;
+pub(crate) const WHOLE: f32 = 18.0;
 /// Columns and rows around a pixel that tell its light.
 const REACH: usize = 2;
 /// Error of all light relative to it and to what is told: what is bright counts for what is dark no more than in
 /// proportion.
-const RELATIVE_ERROR: f32 = 0.1;
+pub(crate) const RELATIVE_ERROR: f32 = 0.1;
 /// The same of no light: not zero.
 const LEAST_VARIANCE: f32 = 1e-12;
 /// By how much coefficients are drawn to zero where guides say little.
-const RIDGE: f32 = 1e-3;
+pub(crate) const RIDGE: f32 = 1e-3;
 /// Relative difference of depths that counts as much as one of normals of 1.
-const DEPTH_SCALE: f32 = 0.1;
+pub(crate) const DEPTH_SCALE: f32 = 0.1;
 /// A constant, albedo, normal and nearness.
 const TERMS: usize = 6;
 

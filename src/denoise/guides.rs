@@ -8,27 +8,27 @@ use rayon::prelude::*;
 use super::samples::Samples;
 
 /// Albedo that counts as none: black surfaces are smoothed as they are.
-const LEAST_ALBEDO: f32 = 0.02;
+pub(crate) const LEAST_ALBEDO: f32 = 0.02;
 /// Squared difference of albedos at which pixels have nothing in common. Light is compared without albedo, so this
 /// is loose: patterns do not stop the filter, black beside white does.
-const ALBEDO_TOLERANCE: f32 = 0.5;
+pub(crate) const ALBEDO_TOLERANCE: f32 = 0.5;
 /// Squared difference of normals at which pixels have nothing in common, without noise.
-const NORMAL_TOLERANCE: f32 = 0.06;
+pub(crate) const NORMAL_TOLERANCE: f32 = 0.06;
 /// Variances of both normals that are tolerated as well.
-const NORMAL_VARIANCES: f32 = 2.0;
+pub(crate) const NORMAL_VARIANCES: f32 = 2.0;
 /// Squared difference of coverages at which pixels have nothing in common, without chance: what is behind all surfaces
 /// may be a thousand times as bright.
-const COVERAGE_TOLERANCE: f32 = 1e-6;
+pub(crate) const COVERAGE_TOLERANCE: f32 = 1e-6;
 /// Variances of both coverages that are tolerated as well.
-const CHANCES: f32 = 4.0;
+pub(crate) const CHANCES: f32 = 4.0;
 /// Relative difference of depths at which pixels have nothing in common, on what faces the camera.
-const DEPTH_TOLERANCE: f32 = 0.007;
+pub(crate) const DEPTH_TOLERANCE: f32 = 0.007;
 /// Share by which that grows with every pixel of distance.
-const DEPTH_GROWTH: f32 = 0.25;
+pub(crate) const DEPTH_GROWTH: f32 = 0.25;
 /// Nearness that counts as none: a sky's.
-const LEAST_NEARNESS: f32 = 1e-9;
+pub(crate) const LEAST_NEARNESS: f32 = 1e-9;
 /// How much of the difference that the slope explains is tolerated.
-const SLOPE_TOLERANCE: f32 = 0.8;
+pub(crate) const SLOPE_TOLERANCE: f32 = 0.8;
 
 /// What a pixel's samples met first, as means over them. Those that met nothing count as black normals and albedos of
 /// 1, so that in a pixel that shows some of each of two surfaces all is between theirs, in proportion.

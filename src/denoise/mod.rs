@@ -2,8 +2,8 @@
 
 pub(crate) mod a_trous;
 mod cell;
-mod edges;
-mod guides;
+pub(crate) mod edges;
+pub(crate) mod guides;
 mod oidn;
 mod samples;
 mod scales;

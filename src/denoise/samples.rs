@@ -1,9 +1,10 @@
-//! What the filter is given: a film or, of the same view, two.
+//! What the filter is given: a film or, of the same view and points, two.
 
 use glam::Vec3;
 
+use crate::color::luminance;
 use crate::image::Image;
-use crate::render::film::{Film, Pixel, Surface};
+use crate::render::film::{Film, Pixel};
 
 /// A film and, perhaps, another one of its size and with its layers, each of whose samples counts as so many of the
 /// film's own.
@@ -21,20 +22,20 @@ pub(super) struct Mean {
 }
 
 impl Samples<'_> {
-    /// Samples of a pixel of both films, all alike.
+    /// Samples of a pixel that are independent: those of the film that has more, for both begin with the same points.
     pub(super) fn count(&self, index: usize) -> u32 {
-        let other = self.other.map_or(0, |(film, _)| film.pixels()[index].samples());
-        self.film.pixels()[index].samples().saturating_add(other)
+        self.fuller(index).pixels()[index].samples()
     }
 
-    /// Sums over the first hits of a pixel's samples.
+    /// Sums over the first hits of those samples.
     pub(super) fn first_hits(&self, index: usize) -> [f32; 8] {
-        let mut sums = self.film.surfaces()[index].sums();
-        let other = self.other.map(|(film, _)| film.surfaces()[index]);
-        for (sum, more) in sums.iter_mut().zip(other.as_ref().map_or([0.0; 8], Surface::sums)) {
-            *sum += more;
-        }
-        sums.map(|sum| sum as f32)
+        self.fuller(index).surfaces()[index].sums().map(|sum| sum as f32)
+    }
+
+    fn fuller(&self, index: usize) -> &Film {
+        let count = |film: &Film| film.pixels()[index].samples();
+        let other = self.other.map(|(other, _)| other);
+        other.filter(|other| count(other) > count(self.film)).unwrap_or(self.film)
     }
 
     /// The picture as it is.
@@ -66,14 +67,22 @@ impl Samples<'_> {
         let [n, m] = [own, other].map(|pixel| pixel.samples() as f32);
         let total = (n + worth * m).max(f32::MIN_POSITIVE);
         let rgb = (vec3(own) * n + vec3(other) * (worth * m)) / total;
-        // Both tell of the spread of one sample.
-        let known = [own, other].into_iter().filter(|pixel| pixel.samples() > 1);
-        let (squares, freedom) = known.fold((0.0, 0.0), |(squares, freedom), pixel| {
-            let (count, others) = (f64::from(pixel.samples()), f64::from(pixel.samples() - 1));
-            (squares + pixel.variance_of_mean() * others * count, freedom + others)
-        });
-        let per_sample = (n + worth * worth * m) / (total * total);
-        let variance = (freedom > 0.0).then(|| (squares / freedom) as f32 * per_sample);
+        // Both tell of the spread of one of the film's own samples, and so does how far apart they are: of
+        // something bright one may have met nothing.
+        let apart = luminance(vec3(own) - vec3(other)).powi(2);
+        let (mut squares, mut freedom) = (0.0, 0.0);
+        for (pixel, worth) in [(own, 1.0), (other, worth)] {
+            if pixel.samples() > 1 {
+                let (count, others) = (pixel.samples() as f32, (pixel.samples() - 1) as f32);
+                squares += worth * pixel.variance_of_mean() as f32 * others * count;
+                freedom += others;
+            }
+        }
+        if freedom > 0.0 && n > 0.0 && m > 0.0 && worth > 0.0 {
+            squares += apart / (1.0 / n + 1.0 / (worth * m));
+            freedom += 1.0;
+        }
+        let variance = (freedom > 0.0).then(|| squares / freedom / total);
         Mean { rgb, variance }
     }
 }
@@ -97,13 +106,14 @@ mod tests {
         let mean = |worth| Samples { film: &own, other: Some((&other, worth)) }.mean(0);
         assert_eq!(mean(1.0).rgb, Vec3::splat(4.0));
         assert!((mean(4.0).rgb - Vec3::splat(84.0 / 18.0)).length() < 1e-6);
-        // Squared deviations 2 and 2, of which four are free.
-        assert!((mean(1.0).variance.expect("known") - 1.0 / 6.0).abs() < 1e-6);
-        assert!((mean(4.0).variance.expect("known") - 66.0 / (18.0 * 18.0)).abs() < 1e-6);
+        // Squared deviations 2 and 2, of which four are free, and means that are 3 apart.
+        let variance = |worth| mean(worth).variance.expect("known");
+        assert!((variance(1.0) - (2.0 + 2.0 + 9.0 / 0.75) / 5.0 / 6.0).abs() < 1e-6);
+        assert!((variance(4.0) - (2.0 + 8.0 + 9.0 / 0.5625) / 5.0 / 18.0).abs() < 1e-6);
         let single = film(&[2.0]);
         assert_eq!(Samples { film: &single, other: None }.mean(0).variance, None);
         let both = Samples { film: &single, other: Some((&film(&[4.0]), 1.0)) };
         assert_eq!((both.mean(0).rgb, both.mean(0).variance), (Vec3::splat(3.0), None));
-        assert_eq!(both.count(0), 2);
+        assert_eq!(both.count(0), 1);
     }
 }

@@ -2,7 +2,34 @@
 
 use super::{dispatch, entry, filled, pipeline};
 use crate::denoise::a_trous::STEPS;
-use crate::render::gpu::{DeviceFilm, Gpu};
+use crate::denoise::{a_trous, edges, guides};
+use crate::render::gpu::{DeviceFilm, Gpu, constants};
+
+constants::constants! {
+    ALBEDO_TOLERANCE: guides::ALBEDO_TOLERANCE,
+    CHANCES: guides::CHANCES,
+    COVERAGE_TOLERANCE: guides::COVERAGE_TOLERANCE,
+    DEPTH_GROWTH: guides::DEPTH_GROWTH,
+    DEPTH_SCALE: edges::DEPTH_SCALE,
+    DEPTH_TOLERANCE: guides::DEPTH_TOLERANCE,
+    ERRORS_TOLERATED: a_trous::ERRORS_TOLERATED,
+    FEWER: a_trous::FEWER,
+    LARGEST_LUMINANCE: a_trous::LARGEST_LUMINANCE,
+    LARGEST_VARIANCE: a_trous::LARGEST_VARIANCE,
+    LEAST_ALBEDO: guides::LEAST_ALBEDO,
+    LEAST_ALIKE: edges::LEAST_ALIKE,
+    LEAST_LIKENESS: a_trous::LEAST_LIKENESS,
+    LEAST_NEARNESS: guides::LEAST_NEARNESS,
+    LEAST_SPREAD: a_trous::LEAST_SPREAD,
+    LEAST_VARIANCE: a_trous::LEAST_VARIANCE,
+    NORMAL_TOLERANCE: guides::NORMAL_TOLERANCE,
+    NORMAL_VARIANCES: guides::NORMAL_VARIANCES,
+    RELATIVE_ERROR: edges::RELATIVE_ERROR,
+    RIDGE: edges::RIDGE,
+    SINGLE: a_trous::SINGLE,
+    SLOPE_TOLERANCE: guides::SLOPE_TOLERANCE,
+    WHOLE: edges::WHOLE,
+}
 
 /// Bytes of a pixel's `Guide`.
 const GUIDE_BYTES: u64 = 48;
@@ -22,7 +49,9 @@ impl Passes {
     pub(super) fn new(gpu: &Gpu) -> Self {
         let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("a-trous"),
-            source: wgpu::ShaderSource::Wgsl(include_str!("../../shaders/a_trous.wgsl").into()),
+            source: wgpu::ShaderSource::Wgsl(
+                (shared() + include_str!("../../shaders/a_trous.wgsl")).into(),
+            ),
         });
         Self {
             undress: pipeline(gpu, &shader, "undress"),
@@ -77,13 +106,21 @@ impl Passes {
         dispatch(gpu, &mut commands, &self.undress, &entries, size);
         let entries = [entry(0, &one), entry(2, &film.counts), entry(4, &guides)];
         dispatch(gpu, &mut commands, &self.survey, &entries, size);
+        let entries = [
+            entry(0, &one),
+            entry(2, &film.counts),
+            entry(4, &guides),
+            entry(5, &light),
+            entry(6, &result),
+        ];
+        dispatch(gpu, &mut commands, &self.share_errors, &entries, size);
+        std::mem::swap(&mut light, &mut result);
         let mut pass = |pipeline, settings: &wgpu::Buffer| {
             let entries =
                 [entry(0, settings), entry(4, &guides), entry(5, &light), entry(6, &result)];
             dispatch(gpu, &mut commands, pipeline, &entries, size);
             std::mem::swap(&mut light, &mut result);
         };
-        pass(&self.share_errors, &one);
         for step in STEPS {
             pass(&self.smooth_light, &settings(step));
         }

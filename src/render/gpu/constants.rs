@@ -1,7 +1,5 @@
 //! Constants that shaders share with their Rust twins, which alone say what they are.
 
-use std::fmt::Write as _;
-
 use glam::Vec3;
 
 use super::layout::{NO_TEXTURE, PUNCTUAL_WORDS, material_flags as material, texture_flags};
@@ -14,7 +12,8 @@ use crate::sampler;
 use crate::scene::surface;
 
 /// What a shader's constant can be.
-trait Constant: Copy {
+pub(crate) trait Constant: Copy {
+    /// As it is written in WGSL.
     fn wgsl(self) -> String;
 }
 
@@ -44,16 +43,17 @@ impl Constant for Vec3 {
     }
 }
 
+/// Makes `shared`, all of them in WGSL, out of names and values.
 macro_rules! constants {
     ($($name:ident: $value:expr,)+) => {
-        /// All of them, in WGSL.
         pub(super) fn shared() -> String {
-            let mut source = String::new();
-            $(let _ = writeln!(source, "const {} = {};", stringify!($name), $value.wgsl());)+
-            source
+            use $crate::render::gpu::constants::Constant as _;
+            let lines = [$(format!("const {} = {};\n", stringify!($name), $value.wgsl())),+];
+            lines.concat()
         }
     };
 }
+pub(crate) use constants;
 
 constants! {
     ALBEDO_NODES: albedo::COSINES,

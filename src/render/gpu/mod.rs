@@ -7,7 +7,7 @@
 mod acceleration;
 mod buffers;
 mod cast;
-mod constants;
+pub(crate) mod constants;
 mod device;
 mod facts;
 mod features;
