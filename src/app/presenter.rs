@@ -64,9 +64,18 @@ impl Order {
     }
 }
 
-/// After a picture of work that goes on it rests so many times as long as that took: with half of the
-/// cores, it takes a fourteenth of the machine.
-const REST: u32 = 6;
+/// After a picture of work that goes on it rests so many times as long as that took: little at first, when each
+/// is much better than the last, and most after [`MOST_AFTER`]. With half of the cores it takes then a twenty-sixth of the
+/// machine, and in the first minute less than a tenth.
+const REST: [f64; 2] = [3.0, 12.0];
+/// Seconds of work on a view after which pictures change slowly.
+const MOST_AFTER: f64 = 12.0;
+
+/// For how long it rests after a picture that took so long, of so many seconds of work.
+fn rest_after(took: Duration, seconds: f64) -> Duration {
+    let [least, most] = REST;
+    took.mul_f64(least + (most - least) * (seconds / MOST_AFTER).clamp(0.0, 1.0))
+}
 
 /// What a picture took, for its rest. By the clock that would be far too long where other programs take the
 /// cores (a picture stood still for half a minute), by this thread's time at work far too short for the
@@ -258,7 +267,8 @@ fn run(shared: &Shared) {
         if let Ok(shown) = memory.present(order) {
             *lock(&shared.shown) = Some(Arc::new(shown));
         }
-        let end = Instant::now() + REST * work.time(start.elapsed());
+        let rest = rest_after(work.time(start.elapsed()), kept.snapshot.seconds());
+        let end = Instant::now() + rest;
         kept.snapshot.rest.set_end(end);
         last = Some((kept, end));
         (shared.wake)();
@@ -562,10 +572,12 @@ mod tests {
     use crate::render::{Figures, Sampling};
 
     #[test]
-    fn a_rest_is_shorter_where_others_take_the_cores() {
+    fn a_rest_is_shorter_at_first_and_where_others_take_the_cores() {
         let seconds = Duration::from_secs_f64;
         assert_eq!(between(seconds(0.5), seconds(0.5)), seconds(0.5));
         assert_eq!(between(seconds(0.25), seconds(4.0)), seconds(1.0));
+        assert_eq!(rest_after(seconds(0.5), 0.0), seconds(1.5));
+        assert_eq!(rest_after(seconds(0.5), 1e9), seconds(6.0));
         // Who sleeps is not at work.
         if let Some(before) = time_at_work() {
             std::thread::sleep(Duration::from_millis(200));

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use egui::epaint::{ImageData, ImageDelta};
 use egui::mutex::RwLock;
 use egui::{Color32, ColorImage, TextureId, TexturesDelta};
-use egui_wgpu::Renderer;
+use egui_wgpu::{Renderer, RendererOptions};
 
 use crate::develop::{DevelopSettings, Developer, DisplayTexture, LinearPicture, OverlayTexture};
 use crate::error::Result;
@@ -34,6 +34,11 @@ impl Screen {
     pub(super) fn gpu(&self) -> &Gpu {
         self.developer.gpu()
     }
+}
+
+/// How egui draws: without dither, which developed pictures have already.
+pub(super) fn renderer_options() -> RendererOptions {
+    RendererOptions { dithering: false, ..RendererOptions::default() }
 }
 
 /// A picture as egui wants it.

@@ -6,11 +6,11 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use egui::mutex::RwLock;
-use egui_wgpu::{Renderer, RendererOptions, ScreenDescriptor};
+use egui_wgpu::{Renderer, ScreenDescriptor};
 use wgpu::{Extent3d, TextureFormat, TextureUsages};
 
 use super::interface::Interface;
-use super::screen::{Screen, TextureCopies};
+use super::screen::{Screen, TextureCopies, renderer_options};
 use super::{App, Start, Wake, Wakes};
 use crate::error::{Error, Result};
 use crate::image::Rgb8;
@@ -203,8 +203,7 @@ impl Canvas {
             usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
             view_formats: &[],
         });
-        let options = RendererOptions { dithering: false, ..RendererOptions::default() };
-        let mut renderer = Renderer::new(&gpu.device, format, options);
+        let mut renderer = Renderer::new(&gpu.device, format, renderer_options());
         copies.upload(&gpu, &mut renderer);
         Self { gpu, renderer: Arc::new(RwLock::new(renderer)), target, copies }
     }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use egui::ViewportId;
 use egui_wgpu::winit::Painter;
-use egui_wgpu::{RendererOptions, WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
+use egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use winit::application::ApplicationHandler;
@@ -20,7 +20,7 @@ use winit::event_loop::{
 };
 use winit::window::{Window, WindowId};
 
-use super::screen::{Screen, TextureCopies};
+use super::screen::{Screen, TextureCopies, renderer_options};
 use super::{App, Start, Wake, Wakes, theme};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -42,6 +42,8 @@ enum Call {
 const REST: u32 = 19;
 /// But it rests no longer than this.
 const LONGEST_REST: Duration = Duration::from_millis(900);
+/// While a picture is made ready, figures go on in steps of this.
+const STATUS_GAP: Duration = Duration::from_millis(950);
 
 /// Losses of a device sooner after one another than this belong together.
 const LOSS_GAP: Duration = Duration::from_secs(10);
@@ -126,6 +128,8 @@ struct Running {
     copies: TextureCopies,
     /// When a device was lost last, and how many were in a row.
     lost: Option<(Instant, u32)>,
+    /// When the last frame was drawn.
+    drawn_at: Instant,
     /// When the next frame of what is new can be afforded.
     rested_at: Instant,
     app: App,
@@ -150,7 +154,7 @@ fn paint_on(
         }),
         ..WgpuConfiguration::default()
     };
-    let options = RendererOptions::default();
+    let options = renderer_options();
     let mut painter = pollster::block_on(Painter::new(context.clone(), config, false, options));
     pollster::block_on(painter.set_window(ViewportId::ROOT, Some(Arc::clone(window))))
         .map_err(|e| Error::new(e.to_string()))?;
@@ -213,6 +217,7 @@ impl Runner {
             painter: Some(painter),
             copies,
             lost: None,
+            drawn_at: Instant::now(),
             rested_at: Instant::now(),
             app,
             title: String::new(),
@@ -281,7 +286,8 @@ impl Running {
             self.window.set_title(&title);
             self.title = title;
         }
-        self.rested_at = Instant::now();
+        self.drawn_at = Instant::now();
+        self.rested_at = self.drawn_at;
         if self.app.screen().gpu().facts().is_software() {
             self.rested_at += (REST * start.elapsed()).min(LONGEST_REST);
         }
@@ -335,7 +341,7 @@ impl ApplicationHandler<Call> for Runner {
             Call::Repaint(at) => at,
             Call::Draw => running.rested_at,
             Call::Relay if running.app.relay(&running.context) => running.rested_at,
-            Call::Relay => return,
+            Call::Relay => running.rested_at.max(running.drawn_at + STATUS_GAP),
         };
         self.repaint_at = Some(self.repaint_at.map_or(at, |before| before.min(at)));
     }

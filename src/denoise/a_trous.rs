@@ -8,6 +8,7 @@
 //! then told by the guides of those around it ([`super::edges`]). Biased: for looking, not for measuring.
 
 use glam::Vec3;
+use pulp::Arch;
 use rayon::prelude::*;
 
 use super::edges;
@@ -152,6 +153,8 @@ fn share_errors(light: &mut Light, guides: &Guides, samples: &Samples<'_>) -> Ve
         };
         sums.into_iter().zip(own).map(told).collect::<Vec<_>>()
     };
+    let lanes = Arch::new();
+    let told = |y| lanes.dispatch(|| told(y));
     let (variance, support) = (0..guides.height).into_par_iter().flat_map(told).unzip();
     light.variance = variance;
     support
@@ -182,10 +185,14 @@ fn square(reach: isize) -> impl Iterator<Item = [isize; 2]> {
 fn filtered(light: &Light, guides: &Guides, step: isize) -> Light {
     let mut result = Light::black(light.luminance.len());
     let rows = result.rows(guides.width);
-    rows.into_par_iter().enumerate().for_each(|(y, row)| filter_row(light, guides, (y, row), step));
+    let lanes = Arch::new();
+    let filter = |row| lanes.dispatch(|| filter_row(light, guides, row, step));
+    rows.into_par_iter().enumerate().for_each(filter);
     result
 }
 
+/// In-lined, as is what it calls, into code for the widest lanes there are.
+#[inline(always)]
 fn filter_row(light: &Light, guides: &Guides, (y, mut row): (usize, Row<'_>), step: isize) {
     let width = guides.width;
     // Until the end the sum of weights.
@@ -232,6 +239,7 @@ fn filter_row(light: &Light, guides: &Guides, (y, mut row): (usize, Row<'_>), st
 impl Light {
     /// Multiplies each weight by how well the light fits that of the pixels from `there` on. It is the same for both
     /// of two pixels: what one gives the other gets.
+    #[inline(always)]
     fn compare(&self, [here, there]: [usize; 2], weights: &mut [f32]) {
         let at = ([here, there], weights.len());
         let planes = [&self.luminance, &self.variance];

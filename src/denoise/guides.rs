@@ -87,9 +87,6 @@ impl Guides {
         let [width, height] = [samples.film.width, samples.film.height].map(|side| side as usize);
         let of = |index| Guide::of(samples, index);
         let guides: Vec<Guide> = (0..width * height).into_par_iter().map(of).collect();
-        let plane = |value: &(dyn Fn(usize) -> f32 + Sync)| -> Vec<f32> {
-            (0..guides.len()).into_par_iter().map(value).collect()
-        };
         let doubt = |index: usize| {
             let is_single = samples.count(index) < 2;
             if is_single { spread_around(&guides, index, width) } else { guides[index].doubt }
@@ -98,17 +95,25 @@ impl Guides {
             let around = around(index, [width, height], 1).map(|(other, _)| guides[other].chance);
             around.fold(f32::INFINITY, f32::min)
         };
-        Self {
-            width,
-            height,
-            albedo: [0, 1, 2].map(|c| plane(&|i| guides[i].albedo[c])),
-            normal: [0, 1, 2].map(|c| plane(&|i| guides[i].normal[c])),
-            doubt: plane(&doubt),
-            coverage: plane(&|i| guides[i].coverage),
-            chance: plane(&chance),
-            nearness: plane(&|i| guides[i].nearness),
-            slope: plane(&|i| slope(&guides, i, width)),
-        }
+        let values = |index: usize| {
+            let Guide { albedo, normal, coverage, nearness, .. } = guides[index];
+            let ([r, g, b], [x, y, z]) = (albedo.to_array(), normal.to_array());
+            let (doubt, chance, slope) =
+                (doubt(index), chance(index), slope(&guides, index, width));
+            [r, g, b, x, y, z, doubt, coverage, chance, nearness, slope]
+        };
+        let mut planes: [Vec<f32>; 11] = std::array::from_fn(|_| vec![0.0; width * height]);
+        // Row by row, so that what is read once fills all of them.
+        rows(&mut planes, width).into_par_iter().enumerate().for_each(|(y, mut row)| {
+            for x in 0..width {
+                for (plane, value) in row.iter_mut().zip(values(y * width + x)) {
+                    plane[x] = value;
+                }
+            }
+        });
+        let [r, g, b, x, y, z, doubt, coverage, chance, nearness, slope] = planes;
+        let (albedo, normal) = ([r, g, b], [x, y, z]);
+        Self { width, height, albedo, normal, doubt, coverage, chance, nearness, slope }
     }
 
     /// That of a pixel.
@@ -136,6 +141,7 @@ impl Guides {
 
     /// How much pixels of a row belong to the surfaces of those `offset` columns and rows away, from 1 to 0: as many as
     /// `likeness` holds, from index `here` and, of the others, `there` on.
+    #[inline(always)]
     pub(super) fn compare(
         &self,
         [here, there]: [usize; 2],
@@ -172,12 +178,25 @@ impl Guides {
 }
 
 /// Tukey's biweight, 1 at 0 and 0 from 1 on: what is too far off does not count at all, and no exponential is taken.
+#[inline(always)]
 pub(super) fn falling(squared: f32) -> f32 {
     let rest = (1.0 - squared).max(0.0);
     rest * rest
 }
 
+/// The rows of planes, all planes' together.
+pub(super) fn rows<const N: usize>(
+    planes: &mut [Vec<f32>; N],
+    width: usize,
+) -> Vec<[&mut [f32]; N]> {
+    let height = planes[0].len() / width;
+    let mut rows = planes.each_mut().map(|plane| plane.chunks_exact_mut(width));
+    let next = |_| rows.each_mut().map(|rows| rows.next().expect("planes are alike"));
+    (0..height).map(next).collect()
+}
+
 /// So many values of a plane from both places on.
+#[inline(always)]
 pub(super) fn pairs(
     plane: &[f32],
     ([here, there], count): ([usize; 2], usize),

@@ -23,7 +23,7 @@ const FLOORS: [&[&str]; 14] = [
 ];
 
 /// Crates and where alone they are named: rooms, or parts of one. Any other is named anywhere.
-const CRATES: [(&str, &[&str]); 26] = [
+const CRATES: [(&str, &[&str]); 27] = [
     ("basisu", &["image/ktx2"]),
     ("bevy_mikktspace", &["scene/gltf/tangents"]),
     ("bitflags", &["features"]),
@@ -45,6 +45,7 @@ const CRATES: [(&str, &[&str]); 26] = [
     ("obvhs", &["bvh"]),
     ("png", &["image"]),
     ("pollster", &["app", "render/gpu"]),
+    ("pulp", &["denoise"]),
     ("rfd", &["app/execute"]),
     ("ruzstd", &["image/ktx2"]),
     ("signal_hook", &["app/window", "cli/interrupt"]),

@@ -90,8 +90,12 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
     let session = &snapshot.main;
     number(ui, &theme::samples(snapshot.mean_samples()), "samples", "Mean samples per pixel");
     if !hides_clock {
-        let seconds = snapshot.now.elapsed_seconds() + snapshot.calm_seconds;
-        number(ui, &theme::clock(seconds), "", "Learning and rendering, fast light included");
+        number(
+            ui,
+            &theme::clock(snapshot.seconds()),
+            "",
+            "Learning and rendering, fast light included",
+        );
         let rate = snapshot.now.rays as f64 / snapshot.now.render_seconds.max(1e-9);
         number(ui, &theme::figure(rate), "rays/s", "Rays, shadow rays included, while rendering");
     }

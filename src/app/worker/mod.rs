@@ -270,6 +270,11 @@ impl Snapshot {
         self.now.samples as f64 / self.main.film.pixels().len().max(1) as f64
     }
 
+    /// Seconds of learning and rendering, fast light included.
+    pub fn seconds(&self) -> f64 {
+        self.now.elapsed_seconds() + self.calm_seconds
+    }
+
     /// Whether the picture has its full size and every pixel a sample: it has not at first and while
     /// the camera moves.
     pub fn is_whole(&self) -> bool {
