@@ -299,6 +299,11 @@ impl App {
         format!("{} - lightgrid", self.document.scene)
     }
 
+    /// Seconds of work on what is shown.
+    pub(super) fn seconds(&self) -> f64 {
+        self.snapshot.as_ref().map_or(0.0, |snapshot| snapshot.seconds())
+    }
+
     fn panels(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
         let snapshot = self.snapshot.as_deref();
         if self.interface.panels {

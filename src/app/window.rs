@@ -40,8 +40,10 @@ enum Call {
 /// Where software draws, it rests so many times as long as a frame took before it draws again what is
 /// new: frames take the renderer's time.
 const REST: u32 = 19;
-/// But it rests no longer than this.
+/// But it rests no longer than this, and less in the first seconds of a view, of which there are few pictures.
 const LONGEST_REST: Duration = Duration::from_millis(900);
+/// So much of each second that a view has been worked on.
+const REST_OF_A_SECOND: f64 = 0.1;
 /// While a picture is made ready, figures go on in steps of this.
 const STATUS_GAP: Duration = Duration::from_millis(950);
 
@@ -130,8 +132,8 @@ struct Running {
     lost: Option<(Instant, u32)>,
     /// When the last frame was drawn.
     drawn_at: Instant,
-    /// When the next frame of what is new can be afforded.
-    rested_at: Instant,
+    /// For how long no other is to be, if it need not.
+    rest: Duration,
     app: App,
     title: String,
 }
@@ -218,7 +220,7 @@ impl Runner {
             copies,
             lost: None,
             drawn_at: Instant::now(),
-            rested_at: Instant::now(),
+            rest: Duration::ZERO,
             app,
             title: String::new(),
         })
@@ -287,11 +289,17 @@ impl Running {
             self.title = title;
         }
         self.drawn_at = Instant::now();
-        self.rested_at = self.drawn_at;
+        self.rest = Duration::ZERO;
         if self.app.screen().gpu().facts().is_software() {
-            self.rested_at += (REST * start.elapsed()).min(LONGEST_REST);
+            self.rest = (REST * start.elapsed()).min(LONGEST_REST);
         }
         Ok(())
+    }
+
+    /// When the next frame of what is new can be afforded.
+    fn rested_at(&self) -> Instant {
+        let longest = LONGEST_REST.as_secs_f64().min(REST_OF_A_SECOND * self.app.seconds());
+        self.drawn_at + self.rest.min(Duration::from_secs_f64(longest))
     }
 
     /// Opens a device anew; the application and what it shows stay as they are.
@@ -339,9 +347,9 @@ impl ApplicationHandler<Call> for Runner {
         let Some(running) = &mut self.running else { return };
         let at = match call {
             Call::Repaint(at) => at,
-            Call::Draw => running.rested_at,
-            Call::Relay if running.app.relay(&running.context) => running.rested_at,
-            Call::Relay => running.rested_at.max(running.drawn_at + STATUS_GAP),
+            Call::Draw => running.rested_at(),
+            Call::Relay if running.app.relay(&running.context) => running.rested_at(),
+            Call::Relay => running.rested_at().max(running.drawn_at + STATUS_GAP),
         };
         self.repaint_at = Some(self.repaint_at.map_or(at, |before| before.min(at)));
     }

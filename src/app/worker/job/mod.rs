@@ -133,7 +133,7 @@ impl<'a> Job<'a> {
             let wants_calm = self.is_calm(&main);
             if !wants_calm {
                 self.end_calm(&mut calm);
-            } else if calm.is_none() && !self.has_calm && main.phase() == Phase::Rendering {
+            } else if calm.is_none() && !self.has_calm && self.is_time_for_calm(&main) {
                 let view = View { gi: Gi::Cached, ..view.clone() };
                 calm = Some(self.experienced_session(world, environment, view));
             }
@@ -222,6 +222,12 @@ impl<'a> Job<'a> {
             && !self.request.split
             && !self.kept.device.is_quick(&self.request)
             && calm_worth(main.samples()) > 0.0
+    }
+
+    /// Where the cache is to be trained first, every pixel has its first exact sample before.
+    fn is_time_for_calm(&self, main: &Session<'_>) -> bool {
+        main.phase() == Phase::Rendering
+            && (main.samples() > 0 || self.kept.has_training_for(&self.request))
     }
 
     fn end_calm(&mut self, calm: &mut Option<Session<'_>>) {
