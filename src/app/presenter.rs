@@ -65,8 +65,8 @@ impl Order {
 }
 
 /// After a picture of work that goes on it rests so many times as long as that took: little at first, when each
-/// is much better than the last, and most after [`MOST_AFTER`]. With half of the cores it takes then a twenty-sixth of the
-/// machine, and in the first minute less than a tenth.
+/// is much better than the last, and most after [`MOST_AFTER`]. With half of the cores it then takes a
+/// twenty-sixth of the machine, and in the first minute less than a tenth.
 const REST: [f64; 2] = [3.0, 12.0];
 /// Seconds of work on a view after which pictures change slowly.
 const MOST_AFTER: f64 = 12.0;

@@ -12,7 +12,7 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use super::edges;
-use super::guides::{Guides, falling, pairs};
+use super::guides::{Guides, falling, pairs, rows};
 use super::samples::Samples;
 use crate::color::luminance;
 use crate::image::Image;
@@ -92,11 +92,9 @@ impl Light {
     }
 
     fn rows(&mut self, width: usize) -> Vec<Row<'_>> {
-        let [r, g, b] = self.rgb.each_mut().map(|plane| plane.chunks_mut(width));
-        let luminance = self.luminance.chunks_mut(width);
-        let variance = self.variance.chunks_mut(width);
-        let all = r.zip(g).zip(b).zip(luminance).zip(variance);
-        all.map(|((((r, g), b), luminance), variance)| Row { rgb: [r, g, b], luminance, variance })
+        let [r, g, b] = self.rgb.each_mut();
+        let all = rows([r, g, b, &mut self.luminance, &mut self.variance], width).into_iter();
+        all.map(|[r, g, b, luminance, variance]| Row { rgb: [r, g, b], luminance, variance })
             .collect()
     }
 }

@@ -104,7 +104,7 @@ impl Guides {
         };
         let mut planes: [Vec<f32>; 11] = std::array::from_fn(|_| vec![0.0; width * height]);
         // Row by row, so that what is read once fills all of them.
-        rows(&mut planes, width).into_par_iter().enumerate().for_each(|(y, mut row)| {
+        rows(planes.each_mut(), width).into_par_iter().enumerate().for_each(|(y, mut row)| {
             for x in 0..width {
                 for (plane, value) in row.iter_mut().zip(values(y * width + x)) {
                     plane[x] = value;
@@ -186,11 +186,11 @@ pub(super) fn falling(squared: f32) -> f32 {
 
 /// The rows of planes, all planes' together.
 pub(super) fn rows<const N: usize>(
-    planes: &mut [Vec<f32>; N],
+    planes: [&mut Vec<f32>; N],
     width: usize,
 ) -> Vec<[&mut [f32]; N]> {
     let height = planes[0].len() / width;
-    let mut rows = planes.each_mut().map(|plane| plane.chunks_exact_mut(width));
+    let mut rows = planes.map(|plane| plane.chunks_exact_mut(width));
     let next = |_| rows.each_mut().map(|rows| rows.next().expect("planes are alike"));
     (0..height).map(next).collect()
 }

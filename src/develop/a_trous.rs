@@ -106,36 +106,20 @@ impl Passes {
         dispatch(gpu, &mut commands, &self.undress, &entries, size);
         let entries = [entry(0, &one), entry(2, &film.counts), entry(4, &guides)];
         dispatch(gpu, &mut commands, &self.survey, &entries, size);
-        let entries = [
-            entry(0, &one),
-            entry(2, &film.counts),
-            entry(4, &guides),
-            entry(5, &light),
-            entry(6, &result),
-        ];
-        dispatch(gpu, &mut commands, &self.share_errors, &entries, size);
-        std::mem::swap(&mut light, &mut result);
-        let mut pass = |pipeline, settings: &wgpu::Buffer| {
-            let entries =
+        let mut pass = |pipeline, settings: &wgpu::Buffer, more: &[wgpu::BindGroupEntry<'_>]| {
+            let always =
                 [entry(0, settings), entry(4, &guides), entry(5, &light), entry(6, &result)];
-            dispatch(gpu, &mut commands, pipeline, &entries, size);
+            dispatch(gpu, &mut commands, pipeline, &[&always, more].concat(), size);
             std::mem::swap(&mut light, &mut result);
         };
+        pass(&self.share_errors, &one, &[entry(2, &film.counts)]);
         for step in STEPS {
-            pass(&self.smooth_light, &settings(step));
+            pass(&self.smooth_light, &settings(step), &[]);
         }
-        pass(&self.mend, &one);
-        let entries = [
-            entry(0, &one),
-            entry(2, &film.counts),
-            entry(4, &guides),
-            entry(5, &light),
-            entry(6, &result),
-            entry(7, &counts),
-        ];
-        dispatch(gpu, &mut commands, &self.dress, &entries, size);
+        pass(&self.mend, &one, &[]);
+        pass(&self.dress, &one, &[entry(2, &film.counts), entry(7, &counts)]);
         gpu.queue.submit([commands.finish()]);
         let [width, height] = size;
-        Some(DeviceFilm { sum: result, counts, surfaces: None, width, height, scale: 1.0 })
+        Some(DeviceFilm { sum: light, counts, surfaces: None, width, height, scale: 1.0 })
     }
 }
