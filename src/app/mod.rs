@@ -234,6 +234,11 @@ impl App {
         self.presenter.is_settled()
     }
 
+    /// Whether something lies over all else and has the keyboard.
+    pub fn is_modal(&self) -> bool {
+        self.interface.is_modal()
+    }
+
     /// The screen that is drawn on.
     pub fn screen(&self) -> &Screen {
         &self.screen
@@ -328,10 +333,10 @@ impl App {
             self.sides(ui, commands);
             self.dock(ui, commands);
         }
-        self.viewport(ui, commands);
+        let area = self.viewport(ui, commands);
         panels::prompt::show(ui.ctx(), &mut self.interface, &self.settings, commands);
         panels::shortcuts::show(ui.ctx(), &mut self.interface);
-        panels::messages::show(ui.ctx(), &mut self.messages);
+        panels::messages::show(ui.ctx(), area, &mut self.messages);
     }
 
     /// Stops in all, once it is known what the automatic ones are.
@@ -409,7 +414,7 @@ impl App {
         });
     }
 
-    fn viewport(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
+    fn viewport(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) -> egui::Rect {
         let settings = self.develop_settings();
         let mut scope = panels::scope::Scope {
             document: &mut self.document,
@@ -424,7 +429,7 @@ impl App {
             loading: self.loader.busy_with().next().is_some(),
             commands,
         };
-        panels::viewport::show(ui, &mut scope);
+        panels::viewport::show(ui, &mut scope)
     }
 
     /// Takes what the threads have ready.

@@ -13,6 +13,7 @@ use super::surface_map::SurfaceMap;
 use super::worker::{Activity, Backdrop, Request, SessionSnapshot, Snapshot};
 use crate::denoise::{Denoiser, blend};
 use crate::develop::{Developer, LinearPicture, OverlayTexture};
+use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::light_grid::LightGrid;
@@ -320,9 +321,17 @@ impl Prepared {
     }
 }
 
+/// The exposure of the last whole picture.
+struct Metered {
+    environment: Arc<Environment>,
+    white_balance: WhiteBalance,
+    ev: f32,
+}
+
 /// What can be used again for the next order.
 #[derive(Default)]
 struct Memory {
+    whole: Option<Metered>,
     surfaces: Option<(Arc<Request>, SurfaceMap)>,
     facts: Option<(Arc<LightGrid>, bool, Arc<CellFacts>)>,
     uploads: Uploads,
@@ -365,9 +374,19 @@ impl Memory {
         let Prepared { mut picture, image, mut failure } =
             self.uploads.picture.or_make(source.clone(), prepare)?;
         let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
+            if let Some(ev) = self.whole_ev(&order) {
+                return Ok(ev);
+            }
             let meter = || developer.auto_exposure_ev(&picture, white_balance);
             self.uploads.metered.or_make((source.clone(), white_balance), meter)
         })?;
+        if order.snapshot.request.view.crop.is_none() {
+            self.whole = order.metered.map(|white_balance| Metered {
+                environment: Arc::clone(&order.snapshot.request.environment),
+                white_balance,
+                ev: automatic_ev,
+            });
+        }
         let painted = order.overlay.map_or(Ok(None), |overlay| {
             let mut last = std::mem::take(&mut self.uploads.overlay);
             let look = order.look.map(|look| (look, automatic_ev));
@@ -407,6 +426,16 @@ impl Memory {
             failure,
             facts,
         })
+    }
+
+    /// The exposure a part of a picture has from the whole one it lies on: it does not become brighter or
+    /// darker because less is rendered. Under another map it is measured.
+    fn whole_ev(&self, order: &Order) -> Option<f32> {
+        let (request, whole) = (&order.snapshot.request, self.whole.as_ref()?);
+        request.view.crop?;
+        let is_alike = whole.environment.shares_map_with(&request.environment)
+            && Some(whole.white_balance) == order.metered;
+        is_alike.then_some(whole.ev)
     }
 
     /// Lets go of what the order does not ask for: each holds a film, or a scene.

@@ -4,6 +4,7 @@ use egui::{
     Align2, Color32, CornerRadius, FontId, Margin, Pos2, RichText, Shape, Stroke, TextStyle, Ui,
     Vec2, Visuals,
 };
+use glam::Vec3;
 
 /// Behind everything.
 pub(super) const BACKGROUND: Color32 = Color32::from_rgb(24, 25, 28);
@@ -161,6 +162,17 @@ pub(super) fn count(value: u64) -> String {
     if value < 10_000 { value.to_string() } else { figure(value as f64) }
 }
 
+/// A box's sides in metres, in the unit that suits the longest.
+pub(super) fn extent(size: Vec3) -> String {
+    let (factor, unit) = match size.max_element() {
+        ..1.0 => (100.0, "cm"),
+        ..10_000.0 => (1.0, "m"),
+        _ => (0.001, "km"),
+    };
+    let [x, y, z] = (size * factor).to_array();
+    format!("{x:.1} x {y:.1} x {z:.1} {unit}")
+}
+
 /// Bytes in the unit that suits.
 pub(super) fn bytes(count: usize) -> String {
     match count as f64 {
@@ -201,6 +213,9 @@ mod tests {
             assert_eq!(figure(value), text);
         }
         assert_eq!(figure(1_234_567.0), "1.23 M");
+        assert_eq!(extent(Vec3::new(6.5, 3.5, 12.0)), "6.5 x 3.5 x 12.0 m");
+        assert_eq!(extent(Vec3::new(0.2, 0.014, 0.0)), "20.0 x 1.4 x 0.0 cm");
+        assert_eq!(extent(Vec3::new(2e4, 1e3, 3e4)), "20.0 x 1.0 x 30.0 km");
         assert_eq!((bytes(10), bytes(3 << 20)), ("10 B".into(), "3.0 MB".into()));
         assert_eq!((clock(4.25), clock(187.0)), ("4.2 s".into(), "3:07".into()));
         assert_eq!(clock(3723.0), "1:02:03");

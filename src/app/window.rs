@@ -258,7 +258,12 @@ impl Running {
             self.replace_device(&loss)?;
         }
         let input = self.input.take_egui_input(&self.window);
+        let was_modal = self.app.is_modal();
         let mut output = self.context.run_ui(input, |ui| self.app.show(ui));
+        if self.app.is_modal() && !was_modal {
+            // Or a tooltip from before lies over the question until the pointer moves.
+            self.input.egui_input_mut().events.push(egui::Event::PointerGone);
+        }
         self.input.handle_platform_output(&self.window, output.platform_output);
         let points = output.pixels_per_point;
         let primitives = self.context.tessellate(output.shapes, points);

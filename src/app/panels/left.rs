@@ -95,14 +95,8 @@ fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut 
     commands.extend(chosen.map(Command::OpenScene));
     if let Some(scene) = sources.scene {
         let (low, high) = scene.world.bvh.bounds();
-        let size = high - low;
-        let text = format!(
-            "{} triangles, {:.1} x {:.1} x {:.1} m",
-            theme::count(scene.world.scene.shown_triangles()),
-            size.x,
-            size.y,
-            size.z
-        );
+        let triangles = theme::count(scene.world.scene.shown_triangles());
+        let text = format!("{triangles} triangles, {}", theme::extent(high - low));
         ui.label(theme::quiet(text)).on_hover_text(format!(
             "{} materials, {} textures; BVH {}",
             scene.world.scene.materials.len(),

@@ -1,12 +1,12 @@
 //! Messages over the picture.
 
-use egui::{Align2, Area, Color32, Context, Frame, Id, Margin, RichText, Stroke};
+use egui::{Align2, Area, Color32, Context, Frame, Id, Margin, Rect, RichText, Stroke, Vec2};
 
 use crate::app::messages::{Messages, NOTICE_SECONDS};
 use crate::app::theme;
 
-/// Draws the messages; errors stay until they are closed.
-pub(in crate::app) fn show(context: &Context, messages: &mut Messages) {
+/// Draws the messages at the foot of the picture's room; errors stay until they are closed.
+pub(in crate::app) fn show(context: &Context, room: Rect, messages: &mut Messages) {
     let now = context.time();
     messages.list().retain(|message| {
         message.is_error || message.since.is_none_or(|since| now - since < NOTICE_SECONDS)
@@ -15,7 +15,9 @@ pub(in crate::app) fn show(context: &Context, messages: &mut Messages) {
         return;
     }
     context.request_repaint_after(std::time::Duration::from_secs(1));
-    let area = Area::new(Id::unique("messages")).anchor(Align2::CENTER_BOTTOM, [0.0, -44.0]);
+    let foot = room.center_bottom() - Vec2::new(0.0, 12.0);
+    let area = Area::new(Id::unique("messages")).pivot(Align2::CENTER_BOTTOM).fixed_pos(foot);
+    let width = (room.width() - 60.0).clamp(160.0, 620.0);
     area.show(context, |ui| {
         let mut closed = None;
         for (i, message) in messages.list().iter_mut().enumerate() {
@@ -28,7 +30,7 @@ pub(in crate::app) fn show(context: &Context, messages: &mut Messages) {
                 .corner_radius(6)
                 .inner_margin(Margin::symmetric(12, 7))
                 .show(ui, |ui| {
-                    ui.set_max_width(620.0);
+                    ui.set_max_width(width);
                     ui.horizontal_wrapped(|ui| {
                         ui.label(RichText::new(&message.sentence).color(color));
                         if ui.small_button("×").clicked() {

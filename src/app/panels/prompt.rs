@@ -1,5 +1,6 @@
 //! Asking for a path: typed, pasted, recent, or from the system's dialogue.
 
+use egui::text::{CCursor, CCursorRange};
 use egui::{Context, Id, Key, Modal, RichText, TextEdit};
 
 use crate::app::commands::Command;
@@ -43,13 +44,17 @@ pub(in crate::app) fn show(
         ui.set_width(520.0);
         ui.label(RichText::new(title).heading());
         ui.add_space(4.0);
-        let field = ui.add(
-            TextEdit::singleline(&mut prompt.path).hint_text(hint).desired_width(f32::INFINITY),
-        );
+        let field = TextEdit::singleline(&mut prompt.path);
+        let mut field = field.hint_text(hint).desired_width(f32::INFINITY).show(ui);
         if !prompt.is_focused {
-            field.request_focus();
+            field.response.request_focus();
             prompt.is_focused = true;
+            // Whoever types means another name.
+            let end = CCursor::new(prompt.path.chars().count());
+            field.state.cursor.set_char_range(Some(CCursorRange::two(CCursor::new(0), end)));
+            field.state.store(ui.ctx(), field.response.id);
         }
+        let field = field.response;
         if field.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
             is_done = true;
             // Enter takes the keyboard away; without a path there is nothing to be done yet.

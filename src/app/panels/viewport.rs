@@ -16,10 +16,10 @@ use crate::app::worker::{Activity, SessionSnapshot, Snapshot};
 use crate::develop::{DevelopSettings, LinearPicture};
 use crate::render::View;
 
-/// Draws the picture and takes gestures.
-pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
+/// Draws the picture and takes gestures; the room it has.
+pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
     let frame = egui::Frame::new().fill(theme::BACKGROUND);
-    CentralPanel::default().frame(frame).show(ui, |ui| {
+    let panel = CentralPanel::default().frame(frame).show(ui, |ui| {
         let area = ui.max_rect();
         measure(ui, area, scope);
         let response = ui.interact(area, ui.scope_id().with("picture"), Sense::click_and_drag());
@@ -54,6 +54,28 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) {
         gestures::show(ui, (whole, rect), &response, handle, scope);
         pin(ui, rect, scope.interface);
     });
+    let area = panel.response.rect;
+    what_would_open(ui, area);
+    area
+}
+
+/// What happens if the files that are held over the window are let go.
+fn what_would_open(ui: &Ui, area: Rect) {
+    let name = |file: &egui::HoveredFile| {
+        file.path.as_ref()?.file_name().map(|name| name.to_string_lossy().into_owned())
+    };
+    let names =
+        ui.input(|input| input.raw.hovered_files.iter().filter_map(name).collect::<Vec<_>>());
+    if names.is_empty() {
+        return;
+    }
+    let painter = ui.painter();
+    painter.rect_filled(area, 0.0, Color32::from_black_alpha(150));
+    let edge = Stroke::new(2.0, theme::ACCENT);
+    painter.rect_stroke(area.shrink(8.0), 6.0, edge, StrokeKind::Inside);
+    let text = format!("Drop to open {}", names.join(" and "));
+    let font = FontId::proportional(18.0);
+    painter.text(area.center(), Align2::CENTER_CENTER, text, font, theme::TEXT);
 }
 
 /// Notes how large a picture may be. A panel that opens leaves it as it is: it would begin anew, and
