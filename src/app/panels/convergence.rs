@@ -42,7 +42,7 @@ pub(in crate::app) fn show(
     }
     Plot::new("convergence")
         // Errors fall: there is room below their beginning.
-        .legend(Legend::default().position(Corner::LeftBottom))
+        .legend(Legend::default().position(Corner::RightTop))
         .height((ui.available_height() - 4.0).max(90.0))
         .allow_scroll(false)
         .show_grid(Vec2b::TRUE)

@@ -37,24 +37,28 @@ impl Device {
         Self { adapter, rays, screen, choice: None, gpu: None, uploaded: None, failure: None }
     }
 
-    /// Whether [`Self::place`] may take long.
+    /// Chooses the device that the request names, which may be none but the CPU.
+    pub(super) fn choose_for(&mut self, request: &Request) {
+        if self.choice != Some(request.device) {
+            self.choose(request.device);
+        }
+    }
+
+    /// Whether a GPU was chosen that has to be prepared for it, which takes long.
     pub(super) fn needs_preparation(&self, request: &Request) -> bool {
         let is_uploaded =
             self.uploaded.as_ref().is_some_and(|on| Arc::ptr_eq(&on.world, &request.world));
-        self.choice != Some(request.device) || (self.gpu.is_some() && !is_uploaded)
+        self.gpu.is_some() && !is_uploaded
     }
 
     /// Whether a GPU is ready that has all first samples in a moment; software has not.
     pub(super) fn is_quick(&self, request: &Request) -> bool {
         let is_real = self.gpu.as_ref().is_some_and(|gpu| !gpu.facts().is_software());
-        is_real && !self.needs_preparation(request)
+        is_real && self.choice == Some(request.device) && !self.needs_preparation(request)
     }
 
-    /// Lets the session run where the request says; what it has so far is kept.
+    /// Lets the session run on the device that was chosen; what it has so far is kept.
     pub(super) fn place(&mut self, session: &mut Session<'_>, request: &Request) {
-        if self.choice != Some(request.device) {
-            self.choose(request.device);
-        }
         let Some(gpu) = self.gpu.clone() else {
             session.continue_on_cpu();
             return;

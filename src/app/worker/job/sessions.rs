@@ -131,8 +131,8 @@ impl Job<'_> {
             session.continue_on_cpu();
             return;
         }
-        let is_long = self.kept.device.needs_preparation(&self.request);
-        if is_long {
+        self.kept.device.choose_for(&self.request);
+        if self.kept.device.needs_preparation(&self.request) {
             self.shared.is_preparing.store(true, Ordering::Relaxed);
             (self.shared.wake)();
             // The other device's speed says nothing.
