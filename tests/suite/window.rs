@@ -5,6 +5,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use lightgrid::image::read_picture;
+use lightgrid::tone::auto_exposure_ev;
 
 /// An X server without a screen, and a window of ours in it.
 struct Desk {
@@ -186,6 +187,17 @@ impl Desk {
         self.wait_for(name, || path.exists().then(|| read_picture(&path).expect("a picture")))
     }
 
+    /// Stops that a saved `.png` was developed with.
+    fn exposure_ev(&self, name: &str) -> f32 {
+        let bytes = std::fs::read(self.path(name)).expect("a picture");
+        let text = String::from_utf8_lossy(&bytes);
+        let (_, said) = text.split_once("lightgrid.exposure_ev\0").expect("the stops");
+        let said = said.trim_start_matches('\0');
+        let is_number = |c: char| c.is_ascii_digit() || "+-.".contains(c);
+        let end = said.find(|c| !is_number(c)).expect("an end");
+        said[..end].parse().expect("a number")
+    }
+
     /// What a picture's file says of a key.
     fn metadata(&self, name: &str, key: &str) -> Option<String> {
         let metadata = lightgrid::image::read_exr_metadata(&self.path(name)).expect("metadata");
@@ -245,6 +257,13 @@ fn a_real_window_moves_opens_saves_and_remembers() {
         std::fs::remove_file(desk.path("part.exr")).expect("removed");
         (part.width < 60 && part.height < 50).then_some(())
     });
+    // It is as bright as it was in the whole, whatever it would need by itself.
+    let whole_ev = auto_exposure_ev(&first);
+    let part = desk.save("part.exr");
+    desk.save("part.png");
+    let (own_ev, shown_ev) = (auto_exposure_ev(&part), desk.exposure_ev("part.png"));
+    assert!((own_ev - whole_ev).abs() > 0.3, "a part like the whole: {own_ev} {whole_ev}");
+    assert!((shown_ev - whole_ev).abs() < 0.2, "{shown_ev} in place of {whole_ev}");
     desk.xdotool("key x");
 
     // Another scene.
