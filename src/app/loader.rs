@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use super::Wake;
+use super::document::Document;
 use crate::environment::landmarks::{Sun, equal_energy_tiles};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{Error, Notices, Result};
@@ -94,28 +95,32 @@ pub struct Loader {
 }
 
 impl Loader {
-    /// `wake` is called when something has been loaded.
-    pub fn new(wake: Wake, options: SceneOptions) -> Self {
+    /// Begins with what a window is opened with; `wake` is called when something has been loaded.
+    pub fn start(document: &Document, options: SceneOptions, wake: Wake) -> Self {
         let (sender, receiver) = channel();
-        Self { sender, receiver, wake, in_flight: [None, None], options, turns: Default::default() }
+        let (in_flight, turns) = ([None, None], Default::default());
+        let mut loader = Self { sender, receiver, wake, in_flight, options, turns };
+        loader.load_scene(&document.scene);
+        loader.load_map(&document.map, document.sun);
+        loader
     }
 
     /// Starts to load a scene unless it is being loaded.
     pub fn load_scene(&mut self, name: &str) {
         let options = self.options.clone();
-        self.start(0, name, move |name| Loaded::Scene(name.to_owned(), load_scene(name, &options)));
+        self.spawn(0, name, move |name| Loaded::Scene(name.to_owned(), load_scene(name, &options)));
     }
 
     /// Starts to change the materials of a scene that is there, unless something is being done to it.
     pub fn edit_scene(&mut self, scene: &LoadedScene, edits: &BTreeMap<u32, MaterialEdit>) {
         let (scene, edits) = (scene.clone(), edits.clone());
         let name = scene.name.clone();
-        self.start(0, &name, move |name| Loaded::Edited(name.to_owned(), scene.edited(edits)));
+        self.spawn(0, &name, move |name| Loaded::Edited(name.to_owned(), scene.edited(edits)));
     }
 
     /// Starts to load a map unless it is being loaded.
     pub fn load_map(&mut self, name: &str, sun_factor: f32) {
-        self.start(1, name, move |name| Loaded::Map(name.to_owned(), load_map(name, sun_factor)));
+        self.spawn(1, name, move |name| Loaded::Map(name.to_owned(), load_map(name, sun_factor)));
     }
 
     /// What is being loaded.
@@ -139,7 +144,7 @@ impl Loader {
         results
     }
 
-    fn start(
+    fn spawn(
         &mut self,
         kind: usize,
         name: &str,

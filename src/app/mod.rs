@@ -155,12 +155,13 @@ enum Later {
 }
 
 impl App {
-    /// Starts the threads, which call `wakes`.
+    /// Starts the threads, which call `wakes`, but for the loader's, which is at work.
     ///
     /// # Errors
     /// If the system gives no threads.
     pub fn new(
         start: Start,
+        loader: Loader,
         screen: Screen,
         context: &egui::Context,
         wakes: Wakes,
@@ -191,7 +192,7 @@ impl App {
             history,
             convergence: Convergence::default(),
             inspector: Inspector::new(wake.clone()),
-            loader: Loader::new(wake.clone(), start.of_scene.clone()),
+            loader,
             worker: Worker::start(relay, (start.adapter, start.rays), screen.gpu().clone())?,
             presenter: Presenter::start(wake.clone())?,
             scene: None,

@@ -57,11 +57,13 @@ impl PartialEq for Order {
 }
 
 impl Order {
-    /// Whether it asks for the same of a later picture of the same work, which may wait.
+    /// Whether it asks for the same of a later picture of the same work, which may wait; the first one with a
+    /// sample in every pixel does not.
     fn only_follows(&self, before: &Self) -> bool {
         let is_over = matches!(self.snapshot.activity, Activity::Done | Activity::Paused);
+        let is_first = self.snapshot.is_whole() && !before.snapshot.is_whole();
         let snapshot = Arc::clone(&before.snapshot);
-        !is_over && Self { snapshot, ..self.clone() } == *before
+        !is_over && !is_first && Self { snapshot, ..self.clone() } == *before
     }
 }
 

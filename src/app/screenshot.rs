@@ -10,6 +10,7 @@ use egui_wgpu::{Renderer, ScreenDescriptor};
 use wgpu::{Extent3d, TextureFormat, TextureUsages};
 
 use super::interface::Interface;
+use super::loader::Loader;
 use super::screen::{Screen, TextureCopies, renderer_options};
 use super::{App, Start, Wake, Wakes};
 use crate::error::{Error, Result};
@@ -66,7 +67,8 @@ impl Studio {
         });
         let start = Start { is_repeatable: true, ..shot.start };
         let wakes = Wakes { draw: wake.clone(), relay: wake };
-        let app = App::new(start, screen, &context, wakes)?;
+        let loader = Loader::start(&start.document, start.of_scene.clone(), wakes.draw.clone());
+        let app = App::new(start, loader, screen, &context, wakes)?;
         let deadline = Instant::now() + shot.patience;
         Ok(Self { app, context, canvas, news, deadline, patience: shot.patience, time: 0.0 })
     }

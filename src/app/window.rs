@@ -20,6 +20,7 @@ use winit::event_loop::{
 };
 use winit::window::{Window, WindowId};
 
+use super::loader::Loader;
 use super::screen::{Screen, TextureCopies, renderer_options};
 use super::{App, Start, Wake, Wakes, theme};
 use crate::error::{Error, Result};
@@ -44,6 +45,10 @@ const REST: u32 = 19;
 const LONGEST_REST: Duration = Duration::from_millis(900);
 /// So much of each second that a view has been worked on.
 const REST_OF_A_SECOND: f64 = 0.1;
+/// And never less, unless a hand has been at the window: new widgets ask for frame after frame.
+const LEAST_REST: Duration = Duration::from_millis(150);
+/// For how long after that all is drawn at once.
+const TOUCH: Duration = Duration::from_millis(500);
 /// While a picture is made ready, figures go on in steps of this.
 const STATUS_GAP: Duration = Duration::from_millis(950);
 
@@ -134,6 +139,8 @@ struct Running {
     drawn_at: Instant,
     /// For how long no other is to be, if it need not.
     rest: Duration,
+    /// When a person did something last.
+    touched_at: Option<Instant>,
     app: App,
     title: String,
 }
@@ -181,6 +188,16 @@ impl Runner {
             .with_min_inner_size(LogicalSize::new(720.0, 480.0))
             .with_inner_size(LogicalSize::new(width.max(720.0), height.max(480.0)));
         let window = Arc::new(event_loop.create_window(attributes).map_err(|e| cannot(&e))?);
+        let wake = |call: Call| -> Wake {
+            let proxy = self.proxy.clone();
+            Arc::new(move || {
+                // The event loop may have ended meanwhile.
+                let _ = proxy.send_event(call);
+            })
+        };
+        let wakes = Wakes { draw: wake(Call::Draw), relay: wake(Call::Relay) };
+        // Devices take as long to open as files to be read.
+        let loader = Loader::start(&start.document, start.of_scene.clone(), wakes.draw.clone());
         let context = egui::Context::default();
         let proxy = self.proxy.clone();
         context.set_request_repaint_callback(move |info| {
@@ -200,15 +217,7 @@ impl Runner {
             None,
             Some(screen.gpu().limits.max_texture_dimension_2d as usize),
         );
-        let wake = |call: Call| -> Wake {
-            let proxy = self.proxy.clone();
-            Arc::new(move || {
-                // The event loop may have ended meanwhile.
-                let _ = proxy.send_event(call);
-            })
-        };
-        let wakes = Wakes { draw: wake(Call::Draw), relay: wake(Call::Relay) };
-        let mut app = App::new(start, screen, &context, wakes)?;
+        let mut app = App::new(start, loader, screen, &context, wakes)?;
         self.notices.drain(..).for_each(|sentence| app.say(sentence));
         Ok(Running {
             window,
@@ -220,6 +229,7 @@ impl Runner {
             copies,
             lost: None,
             drawn_at: Instant::now(),
+            touched_at: None,
             rest: Duration::ZERO,
             app,
             title: String::new(),
@@ -304,7 +314,14 @@ impl Running {
     /// When the next frame of what is new can be afforded.
     fn rested_at(&self) -> Instant {
         let longest = LONGEST_REST.as_secs_f64().min(REST_OF_A_SECOND * self.app.seconds());
-        self.drawn_at + self.rest.min(Duration::from_secs_f64(longest))
+        self.least_rested_at().max(self.drawn_at + self.rest.min(Duration::from_secs_f64(longest)))
+    }
+
+    /// When the next frame of whatever can be afforded.
+    fn least_rested_at(&self) -> Instant {
+        let is_touched = self.touched_at.is_some_and(|at| at.elapsed() < TOUCH)
+            || self.context.egui_is_using_pointer();
+        self.drawn_at + self.rest.min(if is_touched { Duration::ZERO } else { LEAST_REST })
     }
 
     /// Opens a device anew; the application and what it shows stay as they are.
@@ -351,7 +368,7 @@ impl ApplicationHandler<Call> for Runner {
         }
         let Some(running) = &mut self.running else { return };
         let at = match call {
-            Call::Repaint(at) => at,
+            Call::Repaint(at) => at.max(running.least_rested_at()),
             Call::Draw => running.rested_at(),
             Call::Relay if running.app.relay(&running.context) => running.rested_at(),
             Call::Relay => running.rested_at().max(running.drawn_at + STATUS_GAP),
@@ -382,6 +399,10 @@ impl ApplicationHandler<Call> for Runner {
                     painter.on_window_resized(ViewportId::ROOT, width, height);
                 }
             }
+            WindowEvent::KeyboardInput { .. }
+            | WindowEvent::MouseInput { .. }
+            | WindowEvent::MouseWheel { .. }
+            | WindowEvent::Touch(_) => running.touched_at = Some(Instant::now()),
             _ => {}
         }
         if running.input.on_window_event(&running.window, &event).repaint {

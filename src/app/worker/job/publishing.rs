@@ -210,7 +210,11 @@ impl Job<'_> {
     ) -> (SessionSnapshot, Duration) {
         let in_place = self.in_place(session);
         let is_in_place = in_place.is_some();
-        let kept = self.reading(role, in_place.as_ref(), rests).filter(|_| !is_final).cloned();
+        // The first picture with a sample in every pixel is shown at once.
+        let is_due = session.samples() > 0
+            && self.readings[role].as_ref().is_some_and(|reading| reading.samples == 0);
+        let kept =
+            self.reading(role, in_place.as_ref(), rests && !is_due).filter(|_| !is_final).cloned();
         let (reading, cost) = match kept {
             Some(reading) => (reading, Duration::ZERO),
             None => {
