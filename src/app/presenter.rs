@@ -62,8 +62,10 @@ impl Order {
     fn only_follows(&self, before: &Self) -> bool {
         let is_over = matches!(self.snapshot.activity, Activity::Done | Activity::Paused);
         let is_first = self.snapshot.is_whole() && !before.snapshot.is_whole();
+        let (request, old) = (&self.snapshot.request, &before.snapshot.request);
+        let is_same_work = Arc::ptr_eq(request, old) || (request.moving && old.moving);
         let snapshot = Arc::clone(&before.snapshot);
-        !is_over && !is_first && Self { snapshot, ..self.clone() } == *before
+        is_same_work && !is_over && !is_first && Self { snapshot, ..self.clone() } == *before
     }
 }
 
@@ -598,6 +600,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
+    use crate::app::worker::tests::{request_of, snapshot_of};
     use crate::denoise::quick;
     use crate::path::{FirstHit, PathResult};
     use crate::render::{Figures, Sampling};
@@ -642,6 +645,35 @@ mod tests {
             }
         }
         film
+    }
+
+    #[test]
+    fn a_movement_does_not_wait_for_the_picture_before_it() {
+        let developer = match Gpu::open(None).and_then(|gpu| Developer::new(&gpu)) {
+            Ok(developer) => Arc::new(developer),
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let still = Arc::new(request_of("open", [12, 8]));
+        let order = |request: &Arc<Request>, samples| Order {
+            developer: Arc::clone(&developer),
+            snapshot: Arc::new(snapshot_of(
+                request,
+                SessionSnapshot { samples, ..session(film(12, 1, 1)) },
+            )),
+            denoiser: None,
+            metered: None,
+            overlay: None,
+            look: None,
+            tile: None,
+            compared: None,
+        };
+        let [moving, later] =
+            [(); 2].map(|()| Arc::new(Request { moving: true, ..(*still).clone() }));
+        assert!(order(&still, 2).only_follows(&order(&still, 1)), "more of the same");
+        assert!(!order(&still, 1).only_follows(&order(&still, 0)), "the first with all pixels");
+        assert!(!order(&moving, 1).only_follows(&order(&still, 1)), "off it goes");
+        assert!(order(&later, 1).only_follows(&order(&moving, 1)), "on it goes");
+        assert!(!order(&still, 1).only_follows(&order(&later, 1)), "there it stays");
     }
 
     #[test]

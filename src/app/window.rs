@@ -45,9 +45,10 @@ const REST: u32 = 19;
 const LONGEST_REST: Duration = Duration::from_millis(900);
 /// So much of each second that a view has been worked on.
 const REST_OF_A_SECOND: f64 = 0.1;
-/// And never less, unless a hand has been at the window: new widgets ask for frame after frame.
+/// And never less, for new widgets ask for frame after frame, unless a hand has been at the window: then as long
+/// as a frame takes.
 const LEAST_REST: Duration = Duration::from_millis(150);
-/// For how long after that all is drawn at once.
+/// For how long after that.
 const TOUCH: Duration = Duration::from_millis(500);
 /// While a picture is made ready, figures go on in steps of this.
 const STATUS_GAP: Duration = Duration::from_millis(950);
@@ -236,6 +237,11 @@ impl Runner {
         })
     }
 
+    /// Has a frame drawn at this time, or before.
+    fn repaint(&mut self, at: Instant) {
+        self.repaint_at = Some(self.repaint_at.map_or(at, |before| before.min(at)));
+    }
+
     fn close(&mut self, event_loop: &ActiveEventLoop) {
         if let Some(running) = &self.running {
             // A GPU that is being made ready cannot be stopped; nobody has to look at that.
@@ -321,7 +327,7 @@ impl Running {
     fn least_rested_at(&self) -> Instant {
         let is_touched = self.touched_at.is_some_and(|at| at.elapsed() < TOUCH)
             || self.context.egui_is_using_pointer();
-        self.drawn_at + self.rest.min(if is_touched { Duration::ZERO } else { LEAST_REST })
+        self.drawn_at + self.rest.min(if is_touched { self.rest / REST } else { LEAST_REST })
     }
 
     /// Opens a device anew; the application and what it shows stay as they are.
@@ -373,7 +379,7 @@ impl ApplicationHandler<Call> for Runner {
             Call::Relay if running.app.relay(&running.context) => running.rested_at(),
             Call::Relay => running.rested_at().max(running.drawn_at + STATUS_GAP),
         };
-        self.repaint_at = Some(self.repaint_at.map_or(at, |before| before.min(at)));
+        self.repaint(at);
     }
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
@@ -406,7 +412,8 @@ impl ApplicationHandler<Call> for Runner {
             _ => {}
         }
         if running.input.on_window_event(&running.window, &event).repaint {
-            running.window.request_redraw();
+            let at = running.least_rested_at();
+            self.repaint(at);
         }
     }
 

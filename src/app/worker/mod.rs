@@ -74,6 +74,15 @@ impl Request {
             || self.run != new.run
     }
 
+    /// Whether `new` is only the next moment of a movement, for which a picture of this one is worth to be seen:
+    /// were each ended by the next, none would be seen before the movement ends.
+    fn is_followed_by(&self, new: &Self) -> bool {
+        self.moving
+            && new.moving
+            && Arc::ptr_eq(&self.world, &new.world)
+            && self.environment.shares_map_with(&new.environment)
+    }
+
     /// Whether the same light falls on the same scene, whatever its surfaces make of it.
     fn is_lit_like(&self, other: &Self) -> bool {
         self.world.is_seen_through_like(&other.world)
@@ -363,7 +372,8 @@ impl Worker {
         if slot.request.as_ref().is_some_and(|old| old.is_same(&request)) {
             return;
         }
-        if slot.request.as_ref().is_some_and(|old| old.restarts(&request)) {
+        let ends = |old: &Arc<Request>| old.restarts(&request) && !old.is_followed_by(&request);
+        if slot.request.as_ref().is_some_and(ends) {
             self.shared.cancel.store(true, Ordering::Relaxed);
         }
         slot.request = Some(Arc::new(request));
@@ -457,7 +467,7 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: (Option<String>, Ray
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::environment::{EnvironmentOptions, sky};
     use crate::scene::builtin;
@@ -486,8 +496,26 @@ mod tests {
         }
     }
 
+    /// What is there of a session's picture.
+    pub(in crate::app) fn snapshot_of(request: &Arc<Request>, main: SessionSnapshot) -> Snapshot {
+        Snapshot {
+            number: main.figures.samples,
+            request: Arc::clone(request),
+            activity: Activity::Rendering,
+            now: main.figures,
+            main,
+            plain: None,
+            counters: None,
+            cache: Err(NoCache::Unasked),
+            curves: [Vec::new(), Vec::new()],
+            backdrop: None,
+            calm_seconds: 0.0,
+            rest: Arc::new(Rest::new()),
+        }
+    }
+
     /// The same for a built-in scene under a soft sky.
-    fn request_of(scene: &str, size: [u32; 2]) -> Request {
+    pub(in crate::app) fn request_of(scene: &str, size: [u32; 2]) -> Request {
         let map = sky::build("overcast", 64, 32).expect("a sky");
         let environment = Environment::new(map, &EnvironmentOptions::default());
         let world = World::new(builtin::build(scene).expect("built in"));
@@ -537,6 +565,31 @@ mod tests {
         assert!(after.now.learned_cells > 0);
         let open = changed(&|material| material.transmission = 0.9);
         assert!(done(&open).now.learning_paths > 0, "more light comes in");
+    }
+
+    #[test]
+    fn a_movement_is_seen_while_it_goes_on() {
+        let gpu = match Gpu::open(None) {
+            Ok(gpu) => gpu,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let worker = Worker::start(Arc::new(|| ()), (None, RayChoice::default()), gpu)
+            .expect("threads can be had");
+        let mut request = Request { moving: true, ..request_of("office", [640, 480]) };
+        let (start, mut seen) = (Instant::now(), std::collections::BTreeSet::new());
+        while seen.len() < 3 {
+            assert!(start.elapsed() < Duration::from_secs(120), "pictures are ended by the next");
+            request.view.camera.world_from_camera.translation.x += 1e-4;
+            worker.submit(request.clone());
+            std::thread::sleep(Duration::from_millis(2));
+            seen.extend(worker.snapshot().map(|snapshot| {
+                assert_eq!(snapshot.activity, Activity::Moving);
+                snapshot.number
+            }));
+        }
+        // Something else is not kept waiting, and nothing else is shown for it.
+        assert!(!request.is_followed_by(&request_of("office", [640, 480])));
+        assert!(!request.is_followed_by(&Request { moving: false, ..request.clone() }));
     }
 
     #[test]

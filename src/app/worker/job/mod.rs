@@ -98,7 +98,7 @@ impl<'a> Job<'a> {
             // The first pass is never cut short: some picture is better than none.
             let cut = session.samples() > 0;
             self.advance(&mut session, None, cut);
-            if session.samples() == 0 || self.is_superseded() {
+            if session.samples() == 0 || self.is_elsewhere() {
                 break;
             }
             self.measure(&session);
@@ -300,6 +300,14 @@ impl<'a> Job<'a> {
     fn is_superseded(&self) -> bool {
         let slot = lock(&self.shared.slot);
         slot.quit || slot.request.as_ref().is_some_and(|new| self.request.restarts(new))
+    }
+
+    /// Whether something else is asked for than the next moment of a movement.
+    fn is_elsewhere(&self) -> bool {
+        let slot = lock(&self.shared.slot);
+        let is_elsewhere =
+            |new: &Arc<Request>| self.request.restarts(new) && !self.request.is_followed_by(new);
+        slot.quit || slot.request.as_ref().is_some_and(is_elsewhere)
     }
 
     /// Waits until something else is asked for.
