@@ -8,9 +8,7 @@
 //! that draws it. [`window`] shows it on a display, [`screenshot`] in a texture without one.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
-
-use glam::Vec2;
+use std::sync::{Arc, Mutex};
 
 mod album;
 pub mod commands;
@@ -18,6 +16,7 @@ mod comparison;
 pub mod convergence;
 pub mod document;
 pub mod drag;
+mod exchange;
 mod execute;
 pub mod history;
 mod inspect;
@@ -40,29 +39,26 @@ mod undo;
 pub mod window;
 pub mod worker;
 
-use crate::denoise::Denoiser;
 use crate::develop::DevelopSettings;
-use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::path::framing;
-use crate::render::gpu::{DeviceChoice, RayChoice};
+use crate::render::gpu::RayChoice;
 
 use commands::Command;
-use comparison::Comparison;
 use convergence::Convergence;
-use document::{Document, PictureSize, Viewpoint};
+use document::Document;
+use exchange::Lit;
 use history::History;
 use inspect::Inspector;
-use interface::{Chosen, Interface};
+use interface::Interface;
 use kept_picture::KeptPicture;
-use loader::{Loaded, LoadedMap, LoadedScene, Loader};
+use loader::{LoadedMap, LoadedScene, Loader};
 use messages::Messages;
-use presenter::{Order, Presenter, Shown};
+use presenter::{Presenter, Shown};
 use screen::Screen;
 use settings_file::Settings;
 use speed_up::SpeedUp;
 use undo::Undo;
-use worker::{Activity, Reference, Request, Snapshot, Worker};
+use worker::{Activity, Reference, Snapshot, Worker};
 
 /// Called from any thread when there is something new.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
@@ -132,14 +128,6 @@ pub struct App {
     waiting_save: Option<std::path::PathBuf>,
     is_repeatable: bool,
     is_closing: bool,
-}
-
-/// An environment and what it was made from.
-struct Lit {
-    map: Arc<Environment>,
-    rotation_degrees: f32,
-    intensity: f32,
-    environment: Arc<Environment>,
 }
 
 /// What comes back from a thread.
@@ -432,252 +420,4 @@ impl App {
         };
         panels::viewport::show(ui, &mut scope)
     }
-
-    /// Takes what the threads have ready.
-    fn collect(&mut self, context: &egui::Context) {
-        for loaded in self.loader.take() {
-            match loaded {
-                Loaded::Scene(_, Ok(scene)) => self.take_scene(scene),
-                Loaded::Edited(_, Ok(scene)) => {
-                    self.scene = Some(scene);
-                    self.inspector.forget();
-                }
-                Loaded::Edited(_, Err(error)) => {
-                    self.messages.error(error.to_string());
-                    self.document.materials =
-                        self.scene.as_ref().map(|scene| scene.edits.clone()).unwrap_or_default();
-                }
-                Loaded::Map(_, Ok(map)) => {
-                    if self.map.as_ref().is_none_or(|old| old.name != map.name) {
-                        map.notices.iter().for_each(|sentence| self.messages.notice(sentence));
-                    }
-                    self.settings.recent_map(&map.name);
-                    self.map = Some(map);
-                }
-                // What is shown stays, and the document says so again.
-                Loaded::Scene(_, Err(error)) => {
-                    self.messages.error(error.to_string());
-                    self.save_nothing();
-                    self.stay_in_scene();
-                }
-                Loaded::Map(_, Err(error)) => {
-                    self.messages.error(error.to_string());
-                    self.save_nothing();
-                    let Document { map, sun, .. } = Document::default();
-                    (self.document.map, self.document.sun) = match &self.map {
-                        Some(map) => (map.name.clone(), map.sun_factor),
-                        // At the start there is none: the built-in one is always there.
-                        None => (map, sun),
-                    };
-                }
-            }
-        }
-        while let Ok(later) = self.later.1.try_recv() {
-            match later {
-                Later::Command(command) => {
-                    self.interface.prompt = None;
-                    self.execute(command, context);
-                }
-                Later::Done(sentence) => self.messages.notice(sentence),
-                Later::Failed(sentence) => self.messages.error(sentence),
-                Later::Kept(earlier) => {
-                    let count = self.history.take_over(earlier);
-                    self.interface.compared.shift(count);
-                }
-            }
-        }
-        let arrived = self.arriving.lock().unwrap_or_else(PoisonError::into_inner).take();
-        self.reference = arrived.or(self.reference.take());
-        for sentence in self.worker.take_failures() {
-            self.messages.error(sentence);
-            // Asked for again, it is tried again.
-            self.document.light.device = DeviceChoice::Cpu;
-            self.undo.amend(&self.document);
-        }
-        self.inspector.collect();
-        let snapshot = self.worker.snapshot();
-        if let Some(snapshot) = snapshot
-            && self.snapshot.as_ref().is_none_or(|old| old.number != snapshot.number)
-        {
-            self.convergence.add(&snapshot);
-            let plain = snapshot.plain.as_ref();
-            self.speed_up = plain.and_then(|plain| SpeedUp::of(&snapshot.main, plain));
-            self.snapshot = Some(snapshot);
-        }
-        // What is on a device that was lost cannot be drawn.
-        let is_here =
-            |shown: &Arc<Shown>| Arc::ptr_eq(&shown.order.developer, &self.screen.developer);
-        self.shown = self.presenter.shown().filter(is_here);
-        self.save_when_whole();
-        let shown = self.shown.as_deref();
-        if let Some(failure) = shown.and_then(|shown| shown.failure.clone()) {
-            self.messages.error(failure);
-            self.document.look.denoiser = Denoiser::default();
-            self.undo.amend(&self.document);
-        }
-        // Said once: what cannot be compared is compared no longer.
-        let uncompared = shown.and_then(|shown| shown.uncompared.clone());
-        if let Some(failure) = uncompared.filter(|_| self.interface.compared.left.is_some()) {
-            self.messages.error(failure);
-            self.interface.compared = Chosen::default();
-        }
-    }
-
-    fn take_scene(&mut self, scene: LoadedScene) {
-        scene.world.scene.notices.iter().for_each(|sentence| self.messages.notice(sentence));
-        self.settings.recent_scene(&scene.name);
-        let is_first = self.scene.is_none();
-        if self.document.viewpoint.is_none() {
-            self.document.viewpoint = Some(first_viewpoint(&scene));
-        }
-        if is_first {
-            // An empty window is nothing to go back to.
-            self.undo.amend(&self.document);
-        }
-        self.scene = Some(scene);
-        self.inspector.forget();
-    }
-
-    /// Gives the document what belongs to the scene that is shown, after another could not be read.
-    fn stay_in_scene(&mut self) {
-        let Some(scene) = &self.scene else {
-            // At the start there is none: the built-in one is always there.
-            self.document.scene = Document::default().scene;
-            return;
-        };
-        let before = self.undo.present();
-        if before.scene == scene.name {
-            self.document.scene.clone_from(&before.scene);
-            self.document.viewpoint.clone_from(&before.viewpoint);
-            self.document.bookmarks.clone_from(&before.bookmarks);
-            (self.document.region, self.document.fog) = (before.region, before.fog);
-            self.document.materials.clone_from(&before.materials);
-        } else {
-            // Somebody went back to a file that is no longer there.
-            self.document.scene.clone_from(&scene.name);
-            self.document.viewpoint = Some(first_viewpoint(scene));
-            self.document.materials.clone_from(&scene.edits);
-            self.undo.amend(&self.document);
-        }
-    }
-
-    /// Keeps a step for undo once nobody drags or types any more.
-    fn settle(&mut self, context: &egui::Context) {
-        let busy = context.input(|i| i.pointer.any_down()) || context.text_edit_focused();
-        // A file that is being read may turn out to be damaged: nothing has changed then.
-        let is_there = self.scene.as_ref().is_some_and(|s| s.name == self.document.scene)
-            && self.map.as_ref().is_some_and(|m| m.name == self.document.map);
-        if !busy && is_there && !self.interface.is_moving(context.time()) {
-            self.undo.settle(&self.document);
-        }
-    }
-
-    /// Tells the loader, the worker and the presenter what is wanted now.
-    fn send_down(&mut self, context: &egui::Context) {
-        if self.scene.as_ref().is_none_or(|scene| scene.name != self.document.scene) {
-            self.loader.load_scene(&self.document.scene);
-        } else if let Some(scene) = &self.scene
-            && scene.edits != self.document.materials
-        {
-            self.loader.edit_scene(scene, &self.document.materials);
-        }
-        let (name, sun) = (&self.document.map, self.document.sun);
-        if self.map.as_ref().is_none_or(|map| map.name != *name || map.sun_factor != sun) {
-            self.loader.load_map(name, sun);
-        }
-        if let Some(request) = self.request(context.time()) {
-            if request.moving {
-                context.request_repaint_after(std::time::Duration::from_millis(60));
-            }
-            self.inspector.update(&self.interface, self.snapshot.as_ref());
-            self.worker.submit(request);
-        }
-        if let Some(snapshot) = self.snapshot.as_ref().filter(|s| s.has_picture()) {
-            // Kept pictures are whole ones.
-            let is_whole = self.document.region.is_none() && snapshot.request.view.crop.is_none();
-            let compared = Comparison::new(self.interface.compared, &self.history);
-            let look = &self.document.look;
-            self.presenter.order(Order {
-                developer: Arc::clone(&self.screen.developer),
-                snapshot: Arc::clone(snapshot),
-                denoiser: look.denoise.then_some(look.denoiser),
-                metered: look.auto_exposure.then_some(look.white_balance),
-                overlay: self.interface.overlay,
-                look: self.interface.overlay.filter(|o| o.is_developed()).map(|_| *look),
-                tile: self.interface.tile,
-                compared: compared.filter(|_| is_whole),
-            });
-        }
-    }
-
-    fn request(&mut self, now: f64) -> Option<Request> {
-        let scene = self.scene.as_ref()?;
-        let world = Arc::clone(&scene.world);
-        let environment = self.environment()?;
-        let (width, height) = match self.document.size {
-            PictureSize::Fixed(width, height) => (width, height),
-            PictureSize::Viewport(divisor) => {
-                let size = self.interface.viewport_pixels?;
-                ((size[0] / divisor).max(1), (size[1] / divisor).max(1))
-            }
-        };
-        Some(Request {
-            world,
-            environment,
-            view: self.document.view(width, height)?,
-            split: self.document.light.split,
-            moving: self.interface.is_moving(now) && !self.is_repeatable,
-            previews: !self.is_repeatable,
-            device: self.document.light.device,
-            is_calm: self.document.look.denoise,
-            inspects_cache: self.interface.inspects_cache(),
-            rule: self.document.stop,
-            is_frozen: self.interface.is_frozen,
-            reference: self.reference.clone(),
-            paused: self.interface.paused,
-            run: self.interface.run,
-        })
-    }
-
-    /// The map as the document turns and scales it; made anew only when that changes.
-    fn environment(&mut self) -> Option<Arc<Environment>> {
-        let map = &self.map.as_ref()?.environment;
-        let (rotation_degrees, intensity) =
-            (self.document.rotation_degrees, self.document.intensity);
-        let is_current = self.lit.as_ref().is_some_and(|lit| {
-            Arc::ptr_eq(&lit.map, map)
-                && lit.rotation_degrees == rotation_degrees
-                && lit.intensity == intensity
-        });
-        if !is_current {
-            let mut environment = (**map).clone();
-            environment.set_rotation(rotation_degrees.to_radians());
-            environment.set_intensity(intensity);
-            let environment = Arc::new(environment);
-            self.lit = Some(Lit { map: Arc::clone(map), rotation_degrees, intensity, environment });
-        }
-        self.lit.as_ref().map(|lit| Arc::clone(&lit.environment))
-    }
-}
-
-/// Through the scene's first camera, or of all of it where there is none.
-fn first_viewpoint(scene: &LoadedScene) -> Viewpoint {
-    let camera = scene.world.scene.cameras.first().cloned();
-    let camera = camera.unwrap_or_else(|| framing::frame(&scene.world, 16.0 / 9.0));
-    let distance = pivot_distance(scene, &camera);
-    let mut viewpoint = Viewpoint::of(&camera, distance);
-    if !(viewpoint.focus_distance.is_finite() && viewpoint.focus_distance > 0.0) {
-        viewpoint.focus_distance = distance;
-    }
-    viewpoint
-}
-
-/// Metres to what is in the middle of a camera's picture.
-fn pivot_distance(scene: &LoadedScene, camera: &crate::scene::Camera) -> f32 {
-    let rays = crate::path::camera::CameraRays::new(camera, 16, 9);
-    let ray = rays.ray(Vec2::new(8.0, 4.5), Vec2::splat(0.5));
-    let (low, high) = scene.world.bvh.bounds();
-    surface_map::look(&scene.world, ray)
-        .map_or(0.5 * (high - low).length(), |spot| spot.position.distance(ray.origin))
-        .max(0.05)
 }

@@ -5,6 +5,7 @@
 //! the film, whose sums lose nothing at any number of samples, only when somebody asks for it.
 
 mod acceleration;
+mod bound;
 mod buffers;
 mod cast;
 pub(crate) mod constants;
@@ -15,6 +16,7 @@ mod film;
 mod flight;
 pub(crate) mod kernel;
 mod layout;
+mod learning;
 mod pacer;
 #[cfg(test)]
 mod parity;
@@ -29,8 +31,6 @@ mod uploaded_scene;
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::ops::Range;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::Vec3;
@@ -39,20 +39,20 @@ use super::film::Film;
 use super::{Pass, View};
 use crate::bsdf::{albedo, sheen};
 use crate::environment::Environment;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::features::Features;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::path::camera::CameraRays;
-use crate::radiance_cache::{RadianceCache, RadianceSums};
+use crate::radiance_cache::RadianceCache;
+use bound::Bound;
 use buffers::Buffers;
 use film::Sums;
 use flight::{Flights, Job};
 use kernel::Kernel;
 use layout::{Globals, Work};
-use pipeline::Pipeline;
 use queue::Queue;
-use shader::{Binding, Constants, Program};
+use shader::{Constants, Program};
 use sharing::Sharing;
 use uploaded_scene::put_array;
 
@@ -95,13 +95,6 @@ pub(crate) struct Renderer {
     told: u64,
     kernel_facts: KernelFacts,
     seed: u32,
-}
-
-/// A kernel and what it is bound to.
-struct Bound {
-    pipeline: Arc<Pipeline>,
-    /// With the version of the buffers that it binds.
-    bind_group: Option<(u64, wgpu::BindGroup)>,
 }
 
 /// How far the film is, dispatches under way included: tiles before `tile` have `ahead` samples a
@@ -162,7 +155,7 @@ impl Renderer {
         (world, environment): (&World, &Environment),
         view: &View,
         rays: &CameraRays,
-        compile: impl FnOnce(&Gpu, Program) -> Result<Arc<Pipeline>>,
+        compile: impl FnOnce(&Gpu, Program) -> Result<std::sync::Arc<pipeline::Pipeline>>,
     ) -> Result<Self> {
         let mut renderer = Self::without_kernels(uploaded, (world, environment), view, rays, None)?;
         let Self { features, constants, buffers, .. } = &renderer;
@@ -252,39 +245,6 @@ impl Renderer {
         Ok(())
     }
 
-    /// Traces the learning paths in `paths`, drawing from the distributions last set; returns the number of
-    /// rays. The counters are as before if it is cancelled or fails.
-    pub(crate) fn learn(
-        &mut self,
-        paths: Range<u64>,
-        learning: &LearningGrid,
-        cancel: &AtomicBool,
-    ) -> Result<u64> {
-        self.put_counters(learning)?;
-        let (done, rays) = self.trace_anywhere(Kernel::Learn, paths.clone(), cancel)?;
-        if done < paths.end {
-            return Ok(0);
-        }
-        self.take_counters(learning)?;
-        Ok(rays)
-    }
-
-    /// Traces paths that train the radiance cache; what was set of it last is what is known by now.
-    /// Returns the first path that was not traced, and the number of rays.
-    pub(crate) fn train(
-        &mut self,
-        paths: Range<u64>,
-        sums: &RadianceSums,
-        cancel: &AtomicBool,
-    ) -> Result<(u64, u64)> {
-        let (words, scale) = sums.words_and_scale();
-        self.globals.set_cells_of_cache(sums.cells(), scale);
-        self.buffers.put("cache_sums", bytemuck::cast_slice(&words), "the radiance cache")?;
-        let done = self.trace_anywhere(Kernel::Train, paths, cancel)?;
-        sums.set_words(&self.read_words("cache_sums", words.len())?);
-        Ok(done)
-    }
-
     /// Uploads the cache that paths end in; without one they go on.
     pub(crate) fn set_cache(&mut self, cache: Option<&RadianceCache>) -> Result<()> {
         if !self.features.contains(Features::RADIANCE_CACHE) {
@@ -299,58 +259,6 @@ impl Renderer {
         let slots = if slots.is_empty() { &[[0; 4]; 1] } else { slots };
         put_array(&mut self.buffers, "cache_slots", "the radiance cache", slots)?;
         self.write_globals();
-        Ok(())
-    }
-
-    /// Traces paths that begin anywhere in the picture, as far as `cancel` allows. Returns the first one
-    /// that was not traced, and the number of rays of the others.
-    fn trace_anywhere(
-        &mut self,
-        kernel: Kernel,
-        paths: Range<u64>,
-        cancel: &AtomicBool,
-    ) -> Result<(u64, u64)> {
-        self.globals.seed = self.seed;
-        self.write_globals();
-        self.buffers.put("learning_rays", &[0; 4], "a count")?;
-        let mut first = paths.start;
-        while first < paths.end && !cancel.load(Ordering::Relaxed) {
-            let groups = self.flights.units(kernel).min(MAX_GROUPS);
-            let count = (groups * GROUP).min(paths.end - first);
-            let work = Work {
-                first: first as u32,
-                first_high: (first >> 32) as u32,
-                count: count as u32,
-                ..Work::default()
-            };
-            let groups = count.div_ceil(GROUP);
-            self.dispatch(kernel, &work, groups as u32, groups)?;
-            first += count;
-        }
-        self.settle()?;
-        let rays = self.read_words("learning_rays", 1)?.first().copied();
-        Ok((first, rays.map_or(0, u64::from)))
-    }
-
-    /// Uploads counters, to be counted on.
-    fn put_counters(&mut self, learning: &LearningGrid) -> Result<()> {
-        self.globals.set_cells(&learning.grid);
-        self.globals.tries_per_vertex = learning.tries_per_vertex();
-        self.write_globals();
-        let (visits, slots, mut blocks) = learning.counters.words();
-        if blocks.is_empty() {
-            blocks.push(0);
-        }
-        self.buffers.put("visits", bytemuck::cast_slice(&visits), "the light grid's cells")?;
-        self.buffers.put("slot_of_cell", bytemuck::cast_slice(slots), "the light grid's cells")?;
-        self.buffers.put("counters", bytemuck::cast_slice(&blocks), "the learning counters")
-    }
-
-    /// Takes back the counters that were uploaded.
-    fn take_counters(&self, learning: &LearningGrid) -> Result<()> {
-        let (visits, blocks) = learning.counters.word_counts();
-        let visits = self.read_words("visits", visits)?;
-        learning.counters.set_words(&visits, &self.read_words("counters", blocks)?);
         Ok(())
     }
 
@@ -559,62 +467,6 @@ impl Progress {
     }
 }
 
-impl Bound {
-    fn new(pipeline: Arc<Pipeline>) -> Self {
-        Self { pipeline, bind_group: None }
-    }
-
-    /// The kernel and what binds the buffers as they are now; that is made anew when others have taken
-    /// their place.
-    fn current(
-        &mut self,
-        gpu: &Gpu,
-        buffers: &Buffers,
-    ) -> Result<(wgpu::ComputePipeline, wgpu::BindGroup)> {
-        let version = buffers.version();
-        let kept = self.bind_group.take().filter(|(of, _)| *of == version);
-        let current = match kept {
-            Some(kept) => kept,
-            None => (version, self.bind(gpu, buffers)?),
-        };
-        let bind_group = self.bind_group.insert(current).1.clone();
-        Ok((self.pipeline.pipeline.clone(), bind_group))
-    }
-
-    fn bind(&self, gpu: &Gpu, buffers: &Buffers) -> Result<wgpu::BindGroup> {
-        let missing = |name| Error::new(format!("the shader's {name} was not uploaded"));
-        let bindings = &self.pipeline.program.bindings;
-        let mut views = Vec::new();
-        for binding in bindings {
-            if let Binding::Array(array) = binding {
-                let texture = buffers.array(array.name).ok_or_else(|| missing(array.name))?;
-                views.push(texture.create_view(&wgpu::TextureViewDescriptor::default()));
-            }
-        }
-        let mut next_view = views.iter();
-        let mut entries = Vec::new();
-        for (binding, index) in bindings.iter().zip(0..) {
-            let resource = match binding {
-                Binding::Buffer { name, .. } => {
-                    buffers.get(name).ok_or_else(|| missing(name))?.as_entire_binding()
-                }
-                Binding::Array(array) => wgpu::BindingResource::TextureView(
-                    next_view.next().ok_or_else(|| missing(array.name))?,
-                ),
-                Binding::Tree => wgpu::BindingResource::AccelerationStructure(
-                    buffers.tree.as_ref().ok_or_else(|| missing("tree"))?,
-                ),
-            };
-            entries.push(wgpu::BindGroupEntry { binding: index, resource });
-        }
-        Ok(gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &self.pipeline.layout,
-            entries: &entries,
-        }))
-    }
-}
-
 /// Uploads the small tables of numbers; says where each begins.
 fn upload_tables(
     buffers: &mut Buffers,
@@ -637,95 +489,22 @@ fn upload_tables(
 
 #[cfg(test)]
 pub(super) mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use crate::environment::EnvironmentOptions;
-    use crate::light_grid::cells::SphericalGrid;
-    use crate::light_grid::{DistributionOptions, Recording};
-    use crate::path::PathTracer;
-    use crate::render::gi::CacheTraining;
+    use crate::light_grid::DistributionOptions;
+    use crate::render::Sampling;
     use crate::render::gi::tests::view;
-    use crate::render::{Gi, Sampling, cpu};
     use crate::sampler::Sequence;
     use crate::scene::builtin;
 
-    fn crack() -> (World, Environment) {
+    pub(super) fn crack() -> (World, Environment) {
         let world = World::new(builtin::build("crack").expect("built in"));
         let map = crate::environment::sky::build("sunset", 128, 64).expect("a sky");
         let environment =
             Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
         (world, environment)
-    }
-
-    /// Visits of each cell and, cell by cell, tile counters after two learning passes, the second with
-    /// distributions of the first, and a rendering pass of which a third is counted, if rendered paths count.
-    pub(super) fn learn(
-        gpu: Option<&Gpu>,
-        recording: DistributionOptions,
-    ) -> (Vec<u32>, Vec<u32>, u64) {
-        let (world, environment) = crack();
-        let view = view(&world, recording);
-        let rays = CameraRays::new(&view.camera, view.width, view.height);
-        let grid = SphericalGrid {
-            center: rays.position,
-            columns: 64,
-            rows: 32,
-            faces: recording.faces,
-            medium: false,
-        };
-        let mut learning = LearningGrid::new(grid, environment.tile_count(), recording);
-        let mut distributions = LightGrid::whole_map(environment.tile_energies());
-        let never = AtomicBool::new(false);
-        let mut renderer = gpu.map(|gpu| {
-            let uploaded = UploadedScene::new(gpu, &world, &environment).expect("it fits");
-            Renderer::new(&uploaded, &world, &environment, &view, &rays, None).expect("it fits")
-        });
-        let mut traced = 0;
-        for paths in [Some(0..4096), Some(4096..16384), None] {
-            let mut film = Film::new(view.width, view.height, false);
-            let pass = Pass {
-                target: 4,
-                every: 1,
-                shares: true,
-                stride: 3,
-                sequence: Sequence::default(),
-            };
-            let rendered = recording.goes_on().then_some(pass);
-            traced += match (&mut renderer, paths) {
-                (Some(renderer), paths) => {
-                    renderer.set_grid(distributions.as_ref()).expect("uploaded");
-                    let counts = Some(&learning);
-                    match (paths, rendered) {
-                        (Some(paths), _) => renderer.learn(paths, &learning, &never),
-                        (None, Some(pass)) => {
-                            renderer.render(pass, counts, &never).and_then(|_| {
-                                renderer.read_film(&mut film)?;
-                                Ok(renderer.rays())
-                            })
-                        }
-                        (None, None) => Ok(0),
-                    }
-                    .expect("done")
-                }
-                (None, paths) => {
-                    let tracer = view.tracer(&world, &environment, distributions.as_ref());
-                    let tracer = PathTracer { counts: Some(&learning), ..tracer };
-                    match (paths, rendered) {
-                        (Some(paths), _) => cpu::learn(&tracer, &rays, &view, paths, &never),
-                        (None, Some(pass)) => {
-                            cpu::render(&tracer, &rays, &view, pass, &mut film, &never).1
-                        }
-                        (None, None) => 0,
-                    }
-                }
-            };
-            learning.counters.end_pass();
-            distributions = learning.distributions(&environment);
-        }
-        let (visits, slots, blocks) = learning.counters.words();
-        let words = 2 * environment.tile_count() as usize;
-        let counted = slots.iter().filter(|slot| **slot != u32::MAX);
-        let by_cell = counted.flat_map(|slot| &blocks[*slot as usize * words..][..words]);
-        (visits, by_cell.copied().collect(), traced)
     }
 
     /// As a window does that looks for news after each slice of work.
@@ -785,80 +564,5 @@ pub(super) mod tests {
         assert!(calls > 1, "it was cut");
         assert_eq!(samples, all);
         assert!(films[0] == films[1], "the same samples, each once");
-    }
-
-    /// Rounding sends a path in a thousand to another triangle, texel or cell; what it meets from
-    /// there on differs. So one count in 500 may lie elsewhere.
-    #[test]
-    fn both_devices_learn_the_same_counters() {
-        let gpu = match Gpu::open(None) {
-            Ok(gpu) => gpu,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
-        let squared = DistributionOptions {
-            faces: false,
-            recording: Recording::VisibleCosineSquared,
-            ..DistributionOptions::ADAPTIVE
-        };
-        for recording in [DistributionOptions::ADAPTIVE, DistributionOptions::TALK, squared] {
-            let (cpu_visits, cpu_blocks, cpu_rays) = learn(None, recording);
-            let (gpu_visits, gpu_blocks, gpu_rays) = learn(Some(&gpu), recording);
-            assert_eq!(cpu_blocks.len(), gpu_blocks.len(), "the same cells have counters");
-            for (what, a, b) in
-                [("visits", cpu_visits, gpu_visits), ("counters", cpu_blocks, gpu_blocks)]
-            {
-                let total: u64 = a.iter().map(|n| u64::from(*n)).sum();
-                let moved: u64 = a.iter().zip(&b).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
-                eprintln!("{what}: {moved} of {total} differ");
-                assert!(total > 10_000 && moved * 500 < total, "{what}: {moved} of {total}");
-            }
-            assert!(cpu_rays.abs_diff(gpu_rays) * 1000 < cpu_rays, "{cpu_rays} {gpu_rays}");
-        }
-    }
-
-    /// As above: one path in a thousand goes elsewhere.
-    #[test]
-    fn both_devices_train_the_same() {
-        let gpu = match Gpu::open(None) {
-            Ok(gpu) => gpu,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
-        let (world, environment) = crack();
-        let view = View { gi: Gi::Cached, ..view(&world, DistributionOptions::ADAPTIVE) };
-        let rays = CameraRays::new(&view.camera, view.width, view.height);
-        let training =
-            || CacheTraining::new(&world, &environment, &view, &rays).expect("there is light");
-        let distributions = LightGrid::whole_map(environment.tile_energies());
-        let (on_cpu, on_gpu) = (training(), training());
-        let tracer = view.tracer(&world, &environment, distributions.as_ref());
-        let uploaded = UploadedScene::new(&gpu, &world, &environment).expect("it fits");
-        let mut renderer =
-            Renderer::new(&uploaded, &world, &environment, &view, &rays, None).expect("it fits");
-        renderer.set_grid(distributions.as_ref()).expect("uploaded");
-        let never = AtomicBool::new(false);
-        let mut known = None;
-        for paths in [0..8192, 8192..16384] {
-            let cpu_rays = cpu::train(
-                &PathTracer { cache: known.as_ref(), ..tracer },
-                &rays,
-                &view,
-                paths.clone(),
-                on_cpu.sums(),
-            );
-            renderer.set_cache(known.as_ref()).expect("uploaded");
-            let (end, gpu_rays) =
-                renderer.train(paths.clone(), on_gpu.sums(), &never).expect("trained");
-            assert_eq!(end, paths.end);
-            assert!(cpu_rays.abs_diff(gpu_rays) * 500 < cpu_rays, "{cpu_rays} {gpu_rays}");
-            let totals = [&on_cpu, &on_gpu].map(|training| training.sums().totals());
-            let [(cpu_count, cpu_sums), (gpu_count, gpu_sums)] = totals;
-            eprintln!("{cpu_count} {cpu_sums} against {gpu_count} {gpu_sums}");
-            assert!(cpu_count.abs_diff(gpu_count) * 500 < cpu_count);
-            assert!((cpu_sums / gpu_sums - 1.0).abs().max_element() < 0.01);
-            known = on_cpu.sums().cache();
-            let found = on_gpu.sums().cache().expect("there is room").used_slots();
-            let slots = known.as_ref().map_or(0, RadianceCache::used_slots);
-            assert!(slots.abs_diff(found) * 200 < slots, "{slots} {found}");
-        }
     }
 }

@@ -129,7 +129,7 @@ impl Renderer {
 #[cfg(test)]
 mod tests {
     use super::super::parity::fixture;
-    use super::super::{Advance, UploadedScene, tests};
+    use super::super::{Advance, UploadedScene, learning};
     use super::*;
     use crate::environment::{Environment, EnvironmentOptions};
     use crate::light_grid::{DistributionOptions, LightGrid};
@@ -211,8 +211,9 @@ mod tests {
     #[test]
     fn both_schedules_count_the_same() {
         let Some(gpus) = devices() else { return };
-        let [whole, queue] =
-            gpus.each_ref().map(|gpu| tests::learn(Some(gpu), DistributionOptions::ADAPTIVE));
+        let [whole, queue] = gpus
+            .each_ref()
+            .map(|gpu| learning::tests::learn(Some(gpu), DistributionOptions::ADAPTIVE));
         assert!(whole == queue, "the same visits, counters and rays");
     }
 }

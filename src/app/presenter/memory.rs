@@ -1,0 +1,228 @@
+//! What the presenter keeps from one order to the next.
+
+use std::sync::Arc;
+
+use super::order::{Order, Shown};
+use super::source::{Prepared, Source};
+use crate::app::comparison::{Compared, Comparison};
+use crate::app::document::Look;
+use crate::app::overlays::{CellFacts, Label, Legend, Overlay, Sources};
+use crate::app::surface_map::SurfaceMap;
+use crate::app::worker::{Request, Snapshot};
+use crate::develop::{Developer, LinearPicture, OverlayTexture};
+use crate::environment::Environment;
+use crate::error::Result;
+use crate::light_grid::LightGrid;
+use crate::tone::WhiteBalance;
+
+/// The last result and what it was made for.
+struct Last<K, V>(Option<(K, V)>);
+
+impl<K, V> Default for Last<K, V> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+impl<K: PartialEq, V: Clone> Last<K, V> {
+    fn or_make(&mut self, key: K, make: impl FnOnce() -> Result<V>) -> Result<V> {
+        if let Some((_, value)) = self.0.as_ref().filter(|(last, _)| *last == key) {
+            return Ok(value.clone());
+        }
+        let value = make()?;
+        self.0 = Some((key, value.clone()));
+        Ok(value)
+    }
+}
+
+/// The exposure of the last whole picture.
+struct Metered {
+    environment: Arc<Environment>,
+    white_balance: WhiteBalance,
+    ev: f32,
+}
+
+/// What can be used again for the next order.
+#[derive(Default)]
+pub(super) struct Memory {
+    whole: Option<Metered>,
+    surfaces: Option<(Arc<Request>, SurfaceMap)>,
+    facts: Option<(Arc<LightGrid>, bool, Arc<CellFacts>)>,
+    uploads: Uploads,
+}
+
+/// Snapshot, overlay, tile, and how light is developed: what an overlay is painted from.
+type OverlayKey = (u64, Overlay, Option<u32>, Option<(Look, f32)>);
+
+/// What is on one device.
+#[derive(Default)]
+struct Uploads {
+    developer: Option<Arc<Developer>>,
+    picture: Last<Source, Prepared>,
+    plain: Last<Source, Prepared>,
+    /// By the picture that is rendered, too, where that is compared.
+    compared: Last<(Comparison, Option<Source>), Compared>,
+    metered: Last<(Source, WhiteBalance), f32>,
+    overlay: Last<OverlayKey, Option<Painted>>,
+}
+
+/// An overlay on the device.
+#[derive(Clone)]
+struct Painted {
+    colors: OverlayTexture,
+    legend: Legend,
+    labels: Vec<Label>,
+}
+
+impl Memory {
+    /// Fails only if the device does.
+    pub(super) fn present(&mut self, order: Order) -> Result<Shown> {
+        let developer = Arc::clone(&order.developer);
+        if self.uploads.developer.as_ref().is_none_or(|old| !Arc::ptr_eq(old, &developer)) {
+            let developer = Some(Arc::clone(&developer));
+            self.uploads = Uploads { developer, ..Uploads::default() };
+        }
+        self.leave_what_is_not_in(&order);
+        let source = Source::main(&order);
+        let prepare = || Ok(source.prepare(&developer));
+        let Prepared { mut picture, image, mut failure } =
+            self.uploads.picture.or_make(source.clone(), prepare)?;
+        let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
+            if let Some(ev) = self.whole_ev(&order) {
+                return Ok(ev);
+            }
+            let meter = || developer.auto_exposure_ev(&picture, white_balance);
+            self.uploads.metered.or_make((source.clone(), white_balance), meter)
+        })?;
+        if order.snapshot.request.view.crop.is_none() {
+            self.whole = order.metered.map(|white_balance| Metered {
+                environment: Arc::clone(&order.snapshot.request.environment),
+                white_balance,
+                ev: automatic_ev,
+            });
+        }
+        let painted = order.overlay.map_or(Ok(None), |overlay| {
+            let mut last = std::mem::take(&mut self.uploads.overlay);
+            let look = order.look.map(|look| (look, automatic_ev));
+            let key = (order.snapshot.number, overlay, order.tile, look);
+            let painted = last.or_make(key, || Ok(self.paint(&order, overlay, look, &picture)));
+            self.uploads.overlay = last;
+            painted
+        })?;
+        let (mut other, mut uncompared) = (None, None);
+        if let Some(comparison) = &order.compared {
+            let now = || image.clone().unwrap_or_else(|| Arc::new(source.session.film.image()));
+            let of = comparison.shows_now().then(|| source.clone());
+            let compare = || Ok(comparison.prepare(&developer, now));
+            let compared = self.uploads.compared.or_make((comparison.clone(), of), compare)?;
+            picture = compared.picture.unwrap_or(picture);
+            (other, uncompared) = (compared.other, compared.failure);
+        } else if let Some(source) = Source::plain(&order) {
+            let prepare = || Ok(source.prepare(&developer));
+            let plain = self.uploads.plain.or_make(source.clone(), prepare)?;
+            (other, failure) = (Some(plain.picture), failure.or(plain.failure));
+        }
+        developer.gpu().check()?;
+        let facts = self.facts.as_ref().map(|(_, _, facts)| Arc::clone(facts));
+        let (overlay, words) =
+            painted.map(|painted| (painted.colors, (painted.legend, painted.labels))).unzip();
+        let (legend, labels) = words.unzip();
+        Ok(Shown {
+            order,
+            picture,
+            image,
+            other,
+            uncompared,
+            automatic_ev,
+            overlay,
+            legend,
+            labels: labels.unwrap_or_default(),
+            failure,
+            facts,
+        })
+    }
+
+    /// The exposure a part of a picture has from the whole one it lies on: it does not become brighter or
+    /// darker because less is rendered. Under another map it is measured.
+    fn whole_ev(&self, order: &Order) -> Option<f32> {
+        let (request, whole) = (&order.snapshot.request, self.whole.as_ref()?);
+        request.view.crop?;
+        let is_alike = whole.environment.shares_map_with(&request.environment)
+            && Some(whole.white_balance) == order.metered;
+        is_alike.then_some(whole.ev)
+    }
+
+    /// Lets go of what the order does not ask for: each holds a film, or a scene.
+    fn leave_what_is_not_in(&mut self, order: &Order) {
+        if order.compared.is_none() {
+            self.uploads.compared = Last::default();
+        }
+        if order.compared.is_some() || order.snapshot.plain.is_none() {
+            self.uploads.plain = Last::default();
+        }
+        if order.metered.is_none() {
+            self.uploads.metered = Last::default();
+        }
+        if order.overlay.is_none() {
+            (self.uploads.overlay, self.surfaces, self.facts) = (Last::default(), None, None);
+        }
+    }
+
+    fn paint(
+        &mut self,
+        order: &Order,
+        overlay: Overlay,
+        look: Option<(Look, f32)>,
+        picture: &LinearPicture,
+    ) -> Option<Painted> {
+        let snapshot = &order.snapshot;
+        let session = &snapshot.main;
+        if overlay.needs_surfaces() {
+            self.prepare(snapshot);
+        }
+        let sources = Sources {
+            film: &session.film,
+            environment: &snapshot.request.environment,
+            grid: session.grid.as_ref(),
+            counters: snapshot.counters.as_deref(),
+            surfaces: self.surfaces.as_ref().map(|(_, surfaces)| surfaces),
+            facts: self.facts.as_ref().map(|(_, _, facts)| &**facts),
+            cache: snapshot.cache.as_deref().ok(),
+            look,
+            tile: order.tile,
+        };
+        let painted = sources.paint(overlay)?;
+        let colors = order.developer.upload_overlay(&painted.colors, session.film.width, picture);
+        Some(Painted { colors, legend: painted.legend, labels: painted.labels })
+    }
+
+    /// Brings surfaces and facts up to date with the snapshot.
+    fn prepare(&mut self, snapshot: &Arc<Snapshot>) {
+        let film = &snapshot.main.film;
+        let is_current = self.surfaces.as_ref().is_some_and(|(old, surfaces)| {
+            Arc::ptr_eq(&old.world, &snapshot.request.world)
+                && old.view.camera == snapshot.request.view.camera
+                && (surfaces.width, surfaces.height) == (film.width, film.height)
+        });
+        if !is_current {
+            let mut view = snapshot.request.view.clone();
+            (view.width, view.height) = (film.width, film.height);
+            let surfaces = SurfaceMap::of(&snapshot.request.world, &view);
+            self.surfaces = Some((Arc::clone(&snapshot.request), surfaces));
+        }
+        let Some(grid) = &snapshot.main.grid else {
+            self.facts = None;
+            return;
+        };
+        let counted = snapshot.counters.is_some();
+        let is_current = self
+            .facts
+            .as_ref()
+            .is_some_and(|(old, with, _)| Arc::ptr_eq(old, grid) && *with == counted);
+        if !is_current {
+            let environment = &snapshot.request.environment;
+            let facts = CellFacts::of(grid, snapshot.counters.as_deref(), environment);
+            self.facts = Some((Arc::clone(grid), counted, Arc::new(facts)));
+        }
+    }
+}

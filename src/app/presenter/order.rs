@@ -1,0 +1,123 @@
+//! What is to be shown, and what there is to show.
+
+use std::sync::Arc;
+
+use crate::app::comparison::Comparison;
+use crate::app::document::Look;
+use crate::app::overlays::{CellFacts, Label, Legend, Overlay};
+use crate::app::worker::{Activity, Snapshot};
+use crate::denoise::Denoiser;
+use crate::develop::{Developer, LinearPicture, OverlayTexture};
+use crate::image::Image;
+use crate::tone::WhiteBalance;
+
+/// What is to be shown.
+#[derive(Clone)]
+pub struct Order {
+    /// What pictures are developed by, hence the device they are to be on.
+    pub(in crate::app) developer: Arc<Developer>,
+    /// The film.
+    pub snapshot: Arc<Snapshot>,
+    /// What takes noise out, if anything shall.
+    pub denoiser: Option<Denoiser>,
+    /// The white balance the exposure is to be measured under, if it shall be.
+    pub metered: Option<WhiteBalance>,
+    /// What is drawn over it.
+    pub overlay: Option<Overlay>,
+    /// How the overlay is developed, if it shows light.
+    pub look: Option<Look>,
+    /// The tile chosen on the map.
+    pub tile: Option<u32>,
+    /// Kept pictures that are compared.
+    pub compared: Option<Comparison>,
+}
+
+impl PartialEq for Order {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.developer, &other.developer)
+            && self.snapshot.number == other.snapshot.number
+            && self.denoiser == other.denoiser
+            && self.metered == other.metered
+            && self.overlay == other.overlay
+            && self.look == other.look
+            && self.tile == other.tile
+            && self.compared == other.compared
+    }
+}
+
+impl Order {
+    /// Whether it asks for the same of a later picture of the same work, which may wait; the first one with a
+    /// sample in every pixel does not.
+    pub(super) fn only_follows(&self, before: &Self) -> bool {
+        let is_over = matches!(self.snapshot.activity, Activity::Done | Activity::Paused);
+        let is_first = self.snapshot.is_whole() && !before.snapshot.is_whole();
+        let (request, old) = (&self.snapshot.request, &before.snapshot.request);
+        let is_same_work = Arc::ptr_eq(request, old) || (request.moving && old.moving);
+        let snapshot = Arc::clone(&before.snapshot);
+        is_same_work && !is_over && !is_first && Self { snapshot, ..self.clone() } == *before
+    }
+}
+
+/// What the screen is developed from.
+pub struct Shown {
+    /// What was ordered.
+    pub order: Order,
+    /// The picture.
+    pub(in crate::app) picture: LinearPicture,
+    /// It as it was made on the host, unless it was made on the device.
+    pub(in crate::app) image: Option<Arc<Image>>,
+    /// What the wipe uncovers: the plain picture or one of the history.
+    pub(in crate::app) other: Option<LinearPicture>,
+    /// Stops that bring the picture to middle grey; 0 unless measured.
+    pub automatic_ev: f32,
+    /// The overlay's colours, one a pixel of `picture`.
+    pub(in crate::app) overlay: Option<OverlayTexture>,
+    /// What they mean.
+    pub legend: Option<Legend>,
+    /// What the overlay writes on the picture.
+    pub labels: Vec<Label>,
+    /// Why the denoiser did not do its work.
+    pub failure: Option<String>,
+    /// Why two pictures cannot be compared.
+    pub uncompared: Option<String>,
+    /// Facts about the grid's cells, when the overlay asked for them.
+    pub facts: Option<Arc<CellFacts>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::presenter::source::tests::{film, session};
+    use crate::app::worker::tests::{request_of, snapshot_of};
+    use crate::app::worker::{Request, SessionSnapshot};
+    use crate::render::gpu::Gpu;
+
+    #[test]
+    fn a_movement_does_not_wait_for_the_picture_before_it() {
+        let developer = match Gpu::open(None).and_then(|gpu| Developer::new(&gpu)) {
+            Ok(developer) => Arc::new(developer),
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let still = Arc::new(request_of("open", [12, 8]));
+        let order = |request: &Arc<Request>, samples| Order {
+            developer: Arc::clone(&developer),
+            snapshot: Arc::new(snapshot_of(
+                request,
+                SessionSnapshot { samples, ..session(film(12, 1, 1)) },
+            )),
+            denoiser: None,
+            metered: None,
+            overlay: None,
+            look: None,
+            tile: None,
+            compared: None,
+        };
+        let [moving, later] =
+            [(); 2].map(|()| Arc::new(Request { moving: true, ..(*still).clone() }));
+        assert!(order(&still, 2).only_follows(&order(&still, 1)), "more of the same");
+        assert!(!order(&still, 1).only_follows(&order(&still, 0)), "the first with all pixels");
+        assert!(!order(&moving, 1).only_follows(&order(&still, 1)), "off it goes");
+        assert!(order(&later, 1).only_follows(&order(&moving, 1)), "on it goes");
+        assert!(!order(&still, 1).only_follows(&order(&later, 1)), "there it stays");
+    }
+}

@@ -1,0 +1,71 @@
+//! How long the presenter rests after a picture.
+
+use std::time::Duration;
+
+/// After a picture of work that goes on it rests so many times as long as that took: little at first, when each
+/// is much better than the last, and most after [`MOST_AFTER`]. With half of the cores it then takes a
+/// twenty-sixth of the machine, and in the first minute less than a tenth.
+const REST: [f64; 2] = [3.0, 12.0];
+/// Seconds of work on a view after which pictures change slowly.
+const MOST_AFTER: f64 = 12.0;
+
+/// For how long it rests after a picture that took so long, of so many seconds of work.
+pub(super) fn rest_after(took: Duration, seconds: f64) -> Duration {
+    let [least, most] = REST;
+    took.mul_f64(least + (most - least) * (seconds / MOST_AFTER).clamp(0.0, 1.0))
+}
+
+/// What a picture took, for its rest. By the clock that would be far too long where other programs take the
+/// cores (a picture stood still for half a minute), by this thread's time at work far too short for the
+/// renderer, which gets as little: it is the geometric mean of both.
+pub(super) struct Work(Option<Duration>);
+
+impl Work {
+    pub(super) fn start() -> Self {
+        Self(time_at_work())
+    }
+
+    /// What it took, of so much by the clock.
+    pub(super) fn time(&self, elapsed: Duration) -> Duration {
+        let worked = time_at_work().zip(self.0).map(|(now, start)| now.saturating_sub(start));
+        worked.map_or(elapsed, |worked| between(worked.min(elapsed), elapsed))
+    }
+}
+
+fn between(worked: Duration, elapsed: Duration) -> Duration {
+    Duration::from_secs_f64((worked.as_secs_f64() * elapsed.as_secs_f64()).sqrt())
+}
+
+/// Of this thread, where the system tells.
+fn time_at_work() -> Option<Duration> {
+    #[cfg(target_os = "linux")]
+    {
+        let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+        // SAFETY: plain system call, which writes into what it is given.
+        let outcome = unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
+        let seconds = u64::try_from(time.tv_sec).ok().filter(|_| outcome == 0)?;
+        Some(Duration::new(seconds, u32::try_from(time.tv_nsec).ok()?))
+    }
+    #[cfg(not(target_os = "linux"))]
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rest_is_shorter_at_first_and_where_others_take_the_cores() {
+        let seconds = Duration::from_secs_f64;
+        assert_eq!(between(seconds(0.5), seconds(0.5)), seconds(0.5));
+        assert_eq!(between(seconds(0.25), seconds(4.0)), seconds(1.0));
+        assert_eq!(rest_after(seconds(0.5), 0.0), seconds(1.5));
+        assert_eq!(rest_after(seconds(0.5), 1e9), seconds(6.0));
+        // Who sleeps is not at work.
+        if let Some(before) = time_at_work() {
+            std::thread::sleep(Duration::from_millis(200));
+            let worked = time_at_work().expect("it told before") - before;
+            assert!(worked < Duration::from_millis(200), "{worked:?}");
+        }
+    }
+}

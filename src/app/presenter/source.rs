@@ -1,0 +1,190 @@
+//! What a picture is made from, and how.
+
+use std::sync::Arc;
+
+use super::order::Order;
+use crate::app::worker::{Backdrop, SessionSnapshot};
+use crate::denoise::{Denoiser, blend};
+use crate::develop::{Developer, LinearPicture};
+use crate::image::Image;
+use crate::render::film::Film;
+use crate::render::gpu::{DeviceFilm, Gpu};
+
+/// A picture on the device.
+#[derive(Clone)]
+pub(super) struct Prepared {
+    pub(super) picture: LinearPicture,
+    /// The same, if it was made on the host.
+    pub(super) image: Option<Arc<Image>>,
+    /// Why its noise was not taken out as was wished.
+    pub(super) failure: Option<String>,
+}
+
+impl Prepared {
+    fn of(developer: &Developer, image: Image) -> Self {
+        let picture = developer.upload_image(&image);
+        Self { picture, image: Some(Arc::new(image)), failure: None }
+    }
+
+    fn on_device(picture: LinearPicture) -> Self {
+        Self { picture, image: None, failure: None }
+    }
+}
+
+/// A filtered picture is as good as the blend of so many times its samples.
+const FILTER_WORTH: u64 = 4;
+
+/// What a linear picture is made from; equal ones give the same picture.
+#[derive(Clone)]
+pub(super) struct Source {
+    pub(super) session: SessionSnapshot,
+    backdrop: Option<Backdrop>,
+    denoiser: Option<Denoiser>,
+    /// Whether every pixel has a sample and the picture its full size.
+    is_whole: bool,
+}
+
+impl PartialEq for Source {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.session.film, &other.session.film)
+            && self.backdrop == other.backdrop
+            && (self.denoiser, self.is_whole) == (other.denoiser, other.is_whole)
+    }
+}
+
+impl Source {
+    pub(super) fn main(order: &Order) -> Self {
+        let snapshot = &order.snapshot;
+        // Where there are no samples, the film is that from before.
+        let backdrop = snapshot.backdrop.clone();
+        let backdrop =
+            backdrop.filter(|backdrop| !Arc::ptr_eq(&backdrop.film, &snapshot.main.film));
+        let session = snapshot.main.clone();
+        Self { session, backdrop, denoiser: order.denoiser, is_whole: snapshot.is_whole() }
+    }
+
+    pub(super) fn plain(order: &Order) -> Option<Self> {
+        let session = order.snapshot.plain.clone()?;
+        let is_whole = session.samples > 0;
+        Some(Self { session, backdrop: None, denoiser: order.denoiser, is_whole })
+    }
+
+    /// The picture on the device, without noise if that is asked for.
+    pub(super) fn prepare(&self, developer: &Developer) -> Prepared {
+        let film = &self.session.film;
+        let is_here = |(gpu, _): &&(Gpu, DeviceFilm)| gpu.is_same(developer.gpu());
+        let noisy = |layers| match self.session.on_device.as_ref().filter(is_here) {
+            Some((_, on_device)) => LinearPicture::live(on_device.clone()),
+            None => developer.upload_film(film, layers),
+        };
+        let backdrop = self.backdrop.as_ref().map(|backdrop| (&*backdrop.film, backdrop.worth));
+        let blended = || Prepared::of(developer, blend(film, backdrop));
+        // Filters take whole films of one size.
+        let other = backdrop.filter(|(other, worth)| {
+            film.is_alike(other) && other.min_samples() > 0 && *worth > 0.0
+        });
+        let is_calmed = other.is_some() && self.backdrop.as_ref().is_some_and(|b| b.is_cached);
+        let is_surpassed =
+            |(other, _): (&Film, f32)| other.total_samples() <= FILTER_WORTH * film.total_samples();
+        let can_filter = other.is_some() || (self.is_whole && backdrop.is_none_or(is_surpassed));
+        match self.denoiser {
+            None if self.is_whole => Prepared::on_device(noisy(false)),
+            Some(Denoiser::ATrous)
+                if self.is_whole
+                    && !is_calmed
+                    && developer.can_denoise(film.width, film.height) =>
+            {
+                Prepared::on_device(developer.denoised(&noisy(true)))
+            }
+            // A picture with holes or in other pixels is there to see where one is going.
+            None => blended(),
+            Some(_) if !can_filter => blended(),
+            Some(denoiser) => match denoiser.denoise(film, other) {
+                Ok(image) => Prepared::of(developer, image),
+                Err(failure) => Prepared { failure: Some(failure.to_string()), ..blended() },
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::denoise::quick;
+    use crate::path::{FirstHit, PathResult};
+    use crate::render::{Figures, Sampling};
+
+    pub(in crate::app::presenter) fn session(film: Film) -> SessionSnapshot {
+        SessionSnapshot {
+            samples: 1,
+            sampling: Sampling::Plain,
+            film: Arc::new(film),
+            figures: Figures::default(),
+            noise: 0.0,
+            grid: None,
+            gpu: None,
+            on_device: None,
+        }
+    }
+
+    /// A wall with light that is the pixel's own, in every so-manyth column.
+    pub(in crate::app::presenter) fn film(width: u32, every: u32, samples: u32) -> Film {
+        let mut film = Film::new(width, 8, true);
+        for (y, x) in (0..8).flat_map(|y| (0..width).step_by(every as usize).map(move |x| (y, x))) {
+            for sample in 0..samples {
+                let radiance = Vec3::splat(((x * 7 + y * 5 + sample * 3) % 11) as f32);
+                let (albedo, normal, depth) = (Vec3::splat(0.5), Vec3::Z, 1.0);
+                let first_hit = Some(FirstHit { albedo, normal, depth });
+                film.add(x, y, &PathResult { radiance, first_hit, ..PathResult::default() });
+            }
+        }
+        film
+    }
+
+    #[test]
+    fn a_calm_picture_of_all_pixels_is_filtered_with_what_there_is_of_the_exact_one() {
+        let developer = match Gpu::open(None).and_then(|gpu| Developer::new(&gpu)) {
+            Ok(developer) => developer,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let prepared = |own: Film, other: Film, is_whole| {
+            let backdrop = Some(Backdrop { film: Arc::new(other), worth: 4.0, is_cached: true });
+            let (session, denoiser) = (session(own), Some(Denoiser::ATrous));
+            let prepared = Source { session, backdrop, denoiser, is_whole }.prepare(&developer);
+            prepared.image.expect("made on the host").pixels.clone()
+        };
+        let (holes, whole, calm, large) =
+            (film(12, 2, 1), film(12, 1, 1), film(12, 1, 2), film(16, 1, 9));
+        let filtered = |film, other| quick(film, Some((other, 4.0))).pixels;
+        let blended = |film, other| blend(film, Some((other, 4.0))).pixels;
+        assert_eq!(prepared(whole.clone(), calm.clone(), true), filtered(&whole, &calm));
+        assert_eq!(prepared(holes.clone(), calm.clone(), false), filtered(&holes, &calm));
+        // The calm one has holes, is larger and says more.
+        assert_eq!(prepared(holes.clone(), holes.clone(), false), blended(&holes, &holes));
+        assert_eq!(prepared(whole.clone(), large.clone(), true), blended(&whole, &large));
+    }
+
+    #[test]
+    fn a_film_on_the_same_device_is_shown_as_it_is_and_others_are_uploaded() {
+        let opened = || Gpu::open(None).and_then(|gpu| Developer::new(&gpu));
+        let (developer, other) = match opened().and_then(|one| Ok((one, opened()?))) {
+            Ok(both) => both,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let mut session = session(Film::new(6, 4, true));
+        let is_live = |developer: &Developer, session: &SessionSnapshot, denoiser| {
+            let session = session.clone();
+            let source = Source { session, backdrop: None, denoiser, is_whole: true };
+            source.prepare(developer).picture.is_live()
+        };
+        assert!(!is_live(&developer, &session, None));
+        let uploaded = developer.upload_film(&session.film, true);
+        session.on_device = Some((developer.gpu().clone(), uploaded.film().clone()));
+        assert!(is_live(&developer, &session, None));
+        assert!(!is_live(&other, &session, None));
+        assert!(!is_live(&developer, &session, Some(Denoiser::ATrous)));
+        developer.gpu().check().and(other.gpu().check()).expect("no buffer is used elsewhere");
+    }
+}
