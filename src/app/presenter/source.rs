@@ -34,6 +34,9 @@ impl Prepared {
 /// A filtered picture is as good as the blend of so many times its samples.
 const FILTER_WORTH: u64 = 4;
 
+/// A sample of a smaller picture says as much as so many of pixels here and there.
+const DOTS_WORTH: u64 = 4;
+
 /// What a linear picture is made from; equal ones give the same picture.
 #[derive(Clone)]
 pub(super) struct Source {
@@ -69,6 +72,19 @@ impl Source {
         Some(Self { session, backdrop: None, denoiser: order.denoiser, is_whole })
     }
 
+    /// Whether the film has too few samples to be seen in place of a smaller picture of this view. As long as
+    /// pixels have none, those that have one would be dots in it.
+    fn is_behind(&self, before: &Film) -> bool {
+        let film = &self.session.film;
+        let shape = |film: &Film| f64::from(film.width) / f64::from(film.height);
+        let is_alike = (shape(before) / shape(film) - 1.0).abs() < 0.05;
+        let [own, other] = [film, before].map(Film::total_samples);
+        before.width < film.width
+            && before.min_samples() > 0
+            && is_alike
+            && if self.is_whole { 2 * own < other } else { own < DOTS_WORTH * other }
+    }
+
     /// The picture on the device, without noise if that is asked for.
     pub(super) fn prepare(&self, developer: &Developer) -> Prepared {
         let film = &self.session.film;
@@ -78,6 +94,8 @@ impl Source {
             None => developer.upload_film(film, layers),
         };
         let backdrop = self.backdrop.as_ref().map(|backdrop| (&*backdrop.film, backdrop.worth));
+        let ahead = backdrop.filter(|(before, _)| self.is_behind(before));
+        let (film, backdrop) = ahead.map_or((&**film, backdrop), |(before, _)| (before, None));
         let blended = || Prepared::of(developer, blend(film, backdrop));
         // Filters take whole films of one size.
         let other = backdrop.filter(|(other, worth)| {
@@ -86,11 +104,13 @@ impl Source {
         let is_calmed = other.is_some() && self.backdrop.as_ref().is_some_and(|b| b.is_cached);
         let is_surpassed =
             |(other, _): (&Film, f32)| other.total_samples() <= FILTER_WORTH * film.total_samples();
-        let can_filter = other.is_some() || (self.is_whole && backdrop.is_none_or(is_surpassed));
+        let has_all = film.min_samples() > 0;
+        let can_filter = other.is_some() || (has_all && backdrop.is_none_or(is_surpassed));
         match self.denoiser {
             None if self.is_whole => Prepared::on_device(noisy(false)),
             Some(Denoiser::ATrous)
                 if self.is_whole
+                    && ahead.is_none()
                     && !is_calmed
                     && developer.can_denoise(film.width, film.height) =>
             {
@@ -131,8 +151,14 @@ pub(super) mod tests {
 
     /// A wall with light that is the pixel's own, in every so-manyth column.
     pub(in crate::app::presenter) fn film(width: u32, every: u32, samples: u32) -> Film {
-        let mut film = Film::new(width, 8, true);
-        for (y, x) in (0..8).flat_map(|y| (0..width).step_by(every as usize).map(move |x| (y, x))) {
+        film_of([width, 8], every, samples)
+    }
+
+    fn film_of([width, height]: [u32; 2], every: u32, samples: u32) -> Film {
+        let mut film = Film::new(width, height, true);
+        for (y, x) in
+            (0..height).flat_map(|y| (0..width).step_by(every as usize).map(move |x| (y, x)))
+        {
             for sample in 0..samples {
                 let radiance = Vec3::splat(((x * 7 + y * 5 + sample * 3) % 11) as f32);
                 let (albedo, normal, depth) = (Vec3::splat(0.5), Vec3::Z, 1.0);
@@ -164,6 +190,10 @@ pub(super) mod tests {
         // The calm one has holes, is larger and says more.
         assert_eq!(prepared(holes.clone(), holes.clone(), false), blended(&holes, &holes));
         assert_eq!(prepared(whole.clone(), large.clone(), true), blended(&whole, &large));
+        // A smaller one with more samples is seen alone.
+        let [small, many] = [9, 99].map(|samples| film_of([6, 4], 1, samples));
+        assert_eq!(prepared(holes.clone(), small.clone(), false), quick(&small, None).pixels);
+        assert_eq!(prepared(calm.clone(), many.clone(), true), quick(&many, None).pixels);
     }
 
     #[test]

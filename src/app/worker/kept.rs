@@ -24,6 +24,8 @@ pub(super) struct Kept {
     pub(super) world: Option<Arc<World>>,
     /// Seconds one camera path takes, all threads together.
     pub(super) seconds_per_path: Option<f64>,
+    /// By what the last moving picture's sides were divided.
+    pub(super) shrink: Option<u32>,
     pub(super) snapshots: u64,
     /// A film of what was seen last, and what it was rendered for.
     pub(super) backdrop: Option<(Arc<Request>, Arc<Film>)>,
@@ -41,6 +43,7 @@ impl Kept {
             counted: None,
             world: None,
             seconds_per_path: None,
+            shrink: None,
             snapshots: 0,
             backdrop: None,
             training: None,

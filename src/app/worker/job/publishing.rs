@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 
 use super::sessions::SLICE;
 use super::{CALM_SAMPLES, Job};
-use crate::app::worker::{Activity, Backdrop, NoCache, Point, SessionSnapshot, Snapshot, lock};
+use crate::app::worker::{
+    Activity, Backdrop, NoCache, Point, Request, SessionSnapshot, Snapshot, lock,
+};
 use crate::light_grid::LightGrid;
 use crate::metrics;
 use crate::radiance_cache::CacheFacts;
@@ -161,7 +163,10 @@ impl Job<'_> {
         calm: Option<&Session<'_>>,
         rests: bool,
     ) -> Option<Backdrop> {
-        let before = self.backdrop().map(|film| Backdrop { film, worth: 1.0, is_cached: false });
+        // What this job itself has kept has the same samples.
+        let is_own = |(of, _): &(Arc<Request>, Arc<Film>)| Arc::ptr_eq(of, &self.request);
+        let before = self.backdrop().filter(|_| !self.kept.backdrop.as_ref().is_some_and(is_own));
+        let before = before.map(|film| Backdrop { film, worth: 1.0, is_cached: false });
         let seen = before.as_ref().map_or(0, |backdrop| backdrop.film.total_samples());
         let says_more = |samples: u64| 2 * samples > 3 * seen;
         let film = match calm {

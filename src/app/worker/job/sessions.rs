@@ -83,12 +83,15 @@ impl Job<'_> {
         session
     }
 
-    /// By what a moving picture's sides are divided.
-    fn shrink(&self, view: &View) -> u32 {
+    /// By what a moving picture's sides are divided: as for the last one, unless that took far too long or
+    /// could have been much larger, for sizes that come and go are seen.
+    fn shrink(&mut self, view: &View) -> u32 {
         let pixels = f64::from(view.width) * f64::from(view.height);
         let seconds_per_path = self.kept.seconds_per_path.unwrap_or(LIKELY_SECONDS_PER_PATH);
-        let shrink = (pixels * seconds_per_path / MOVING_SECONDS).sqrt().ceil();
-        (shrink as u32).clamp(1, 16)
+        let shrink = (pixels * seconds_per_path / MOVING_SECONDS).sqrt();
+        let is_right = |last: &u32| (0.6..=1.8).contains(&(f64::from(*last) / shrink));
+        let last = self.kept.shrink.filter(is_right);
+        *self.kept.shrink.insert(last.unwrap_or((shrink.ceil() as u32).clamp(1, 16)))
     }
 
     /// One pass, cut short after a slice if asked for.
