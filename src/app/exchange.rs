@@ -1,6 +1,6 @@
 //! What comes up from the threads, and what is sent down to them.
 
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 
 use glam::Vec2;
 
@@ -11,7 +11,7 @@ use super::loader::{Loaded, LoadedScene};
 use super::presenter::{Order, Shown};
 use super::speed_up::SpeedUp;
 use super::worker::Request;
-use super::{App, Later, surface_map};
+use super::{App, Later, lock, surface_map};
 use crate::denoise::Denoiser;
 use crate::environment::Environment;
 use crate::path::framing;
@@ -79,7 +79,7 @@ impl App {
                 }
             }
         }
-        let arrived = self.arriving.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let arrived = lock(&self.arriving).take();
         self.reference = arrived.or(self.reference.take());
         for sentence in self.worker.take_failures() {
             self.messages.error(sentence);

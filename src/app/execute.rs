@@ -1,7 +1,7 @@
 //! Carrying out commands.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::commands::Command;
@@ -10,7 +10,7 @@ use super::history;
 use super::interface::{Chosen, Dock, Interface, Prompt, Purpose, Tab};
 use super::screen::color_image;
 use super::worker::Reference;
-use super::{App, Later, convergence, save, surface_map, theme};
+use super::{App, Later, convergence, lock, save, surface_map, theme};
 use crate::error::{Error, Result};
 use crate::image::read_picture;
 use crate::render::gpu::DeviceChoice;
@@ -261,8 +261,7 @@ impl App {
                  for that"
             );
             let name = path.clone();
-            *slot.lock().unwrap_or_else(PoisonError::into_inner) =
-                Some(Arc::new(Reference { name, image }));
+            *lock(&slot) = Some(Arc::new(Reference { name, image }));
             Ok(sentence)
         });
     }

@@ -1,11 +1,12 @@
 //! A picture that was kept.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, Weak};
 
 use egui::{ColorImage, TextureHandle};
 
 use super::document::Document;
+use super::lock;
 use crate::error::Decoded;
 use crate::image::{Image, read_picture};
 use crate::scene::SceneOptions;
@@ -78,7 +79,7 @@ impl Pixels {
     }
 
     fn source(&self) -> MutexGuard<'_, Source> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.0)
     }
 }
 

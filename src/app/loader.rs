@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use super::Wake;
 use super::document::Document;
+use super::{Wake, lock};
 use crate::environment::landmarks::{Sun, equal_energy_tiles};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{Error, Notices, Result};
@@ -158,7 +158,7 @@ impl Loader {
         let turn = Arc::clone(&self.turns[kind]);
         let name = name.to_owned();
         let thread = std::thread::Builder::new().name("load".to_owned()).spawn(move || {
-            let _turn = turn.lock().unwrap_or_else(PoisonError::into_inner);
+            let _turn = lock(&turn);
             // A panic must not leave the window waiting for ever.
             let failed = || Error::at(&name, "cannot be read: the program failed at it");
             let loaded = catch_panic(|| load(&name)).unwrap_or_else(|| match kind {

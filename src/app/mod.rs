@@ -8,7 +8,7 @@
 //! that draws it. [`window`] shows it on a display, [`screenshot`] in a texture without one.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 mod album;
 pub mod commands;
@@ -128,6 +128,11 @@ pub struct App {
     waiting_save: Option<std::path::PathBuf>,
     is_repeatable: bool,
     is_closing: bool,
+}
+
+/// What others hold is sound even if one of them has panicked with it.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What comes back from a thread.

@@ -6,7 +6,7 @@ mod order;
 mod rest;
 mod source;
 
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -14,7 +14,7 @@ use memory::Memory;
 pub use order::{Order, Shown};
 use rest::{Work, rest_after};
 
-use super::Wake;
+use super::{Wake, lock};
 use crate::error::{Error, Result};
 
 /// No picture takes longer to be made ready.
@@ -34,10 +34,6 @@ struct Shared {
     changed: Condvar,
     shown: Mutex<Option<Arc<Shown>>>,
     wake: Wake,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The handle of the presenting thread; it ends when dropped.

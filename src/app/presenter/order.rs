@@ -87,17 +87,13 @@ pub struct Shown {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::presenter::source::tests::{film, session};
+    use crate::app::presenter::source::tests::{developer, film, session};
     use crate::app::worker::tests::{request_of, snapshot_of};
     use crate::app::worker::{Request, SessionSnapshot};
-    use crate::render::gpu::Gpu;
 
     #[test]
     fn a_movement_does_not_wait_for_the_picture_before_it() {
-        let developer = match Gpu::open(None).and_then(|gpu| Developer::new(&gpu)) {
-            Ok(developer) => Arc::new(developer),
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
+        let Some(developer) = developer().map(Arc::new) else { return };
         let still = Arc::new(request_of("open", [12, 8]));
         let order = |request: &Arc<Request>, samples| Order {
             developer: Arc::clone(&developer),

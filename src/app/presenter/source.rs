@@ -136,6 +136,12 @@ pub(super) mod tests {
     use crate::path::{FirstHit, PathResult};
     use crate::render::{Figures, Sampling};
 
+    /// Of a device; `None`, which is said, where there is none.
+    pub(in crate::app::presenter) fn developer() -> Option<Developer> {
+        let developer = Gpu::open(None).and_then(|gpu| Developer::new(&gpu));
+        developer.map_err(|reason| eprintln!("SKIPPED: {reason}")).ok()
+    }
+
     pub(in crate::app::presenter) fn session(film: Film) -> SessionSnapshot {
         SessionSnapshot {
             samples: 1,
@@ -171,10 +177,7 @@ pub(super) mod tests {
 
     #[test]
     fn a_calm_picture_of_all_pixels_is_filtered_with_what_there_is_of_the_exact_one() {
-        let developer = match Gpu::open(None).and_then(|gpu| Developer::new(&gpu)) {
-            Ok(developer) => developer,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
+        let Some(developer) = developer() else { return };
         let prepared = |own: Film, other: Film, is_whole| {
             let backdrop = Some(Backdrop { film: Arc::new(other), worth: 4.0, is_cached: true });
             let (session, denoiser) = (session(own), Some(Denoiser::ATrous));
@@ -198,11 +201,7 @@ pub(super) mod tests {
 
     #[test]
     fn a_film_on_the_same_device_is_shown_as_it_is_and_others_are_uploaded() {
-        let opened = || Gpu::open(None).and_then(|gpu| Developer::new(&gpu));
-        let (developer, other) = match opened().and_then(|one| Ok((one, opened()?))) {
-            Ok(both) => both,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
+        let Some((developer, other)) = developer().zip(developer()) else { return };
         let mut session = session(Film::new(6, 4, true));
         let is_live = |developer: &Developer, session: &SessionSnapshot, denoiser| {
             let session = session.clone();

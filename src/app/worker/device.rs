@@ -2,7 +2,8 @@
 
 use std::sync::{Arc, Mutex};
 
-use super::{Request, lock};
+use super::Request;
+use crate::app::lock;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::World;

@@ -6,7 +6,7 @@
 //! view at once and no sample is lost.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -17,7 +17,7 @@ mod kept;
 use job::Job;
 use kept::Kept;
 
-use super::Wake;
+use super::{Wake, lock};
 use crate::alarm::Alarm;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
@@ -81,6 +81,11 @@ impl Request {
             && new.moving
             && Arc::ptr_eq(&self.world, &new.world)
             && self.environment.shares_map_with(&new.environment)
+    }
+
+    /// Whether work for `self` is to be dropped for `new`.
+    fn is_ended_by(&self, new: &Self) -> bool {
+        self.restarts(new) && !self.is_followed_by(new)
     }
 
     /// Whether the same light falls on the same scene, whatever its surfaces make of it.
@@ -315,10 +320,6 @@ struct Slot {
     quit: bool,
 }
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// The handle of the render thread; it ends when dropped.
 pub struct Worker {
     shared: Arc<Shared>,
@@ -372,8 +373,7 @@ impl Worker {
         if slot.request.as_ref().is_some_and(|old| old.is_same(&request)) {
             return;
         }
-        let ends = |old: &Arc<Request>| old.restarts(&request) && !old.is_followed_by(&request);
-        if slot.request.as_ref().is_some_and(ends) {
+        if slot.request.as_ref().is_some_and(|old| old.is_ended_by(&request)) {
             self.shared.cancel.store(true, Ordering::Relaxed);
         }
         slot.request = Some(Arc::new(request));
@@ -522,6 +522,13 @@ pub(super) mod tests {
         request(Arc::new(world), Arc::new(environment.expect("a sound map")), size)
     }
 
+    /// A worker beside a window; `None`, which is said, where none can be drawn.
+    fn worker() -> Option<Worker> {
+        let gpu = Gpu::open(None).map_err(|reason| eprintln!("SKIPPED: {reason}")).ok()?;
+        let worker = Worker::start(Arc::new(|| ()), (None, RayChoice::default()), gpu);
+        Some(worker.expect("threads can be had"))
+    }
+
     /// Waits until a snapshot is as it should be.
     fn wait_for(worker: &Worker, is_right: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
         let start = Instant::now();
@@ -536,12 +543,7 @@ pub(super) mod tests {
 
     #[test]
     fn what_was_learned_outlives_a_change_of_colour() {
-        let gpu = match Gpu::open(None) {
-            Ok(gpu) => gpu,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
-        let worker = Worker::start(Arc::new(|| ()), (None, RayChoice::default()), gpu)
-            .expect("threads can be had");
+        let Some(worker) = worker() else { return };
         let request = Request {
             previews: false,
             rule: StopRule { samples: Some(2), ..StopRule::default() },
@@ -569,12 +571,7 @@ pub(super) mod tests {
 
     #[test]
     fn a_movement_is_seen_while_it_goes_on() {
-        let gpu = match Gpu::open(None) {
-            Ok(gpu) => gpu,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
-        let worker = Worker::start(Arc::new(|| ()), (None, RayChoice::default()), gpu)
-            .expect("threads can be had");
+        let Some(worker) = worker() else { return };
         let mut request = Request { moving: true, ..request_of("office", [640, 480]) };
         let (start, mut seen) = (Instant::now(), std::collections::BTreeSet::new());
         while seen.len() < 3 {
@@ -594,12 +591,7 @@ pub(super) mod tests {
 
     #[test]
     fn films_are_copied_when_they_are_wanted() {
-        let gpu = match Gpu::open(None) {
-            Ok(gpu) => gpu,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
-        let worker = Worker::start(Arc::new(|| ()), (None, RayChoice::default()), gpu)
-            .expect("threads can be had");
+        let Some(worker) = worker() else { return };
         let request = request_of("open", [64, 48]);
         worker.submit(request.clone());
         let first = wait_for(&worker, |snapshot| snapshot.main.samples > 1);

@@ -11,8 +11,9 @@ use std::time::{Duration, Instant};
 use publishing::{Reading, calm_worth};
 
 use super::kept::Kept;
-use super::{Activity, Point, Request, Shared, lock};
+use super::{Activity, Point, Request, Shared};
 use crate::alarm::Alarm;
+use crate::app::lock;
 use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
@@ -298,16 +299,17 @@ impl<'a> Job<'a> {
     }
 
     fn is_superseded(&self) -> bool {
-        let slot = lock(&self.shared.slot);
-        slot.quit || slot.request.as_ref().is_some_and(|new| self.request.restarts(new))
+        self.is_left_for(Request::restarts)
     }
 
     /// Whether something else is asked for than the next moment of a movement.
     fn is_elsewhere(&self) -> bool {
+        self.is_left_for(Request::is_ended_by)
+    }
+
+    fn is_left_for(&self, is_other: impl Fn(&Request, &Request) -> bool) -> bool {
         let slot = lock(&self.shared.slot);
-        let is_elsewhere =
-            |new: &Arc<Request>| self.request.restarts(new) && !self.request.is_followed_by(new);
-        slot.quit || slot.request.as_ref().is_some_and(is_elsewhere)
+        slot.quit || slot.request.as_ref().is_some_and(|new| is_other(&self.request, new))
     }
 
     /// Waits until something else is asked for.

@@ -6,9 +6,8 @@ use std::time::{Duration, Instant};
 
 use super::sessions::SLICE;
 use super::{CALM_SAMPLES, Job};
-use crate::app::worker::{
-    Activity, Backdrop, NoCache, Point, Request, SessionSnapshot, Snapshot, lock,
-};
+use crate::app::lock;
+use crate::app::worker::{Activity, Backdrop, NoCache, Point, Request, SessionSnapshot, Snapshot};
 use crate::light_grid::LightGrid;
 use crate::metrics;
 use crate::radiance_cache::CacheFacts;

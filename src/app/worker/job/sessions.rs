@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::Job;
-use crate::app::worker::lock;
+use crate::app::lock;
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::path::World;
