@@ -35,6 +35,7 @@ pub mod settings_file;
 mod speed_up;
 pub mod surface_map;
 mod theme;
+mod turns;
 mod undo;
 pub mod window;
 pub mod worker;

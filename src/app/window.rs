@@ -22,7 +22,7 @@ use winit::window::{Window, WindowId};
 
 use super::loader::Loader;
 use super::screen::{Screen, TextureCopies, renderer_options};
-use super::{App, Start, Wake, Wakes, theme};
+use super::{App, Start, Wake, Wakes, theme, turns};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::render::gpu::Gpu;
@@ -273,7 +273,12 @@ impl Running {
         if let Err(loss) = self.app.screen().gpu().check() {
             self.replace_device(&loss)?;
         }
-        let input = self.input.take_egui_input(&self.window);
+        let mut input = self.input.take_egui_input(&self.window);
+        let later = turns::first_turn(&mut input.events);
+        if !later.is_empty() {
+            self.input.egui_input_mut().events = later;
+            self.context.request_repaint();
+        }
         let was_modal = self.app.is_modal();
         let mut output = self.context.run_ui(input, |ui| self.app.show(ui));
         if self.app.is_modal() && !was_modal {

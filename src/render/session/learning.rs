@@ -204,7 +204,8 @@ mod tests {
     use crate::environment::{EnvironmentOptions, sky};
     use crate::light_grid::DistributionOptions;
     use crate::render::gi::tests::view;
-    use crate::render::{Phase, Sampling};
+    use crate::render::gpu::{Gpu, UploadedScene};
+    use crate::render::{Phase, Sampling, StopRule};
     use crate::scene::builtin;
 
     fn office() -> (World, Environment) {
@@ -251,6 +252,31 @@ mod tests {
             session.film().clone()
         });
         assert_eq!(films[0], films[1]);
+    }
+
+    /// A GPU takes as many samples at a time as it can, but what is learned of them does not depend on it.
+    #[test]
+    fn how_fast_a_gpu_is_changes_nothing_of_what_is_learned() {
+        let gpu = match Gpu::open(None) {
+            Ok(gpu) => gpu,
+            Err(reason) => return eprintln!("SKIPPED: {reason}"),
+        };
+        let (world, environment) = office();
+        let view = view(&world, DistributionOptions::ADAPTIVE);
+        let uploaded = UploadedScene::new(&gpu, &world, &environment).expect("it fits");
+        let rule = StopRule { samples: Some(16), ..StopRule::default() };
+        // Seconds a pass while there are fewer than three samples, and then.
+        let films = [[1e-3, 1e-3], [1e3, 1e-3], [1e3, 1e3]].map(|seconds| {
+            let session = Session::on_gpu(&world, &environment, view.clone(), &uploaded);
+            let mut session = session.expect("it fits");
+            while !session.is_done(&rule) {
+                session.figures.render_seconds = seconds[usize::from(session.samples() > 2)];
+                let samples = session.next_pass(&rule);
+                session.advance(samples, &AtomicBool::new(false)).expect("rendered");
+            }
+            session.film().clone()
+        });
+        assert!(films.iter().all(|film| *film == films[0]), "the same bits");
     }
 
     #[test]

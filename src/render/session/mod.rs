@@ -241,25 +241,27 @@ impl<'a> Session<'a> {
     }
 
     /// Samples per pixel that the next pass should take: growing with what is there, so that few
-    /// passes are needed and none is much longer than those before it. Where noise is asked for it
-    /// depends on counts alone, so that the picture is repeatable; else a GPU takes as many as it can in
-    /// a moment.
+    /// passes are needed and none is much longer than those before it. Where noise is asked for, or
+    /// something is learned of what is rendered, it depends on counts alone, so that the picture is
+    /// repeatable; else a GPU takes as many as it can in a moment.
     pub fn next_pass(&self, rule: &StopRule) -> u32 {
         let samples = self.samples;
+        let is_counting =
+            self.learning.as_ref().is_some_and(|learning| learning.stage == Stage::Counting);
         let pass = match &self.engine {
-            Engine::Cpu => (samples / 16).clamp(1, 64),
             // Each look at the noise reads the film.
             Engine::Gpu(_) if rule.noise.is_some() => (samples / 8).clamp(1, 64),
-            Engine::Gpu(_) => {
+            Engine::Gpu(_) if !is_counting => {
                 let each = self.figures.render_seconds / f64::from(samples.max(1));
                 let affordable = (GPU_PASS_SECONDS / each.max(1e-9)) as u32;
                 affordable.max(samples / 16).min(samples).clamp(1, 64)
             }
+            _ => (samples / 16).clamp(1, 64),
         };
-        // The radiance cache learns where samples are a power of two.
-        let until_training =
-            self.training.as_ref().map(|_| (samples + 1).next_power_of_two() - samples);
-        let pass = until_training.map_or(pass, |until| pass.min(until));
+        // The radiance cache and the distributions learn where samples are a power of two.
+        let until_learning = (self.training.is_some() || is_counting)
+            .then(|| (samples + 1).next_power_of_two() - samples);
+        let pass = until_learning.map_or(pass, |until| pass.min(until));
         rule.samples.map_or(pass, |limit| pass.min(limit.saturating_sub(samples)).max(1))
     }
 

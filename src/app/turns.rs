@@ -1,0 +1,57 @@
+//! Keys and buttons take turns: a key may change what the next press of a button means, and where
+//! software draws both can come in one frame, of which egui does not keep the order.
+
+use egui::Event;
+
+/// Leaves in `events` what may be taken in one frame: presses of keys or of buttons, not both. What
+/// comes after the change from one to the other is returned; it is meant for the next frame.
+pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
+    let presses = |event: &Event| match event {
+        Event::Key { pressed: true, .. } => Some("keys"),
+        Event::PointerButton { pressed: true, .. } => Some("buttons"),
+        _ => None,
+    };
+    let first = events.iter().find_map(presses);
+    let is_other = |event: &Event| presses(event).is_some() && presses(event) != first;
+    let end = events.iter().position(is_other).unwrap_or(events.len());
+    events.split_off(end)
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::{Key, Modifiers, PointerButton, Pos2};
+
+    use super::*;
+
+    #[test]
+    fn what_a_key_means_for_a_drag_is_known_before_it_begins() {
+        let (pos, modifiers) = (Pos2::ZERO, Modifiers::NONE);
+        let key = |pressed| Event::Key {
+            key: Key::X,
+            physical_key: None,
+            pressed,
+            repeat: false,
+            modifiers,
+        };
+        let button = |pressed| Event::PointerButton {
+            pos,
+            button: PointerButton::Primary,
+            pressed,
+            modifiers,
+        };
+        let moves = Event::PointerMoved(pos);
+        let drag = [button(true), moves.clone(), button(false)];
+        let turns = [
+            vec![moves.clone(), key(true), key(false), key(true), moves],
+            [&drag[..], &drag[..]].concat(),
+            vec![key(true), key(false)],
+        ];
+        let mut events = turns.concat();
+        for turn in turns {
+            let rest = first_turn(&mut events);
+            assert_eq!(events, turn);
+            events = rest;
+        }
+        assert!(events.is_empty() && first_turn(&mut events).is_empty());
+    }
+}
