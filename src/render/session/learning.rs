@@ -204,8 +204,7 @@ mod tests {
     use crate::environment::{EnvironmentOptions, sky};
     use crate::light_grid::DistributionOptions;
     use crate::render::gi::tests::view;
-    use crate::render::gpu::{Gpu, UploadedScene};
-    use crate::render::{Phase, Sampling, StopRule};
+    use crate::render::{Phase, Sampling};
     use crate::scene::builtin;
 
     fn office() -> (World, Environment) {
@@ -255,8 +254,12 @@ mod tests {
     }
 
     /// A GPU takes as many samples at a time as it can, but what is learned of them does not depend on it.
+    #[cfg(feature = "gpu")]
     #[test]
     fn how_fast_a_gpu_is_changes_nothing_of_what_is_learned() {
+        use crate::render::StopRule;
+        use crate::render::gpu::{Gpu, UploadedScene};
+
         let gpu = match Gpu::open(None) {
             Ok(gpu) => gpu,
             Err(reason) => return eprintln!("SKIPPED: {reason}"),
