@@ -8,298 +8,23 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
 
 mod device;
 mod job;
 mod kept;
+mod request;
+mod snapshot;
 
 use job::Job;
 use kept::Kept;
+pub use request::{Reference, Request};
+use snapshot::Rest;
+pub use snapshot::{Activity, Backdrop, NoCache, Point, SessionSnapshot, Snapshot};
 
 use super::{Wake, lock};
 use crate::alarm::Alarm;
-use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::image::Image;
-use crate::light_grid::{LearningGrid, LightGrid};
-use crate::path::World;
-use crate::radiance_cache::CacheFacts;
-use crate::render::film::Film;
-use crate::render::gpu::{DeviceChoice, DeviceFilm, Gpu, GpuFigures, RayChoice};
-use crate::render::{Figures, Sampling, StopRule, View};
-
-/// What is to be rendered.
-#[derive(Clone)]
-pub struct Request {
-    /// The scene.
-    pub world: Arc<World>,
-    /// The map, turned and scaled.
-    pub environment: Arc<Environment>,
-    /// What is seen and how.
-    pub view: View,
-    /// Render plainly beside it, at equal time.
-    pub split: bool,
-    /// The camera moves: a small picture at once rather than a good one.
-    pub moving: bool,
-    /// Show pictures on the way; else only what [`View`] asks for, for repeatable screenshots.
-    pub previews: bool,
-    /// Where it is rendered.
-    pub device: DeviceChoice,
-    /// Show light from a radiance cache while there is little of what is asked for.
-    pub is_calm: bool,
-    /// Tell what is in that cache.
-    pub inspects_cache: bool,
-    /// When to stop.
-    pub rule: StopRule,
-    /// Render with what was learned before rather than learn anew.
-    pub is_frozen: bool,
-    /// What errors are measured against.
-    pub reference: Option<Arc<Reference>>,
-    /// Do nothing for now.
-    pub paused: bool,
-    /// Counts restarts asked for by hand.
-    pub run: u32,
-}
-
-impl Request {
-    /// Whether what is rendered for `self` is of no use for `new`.
-    fn restarts(&self, new: &Self) -> bool {
-        !Arc::ptr_eq(&self.world, &new.world)
-            || !Arc::ptr_eq(&self.environment, &new.environment)
-            || self.view != new.view
-            // Both halves start together; the plain one can be dropped at any time.
-            || (!self.split && new.split)
-            || self.moving != new.moving
-            || self.run != new.run
-    }
-
-    /// Whether `new` is only the next moment of a movement, for which a picture of this one is worth to be seen:
-    /// were each ended by the next, none would be seen before the movement ends.
-    fn is_followed_by(&self, new: &Self) -> bool {
-        self.moving
-            && new.moving
-            && Arc::ptr_eq(&self.world, &new.world)
-            && self.environment.shares_map_with(&new.environment)
-    }
-
-    /// Whether work for `self` is to be dropped for `new`.
-    fn is_ended_by(&self, new: &Self) -> bool {
-        self.restarts(new) && !self.is_followed_by(new)
-    }
-
-    /// Whether the same light falls on the same scene, whatever its surfaces make of it.
-    fn is_lit_like(&self, other: &Self) -> bool {
-        self.world.is_seen_through_like(&other.world)
-            && Arc::ptr_eq(&self.environment, &other.environment)
-            && (self.view.medium, self.view.limits) == (other.view.medium, other.view.limits)
-    }
-
-    /// Whether a picture for `self` shows what one for `new` will show, but for its size and noise.
-    fn looks_like(&self, new: &Self) -> bool {
-        let (a, b) = (&self.view, &new.view);
-        Arc::ptr_eq(&self.world, &new.world)
-            && Arc::ptr_eq(&self.environment, &new.environment)
-            && (&a.camera, a.crop, a.medium) == (&b.camera, b.crop, b.medium)
-            && (a.background, a.limits) == (b.background, b.limits)
-            // Whoever asks for other samples wants to see those.
-            && (a.sampling, a.seed, self.run) == (b.sampling, b.seed, new.run)
-    }
-
-    fn is_same(&self, new: &Self) -> bool {
-        !self.restarts(new)
-            && self.split == new.split
-            && self.device == new.device
-            && self.is_frozen == new.is_frozen
-            && self.is_calm == new.is_calm
-            && self.inspects_cache == new.inspects_cache
-            && self.reference.as_ref().map(Arc::as_ptr) == new.reference.as_ref().map(Arc::as_ptr)
-            && self.rule == new.rule
-            && self.paused == new.paused
-    }
-}
-
-/// What the worker is doing.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Activity {
-    /// A small picture while the camera moves.
-    Moving,
-    /// Learning, the share done in `[0,1]`.
-    Learning(f32),
-    /// Adding samples.
-    Rendering,
-    /// Asked to pause.
-    Paused,
-    /// A stop rule was met.
-    Done,
-}
-
-/// A picture without noise.
-pub struct Reference {
-    /// Where it came from.
-    pub name: String,
-    /// Linear radiance.
-    pub image: Image,
-}
-
-/// How good a picture was at one moment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
-    /// Seconds of learning and rendering.
-    pub seconds: f64,
-    /// Samples per pixel.
-    pub samples: f64,
-    /// Estimated relative RMS error.
-    pub noise: f64,
-    /// The true one, where there is a reference.
-    pub error: Option<f64>,
-}
-
-/// One picture and what was done for it.
-#[derive(Clone)]
-pub struct SessionSnapshot {
-    /// How the map was sampled.
-    pub sampling: Sampling,
-    /// The sums. While the window shows those on its own device in every frame, or shows no newer ones for
-    /// now, they are as they were read last: at most a few seconds ago, and the last ones when nothing is
-    /// rendered.
-    pub film: Arc<Film>,
-    /// Fewest samples of any of its pixels.
-    pub samples: u32,
-    /// What was done for them.
-    pub figures: Figures,
-    /// [`Film::noise`].
-    pub noise: f64,
-    /// The distributions in use.
-    pub grid: Option<Arc<LightGrid>>,
-    /// The GPU at work; `None` is the CPU.
-    pub gpu: Option<Arc<GpuFigures>>,
-    /// The sums of `film` or later ones where a GPU has them, and that GPU.
-    pub(crate) on_device: Option<(Gpu, DeviceFilm)>,
-}
-
-impl SessionSnapshot {
-    /// Samples a pixel, in the mean.
-    pub fn mean_samples(&self) -> f64 {
-        self.figures.samples as f64 / self.film.pixels().len().max(1) as f64
-    }
-}
-
-/// Why there is no radiance cache to be looked at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NoCache {
-    /// Nobody has asked for it.
-    Unasked,
-    /// It is there for fast light, which only denoised pictures show.
-    NotDenoised,
-    /// A split view compares pictures, and shows no fast light.
-    Split,
-    /// The device has many samples before a cache would be trained.
-    QuickDevice,
-    /// Light that has met one surface needs none.
-    OneBounce,
-    /// It will be.
-    Untrained,
-}
-
-/// The latest picture.
-#[derive(Clone)]
-pub struct Snapshot {
-    /// Counts snapshots.
-    pub number: u64,
-    /// What it was rendered for.
-    pub request: Arc<Request>,
-    /// What is going on.
-    pub activity: Activity,
-    /// The picture.
-    pub main: SessionSnapshot,
-    /// What has been done for it by now; its own figures are those of its film.
-    pub now: Figures,
-    /// The plain picture of a split view.
-    pub plain: Option<SessionSnapshot>,
-    /// What learning counted, once it has ended.
-    pub counters: Option<Arc<LearningGrid>>,
-    /// What is in the radiance cache of fast light.
-    pub cache: std::result::Result<Arc<CacheFacts>, NoCache>,
-    /// How the error of `main` and of `plain` fell.
-    pub curves: [Vec<Point>; 2],
-    /// Another film of the same view; its samples help where `main` has few.
-    pub backdrop: Option<Backdrop>,
-    /// Seconds spent on a backdrop whose light comes from a radiance cache, which are none of `main`'s.
-    pub calm_seconds: f64,
-    /// Whoever shows it says here when the next one will be wanted.
-    pub(super) rest: Arc<Rest>,
-}
-
-/// How long no newer picture will be shown: films are large, and none is copied for nothing.
-pub(super) struct Rest(Mutex<Instant>);
-
-impl Rest {
-    fn new() -> Self {
-        Self(Mutex::new(Instant::now()))
-    }
-
-    /// No newer picture will be shown before this.
-    pub(super) fn set_end(&self, end: Instant) {
-        *lock(&self.0) = end;
-    }
-
-    /// Whether it lasts for longer than this.
-    fn lasts(&self, time: Duration) -> bool {
-        *lock(&self.0) > Instant::now() + time
-    }
-}
-
-/// A film that is shown together with the picture's own, and never saved.
-#[derive(Clone)]
-pub struct Backdrop {
-    /// Of any size.
-    pub film: Arc<Film>,
-    /// What one of its samples counts beside one of the picture's own.
-    pub worth: f32,
-    /// Whether its light comes from a radiance cache.
-    pub is_cached: bool,
-}
-
-impl Backdrop {
-    /// The share of what is shown that it makes up, in `[0,1]`, beside a film of the same size with so
-    /// many samples a pixel.
-    pub fn share(&self, samples: u32) -> f32 {
-        let own = self.worth * self.film.min_samples() as f32;
-        if own > 0.0 { own / (own + samples as f32) } else { 0.0 }
-    }
-}
-
-/// Of the very same film, counting alike.
-impl PartialEq for Backdrop {
-    fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.film, &other.film)
-            && (self.worth, self.is_cached) == (other.worth, other.is_cached)
-    }
-}
-
-impl Snapshot {
-    /// Samples a pixel of the picture by now, in the mean.
-    pub fn mean_samples(&self) -> f64 {
-        self.now.samples as f64 / self.main.film.pixels().len().max(1) as f64
-    }
-
-    /// Seconds of learning and rendering, fast light included.
-    pub fn seconds(&self) -> f64 {
-        self.now.elapsed_seconds() + self.calm_seconds
-    }
-
-    /// Whether the picture has its full size and every pixel a sample: it has not at first and while
-    /// the camera moves.
-    pub fn is_whole(&self) -> bool {
-        self.main.samples > 0 && self.main.film.width == self.request.view.width
-    }
-
-    /// Whether there is anything to be seen.
-    pub fn has_picture(&self) -> bool {
-        self.main.figures.samples > 0 || self.backdrop.is_some()
-    }
-}
+use crate::render::gpu::{Gpu, RayChoice};
 
 struct Shared {
     slot: Mutex<Slot>,
@@ -468,8 +193,13 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: (Option<String>, Ray
 
 #[cfg(test)]
 pub(super) mod tests {
+    use std::time::{Duration, Instant};
+
     use super::*;
-    use crate::environment::{EnvironmentOptions, sky};
+    use crate::environment::{Environment, EnvironmentOptions, sky};
+    use crate::path::World;
+    use crate::render::gpu::DeviceChoice;
+    use crate::render::{StopRule, View};
     use crate::scene::builtin;
 
     /// What a window asks for that has just opened.

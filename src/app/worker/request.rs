@@ -1,0 +1,107 @@
+//! What the window asks of the render thread, and what a new request means for the one before.
+
+use std::sync::Arc;
+
+use crate::environment::Environment;
+use crate::image::Image;
+use crate::path::World;
+use crate::render::gpu::DeviceChoice;
+use crate::render::{StopRule, View};
+
+/// What is to be rendered.
+#[derive(Clone)]
+pub struct Request {
+    /// The scene.
+    pub world: Arc<World>,
+    /// The map, turned and scaled.
+    pub environment: Arc<Environment>,
+    /// What is seen and how.
+    pub view: View,
+    /// Render plainly beside it, at equal time.
+    pub split: bool,
+    /// The camera moves: a small picture at once rather than a good one.
+    pub moving: bool,
+    /// Show pictures on the way; else only what [`View`] asks for, for repeatable screenshots.
+    pub previews: bool,
+    /// Where it is rendered.
+    pub device: DeviceChoice,
+    /// Show light from a radiance cache while there is little of what is asked for.
+    pub is_calm: bool,
+    /// Tell what is in that cache.
+    pub inspects_cache: bool,
+    /// When to stop.
+    pub rule: StopRule,
+    /// Render with what was learned before rather than learn anew.
+    pub is_frozen: bool,
+    /// What errors are measured against.
+    pub reference: Option<Arc<Reference>>,
+    /// Do nothing for now.
+    pub paused: bool,
+    /// Counts restarts asked for by hand.
+    pub run: u32,
+}
+
+impl Request {
+    /// Whether what is rendered for `self` is of no use for `new`.
+    pub(super) fn restarts(&self, new: &Self) -> bool {
+        !Arc::ptr_eq(&self.world, &new.world)
+            || !Arc::ptr_eq(&self.environment, &new.environment)
+            || self.view != new.view
+            // Both halves start together; the plain one can be dropped at any time.
+            || (!self.split && new.split)
+            || self.moving != new.moving
+            || self.run != new.run
+    }
+
+    /// Whether `new` is only the next moment of a movement, for which a picture of this one is worth to be seen:
+    /// were each ended by the next, none would be seen before the movement ends.
+    pub(super) fn is_followed_by(&self, new: &Self) -> bool {
+        self.moving
+            && new.moving
+            && Arc::ptr_eq(&self.world, &new.world)
+            && self.environment.shares_map_with(&new.environment)
+    }
+
+    /// Whether work for `self` is to be dropped for `new`.
+    pub(super) fn is_ended_by(&self, new: &Self) -> bool {
+        self.restarts(new) && !self.is_followed_by(new)
+    }
+
+    /// Whether the same light falls on the same scene, whatever its surfaces make of it.
+    pub(super) fn is_lit_like(&self, other: &Self) -> bool {
+        self.world.is_seen_through_like(&other.world)
+            && Arc::ptr_eq(&self.environment, &other.environment)
+            && (self.view.medium, self.view.limits) == (other.view.medium, other.view.limits)
+    }
+
+    /// Whether a picture for `self` shows what one for `new` will show, but for its size and noise.
+    pub(super) fn looks_like(&self, new: &Self) -> bool {
+        let (a, b) = (&self.view, &new.view);
+        Arc::ptr_eq(&self.world, &new.world)
+            && Arc::ptr_eq(&self.environment, &new.environment)
+            && (&a.camera, a.crop, a.medium) == (&b.camera, b.crop, b.medium)
+            && (a.background, a.limits) == (b.background, b.limits)
+            // Whoever asks for other samples wants to see those.
+            && (a.sampling, a.seed, self.run) == (b.sampling, b.seed, new.run)
+    }
+
+    pub(super) fn is_same(&self, new: &Self) -> bool {
+        !self.restarts(new)
+            && self.split == new.split
+            && self.device == new.device
+            && self.is_frozen == new.is_frozen
+            && self.is_calm == new.is_calm
+            && self.inspects_cache == new.inspects_cache
+            && self.reference.as_ref().map(Arc::as_ptr) == new.reference.as_ref().map(Arc::as_ptr)
+            && self.rule == new.rule
+            && self.paused == new.paused
+    }
+}
+
+/// A picture without noise.
+pub struct Reference {
+    /// Where it came from.
+    pub name: String,
+    /// Linear radiance.
+    pub image: Image,
+}
