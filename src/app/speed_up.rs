@@ -55,8 +55,9 @@ fn block_errors(session: &SessionSnapshot, lights: &[f64]) -> Vec<f64> {
     let film = &session.film;
     let (width, height) = (film.width as usize, film.height as usize);
     let mean = lights.iter().sum::<f64>() / lights.len() as f64;
+    let left = 1.0 - session.figures.variance_saved;
     let error = |(pixel, light): (&crate::render::film::Pixel, &f64)| {
-        pixel.variance_of_mean() / (light.powi(2) + 0.01 * mean * mean)
+        left * pixel.variance_of_mean() / (light.powi(2) + 0.01 * mean * mean)
     };
     let errors: Vec<f64> = film.pixels().iter().zip(lights).map(error).collect();
     let kept = (errors.len() - errors.len() / TRIMMED).max(1) - 1;

@@ -110,7 +110,7 @@ pub(crate) fn block_means(image: &Image) -> Image {
     Image { width, height, pixels: (0..width * height).map(mean).collect() }
 }
 
-/// What `Film::noise` estimates: the root of the mean over pixels of
+/// What `Session::noise` estimates: the root of the mean over pixels, without the largest thousandth, of
 /// `(a - r)^2 / (r^2 + 0.01 mean(r)^2)` of luminances. `None` if the sizes differ or the reference is
 /// black.
 pub fn relative_rms_error(image: &Image, reference: &Image) -> Option<f64> {
@@ -122,13 +122,11 @@ pub fn relative_rms_error(image: &Image, reference: &Image) -> Option<f64> {
     let mean = reference.pixels.iter().map(light).sum::<f64>() / count;
     let floor = REL_MSE_EPSILON * mean * mean;
     let pairs = image.pixels.iter().zip(&reference.pixels);
-    let sum: f64 = pairs
-        .map(|(a, r)| {
-            let (a, r) = (light(a), light(r));
-            (a - r) * (a - r) / (r * r + floor)
-        })
-        .sum();
-    (mean > 0.0).then(|| (sum / count).sqrt())
+    let relative = |(a, r)| {
+        let (a, r) = (light(a), light(r));
+        (a - r) * (a - r) / (r * r + floor)
+    };
+    (mean > 0.0).then(|| trimmed_mean(&mut pairs.map(relative).collect::<Vec<_>>()).sqrt())
 }
 
 fn check_finite(image: &Image, which: &str) -> Result<()> {
@@ -146,10 +144,13 @@ pub(crate) fn mean(image: &Image) -> f64 {
     sum / (3 * image.pixels.len()) as f64
 }
 
-/// Mean without the largest thousandth, at least one value; of one value that value.
+/// Mean without the largest thousandth, at least one value; of one value that value, of none NaN.
 pub(crate) fn trimmed_mean(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return f64::NAN;
+    }
     let trimmed = (values.len() / 1000).max(1);
     let kept = (values.len() - trimmed).max(1);
-    values.sort_unstable_by(f64::total_cmp);
+    values.select_nth_unstable_by(kept - 1, f64::total_cmp);
     values[..kept].iter().sum::<f64>() / kept as f64
 }

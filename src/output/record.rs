@@ -86,7 +86,7 @@ impl Record<'_> {
         let film = self.film;
         let figures = self.figures;
         let memory = self.environment.memory_bytes();
-        let noise = film.noise();
+        let noise = figures.noise_of(film);
         json!({
             "software": concat!("lightgrid ", env!("CARGO_PKG_VERSION")),
             "scene": self.scene,

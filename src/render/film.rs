@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::color::luminance;
 use crate::image::Image;
+use crate::metrics::trimmed_mean;
 use crate::path::PathResult;
 
 /// Sums of one pixel in f64: at 1e6 samples an f32 sum would have lost half its digits.
@@ -119,6 +120,11 @@ impl Surface {
         let ([r, g, b], [x, y, z]) = (self.albedo.to_array(), self.normal.to_array());
         [r, g, b, self.depth, x, y, z, f64::from(self.hits)]
     }
+}
+
+/// A squared error over its scale; none is none even where all is black.
+pub(super) fn relative(squared: f64, scale: f64) -> f64 {
+    if squared == 0.0 { 0.0 } else { squared / scale }
 }
 
 /// A film begins with every so-manyth pixel of every so-manyth row.
@@ -285,26 +291,26 @@ impl Film {
         (0..self.pixels.len()).into_par_iter().map(mean).collect()
     }
 
-    /// Estimated root of the relative mean squared error of the picture: the root of the mean over
-    /// pixels of `variance_of_mean / (luminance^2 + 0.01 mean_luminance^2)`, with the luminance of the
-    /// pixel and those around it.
+    /// Estimated root of the trimmed relative mean squared error of the picture: the root of the mean over
+    /// pixels, without the largest thousandth, of
+    /// `variance_of_mean / (luminance^2 + 0.01 mean_luminance^2)`, with the luminance of the pixel and
+    /// those around it.
     ///
     /// It is an estimate from the samples' own spread: conservative for low-discrepancy samples,
     /// blind to light no sample has met yet. Infinite below two samples a pixel.
     pub fn noise(&self) -> f64 {
+        let pixels = self.pixels.iter().zip(self.error_scales());
+        let relative = |(pixel, scale): (&Pixel, f64)| relative(pixel.variance_of_mean(), scale);
+        trimmed_mean(&mut pixels.map(relative).collect::<Vec<_>>()).sqrt()
+    }
+
+    /// By what squared errors of pixels are divided: `luminance^2 + 0.01 mean_luminance^2`, with the luminance
+    /// of the pixel and those around it.
+    pub(super) fn error_scales(&self) -> impl Iterator<Item = f64> {
         let count = self.pixels.len() as f64;
         let mean = self.pixels.iter().map(Pixel::mean_luminance).sum::<f64>() / count;
         let floor = 0.01 * mean * mean;
-        let sum: f64 = self
-            .pixels
-            .iter()
-            .zip(self.luminance_around())
-            .map(|(pixel, light)| {
-                let variance = pixel.variance_of_mean();
-                if variance == 0.0 { 0.0 } else { variance / (light.powi(2) + floor) }
-            })
-            .sum();
-        (sum / count).sqrt()
+        self.luminance_around().into_iter().map(move |light| light.powi(2) + floor)
     }
 
     /// Albedo, normal and depth of each pixel; `None` unless layers were asked for. Where nothing

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::film::Film;
+
 /// When to stop; whichever comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct StopRule {
@@ -9,7 +11,7 @@ pub struct StopRule {
     pub samples: Option<u32>,
     /// Seconds of learning and rendering.
     pub seconds: Option<f64>,
-    /// Noise as [`super::film::Film::noise`] estimates it.
+    /// Noise as [`super::Session::noise`] estimates it.
     pub noise: Option<f64>,
 }
 
@@ -53,11 +55,21 @@ pub struct Figures {
     pub rays: u64,
     /// Seconds of rendering.
     pub render_seconds: f64,
+    /// The share of the variance of pixels' means, as samples' own spread tells it, that is not there: points
+    /// of a sequence do better than chance. 0 until it is known; below 0 where they do worse.
+    #[serde(default)]
+    pub variance_saved: f64,
 }
 
 impl Figures {
     /// Seconds of learning and rendering.
     pub fn elapsed_seconds(&self) -> f64 {
         self.learning_seconds + self.render_seconds
+    }
+
+    /// Estimated root of the relative mean squared error of these figures' film: [`Film::noise`], less what
+    /// low-discrepancy samples save.
+    pub fn noise_of(&self, film: &Film) -> f64 {
+        film.noise() * (1.0 - self.variance_saved).max(0.0).sqrt()
     }
 }

@@ -52,7 +52,7 @@ pub struct SessionSnapshot {
     pub samples: u32,
     /// What was done for them.
     pub figures: Figures,
-    /// [`Film::noise`].
+    /// [`crate::render::Session::noise`].
     pub noise: f64,
     /// The distributions in use.
     pub grid: Option<Arc<LightGrid>>,

@@ -9,8 +9,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
+mod doubling;
 mod learning;
 
+use doubling::Doubling;
 use learning::{Learning, Stage};
 
 use super::film::{BEGINNINGS, Film};
@@ -56,6 +58,8 @@ pub struct Session<'a> {
     skipped: u32,
     /// When a GPU's film was read last.
     last_read: Instant,
+    /// The film with half its samples.
+    doubling: Doubling,
     whole_map: Option<LightGrid>,
     learned: Option<LightGrid>,
     sequence: Sequence,
@@ -84,6 +88,7 @@ impl<'a> Session<'a> {
             samples: 0,
             skipped: 0,
             last_read: Instant::now(),
+            doubling: Doubling::default(),
             world,
             environment,
             view,
@@ -258,10 +263,9 @@ impl<'a> Session<'a> {
             }
             _ => (samples / 16).clamp(1, 64),
         };
-        // The radiance cache and the distributions learn where samples are a power of two.
-        let until_learning = (self.training.is_some() || is_counting)
-            .then(|| (samples + 1).next_power_of_two() - samples);
-        let pass = until_learning.map_or(pass, |until| pass.min(until));
+        // Where samples are a power of two the radiance cache and the distributions learn, and it is found out
+        // how good the picture is.
+        let pass = pass.min((samples + 1).next_power_of_two() - samples);
         rule.samples.map_or(pass, |limit| pass.min(limit.saturating_sub(samples)).max(1))
     }
 
@@ -372,6 +376,7 @@ impl<'a> Session<'a> {
         figures.learning_seconds += before.learning_seconds;
         figures.distribution_seconds += before.distribution_seconds;
         figures.render_seconds += before.render_seconds;
+        figures.variance_saved = before.variance_saved;
     }
 
     /// What was counted, for inspection.
@@ -392,10 +397,13 @@ impl<'a> Session<'a> {
         film.unwrap_or_else(|| self.newest_film().0)
     }
 
-    /// [`Film::noise`] of [`Self::film`], which looks at every pixel once; infinite if some of its
-    /// samples are others'.
+    /// [`Film::noise`] of [`Self::film`], which looks at every pixel once, less what low-discrepancy samples
+    /// save ([`Figures::variance_saved`]); infinite if some of its samples are others'.
     pub fn noise(&self) -> f64 {
-        let noise = || if self.skipped == 0 { self.film().noise() } else { f64::INFINITY };
+        let noise = || match self.skipped {
+            0 => self.figures.noise_of(self.film()),
+            _ => f64::INFINITY,
+        };
         *self.noise.get_or_init(noise)
     }
 
@@ -550,6 +558,12 @@ impl<'a> Session<'a> {
             }
         };
         self.figures.samples += samples;
+        if self.skipped == 0 && self.doubling.is_due(self.samples) {
+            let film = self.film.take().unwrap_or_else(|| self.newest_film().0);
+            let saved = self.doubling.note(&film, self.samples);
+            self.figures.variance_saved = saved.unwrap_or(self.figures.variance_saved);
+            self.film = OnceLock::from(film);
+        }
         let is_whole = self.samples >= target;
         self.learn_from_rendered(samples.div_ceil(u64::from(stride)), is_whole)
     }

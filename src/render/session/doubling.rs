@@ -1,0 +1,120 @@
+//! How good pictures really are beside what their samples' own spread tells.
+//!
+//! The points of a scrambled sequence avoid each other, so that a pixel's mean is better than the mean of
+//! as many independent samples. Both halves of a pixel's samples estimate the same: a quarter of their squared
+//! difference is an estimate of the variance of their mean that knows of this within the halves, though
+//! not between them (replication, Owen 1997). One pixel's says little; the sum over many does.
+
+use crate::metrics::trimmed_mean;
+use crate::render::film::{Film, Pixel, relative};
+
+/// Of how many pixels at most, spread over the picture.
+const MOST_PIXELS: usize = 1 << 16;
+/// Fewest samples a pixel of a half that is compared.
+const FIRST: u32 = 8;
+
+/// Some pixels as they were when they had half their samples.
+#[derive(Default)]
+pub(super) struct Doubling {
+    /// Samples, and their mean luminance.
+    halves: Vec<(u32, f64)>,
+    samples: u32,
+}
+
+impl Doubling {
+    /// Whether a picture with so many samples a pixel is to be looked at.
+    pub(super) fn is_due(&self, samples: u32) -> bool {
+        samples >= FIRST && samples.is_power_of_two() && samples > self.samples
+    }
+
+    /// Takes note of a picture. Returns the share of the variance that its samples' own spread tells which
+    /// is not there, if it was noted before with at most half the samples.
+    pub(super) fn note(&mut self, film: &Film, samples: u32) -> Option<f64> {
+        let stride = film.pixels().len().div_ceil(MOST_PIXELS).max(1);
+        let chosen = || film.pixels().iter().zip(film.error_scales()).step_by(stride);
+        let (mut found, mut told) = (Vec::new(), Vec::new());
+        for ((pixel, scale), half) in chosen().zip(&self.halves) {
+            if let Some(variance) = variance_between(pixel, *half) {
+                found.push(relative(variance, scale));
+                told.push(relative(pixel.variance_of_mean(), scale));
+            }
+        }
+        self.halves =
+            chosen().map(|(pixel, _)| (pixel.samples(), pixel.mean_luminance())).collect();
+        self.samples = samples;
+        let saved = 1.0 - trimmed_mean(&mut found) / trimmed_mean(&mut told);
+        saved.is_finite().then_some(saved)
+    }
+}
+
+/// Variance of the mean of all samples, from the means of the first and of the others.
+fn variance_between(pixel: &Pixel, (first, mean_of_first): (u32, f64)) -> Option<f64> {
+    let others = pixel.samples().checked_sub(first).filter(|others| *others > 0 && first > 0)?;
+    let (first, others, all) = (f64::from(first), f64::from(others), f64::from(pixel.samples()));
+    let mean_of_others = (all * pixel.mean_luminance() - first * mean_of_first) / others;
+    Some((mean_of_first - mean_of_others).powi(2) * first * others / (all * all))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use crate::environment::{Environment, EnvironmentOptions, sky};
+    use crate::metrics::trimmed_mean;
+    use crate::path::World;
+    use crate::render::{Sampling, Session, Sharing, StopRule, View};
+    use crate::scene::builtin;
+
+    /// Root mean squared noise of several pictures: as told, as samples' spread alone would have it, and as
+    /// they differ from each other.
+    fn noise(scene: &str, sampling: Sampling, sharing: Sharing) -> [f64; 3] {
+        let map = sky::build("overcast", 128, 64).expect("a sky");
+        let environment =
+            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let world = World::new(builtin::build(scene).expect("built in"));
+        let rule = StopRule { samples: Some(64), ..StopRule::default() };
+        let pictures: Vec<_> = (1..9)
+            .map(|seed| {
+                let view = View::new(world.scene.cameras[0].clone(), [48, 27]);
+                let view = View { sampling, sharing, seed, ..view };
+                let mut session = Session::new(&world, &environment, view);
+                while !session.is_done(&rule) {
+                    let samples = session.next_pass(&rule);
+                    session.advance(samples, &AtomicBool::new(false)).expect("no GPU");
+                }
+                (session.noise(), session.into_film())
+            })
+            .collect();
+        let count = pictures.len() as f64;
+        let told = pictures.iter().map(|(noise, _)| noise.powi(2)).sum::<f64>() / count;
+        let spread = pictures.iter().map(|(_, film)| film.noise().powi(2)).sum::<f64>() / count;
+        let pixels = pictures[0].1.pixels().len();
+        let of =
+            |at: usize| pictures.iter().map(move |(_, film)| film.pixels()[at].mean_luminance());
+        let means: Vec<f64> = (0..pixels).map(|at| of(at).sum::<f64>() / count).collect();
+        let floor = 0.01 * (means.iter().sum::<f64>() / pixels as f64).powi(2);
+        let variance = |at: usize| {
+            let squares: f64 = of(at).map(|value| (value - means[at]).powi(2)).sum();
+            squares / (count - 1.0) / (means[at].powi(2) + floor)
+        };
+        let found = trimmed_mean(&mut (0..pixels).map(variance).collect::<Vec<_>>());
+        [told, spread, found].map(f64::sqrt)
+    }
+
+    #[test]
+    fn noise_is_told_as_pictures_differ() {
+        for (scene, sampling, sharing, saves) in [
+            ("open", Sampling::Plain, Sharing::Off, true),
+            ("open", Sampling::Adaptive, Sharing::Off, true),
+            ("office", Sampling::Adaptive, Sharing::Off, false),
+            ("office", Sampling::Plain, Sharing::Large, false),
+        ] {
+            let [told, spread, found] = noise(scene, sampling, sharing);
+            eprintln!(
+                "{scene}, {sampling:?}, {sharing:?}: {told:.4}, spread {spread:.4}; {found:.4}"
+            );
+            assert!((0.8..1.25).contains(&(told / found)), "{scene}: {told} for {found}");
+            assert!(!saves || spread > 1.4 * found, "{scene}: nothing was saved");
+        }
+    }
+}
