@@ -10,26 +10,24 @@ use crate::render::film::{Film, Pixel, relative};
 
 /// Of how many pixels at most, spread over the picture.
 const MOST_PIXELS: usize = 1 << 16;
-/// Fewest samples a pixel of a half that is compared.
-const FIRST: u32 = 8;
 
-/// Some pixels as they were when they had half their samples.
+/// Some pixels as they were when they had at most half their samples.
 #[derive(Default)]
 pub(super) struct Doubling {
     /// Samples, and their mean luminance.
     halves: Vec<(u32, f64)>,
     samples: u32,
+    /// [`crate::render::Figures::variance_saved`].
+    pub(super) saved: f64,
 }
 
 impl Doubling {
-    /// Whether a picture with so many samples a pixel is to be looked at.
-    pub(super) fn is_due(&self, samples: u32) -> bool {
-        samples >= FIRST && samples.is_power_of_two() && samples > self.samples
-    }
-
-    /// Takes note of a picture. Returns the share of the variance that its samples' own spread tells which
-    /// is not there, if it was noted before with at most half the samples.
-    pub(super) fn note(&mut self, film: &Film, samples: u32) -> Option<f64> {
+    /// Takes note of a picture with so many samples a pixel, if they are at least `first` and twice those of
+    /// the one before.
+    pub(super) fn note(&mut self, film: &Film, samples: u32, first: u32) {
+        if samples < first.max(self.samples.saturating_mul(2)) {
+            return;
+        }
         let stride = film.pixels().len().div_ceil(MOST_PIXELS).max(1);
         let chosen = || film.pixels().iter().zip(film.error_scales()).step_by(stride);
         let (mut found, mut told) = (Vec::new(), Vec::new());
@@ -39,11 +37,13 @@ impl Doubling {
                 told.push(relative(pixel.variance_of_mean(), scale));
             }
         }
+        let saved = 1.0 - trimmed_mean(&mut found) / trimmed_mean(&mut told);
+        if saved.is_finite() {
+            self.saved = saved;
+        }
         self.halves =
             chosen().map(|(pixel, _)| (pixel.samples(), pixel.mean_luminance())).collect();
         self.samples = samples;
-        let saved = 1.0 - trimmed_mean(&mut found) / trimmed_mean(&mut told);
-        saved.is_finite().then_some(saved)
     }
 }
 

@@ -6,7 +6,7 @@
 //! order, and learning counts integers.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 mod doubling;
@@ -30,6 +30,10 @@ use crate::sampler::Sequence;
 const GPU_PASS_SECONDS: f64 = 0.1;
 /// A GPU's film is read at least this often: so much work is lost with a device.
 const KEPT_SECONDS: Duration = Duration::from_secs(5);
+/// Fewest samples a pixel with which noise ends a picture.
+const LEAST_SAMPLES_OF_NOISE: u32 = 16;
+/// Fewest samples a pixel of a picture on the CPU that a later one is compared with, to find its noise.
+const FIRST_NOTED: u32 = 8;
 /// Learning takes at most this share of the seconds asked for.
 const LEARNING_TIME_SHARE: f64 = 0.05;
 
@@ -59,7 +63,7 @@ pub struct Session<'a> {
     /// When a GPU's film was read last.
     last_read: Instant,
     /// The film with half its samples.
-    doubling: Doubling,
+    doubling: Mutex<Doubling>,
     whole_map: Option<LightGrid>,
     learned: Option<LightGrid>,
     sequence: Sequence,
@@ -88,7 +92,7 @@ impl<'a> Session<'a> {
             samples: 0,
             skipped: 0,
             last_read: Instant::now(),
-            doubling: Doubling::default(),
+            doubling: Mutex::default(),
             world,
             environment,
             view,
@@ -376,7 +380,7 @@ impl<'a> Session<'a> {
         figures.learning_seconds += before.learning_seconds;
         figures.distribution_seconds += before.distribution_seconds;
         figures.render_seconds += before.render_seconds;
-        figures.variance_saved = before.variance_saved;
+        self.doubling().saved = before.variance_saved;
     }
 
     /// What was counted, for inspection.
@@ -401,10 +405,26 @@ impl<'a> Session<'a> {
     /// save ([`Figures::variance_saved`]); infinite if some of its samples are others'.
     pub fn noise(&self) -> f64 {
         let noise = || match self.skipped {
-            0 => self.figures.noise_of(self.film()),
+            0 => {
+                let film = self.film();
+                self.note_doubling(film);
+                self.figures().noise_of(film)
+            }
             _ => f64::INFINITY,
         };
         *self.noise.get_or_init(noise)
+    }
+
+    fn doubling(&self) -> MutexGuard<'_, Doubling> {
+        self.doubling.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes note of the film where it has twice the samples of the one noted before. A GPU's is not read for
+    /// this: it is noted when somebody asks, which is after equal samples only from those on with which
+    /// noise can end a picture.
+    fn note_doubling(&self, film: &Film) {
+        let first = if self.is_on_gpu() { LEAST_SAMPLES_OF_NOISE } else { FIRST_NOTED };
+        self.doubling().note(film, self.samples, first);
     }
 
     /// The last film brought up to date, as far as that worked.
@@ -448,7 +468,8 @@ impl<'a> Session<'a> {
             Engine::Cpu => 0,
             Engine::Gpu(renderer) => renderer.rays(),
         };
-        Figures { rays: self.figures.rays + rays, ..self.figures }
+        let variance_saved = self.doubling().saved;
+        Figures { rays: self.figures.rays + rays, variance_saved, ..self.figures }
     }
 
     /// Seconds of learning and rendering so far.
@@ -461,7 +482,8 @@ impl<'a> Session<'a> {
         let samples = self.samples;
         rule.samples.is_some_and(|limit| samples >= limit)
             || (samples > 0 && rule.seconds.is_some_and(|limit| self.elapsed_seconds() >= limit))
-            || (samples >= 16 && rule.noise.is_some_and(|limit| self.noise() <= limit))
+            || (samples >= LEAST_SAMPLES_OF_NOISE
+                && rule.noise.is_some_and(|limit| self.noise() <= limit))
     }
 
     fn tracer<'b>(&'b self, counts: Option<&'b LearningGrid>) -> PathTracer<'b> {
@@ -558,11 +580,8 @@ impl<'a> Session<'a> {
             }
         };
         self.figures.samples += samples;
-        if self.skipped == 0 && self.doubling.is_due(self.samples) {
-            let film = self.film.take().unwrap_or_else(|| self.newest_film().0);
-            let saved = self.doubling.note(&film, self.samples);
-            self.figures.variance_saved = saved.unwrap_or(self.figures.variance_saved);
-            self.film = OnceLock::from(film);
+        if let Some(film) = self.film.get().filter(|_| self.skipped == 0) {
+            self.note_doubling(film);
         }
         let is_whole = self.samples >= target;
         self.learn_from_rendered(samples.div_ceil(u64::from(stride)), is_whole)
