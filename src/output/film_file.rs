@@ -17,8 +17,8 @@ use crate::digest::Digest;
 use crate::error::{Decoded, Error, Result};
 use crate::image::{open_file, read_cause, read_file, write_beside_and_rename};
 use crate::memory;
-use crate::render::Figures;
 use crate::render::film::{Film, Pixel, Surface};
+use crate::render::{Doubling, Figures};
 
 /// One of several disjoint shares of a picture's samples, in all pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -62,6 +62,9 @@ pub struct FilmFacts {
     pub figures: Figures,
     /// What a picture of it says about itself.
     pub metadata: Vec<(String, String)>,
+    /// What its noise is found by, if it is to be gone on from.
+    #[serde(default)]
+    pub noted: Doubling,
 }
 
 impl FilmFacts {

@@ -19,6 +19,6 @@ pub(crate) use gi::CacheTraining;
 pub use gi::Gi;
 use pass::Pass;
 pub use progress::{Figures, Phase, StopRule};
-pub use session::Session;
+pub use session::{Doubling, Session};
 pub use sharing::Sharing;
 pub use view::{Crop, Sampling, View};

@@ -20,7 +20,7 @@ use crate::output::film_file::{FilmFacts, Part, read_film, write_film};
 use crate::output::record::Record;
 use crate::path::World;
 use crate::render::film::Film;
-use crate::render::{Figures, Gi, Phase, Session, StopRule, View};
+use crate::render::{Doubling, Figures, Gi, Phase, Session, StopRule, View};
 use crate::scene::builtin;
 
 /// A first sample that pixels share is begun where so many times as long is left as all would take of their
@@ -55,6 +55,7 @@ struct Awaited {
     film: Film,
     /// What was done for it.
     figures: Option<Figures>,
+    noted: Doubling,
 }
 
 struct Checkpoint {
@@ -120,7 +121,7 @@ impl Share {
         }
         if share.awaited.is_none() && share.first > 0 {
             let film = Film::new(view.width, view.height, view.layers);
-            share.awaited = Some(Awaited { film, figures: None });
+            share.awaited = Some(Awaited { film, figures: None, noted: Doubling::default() });
         }
         Ok(share)
     }
@@ -148,7 +149,7 @@ impl Share {
             ));
         }
         self.target = facts.target;
-        self.awaited = Some(Awaited { film, figures: Some(facts.figures) });
+        self.awaited = Some(Awaited { film, figures: Some(facts.figures), noted: facts.noted });
         Ok(())
     }
 
@@ -261,8 +262,9 @@ impl Share {
     }
 
     fn begin(&mut self, session: &mut Session<'_>) -> Result<()> {
-        let Some(Awaited { film, figures }) = self.awaited.take() else { return Ok(()) };
+        let Some(Awaited { film, figures, noted }) = self.awaited.take() else { return Ok(()) };
         session.add_figures(&figures.unwrap_or_default());
+        session.set_noted(noted);
         session.continue_from(film, self.first)
     }
 
@@ -326,7 +328,8 @@ impl Share {
     /// # Errors
     /// If it cannot be written; the one from before is kept.
     pub(super) fn keep(&mut self, session: &Session<'_>) -> Result<()> {
-        let facts = self.facts(session.figures(), Vec::new());
+        let noted = session.noted();
+        let facts = FilmFacts { noted, ..self.facts(session.figures(), Vec::new()) };
         let Some(checkpoint) = &mut self.checkpoint else { return Ok(()) };
         let written = write_film(&checkpoint.path, &facts, session.film(), self.first);
         checkpoint.written = Instant::now();
@@ -358,6 +361,7 @@ impl Share {
             target: self.target,
             figures,
             metadata,
+            noted: Doubling::default(),
         }
     }
 }

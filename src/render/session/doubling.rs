@@ -5,23 +5,30 @@
 //! difference is an estimate of the variance of their mean that knows of this within the halves, though
 //! not between them (replication, Owen 1997). One pixel's says little; the sum over many does.
 
+use serde::{Deserialize, Serialize};
+
 use crate::metrics::trimmed_mean;
 use crate::render::film::{Film, Pixel, relative};
 
 /// Of how many pixels at most, spread over the picture.
-const MOST_PIXELS: usize = 1 << 16;
+const MOST_PIXELS: usize = 1 << 14;
 
-/// Some pixels as they were when they had at most half their samples.
-#[derive(Default)]
-pub(super) struct Doubling {
-    /// Samples, and their mean luminance.
-    halves: Vec<(u32, f64)>,
+/// Some pixels as they were when they had at most half their samples. A checkpoint keeps it, to the bit.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Doubling {
+    /// Samples, and the bits of their mean luminance.
+    halves: Vec<(u32, u64)>,
     samples: u32,
-    /// [`crate::render::Figures::variance_saved`].
-    pub(super) saved: f64,
+    /// The bits of [`Self::saved`].
+    saved: u64,
 }
 
 impl Doubling {
+    /// [`crate::render::Figures::variance_saved`].
+    pub(super) fn saved(&self) -> f64 {
+        f64::from_bits(self.saved)
+    }
+
     /// Takes note of a picture with so many samples a pixel, if they are at least `first` and twice those of
     /// the one before.
     pub(super) fn note(&mut self, film: &Film, samples: u32, first: u32) {
@@ -39,16 +46,17 @@ impl Doubling {
         }
         let saved = 1.0 - trimmed_mean(&mut found) / trimmed_mean(&mut told);
         if saved.is_finite() {
-            self.saved = saved;
+            self.saved = saved.to_bits();
         }
-        self.halves =
-            chosen().map(|(pixel, _)| (pixel.samples(), pixel.mean_luminance())).collect();
+        let noted = |(pixel, _): (&Pixel, f64)| (pixel.samples(), pixel.mean_luminance().to_bits());
+        self.halves = chosen().map(noted).collect();
         self.samples = samples;
     }
 }
 
 /// Variance of the mean of all samples, from the means of the first and of the others.
-fn variance_between(pixel: &Pixel, (first, mean_of_first): (u32, f64)) -> Option<f64> {
+fn variance_between(pixel: &Pixel, (first, mean_of_first): (u32, u64)) -> Option<f64> {
+    let mean_of_first = f64::from_bits(mean_of_first);
     let others = pixel.samples().checked_sub(first).filter(|others| *others > 0 && first > 0)?;
     let (first, others, all) = (f64::from(first), f64::from(others), f64::from(pixel.samples()));
     let mean_of_others = (all * pixel.mean_luminance() - first * mean_of_first) / others;

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 mod doubling;
 mod learning;
 
-use doubling::Doubling;
+pub use doubling::Doubling;
 use learning::{Learning, Stage};
 
 use super::film::{BEGINNINGS, Film};
@@ -380,7 +380,6 @@ impl<'a> Session<'a> {
         figures.learning_seconds += before.learning_seconds;
         figures.distribution_seconds += before.distribution_seconds;
         figures.render_seconds += before.render_seconds;
-        self.doubling().saved = before.variance_saved;
     }
 
     /// What was counted, for inspection.
@@ -413,6 +412,16 @@ impl<'a> Session<'a> {
             _ => f64::INFINITY,
         };
         *self.noise.get_or_init(noise)
+    }
+
+    /// What noise is found by, for a checkpoint.
+    pub(crate) fn noted(&self) -> Doubling {
+        self.doubling().clone()
+    }
+
+    /// Goes on with what noise was found by.
+    pub(crate) fn set_noted(&mut self, noted: Doubling) {
+        self.doubling = Mutex::new(noted);
     }
 
     fn doubling(&self) -> MutexGuard<'_, Doubling> {
@@ -468,7 +477,7 @@ impl<'a> Session<'a> {
             Engine::Cpu => 0,
             Engine::Gpu(renderer) => renderer.rays(),
         };
-        let variance_saved = self.doubling().saved;
+        let variance_saved = self.doubling().saved();
         Figures { rays: self.figures.rays + rays, variance_saved, ..self.figures }
     }
 
