@@ -1,18 +1,21 @@
 //! Keys and buttons take turns: a key may change what the next press of a button means, and where
 //! software draws both can come in one frame, of which egui does not keep the order.
 
+use std::mem::discriminant;
+
 use egui::Event;
 
 /// Leaves in `events` what may be taken in one frame: presses of keys or of buttons, not both. What
 /// comes after the change from one to the other is returned; it is meant for the next frame.
 pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
-    let presses = |event: &Event| match event {
-        Event::Key { pressed: true, .. } => Some("keys"),
-        Event::PointerButton { pressed: true, .. } => Some("buttons"),
-        _ => None,
+    let is_press = |event: &&Event| {
+        matches!(
+            event,
+            Event::Key { pressed: true, .. } | Event::PointerButton { pressed: true, .. }
+        )
     };
-    let first = events.iter().find_map(presses);
-    let is_other = |event: &Event| presses(event).is_some() && presses(event) != first;
+    let first = events.iter().find(is_press).map(discriminant);
+    let is_other = |event: &Event| is_press(&event) && first != Some(discriminant(event));
     let end = events.iter().position(is_other).unwrap_or(events.len());
     events.split_off(end)
 }

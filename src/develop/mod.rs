@@ -7,7 +7,7 @@
 
 mod a_trous;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod upload;
 
 use bytemuck::{Pod, Zeroable};

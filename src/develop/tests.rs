@@ -6,8 +6,9 @@ use crate::path::{FirstHit, PathResult};
 use crate::render::film::Film;
 use crate::tone::{DAYLIGHT_KELVIN, display_rgb8};
 
-fn developer() -> Option<Developer> {
-    let developer = Gpu::open(None).and_then(|gpu| Developer::new(&gpu));
+/// Of a device; `None`, which is said, where there is none.
+pub(crate) fn developer() -> Option<Developer> {
+    let developer = Developer::new(&Gpu::for_test()?);
     developer.inspect_err(|reason| eprintln!("SKIPPED: {reason}")).ok()
 }
 

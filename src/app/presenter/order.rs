@@ -87,9 +87,10 @@ pub struct Shown {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::presenter::source::tests::{developer, film, session};
+    use crate::app::presenter::source::tests::{film, session};
     use crate::app::worker::tests::{request_of, snapshot_of};
     use crate::app::worker::{Request, SessionSnapshot};
+    use crate::develop::tests::developer;
 
     #[test]
     fn a_movement_does_not_wait_for_the_picture_before_it() {

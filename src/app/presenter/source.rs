@@ -133,14 +133,9 @@ pub(super) mod tests {
 
     use super::*;
     use crate::denoise::quick;
+    use crate::develop::tests::developer;
     use crate::path::{FirstHit, PathResult};
     use crate::render::{Figures, Sampling};
-
-    /// Of a device; `None`, which is said, where there is none.
-    pub(in crate::app::presenter) fn developer() -> Option<Developer> {
-        let developer = Gpu::open(None).and_then(|gpu| Developer::new(&gpu));
-        developer.map_err(|reason| eprintln!("SKIPPED: {reason}")).ok()
-    }
 
     pub(in crate::app::presenter) fn session(film: Film) -> SessionSnapshot {
         SessionSnapshot {

@@ -132,10 +132,7 @@ mod tests {
 
     #[test]
     fn the_radiance_cache_is_kept_for_the_same_light_on_the_same_scene_near_by() {
-        let gpu = match Gpu::open(None) {
-            Ok(gpu) => gpu,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
+        let Some(gpu) = Gpu::for_test() else { return };
         let world = Arc::new(World::new(builtin::build("office").expect("built in")));
         let request = request(Arc::clone(&world), lit("overcast"), [16, 9]);
         let view = View { gi: Gi::Cached, ..request.view.clone() };

@@ -254,7 +254,7 @@ pub(super) mod tests {
 
     /// A worker beside a window; `None`, which is said, where none can be drawn.
     fn worker() -> Option<Worker> {
-        let gpu = Gpu::open(None).map_err(|reason| eprintln!("SKIPPED: {reason}")).ok()?;
+        let gpu = Gpu::for_test()?;
         let worker = Worker::start(Arc::new(|| ()), (None, RayChoice::default()), gpu);
         Some(worker.expect("threads can be had"))
     }

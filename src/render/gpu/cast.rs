@@ -123,10 +123,7 @@ mod tests {
     /// Panes, leaves cut out of textures and ten thousands of triangles; the same in instances.
     #[test]
     fn a_device_hits_what_the_cpu_hits() {
-        let gpu = match Gpu::open(None) {
-            Ok(gpu) => gpu,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
+        let Some(gpu) = Gpu::for_test() else { return };
         for choice in [RayChoice::Software, RayChoice::Hardware] {
             let gpu = match gpu.clone().with_rays(choice) {
                 Ok(gpu) => gpu,

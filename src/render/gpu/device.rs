@@ -127,6 +127,12 @@ impl Gpu {
         Self::open_or_share(name, None)
     }
 
+    /// For a test: the best adapter; `None`, which is said, if there is none.
+    #[cfg(test)]
+    pub(crate) fn for_test() -> Option<Self> {
+        Self::open(None).inspect_err(|reason| eprintln!("SKIPPED: {reason}")).ok()
+    }
+
     /// [`Self::open`], but a clone of `shared` if that is the GPU chosen and still of use.
     ///
     /// # Errors

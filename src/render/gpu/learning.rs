@@ -189,10 +189,7 @@ pub(super) mod tests {
     /// there on differs. So one count in 500 may lie elsewhere.
     #[test]
     fn both_devices_learn_the_same_counters() {
-        let gpu = match Gpu::open(None) {
-            Ok(gpu) => gpu,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
+        let Some(gpu) = Gpu::for_test() else { return };
         let squared = DistributionOptions {
             faces: false,
             recording: Recording::VisibleCosineSquared,
@@ -217,10 +214,7 @@ pub(super) mod tests {
     /// As above: one path in a thousand goes elsewhere.
     #[test]
     fn both_devices_train_the_same() {
-        let gpu = match Gpu::open(None) {
-            Ok(gpu) => gpu,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
+        let Some(gpu) = Gpu::for_test() else { return };
         let (world, environment) = crack();
         let view = View { gi: Gi::Cached, ..view(&world, DistributionOptions::ADAPTIVE) };
         let rays = CameraRays::new(&view.camera, view.width, view.height);

@@ -141,15 +141,8 @@ mod tests {
 
     /// Schedules on the device at hand.
     fn devices() -> Option<[Gpu; 2]> {
-        match Gpu::open(None) {
-            Ok(gpu) => {
-                Some([Schedule::Whole, Schedule::Queue].map(|s| gpu.clone().with_schedule(Some(s))))
-            }
-            Err(reason) => {
-                eprintln!("SKIPPED: {reason}");
-                None
-            }
-        }
+        let gpu = Gpu::for_test()?;
+        Some([Schedule::Whole, Schedule::Queue].map(|s| gpu.clone().with_schedule(Some(s))))
     }
 
     /// Four samples, then two more. Fewer slots than pixels.

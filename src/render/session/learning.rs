@@ -260,10 +260,7 @@ mod tests {
         use crate::render::StopRule;
         use crate::render::gpu::{Gpu, UploadedScene};
 
-        let gpu = match Gpu::open(None) {
-            Ok(gpu) => gpu,
-            Err(reason) => return eprintln!("SKIPPED: {reason}"),
-        };
+        let Some(gpu) = Gpu::for_test() else { return };
         let (world, environment) = office();
         let view = view(&world, DistributionOptions::ADAPTIVE);
         let uploaded = UploadedScene::new(&gpu, &world, &environment).expect("it fits");

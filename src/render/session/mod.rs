@@ -6,14 +6,15 @@
 //! order, and learning counts integers.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-mod doubling;
 mod learning;
+mod noise;
 
-pub use doubling::Doubling;
 use learning::{Learning, Stage};
+pub use noise::Doubling;
+use noise::LEAST_SAMPLES_OF_NOISE;
 
 use super::film::{BEGINNINGS, Film};
 use super::gi::{CacheTraining, PATHS_AT_A_TIME};
@@ -30,10 +31,6 @@ use crate::sampler::Sequence;
 const GPU_PASS_SECONDS: f64 = 0.1;
 /// A GPU's film is read at least this often: so much work is lost with a device.
 const KEPT_SECONDS: Duration = Duration::from_secs(5);
-/// Fewest samples a pixel with which noise ends a picture.
-const LEAST_SAMPLES_OF_NOISE: u32 = 16;
-/// Fewest samples a pixel of a picture on the CPU that a later one is compared with, to find its noise.
-const FIRST_NOTED: u32 = 8;
 /// Learning takes at most this share of the seconds asked for.
 const LEARNING_TIME_SHARE: f64 = 0.05;
 
@@ -398,42 +395,6 @@ impl<'a> Session<'a> {
     pub(crate) fn into_film(mut self) -> Film {
         let film = self.film.take();
         film.unwrap_or_else(|| self.newest_film().0)
-    }
-
-    /// [`Film::noise`] of [`Self::film`], which looks at every pixel once, less what low-discrepancy samples
-    /// save ([`Figures::variance_saved`]); infinite if some of its samples are others'.
-    pub fn noise(&self) -> f64 {
-        let noise = || match self.skipped {
-            0 => {
-                let film = self.film();
-                self.note_doubling(film);
-                self.figures().noise_of(film)
-            }
-            _ => f64::INFINITY,
-        };
-        *self.noise.get_or_init(noise)
-    }
-
-    /// What noise is found by, for a checkpoint.
-    pub(crate) fn noted(&self) -> Doubling {
-        self.doubling().clone()
-    }
-
-    /// Goes on with what noise was found by.
-    pub(crate) fn set_noted(&mut self, noted: Doubling) {
-        self.doubling = Mutex::new(noted);
-    }
-
-    fn doubling(&self) -> MutexGuard<'_, Doubling> {
-        self.doubling.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Takes note of the film where it has twice the samples of the one noted before. A GPU's is not read for
-    /// this: it is noted when somebody asks, which is after equal samples only from those on with which
-    /// noise can end a picture.
-    fn note_doubling(&self, film: &Film) {
-        let first = if self.is_on_gpu() { LEAST_SAMPLES_OF_NOISE } else { FIRST_NOTED };
-        self.doubling().note(film, self.samples, first);
     }
 
     /// The last film brought up to date, as far as that worked.

@@ -7,6 +7,7 @@ use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LightGrid;
 use lightgrid::light_grid::cells::SphericalGrid;
 use lightgrid::metrics::hypothesis::{Means, z_test};
+use lightgrid::metrics::relative_rms_error;
 use lightgrid::path::{PathLimits, World};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::{Sampling, Session, Sharing, View};
@@ -285,17 +286,9 @@ fn the_noise_is_told_as_it_is() {
         render(&world, &environment, view, samples)
     };
     let truth = film(Sharing::Off, 1, 1 << 13);
-    let floor = 0.01 * mean(&truth).luminance.powi(2);
+    let truth = truth.image();
     let error = |film: &Film| {
-        let pixels = film.pixels().iter().zip(truth.pixels());
-        let of = |(a, b): (&Pixel, &Pixel)| {
-            (a.mean_luminance() - b.mean_luminance()).powi(2) / (b.mean_luminance().powi(2) + floor)
-        };
-        let mut errors: Vec<f64> = pixels.map(of).collect();
-        errors.sort_unstable_by(f64::total_cmp);
-        // As the noise is told: without the largest thousandth.
-        errors.truncate(errors.len() - (errors.len() / 1000).max(1));
-        errors.iter().sum::<f64>() / errors.len() as f64
+        relative_rms_error(&film.image(), &truth).expect("of a size, and not black").powi(2)
     };
     for sharing in [Sharing::Off, Sharing::Small, Sharing::Large] {
         let films: Vec<Film> = (10..26).map(|seed| film(sharing, seed, 32)).collect();

@@ -5,11 +5,18 @@
 //! difference is an estimate of the variance of their mean that knows of this within the halves, though
 //! not between them (replication, Owen 1997). One pixel's says little; the sum over many does.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use serde::{Deserialize, Serialize};
 
+use super::Session;
 use crate::metrics::trimmed_mean;
 use crate::render::film::{Film, Pixel, relative};
 
+/// Fewest samples a pixel with which noise ends a picture.
+pub(super) const LEAST_SAMPLES_OF_NOISE: u32 = 16;
+/// Fewest samples a pixel of a picture on the CPU that a later one is compared with, to find its noise.
+const FIRST_NOTED: u32 = 8;
 /// Of how many pixels at most, spread over the picture.
 const MOST_PIXELS: usize = 1 << 14;
 
@@ -31,14 +38,15 @@ impl Doubling {
 
     /// Takes note of a picture with so many samples a pixel, if they are at least `first` and twice those of
     /// the one before.
-    pub(super) fn note(&mut self, film: &Film, samples: u32, first: u32) {
+    fn note(&mut self, film: &Film, samples: u32, first: u32) {
         if samples < first.max(self.samples.saturating_mul(2)) {
             return;
         }
         let stride = film.pixels().len().div_ceil(MOST_PIXELS).max(1);
-        let chosen = || film.pixels().iter().zip(film.error_scales()).step_by(stride);
+        let chosen = film.pixels().iter().step_by(stride);
+        let scales = film.error_scales().step_by(stride);
         let (mut found, mut told) = (Vec::new(), Vec::new());
-        for ((pixel, scale), half) in chosen().zip(&self.halves) {
+        for ((pixel, half), scale) in chosen.clone().zip(&self.halves).zip(scales) {
             if let Some(variance) = variance_between(pixel, *half) {
                 found.push(relative(variance, scale));
                 told.push(relative(pixel.variance_of_mean(), scale));
@@ -48,9 +56,47 @@ impl Doubling {
         if saved.is_finite() {
             self.saved = saved.to_bits();
         }
-        let noted = |(pixel, _): (&Pixel, f64)| (pixel.samples(), pixel.mean_luminance().to_bits());
-        self.halves = chosen().map(noted).collect();
+        let noted = |pixel: &Pixel| (pixel.samples(), pixel.mean_luminance().to_bits());
+        self.halves = chosen.map(noted).collect();
         self.samples = samples;
+    }
+}
+
+impl Session<'_> {
+    /// [`Film::noise`] of [`Self::film`], which looks at every pixel once, less what low-discrepancy samples
+    /// save ([`crate::render::Figures::variance_saved`]); infinite if some of its samples are others'.
+    pub fn noise(&self) -> f64 {
+        let noise = || match self.skipped {
+            0 => {
+                let film = self.film();
+                self.note_doubling(film);
+                self.figures().noise_of(film)
+            }
+            _ => f64::INFINITY,
+        };
+        *self.noise.get_or_init(noise)
+    }
+
+    /// What noise is found by, for a checkpoint.
+    pub(crate) fn noted(&self) -> Doubling {
+        self.doubling().clone()
+    }
+
+    /// Goes on with what noise was found by.
+    pub(crate) fn set_noted(&mut self, noted: Doubling) {
+        self.doubling = Mutex::new(noted);
+    }
+
+    pub(super) fn doubling(&self) -> MutexGuard<'_, Doubling> {
+        self.doubling.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes note of the film where it has twice the samples of the one noted before. A GPU's is not read for
+    /// this: it is noted when somebody asks, which is after equal samples only from those on with which
+    /// noise can end a picture.
+    pub(super) fn note_doubling(&self, film: &Film) {
+        let first = if self.is_on_gpu() { LEAST_SAMPLES_OF_NOISE } else { FIRST_NOTED };
+        self.doubling().note(film, self.samples, first);
     }
 }
 
