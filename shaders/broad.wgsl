@@ -11,11 +11,9 @@ fn is_broad(vertex: Vertex, least_alpha: f32) -> bool {
     transmits = transmits || vertex.point.parameters.diffuse_transmission > 0.0;
 //#end
     let interface_ = vertex.bsdf.interface_;
-    var is_broad = interface_is_absent(interface_) || interface_.ggx.alpha >= least_alpha;
-//#if CLEARCOAT
-    is_broad = is_broad && vertex.bsdf.coat.strength == 0.0;
-//#end
-    return !transmits && is_broad && !bsdf_is_delta_only(vertex.bsdf);
+    let is_broad = interface_is_absent(interface_) || interface_.ggx.alpha >= least_alpha;
+    return !transmits && is_broad && coat_is_absent(vertex.bsdf.coat)
+        && !bsdf_is_delta_only(vertex.bsdf);
 }
 
 // Whether the path is outside of all bodies.

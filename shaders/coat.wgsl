@@ -18,6 +18,10 @@ fn coat_new(p: SurfaceParameters, entering: bool) -> Coat {
     );
 }
 
+fn coat_is_absent(coat: Coat) -> bool {
+    return coat.strength == 0.0;
+}
+
 fn coat_is_outside(coat: Coat, z: f32) -> bool {
     return coat.thin || (z > 0.0) == coat.entering;
 }

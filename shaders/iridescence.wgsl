@@ -5,12 +5,30 @@ struct Film {
     ior: f32,
     // Micrometres.
     thickness: f32,
+    // What is under it: F0 and share of the opaque dielectric and of the metal.
+    base_f0: vec3f,
+    dielectric_share: f32,
+    metal_f0: vec3f,
+    metal_share: f32,
 }
 
 fn film_new(p: SurfaceParameters) -> Film {
     let t = saturate(p.iridescence_thickness / 0.03);
     let ior = 1.0 + (max(p.iridescence_ior, 1.0) - 1.0) * (t * t * (3.0 - 2.0 * t));
-    return Film(p.iridescence, ior, 1e-3 * p.iridescence_thickness);
+    let opaque_share = (1.0 - p.metallic) * (1.0 - p.transmission);
+    return Film(
+        p.iridescence,
+        ior,
+        1e-3 * p.iridescence_thickness,
+        min(normal_reflectance(p.ior) * p.specular_color, vec3f(1.0)),
+        p.specular * opaque_share,
+        p.base_color,
+        p.metallic,
+    );
+}
+
+fn film_is_absent(film: Film) -> bool {
+    return film.share == 0.0;
 }
 
 fn film_sensitivity(path: f32, signs: vec3f) -> vec3f {
@@ -61,15 +79,57 @@ fn film_reflectance(film: Film, cosine: f32, f0: vec3f) -> vec3f {
     return saturate(sum);
 }
 
-// Twin of `Film::largest_f0`.
-fn film_largest_f0(film: Film, f0: vec3f, specular: f32) -> f32 {
+// Reflectance of the opaque share, given the one without a film.
+fn film_over(film: Film, plain: vec3f, cosine: f32) -> vec3f {
+    if film.share == 0.0 {
+        return plain;
+    }
+    var filmed = vec3f(0.0);
+    // A loop, for what it calls is long.
+    for (var part = 0u; part < 2u; part++) {
+        let share = select(film.dielectric_share, film.metal_share, part == 1u);
+        if share > 0.0 {
+            let f0 = select(film.base_f0, film.metal_f0, part == 1u);
+            filmed += film_reflectance(film, cosine, f0) * share;
+        }
+    }
+    return mix(plain, filmed, film.share);
+}
+
+// Fresnel's factor of glass of this relative index and F90, given the one without a film.
+fn film_over_glass(film: Film, bare: vec3f, cosine: f32, eta: f32, f90: f32) -> vec3f {
+    if film.share == 0.0 {
+        return bare;
+    }
+    // Both sides see the film alike: by the angle outside.
+    let sin2 = (1.0 - cosine * cosine) / select(1.0, eta * eta, eta < 1.0);
+    let filmed = film_reflectance(film, sqrt(max(1.0 - sin2, 0.0)), film.base_f0);
+    return mix(bare, filmed * f90, film.share);
+}
+
+// The film, with nothing opaque under it.
+fn film_over_glass_alone(film: Film) -> Film {
+    var alone = film;
+    alone.dielectric_share = 0.0;
+    alone.metal_share = 0.0;
+    return alone;
+}
+
+// Twin of `Film::largest_f0` and of what is asked of it: the largest F0 of a dielectric, given the one
+// without a film.
+fn film_largest_f0(film: Film, bare: f32, specular: f32) -> f32 {
+    if film.share == 0.0 || film.dielectric_share == 0.0 {
+        return bare;
+    }
     var largest = 0.0;
     for (var i = 1; i <= 12; i++) {
         let cosine = f32(i) / 12.0;
         let weight = schlick_weight(cosine);
-        let plain = f0 * specular + (specular - f0 * specular) * weight;
-        let mixed = mix(plain, film_reflectance(film, cosine, f0) * specular, film.share);
+        let f0 = film.base_f0 * specular;
+        let plain = f0 + (specular - f0) * weight;
+        let filmed = film_reflectance(film, cosine, film.base_f0) * specular;
+        let mixed = mix(plain, filmed, film.share);
         largest = max(largest, (max_element(mixed) - specular * weight) / (1.0 - weight));
     }
-    return min(largest, specular);
+    return max(bare, min(largest, specular));
 }

@@ -22,6 +22,10 @@ fn is_smooth(ggx: Ggx) -> bool {
 }
 
 //#if ANISOTROPY
+fn ggx_of(p: SurfaceParameters) -> Ggx {
+    return ggx_stretched(p.roughness, p.anisotropy, p.anisotropy_axis);
+}
+
 fn ggx_stretched(roughness: f32, strength: f32, axis: vec2f) -> Ggx {
     let ggx = ggx_from_roughness(roughness);
     let along = ggx.alpha + (1.0 - ggx.alpha) * (strength * strength);
@@ -52,6 +56,10 @@ fn roughness_towards(ggx: Ggx, v: vec3f) -> f32 {
     let squared = dot(flat, flat);
     let unit_flat = select(vec2f(1.0, 0.0), flat / sqrt(squared), squared > 0.0);
     return roughness_off_axis(ggx, unit_flat.x, unit_flat.y);
+}
+//#else
+fn ggx_of(p: SurfaceParameters) -> Ggx {
+    return ggx_from_roughness(p.roughness);
 }
 //#end
 

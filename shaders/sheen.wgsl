@@ -32,6 +32,10 @@ fn sheen_new(p: SurfaceParameters, entering: bool) -> Sheen {
     );
 }
 
+fn sheen_is_absent(sheen: Sheen) -> bool {
+    return sheen.strength == 0.0;
+}
+
 fn sheen_is_outside(sheen: Sheen, z: f32) -> bool {
     return sheen.thin || (z > 0.0) == sheen.entering;
 }
@@ -56,6 +60,10 @@ fn sheen_albedo(sheen: Sheen, v: vec3f) -> f32 {
         return 0.0;
     }
     return min(sheen_gain(sheen, abs(v.z)), 1.0);
+}
+
+fn sheen_colored_albedo(sheen: Sheen, v: vec3f) -> vec3f {
+    return sheen.color * sheen_albedo(sheen, v);
 }
 
 // What of a base's light is left between two directions.

@@ -110,8 +110,6 @@ bitflags::bitflags! {
         /// Paths train the radiance cache.
         const TRAINING = 1 << 49;
         // Of what follows from others.
-        /// Directional albedos at a vertex.
-        const ALBEDO = 1 << 50;
         /// Some hits of closest-hit rays do not count.
         const FILTERED_HITS = 1 << 51;
         /// The same, or rays pass them.

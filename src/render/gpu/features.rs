@@ -11,8 +11,7 @@ use crate::path::{Background, World};
 use crate::sampler::Points;
 
 /// What follows from any of some others.
-const FOLLOWS: [(Features, Features); 10] = [
-    (Features::ALBEDO, Features::LAYERS.union(Features::RADIANCE_CACHE)),
+const FOLLOWS: [(Features, Features); 9] = [
     (Features::FILTERED_HITS, Features::ALPHA_MASK.union(Features::SINGLE_SIDED)),
     (
         Features::FILTERED_OR_PASSED,
@@ -171,7 +170,6 @@ impl Features {
         if !features.intersects(Self::CACHED | Self::TRAINING) {
             features -= Self::RADIANCE_CACHE;
         }
-        features.set(Self::ALBEDO, features.intersects(Self::LAYERS | Self::RADIANCE_CACHE));
         features
     }
 

@@ -332,12 +332,16 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 56] {
+fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 65] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
         };
     }
+    let (is_clear, is_translucent) = (
+        features.contains(Features::TRANSMISSION),
+        features.contains(Features::DIFFUSE_TRANSMISSION),
+    );
     let samples_map = features.contains(Features::MAP_SAMPLING);
     let has_shadow_rays = features.contains(Features::SHADOW_RAYS);
     [
@@ -350,10 +354,19 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 56] {
         (wgsl!("fresnel"), true),
         (wgsl!("microfacet"), true),
         (wgsl!("iridescence"), features.contains(Features::IRIDESCENCE)),
+        (wgsl!("no_iridescence"), !features.contains(Features::IRIDESCENCE)),
         (wgsl!("sheen"), features.contains(Features::SHEEN)),
+        (wgsl!("no_sheen"), !features.contains(Features::SHEEN)),
         (wgsl!("albedo"), true),
+        (wgsl!("dispersion"), features.contains(Features::DISPERSION)),
+        (wgsl!("no_dispersion"), is_clear && !features.contains(Features::DISPERSION)),
+        (wgsl!("glass"), is_clear),
+        (wgsl!("no_glass"), !is_clear),
         (wgsl!("interface"), true),
+        (wgsl!("diffuse"), !is_translucent),
+        (wgsl!("translucent"), is_translucent),
         (wgsl!("coat"), features.contains(Features::CLEARCOAT)),
+        (wgsl!("no_coat"), !features.contains(Features::CLEARCOAT)),
         (wgsl!("bsdf"), true),
         (wgsl!("light_grid"), true),
         (wgsl!("environment"), true),
