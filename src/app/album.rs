@@ -78,9 +78,12 @@ impl Album {
         let file = self.folder.join(format!("{time:015}-{process}-{:04}.exr", self.written));
         self.written += 1;
         let document = &kept.document;
+        let name = |name: &str, is_built_in: bool| {
+            if is_built_in { name.to_owned() } else { settings_file::lasting(name) }
+        };
         let lasting = Document {
-            scene: lasting(&document.scene, builtin::names().contains(&document.scene.as_str())),
-            map: lasting(&document.map, document.map.starts_with("sky:")),
+            scene: name(&document.scene, builtin::names().contains(&document.scene.as_str())),
+            map: name(&document.map, document.map.starts_with("sky:")),
             ..document.clone()
         };
         let texts = [
@@ -117,12 +120,6 @@ impl Drop for Album {
             let _ = thread.join();
         }
     }
-}
-
-/// A name that means the same in another folder.
-fn lasting(name: &str, is_builtin: bool) -> String {
-    let absolute = || std::path::absolute(name).ok()?.to_str().map(str::to_owned);
-    if is_builtin { name.to_owned() } else { absolute().unwrap_or_else(|| name.to_owned()) }
 }
 
 fn carry_out(job: Job) -> Result<()> {

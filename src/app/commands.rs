@@ -14,6 +14,8 @@ pub enum Command {
     OpenScene(String),
     /// Light with another map: a file or a built-in sky.
     OpenMap(String),
+    /// Read the files of scene and map again: another program may have written them.
+    ReadAgain,
     /// Ask for a scene file.
     ChooseScene,
     /// Ask for a map file.
@@ -81,7 +83,7 @@ pub enum Command {
 }
 
 /// Keys, what they do, and the command.
-pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 18] = [
+pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 19] = [
     (plain(Key::Space), "Pause, resume", Command::TogglePause),
     (plain(Key::R), "Restart the picture", Command::Restart),
     (plain(Key::F), "Frame the whole scene", Command::FrameAll),
@@ -97,6 +99,7 @@ pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 18] = [
     (control(Key::S), "Save the picture", Command::ChooseSave),
     (control(Key::O), "Open a scene", Command::ChooseScene),
     (control(Key::M), "Open a map", Command::ChooseMap),
+    (plain(Key::F5), "Read scene and map again", Command::ReadAgain),
     (control(Key::Z), "Undo", Command::Undo),
     (control(Key::Y), "Redo", Command::Redo),
     (control(Key::Q), "Quit", Command::Quit),

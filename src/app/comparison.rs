@@ -18,6 +18,8 @@ pub(super) const AMPLIFIED: f32 = 4.0;
 pub struct Comparison {
     /// What to call the left and the right picture.
     pub names: [String; 2],
+    /// Of what part of the whole they are, as [`super::document::Document::region`] says.
+    pub regions: [Option<[f32; 4]>; 2],
     /// A kept picture.
     pub left: Arc<Pixels>,
     /// Another one, or `None` for what is rendered now.
@@ -56,6 +58,7 @@ impl Comparison {
         let name = right.map_or("Now", |kept| &kept.name).to_owned();
         Some(Self {
             names: [left.name.clone(), name],
+            regions: [left.document.region, right.and_then(|kept| kept.document.region)],
             left: Arc::clone(&left.pixels),
             right: right.map(|kept| Arc::clone(&kept.pixels)),
             is_difference: chosen.is_difference,
@@ -83,7 +86,12 @@ impl Comparison {
         };
         compared.read = right.iter().chain([&left]).cloned().collect();
         if self.is_difference {
-            match difference(&left, &right.clone().unwrap_or_else(now)) {
+            let [of_left, of_right] = self.regions;
+            let found = match of_left == of_right {
+                true => difference(&left, &right.clone().unwrap_or_else(now)),
+                false => Err("pictures of different parts have no difference".to_owned()),
+            };
+            match found {
                 Ok(image) => {
                     let picture = Some(developer.upload_image(&image));
                     return Compared { picture, ..compared };

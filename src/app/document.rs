@@ -95,7 +95,7 @@ pub enum PictureSize {
     Fixed(u32, u32),
 }
 
-/// Paths to learn from before the first sample of a picture without end.
+/// Paths to learn from before the first sample.
 const MOST_LEARNING_PATHS: u64 = 1 << 13;
 
 impl Default for Document {
@@ -151,11 +151,12 @@ impl Document {
             && self.materials.values().all(MaterialEdit::is_sound)
     }
 
-    /// So few that the first picture does not wait for them: rendered paths teach the rest.
+    /// So few that the first picture does not wait for them: rendered paths teach the rest. Whatever ends the
+    /// picture, for that may be changed while it is made.
     fn learning_paths(&self, size: [u32; 2]) -> u64 {
-        let paths = View::suitable_learning_paths(self.light.sampling, size, self.stop.samples);
-        match (self.light.sampling, self.stop.samples) {
-            (Sampling::Adaptive, None) => paths.min(MOST_LEARNING_PATHS),
+        let paths = View::suitable_learning_paths(self.light.sampling, size, None);
+        match self.light.sampling {
+            Sampling::Adaptive => paths.min(MOST_LEARNING_PATHS),
             _ => paths,
         }
     }
@@ -298,6 +299,21 @@ impl Viewpoint {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_ends_a_picture_does_not_change_it() {
+        let camera = Camera::look_at(Vec3::ONE, Vec3::ZERO, 0.7);
+        let viewpoint = Some(Viewpoint::of(&camera, 1.0));
+        let endless = Document { viewpoint, ..Document::default() };
+        for sampling in [Sampling::Adaptive, Sampling::Talk] {
+            let light = Light { sampling, ..endless.light };
+            let view = |samples| {
+                let stop = StopRule { samples, ..StopRule::default() };
+                Document { stop, light, ..endless.clone() }.view(1280, 720)
+            };
+            assert!(view(None) == view(Some(4)) && view(None) == view(Some(1 << 20)));
+        }
+    }
 
     #[test]
     fn regions_are_at_least_a_pixel_and_inside() {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 
 use super::comparison::Comparison;
 use super::document::{Document, PictureSize, Viewpoint};
@@ -14,8 +14,13 @@ use super::worker::Request;
 use super::{App, Later, lock, surface_map};
 use crate::denoise::Denoiser;
 use crate::environment::Environment;
+use crate::memory;
 use crate::path::framing;
 use crate::render::gpu::DeviceChoice;
+
+/// What a pixel of the picture takes: films of its exact and of its fast light, copies of both that are shown
+/// and that will be, and what takes noise out (measured: 630).
+const BYTES_PER_PIXEL: u64 = 640;
 
 /// An environment and what it was made from.
 pub(super) struct Lit {
@@ -30,6 +35,9 @@ impl App {
     pub(super) fn collect(&mut self, context: &egui::Context) {
         for loaded in self.loader.take() {
             match loaded {
+                // Somebody has gone back meanwhile.
+                Loaded::Scene(name, _) if name != self.document.scene => {}
+                Loaded::Map(name, _) if name != self.document.map => {}
                 Loaded::Scene(_, Ok(scene)) => self.take_scene(scene),
                 Loaded::Edited(_, Ok(scene)) => {
                     self.scene = Some(scene);
@@ -44,17 +52,18 @@ impl App {
                     if self.map.as_ref().is_none_or(|old| old.name != map.name) {
                         map.notices.iter().for_each(|sentence| self.messages.notice(sentence));
                     }
+                    self.messages.opened();
                     self.settings.recent_map(&map.name);
                     self.map = Some(map);
                 }
                 // What is shown stays, and the document says so again.
                 Loaded::Scene(_, Err(error)) => {
-                    self.messages.error(error.to_string());
+                    self.messages.not_opened(error.to_string());
                     self.save_nothing();
                     self.stay_in_scene();
                 }
                 Loaded::Map(_, Err(error)) => {
-                    self.messages.error(error.to_string());
+                    self.messages.not_opened(error.to_string());
                     self.save_nothing();
                     let Document { map, sun, .. } = Document::default();
                     (self.document.map, self.document.sun) = match &self.map {
@@ -117,6 +126,7 @@ impl App {
     }
 
     fn take_scene(&mut self, scene: LoadedScene) {
+        self.messages.opened();
         scene.world.scene.notices.iter().for_each(|sentence| self.messages.notice(sentence));
         self.settings.recent_scene(&scene.name);
         let is_first = self.scene.is_none();
@@ -132,7 +142,7 @@ impl App {
     }
 
     /// Gives the document what belongs to the scene that is shown, after another could not be read.
-    fn stay_in_scene(&mut self) {
+    pub(super) fn stay_in_scene(&mut self) {
         let Some(scene) = &self.scene else {
             // At the start there is none: the built-in one is always there.
             self.document.scene = Document::default().scene;
@@ -203,7 +213,25 @@ impl App {
         }
     }
 
+    /// Takes back a size for which there is no memory: the system would end the window.
+    fn check_size(&mut self) {
+        let size = self.document.size;
+        if size == self.affordable {
+            return;
+        }
+        if let PictureSize::Fixed(width, height) = size
+            && let Some(view) = self.document.view(width, height)
+            && let Err(cause) =
+                memory::check(u64::from(view.width) * u64::from(view.height) * BYTES_PER_PIXEL)
+        {
+            self.messages.error(format!("a picture of {width} x {height} pixels {cause}"));
+            self.document.size = self.affordable;
+        }
+        self.affordable = self.document.size;
+    }
+
     fn request(&mut self, now: f64) -> Option<Request> {
+        self.check_size();
         let scene = self.scene.as_ref()?;
         let world = Arc::clone(&scene.world);
         let environment = self.environment()?;
@@ -255,9 +283,17 @@ impl App {
 
 /// Through the scene's first camera, or of all of it where there is none.
 fn first_viewpoint(scene: &LoadedScene) -> Viewpoint {
-    let camera = scene.world.scene.cameras.first().cloned();
-    let camera = camera.unwrap_or_else(|| framing::frame(&scene.world, 16.0 / 9.0));
-    let distance = pivot_distance(scene, &camera);
+    let own = scene.world.scene.cameras.first().cloned();
+    let is_framed = own.is_none();
+    let camera = own.unwrap_or_else(|| framing::frame(&scene.world, 16.0 / 9.0));
+    let (low, high) = scene.world.bvh.bounds();
+    let eye = Vec3::from(camera.world_from_camera.translation);
+    let is_outside = !(eye.cmpge(low) & eye.cmple(high)).all();
+    // What is framed from outside is turned about its middle, not about what is seen first or behind it.
+    let distance = match is_framed && is_outside {
+        true => camera.focus_distance,
+        false => pivot_distance(scene, &camera),
+    };
     let mut viewpoint = Viewpoint::of(&camera, distance);
     if !(viewpoint.focus_distance.is_finite() && viewpoint.focus_distance > 0.0) {
         viewpoint.focus_distance = distance;

@@ -1,11 +1,12 @@
 //! Carrying out commands.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::commands::Command;
-use super::document::Viewpoint;
+use super::document::{Document, Viewpoint};
 use super::history;
 use super::interface::{Chosen, Dock, Interface, Prompt, Purpose, Tab};
 use super::screen::color_image;
@@ -21,25 +22,13 @@ impl App {
     pub(super) fn execute(&mut self, command: Command, context: &egui::Context) {
         let interface = &mut self.interface;
         match command {
-            Command::OpenScene(name) => {
-                if self.scene.as_ref().is_none_or(|scene| scene.name != name) {
-                    // Built-in scenes bring their own sky, unless another map was chosen.
-                    let is_own_sky = self.document.map == builtin::sky(&self.document.scene);
-                    if is_own_sky && builtin::names().contains(&name.as_str()) {
-                        builtin::sky(&name).clone_into(&mut self.document.map);
-                    }
-                    // A file that cannot be read must leave what is shown as it is.
-                    self.document.scene = name;
-                    self.document.viewpoint = None;
-                    self.document.bookmarks.clear();
-                    self.document.materials.clear();
-                    interface.material = None;
-                    self.document.region = None;
-                    self.document.fog = None;
-                    interface.pinned = None;
-                }
-            }
+            Command::OpenScene(name) => self.open_scene(name),
+            Command::OpenMap(name) if self.document.map == name => self.read_map_again(),
             Command::OpenMap(name) => self.document.map = name,
+            Command::ReadAgain => {
+                self.read_scene_again();
+                self.read_map_again();
+            }
             Command::ChooseScene => interface.ask(Purpose::Scene, String::new()),
             Command::ChooseMap => interface.ask(Purpose::Map, String::new()),
             Command::ChooseSave => {
@@ -59,7 +48,9 @@ impl App {
             Command::LookFrom(viewpoint) => self.document.viewpoint = Some(viewpoint),
             Command::Bookmark => self.bookmark(),
             Command::ForgetBookmark(index) => {
-                self.document.bookmarks.remove(index);
+                if index < self.document.bookmarks.len() {
+                    self.document.bookmarks.remove(index);
+                }
             }
             Command::FrameAll => {
                 let bounds = self.scene.as_ref().map(|scene| scene.world.bvh.bounds());
@@ -83,12 +74,13 @@ impl App {
                 // What has just been changed may not have been noted as yet.
                 self.undo.settle(&self.document);
                 if let Some(document) = self.undo.undo() {
-                    self.document = document;
+                    self.go_to(document);
                 }
             }
             Command::Redo => {
+                self.undo.settle(&self.document);
                 if let Some(document) = self.undo.redo() {
-                    self.document = document;
+                    self.go_to(document);
                 }
             }
             Command::ToggleSplit => self.document.light.split = !self.document.light.split,
@@ -105,7 +97,7 @@ impl App {
             Command::KeepPicture => self.keep(),
             Command::SetAsKept(index) => {
                 if let Some(kept) = self.history.get(index) {
-                    self.document = kept.document.clone();
+                    let document = kept.document.clone();
                     if self.history.is_of_other_options(kept) {
                         self.messages.notice(format!(
                             "{}: its scene was opened with other options than now (--variant, --outlines, \
@@ -113,6 +105,7 @@ impl App {
                             kept.name
                         ));
                     }
+                    self.go_to(document);
                 }
             }
             Command::Quit => self.is_closing = true,
@@ -122,6 +115,54 @@ impl App {
                 }
             }
         }
+    }
+
+    /// Goes over to another scene; one that is shown already is read again, for its file may have changed.
+    fn open_scene(&mut self, name: String) {
+        if self.scene.as_ref().is_some_and(|scene| scene.name == name) {
+            if self.document.scene == name {
+                self.read_scene_again();
+            } else {
+                // Another one was asked for, and is still being read.
+                self.stay_in_scene();
+            }
+            return;
+        }
+        // Built-in scenes bring their own sky, unless another map was chosen.
+        let is_own_sky = self.document.map == builtin::sky(&self.document.scene);
+        if is_own_sky && builtin::names().contains(&name.as_str()) {
+            builtin::sky(&name).clone_into(&mut self.document.map);
+        }
+        // A file that cannot be read must leave what is shown as it is.
+        self.go_to(Document {
+            scene: name,
+            viewpoint: None,
+            bookmarks: Vec::new(),
+            materials: BTreeMap::new(),
+            region: None,
+            fog: None,
+            ..self.document.clone()
+        });
+    }
+
+    fn read_scene_again(&mut self) {
+        if !builtin::names().contains(&self.document.scene.as_str()) {
+            self.loader.load_scene(&self.document.scene);
+        }
+    }
+
+    fn read_map_again(&mut self) {
+        if !self.document.map.starts_with("sky:") {
+            self.loader.load_map(&self.document.map, self.document.sun);
+        }
+    }
+
+    /// Takes all settings of a document. What was chosen in another scene is not in this one.
+    fn go_to(&mut self, document: Document) {
+        if document.scene != self.document.scene {
+            (self.interface.material, self.interface.pinned) = (None, None);
+        }
+        self.document = document;
     }
 
     /// Files dropped onto the window: scenes and maps are told apart by their extension.
@@ -368,7 +409,7 @@ impl Purpose {
 
 impl Interface {
     fn ask(&mut self, purpose: Purpose, path: String) {
-        self.prompt = Some(Prompt { purpose, path, is_focused: false });
+        self.prompt = Some(Prompt { purpose, path, is_focused: false, objection: None });
     }
 
     fn toggle_developer(&mut self) {

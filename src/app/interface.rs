@@ -119,6 +119,8 @@ pub struct Prompt {
     pub path: String,
     /// Whether the field has been given the keyboard.
     pub is_focused: bool,
+    /// What is to be known of a path before it is taken, and of which.
+    pub objection: Option<(String, &'static str)>,
 }
 
 /// What a path is asked for.

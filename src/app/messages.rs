@@ -1,7 +1,7 @@
 //! Sentences for the person: what went wrong stays until it is closed, notices go by themselves.
 
 /// Most messages shown at a time.
-const MOST: usize = 5;
+const MOST: usize = 4;
 /// Seconds a notice stays.
 pub const NOTICE_SECONDS: f64 = 8.0;
 
@@ -14,6 +14,8 @@ pub struct Message {
     pub is_error: bool,
     /// When it was first drawn, in the window's seconds.
     pub since: Option<f64>,
+    /// Whether it is about a file that could not be opened.
+    is_of_opening: bool,
 }
 
 /// What is to be said, newest last.
@@ -25,17 +27,27 @@ pub struct Messages {
 impl Messages {
     /// Something worth knowing.
     pub fn notice(&mut self, sentence: impl Into<String>) {
-        self.add(sentence.into(), false);
+        self.add(sentence.into(), false, false);
     }
 
     /// Something that failed.
     pub fn error(&mut self, sentence: impl Into<String>) {
-        self.add(sentence.into(), true);
+        self.add(sentence.into(), true, false);
     }
 
-    fn add(&mut self, sentence: String, is_error: bool) {
+    /// A file could not be opened.
+    pub fn not_opened(&mut self, sentence: impl Into<String>) {
+        self.add(sentence.into(), true, true);
+    }
+
+    /// A file was opened: nobody wonders any more why others were not.
+    pub fn opened(&mut self) {
+        self.list.retain(|message| !message.is_of_opening);
+    }
+
+    fn add(&mut self, sentence: String, is_error: bool, is_of_opening: bool) {
         self.list.retain(|message| message.sentence != sentence);
-        self.list.push(Message { sentence, is_error, since: None });
+        self.list.push(Message { sentence, is_error, since: None, is_of_opening });
         if self.list.len() > MOST {
             self.list.remove(0);
         }

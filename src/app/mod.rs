@@ -129,6 +129,8 @@ pub struct App {
     waiting_save: Option<std::path::PathBuf>,
     is_repeatable: bool,
     is_closing: bool,
+    /// The size of the picture for which there is memory.
+    affordable: document::PictureSize,
 }
 
 /// What others hold is sound even if one of them has panicked with it.
@@ -204,6 +206,7 @@ impl App {
             waiting_save: None,
             is_repeatable: start.is_repeatable,
             is_closing: false,
+            affordable: document::PictureSize::Viewport(1),
         })
     }
 

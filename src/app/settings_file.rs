@@ -11,6 +11,7 @@ use super::interface::{Dock, Interface, Tab};
 use crate::error::{Error, Result};
 use crate::image::{read_file, write_beside_and_rename};
 use crate::render::StopRule;
+use crate::scene::builtin;
 
 /// Largest picture in pixels, as on the command line.
 const MAX_PIXELS: u64 = 1 << 27;
@@ -194,17 +195,23 @@ impl Settings {
 
     /// Notes a scene that was opened; built-in ones are always offered.
     pub fn recent_scene(&mut self, name: &str) {
-        if !crate::scene::builtin::names().contains(&name) {
-            put_first(&mut self.recent_scenes, name);
+        if !builtin::names().contains(&name) {
+            put_first(&mut self.recent_scenes, &lasting(name));
         }
     }
 
     /// Notes a map that was opened; built-in skies are always offered.
     pub fn recent_map(&mut self, name: &str) {
         if !name.starts_with("sky:") {
-            put_first(&mut self.recent_maps, name);
+            put_first(&mut self.recent_maps, &lasting(name));
         }
     }
+}
+
+/// A path that means the same in another folder.
+pub(super) fn lasting(path: &str) -> String {
+    let absolute = || std::path::absolute(path).ok()?.to_str().map(str::to_owned);
+    absolute().unwrap_or_else(|| path.to_owned())
 }
 
 /// The path of something beside a file.
@@ -291,7 +298,7 @@ mod tests {
         settings.write(&path).expect("written");
         let again = Settings::read(&path).expect("read");
         assert_eq!(again, settings);
-        assert_eq!((again.recent_maps.len(), again.recent_maps[0].as_str()), (8, "19.hdr"));
+        assert_eq!((again.recent_maps.len(), &again.recent_maps[0]), (8, &lasting("19.hdr")));
         assert!(again.recent_scenes.is_empty());
         std::fs::write(&path, r#"{"window_size": [1, 2], "gone": 3}"#).expect("written");
         assert_eq!(Settings::read(&path).expect("read").window_size, [1.0, 2.0]);

@@ -116,6 +116,25 @@ pub(super) fn row<R>(ui: &mut Ui, name: &str, hint: &str, add: impl FnOnce(&mut 
 /// Width of the names of settings, in points.
 const LABEL_WIDTH: f32 = 84.0;
 
+/// A button that opens a picker of linear colours; whether another one was chosen. A picker that is only
+/// opened gives back what differs by rounding.
+pub(super) fn color(ui: &mut Ui, color: &mut [f32; 3]) -> bool {
+    let shown = |[r, g, b]: [f32; 3]| Color32::from(egui::Rgba::from_rgb(r, g, b));
+    let mut chosen = *color;
+    ui.color_edit_button_rgb(&mut chosen);
+    let is_another = shown(chosen) != shown(*color);
+    if is_another {
+        *color = chosen;
+    }
+    is_another
+}
+
+/// A list to choose from, across the panel and as high as the window has room for.
+pub(super) fn choice(ui: &Ui, name: &str) -> egui::ComboBox<'static> {
+    let height = 0.7 * ui.ctx().content_rect().height();
+    egui::ComboBox::from_id_salt(name).width(ui.available_width()).height(height)
+}
+
 /// Whether the window is too narrow for everything: what can be had elsewhere gives way.
 pub(super) fn is_narrow(ui: &Ui) -> bool {
     ui.ctx().content_rect().width() < 1260.0
@@ -140,7 +159,7 @@ pub(super) fn samples(mean: f64) -> String {
     }
 }
 
-/// A number with as many digits as help: 1.23, 45.6, 789, 12.3 k, 4.5 M.
+/// A number with as many digits as help: 0.0012, 1.23, 45.6, 789, 12.3 k, 4.5 M.
 pub(super) fn figure(value: f64) -> String {
     let (value, suffix) = match value.abs() {
         x if x >= 1e9 => (value / 1e9, " G"),
@@ -152,6 +171,7 @@ pub(super) fn figure(value: f64) -> String {
         x if x >= 100.0 || x == 0.0 => 0,
         x if x >= 10.0 => 1,
         x if x >= 0.1 => 2,
+        x if x >= 1e-4 => (1 - x.log10().floor() as i32) as usize,
         _ => return format!("{value:.1e}{suffix}"),
     };
     format!("{value:.digits$}{suffix}")
@@ -208,10 +228,12 @@ mod tests {
 
     #[test]
     fn figures_read_well() {
-        let cases = [(0.0, "0"), (0.012, "1.2e-2"), (0.5, "0.50"), (12.34, "12.3"), (999.4, "999")];
+        let cases =
+            [(0.0, "0"), (1.2e-5, "1.2e-5"), (0.5, "0.50"), (12.34, "12.3"), (999.4, "999")];
         for (value, text) in cases {
             assert_eq!(figure(value), text);
         }
+        assert_eq!((figure(0.012), figure(1e-3)), ("0.012".into(), "0.0010".into()));
         assert_eq!(figure(1_234_567.0), "1.23 M");
         assert_eq!(extent(Vec3::new(6.5, 3.5, 12.0)), "6.5 x 3.5 x 12.0 m");
         assert_eq!(extent(Vec3::new(0.2, 0.014, 0.0)), "20.0 x 1.4 x 0.0 cm");

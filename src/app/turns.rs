@@ -1,12 +1,13 @@
 //! Keys and buttons take turns: a key may change what the next press of a button means, and where
-//! software draws both can come in one frame, of which egui does not keep the order.
+//! software draws both can come in one frame, of which egui does not keep the order. A button that is pressed
+//! and let go in one frame, as a touchpad's tap is, would move no slider.
 
 use std::mem::discriminant;
 
 use egui::Event;
 
-/// Leaves in `events` what may be taken in one frame: presses of keys or of buttons, not both. What
-/// comes after the change from one to the other is returned; it is meant for the next frame.
+/// Leaves in `events` what may be taken in one frame: presses of keys or of buttons, not both, and no button
+/// let go that was pressed in it. The rest is returned; it is meant for the next frame.
 pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
     let is_press = |event: &&Event| {
         matches!(
@@ -16,7 +17,14 @@ pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
     };
     let first = events.iter().find(is_press).map(discriminant);
     let is_other = |event: &Event| is_press(&event) && first != Some(discriminant(event));
-    let end = events.iter().position(is_other).unwrap_or(events.len());
+    let mut is_down = false;
+    let ends = |event: &Event| {
+        let is_button =
+            |down| matches!(event, Event::PointerButton { pressed, .. } if *pressed == down);
+        is_down |= is_button(true);
+        is_other(event) || (is_down && is_button(false))
+    };
+    let end = events.iter().position(ends).unwrap_or(events.len());
     events.split_off(end)
 }
 
@@ -27,7 +35,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_key_means_for_a_drag_is_known_before_it_begins() {
+    fn what_a_key_means_for_a_drag_is_known_before_it_begins_and_a_tap_lasts_a_frame() {
         let (pos, modifiers) = (Pos2::ZERO, Modifiers::NONE);
         let key = |pressed| Event::Key {
             key: Key::X,
@@ -43,11 +51,12 @@ mod tests {
             modifiers,
         };
         let moves = Event::PointerMoved(pos);
-        let drag = [button(true), moves.clone(), button(false)];
+        let drag = [button(true), moves.clone()];
         let turns = [
-            vec![moves.clone(), key(true), key(false), key(true), moves],
-            [&drag[..], &drag[..]].concat(),
-            vec![key(true), key(false)],
+            vec![moves.clone(), key(true), key(false), key(true), moves.clone()],
+            drag.to_vec(),
+            [&[button(false)], &drag[..]].concat(),
+            vec![button(false), moves, key(true), key(false)],
         ];
         let mut events = turns.concat();
         for turn in turns {

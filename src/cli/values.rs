@@ -43,6 +43,18 @@ pub(super) fn coefficient(text: &str) -> Result<Vec3, String> {
     }
 }
 
+/// A relative error above 0 and at most 1, or so many percent.
+pub(super) fn noise(text: &str) -> Result<f64, String> {
+    let share = match text.trim().strip_suffix('%') {
+        Some(percent) => positive(percent)? / 100.0,
+        None => positive(text)?,
+    };
+    match share {
+        ..=1.0 => Ok(share),
+        _ => Err(format!("more than 1 is all noise: {text} % is {}", share / 100.0)),
+    }
+}
+
 /// `X,Y,WIDTH,HEIGHT` in pixels.
 pub(super) fn region(text: &str) -> Result<[u32; 4], String> {
     let numbers: Vec<u32> = text.split(',').filter_map(|t| t.trim().parse().ok()).collect();

@@ -68,18 +68,6 @@ impl fmt::Display for Lookup {
     }
 }
 
-impl FromStr for Lookup {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        match name {
-            "bilinear" => Ok(Self::Bilinear),
-            "nearest" => Ok(Self::Nearest),
-            _ => Err(Error::new(format!("no map look-up \"{name}\": bilinear or nearest"))),
-        }
-    }
-}
-
 /// What an [`super::Environment`] is built with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EnvironmentOptions {
@@ -139,9 +127,6 @@ mod tests {
     fn names_read_back() {
         for kind in TableKind::ALL {
             assert_eq!(kind.to_string().parse(), Ok(kind));
-        }
-        for lookup in [Lookup::Bilinear, Lookup::Nearest] {
-            assert_eq!(lookup.to_string().parse(), Ok(lookup));
         }
         assert!("u64".parse::<TableKind>().is_err());
     }

@@ -44,7 +44,7 @@ pub fn write_beside_and_rename(
         .and_then(|()| fs::rename(&temporary.path, &target));
     written.map_err(|error| Error::at(path, write_cause(&error)))?;
     // The rename itself reaches the disk with its folder; not every file system allows asking.
-    if let Some(Ok(folder)) = target.parent().map(File::open) {
+    if let Ok(folder) = File::open(folder_of(&target)) {
         let _ = folder.sync_all();
     }
     Ok(())

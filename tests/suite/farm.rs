@@ -88,6 +88,18 @@ fn parts_that_do_not_belong_together_are_refused_by_name() {
         assert!(message.contains(sentence), "{names}: {message}");
         assert_eq!(message.lines().count(), 1, "{message}");
     }
+    // A built-in scene is known by its name, and by what was changed of it.
+    let of_crack = |rest: &str, name: &str| {
+        let size = "--size 16x9 --spp 2 --device cpu --learning-paths 100";
+        let output = bench.run(&format!("render crack --env map.exr {size} {rest} -o {name}.part"));
+        assert!(output.status.success(), "{rest}: {}", text(&output.stderr));
+    };
+    of_crack("--part 1/2", "crack");
+    for change in ["--material brick:color=#f00000", "--hide pine"] {
+        of_crack(&format!("--part 2/2 {change}"), "changed");
+        let message = bench.refusal("merge crack.part changed.part -o c.exr", 1);
+        assert!(message.contains("changed.part: does not belong to crack.part: another scene"));
+    }
     let output = bench.run("merge a.part --allow-missing -o c.png");
     assert!(output.status.success());
     assert!(text(&output.stderr).contains("of 2 parts are missing: 2\n"));

@@ -1,6 +1,6 @@
 //! A real window under Xvfb.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -134,15 +134,20 @@ impl Desk {
         }
     }
 
-    /// Types a path into the prompt that a key opens. An open prompt darkens what is behind it;
-    /// what is typed before is not meant for it.
+    /// Types a path into the prompt that a key opens, which takes it.
     fn answer(&self, key: &str, path: &str) {
+        self.answer_and(key, path, "key Return");
+    }
+
+    /// Types a path into the prompt that a key opens, and what ends that. An open prompt darkens what is
+    /// behind it; what is typed before is not meant for it.
+    fn answer_and(&self, key: &str, path: &str, end: &str) {
         let level = self.brightness();
         self.xdotool(&format!("key {key}"));
         self.wait_for("prompt", || (self.brightness() < 0.8 * level).then_some(()));
         self.xdotool("key ctrl+a");
         self.xdotool(&format!("type --delay 20 {path}"));
-        self.xdotool("key Return");
+        self.xdotool(end);
         self.wait_for("end of the prompt", || (self.brightness() > 0.9 * level).then_some(()));
     }
 
@@ -228,8 +233,8 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     });
     desk.xdotool("key g");
 
-    // A file that is not there changes nothing: the camera can still be turned.
-    desk.answer("ctrl+o", "none.glb");
+    // A file that is not there changes nothing: the path can be mended, or the camera still be turned.
+    desk.answer_and("ctrl+o", "none.glb", "key --delay 300 Return Escape");
     desk.wait_for("old scene", || desk.title().starts_with("open").then_some(()));
 
     // A drag turns the camera: another picture. It is taken back, also after the list of keys was open.
@@ -266,6 +271,24 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     assert!((shown_ev - whole_ev).abs() < 0.2, "{shown_ev} in place of {whole_ev}");
     desk.xdotool("key x");
 
+    // A file, which then is written anew and read again.
+    triangle(&desk.path("room.gltf"), 1.0);
+    desk.answer("ctrl+o", "room.gltf");
+    desk.wait_for("file", || desk.title().starts_with("room.gltf").then_some(()));
+    let large = desk.wait_for("triangle", || {
+        let picture = desk.save("large.exr");
+        let scene = desk.metadata("large.exr", "scene");
+        std::fs::remove_file(desk.path("large.exr")).expect("removed");
+        (scene.as_deref() == Some("room.gltf")).then_some(picture)
+    });
+    triangle(&desk.path("room.gltf"), 0.3);
+    desk.xdotool("key F5");
+    desk.wait_for("small triangle", || {
+        let small = desk.save("small.exr");
+        std::fs::remove_file(desk.path("small.exr")).expect("removed");
+        (small.pixels != large.pixels).then_some(())
+    });
+
     // Another scene.
     desk.answer("ctrl+o", "crack");
     desk.wait_for("new scene", || desk.title().starts_with("crack").then_some(()));
@@ -278,6 +301,22 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     assert!(!desk.says().contains("panicked"), "{}", desk.says());
     let settings = std::fs::read_to_string(desk.path("window.json")).expect("settings");
     assert!(settings.contains("window_size"), "{settings}");
+}
+
+/// Writes a scene of one triangle so large.
+fn triangle(path: &Path, size: f32) {
+    let corners = [[-size, -size, 0.0], [size, -size, 0.0], [0.0, size, 0.0]];
+    let bytes: Vec<u8> = corners.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
+    std::fs::write(path.with_extension("bin"), bytes).expect("written");
+    let text = format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}], "scene": 0,
+        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+            "min": [-{size}, -{size}, 0], "max": [{size}, {size}, 0]}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": 36}}],
+        "buffers": [{{"uri": "room.bin", "byteLength": 36}}]}}"#
+    );
+    std::fs::write(path, text).expect("written");
 }
 
 /// Mean squared difference of levels.

@@ -50,11 +50,7 @@ pub(in crate::app) fn show(
         .y_axis_label("relative RMS error")
         .x_grid_spacer(|input| grid_lines(input.bounds))
         .y_grid_spacer(|input| grid_lines(input.bounds))
-        .x_axis_formatter(|mark, range| match along(mark, range) {
-            // Cut off at the edge.
-            place if place > LAST_TICK => String::new(),
-            _ => tick(mark, range, 1.0),
-        })
+        .x_axis_formatter(|mark, range| tick(mark, range, 1.0))
         .y_axis_formatter(|mark, range| match tick(mark, range, 100.0) {
             text if text.is_empty() => text,
             text => format!("{text} %"),
@@ -68,12 +64,8 @@ pub(in crate::app) fn show(
         });
 }
 
-/// Part of the axis beyond which nothing is written.
-const LAST_TICK: f64 = 0.98;
-
-fn along(mark: GridMark, range: &RangeInclusive<f64>) -> f64 {
-    (mark.value - range.start()) / (range.end() - range.start())
-}
+/// Part of an axis on which numbers are written; beyond it they would stand outside of the plot.
+const WRITTEN: RangeInclusive<f64> = 0.0..=0.98;
 
 /// Span in decades below which grid lines are evenly spaced.
 const NARROW: f64 = 0.5;
@@ -106,6 +98,9 @@ fn grid_lines((low, high): (f64, f64)) -> Vec<GridMark> {
 /// What is written at a grid line: at as many as there is room for.
 fn tick(mark: GridMark, range: &RangeInclusive<f64>, factor: f64) -> String {
     let span = range.end() - range.start();
+    if !WRITTEN.contains(&((mark.value - range.start()) / span)) {
+        return String::new();
+    }
     let written: &[i32] = match span {
         span if span < 0.8 => &[1, 2, 3, 4, 6, 8],
         span if span < 2.5 => &[1, 2, 5],
@@ -177,10 +172,13 @@ mod tests {
 
     #[test]
     fn some_numbers_are_written_whatever_the_span() {
-        assert_eq!(written(0.9, 1100.0), ["1", "10", "100", "1000"]);
-        assert_eq!(written(0.9, 21.0), ["1", "2", "5", "10", "20"]);
+        assert_eq!(written(0.9, 1300.0), ["1", "10", "100", "1000"]);
+        assert_eq!(written(0.9, 23.0), ["1", "2", "5", "10", "20"]);
         assert_eq!(written(1.99, 4.1), ["2", "2.5", "3", "3.5", "4"]);
-        assert_eq!(written(43.9, 49.1), ["44", "45", "46", "47", "48", "49"]);
+        assert_eq!(written(43.9, 49.5), ["44", "45", "46", "47", "48", "49"]);
         assert_eq!(written(30.99, 31.41).len(), 5);
+        assert_eq!(written(1e-4, 0.2), ["0.0001", "0.001", "0.01", "0.1"]);
+        // What lies at the very end would be cut off, and what lies beyond it over something else.
+        assert_eq!(written(0.9, 101.0), ["1", "2", "5", "10", "20", "50"]);
     }
 }

@@ -15,11 +15,12 @@ pub(in crate::app) fn show(
         return;
     }
     let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 6));
-    let panel = Panel::bottom("dock").frame(frame);
     let Some(dock) = interface.dock else {
-        panel.show(ui, |ui| tabs(ui, interface));
+        // Of another name: panels remember how high they were.
+        Panel::bottom("closed dock").frame(frame).show(ui, |ui| tabs(ui, interface));
         return;
     };
+    let panel = Panel::bottom("dock").frame(frame);
     panel.resizable(true).default_size(230.0).min_size(120.0).show(ui, |ui| {
         tabs(ui, interface);
         ui.add_space(2.0);

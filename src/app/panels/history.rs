@@ -1,6 +1,6 @@
 //! Kept pictures.
 
-use egui::{Image, Sense, TextureOptions, Ui, Vec2};
+use egui::{Id, Image, RichText, Sense, TextureOptions, Ui, Vec2};
 
 use crate::app::commands::Command;
 use crate::app::history::History;
@@ -47,7 +47,7 @@ pub(in crate::app) fn show(
                     if ui.small_button("As then").on_hover_text(hint).clicked() {
                         commands.push(Command::SetAsKept(i));
                     }
-                    if ui.small_button("×").on_hover_text("Forget this picture").clicked() {
+                    if forget(ui, i) {
                         removed = Some(i);
                     }
                 });
@@ -58,6 +58,21 @@ pub(in crate::app) fn show(
         history.remove(index);
         *chosen = Chosen::default();
     }
+}
+
+/// Whether a picture is to be forgotten: asked twice, for its file goes with it.
+fn forget(ui: &mut Ui, index: usize) -> bool {
+    let id = Id::unique("forget a picture");
+    let is_asked = ui.data(|data| data.get_temp(id)) == Some(index);
+    let text = if is_asked { RichText::new("Delete?").color(theme::ALERT) } else { "×".into() };
+    let response = ui.small_button(text).on_hover_text("Forget this picture, and its file");
+    if response.clicked() {
+        ui.data_mut(|data| data.insert_temp(id, index));
+    }
+    if is_asked && (response.clicked() || response.clicked_elsewhere()) {
+        ui.data_mut(|data| data.remove::<usize>(id));
+    }
+    is_asked && response.clicked()
 }
 
 /// Chooses a picture for one side, or gives that back.

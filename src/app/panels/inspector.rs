@@ -119,9 +119,13 @@ fn equal_energy(ui: &mut Ui, map: &LoadedMap) {
 fn sun_sentence(sun: &Sun, rotation_turns: f32) -> String {
     let azimuth =
         (sun.azimuth_degrees + 360.0 * f64::from(rotation_turns) + 180.0).rem_euclid(360.0) - 180.0;
+    let turned = match 360.0 * rotation_turns {
+        0.0 => String::new(),
+        degrees => format!("; the map is turned by {degrees:.0}°, but not here"),
+    };
     format!(
         "Brightest at azimuth {azimuth:.0}° (0° is +X), elevation {:.0}°; {:.0}\u{a0}% of the energy \
-         within 2.5° of it",
+         within 2.5° of it{turned}",
         sun.elevation_degrees,
         100.0 * sun.energy_share
     )
@@ -309,7 +313,7 @@ fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
         (None, Ok(_)) => return,
     };
     let face = FACES.get(cell.face as usize).copied().unwrap_or("all");
-    let [r, g, b] = cell.radiance.to_array();
+    let [r, g, b] = cell.radiance.to_array().map(|light| theme::figure(f64::from(light)));
     let trained = match (cell.samples, cell.samples_around) {
         (0, 0) => "nothing: the mean of all speaks for it".to_owned(),
         (0, around) => format!("nothing: {} around speak for it", theme::count(around)),
@@ -326,7 +330,7 @@ fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
             format!("level {}, edge {}, face {face}", cell.level, length(cell.edge)),
         );
         line("Trained by", trained);
-        line("Radiance", format!("{r:.3}  {g:.3}  {b:.3}"));
+        line("Radiance", format!("{r}  {g}  {b}"));
         line("Cache", overlay::cache_size(cache));
     });
 }

@@ -1,7 +1,7 @@
 //! The left panel: scene, cameras, environment, fog, material. Where there is no room for it, the right one
 //! shows the same.
 
-use egui::{Margin, Panel, RichText, ScrollArea, Slider, Ui};
+use egui::{Margin, Panel, RichText, ScrollArea, Slider, SliderClamping, Ui};
 
 use glam::Vec3;
 
@@ -80,18 +80,15 @@ fn short(name: &str) -> String {
 
 fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut Vec<Command>) {
     let mut chosen = None;
-    egui::ComboBox::from_id_salt("scene")
-        .width(ui.available_width())
-        .selected_text(short(&document.scene))
-        .show_ui(ui, |ui| {
-            ui.label(theme::quiet("Built in"));
-            for name in builtin::names() {
-                if ui.selectable_label(document.scene == *name, *name).clicked() {
-                    chosen = Some((*name).to_owned());
-                }
+    theme::choice(ui, "scene").selected_text(short(&document.scene)).show_ui(ui, |ui| {
+        ui.label(theme::quiet("Built in"));
+        for name in builtin::names() {
+            if ui.selectable_label(document.scene == *name, *name).clicked() {
+                chosen = Some((*name).to_owned());
             }
-            recent(ui, &sources.settings.recent_scenes, &document.scene, &mut chosen);
-        });
+        }
+        recent(ui, &sources.settings.recent_scenes, &document.scene, &mut chosen);
+    });
     commands.extend(chosen.map(Command::OpenScene));
     if let Some(scene) = sources.scene {
         let (low, high) = scene.world.bvh.bounds();
@@ -200,19 +197,16 @@ fn environment(
         );
     }
     let mut chosen = None;
-    egui::ComboBox::from_id_salt("map")
-        .width(ui.available_width())
-        .selected_text(short(&document.map))
-        .show_ui(ui, |ui| {
-            ui.label(theme::quiet("Built in"));
-            for name in sky::names() {
-                let name = format!("sky:{name}");
-                if ui.selectable_label(document.map == name, &name).clicked() {
-                    chosen = Some(name);
-                }
+    theme::choice(ui, "map").selected_text(short(&document.map)).show_ui(ui, |ui| {
+        ui.label(theme::quiet("Built in"));
+        for name in sky::names() {
+            let name = format!("sky:{name}");
+            if ui.selectable_label(document.map == name, &name).clicked() {
+                chosen = Some(name);
             }
-            recent(ui, &sources.settings.recent_maps, &document.map, &mut chosen);
-        });
+        }
+        recent(ui, &sources.settings.recent_maps, &document.map, &mut chosen);
+    });
     commands.extend(chosen.map(Command::OpenMap));
     if let Some(map) = sources.map {
         let image = map.environment.map();
@@ -223,8 +217,14 @@ fn environment(
         ));
     }
     theme::row(ui, "Rotation", "Turns the map about the vertical", |ui| {
-        let slider = Slider::new(&mut document.rotation_degrees, 0.0..=360.0).suffix("°");
-        if ui.add(slider.fixed_decimals(0)).dragged() {
+        let degrees = &mut document.rotation_degrees;
+        let slider = Slider::new(degrees, 0.0..=360.0).suffix("°").fixed_decimals(0);
+        let response = ui.add(slider.clamping(SliderClamping::Never));
+        // Somebody may type -90.
+        if !(0.0..=360.0).contains(degrees) {
+            *degrees = degrees.rem_euclid(360.0);
+        }
+        if response.dragged() {
             interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
         }
     });
@@ -278,18 +278,15 @@ fn background(ui: &mut Ui, background: &mut Background) {
         "Background",
         "What the camera sees of the map, straight or through panes",
         |ui| {
-            egui::ComboBox::from_id_salt("background")
-                .width(ui.available_width())
-                .selected_text(name)
-                .show_ui(ui, |ui| {
-                    for (kind, name) in kinds {
-                        if ui.selectable_label(is_same(&kind, background), name).clicked()
-                            && !is_same(&kind, background)
-                        {
-                            *background = kind;
-                        }
+            theme::choice(ui, "background").selected_text(name).show_ui(ui, |ui| {
+                for (kind, name) in kinds {
+                    if ui.selectable_label(is_same(&kind, background), name).clicked()
+                        && !is_same(&kind, background)
+                    {
+                        *background = kind;
                     }
-                });
+                }
+            });
         },
     );
     match background {
@@ -305,7 +302,7 @@ fn background(ui: &mut Ui, background: &mut Background) {
         }
         Background::Color(rgb) => {
             theme::row(ui, "Colour", "Linear radiance", |ui| {
-                ui.color_edit_button_rgb(rgb);
+                theme::color(ui, rgb);
             });
         }
     }

@@ -1,6 +1,6 @@
 //! The material that was clicked: its colour, roughness and metalness, and whether it is there at all.
 
-use egui::{Align, ComboBox, RichText, Slider, Ui};
+use egui::{Align, RichText, Slider, Ui};
 use glam::Vec3;
 
 use crate::app::document::Document;
@@ -34,17 +34,14 @@ pub(super) fn show(
         (Some(number), Some(material)) => title(number, material),
         _ => "Click a surface".to_owned(),
     };
-    ComboBox::from_id_salt("material").width(ui.available_width()).selected_text(text).show_ui(
-        ui,
-        |ui| {
-            for (number, material) in (0..).zip(scene.materials.iter()) {
-                let is_chosen = interface.material == Some(number);
-                if ui.selectable_label(is_chosen, title(number, material)).clicked() {
-                    interface.material = Some(number);
-                }
+    theme::choice(ui, "material").selected_text(text).show_ui(ui, |ui| {
+        for (number, material) in (0..).zip(scene.materials.iter()) {
+            let is_chosen = interface.material == Some(number);
+            if ui.selectable_label(is_chosen, title(number, material)).clicked() {
+                interface.material = Some(number);
             }
-        },
-    );
+        }
+    });
     let (Some(number), Some(material)) = (interface.material, chosen) else { return };
     let before = document.materials.get(&number).copied().unwrap_or_default();
     let mut edit = before;
@@ -66,7 +63,7 @@ fn change(ui: &mut Ui, edit: &mut MaterialEdit, material: &Material) {
     let has = |texture: bool| if texture { "Its texture is multiplied by this" } else { "" };
     theme::row(ui, "Colour", has(material.base_color_texture.is_some()), |ui| {
         let mut rgb = edit.color.unwrap_or(material.base_color.truncate()).to_array();
-        if ui.color_edit_button_rgb(&mut rgb).changed() {
+        if theme::color(ui, &mut rgb) {
             edit.color = Some(Vec3::from(rgb));
         }
     });

@@ -1,9 +1,14 @@
 //! Messages over the picture.
 
-use egui::{Align2, Area, Color32, Context, Frame, Id, Margin, Rect, RichText, Stroke, Vec2};
+use egui::{
+    Align2, Area, Color32, Context, Frame, Id, Label, Margin, Rect, RichText, Stroke, Vec2,
+};
 
 use crate::app::messages::{Messages, NOTICE_SECONDS};
 use crate::app::theme;
+
+/// Room beside a sentence for what closes it, in points.
+const CLOSE_WIDTH: f32 = 36.0;
 
 /// Draws the messages at the foot of the picture's room; errors stay until they are closed.
 pub(in crate::app) fn show(context: &Context, room: Rect, messages: &mut Messages) {
@@ -15,6 +20,10 @@ pub(in crate::app) fn show(context: &Context, room: Rect, messages: &mut Message
         return;
     }
     context.request_repaint_after(std::time::Duration::from_secs(1));
+    if messages.list().iter().any(|message| message.since.is_none()) {
+        // How high they are is known once they are laid out: until then they would lie too low.
+        context.request_discard("a message is new");
+    }
     let foot = room.center_bottom() - Vec2::new(0.0, 12.0);
     let area = Area::new(Id::unique("messages")).pivot(Align2::CENTER_BOTTOM).fixed_pos(foot);
     let width = (room.width() - 60.0).clamp(160.0, 620.0);
@@ -31,9 +40,13 @@ pub(in crate::app) fn show(context: &Context, room: Rect, messages: &mut Message
                 .inner_margin(Margin::symmetric(12, 7))
                 .show(ui, |ui| {
                     ui.set_max_width(width);
-                    ui.horizontal_wrapped(|ui| {
-                        ui.label(RichText::new(&message.sentence).color(color));
-                        if ui.small_button("×").clicked() {
+                    ui.horizontal_top(|ui| {
+                        let text = RichText::new(&message.sentence).color(color);
+                        ui.scope(|ui| {
+                            ui.set_max_width(width - CLOSE_WIDTH);
+                            ui.add(Label::new(text).wrap());
+                        });
+                        if ui.small_button("×").on_hover_text("Close").clicked() {
                             closed = Some(i);
                         }
                     });

@@ -13,17 +13,14 @@ use crate::radiance_cache::CacheFacts;
 /// Draws the choice and the legend.
 pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option<&Shown>) {
     theme::heading(ui, "OVERLAY");
-    egui::ComboBox::from_id_salt("overlay")
-        .width(ui.available_width())
-        .height(420.0)
-        .selected_text(interface.overlay.map_or("None", Overlay::title))
-        .show_ui(ui, |ui| {
-            ui.selectable_value(&mut interface.overlay, None, "None");
-            for overlay in Overlay::ALL {
-                ui.selectable_value(&mut interface.overlay, Some(overlay), overlay.title())
-                    .on_hover_text(overlay.description());
-            }
-        });
+    let title = interface.overlay.map_or("None", Overlay::title);
+    theme::choice(ui, "overlay").selected_text(title).show_ui(ui, |ui| {
+        ui.selectable_value(&mut interface.overlay, None, "None");
+        for overlay in Overlay::ALL {
+            ui.selectable_value(&mut interface.overlay, Some(overlay), overlay.title())
+                .on_hover_text(overlay.description());
+        }
+    });
     let Some(overlay) = interface.overlay else { return };
     ui.label(theme::quiet(overlay.description()));
     if !overlay.is_opaque() {
@@ -87,7 +84,7 @@ fn legend(ui: &mut Ui, legend: &Legend) {
                 ui.horizontal(|ui| {
                     let (rect, _) = ui.allocate_exact_size(Vec2::splat(14.0), Sense::hover());
                     ui.painter().rect_filled(rect, 3.0, of(*color));
-                    ui.label(name);
+                    ui.add(egui::Label::new(name).wrap());
                 });
             }
         }

@@ -129,16 +129,13 @@ fn size(ui: &mut Ui, size: &mut PictureSize) {
         PictureSize::Fixed(width, height) => format!("{width} x {height}"),
     };
     theme::row(ui, "Pixels", "Size of the picture", |ui| {
-        egui::ComboBox::from_id_salt("size")
-            .width(ui.available_width())
-            .selected_text(name(*size))
-            .show_ui(ui, |ui| {
-                let viewport = [1, 2, 4].map(PictureSize::Viewport);
-                let fixed = FIXED.map(|(w, h)| PictureSize::Fixed(w, h));
-                for choice in viewport.into_iter().chain(fixed) {
-                    ui.selectable_value(size, choice, name(choice));
-                }
-            });
+        theme::choice(ui, "size").selected_text(name(*size)).show_ui(ui, |ui| {
+            let viewport = [1, 2, 4].map(PictureSize::Viewport);
+            let fixed = FIXED.map(|(w, h)| PictureSize::Fixed(w, h));
+            for choice in viewport.into_iter().chain(fixed) {
+                ui.selectable_value(size, choice, name(choice));
+            }
+        });
     });
     if let PictureSize::Fixed(width, height) = size {
         theme::row(ui, "", "", |ui| {

@@ -1,5 +1,7 @@
 //! Asking for a path: typed, pasted, recent, or from the system's dialogue.
 
+use std::path::Path;
+
 use egui::text::{CCursor, CCursorRange};
 use egui::{Context, Id, Key, Modal, RichText, TextEdit};
 
@@ -7,6 +9,24 @@ use crate::app::commands::Command;
 use crate::app::interface::{Interface, Purpose};
 use crate::app::settings_file::Settings;
 use crate::app::theme;
+use crate::scene::builtin;
+
+/// Nothing can be opened there.
+const MISSING: &str = "There is no such file.";
+/// What is asked before a file is written over.
+const REPLACED: &str = "This file is there already: Enter again replaces it.";
+
+/// What is to be known of a path before it is taken.
+fn objection(purpose: Purpose, path: &str) -> Option<&'static str> {
+    let is_there = Path::new(path).exists();
+    let is_built_in = match purpose {
+        Purpose::Scene => builtin::names().contains(&path),
+        Purpose::Map => path.starts_with("sky:"),
+        Purpose::Reference => false,
+        Purpose::Picture | Purpose::Distributions => return is_there.then_some(REPLACED),
+    };
+    (!is_there && !is_built_in).then_some(MISSING)
+}
 
 /// Draws the open prompt, if any.
 pub(in crate::app) fn show(
@@ -60,6 +80,10 @@ pub(in crate::app) fn show(
             // Enter takes the keyboard away; without a path there is nothing to be done yet.
             field.request_focus();
         }
+        let objection = prompt.objection.clone().filter(|(of, _)| of == prompt.path.trim());
+        if let Some((_, sentence)) = &objection {
+            ui.label(RichText::new(*sentence).color(theme::ALERT));
+        }
         for name in recent {
             if ui.link(RichText::new(name).size(12.5)).clicked() {
                 prompt.path.clone_from(name);
@@ -68,6 +92,8 @@ pub(in crate::app) fn show(
         }
         ui.add_space(6.0);
         ui.horizontal(|ui| {
+            let replaces = objection.is_some_and(|(_, sentence)| sentence == REPLACED);
+            let accept = if replaces { "Replace" } else { accept };
             is_done |= ui.button(RichText::new(accept).color(theme::ACCENT)).clicked();
             if ui.button("Browse…").on_hover_text("The system's file dialogue").clicked() {
                 commands.push(Command::Browse(prompt.purpose));
@@ -77,10 +103,39 @@ pub(in crate::app) fn show(
     });
     let path = prompt.path.trim();
     if is_done && !path.is_empty() {
-        commands.push(prompt.purpose.command(path));
-        is_closed = true;
+        let is_known = prompt.objection.as_ref().is_some_and(|(of, _)| of == path);
+        match objection(prompt.purpose, path) {
+            Some(sentence) if sentence == MISSING || !is_known => {
+                prompt.objection = Some((path.to_owned(), sentence));
+            }
+            _ => {
+                commands.push(prompt.purpose.command(path));
+                is_closed = true;
+            }
+        }
     }
     if is_closed || response.should_close() {
         interface.prompt = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_opened_that_is_not_there_and_nothing_replaced_unasked() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [there, gone] = ["a.png", "b.png"].map(|name| folder.path().join(name));
+        std::fs::write(&there, "").expect("written");
+        let asked = |purpose, path: &Path| objection(purpose, path.to_str().expect("text"));
+        for purpose in [Purpose::Scene, Purpose::Map, Purpose::Reference] {
+            assert_eq!((asked(purpose, &there), asked(purpose, &gone)), (None, Some(MISSING)));
+        }
+        for purpose in [Purpose::Picture, Purpose::Distributions] {
+            assert_eq!((asked(purpose, &there), asked(purpose, &gone)), (Some(REPLACED), None));
+        }
+        assert_eq!(objection(Purpose::Scene, "office"), None);
+        assert_eq!(objection(Purpose::Map, "sky:day@64x32"), None);
     }
 }

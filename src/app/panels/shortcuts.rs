@@ -1,40 +1,57 @@
 //! The sheet of keys and gestures.
 
-use egui::{Align2, Color32, Context, Frame, Grid, Margin, RichText, Ui, Window};
+use egui::{Align2, Color32, Context, Frame, Grid, Margin, RichText, ScrollArea, Ui, Vec2, Window};
 
 use crate::app::commands::{GESTURES, SHORTCUTS};
 use crate::app::interface::Interface;
 use crate::app::theme;
 
+/// What both lists take side by side, in points.
+const WIDTH: f32 = 720.0;
+
 /// Draws the sheet while it is open.
 pub(in crate::app) fn show(context: &Context, interface: &mut Interface) {
     let mut is_open = interface.shortcuts;
+    let room = context.content_rect().size() - Vec2::new(48.0, 96.0);
     Window::new("Keys and gestures")
         .open(&mut is_open)
         .collapsible(false)
         .resizable(false)
         // Else the first frame cuts it.
-        .default_width(660.0)
+        .default_width(WIDTH.min(room.x))
         .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
         .show(context, |ui| {
-            ui.add_space(4.0);
-            ui.horizontal_top(|ui| {
-                list(
-                    ui,
-                    "keys",
-                    SHORTCUTS.iter().map(|(keys, what, _)| (context.format_shortcut(keys), *what)),
-                );
-                ui.add_space(24.0);
-                ui.vertical(|ui| {
-                    let gestures = GESTURES.iter().map(|(how, what)| ((*how).to_owned(), *what));
-                    list(ui, "gestures", gestures);
+            let area = ScrollArea::vertical().max_height(room.y).min_scrolled_height(room.y);
+            area.show(ui, |ui| {
+                ui.add_space(4.0);
+                if room.x < WIDTH {
+                    keys(ui);
                     ui.add_space(10.0);
-                    let more = [("? or F1", "This sheet"), ("Ctrl+C", "Copy the picture")];
-                    list(ui, "more", more.into_iter().map(|(k, w)| (k.to_owned(), w)));
-                });
+                    gestures(ui);
+                } else {
+                    ui.horizontal_top(|ui| {
+                        keys(ui);
+                        ui.add_space(24.0);
+                        ui.vertical(gestures);
+                    });
+                }
             });
         });
     interface.shortcuts = is_open;
+}
+
+fn keys(ui: &mut Ui) {
+    let context = ui.ctx().clone();
+    let line = |(keys, what, _): &(_, &'static str, _)| (context.format_shortcut(keys), *what);
+    list(ui, "keys", SHORTCUTS.iter().map(line));
+}
+
+fn gestures(ui: &mut Ui) {
+    let gestures = GESTURES.iter().map(|(how, what)| ((*how).to_owned(), *what));
+    list(ui, "gestures", gestures);
+    ui.add_space(10.0);
+    let more = [("? or F1", "This sheet"), ("Ctrl+C", "Copy the picture")];
+    list(ui, "more", more.into_iter().map(|(k, w)| (k.to_owned(), w)));
 }
 
 fn list<'a>(ui: &mut Ui, id: &str, lines: impl Iterator<Item = (String, &'a str)>) {

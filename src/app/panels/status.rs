@@ -145,8 +145,12 @@ fn pixel(ui: &mut Ui, snapshot: &Snapshot, place: glam::Vec2) {
     let index = |share: f32, count: u32| ((share * count as f32) as u32).min(count.max(1) - 1);
     let (x, y) = (index(place.x, film.width), index(place.y, film.height));
     let Some(pixel) = film.pixels().get((y * film.width + x) as usize) else { return };
-    let [r, g, b] = pixel.mean();
-    let text = format!("{x}, {y}:  {r:.3}  {g:.3}  {b:.3}  ·  {} samples", pixel.samples());
+    let [r, g, b] = pixel.mean().map(theme::figure);
+    let samples = match pixel.samples() {
+        1 => "1 sample".to_owned(),
+        all => format!("{all} samples"),
+    };
+    let text = format!("{x}, {y}:  {r}  {g}  {b}  ·  {samples}");
     ui.label(theme::quiet(text)).on_hover_text("Linear radiance of the pixel, unfiltered");
 }
 

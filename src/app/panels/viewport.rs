@@ -28,9 +28,17 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
             return;
         };
         let view = scope.snapshot.map_or(&shown.order.snapshot.request.view, |s| &s.request.view);
-        let whole = fitted(area, view);
-        let rect = part_rect(whole, &shown.order.snapshot.request.view);
-        picture(ui, (whole, rect), shown, settings, scope);
+        let compared = shown.order.compared.as_ref();
+        let (whole, rect) = match compared {
+            // A kept picture may be of another shape, or of a part.
+            Some(compared) => kept_rects(area, shown.picture.size(), compared.regions[1]),
+            None => {
+                let whole = fitted(area, view.whole_size());
+                (whole, part_rect(whole, &shown.order.snapshot.request.view))
+            }
+        };
+        let ground = if compared.is_some() { rect } else { whole };
+        picture(ui, (ground, rect), shown, settings, scope);
         labels(ui, rect, shown);
         let mut handle = Rect::NOTHING;
         if let Some(other) = &shown.other {
@@ -38,7 +46,16 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
             let changes = changes(ui, other, scope);
             let texture =
                 Developed::update(&mut scope.textures.other, scope.screen, recipe, changes);
-            handle = wipe(ui, rect, texture, scope.interface);
+            let of_left = compared.map_or(rect, |compared| {
+                let (of_whole, part) = kept_rects(area, other.size(), compared.regions[0]);
+                if !is_alike(of_whole, whole) {
+                    // Beside another shape nothing is to be seen of what lies under it.
+                    let hidden = left_of(rect, rect, scope.interface.wipe);
+                    ui.painter().rect_filled(hidden, 0.0, theme::BACKGROUND);
+                }
+                part
+            });
+            handle = wipe(ui, (rect, of_left), texture, scope.interface);
             match &shown.order.compared {
                 Some(compared) => wipe_labels(ui, rect, &compared.names),
                 None => split_labels(ui, rect, scope),
@@ -90,9 +107,30 @@ fn measure(ui: &Ui, area: Rect, scope: &mut Scope<'_>) {
     }
 }
 
+/// Where a kept picture and the whole that it may be a part of lie.
+fn kept_rects(area: Rect, size: [u32; 2], region: Option<[f32; 4]>) -> (Rect, Rect) {
+    let Some([left, top, right, bottom]) = region else {
+        let whole = fitted(area, size);
+        return (whole, whole);
+    };
+    let whole = |pixels: u32, low: f32, high: f32| (pixels as f32 / (high - low)).round() as u32;
+    let whole = fitted(area, [whole(size[0], left, right), whole(size[1], top, bottom)]);
+    let at = |x: f32, y: f32| whole.min + Vec2::new(x, y) * whole.size();
+    (whole, Rect::from_min_max(at(left, top), at(right, bottom)))
+}
+
+/// Whether two rectangles are the same but for rounding.
+fn is_alike(a: Rect, b: Rect) -> bool {
+    (a.min - b.min).length() + (a.max - b.max).length() < 4.0
+}
+
+/// What of a rectangle is left of the line of a wipe across `rect`.
+fn left_of(all: Rect, rect: Rect, wipe: f32) -> Rect {
+    all.with_max_x((rect.left() + rect.width() * wipe).max(all.left()))
+}
+
 /// The picture as large as fits, in its own shape.
-fn fitted(area: Rect, view: &View) -> Rect {
-    let [width, height] = view.whole_size();
+fn fitted(area: Rect, [width, height]: [u32; 2]) -> Rect {
     let size = Vec2::new(width as f32, height as f32);
     let scale = (area.width() / size.x).min(area.height() / size.y);
     Rect::from_center_size(area.center(), size * scale)
@@ -169,12 +207,18 @@ fn waiting(ui: &Ui, area: Rect, is_loading: bool) {
     );
 }
 
-/// The other picture left of a line that can be dragged; where that can be taken hold of.
-fn wipe(ui: &Ui, rect: Rect, texture: TextureId, interface: &mut Interface) -> Rect {
+/// The other picture, which lies in a rectangle of its own, left of a line across `rect` that can be dragged;
+/// where that can be taken hold of.
+fn wipe(
+    ui: &Ui,
+    (rect, of_left): (Rect, Rect),
+    texture: TextureId,
+    interface: &mut Interface,
+) -> Rect {
     let x = rect.left() + rect.width() * interface.wipe;
-    let left = Rect::from_min_max(rect.min, Pos2::new(x, rect.bottom()));
-    let uv = Rect::from_min_max(Pos2::ZERO, Pos2::new(interface.wipe, 1.0));
-    ui.painter().image(texture, left, uv, Color32::WHITE);
+    let uv = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+    let left = left_of(of_left, rect, interface.wipe);
+    ui.painter_at(left).image(texture, of_left, uv, Color32::WHITE);
     let handle =
         Rect::from_center_size(Pos2::new(x, rect.center().y), Vec2::new(14.0, rect.height()));
     let response = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());
@@ -229,4 +273,23 @@ fn pin(ui: &Ui, rect: Rect, interface: &Interface) {
     let at = rect.min + Vec2::new(place.x, place.y) * rect.size();
     ui.painter().circle_stroke(at, 7.0, Stroke::new(3.0, Color32::from_black_alpha(160)));
     ui.painter().circle_stroke(at, 7.0, Stroke::new(1.5, theme::ACCENT));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kept_pictures_keep_their_shape_and_parts_their_place() {
+        let area = Rect::from_min_size(Pos2::new(10.0, 20.0), Vec2::new(400.0, 200.0));
+        let (whole, part) = kept_rects(area, [100, 100], None);
+        assert!(
+            whole == part && whole == Rect::from_center_size(area.center(), Vec2::splat(200.0))
+        );
+        // The right half of a picture of 100 x 50 pixels.
+        let (whole, part) = kept_rects(area, [50, 50], Some([0.5, 0.0, 1.0, 1.0]));
+        assert_eq!(whole, area);
+        assert_eq!(part, area.with_min_x(210.0));
+        assert_eq!(left_of(area, part, 0.25).right(), 260.0);
+    }
 }

@@ -112,8 +112,8 @@ pub(in crate::cli) struct RenderArguments {
     /// pixel, a CPU makes a coarser picture.
     #[arg(long, value_parser = values::positive, value_name = "S", help_heading = "Stop")]
     pub(super) seconds: Option<f64>,
-    /// Stop when the estimated relative RMS error falls below this, e.g. 0.05.
-    #[arg(long, value_parser = values::positive, value_name = "E", help_heading = "Stop")]
+    /// Stop when the estimated relative RMS error falls below this, e.g. 0.05 or 5%.
+    #[arg(long, value_parser = values::noise, value_name = "E", help_heading = "Stop")]
     pub(super) noise: Option<f64>,
 
     /// How the map is sampled.
@@ -185,7 +185,7 @@ pub(in crate::cli) struct RenderArguments {
     #[arg(long, value_name = "FILE", help_heading = "Run")]
     pub(super) json: Option<PathBuf>,
     /// Writes what was learned, each cell's probability of each tile: .csv, .json or .exr.
-    #[arg(long, alias = "laws", value_name = "FILE", help_heading = "Run")]
+    #[arg(long, value_name = "FILE", help_heading = "Run")]
     pub(super) distributions: Option<PathBuf>,
 
     /// Renders only this share of every pixel's samples, such as 2/8, into a .part for `lightgrid

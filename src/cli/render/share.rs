@@ -389,7 +389,10 @@ fn identity(
         ..
     } = view;
     let scene = match builtin::names().contains(&arguments.scene.as_str()) {
-        true => arguments.scene.clone(),
+        true => {
+            let changes = (arguments.of_scene.options().hide, arguments.of_scene.edits());
+            format!("{} {}", arguments.scene, Digest::new().debug(&changes))
+        }
         false => Digest::new().scene(&world.scene).to_string(),
     };
     let map = match arguments.map().starts_with("sky:") {

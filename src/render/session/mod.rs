@@ -126,21 +126,16 @@ impl<'a> Session<'a> {
     /// If the GPU fails; the film as it was read last is kept, and [`Self::continue_on_cpu`] goes on
     /// from there.
     pub fn advance(&mut self, samples: u32, cancel: &AtomicBool) -> Result<()> {
-        let (start, distribution_seconds) = (Instant::now(), self.figures.distribution_seconds);
         match self.phase() {
             Phase::Learning => {
+                let start = Instant::now();
                 let result = self.learn(cancel);
                 self.figures.learning_seconds += start.elapsed().as_secs_f64();
                 result
             }
             Phase::Rendering => {
                 self.train(1, cancel)?;
-                let start = Instant::now();
-                let result = self.render(self.samples.saturating_add(samples), (1, true), cancel);
-                let distributions = self.figures.distribution_seconds - distribution_seconds;
-                self.figures.learning_seconds += distributions;
-                self.figures.render_seconds += start.elapsed().as_secs_f64() - distributions;
-                result
+                self.render_timed(samples, (1, true), cancel)
             }
         }
     }
@@ -153,11 +148,9 @@ impl<'a> Session<'a> {
     pub fn begin(&mut self, every: u32, cancel: &AtomicBool) {
         let every = every.max(1);
         if (self.samples == 0 || every == 1) && !self.is_on_gpu() {
-            // Only a GPU fails, and distributions are made of whole passes.
+            // Only a GPU fails.
             let _ = self.train(every, cancel);
-            let start = Instant::now();
-            let _ = self.render(self.samples.saturating_add(1), (every, false), cancel);
-            self.figures.render_seconds += start.elapsed().as_secs_f64();
+            let _ = self.render_timed(1, (every, false), cancel);
         }
     }
 
@@ -203,31 +196,24 @@ impl<'a> Session<'a> {
     /// Lets the CPU take over from a GPU, with everything learned and rendered so far, as far as it can
     /// still be read.
     pub fn continue_on_cpu(&mut self) {
-        if self.is_on_gpu() {
-            self.leave_gpu();
-            self.engine = Engine::Cpu;
+        if !self.is_on_gpu() {
+            return;
         }
-    }
-
-    /// Reads what there is on a GPU that is to be left.
-    fn leave_gpu(&mut self) {
         let film = self.film();
         let skipped = u64::from(self.skipped) * film.pixels().len() as u64;
         (self.samples, self.figures.samples) = (film.min_samples(), film.total_samples() - skipped);
         self.figures.rays = self.figures().rays;
         // With a device goes what was done since its film was read.
         self.sequence.first_sample = self.sequence.first_sample.min(self.samples);
+        self.engine = Engine::Cpu;
     }
 
-    /// Lets a GPU take over, to which this session's world and environment are uploaded, with
+    /// Lets a GPU take over from the CPU, to which this session's world and environment are uploaded, with
     /// everything learned and rendered so far.
     ///
     /// # Errors
     /// If it does not fit on the device; the session stays where it is.
     pub fn continue_on_gpu(&mut self, uploaded: &gpu::UploadedScene) -> Result<()> {
-        if self.is_on_gpu() {
-            self.leave_gpu();
-        }
         let (world, environment) = (self.world, self.environment);
         let film = (self.figures.samples > 0).then(|| self.film());
         let mut renderer =
@@ -511,6 +497,16 @@ impl<'a> Session<'a> {
         }
     }
 
+    /// [`Self::render`], `samples` further. Making distributions counts as learning.
+    fn render_timed(&mut self, samples: u32, how: (u32, bool), cancel: &AtomicBool) -> Result<()> {
+        let (start, before) = (Instant::now(), self.figures.distribution_seconds);
+        let result = self.render(self.samples.saturating_add(samples), how, cancel);
+        let distributions = self.figures.distribution_seconds - before;
+        self.figures.learning_seconds += distributions;
+        self.figures.render_seconds += start.elapsed().as_secs_f64() - distributions;
+        result
+    }
+
     fn render(
         &mut self,
         target: u32,
@@ -550,7 +546,9 @@ impl<'a> Session<'a> {
             }
         };
         self.figures.samples += samples;
-        if let Some(film) = self.film.get().filter(|_| self.skipped == 0) {
+        // A GPU's film may have been read for the clock's sake: noise does not depend on that.
+        let is_noted = self.skipped == 0 && !self.is_on_gpu();
+        if let Some(film) = self.film.get().filter(|_| is_noted) {
             self.note_doubling(film);
         }
         let is_whole = self.samples >= target;
