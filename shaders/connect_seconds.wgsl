@@ -48,7 +48,7 @@ fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32
         let way = target_ - origin;
         let distance = length(way);
         (*path).rays += 1u;
-        let visible = transmittance_along(Ray(origin, way / distance, distance * (1.0 - 1e-4)));
+        let visible = transmittance_along(Ray(origin, way / distance, distance * SHADOW_RAY_SHARE));
         if any(visible != vec3f(1.0)) {
             return vec4f(0.0);
         }

@@ -405,5 +405,5 @@ fn roulette_probability(path: ptr<function, Path>) -> f32 {
 //#if SHARING
     in_air *= (*path).throughput_before;
 //#end
-    return clamp(ROULETTE_MILDNESS * in_air, 0.05, 1.0);
+    return clamp(ROULETTE_MILDNESS * in_air, LEAST_SURVIVAL, 1.0);
 }

@@ -62,7 +62,7 @@ fn shadow_towards(
     }
 //#end
     // Stop short of the light's own surface.
-    shadow.ray = Ray(origin, direction, distance * (1.0 - 1e-4));
+    shadow.ray = Ray(origin, direction, distance * SHADOW_RAY_SHARE);
     return shadow;
 }
 

@@ -134,6 +134,6 @@ fn is_true_from(normal: vec3f, geometric_normal: vec3f, to_viewer: vec3f) -> boo
     let geometric_cosine = dot(geometric_normal, to_viewer);
     let cosine = dot(normal, to_viewer);
     let mirrored = 2.0 * cosine * dot(normal, geometric_normal) - geometric_cosine;
-    return geometric_cosine > 0.0 && cosine >= 0.1 * geometric_cosine
-        && mirrored >= min(0.95 * geometric_cosine, 0.02);
+    return geometric_cosine > 0.0 && cosine >= TRUE_COSINE_SHARE * geometric_cosine
+        && mirrored >= min(TRUE_MIRROR_SHARE * geometric_cosine, TRUE_MIRROR_COSINE);
 }

@@ -7,12 +7,9 @@ use glam::{Affine3A, Mat3A, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::denoise::Denoiser;
-use crate::light_grid::DistributionOptions;
 use crate::path::{Background, PathLimits};
-use crate::render::filter::PixelFilter;
 use crate::render::gpu::DeviceChoice;
-use crate::render::{Crop, Gi, Sampling, Sharing, StopRule, View};
-use crate::sampler::Points;
+use crate::render::{Crop, Sampling, Sharing, StopRule, View};
 use crate::scene::{Camera, MaterialEdit, Medium, Projection, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
 
@@ -167,25 +164,18 @@ impl Document {
         let crop = self.region.map(|region| pixels_of(region, whole));
         let [width, height] = crop.map_or(whole, |(_, size)| size);
         Some(View {
-            camera: self.viewpoint.as_ref()?.camera(),
-            width,
-            height,
-            filter: PixelFilter::default(),
             sampling: self.light.sampling,
             limits: PathLimits { bounces: self.light.bounces, russian_roulette: true },
             seed: self.light.seed,
-            points: Points::Sobol,
-            grid_columns: 64,
             // What neighbours share, denoising cannot tell from light.
             sharing: Sharing::Off,
-            gi: Gi::Exact,
             learning_paths: self.learning_paths([width, height]),
-            distributions: DistributionOptions::ADAPTIVE,
             medium: self.fog,
             background: self.background,
             crop: crop.map(|(corner, _)| Crop { corner, whole }),
             // The denoiser, focusing and the surface overlays need them.
             layers: true,
+            ..View::new(self.viewpoint.as_ref()?.camera(), [width, height])
         })
     }
 }

@@ -107,7 +107,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
             let error = error.to_string();
             let error = error.trim_end_matches('.');
             tell(format_args!("lightgrid: {error}; rendering into {picture} instead"));
-            super::render::run(&headless(arguments))
+            super::render::run(&headless(arguments)?)
         }
     }
 }
@@ -130,17 +130,16 @@ fn document(arguments: &ViewArguments, settings: &Settings) -> Document {
     document
 }
 
-fn headless(arguments: &ViewArguments) -> super::render::RenderArguments {
-    let seconds = arguments.samples.is_none().then_some(HEADLESS_SECONDS);
+fn headless(arguments: &ViewArguments) -> Result<super::render::RenderArguments> {
     let [scene, map] = arguments.names();
-    let mut headless = super::render::RenderArguments::for_picture(
-        scene,
-        map,
-        &arguments.output,
-        arguments.sampling.unwrap_or_default(),
-        (arguments.size, arguments.samples, seconds),
-        (arguments.device.unwrap_or_default(), arguments.adapter.clone(), arguments.rays),
-    );
+    let mut headless = super::render::RenderArguments::of_picture(scene, map, &arguments.output)?;
     headless.of_scene = arguments.of_scene.clone();
-    headless
+    headless.size = arguments.size.unwrap_or(headless.size);
+    headless.spp = arguments.samples;
+    headless.seconds = arguments.samples.is_none().then_some(HEADLESS_SECONDS);
+    headless.sampling = arguments.sampling.unwrap_or_default();
+    headless.device = arguments.device.unwrap_or_default();
+    headless.adapter.clone_from(&arguments.adapter);
+    headless.rays = arguments.rays;
+    Ok(headless)
 }

@@ -112,6 +112,12 @@ pub(crate) const ROULETTE_AFTER: u32 = 3;
 /// less than 1 saves a third of the rays of an office and doubles its error.
 pub(crate) const ROULETTE_MILDNESS: f32 = 3.0;
 
+/// Least probability of surviving it: a path that carries little is not made to count for too much.
+pub(crate) const LEAST_SURVIVAL: f32 = 0.05;
+
+/// Share of the way to a light, or to a vertex, that a shadow ray goes: it stops short of that surface.
+pub(crate) const SHADOW_RAY_SHARE: f32 = 1.0 - 1e-4;
+
 /// Panes and leaves one ray may pass; only a scene that is broken has more.
 pub(crate) const MAX_PASSES: u32 = 1000;
 
@@ -429,8 +435,7 @@ impl<'a> Path<'a> {
             return left;
         }
         self.rays += 1;
-        // Stop short of the light's own surface.
-        let ray = Ray { origin, direction, t_min: 0.0, t_max: distance * (1.0 - 1e-4) };
+        let ray = Ray { origin, direction, t_min: 0.0, t_max: distance * SHADOW_RAY_SHARE };
         self.tracer.world.transmittance(&ray) * left
     }
 
@@ -493,7 +498,7 @@ impl<'a> Path<'a> {
         }
         let in_air = self.throughput.max_element() * self.body.squared_index;
         let carried = self.throughput_before * in_air;
-        let probability = (ROULETTE_MILDNESS * carried).clamp(0.05, 1.0);
+        let probability = (ROULETTE_MILDNESS * carried).clamp(LEAST_SURVIVAL, 1.0);
         let survives = probability >= 1.0 || self.sampler.next_pair()[1] < probability;
         survives.then_some(probability)
     }

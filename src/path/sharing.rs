@@ -18,7 +18,7 @@ use glam::Vec3;
 
 use super::gather::Arriving;
 use super::vertex::{Scatterer, SurfaceScatterer, Vertex};
-use super::{Path, PathResult, PathTracer};
+use super::{Path, PathResult, PathTracer, SHADOW_RAY_SHARE};
 use crate::bsdf::Bsdf;
 use crate::bvh::{Ray, offset_origin};
 use crate::medium::{Crossing, Phase};
@@ -76,6 +76,14 @@ pub struct Start<'a> {
 
 /// Least GGX alpha of a vertex that takes part: narrower reflections are not seen alike from two pixels.
 pub(crate) const LEAST_ALPHA: f32 = 0.01;
+
+/// A normal is seen as it is where the viewer's cosine with it is at least this share of that with the geometric
+/// normal: beyond where bending begins, so that what is bent is not taken for true.
+pub(crate) const TRUE_COSINE_SHARE: f32 = 0.1;
+/// And where the mirrored viewer's cosine with the geometric normal is at least this share of the viewer's...
+pub(crate) const TRUE_MIRROR_SHARE: f32 = 0.95;
+/// ...or as large as this.
+pub(crate) const TRUE_MIRROR_COSINE: f32 = 0.02;
 
 /// Keeps the places of tiles apart from other random numbers.
 pub(crate) const TILE_SEED: u32 = 0x7469_6c65;
@@ -243,16 +251,15 @@ impl Path<'_> {
 
 impl SurfaceScatterer<'_> {
     /// Whether a viewer in this direction sees the normal as it is, not bent into sight
-    /// ([`crate::scene::surface::SurfacePoint`]). The bounds are beyond those where bending begins: what
-    /// is bent is not taken for true.
+    /// ([`crate::scene::surface::SurfacePoint`]).
     fn is_true_from(&self, to_viewer: Vec3) -> bool {
         let (normal, geometric) = (self.shading_frame.z, self.geometric_normal);
         let geometric_cos = geometric.dot(to_viewer);
         let cos = normal.dot(to_viewer);
         let mirrored = 2.0 * cos * normal.dot(geometric) - geometric_cos;
         geometric_cos > 0.0
-            && cos >= 0.1 * geometric_cos
-            && mirrored >= (0.95 * geometric_cos).min(0.02)
+            && cos >= TRUE_COSINE_SHARE * geometric_cos
+            && mirrored >= (TRUE_MIRROR_SHARE * geometric_cos).min(TRUE_MIRROR_COSINE)
     }
 }
 
@@ -344,7 +351,7 @@ impl First<'_> {
         let origin = self.vertex.scatterer.origin_toward(self.vertex.position, direction);
         let way = target - origin;
         let distance = way.length();
-        let t_max = distance * (1.0 - 1e-4);
+        let t_max = distance * SHADOW_RAY_SHARE;
         let ray = Ray { origin, direction: way / distance, t_min: 0.0, t_max };
         tracer.world.transmittance(&ray) == Vec3::ONE
     }

@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use glam::Vec2;
 use rayon::prelude::*;
 
+use super::View;
 use super::film::{Film, FilmTile};
-use super::{Pass, View};
+use super::pass::{Coverage, Pass};
 use crate::bvh::Ray;
 use crate::light_grid::counters::MAX_RECORDS_PER_PASS;
 use crate::path::PathTracer;
@@ -115,9 +116,9 @@ pub(super) fn render(
     let without_counts = PathTracer { counts: None, ..*tracer };
     let task = Task { tracers: [&without_counts, tracer], rays, view, pass, cancel };
     let add = |a: (u64, u64), b: (u64, u64)| (a.0 + b.0, a.1 + b.1);
-    let Some(tile) = view.shared_tile().filter(|_| pass.shares) else {
+    let Some(tile) = view.shared_tile().filter(|_| pass.coverage == Coverage::All) else {
         let rows = film.tiles(film.width, 1, [0, 0]).into_iter().enumerate();
-        let mut rows: Vec<_> = rows.step_by(pass.every as usize).collect();
+        let mut rows: Vec<_> = rows.step_by(pass.coverage.step() as usize).collect();
         // Multiples of the golden ratio lie evenly.
         rows.sort_unstable_by_key(|(y, _)| (*y as u32).wrapping_mul(0x9e37_79b9));
         let rows = rows.into_par_iter();
@@ -161,7 +162,7 @@ impl Task<'_> {
     /// Brings pixel after pixel to the target; returns the numbers of samples and rays.
     fn render_pixels(&self, mut tile: FilmTile<'_>) -> (u64, u64) {
         let (mut samples, mut ray_count) = (0, 0);
-        for (at, mut pixel) in tile.pixels().step_by(self.pass.every as usize) {
+        for (at, mut pixel) in tile.pixels().step_by(self.pass.coverage.step() as usize) {
             // A row of a long pass takes too long for somebody who waits.
             if self.cancel.load(Ordering::Relaxed) {
                 break;

@@ -7,17 +7,40 @@ use crate::sampler::Sequence;
 pub(super) struct Pass {
     /// Samples that every pixel is to have after it.
     pub(super) target: u32,
-    /// It is about every so-manyth pixel of every so-manyth row; on a GPU about all.
-    pub(super) every: u32,
-    /// Whether pixels share second vertices if the view says so; on a GPU they do.
-    pub(super) shares: bool,
+    /// Which pixels it is about; on a GPU all.
+    pub(super) coverage: Coverage,
     /// Of so many samples one is counted, lest a counter wrap.
     pub(super) stride: u32,
     /// Which points its samples are.
     pub(super) sequence: Sequence,
 }
 
+/// Which pixels a pass is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Coverage {
+    /// All: they share second vertices if the view says so.
+    All,
+    /// Every so-manyth pixel of every so-manyth row, each for itself.
+    Every(u32),
+}
+
+impl Coverage {
+    /// Pixels and rows from one to the next.
+    pub(super) fn step(self) -> u32 {
+        match self {
+            Self::All => 1,
+            Self::Every(step) => step,
+        }
+    }
+}
+
 impl Pass {
+    /// Brings all pixels to so many samples.
+    #[cfg(test)]
+    pub(super) fn to(target: u32) -> Self {
+        Self { target, coverage: Coverage::All, stride: 1, sequence: Sequence::default() }
+    }
+
     /// Whether sample `sample` of a pixel is counted.
     pub(super) fn counts(self, pixel: u32, sample: u32) -> bool {
         pixel.wrapping_add(sample).is_multiple_of(self.stride)

@@ -14,14 +14,9 @@ use crate::render::{CacheTraining, Session};
 /// What one job leaves for the next.
 pub(super) struct Kept {
     pub(super) device: Device,
-    /// The last distributions that learning ended with, and the map they are for.
-    pub(super) learned: Option<(Arc<LightGrid>, Arc<Environment>)>,
-    /// Whether that learning came to its end.
-    pub(super) is_complete: bool,
+    pub(super) learned: Option<Learned>,
     /// What was counted, if it came to its end, and what for.
     pub(super) counted: Option<(Arc<LearningGrid>, Arc<Request>)>,
-    /// The world they were learned in.
-    pub(super) world: Option<Arc<World>>,
     /// Seconds one camera path takes, all threads together.
     pub(super) seconds_per_path: Option<f64>,
     /// By what the last moving picture's sides were divided.
@@ -33,15 +28,23 @@ pub(super) struct Kept {
     pub(super) training: Option<(CacheTraining, Arc<Request>)>,
 }
 
+/// The last distributions that learning ended with.
+pub(super) struct Learned {
+    pub(super) grid: Arc<LightGrid>,
+    /// The map they are for, and the world they were learned in.
+    pub(super) environment: Arc<Environment>,
+    pub(super) world: Arc<World>,
+    /// Whether learning came to its end.
+    pub(super) is_complete: bool,
+}
+
 impl Kept {
     /// Of a worker that has done nothing yet.
     pub(super) fn new(gpu: (Option<String>, RayChoice), screen: Arc<Mutex<Gpu>>) -> Self {
         Self {
             device: Device::new(gpu, screen),
             learned: None,
-            is_complete: false,
             counted: None,
-            world: None,
             seconds_per_path: None,
             shrink: None,
             snapshots: 0,
@@ -61,16 +64,15 @@ impl Kept {
         if let Some((_, of)) = self.counted.as_mut().filter(|(_, of)| is_other(of)) {
             *of = Arc::new(Request { world: Arc::clone(world), ..(**of).clone() });
         }
-        if self.world.as_ref().is_some_and(|learned_in| learned_in.is_seen_through_like(world)) {
-            self.world = Some(Arc::clone(world));
-        } else {
-            (self.world, self.learned, self.is_complete) = (None, None, false);
+        self.learned.take_if(|learned| !learned.world.is_seen_through_like(world));
+        if let Some(learned) = &mut self.learned {
+            learned.world = Arc::clone(world);
         }
     }
 
     /// Whether learning has come to its end in this scene.
     pub(super) fn has_learned_in(&self, request: &Request) -> bool {
-        self.is_complete && self.is_of_world(request)
+        self.learned_in(request).is_some_and(|learned| learned.is_complete)
     }
 
     /// Whether the radiance cache was trained in this scene with this light, near by.
@@ -91,10 +93,7 @@ impl Kept {
 
     /// Distributions for this request from the last ones, if they are of the same scene.
     pub(super) fn distributions_for(&self, request: &Request) -> Option<Arc<LightGrid>> {
-        if !self.is_of_world(request) {
-            return None;
-        }
-        let (distributions, map) = self.learned.as_ref()?;
+        let Learned { grid: distributions, environment: map, .. } = self.learned_in(request)?;
         let same = map.tile_energies() == request.environment.tile_energies()
             && map.direction_in_tile(0, glam::Vec2::ZERO)
                 == request.environment.direction_in_tile(0, glam::Vec2::ZERO);
@@ -110,8 +109,8 @@ impl Kept {
         of.is_lit_like(request).then(|| Arc::clone(counted))
     }
 
-    fn is_of_world(&self, request: &Request) -> bool {
-        self.world.as_ref().is_some_and(|world| Arc::ptr_eq(world, &request.world))
+    fn learned_in(&self, request: &Request) -> Option<&Learned> {
+        self.learned.as_ref().filter(|learned| Arc::ptr_eq(&learned.world, &request.world))
     }
 }
 

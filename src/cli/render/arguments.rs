@@ -1,8 +1,10 @@
 //! Arguments of `render`, and what they ask for.
 
+use std::ffi::OsStr;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
+use clap::Parser as _;
 use glam::Vec3;
 
 use crate::cli::choices::SceneArguments;
@@ -95,7 +97,7 @@ pub(in crate::cli) struct RenderArguments {
 
     /// Picture size in pixels.
     #[arg(long, default_value = "1280x720", value_parser = values::size, allow_hyphen_values = true, value_name = "WxH", help_heading = "Picture")]
-    pub(super) size: (u32, u32),
+    pub(in crate::cli) size: (u32, u32),
     /// Renders only this part of the picture: its left and top, width and height in pixels.
     #[arg(long, value_parser = values::region, allow_hyphen_values = true, value_name = "X,Y,W,H", help_heading = "Picture")]
     pub(super) region: Option<[u32; 4]>,
@@ -107,18 +109,18 @@ pub(in crate::cli) struct RenderArguments {
 
     /// Stop at this many samples per pixel (256 if no stop rule is given).
     #[arg(long, visible_alias = "samples", value_parser = values::whole::<u32>(1..=u32::MAX), value_name = "N", help_heading = "Stop")]
-    pub(super) spp: Option<u32>,
+    pub(in crate::cli) spp: Option<u32>,
     /// Stop after this many seconds of learning and rendering; if they do not suffice for a sample of every
     /// pixel, a CPU makes a coarser picture.
     #[arg(long, value_parser = values::positive, value_name = "S", help_heading = "Stop")]
-    pub(super) seconds: Option<f64>,
+    pub(in crate::cli) seconds: Option<f64>,
     /// Stop when the estimated relative RMS error falls below this, e.g. 0.05 or 5%.
     #[arg(long, value_parser = values::noise, value_name = "E", help_heading = "Stop")]
     pub(super) noise: Option<f64>,
 
     /// How the map is sampled.
     #[arg(long, default_value = "adaptive", value_enum, help_heading = "Light")]
-    pub(super) sampling: Sampling,
+    pub(in crate::cli) sampling: Sampling,
     /// Whether the pixels of a tile share what their paths find behind the second vertex: less noise at
     /// each pixel, but coarser. `auto` shares with adaptive sampling, from 64x64 pixels on that are not
     /// denoised: 8x8 inside, 4x4 outside and in fog, nothing in the open.
@@ -164,13 +166,13 @@ pub(in crate::cli) struct RenderArguments {
     pub(super) seed: u32,
     /// Where to render: auto takes a GPU if there is a real one and everything fits on it.
     #[arg(long, default_value = "auto", value_enum, help_heading = "Run")]
-    pub(super) device: DeviceChoice,
+    pub(in crate::cli) device: DeviceChoice,
     /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
     #[arg(long, value_name = "NAME", help_heading = "Run")]
-    pub(super) adapter: Option<String>,
+    pub(in crate::cli) adapter: Option<String>,
     /// What finds the surfaces that rays hit on a GPU.
     #[arg(long, default_value = "auto", value_enum, help_heading = "Run")]
-    pub(super) rays: RayChoice,
+    pub(in crate::cli) rays: RayChoice,
     /// How a GPU's kernels share the work: one does all, or three take turns; without it, what suits the
     /// scene. The picture is the same.
     #[arg(long, value_enum, help_heading = "Run")]
@@ -229,68 +231,20 @@ impl RenderArguments {
         self.env.as_deref().unwrap_or_else(|| builtin::sky(&self.scene))
     }
 
-    /// Defaults but for scene, map, picture, sampling, (size, samples, seconds) and (device,
-    /// adapter, rays).
-    pub(in crate::cli) fn for_picture(
-        scene: &str,
-        map: &str,
-        picture: &Path,
-        sampling: Sampling,
-        (size, samples, seconds): (Option<(u32, u32)>, Option<u32>, Option<f64>),
-        (device, adapter, rays): (DeviceChoice, Option<String>, RayChoice),
-    ) -> Self {
-        Self {
-            scene: scene.to_owned(),
-            of_scene: SceneArguments::default(),
-            outputs: vec![picture.to_owned()],
-            env: Some(map.to_owned()),
-            env_rotation: 0.0,
-            env_intensity: 1.0,
-            env_sun: 1.0,
-            background: None,
-            region: None,
-            fog: None,
-            fog_absorption: None,
-            fog_anisotropy: None,
-            fog_box: None,
-            camera: None,
-            eye: None,
-            target: None,
-            fov: None,
-            lens_radius: None,
-            focus: None,
-            size: size.unwrap_or((1280, 720)),
-            filter: PixelFilter::default(),
-            picture: PictureArguments::default(),
-            spp: samples,
-            seconds,
-            noise: None,
-            sampling,
-            sharing: Sharing::Auto,
-            gi: Gi::Exact,
-            table: TableKind::default(),
-            bounces: 8,
-            no_russian_roulette: false,
-            tiles: (16, 8),
-            grid: 64,
-            learning_paths: None,
-            seed: 0,
-            device,
-            adapter,
-            rays,
-            schedule: None,
-            threads: 0,
-            reproducible: false,
-            json: None,
-            distributions: None,
-            part: None,
-            checkpoint: None,
-            checkpoint_every: 60.0,
-            frames: None,
-            turntable: None,
-            fps: 24.0,
-            frame_of_video: None,
+    /// Of this scene, map and picture; all else as where nothing is asked for.
+    ///
+    /// # Errors
+    /// If nothing of the kind can be typed.
+    pub(in crate::cli) fn of_picture(scene: &str, map: &str, picture: &Path) -> Result<Self> {
+        #[derive(clap::Parser)]
+        struct Line {
+            #[command(flatten)]
+            arguments: RenderArguments,
         }
+        let words = ["render", "--env", map, "-o"].map(OsStr::new);
+        let rest = [picture.as_os_str(), OsStr::new("--"), OsStr::new(scene)];
+        let line = Line::try_parse_from(words.into_iter().chain(rest));
+        line.map(|line| line.arguments).map_err(|error| Error::new(error.to_string()))
     }
 
     pub(super) fn environment_options(&self) -> EnvironmentOptions {

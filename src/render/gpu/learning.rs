@@ -111,7 +111,6 @@ pub(super) mod tests {
     use crate::render::gpu::tests::crack;
     use crate::render::gpu::{Gpu, UploadedScene};
     use crate::render::{Gi, Pass, View, cpu};
-    use crate::sampler::Sequence;
 
     /// Visits of each cell and, cell by cell, tile counters after two learning passes, the second with
     /// distributions of the first, and a rendering pass of which a third is counted, if rendered paths count.
@@ -139,13 +138,7 @@ pub(super) mod tests {
         let mut traced = 0;
         for paths in [Some(0..4096), Some(4096..16384), None] {
             let mut film = Film::new(view.width, view.height, false);
-            let pass = Pass {
-                target: 4,
-                every: 1,
-                shares: true,
-                stride: 3,
-                sequence: Sequence::default(),
-            };
+            let pass = Pass { stride: 3, ..Pass::to(4) };
             let rendered = recording.goes_on().then_some(pass);
             traced += match (&mut renderer, paths) {
                 (Some(renderer), paths) => {

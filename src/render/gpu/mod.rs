@@ -496,7 +496,6 @@ pub(super) mod tests {
     use crate::light_grid::DistributionOptions;
     use crate::render::Sampling;
     use crate::render::gi::tests::view;
-    use crate::sampler::Sequence;
     use crate::scene::builtin;
 
     pub(super) fn crack() -> (World, Environment) {
@@ -529,8 +528,7 @@ pub(super) mod tests {
             renderer
         };
         let mut films = [true, false].map(|_| Film::new(view.width, view.height, false));
-        let pass =
-            Pass { target: 3, every: 1, shares: true, stride: 1, sequence: Sequence::default() };
+        let pass = Pass::to(3);
         let mut at_once = begin();
         let done = at_once.render(pass, None, &AtomicBool::new(false)).expect("rendered");
         at_once.read_film(&mut films[0]).expect("read");

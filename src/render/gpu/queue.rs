@@ -136,7 +136,6 @@ mod tests {
     use crate::path::World;
     use crate::render::film::Film;
     use crate::render::{Sampling, View};
-    use crate::sampler::Sequence;
     use crate::scene::builtin;
 
     /// Schedules on the device at hand.
@@ -162,8 +161,7 @@ mod tests {
         let mut film = Film::new(view.width, view.height, view.layers);
         let pixels = u64::from(view.width * view.height);
         for (target, samples) in [(4, 4), (6, 2)] {
-            let pass =
-                Pass { target, every: 1, shares: true, stride: 1, sequence: Sequence::default() };
+            let pass = Pass::to(target);
             let done = renderer.render(pass, None, &AtomicBool::new(false)).expect("it runs");
             assert_eq!(done, Advance { samples: samples * pixels, least: target });
         }

@@ -48,6 +48,11 @@ const LAST_LEARNING_SAMPLE: u32 = 4;
 const MOST_MOVED: f32 = 0.5;
 
 impl Learning {
+    /// Whether nothing is counted any more.
+    pub(super) fn is_over(&self) -> bool {
+        self.stage == Stage::Over
+    }
+
     /// An empty grid, if the view is to learn and the map has anything to learn about.
     pub(super) fn new(
         world: &World,
@@ -159,8 +164,7 @@ impl Session<'_> {
         let pixels = u64::from(self.view.width) * u64::from(self.view.height);
         let paths = pixels * u64::from(samples);
         let stride = paths.div_ceil(most).max(1);
-        if let Some(learning) =
-            self.learning.as_mut().filter(|learning| learning.stage != Stage::Over)
+        if let Some(learning) = self.learning.as_mut().filter(|learning| !learning.is_over())
             && learning.paths_of_pass + paths.div_ceil(stride) > most
         {
             learning.grid.counters.end_pass();
@@ -173,9 +177,7 @@ impl Session<'_> {
     /// as those in use were made of, where each pixel has a power of two of samples: the points of the
     /// sequences that then end and begin are evenly spread.
     pub(super) fn learn_from_rendered(&mut self, paths: u64, is_whole: bool) -> Result<()> {
-        let Some(learning) =
-            self.learning.as_mut().filter(|learning| learning.stage != Stage::Over)
-        else {
+        let Some(learning) = self.learning.as_mut().filter(|learning| !learning.is_over()) else {
             return Ok(());
         };
         self.figures.counted_paths += paths;

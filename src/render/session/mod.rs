@@ -5,20 +5,22 @@
 //! sample's random numbers depend on its pixel and index alone, a pixel's samples are added in
 //! order, and learning counts integers.
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
+mod host_film;
 mod learning;
 mod noise;
 
+use host_film::HostFilm;
 use learning::{Learning, Stage};
 pub use noise::Doubling;
 use noise::LEAST_SAMPLES_OF_NOISE;
 
 use super::film::{BEGINNINGS, Film};
 use super::gi::{CacheTraining, PATHS_AT_A_TIME};
-use super::pass::Pass;
+use super::pass::{Coverage, Pass};
 use super::{Figures, Phase, Sampling, StopRule, View, cpu, gpu};
 use crate::environment::Environment;
 use crate::error::Result;
@@ -47,18 +49,11 @@ pub struct Session<'a> {
     view: View,
     rays: CameraRays,
     engine: Engine,
-    /// The film as it is; made when somebody asks.
-    film: OnceLock<Film>,
-    /// Its noise, once somebody has asked.
-    noise: OnceLock<f64>,
-    /// The film as it was when somebody asked last, to be brought up to date; it survives a GPU.
-    film_before: Mutex<Film>,
+    film: HostFilm,
     /// Fewest samples of any pixel.
     samples: u32,
     /// So many first samples of each pixel are others'.
     skipped: u32,
-    /// When a GPU's film was read last.
-    last_read: Instant,
     /// The film with half its samples.
     doubling: Mutex<Doubling>,
     whole_map: Option<LightGrid>,
@@ -83,12 +78,9 @@ impl<'a> Session<'a> {
         let training = CacheTraining::new(world, environment, &view, &rays);
         Self {
             training,
-            film: OnceLock::new(),
-            noise: OnceLock::new(),
-            film_before: Mutex::default(),
+            film: HostFilm::new(),
             samples: 0,
             skipped: 0,
-            last_read: Instant::now(),
             doubling: Mutex::default(),
             world,
             environment,
@@ -135,7 +127,7 @@ impl<'a> Session<'a> {
             }
             Phase::Rendering => {
                 self.train(1, cancel)?;
-                self.render_timed(samples, (1, true), cancel)
+                self.render_timed(samples, Coverage::All, cancel)
             }
         }
     }
@@ -150,7 +142,7 @@ impl<'a> Session<'a> {
         if (self.samples == 0 || every == 1) && !self.is_on_gpu() {
             // Only a GPU fails.
             let _ = self.train(every, cancel);
-            let _ = self.render_timed(1, (every, false), cancel);
+            let _ = self.render_timed(1, Coverage::Every(every), cancel);
         }
     }
 
@@ -182,12 +174,7 @@ impl<'a> Session<'a> {
         let start = Instant::now();
         if let Engine::Gpu(renderer) = &mut self.engine {
             renderer.settle()?;
-            if self.film.get().is_none() {
-                let (film, read) = self.newest_film();
-                self.film = OnceLock::from(film);
-                read?;
-                self.last_read = Instant::now();
-            }
+            self.film.update(&self.view, |film| renderer.read_film(film))?;
             self.figures.render_seconds += start.elapsed().as_secs_f64();
         }
         Ok(())
@@ -324,7 +311,7 @@ impl<'a> Session<'a> {
     /// Whether no samples to come change what is sampled by: each is then a matter of its pixel and its
     /// index alone.
     pub fn has_final_distributions(&self) -> bool {
-        self.learning.as_ref().is_none_or(|learning| learning.stage == Stage::Over)
+        self.learning.as_ref().is_none_or(Learning::is_over)
     }
 
     /// Goes on from another film of this view with what was learned so far, as if its samples were
@@ -341,17 +328,12 @@ impl<'a> Session<'a> {
         film.skip(skipped);
         self.skipped = skipped;
         self.samples = film.min_samples();
-        self.noise = OnceLock::new();
-        match &mut self.engine {
-            Engine::Cpu => self.film = OnceLock::from(film),
-            Engine::Gpu(renderer) => {
-                let set = renderer.set_film(&film);
-                self.film = OnceLock::new();
-                self.film_before = Mutex::new(film);
-                set?;
-            }
-        }
-        Ok(())
+        let set = match &mut self.engine {
+            Engine::Cpu => Ok(()),
+            Engine::Gpu(renderer) => renderer.set_film(&film),
+        };
+        self.film.put(film);
+        set
     }
 
     /// Counts what an earlier process did for the film that is gone on from.
@@ -374,25 +356,18 @@ impl<'a> Session<'a> {
     /// its time; should the GPU fail meanwhile, it is the film as it was read last, and the next call of
     /// [`Self::advance`] or [`Self::settle`] says why.
     pub fn film(&self) -> &Film {
-        self.film.get_or_init(|| self.newest_film().0)
+        self.film.get(&self.view, |film| {
+            if let Engine::Gpu(renderer) = &self.engine {
+                // What fails is heard of at the next call.
+                let _ = renderer.read_film(film);
+            }
+        })
     }
 
     /// The film, of which nobody needs a copy then.
     pub(crate) fn into_film(mut self) -> Film {
-        let film = self.film.take();
-        film.unwrap_or_else(|| self.newest_film().0)
-    }
-
-    /// The last film brought up to date, as far as that worked.
-    fn newest_film(&self) -> (Film, Result<()>) {
-        let mut before = self.film_before.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut film = std::mem::take(&mut *before);
-        prepare_film(&mut film, &self.view);
-        let read = match &self.engine {
-            Engine::Cpu => Ok(()),
-            Engine::Gpu(renderer) => renderer.read_film(&mut film),
-        };
-        (film, read)
+        self.film();
+        self.film.take(&self.view)
     }
 
     /// Whether a GPU is at work.
@@ -498,49 +473,48 @@ impl<'a> Session<'a> {
     }
 
     /// [`Self::render`], `samples` further. Making distributions counts as learning.
-    fn render_timed(&mut self, samples: u32, how: (u32, bool), cancel: &AtomicBool) -> Result<()> {
+    fn render_timed(
+        &mut self,
+        samples: u32,
+        coverage: Coverage,
+        cancel: &AtomicBool,
+    ) -> Result<()> {
         let (start, before) = (Instant::now(), self.figures.distribution_seconds);
-        let result = self.render(self.samples.saturating_add(samples), how, cancel);
+        let result = self.render(self.samples.saturating_add(samples), coverage, cancel);
         let distributions = self.figures.distribution_seconds - before;
         self.figures.learning_seconds += distributions;
         self.figures.render_seconds += start.elapsed().as_secs_f64() - distributions;
         result
     }
 
-    fn render(
-        &mut self,
-        target: u32,
-        (every, shares): (u32, bool),
-        cancel: &AtomicBool,
-    ) -> Result<()> {
+    fn render(&mut self, target: u32, coverage: Coverage, cancel: &AtomicBool) -> Result<()> {
         let stride = self.prepare_counting(target - self.samples);
-        let pass = Pass { target, every, shares, stride, sequence: self.sequence };
-        let film_before = self.film_before.get_mut().unwrap_or_else(PoisonError::into_inner);
-        if let Some(film) = self.film.take() {
-            *film_before = film;
-        }
-        self.noise = OnceLock::new();
-        let learning = self.learning.as_ref().filter(|learning| learning.stage != Stage::Over);
+        let pass = Pass { target, coverage, stride, sequence: self.sequence };
+        let mut film = match &self.engine {
+            Engine::Cpu => self.film.take(&self.view),
+            Engine::Gpu(_) => {
+                self.film.outdate();
+                Film::default()
+            }
+        };
+        let learning = self.learning.as_ref().filter(|learning| !learning.is_over());
         let counts = learning.map(|learning| &learning.grid);
         let samples = match &mut self.engine {
             Engine::Cpu => {
-                let mut film = std::mem::take(film_before);
-                prepare_film(&mut film, &self.view);
                 let tracer = self.tracer(counts);
                 let (samples, rays) =
                     cpu::render(&tracer, &self.rays, &self.view, pass, &mut film, cancel);
                 self.samples = film.min_samples();
-                self.film = OnceLock::from(film);
+                self.film.put(film);
                 self.figures.rays += rays;
                 samples
             }
             Engine::Gpu(renderer) => {
                 let done = renderer.render(pass, counts, cancel)?;
                 self.samples = done.least;
-                if self.last_read.elapsed() > KEPT_SECONDS {
-                    // What is on the host outlives the device.
-                    let _ = self.film();
-                    self.last_read = Instant::now();
+                if self.film.is_older_than(KEPT_SECONDS) {
+                    // What is on the host outlives the device; what fails is heard of at the next call.
+                    let _ = self.film.update(&self.view, |film| renderer.read_film(film));
                 }
                 done.samples
             }
@@ -548,17 +522,10 @@ impl<'a> Session<'a> {
         self.figures.samples += samples;
         // A GPU's film may have been read for the clock's sake: noise does not depend on that.
         let is_noted = self.skipped == 0 && !self.is_on_gpu();
-        if let Some(film) = self.film.get().filter(|_| is_noted) {
+        if let Some(film) = self.film.known().filter(|_| is_noted) {
             self.note_doubling(film);
         }
         let is_whole = self.samples >= target;
         self.learn_from_rendered(samples.div_ceil(u64::from(stride)), is_whole)
-    }
-}
-
-/// Makes a black film of one that has no pixels yet.
-fn prepare_film(film: &mut Film, view: &View) {
-    if film.pixels().is_empty() {
-        *film = Film::new(view.width, view.height, view.layers);
     }
 }

@@ -74,7 +74,7 @@ impl Session<'_> {
             }
             _ => f64::INFINITY,
         };
-        *self.noise.get_or_init(noise)
+        self.film.noise(noise)
     }
 
     /// What noise is found by, for a checkpoint.

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use publishing::{Reading, calm_worth};
 
-use super::kept::Kept;
+use super::kept::{Kept, Learned};
 use super::{Activity, Point, Request, Shared};
 use crate::alarm::Alarm;
 use crate::app::lock;
@@ -291,10 +291,10 @@ impl<'a> Job<'a> {
             let request = || Arc::clone(&self.request);
             self.kept.counted = self.counters.clone().map(|counted| (counted, request()));
         }
-        if let Some(distributions) = self.distributions_of(main) {
-            self.kept.learned = Some((distributions, Arc::clone(&self.request.environment)));
-            self.kept.world = Some(Arc::clone(&self.request.world));
-            self.kept.is_complete = is_complete;
+        if let Some(grid) = self.distributions_of(main) {
+            let (environment, world) = (&self.request.environment, &self.request.world);
+            let (environment, world) = (Arc::clone(environment), Arc::clone(world));
+            self.kept.learned = Some(Learned { grid, environment, world, is_complete });
         }
     }
 
