@@ -183,8 +183,14 @@ impl App {
             1 => "1 sample".to_owned(),
             all => format!("{all} samples"),
         };
-        let summary =
-            format!("{}, {samples}, {}", convergence::name_of(main.sampling), self.document.scene);
+        let [scene, map] =
+            [&self.document.scene, &self.document.map].map(|name| theme::file_name(name));
+        let turned = match self.document.rotation_degrees {
+            0.0 => String::new(),
+            degrees => format!(" {degrees:.0}°"),
+        };
+        let method = convergence::name_of(main.sampling);
+        let summary = format!("{method}, {samples}, {scene}, {map}{turned}");
         let look = &self.document.look;
         let small = look.white_balance.apply(image.shrunk(history::SMALL_WIDTH));
         let exposure_ev = self.exposure_ev().unwrap_or_default();

@@ -28,10 +28,8 @@ pub(super) struct Inspected {
     pub(super) spot: Spot,
     /// Its material's name.
     pub(super) material: String,
-    /// Index of its cell; `None` without a grid.
-    pub(super) cell: Option<u32>,
-    /// Face, row and column of the cell.
-    pub(super) coordinates: [u32; 3],
+    /// Index of its cell, and that one's face, row and column; `None` without a grid.
+    pub(super) cell: Option<(u32, [u32; 3])>,
     /// Index of its distribution.
     pub(super) distribution: u32,
     /// Bytes of its distribution.
@@ -185,7 +183,6 @@ fn inspect(snapshot: &Snapshot, place: Vec2) -> Option<Inspected> {
         spot,
         material,
         cell: None,
-        coordinates: [0; 3],
         distribution: WHOLE_MAP,
         memory_bytes: None,
         probabilities: Vec::new(),
@@ -205,8 +202,7 @@ fn inspect(snapshot: &Snapshot, place: Vec2) -> Option<Inspected> {
     inspected.probabilities =
         (0..distributions.tile_count()).map(|tile| grid.probability(distribution, tile)).collect();
     if let (Some(cells), Some(cell)) = (grid.grid(), cell) {
-        inspected.cell = Some(cell);
-        inspected.coordinates = cells.coordinates(cell).into();
+        inspected.cell = Some((cell, cells.coordinates(cell).into()));
         if let Some(learning) = snapshot.counters.as_ref().filter(|l| l.grid == *cells)
             && let Some(slot) = learning.counters.cells().iter().position(|c| *c == cell)
         {

@@ -145,6 +145,13 @@ pub(super) fn is_small(ui: &Ui) -> bool {
     ui.ctx().content_rect().width() < 860.0
 }
 
+/// The last part of a path, or the whole name of what is no file.
+pub(super) fn file_name(path: &str) -> String {
+    std::path::Path::new(path)
+        .file_name()
+        .map_or_else(|| path.to_owned(), |file| file.to_string_lossy().into_owned())
+}
+
 /// Text that explains.
 pub(super) fn quiet(text: impl Into<String>) -> RichText {
     RichText::new(text).color(QUIET).size(12.0)

@@ -265,10 +265,11 @@ fn cell(
 
 fn facts(ui: &mut Ui, inspected: &Inspected) {
     let p = inspected.spot.position;
-    let [face, row, column] = inspected.coordinates;
-    let face = FACES.get(face as usize).copied().unwrap_or("all");
     let cell = match inspected.cell {
-        Some(cell) => format!("{cell}: row {row}, column {column}, face {face}"),
+        Some((cell, [face, row, column])) => {
+            let face = FACES.get(face as usize).copied().unwrap_or("all");
+            format!("{cell}: row {row}, column {column}, face {face}")
+        }
         None => "no grid: the whole map everywhere".to_owned(),
     };
     let distribution = match inspected.distribution {

@@ -72,15 +72,9 @@ pub(in crate::app) fn sections(
     material::show(ui, document, interface, sources.scene);
 }
 
-fn short(name: &str) -> String {
-    std::path::Path::new(name)
-        .file_name()
-        .map_or_else(|| name.to_owned(), |file| file.to_string_lossy().into_owned())
-}
-
 fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut Vec<Command>) {
     let mut chosen = None;
-    theme::choice(ui, "scene").selected_text(short(&document.scene)).show_ui(ui, |ui| {
+    theme::choice(ui, "scene").selected_text(theme::file_name(&document.scene)).show_ui(ui, |ui| {
         ui.label(theme::quiet("Built in"));
         for name in builtin::names() {
             if ui.selectable_label(document.scene == *name, *name).clicked() {
@@ -110,7 +104,8 @@ fn recent(ui: &mut Ui, list: &[String], current: &str, chosen: &mut Option<Strin
     ui.separator();
     ui.label(theme::quiet("Recent"));
     for name in list {
-        let label = ui.selectable_label(current == name, short(name)).on_hover_text(name);
+        let label =
+            ui.selectable_label(current == name, theme::file_name(name)).on_hover_text(name);
         if label.clicked() {
             *chosen = Some(name.clone());
         }
@@ -197,7 +192,7 @@ fn environment(
         );
     }
     let mut chosen = None;
-    theme::choice(ui, "map").selected_text(short(&document.map)).show_ui(ui, |ui| {
+    theme::choice(ui, "map").selected_text(theme::file_name(&document.map)).show_ui(ui, |ui| {
         ui.label(theme::quiet("Built in"));
         for name in sky::names() {
             let name = format!("sky:{name}");

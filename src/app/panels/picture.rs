@@ -59,7 +59,7 @@ fn denoiser(ui: &mut Ui, document: &mut Document) {
         }
         // The library is looked for once.
         if Denoiser::Oidn.check().is_err() {
-            ui.weak("no Open Image Denoise").on_hover_text("Intel's trained filter is smoother. Get its library from openimagedenoise.org, name its folder in LD_LIBRARY_PATH (PATH on Windows), and start again: then it can be chosen here");
+            ui.weak("built-in filter").on_hover_text("Open Image Denoise, Intel's trained filter, is smoother. Get its library from openimagedenoise.org, name its folder in LD_LIBRARY_PATH (PATH on Windows), and start again: then it can be chosen here");
             return;
         }
         let chosen = &mut document.look.denoiser;
