@@ -83,7 +83,7 @@ pub enum Command {
 }
 
 /// Keys, what they do, and the command.
-pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 19] = [
+pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 19] = [
     (plain(Key::Space), "Pause, resume", Command::TogglePause),
     (plain(Key::R), "Restart the picture", Command::Restart),
     (plain(Key::F), "Frame the whole scene", Command::FrameAll),
@@ -106,7 +106,7 @@ pub const SHORTCUTS: [(KeyboardShortcut, &str, Command); 19] = [
 ];
 
 /// What the mouse and held keys do in the picture.
-pub const GESTURES: [(&str, &str); 7] = [
+pub(crate) const GESTURES: [(&str, &str); 7] = [
     ("Drag", "Orbit around the pivot"),
     ("Shift drag, middle drag", "Pan"),
     ("Right drag", "Look around"),
@@ -130,7 +130,7 @@ const fn control(key: Key) -> KeyboardShortcut {
 
 /// Takes the shortcuts pressed in this frame; while somebody types or answers a question, it is only the
 /// one that leaves.
-pub fn pressed(context: &egui::Context, is_modal: bool) -> Vec<Command> {
+pub(crate) fn pressed(context: &egui::Context, is_modal: bool) -> Vec<Command> {
     if is_modal || context.text_edit_focused() {
         let leaves = context.input_mut(|input| input.consume_shortcut(&control(Key::Q)));
         return if leaves { vec![Command::Quit] } else { Vec::new() };

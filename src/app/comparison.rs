@@ -15,7 +15,7 @@ pub(super) const AMPLIFIED: f32 = 4.0;
 
 /// What is compared; equal ones are of the very same pictures.
 #[derive(Clone)]
-pub struct Comparison {
+pub(crate) struct Comparison {
     /// What to call the left and the right picture.
     pub names: [String; 2],
     /// Of what part of the whole they are, as [`super::document::Document::region`] says.

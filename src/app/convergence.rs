@@ -8,7 +8,7 @@ const MOST_RUNS: usize = 8;
 
 /// One picture from its start on.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Run {
+pub(crate) struct Run {
     /// What was rendered how.
     pub name: String,
     /// In order of time.
@@ -17,7 +17,7 @@ pub struct Run {
 
 /// All runs of this window, newest last.
 #[derive(Debug, Clone, Default)]
-pub struct Convergence {
+pub(crate) struct Convergence {
     runs: Vec<Run>,
     plain: Option<Run>,
     /// Whether the plot's axis is samples rather than seconds.
@@ -26,7 +26,7 @@ pub struct Convergence {
 
 impl Convergence {
     /// Takes over what a snapshot says.
-    pub fn add(&mut self, snapshot: &Snapshot) {
+    pub(crate) fn add(&mut self, snapshot: &Snapshot) {
         let [main, plain] = &snapshot.curves;
         let Some(first) = main.first() else { return };
         let is_new = self.runs.last().and_then(|run| run.points.first()) != Some(first);
@@ -45,22 +45,20 @@ impl Convergence {
     }
 
     /// Runs, oldest first; the last one is going on.
-    pub fn runs(&self) -> &[Run] {
+    pub(crate) fn runs(&self) -> &[Run] {
         &self.runs
     }
 
     /// The plain half of a split view.
-    pub fn plain(&self) -> Option<&Run> {
+    pub(crate) fn plain(&self) -> Option<&Run> {
         self.plain.as_ref()
     }
 }
 
 /// What a person calls a way of sampling.
-pub fn name_of(sampling: Sampling) -> &'static str {
+pub(crate) fn name_of(sampling: Sampling) -> &'static str {
     match sampling {
-        Sampling::Adaptive => "adaptive",
-        Sampling::Talk => "talk",
-        Sampling::Plain => "plain",
         Sampling::Bsdf => "BSDF",
+        other => other.name(),
     }
 }

@@ -15,11 +15,11 @@ use crate::scene::SceneOptions;
 pub(super) const MOST: usize = 12;
 
 /// Width in pixels at which they are shown in the list.
-pub const SMALL_WIDTH: u32 = 128;
+pub(crate) const SMALL_WIDTH: u32 = 128;
 
 /// Kept pictures, oldest first.
 #[derive(Default)]
-pub struct History {
+pub(crate) struct History {
     list: Vec<KeptPicture>,
     count: u32,
     album: Option<Album>,
@@ -29,7 +29,7 @@ pub struct History {
 
 impl History {
     /// Of a window in which so much is asked of the files of scenes.
-    pub fn new(of_scene: SceneOptions) -> Self {
+    pub(crate) fn new(of_scene: SceneOptions) -> Self {
         Self { of_scene, ..Self::default() }
     }
 
@@ -38,7 +38,7 @@ impl History {
     ///
     /// # Errors
     /// If the system gives no thread.
-    pub fn of_folder(
+    pub(crate) fn of_folder(
         self,
         folder: PathBuf,
         report: impl Fn(Result<Vec<KeptPicture>>) + Send + 'static,
@@ -47,12 +47,12 @@ impl History {
     }
 
     /// Waits until everything is written.
-    pub fn finish(&mut self) {
+    pub(crate) fn finish(&mut self) {
         self.album = None;
     }
 
     /// Takes over what earlier windows left; how many those are.
-    pub fn take_over(&mut self, mut earlier: Vec<KeptPicture>) -> usize {
+    pub(crate) fn take_over(&mut self, mut earlier: Vec<KeptPicture>) -> usize {
         let number = |kept: &KeptPicture| kept.name.rsplit(' ').next()?.parse().ok();
         self.count = earlier.iter().filter_map(number).fold(self.count, u32::max);
         let count = earlier.len();
@@ -69,7 +69,7 @@ impl History {
     ///
     /// # Errors
     /// If it cannot be kept for the next window.
-    pub fn keep(
+    pub(crate) fn keep(
         &mut self,
         summary: String,
         image: &Arc<Image>,
@@ -104,22 +104,22 @@ impl History {
     }
 
     /// Whether something else was asked of a picture's scene than in this window.
-    pub fn is_of_other_options(&self, kept: &KeptPicture) -> bool {
+    pub(crate) fn is_of_other_options(&self, kept: &KeptPicture) -> bool {
         kept.of_scene != self.of_scene
     }
 
     /// One of them.
-    pub fn get(&self, index: usize) -> Option<&KeptPicture> {
+    pub(crate) fn get(&self, index: usize) -> Option<&KeptPicture> {
         self.list.get(index)
     }
 
     /// All of them.
-    pub fn list_mut(&mut self) -> &mut [KeptPicture] {
+    pub(crate) fn list_mut(&mut self) -> &mut [KeptPicture] {
         &mut self.list
     }
 
     /// Drops one, and its file.
-    pub fn remove(&mut self, index: usize) {
+    pub(crate) fn remove(&mut self, index: usize) {
         let kept = self.list.remove(index);
         if let (Some(album), Some(file)) = (&self.album, kept.file) {
             album.remove(file);

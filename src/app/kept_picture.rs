@@ -12,7 +12,7 @@ use crate::image::{Image, read_picture};
 use crate::scene::SceneOptions;
 
 /// A kept picture.
-pub struct KeptPicture {
+pub(crate) struct KeptPicture {
     /// What to call it.
     pub name: String,
     /// What was done for it.
@@ -32,7 +32,7 @@ pub struct KeptPicture {
 }
 
 /// Linear radiance of a kept picture: in memory until it is in a file, then where somebody looks at it.
-pub struct Pixels(Mutex<Source>);
+pub(crate) struct Pixels(Mutex<Source>);
 
 enum Source {
     Here(Arc<Image>),
@@ -41,17 +41,17 @@ enum Source {
 
 impl Pixels {
     /// Those of a picture that is in no file.
-    pub fn new(image: Arc<Image>) -> Self {
+    pub(crate) fn new(image: Arc<Image>) -> Self {
         Self(Mutex::new(Source::Here(image)))
     }
 
     /// Those of a file.
-    pub fn of_file(file: PathBuf) -> Self {
+    pub(crate) fn of_file(file: PathBuf) -> Self {
         Self(Mutex::new(Source::InFile(file, Weak::new())))
     }
 
     /// Leaves them to a file that they were written to.
-    pub fn leave_to(&self, file: PathBuf) {
+    pub(crate) fn leave_to(&self, file: PathBuf) {
         let mut source = self.source();
         if let Source::Here(image) = &*source {
             let known = Arc::downgrade(image);
@@ -63,7 +63,7 @@ impl Pixels {
     ///
     /// # Errors
     /// If their file cannot be read.
-    pub fn get(&self) -> Decoded<Arc<Image>> {
+    pub(crate) fn get(&self) -> Decoded<Arc<Image>> {
         match &mut *self.source() {
             Source::Here(image) => Ok(Arc::clone(image)),
             Source::InFile(file, known) => {

@@ -3,11 +3,11 @@
 /// Most messages shown at a time.
 const MOST: usize = 4;
 /// Seconds a notice stays.
-pub const NOTICE_SECONDS: f64 = 8.0;
+pub(crate) const NOTICE_SECONDS: f64 = 8.0;
 
 /// One sentence.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Message {
+pub(crate) struct Message {
     /// What to say.
     pub sentence: String,
     /// Whether something failed.
@@ -20,28 +20,28 @@ pub struct Message {
 
 /// What is to be said, newest last.
 #[derive(Debug, Clone, Default)]
-pub struct Messages {
+pub(crate) struct Messages {
     list: Vec<Message>,
 }
 
 impl Messages {
     /// Something worth knowing.
-    pub fn notice(&mut self, sentence: impl Into<String>) {
+    pub(crate) fn notice(&mut self, sentence: impl Into<String>) {
         self.add(sentence.into(), false, false);
     }
 
     /// Something that failed.
-    pub fn error(&mut self, sentence: impl Into<String>) {
+    pub(crate) fn error(&mut self, sentence: impl Into<String>) {
         self.add(sentence.into(), true, false);
     }
 
     /// A file could not be opened.
-    pub fn not_opened(&mut self, sentence: impl Into<String>) {
+    pub(crate) fn not_opened(&mut self, sentence: impl Into<String>) {
         self.add(sentence.into(), true, true);
     }
 
     /// A file was opened: nobody wonders any more why others were not.
-    pub fn opened(&mut self) {
+    pub(crate) fn opened(&mut self) {
         self.list.retain(|message| !message.is_of_opening);
     }
 
@@ -54,12 +54,12 @@ impl Messages {
     }
 
     /// The messages, to be drawn and closed.
-    pub fn list(&mut self) -> &mut Vec<Message> {
+    pub(crate) fn list(&mut self) -> &mut Vec<Message> {
         &mut self.list
     }
 
     /// The oldest error.
-    pub fn first_error(&self) -> Option<&str> {
+    pub(crate) fn first_error(&self) -> Option<&str> {
         self.list.iter().find(|m| m.is_error).map(|m| m.sentence.as_str())
     }
 }

@@ -2,43 +2,43 @@
 //!
 //! [`App`] holds a [`document::Document`] (what the picture is, undone by comparing snapshots) and an
 //! [`interface::Interface`] (what is open and pointed at). Every frame panels draw from them and
-//! change them or ask for a [`commands::Command`]; then the [`worker`] is told what to render and the
-//! [`presenter`] what to make ready on the device. Both take the latest value and publish the latest
-//! picture: nothing here waits. The viewport develops it on the device of the [`screen`] in the frame
-//! that draws it. [`window`] shows it on a display, [`screenshot`] in a texture without one.
+//! change them or ask for a `commands::Command`; then the `worker` is told what to render and the
+//! `presenter` what to make ready on the device. Both take the latest value and publish the latest
+//! picture: nothing here waits. The viewport develops it on the device of the `screen` in the frame
+//! that draws it. `window` shows it on a display, [`screenshot`] in a texture without one.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 mod album;
-pub mod commands;
+pub(crate) mod commands;
 mod comparison;
-pub mod convergence;
+pub(crate) mod convergence;
 pub mod document;
 pub mod drag;
 mod exchange;
 mod execute;
-pub mod history;
+pub(crate) mod history;
 mod inspect;
 pub mod interface;
-pub mod kept_picture;
-pub mod loader;
-pub mod messages;
+pub(crate) mod kept_picture;
+pub(crate) mod loader;
+pub(crate) mod messages;
 mod navigation;
 pub mod overlays;
 mod panels;
-pub mod presenter;
+pub(crate) mod presenter;
 mod save;
-pub mod screen;
+pub(crate) mod screen;
 pub mod screenshot;
 pub mod settings_file;
 mod speed_up;
-pub mod surface_map;
+pub(crate) mod surface_map;
 mod theme;
 mod turns;
 mod undo;
-pub mod window;
-pub mod worker;
+pub(crate) mod window;
+pub(crate) mod worker;
 
 use crate::develop::DevelopSettings;
 use crate::error::{Error, Result};

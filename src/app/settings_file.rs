@@ -10,11 +10,8 @@ use super::document::{Document, Light, Look, PictureSize};
 use super::interface::{Dock, Interface, Tab};
 use crate::error::{Error, Result};
 use crate::image::{read_file, write_beside_and_rename};
-use crate::render::StopRule;
+use crate::render::{StopRule, View};
 use crate::scene::builtin;
-
-/// Largest picture in pixels, as on the command line.
-const MAX_PIXELS: u64 = 1 << 27;
 
 /// Recent files kept.
 const MOST_RECENT: usize = 8;
@@ -121,7 +118,7 @@ impl Settings {
         self.size = match self.size {
             PictureSize::Viewport(divisor) => PictureSize::Viewport(divisor.clamp(1, 64)),
             PictureSize::Fixed(width, height)
-                if (1..=MAX_PIXELS).contains(&(u64::from(width) * u64::from(height))) =>
+                if (1..=View::MAX_PIXELS).contains(&(u64::from(width) * u64::from(height))) =>
             {
                 self.size
             }

@@ -1,12 +1,10 @@
 //! How much faster one way of sampling is than another, from two films of the same view.
 
 use super::worker::SessionSnapshot;
+use crate::metrics::{REL_MSE_EPSILON, kept_of};
 
 /// Blocks along each side of the picture that the uncertainty is taken from.
 const BLOCKS: usize = 8;
-/// Of so many pixels the worst one is left out on either side, as in the reports: a few bright samples
-/// would decide.
-const TRIMMED: usize = 1000;
 /// Standard errors that hold 95 % (Student, 63 degrees of freedom).
 const STANDARD_ERRORS: f64 = 2.0;
 
@@ -57,11 +55,12 @@ fn block_errors(session: &SessionSnapshot, lights: &[f64]) -> Vec<f64> {
     let mean = lights.iter().sum::<f64>() / lights.len() as f64;
     let left = 1.0 - session.figures.variance_saved;
     let error = |(pixel, light): (&crate::render::film::Pixel, &f64)| {
-        left * pixel.variance_of_mean() / (light.powi(2) + 0.01 * mean * mean)
+        left * pixel.variance_of_mean() / (light.powi(2) + REL_MSE_EPSILON * mean * mean)
     };
     let errors: Vec<f64> = film.pixels().iter().zip(lights).map(error).collect();
-    let kept = (errors.len() - errors.len() / TRIMMED).max(1) - 1;
-    let largest = *errors.clone().select_nth_unstable_by(kept, f64::total_cmp).1;
+    // As in the reports: a few bright samples would decide.
+    let last = kept_of(errors.len()) - 1;
+    let largest = *errors.clone().select_nth_unstable_by(last, f64::total_cmp).1;
     let mut sums = vec![0.0; BLOCKS * BLOCKS];
     for (i, error) in errors.into_iter().enumerate().filter(|(_, error)| *error <= largest) {
         let block = (i / width) * BLOCKS / height * BLOCKS + (i % width) * BLOCKS / width;

@@ -57,7 +57,7 @@ impl SurfaceMap {
 }
 
 /// The first surface along a camera ray that is mostly not seen through.
-pub fn look(world: &World, mut ray: Ray) -> Option<Spot> {
+pub(crate) fn look(world: &World, mut ray: Ray) -> Option<Spot> {
     for _ in 0..MAX_PASSES {
         let hit = world.closest_hit(&ray, true)?;
         let point = world.point(&hit, ray.direction);
@@ -74,7 +74,7 @@ pub fn look(world: &World, mut ray: Ray) -> Option<Spot> {
 }
 
 /// The surface seen at a place of the picture, both coordinates in `[0,1]`.
-pub fn look_at_place(world: &World, view: &View, place: Vec2) -> Option<Spot> {
+pub(crate) fn look_at_place(world: &World, view: &View, place: Vec2) -> Option<Spot> {
     let rays = view.rays();
     let pixel = place * Vec2::new(view.width as f32, view.height as f32);
     look(world, rays.ray(pixel, Vec2::splat(0.5)))

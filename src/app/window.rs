@@ -63,7 +63,7 @@ const MOST_LOSSES: u32 = 5;
 ///
 /// # Errors
 /// If there is no display, or none that can be drawn on: nothing has been shown then.
-pub fn run(
+pub(crate) fn run(
     start: Start,
     notices: Vec<String>,
     settings_path: Option<PathBuf>,

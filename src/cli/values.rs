@@ -6,17 +6,16 @@ use glam::Vec3;
 
 use crate::output::film_file::Part;
 use crate::path::Background;
+use crate::render::View;
 pub(super) use crate::sources::size_pair as pair;
-
-/// Largest picture in pixels: 40 bytes a pixel stay under 5.4 GB.
-const MAX_PIXELS: u64 = 1 << 27;
 
 /// `WIDTHxHEIGHT` in pixels.
 pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
     let (width, height) = pair(text)?;
     let pixels = u64::from(width) * u64::from(height);
-    if pixels > MAX_PIXELS {
-        return Err(format!("{pixels} pixels are more than the {MAX_PIXELS} a picture may have"));
+    if pixels > View::MAX_PIXELS {
+        let most = View::MAX_PIXELS;
+        return Err(format!("{pixels} pixels are more than the {most} a picture may have"));
     }
     Ok((width, height))
 }

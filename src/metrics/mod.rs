@@ -144,13 +144,19 @@ pub(crate) fn mean(image: &Image) -> f64 {
     sum / (3 * image.pixels.len()) as f64
 }
 
+/// How many of so many values are left without the largest thousandth, at least one of them; of one it is
+/// left.
+pub(crate) fn kept_of(count: usize) -> usize {
+    let trimmed = (count / 1000).max(1);
+    count.saturating_sub(trimmed).max(1)
+}
+
 /// Mean without the largest thousandth, at least one value; of one value that value, of none NaN.
 pub(crate) fn trimmed_mean(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return f64::NAN;
     }
-    let trimmed = (values.len() / 1000).max(1);
-    let kept = (values.len() - trimmed).max(1);
+    let kept = kept_of(values.len());
     values.select_nth_unstable_by(kept - 1, f64::total_cmp);
     values[..kept].iter().sum::<f64>() / kept as f64
 }

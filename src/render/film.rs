@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::color::luminance;
 use crate::image::Image;
-use crate::metrics::trimmed_mean;
+use crate::metrics::{REL_MSE_EPSILON, trimmed_mean};
 use crate::path::PathResult;
 
 /// Sums of one pixel in f64: at 1e6 samples an f32 sum would have lost half its digits.
@@ -309,7 +309,7 @@ impl Film {
     pub(super) fn error_scales(&self) -> impl Iterator<Item = f64> {
         let count = self.pixels.len() as f64;
         let mean = self.pixels.iter().map(Pixel::mean_luminance).sum::<f64>() / count;
-        let floor = 0.01 * mean * mean;
+        let floor = REL_MSE_EPSILON * mean * mean;
         self.luminance_around().into_iter().map(move |light| light.powi(2) + floor)
     }
 

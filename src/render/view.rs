@@ -27,10 +27,23 @@ pub enum Sampling {
     Bsdf,
 }
 
+impl Sampling {
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Adaptive => "adaptive",
+            Self::Talk => "talk",
+            Self::Plain => "plain",
+            Self::Bsdf => "bsdf",
+        }
+    }
+}
+
 /// One learning path for this many paths rendered.
 const LEARNING_SHARE: u64 = 64;
 /// The same where each vertex tries several samples of the map: such a path takes four times as long.
 const ADAPTIVE_LEARNING_SHARE: u64 = 96;
+
 /// What is to be rendered and how. Equal views give equal pictures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
@@ -81,6 +94,9 @@ pub struct Crop {
 }
 
 impl View {
+    /// Most pixels of a picture: 40 bytes each stay under 5.4 GB.
+    pub const MAX_PIXELS: u64 = 1 << 27;
+
     /// What `lightgrid render` takes where nothing else is asked for.
     pub fn new(camera: Camera, [width, height]: [u32; 2]) -> Self {
         let sampling = Sampling::default();

@@ -130,13 +130,7 @@ pub struct Method {
 impl Method {
     /// One of the sampling modes, called as on the command line.
     pub fn of(sampling: Sampling) -> Self {
-        let name = match sampling {
-            Sampling::Adaptive => "adaptive",
-            Sampling::Talk => "talk",
-            Sampling::Plain => "plain",
-            Sampling::Bsdf => "bsdf",
-        };
-        Self { name: name.to_owned(), group: None, settings: Settings::of(sampling) }
+        Self { name: sampling.name().to_owned(), group: None, settings: Settings::of(sampling) }
     }
 
     /// The same with indirect light found like this.

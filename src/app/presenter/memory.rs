@@ -123,7 +123,6 @@ impl Memory {
             (other, failure) = (Some(plain.picture), failure.or(plain.failure));
         }
         developer.gpu().check()?;
-        let facts = self.facts.as_ref().map(|(_, _, facts)| Arc::clone(facts));
         let (overlay, words) =
             painted.map(|painted| (painted.colors, (painted.legend, painted.labels))).unzip();
         let (legend, labels) = words.unzip();
@@ -138,7 +137,6 @@ impl Memory {
             legend,
             labels: labels.unwrap_or_default(),
             failure,
-            facts,
         })
     }
 

@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use memory::Memory;
-pub use order::{Order, Shown};
+pub(crate) use order::{Order, Shown};
 use rest::{Work, rest_after};
 
 use super::{Wake, lock};
@@ -37,7 +37,7 @@ struct Shared {
 }
 
 /// The handle of the presenting thread; it ends when dropped.
-pub struct Presenter {
+pub(crate) struct Presenter {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
     ordered: Option<Order>,
@@ -48,7 +48,7 @@ impl Presenter {
     ///
     /// # Errors
     /// If the system gives no thread.
-    pub fn start(wake: Wake) -> Result<Self> {
+    pub(crate) fn start(wake: Wake) -> Result<Self> {
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
         // Not the render threads: those are busy for as long as a pass takes.
         let pool = rayon::ThreadPoolBuilder::new()
@@ -71,7 +71,7 @@ impl Presenter {
     }
 
     /// Orders a picture; the latest order counts.
-    pub fn order(&mut self, order: Order) {
+    pub(crate) fn order(&mut self, order: Order) {
         if self.ordered.as_ref() == Some(&order) {
             return;
         }
@@ -81,12 +81,12 @@ impl Presenter {
     }
 
     /// What there is to show.
-    pub fn shown(&self) -> Option<Arc<Shown>> {
+    pub(crate) fn shown(&self) -> Option<Arc<Shown>> {
         lock(&self.shared.shown).clone()
     }
 
     /// Whether the last order is what is shown.
-    pub fn is_settled(&self) -> bool {
+    pub(crate) fn is_settled(&self) -> bool {
         let shown = self.shown();
         shown.as_ref().map(|s| &s.order) == self.ordered.as_ref()
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::app::comparison::Comparison;
 use crate::app::document::Look;
-use crate::app::overlays::{CellFacts, Label, Legend, Overlay};
+use crate::app::overlays::{Label, Legend, Overlay};
 use crate::app::worker::{Activity, Snapshot};
 use crate::denoise::Denoiser;
 use crate::develop::{Developer, LinearPicture, OverlayTexture};
@@ -13,7 +13,7 @@ use crate::tone::WhiteBalance;
 
 /// What is to be shown.
 #[derive(Clone)]
-pub struct Order {
+pub(crate) struct Order {
     /// What pictures are developed by, hence the device they are to be on.
     pub(in crate::app) developer: Arc<Developer>,
     /// The film.
@@ -59,7 +59,7 @@ impl Order {
 }
 
 /// What the screen is developed from.
-pub struct Shown {
+pub(crate) struct Shown {
     /// What was ordered.
     pub order: Order,
     /// The picture.
@@ -80,8 +80,6 @@ pub struct Shown {
     pub failure: Option<String>,
     /// Why two pictures cannot be compared.
     pub uncompared: Option<String>,
-    /// Facts about the grid's cells, when the overlay asked for them.
-    pub facts: Option<Arc<CellFacts>>,
 }
 
 #[cfg(test)]

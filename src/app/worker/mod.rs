@@ -17,9 +17,9 @@ mod snapshot;
 
 use job::Job;
 use kept::Kept;
-pub use request::{Reference, Request};
+pub(crate) use request::{Reference, Request};
 use snapshot::Rest;
-pub use snapshot::{Activity, Backdrop, NoCache, Point, SessionSnapshot, Snapshot};
+pub(crate) use snapshot::{Activity, Backdrop, NoCache, Point, SessionSnapshot, Snapshot};
 
 use super::{Wake, lock};
 use crate::alarm::Alarm;
@@ -46,7 +46,7 @@ struct Slot {
 }
 
 /// The handle of the render thread; it ends when dropped.
-pub struct Worker {
+pub(crate) struct Worker {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
     pool: Arc<rayon::ThreadPool>,
@@ -58,7 +58,7 @@ impl Worker {
     ///
     /// # Errors
     /// If the system gives no thread.
-    pub fn start(wake: Wake, gpu: (Option<String>, RayChoice), screen: Gpu) -> Result<Self> {
+    pub(crate) fn start(wake: Wake, gpu: (Option<String>, RayChoice), screen: Gpu) -> Result<Self> {
         let no_thread = |e: &dyn std::fmt::Display| {
             Error::new(format!("the render threads cannot be started: {e}"))
         };
@@ -88,12 +88,12 @@ impl Worker {
     }
 
     /// Says which device the window is drawn on now.
-    pub fn move_to(&self, screen: Gpu) {
+    pub(crate) fn move_to(&self, screen: Gpu) {
         *lock(&self.shared.screen) = screen;
     }
 
     /// Asks for a picture; the latest request counts.
-    pub fn submit(&self, request: Request) {
+    pub(crate) fn submit(&self, request: Request) {
         let mut slot = lock(&self.shared.slot);
         if slot.request.as_ref().is_some_and(|old| old.is_same(&request)) {
             return;
@@ -106,7 +106,7 @@ impl Worker {
     }
 
     /// The latest picture.
-    pub fn snapshot(&self) -> Option<Arc<Snapshot>> {
+    pub(crate) fn snapshot(&self) -> Option<Arc<Snapshot>> {
         lock(&self.shared.snapshot).clone()
     }
 
@@ -117,17 +117,17 @@ impl Worker {
     }
 
     /// Whether a GPU is being opened, filled or programmed.
-    pub fn is_preparing(&self) -> bool {
+    pub(crate) fn is_preparing(&self) -> bool {
         self.shared.is_preparing.load(Ordering::Relaxed)
     }
 
     /// Failures of GPUs since this was asked last, a sentence each.
-    pub fn take_failures(&self) -> Vec<String> {
+    pub(crate) fn take_failures(&self) -> Vec<String> {
         std::mem::take(&mut lock(&self.shared.failures))
     }
 
     /// Threads that render.
-    pub fn threads(&self) -> usize {
+    pub(crate) fn threads(&self) -> usize {
         self.pool.current_num_threads()
     }
 }

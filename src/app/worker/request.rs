@@ -10,7 +10,7 @@ use crate::render::{StopRule, View};
 
 /// What is to be rendered.
 #[derive(Clone)]
-pub struct Request {
+pub(crate) struct Request {
     /// The scene.
     pub world: Arc<World>,
     /// The map, turned and scaled.
@@ -99,7 +99,7 @@ impl Request {
 }
 
 /// A picture without noise.
-pub struct Reference {
+pub(crate) struct Reference {
     /// Where it came from.
     pub name: String,
     /// Linear radiance.

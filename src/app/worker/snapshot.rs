@@ -13,7 +13,7 @@ use crate::render::{Figures, Sampling};
 
 /// What the worker is doing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Activity {
+pub(crate) enum Activity {
     /// A small picture while the camera moves.
     Moving,
     /// Learning, the share done in `[0,1]`.
@@ -28,7 +28,7 @@ pub enum Activity {
 
 /// How good a picture was at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Point {
+pub(crate) struct Point {
     /// Seconds of learning and rendering.
     pub seconds: f64,
     /// Samples per pixel.
@@ -41,7 +41,7 @@ pub struct Point {
 
 /// One picture and what was done for it.
 #[derive(Clone)]
-pub struct SessionSnapshot {
+pub(crate) struct SessionSnapshot {
     /// How the map was sampled.
     pub sampling: Sampling,
     /// The sums. While the window shows those on its own device in every frame, or shows no newer ones for
@@ -64,14 +64,14 @@ pub struct SessionSnapshot {
 
 impl SessionSnapshot {
     /// Samples a pixel, in the mean.
-    pub fn mean_samples(&self) -> f64 {
+    pub(crate) fn mean_samples(&self) -> f64 {
         self.figures.samples as f64 / self.film.pixels().len().max(1) as f64
     }
 }
 
 /// Why there is no radiance cache to be looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NoCache {
+pub(crate) enum NoCache {
     /// Nobody has asked for it.
     Unasked,
     /// It is there for fast light, which only denoised pictures show.
@@ -88,7 +88,7 @@ pub enum NoCache {
 
 /// The latest picture.
 #[derive(Clone)]
-pub struct Snapshot {
+pub(crate) struct Snapshot {
     /// Counts snapshots.
     pub number: u64,
     /// What it was rendered for.
@@ -136,7 +136,7 @@ impl Rest {
 
 /// A film that is shown together with the picture's own, and never saved.
 #[derive(Clone)]
-pub struct Backdrop {
+pub(crate) struct Backdrop {
     /// Of any size.
     pub film: Arc<Film>,
     /// What one of its samples counts beside one of the picture's own.
@@ -148,7 +148,7 @@ pub struct Backdrop {
 impl Backdrop {
     /// The share of what is shown that it makes up, in `[0,1]`, beside a film of the same size with so
     /// many samples a pixel.
-    pub fn share(&self, samples: u32) -> f32 {
+    pub(crate) fn share(&self, samples: u32) -> f32 {
         let own = self.worth * self.film.min_samples() as f32;
         if own > 0.0 { own / (own + samples as f32) } else { 0.0 }
     }
@@ -164,23 +164,23 @@ impl PartialEq for Backdrop {
 
 impl Snapshot {
     /// Samples a pixel of the picture by now, in the mean.
-    pub fn mean_samples(&self) -> f64 {
+    pub(crate) fn mean_samples(&self) -> f64 {
         self.now.samples as f64 / self.main.film.pixels().len().max(1) as f64
     }
 
     /// Seconds of learning and rendering, fast light included.
-    pub fn seconds(&self) -> f64 {
+    pub(crate) fn seconds(&self) -> f64 {
         self.now.elapsed_seconds() + self.calm_seconds
     }
 
     /// Whether the picture has its full size and every pixel a sample: it has not at first and while
     /// the camera moves.
-    pub fn is_whole(&self) -> bool {
+    pub(crate) fn is_whole(&self) -> bool {
         self.main.samples > 0 && self.main.film.width == self.request.view.width
     }
 
     /// Whether there is anything to be seen.
-    pub fn has_picture(&self) -> bool {
+    pub(crate) fn has_picture(&self) -> bool {
         self.main.figures.samples > 0 || self.backdrop.is_some()
     }
 }
