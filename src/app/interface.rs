@@ -120,7 +120,16 @@ pub struct Prompt {
     /// Whether the field has been given the keyboard.
     pub is_focused: bool,
     /// What is to be known of a path before it is taken, and of which.
-    pub objection: Option<(String, &'static str)>,
+    pub objection: Option<(String, Objection)>,
+}
+
+/// What is to be known of a path before it is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Objection {
+    /// Nothing can be opened there.
+    Missing,
+    /// A file would be written over.
+    Replaces,
 }
 
 /// What a path is asked for.

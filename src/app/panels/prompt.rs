@@ -6,26 +6,30 @@ use egui::text::{CCursor, CCursorRange};
 use egui::{Context, Id, Key, Modal, RichText, TextEdit};
 
 use crate::app::commands::Command;
-use crate::app::interface::{Interface, Purpose};
+use crate::app::interface::{Interface, Objection, Purpose};
 use crate::app::settings_file::Settings;
 use crate::app::theme;
 use crate::scene::builtin;
 
-/// Nothing can be opened there.
-const MISSING: &str = "There is no such file.";
-/// What is asked before a file is written over.
-const REPLACED: &str = "This file is there already: Enter again replaces it.";
-
 /// What is to be known of a path before it is taken.
-fn objection(purpose: Purpose, path: &str) -> Option<&'static str> {
+fn objection(purpose: Purpose, path: &str) -> Option<Objection> {
     let is_there = Path::new(path).exists();
     let is_built_in = match purpose {
         Purpose::Scene => builtin::names().contains(&path),
         Purpose::Map => path.starts_with("sky:"),
         Purpose::Reference => false,
-        Purpose::Picture | Purpose::Distributions => return is_there.then_some(REPLACED),
+        Purpose::Picture | Purpose::Distributions => {
+            return is_there.then_some(Objection::Replaces);
+        }
     };
-    (!is_there && !is_built_in).then_some(MISSING)
+    (!is_there && !is_built_in).then_some(Objection::Missing)
+}
+
+fn sentence(objection: Objection) -> &'static str {
+    match objection {
+        Objection::Missing => "There is no such file.",
+        Objection::Replaces => "This file is there already: Enter again replaces it.",
+    }
 }
 
 /// Draws the open prompt, if any.
@@ -80,9 +84,10 @@ pub(in crate::app) fn show(
             // Enter takes the keyboard away; without a path there is nothing to be done yet.
             field.request_focus();
         }
-        let objection = prompt.objection.clone().filter(|(of, _)| of == prompt.path.trim());
-        if let Some((_, sentence)) = &objection {
-            ui.label(RichText::new(*sentence).color(theme::ALERT));
+        let objection = prompt.objection.as_ref().filter(|(of, _)| of == prompt.path.trim());
+        let objection = objection.map(|(_, objection)| *objection);
+        if let Some(objection) = objection {
+            ui.label(RichText::new(sentence(objection)).color(theme::ALERT));
         }
         for name in recent {
             if ui.link(RichText::new(name).size(12.5)).clicked() {
@@ -92,7 +97,7 @@ pub(in crate::app) fn show(
         }
         ui.add_space(6.0);
         ui.horizontal(|ui| {
-            let replaces = objection.is_some_and(|(_, sentence)| sentence == REPLACED);
+            let replaces = objection == Some(Objection::Replaces);
             let accept = if replaces { "Replace" } else { accept };
             is_done |= ui.button(RichText::new(accept).color(theme::ACCENT)).clicked();
             if ui.button("Browse…").on_hover_text("The system's file dialogue").clicked() {
@@ -105,8 +110,8 @@ pub(in crate::app) fn show(
     if is_done && !path.is_empty() {
         let is_known = prompt.objection.as_ref().is_some_and(|(of, _)| of == path);
         match objection(prompt.purpose, path) {
-            Some(sentence) if sentence == MISSING || !is_known => {
-                prompt.objection = Some((path.to_owned(), sentence));
+            Some(objection) if objection == Objection::Missing || !is_known => {
+                prompt.objection = Some((path.to_owned(), objection));
             }
             _ => {
                 commands.push(prompt.purpose.command(path));
@@ -130,10 +135,16 @@ mod tests {
         std::fs::write(&there, "").expect("written");
         let asked = |purpose, path: &Path| objection(purpose, path.to_str().expect("text"));
         for purpose in [Purpose::Scene, Purpose::Map, Purpose::Reference] {
-            assert_eq!((asked(purpose, &there), asked(purpose, &gone)), (None, Some(MISSING)));
+            assert_eq!(
+                (asked(purpose, &there), asked(purpose, &gone)),
+                (None, Some(Objection::Missing))
+            );
         }
         for purpose in [Purpose::Picture, Purpose::Distributions] {
-            assert_eq!((asked(purpose, &there), asked(purpose, &gone)), (Some(REPLACED), None));
+            assert_eq!(
+                (asked(purpose, &there), asked(purpose, &gone)),
+                (Some(Objection::Replaces), None)
+            );
         }
         assert_eq!(objection(Purpose::Scene, "office"), None);
         assert_eq!(objection(Purpose::Map, "sky:day@64x32"), None);
