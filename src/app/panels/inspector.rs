@@ -314,7 +314,11 @@ fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
         (None, Ok(_)) => return,
     };
     let face = FACES.get(cell.face as usize).copied().unwrap_or("all");
-    let [r, g, b] = cell.radiance.to_array().map(|light| theme::figure(f64::from(light)));
+    let radiance = match (cell.samples, cell.samples_around) {
+        // Nobody has told the albedo, either.
+        (0, 0) => "unknown".to_owned(),
+        _ => cell.radiance.to_array().map(|light| theme::figure(f64::from(light))).join("  "),
+    };
     let trained = match (cell.samples, cell.samples_around) {
         (0, 0) => "nothing: the mean of all speaks for it".to_owned(),
         (0, around) => format!("nothing: {} around speak for it", theme::count(around)),
@@ -331,7 +335,7 @@ fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
             format!("level {}, edge {}, face {face}", cell.level, length(cell.edge)),
         );
         line("Trained by", trained);
-        line("Radiance", format!("{r}  {g}  {b}"));
+        line("Radiance", radiance);
         line("Cache", overlay::cache_size(cache));
     });
 }
