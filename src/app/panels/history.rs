@@ -65,8 +65,10 @@ pub(in crate::app) fn show(
 fn forget(ui: &mut Ui, index: usize) -> bool {
     let id = Id::unique("forget a picture");
     let is_asked = ui.data(|data| data.get_temp(id)) == Some(index);
-    let text = if is_asked { RichText::new("Delete?").color(theme::ALERT) } else { "×".into() };
-    let response = ui.small_button(text).on_hover_text("Forget this picture, and its file");
+    // As short as it can be: there is no more room beside the others.
+    let sure = RichText::new("Sure?").size(11.0).color(theme::ALERT);
+    let text = if is_asked { sure } else { "×".into() };
+    let response = ui.small_button(text).on_hover_text("Delete this picture and its file");
     if response.clicked() {
         ui.data_mut(|data| data.insert_temp(id, index));
     }
