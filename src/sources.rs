@@ -29,7 +29,7 @@ pub fn scene(name: &str) -> Result<Scene> {
 /// As [`scene`].
 pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
     check_scene(name)?;
-    let mut scene = if builtin::names().contains(&name) {
+    let mut scene = if is_built_in_scene(name) {
         if let Some(variant) = &options.variant {
             return Err(Error::at(name, format!("there is no variant {variant}: it has none")));
         }
@@ -55,6 +55,16 @@ pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
     Ok(scene)
 }
 
+/// Whether a name is that of a built-in scene and of no file.
+pub(crate) fn is_built_in_scene(name: &str) -> bool {
+    builtin::names().contains(&name)
+}
+
+/// Whether a name is that of a built-in sky and of no file.
+pub(crate) fn is_built_in_map(name: &str) -> bool {
+    name.starts_with("sky:")
+}
+
 /// Whether a name stands for a scene rather than a map: by how its file begins, else by the name.
 pub(crate) fn is_scene(name: &str) -> bool {
     let mut start = [0; 64];
@@ -67,9 +77,9 @@ pub(crate) fn is_scene(name: &str) -> bool {
         return false;
     }
     let extension = Path::new(name).extension().map(|e| e.to_string_lossy().to_lowercase());
-    builtin::names().contains(&name)
+    is_built_in_scene(name)
         || matches!(extension.as_deref(), Some("gltf" | "glb"))
-        || (extension.is_none() && !name.starts_with("sky:"))
+        || (extension.is_none() && !is_built_in_map(name))
 }
 
 /// Whether there is such a scene, without reading it.
@@ -77,7 +87,7 @@ pub(crate) fn is_scene(name: &str) -> bool {
 /// # Errors
 /// One sentence: the name is neither a file nor a built-in's.
 pub fn check_scene(name: &str) -> Result<()> {
-    let exists = builtin::names().contains(&name) || Path::new(name).exists();
+    let exists = is_built_in_scene(name) || Path::new(name).exists();
     match exists {
         true => Ok(()),
         false if name.contains(['.', '/', '\\']) => Err(Error::at(name, "there is no such file")),

@@ -19,7 +19,8 @@ use super::settings_file;
 use crate::error::{Error, Result};
 use crate::image::{ExrPicture, Rgb8, read_exr_metadata, read_exr_preview, write_exr};
 use crate::output::record::to_json;
-use crate::scene::{SceneOptions, builtin};
+use crate::scene::SceneOptions;
+use crate::sources;
 
 /// Names of the header's attributes.
 const NAME: &str = "lightgrid.kept.name";
@@ -82,8 +83,8 @@ impl Album {
             if is_built_in { name.to_owned() } else { settings_file::lasting(name) }
         };
         let lasting = Document {
-            scene: name(&document.scene, builtin::names().contains(&document.scene.as_str())),
-            map: name(&document.map, document.map.starts_with("sky:")),
+            scene: name(&document.scene, sources::is_built_in_scene(&document.scene)),
+            map: name(&document.map, sources::is_built_in_map(&document.map)),
             ..document.clone()
         };
         let texts = [

@@ -16,6 +16,7 @@ use crate::error::{Error, Result};
 use crate::image::read_picture;
 use crate::render::gpu::DeviceChoice;
 use crate::scene::builtin;
+use crate::sources;
 use crate::tone::display_rgb8;
 
 impl App {
@@ -130,7 +131,7 @@ impl App {
         }
         // Built-in scenes bring their own sky, unless another map was chosen.
         let is_own_sky = self.document.map == builtin::sky(&self.document.scene);
-        if is_own_sky && builtin::names().contains(&name.as_str()) {
+        if is_own_sky && sources::is_built_in_scene(&name) {
             builtin::sky(&name).clone_into(&mut self.document.map);
         }
         // A file that cannot be read must leave what is shown as it is.
@@ -146,13 +147,13 @@ impl App {
     }
 
     fn read_scene_again(&mut self) {
-        if !builtin::names().contains(&self.document.scene.as_str()) {
+        if !sources::is_built_in_scene(&self.document.scene) {
             self.loader.load_scene(&self.document.scene);
         }
     }
 
     fn read_map_again(&mut self) {
-        if !self.document.map.starts_with("sky:") {
+        if !sources::is_built_in_map(&self.document.map) {
             self.loader.load_map(&self.document.map, self.document.sun);
         }
     }

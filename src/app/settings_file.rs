@@ -11,7 +11,7 @@ use super::interface::{Dock, Interface, Tab};
 use crate::error::{Error, Result};
 use crate::image::{read_file, write_beside_and_rename};
 use crate::render::{StopRule, View};
-use crate::scene::builtin;
+use crate::sources;
 
 /// Recent files kept.
 const MOST_RECENT: usize = 8;
@@ -192,14 +192,14 @@ impl Settings {
 
     /// Notes a scene that was opened; built-in ones are always offered.
     pub fn recent_scene(&mut self, name: &str) {
-        if !builtin::names().contains(&name) {
+        if !sources::is_built_in_scene(name) {
             put_first(&mut self.recent_scenes, &lasting(name));
         }
     }
 
     /// Notes a map that was opened; built-in skies are always offered.
     pub fn recent_map(&mut self, name: &str) {
-        if !name.starts_with("sky:") {
+        if !sources::is_built_in_map(name) {
             put_first(&mut self.recent_maps, &lasting(name));
         }
     }

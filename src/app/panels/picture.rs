@@ -86,14 +86,12 @@ fn exposure(ui: &mut Ui, document: &mut Document, exposure_ev: Option<f32>) {
 
 fn curve(ui: &mut Ui, document: &mut Document) {
     theme::row(ui, "Tone curve", "How bright light fades into white", |ui| {
-        egui::ComboBox::from_id_salt("curve")
-            .width(ui.available_width())
-            .selected_text(curve_name(document.look.curve))
-            .show_ui(ui, |ui| {
-                for curve in ToneCurve::ALL {
-                    ui.selectable_value(&mut document.look.curve, curve, curve_name(curve));
-                }
-            });
+        let name = curve_name(document.look.curve);
+        theme::choice(ui, "curve").selected_text(name).show_ui(ui, |ui| {
+            for curve in ToneCurve::ALL {
+                ui.selectable_value(&mut document.look.curve, curve, curve_name(curve));
+            }
+        });
     });
 }
 

@@ -9,20 +9,20 @@ use crate::app::commands::Command;
 use crate::app::interface::{Interface, Objection, Purpose};
 use crate::app::settings_file::Settings;
 use crate::app::theme;
-use crate::scene::builtin;
+use crate::sources;
 
 /// What is to be known of a path before it is taken.
 fn objection(purpose: Purpose, path: &str) -> Option<Objection> {
     let is_there = Path::new(path).exists();
-    let is_built_in = match purpose {
-        Purpose::Scene => builtin::names().contains(&path),
-        Purpose::Map => path.starts_with("sky:"),
-        Purpose::Reference => false,
+    let is_missing = match purpose {
+        Purpose::Scene => sources::check_scene(path).is_err(),
+        Purpose::Map => !(is_there || sources::is_built_in_map(path)),
+        Purpose::Reference => !is_there,
         Purpose::Picture | Purpose::Distributions => {
             return is_there.then_some(Objection::Replaces);
         }
     };
-    (!is_there && !is_built_in).then_some(Objection::Missing)
+    is_missing.then_some(Objection::Missing)
 }
 
 fn sentence(objection: Objection) -> &'static str {

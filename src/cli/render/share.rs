@@ -21,7 +21,7 @@ use crate::output::record::Record;
 use crate::path::World;
 use crate::render::film::Film;
 use crate::render::{Doubling, Figures, Gi, Phase, Session, StopRule, View};
-use crate::scene::builtin;
+use crate::sources;
 
 /// A first sample that pixels share is begun where so many times as long is left as all would take of their
 /// own, as far as the first of those tell: it takes 1.3 to 1.7 times as long, and half a one is worth little.
@@ -388,14 +388,14 @@ fn identity(
         medium,
         ..
     } = view;
-    let scene = match builtin::names().contains(&arguments.scene.as_str()) {
+    let scene = match sources::is_built_in_scene(&arguments.scene) {
         true => {
             let changes = (arguments.of_scene.options().hide, arguments.of_scene.edits());
             format!("{} {}", arguments.scene, Digest::new().debug(&changes))
         }
         false => Digest::new().scene(&world.scene).to_string(),
     };
-    let map = match arguments.map().starts_with("sky:") {
+    let map = match sources::is_built_in_map(arguments.map()) {
         true => arguments.map().to_owned(),
         false => Digest::new().map(environment.map()).to_string(),
     };

@@ -490,17 +490,11 @@ impl<'a> Session<'a> {
     fn render(&mut self, target: u32, coverage: Coverage, cancel: &AtomicBool) -> Result<()> {
         let stride = self.prepare_counting(target - self.samples);
         let pass = Pass { target, coverage, stride, sequence: self.sequence };
-        let mut film = match &self.engine {
-            Engine::Cpu => self.film.take(&self.view),
-            Engine::Gpu(_) => {
-                self.film.outdate();
-                Film::default()
-            }
-        };
         let learning = self.learning.as_ref().filter(|learning| !learning.is_over());
         let counts = learning.map(|learning| &learning.grid);
         let samples = match &mut self.engine {
             Engine::Cpu => {
+                let mut film = self.film.take(&self.view);
                 let tracer = self.tracer(counts);
                 let (samples, rays) =
                     cpu::render(&tracer, &self.rays, &self.view, pass, &mut film, cancel);
@@ -510,6 +504,7 @@ impl<'a> Session<'a> {
                 samples
             }
             Engine::Gpu(renderer) => {
+                self.film.outdate();
                 let done = renderer.render(pass, counts, cancel)?;
                 self.samples = done.least;
                 if self.film.is_older_than(KEPT_SECONDS) {
