@@ -37,6 +37,11 @@ const FILTER_WORTH: u64 = 4;
 /// A sample of a smaller picture says as much as so many of pixels here and there.
 const DOTS_WORTH: u64 = 4;
 
+/// A whole picture of n samples a pixel is as good as a smaller one of so many times n times its own samples: in
+/// the office and the living room, at half the width, one sample as two to four, two as seven to twelve, and
+/// four as thirty, for what is small is blurred.
+const WHOLE_WORTH: f64 = 0.6;
+
 /// What a linear picture is made from; equal ones give the same picture.
 #[derive(Clone)]
 pub(super) struct Source {
@@ -82,7 +87,12 @@ impl Source {
         before.width < film.width
             && before.min_samples() > 0
             && is_alike
-            && if self.is_whole { 2 * own < other } else { own < DOTS_WORTH * other }
+            && if self.is_whole {
+                let own = own as f64;
+                WHOLE_WORTH * own * (own / film.pixels().len() as f64) < other as f64
+            } else {
+                own < DOTS_WORTH * other
+            }
     }
 
     /// The picture on the device, without noise if that is asked for.
@@ -192,6 +202,8 @@ pub(super) mod tests {
         let [small, many] = [9, 99].map(|samples| film_of([6, 4], 1, samples));
         assert_eq!(prepared(holes.clone(), small.clone(), false), quick(&small, None).pixels);
         assert_eq!(prepared(calm.clone(), many.clone(), true), quick(&many, None).pixels);
+        let few = film_of([6, 4], 1, 3);
+        assert_eq!(prepared(whole.clone(), few.clone(), true), quick(&few, None).pixels);
     }
 
     #[test]
