@@ -9,6 +9,7 @@ use super::interface::Chosen;
 use super::kept_picture::Pixels;
 use crate::develop::{Developer, LinearPicture};
 use crate::image::Image;
+use crate::metrics::relative_rms_error;
 
 /// Differences are shown so many times as bright as they are.
 pub(super) const AMPLIFIED: f32 = 4.0;
@@ -38,12 +39,14 @@ impl PartialEq for Comparison {
 }
 
 /// A comparison on the device.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct Compared {
     /// What is shown in place of the picture that is rendered.
     pub(super) picture: Option<LinearPicture>,
     /// What the wipe uncovers.
     pub(super) other: Option<LinearPicture>,
+    /// [`relative_rms_error`] of the left picture against the right one, where their difference is shown.
+    pub(super) difference: Option<f64>,
     /// What was read for it, lest it be read again.
     read: Vec<Arc<Image>>,
     /// Why it is not what was asked for.
@@ -76,7 +79,7 @@ impl Comparison {
         developer: &Developer,
         now: impl FnOnce() -> Arc<Image>,
     ) -> Compared {
-        let mut compared = Compared { picture: None, other: None, read: Vec::new(), failure: None };
+        let mut compared = Compared::default();
         let right = self.right.as_ref().map(|pixels| pixels.get()).transpose();
         let (left, right) = match (self.left.get(), right) {
             (Ok(left), Ok(right)) => (left, right),
@@ -87,14 +90,16 @@ impl Comparison {
         compared.read = right.iter().chain([&left]).cloned().collect();
         if self.is_difference {
             let [of_left, of_right] = self.regions;
+            let reference = right.clone().unwrap_or_else(now);
             let found = match of_left == of_right {
-                true => difference(&left, &right.clone().unwrap_or_else(now)),
+                true => difference(&left, &reference),
                 false => Err("pictures of different parts have no difference".to_owned()),
             };
             match found {
                 Ok(image) => {
                     let picture = Some(developer.upload_image(&image));
-                    return Compared { picture, ..compared };
+                    let difference = relative_rms_error(&left, &reference);
+                    return Compared { picture, difference, ..compared };
                 }
                 Err(sentence) => compared.failure = Some(sentence),
             }

@@ -217,7 +217,7 @@ pub struct Viewpoint {
 
 impl Viewpoint {
     /// Whether all numbers are in range.
-    fn is_sound(&self) -> bool {
+    pub(super) fn is_sound(&self) -> bool {
         let lengths = [self.pivot_distance, self.half_height, self.focus_distance];
         self.eye.iter().all(|x| x.is_finite())
             && self.rotation().is_normalized()

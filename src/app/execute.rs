@@ -98,7 +98,9 @@ impl App {
             Command::KeepPicture => self.keep(),
             Command::SetAsKept(index) => {
                 if let Some(kept) = self.history.get(index) {
-                    let document = kept.document.clone();
+                    let mut document = kept.document.clone();
+                    // Those kept since are no part of the picture, and would be lost.
+                    document.bookmarks = self.viewpoints_of(&document.scene);
                     if self.history.is_of_other_options(kept) {
                         self.messages.notice(format!(
                             "{}: its scene was opened with other options than now (--variant, --outlines, \
@@ -136,9 +138,9 @@ impl App {
         }
         // A file that cannot be read must leave what is shown as it is.
         self.go_to(Document {
-            scene: name,
             viewpoint: None,
-            bookmarks: Vec::new(),
+            bookmarks: self.viewpoints_of(&name),
+            scene: name,
             materials: BTreeMap::new(),
             region: None,
             fog: None,
@@ -161,6 +163,7 @@ impl App {
     /// Takes all settings of a document. What was chosen in another scene is not in this one.
     fn go_to(&mut self, document: Document) {
         if document.scene != self.document.scene {
+            self.settings.keep_viewpoints(&self.document);
             (self.interface.material, self.interface.pinned) = (None, None);
         }
         self.document = document;
@@ -204,10 +207,20 @@ impl App {
         self.interface.tab = Tab::Picture;
     }
 
+    /// The viewpoints that were kept of a scene by now.
+    fn viewpoints_of(&self, scene: &str) -> Vec<Viewpoint> {
+        match scene == self.document.scene {
+            true => self.document.bookmarks.clone(),
+            false => self.settings.viewpoints_of(scene),
+        }
+    }
+
     fn bookmark(&mut self) {
         let Some(viewpoint) = &self.document.viewpoint else { return };
-        let name = format!("View {}", self.document.bookmarks.len() + 1);
-        self.document.bookmarks.push(Viewpoint { name, ..viewpoint.clone() });
+        let bookmarks = &mut self.document.bookmarks;
+        let is_new = |name: &String| bookmarks.iter().all(|kept| kept.name != *name);
+        let name = (1..).map(|number| format!("View {number}")).find(is_new).unwrap_or_default();
+        bookmarks.push(Viewpoint { name, ..viewpoint.clone() });
     }
 
     fn frame(&mut self, bounds: Option<(glam::Vec3, glam::Vec3)>) {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::document::{Document, Light, Look, PictureSize};
+use super::document::{Document, Light, Look, PictureSize, Viewpoint};
 use super::interface::{Dock, Interface, Tab};
 use crate::error::{Error, Result};
 use crate::image::{read_file, write_beside_and_rename};
@@ -15,6 +15,17 @@ use crate::sources;
 
 /// Recent files kept.
 const MOST_RECENT: usize = 8;
+/// Scenes whose viewpoints are kept.
+const MOST_SCENES: usize = 100;
+
+/// What was kept of a scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SceneViewpoints {
+    /// Its file, or what it is called if it is built in.
+    pub scene: String,
+    /// Viewpoints, oldest first.
+    pub viewpoints: Vec<Viewpoint>,
+}
 
 /// Kept settings; what a file does not say stays at its default.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -24,6 +35,8 @@ pub struct Settings {
     pub recent_scenes: Vec<String>,
     /// Map files, latest first.
     pub recent_maps: Vec<String>,
+    /// Kept viewpoints, by scene, that changed last first.
+    pub viewpoints: Vec<SceneViewpoints>,
     /// Where pictures were written last.
     pub save_folder: Option<PathBuf>,
     /// Size of the window in points.
@@ -48,6 +61,7 @@ impl Default for Settings {
         Self {
             recent_scenes: Vec::new(),
             recent_maps: Vec::new(),
+            viewpoints: Vec::new(),
             save_folder: None,
             window_size: [1440.0, 900.0],
             look: document.look,
@@ -128,6 +142,7 @@ impl Settings {
             *side = if side.is_finite() { side.clamp(1.0, 16_384.0) } else { usual };
         }
         let finite = |x: f32, usual: f32| if x.is_finite() { x } else { usual };
+        self.viewpoints.iter_mut().for_each(|of| of.viewpoints.retain(Viewpoint::is_sound));
         let (look, usual) = (&mut self.look, &default.look);
         look.exposure_ev = finite(look.exposure_ev, usual.exposure_ev).clamp(-64.0, 64.0);
         let (balance, usual) = (&mut look.white_balance, &usual.white_balance);
@@ -188,6 +203,28 @@ impl Settings {
         take(&mut self.stop, document.stop, &start.stop);
         self.tab = interface.tab;
         self.dock = interface.dock;
+        self.keep_viewpoints(document);
+    }
+
+    /// Takes over the viewpoints that a document has of its scene.
+    pub(super) fn keep_viewpoints(&mut self, document: &Document) {
+        let viewpoints = &document.bookmarks;
+        if self.viewpoints_of(&document.scene) == *viewpoints {
+            return;
+        }
+        let scene = lasting_scene(&document.scene);
+        self.viewpoints.retain(|other| other.scene != scene);
+        if !viewpoints.is_empty() {
+            self.viewpoints.insert(0, SceneViewpoints { scene, viewpoints: viewpoints.clone() });
+            self.viewpoints.truncate(MOST_SCENES);
+        }
+    }
+
+    /// The viewpoints that were kept of a scene.
+    pub fn viewpoints_of(&self, scene: &str) -> Vec<Viewpoint> {
+        let scene = lasting_scene(scene);
+        let kept = self.viewpoints.iter().find(|kept| kept.scene == scene);
+        kept.map(|kept| kept.viewpoints.clone()).unwrap_or_default()
     }
 
     /// Notes a scene that was opened; built-in ones are always offered.
@@ -209,6 +246,11 @@ impl Settings {
 pub(super) fn lasting(path: &str) -> String {
     let absolute = || std::path::absolute(path).ok()?.to_str().map(str::to_owned);
     absolute().unwrap_or_else(|| path.to_owned())
+}
+
+/// The same for a scene, which may be built in.
+fn lasting_scene(name: &str) -> String {
+    if sources::is_built_in_scene(name) { name.to_owned() } else { lasting(name) }
 }
 
 /// The path of something beside a file.
@@ -279,6 +321,32 @@ mod tests {
         let mut expected = Settings::default();
         (expected.light.bounces, expected.look.exposure_ev) = (3, 1.0);
         assert_eq!(settings, expected);
+    }
+
+    #[test]
+    fn viewpoints_are_kept_of_each_scene() {
+        let view = |name: &str| {
+            let camera = &crate::scene::builtin::build("office").expect("built in").cameras[0];
+            Viewpoint { name: name.to_owned(), ..Viewpoint::of(camera, 3.0) }
+        };
+        let document = |scene: &str, names: &[&str]| Document {
+            scene: scene.to_owned(),
+            bookmarks: names.iter().map(|name| view(name)).collect(),
+            ..Document::default()
+        };
+        let mut settings = Settings::default();
+        settings.keep_viewpoints(&document("office", &["a", "b"]));
+        settings.keep_viewpoints(&document("room.glb", &["c"]));
+        settings.keep_viewpoints(&document("crack", &[]));
+        let text = serde_json::to_string(&settings).expect("written");
+        let mut settings = serde_json::from_str::<Settings>(&text).expect("read").within_bounds();
+        assert_eq!(settings.viewpoints_of("office"), [view("a"), view("b")]);
+        assert_eq!(settings.viewpoints_of("./room.glb"), [view("c")]);
+        assert_eq!(settings.viewpoints.len(), 2);
+        settings.keep_viewpoints(&document("office", &[]));
+        assert_eq!(settings.viewpoints_of("office"), []);
+        settings.viewpoints[0].viewpoints[0].lens_radius = f32::NAN;
+        assert_eq!(settings.within_bounds().viewpoints_of("room.glb"), []);
     }
 
     #[test]

@@ -114,7 +114,8 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
 
 fn document(arguments: &ViewArguments, settings: &Settings) -> Document {
     let [scene, map] = arguments.names().map(str::to_owned);
-    let mut document = Document { scene, map, ..settings.document() };
+    let bookmarks = settings.viewpoints_of(&scene);
+    let mut document = Document { scene, map, bookmarks, ..settings.document() };
     if let Some(sampling) = arguments.sampling {
         document.light.sampling = sampling;
     }

@@ -64,7 +64,9 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
             shown.order.compared.as_ref().filter(|compared| compared.is_difference)
         {
             let [left, right] = &compared.names;
-            let text = format!("{left} and {right}: difference × {AMPLIFIED:.0}");
+            let percent = shown.difference.map(|apart| format!(", {:.1} % (RMS)", 100.0 * apart));
+            let percent = percent.unwrap_or_default();
+            let text = format!("{left} and {right}: difference × {AMPLIFIED:.0}{percent}");
             let at = Pos2::new(rect.center().x, rect.top() + 14.0);
             theme::badge(ui, at, Align2::CENTER_TOP, &text, theme::TEXT);
         }

@@ -109,14 +109,15 @@ impl Memory {
             self.uploads.overlay = last;
             painted
         })?;
-        let (mut other, mut uncompared) = (None, None);
+        let (mut other, mut difference, mut uncompared) = (None, None, None);
         if let Some(comparison) = &order.compared {
             let now = || image.clone().unwrap_or_else(|| Arc::new(source.session.film.image()));
             let of = comparison.shows_now().then(|| source.clone());
             let compare = || Ok(comparison.prepare(&developer, now));
             let compared = self.uploads.compared.or_make((comparison.clone(), of), compare)?;
             picture = compared.picture.unwrap_or(picture);
-            (other, uncompared) = (compared.other, compared.failure);
+            (other, difference) = (compared.other, compared.difference);
+            uncompared = compared.failure;
         } else if let Some(source) = Source::plain(&order) {
             let prepare = || Ok(source.prepare(&developer));
             let plain = self.uploads.plain.or_make(source.clone(), prepare)?;
@@ -131,6 +132,7 @@ impl Memory {
             picture,
             image,
             other,
+            difference,
             uncompared,
             automatic_ev,
             overlay,

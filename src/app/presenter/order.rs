@@ -78,6 +78,8 @@ pub(crate) struct Shown {
     pub labels: Vec<Label>,
     /// Why the denoiser did not do its work.
     pub failure: Option<String>,
+    /// How far apart the pictures are whose difference is shown: [`crate::metrics::relative_rms_error`].
+    pub difference: Option<f64>,
     /// Why two pictures cannot be compared.
     pub uncompared: Option<String>,
 }
