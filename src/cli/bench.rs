@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::choices::SceneArguments;
-use super::picture::say_written;
+use super::picture::{check_kept, say_written};
 use super::progress::Progress;
 use super::{interrupt, render, values};
 use crate::bench::{Options, Subject, run as measure};
@@ -64,6 +64,9 @@ pub(super) struct BenchArguments {
 /// Measures and prints.
 pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     if let Some(file) = &arguments.json {
+        for read in arguments.scenes.iter().chain([&arguments.env]) {
+            check_kept(file, read, None)?;
+        }
         check_writable(file)?;
     }
     if arguments.adapter.is_some() && arguments.device == [Device::Cpu] {

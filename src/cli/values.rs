@@ -50,6 +50,7 @@ pub(super) fn noise(text: &str) -> Result<f64, String> {
     };
     match share {
         ..=1.0 => Ok(share),
+        _ if text.trim().ends_with('%') => Err("more than 100 % is all noise".to_owned()),
         _ => Err(format!("more than 1 is all noise: {text} % is {}", share / 100.0)),
     }
 }

@@ -95,7 +95,7 @@ pub fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
     let coverage = film.coverage();
     if coverage < 1.0 {
         remarks.push(format!(
-            "the time was over when {:.0} % of the pixels had a sample: the others show one beside them",
+            "it ended when {:.0} % of the pixels had a sample: the others show one beside them",
             100.0 * coverage
         ));
     }

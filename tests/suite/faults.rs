@@ -264,10 +264,15 @@ fn what_is_rendered_is_not_written_over() {
     let bench = Bench::new();
     let before = ["scene.gltf", "map.exr"].map(|name| fs::read(bench.path(name)).expect("a file"));
     let render = "render scene.gltf --env map.exr --device cpu --size 16x9 --spp 1";
-    for outputs in
-        ["-o a.png --json ./scene.gltf", "-o map.exr", "-o a.exr --distributions map.exr"]
-    {
-        let says = bench.refusal(&format!("{render} {outputs}"), 1);
+    let measure = "bench scene.gltf --env map.exr --device cpu --size 16x9 --seconds 0.1";
+    for line in [
+        format!("{render} -o a.png --json ./scene.gltf"),
+        format!("{render} -o map.exr"),
+        format!("{render} -o a.exr --distributions map.exr"),
+        format!("{measure} --json ./scene.gltf"),
+        format!("{measure} --json map.exr"),
+    ] {
+        let says = bench.refusal(&line, 1);
         assert!(says.ends_with(": would be written over the scene or the map\n"), "{says}");
     }
     let after = ["scene.gltf", "map.exr"].map(|name| fs::read(bench.path(name)).expect("a file"));
