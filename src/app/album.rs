@@ -20,7 +20,6 @@ use crate::error::{Error, Result};
 use crate::image::{ExrPicture, Rgb8, read_exr_metadata, read_exr_preview, write_exr};
 use crate::output::record::to_json;
 use crate::scene::SceneOptions;
-use crate::sources;
 
 /// Names of the header's attributes.
 const NAME: &str = "lightgrid.kept.name";
@@ -79,12 +78,9 @@ impl Album {
         let file = self.folder.join(format!("{time:015}-{process}-{:04}.exr", self.written));
         self.written += 1;
         let document = &kept.document;
-        let name = |name: &str, is_built_in: bool| {
-            if is_built_in { name.to_owned() } else { settings_file::lasting(name) }
-        };
         let lasting = Document {
-            scene: name(&document.scene, sources::is_built_in_scene(&document.scene)),
-            map: name(&document.map, sources::is_built_in_map(&document.map)),
+            scene: settings_file::lasting_scene(&document.scene),
+            map: settings_file::lasting_map(&document.map),
             ..document.clone()
         };
         let texts = [

@@ -90,15 +90,15 @@ impl Comparison {
         compared.read = right.iter().chain([&left]).cloned().collect();
         if self.is_difference {
             let [of_left, of_right] = self.regions;
-            let reference = right.clone().unwrap_or_else(now);
-            let found = match of_left == of_right {
-                true => difference(&left, &reference),
-                false => Err("pictures of different parts have no difference".to_owned()),
+            let found = if of_left == of_right {
+                let right = right.clone().unwrap_or_else(now);
+                difference(&left, &right).map(|image| (image, relative_rms_error(&left, &right)))
+            } else {
+                Err("pictures of different parts have no difference".to_owned())
             };
             match found {
-                Ok(image) => {
+                Ok((image, difference)) => {
                     let picture = Some(developer.upload_image(&image));
-                    let difference = relative_rms_error(&left, &reference);
                     return Compared { picture, difference, ..compared };
                 }
                 Err(sentence) => compared.failure = Some(sentence),

@@ -146,6 +146,7 @@ impl App {
         let Some(scene) = &self.scene else {
             // At the start there is none: the built-in one is always there.
             self.document.scene = Document::default().scene;
+            self.document.bookmarks = self.settings.viewpoints_of(&self.document.scene);
             return;
         };
         let before = self.undo.present();
@@ -159,6 +160,7 @@ impl App {
             // Somebody went back to a file that is no longer there.
             self.document.scene.clone_from(&scene.name);
             self.document.viewpoint = Some(first_viewpoint(scene));
+            self.document.bookmarks = self.settings.viewpoints_of(&scene.name);
             self.document.materials.clone_from(&scene.edits);
             self.undo.amend(&self.document);
         }

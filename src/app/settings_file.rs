@@ -243,14 +243,19 @@ impl Settings {
 }
 
 /// A path that means the same in another folder.
-pub(super) fn lasting(path: &str) -> String {
+fn lasting(path: &str) -> String {
     let absolute = || std::path::absolute(path).ok()?.to_str().map(str::to_owned);
     absolute().unwrap_or_else(|| path.to_owned())
 }
 
 /// The same for a scene, which may be built in.
-fn lasting_scene(name: &str) -> String {
+pub(super) fn lasting_scene(name: &str) -> String {
     if sources::is_built_in_scene(name) { name.to_owned() } else { lasting(name) }
+}
+
+/// The same for a map.
+pub(super) fn lasting_map(name: &str) -> String {
+    if sources::is_built_in_map(name) { name.to_owned() } else { lasting(name) }
 }
 
 /// The path of something beside a file.

@@ -64,9 +64,7 @@ pub(super) struct BenchArguments {
 /// Measures and prints.
 pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     if let Some(file) = &arguments.json {
-        for read in arguments.scenes.iter().chain([&arguments.env]) {
-            check_kept(file, read, None)?;
-        }
+        check_kept(file, arguments.scenes.iter().chain([&arguments.env]))?;
         check_writable(file)?;
     }
     if arguments.adapter.is_some() && arguments.device == [Device::Cpu] {

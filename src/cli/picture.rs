@@ -1,6 +1,5 @@
 //! How a picture is made of a film and written, wherever the film comes from.
 
-use std::iter;
 use std::path::{Path, PathBuf};
 
 use super::values;
@@ -131,10 +130,12 @@ impl PictureArguments {
     }
 }
 
-/// Refuses to write over the scene or the map.
-pub(super) fn check_kept(output: &Path, scene: &str, map: Option<&String>) -> Result<()> {
-    let mut read = iter::once(scene).chain(map.map(String::as_str)).map(Path::new);
-    match read.any(|other| is_same_file(other, output)) {
+/// Refuses to write over what is read, the names of scenes and maps.
+pub(super) fn check_kept<'a>(
+    output: &Path,
+    read: impl IntoIterator<Item = &'a String>,
+) -> Result<()> {
+    match read.into_iter().any(|other| is_same_file(Path::new(other), output)) {
         true => Err(Error::at(output, "would be written over the scene or the map")),
         false => Ok(()),
     }

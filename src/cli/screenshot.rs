@@ -121,7 +121,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         return Err(Error::at(path, "screenshots are written as .png"));
     }
-    check_kept(path, &arguments.scene, arguments.env.as_ref())?;
+    check_kept(path, [&arguments.scene].into_iter().chain(&arguments.env))?;
     check_writable(path)?;
     let shows_cache = arguments.overlay.is_some_and(Overlay::is_of_cache);
     if shows_cache && (!arguments.denoise || arguments.split) {

@@ -44,14 +44,15 @@ pub(super) fn coefficient(text: &str) -> Result<Vec3, String> {
 
 /// A relative error above 0 and at most 1, or so many percent.
 pub(super) fn noise(text: &str) -> Result<f64, String> {
-    let share = match text.trim().strip_suffix('%') {
-        Some(percent) => positive(percent)? / 100.0,
-        None => positive(text)?,
-    };
-    match share {
-        ..=1.0 => Ok(share),
-        _ if text.trim().ends_with('%') => Err("more than 100 % is all noise".to_owned()),
-        _ => Err(format!("more than 1 is all noise: {text} % is {}", share / 100.0)),
+    if let Some(percent) = text.trim().strip_suffix('%') {
+        return match positive(percent)? {
+            percent @ ..=100.0 => Ok(percent / 100.0),
+            _ => Err("more than 100 % is all noise".to_owned()),
+        };
+    }
+    match positive(text)? {
+        share @ ..=1.0 => Ok(share),
+        percent => Err(format!("more than 1 is all noise: {text} % is {}", percent / 100.0)),
     }
 }
 

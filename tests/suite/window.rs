@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use lightgrid::app::document::Viewpoint;
+use lightgrid::app::settings_file::{SceneViewpoints, Settings};
 use lightgrid::image::read_picture;
+use lightgrid::scene::builtin;
 use lightgrid::tone::auto_exposure_ev;
 
 /// An X server without a screen, and a window of ours in it.
@@ -312,6 +315,31 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     assert!(!desk.says().contains("panicked"), "{}", desk.says());
     let settings = std::fs::read_to_string(desk.path("window.json")).expect("settings");
     assert!(settings.contains("window_size"), "{settings}");
+}
+
+#[test]
+fn a_scene_shown_in_place_of_a_damaged_one_keeps_its_viewpoints() {
+    let Some(mut desk) = Desk::open() else { return };
+    std::fs::write(desk.path("bad.gltf"), "{").expect("written");
+    let bad = std::path::absolute(desk.path("bad.gltf")).expect("a path");
+    let view = |name: &str| {
+        let camera = &builtin::build("office").expect("built in").cameras[0];
+        Viewpoint { name: name.to_owned(), ..Viewpoint::of(camera, 3.0) }
+    };
+    let viewpoints =
+        [("living-room", "a"), (bad.to_str().expect("text"), "b")].map(|(scene, name)| {
+            SceneViewpoints { scene: scene.to_owned(), viewpoints: vec![view(name)] }
+        });
+    let settings = Settings { viewpoints: viewpoints.to_vec(), ..Settings::default() };
+    settings.write(&desk.path("w.json")).expect("written");
+    desk.start("view bad.gltf --size 96x64 --samples 1 --device cpu --settings w.json");
+    desk.wait_for("scene", || desk.title().starts_with("living-room").then_some(()));
+    desk.xdotool("key ctrl+q");
+    let mut child = desk.window.take().expect("started");
+    let status = desk.wait_for("end", || child.try_wait().expect("asked"));
+    assert!(status.success(), "{}", desk.says());
+    let kept = Settings::read(&desk.path("w.json")).expect("read").viewpoints;
+    assert_eq!(kept, viewpoints);
 }
 
 /// Writes a scene of one triangle so large.

@@ -51,7 +51,7 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
         if files[..i].iter().any(|other| is_same_file(other, file)) {
             return Err(Error::at(file, "two outputs would be written to this one file"));
         }
-        check_kept(file, &arguments.scene, arguments.env.as_ref())?;
+        check_kept(file, [&arguments.scene].into_iter().chain(&arguments.env))?;
         check_writable(file)?;
     }
     if arguments.part.is_none() {
