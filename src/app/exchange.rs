@@ -18,7 +18,7 @@ use crate::memory;
 use crate::path::framing;
 use crate::render::gpu::DeviceChoice;
 
-/// What a pixel of the picture takes: films of its exact and of its fast light, copies of both that are shown
+/// What a pixel of the picture takes: films of its exact and of its cached light, copies of both that are shown
 /// and that will be, and what takes noise out (measured: 630).
 const BYTES_PER_PIXEL: u64 = 640;
 
@@ -146,6 +146,7 @@ impl App {
         let Some(scene) = &self.scene else {
             // At the start there is none: the built-in one is always there.
             self.document.scene = Document::default().scene;
+            self.document.viewpoint = None;
             self.document.bookmarks = self.settings.viewpoints_of(&self.document.scene);
             return;
         };
@@ -252,7 +253,7 @@ impl App {
             moving: self.interface.is_moving(now) && !self.is_repeatable,
             previews: !self.is_repeatable,
             device: self.document.light.device,
-            is_calm: self.document.look.denoise,
+            wants_cached: self.document.look.denoise,
             inspects_cache: self.interface.inspects_cache(),
             rule: self.document.stop,
             is_frozen: self.interface.is_frozen,

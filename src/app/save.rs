@@ -9,7 +9,7 @@ use super::loader::{LoadedMap, LoadedScene};
 use super::worker::Snapshot;
 use crate::error::{Notices, Result};
 use crate::image::check_writable;
-use crate::output::record::{Phases, Record};
+use crate::output::record::{Phases, Record, settings_of};
 use crate::output::{Exposure, LayerName, PictureOptions, write_picture};
 
 /// What a picture is written from.
@@ -71,27 +71,16 @@ fn edits(picture: &Picture) -> Vec<String> {
 }
 
 fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
-    let view = &picture.snapshot.request.view;
     let document = &picture.document;
-    let camera = document.viewpoint.as_ref();
-    vec![
-        ("sampling", json!(view.sampling)),
-        ("sharing", json!(view.sharing)),
-        ("gi", json!(view.gi)),
-        ("grid_columns", json!(view.grid_columns)),
-        ("bounces", json!(view.limits.bounces)),
-        ("filter", json!(view.filter)),
+    let request = &picture.snapshot.request;
+    let mut settings = settings_of(&request.view, &request.world);
+    settings.extend([
         ("env_rotation_degrees", json!(document.rotation_degrees)),
         ("env_intensity", json!(document.intensity)),
         ("env_sun", json!(document.sun)),
-        ("background", json!(view.background)),
-        ("region", json!(view.crop.map(|crop| [crop.corner, [view.width, view.height]].concat()))),
         ("materials", json!(edits(picture))),
-        ("seed", json!(view.seed)),
-        ("white_balance_kelvin", json!(document.look.white_balance.kelvin)),
-        ("camera_eye", json!(camera.map(|c| c.eye))),
-        ("camera_rotation", json!(camera.map(|c| c.rotation))),
-    ]
+    ]);
+    settings
 }
 
 /// What is remarkable about a picture that was written, for the message.

@@ -9,7 +9,7 @@ use crate::image::is_same_file;
 use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::render::film::Film;
 use crate::terminal::{notice, tell};
-use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev};
+use crate::tone::{ToneCurve, WhiteBalance};
 
 /// How pictures are written.
 #[derive(Debug, Clone, clap::Args)]
@@ -44,7 +44,8 @@ impl Default for PictureArguments {
     }
 }
 
-fn parse_exposure(text: &str) -> std::result::Result<Exposure, String> {
+/// Stops, or `auto`.
+pub(super) fn parse_exposure(text: &str) -> std::result::Result<Exposure, String> {
     if text == "auto" {
         return Ok(Exposure::Auto);
     }
@@ -70,27 +71,33 @@ impl PictureArguments {
     }
 
     /// Says what was asked for that none of these pictures holds.
-    pub(super) fn say_unused<'a>(&self, mut pictures: impl Iterator<Item = &'a PathBuf>) {
-        if !self.layers.is_empty() && !pictures.any(|path| output::holds_layers(path)) {
+    pub(super) fn say_unused(&self, pictures: &[PathBuf]) {
+        if !self.layers.is_empty() && !pictures.iter().any(|path| output::holds_layers(path)) {
             notice("--layers adds nothing: they are written into .exr pictures alone");
+        }
+        if self.denoise.is_some() && !self.is_denoised(pictures) {
+            notice("--denoise changes nothing: .exr pictures hold what was rendered");
         }
     }
 
-    /// Whether albedo, normal and depth are wanted.
-    pub(super) fn wants_surfaces(&self) -> bool {
+    /// Whether noise is to be taken out of one of these pictures, or of those that are made of a part.
+    pub(super) fn is_denoised<'a>(&self, pictures: impl IntoIterator<Item = &'a PathBuf>) -> bool {
+        self.denoise.is_some() && !pictures.into_iter().all(|path| output::holds_layers(path))
+    }
+
+    /// Whether albedo, normal and depth are wanted for these pictures.
+    pub(super) fn wants_surfaces<'a>(
+        &self,
+        pictures: impl IntoIterator<Item = &'a PathBuf>,
+    ) -> bool {
         let is_surface = |l: &LayerName| !matches!(l, LayerName::Samples | LayerName::Variance);
-        self.denoise.is_some() || self.layers.iter().any(is_surface)
+        self.is_denoised(pictures) || self.layers.iter().any(is_surface)
     }
 
     /// The exposure that a film's picture gets, to be that of others, too.
     pub(super) fn exposure_of(&self, film: &Film) -> Exposure {
-        match self.exposure {
-            Exposure::Stops(stops) => Exposure::Stops(stops),
-            Exposure::Auto => {
-                let image = self.white.unwrap_or_default().apply(film.without_gaps().image());
-                Exposure::Stops(auto_exposure_ev(&image))
-            }
-        }
+        let image = self.white.unwrap_or_default().apply(film.without_gaps().image());
+        Exposure::Stops(self.exposure.of(film, &image))
     }
 
     /// Takes this exposure.

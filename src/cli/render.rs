@@ -21,8 +21,9 @@ use crate::memory;
 use crate::output::record::{Phases, Record};
 use crate::output::{self, Exposure};
 use crate::path::World;
-use crate::render::Session;
+use crate::render::film::Film;
 use crate::render::gpu::{DeviceChoice, Gpu};
+use crate::render::{Figures, Session};
 use crate::scene::Camera;
 use crate::terminal::notice;
 pub(super) use arguments::RenderArguments;
@@ -82,7 +83,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
 /// What the film takes, and what writing it does: pixels, encoders and the stacks of their threads.
 fn needed_bytes(arguments: &RenderArguments) -> [u64; 2] {
     let [width, height] = arguments.size();
-    let has_layers = arguments.picture.wants_surfaces();
+    let has_layers = arguments.wants_surfaces();
     let of_pixel = if has_layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
     let [film, writing] = of_pixel.map(|bytes| u64::from(width) * u64::from(height) * bytes);
     [film, writing + BYTES_OF_ENCODERS + rayon::current_num_threads() as u64 * STACK_BYTES]
@@ -132,6 +133,9 @@ impl Job<'_> {
         let gpu = self.gpu.as_ref();
         let mut session =
             device::start(arguments.device, gpu, world, environment, view, &mut notices)?;
+        let (nothing, not_yet) = (Film::new(0, 0, false), Figures::default());
+        let record = self.record(arguments, &session, (&nothing, &not_yet), &notices);
+        share.set_metadata(record.metadata());
         let mut cpu = TakeOver { device: arguments.device, notices: &mut notices };
         let counted = known.as_ref().and_then(|known| known.counted.as_ref());
         let begun = counted.map_or(Ok(()), |counted| {
@@ -149,19 +153,8 @@ impl Job<'_> {
         let remarks = output::remarks(&film, environment);
         remarks.iter().for_each(|sentence| notices.add(sentence));
 
-        let record = Record {
-            scene: &arguments.scene,
-            map: arguments.map(),
-            world,
-            environment,
-            film: &film,
-            figures: &session.figures(),
-            gpu: session.gpu_figures(),
-            phases: &self.phases,
-            notices: &notices,
-            with_times: !arguments.reproducible,
-            options: outputs::settings(arguments, world, session.view()),
-        };
+        let figures = session.figures();
+        let record = self.record(arguments, &session, (&film, &figures), &notices);
         let mut failures = outputs::write(arguments, &share, &record, session.grid());
         failures.extend(share.keep(&session).err());
         remarks.iter().for_each(notice);
@@ -174,6 +167,29 @@ impl Job<'_> {
             known.counted = session.counters().map(LearningGrid::snapshot);
         }
         Ok(failures)
+    }
+
+    /// What there is to say about a film of the session.
+    fn record<'r>(
+        &'r self,
+        arguments: &'r RenderArguments,
+        session: &Session<'_>,
+        (film, figures): (&'r Film, &'r Figures),
+        notices: &'r Notices,
+    ) -> Record<'r> {
+        Record {
+            scene: &arguments.scene,
+            map: arguments.map(),
+            world: self.world,
+            environment: self.environment,
+            film,
+            figures,
+            gpu: session.gpu_figures(),
+            phases: &self.phases,
+            notices,
+            with_times: !arguments.reproducible,
+            options: outputs::settings(arguments, self.world, session.view()),
+        }
     }
 
     /// Renders one picture after another; while the camera stays near, they go on learning what those before

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::digest::Digest;
 use crate::error::{Decoded, Error, Result};
-use crate::image::{open_file, read_cause, read_file, write_beside_and_rename};
+use crate::image::{looks_like_film, open_file, read_cause, read_file, write_beside_and_rename};
 use crate::memory;
 use crate::render::film::{Film, Pixel, Surface};
 use crate::render::{Doubling, Figures};
@@ -106,6 +106,7 @@ const FORMAT: u32 = 1;
 /// Longer first lines than any of ours.
 const MOST_OF_HEADER: u64 = 1 << 20;
 const DAMAGED: &str = "is damaged: its checksum does not fit";
+const CUT_SHORT: &str = "is cut short";
 const PIXEL_WORDS: usize = 5;
 const SURFACE_WORDS: usize = 8;
 const WORD_BYTES: u64 = size_of::<u64>() as u64;
@@ -175,7 +176,8 @@ pub fn read_facts(path: &Path) -> Result<FilmFacts> {
 fn header(start: &[u8]) -> Decoded<(&[u8], Header)> {
     let other = "is neither a part of a picture nor a checkpoint of lightgrid";
     let start = &start[..start.len().min(MOST_OF_HEADER as usize)];
-    let length = start.iter().position(|byte| *byte == b'\n').ok_or(other)?;
+    let cause = if looks_like_film(start) { CUT_SHORT } else { other };
+    let length = start.iter().position(|byte| *byte == b'\n').ok_or(cause)?;
     let line = &start[..length];
     let header: serde_json::Value = serde_json::from_slice(line).map_err(|_| other)?;
     match header.get("lightgrid_film").and_then(serde_json::Value::as_u64) {
@@ -201,7 +203,7 @@ fn decode(bytes: &[u8]) -> Decoded<(FilmFacts, Film)> {
     let wanted =
         pixels.saturating_mul(words_of_pixel as u64 * WORD_BYTES).saturating_add(WORD_BYTES);
     if (rest.len() as u64) < wanted {
-        return Err("is cut short".into());
+        return Err(CUT_SHORT.into());
     }
     let (content, last) = rest.split_at(rest.len() - WORD_BYTES as usize);
     let (of_pixels, of_surfaces) =

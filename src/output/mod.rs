@@ -10,7 +10,7 @@ use crate::color::luminance;
 use crate::denoise::{Denoiser, blend};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::image::{ExrPicture, Layer, write_exr, write_png};
+use crate::image::{ExrPicture, Image, Layer, write_exr, write_png};
 use crate::render::film::{Film, Pixel};
 use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev, display_rgb8};
 
@@ -38,6 +38,18 @@ pub enum Exposure {
     Stops(f32),
     /// What brings the picture to middle grey.
     Auto,
+}
+
+impl Exposure {
+    /// In stops, of what a film is shown as; a film without light is left as dark as it is.
+    pub(crate) fn of(self, film: &Film, shown: &Image) -> f32 {
+        match self {
+            Self::Stops(stops) => stops,
+            // A filter spreads the little that there is.
+            Self::Auto if film.is_dark() => 0.0,
+            Self::Auto => auto_exposure_ev(shown),
+        }
+    }
 }
 
 /// How a picture is written.
@@ -101,7 +113,8 @@ pub fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
     }
     let mean =
         film.pixels().iter().map(Pixel::mean_luminance).sum::<f64>() / film.pixels().len() as f64;
-    if mean <= BLACK_SHARE * f64::from(luminance(environment.mean_radiance())) {
+    let is_black = mean <= BLACK_SHARE * f64::from(luminance(environment.mean_radiance()));
+    if is_black || film.is_dark() {
         remarks.push("the picture is black: hardly any light reaches what the camera sees".into());
     }
     remarks
@@ -139,11 +152,12 @@ pub fn write_picture(
         None => image,
     };
     let image = options.white_balance.apply(image);
-    let stops = match options.exposure {
-        Exposure::Stops(stops) => stops,
-        Exposure::Auto => auto_exposure_ev(&image),
-    };
+    let stops = options.exposure.of(film, &image);
     metadata.push(("lightgrid.exposure_ev".to_owned(), format!("{stops:.3}")));
+    if options.white_balance != WhiteBalance::default() {
+        let WhiteBalance { kelvin, tint } = options.white_balance;
+        metadata.push(("lightgrid.white_balance".to_owned(), format!("{kelvin},{tint}")));
+    }
     if let Some(denoiser) = options.denoiser {
         metadata.push(("lightgrid.denoiser".to_owned(), denoiser.name().to_owned()));
     }
@@ -189,4 +203,29 @@ fn split(pixels: &[[f32; 3]], names: [&str; 3]) -> Vec<(String, Vec<f32>)> {
         .enumerate()
         .map(|(i, name)| (name.to_owned(), pixels.iter().map(|p| p[i]).collect()))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::path::PathResult;
+
+    #[test]
+    fn a_film_of_chance_light_is_shown_as_dark_as_it_is() {
+        let of = |lit: u32| {
+            let mut film = Film::new(100, 100, false);
+            for (y, x) in (0..100).flat_map(|y| (0..100).map(move |x| (y, x))) {
+                let radiance = Vec3::splat(if 100 * y + x < lit { 1e-6 } else { 0.0 });
+                film.add(x, y, &PathResult { radiance, ..PathResult::default() });
+            }
+            // A filter makes much of little.
+            Exposure::Auto.of(&film, &Image::filled(100, 100, [1e-6; 3]))
+        };
+        assert_eq!([of(0), of(9)], [0.0; 2]);
+        assert!(of(10) > 17.0 && of(10000) > 17.0);
+        let film = Film::new(2, 2, false);
+        assert_eq!(Exposure::Stops(3.0).of(&film, &film.image()), 3.0);
+    }
 }

@@ -9,10 +9,12 @@ use serde_json::{Value, json};
 use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
 use crate::image::write_beside_and_rename;
+use crate::medium::Fog;
 use crate::path::World;
-use crate::render::Figures;
 use crate::render::film::Film;
 use crate::render::gpu::GpuFigures;
+use crate::render::{Figures, View};
+use crate::scene::Projection;
 
 /// Seconds before the session starts.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
@@ -119,6 +121,50 @@ impl Record<'_> {
             "notices": self.notices.iter().collect::<Vec<_>>(),
         })
     }
+}
+
+/// Settings of a view that belong into metadata and JSON, by name.
+pub fn settings_of(view: &View, world: &World) -> Vec<(&'static str, Value)> {
+    let camera = &view.camera;
+    let eye = camera.world_from_camera.translation;
+    let forward = -camera.world_from_camera.matrix3.z_axis.normalize_or_zero();
+    let target = eye + forward * camera.focus_distance;
+    let fov_degrees = match camera.projection {
+        Projection::Perspective { fov_y_radians } => Some(in_digits(fov_y_radians.to_degrees())),
+        Projection::Orthographic { .. } => None,
+    };
+    let fog = view.fog(world).map(|fog| {
+        let Fog { interior, bounds: [low, high] } = fog;
+        json!({
+            "scattering": interior.scattering.to_array(),
+            "absorption": (interior.extinction - interior.scattering).to_array(),
+            "anisotropy": interior.phase.mean_cosine(),
+            "box": [low.to_array(), high.to_array()],
+        })
+    });
+    let region = view.crop.map(|crop| [crop.corner, [view.width, view.height]].concat());
+    vec![
+        ("eye", json!(eye.to_array().map(in_digits))),
+        ("target", json!(target.to_array().map(in_digits))),
+        ("fov_degrees", json!(fov_degrees)),
+        ("lens_radius", json!(in_digits(camera.lens_radius))),
+        ("fog", json!(fog)),
+        ("sampling", json!(view.sampling)),
+        ("sharing", json!(view.sharing)),
+        ("gi", json!(view.gi)),
+        ("grid_columns", json!(view.grid_columns)),
+        ("bounces", json!(view.limits.bounces)),
+        ("russian_roulette", json!(view.limits.russian_roulette)),
+        ("filter", json!(view.filter)),
+        ("region", json!(region)),
+        ("background", json!(view.background)),
+        ("seed", json!(view.seed)),
+    ]
+}
+
+/// A number with the digits that an f32 has.
+fn in_digits(x: f32) -> f64 {
+    x.to_string().parse().unwrap_or(f64::NAN)
 }
 
 /// Pretty JSON of anything serialisable.

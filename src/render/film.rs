@@ -10,6 +10,9 @@ use crate::image::Image;
 use crate::metrics::{REL_MSE_EPSILON, trimmed_mean};
 use crate::path::PathResult;
 
+/// Fewer pixels with light than one in so many are chance.
+const LEAST_LIT: usize = 1000;
+
 /// Sums of one pixel in f64: at 1e6 samples an f32 sum would have lost half its digits.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Pixel {
@@ -178,6 +181,13 @@ impl Film {
     pub(crate) fn coverage(&self) -> f64 {
         let covered = self.pixels.iter().filter(|pixel| pixel.samples > 0).count();
         covered as f64 / self.pixels.len().max(1) as f64
+    }
+
+    /// Whether so few of its pixels have got light that none is typical of the picture.
+    pub(crate) fn is_dark(&self) -> bool {
+        let sampled = self.pixels.iter().filter(|pixel| pixel.samples > 0);
+        let lit = |pixel: &&Pixel| pixel.mean_luminance() > 0.0;
+        sampled.clone().filter(lit).count() * LEAST_LIT < sampled.count()
     }
 
     /// A film that was only begun, to be looked at: pixels without samples show one beside them or, farther

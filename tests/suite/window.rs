@@ -263,9 +263,9 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     desk.xdotool("key ctrl+z");
     desk.wait_for("first camera", || {
         desk.save("again.exr");
-        let eye = desk.metadata("again.exr", "camera_eye");
+        let eye = desk.metadata("again.exr", "eye");
         std::fs::remove_file(desk.path("again.exr")).expect("removed");
-        (eye == of("camera_eye")).then_some(())
+        (eye == of("eye")).then_some(())
     });
 
     // A part of it, marked by a drag so fast that it may fall into one frame; then the whole again.

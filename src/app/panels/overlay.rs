@@ -51,11 +51,11 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
 pub(in crate::app) fn no_cache(missing: NoCache) -> &'static str {
     match missing {
         NoCache::NotDenoised => {
-            "There is no radiance cache: it is trained for fast light, with Denoise."
+            "There is no radiance cache: it is trained for cached light, with Denoise."
         }
-        NoCache::Split => "There is no radiance cache: a split view shows no fast light.",
+        NoCache::Split => "There is no radiance cache: a split view shows no cached light.",
         NoCache::QuickDevice => {
-            "There is no radiance cache: this GPU is quick enough without fast light."
+            "There is no radiance cache: this GPU is quick enough without cached light."
         }
         NoCache::OneBounce => {
             "There is no radiance cache: light that has met one surface needs none."

@@ -94,7 +94,7 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
             ui,
             &theme::clock(snapshot.seconds()),
             "",
-            "Learning and rendering, fast light included",
+            "Learning and rendering, cached light included",
         );
         let rate = snapshot.now.rays as f64 / snapshot.now.render_seconds.max(1e-9);
         number(ui, &theme::figure(rate), "rays/s", "Rays, shadow rays included, while rendering");
@@ -104,7 +104,7 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
         number(
             ui,
             &share,
-            "fast light",
+            "cached light",
             "So much of what is shown is light remembered by place: calm at once, a few percent off, \
              gone when there are enough samples, and never in what is saved",
         );

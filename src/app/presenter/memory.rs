@@ -91,7 +91,10 @@ impl Memory {
             if let Some(ev) = self.whole_ev(&order) {
                 return Ok(ev);
             }
-            let meter = || developer.auto_exposure_ev(&picture, white_balance);
+            let meter = || match source.is_dark() {
+                true => Ok(0.0),
+                false => developer.auto_exposure_ev(&picture, white_balance),
+            };
             self.uploads.metered.or_make((source.clone(), white_balance), meter)
         })?;
         if order.snapshot.request.view.crop.is_none() {

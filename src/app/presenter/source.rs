@@ -77,6 +77,15 @@ impl Source {
         Some(Self { session, backdrop: None, denoiser: order.denoiser, is_whole })
     }
 
+    /// Whether nothing that it is made from has light enough for an exposure; a film on the device is not
+    /// asked.
+    pub(super) fn is_dark(&self) -> bool {
+        let is_dark = |backdrop: &Backdrop| backdrop.film.is_dark();
+        self.session.on_device.is_none()
+            && self.session.film.is_dark()
+            && self.backdrop.as_ref().is_none_or(is_dark)
+    }
+
     /// Whether the film has too few samples to be seen in place of a smaller picture of this view. As long as
     /// pixels have none, those that have one would be dots in it.
     fn is_behind(&self, before: &Film) -> bool {
@@ -111,7 +120,7 @@ impl Source {
         let other = backdrop.filter(|(other, worth)| {
             film.is_alike(other) && other.min_samples() > 0 && *worth > 0.0
         });
-        let is_calmed = other.is_some() && self.backdrop.as_ref().is_some_and(|b| b.is_cached);
+        let is_blended = other.is_some() && self.backdrop.as_ref().is_some_and(|b| b.is_cached);
         let is_surpassed =
             |(other, _): (&Film, f32)| other.total_samples() <= FILTER_WORTH * film.total_samples();
         let has_all = film.min_samples() > 0;
@@ -121,7 +130,7 @@ impl Source {
             Some(Denoiser::ATrous)
                 if self.is_whole
                     && ahead.is_none()
-                    && !is_calmed
+                    && !is_blended
                     && developer.can_denoise(film.width, film.height) =>
             {
                 Prepared::on_device(developer.denoised(&noisy(true)))
@@ -181,7 +190,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_calm_picture_of_all_pixels_is_filtered_with_what_there_is_of_the_exact_one() {
+    fn a_cached_picture_of_all_pixels_is_filtered_with_what_there_is_of_the_exact_one() {
         let Some(developer) = developer() else { return };
         let prepared = |own: Film, other: Film, is_whole| {
             let backdrop = Some(Backdrop { film: Arc::new(other), worth: 4.0, is_cached: true });
@@ -189,19 +198,19 @@ pub(super) mod tests {
             let prepared = Source { session, backdrop, denoiser, is_whole }.prepare(&developer);
             prepared.image.expect("made on the host").pixels.clone()
         };
-        let (holes, whole, calm, large) =
+        let (holes, whole, cached, large) =
             (film(12, 2, 1), film(12, 1, 1), film(12, 1, 2), film(16, 1, 9));
         let filtered = |film, other| quick(film, Some((other, 4.0))).pixels;
         let blended = |film, other| blend(film, Some((other, 4.0))).pixels;
-        assert_eq!(prepared(whole.clone(), calm.clone(), true), filtered(&whole, &calm));
-        assert_eq!(prepared(holes.clone(), calm.clone(), false), filtered(&holes, &calm));
-        // The calm one has holes, is larger and says more.
+        assert_eq!(prepared(whole.clone(), cached.clone(), true), filtered(&whole, &cached));
+        assert_eq!(prepared(holes.clone(), cached.clone(), false), filtered(&holes, &cached));
+        // The cached one has holes, is larger and says more.
         assert_eq!(prepared(holes.clone(), holes.clone(), false), blended(&holes, &holes));
         assert_eq!(prepared(whole.clone(), large.clone(), true), blended(&whole, &large));
         // A smaller one with more samples is seen alone.
         let [small, many] = [9, 99].map(|samples| film_of([6, 4], 1, samples));
         assert_eq!(prepared(holes.clone(), small.clone(), false), quick(&small, None).pixels);
-        assert_eq!(prepared(calm.clone(), many.clone(), true), quick(&many, None).pixels);
+        assert_eq!(prepared(cached.clone(), many.clone(), true), quick(&many, None).pixels);
         let few = film_of([6, 4], 1, 3);
         assert_eq!(prepared(whole.clone(), few.clone(), true), quick(&few, None).pixels);
     }

@@ -135,7 +135,7 @@ mod tests {
         let world = Arc::new(World::new(builtin::build("office").expect("built in")));
         let request = request(Arc::clone(&world), lit("overcast"), [16, 9]);
         let view = View { gi: Gi::Cached, ..request.view.clone() };
-        let request = Request { view, is_calm: true, ..request };
+        let request = Request { view, wants_cached: true, ..request };
         let mut kept = Kept::new((None, RayChoice::default()), Arc::new(Mutex::new(gpu)));
         let mut session = Session::new(&world, &request.environment, request.view.clone());
         kept.keep_training(&mut session, &Arc::new(request.clone()));

@@ -216,7 +216,7 @@ pub(super) mod tests {
             moving: false,
             previews: true,
             device: DeviceChoice::Cpu,
-            is_calm: false,
+            wants_cached: false,
             inspects_cache: false,
             rule: StopRule::default(),
             is_frozen: false,
@@ -239,7 +239,7 @@ pub(super) mod tests {
             cache: Err(NoCache::Unasked),
             curves: [Vec::new(), Vec::new()],
             backdrop: None,
-            calm_seconds: 0.0,
+            cached_seconds: 0.0,
             rest: Arc::new(Rest::new()),
         }
     }

@@ -26,7 +26,7 @@ pub(crate) struct Request {
     /// Where it is rendered.
     pub device: DeviceChoice,
     /// Show light from a radiance cache while there is little of what is asked for.
-    pub is_calm: bool,
+    pub wants_cached: bool,
     /// Tell what is in that cache.
     pub inspects_cache: bool,
     /// When to stop.
@@ -90,7 +90,7 @@ impl Request {
             && self.split == new.split
             && self.device == new.device
             && self.is_frozen == new.is_frozen
-            && self.is_calm == new.is_calm
+            && self.wants_cached == new.wants_cached
             && self.inspects_cache == new.inspects_cache
             && self.reference.as_ref().map(Arc::as_ptr) == new.reference.as_ref().map(Arc::as_ptr)
             && self.rule == new.rule

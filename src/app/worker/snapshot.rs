@@ -74,9 +74,9 @@ impl SessionSnapshot {
 pub(crate) enum NoCache {
     /// Nobody has asked for it.
     Unasked,
-    /// It is there for fast light, which only denoised pictures show.
+    /// It is there for cached light, which only denoised pictures show.
     NotDenoised,
-    /// A split view compares pictures, and shows no fast light.
+    /// A split view compares pictures, and shows no cached light.
     Split,
     /// The device has many samples before a cache would be trained.
     QuickDevice,
@@ -103,14 +103,14 @@ pub(crate) struct Snapshot {
     pub plain: Option<SessionSnapshot>,
     /// What learning counted, once it has ended.
     pub counters: Option<Arc<LearningGrid>>,
-    /// What is in the radiance cache of fast light.
+    /// What is in the radiance cache of cached light.
     pub cache: Result<Arc<CacheFacts>, NoCache>,
     /// How the error of `main` and of `plain` fell.
     pub curves: [Vec<Point>; 2],
     /// Another film of the same view; its samples help where `main` has few.
     pub backdrop: Option<Backdrop>,
     /// Seconds spent on a backdrop whose light comes from a radiance cache, which are none of `main`'s.
-    pub calm_seconds: f64,
+    pub cached_seconds: f64,
     /// Whoever shows it says here when the next one will be wanted.
     pub(in crate::app) rest: Arc<Rest>,
 }
@@ -168,9 +168,9 @@ impl Snapshot {
         self.now.samples as f64 / self.main.film.pixels().len().max(1) as f64
     }
 
-    /// Seconds of learning and rendering, fast light included.
+    /// Seconds of learning and rendering, cached light included.
     pub(crate) fn seconds(&self) -> f64 {
-        self.now.elapsed_seconds() + self.calm_seconds
+        self.now.elapsed_seconds() + self.cached_seconds
     }
 
     /// Whether the picture has its full size and every pixel a sample: it has not at first and while

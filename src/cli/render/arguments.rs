@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Parser as _;
 use glam::Vec3;
 
+use crate::cli::camera::CameraArguments;
 use crate::cli::choices::SceneArguments;
 use crate::cli::picture::PictureArguments;
 use crate::cli::values;
@@ -17,7 +18,7 @@ use crate::path::{Background, PathLimits, World, framing};
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
 use crate::render::{Crop, Gi, Sampling, Sharing, StopRule, View};
-use crate::scene::{Camera, Medium, Projection, Scene, builtin};
+use crate::scene::{Camera, Medium, Scene, builtin};
 
 /// Arguments of `render`.
 #[derive(Debug, Clone, clap::Args)]
@@ -79,15 +80,8 @@ pub(in crate::cli) struct RenderArguments {
     /// Which of the file's cameras, counted from 0.
     #[arg(long, value_parser = values::whole::<usize>(0..=u32::MAX), value_name = "N", help_heading = "Camera")]
     pub(super) camera: Option<usize>,
-    /// Camera position in metres, instead of a camera of the file.
-    #[arg(long, value_parser = values::vector, requires = "target", allow_hyphen_values = true, value_name = "X,Y,Z", help_heading = "Camera")]
-    pub(super) eye: Option<Vec3>,
-    /// What the camera at --eye looks at.
-    #[arg(long, value_parser = values::vector, requires = "eye", allow_hyphen_values = true, value_name = "X,Y,Z", help_heading = "Camera")]
-    pub(super) target: Option<Vec3>,
-    /// Vertical field of view in degrees.
-    #[arg(long, value_parser = values::positive, value_name = "DEG", help_heading = "Camera")]
-    pub(super) fov: Option<f64>,
+    #[command(flatten)]
+    pub(in crate::cli) place: CameraArguments,
     /// Radius of a thin lens in metres; 0 keeps everything sharp.
     #[arg(long, value_parser = values::not_negative, value_name = "M", help_heading = "Camera")]
     pub(super) lens_radius: Option<f32>,
@@ -114,8 +108,9 @@ pub(in crate::cli) struct RenderArguments {
     /// pixel, a CPU makes a coarser picture.
     #[arg(long, value_parser = values::positive, value_name = "S", help_heading = "Stop")]
     pub(in crate::cli) seconds: Option<f64>,
-    /// Stop when the estimated relative RMS error falls below this, e.g. 0.05 or 5%.
-    #[arg(long, value_parser = values::noise, value_name = "E", help_heading = "Stop")]
+    /// Stop when the estimated relative RMS error falls below this, e.g. 0.05 or 5%; it is known from 16
+    /// samples per pixel on.
+    #[arg(long, value_parser = values::noise, allow_hyphen_values = true, value_name = "E", help_heading = "Stop")]
     pub(super) noise: Option<f64>,
 
     /// How the map is sampled.
@@ -144,7 +139,8 @@ pub(in crate::cli) struct RenderArguments {
     /// Importance table of the map: tile-local, u32, f32, f64.
     #[arg(long, default_value = "tile-local", value_name = "KIND", help_heading = "Light")]
     pub(super) table: TableKind,
-    /// Surface vertices at which a path gathers light; 1 is direct light only.
+    /// Surface vertices at which a path gathers light; 1 is direct light only, 0 lamps
+    /// and the map alone.
     #[arg(long, default_value = "8", value_parser = values::whole::<u32>(0..=100_000), value_name = "N", help_heading = "Light")]
     pub(super) bounces: u32,
     /// Never end dim paths at random.
@@ -194,7 +190,8 @@ pub(in crate::cli) struct RenderArguments {
     /// merge`. All parts take the same options, of which those for .png and .exr are for merge.
     #[arg(long, value_parser = values::part, conflicts_with_all = ["seconds", "noise"], value_name = "I/N", help_heading = "Farm")]
     pub(super) part: Option<Part>,
-    /// Keeps what is done in this file; the same command goes on from it, should this one be killed.
+    /// Keeps what is done in this file; the same command goes on from it, should this one be killed. With
+    /// more samples asked for it goes on, too, by what was learned for the first.
     #[arg(long, value_name = "FILE", help_heading = "Farm")]
     pub(super) checkpoint: Option<PathBuf>,
     /// Seconds between two writings of the checkpoint.
@@ -218,7 +215,8 @@ pub(in crate::cli) struct RenderArguments {
 }
 
 fn tile_grid(text: &str) -> std::result::Result<(u32, u32), String> {
-    let (columns, rows) = values::pair(text)?;
+    let (columns, rows) = values::pair(text)
+        .map_err(|_| "expected two positive whole numbers like 16x8".to_owned())?;
     if columns > 256 || rows > 256 {
         return Err("at most 256x256 tiles".to_owned());
     }
@@ -271,9 +269,18 @@ impl RenderArguments {
     /// A picture to be denoised gains nothing from noise that neighbours share, which filters keep.
     pub(super) fn sharing(&self) -> Sharing {
         match self.sharing {
-            Sharing::Auto if self.picture.denoise.is_some() => Sharing::Off,
+            Sharing::Auto if self.picture.is_denoised(self.pictures()) => Sharing::Off,
             asked => asked,
         }
+    }
+
+    /// Whether albedo, normal and depth are to be found.
+    pub(super) fn wants_surfaces(&self) -> bool {
+        self.picture.wants_surfaces(self.pictures())
+    }
+
+    fn pictures(&self) -> impl Iterator<Item = &PathBuf> {
+        self.outputs.iter().chain(&self.frame_of_video)
     }
 
     /// Width and height of what is rendered.
@@ -303,7 +310,7 @@ impl RenderArguments {
                 corner: [left, top],
                 whole: [self.size.0, self.size.1],
             }),
-            layers: self.picture.wants_surfaces(),
+            layers: self.wants_surfaces(),
             ..View::new(camera, size)
         }
     }
@@ -334,11 +341,8 @@ impl RenderArguments {
 
     pub(super) fn camera(&self, world: &World, notices: &mut Notices) -> Result<Camera> {
         let cameras = &world.scene.cameras;
-        let mut camera = if let (Some(eye), Some(target)) = (self.eye, self.target) {
-            if eye == target {
-                return Err(Error::new("--eye and --target are the same point"));
-            }
-            Camera::look_at(eye, target, 0.9)
+        let camera = if let Some(camera) = self.place.placed()? {
+            camera
         } else if let Some(index) = self.camera {
             cameras.get(index).cloned().ok_or_else(|| {
                 let there_are = match cameras.len() {
@@ -355,7 +359,7 @@ impl RenderArguments {
             let eye = chosen.world_from_camera.translation;
             let target = eye - chosen.world_from_camera.matrix3.z_axis * chosen.focus_distance;
             notices.add(format!(
-                "{} has no camera; the view is --eye {},{},{} --target {},{},{} --fov {:.1}",
+                "{} has no camera; the view is --eye {},{},{} --target {},{},{} --fov {}",
                 self.scene,
                 eye.x,
                 eye.y,
@@ -367,13 +371,7 @@ impl RenderArguments {
             ));
             chosen
         };
-        if let Some(degrees) = self.fov {
-            if degrees >= 179.0 {
-                return Err(Error::new(format!("--fov {degrees}: must be below 179 degrees")));
-            }
-            camera.projection =
-                Projection::Perspective { fov_y_radians: degrees.to_radians() as f32 };
-        }
+        let mut camera = self.place.with_fov(camera)?;
         camera.lens_radius = self.lens_radius.unwrap_or(camera.lens_radius);
         camera.focus_distance = self.focus.map_or(camera.focus_distance, |f| f as f32);
         Ok(camera)

@@ -41,13 +41,13 @@ impl<'a> Frames<'a> {
         let (motion, all) = match (&arguments.frames, arguments.turntable) {
             (None, None) => return Ok(None),
             (_, Some(count)) => {
-                let about = arguments.target.unwrap_or_else(|| centre(world, camera));
+                let about = arguments.place.target.unwrap_or_else(|| centre(world, camera));
                 (Motion::Turn { about, count }, 0..=count - 1)
             }
             (Some(frames), None) => {
                 let paths = &world.scene.camera_paths;
                 let path = paths.get(arguments.camera.unwrap_or(0)).and_then(Option::as_ref);
-                let path = path.filter(|_| arguments.eye.is_none()).ok_or_else(|| {
+                let path = path.filter(|_| arguments.place.eye.is_none()).ok_or_else(|| {
                     Error::new(format!(
                         "--frames: the camera does not move in {} (--turntable turns any)",
                         arguments.scene

@@ -8,7 +8,6 @@ use crate::cli::picture::{check_kept, say_written};
 use crate::error::{Error, Result};
 use crate::image::{check_writable, is_same_file};
 use crate::light_grid::LightGrid;
-use crate::medium::Fog;
 use crate::output::distributions::{check_distributions_extension, write_distributions};
 use crate::output::record::{self, Record};
 use crate::path::World;
@@ -55,7 +54,7 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
         check_writable(file)?;
     }
     if arguments.part.is_none() {
-        arguments.picture.say_unused(arguments.outputs.iter());
+        arguments.picture.say_unused(&arguments.outputs);
     }
     Ok(())
 }
@@ -119,32 +118,14 @@ pub(super) fn settings(
     world: &World,
     view: &View,
 ) -> Vec<(&'static str, serde_json::Value)> {
-    let fog = view.fog(world).map(|fog| {
-        let Fog { interior, bounds: [low, high] } = fog;
-        serde_json::json!({
-            "scattering": interior.scattering.to_array(),
-            "absorption": (interior.extinction - interior.scattering).to_array(),
-            "anisotropy": interior.phase.mean_cosine(),
-            "box": [low.to_array(), high.to_array()],
-        })
-    });
-    vec![
-        ("fog", serde_json::json!(fog)),
-        ("sampling", serde_json::json!(arguments.sampling)),
-        ("sharing", serde_json::json!(view.sharing)),
-        ("gi", serde_json::json!(arguments.gi)),
+    let mut settings = record::settings_of(view, world);
+    settings.extend([
         ("table", serde_json::json!(arguments.table.to_string())),
         ("tiles", serde_json::json!(format!("{}x{}", arguments.tiles.0, arguments.tiles.1))),
-        ("grid_columns", serde_json::json!(arguments.grid)),
-        ("bounces", serde_json::json!(arguments.bounces)),
-        ("russian_roulette", serde_json::json!(!arguments.no_russian_roulette)),
-        ("filter", serde_json::json!(arguments.filter)),
-        ("region", serde_json::json!(arguments.region)),
-        ("background", serde_json::json!(arguments.background.unwrap_or_default())),
         ("env_rotation_degrees", serde_json::json!(arguments.env_rotation)),
         ("env_intensity", serde_json::json!(arguments.env_intensity)),
         ("env_sun", serde_json::json!(arguments.env_sun)),
         ("materials", serde_json::json!(arguments.of_scene.edits())),
-        ("seed", serde_json::json!(arguments.seed)),
-    ]
+    ]);
+    settings
 }

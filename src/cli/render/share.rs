@@ -18,7 +18,7 @@ use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
 use crate::output::film_file::{FilmFacts, Part, read_film, write_film};
 use crate::output::record::Record;
-use crate::path::World;
+use crate::path::{PathLimits, World};
 use crate::render::film::Film;
 use crate::render::{Doubling, Figures, Gi, Phase, Session, StopRule, View};
 use crate::sources;
@@ -48,6 +48,8 @@ pub(super) struct Share {
     is_alone: bool,
     /// See [`FilmFacts::picture`].
     picture: Vec<(String, String)>,
+    /// What checkpoints hold as [`FilmFacts::metadata`].
+    metadata: Vec<(String, String)>,
 }
 
 /// A film to go on from.
@@ -107,6 +109,7 @@ impl Share {
                 true => identity(arguments, world, environment, view),
                 false => Vec::new(),
             },
+            metadata: Vec::new(),
         };
         if let Some(path) = &arguments.checkpoint {
             if path.exists() {
@@ -158,8 +161,16 @@ impl Share {
         let before = self.awaited.as_ref().filter(|awaited| awaited.figures.is_some());
         if let (Some(Awaited { film, .. }), Some(checkpoint)) = (before, &self.checkpoint) {
             let (path, samples) = (checkpoint.path.display(), film.min_samples());
-            say(notices, format!("{path}: goes on from {samples} samples a pixel"));
+            let more = self.rule.samples.filter(|asked| self.first + samples > *asked);
+            let more =
+                more.map_or_else(String::new, |_| ", which is more than is asked for".into());
+            say(notices, format!("{path}: goes on from {samples} samples a pixel{more}"));
         }
+    }
+
+    /// What pictures of its checkpoints are to say about themselves.
+    pub(super) fn set_metadata(&mut self, metadata: Vec<(String, String)>) {
+        self.metadata = metadata;
     }
 
     /// When to stop; samples are counted from the picture's first.
@@ -329,7 +340,7 @@ impl Share {
     /// If it cannot be written; the one from before is kept.
     pub(super) fn keep(&mut self, session: &Session<'_>) -> Result<()> {
         let noted = session.noted();
-        let facts = FilmFacts { noted, ..self.facts(session.figures(), Vec::new()) };
+        let facts = FilmFacts { noted, ..self.facts(session.figures(), self.metadata.clone()) };
         let Some(checkpoint) = &mut self.checkpoint else { return Ok(()) };
         let written = write_film(&checkpoint.path, &facts, session.film(), self.first);
         checkpoint.written = Instant::now();
@@ -374,20 +385,6 @@ fn identity(
     environment: &Environment,
     view: &View,
 ) -> Vec<(String, String)> {
-    let View {
-        camera,
-        width,
-        height,
-        filter,
-        sampling,
-        limits,
-        seed,
-        points,
-        grid_columns,
-        distributions,
-        medium,
-        ..
-    } = view;
     let scene = match sources::is_built_in_scene(&arguments.scene) {
         true => {
             let changes = (arguments.of_scene.options().hide, arguments.of_scene.edits());
@@ -399,19 +396,32 @@ fn identity(
         true => arguments.map().to_owned(),
         false => Digest::new().map(environment.map()).to_string(),
     };
-    let settings = Digest::new()
-        .debug(&(filter, sampling, arguments.sharing(), limits, points, grid_columns))
-        .debug(&(distributions, medium, view.background, view.layers, arguments.learning_paths))
-        .debug(&arguments.environment_options());
+    let PathLimits { bounces, russian_roulette } = view.limits;
     let pairs = [
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
         ("scene", scene),
         ("map", map),
-        ("camera", Digest::new().debug(camera).to_string()),
-        ("size", format!("{width}x{height}")),
-        ("region", format!("{:?}", view.crop)),
-        ("seed", seed.to_string()),
-        ("settings", settings.to_string()),
+        ("camera", Digest::new().debug(&view.camera).to_string()),
+        ("size", format!("{}x{}", view.width, view.height)),
+        ("--region", format!("{:?}", view.crop)),
+        ("--seed", view.seed.to_string()),
+        ("--filter", format!("{:?}", view.filter)),
+        ("--sampling", view.sampling.name().to_owned()),
+        ("--sharing or --denoise", format!("{:?}", arguments.sharing())),
+        ("--bounces", bounces.to_string()),
+        ("--no-russian-roulette", (!russian_roulette).to_string()),
+        ("--grid", view.grid_columns.to_string()),
+        ("--tiles", format!("{:?}", arguments.tiles)),
+        ("--table", arguments.table.to_string()),
+        ("--learning-paths", format!("{:?}", arguments.learning_paths)),
+        ("--env-rotation", arguments.env_rotation.to_string()),
+        ("--env-intensity", arguments.env_intensity.to_string()),
+        ("--env-sun", arguments.env_sun.to_string()),
+        ("fog", Digest::new().debug(&view.medium).to_string()),
+        ("--background", format!("{:?}", view.background)),
+        ("layers", view.layers.to_string()),
+        // What no option changes, but versions may.
+        ("settings", Digest::new().debug(&(view.points, &view.distributions)).to_string()),
     ];
     pairs.map(|(name, value)| (name.to_owned(), value)).into()
 }

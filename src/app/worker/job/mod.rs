@@ -1,5 +1,6 @@
 //! One request being worked on.
 
+mod cached;
 mod publishing;
 mod sessions;
 
@@ -8,7 +9,8 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
-use publishing::{Reading, calm_worth};
+use cached::{CachedPicture, worth};
+use publishing::Reading;
 
 use super::kept::{Kept, Learned};
 use super::{Activity, Point, Request, Shared};
@@ -21,9 +23,6 @@ use crate::radiance_cache::CacheFacts;
 use crate::render::film::Film;
 use crate::render::{Gi, Phase, Sampling, Session, StopRule, View};
 
-/// Samples a pixel of the calm picture, which is rendered before the exact one: with them it is as good,
-/// denoised, as the exact one with twice as many, in half the time.
-const CALM_SAMPLES: u32 = 16;
 /// While there is much to learn the picture goes on a little this often.
 const STANDSTILL: Duration = Duration::from_millis(400);
 
@@ -43,12 +42,8 @@ pub(super) struct Job<'a> {
     films: Vec<Weak<Film>>,
     /// The distributions published last, with what tells whether they are still those in use.
     distributions: Option<((usize, u64), Arc<LightGrid>)>,
-    /// The calm film published last, of so many samples in all.
-    calm_film: Option<(u64, Arc<Film>)>,
-    /// Whether that is all of it.
-    has_calm: bool,
-    /// Seconds spent on the calm picture.
-    calm_seconds: f64,
+    /// Seconds spent on the cached picture.
+    cached_seconds: f64,
     /// What is known of the radiance cache, with what tells of which.
     cache: Option<((u64, f32), Arc<CacheFacts>)>,
     /// How the error of the main and of the plain picture fell.
@@ -74,9 +69,7 @@ impl<'a> Job<'a> {
             readings: [None, None],
             films: Vec::new(),
             distributions: None,
-            calm_film: None,
-            has_calm: false,
-            calm_seconds: 0.0,
+            cached_seconds: 0.0,
             cache: None,
             curves: [Vec::new(), Vec::new()],
         }
@@ -104,7 +97,7 @@ impl<'a> Job<'a> {
             }
             self.measure(&session);
             self.keep_backdrop(Cow::Borrowed(session.film()));
-            self.publish(Activity::Moving, &session, [None, None]);
+            self.publish(Activity::Moving, &session, None, &mut CachedPicture::default());
             if session.samples() >= 64 {
                 self.rest();
             }
@@ -125,18 +118,18 @@ impl<'a> Job<'a> {
         let mut plain = self.request.split.then(|| {
             Session::new(world, environment, View { sampling: Sampling::Plain, ..view.clone() })
         });
-        let mut calm = None;
-        // Of the calm picture, one after the other.
+        let mut cached = CachedPicture::default();
+        // Of the cached picture, one after the other.
         let mut turns = 0;
         // When the picture went on last.
         let mut went_on = Instant::now();
         while let Some(activity) = self.next_activity(&main) {
-            let wants_calm = self.is_calm(&main);
-            if !wants_calm {
-                self.end_calm(&mut calm);
-            } else if calm.is_none() && !self.has_calm && self.is_time_for_calm(&main) {
+            if !self.wants_cached(&main) {
+                cached.end(|session| self.kept.keep_training(session, &self.request));
+            } else if cached.is_absent() && self.is_time_for_cached(&main) {
                 let view = View { gi: Gi::Cached, ..view.clone() };
-                calm = Some(self.experienced_session(world, environment, view));
+                let session = self.experienced_session(world, environment, view);
+                cached = CachedPicture::UnderWay(Box::new(session), None);
             }
             if !self.request.split {
                 plain = None;
@@ -152,7 +145,7 @@ impl<'a> Job<'a> {
                             continue;
                         }
                     }
-                    self.publish(activity, &main, [plain.as_ref(), calm.as_ref()]);
+                    self.publish(activity, &main, plain.as_ref(), &mut cached);
                     self.rest();
                     continue;
                 }
@@ -166,41 +159,18 @@ impl<'a> Job<'a> {
                     went_on = Instant::now();
                 }
                 Activity::Learning(_) => self.learn(&mut main),
-                Activity::Rendering | Activity::Moving => match &mut plain {
-                    // Equal time, learning included.
-                    Some(plain) if plain.elapsed_seconds() < main.elapsed_seconds() => {
-                        self.advance(plain, None, true);
-                    }
-                    _ if let Some(calm) =
-                        calm.as_mut().filter(|calm| goes_first(calm, &main, turns)) =>
-                    {
-                        let start = Instant::now();
-                        self.advance(calm, None, self.request.previews);
-                        self.calm_seconds += start.elapsed().as_secs_f64();
-                        turns += 1;
-                    }
-                    _ => {
-                        turns = 0;
-                        let distribution_paths = main.figures().distribution_paths;
-                        self.advance(&mut main, Some(self.rule()), self.request.previews);
-                        self.measure(&main);
-                        if main.figures().distribution_paths > distribution_paths {
-                            self.keep_distributions(&main, true);
-                        }
-                    }
-                },
+                Activity::Rendering | Activity::Moving => {
+                    self.take_turn(&mut main, plain.as_mut(), &mut cached, &mut turns);
+                }
             }
-            if let Some(complete) = calm.take_if(|calm| is_complete(calm)) {
-                self.complete_calm(complete);
-            }
+            cached.complete(|session| self.kept.keep_training(session, &self.request));
             let due = self.published.elapsed() >= self.publish_gap;
             let is_reading_due = due && self.is_reading_due(&main);
             if due && self.request.previews && !self.is_superseded() {
-                let others = [plain.as_ref(), calm.as_ref()];
-                let progress =
-                    progress(&main) + others.iter().flatten().map(|s| progress(s)).sum::<u64>();
+                let sessions = [Some(&main), plain.as_ref(), cached.session()];
+                let progress = sessions.into_iter().flatten().map(progress).sum();
                 if self.last != Some((activity, progress)) {
-                    self.publish(activity, &main, others);
+                    self.publish(activity, &main, plain.as_ref(), &mut cached);
                     self.last = Some((activity, progress));
                 }
             }
@@ -210,38 +180,59 @@ impl<'a> Job<'a> {
                 plain.iter().for_each(|plain| self.note(1, plain));
             }
         }
-        self.end_calm(&mut calm);
+        cached.end(|session| self.kept.keep_training(session, &self.request));
         if self.request.previews {
             self.keep_backdrop(Cow::Owned(main.into_film()));
         }
     }
 
+    /// Some samples of the picture that is next: the plain one at equal time, learning included, the cached
+    /// one so many `turns` in a row, or the main one.
+    fn take_turn(
+        &mut self,
+        main: &mut Session<'_>,
+        plain: Option<&mut Session<'_>>,
+        cached: &mut CachedPicture<'_>,
+        turns: &mut u32,
+    ) {
+        let is_behind = |plain: &&mut Session<'_>| plain.elapsed_seconds() < main.elapsed_seconds();
+        if let Some(plain) = plain.filter(is_behind) {
+            self.advance(plain, None, true);
+        } else if let Some(cached) = cached.next(main, *turns) {
+            let start = Instant::now();
+            self.advance(cached, None, self.request.previews);
+            self.cached_seconds += start.elapsed().as_secs_f64();
+            *turns += 1;
+        } else {
+            *turns = 0;
+            let distribution_paths = main.figures().distribution_paths;
+            self.advance(main, Some(self.rule()), self.request.previews);
+            self.measure(main);
+            if main.figures().distribution_paths > distribution_paths {
+                self.keep_distributions(main, true);
+            }
+        }
+    }
+
     /// Whether light from a radiance cache is to be shown beside what there is: not where a real GPU has
     /// many samples in a moment, nor where pictures are compared.
-    fn is_calm(&self, main: &Session<'_>) -> bool {
-        self.request.is_calm
+    fn wants_cached(&self, main: &Session<'_>) -> bool {
+        self.request.wants_cached
             && !self.request.split
             && !self.kept.device.is_quick(&self.request)
-            && calm_worth(main.samples()) > 0.0
+            && worth(main.samples()) > 0.0
     }
 
     /// Where the cache is to be trained first, every pixel has its first exact sample before.
-    fn is_time_for_calm(&self, main: &Session<'_>) -> bool {
+    fn is_time_for_cached(&self, main: &Session<'_>) -> bool {
         main.phase() == Phase::Rendering
             && (main.samples() > 0 || self.kept.has_training_for(&self.request))
     }
 
-    fn end_calm(&mut self, calm: &mut Option<Session<'_>>) {
-        (self.calm_film, self.has_calm) = (None, false);
-        if let Some(mut calm) = calm.take() {
-            self.kept.keep_training(&mut calm, &self.request);
-        }
-    }
-
-    /// When the main picture is done: what the calm one took counts.
+    /// When the main picture is done: what the cached one took counts.
     fn rule(&self) -> StopRule {
         let StopRule { seconds, .. } = self.request.rule;
-        let seconds = seconds.map(|seconds| seconds - self.calm_seconds);
+        let seconds = seconds.map(|seconds| seconds - self.cached_seconds);
         StopRule { seconds, ..self.request.rule }
     }
 
@@ -319,18 +310,6 @@ impl<'a> Job<'a> {
             slot = self.shared.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
         }
     }
-}
-
-/// Whether the calm picture gets its next sample before the exact one: a few of them for each. Until it
-/// has one the exact one has every third turn, for what is shown must not stand still while the cache is
-/// trained.
-fn goes_first(calm: &Session<'_>, main: &Session<'_>, turns: u32) -> bool {
-    let is_shown = calm.samples() > 0;
-    calm.samples() < CALM_SAMPLES.min(2 + 4 * main.samples()) && (is_shown || turns < 2)
-}
-
-fn is_complete(calm: &Session<'_>) -> bool {
-    calm.samples() >= CALM_SAMPLES
 }
 
 fn learned_share(session: &Session<'_>) -> f32 {

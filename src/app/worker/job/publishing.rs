@@ -4,8 +4,9 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::Job;
+use super::cached::{CachedPicture, worth};
 use super::sessions::SLICE;
-use super::{CALM_SAMPLES, Job};
 use crate::app::lock;
 use crate::app::worker::{Activity, Backdrop, NoCache, Point, Request, SessionSnapshot, Snapshot};
 use crate::light_grid::LightGrid;
@@ -23,10 +24,6 @@ const OLDEST: Duration = Duration::from_secs(2);
 const PUBLISH_SHARE: u32 = 40;
 /// But a picture that changes is shown at least so often.
 const LONGEST_GAP: Duration = Duration::from_millis(800);
-/// What one of them counts beside an exact one. (Before filtering it is worth five to ten; but its error
-/// falls no further.)
-const CALM_WORTH: f32 = 4.0;
-
 /// Sessions by what they are for.
 const MAIN: usize = 0;
 const PLAIN: usize = 1;
@@ -64,16 +61,6 @@ impl Job<'_> {
         }
     }
 
-    /// Ends a calm picture that is complete: its film is shown from then on, and no copy of it.
-    pub(super) fn complete_calm(&mut self, mut calm: Session<'_>) {
-        self.kept.keep_training(&mut calm, &self.request);
-        let samples = calm.figures().samples;
-        // What was published goes first: both together are large.
-        self.calm_film = None;
-        self.calm_film = Some((samples, Arc::new(calm.into_film())));
-        self.has_calm = true;
-    }
-
     /// The distributions in use. They are megabytes and seldom change: they are copied once.
     pub(super) fn distributions_of(&mut self, session: &Session<'_>) -> Option<Arc<LightGrid>> {
         let grid = session.grid()?;
@@ -92,7 +79,8 @@ impl Job<'_> {
         &mut self,
         activity: Activity,
         main: &Session<'_>,
-        [plain, calm]: [Option<&Session<'_>>; 2],
+        plain: Option<&Session<'_>>,
+        cached: &mut CachedPicture<'_>,
     ) {
         let start = Instant::now();
         self.kept.snapshots += 1;
@@ -110,9 +98,9 @@ impl Job<'_> {
             now: main.figures(),
             plain: plain_snapshot.map(|(snapshot, _)| snapshot),
             counters: self.counters.clone(),
-            backdrop: self.shown_backdrop(main, calm, rests),
-            calm_seconds: self.calm_seconds,
-            cache: self.cache_facts(calm.unwrap_or(main)),
+            backdrop: self.shown_backdrop(main, cached, rests),
+            cached_seconds: self.cached_seconds,
+            cache: self.cache_facts(cached.session().unwrap_or(main)),
             curves: self.curves.clone(),
             rest: Arc::clone(&self.shared.rest),
         };
@@ -135,7 +123,7 @@ impl Job<'_> {
         let kept = self.kept.training.as_ref().filter(|_| is_kept).map(|(training, _)| training);
         let missing = if request.view.limits.bounces < 2 {
             NoCache::OneBounce
-        } else if !request.is_calm {
+        } else if !request.wants_cached {
             NoCache::NotDenoised
         } else if request.split {
             NoCache::Split
@@ -154,12 +142,12 @@ impl Job<'_> {
         Ok(facts)
     }
 
-    /// What is shown together with the session's own film: the calm one once it has clearly more to say
+    /// What is shown together with the session's own film: the cached one once it has clearly more to say
     /// than what was seen before, as chance and gaps between its first pixels count against it.
     fn shown_backdrop(
-        &mut self,
+        &self,
         main: &Session<'_>,
-        calm: Option<&Session<'_>>,
+        cached: &mut CachedPicture<'_>,
         rests: bool,
     ) -> Option<Backdrop> {
         // What this job itself has kept has the same samples.
@@ -168,21 +156,9 @@ impl Job<'_> {
         let before = before.map(|film| Backdrop { film, worth: 1.0, is_cached: false });
         let seen = before.as_ref().map_or(0, |backdrop| backdrop.film.total_samples());
         let says_more = |samples: u64| 2 * samples > 3 * seen;
-        let film = match calm {
-            Some(calm) if says_more(calm.figures().samples) => {
-                // It is megabytes and is soon complete.
-                let samples = calm.figures().samples;
-                let kept = self.calm_film.take().filter(|(of, _)| rests || *of == samples);
-                let kept = kept.unwrap_or_else(|| (samples, Arc::new(calm.film().clone())));
-                Arc::clone(&self.calm_film.insert(kept).1)
-            }
-            None if self.has_calm => match &self.calm_film {
-                Some((samples, film)) if says_more(*samples) => Arc::clone(film),
-                _ => return before,
-            },
-            _ => return before,
-        };
-        Some(Backdrop { film, worth: calm_worth(main.samples()), is_cached: true })
+        let film = cached.film(says_more, rests);
+        let worth = worth(main.samples());
+        film.map(|film| Backdrop { film, worth, is_cached: true }).or(before)
     }
 
     /// Adds a point to a curve, unless nothing has happened since the last one.
@@ -294,12 +270,6 @@ impl Job<'_> {
         session.samples() > 0
             && self.reading(MAIN, self.in_place(session).as_ref(), false).is_none()
     }
-}
-
-/// What a sample of the calm picture counts where the exact one has so many: it fades out.
-pub(super) fn calm_worth(samples: u32) -> f32 {
-    let all = CALM_WORTH * CALM_SAMPLES as f32;
-    CALM_WORTH * ((4.0 * all - samples as f32) / (3.0 * all)).clamp(0.0, 1.0)
 }
 
 fn is_same((gpu, film): &(Gpu, DeviceFilm), other: &(Gpu, DeviceFilm)) -> bool {

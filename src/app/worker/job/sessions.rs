@@ -33,7 +33,7 @@ impl Job<'_> {
             crop.whole = crop.whole.map(|pixels| (pixels / shrink).max(1));
         }
         // Learning would take longer than the picture.
-        if self.request.is_calm && self.kept.has_training_for(&self.request) {
+        if self.request.wants_cached && self.kept.has_training_for(&self.request) {
             view.gi = Gi::Cached;
         }
         self.experienced_session(world, environment, view)

@@ -1,0 +1,95 @@
+//! The picture by light from a radiance cache: it is rendered before the exact one, and shown with it until
+//! that has more to say.
+
+use std::sync::Arc;
+
+use crate::render::Session;
+use crate::render::film::Film;
+
+/// Samples a pixel of it: with them it is as good, denoised, as the exact one with twice as many, in half the
+/// time.
+const SAMPLES: u32 = 16;
+/// What one of them counts beside an exact one. (Before filtering it is worth five to ten; but its error
+/// falls no further.)
+const WORTH: f32 = 4.0;
+
+/// How far it is.
+#[derive(Default)]
+pub(super) enum CachedPicture<'s> {
+    /// There is none.
+    #[default]
+    Absent,
+    /// It is rendered; the film published last, of so many samples in all.
+    UnderWay(Box<Session<'s>>, Option<(u64, Arc<Film>)>),
+    /// All of it, of so many samples in all.
+    Complete(u64, Arc<Film>),
+}
+
+impl<'s> CachedPicture<'s> {
+    /// Whether it has not been begun.
+    pub(super) fn is_absent(&self) -> bool {
+        matches!(self, Self::Absent)
+    }
+
+    /// What renders it.
+    pub(super) fn session(&self) -> Option<&Session<'s>> {
+        match self {
+            Self::UnderWay(session, _) => Some(session),
+            _ => None,
+        }
+    }
+
+    /// What renders it, if it gets its next sample before the exact picture: a few of them for each. Until it
+    /// has one the exact one has every third turn, for what is shown must not stand still while the cache is
+    /// trained.
+    pub(super) fn next(&mut self, main: &Session<'_>, turns: u32) -> Option<&mut Session<'s>> {
+        let Self::UnderWay(session, _) = self else { return None };
+        let is_shown = session.samples() > 0;
+        let is_next =
+            session.samples() < SAMPLES.min(2 + 4 * main.samples()) && (is_shown || turns < 2);
+        is_next.then_some(session)
+    }
+
+    /// Ends with it if it is complete: its film is shown from then on, and no copy of it. `keep` gets what
+    /// rendered it before.
+    pub(super) fn complete(&mut self, keep: impl FnOnce(&mut Session<'s>)) {
+        if self.session().is_some_and(|session| session.samples() >= SAMPLES)
+            && let Some(session) = self.end(keep)
+        {
+            *self = Self::Complete(session.figures().samples, Arc::new(session.into_film()));
+        }
+    }
+
+    /// Drops it. `keep` gets what rendered it, which is returned.
+    pub(super) fn end(&mut self, keep: impl FnOnce(&mut Session<'s>)) -> Option<Box<Session<'s>>> {
+        // The copy goes first: both together are large.
+        let Self::UnderWay(mut session, _) = std::mem::take(self) else { return None };
+        keep(&mut session);
+        Some(session)
+    }
+
+    /// Its film, if there is enough of it. A copy is made unless there is a new one already or, if it `rests`,
+    /// any: it is megabytes and is soon complete.
+    pub(super) fn film(
+        &mut self,
+        suffices: impl Fn(u64) -> bool,
+        rests: bool,
+    ) -> Option<Arc<Film>> {
+        match self {
+            Self::UnderWay(session, copy) if suffices(session.figures().samples) => {
+                let samples = session.figures().samples;
+                let kept = copy.take().filter(|(of, _)| rests || *of == samples);
+                let kept = kept.unwrap_or_else(|| (samples, Arc::new(session.film().clone())));
+                Some(Arc::clone(&copy.insert(kept).1))
+            }
+            Self::Complete(samples, film) if suffices(*samples) => Some(Arc::clone(film)),
+            _ => None,
+        }
+    }
+}
+
+/// What a sample of it counts where the exact picture has so many: it fades out.
+pub(super) fn worth(samples: u32) -> f32 {
+    let all = WORTH * SAMPLES as f32;
+    WORTH * ((4.0 * all - samples as f32) / (3.0 * all)).clamp(0.0, 1.0)
+}
