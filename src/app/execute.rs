@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::commands::Command;
 use super::document::{Document, Viewpoint};
 use super::history;
-use super::interface::{Chosen, Dock, Interface, Prompt, Purpose, Tab};
+use super::interface::{Chosen, Cursor, Dock, Interface, Prompt, Purpose, Tab};
 use super::screen::color_image;
 use super::worker::Reference;
 use super::{App, Later, convergence, lock, save, surface_map, theme};
@@ -346,23 +346,13 @@ impl App {
 
     /// Opens the system's file dialogue for the prompt; its answer comes as a command.
     fn browse(&mut self, purpose: Purpose) {
-        let dialog = rfd::AsyncFileDialog::new();
+        let (kind, extensions) = purpose.files();
+        let dialog = rfd::AsyncFileDialog::new().add_filter(kind, extensions);
         let (sender, wake) = (self.later.0.clone(), self.wake.clone());
         let chosen: std::pin::Pin<Box<dyn Future<Output = Option<rfd::FileHandle>> + Send>> =
-            match purpose {
-                Purpose::Scene => {
-                    Box::pin(dialog.add_filter("glTF scene", &["gltf", "glb"]).pick_file())
-                }
-                Purpose::Reference => {
-                    Box::pin(dialog.add_filter("Picture", &["exr", "hdr"]).pick_file())
-                }
-                Purpose::Map => Box::pin(dialog.add_filter("Map", &MAP_EXTENSIONS).pick_file()),
-                Purpose::Picture => {
-                    Box::pin(dialog.add_filter("Picture", &["png", "exr"]).save_file())
-                }
-                Purpose::Distributions => Box::pin(
-                    dialog.add_filter("Distributions", &["csv", "json", "exr"]).save_file(),
-                ),
+            match purpose.is_output() {
+                true => Box::pin(dialog.save_file()),
+                false => Box::pin(dialog.pick_file()),
             };
         let thread = std::thread::Builder::new().name("dialogue".to_owned()).spawn(move || {
             let start = Instant::now();
@@ -400,10 +390,6 @@ impl App {
 /// A person takes longer to close a file dialogue.
 const QUICKEST_ANSWER: Duration = Duration::from_millis(500);
 
-/// What maps' files are called.
-const MAP_EXTENSIONS: [&str; 9] =
-    ["exr", "hdr", "png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp"];
-
 /// How to open a file: what is not a glTF file is taken for a map.
 fn open_command(path: &Path) -> Command {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
@@ -429,7 +415,9 @@ impl Purpose {
 
 impl Interface {
     fn ask(&mut self, purpose: Purpose, path: String) {
-        self.prompt = Some(Prompt { purpose, path, is_focused: false, objection: None });
+        let cursor = Some(Cursor::OverAll);
+        let offers = Vec::new();
+        self.prompt = Some(Prompt { purpose, path, cursor, objection: None, offers });
     }
 
     fn toggle_developer(&mut self) {

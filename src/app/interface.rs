@@ -117,10 +117,21 @@ pub struct Prompt {
     pub purpose: Purpose,
     /// What has been typed.
     pub path: String,
-    /// Whether the field has been given the keyboard.
-    pub is_focused: bool,
+    /// Where the field is to get its cursor, and the keyboard with it.
+    pub cursor: Option<Cursor>,
     /// What is to be known of a path before it is taken, and of which.
     pub objection: Option<(String, Objection)>,
+    /// What the path may go on to, for those who asked.
+    pub offers: Vec<String>,
+}
+
+/// A place in a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cursor {
+    /// What is typed next takes the place of all.
+    OverAll,
+    /// What is typed next follows.
+    AtEnd,
 }
 
 /// What is to be known of a path before it is taken.
@@ -145,6 +156,26 @@ pub enum Purpose {
     Distributions,
     /// A picture without noise.
     Reference,
+}
+
+impl Purpose {
+    /// What its files hold, and their extensions.
+    pub fn files(self) -> (&'static str, &'static [&'static str]) {
+        match self {
+            Self::Scene => ("glTF scene", &["gltf", "glb"]),
+            Self::Map => {
+                ("Map", &["exr", "hdr", "png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp"])
+            }
+            Self::Picture => ("Picture", &["png", "exr"]),
+            Self::Distributions => ("Distributions", &["csv", "json", "exr"]),
+            Self::Reference => ("Picture", &["exr", "hdr"]),
+        }
+    }
+
+    /// Whether they are written.
+    pub fn is_output(self) -> bool {
+        matches!(self, Self::Picture | Self::Distributions)
+    }
 }
 
 impl Default for Interface {

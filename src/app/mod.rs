@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 mod album;
 pub(crate) mod commands;
 mod comparison;
+mod completion;
 pub(crate) mod convergence;
 pub mod document;
 pub mod drag;
@@ -314,7 +315,7 @@ impl App {
             panels::top::show(
                 ui,
                 &mut self.document,
-                &mut self.interface,
+                &self.interface,
                 &self.undo,
                 is_on_gpu,
                 commands,

@@ -1,8 +1,8 @@
 //! Colours, spacing and small pieces of layout that all panels share.
 
 use egui::{
-    Align2, Color32, CornerRadius, FontId, Margin, Pos2, RichText, Shape, Stroke, TextStyle, Ui,
-    Vec2, Visuals,
+    Align2, Color32, CornerRadius, FontId, Margin, Pos2, Rect, RichText, Shape, Stroke, TextStyle,
+    Ui, Vec2, Visuals,
 };
 use glam::Vec3;
 
@@ -222,11 +222,24 @@ pub(super) fn clock(seconds: f64) -> String {
 
 /// Text on a dark plate.
 pub(in crate::app) fn badge(ui: &Ui, at: Pos2, align: Align2, text: &str, color: Color32) {
-    let galley = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(13.0), color);
-    let rect = align.anchor_size(at, galley.size());
-    let plate = rect.expand2(Vec2::new(8.0, 4.0));
-    ui.painter().add(Shape::rect_filled(plate, 5.0, Color32::from_black_alpha(170)));
-    ui.painter().galley(rect.min, galley, color);
+    badges(ui, &[(at, align, text, color)]);
+}
+
+/// Several of them; one that would cover another is moved below it.
+pub(in crate::app) fn badges(ui: &Ui, badges: &[(Pos2, Align2, &str, Color32)]) {
+    let mut taken: Vec<Rect> = Vec::new();
+    for (at, align, text, color) in badges {
+        let font = FontId::proportional(13.0);
+        let galley = ui.painter().layout_no_wrap((*text).to_owned(), font, *color);
+        let mut rect = align.anchor_size(*at, galley.size());
+        let plate = |rect: Rect| rect.expand2(Vec2::new(8.0, 4.0));
+        while let Some(other) = taken.iter().find(|other| other.intersects(plate(rect))) {
+            rect = rect.translate(Vec2::new(0.0, other.bottom() - plate(rect).top() + 2.0));
+        }
+        taken.push(plate(rect));
+        ui.painter().add(Shape::rect_filled(plate(rect), 5.0, Color32::from_black_alpha(170)));
+        ui.painter().galley(rect.min, galley, *color);
+    }
 }
 
 #[cfg(test)]

@@ -4,10 +4,11 @@
 
 use std::mem::discriminant;
 
-use egui::Event;
+use egui::{Event, Key};
 
-/// Leaves in `events` what may be taken in one frame: presses of keys or of buttons, not both, and no button
-/// let go that was pressed in it. The rest is returned; it is meant for the next frame.
+/// Leaves in `events` what may be taken in one frame: presses of keys or of buttons, not both, no button let go
+/// that was pressed in it, and Tab, which completes what is typed, without anything typed before or after it.
+/// The rest is returned; it is meant for the next frame.
 pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
     let is_press = |event: &&Event| {
         matches!(
@@ -17,12 +18,16 @@ pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
     };
     let first = events.iter().find(is_press).map(discriminant);
     let is_other = |event: &Event| is_press(&event) && first != Some(discriminant(event));
-    let mut is_down = false;
+    let (mut is_down, mut typed) = (false, None);
     let ends = |event: &Event| {
         let is_button =
             |down| matches!(event, Event::PointerButton { pressed, .. } if *pressed == down);
         is_down |= is_button(true);
-        is_other(event) || (is_down && is_button(false))
+        let is_tab = matches!(event, Event::Key { key: Key::Tab, pressed: true, .. });
+        let is_typing = matches!(event, Event::Text(_) | Event::Key { pressed: true, .. });
+        let is_beside_tab = is_typing && typed.is_some_and(|was_tab| was_tab || is_tab);
+        typed = if is_typing { Some(is_tab) } else { typed };
+        is_other(event) || (is_down && is_button(false)) || is_beside_tab
     };
     let end = events.iter().position(ends).unwrap_or(events.len());
     events.split_off(end)
@@ -30,9 +35,34 @@ pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
 
 #[cfg(test)]
 mod tests {
-    use egui::{Key, Modifiers, PointerButton, Pos2};
+    use egui::{Modifiers, PointerButton, Pos2};
 
     use super::*;
+
+    #[test]
+    fn tab_completes_what_is_typed_before_it() {
+        let key = |key| Event::Key {
+            key,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers: Modifiers::NONE,
+        };
+        let text = |letter: &str| Event::Text(letter.to_owned());
+        let turns = [
+            vec![key(Key::A), text("a"), key(Key::B), text("b")],
+            vec![key(Key::Tab)],
+            vec![key(Key::Tab)],
+            vec![key(Key::C), text("c"), key(Key::Enter)],
+        ];
+        let mut events = turns.concat();
+        for turn in turns {
+            let rest = first_turn(&mut events);
+            assert_eq!(events, turn);
+            events = rest;
+        }
+        assert!(events.is_empty());
+    }
 
     #[test]
     fn what_a_key_means_for_a_drag_is_known_before_it_begins_and_a_tap_lasts_a_frame() {

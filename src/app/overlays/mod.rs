@@ -127,7 +127,7 @@ impl Overlay {
             }
             Self::Tile => "Probability with which each cell samples the tile chosen on the map.",
             Self::CacheCells => {
-                "Cells of the radiance cache, which fast light is taken from; hue is how often a cell's edge \
+                "Cells of the radiance cache, which cached light is taken from; hue is how often a cell's edge \
                  was doubled, dark is what nothing has trained, glossy surfaces among it."
             }
             Self::CacheRadiance => {
@@ -146,7 +146,12 @@ impl Overlay {
         }
     }
 
-    /// Whether it is about the grid, hence needs the surfaces behind the pixels.
+    /// Whether it is about the Light Grid.
+    pub fn is_of_grid(self) -> bool {
+        self.needs_surfaces() && !self.is_of_cache()
+    }
+
+    /// Whether it is about cells, hence needs the surfaces behind the pixels.
     pub fn needs_surfaces(self) -> bool {
         !matches!(self, Self::Samples | Self::Error | Self::Albedo | Self::Normal | Self::Depth)
     }

@@ -1,12 +1,13 @@
 //! Asking for a path: typed, pasted, recent, or from the system's dialogue.
 
-use std::path::Path;
+use std::path::{MAIN_SEPARATOR, Path, is_separator};
 
 use egui::text::{CCursor, CCursorRange};
-use egui::{Context, Id, Key, Modal, RichText, TextEdit};
+use egui::{Context, Id, Key, Modal, Modifiers, RichText, TextEdit};
 
 use crate::app::commands::Command;
-use crate::app::interface::{Interface, Objection, Purpose};
+use crate::app::completion::{Completion, complete, in_home};
+use crate::app::interface::{Cursor, Interface, Objection, Prompt, Purpose};
 use crate::app::settings_file::Settings;
 use crate::app::theme;
 use crate::sources;
@@ -29,6 +30,25 @@ fn sentence(objection: Objection) -> &'static str {
     match objection {
         Objection::Missing => "There is no such file.",
         Objection::Replaces => "This file is there already: Enter again replaces it.",
+    }
+}
+
+/// Ways to go on that are shown.
+const MOST_OFFERS: usize = 12;
+
+impl Prompt {
+    /// Goes on with what is typed as far as there is one way, and offers the ways where there are several.
+    fn complete(&mut self) {
+        let (_, extensions) = self.purpose.files();
+        let Completion { path, offers } = complete(&self.path, extensions);
+        (self.path, self.offers) = (path, offers);
+        self.cursor = Some(Cursor::AtEnd);
+    }
+
+    /// Goes on from here.
+    fn go_on(&mut self, path: String) {
+        self.path = path;
+        self.complete();
     }
 }
 
@@ -68,17 +88,26 @@ pub(in crate::app) fn show(
         ui.set_width(520.0);
         ui.label(RichText::new(title).heading());
         ui.add_space(4.0);
-        let field = TextEdit::singleline(&mut prompt.path);
-        let mut field = field.hint_text(hint).desired_width(f32::INFINITY).show(ui);
-        if !prompt.is_focused {
-            field.response.request_focus();
-            prompt.is_focused = true;
-            // Whoever types means another name.
+        if ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab)) {
+            prompt.complete();
+        }
+        let field = TextEdit::singleline(&mut prompt.path).hint_text(hint).lock_focus(true);
+        let mut field = field.desired_width(f32::INFINITY).show(ui);
+        if let Some(cursor) = prompt.cursor.take() {
+            // Asked for again, it would not keep Tab for itself in the next frame.
+            if !field.response.has_focus() {
+                field.response.request_focus();
+            }
             let end = CCursor::new(prompt.path.chars().count());
-            field.state.cursor.set_char_range(Some(CCursorRange::two(CCursor::new(0), end)));
+            let begin = if cursor == Cursor::OverAll { CCursor::new(0) } else { end };
+            field.state.cursor.set_char_range(Some(CCursorRange::two(begin, end)));
             field.state.store(ui.ctx(), field.response.id);
+            ui.ctx().request_repaint();
         }
         let field = field.response;
+        if field.changed() {
+            prompt.offers.clear();
+        }
         if field.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
             is_done = true;
             // Enter takes the keyboard away; without a path there is nothing to be done yet.
@@ -89,6 +118,17 @@ pub(in crate::app) fn show(
         if let Some(objection) = objection {
             ui.label(RichText::new(sentence(objection)).color(theme::ALERT));
         }
+        let offers = prompt.offers.iter().take(MOST_OFFERS);
+        let taken = offers.filter(|offer| ui.link(RichText::new(*offer).size(12.5)).clicked());
+        if let Some(offer) = taken.last().cloned() {
+            prompt.go_on(offer);
+            ui.ctx().request_repaint();
+        }
+        let hidden = prompt.offers.len().saturating_sub(MOST_OFFERS);
+        if hidden > 0 {
+            ui.label(theme::quiet(format!("and {hidden} more")));
+        }
+        let recent = if prompt.offers.is_empty() { recent } else { &[] };
         for name in recent {
             if ui.link(RichText::new(name).size(12.5)).clicked() {
                 prompt.path.clone_from(name);
@@ -106,12 +146,17 @@ pub(in crate::app) fn show(
             is_closed |= ui.button("Cancel").clicked();
         });
     });
-    let path = prompt.path.trim();
-    if is_done && !path.is_empty() {
-        let is_known = prompt.objection.as_ref().is_some_and(|(of, _)| of == path);
+    let typed = prompt.path.trim();
+    let path = &in_home(typed);
+    if is_done && Path::new(path).is_dir() {
+        let is_ended = typed.ends_with(is_separator);
+        prompt.go_on(if is_ended { typed.to_owned() } else { format!("{typed}{MAIN_SEPARATOR}") });
+        context.request_repaint();
+    } else if is_done && !typed.is_empty() {
+        let is_known = prompt.objection.as_ref().is_some_and(|(of, _)| of == typed);
         match objection(prompt.purpose, path) {
             Some(objection) if objection == Objection::Missing || !is_known => {
-                prompt.objection = Some((path.to_owned(), objection));
+                prompt.objection = Some((typed.to_owned(), objection));
             }
             _ => {
                 commands.push(prompt.purpose.command(path));

@@ -13,48 +13,95 @@ use crate::render::gpu::DeviceChoice;
 pub(in crate::app) fn show(
     ui: &mut Ui,
     document: &mut Document,
-    interface: &mut Interface,
+    interface: &Interface,
     undo: &Undo<Document>,
     is_on_gpu: bool,
     commands: &mut Vec<Command>,
 ) {
     let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(10, 7));
     Panel::top("top").frame(frame).show(ui, |ui| {
+        let width = ui.ctx().content_rect().width();
+        let is_tight = width < TIGHT;
+        if width < TIGHTEST {
+            ui.spacing_mut().item_spacing.x = 3.0;
+            ui.spacing_mut().button_padding.x = 7.0;
+        }
         ui.horizontal(|ui| {
             files(ui, commands);
-            ui.separator();
-            steps(ui, undo, commands);
-            ui.separator();
-            device(ui, document, is_on_gpu);
+            if is_tight {
+                ui.menu_button("More", |ui| {
+                    copy(ui, commands);
+                    steps(ui, undo, commands);
+                    ui.separator();
+                    device(ui, document, is_on_gpu);
+                    ui.separator();
+                    restart(ui, commands);
+                    shortcuts(ui, "Keys and gestures", commands);
+                });
+            } else {
+                copy(ui, commands);
+                ui.separator();
+                steps(ui, undo, commands);
+                ui.separator();
+                ui.spacing_mut().item_spacing.x = 3.0;
+                device(ui, document, is_on_gpu);
+                ui.spacing_mut().item_spacing.x = 8.0;
+            }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                running(ui, document, interface, commands);
+                if !is_tight {
+                    shortcuts(ui, "?", commands);
+                }
+                developer(ui, interface, commands);
+                // The right panel has it too.
+                if !theme::is_narrow(ui) {
+                    denoise(ui, document);
+                }
+                if !is_tight {
+                    ui.separator();
+                    restart(ui, commands);
+                }
+                pause(ui, interface, commands);
             });
         });
     });
 }
 
+/// Points of width below which there is no room for all in a row.
+const TIGHT: f32 = 800.0;
+/// And where the little that is left must move together.
+const TIGHTEST: f32 = 480.0;
+
+fn button(ui: &mut Ui, (text, hint): (&str, &str), commands: &mut Vec<Command>, command: Command) {
+    if ui.button(text).on_hover_text(hint).clicked() {
+        commands.push(command);
+    }
+}
+
 fn files(ui: &mut Ui, commands: &mut Vec<Command>) {
     let is_narrow = theme::is_narrow(ui);
-    let has_room = ui.ctx().content_rect().width() >= 800.0;
-    let mut button = |text: &str, hint: &str, command: Command| {
-        if ui.button(text).on_hover_text(hint).clicked() {
-            commands.push(command);
-        }
-    };
-    button(
-        if is_narrow { "Scene…" } else { "Open scene…" },
-        "A glTF file (Ctrl O); it can be dropped onto the window too",
-        Command::ChooseScene,
-    );
-    button(
-        if is_narrow { "Map…" } else { "Open map…" },
-        "A lat-long HDR map (Ctrl M); it can be dropped onto the window too",
-        Command::ChooseMap,
-    );
-    button("Save…", "The picture as .png or .exr (Ctrl S)", Command::ChooseSave);
-    if has_room {
-        button("Copy", "The picture to the clipboard (Ctrl C)", Command::Copy);
-    }
+    let scene = if is_narrow { "Scene…" } else { "Open scene…" };
+    let hint = "A glTF file (Ctrl O); it can be dropped onto the window too";
+    button(ui, (scene, hint), commands, Command::ChooseScene);
+    let map = if is_narrow { "Map…" } else { "Open map…" };
+    let hint = "A lat-long HDR map (Ctrl M); it can be dropped onto the window too";
+    button(ui, (map, hint), commands, Command::ChooseMap);
+    let hint = "The picture as .png or .exr (Ctrl S)";
+    button(ui, ("Save…", hint), commands, Command::ChooseSave);
+}
+
+fn copy(ui: &mut Ui, commands: &mut Vec<Command>) {
+    let hint = "The picture to the clipboard (Ctrl C)";
+    button(ui, ("Copy", hint), commands, Command::Copy);
+}
+
+fn restart(ui: &mut Ui, commands: &mut Vec<Command>) {
+    button(ui, ("Restart", "Start the picture again (R)"), commands, Command::Restart);
+}
+
+fn pause(ui: &mut Ui, interface: &Interface, commands: &mut Vec<Command>) {
+    let words =
+        if interface.paused { ("Resume", "Go on (Space)") } else { ("Pause", "Pause (Space)") };
+    button(ui, words, commands, Command::TogglePause);
 }
 
 fn steps(ui: &mut Ui, undo: &Undo<Document>, commands: &mut Vec<Command>) {
@@ -70,7 +117,6 @@ fn steps(ui: &mut Ui, undo: &Undo<Document>, commands: &mut Vec<Command>) {
 
 /// Who renders; what is highlighted is what does, not what was asked for.
 fn device(ui: &mut Ui, document: &mut Document, is_on_gpu: bool) {
-    ui.spacing_mut().item_spacing.x = 3.0;
     let mut choose = |text: &str, hint: &str, is_on: bool, choice: DeviceChoice| {
         if ui.selectable_label(is_on, text).on_hover_text(hint).clicked() {
             document.light.device = choice;
@@ -78,36 +124,72 @@ fn device(ui: &mut Ui, document: &mut Document, is_on_gpu: bool) {
     };
     choose("CPU", "Render on the processor (G changes)", !is_on_gpu, DeviceChoice::Cpu);
     choose("GPU", "Render on the graphics card (G changes)", is_on_gpu, DeviceChoice::Gpu);
-    ui.spacing_mut().item_spacing.x = 8.0;
 }
 
-fn running(
-    ui: &mut Ui,
-    document: &mut Document,
-    interface: &mut Interface,
-    commands: &mut Vec<Command>,
-) {
-    if ui.button("?").on_hover_text("Keys and gestures").clicked() {
-        commands.push(Command::ToggleShortcuts);
-    }
+fn shortcuts(ui: &mut Ui, text: &str, commands: &mut Vec<Command>) {
+    button(ui, (text, "Keys and gestures (?)"), commands, Command::ToggleShortcuts);
+}
+
+fn developer(ui: &mut Ui, interface: &Interface, commands: &mut Vec<Command>) {
     let is_developer = interface.tab == Tab::Inspect || interface.dock.is_some();
     let developer = ui.selectable_label(is_developer, "Inspect");
     if developer.on_hover_text("Overlays, inspector and plots (F12)").clicked() {
         commands.push(Command::ToggleDeveloper);
     }
-    // The right panel has it too.
-    if !theme::is_narrow(ui) {
-        ui.toggle_value(&mut document.look.denoise, "Denoise").on_hover_text(
-            "Filter what noise is left, for display and .png; off and on shows the difference (N)",
-        );
+}
+
+fn denoise(ui: &mut Ui, document: &mut Document) {
+    ui.toggle_value(&mut document.look.denoise, "Denoise").on_hover_text(
+        "Filter what noise is left, for display and .png; off and on shows the difference (N)",
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::{Context, Pos2, RawInput, Rect, Shape, Vec2};
+
+    use super::*;
+
+    /// Where the words of the bar are.
+    fn words(width: f32) -> Vec<(String, Rect)> {
+        let context = Context::default();
+        theme::apply(&context);
+        let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(width, 300.0)));
+        let (mut document, undo) = (Document::default(), Undo::new(Document::default()));
+        let interface = Interface { paused: true, ..Interface::default() };
+        let mut draw = || {
+            let input = RawInput { screen_rect, ..RawInput::default() };
+            context.run_ui(input, |ui| {
+                show(ui, &mut document, &interface, &undo, true, &mut Vec::new());
+            })
+        };
+        // Sizes are known after a frame.
+        let _ = draw();
+        let word = |shape: &Shape| match shape {
+            Shape::Text(text) => {
+                Some((text.galley.text().to_owned(), shape.visual_bounding_rect()))
+            }
+            _ => None,
+        };
+        draw().shapes.iter().filter_map(|clipped| word(&clipped.shape)).collect()
     }
-    ui.separator();
-    if ui.button("Restart").on_hover_text("Start the picture again (R)").clicked() {
-        commands.push(Command::Restart);
-    }
-    let (symbol, hint) =
-        if interface.paused { ("Resume", "Go on (Space)") } else { ("Pause", "Pause (Space)") };
-    if ui.button(symbol).on_hover_text(hint).clicked() {
-        commands.push(Command::TogglePause);
+
+    #[test]
+    fn nothing_in_the_bar_covers_anything_else() {
+        for width in
+            [400.0, 500.0, 640.0, 720.0, 799.0, 800.0, 900.0, 1000.0, 1260.0, 1440.0, 3840.0]
+        {
+            let plate = Vec2::new(if width < TIGHTEST { 7.0 } else { 9.0 }, 0.0);
+            let words: Vec<_> =
+                words(width).into_iter().map(|(word, rect)| (word, rect.expand2(plate))).collect();
+            assert!(words.len() >= 6, "{width}: {words:?}");
+            for (i, (word, place)) in words.iter().enumerate() {
+                let is_inside = place.left() >= 0.0 && place.right() <= width;
+                assert!(is_inside, "{width}: {word:?} is at {place:?}");
+                for (other, of_other) in &words[..i] {
+                    assert!(!place.intersects(*of_other), "{width}: {word:?} is over {other:?}");
+                }
+            }
+        }
     }
 }

@@ -57,7 +57,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
             });
             handle = wipe(ui, (rect, of_left), texture, scope.interface);
             match &shown.order.compared {
-                Some(compared) => wipe_labels(ui, rect, &compared.names),
+                Some(compared) => wipe_labels(ui, rect, &compared.names, None),
                 None => split_labels(ui, rect, scope),
             }
         } else if let Some(compared) =
@@ -238,12 +238,16 @@ fn wipe(
     handle
 }
 
-fn wipe_labels(ui: &Ui, rect: Rect, [left, right]: &[String; 2]) {
-    let corner = |x: f32, align: Align2, text: &str| {
-        theme::badge(ui, Pos2::new(x, rect.top() + 14.0), align, text, theme::TEXT);
-    };
-    corner(rect.left() + 14.0, Align2::LEFT_TOP, left);
-    corner(rect.right() - 14.0, Align2::RIGHT_TOP, right);
+/// Names both sides, and what is to be said of them.
+fn wipe_labels(ui: &Ui, rect: Rect, [left, right]: &[String; 2], middle: Option<&str>) {
+    let at = |x: f32| Pos2::new(x, rect.top() + 14.0);
+    let mut badges: Vec<(Pos2, Align2, &str, Color32)> = vec![
+        (at(rect.left() + 14.0), Align2::LEFT_TOP, left, theme::TEXT),
+        (at(rect.right() - 14.0), Align2::RIGHT_TOP, right, theme::TEXT),
+    ];
+    badges
+        .extend(middle.map(|text| (at(rect.center().x), Align2::CENTER_TOP, text, theme::ACCENT)));
+    theme::badges(ui, &badges);
 }
 
 /// How far the plain method and the chosen one have come.
@@ -256,17 +260,15 @@ fn split_labels(ui: &Ui, rect: Rect, scope: &Scope<'_>) {
     };
     let plain = snapshot.plain.as_ref().map_or_else(String::new, |plain| label("plain", plain));
     let name = crate::app::convergence::name_of(snapshot.main.sampling);
-    wipe_labels(ui, rect, &[plain, label(name, &snapshot.main)]);
-    if let Some(speed_up) = scope.speed_up {
-        let text = format!(
+    let speed_up = scope.speed_up.as_ref().map(|speed_up| {
+        format!(
             "{:.2} × as fast ({:.2} to {:.2})",
             speed_up.ratio,
             speed_up.ratio / speed_up.factor,
             speed_up.ratio * speed_up.factor
-        );
-        let at = Pos2::new(rect.center().x, rect.top() + 14.0);
-        theme::badge(ui, at, Align2::CENTER_TOP, &text, theme::ACCENT);
-    }
+        )
+    });
+    wipe_labels(ui, rect, &[plain, label(name, &snapshot.main)], speed_up.as_deref());
 }
 
 /// A ring where the inspector stays.
