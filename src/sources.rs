@@ -90,6 +90,9 @@ pub fn check_scene(name: &str) -> Result<()> {
     let exists = is_built_in_scene(name) || Path::new(name).exists();
     match exists {
         true => Ok(()),
+        false if is_built_in_map(name) => {
+            Err(Error::new(format!("{name}: is a sky, which a scene gets by --env")))
+        }
         false if name.contains(['.', '/', '\\']) => Err(Error::at(name, "there is no such file")),
         false => Err(Error::new(format!(
             "{name}: neither a file nor a built-in scene ({})",

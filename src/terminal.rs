@@ -2,7 +2,7 @@
 //! the work that is done.
 
 use std::fmt::Display;
-use std::io::{self, Write as _};
+use std::io::{self, IsTerminal as _, Write as _};
 
 use crate::error::{Error, Result};
 
@@ -25,6 +25,13 @@ pub(crate) fn print(text: impl Display) -> Result<()> {
 pub(crate) fn tell(text: impl Display) {
     let line = one_line(&text.to_string()) + "\n";
     let _ = io::stderr().lock().write_all(line.as_bytes());
+}
+
+/// Leaves the line on which a terminal shows `^C`, and progress.
+pub(crate) fn leave_line() {
+    if io::stderr().is_terminal() {
+        tell("");
+    }
 }
 
 /// Says what a person should know, though nothing failed.

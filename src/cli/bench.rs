@@ -24,7 +24,9 @@ use crate::terminal::print;
     after_help = "Rays are traced alone, the same ones on every device: through each pixel \
 (primary), from where they end to the map (shadow), and as a matte surface spreads light (diffuse). \
 Paths are what `render` does. `pass` is a pass on the clock, `device` what of it the device was at \
-work; `distributions` and `picture` are the seconds until there are any, compiling included."
+work; `distributions` and `picture` are the seconds until there are any, compiling included; \
+`to stop` is how long a device goes on when told to stop, `to turn` the wait for a small picture after the \
+camera was turned."
 )]
 pub(super) struct BenchArguments {
     /// Scenes: glTF files or built-in ones; without any, all that are built in.
@@ -113,5 +115,9 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         write_json(file, &crate::output::record::to_value(&bench)?)?;
         say_written(file);
     }
-    print(bench.to_string().trim_end())
+    print(bench.to_string().trim_end())?;
+    match interrupt.was_signalled() {
+        true => Err(Error::new("stopped before the end")),
+        false => Ok(()),
+    }
 }

@@ -146,7 +146,7 @@ choices! {
         Entropy = "entropy": "Entropy of the cell's distribution"
         Distance = "distance": "Distance of the cell's distribution from the whole map's"
         Tile = "tile": "Each cell's probability of the tile chosen on the map"
-        CacheCells = "cache-cells": "Cells of the radiance cache, which fast light comes from"
+        CacheCells = "cache-cells": "Cells of the radiance cache, which cached light comes from"
         CacheRadiance = "cache-radiance": "Radiance of those cells, developed as the picture is"
         CacheSamples = "cache-samples": "What has trained those cells"
         Samples = "samples": "Samples of each pixel"

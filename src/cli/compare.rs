@@ -22,8 +22,8 @@ pub(super) struct CompareArguments {
 
 /// Prints the errors of a picture against a reference.
 pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
-    let [is_linear_picture, is_linear_reference] =
-        [is_as_rendered(&arguments.picture)?, is_as_rendered(&arguments.reference)?];
+    let [(picture, is_linear_picture), (reference, is_linear_reference)] =
+        [read(&arguments.picture)?, read(&arguments.reference)?];
     if is_linear_picture != is_linear_reference {
         let (developed, linear) = match is_linear_picture {
             true => (&arguments.reference, &arguments.picture),
@@ -34,8 +34,6 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
             format!("is developed for a display and {linear} is linear: that is no comparison");
         return Err(Error::at(developed, cause));
     }
-    let picture = read(&arguments.picture)?;
-    let reference = read(&arguments.reference)?;
     let comparison = compare(&picture, &reference).map_err(|e| Error::at(&arguments.picture, e))?;
     if arguments.json {
         return print(crate::output::record::to_json(&comparison)?);
@@ -43,7 +41,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
     let Comparison { mean_ratio, mse, rel_mse, trimmed_rel_mse, block_rel_mse, flip, .. } =
         comparison;
     print(format_args!("mean ratio        {mean_ratio:.5}"))?;
-    print(format_args!("MSE               {mse:.4e}"))?;
+    print(format_args!("MSE / mean^2      {mse:.4e}"))?;
     print(format_args!("relMSE            {rel_mse:.4e}"))?;
     print(format_args!("trimmed relMSE    {trimmed_rel_mse:.4e}"))?;
     print(format_args!("of 8x8 blocks     {block_rel_mse:.4e}"))?;
@@ -53,12 +51,10 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
     }
 }
 
-/// Whether a file has radiance, as films have.
-fn is_as_rendered(path: &Path) -> Result<bool> {
-    if is_film(path) { Ok(true) } else { is_linear(path) }
-}
-
-/// The picture in a file, or that of the film in it.
-fn read(path: &Path) -> Result<Image> {
-    if is_film(path) { Ok(read_film(path)?.1.image()) } else { read_picture(path) }
+/// The picture in a file, or that of the film in it, and whether it is radiance, as films are.
+fn read(path: &Path) -> Result<(Image, bool)> {
+    match is_film(path) {
+        true => Ok((read_film(path)?.1.image(), true)),
+        false => Ok((read_picture(path)?, is_linear(path)?)),
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::CommandFactory as _;
+use clap::{Command, CommandFactory as _};
 use clap_complete::Shell;
 use clap_mangen::Man;
 
@@ -42,14 +42,23 @@ pub(super) fn completions(arguments: &CompletionsArguments) -> Result<()> {
 
 /// Writes a manual page for each command.
 pub(super) fn man(arguments: &ManArguments) -> Result<()> {
+    let ManArguments { folder } = arguments;
+    if !folder.is_dir() {
+        return Err(Error::at(folder, "there is no such folder"));
+    }
     let mut command = Arguments::command().disable_help_subcommand(true);
     command.build();
-    let shown = command.get_subcommands().filter(|command| !command.is_hide_set());
-    let pages = std::iter::once(&command).chain(shown).map(|command| Man::new(command.clone()));
-    let write = |page: Man| {
-        let path = arguments.folder.join(page.get_filename());
+    let write = |command: &Command| {
+        let page = Man::new(command.clone());
+        let path = folder.join(page.get_filename());
         let written = write_beside_and_rename(&path, |file| page.render(file));
         written.map(|()| say_written(&path)).err()
     };
-    Error::all(pages.filter_map(write).collect())
+    Error::all(with_subcommands(&command).into_iter().filter_map(write).collect())
+}
+
+/// A command and those beneath it that are shown.
+fn with_subcommands(command: &Command) -> Vec<&Command> {
+    let shown = command.get_subcommands().filter(|command| !command.is_hide_set());
+    std::iter::once(command).chain(shown.flat_map(with_subcommands)).collect()
 }

@@ -9,7 +9,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::register_usize;
 
 use crate::image::remove_unfinished;
-use crate::terminal::{hang_up, notice, tell};
+use crate::terminal::{hang_up, leave_line, notice, tell};
 
 /// How often signals are looked for: sooner than anybody notices.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
@@ -45,7 +45,7 @@ impl Interrupt {
                     }
                     if was_asked || !has_work.load(Ordering::Relaxed) {
                         if !was_asked {
-                            tell("");
+                            leave_line();
                             tell("lightgrid: interrupted before there was anything to keep");
                         }
                         remove_unfinished();
@@ -54,7 +54,7 @@ impl Interrupt {
                     was_asked = true;
                     signalled.store(true, Ordering::SeqCst);
                     asked.store(true, Ordering::SeqCst);
-                    tell("");
+                    leave_line();
                     tell(format_args!("lightgrid: {what} (again: leave now)"));
                 }
             })

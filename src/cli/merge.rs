@@ -19,7 +19,7 @@ A checkpoint of `lightgrid render` is a part, too: with --allow-missing, a pictu
 
 Examples:
   lightgrid merge office.*.part -o office.exr -o office.png
-  lightgrid merge office.checkpoint --allow-missing --denoise -o so-far.png"
+  lightgrid merge office.checkpoint --allow-missing -o so-far.png"
 )]
 pub(super) struct MergeArguments {
     /// What `lightgrid render --part` wrote, in any order.
@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<()> {
         }
         check_writable(output)?;
     }
-    picture.say_unused(outputs.iter());
+    picture.say_unused(outputs);
     let progress = Progress::start("looking at the parts");
     let parts = belonging_together(parts)?;
     let mut missing = missing_parts(&parts);
@@ -53,8 +53,8 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<()> {
     for (path, facts) in &parts {
         progress.say(format!("adding part {}", facts.part));
         let (_, film) = read_film(path)?;
-        if picture.wants_surfaces() && !film.has_layers() {
-            let advice = "render the parts with --layers albedo,normal,depth";
+        if picture.wants_surfaces(outputs) && !film.has_layers() {
+            let advice = "render with --layers albedo,normal,depth";
             return Err(Error::at(path, format!("has no albedo, normal and depth: {advice}")));
         }
         missing.extend(missing_samples(facts, &film));
@@ -119,14 +119,13 @@ fn missing_parts(parts: &[(&Path, FilmFacts)]) -> Vec<String> {
     let shown: Vec<String> =
         missing.by_ref().take(MOST_NAMED).map(|number| number.to_string()).collect();
     let more = missing.count();
-    let shown = match more {
-        0 => shown.join(", "),
-        more => format!("{} and {more} more", shown.join(", ")),
-    };
-    if shown.is_empty() {
-        Vec::new()
-    } else {
-        vec![format!("of {count} parts are missing: {shown}")]
+    match &shown[..] {
+        [] => Vec::new(),
+        [one] => vec![format!("part {one} of {count} is missing")],
+        many if more > 0 => {
+            vec![format!("parts {} and {more} more of {count} are missing", many.join(", "))]
+        }
+        many => vec![format!("parts {} of {count} are missing", many.join(", "))],
     }
 }
 

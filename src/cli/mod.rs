@@ -12,6 +12,7 @@ use crate::memory;
 mod absent;
 #[cfg(feature = "report")]
 mod bench;
+mod camera;
 mod choices;
 mod compare;
 mod device;

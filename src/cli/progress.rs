@@ -1,4 +1,4 @@
-//! The line that says how far it is; nothing when stderr is not a terminal.
+//! The line that says how far it is; when stderr is not a terminal, a new one every minute of rendering.
 
 use std::cell::Cell;
 use std::time::{Duration, Instant};
@@ -15,7 +15,12 @@ pub(super) struct Progress {
     prefix: String,
     /// The noise shown, and when it was found.
     noise: Cell<Option<(Instant, f64)>>,
+    /// When a line was last written for a file or another program, or it was begun.
+    written: Cell<Instant>,
 }
+
+/// A line is written so often where there is no terminal.
+const LINE_EVERY: Duration = Duration::from_secs(60);
 
 /// The noise is looked at so often: that takes a look at every pixel, wherever it is.
 const NOISE_EVERY: Duration = Duration::from_secs(2);
@@ -32,7 +37,7 @@ impl Progress {
         if !bar.is_hidden() {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
-        Self { bar, prefix: String::new(), noise: Cell::default() }
+        Self { bar, prefix: String::new(), noise: Cell::default(), written: Instant::now().into() }
     }
 
     /// One that says which of the frames it is about.
@@ -49,6 +54,10 @@ impl Progress {
     pub(super) fn show(&self, session: &Session<'_>, rule: &StopRule) {
         if !self.bar.is_hidden() {
             self.say(line(session, rule, self.noise(session)));
+        } else if self.written.get().elapsed() > LINE_EVERY {
+            self.written.set(Instant::now());
+            let line = line(session, rule, self.noise(session));
+            tell(format_args!("lightgrid: {}{line}", self.prefix));
         }
     }
 

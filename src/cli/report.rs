@@ -265,7 +265,9 @@ fn report(plan: &Plan, arguments: &EffortArguments) -> Result<()> {
 
 fn finish(report: &Report, folder: &std::path::Path) -> Result<()> {
     tell(format_args!("the report is {}", folder.join("report.html").display()));
-    print(markdown_table(report))?;
+    if report.rows.iter().any(|row| !row.devices.is_empty()) {
+        print(markdown_table(report))?;
+    }
     if report.is_finished {
         return Ok(());
     }
@@ -279,10 +281,13 @@ fn estimate(plan: &Plan) -> String {
         Some(_) => String::new(),
         None => format!(", references of about {} each", duration(seconds / reference_noise)),
     };
+    let rows = match &plan.rows[..] {
+        [row] => row.title.clone(),
+        rows => format!("{} rows", rows.len()),
+    };
     format!(
-        "about {} from nothing: {} rows x {} devices x {} methods x {seeds} runs of {seconds} s{reference}",
+        "about {} from nothing: {rows} x {} devices x {} methods x {seeds} runs of {seconds} s{reference}",
         duration(plan.expected_seconds()),
-        plan.rows.len(),
         devices.len(),
         plan.methods.len()
     )

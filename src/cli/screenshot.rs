@@ -5,16 +5,18 @@ use std::time::Duration;
 
 use glam::Vec2;
 
+use super::camera::CameraArguments;
 use super::choices::SceneArguments;
-use super::picture::{check_kept, say_written};
+use super::picture::{check_kept, parse_exposure, say_written};
 use super::values;
 use crate::app::Start;
-use crate::app::document::{Document, Light};
+use crate::app::document::{Document, Light, Look};
 use crate::app::interface::{Dock, Interface, Tab, TileView};
 use crate::app::overlays::Overlay;
 use crate::app::screenshot::{Shot, Studio};
 use crate::error::{Error, Result};
 use crate::image::{check_writable, write_png};
+use crate::output::Exposure;
 use crate::render::gpu::DeviceChoice;
 use crate::render::{Sampling, StopRule};
 use crate::scene::builtin;
@@ -54,6 +56,11 @@ pub(super) struct ScreenshotArguments {
     /// built-in scene.
     #[arg(long, value_name = "MAP")]
     env: Option<String>,
+    #[command(flatten)]
+    place: CameraArguments,
+    /// Exposure in stops, or `auto`.
+    #[arg(long, default_value = "auto", value_parser = parse_exposure, allow_hyphen_values = true, value_name = "EV|auto")]
+    exposure: Exposure,
     /// What is drawn over the picture.
     #[arg(long, value_enum, value_name = "NAME")]
     overlay: Option<Overlay>,
@@ -72,6 +79,9 @@ pub(super) struct ScreenshotArguments {
     /// Where to render the picture; the window itself is always drawn by a graphics device.
     #[arg(long, default_value = "cpu", value_enum)]
     device: DeviceChoice,
+    /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
     /// Plain on the left, the chosen sampling on the right; not repeatable, for it is by time.
     #[arg(long)]
     split: bool,
@@ -126,10 +136,28 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     let shows_cache = arguments.overlay.is_some_and(Overlay::is_of_cache);
     if shows_cache && (!arguments.denoise || arguments.split) {
         return Err(Error::new(
-            "the radiance cache is trained for fast light: overlays of it need --denoise, and no --split",
+            "the radiance cache is trained for cached light: overlays of it need --denoise, and no --split",
         ));
     }
+    let learns = matches!(arguments.sampling, Sampling::Adaptive | Sampling::Talk);
+    if arguments.overlay.is_some_and(Overlay::is_of_grid) && !learns {
+        return Err(Error::new(format!(
+            "--sampling {} learns nothing that this overlay could show",
+            arguments.sampling.name()
+        )));
+    }
+    if arguments.overlay == Some(Overlay::Tile) && arguments.tile.is_none() {
+        return Err(Error::new("the overlay of a tile wants one: --tile N"));
+    }
+    if arguments.panel.len() > 1 && arguments.panel.contains(&PanelName::None) {
+        return Err(Error::new("--panel none and other panels exclude each other"));
+    }
     let defaults = Document::default();
+    let look = match arguments.exposure {
+        Exposure::Auto => defaults.look,
+        Exposure::Stops(exposure_ev) => Look { auto_exposure: false, exposure_ev, ..defaults.look },
+    };
+    let look = Look { denoise: arguments.denoise, ..look };
     let document = Document {
         scene: arguments.scene.clone(),
         map: arguments.env.clone().unwrap_or_else(|| builtin::sky(&arguments.scene).to_owned()),
@@ -142,7 +170,8 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
             seed: arguments.seed,
             ..defaults.light
         },
-        look: crate::app::document::Look { denoise: arguments.denoise, ..defaults.look },
+        viewpoint: arguments.place.viewpoint()?,
+        look,
         stop: StopRule { samples: Some(arguments.samples), ..StopRule::default() },
         ..defaults
     };
@@ -151,6 +180,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
             document,
             interface: interface(arguments),
             of_scene: arguments.of_scene.options_beside(vec![arguments.output.clone()]),
+            adapter: arguments.adapter.clone(),
             ..Start::default()
         },
         size: arguments.size,

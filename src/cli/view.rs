@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::camera::CameraArguments;
 use super::choices::SceneArguments;
 use super::values;
 use crate::app::Start;
@@ -31,6 +32,8 @@ pub(super) struct ViewArguments {
     /// built-in scene.
     #[arg(long, value_name = "MAP")]
     env: Option<String>,
+    #[command(flatten)]
+    place: CameraArguments,
     /// How the map is sampled.
     #[arg(long, value_enum)]
     sampling: Option<Sampling>,
@@ -73,6 +76,7 @@ impl ViewArguments {
             scene: builtin::DEFAULT_SCENE.to_owned(),
             of_scene: SceneArguments::default(),
             env: None,
+            place: CameraArguments::default(),
             sampling: None,
             device: None,
             adapter: None,
@@ -90,7 +94,10 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
     let path = arguments.settings.clone().or_else(Settings::default_path);
     let (settings, notice) = path.as_deref().map(Settings::recover).unwrap_or_default();
     let start = Start {
-        document: document(arguments, &settings),
+        document: Document {
+            viewpoint: arguments.place.viewpoint()?,
+            ..document(arguments, &settings)
+        },
         interface: settings.interface(),
         settings,
         of_scene: arguments.of_scene.options(),
@@ -135,6 +142,7 @@ fn headless(arguments: &ViewArguments) -> Result<super::render::RenderArguments>
     let [scene, map] = arguments.names();
     let mut headless = super::render::RenderArguments::of_picture(scene, map, &arguments.output)?;
     headless.of_scene = arguments.of_scene.clone();
+    headless.place = arguments.place.clone();
     headless.size = arguments.size.unwrap_or(headless.size);
     headless.spp = arguments.samples;
     headless.seconds = arguments.samples.is_none().then_some(HEADLESS_SECONDS);

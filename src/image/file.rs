@@ -25,8 +25,7 @@ pub fn write_beside_and_rename(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<()> {
-    let target = followed(path);
-    check_target(&target).map_err(|cause| Error::at(path, cause))?;
+    let target = checked_target(path)?;
     remove_leftovers(folder_of(&target));
     let temporary = Temporary::beside(&target);
     let written = temporary
@@ -56,8 +55,7 @@ pub fn write_beside_and_rename(
 /// # Errors
 /// As for writing.
 pub fn check_writable(path: &Path) -> Result<()> {
-    let target = followed(path);
-    check_target(&target).map_err(|cause| Error::at(path, cause))?;
+    let target = checked_target(path)?;
     let temporary = Temporary::beside(&target);
     temporary.create().map_err(|error| Error::at(path, write_cause(&error)))?;
     Ok(())
@@ -91,6 +89,26 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     matches!((place(a), place(b)), (Ok(a), Ok(b)) if a == b)
 }
 
+/// The file to be written in place of what `path` names.
+fn checked_target(path: &Path) -> Result<PathBuf> {
+    if is_stream(path) {
+        return Err(Error::at(path, NOT_ORDINARY));
+    }
+    let target = followed(path);
+    check_target(&target).map_err(|cause| Error::at(path, cause))?;
+    Ok(target)
+}
+
+const NOT_ORDINARY: &str = "cannot be written: it is not an ordinary file";
+
+/// Whether a path means what this process has open, as /dev/stdout does: a file that it happens to be would
+/// not be the same one once it was replaced.
+fn is_stream(path: &Path) -> bool {
+    let next = |path: &PathBuf| Some(path.with_file_name(fs::read_link(path).ok()?));
+    let mut links = std::iter::successors(Some(path.to_owned()), next).take(MOST_LINKS);
+    links.any(|link| link.starts_with("/proc"))
+}
+
 /// Links one after another that are followed, as many as systems do.
 const MOST_LINKS: usize = 40;
 
@@ -122,9 +140,7 @@ fn check_target(target: &Path) -> std::result::Result<(), String> {
     }
     match fs::metadata(target) {
         Ok(existing) if existing.is_dir() => Err("cannot be written: it is a folder".into()),
-        Ok(existing) if !existing.is_file() => {
-            Err("cannot be written: it is not an ordinary file".into())
-        }
+        Ok(existing) if !existing.is_file() => Err(NOT_ORDINARY.into()),
         Ok(existing) if existing.permissions().readonly() => {
             Err("cannot be written: it is read-only".into())
         }

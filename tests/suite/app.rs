@@ -255,10 +255,13 @@ fn a_screenshot_is_repeatable_and_says_what_is_wrong() {
     for (rest, reason) in [
         ("--tile 99999", "sky:day@64x32: there is no tile 99999: it has 128, counted from 0"),
         ("--size 200000x10", "a window of 200000x10 pixels cannot be drawn: "),
+        ("--overlay visits --sampling plain", "--sampling plain learns nothing that"),
+        ("--overlay tile", "the overlay of a tile wants one: --tile N"),
+        ("--panel none --panel needs", "--panel none and other panels exclude each other"),
         ("--overlay cache-cells", "overlays of it need --denoise, and no --split"),
         (
             "--overlay cache-samples --denoise --split",
-            "the radiance cache is trained for fast light",
+            "the radiance cache is trained for cached light",
         ),
     ] {
         let refused = shoot(rest);

@@ -304,6 +304,17 @@ fn a_black_map_has_no_tables_worth_reading_and_no_distributions() {
     assert!(says.contains("d.csv: not written: this map"), "{says}");
 }
 
+/// What is asked of pictures that a command does not write is said, and changes nothing in those it does.
+#[test]
+fn a_filter_for_pictures_that_are_not_written_changes_nothing() {
+    let bench = Bench::new();
+    bench.render("-o a.exr --size 64x64 --reproducible");
+    let output = bench.render("-o b.exr --size 64x64 --reproducible --denoise");
+    assert!(text(&output.stderr).contains("--denoise changes nothing"), "{}", text(&output.stderr));
+    let [a, b] = ["a.exr", "b.exr"].map(|name| fs::read(bench.path(name)).expect("written"));
+    assert!(a == b);
+}
+
 #[test]
 fn a_black_picture_is_remarked() {
     let output = Bench::new().render("-o a.png --env-intensity 0");
@@ -409,6 +420,8 @@ fn what_cannot_be_done_is_one_sentence_and_status_1() {
         (line("-o a.jpg"), "a.jpg: pictures are written as .png or .exr"),
         (line("-o none/a.png"), "there is no folder none"),
         (line("-o a.png -o ./a.png"), "./a.png: two outputs"),
+        #[cfg(unix)]
+        (line("-o a.png --json /dev/stdout"), "/dev/stdout: cannot be written: it is not an ord"),
         (line("-o a.png/"), "a.png/: cannot be written: its name is that of a folder"),
         (
             line("-o a.png --sampling bsdf --distributions d.csv"),
@@ -417,6 +430,7 @@ fn what_cannot_be_done_is_one_sentence_and_status_1() {
         (line("-o a.png --json a.png"), "a.png: two outputs"),
         ("render none.glb -o a.png".into(), "none.glb: there is no such file"),
         ("render none -o a.png".into(), "neither a file nor a built-in scene"),
+        ("render sky:day -o a.png".into(), "sky:day: is a sky, which a scene gets by --env"),
         ("render map.exr -o a.png".into(), "map.exr: is a picture, where a scene is expected"),
         ("render scene.gltf -o a.png --env none.hdr".into(), "none.hdr: there is no such file"),
         (
@@ -468,7 +482,10 @@ fn a_part_is_compared_as_its_picture() {
     }
     fs::write(bench.path("a.part"), r#"{"lightgrid_film":1,"si"#).unwrap();
     let says = bench.refusal("compare a.part a.exr", 1);
-    assert!(says.contains("a.part: is neither a part of a picture nor a checkpoint"), "{says}");
+    assert!(says.contains("a.part: is cut short"), "{says}");
+    fs::write(bench.path("a.txt"), "no picture").unwrap();
+    let says = bench.refusal("compare a.txt a.exr", 1);
+    assert!(says.contains("a.txt: is not a picture of a known format"), "{says}");
 }
 
 #[test]

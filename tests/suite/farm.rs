@@ -67,10 +67,10 @@ fn parts_that_do_not_belong_together_are_refused_by_name() {
     damaged[whole.len() / 2] ^= 1;
     fs::write(bench.path("damaged.part"), damaged).expect("written");
     for (names, sentence) in [
-        ("seed.part", "seed.part: does not belong to a.part: another seed"),
+        ("seed.part", "seed.part: does not belong to a.part: another --seed"),
         ("size.part", "size.part: does not belong to a.part: another camera, size"),
         ("camera.part", "camera.part: does not belong to a.part: another camera"),
-        ("settings.part", "settings.part: does not belong to a.part: another settings"),
+        ("settings.part", "settings.part: does not belong to a.part: another --env-rotation"),
         (
             "three.part",
             "three.part: is part 2 of 3 of 3 samples a pixel, but a.part is part 1 of 2",
@@ -81,8 +81,8 @@ fn parts_that_do_not_belong_together_are_refused_by_name() {
         ("damaged.part", "damaged.part: is damaged: its checksum does not fit"),
         ("map.exr", "map.exr: is neither a part of a picture nor a checkpoint"),
         ("nowhere.part", "nowhere.part: there is no such file"),
-        ("", "the picture is not whole: of 2 parts are missing: 2 (--allow-missing"),
-        ("b.part --denoise", "a.part: has no albedo, normal and depth"),
+        ("", "the picture is not whole: part 2 of 2 is missing (--allow-missing"),
+        ("b.part -o c.png --denoise", "a.part: has no albedo, normal and depth"),
     ] {
         let message = bench.refusal(&format!("merge a.part {names} -o c.exr"), 1);
         assert!(message.contains(sentence), "{names}: {message}");
@@ -102,7 +102,7 @@ fn parts_that_do_not_belong_together_are_refused_by_name() {
     }
     let output = bench.run("merge a.part --allow-missing -o c.png");
     assert!(output.status.success());
-    assert!(text(&output.stderr).contains("of 2 parts are missing: 2\n"));
+    assert!(text(&output.stderr).contains("part 2 of 2 is missing\n"));
     for (rest, status, sentence) in [
         ("--part 1/2 -o c.png", 1, "c.png: a part is written as .part"),
         ("--part 1/2 -o c.part -o d.part", 1, "--part writes one file"),
@@ -121,6 +121,24 @@ fn parts_that_do_not_belong_together_are_refused_by_name() {
         let message = bench.refusal(&render_line(rest), status);
         assert!(message.contains(sentence), "{rest}: {message}");
     }
+}
+
+/// Made from a checkpoint, too; one that holds more samples than are asked for keeps them, and says so.
+#[test]
+fn a_picture_of_a_checkpoint_says_what_it_is_of() {
+    let bench = Bench::new();
+    bench.render("--spp 3 --checkpoint c.film -o a.exr --seed 77");
+    assert!(bench.run("merge c.film --allow-missing -o b.exr").status.success());
+    let [whole, merged] = ["a.exr", "b.exr"].map(|name| {
+        let file = fs::read(bench.path(name)).expect("written");
+        let names = file.windows(10).filter(|bytes| bytes == b"lightgrid.").count();
+        (names, String::from_utf8_lossy(&file).contains("scene.gltf"))
+    });
+    assert!(whole.0 > 15 && whole.1, "{whole:?}");
+    assert_eq!(merged, whole);
+    let output = bench.render("--spp 2 --checkpoint c.film -o a.exr --seed 77");
+    let says = text(&output.stderr);
+    assert!(says.contains("goes on from 3 samples a pixel, which is more than is asked"), "{says}");
 }
 
 #[cfg(unix)]
@@ -179,7 +197,7 @@ mod killed {
                 _ => assert!(content(&whole) == content(&resumed), "{rule}"),
             }
             let message = bench.refusal(&render_line(&format!("{command} --seed 7")), 1);
-            assert!(message.contains("of another picture, which differs in seed"), "{message}");
+            assert!(message.contains("of another picture, which differs in --seed"), "{message}");
         }
     }
 
@@ -324,7 +342,11 @@ fn shells_and_man_know_every_command() {
     for page in ["lightgrid", "lightgrid-merge", "lightgrid-view", "lightgrid-stability"] {
         assert!(bench.path(&format!("man1/{page}.1")).exists(), "{page}");
     }
-    assert!(bench.refusal("man nowhere", 1).contains("there is no folder nowhere"));
+    if cfg!(feature = "report") {
+        assert!(bench.path("man1/lightgrid-report-talk.1").exists());
+    }
+    let says = bench.refusal("man nowhere", 1);
+    assert_eq!(says, "lightgrid: nowhere: there is no such folder\n");
     assert!(bench.refusal("render --sp 3 -o a.png", 2).contains("'--spp'"), "did you mean");
 }
 
