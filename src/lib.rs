@@ -17,9 +17,7 @@
 //!   smooths them, [`tone`] develops them, and `develop` does so on a GPU. [`stability`] tries all of it
 //!   on stiff and extreme cases, [`mod@bench`] measures a machine.
 //!
-//! Arrows point down: `cli -> {app, stability, bench -> report} -> render -> path ->
-//! {light_grid, bsdf, medium, bvh} ->
-//! {scene, environment} -> {image, sampler, math, color, error}`.
+//! Each uses those beneath it alone; CONTRIBUTING.md draws the house.
 //!
 //! Without the default features it renders on the CPU: `gpu` adds GPUs, `window` the window and with it
 //! GPUs, `report` what measures, `flip` a metric, `meshopt` a compression of glTF files.

@@ -13,7 +13,7 @@ use crate::color::{luminance, srgb_from_linear};
 use crate::error::Error;
 use crate::image::{Image, Rgb8};
 
-pub use white_balance::{DAYLIGHT_KELVIN, WhiteBalance};
+pub use white_balance::{DAYLIGHT_KELVIN, KELVIN, TINT, WhiteBalance};
 
 /// How radiance of any size becomes display light in `[0,1]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

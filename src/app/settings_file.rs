@@ -10,8 +10,10 @@ use super::document::{Document, Light, Look, PictureSize, Viewpoint};
 use super::interface::{Dock, Interface, Tab};
 use crate::error::{Error, Result};
 use crate::image::{read_file, write_beside_and_rename};
+use crate::path::PathLimits;
 use crate::render::{StopRule, View};
 use crate::sources;
+use crate::tone::{KELVIN, TINT};
 
 /// Recent files kept.
 const MOST_RECENT: usize = 8;
@@ -146,9 +148,9 @@ impl Settings {
         let (look, usual) = (&mut self.look, &default.look);
         look.exposure_ev = finite(look.exposure_ev, usual.exposure_ev).clamp(-64.0, 64.0);
         let (balance, usual) = (&mut look.white_balance, &usual.white_balance);
-        balance.kelvin = finite(balance.kelvin, usual.kelvin).clamp(2000.0, 12_000.0);
-        balance.tint = finite(balance.tint, usual.tint).clamp(-1.0, 1.0);
-        self.light.bounces = self.light.bounces.min(100_000);
+        balance.kelvin = finite(balance.kelvin, usual.kelvin).clamp(*KELVIN.start(), *KELVIN.end());
+        balance.tint = finite(balance.tint, usual.tint).clamp(*TINT.start(), *TINT.end());
+        self.light.bounces = self.light.bounces.min(PathLimits::MOST_BOUNCES);
         let positive = |x: &f64| *x > 0.0 && x.is_finite();
         self.stop.seconds = self.stop.seconds.filter(positive);
         self.stop.noise = self.stop.noise.filter(positive);

@@ -9,7 +9,7 @@ use crate::image::is_same_file;
 use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::render::film::Film;
 use crate::terminal::{notice, tell};
-use crate::tone::{ToneCurve, WhiteBalance};
+use crate::tone::{KELVIN, TINT, ToneCurve, WhiteBalance};
 
 /// How pictures are written.
 #[derive(Debug, Clone, clap::Args)]
@@ -57,8 +57,12 @@ pub(super) fn parse_exposure(text: &str) -> std::result::Result<Exposure, String
 fn parse_white(text: &str) -> std::result::Result<WhiteBalance, String> {
     let (kelvin, tint) = text.split_once(',').unwrap_or((text, "0"));
     let (kelvin, tint) = (values::finite(kelvin)? as f32, values::finite(tint)? as f32);
-    if !((2000.0..=12000.0).contains(&kelvin) && (-1.0..=1.0).contains(&tint)) {
-        return Err("expected 2000 to 12000 kelvin and a tint from -1 to 1".to_owned());
+    if !(KELVIN.contains(&kelvin) && TINT.contains(&tint)) {
+        let [(least, most), (green, magenta)] =
+            [KELVIN, TINT].map(|range| (*range.start(), *range.end()));
+        return Err(format!(
+            "expected {least} to {most} kelvin and a tint from {green} to {magenta}"
+        ));
     }
     Ok(WhiteBalance { kelvin, tint })
 }

@@ -1,9 +1,9 @@
 //! `lightgrid render`.
 
 mod arguments;
+mod assignment;
 mod frames;
 mod outputs;
-mod share;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -27,8 +27,8 @@ use crate::render::{Figures, Session};
 use crate::scene::Camera;
 use crate::terminal::notice;
 pub(super) use arguments::RenderArguments;
+use assignment::Assignment;
 use frames::{Frames, Reel};
-use share::Share;
 
 /// Bytes of a pixel in the film, and in what is made of it to be written.
 const BYTES_OF_PIXEL: [u64; 2] = [40, 40];
@@ -128,35 +128,36 @@ impl Job<'_> {
             memory::reserved(needed_bytes(arguments)[1]).map_err(|cause| too_large(&cause))?;
         let view = arguments.view(world, camera);
         let rule = arguments.stop_rule();
-        let mut share = Share::open(arguments, rule, (world, environment), &view)?;
-        share.say(&mut notices);
+        let mut assignment = Assignment::open(arguments, rule, (world, environment), &view)?;
+        assignment.say(&mut notices);
         let gpu = self.gpu.as_ref();
         let mut session =
             device::start(arguments.device, gpu, world, environment, view, &mut notices)?;
         let (nothing, not_yet) = (Film::new(0, 0, false), Figures::default());
         let record = self.record(arguments, &session, (&nothing, &not_yet), &notices);
-        share.set_metadata(record.metadata());
+        assignment.set_metadata(record.metadata());
         let mut cpu = TakeOver { device: arguments.device, notices: &mut notices };
         let counted = known.as_ref().and_then(|known| known.counted.as_ref());
         let begun = counted.map_or(Ok(()), |counted| {
             let taken_up = session.continue_learning(counted);
             cpu.goes_on(&mut session, taken_up).map(|_| ())
         });
-        let outcome = begun
-            .and_then(|()| work(&mut session, &mut share, &self.interrupt, progress, &mut cpu));
+        let outcome = begun.and_then(|()| {
+            work(&mut session, &mut assignment, &self.interrupt, progress, &mut cpu)
+        });
         progress.finish();
-        if !share.has_samples(&session) {
+        if !assignment.has_samples(&session) {
             return outcome.map(|()| Vec::new());
         }
         drop(spare);
-        let film = share.film(&session);
+        let film = assignment.film(&session);
         let remarks = output::remarks(&film, environment);
         remarks.iter().for_each(|sentence| notices.add(sentence));
 
         let figures = session.figures();
         let record = self.record(arguments, &session, (&film, &figures), &notices);
-        let mut failures = outputs::write(arguments, &share, &record, session.grid());
-        failures.extend(share.keep(&session).err());
+        let mut failures = outputs::write(arguments, &assignment, &record, session.grid());
+        failures.extend(assignment.keep(&session).err());
         remarks.iter().for_each(notice);
         if let Err(failure) = outcome {
             failures.push(failure);
@@ -311,15 +312,15 @@ impl TakeOver<'_> {
 /// with what it has.
 fn work(
     session: &mut Session<'_>,
-    share: &mut Share,
+    assignment: &mut Assignment,
     interrupt: &Interrupt,
     progress: &Progress,
     cpu: &mut TakeOver<'_>,
 ) -> Result<()> {
     let alarm = Alarm::start(Arc::clone(interrupt.asked()));
     loop {
-        progress.show(session, share.rule());
-        let step = share.step(session, interrupt, &alarm, cpu.notices);
+        progress.show(session, assignment.rule());
+        let step = assignment.step(session, interrupt, &alarm, cpu.notices);
         if cpu.goes_on(session, step)? == Some(true) {
             return Ok(());
         }

@@ -13,7 +13,7 @@ pub const FOV_Y_RADIANS: f32 = 0.87;
 /// Share of the picture's width or height that an object fills.
 const FILL: f32 = 0.9;
 /// A scene is a room if from places in it at least this share of directions shows it from inside.
-const ROOM_ENCLOSURE: f32 = 0.6;
+const SHARE_INSIDE: f32 = 0.6;
 
 /// Triangles that rays from the middle may cross: some 150 each. Where surfaces lie on one another by the
 /// thousand each ray takes long, and no place is better than another.
@@ -22,7 +22,7 @@ const MOST_CROSSINGS: u32 = 1 << 19;
 /// Frames the scene for a picture of `aspect` (width over height): a room from inside, anything else
 /// from outside, a little from above and the right, filling the picture.
 pub fn frame(world: &World, aspect: f32) -> Camera {
-    let is_room = !is_dense(world) && enclosure(world) > ROOM_ENCLOSURE;
+    let is_room = !is_dense(world) && share_inside(world) > SHARE_INSIDE;
     if is_room { inside(world) } else { outside(world, aspect) }
 }
 
@@ -75,18 +75,19 @@ fn middle_places(world: &World) -> impl Iterator<Item = Vec3> {
     })
 }
 
-/// Median share, over places spread through the middle of the scene, of [`enclosure_at`]: furniture and
+/// Median share, over places spread through the middle of the scene, of [`share_inside_at`]: furniture and
 /// pillars have an inside too.
-fn enclosure(world: &World) -> f32 {
+fn share_inside(world: &World) -> f32 {
     let places: Vec<Vec3> = middle_places(world).collect();
-    let mut shares: Vec<f32> = places.par_iter().map(|place| enclosure_at(world, *place)).collect();
+    let mut shares: Vec<f32> =
+        places.par_iter().map(|place| share_inside_at(world, *place)).collect();
     shares.sort_by(f32::total_cmp);
     shares[shares.len() / 2]
 }
 
 /// Share of directions in which a surface is seen from its front: near 1 in a room, near 0 within an
 /// object. Looking down does not count, for an object on a ground plane is not inside anything.
-fn enclosure_at(world: &World, place: Vec3) -> f32 {
+fn share_inside_at(world: &World, place: Vec3) -> f32 {
     let (mut fronts, mut count) = (0, 0);
     for direction in directions(128).filter(|d| d.y > -0.2) {
         count += 1;
@@ -98,7 +99,7 @@ fn enclosure_at(world: &World, place: Vec3) -> f32 {
 
 /// Whether a place is in a room, by what is seen from there.
 pub fn is_in_room(world: &World, place: Vec3) -> bool {
-    enclosure_at(world, place) > ROOM_ENCLOSURE
+    share_inside_at(world, place) > SHARE_INSIDE
 }
 
 /// The point that the middle of a camera's picture shows; where that is nothing, what is in focus.

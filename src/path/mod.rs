@@ -59,6 +59,11 @@ pub struct PathLimits {
     pub russian_roulette: bool,
 }
 
+impl PathLimits {
+    /// Most [`Self::bounces`] that may be asked for.
+    pub const MOST_BOUNCES: u32 = 100_000;
+}
+
 /// All that a path reads.
 #[derive(Clone, Copy)]
 pub struct PathTracer<'a> {

@@ -1,5 +1,7 @@
 //! White balance: the light that shall look white.
 
+use std::ops::RangeInclusive;
+
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -10,12 +12,17 @@ use crate::image::Image;
 /// Colour temperature of Rec.709's white, D65, in kelvin.
 pub const DAYLIGHT_KELVIN: f32 = 6504.0;
 
+/// Colour temperatures that can be white, in kelvin.
+pub const KELVIN: RangeInclusive<f32> = 2000.0..=12000.0;
+/// Tints that it can have.
+pub const TINT: RangeInclusive<f32> = -1.0..=1.0;
+
 /// Which light looks white: the daylight or black body of a correlated colour temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WhiteBalance {
-    /// Kelvin, 2000 to 12000; lower values make a picture cooler, for they call warm light white.
+    /// Within [`KELVIN`]; lower values make a picture cooler, for they call warm light white.
     pub kelvin: f32,
-    /// Along green (negative) to magenta (positive), -1 to 1.
+    /// Along green (negative) to magenta (positive), within [`TINT`].
     pub tint: f32,
 }
 
@@ -32,7 +39,8 @@ impl WhiteBalance {
         if *self == Self::default() {
             return Mat3::IDENTITY;
         }
-        let source = BRADFORD * white_xyz(self.kelvin.clamp(2000.0, 12000.0), self.tint);
+        let source =
+            BRADFORD * white_xyz(self.kelvin.clamp(*KELVIN.start(), *KELVIN.end()), self.tint);
         let target = BRADFORD * white_xyz(DAYLIGHT_KELVIN, 0.0);
         let adapt = BRADFORD.inverse() * Mat3::from_diagonal(target / source) * BRADFORD;
         REC709_FROM_XYZ * adapt * REC709_FROM_XYZ.inverse()

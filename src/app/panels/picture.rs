@@ -6,7 +6,7 @@ use crate::app::commands::Command;
 use crate::app::document::{Document, PictureSize};
 use crate::app::theme;
 use crate::denoise::Denoiser;
-use crate::tone::{DAYLIGHT_KELVIN, ToneCurve, WhiteBalance};
+use crate::tone::{DAYLIGHT_KELVIN, KELVIN, TINT, ToneCurve, WhiteBalance};
 
 /// Draws the settings.
 pub(in crate::app) fn show(
@@ -107,11 +107,11 @@ fn curve_name(curve: ToneCurve) -> &'static str {
 
 fn white_balance(ui: &mut Ui, balance: &mut WhiteBalance) {
     theme::row(ui, "White", "Colour temperature of the light that looks white", |ui| {
-        let slider = Slider::new(&mut balance.kelvin, 2000.0..=12000.0).suffix(" K");
+        let slider = Slider::new(&mut balance.kelvin, KELVIN).suffix(" K");
         ui.add(slider.fixed_decimals(0).logarithmic(true));
     });
     theme::row(ui, "Tint", "Green to magenta", |ui| {
-        ui.add(Slider::new(&mut balance.tint, -1.0..=1.0).fixed_decimals(2));
+        ui.add(Slider::new(&mut balance.tint, TINT).fixed_decimals(2));
     });
     let is_changed = *balance != WhiteBalance::default();
     if is_changed && ui.button(format!("Daylight, {DAYLIGHT_KELVIN:.0} K")).clicked() {

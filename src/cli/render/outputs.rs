@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::share::Share;
+use super::assignment::Assignment;
 use super::{RenderArguments, frames};
 use crate::cli::picture::{check_kept, say_written};
 use crate::error::{Error, Result};
@@ -88,13 +88,13 @@ pub(super) fn without_distributions(path: &Path) -> Error {
 /// failed.
 pub(super) fn write(
     arguments: &RenderArguments,
-    share: &Share,
+    assignment: &Assignment,
     record: &Record<'_>,
     grid: Option<&LightGrid>,
 ) -> Vec<Error> {
     let metadata = record.metadata();
     let write = |path: &PathBuf| match arguments.part {
-        Some(_) => share.write_part(path, record),
+        Some(_) => assignment.write_part(path, record),
         None => arguments.picture.write(path, record.film, &metadata),
     };
     let write_and_say = |path: &PathBuf| write(path).map(|()| say_written(path)).err();

@@ -28,7 +28,7 @@ use crate::sources;
 const RESERVE: f64 = 2.0;
 
 /// What one process renders of a picture.
-pub(super) struct Share {
+pub(super) struct Assignment {
     part: Part,
     /// Samples a pixel before those of this part.
     first: u32,
@@ -66,8 +66,8 @@ struct Checkpoint {
     written: Instant,
 }
 
-impl Share {
-    /// The share that the arguments ask for, without what a checkpoint says is done.
+impl Assignment {
+    /// What the arguments ask for, without what a checkpoint says is done.
     ///
     /// # Errors
     /// If there is a checkpoint that is of another picture or cannot be read, or a part has no samples.
@@ -93,7 +93,7 @@ impl Share {
                 part.number, part.count
             )));
         }
-        let mut share = Self {
+        let mut assignment = Self {
             part,
             first: range.start,
             rule: StopRule { samples: rule.samples.map(|_| range.end), ..rule },
@@ -113,23 +113,23 @@ impl Share {
         };
         if let Some(path) = &arguments.checkpoint {
             if path.exists() {
-                share.take_up(path, view)?;
+                assignment.take_up(path, view)?;
             }
-            share.checkpoint = Some(Checkpoint {
+            assignment.checkpoint = Some(Checkpoint {
                 path: path.clone(),
                 every: Duration::try_from_secs_f64(arguments.checkpoint_every)
                     .unwrap_or(Duration::MAX),
                 written: Instant::now(),
             });
         }
-        if share.awaited.is_none() && share.first > 0 {
+        if assignment.awaited.is_none() && assignment.first > 0 {
             let film = Film::new(view.width, view.height, view.layers);
-            share.awaited = Some(Awaited { film, figures: None, noted: Doubling::default() });
+            assignment.awaited = Some(Awaited { film, figures: None, noted: Doubling::default() });
         }
-        Ok(share)
+        Ok(assignment)
     }
 
-    /// Goes on from a checkpoint, if it is one of this share.
+    /// Goes on from a checkpoint, if it is one of this part.
     fn take_up(&mut self, path: &Path, view: &View) -> Result<()> {
         let (facts, film) = read_film(path)?;
         let advice = "remove it or name another";
@@ -141,11 +141,11 @@ impl Share {
                 ),
             ));
         }
-        let is_of_share =
+        let is_of_part =
             facts.part == self.part && (self.part == Part::WHOLE || facts.samples == self.samples);
         let is_alike = (film.width, film.height) == (view.width, view.height)
             && film.has_layers() == view.layers;
-        if !is_of_share || !is_alike {
+        if !is_of_part || !is_alike {
             return Err(Error::at(
                 path,
                 format!("is the checkpoint of {}: {advice}", facts.share()),
@@ -178,7 +178,7 @@ impl Share {
         &self.rule
     }
 
-    /// Whether there is a picture of this share's own samples.
+    /// Whether there is a picture of this part's own samples.
     pub(super) fn has_samples(&self, session: &Session<'_>) -> bool {
         self.awaited.is_none()
             && (session.samples() > self.first || self.is_hasty() && session.is_begun())
@@ -190,7 +190,7 @@ impl Share {
         self.rule.seconds.is_some() && self.part == Part::WHOLE && self.checkpoint.is_none()
     }
 
-    /// This share's own samples.
+    /// This part's own samples.
     pub(super) fn film<'s>(&self, session: &'s Session<'_>) -> Cow<'s, Film> {
         match self.first {
             0 => Cow::Borrowed(session.film()),
@@ -347,7 +347,7 @@ impl Share {
         written
     }
 
-    /// Writes this share's own samples for `lightgrid merge`.
+    /// Writes this part's own samples for `lightgrid merge`.
     ///
     /// # Errors
     /// If the file cannot be written.
