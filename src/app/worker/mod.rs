@@ -320,6 +320,21 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn a_split_view_goes_on_with_the_picture_that_there_is() {
+        let Some(worker) = worker() else { return };
+        let rule = StopRule { samples: Some(16), ..StopRule::default() };
+        let request = Request { rule, ..request_of("open", [64, 48]) };
+        worker.submit(request.clone());
+        let is_done = |now: &Snapshot| now.activity == Activity::Done;
+        let before = wait_for(&worker, is_done);
+        worker.submit(Request { split: true, ..request });
+        let after = wait_for(&worker, |now| is_done(now) && now.plain.is_some());
+        assert_eq!(after.main.figures, before.main.figures, "nothing of it is done again");
+        let plain = after.plain.as_ref().expect("there is one").figures;
+        assert!(plain.elapsed_seconds() >= before.now.elapsed_seconds(), "at equal time");
+    }
+
+    #[test]
     fn films_are_copied_when_they_are_wanted() {
         let Some(worker) = worker() else { return };
         let request = request_of("open", [64, 48]);

@@ -47,8 +47,6 @@ impl Request {
         !Arc::ptr_eq(&self.world, &new.world)
             || !Arc::ptr_eq(&self.environment, &new.environment)
             || self.view != new.view
-            // Both halves start together; the plain one can be dropped at any time.
-            || (!self.split && new.split)
             || self.moving != new.moving
             || self.run != new.run
     }

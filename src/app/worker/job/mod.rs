@@ -115,15 +115,13 @@ impl<'a> Job<'a> {
         } else {
             self.learning_session(world, environment, view.clone())
         };
-        let mut plain = self.request.split.then(|| {
-            Session::new(world, environment, View { sampling: Sampling::Plain, ..view.clone() })
-        });
+        let mut plain: Option<Session<'_>> = None;
         let mut cached = CachedPicture::default();
         // Of the cached picture, one after the other.
         let mut turns = 0;
         // When the picture went on last.
         let mut went_on = Instant::now();
-        while let Some(activity) = self.next_activity(&main) {
+        while let Some(activity) = self.next_activity(&main, plain.as_ref()) {
             if !self.wants_cached(&main) {
                 cached.end(|session| self.kept.keep_training(session, &self.request));
             } else if cached.is_absent() && self.is_time_for_cached(&main) {
@@ -134,6 +132,9 @@ impl<'a> Job<'a> {
             if !self.request.split {
                 plain = None;
                 self.curves[1].clear();
+            } else if plain.is_none() {
+                let view = View { sampling: Sampling::Plain, ..view.clone() };
+                plain = Some(Session::new(world, environment, view));
             }
             match activity {
                 Activity::Paused | Activity::Done => {
@@ -237,7 +238,11 @@ impl<'a> Job<'a> {
     }
 
     /// What is to be done next; `None` when something else is asked for.
-    fn next_activity(&mut self, main: &Session<'_>) -> Option<Activity> {
+    fn next_activity(
+        &mut self,
+        main: &Session<'_>,
+        plain: Option<&Session<'_>>,
+    ) -> Option<Activity> {
         {
             let slot = lock(&self.shared.slot);
             if slot.quit {
@@ -251,11 +256,14 @@ impl<'a> Job<'a> {
             }
             self.shared.cancel.store(false, Ordering::Relaxed);
         }
+        // Begun later, it has the same time to come.
+        let is_level = |plain: &Session<'_>| plain.elapsed_seconds() >= main.elapsed_seconds();
+        let is_compared = !self.request.split || plain.is_some_and(is_level);
         Some(if self.request.paused {
             Activity::Paused
         } else if main.phase() == Phase::Learning {
             Activity::Learning(learned_share(main))
-        } else if main.samples() > 0 && main.is_done(&self.rule()) {
+        } else if main.samples() > 0 && main.is_done(&self.rule()) && is_compared {
             Activity::Done
         } else {
             Activity::Rendering
