@@ -98,7 +98,7 @@ fn line(session: &Session<'_>, rule: &StopRule, noise: f64) -> String {
         text += &format!(", noise {:.1}%", 100.0 * noise);
     }
     if let Some(left) = seconds_left(session, rule, noise) {
-        text += &format!(", {left:.0} s left");
+        text += &format!(", {} left", in_words(left));
     }
     text
 }
@@ -121,4 +121,25 @@ fn seconds_left(session: &Session<'_>, rule: &StopRule, noise: f64) -> Option<f6
         .filter(|seconds| seconds.is_finite())
         .min_by(f64::total_cmp)
         .map(|seconds| seconds.max(0.0))
+}
+
+/// Seconds, in the unit that suits them.
+fn in_words(seconds: f64) -> String {
+    match seconds {
+        ..180.0 => format!("{seconds:.0} s"),
+        ..7200.0 => format!("{:.0} min", seconds / 60.0),
+        ..172_800.0 => format!("{:.0} h", seconds / 3600.0),
+        _ => format!("{:.0} days", seconds / 86_400.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_words;
+
+    #[test]
+    fn times_are_told_in_units_that_suit_them() {
+        let words = [0.4, 179.0, 600.0, 7300.0, 4_552_324.0].map(in_words);
+        assert_eq!(words, ["0 s", "179 s", "10 min", "2 h", "53 days"]);
+    }
 }

@@ -16,7 +16,7 @@ use crate::render::film::{Film, Pixel, relative};
 /// Fewest samples a pixel with which noise ends a picture.
 pub(super) const LEAST_SAMPLES_OF_NOISE: u32 = 16;
 /// Fewest samples a pixel of a picture on the CPU that a later one is compared with, to find its noise.
-const FIRST_NOTED: u32 = 8;
+const FIRST_NOTED: u32 = 2;
 /// Of how many pixels at most, spread over the picture.
 const MOST_PIXELS: usize = 1 << 14;
 
