@@ -14,6 +14,7 @@ pub(super) struct Completion {
 /// Completes a path to a folder or to a file with one of these extensions. What begins with a dot is only
 /// offered to who types it, and capitals count where both are there.
 pub(super) fn complete(typed: &str, extensions: &[&str]) -> Completion {
+    let typed = if typed == "~" { "~/" } else { typed };
     let start = typed.rfind(is_separator).map_or(0, |at| at + 1);
     let (folder, start) = typed.split_at(start);
     let names = names(folder, extensions);

@@ -24,7 +24,10 @@ pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
             |down| matches!(event, Event::PointerButton { pressed, .. } if *pressed == down);
         is_down |= is_button(true);
         let is_tab = matches!(event, Event::Key { key: Key::Tab, pressed: true, .. });
-        let is_typing = matches!(event, Event::Text(_) | Event::Key { pressed: true, .. });
+        let is_typing = matches!(
+            event,
+            Event::Text(_) | Event::Paste(_) | Event::Ime(_) | Event::Key { pressed: true, .. }
+        );
         let is_beside_tab = is_typing && typed.is_some_and(|was_tab| was_tab || is_tab);
         typed = if is_typing { Some(is_tab) } else { typed };
         is_other(event) || (is_down && is_button(false)) || is_beside_tab

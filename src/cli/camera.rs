@@ -10,16 +10,15 @@ use crate::scene::{Camera, Projection};
 
 /// A place, in place of a camera of the file.
 #[derive(Debug, Clone, Default, PartialEq, clap::Args)]
-#[command(next_help_heading = "Camera")]
 pub(super) struct CameraArguments {
     /// Camera position in metres, instead of a camera of the file.
-    #[arg(long, value_parser = values::vector, requires = "target", allow_hyphen_values = true, value_name = "X,Y,Z")]
+    #[arg(long, value_parser = values::vector, requires = "target", allow_hyphen_values = true, value_name = "X,Y,Z", help_heading = "Camera")]
     pub(super) eye: Option<Vec3>,
     /// What the camera at --eye looks at.
-    #[arg(long, value_parser = values::vector, requires = "eye", allow_hyphen_values = true, value_name = "X,Y,Z")]
+    #[arg(long, value_parser = values::vector, requires = "eye", allow_hyphen_values = true, value_name = "X,Y,Z", help_heading = "Camera")]
     pub(super) target: Option<Vec3>,
     /// Vertical field of view in degrees.
-    #[arg(long, value_parser = values::positive, value_name = "DEG")]
+    #[arg(long, value_parser = values::positive, value_name = "DEG", help_heading = "Camera")]
     fov: Option<f64>,
 }
 

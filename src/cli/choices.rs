@@ -18,24 +18,23 @@ use crate::scene::{MaterialEdit, Outlines, SceneOptions};
 
 /// What is asked of a scene's file.
 #[derive(Debug, Clone, Default, PartialEq, clap::Args)]
-#[command(next_help_heading = "Scene")]
 pub(super) struct SceneArguments {
     /// Reads files that the scene names outside of its folder, too.
-    #[arg(long)]
+    #[arg(long, help_heading = "Scene")]
     allow_outside: bool,
     /// The look of a model that has several, by its name.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Scene")]
     variant: Option<String>,
     /// What happens to outlines: enlarged copies of a model that face inwards and, here, would shut out
     /// all light.
-    #[arg(long, value_enum, default_value = "remove", value_name = "WHAT")]
+    #[arg(long, value_enum, default_value = "remove", value_name = "WHAT", help_heading = "Scene")]
     outlines: Outlines,
     /// Leaves out all that is of the material of this name; may be given several times.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Scene")]
     hide: Vec<String>,
     /// Changes all materials of a name: color=#rrggbb, roughness=0..1, metalness=0..1 (each multiplies its
     /// texture), or hidden; may be given several times.
-    #[arg(long = "material", value_name = "NAME:CHANGES", value_parser = MaterialEdit::parse)]
+    #[arg(long = "material", value_name = "NAME:CHANGES", value_parser = MaterialEdit::parse, help_heading = "Scene")]
     edits: Vec<(String, MaterialEdit)>,
 }
 

@@ -100,8 +100,13 @@ impl PictureArguments {
 
     /// The exposure that a film's picture gets, to be that of others, too.
     pub(super) fn exposure_of(&self, film: &Film) -> Exposure {
-        let image = self.white.unwrap_or_default().apply(film.without_gaps().image());
-        Exposure::Stops(self.exposure.of(film, &image))
+        match self.exposure {
+            Exposure::Stops(stops) => Exposure::Stops(stops),
+            Exposure::Auto => {
+                let image = self.white.unwrap_or_default().apply(film.without_gaps().image());
+                Exposure::Stops(self.exposure.of(film, &image))
+            }
+        }
     }
 
     /// Takes this exposure.

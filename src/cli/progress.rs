@@ -40,9 +40,10 @@ impl Progress {
         Self { bar, prefix: String::new(), noise: Cell::default(), written: Instant::now().into() }
     }
 
-    /// One that says which of the frames it is about.
-    pub(super) fn of_frame(number: u32, last: u32) -> Self {
-        Self { prefix: format!("frame {number} up to {last}: "), ..Self::start("") }
+    /// The next one, which says which of the frames it is about.
+    pub(super) fn of_frame(&self, number: u32, last: u32) -> Self {
+        let (prefix, written) = (format!("frame {number} up to {last}: "), self.written.clone());
+        Self { prefix, written, ..Self::start("") }
     }
 
     /// Shows another message.

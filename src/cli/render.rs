@@ -157,6 +157,8 @@ impl Job<'_> {
         let figures = session.figures();
         let record = self.record(arguments, &session, (&film, &figures), &notices);
         let mut failures = outputs::write(arguments, &assignment, &record, session.grid());
+        // Another device may have taken over.
+        assignment.set_metadata(record.metadata());
         failures.extend(assignment.keep(&session).err());
         remarks.iter().for_each(notice);
         if let Err(failure) = outcome {
@@ -207,6 +209,7 @@ impl Job<'_> {
         let mut reel = if videos.is_empty() { None } else { Some(Reel::new()?) };
         let mut failures = Vec::new();
         let mut known = Known::default();
+        let mut progress = Progress::start("");
         for number in frames.numbers() {
             let name = |path: &PathBuf| frames::numbered(path, number);
             of_frame.outputs = pictures.iter().map(|path| name(path)).collect();
@@ -214,7 +217,7 @@ impl Job<'_> {
             of_frame.distributions = arguments.distributions.as_ref().map(name);
             of_frame.frame_of_video = reel.as_mut().map(Reel::next);
             self.interrupt.go_on();
-            let progress = Progress::of_frame(number, *frames.numbers().end());
+            progress = progress.of_frame(number, *frames.numbers().end());
             let camera = frames.camera(number, camera);
             // What one frame cannot be written to may take the next.
             match self.render(&of_frame, camera, Some(&mut known), &progress) {

@@ -106,7 +106,10 @@ const NOT_ORDINARY: &str = "cannot be written: it is not an ordinary file";
 fn is_stream(path: &Path) -> bool {
     let next = |path: &PathBuf| Some(path.with_file_name(fs::read_link(path).ok()?));
     let mut links = std::iter::successors(Some(path.to_owned()), next).take(MOST_LINKS);
-    links.any(|link| link.starts_with("/proc"))
+    links.any(|link| {
+        fs::canonicalize(folder_of(&link))
+            .is_ok_and(|folder| folder.starts_with("/proc") && folder.ends_with("fd"))
+    })
 }
 
 /// Links one after another that are followed, as many as systems do.

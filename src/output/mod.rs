@@ -113,8 +113,7 @@ pub fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
     }
     let mean =
         film.pixels().iter().map(Pixel::mean_luminance).sum::<f64>() / film.pixels().len() as f64;
-    let is_black = mean <= BLACK_SHARE * f64::from(luminance(environment.mean_radiance()));
-    if is_black || film.is_dark() {
+    if mean <= BLACK_SHARE * f64::from(luminance(environment.mean_radiance())) {
         remarks.push("the picture is black: hardly any light reaches what the camera sees".into());
     }
     remarks
@@ -214,17 +213,21 @@ mod tests {
 
     #[test]
     fn a_film_of_chance_light_is_shown_as_dark_as_it_is() {
-        let of = |lit: u32| {
+        let of_samples = |lit: u32, samples: u32| {
             let mut film = Film::new(100, 100, false);
-            for (y, x) in (0..100).flat_map(|y| (0..100).map(move |x| (y, x))) {
-                let radiance = Vec3::splat(if 100 * y + x < lit { 1e-6 } else { 0.0 });
+            let places = (0..100).flat_map(|y| (0..100).map(move |x| (y, x)));
+            for ((y, x), sample) in places.flat_map(|at| (0..4).map(move |sample| (at, sample))) {
+                let is_lit = 100 * y + x < lit && sample < samples;
+                let radiance = Vec3::splat(if is_lit { 1e-6 } else { 0.0 });
                 film.add(x, y, &PathResult { radiance, ..PathResult::default() });
             }
             // A filter makes much of little.
             Exposure::Auto.of(&film, &Image::filled(100, 100, [1e-6; 3]))
         };
+        let of = |lit| of_samples(lit, 1);
         assert_eq!([of(0), of(9)], [0.0; 2]);
         assert!(of(10) > 17.0 && of(10000) > 17.0);
+        assert!(of_samples(9, 4) > 17.0, "a small lamp is no chance");
         let film = Film::new(2, 2, false);
         assert_eq!(Exposure::Stops(3.0).of(&film, &film.image()), 3.0);
     }

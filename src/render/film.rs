@@ -183,11 +183,16 @@ impl Film {
         covered as f64 / self.pixels.len().max(1) as f64
     }
 
-    /// Whether so few of its pixels have got light that none is typical of the picture.
+    /// Whether next to nothing has got light, and that by chance: hardly a pixel, most by one sample alone.
     pub(crate) fn is_dark(&self) -> bool {
-        let sampled = self.pixels.iter().filter(|pixel| pixel.samples > 0);
-        let lit = |pixel: &&Pixel| pixel.mean_luminance() > 0.0;
-        sampled.clone().filter(lit).count() * LEAST_LIT < sampled.count()
+        let sampled = self.pixels.iter().filter(|pixel| pixel.samples > 0).count();
+        let lit = || self.pixels.iter().filter(|pixel| pixel.mean_luminance() > 0.0);
+        let by_more = lit().filter(|pixel| {
+            let sum = pixel.mean_luminance() * f64::from(pixel.samples);
+            sum * sum > 1.5 * pixel.luminance_squared
+        });
+        let (lit, by_more) = (lit().count(), by_more.count());
+        lit * LEAST_LIT < sampled && 10 * by_more <= lit
     }
 
     /// A film that was only begun, to be looked at: pixels without samples show one beside them or, farther

@@ -422,6 +422,8 @@ fn what_cannot_be_done_is_one_sentence_and_status_1() {
         (line("-o a.png -o ./a.png"), "./a.png: two outputs"),
         #[cfg(unix)]
         (line("-o a.png --json /dev/stdout"), "/dev/stdout: cannot be written: it is not an ord"),
+        #[cfg(target_os = "linux")]
+        (line("-o a.png --json /dev/fd/1"), "/dev/fd/1: cannot be written: it is not an ordinary"),
         (line("-o a.png/"), "a.png/: cannot be written: its name is that of a folder"),
         (
             line("-o a.png --sampling bsdf --distributions d.csv"),

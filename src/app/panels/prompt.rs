@@ -148,7 +148,12 @@ pub(in crate::app) fn show(
     });
     let typed = prompt.path.trim();
     let path = &in_home(typed);
-    if is_done && Path::new(path).is_dir() {
+    let is_built_in = match prompt.purpose {
+        Purpose::Scene => sources::is_built_in_scene(path),
+        Purpose::Map => sources::is_built_in_map(path),
+        _ => false,
+    };
+    if is_done && !is_built_in && Path::new(path).is_dir() {
         let is_ended = typed.ends_with(is_separator);
         prompt.go_on(if is_ended { typed.to_owned() } else { format!("{typed}{MAIN_SEPARATOR}") });
         context.request_repaint();

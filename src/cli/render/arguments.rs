@@ -110,7 +110,7 @@ pub(in crate::cli) struct RenderArguments {
     pub(in crate::cli) seconds: Option<f64>,
     /// Stop when the estimated relative RMS error falls below this, e.g. 0.05 or 5%; it is known from 16
     /// samples per pixel on.
-    #[arg(long, value_parser = values::noise, allow_hyphen_values = true, value_name = "E", help_heading = "Stop")]
+    #[arg(long, value_parser = values::noise, value_name = "E", help_heading = "Stop")]
     pub(super) noise: Option<f64>,
 
     /// How the map is sampled.

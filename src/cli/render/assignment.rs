@@ -407,7 +407,7 @@ fn identity(
         ("--seed", view.seed.to_string()),
         ("--filter", format!("{:?}", view.filter)),
         ("--sampling", view.sampling.name().to_owned()),
-        ("--sharing or --denoise", format!("{:?}", arguments.sharing())),
+        ("--sharing", format!("{:?}", arguments.sharing())),
         ("--bounces", bounces.to_string()),
         ("--no-russian-roulette", (!russian_roulette).to_string()),
         ("--grid", view.grid_columns.to_string()),
@@ -417,9 +417,9 @@ fn identity(
         ("--env-rotation", arguments.env_rotation.to_string()),
         ("--env-intensity", arguments.env_intensity.to_string()),
         ("--env-sun", arguments.env_sun.to_string()),
-        ("fog", Digest::new().debug(&view.medium).to_string()),
+        ("--fog", Digest::new().debug(&view.medium).to_string()),
         ("--background", format!("{:?}", view.background)),
-        ("layers", view.layers.to_string()),
+        ("--layers or --denoise", view.layers.to_string()),
         // What no option changes, but versions may.
         ("settings", Digest::new().debug(&(view.points, &view.distributions)).to_string()),
     ];

@@ -131,6 +131,7 @@ impl<'a> Job<'a> {
             }
             if !self.request.split {
                 plain = None;
+                self.readings[1] = None;
                 self.curves[1].clear();
             } else if plain.is_none() {
                 let view = View { sampling: Sampling::Plain, ..view.clone() };
