@@ -42,15 +42,25 @@ mod tests {
 
     use super::*;
 
+    fn key_event(key: Key, pressed: bool) -> Event {
+        let modifiers = Modifiers::NONE;
+        Event::Key { key, physical_key: None, pressed, repeat: false, modifiers }
+    }
+
+    /// Asserts that all of them together are taken in these turns.
+    fn check(turns: &[Vec<Event>]) {
+        let mut events = turns.concat();
+        for turn in turns {
+            let rest = first_turn(&mut events);
+            assert_eq!(events, *turn);
+            events = rest;
+        }
+        assert!(events.is_empty() && first_turn(&mut events).is_empty());
+    }
+
     #[test]
     fn tab_completes_what_is_typed_before_it() {
-        let key = |key| Event::Key {
-            key,
-            physical_key: None,
-            pressed: true,
-            repeat: false,
-            modifiers: Modifiers::NONE,
-        };
+        let key = |key| key_event(key, true);
         let text = |letter: &str| Event::Text(letter.to_owned());
         let turns = [
             vec![key(Key::A), text("a"), key(Key::B), text("b")],
@@ -58,25 +68,13 @@ mod tests {
             vec![key(Key::Tab)],
             vec![key(Key::C), text("c"), key(Key::Enter)],
         ];
-        let mut events = turns.concat();
-        for turn in turns {
-            let rest = first_turn(&mut events);
-            assert_eq!(events, turn);
-            events = rest;
-        }
-        assert!(events.is_empty());
+        check(&turns);
     }
 
     #[test]
     fn what_a_key_means_for_a_drag_is_known_before_it_begins_and_a_tap_lasts_a_frame() {
         let (pos, modifiers) = (Pos2::ZERO, Modifiers::NONE);
-        let key = |pressed| Event::Key {
-            key: Key::X,
-            physical_key: None,
-            pressed,
-            repeat: false,
-            modifiers,
-        };
+        let key = |pressed| key_event(Key::X, pressed);
         let button = |pressed| Event::PointerButton {
             pos,
             button: PointerButton::Primary,
@@ -91,12 +89,6 @@ mod tests {
             [&[button(false)], &drag[..]].concat(),
             vec![button(false), moves, key(true), key(false)],
         ];
-        let mut events = turns.concat();
-        for turn in turns {
-            let rest = first_turn(&mut events);
-            assert_eq!(events, turn);
-            events = rest;
-        }
-        assert!(events.is_empty() && first_turn(&mut events).is_empty());
+        check(&turns);
     }
 }

@@ -153,11 +153,10 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
         return Err(Error::new("--panel none and other panels exclude each other"));
     }
     let defaults = Document::default();
-    let look = match arguments.exposure {
-        Exposure::Auto => defaults.look,
-        Exposure::Stops(exposure_ev) => Look { auto_exposure: false, exposure_ev, ..defaults.look },
+    let (auto_exposure, exposure_ev) = match arguments.exposure {
+        Exposure::Auto => (true, 0.0),
+        Exposure::Stops(stops) => (false, stops),
     };
-    let look = Look { denoise: arguments.denoise, ..look };
     let document = Document {
         scene: arguments.scene.clone(),
         map: arguments.env.clone().unwrap_or_else(|| builtin::sky(&arguments.scene).to_owned()),
@@ -171,7 +170,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
             ..defaults.light
         },
         viewpoint: arguments.place.viewpoint()?,
-        look,
+        look: Look { auto_exposure, exposure_ev, denoise: arguments.denoise, ..defaults.look },
         stop: StopRule { samples: Some(arguments.samples), ..StopRule::default() },
         ..defaults
     };

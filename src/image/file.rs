@@ -104,9 +104,7 @@ const NOT_ORDINARY: &str = "cannot be written: it is not an ordinary file";
 /// Whether a path means what this process has open, as /dev/stdout does: a file that it happens to be would
 /// not be the same one once it was replaced.
 fn is_stream(path: &Path) -> bool {
-    let next = |path: &PathBuf| Some(path.with_file_name(fs::read_link(path).ok()?));
-    let mut links = std::iter::successors(Some(path.to_owned()), next).take(MOST_LINKS);
-    links.any(|link| {
+    links(path).any(|link| {
         fs::canonicalize(folder_of(&link))
             .is_ok_and(|folder| folder.starts_with("/proc") && folder.ends_with("fd"))
     })
@@ -120,12 +118,13 @@ fn followed(path: &Path) -> PathBuf {
     if let Ok(target) = fs::canonicalize(path) {
         return target;
     }
-    let mut target = path.to_owned();
-    for _ in 0..MOST_LINKS {
-        let Ok(next) = fs::read_link(&target) else { break };
-        target = target.with_file_name(next);
-    }
-    target
+    links(path).last().unwrap_or_else(|| path.to_owned())
+}
+
+/// A path and the links that it leads through, one after the other, the last of which is none.
+fn links(path: &Path) -> impl Iterator<Item = PathBuf> {
+    let next = |path: &PathBuf| Some(path.with_file_name(fs::read_link(path).ok()?));
+    std::iter::successors(Some(path.to_owned()), next).take(MOST_LINKS + 1)
 }
 
 /// Why `target` cannot be written, as far as can be known before trying.

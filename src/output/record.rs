@@ -127,8 +127,6 @@ impl Record<'_> {
 pub fn settings_of(view: &View, world: &World) -> Vec<(&'static str, Value)> {
     let camera = &view.camera;
     let eye = camera.world_from_camera.translation;
-    let forward = -camera.world_from_camera.matrix3.z_axis.normalize_or_zero();
-    let target = eye + forward * camera.focus_distance;
     let fov_degrees = match camera.projection {
         Projection::Perspective { fov_y_radians } => Some(in_digits(fov_y_radians.to_degrees())),
         Projection::Orthographic { .. } => None,
@@ -145,7 +143,7 @@ pub fn settings_of(view: &View, world: &World) -> Vec<(&'static str, Value)> {
     let region = view.crop.map(|crop| [crop.corner, [view.width, view.height]].concat());
     vec![
         ("eye", json!(eye.to_array().map(in_digits))),
-        ("target", json!(target.to_array().map(in_digits))),
+        ("target", json!(camera.target().to_array().map(in_digits))),
         ("fov_degrees", json!(fov_degrees)),
         ("lens_radius", json!(in_digits(camera.lens_radius))),
         ("fog", json!(fog)),

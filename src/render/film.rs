@@ -185,8 +185,12 @@ impl Film {
 
     /// Whether next to nothing has got light, and that by chance: hardly a pixel, most by one sample alone.
     pub(crate) fn is_dark(&self) -> bool {
-        let sampled = self.pixels.iter().filter(|pixel| pixel.samples > 0).count();
         let lit = || self.pixels.iter().filter(|pixel| pixel.mean_luminance() > 0.0);
+        // Of most pictures the first pixels tell.
+        if lit().nth(self.pixels.len() / LEAST_LIT).is_some() {
+            return false;
+        }
+        let sampled = self.pixels.iter().filter(|pixel| pixel.samples > 0).count();
         let by_more = lit().filter(|pixel| {
             let sum = pixel.mean_luminance() * f64::from(pixel.samples);
             sum * sum > 1.5 * pixel.luminance_squared

@@ -437,6 +437,12 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// The point straight ahead at which the picture is sharp.
+    pub fn target(&self) -> Vec3 {
+        let back = self.world_from_camera.matrix3.z_axis.normalize_or_zero();
+        Vec3::from(self.world_from_camera.translation - back * self.focus_distance)
+    }
+
     /// A pinhole camera at `eye` that looks at `target`.
     pub fn look_at(eye: Vec3, target: Vec3, fov_y_radians: f32) -> Self {
         let z = (eye - target).normalize_or(Vec3::Z);

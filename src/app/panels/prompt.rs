@@ -15,15 +15,18 @@ use crate::sources;
 /// What is to be known of a path before it is taken.
 fn objection(purpose: Purpose, path: &str) -> Option<Objection> {
     let is_there = Path::new(path).exists();
-    let is_missing = match purpose {
-        Purpose::Scene => sources::check_scene(path).is_err(),
-        Purpose::Map => !(is_there || sources::is_built_in_map(path)),
-        Purpose::Reference => !is_there,
-        Purpose::Picture | Purpose::Distributions => {
-            return is_there.then_some(Objection::Replaces);
-        }
-    };
-    is_missing.then_some(Objection::Missing)
+    if purpose.is_output() {
+        return is_there.then_some(Objection::Replaces);
+    }
+    (!is_there && !is_built_in(purpose, path)).then_some(Objection::Missing)
+}
+
+fn is_built_in(purpose: Purpose, name: &str) -> bool {
+    match purpose {
+        Purpose::Scene => sources::is_built_in_scene(name),
+        Purpose::Map => sources::is_built_in_map(name),
+        _ => false,
+    }
 }
 
 fn sentence(objection: Objection) -> &'static str {
@@ -118,9 +121,13 @@ pub(in crate::app) fn show(
         if let Some(objection) = objection {
             ui.label(RichText::new(sentence(objection)).color(theme::ALERT));
         }
-        let offers = prompt.offers.iter().take(MOST_OFFERS);
-        let taken = offers.filter(|offer| ui.link(RichText::new(*offer).size(12.5)).clicked());
-        if let Some(offer) = taken.last().cloned() {
+        let mut taken = None;
+        for offer in prompt.offers.iter().take(MOST_OFFERS) {
+            if ui.link(RichText::new(offer).size(12.5)).clicked() {
+                taken = Some(offer.clone());
+            }
+        }
+        if let Some(offer) = taken {
             prompt.go_on(offer);
             ui.ctx().request_repaint();
         }
@@ -148,12 +155,7 @@ pub(in crate::app) fn show(
     });
     let typed = prompt.path.trim();
     let path = &in_home(typed);
-    let is_built_in = match prompt.purpose {
-        Purpose::Scene => sources::is_built_in_scene(path),
-        Purpose::Map => sources::is_built_in_map(path),
-        _ => false,
-    };
-    if is_done && !is_built_in && Path::new(path).is_dir() {
+    if is_done && !is_built_in(prompt.purpose, path) && Path::new(path).is_dir() {
         let is_ended = typed.ends_with(is_separator);
         prompt.go_on(if is_ended { typed.to_owned() } else { format!("{typed}{MAIN_SEPARATOR}") });
         context.request_repaint();

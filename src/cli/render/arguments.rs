@@ -357,7 +357,7 @@ impl RenderArguments {
         } else {
             let chosen = framing::frame(world, self.size.0 as f32 / self.size.1 as f32);
             let eye = chosen.world_from_camera.translation;
-            let target = eye - chosen.world_from_camera.matrix3.z_axis * chosen.focus_distance;
+            let target = chosen.target();
             notices.add(format!(
                 "{} has no camera; the view is --eye {},{},{} --target {},{},{} --fov {}",
                 self.scene,

@@ -161,9 +161,8 @@ impl Assignment {
         let before = self.awaited.as_ref().filter(|awaited| awaited.figures.is_some());
         if let (Some(Awaited { film, .. }), Some(checkpoint)) = (before, &self.checkpoint) {
             let (path, samples) = (checkpoint.path.display(), film.min_samples());
-            let more = self.rule.samples.filter(|asked| self.first + samples > *asked);
-            let more =
-                more.map_or_else(String::new, |_| ", which is more than is asked for".into());
+            let is_more = self.rule.samples.is_some_and(|asked| self.first + samples > asked);
+            let more = if is_more { ", which is more than is asked for" } else { "" };
             say(notices, format!("{path}: goes on from {samples} samples a pixel{more}"));
         }
     }

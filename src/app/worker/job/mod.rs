@@ -23,6 +23,9 @@ use crate::radiance_cache::CacheFacts;
 use crate::render::film::Film;
 use crate::render::{Gi, Phase, Sampling, Session, StopRule, View};
 
+/// Sessions by what they are for.
+const MAIN: usize = 0;
+const PLAIN: usize = 1;
 /// While there is much to learn the picture goes on a little this often.
 const STANDSTILL: Duration = Duration::from_millis(400);
 
@@ -131,8 +134,8 @@ impl<'a> Job<'a> {
             }
             if !self.request.split {
                 plain = None;
-                self.readings[1] = None;
-                self.curves[1].clear();
+                self.readings[PLAIN] = None;
+                self.curves[PLAIN].clear();
             } else if plain.is_none() {
                 let view = View { sampling: Sampling::Plain, ..view.clone() };
                 plain = Some(Session::new(world, environment, view));
@@ -178,8 +181,8 @@ impl<'a> Job<'a> {
             }
             // After publishing, which has read the film.
             if is_reading_due || !self.request.previews {
-                self.note(0, &main);
-                plain.iter().for_each(|plain| self.note(1, plain));
+                self.note(MAIN, &main);
+                plain.iter().for_each(|plain| self.note(PLAIN, plain));
             }
         }
         cached.end(|session| self.kept.keep_training(session, &self.request));
@@ -197,8 +200,7 @@ impl<'a> Job<'a> {
         cached: &mut CachedPicture<'_>,
         turns: &mut u32,
     ) {
-        let is_behind = |plain: &&mut Session<'_>| plain.elapsed_seconds() < main.elapsed_seconds();
-        if let Some(plain) = plain.filter(is_behind) {
+        if let Some(plain) = plain.filter(|plain| !is_level(plain, main)) {
             self.advance(plain, None, true);
         } else if let Some(cached) = cached.next(main, *turns) {
             let start = Instant::now();
@@ -258,8 +260,7 @@ impl<'a> Job<'a> {
             self.shared.cancel.store(false, Ordering::Relaxed);
         }
         // Begun later, it has the same time to come.
-        let is_level = |plain: &Session<'_>| plain.elapsed_seconds() >= main.elapsed_seconds();
-        let is_compared = !self.request.split || plain.is_some_and(is_level);
+        let is_compared = !self.request.split || plain.is_some_and(|plain| is_level(plain, main));
         Some(if self.request.paused {
             Activity::Paused
         } else if main.phase() == Phase::Learning {
@@ -319,6 +320,11 @@ impl<'a> Job<'a> {
             slot = self.shared.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
         }
     }
+}
+
+/// Whether the plain picture of a split view has had the time of the main one, learning included.
+fn is_level(plain: &Session<'_>, main: &Session<'_>) -> bool {
+    plain.elapsed_seconds() >= main.elapsed_seconds()
 }
 
 fn learned_share(session: &Session<'_>) -> f32 {

@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::Job;
 use super::cached::{CachedPicture, worth};
 use super::sessions::SLICE;
+use super::{Job, MAIN, PLAIN};
 use crate::app::lock;
 use crate::app::worker::{Activity, Backdrop, NoCache, Point, Request, SessionSnapshot, Snapshot};
 use crate::light_grid::LightGrid;
@@ -24,9 +24,6 @@ const OLDEST: Duration = Duration::from_secs(2);
 const PUBLISH_SHARE: u32 = 40;
 /// But a picture that changes is shown at least so often.
 const LONGEST_GAP: Duration = Duration::from_millis(800);
-/// Sessions by what they are for.
-const MAIN: usize = 0;
-const PLAIN: usize = 1;
 
 /// A film as it was copied, or read back from the window's device, last.
 #[derive(Clone)]
