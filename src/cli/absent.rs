@@ -37,14 +37,6 @@ absent!(report, ReportArguments, "measurements (feature `report`)");
 #[cfg(not(feature = "report"))]
 absent!(stability, StabilityArguments, "measurements (feature `report`)");
 
-#[cfg(not(feature = "window"))]
-impl Words {
-    /// What `lightgrid` alone stands for.
-    pub(super) fn plain() -> Self {
-        Self::default()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use clap::Parser as _;

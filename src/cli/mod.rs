@@ -122,7 +122,9 @@ pub fn remove_unfinished() {
 }
 
 fn run(arguments: Arguments) -> Result<()> {
-    let command = arguments.command.unwrap_or_else(|| Command::View(view::ViewArguments::plain()));
+    let Some(command) = arguments.command else {
+        return run(Arguments::parse_from(["lightgrid", "view"]));
+    };
     if !matches!(command, Command::View(_)) {
         memory::refusal_ends();
     }

@@ -32,18 +32,6 @@ pub(super) struct PictureArguments {
     layers: Vec<LayerName>,
 }
 
-impl Default for PictureArguments {
-    fn default() -> Self {
-        Self {
-            exposure: Exposure::Auto,
-            tonemap: ToneCurve::default(),
-            denoise: None,
-            white: None,
-            layers: Vec::new(),
-        }
-    }
-}
-
 /// Stops, or `auto`.
 pub(super) fn parse_exposure(text: &str) -> std::result::Result<Exposure, String> {
     if text == "auto" {

@@ -69,24 +69,6 @@ impl ViewArguments {
             None => [builtin::DEFAULT_SCENE, &self.scene],
         }
     }
-
-    /// What `lightgrid` alone stands for.
-    pub(super) fn plain() -> Self {
-        Self {
-            scene: builtin::DEFAULT_SCENE.to_owned(),
-            of_scene: SceneArguments::default(),
-            env: None,
-            place: CameraArguments::default(),
-            sampling: None,
-            device: None,
-            adapter: None,
-            rays: RayChoice::Auto,
-            size: None,
-            samples: None,
-            settings: None,
-            output: "lightgrid.png".into(),
-        }
-    }
 }
 
 /// Opens the window; without a display, says so and renders the picture into a file.

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::metrics::hypothesis::{student_975, two_sided_p};
 use crate::sampler::hash;
 
 /// A mean over runs.
@@ -212,14 +213,6 @@ pub fn bootstrap(counts: [usize; 2], statistic: impl Fn([&[usize]; 2]) -> f64) -
 
 /// Chance to leave out at each end, for groups of `count` runs.
 fn expanded_tail(count: usize) -> f64 {
-    let student = STUDENT_975.get(count - 2).copied().unwrap_or(1.96);
-    let z = student * (count as f64 / (count as f64 - 1.0)).sqrt();
-    0.5 * crate::metrics::hypothesis::two_sided_p(z)
+    let z = student_975(count - 1) * (count as f64 / (count as f64 - 1.0)).sqrt();
+    0.5 * two_sided_p(z)
 }
-
-/// 97.5 % quantiles of Student's distribution with 1, 2, ... degrees of freedom (any table).
-const STUDENT_975: [f64; 30] = [
-    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160,
-    2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056,
-    2.052, 2.048, 2.045, 2.042,
-];

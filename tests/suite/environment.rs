@@ -9,9 +9,10 @@ use lightgrid::color::importance;
 use lightgrid::environment::{Environment, EnvironmentOptions, Lookup, TableKind};
 use lightgrid::image::Image;
 use lightgrid::math::{direction_from_uv, rotate_y, texel_solid_angle, uv_from_direction};
-use lightgrid::metrics::hypothesis::{chi_square_test, sidak};
+use lightgrid::metrics::hypothesis::chi_square_test;
 
 use crate::shared::SplitMix;
+use crate::z_test::sidak;
 
 /// Random numbers, points and directions.
 struct Random(SplitMix);

@@ -7,7 +7,6 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions, TableKind, sky};
-use lightgrid::metrics::hypothesis::{Means, z_test};
 use lightgrid::path::{Background, PathLimits, World, WorldBuilder, framing};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
@@ -20,6 +19,7 @@ use crate::estimator::scenes::{self, lambert, lamp, room, smoked_glass};
 use crate::estimator::{MODES, mean, render, view};
 use crate::instances::{many, placings};
 use crate::shared::shared;
+use crate::z_test::expect_same_pixels;
 
 /// Chance that a sound pair of devices fails one comparison.
 const ALPHA: f64 = 1e-3;
@@ -76,23 +76,6 @@ fn differing(a: &Film, b: &Film) -> f64 {
     count as f64 / a.pixels().len() as f64
 }
 
-/// Asserts that two films of independent samples have the same mean in every pixel.
-fn expect_agreement(what: &str, a: &Film, b: &Film) {
-    let floor = (1e-3 * mean(a).luminance).powi(2);
-    let of = |film: &Film| -> (Vec<f64>, Vec<f64>) {
-        let pixels = film.pixels().iter();
-        pixels.map(|p| (p.mean_luminance(), p.variance_of_mean() + floor)).unzip()
-    };
-    let ((a_mean, a_variance), (b_mean, b_variance)) = (of(a), of(b));
-    let test = z_test(
-        Means { mean: &a_mean, variance_of_mean: &a_variance },
-        Means { mean: &b_mean, variance_of_mean: &b_variance },
-        ALPHA,
-    );
-    let test = test.expect("two pictures of one size");
-    assert!(test.passed(), "{what}: {test:?}");
-}
-
 /// The same seed draws nearly the same paths, and other seeds the same expectation.
 fn compare(gpu: &Gpu, what: &str, world: &World, environment: &Environment, sampling: Sampling) {
     compare_views(gpu, what, world, environment, picture(world, sampling));
@@ -115,7 +98,7 @@ fn compare_views(gpu: &Gpu, what: &str, world: &World, environment: &Environment
     let most = if learns { 0.5 } else { 0.05 };
     assert!(share < most, "{what}, {sampling:?}: {share} of the pixels differ");
     let other = render(world, environment, View { seed: 77, ..view }, 4 * samples);
-    expect_agreement(&format!("{what}, {sampling:?}"), &other, &gpu_film);
+    expect_same_pixels(&format!("{what}, {sampling:?}"), &other, &gpu_film, ALPHA);
 }
 
 #[test]
@@ -318,7 +301,7 @@ fn pixels_share_the_same_vertices() {
         eprintln!("{name}, {sharing:?}: differences are {share:.4} of the noise");
         assert!(share < 0.1, "{name}, {sharing:?}: {share}");
         let alone = View { seed: 77, sharing: Sharing::Off, ..view.clone() };
-        expect_agreement(name, &render(&world, &environment, alone, 128), &gpu_film);
+        expect_same_pixels(name, &render(&world, &environment, alone, 128), &gpu_film, ALPHA);
 
         // In pieces, and begun by the CPU.
         let never = AtomicBool::new(false);

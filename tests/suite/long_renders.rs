@@ -8,7 +8,6 @@ use std::sync::atomic::AtomicBool;
 use lightgrid::environment::{Environment, EnvironmentOptions};
 use lightgrid::light_grid::LightGrid;
 use lightgrid::light_grid::cells::SphericalGrid;
-use lightgrid::metrics::hypothesis::{Means, z_test};
 use lightgrid::path::{PathLimits, World};
 use lightgrid::render::{Phase, Sampling, Session, Sharing, StopRule, View};
 use lightgrid::scene::builtin;
@@ -16,6 +15,7 @@ use lightgrid::sources;
 
 use crate::estimator::view;
 use crate::peers::{PEERS, Peer};
+use crate::z_test::{Mean, z_test};
 
 /// Samples a pixel of a long render.
 const SAMPLES: u32 = 4096;
@@ -195,13 +195,9 @@ fn deviations(a: &[Values], b: &[Values], least_error: f64) -> Values {
 /// The largest deviation of any quantity in standard errors, and whether chance explains it.
 fn agreement(a: &[Values], b: &[Values], least_error: f64) -> (f64, bool) {
     let found = deviations(a, b, least_error);
-    let (none, one) = (vec![0.0; found.len()], vec![1.0; found.len()]);
-    let test = z_test(
-        Means { mean: &found, variance_of_mean: &one },
-        Means { mean: &none, variance_of_mean: &none },
-        ALPHA,
-    );
-    (found.into_iter().fold(0.0, f64::max), test.is_ok_and(|test| test.passed()))
+    let standard: Vec<Mean> = found.iter().map(|deviation| (*deviation, 1.0)).collect();
+    let test = z_test(&standard, &vec![(0.0, 0.0); found.len()], ALPHA);
+    (found.into_iter().fold(0.0, f64::max), test.passed())
 }
 
 /// Compares, prints a line and says what is wrong.

@@ -35,3 +35,4 @@ mod shared;
 mod stability;
 #[cfg(feature = "window")]
 mod window;
+mod z_test;

@@ -23,7 +23,7 @@ const FLOORS: [&[&str]; 14] = [
 ];
 
 /// Crates and where alone they are named: rooms, or parts of one. Any other is named anywhere.
-const CRATES: [(&str, &[&str]); 27] = [
+const CRATES: [(&str, &[&str]); 28] = [
     ("basisu", &["image/ktx2"]),
     ("bevy_mikktspace", &["scene/gltf/tangents"]),
     ("bitflags", &["features"]),
@@ -49,6 +49,7 @@ const CRATES: [(&str, &[&str]); 27] = [
     ("rfd", &["app/execute"]),
     ("ruzstd", &["image/ktx2"]),
     ("signal_hook", &["app/window", "cli/interrupt"]),
+    ("statrs", &["metrics"]),
     ("wgpu", &["app", "develop", "render/gpu"]),
     ("winit", &["app/window"]),
 ];

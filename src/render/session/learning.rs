@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use super::{Engine, Session};
+use super::Session;
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::cells::SphericalGrid;
@@ -112,12 +112,12 @@ impl Session<'_> {
     pub(super) fn learn(&mut self, cancel: &AtomicBool) -> Result<()> {
         let Some(learning) = &self.learning else { return Ok(()) };
         let range = cpu::learning_range(&self.view, learning.pass);
-        let rays = match &mut self.engine {
-            Engine::Cpu => {
+        let rays = match &mut self.gpu {
+            None => {
                 let tracer = self.tracer(Some(&learning.grid));
                 cpu::learn(&tracer, &self.rays, &self.view, range.clone(), cancel)
             }
-            Engine::Gpu(renderer) => renderer.learn(range.clone(), &learning.grid, cancel)?,
+            Some(renderer) => renderer.learn(range.clone(), &learning.grid, cancel)?,
         };
         if cancel.load(Ordering::Relaxed) {
             // Which paths of the pass were counted depends on the threads: start over.

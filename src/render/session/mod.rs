@@ -36,19 +36,14 @@ const KEPT_SECONDS: Duration = Duration::from_secs(5);
 /// Learning takes at most this share of the seconds asked for.
 const LEARNING_TIME_SHARE: f64 = 0.05;
 
-/// What does the work.
-enum Engine {
-    Cpu,
-    Gpu(Box<gpu::Renderer>),
-}
-
 /// A picture in the making.
 pub struct Session<'a> {
     world: &'a World,
     environment: &'a Environment,
     view: View,
     rays: CameraRays,
-    engine: Engine,
+    /// Does the work, if it is there, in place of the CPU.
+    gpu: Option<Box<gpu::Renderer>>,
     film: HostFilm,
     /// Fewest samples of any pixel.
     samples: u32,
@@ -86,7 +81,7 @@ impl<'a> Session<'a> {
             environment,
             view,
             rays,
-            engine: Engine::Cpu,
+            gpu: None,
             whole_map,
             learned: None,
             sequence: Sequence::default(),
@@ -172,7 +167,7 @@ impl<'a> Session<'a> {
     /// As [`Self::advance`].
     pub fn settle(&mut self) -> Result<()> {
         let start = Instant::now();
-        if let Engine::Gpu(renderer) = &mut self.engine {
+        if let Some(renderer) = &mut self.gpu {
             renderer.settle()?;
             self.film.update(&self.view, |film| renderer.read_film(film))?;
             self.figures.render_seconds += start.elapsed().as_secs_f64();
@@ -192,7 +187,7 @@ impl<'a> Session<'a> {
         self.figures.rays = self.figures().rays;
         // With a device goes what was done since its film was read.
         self.sequence.first_sample = self.sequence.first_sample.min(self.samples);
-        self.engine = Engine::Cpu;
+        self.gpu = None;
     }
 
     /// Lets a GPU take over from the CPU, to which this session's world and environment are uploaded, with
@@ -207,16 +202,13 @@ impl<'a> Session<'a> {
             gpu::Renderer::new(uploaded, world, environment, &self.view, &self.rays, film)?;
         renderer.set_grid(self.learned.as_ref().or(self.whole_map.as_ref()))?;
         renderer.set_cache(self.training.as_ref().and_then(CacheTraining::cache))?;
-        self.engine = Engine::Gpu(Box::new(renderer));
+        self.gpu = Some(Box::new(renderer));
         Ok(())
     }
 
     /// Figures of the GPU at work; `None` on the CPU.
     pub fn gpu_figures(&self) -> Option<gpu::GpuFigures> {
-        match &self.engine {
-            Engine::Cpu => None,
-            Engine::Gpu(renderer) => Some(renderer.figures()),
-        }
+        self.gpu.as_ref().map(|renderer| renderer.figures())
     }
 
     /// Samples per pixel that the next pass should take: growing with what is there, so that few
@@ -227,10 +219,10 @@ impl<'a> Session<'a> {
         let samples = self.samples;
         let is_counting =
             self.learning.as_ref().is_some_and(|learning| learning.stage == Stage::Counting);
-        let pass = match &self.engine {
+        let pass = match self.gpu {
             // Each look at the noise reads the film.
-            Engine::Gpu(_) if rule.noise.is_some() => (samples / 8).clamp(1, 64),
-            Engine::Gpu(_) if !is_counting => {
+            Some(_) if rule.noise.is_some() => (samples / 8).clamp(1, 64),
+            Some(_) if !is_counting => {
                 let each = self.figures.render_seconds / f64::from(samples.max(1));
                 let affordable = (GPU_PASS_SECONDS / each.max(1e-9)) as u32;
                 affordable.max(samples / 16).min(samples).clamp(1, 64)
@@ -291,10 +283,7 @@ impl<'a> Session<'a> {
     /// If it does not fit on the GPU.
     pub(crate) fn set_training(&mut self, training: CacheTraining) -> Result<()> {
         let training = self.training.insert(training);
-        match &mut self.engine {
-            Engine::Cpu => Ok(()),
-            Engine::Gpu(renderer) => renderer.set_cache(training.cache()),
-        }
+        self.gpu.as_mut().map_or(Ok(()), |renderer| renderer.set_cache(training.cache()))
     }
 
     /// The training of the radiance cache so far, for another session; this one follows all paths to
@@ -328,10 +317,7 @@ impl<'a> Session<'a> {
         film.skip(skipped);
         self.skipped = skipped;
         self.samples = film.min_samples();
-        let set = match &mut self.engine {
-            Engine::Cpu => Ok(()),
-            Engine::Gpu(renderer) => renderer.set_film(&film),
-        };
+        let set = self.gpu.as_mut().map_or(Ok(()), |renderer| renderer.set_film(&film));
         self.film.put(film);
         set
     }
@@ -357,7 +343,7 @@ impl<'a> Session<'a> {
     /// [`Self::advance`] or [`Self::settle`] says why.
     pub fn film(&self) -> &Film {
         self.film.get(&self.view, |film| {
-            if let Engine::Gpu(renderer) = &self.engine {
+            if let Some(renderer) = &self.gpu {
                 // What fails is heard of at the next call.
                 let _ = renderer.read_film(film);
             }
@@ -372,15 +358,12 @@ impl<'a> Session<'a> {
 
     /// Whether a GPU is at work.
     pub fn is_on_gpu(&self) -> bool {
-        matches!(self.engine, Engine::Gpu(_))
+        self.gpu.is_some()
     }
 
     /// The film where a GPU keeps it, and that GPU; `None` on the CPU.
     pub(crate) fn film_on_device(&self) -> Option<(gpu::Gpu, gpu::DeviceFilm)> {
-        match &self.engine {
-            Engine::Cpu => None,
-            Engine::Gpu(renderer) => renderer.film_on_device(),
-        }
+        self.gpu.as_ref()?.film_on_device()
     }
 
     /// What is rendered; it is decided whether pixels share.
@@ -395,10 +378,7 @@ impl<'a> Session<'a> {
 
     /// What has been done so far. A GPU's rays are those up to the last reading of its film.
     pub fn figures(&self) -> Figures {
-        let rays = match &self.engine {
-            Engine::Cpu => 0,
-            Engine::Gpu(renderer) => renderer.rays(),
-        };
+        let rays = self.gpu.as_ref().map_or(0, |renderer| renderer.rays());
         let variance_saved = self.doubling().saved();
         Figures { rays: self.figures.rays + rays, variance_saved, ..self.figures }
     }
@@ -435,20 +415,20 @@ impl<'a> Session<'a> {
             && !cancel.load(Ordering::Relaxed)
         {
             let sums = training.sums();
-            let (done, rays) = match &mut self.engine {
-                Engine::Cpu => {
+            let (done, rays) = match &mut self.gpu {
+                None => {
                     let paths = paths.start..paths.end.min(paths.start + PATHS_AT_A_TIME);
                     let rays =
                         cpu::train(&self.tracer(None), &self.rays, &self.view, paths.clone(), sums);
                     (paths.end, rays)
                 }
-                Engine::Gpu(renderer) => renderer.train(paths, sums, cancel)?,
+                Some(renderer) => renderer.train(paths, sums, cancel)?,
             };
             self.figures.learning_rays += rays;
             self.figures.training_paths = done;
             if let Some(training) = &mut self.training {
                 training.advance(done);
-                if let Engine::Gpu(renderer) = &mut self.engine {
+                if let Some(renderer) = &mut self.gpu {
                     renderer.set_cache(training.cache())?;
                 }
             }
@@ -466,10 +446,7 @@ impl<'a> Session<'a> {
             // Pixels that are ahead begin later in it.
             self.sequence = Sequence { generation, first_sample: self.samples };
         }
-        match &mut self.engine {
-            Engine::Cpu => Ok(()),
-            Engine::Gpu(renderer) => renderer.set_grid(grid),
-        }
+        self.gpu.as_mut().map_or(Ok(()), |renderer| renderer.set_grid(grid))
     }
 
     /// [`Self::render`], `samples` further. Making distributions counts as learning.
@@ -492,8 +469,8 @@ impl<'a> Session<'a> {
         let pass = Pass { target, coverage, stride, sequence: self.sequence };
         let learning = self.learning.as_ref().filter(|learning| !learning.is_over());
         let counts = learning.map(|learning| &learning.grid);
-        let samples = match &mut self.engine {
-            Engine::Cpu => {
+        let samples = match &mut self.gpu {
+            None => {
                 let mut film = self.film.take(&self.view);
                 let tracer = self.tracer(counts);
                 let (samples, rays) =
@@ -503,7 +480,7 @@ impl<'a> Session<'a> {
                 self.figures.rays += rays;
                 samples
             }
-            Engine::Gpu(renderer) => {
+            Some(renderer) => {
                 self.film.outdate();
                 let done = renderer.render(pass, counts, cancel)?;
                 self.samples = done.least;

@@ -3,13 +3,10 @@
 use std::fmt::Write as _;
 
 use super::super::summary::{DeviceReport, Measure, MethodReport, Report, RowReport};
+use super::escape;
 use super::plots::{Entry, ratio_plot};
 use super::tables::Table;
-use super::words;
-use super::{
-    escape,
-    words::{baseline, is_long, percent},
-};
+use super::words::{self, baseline, is_long};
 
 /// What came out, in one table and one plot.
 pub(super) fn overview(report: &Report, html: &mut String) {
@@ -21,42 +18,21 @@ pub(super) fn overview(report: &Report, html: &mut String) {
     if let Some(plot) = overview_plot(report) {
         let _ = writeln!(html, "<div class=\"plots\">{plot}</div>");
     }
-    let plan = &report.plan;
-    let baseline = baseline(report);
-    let others: Vec<&str> =
-        plan.methods.iter().map(|m| m.name.as_str()).filter(|name| *name != baseline).collect();
-    let mut head = vec!["", "device"];
-    head.extend(&others);
-    let is_beside_talk =
-        plan.rows.iter().any(|row| row.published.is_some() || row.target.is_some());
-    if is_beside_talk {
-        head.extend(["published", "target"]);
-    }
-    head.push("reference noise");
-    let mut table = Table::new(&head);
+    let mut table = Table::new(&words::results_head(report));
     for row in &report.rows {
         for device in &row.devices {
             if let Some(reason) = &device.not_measured {
                 table.remark(&row.row.title, &format!("{}: {reason}", device.device.title()));
                 continue;
             }
-            let mut cells = vec![row.row.title.clone(), device.device.title().to_owned()];
-            cells.extend(others.iter().map(|name| ratio_cell(device, name, baseline)));
-            if is_beside_talk {
-                let published = words::published(row, device.device);
-                cells.push(published.map_or_else(String::new, words::ratio));
-                cells.push(words::target_cell(row, device, baseline).trim_matches('-').to_owned());
-            }
-            let share = row.reference.as_ref().and_then(|r| r.share);
-            cells.push(share.map_or_else(|| "unknown".to_owned(), percent));
-            table.row(&cells);
+            table.row(&words::results_cells(report, row, device));
         }
     }
     let _ = writeln!(
         html,
         "<p>Time to equal trimmed relMSE: how many times sooner than <b>{}</b>, with learning and \
          tables counted.</p>",
-        escape(baseline)
+        escape(baseline(report))
     );
     html.push_str(&table.finish());
 }
@@ -83,11 +59,6 @@ pub(super) fn overview_plot(report: &Report) -> Option<String> {
         }
     }
     ratio_plot("Time to equal error", baseline, &entries)
-}
-
-fn ratio_cell(device: &DeviceReport, name: &str, baseline: &str) -> String {
-    let method = device.method(name);
-    method.map_or_else(String::new, |m| words::speed_up_cell(m, baseline, Measure::TrimmedRelMse))
 }
 
 /// Methods down, rows across: speed-ups over the last baseline, and their geometric mean.

@@ -11,10 +11,10 @@ pub(super) struct Table {
 }
 
 impl Table {
-    pub(super) fn new(head: &[&str]) -> Self {
+    pub(super) fn new<S: AsRef<str>>(head: &[S]) -> Self {
         let mut html = String::from("<div class=\"wide\"><table><thead><tr>");
         for cell in head {
-            let _ = write!(html, "<th>{}</th>", escape(cell));
+            let _ = write!(html, "<th>{}</th>", escape(cell.as_ref()));
         }
         html.push_str("</tr></thead><tbody>\n");
         Self { html, columns: head.len() }

@@ -178,44 +178,63 @@ pub fn row_sentence(report: &Report, row: &RowReport) -> String {
 
 /// Speed-ups of all rows as a Markdown table.
 pub fn markdown_table(report: &Report) -> String {
-    let plan = &report.plan;
-    let baseline = &plan.methods[plan.baselines[0]].name;
-    let others: Vec<&str> =
-        plan.methods.iter().map(|m| m.name.as_str()).filter(|name| name != baseline).collect();
-    let has_published = plan.rows.iter().any(|row| row.published.is_some());
-    let has_target = plan.rows.iter().any(|row| row.target.is_some());
-    let mut head = vec!["row".to_owned(), "device".to_owned()];
-    head.extend(others.iter().map(|name| (*name).to_owned()));
-    head.extend(has_published.then(|| "published".to_owned()));
-    head.extend(has_target.then(|| "target".to_owned()));
-    head.push("reference noise".to_owned());
+    let head = results_head(report);
     let mut text = String::new();
     let _ = writeln!(text, "| {} |", head.join(" | "));
     let _ = writeln!(text, "|{}", "---|".repeat(head.len()));
     for row in &report.rows {
         for device in &row.devices {
-            let mut cells = vec![row.row.title.clone(), device.device.title().to_owned()];
-            cells.extend(others.iter().map(|name| {
-                let cell =
-                    device.method(name).map(|m| speed_up_cell(m, baseline, Measure::TrimmedRelMse));
-                cell.filter(|text| !text.is_empty()).unwrap_or_else(|| "-".to_owned())
-            }));
-            if has_published {
-                cells.push(published(row, device.device).map_or_else(|| "-".to_owned(), ratio));
-            }
-            if has_target {
-                cells.push(target_cell(row, device, baseline));
-            }
-            let share = row.reference.as_ref().and_then(|r| r.share);
-            cells.push(share.map_or_else(|| "unknown".to_owned(), percent));
-            let _ = writeln!(text, "| {} |", cells.join(" | "));
+            let _ = writeln!(text, "| {} |", results_cells(report, row, device).join(" | "));
         }
     }
     text
 }
 
+/// Names of the columns of a table of speed-ups.
+pub(super) fn results_head(report: &Report) -> Vec<String> {
+    let mut head = vec!["row".to_owned(), "device".to_owned()];
+    head.extend(others(report).map(str::to_owned));
+    if is_beside_talk(report) {
+        head.extend(["published", "target"].map(str::to_owned));
+    }
+    head.push("reference noise".to_owned());
+    head
+}
+
+/// A device's row of that table; "-" is what there is not.
+pub(super) fn results_cells(
+    report: &Report,
+    row: &RowReport,
+    device: &DeviceReport,
+) -> Vec<String> {
+    let mut cells = vec![row.row.title.clone(), device.device.title().to_owned()];
+    cells.extend(others(report).map(|name| {
+        let method = device.method(name);
+        let cell = method.map(|m| speed_up_cell(m, baseline(report), Measure::TrimmedRelMse));
+        cell.filter(|text| !text.is_empty()).unwrap_or_else(|| "-".to_owned())
+    }));
+    if is_beside_talk(report) {
+        cells.push(published(row, device.device).map_or_else(|| "-".to_owned(), ratio));
+        cells.push(target_cell(row, device, baseline(report)));
+    }
+    let share = row.reference.as_ref().and_then(|r| r.share);
+    cells.push(share.map_or_else(|| "unknown".to_owned(), percent));
+    cells
+}
+
+/// Names of the methods that are compared with the baseline.
+fn others(report: &Report) -> impl Iterator<Item = &str> {
+    let names = report.plan.methods.iter().map(|m| m.name.as_str());
+    names.filter(|name| *name != baseline(report))
+}
+
+/// Whether there are published figures or targets.
+fn is_beside_talk(report: &Report) -> bool {
+    report.plan.rows.iter().any(|row| row.published.is_some() || row.target.is_some())
+}
+
 /// The target and what became of it.
-pub(super) fn target_cell(row: &RowReport, device: &DeviceReport, baseline: &str) -> String {
+fn target_cell(row: &RowReport, device: &DeviceReport, baseline: &str) -> String {
     let Some(target) = row.row.target else { return "-".to_owned() };
     let found = device.method("adaptive");
     let found = found.and_then(|m| m.speed_up(baseline, Measure::TrimmedRelMse));

@@ -6,7 +6,6 @@ use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::light_grid::LightGrid;
 use lightgrid::light_grid::cells::SphericalGrid;
-use lightgrid::metrics::hypothesis::{Means, z_test};
 use lightgrid::metrics::relative_rms_error;
 use lightgrid::path::{PathLimits, World};
 use lightgrid::render::film::{Film, Pixel};
@@ -17,6 +16,7 @@ use rayon::prelude::*;
 
 use super::scenes::{black, blended, lambert, lamp, pane, room};
 use super::{environment, mean, view};
+use crate::z_test::expect_same_pixels;
 
 const SHARED: [Sharing; 2] = [Sharing::Small, Sharing::Large];
 
@@ -52,27 +52,17 @@ fn over_seeds(picture: impl Fn(u32) -> f64 + Send + Sync) -> (f64, f64) {
 /// `precision`.
 fn expect_unbiased(what: &str, world: &World, map: &Environment, camera: &Camera, precision: f64) {
     let alone = picture(camera, Sampling::Plain, Sharing::Off, 1);
-    let pixels = |film: &Film| -> (Vec<f64>, Vec<f64>) {
-        let floor = (1e-3 * mean(film).luminance).powi(2);
-        film.pixels().iter().map(|p| (p.mean_luminance(), p.variance_of_mean() + floor)).unzip()
-    };
     let means = |sharing, first: u32| {
         over_seeds(|seed| {
             let view = picture(camera, Sampling::Plain, sharing, first + seed);
             mean(&render(world, map, view, 32)).luminance
         })
     };
-    let (reference, reference_variance) = pixels(&render(world, map, alone, 512));
+    let reference = render(world, map, alone, 512);
     let (mean_alone, error_alone) = means(Sharing::Off, 1000);
     for (seed, sharing) in (2..).zip(SHARED) {
         let film = render(world, map, picture(camera, Sampling::Plain, sharing, seed), 256);
-        let (found, variance) = pixels(&film);
-        let test = z_test(
-            Means { mean: &reference, variance_of_mean: &reference_variance },
-            Means { mean: &found, variance_of_mean: &variance },
-            1e-3,
-        );
-        assert!(test.as_ref().is_ok_and(|test| test.passed()), "{what}, {sharing:?}: {test:?}");
+        expect_same_pixels(&format!("{what}, {sharing:?}"), &reference, &film, 1e-3);
         let (mean, error) = means(sharing, 2000 * seed);
         let (off, noise) = (mean / mean_alone - 1.0, error.hypot(error_alone) / mean_alone);
         eprintln!("{what}, {sharing:?}: {:+.3} % +- {:.3}", 100.0 * off, 100.0 * noise);

@@ -6,7 +6,6 @@ use lightgrid::environment::{Environment, EnvironmentOptions, TableKind, sky};
 use lightgrid::image::Image;
 use lightgrid::light_grid::cells::SphericalGrid;
 use lightgrid::light_grid::{DistributionOptions, LightGrid, RenderedPaths};
-use lightgrid::metrics::hypothesis::{Means, ZTest, z_test};
 use lightgrid::path::World;
 use lightgrid::render::film::Film;
 use lightgrid::render::{Sampling, Session, StopRule, View};
@@ -15,33 +14,14 @@ use rayon::prelude::*;
 
 use super::scenes::{pane, room};
 use super::{environment, expect_same_mean, learned, mean, probe, render, view};
+use crate::z_test::expect_same_pixels;
 
 /// Chance that a sound estimator fails one comparison.
 const ALPHA: f64 = 1e-3;
 
-/// Least standard error of a pixel in units of the picture's mean: a pixel that has met none of its
-/// rare light yet knows nothing of its variance.
-const LEAST_ERROR: f64 = 1e-3;
-
-fn compare(a: &Film, b: &Film) -> ZTest {
-    let floor = (LEAST_ERROR * mean(a).luminance).powi(2);
-    let of = |film: &Film| -> (Vec<f64>, Vec<f64>) {
-        let pixels = film.pixels().iter();
-        pixels.map(|p| (p.mean_luminance(), p.variance_of_mean() + floor)).unzip()
-    };
-    let ((a_mean, a_variance), (b_mean, b_variance)) = (of(a), of(b));
-    z_test(
-        Means { mean: &a_mean, variance_of_mean: &a_variance },
-        Means { mean: &b_mean, variance_of_mean: &b_variance },
-        ALPHA,
-    )
-    .expect("two pictures of one size")
-}
-
 /// Asserts that two pictures of different seeds agree in every pixel and in the mean.
 pub(super) fn expect_agreement(what: &str, a: &Film, b: &Film, precision: f64) {
-    let test = compare(a, b);
-    assert!(test.passed(), "{what}: {test:?}");
+    expect_same_pixels(what, a, b, ALPHA);
     expect_same_mean(what, a, b, precision);
 }
 
