@@ -136,6 +136,16 @@ pub(crate) fn pressed(context: &egui::Context, is_modal: bool) -> Vec<Command> {
         return if leaves { vec![Command::Quit] } else { Vec::new() };
     }
     context.input_mut(|input| {
+        // A key that is held asks once; only steps back and forth are taken one after the other.
+        let asks_again = |key: &Key| {
+            let steps = [Command::Undo, Command::Redo];
+            SHORTCUTS.iter().any(|(shortcut, _, command)| {
+                shortcut.logical_key == *key && !steps.contains(command)
+            })
+        };
+        input.events.retain(
+            |event| !matches!(event, egui::Event::Key { key, repeat: true, .. } if asks_again(key)),
+        );
         let mut commands: Vec<Command> = SHORTCUTS
             .iter()
             .rev()
@@ -156,4 +166,25 @@ pub(crate) fn pressed(context: &egui::Context, is_modal: bool) -> Vec<Command> {
         }
         commands
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_that_is_held_asks_once_but_for_steps_back() {
+        let context = egui::Context::default();
+        let held = |key, modifiers: Modifiers, repeat| {
+            let event =
+                egui::Event::Key { key, physical_key: None, pressed: true, repeat, modifiers };
+            let input = egui::RawInput { events: vec![event], ..Default::default() };
+            let mut commands = Vec::new();
+            let _ = context.run_ui(input, |ui| commands = pressed(ui.ctx(), false));
+            commands
+        };
+        assert_eq!(held(Key::K, Modifiers::NONE, false), [Command::KeepPicture]);
+        assert_eq!(held(Key::K, Modifiers::NONE, true), []);
+        assert_eq!(held(Key::Z, Modifiers::COMMAND, true), [Command::Undo]);
+    }
 }

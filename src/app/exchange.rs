@@ -7,10 +7,10 @@ use glam::{Vec2, Vec3};
 use super::comparison::Comparison;
 use super::document::{Document, PictureSize, Viewpoint};
 use super::interface::Chosen;
-use super::loader::{Loaded, LoadedScene};
+use super::loader::{Kind, Loaded, LoadedMap, LoadedScene};
 use super::presenter::{Order, Shown};
 use super::speed_up::SpeedUp;
-use super::worker::Request;
+use super::worker::{Request, Snapshot};
 use super::{App, Later, lock, surface_map};
 use crate::denoise::Denoiser;
 use crate::environment::Environment;
@@ -20,7 +20,7 @@ use crate::render::gpu::DeviceChoice;
 
 /// What a pixel of the picture takes: films of its exact and of its cached light, copies of both that are shown
 /// and that will be, and what takes noise out (measured: 630).
-const BYTES_PER_PIXEL: u64 = 640;
+pub(super) const BYTES_PER_PIXEL: u64 = 640;
 
 /// An environment and what it was made from.
 pub(super) struct Lit {
@@ -45,40 +45,50 @@ impl App {
                 }
                 Loaded::Edited(_, Err(error)) => {
                     self.messages.error(error.to_string());
-                    self.document.materials =
-                        self.scene.as_ref().map(|scene| scene.edits.clone()).unwrap_or_default();
+                    let edits = self.scene.as_ref().map(|scene| scene.edits.clone());
+                    self.put_back(|document| document.materials = edits.unwrap_or_default());
                 }
                 Loaded::Map(_, Ok(map)) => {
                     if self.map.as_ref().is_none_or(|old| old.name != map.name) {
-                        map.notices.iter().for_each(|sentence| self.messages.notice(sentence));
+                        self.messages.notices(&map.notices);
                     }
-                    self.messages.opened();
+                    self.messages.opened(Kind::Map);
                     self.settings.recent_map(&map.name);
                     self.map = Some(map);
+                    self.inspector.forget();
                 }
                 // What is shown stays, and the document says so again.
                 Loaded::Scene(_, Err(error)) => {
-                    self.messages.not_opened(error.to_string());
+                    match &self.scene {
+                        Some(_) => self.messages.not_opened(Kind::Scene, error.to_string()),
+                        None => self.messages.error(error.to_string()),
+                    }
                     self.save_nothing();
                     self.stay_in_scene();
                 }
                 Loaded::Map(_, Err(error)) => {
-                    self.messages.not_opened(error.to_string());
-                    self.save_nothing();
-                    let Document { map, sun, .. } = Document::default();
-                    (self.document.map, self.document.sun) = match &self.map {
-                        Some(map) => (map.name.clone(), map.sun_factor),
+                    let (map, sun) = match &self.map {
+                        Some(map) => {
+                            self.messages.not_opened(Kind::Map, error.to_string());
+                            (map.name.clone(), map.sun_factor)
+                        }
                         // At the start there is none: the built-in one is always there.
-                        None => (map, sun),
+                        None => {
+                            self.messages.error(error.to_string());
+                            let Document { map, sun, .. } = Document::default();
+                            (map, sun)
+                        }
                     };
+                    self.save_nothing();
+                    self.put_back(|document| (document.map, document.sun) = (map, sun));
                 }
             }
         }
         while let Ok(later) = self.later.1.try_recv() {
             match later {
-                Later::Command(command) => {
-                    self.interface.prompt = None;
-                    self.execute(command, context);
+                Later::Chosen(purpose, path) => {
+                    self.interface.prompt.take_if(|prompt| prompt.purpose == purpose);
+                    self.execute(purpose.command(&path), context);
                 }
                 Later::Done(sentence) => self.messages.notice(sentence),
                 Later::Failed(sentence) => self.messages.error(sentence),
@@ -92,9 +102,11 @@ impl App {
         self.reference = arrived.or(self.reference.take());
         for sentence in self.worker.take_failures() {
             self.messages.error(sentence);
-            // Asked for again, it is tried again.
-            self.document.light.device = DeviceChoice::Cpu;
-            self.undo.amend(&self.document);
+            // Asked for again, it is tried again. The worker does without by itself where none was asked for.
+            if self.document.light.device == DeviceChoice::Gpu {
+                self.document.light.device = DeviceChoice::Cpu;
+                self.undo.amend(&self.document);
+            }
         }
         self.inspector.collect();
         let snapshot = self.worker.snapshot();
@@ -110,7 +122,6 @@ impl App {
         let is_here =
             |shown: &Arc<Shown>| Arc::ptr_eq(&shown.order.developer, &self.screen.developer);
         self.shown = self.presenter.shown().filter(is_here);
-        self.save_when_whole();
         let shown = self.shown.as_deref();
         if let Some(failure) = shown.and_then(|shown| shown.failure.clone()) {
             self.messages.error(failure);
@@ -118,16 +129,17 @@ impl App {
             self.undo.amend(&self.document);
         }
         // Said once: what cannot be compared is compared no longer.
-        let uncompared = shown.and_then(|shown| shown.uncompared.clone());
-        if let Some(failure) = uncompared.filter(|_| self.interface.compared.left.is_some()) {
+        let compared = Comparison::new(self.interface.compared, &self.history);
+        let shown = shown.filter(|shown| compared.is_some() && shown.order.compared == compared);
+        if let Some(failure) = shown.and_then(|shown| shown.uncompared.clone()) {
             self.messages.error(failure);
             self.interface.compared = Chosen::default();
         }
     }
 
     fn take_scene(&mut self, scene: LoadedScene) {
-        self.messages.opened();
-        scene.world.scene.notices.iter().for_each(|sentence| self.messages.notice(sentence));
+        self.messages.opened(Kind::Scene);
+        self.messages.notices(&scene.world.scene.notices);
         self.settings.recent_scene(&scene.name);
         let is_first = self.scene.is_none();
         if self.document.viewpoint.is_none() {
@@ -157,6 +169,8 @@ impl App {
             self.document.bookmarks.clone_from(&before.bookmarks);
             (self.document.region, self.document.fog) = (before.region, before.fog);
             self.document.materials.clone_from(&before.materials);
+            // The sky that came with the other one goes with it.
+            self.document.map.clone_from(&before.map);
         } else {
             // Somebody went back to a file that is no longer there.
             self.document.scene.clone_from(&scene.name);
@@ -171,25 +185,61 @@ impl App {
     pub(super) fn settle(&mut self, context: &egui::Context) {
         let busy = context.input(|i| i.pointer.any_down()) || context.text_edit_focused();
         // A file that is being read may turn out to be damaged: nothing has changed then.
-        let is_there = self.scene.as_ref().is_some_and(|s| s.name == self.document.scene)
-            && self.map.as_ref().is_some_and(|m| m.name == self.document.map);
+        let is_there = self.scene_of_document().is_some() && self.map_of_document().is_some();
         if !busy && is_there && !self.interface.is_moving(context.time()) {
             self.undo.settle(&self.document);
         }
     }
 
+    /// The scene that the document names, if it is there.
+    fn scene_of_document(&self) -> Option<&LoadedScene> {
+        self.scene.as_ref().filter(|scene| scene.name == self.document.scene)
+    }
+
+    /// The map that the document names, if it is there.
+    fn map_of_document(&self) -> Option<&LoadedMap> {
+        self.map.as_ref().filter(|map| map.name == self.document.map)
+    }
+
+    /// Whether scene and map are there as the document wants them.
+    pub(super) fn has_sources(&self) -> bool {
+        self.scene_of_document().is_some_and(|scene| scene.edits == self.document.materials)
+            && self.map_of_document().is_some_and(|map| map.sun_factor == self.document.sun)
+    }
+
+    /// Whether a picture, which may be small, is of what the document says now.
+    pub(super) fn is_of_document(&self, snapshot: &Snapshot) -> bool {
+        self.has_sources() && self.worker.is_of_latest(snapshot)
+    }
+
+    /// Takes back what cannot be had; it was no step.
+    fn put_back(&mut self, change: impl FnOnce(&mut Document)) {
+        let refused = self.document.clone();
+        change(&mut self.document);
+        self.undo.correct(&refused, &self.document);
+    }
+
+    /// Looks from somewhere, where the document does not say from where.
+    fn fill_in_viewpoint(&mut self) {
+        if self.document.viewpoint.is_none()
+            && let Some(viewpoint) = self.scene_of_document().map(first_viewpoint)
+        {
+            self.put_back(|document| document.viewpoint = Some(viewpoint));
+        }
+    }
+
     /// Tells the loader, the worker and the presenter what is wanted now.
     pub(super) fn send_down(&mut self, context: &egui::Context) {
-        if self.scene.as_ref().is_none_or(|scene| scene.name != self.document.scene) {
-            self.loader.load_scene(&self.document.scene);
-        } else if let Some(scene) = &self.scene
-            && scene.edits != self.document.materials
-        {
-            self.loader.edit_scene(scene, &self.document.materials);
+        self.fill_in_viewpoint();
+        match self.scene.as_ref().filter(|scene| scene.name == self.document.scene) {
+            None => self.loader.load_scene(&self.document.scene),
+            Some(scene) if scene.edits != self.document.materials => {
+                self.loader.edit_scene(scene, &self.document.materials);
+            }
+            Some(_) => {}
         }
-        let (name, sun) = (&self.document.map, self.document.sun);
-        if self.map.as_ref().is_none_or(|map| map.name != *name || map.sun_factor != sun) {
-            self.loader.load_map(name, sun);
+        if self.map_of_document().is_none_or(|map| map.sun_factor != self.document.sun) {
+            self.loader.load_map(&self.document.map, self.document.sun);
         }
         if let Some(request) = self.request(context.time()) {
             if request.moving {
@@ -198,6 +248,7 @@ impl App {
             self.inspector.update(&self.interface, self.snapshot.as_ref());
             self.worker.submit(request);
         }
+        self.save_when_whole();
         if let Some(snapshot) = self.snapshot.as_ref().filter(|s| s.has_picture()) {
             // Kept pictures are whole ones.
             let is_whole = self.document.region.is_none() && snapshot.request.view.crop.is_none();
@@ -216,21 +267,24 @@ impl App {
         }
     }
 
-    /// Takes back a size for which there is no memory: the system would end the window.
+    /// Takes back a size, or the whole in place of a region, for which there is no memory: the system would end
+    /// the window.
     fn check_size(&mut self) {
-        let size = self.document.size;
-        if size == self.affordable {
+        let asked = (self.document.size, self.document.region);
+        if asked == self.affordable {
             return;
         }
-        if let PictureSize::Fixed(width, height) = size
-            && let Some(view) = self.document.view(width, height)
-            && let Err(cause) =
-                memory::check(u64::from(view.width) * u64::from(view.height) * BYTES_PER_PIXEL)
-        {
-            self.messages.error(format!("a picture of {width} x {height} pixels {cause}"));
-            self.document.size = self.affordable;
+        if let PictureSize::Fixed(width, height) = asked.0 {
+            // A region of how many pixels is known once there is a camera.
+            let Some(view) = self.document.view(width, height) else { return };
+            let bytes = u64::from(view.width) * u64::from(view.height) * BYTES_PER_PIXEL;
+            if let Err(cause) = memory::check(bytes) {
+                self.messages.error(format!("a picture of {width} x {height} pixels {cause}"));
+                let (size, region) = self.affordable;
+                self.put_back(|document| (document.size, document.region) = (size, region));
+            }
         }
-        self.affordable = self.document.size;
+        self.affordable = (self.document.size, self.document.region);
     }
 
     fn request(&mut self, now: f64) -> Option<Request> {

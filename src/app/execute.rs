@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::commands::Command;
@@ -10,9 +11,10 @@ use super::document::{Document, Viewpoint};
 use super::history;
 use super::interface::{Chosen, Cursor, Dock, Interface, Prompt, Purpose, Tab};
 use super::screen::color_image;
+use super::settings_file::lasting_scene;
 use super::worker::Reference;
 use super::{App, Later, convergence, lock, save, surface_map, theme};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::image::read_picture;
 use crate::render::gpu::DeviceChoice;
 use crate::scene::builtin;
@@ -25,7 +27,11 @@ impl App {
         match command {
             Command::OpenScene(name) => self.open_scene(name),
             Command::OpenMap(name) if self.document.map == name => self.read_map_again(),
-            Command::OpenMap(name) => self.document.map = name,
+            Command::OpenMap(name) => {
+                // The old one is not to be looked at for ever.
+                interface.paused = false;
+                self.document.map = name;
+            }
             Command::ReadAgain => {
                 self.read_scene_again();
                 self.read_map_again();
@@ -101,6 +107,10 @@ impl App {
                     let mut document = kept.document.clone();
                     // Those kept since are no part of the picture, and would be lost.
                     document.bookmarks = self.viewpoints_of(&document.scene);
+                    // Pictures name a file by its whole path.
+                    if lasting_scene(&document.scene) == lasting_scene(&self.document.scene) {
+                        document.scene.clone_from(&self.document.scene);
+                    }
                     if self.history.is_of_other_options(kept) {
                         self.messages.notice(format!(
                             "{}: its scene was opened with other options than now (--variant, --outlines, \
@@ -122,6 +132,11 @@ impl App {
 
     /// Goes over to another scene; one that is shown already is read again, for its file may have changed.
     fn open_scene(&mut self, name: String) {
+        let name = match &self.scene {
+            Some(scene) if lasting_scene(&scene.name) == lasting_scene(&name) => scene.name.clone(),
+            _ => name,
+        };
+        self.interface.paused = false;
         if self.scene.as_ref().is_some_and(|scene| scene.name == name) {
             if self.document.scene == name {
                 self.read_scene_again();
@@ -180,8 +195,13 @@ impl App {
     /// Keeps what is on the screen, without overlays.
     fn keep(&mut self) {
         let Some(shown) = &self.shown else { return };
-        let main = &shown.order.snapshot.main;
-        let image = shown.image.clone().unwrap_or_else(|| Arc::new(main.film.image()));
+        let snapshot = &shown.order.snapshot;
+        if !(snapshot.is_whole() && self.is_of_document(snapshot)) {
+            self.messages.notice("A picture can be kept once it has its full size");
+            return;
+        }
+        let main = &snapshot.main;
+        let image = shown.image.clone().unwrap_or_else(|| Arc::new(shown.order.image()));
         let samples = match main.film.min_samples() {
             0 => format!("{} samples", theme::samples(main.mean_samples())),
             1 => "1 sample".to_owned(),
@@ -209,7 +229,7 @@ impl App {
 
     /// The viewpoints that were kept of a scene by now.
     fn viewpoints_of(&self, scene: &str) -> Vec<Viewpoint> {
-        match scene == self.document.scene {
+        match lasting_scene(scene) == lasting_scene(&self.document.scene) {
             true => self.document.bookmarks.clone(),
             false => self.settings.viewpoints_of(scene),
         }
@@ -253,42 +273,51 @@ impl App {
     /// Writes the picture, or remembers to when there is none as yet or only a small one.
     pub(super) fn save(&mut self, path: PathBuf) {
         self.settings.save_folder = path.parent().map(Path::to_path_buf);
-        self.waiting_save = Some(path);
-        self.save_when_whole();
-        if self.waiting_save.is_some() {
+        self.waiting_saves.push(path);
+        if self.picture().is_none() {
             self.messages.notice("The picture will be saved once it has its full size");
         }
     }
 
-    /// Writes the picture that was asked for, if it is there now.
+    /// Writes the picture where it was asked for, if it is there now.
     pub(super) fn save_when_whole(&mut self) {
-        // Without a path to write to, nothing is to be copied either.
-        let Some(path) = self.waiting_save.take() else { return };
-        let Some(picture) = self.picture().filter(|picture| picture.snapshot.is_whole()) else {
-            self.waiting_save = Some(path);
+        if self.waiting_saves.is_empty() {
             return;
-        };
-        let film = &picture.snapshot.main.film;
-        let sentence = format!("Saved {}, {} x {} pixels", path.display(), film.width, film.height);
-        self.do_later("save", move || {
-            save::picture(&path, &picture)?;
-            let remarks = save::remarks(&picture);
-            Ok(remarks.iter().fold(sentence, |all, remark| format!("{all}; {remark}")))
-        });
+        }
+        let Some(picture) = self.picture().map(Arc::new) else { return };
+        for path in std::mem::take(&mut self.waiting_saves) {
+            let picture = Arc::clone(&picture);
+            let film = &picture.snapshot.main.film;
+            let sentence =
+                format!("Saved {}, {} x {} pixels", path.display(), film.width, film.height);
+            self.write("save", move || {
+                save::picture(&path, &picture)?;
+                let remarks = save::remarks(&picture);
+                Ok(remarks.iter().fold(sentence, |all, remark| format!("{all}; {remark}")))
+            });
+        }
     }
 
     /// Gives up saving a picture of which nothing was seen: what it was to show cannot be read.
     pub(super) fn save_nothing(&mut self) {
-        if self.snapshot.is_none()
-            && let Some(path) = self.waiting_save.take()
-        {
+        if self.snapshot.is_some() {
+            return;
+        }
+        for path in std::mem::take(&mut self.waiting_saves) {
             self.messages.error(format!("{}: there is no picture to be saved", path.display()));
         }
     }
 
+    /// The whole picture of what the document says, if it is there.
     fn picture(&self) -> Option<save::Picture> {
+        let snapshot = self.snapshot.as_ref().filter(|snapshot| snapshot.is_whole())?;
+        // Its exposure is that of what is shown.
+        let of_shown = &self.shown.as_ref()?.order.snapshot;
+        if ![snapshot, of_shown].iter().all(|snapshot| self.is_of_document(snapshot)) {
+            return None;
+        }
         Some(save::Picture {
-            snapshot: Arc::clone(self.snapshot.as_ref()?),
+            snapshot: Arc::clone(snapshot),
             exposure_ev: self.exposure_ev()?,
             document: self.document.clone(),
             scene: self.scene.clone()?,
@@ -306,7 +335,7 @@ impl App {
         };
         let sentence =
             format!("Exported {} distributions to {}", grid.distributions().len(), path.display());
-        self.do_later("export", move || {
+        self.write("export", move || {
             crate::output::distributions::write_distributions(&path, &grid).map(|()| sentence)
         });
     }
@@ -327,8 +356,19 @@ impl App {
         });
     }
 
+    /// Writes a file on a thread, for which the end of the window waits.
+    fn write(&mut self, name: &str, work: impl FnOnce() -> Result<String> + Send + 'static) {
+        self.writing.retain(|thread| !thread.is_finished());
+        let thread = self.do_later(name, work);
+        self.writing.extend(thread);
+    }
+
     /// Runs something slow on a thread; what it says becomes a message.
-    fn do_later(&mut self, name: &str, work: impl FnOnce() -> Result<String> + Send + 'static) {
+    fn do_later(
+        &mut self,
+        name: &str,
+        work: impl FnOnce() -> Result<String> + Send + 'static,
+    ) -> Option<JoinHandle<()>> {
         let (sender, wake) = (self.later.0.clone(), self.wake.clone());
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
             let later = match work() {
@@ -339,9 +379,8 @@ impl App {
             let _ = sender.send(later);
             wake();
         });
-        if let Err(error) = thread {
-            self.messages.error(Error::new(format!("no thread to {name}: {error}")).to_string());
-        }
+        let failed = |error| self.messages.error(format!("no thread to {name}: {error}"));
+        thread.map_err(failed).ok()
     }
 
     /// Opens the system's file dialogue for the prompt; its answer comes as a command.
@@ -357,7 +396,7 @@ impl App {
         let thread = std::thread::Builder::new().name("dialogue".to_owned()).spawn(move || {
             let start = Instant::now();
             let later = match pollster::block_on(chosen) {
-                Some(file) => Later::Command(purpose.command(&file.path().display().to_string())),
+                Some(file) => Later::Chosen(purpose, file.path().display().to_string()),
                 // Nobody closes a dialogue so soon: none was opened.
                 None if start.elapsed() < QUICKEST_ANSWER => Later::Failed(
                     "this system offers no file dialogue; a path can be typed instead".to_owned(),
@@ -434,14 +473,4 @@ impl Interface {
     fn aspect(&self) -> f32 {
         self.viewport_pixels.map_or(16.0 / 9.0, |[w, h]| w as f32 / h.max(1) as f32)
     }
-}
-
-/// Sentence for the tooltip of memory, used by the status bar.
-pub(super) fn memory_sentence(grid: usize, table: usize, pixels: usize) -> String {
-    format!(
-        "Light Grid {}, importance table {}, map {}",
-        theme::bytes(grid),
-        theme::bytes(table),
-        theme::bytes(pixels)
-    )
 }

@@ -107,10 +107,10 @@ impl Inspector {
         self.busy
     }
 
-    /// Forgets everything: another scene is shown.
+    /// Forgets everything: another scene or map is shown, and what is known of the last one is large.
     pub(super) fn forget(&mut self) {
-        self.inspected = None;
-        self.source = None;
+        (self.inspected, self.source) = (None, None);
+        (self.environment, self.learned, self.truth) = (None, None, None);
     }
 
     /// Takes a truth that is ready.

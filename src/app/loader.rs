@@ -71,6 +71,13 @@ pub struct LoadedMap {
     pub seconds: [f64; 2],
 }
 
+/// What is loaded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Scene,
+    Map,
+}
+
 /// What loading came to.
 pub enum Loaded {
     /// A scene, or why not.
@@ -108,19 +115,25 @@ impl Loader {
     /// Starts to load a scene unless it is being loaded.
     pub fn load_scene(&mut self, name: &str) {
         let options = self.options.clone();
-        self.spawn(0, name, move |name| Loaded::Scene(name.to_owned(), load_scene(name, &options)));
+        self.spawn(Kind::Scene, name, move |name| {
+            Loaded::Scene(name.to_owned(), load_scene(name, &options))
+        });
     }
 
     /// Starts to change the materials of a scene that is there, unless something is being done to it.
     pub fn edit_scene(&mut self, scene: &LoadedScene, edits: &BTreeMap<u32, MaterialEdit>) {
         let (scene, edits) = (scene.clone(), edits.clone());
         let name = scene.name.clone();
-        self.spawn(0, &name, move |name| Loaded::Edited(name.to_owned(), scene.edited(edits)));
+        self.spawn(Kind::Scene, &name, move |name| {
+            Loaded::Edited(name.to_owned(), scene.edited(edits))
+        });
     }
 
     /// Starts to load a map unless it is being loaded.
     pub fn load_map(&mut self, name: &str, sun_factor: f32) {
-        self.spawn(1, name, move |name| Loaded::Map(name.to_owned(), load_map(name, sun_factor)));
+        self.spawn(Kind::Map, name, move |name| {
+            Loaded::Map(name.to_owned(), load_map(name, sun_factor))
+        });
     }
 
     /// What is being loaded.
@@ -133,11 +146,12 @@ impl Loader {
         let mut results = Vec::new();
         for loaded in self.receiver.try_iter() {
             let (kind, name) = match &loaded {
-                Loaded::Scene(name, _) | Loaded::Edited(name, _) => (0, name),
-                Loaded::Map(name, _) => (1, name),
+                Loaded::Scene(name, _) | Loaded::Edited(name, _) => (Kind::Scene, name),
+                Loaded::Map(name, _) => (Kind::Map, name),
             };
-            if self.in_flight[kind].as_ref() == Some(name) {
-                self.in_flight[kind] = None;
+            let in_flight = &mut self.in_flight[kind as usize];
+            if in_flight.as_ref() == Some(name) {
+                *in_flight = None;
                 results.push(loaded);
             }
         }
@@ -146,31 +160,32 @@ impl Loader {
 
     fn spawn(
         &mut self,
-        kind: usize,
+        kind: Kind,
         name: &str,
         load: impl FnOnce(&str) -> Loaded + Send + 'static,
     ) {
-        if self.in_flight[kind].as_deref() == Some(name) {
+        let in_flight = &mut self.in_flight[kind as usize];
+        if in_flight.as_deref() == Some(name) {
             return;
         }
-        self.in_flight[kind] = Some(name.to_owned());
+        *in_flight = Some(name.to_owned());
         let (sender, wake) = (self.sender.clone(), self.wake.clone());
-        let turn = Arc::clone(&self.turns[kind]);
+        let turn = Arc::clone(&self.turns[kind as usize]);
         let name = name.to_owned();
         let thread = std::thread::Builder::new().name("load".to_owned()).spawn(move || {
             let _turn = lock(&turn);
             // A panic must not leave the window waiting for ever.
             let failed = || Error::at(&name, "cannot be read: the program failed at it");
             let loaded = catch_panic(|| load(&name)).unwrap_or_else(|| match kind {
-                0 => Loaded::Scene(name.clone(), Err(failed())),
-                _ => Loaded::Map(name.clone(), Err(failed())),
+                Kind::Scene => Loaded::Scene(name.clone(), Err(failed())),
+                Kind::Map => Loaded::Map(name.clone(), Err(failed())),
             });
             // The window may have gone meanwhile.
             let _ = sender.send(loaded);
             wake();
         });
         if thread.is_err() {
-            self.in_flight[kind] = None;
+            *in_flight = None;
         }
     }
 }

@@ -35,6 +35,8 @@ pub mod screenshot;
 pub mod settings_file;
 mod speed_up;
 pub(crate) mod surface_map;
+#[cfg(test)]
+mod tests;
 mod theme;
 mod turns;
 mod undo;
@@ -51,7 +53,7 @@ use document::Document;
 use exchange::Lit;
 use history::History;
 use inspect::Inspector;
-use interface::Interface;
+use interface::{Interface, Purpose};
 use kept_picture::KeptPicture;
 use loader::{LoadedMap, LoadedScene, Loader};
 use messages::Messages;
@@ -127,11 +129,13 @@ pub struct App {
     later: (Sender<Later>, Receiver<Later>),
     wake: Wake,
     /// Where the picture is to be written once it has its full size.
-    waiting_save: Option<std::path::PathBuf>,
+    waiting_saves: Vec<std::path::PathBuf>,
+    /// Threads that write files.
+    writing: Vec<std::thread::JoinHandle<()>>,
     is_repeatable: bool,
     is_closing: bool,
-    /// The size of the picture for which there is memory.
-    affordable: document::PictureSize,
+    /// The size of the picture for which there is memory, and the region.
+    affordable: (document::PictureSize, Option<[f32; 4]>),
 }
 
 /// What others hold is sound even if one of them has panicked with it.
@@ -142,7 +146,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// What comes back from a thread.
 enum Later {
     /// Somebody chose a file.
-    Command(Command),
+    Chosen(Purpose, String),
     /// A file was written.
     Done(String),
     /// Something failed.
@@ -204,10 +208,11 @@ impl App {
             arriving: Arc::default(),
             later,
             wake,
-            waiting_save: None,
+            waiting_saves: Vec::new(),
+            writing: Vec::new(),
             is_repeatable: start.is_repeatable,
             is_closing: false,
-            affordable: document::PictureSize::Viewport(1),
+            affordable: (document::PictureSize::Viewport(1), None),
         })
     }
 
@@ -263,8 +268,7 @@ impl App {
     pub fn is_settled(&self) -> bool {
         let is_done =
             |s: &Arc<Snapshot>| s.activity == Activity::Done && self.worker.has_answered(s);
-        let is_edited = |scene: &LoadedScene| scene.edits == self.document.materials;
-        self.scene.as_ref().is_some_and(is_edited)
+        self.has_sources()
             && self.snapshot.as_ref().is_some_and(is_done)
             && self.shown.is_some()
             && self.presenter.is_settled()
@@ -281,14 +285,25 @@ impl App {
         self.messages.first_error()
     }
 
-    /// Waits until all kept pictures are written; what has failed of that and was not yet told.
+    /// Waits until all files are written; what has failed of that and was not yet told.
     pub fn finish(&mut self) -> Vec<String> {
         self.history.finish();
+        for thread in self.writing.drain(..) {
+            // What panics has said so.
+            let _ = thread.join();
+        }
         let failed = |later| match later {
             Later::Failed(sentence) => Some(sentence),
             _ => None,
         };
-        self.later.1.try_iter().filter_map(failed).collect()
+        let unsaved = |path: std::path::PathBuf| {
+            format!(
+                "{}: not saved: the window was closed before its picture was there",
+                path.display()
+            )
+        };
+        let failures = self.later.1.try_iter().filter_map(failed);
+        failures.chain(self.waiting_saves.drain(..).map(unsaved)).collect()
     }
 
     /// What is to be kept for the next window.

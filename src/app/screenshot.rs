@@ -34,8 +34,8 @@ pub struct Shot {
 
 /// Draws one window, in one state or several.
 pub struct Studio {
-    app: App,
-    context: egui::Context,
+    pub(super) app: App,
+    pub(super) context: egui::Context,
     canvas: Canvas,
     news: Receiver<()>,
     deadline: Instant,
@@ -95,7 +95,9 @@ impl Studio {
         let scene = self.app.scene.iter();
         let number = scene.flat_map(|scene| scene.materials.iter()).position(|m| m.name == name);
         let number = number.ok_or_else(|| {
-            Error::at(&self.app.document.scene, format!("no material is called {name}"))
+            let scene = self.app.scene.as_ref().map(|scene| &scene.world.scene);
+            let cause = scene.map(|scene| scene.without_material(name)).unwrap_or_default();
+            Error::at(&self.app.document.scene, cause)
         })?;
         self.app.interface.choose_material(Some(number as u32));
         Ok(())
@@ -139,7 +141,8 @@ impl Studio {
         self.canvas.gpu.lose();
     }
 
-    fn frame(&mut self) -> Result<()> {
+    /// One frame.
+    pub(super) fn frame(&mut self) -> Result<()> {
         if let Err(loss) = self.canvas.gpu.check() {
             let gpu = Gpu::open(Some(&self.canvas.gpu.facts().name))?;
             let size = (self.canvas.target.width(), self.canvas.target.height());
@@ -153,7 +156,8 @@ impl Studio {
         Ok(())
     }
 
-    fn settle(&mut self) -> Result<()> {
+    /// Frames until the stop rule is met.
+    pub(super) fn settle(&mut self) -> Result<()> {
         self.frame()?;
         self.frame()?;
         loop {

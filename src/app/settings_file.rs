@@ -200,9 +200,18 @@ impl Settings {
         take(&mut light.split, now.split, &before.split);
         take(&mut light.bounces, now.bounces, &before.bounces);
         take(&mut light.seed, now.seed, &before.seed);
-        take(&mut self.look, document.look, &start.look);
+        let (look, now, before) = (&mut self.look, document.look, start.look);
+        take(&mut look.denoise, now.denoise, &before.denoise);
+        take(&mut look.denoiser, now.denoiser, &before.denoiser);
+        take(&mut look.exposure_ev, now.exposure_ev, &before.exposure_ev);
+        take(&mut look.auto_exposure, now.auto_exposure, &before.auto_exposure);
+        take(&mut look.curve, now.curve, &before.curve);
+        take(&mut look.white_balance, now.white_balance, &before.white_balance);
         take(&mut self.size, document.size, &start.size);
-        take(&mut self.stop, document.stop, &start.stop);
+        let (stop, now, before) = (&mut self.stop, document.stop, start.stop);
+        take(&mut stop.samples, now.samples, &before.samples);
+        take(&mut stop.seconds, now.seconds, &before.seconds);
+        take(&mut stop.noise, now.noise, &before.noise);
         self.tab = interface.tab;
         self.dock = interface.dock;
         self.keep_viewpoints(document);
@@ -319,14 +328,15 @@ mod tests {
     fn what_the_command_line_said_is_not_kept_and_what_was_changed_is() {
         let mut settings = Settings::default();
         let mut document = settings.document();
-        document.stop.samples = Some(2);
+        (document.stop.samples, document.look.curve) = (Some(2), crate::tone::ToneCurve::Aces);
         document.light.sampling = crate::render::Sampling::Plain;
         let start = document.clone();
         document.light.bounces = 3;
-        document.look.exposure_ev = 1.0;
+        (document.look.exposure_ev, document.stop.noise) = (1.0, Some(0.1));
         settings.remember(&document, &start, &Interface::default());
         let mut expected = Settings::default();
         (expected.light.bounces, expected.look.exposure_ev) = (3, 1.0);
+        expected.stop.noise = Some(0.1);
         assert_eq!(settings, expected);
     }
 

@@ -102,6 +102,7 @@ mod tests {
             film: Arc::new(film),
             figures: Figures { render_seconds: 1.0, ..Figures::default() },
             noise: 0.0,
+            invalid_samples: 0,
             grid: None,
             gpu: None,
             on_device: None,

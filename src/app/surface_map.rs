@@ -46,14 +46,6 @@ impl SurfaceMap {
             .collect();
         Self { width: view.width, height: view.height, spots }
     }
-
-    /// What a place of the picture shows, both coordinates in `[0,1]`.
-    pub fn at(&self, place: Vec2) -> Option<Spot> {
-        let size = Vec2::new(self.width as f32, self.height as f32);
-        let pixel = (place * size).as_uvec2();
-        (pixel.x < self.width && pixel.y < self.height)
-            .then(|| self.spots[(pixel.y * self.width + pixel.x) as usize])?
-    }
 }
 
 /// The first surface along a camera ray that is mostly not seen through.

@@ -46,6 +46,8 @@ pub(super) fn apply(context: &egui::Context) {
         style.interaction.tooltip_delay = 0.4;
         style.visuals = visuals();
     });
+    // Where frames take long, a press and its release are far apart and are a click all the same.
+    context.options_mut(|options| options.input_options.max_click_duration = f64::INFINITY);
 }
 
 fn visuals() -> Visuals {

@@ -34,6 +34,19 @@ impl<T: Clone + PartialEq> Undo<T> {
         self.present = now.clone();
     }
 
+    /// Puts `now` where `was` is at rest, without a step to go back to: what was asked for is not to be had, or
+    /// the program has filled it in.
+    pub(super) fn correct(&mut self, was: &T, now: &T) {
+        if self.present != *was {
+            return;
+        }
+        self.present = now.clone();
+        for steps in [&mut self.past, &mut self.future] {
+            // It would be a step to itself.
+            steps.pop_if(|next| next == now);
+        }
+    }
+
     /// The state at rest.
     pub(super) fn present(&self) -> &T {
         &self.present
@@ -80,5 +93,22 @@ mod tests {
         undo.settle(&9);
         assert!(!undo.can_redo());
         assert_eq!(undo.undo(), Some(2));
+    }
+
+    #[test]
+    fn what_could_not_be_had_is_no_step() {
+        let mut undo = Undo::new(1);
+        undo.settle(&2);
+        undo.settle(&9);
+        // It is refused, and all is as it was.
+        undo.correct(&9, &2);
+        assert_eq!((undo.undo(), undo.redo(), undo.redo()), (Some(1), Some(2), None));
+        // What was is no longer to be had.
+        assert_eq!(undo.undo(), Some(1));
+        undo.correct(&1, &2);
+        assert!(!undo.can_undo() && !undo.can_redo());
+        // It is none of what is at rest.
+        undo.correct(&7, &8);
+        assert_eq!(*undo.present(), 2);
     }
 }

@@ -94,6 +94,24 @@ pub struct Crop {
 }
 
 impl View {
+    /// The same in so many pixels, at least one each way.
+    pub fn of_size(&self, width: u32, height: u32) -> Self {
+        let mut view = Self { width: width.max(1), height: height.max(1), ..self.clone() };
+        let (new, old) = ([view.width, view.height], [self.width, self.height]);
+        let scaled = |pixels: [u32; 2]| {
+            [0, 1].map(|i| {
+                (u64::from(pixels[i]) * u64::from(new[i]) / u64::from(old[i].max(1))) as u32
+            })
+        };
+        if let Some(crop) = &mut view.crop {
+            *crop = Crop {
+                corner: scaled(crop.corner),
+                whole: scaled(crop.whole).map(|pixels| pixels.max(1)),
+            };
+        }
+        view
+    }
+
     /// Most pixels of a picture: 40 bytes each stay under 5.4 GB.
     pub const MAX_PIXELS: u64 = 1 << 27;
 

@@ -26,7 +26,7 @@ pub(super) fn paint(
             let samples = |cell: KnownCell| trained(&cell).then_some(cell.samples as f32);
             scaled(
                 cells.into_iter().map(|c| c.and_then(samples)),
-                Range::LOGARITHMIC,
+                Range::Logarithmic,
                 "samples a cell",
             )
         }

@@ -240,12 +240,12 @@ impl Sources<'_> {
         match overlay {
             Overlay::Samples => Some(scaled(
                 self.film.pixels().iter().map(|p| Some(p.samples() as f32)),
-                Range::WHOLE,
+                Range::Whole,
                 "samples",
             )),
             Overlay::Error => Some(scaled(
                 self.film.pixels().iter().map(relative_error),
-                Range::LOGARITHMIC,
+                Range::Logarithmic,
                 "of the luminance",
             )),
             Overlay::Albedo | Overlay::Normal | Overlay::Depth => self.layer(overlay),
@@ -273,7 +273,7 @@ impl Sources<'_> {
             }
             _ => {
                 let depths = layers.depth.iter().zip(&layers.normal);
-                scaled(depths.map(|(d, n)| is_hit(n).then_some(*d)), Range::LOGARITHMIC, "m")
+                scaled(depths.map(|(d, n)| is_hit(n).then_some(*d)), Range::Logarithmic, "m")
             }
         })
     }
@@ -293,7 +293,7 @@ impl Sources<'_> {
             Overlay::Faces => faces(surfaces, cells),
             Overlay::Learned => learned(surfaces, cells, grid),
             Overlay::Visits => {
-                by_cell(&|cell| facts.visits(cell), Range::LOGARITHMIC, "tries a cell")
+                by_cell(&|cell| facts.visits(cell), Range::Logarithmic, "tries a cell")
             }
             Overlay::Sky => by_cell(
                 &|cell| facts.visible_share(cell),
@@ -315,22 +315,23 @@ impl Sources<'_> {
                 let most = (self.environment.tile_count() as f32).log2();
                 by_cell(
                     &|cell| Some(facts.entropy[distribution(cell)]),
-                    Range::between(0.0, most),
+                    Range::Fixed(0.0, most),
                     "bits",
                 )
             }
             Overlay::Distance => by_cell(
                 &|cell| Some(facts.distance[distribution(cell)]),
-                Range::between(0.0, 1.0),
+                Range::Fixed(0.0, 1.0),
                 "total variation",
             ),
             _ => {
-                let tile = self.tile?;
+                // The map may have been another one, of more tiles.
+                let tile = self.tile.filter(|tile| *tile < self.environment.tile_count())?;
                 let probability = |cell| {
                     Some(grid.distributions().probability(grid.distribution_of_cell(cell), tile))
                         .filter(|p| *p > 0.0)
                 };
-                by_cell(&probability, Range::LOGARITHMIC, "probability")
+                by_cell(&probability, Range::Logarithmic, "probability")
             }
         })
     }
@@ -419,15 +420,6 @@ enum Range {
 
 /// What a logarithmic scale spans at most: a few cells that see next to nothing must not take it all.
 const LARGEST_RATIO: f32 = 1e4;
-
-impl Range {
-    const WHOLE: Self = Self::Whole;
-    const LOGARITHMIC: Self = Self::Logarithmic;
-
-    fn between(low: f32, high: f32) -> Self {
-        Self::Fixed(low, high)
-    }
-}
 
 fn scaled(values: impl Iterator<Item = Option<f32>>, range: Range, unit: &'static str) -> Painted {
     let values: Vec<Option<f32>> = values.collect();

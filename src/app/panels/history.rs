@@ -1,5 +1,7 @@
 //! Kept pictures.
 
+use std::sync::Arc;
+
 use egui::{Id, Image, RichText, Sense, TextureOptions, Ui, Vec2};
 
 use crate::app::commands::Command;
@@ -48,7 +50,7 @@ pub(in crate::app) fn show(
                     if ui.small_button("As then").on_hover_text(hint).clicked() {
                         commands.push(Command::SetAsKept(i));
                     }
-                    if forget(ui, i) {
+                    if forget(ui, kept) {
                         removed = Some(i);
                     }
                 });
@@ -62,15 +64,17 @@ pub(in crate::app) fn show(
 }
 
 /// Whether a picture is to be forgotten: asked twice, for its file goes with it.
-fn forget(ui: &mut Ui, index: usize) -> bool {
+fn forget(ui: &mut Ui, kept: &KeptPicture) -> bool {
     let id = Id::unique("forget a picture");
-    let is_asked = ui.data(|data| data.get_temp(id)) == Some(index);
+    // Others may come before it meanwhile.
+    let which = Arc::as_ptr(&kept.pixels).addr();
+    let is_asked = ui.data(|data| data.get_temp(id)) == Some(which);
     // As short as it can be: there is no more room beside the others.
     let sure = RichText::new("Sure?").size(11.0).color(theme::ALERT);
     let text = if is_asked { sure } else { "×".into() };
     let response = ui.small_button(text).on_hover_text("Delete this picture and its file");
     if response.clicked() {
-        ui.data_mut(|data| data.insert_temp(id, index));
+        ui.data_mut(|data| data.insert_temp(id, which));
     }
     if is_asked && (response.clicked() || response.clicked_elsewhere()) {
         ui.data_mut(|data| data.remove::<usize>(id));

@@ -54,16 +54,15 @@ fn place(ui: &mut Ui, sense: Sense) -> (Rect, Response) {
     ui.allocate_exact_size(Vec2::new(width, 0.5 * width), sense)
 }
 
-/// The texture of a preview, made once and kept with the context.
+/// The texture of a preview, made once and kept with the context until there is another.
 fn texture(ui: &Ui, image: &Arc<Image>) -> TextureHandle {
-    let id = egui::Id::unique(("map preview", Arc::as_ptr(image).addr()));
+    let id = egui::Id::unique("map preview");
     let kept: Option<(TextureHandle, Arc<Image>)> = ui.ctx().data(|data| data.get_temp(id));
-    if let Some((texture, _)) = kept {
+    if let Some((texture, _)) = kept.filter(|(_, of)| Arc::ptr_eq(of, image)) {
         return texture;
     }
     let rgb = display_rgb8(image, auto_exposure_ev(image) + 0.5, ToneCurve::Agx);
     let texture = ui.ctx().load_texture("map", color_image(&rgb), TextureOptions::LINEAR);
-    // The image is kept too, so that its address stays its own.
     ui.ctx().data_mut(|data| data.insert_temp(id, (texture.clone(), Arc::clone(image))));
     texture
 }

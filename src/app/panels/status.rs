@@ -118,7 +118,7 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
             "Estimated relative RMS error of the pixels, from the samples' own spread",
         );
     }
-    let invalid = session.film.invalid_samples();
+    let invalid = session.invalid_samples;
     if invalid > 0 {
         let text = RichText::new(format!("{} not finite", theme::count(invalid)));
         ui.label(text.color(theme::ALERT)).on_hover_text(
@@ -131,12 +131,9 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
     }
     let grid = session.grid.as_ref().map_or(0, |grid| grid.memory_bytes());
     let map = snapshot.request.environment.memory_bytes();
-    number(
-        ui,
-        &theme::bytes(grid),
-        "grid",
-        &crate::app::execute::memory_sentence(grid, map.table, map.pixels),
-    );
+    let [grid, table, pixels] = [grid, map.table, map.pixels].map(theme::bytes);
+    let hint = format!("Light Grid {grid}, importance table {table}, map {pixels}");
+    number(ui, &grid, "grid", &hint);
 }
 
 /// What the film holds under the pointer.

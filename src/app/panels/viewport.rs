@@ -70,6 +70,9 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
             let at = Pos2::new(rect.center().x, rect.top() + 14.0);
             theme::badge(ui, at, Align2::CENTER_TOP, &text, theme::TEXT);
         }
+        if shown.other.is_none() {
+            scope.textures.other = None;
+        }
         gestures::show(ui, (whole, rect), &response, handle, scope);
         pin(ui, rect, scope.interface);
     });
@@ -164,6 +167,7 @@ fn picture(
     if shown.order.snapshot.request.view.crop.is_none() {
         let texture = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);
         painter.image(texture, whole, full, Color32::WHITE);
+        scope.textures.part = None;
         return;
     }
     if let Some(main) = &scope.textures.main {

@@ -120,7 +120,13 @@ impl Memory {
             let compared = self.uploads.compared.or_make((comparison.clone(), of), compare)?;
             picture = compared.picture.unwrap_or(picture);
             (other, difference) = (compared.other, compared.difference);
-            uncompared = compared.failure;
+            // The small picture of a movement has another size for a moment.
+            uncompared = compared.failure.filter(|_| {
+                let view = &order.snapshot.request.view;
+                let size =
+                    image.as_ref().map_or((view.width, view.height), |i| (i.width, i.height));
+                order.snapshot.is_whole() && size == (view.width, view.height)
+            });
         } else if let Some(source) = Source::plain(&order) {
             let prepare = || Ok(source.prepare(&developer));
             let plain = self.uploads.plain.or_make(source.clone(), prepare)?;
@@ -205,11 +211,11 @@ impl Memory {
         let is_current = self.surfaces.as_ref().is_some_and(|(old, surfaces)| {
             Arc::ptr_eq(&old.world, &snapshot.request.world)
                 && old.view.camera == snapshot.request.view.camera
+                && old.view.crop == snapshot.request.view.crop
                 && (surfaces.width, surfaces.height) == (film.width, film.height)
         });
         if !is_current {
-            let mut view = snapshot.request.view.clone();
-            (view.width, view.height) = (film.width, film.height);
+            let view = snapshot.request.view.of_size(film.width, film.height);
             let surfaces = SurfaceMap::of(&snapshot.request.world, &view);
             self.surfaces = Some((Arc::clone(&snapshot.request), surfaces));
         }

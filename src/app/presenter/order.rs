@@ -46,6 +46,13 @@ impl PartialEq for Order {
 }
 
 impl Order {
+    /// What is to be shown, made on the host.
+    pub(in crate::app) fn image(&self) -> Image {
+        let film = &self.snapshot.main.film;
+        let filtered = self.denoiser.and_then(|denoiser| denoiser.denoise(film, None).ok());
+        filtered.unwrap_or_else(|| film.image())
+    }
+
     /// Whether it asks for the same of a later picture of the same work, which may wait; the first one with a
     /// sample in every pixel does not.
     pub(super) fn only_follows(&self, before: &Self) -> bool {

@@ -163,6 +163,7 @@ pub(super) mod tests {
             film: Arc::new(film),
             figures: Figures::default(),
             noise: 0.0,
+            invalid_samples: 0,
             grid: None,
             gpu: None,
             on_device: None,
@@ -193,7 +194,8 @@ pub(super) mod tests {
     fn a_cached_picture_of_all_pixels_is_filtered_with_what_there_is_of_the_exact_one() {
         let Some(developer) = developer() else { return };
         let prepared = |own: Film, other: Film, is_whole| {
-            let backdrop = Some(Backdrop { film: Arc::new(other), worth: 4.0, is_cached: true });
+            let (samples, film) = (other.total_samples(), Arc::new(other));
+            let backdrop = Some(Backdrop { film, samples, worth: 4.0, is_cached: true });
             let (session, denoiser) = (session(own), Some(Denoiser::ATrous));
             let prepared = Source { session, backdrop, denoiser, is_whole }.prepare(&developer);
             prepared.image.expect("made on the host").pixels.clone()

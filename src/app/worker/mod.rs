@@ -116,6 +116,12 @@ impl Worker {
         slot.request.as_ref().is_some_and(|latest| snapshot.request.is_same(latest))
     }
 
+    /// Whether a picture is of what was asked for last, whatever else is wanted with it.
+    pub(super) fn is_of_latest(&self, snapshot: &Snapshot) -> bool {
+        let slot = lock(&self.shared.slot);
+        slot.request.as_ref().is_some_and(|latest| !snapshot.request.restarts(latest))
+    }
+
     /// Whether a GPU is being opened, filled or programmed.
     pub(crate) fn is_preparing(&self) -> bool {
         self.shared.is_preparing.load(Ordering::Relaxed)

@@ -54,6 +54,8 @@ pub(crate) struct SessionSnapshot {
     pub figures: Figures,
     /// [`crate::render::Session::noise`].
     pub noise: f64,
+    /// [`Film::invalid_samples`].
+    pub invalid_samples: u64,
     /// The distributions in use.
     pub grid: Option<Arc<LightGrid>>,
     /// The GPU at work; `None` is the CPU.
@@ -139,6 +141,8 @@ impl Rest {
 pub(crate) struct Backdrop {
     /// Of any size.
     pub film: Arc<Film>,
+    /// Its samples, of all pixels together.
+    pub samples: u64,
     /// What one of its samples counts beside one of the picture's own.
     pub worth: f32,
     /// Whether its light comes from a radiance cache.
@@ -149,7 +153,7 @@ impl Backdrop {
     /// The share of what is shown that it makes up, in `[0,1]`, beside a film of the same size with so
     /// many samples a pixel.
     pub(crate) fn share(&self, samples: u32) -> f32 {
-        let own = self.worth * self.film.min_samples() as f32;
+        let own = self.worth * self.samples as f32 / self.film.pixels().len().max(1) as f32;
         if own > 0.0 { own / (own + samples as f32) } else { 0.0 }
     }
 }

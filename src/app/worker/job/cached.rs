@@ -68,21 +68,23 @@ impl<'s> CachedPicture<'s> {
         Some(session)
     }
 
-    /// Its film, if there is enough of it. A copy is made unless there is a new one already or, if it `rests`,
+    /// Its film and how many samples that has, if there is enough of it. A copy is made unless there is a new one already or, if it `rests`,
     /// any: it is megabytes and is soon complete.
     pub(super) fn film(
         &mut self,
         suffices: impl Fn(u64) -> bool,
         rests: bool,
-    ) -> Option<Arc<Film>> {
+    ) -> Option<(u64, Arc<Film>)> {
         match self {
             Self::UnderWay(session, copy) if suffices(session.figures().samples) => {
                 let samples = session.figures().samples;
                 let kept = copy.take().filter(|(of, _)| rests || *of == samples);
                 let kept = kept.unwrap_or_else(|| (samples, Arc::new(session.film().clone())));
-                Some(Arc::clone(&copy.insert(kept).1))
+                Some(copy.insert(kept).clone())
             }
-            Self::Complete(samples, film) if suffices(*samples) => Some(Arc::clone(film)),
+            Self::Complete(samples, film) if suffices(*samples) => {
+                Some((*samples, Arc::clone(film)))
+            }
             _ => None,
         }
     }

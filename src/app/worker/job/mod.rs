@@ -150,6 +150,11 @@ impl<'a> Job<'a> {
                             continue;
                         }
                     }
+                    // With an error, if something to measure it by has come.
+                    self.note(MAIN, &main);
+                    if let Some(plain) = &plain {
+                        self.note(PLAIN, plain);
+                    }
                     self.publish(activity, &main, plain.as_ref(), &mut cached);
                     self.rest();
                     continue;

@@ -16,6 +16,8 @@ use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::render::{Figures, Session, View};
 
+/// A point of a curve is drawn if it has so many times the samples of the one before.
+const APART: f64 = 1.01;
 /// A film that is shown in place is read back this seldom.
 const READING_GAP: Duration = Duration::from_millis(250);
 /// A film that is copied for being shown is replaced when it is so old, whoever still has others.
@@ -35,6 +37,7 @@ pub(super) struct Reading {
     samples: u32,
     figures: Figures,
     noise: f64,
+    invalid_samples: u64,
     at: Instant,
     /// Age at which it is too old.
     gap: Duration,
@@ -150,15 +153,20 @@ impl Job<'_> {
         // What this job itself has kept has the same samples.
         let is_own = |(of, _): &(Arc<Request>, Arc<Film>)| Arc::ptr_eq(of, &self.request);
         let before = self.backdrop().filter(|_| !self.kept.backdrop.as_ref().is_some_and(is_own));
-        let before = before.map(|film| Backdrop { film, worth: 1.0, is_cached: false });
-        let seen = before.as_ref().map_or(0, |backdrop| backdrop.film.total_samples());
+        let seen = before.as_ref().map_or(0, |film| film.total_samples());
         let says_more = |samples: u64| 2 * samples > 3 * seen;
-        let film = cached.film(says_more, rests);
-        let worth = worth(main.samples());
-        film.map(|film| Backdrop { film, worth, is_cached: true }).or(before)
+        match cached.film(says_more, rests) {
+            Some((samples, film)) => {
+                let worth = worth(main.samples());
+                Some(Backdrop { film, samples, worth, is_cached: true })
+            }
+            None => {
+                before.map(|film| Backdrop { film, samples: seen, worth: 1.0, is_cached: false })
+            }
+        }
     }
 
-    /// Adds a point to a curve, unless nothing has happened since the last one.
+    /// Brings a curve up to date: its last point is of now, those before are apart.
     pub(super) fn note(&mut self, curve: usize, session: &Session<'_>) {
         let film = session.film();
         let point =
@@ -170,10 +178,18 @@ impl Job<'_> {
                     metrics::relative_rms_error(&film.image(), &reference.image)
                 }),
             };
+        if !(point.noise.is_finite() && point.noise > 0.0) {
+            return;
+        }
         let curve = &mut self.curves[curve];
-        let is_later = curve.last().is_none_or(|last| point.samples > last.samples);
-        if point.noise.is_finite() && point.noise > 0.0 && is_later {
-            curve.push(point);
+        if let [.., before, last] = curve.as_slice()
+            && last.samples < APART * before.samples
+        {
+            curve.pop();
+        }
+        match curve.last_mut() {
+            Some(last) if point.samples <= last.samples => *last = point,
+            _ => curve.push(point),
         }
     }
 
@@ -198,10 +214,12 @@ impl Job<'_> {
                 let start = Instant::now();
                 let film = self.film_of(session);
                 let (noise, figures) = (session.noise(), session.figures());
+                let invalid_samples = film.invalid_samples();
                 let cost = if is_in_place { start.elapsed() } else { Duration::ZERO };
                 let (at, gap) = (Instant::now(), gap_after(cost).max(READING_GAP));
                 let (of, samples) = (in_place, session.samples());
-                let reading = Reading { of, film, samples, figures, noise, at, gap };
+                let reading =
+                    Reading { of, film, samples, figures, noise, invalid_samples, at, gap };
                 self.readings[role] = Some(reading.clone());
                 if session.figures().samples > 0 {
                     self.films.push(Arc::downgrade(&reading.film));
@@ -214,6 +232,7 @@ impl Job<'_> {
             samples: if is_in_place { session.samples() } else { reading.samples },
             sampling: session.view().sampling,
             noise: reading.noise,
+            invalid_samples: reading.invalid_samples,
             film: reading.film,
             figures: reading.figures,
             gpu: session.gpu_figures().map(Arc::new),

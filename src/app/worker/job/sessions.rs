@@ -1,5 +1,6 @@
 //! Sessions of a job: with what is known, where they run, and how far they go at a time.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -24,14 +25,10 @@ impl Job<'_> {
         world: &'b World,
         environment: &'b Environment,
     ) -> Session<'b> {
-        let mut view = self.request.view.clone();
-        let shrink = self.shrink(&view);
-        view.width = (view.width / shrink).max(1);
-        view.height = (view.height / shrink).max(1);
-        if let Some(crop) = &mut view.crop {
-            crop.corner = crop.corner.map(|pixel| pixel / shrink);
-            crop.whole = crop.whole.map(|pixels| (pixels / shrink).max(1));
-        }
+        let request = Arc::clone(&self.request);
+        let shrink = self.shrink(&request.view);
+        let mut view =
+            request.view.of_size(request.view.width / shrink, request.view.height / shrink);
         // Learning would take longer than the picture.
         if self.request.wants_cached && self.kept.has_training_for(&self.request) {
             view.gi = Gi::Cached;

@@ -1,0 +1,167 @@
+//! What a person does, one step after the other, and what must come of it.
+
+use std::path::Path;
+use std::time::Duration;
+
+use super::commands::Command;
+use super::document::{Document, Light, Look, PictureSize};
+use super::interface::Interface;
+use super::overlays::Overlay;
+use super::screenshot::{Shot, Studio};
+use super::{Start, exchange};
+use crate::image::{ExrPicture, Image, read_picture, write_exr};
+use crate::memory;
+use crate::render::StopRule;
+use crate::render::gpu::DeviceChoice;
+
+fn studio(scene: &str) -> Option<Studio> {
+    let defaults = Document::default();
+    let document = Document {
+        scene: scene.to_owned(),
+        map: "sky:day@64x32".to_owned(),
+        size: PictureSize::Fixed(48, 32),
+        stop: StopRule { samples: Some(1), ..StopRule::default() },
+        light: Light { device: DeviceChoice::Cpu, ..defaults.light },
+        look: Look { denoise: false, ..defaults.look },
+        ..defaults
+    };
+    let start = Start { document, ..Start::default() };
+    let shot = Shot { start, size: (800, 500), patience: Duration::from_secs(300) };
+    let studio = Studio::open(shot);
+    let studio = studio.inspect_err(|error| crate::terminal::notice(format!("SKIPPED: {error}")));
+    studio.ok()
+}
+
+impl Studio {
+    fn asks(&mut self, command: Command) {
+        self.app.execute(command, &self.context);
+    }
+}
+
+#[test]
+fn what_is_saved_is_what_was_asked_for_and_not_what_was_there_before() {
+    let Some(mut studio) = studio("open") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let [early, late] = ["early.exr", "late.exr"].map(|name| folder.path().join(name));
+    studio.settle().expect("rendered");
+    studio.asks(Command::OpenScene("crack".to_owned()));
+    studio.asks(Command::Save(early.clone()));
+    studio.asks(Command::Save(folder.path().join("another.png")));
+    studio.asks(Command::KeepPicture);
+    assert!(studio.app.history.list_mut().is_empty(), "it is none of the document");
+    studio.settle().expect("rendered");
+    studio.frame().expect("drawn");
+    studio.asks(Command::Save(late.clone()));
+    studio.asks(Command::KeepPicture);
+    assert_eq!(studio.app.history.list_mut().len(), 1);
+    studio.frame().expect("drawn");
+    assert!(studio.app.finish().is_empty());
+    let pixels = |path: &Path| read_picture(path).expect("written").pixels;
+    assert_eq!(pixels(&early), pixels(&late));
+    assert!(folder.path().join("another.png").exists());
+    // One that is not there in time is not forgotten in silence.
+    studio.asks(Command::OpenScene("open".to_owned()));
+    studio.asks(Command::Save(late.clone()));
+    let failures = studio.app.finish();
+    assert!(failures.len() == 1 && failures[0].contains("late.exr: not saved"), "{failures:?}");
+}
+
+#[test]
+fn a_size_without_memory_is_refused_and_undo_goes_on() {
+    const HUGE: PictureSize = PictureSize::Fixed(16_384, 8_192);
+    if memory::check((16_384 * 8_192) * exchange::BYTES_PER_PIXEL).is_ok() {
+        crate::terminal::notice("SKIPPED: there is memory for everything");
+        return;
+    }
+    let Some(mut studio) = studio("open") else { return };
+    studio.settle().expect("rendered");
+    let small = studio.app.document.size;
+    studio.app.document.rotation_degrees = 30.0;
+    studio.settle().expect("rendered");
+    let frames = |studio: &mut Studio| (0..3).for_each(|_| studio.frame().expect("drawn"));
+    studio.app.document.size = HUGE;
+    frames(&mut studio);
+    assert_eq!(studio.app.document.size, small);
+    assert!(studio.app.failure().is_some_and(|said| said.contains("16384 x 8192")));
+    // Of a part there may be as much as one likes, of the whole not.
+    studio.app.document.region = Some([0.0, 0.0, 0.002, 0.002]);
+    studio.app.document.size = HUGE;
+    frames(&mut studio);
+    assert_eq!(studio.app.document.size, HUGE);
+    studio.asks(Command::ToggleRegion);
+    frames(&mut studio);
+    assert!(studio.app.document.size == HUGE && studio.app.document.region.is_some());
+    studio.asks(Command::Undo);
+    frames(&mut studio);
+    assert_eq!((studio.app.document.size, studio.app.document.region), (small, None));
+    assert_eq!(studio.app.document.rotation_degrees, 30.0);
+    studio.asks(Command::Undo);
+    assert_eq!(studio.app.document.rotation_degrees, 0.0);
+}
+
+#[test]
+fn a_map_that_has_gone_is_no_step_to_go_back_to() {
+    let Some(mut studio) = studio("open") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let maps = ["one.exr", "two.exr"].map(|name| folder.path().join(name).display().to_string());
+    studio.settle().expect("rendered");
+    for map in &maps {
+        let white = Image::filled(4, 2, [1.0; 3]);
+        let picture =
+            ExrPicture { image: &white, layers: Vec::new(), metadata: &[], preview: None };
+        write_exr(Path::new(map), picture).expect("written");
+        studio.asks(Command::OpenMap(map.clone()));
+        studio.settle().expect("rendered");
+    }
+    std::fs::remove_file(&maps[0]).expect("removed");
+    studio.asks(Command::Undo);
+    while studio.app.failure().is_none() {
+        studio.frame().expect("drawn");
+    }
+    assert_eq!(studio.app.document.map, maps[1]);
+    studio.frame().expect("drawn");
+    studio.asks(Command::Undo);
+    assert_eq!(studio.app.document.map, "sky:day@64x32");
+}
+
+#[test]
+fn a_scene_is_looked_at_from_somewhere_and_known_by_any_of_its_paths() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("triangle.gltf");
+    std::fs::write(&file, TRIANGLE).expect("written");
+    let name = file.display().to_string();
+    let Some(mut studio) = studio(&name) else { return };
+    studio.settle().expect("rendered");
+    studio.app.document.viewpoint = None;
+    studio.settle().expect("rendered");
+    assert!(studio.app.document.viewpoint.is_some());
+    studio.asks(Command::Bookmark);
+    studio.app.document.rotation_degrees = 30.0;
+    let before = studio.app.document.clone();
+    studio.asks(Command::OpenScene(folder.path().join("./triangle.gltf").display().to_string()));
+    assert_eq!(studio.app.document, before, "it is read again");
+    // Paused, it would never be seen.
+    studio.asks(Command::TogglePause);
+    studio.asks(Command::OpenScene("open".to_owned()));
+    studio.settle().expect("rendered");
+}
+
+#[test]
+fn a_tile_that_a_smaller_map_does_not_have_is_shown_nowhere() {
+    let Some(mut studio) = studio("open") else { return };
+    let interface =
+        Interface { overlay: Some(Overlay::Tile), tile: Some(100), ..Interface::default() };
+    studio.arrange(interface);
+    studio.settle().expect("rendered");
+    studio.asks(Command::OpenMap("sky:day@4x2".to_owned()));
+    studio.settle().expect("rendered");
+}
+
+/// A triangle, its positions in the file itself.
+const TRIANGLE: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+        "min": [0, 0, 0], "max": [1, 1, 0]}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}],
+    "buffers": [{"byteLength": 36, "uri":
+        "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
