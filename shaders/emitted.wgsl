@@ -4,7 +4,7 @@ fn add_emitted(path: ptr<function, Path>, point: SurfacePoint) {
     if point.parameters.unlit {
         return;
     }
-    let radiance = emitted(point);
+    let radiance = emitted(point, -(*path).ray.direction);
     if max_element(radiance) <= 0.0 {
         return;
     }

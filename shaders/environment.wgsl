@@ -2,11 +2,7 @@
 // radiance is read smoothly, see src/environment/patches.rs.
 
 // How far patch edges lie before texel edges, in texels.
-//#if NEAREST_LOOKUP
-const MAP_SHIFT = 0.0;
-//#else
 const MAP_SHIFT = 0.5;
-//#end
 
 // A patch by column and row, and a place in it, in [0,1]^2 of its extent.
 struct MapPoint {
@@ -54,11 +50,7 @@ struct TilePatches {
 
 // Columns and rows of patches.
 fn patch_grid() -> vec2u {
-//#if NEAREST_LOOKUP
-    return vec2u(globals.map_width, globals.map_height);
-//#else
     return vec2u(globals.map_width, globals.map_height + 1u);
-//#end
 }
 
 fn tile_patches(tile: u32) -> TilePatches {
@@ -121,10 +113,6 @@ fn unpack_radiance(words: vec2u) -> vec3f {
 
 // Wrapped in u, clamped in v.
 fn corners_of(at: vec2u) -> Corners {
-//#if NEAREST_LOOKUP
-    let texel = map_texel(at.x, at.y);
-    return Corners(texel, texel, texel, texel);
-//#else
     let left = select(at.x, globals.map_width, at.x == 0u) - 1u;
     let above = max(at.y, 1u) - 1u;
     let below = min(at.y, globals.map_height - 1u);
@@ -134,7 +122,6 @@ fn corners_of(at: vec2u) -> Corners {
         map_texel(left, below),
         map_texel(at.x, below),
     );
-//#end
 }
 
 fn interpolated(corners: Corners, within: vec2f) -> vec3f {

@@ -47,7 +47,7 @@ fn sample_local_light(receiver: Receiver, bits: vec2u) -> LightSample {
         return none;
     }
     let point = surface_at(triangle, barycentric, direction);
-    return LightSample(direction, distance, emitted(point) / pdf, pdf);
+    return LightSample(direction, distance, emitted(point, -direction) / pdf, pdf);
 //#else
     return none;
 //#end
@@ -98,13 +98,15 @@ fn local_light_pdf_solid_angle(
     return light_probability(receiver, low) * density;
 }
 
-// Radiance a surface point sends towards its viewer: as much as alpha covers it.
-fn emitted(point: SurfacePoint) -> vec3f {
+// Radiance a surface point sends towards its viewer: as much as alpha covers it, and its coat lets through.
+fn emitted(point: SurfacePoint, to_viewer: vec3f) -> vec3f {
     let both_sides = (material_flags(point.material) & DOUBLE_SIDED) != 0u;
-    if point.front_face || both_sides {
-        return point.parameters.emissive * point.parameters.alpha;
+    if !(point.front_face || both_sides) {
+        return vec3f(0.0);
     }
-    return vec3f(0.0);
+    let wo = local_from_world(point.shading_frame, to_viewer);
+    let left = coat_attenuation(coat_new(point.parameters, point.front_face), wo);
+    return point.parameters.emissive * point.parameters.alpha * left;
 }
 //#end
 

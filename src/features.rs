@@ -74,41 +74,39 @@ bitflags::bitflags! {
         const MAP = 1 << 31;
         /// The map is sampled.
         const MAP_SAMPLING = 1 << 32;
-        /// Texels of the map are not interpolated.
-        const NEAREST_LOOKUP = 1 << 33;
         /// A summed-area table of `f32`.
-        const TABLE_F32 = 1 << 34;
+        const TABLE_F32 = 1 << 33;
         /// One of `f64`.
-        const TABLE_F64 = 1 << 35;
+        const TABLE_F64 = 1 << 34;
         /// One of rounded `u32`.
-        const TABLE_U32 = 1 << 36;
+        const TABLE_U32 = 1 << 35;
         /// Tiles are chosen by the cell.
-        const LIGHT_GRID = 1 << 37;
+        const LIGHT_GRID = 1 << 36;
         /// Cells tell which way a surface faces.
-        const FACES = 1 << 38;
+        const FACES = 1 << 37;
         /// It is counted what samples of the map see.
-        const COUNTING = 1 << 39;
+        const COUNTING = 1 << 38;
         /// Counters hold a share of what was tried.
-        const RECORD_RATIO = 1 << 40;
+        const RECORD_RATIO = 1 << 39;
         /// The share is weighted by the cosine.
-        const RECORD_COSINE = 1 << 41;
+        const RECORD_COSINE = 1 << 40;
         /// By its square.
-        const RECORD_SQUARED_COSINE = 1 << 42;
+        const RECORD_SQUARED_COSINE = 1 << 41;
         // Of a kernel.
         /// Paths end in the radiance cache.
-        const CACHED = 1 << 43;
+        const CACHED = 1 << 42;
         /// A walk's stack does not fit into workgroup memory.
-        const DEEP_TREE = 1 << 44;
+        const DEEP_TREE = 1 << 43;
         /// Second vertices are found for a tile.
-        const FINDING = 1 << 45;
+        const FINDING = 1 << 44;
         /// The device finds what rays hit.
-        const HARDWARE_RAYS = 1 << 46;
+        const HARDWARE_RAYS = 1 << 45;
         /// Paths are traced to learn from.
-        const LEARNING = 1 << 47;
+        const LEARNING = 1 << 46;
         /// Second vertices are shared.
-        const SHARING = 1 << 48;
+        const SHARING = 1 << 47;
         /// Paths train the radiance cache.
-        const TRAINING = 1 << 49;
+        const TRAINING = 1 << 48;
         // Of what follows from others.
         /// Some hits of closest-hit rays do not count.
         const FILTERED_HITS = 1 << 51;

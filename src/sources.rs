@@ -46,7 +46,7 @@ pub fn scene_with(name: &str, options: &SceneOptions) -> Result<Scene> {
             is_there = true;
         }
         if !is_there {
-            return Err(Error::at(name, format!("no material is called {material}")));
+            return Err(Error::at(name, scene.without_material(material)));
         }
     }
     if options.edits.iter().any(|(_, edit)| edit.hidden) {

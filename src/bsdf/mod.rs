@@ -337,6 +337,11 @@ impl<'a> ViewedBsdf<'a> {
     }
 }
 
+/// Share of what is under a surface's coat that passes it towards a unit local `wo`, in `[0,1]`.
+pub(crate) fn left_by_coat(p: &SurfaceParameters, entering: bool, wo: Vec3) -> f32 {
+    Coat::new(p, entering).attenuation(wo)
+}
+
 /// What sampling one lobe found.
 #[derive(Debug, Clone, Copy)]
 enum LobeSample {

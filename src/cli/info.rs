@@ -48,11 +48,13 @@ fn scene_facts(name: &str, scene: Scene) -> Value {
     let textures: usize = scene.images.iter().map(|i| i.texels.bytes().len()).sum();
     json!({
         "scene": name,
+        "notices": scene.notices.iter().collect::<Vec<_>>(),
         "triangles": scene.shown_triangles(),
         "triangles_in_memory": scene.triangles.len(),
         "instances": scene.instances.len(),
         "vertices": scene.positions.len(),
         "materials": scene.materials.len(),
+        "material_names": scene.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(),
         "textures": scene.textures.len(),
         "texture_bytes": textures,
         "bvh_bytes": world.bvh.memory_bytes(),
@@ -70,7 +72,6 @@ fn scene_facts(name: &str, scene: Scene) -> Value {
         }).collect::<Vec<_>>(),
         "left_out": world.needs.left_out().collect::<Vec<_>>(),
         "gpu_kernel": KernelFacts::of_scene(&world),
-        "notices": scene.notices.iter().collect::<Vec<_>>(),
     })
 }
 
@@ -82,6 +83,7 @@ fn map_facts(name: &str, map: &Image, notices: &Notices) -> Value {
     };
     json!({
         "map": name,
+        "notices": notices.iter().collect::<Vec<_>>(),
         "size": [map.width, map.height],
         "bytes": map.pixels.len() * 12,
         "mean_luminance": sun.map_or(0.0, |sun| sun.mean_luminance),
@@ -93,7 +95,6 @@ fn map_facts(name: &str, map: &Image, notices: &Notices) -> Value {
         })),
         "energy_within_2.5_degrees_of_it": sun.map(|sun| sun.energy_share),
         "left_out": left_out,
-        "notices": notices.iter().collect::<Vec<_>>(),
     })
 }
 
@@ -101,8 +102,15 @@ fn map_facts(name: &str, map: &Image, notices: &Notices) -> Value {
 fn list_facts(facts: &Value, indent: usize, lines: &mut Vec<String>) {
     let Some(map) = facts.as_object() else { return };
     for (key, value) in map {
-        let label = key.replace('_', " ");
+        let label = match key.as_str() {
+            "left_out" => "not needed, so left out of the program".to_owned(),
+            key => key.replace('_', " "),
+        };
         match value {
+            Value::Array(names) if key.ends_with("_names") => {
+                let names: Vec<String> = names.iter().map(number).collect();
+                lines.push(format!("{:indent$}{label}: {}", "", names.join(", ")));
+            }
             Value::Array(texts) if texts.iter().any(Value::is_string) => {
                 lines.push(format!("{:indent$}{label}:", ""));
                 for text in texts.iter().filter_map(Value::as_str) {

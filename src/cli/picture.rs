@@ -70,6 +70,13 @@ impl PictureArguments {
         if self.denoise.is_some() && !self.is_denoised(pictures) {
             notice("--denoise changes nothing: .exr pictures hold what was rendered");
         }
+        let is_developed = (self.exposure, self.tonemap) != (Exposure::Auto, ToneCurve::default())
+            || self.white.is_some();
+        if is_developed && pictures.iter().all(|path| output::holds_layers(path)) {
+            notice(
+                "--exposure, --tonemap and --white change nothing: .exr pictures hold what was rendered",
+            );
+        }
     }
 
     /// Whether noise is to be taken out of one of these pictures, or of those that are made of a part.

@@ -59,6 +59,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     let mut notices = world.scene.notices.clone();
     notices.extend(&map_notices);
     let camera = arguments.camera(&world, &mut notices)?;
+    arguments.check_fog(&world.scene, &mut notices);
     let frames = Frames::plan(arguments, &world, &camera)?;
     let [of_film, of_writing] = needed_bytes(arguments);
     memory::check(of_film + of_writing).map_err(|cause| too_large(&cause))?;

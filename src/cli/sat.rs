@@ -1,7 +1,7 @@
 //! `lightgrid sat`.
 
 use crate::environment::landmarks::Sun;
-use crate::environment::{Lookup, sat_report};
+use crate::environment::sat_report;
 use crate::error::{Error, Result};
 use crate::terminal::{notice, one_line, print};
 
@@ -36,7 +36,7 @@ pub(super) fn run(arguments: &SatArguments) -> Result<()> {
         if Sun::of(&map).is_none() {
             notice(format_args!("{name}: the map is black, so there is nothing to be sampled"));
         }
-        let report = sat_report(&map, Lookup::Bilinear, SAMPLES).map_err(|e| Error::at(name, e))?;
+        let report = sat_report(&map, SAMPLES).map_err(|e| Error::at(name, e))?;
         if arguments.json {
             reports.insert(name.to_owned(), crate::output::record::to_value(&report)?);
         } else {

@@ -29,7 +29,7 @@ use std::sync::Arc;
 use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 
-pub use self::options::{EnvironmentOptions, Lookup, TableKind};
+pub use self::options::{EnvironmentOptions, TableKind};
 use self::patches::{PatchRows, sample_linear};
 pub use self::sat_report::{SatReport, SatReportRow, sat_report};
 use self::table::{Search, Table};
@@ -47,7 +47,6 @@ use crate::sampler::hash;
 #[derive(Debug, Clone)]
 pub struct Environment {
     map: Arc<Image>,
-    lookup: Lookup,
     grid: TileGrid,
     table: Arc<Table>,
     tile_energies: Vec<f64>,
@@ -120,8 +119,8 @@ impl Environment {
         options.check()?;
         check_size(&map)?;
         let map = if options.sun == 1.0 { map } else { landmarks::with_sun(map, options.sun) };
-        let statistics = Statistics::of(&map, options.lookup)?;
-        let weights = Weights::new(&map, options.lookup);
+        let statistics = Statistics::of(&map)?;
+        let weights = Weights::new(&map);
         let (columns, rows) = weights.size();
         let grid = TileGrid::new(columns, rows, options.tile_columns, options.tile_rows);
         let (table, tile_energies) = Table::build(options.table, &weights, &grid);
@@ -138,9 +137,8 @@ impl Environment {
             })
             .collect();
         let mut environment = Self {
-            patches: PatchRows::new(map.width, map.height, options.lookup),
+            patches: PatchRows::new(map.width, map.height),
             map: Arc::new(map),
-            lookup: options.lookup,
             grid,
             table: Arc::new(table),
             tile_energies,
@@ -204,7 +202,7 @@ impl Environment {
     /// What a tile spans of lat-long u, which may pass 1, and v of world directions.
     pub(crate) fn extent_of_tile(&self, tile: u32) -> [Range<f64>; 2] {
         let patches = self.grid.patches(tile);
-        let shift = f64::from(self.patches.shift());
+        let shift = f64::from(patches::SHIFT);
         let u = |x| (f64::from(x) - shift) / f64::from(self.map.width);
         let turned = |x| u(x) + f64::from(self.rotation_turns);
         // The rows at the poles are half as high.
@@ -280,7 +278,7 @@ impl Environment {
     /// Unit world direction of a place in the patch of this column and row, `within` in `[0,1]`^2 of
     /// its longitudes and of its solid angle.
     pub fn direction_in_patch(&self, (column, row): (u32, u32), within: Vec2) -> Vec3 {
-        let x = column as f32 + within.x - self.patches.shift();
+        let x = column as f32 + within.x - patches::SHIFT;
         let world_turns = x / self.map.width as f32 + self.rotation_turns - 0.5;
         let (sin_phi, cos_phi) = sin_cos_turns(world_turns);
         let (sin_theta, cos_theta) = self.patches.polar_angle(row, within.y);
@@ -331,9 +329,9 @@ impl Environment {
         self.table.words()
     }
 
-    /// Which table, and how radiance is read.
-    pub(crate) fn kind(&self) -> (TableKind, Lookup) {
-        (self.table.kind(), self.lookup)
+    /// Which table.
+    pub(crate) fn table_kind(&self) -> TableKind {
+        self.table.kind()
     }
 
     /// Rotation in turns, in `[0,1)`, and the factor on all radiance.
@@ -398,12 +396,12 @@ impl Environment {
         let uv = uv_from_direction(direction);
         let turned = uv.x - self.rotation_turns;
         let u = if turned < 0.0 { turned + 1.0 } else { turned };
-        let (width, shift) = (self.map.width, self.patches.shift());
-        let x = u * width as f32 + shift;
+        let width = self.map.width;
+        let x = u * width as f32 + patches::SHIFT;
         // Never negative; `floor` is a call where a machine need not have the instruction.
         let left = x as u32;
         let rows = self.patches.rows().len() as u32;
-        let row = ((uv.y * self.map.height as f32 + shift) as u32).min(rows - 1);
+        let row = ((uv.y * self.map.height as f32 + patches::SHIFT) as u32).min(rows - 1);
         let squared_sine = direction.x * direction.x + direction.z * direction.z;
         MapPoint {
             // The last half texel before the seam belongs to the patch across it.
@@ -441,14 +439,8 @@ impl Environment {
     /// Indices of the pixels at the corners of a patch: wrapped in u, clamped in v.
     fn corner_pixels(&self, column: u32, row: u32) -> Corners<usize> {
         let (width, height) = (self.map.width, self.map.height);
-        let (left, above, below) = match self.lookup {
-            Lookup::Nearest => (column, row, row),
-            Lookup::Bilinear => (
-                if column == 0 { width - 1 } else { column - 1 },
-                row.saturating_sub(1),
-                row.min(height - 1),
-            ),
-        };
+        let left = if column == 0 { width - 1 } else { column - 1 };
+        let (above, below) = (row.saturating_sub(1), row.min(height - 1));
         let at = |x: u32, y: u32| y as usize * width as usize + x as usize;
         [at(left, above), at(column, above), at(left, below), at(column, below)]
     }
@@ -509,17 +501,12 @@ struct RowStatistics {
 }
 
 impl Statistics {
-    fn of(map: &Image, lookup: Lookup) -> Result<Self> {
+    fn of(map: &Image) -> Result<Self> {
         let first = map.pixels[0];
-        let solid_angle = |row| patches::solid_angle(map.width, map.height, lookup, row);
+        let solid_angle = |row| patches::solid_angle(map.width, map.height, row);
         // Each row of patches lends half of itself to the row of texels above and below it.
-        let row_weight = |y: u32| match lookup {
-            Lookup::Nearest => solid_angle(y),
-            Lookup::Bilinear => {
-                let pole = |is_pole: bool, row| if is_pole { 1.0 } else { 0.5 } * solid_angle(row);
-                pole(y == 0, y) + pole(y + 1 == map.height, y + 1)
-            }
-        };
+        let share = |is_pole: bool, row| if is_pole { 1.0 } else { 0.5 } * solid_angle(row);
+        let row_weight = |y: u32| share(y == 0, y) + share(y + 1 == map.height, y + 1);
         let rows: Vec<RowStatistics> = map
             .pixels
             .par_chunks_exact(map.width as usize)

@@ -48,33 +48,11 @@ impl FromStr for TableKind {
     }
 }
 
-/// How radiance is read between texel centres.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Lookup {
-    /// Interpolated between the four nearest.
-    #[default]
-    Bilinear,
-    /// Constant over a texel.
-    Nearest,
-}
-
-impl fmt::Display for Lookup {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Bilinear => "bilinear",
-            Self::Nearest => "nearest",
-        })
-    }
-}
-
 /// What an [`super::Environment`] is built with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EnvironmentOptions {
     /// Importance table.
     pub table: TableKind,
-    /// Look-up of radiance; the table matches it.
-    pub lookup: Lookup,
     /// Tiles along u, at least 1; no more are made than the map has columns.
     pub tile_columns: u32,
     /// Tiles along v, at least 1; no more are made than the map has rows.
@@ -91,7 +69,6 @@ impl Default for EnvironmentOptions {
     fn default() -> Self {
         Self {
             table: TableKind::default(),
-            lookup: Lookup::default(),
             tile_columns: 16,
             tile_rows: 8,
             rotation_radians: 0.0,

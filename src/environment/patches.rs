@@ -1,17 +1,18 @@
 //! Patches: the areas within which radiance is read smoothly, and the units of importance tables.
 //!
-//! With bilinear look-up a patch is the rectangle between four texel centres; rows of half height
-//! close the sphere at the poles. With nearest look-up it is a texel. Down a patch, radiance is linear
-//! in the cosine of the polar angle, that is in solid angle: so a patch's integral is its solid angle
-//! times the mean of its corners, and directions are drawn with a density proportional to what is then
-//! read there. (Linear in the angle itself, as others have it, differs by the share
-//! `pi / (8 height tan(theta))` of two texels' difference: 0.08 % at 512 rows, halfway to the pole.)
+//! Radiance is interpolated between texel centres: a patch is the rectangle between four of them; rows of
+//! half height close the sphere at the poles. Down a patch, radiance is linear in the cosine of the polar
+//! angle, that is in solid angle: so a patch's integral is its solid angle times the mean of its corners,
+//! and directions are drawn with a density proportional to what is then read there. (Linear in the angle
+//! itself, as others have it, differs by the share `pi / (8 height tan(theta))` of two texels' difference:
+//! 0.08 % at 512 rows, halfway to the pole.)
 
 use glam::Vec2;
 
 use std::f64::consts::{PI, TAU};
 
-use super::Lookup;
+/// How far patch edges lie before texel edges, in texels.
+pub(crate) const SHIFT: f32 = 0.5;
 
 /// A row of patches.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,35 +30,28 @@ pub(crate) struct PatchRow {
 #[derive(Debug, Clone)]
 pub(crate) struct PatchRows {
     rows: Vec<PatchRow>,
-    /// How far patch edges lie before texel edges, in texels.
-    shift: f32,
 }
 
 impl PatchRows {
     /// The rows of a map of `width` x `height` texels.
-    pub(crate) fn new(width: u32, height: u32, lookup: Lookup) -> Self {
-        let count = row_count(height, lookup);
+    pub(crate) fn new(width: u32, height: u32) -> Self {
+        let count = row_count(height);
         let rows = (0..count).map(|row| {
             let is_upper = is_upper(row, count);
-            let distance = |edge| pole_distance(edge, height, lookup, is_upper);
+            let distance = |edge| pole_distance(edge, height, is_upper);
             let (top, bottom) = (distance(row), distance(row + 1));
             PatchRow {
                 top: top as f32,
                 extent: (bottom - top) as f32,
-                solid_angle: solid_angle(width, height, lookup, row) as f32,
+                solid_angle: solid_angle(width, height, row) as f32,
             }
         });
-        Self { rows: rows.collect(), shift: shift(lookup) }
+        Self { rows: rows.collect() }
     }
 
     /// All rows from top to bottom.
     pub(crate) fn rows(&self) -> &[PatchRow] {
         &self.rows
-    }
-
-    /// How far patch edges lie before texel edges, in texels.
-    pub(crate) fn shift(&self) -> f32 {
-        self.shift
     }
 
     /// Sine and cosine of the polar angle at a place of a row, `down` in `[0,1]` of its extent.
@@ -86,25 +80,15 @@ impl PatchRows {
 }
 
 /// Number of rows of patches.
-pub(crate) fn row_count(height: u32, lookup: Lookup) -> u32 {
-    match lookup {
-        Lookup::Nearest => height,
-        Lookup::Bilinear => height + 1,
-    }
+pub(crate) fn row_count(height: u32) -> u32 {
+    height + 1
 }
 
 /// Exact steradians of a patch of a row.
-pub(crate) fn solid_angle(width: u32, height: u32, lookup: Lookup, row: u32) -> f64 {
-    let is_upper = is_upper(row, row_count(height, lookup));
-    let distance = |edge| pole_distance(edge, height, lookup, is_upper);
+pub(crate) fn solid_angle(width: u32, height: u32, row: u32) -> f64 {
+    let is_upper = is_upper(row, row_count(height));
+    let distance = |edge| pole_distance(edge, height, is_upper);
     TAU / f64::from(width) * (distance(row + 1) - distance(row)).abs()
-}
-
-fn shift(lookup: Lookup) -> f32 {
-    match lookup {
-        Lookup::Nearest => 0.0,
-        Lookup::Bilinear => 0.5,
-    }
 }
 
 /// Whether a row's cosines are told from the upper pole.
@@ -113,8 +97,8 @@ fn is_upper(row: u32, count: u32) -> bool {
 }
 
 /// `1 - cos` of the angle between an edge of rows and a pole, without cancellation.
-fn pole_distance(edge: u32, height: u32, lookup: Lookup, from_upper: bool) -> f64 {
-    let share = (f64::from(edge) - f64::from(shift(lookup))) / f64::from(height);
+fn pole_distance(edge: u32, height: u32, from_upper: bool) -> f64 {
+    let share = (f64::from(edge) - f64::from(SHIFT)) / f64::from(height);
     let share = share.clamp(0.0, 1.0);
     2.0 * (0.5 * PI * if from_upper { share } else { 1.0 - share }).sin().powi(2)
 }
@@ -155,23 +139,20 @@ mod tests {
     #[test]
     fn rows_cover_the_sphere_and_find_their_own_places() {
         for (width, height) in [(1, 1), (2, 1), (4, 3), (64, 32), (16, 8192)] {
-            for lookup in [Lookup::Bilinear, Lookup::Nearest] {
-                let patches = PatchRows::new(width, height, lookup);
-                let count = patches.rows().len() as u32;
-                let sphere: f64 = (0..count)
-                    .map(|row| f64::from(width) * solid_angle(width, height, lookup, row))
-                    .sum();
-                assert!((sphere / (2.0 * TAU) - 1.0).abs() < 1e-12);
-                for row in 0..count {
-                    for down in [0.0, 0.3, 0.9] {
-                        let (sine, cosine) = patches.polar_angle(row, down);
-                        assert!((sine.hypot(cosine) - 1.0).abs() < 1e-6);
-                        let found = patches.down(row, sine * sine, cosine);
-                        // In units of f32 at the distance from the pole.
-                        let PatchRow { top, extent, .. } = patches.rows()[row as usize];
-                        let bound = 4.0 * f32::EPSILON * (1.0 + top / extent.abs());
-                        assert!((found - down).abs() < bound, "{height} {row}: {down} {found}");
-                    }
+            let patches = PatchRows::new(width, height);
+            let count = patches.rows().len() as u32;
+            let sphere: f64 =
+                (0..count).map(|row| f64::from(width) * solid_angle(width, height, row)).sum();
+            assert!((sphere / (2.0 * TAU) - 1.0).abs() < 1e-12);
+            for row in 0..count {
+                for down in [0.0, 0.3, 0.9] {
+                    let (sine, cosine) = patches.polar_angle(row, down);
+                    assert!((sine.hypot(cosine) - 1.0).abs() < 1e-6);
+                    let found = patches.down(row, sine * sine, cosine);
+                    // In units of f32 at the distance from the pole.
+                    let PatchRow { top, extent, .. } = patches.rows()[row as usize];
+                    let bound = 4.0 * f32::EPSILON * (1.0 + top / extent.abs());
+                    assert!((found - down).abs() < bound, "{height} {row}: {down} {found}");
                 }
             }
         }

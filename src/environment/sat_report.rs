@@ -17,7 +17,7 @@ use super::table::Table;
 use super::tile_local::TileLocal;
 use super::tiles::{TileGrid, TilePatches};
 use super::weights::Weights;
-use super::{EnvironmentOptions, Lookup, TableKind, check_size};
+use super::{EnvironmentOptions, TableKind, check_size};
 use crate::error::Result;
 use crate::image::Image;
 
@@ -28,8 +28,6 @@ pub struct SatReport {
     pub width: u32,
     /// Rows of the map.
     pub height: u32,
-    /// The look-up that the weights are for.
-    pub lookup: Lookup,
     /// Share of the patches that have weight.
     pub lit_share: f64,
     /// One row per kind, in the order of [`TableKind::ALL`].
@@ -67,10 +65,10 @@ pub struct SatReportRow {
 ///
 /// # Errors
 /// If the map has no pixels.
-pub fn sat_report(map: &Image, lookup: Lookup, timed_samples: u32) -> Result<SatReport> {
+pub fn sat_report(map: &Image, timed_samples: u32) -> Result<SatReport> {
     check_size(map)?;
     let options = EnvironmentOptions::default();
-    let weights = Weights::new(map, lookup);
+    let weights = Weights::new(map);
     let (columns, rows) = weights.size();
     let grid = TileGrid::new(columns, rows, options.tile_columns, options.tile_rows);
     let patches = f64::from(columns) * f64::from(rows);
@@ -100,7 +98,6 @@ pub fn sat_report(map: &Image, lookup: Lookup, timed_samples: u32) -> Result<Sat
     Ok(SatReport {
         width: map.width,
         height: map.height,
-        lookup,
         lit_share: lit as f64 / patches,
         rows: table_rows.to_vec(),
     })
@@ -240,10 +237,9 @@ impl fmt::Display for SatReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{} x {}, {} look-up, {:.1} % of the patches lit",
+            "{} x {}, bilinear look-up, {:.1} % of the patches lit",
             self.width,
             self.height,
-            self.lookup,
             100.0 * self.lit_share
         )?;
         writeln!(

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Lookup, patches};
+use super::patches;
 use crate::color::importance;
 use crate::image::Image;
 
@@ -11,36 +11,25 @@ use crate::image::Image;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Weights<'a> {
     map: &'a Image,
-    lookup: Lookup,
     /// [`importance`] is linear: these are its coefficients. In f64 nothing overflows or underflows.
     coefficients: [f64; 3],
 }
 
 impl<'a> Weights<'a> {
-    pub(crate) fn new(map: &'a Image, lookup: Lookup) -> Self {
+    pub(crate) fn new(map: &'a Image) -> Self {
         let coefficients = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| f64::from(importance(axis)));
-        Self { map, lookup, coefficients }
+        Self { map, coefficients }
     }
 
     /// Weights of patches `first_x..first_x + out.len()` of row `y`: importance x steradian.
     ///
-    /// With bilinear look-up a patch's integral is its solid angle times the mean of its corners, so
-    /// every patch that touches a lit texel's centre has some weight. `scratch` is overwritten.
+    /// A patch's integral is its solid angle times the mean of its corners, so every patch that touches a
+    /// lit texel's centre has some weight. `scratch` is overwritten.
     pub(crate) fn row(&self, first_x: u32, y: u32, out: &mut [f64], scratch: &mut Vec<f64>) {
-        let solid_angle = patches::solid_angle(self.map.width, self.map.height, self.lookup, y);
-        match self.lookup {
-            Lookup::Nearest => {
-                let row = &self.pixel_row(y)[first_x as usize..];
-                for (weight, pixel) in out.iter_mut().zip(row) {
-                    *weight = solid_angle * self.importance(pixel);
-                }
-            }
-            Lookup::Bilinear => {
-                self.columns(first_x, y, out.len(), scratch);
-                for (weight, sides) in out.iter_mut().zip(scratch.windows(2)) {
-                    *weight = solid_angle / 4.0 * (sides[0] + sides[1]);
-                }
-            }
+        let solid_angle = patches::solid_angle(self.map.width, self.map.height, y);
+        self.columns(first_x, y, out.len(), scratch);
+        for (weight, sides) in out.iter_mut().zip(scratch.windows(2)) {
+            *weight = solid_angle / 4.0 * (sides[0] + sides[1]);
         }
     }
 
@@ -63,7 +52,7 @@ impl<'a> Weights<'a> {
 
     /// Columns and rows of patches.
     pub(crate) fn size(&self) -> (u32, u32) {
-        (self.map.width, patches::row_count(self.map.height, self.lookup))
+        (self.map.width, patches::row_count(self.map.height))
     }
 
     /// Sum of importance above and below, for the left side of each patch and the right one of the
@@ -96,11 +85,11 @@ mod tests {
     #[test]
     fn a_lit_texel_lends_weight_to_the_patches_around_it_across_the_seam() {
         let map = Image::from_fn(8, 4, |x, y| if (x, y) == (0, 1) { [1.0; 3] } else { [0.0; 3] });
-        let weights = Weights::new(&map, Lookup::Bilinear);
+        let weights = Weights::new(&map);
         let mut row = [0.0; 8];
         for (y, lit) in [(0, 0.0), (1, 1.0), (2, 1.0), (3, 0.0), (4, 0.0)] {
             weights.row(0, y, &mut row, &mut Vec::new());
-            let unit = patches::solid_angle(8, 4, Lookup::Bilinear, y) / 4.0;
+            let unit = patches::solid_angle(8, 4, y) / 4.0;
             let expected = [1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0].map(|c| c * lit * unit);
             for (weight, expected) in row.iter().zip(expected) {
                 assert!((weight - expected).abs() <= 1e-6 * expected, "{weight} {expected}");
@@ -111,16 +100,14 @@ mod tests {
     #[test]
     fn the_weights_of_a_constant_map_are_its_solid_angles() {
         let map = Image::filled(5, 3, [2.0; 3]);
-        for lookup in [Lookup::Bilinear, Lookup::Nearest] {
-            let weights = Weights::new(&map, lookup);
-            let mut sum = 0.0;
-            for y in 0..weights.size().1 {
-                let mut row = [0.0; 3];
-                weights.row(2, y, &mut row, &mut Vec::new());
-                sum += row.iter().sum::<f64>() / 3.0 * 5.0;
-            }
-            assert!((sum / (8.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6);
+        let weights = Weights::new(&map);
+        let mut sum = 0.0;
+        for y in 0..weights.size().1 {
+            let mut row = [0.0; 3];
+            weights.row(2, y, &mut row, &mut Vec::new());
+            sum += row.iter().sum::<f64>() / 3.0 * 5.0;
         }
+        assert!((sum / (8.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6);
     }
 
     #[test]
@@ -128,7 +115,7 @@ mod tests {
         for value in [f32::MAX, f32::from_bits(1)] {
             let map = Image::filled(64, 32, [value; 3]);
             let mut row = [0.0; 64];
-            Weights::new(&map, Lookup::Bilinear).row(0, 0, &mut row, &mut Vec::new());
+            Weights::new(&map).row(0, 0, &mut row, &mut Vec::new());
             assert!(row.iter().all(|w| w.is_finite() && *w > 0.0));
         }
     }

@@ -102,8 +102,11 @@ fn checked_target(path: &Path) -> Result<PathBuf> {
 const NOT_ORDINARY: &str = "cannot be written: it is not an ordinary file";
 
 /// Whether a path means what this process has open, as /dev/stdout does: a file that it happens to be would
-/// not be the same one once it was replaced.
+/// not be the same one once it was replaced. "-" is what other programs call it.
 fn is_stream(path: &Path) -> bool {
+    if path.as_os_str() == "-" {
+        return true;
+    }
     links(path).any(|link| {
         fs::canonicalize(folder_of(&link))
             .is_ok_and(|folder| folder.starts_with("/proc") && folder.ends_with("fd"))

@@ -65,6 +65,21 @@ impl Texels {
         self.channels = colors;
     }
 
+    /// Grey made of what an opacity in `[0,1]` becomes, in as many bits; `None` if there is no alpha.
+    pub(crate) fn map_alpha(&self, of: impl Fn(f32) -> f32) -> Option<Self> {
+        if !matches!(self.channels, 2 | 4) {
+            return None;
+        }
+        let turned = |alpha: f32, most: f32| (of(alpha / most).clamp(0.0, 1.0) * most).round();
+        if self.is_deep {
+            let alpha = (0..self.len()).map(|at| f32::from(self.deep_rgba(at)[3]));
+            let values: Vec<u16> = alpha.map(|a| turned(a, f32::from(u16::MAX)) as u16).collect();
+            return Some(Self::deep(1, &values));
+        }
+        let alpha = self.bytes.chunks_exact(self.channels).map(|t| f32::from(t[self.channels - 1]));
+        Some(Self::new(1, alpha.map(|a| turned(a, 255.0) as u8).collect()))
+    }
+
     /// Number of texels.
     pub fn len(&self) -> usize {
         self.stored_len() >> u32::from(self.is_deep)

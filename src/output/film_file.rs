@@ -175,11 +175,14 @@ pub fn read_facts(path: &Path) -> Result<FilmFacts> {
 /// The first line, and what it says.
 fn header(start: &[u8]) -> Decoded<(&[u8], Header)> {
     let other = "is neither a part of a picture nor a checkpoint of lightgrid";
+    if start.is_empty() {
+        return Err(CUT_SHORT.into());
+    }
     let start = &start[..start.len().min(MOST_OF_HEADER as usize)];
-    let cause = if looks_like_film(start) { CUT_SHORT } else { other };
-    let length = start.iter().position(|byte| *byte == b'\n').ok_or(cause)?;
+    let [cut, damaged] = if looks_like_film(start) { [CUT_SHORT, DAMAGED] } else { [other, other] };
+    let length = start.iter().position(|byte| *byte == b'\n').ok_or(cut)?;
     let line = &start[..length];
-    let header: serde_json::Value = serde_json::from_slice(line).map_err(|_| other)?;
+    let header: serde_json::Value = serde_json::from_slice(line).map_err(|_| damaged)?;
     match header.get("lightgrid_film").and_then(serde_json::Value::as_u64) {
         None => return Err(other.into()),
         Some(format) if format != u64::from(FORMAT) => {

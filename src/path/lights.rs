@@ -5,6 +5,7 @@ use std::f32::consts::PI;
 use glam::{Vec2, Vec3};
 
 use super::light_tree::{Light, LightTree, Moments, Receiver, TreeArrays};
+use crate::bsdf;
 use crate::color::importance;
 use crate::sampler::unit_from_bits;
 use crate::scene::needs::is_emitter;
@@ -117,7 +118,7 @@ impl LocalLights {
         let pdf_solid_angle =
             probability * area_to_solid_angle(&corners, direction, distance * distance)?;
         let point = SurfacePoint::at(scene, triangle, barycentric, direction);
-        let radiance = emitted(scene, &point);
+        let radiance = emitted(scene, &point, -direction);
         (radiance.max_element() > 0.0).then(|| LightSample {
             direction,
             distance,
@@ -152,13 +153,18 @@ fn relate(lights: &mut [Light]) {
     }
 }
 
-/// Radiance a surface point sends towards its viewer: as much as alpha covers it.
-pub(super) fn emitted(scene: &Scene, point: &SurfacePoint<'_>) -> Vec3 {
-    if point.front_face || scene.materials[point.material as usize].double_sided {
-        point.parameters.emissive * point.parameters.alpha
-    } else {
-        Vec3::ZERO
+/// Radiance a surface point sends towards its viewer: as much as alpha covers it, and its coat lets through.
+pub(super) fn emitted(scene: &Scene, point: &SurfacePoint<'_>, to_viewer: Vec3) -> Vec3 {
+    if !(point.front_face || scene.materials[point.material as usize].double_sided) {
+        return Vec3::ZERO;
     }
+    let parameters = &point.parameters;
+    let emitted = parameters.emissive * parameters.alpha;
+    if parameters.clearcoat == 0.0 {
+        return emitted;
+    }
+    let wo = point.shading_frame.local_from_world(to_viewer);
+    emitted * bsdf::left_by_coat(parameters, point.front_face, wo)
 }
 
 /// Uniform barycentric coordinates (weights of the second and third corner) of a triangle.

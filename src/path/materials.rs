@@ -82,7 +82,9 @@ mod tests {
     use crate::path::World;
     use crate::sampler::Sampler;
     use crate::scene::surface::SurfaceParameters;
-    use crate::scene::{MaterialEdit, Scene, Texture, TextureImage, TextureRef, Wrap, builtin};
+    use crate::scene::{
+        MaterialEdit, Scene, Texture, TextureImage, TextureRef, TextureSlot, Wrap, builtin,
+    };
 
     /// Asserts that points of triangles, seen from both sides, are those that know nothing of what is
     /// ready; returns how many of them have parameters of their own.
@@ -164,42 +166,27 @@ mod tests {
         assert_eq!(own(triangle(rich())), 0);
         assert_eq!(own(triangle(Material { clearcoat: 0.5, ..rich() })), 0);
         let texture = TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY };
-        let texture = || Some(texture.into());
+        let textured = |slot| rich().with_texture(slot, texture);
         // A normal map turns the frame, but no parameter unless there is a coat.
-        assert_eq!(own(triangle(Material { normal_texture: texture(), ..rich() })), 0);
-        let coat = Material { normal_texture: texture(), clearcoat: 0.5, ..rich() };
+        assert_eq!(own(triangle(textured(TextureSlot::Normal))), 0);
+        let coat = Material { clearcoat: 0.5, ..textured(TextureSlot::Normal) };
         assert_eq!(own(triangle(coat)), 2);
         assert_eq!(own(triangle(Material { anisotropy: 0.5, ..rich() })), 2);
         assert_eq!(own(Scene { colors: vec![Vec4::ONE; 3], ..triangle(rich()) }), 2);
-        assert_eq!(own(triangle(Material { base_color_texture: texture(), ..rich() })), 2);
-        assert_eq!(own(triangle(Material { emissive_texture: texture(), ..rich() })), 2);
+        assert_eq!(own(triangle(textured(TextureSlot::BaseColor))), 2);
+        assert_eq!(own(triangle(textured(TextureSlot::Emissive))), 2);
     }
 
     #[test]
     fn a_texture_of_one_colour_is_a_factor() {
         let texture = TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY };
-        let texture = || Some(texture.into());
-        let textured = Material {
-            base_color_texture: texture(),
-            metallic_roughness_texture: texture(),
-            emissive_texture: texture(),
-            specular_texture: texture(),
-            specular_color_texture: texture(),
-            transmission_texture: texture(),
-            diffuse_transmission_texture: texture(),
-            diffuse_transmission_color_texture: texture(),
-            anisotropy_texture: texture(),
-            anisotropy: 0.5,
-            iridescence_texture: texture(),
-            iridescence_thickness_texture: texture(),
-            sheen_color_texture: texture(),
-            sheen_roughness_texture: texture(),
-            clearcoat_texture: texture(),
-            clearcoat: 0.5,
-            clearcoat_roughness_texture: texture(),
-            clearcoat_roughness: 0.5,
-            ..rich()
-        };
+        let mut textured =
+            Material { anisotropy: 0.5, clearcoat: 0.5, clearcoat_roughness: 0.5, ..rich() };
+        textured.textures.fill(Some(texture.into()));
+        // Normal maps have no factors of that kind.
+        for slot in [TextureSlot::Normal, TextureSlot::ClearcoatNormal] {
+            textured.textures[slot as usize] = None;
+        }
         let [x, y, z, w] = [51.0, 102.0, 153.0, 204.0].map(|byte: f32| byte / 255.0);
         let color = Vec3::new(x, y, z);
         let rich = rich();

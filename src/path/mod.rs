@@ -384,7 +384,7 @@ impl<'a> Path<'a> {
             return;
         }
         let world = self.tracer.world;
-        let emitted = lights::emitted(&world.scene, point);
+        let emitted = lights::emitted(&world.scene, point, -self.ray.direction);
         if emitted.max_element() <= 0.0 {
             return;
         }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::machine::Machine;
 use super::store::Store;
-use crate::environment::{Lookup, SatReport, TableKind, sat_report};
+use crate::environment::{SatReport, TableKind, sat_report};
 use crate::error::Result;
 use crate::image::{Image, write_beside_and_rename};
 use crate::math::direction_from_uv;
@@ -69,7 +69,7 @@ impl Case {
             Some(sky) => crate::environment::sky::build(sky, width, height)?,
             None => extreme(width, height),
         };
-        let report = sat_report(&map, Lookup::Bilinear, SAMPLES)?;
+        let report = sat_report(&map, SAMPLES)?;
         Ok(Measured { title: self.title.to_owned(), published: self.published, report })
     }
 }

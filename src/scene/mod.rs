@@ -153,6 +153,46 @@ pub struct TextureRef {
     pub transform: Affine2,
 }
 
+/// What a texture of a material varies, in the order in which `shaders/surface.wgsl` numbers them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TextureSlot {
+    /// RGB is base colour (sRGB), A is alpha.
+    BaseColor,
+    /// G is roughness, B is metalness.
+    MetallicRoughness,
+    /// Tangent-space normal map.
+    Normal,
+    /// RGB multiplies [`Material::emissive`] (sRGB).
+    Emissive,
+    /// A multiplies [`Material::specular`].
+    Specular,
+    /// RGB multiplies [`Material::specular_color`] (sRGB).
+    SpecularColor,
+    /// R multiplies [`Material::transmission`].
+    Transmission,
+    /// R multiplies [`Material::clearcoat`].
+    Clearcoat,
+    /// G multiplies [`Material::clearcoat_roughness`].
+    ClearcoatRoughness,
+    /// Normal map of the coat; without one the coat follows the geometric shading normal.
+    ClearcoatNormal,
+    /// RG is the direction before rotation in `[-1,1]`, along tangent and bitangent; B multiplies
+    /// [`Material::anisotropy`].
+    Anisotropy,
+    /// RGB multiplies [`Material::sheen_color`] (sRGB).
+    SheenColor,
+    /// A multiplies [`Material::sheen_roughness`].
+    SheenRoughness,
+    /// A multiplies [`Material::diffuse_transmission`].
+    DiffuseTransmission,
+    /// RGB multiplies [`Material::diffuse_transmission_color`] (sRGB).
+    DiffuseTransmissionColor,
+    /// R multiplies [`Material::iridescence`].
+    Iridescence,
+    /// G says where between the two of [`Material::iridescence_thickness`] the thickness lies.
+    IridescenceThickness,
+}
+
 /// glTF metallic-roughness material with the extensions lightgrid renders. Factors are linear. Textures, of
 /// which most materials have few or none, are boxed: a file may have a million materials.
 #[derive(Debug, Clone, PartialEq)]
@@ -161,22 +201,14 @@ pub struct Material {
     pub name: String,
     /// Base colour factor, linear RGB and alpha.
     pub base_color: Vec4,
-    /// RGB is base colour (sRGB), A is alpha.
-    pub base_color_texture: Option<Box<TextureRef>>,
     /// Metalness in `[0,1]`.
     pub metallic: f32,
     /// Perceptual roughness in `[0,1]`; GGX alpha is its square.
     pub roughness: f32,
-    /// G is roughness, B is metalness.
-    pub metallic_roughness_texture: Option<Box<TextureRef>>,
-    /// Tangent-space normal map.
-    pub normal_texture: Option<Box<TextureRef>>,
     /// Scale of the normal map's x and y.
     pub normal_scale: f32,
     /// Emitted radiance, linear, `KHR_materials_emissive_strength` included.
     pub emissive: Vec3,
-    /// RGB multiplies `emissive` (sRGB).
-    pub emissive_texture: Option<Box<TextureRef>>,
     /// How alpha is used.
     pub alpha_mode: AlphaMode,
     /// Whether camera rays see the back too. All other rays meet both sides of every surface: a wall
@@ -188,25 +220,15 @@ pub struct Material {
     pub ior: f32,
     /// `KHR_materials_specular` strength in `[0,1]`.
     pub specular: f32,
-    /// A multiplies `specular`.
-    pub specular_texture: Option<Box<TextureRef>>,
     /// F0 tint, linear.
     pub specular_color: Vec3,
-    /// RGB multiplies `specular_color` (sRGB).
-    pub specular_color_texture: Option<Box<TextureRef>>,
     /// `KHR_materials_transmission` in `[0,1]`.
     pub transmission: f32,
-    /// R multiplies `transmission`.
-    pub transmission_texture: Option<Box<TextureRef>>,
     /// `KHR_materials_diffuse_transmission`: share in `[0,1]` of the body's light that comes through
     /// instead of back.
     pub diffuse_transmission: f32,
-    /// A multiplies `diffuse_transmission`.
-    pub diffuse_transmission_texture: Option<Box<TextureRef>>,
     /// Colour of what comes through, linear, in `[0,1]`.
     pub diffuse_transmission_color: Vec3,
-    /// RGB multiplies `diffuse_transmission_color` (sRGB).
-    pub diffuse_transmission_color_texture: Option<Box<TextureRef>>,
     /// `KHR_materials_volume` thickness; 0 is a thin wall, more is a solid body with an inside.
     pub thickness: f32,
     /// Colour that white light becomes after `attenuation_distance` inside the body.
@@ -222,43 +244,28 @@ pub struct Material {
     pub anisotropy: f32,
     /// Direction of that width in radians from the tangent, counter-clockwise.
     pub anisotropy_rotation: f32,
-    /// RG is the direction before rotation in `[-1,1]`, along tangent and bitangent; B multiplies
-    /// `anisotropy`.
-    pub anisotropy_texture: Option<Box<TextureRef>>,
     /// `KHR_materials_iridescence`: share in `[0,1]` of the surface that a thin film covers.
     pub iridescence: f32,
-    /// R multiplies `iridescence`.
-    pub iridescence_texture: Option<Box<TextureRef>>,
     /// Index of refraction of the film, at least 1.
     pub iridescence_ior: f32,
-    /// Thickness of the film in nanometres where the texture is 0 and where it is 1; without a
+    /// Thickness of the film in nanometres where its texture is 0 and where it is 1; without a
     /// texture it is the second.
     pub iridescence_thickness: [f32; 2],
-    /// G says where between the two the thickness lies.
-    pub iridescence_thickness_texture: Option<Box<TextureRef>>,
     /// `KHR_materials_dispersion`: 20 over the Abbe number of a solid body, not negative; 0 bends all
     /// colours alike.
     pub dispersion: f32,
     /// `KHR_materials_sheen` colour, linear, in `[0,1]`; black is none.
     pub sheen_color: Vec3,
-    /// RGB multiplies `sheen_color` (sRGB).
-    pub sheen_color_texture: Option<Box<TextureRef>>,
     /// Perceptual roughness of the sheen in `[0,1]`.
     pub sheen_roughness: f32,
-    /// A multiplies `sheen_roughness`.
-    pub sheen_roughness_texture: Option<Box<TextureRef>>,
     /// `KHR_materials_clearcoat` strength in `[0,1]`.
     pub clearcoat: f32,
-    /// R multiplies `clearcoat`.
-    pub clearcoat_texture: Option<Box<TextureRef>>,
     /// Perceptual roughness of the coat.
     pub clearcoat_roughness: f32,
-    /// G multiplies `clearcoat_roughness`.
-    pub clearcoat_roughness_texture: Option<Box<TextureRef>>,
-    /// Normal map of the coat; without one the coat follows the geometric shading normal.
-    pub clearcoat_normal_texture: Option<Box<TextureRef>>,
     /// Scale of the coat normal map's x and y.
     pub clearcoat_normal_scale: f32,
+    /// Textures by [`TextureSlot`].
+    pub textures: [Option<Box<TextureRef>>; 17],
 }
 
 impl Default for Material {
@@ -267,28 +274,19 @@ impl Default for Material {
         Self {
             name: String::new(),
             base_color: Vec4::ONE,
-            base_color_texture: None,
             metallic: 1.0,
             roughness: 1.0,
-            metallic_roughness_texture: None,
-            normal_texture: None,
             normal_scale: 1.0,
             emissive: Vec3::ZERO,
-            emissive_texture: None,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
             unlit: false,
             ior: 1.5,
             specular: 1.0,
-            specular_texture: None,
             specular_color: Vec3::ONE,
-            specular_color_texture: None,
             transmission: 0.0,
-            transmission_texture: None,
             diffuse_transmission: 0.0,
-            diffuse_transmission_texture: None,
             diffuse_transmission_color: Vec3::ONE,
-            diffuse_transmission_color_texture: None,
             thickness: 0.0,
             attenuation_color: Vec3::ONE,
             attenuation_distance: f32::INFINITY,
@@ -296,23 +294,16 @@ impl Default for Material {
             scatter_anisotropy: 0.0,
             anisotropy: 0.0,
             anisotropy_rotation: 0.0,
-            anisotropy_texture: None,
             iridescence: 0.0,
-            iridescence_texture: None,
             iridescence_ior: 1.3,
             iridescence_thickness: [100.0, 400.0],
-            iridescence_thickness_texture: None,
             dispersion: 0.0,
             sheen_color: Vec3::ZERO,
-            sheen_color_texture: None,
             sheen_roughness: 0.0,
-            sheen_roughness_texture: None,
             clearcoat: 0.0,
-            clearcoat_texture: None,
             clearcoat_roughness: 0.0,
-            clearcoat_roughness_texture: None,
-            clearcoat_normal_texture: None,
             clearcoat_normal_scale: 1.0,
+            textures: Default::default(),
         }
     }
 }
@@ -341,28 +332,21 @@ impl Material {
             && (self.transmission == 0.0 || glass(self) == glass(other))
     }
 
-    /// All textures, in the order in which `shaders/surface.wgsl` numbers them.
-    pub fn textures(&self) -> [Option<&TextureRef>; 17] {
-        [
-            &self.base_color_texture,
-            &self.metallic_roughness_texture,
-            &self.normal_texture,
-            &self.emissive_texture,
-            &self.specular_texture,
-            &self.specular_color_texture,
-            &self.transmission_texture,
-            &self.clearcoat_texture,
-            &self.clearcoat_roughness_texture,
-            &self.clearcoat_normal_texture,
-            &self.anisotropy_texture,
-            &self.sheen_color_texture,
-            &self.sheen_roughness_texture,
-            &self.diffuse_transmission_texture,
-            &self.diffuse_transmission_color_texture,
-            &self.iridescence_texture,
-            &self.iridescence_thickness_texture,
-        ]
-        .map(|texture| texture.as_deref())
+    /// The texture in a slot.
+    pub fn texture(&self, slot: TextureSlot) -> Option<&TextureRef> {
+        self.textures[slot as usize].as_deref()
+    }
+
+    /// The material with a texture in a slot.
+    pub fn with_texture(mut self, slot: TextureSlot, texture: TextureRef) -> Self {
+        self.textures[slot as usize] = Some(texture.into());
+        self
+    }
+
+    /// Whether a texture turns its normal or that of its coat.
+    pub fn has_normal_map(&self) -> bool {
+        let maps = [TextureSlot::Normal, TextureSlot::ClearcoatNormal];
+        maps.into_iter().any(|slot| self.texture(slot).is_some())
     }
 }
 

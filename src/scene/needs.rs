@@ -95,18 +95,17 @@ impl SceneNeeds {
 
     fn add(&mut self, m: &Material) {
         let Self { features, texture_slots } = self;
-        for (slot, texture) in m.textures().into_iter().enumerate() {
+        for (slot, texture) in m.textures.iter().enumerate() {
             if let Some(texture) = texture {
                 *features |= Features::TEXTURES;
                 *features |= Features::SECOND_UV_SET.only_if(texture.uv_set == 1);
                 *texture_slots |= 1 << slot;
             }
         }
-        let has_normal_map = m.normal_texture.is_some() || m.clearcoat_normal_texture.is_some();
         let has_inside =
             (m.transmission > 0.0 || m.diffuse_transmission > 0.0) && m.thickness > 0.0;
         for (feature, is_needed) in [
-            (Features::NORMAL_MAPS, has_normal_map),
+            (Features::NORMAL_MAPS, m.has_normal_map()),
             (Features::ALPHA_MASK, matches!(m.alpha_mode, AlphaMode::Mask { .. })),
             (Features::ALPHA_BLEND, m.alpha_mode == AlphaMode::Blend),
             (Features::SINGLE_SIDED, !m.double_sided),

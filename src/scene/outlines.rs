@@ -165,11 +165,25 @@ impl Scene {
             let named = (0..).zip(&self.materials).filter(|(_, material)| material.name == *name);
             let hidden: Vec<u32> = named.map(|(number, _)| number).collect();
             if hidden.is_empty() {
-                return Err(format!("no material to hide is called {name}"));
+                return Err(self.without_material(name));
             }
             self.remove_triangles_of(&hidden);
         }
         self.check_shown()
+    }
+
+    /// Says that no material is called so, and what there is instead.
+    pub(crate) fn without_material(&self, name: &str) -> String {
+        const MOST_NAMED: usize = 12;
+        let mut names: Vec<&str> = self.materials.iter().map(|m| m.name.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        let more = match names.len().saturating_sub(MOST_NAMED) {
+            0 => String::new(),
+            count => format!(" and {count} more, which lightgrid info names"),
+        };
+        names.truncate(MOST_NAMED);
+        format!("no material is called \"{name}\"; there are {}{more}", names.join(", "))
     }
 
     /// Whether anything is left to be shown: something that is not of a hidden material.

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
 
 use super::texture::sample_texture;
-use super::{AlphaMode, Material, Placing, Scene, TextureRef};
+use super::{AlphaMode, Material, Placing, Scene, TextureRef, TextureSlot as Slot};
 use crate::math::Frame;
 
 /// A shading normal is bent until its cosine with the viewer is at least this share of the geometric
@@ -74,63 +74,40 @@ pub struct SurfaceParameters {
 /// Sets the parameters that a texture varies to what the value read makes of the material's factors.
 type Variation = fn(&mut SurfaceParameters, &Material, Vec4);
 
-/// A texture that a material may have, and what it varies.
-type Slot = (fn(&Material) -> &Option<Box<TextureRef>>, Variation);
-
 /// The textures that vary parameters; base colour, which vertices have too, apart. A texture that is
 /// not there reads as ones.
-const SLOTS: [Slot; 14] = [
-    (
-        |m| &m.metallic_roughness_texture,
-        |p, m, value| {
-            p.metallic = unit(m.metallic * value.z);
-            p.roughness = unit(m.roughness * value.y);
-        },
-    ),
-    (
-        |m| &m.emissive_texture,
-        |p, m, value| {
-            // What is unlit shows its base colour.
-            if !m.unlit {
-                p.emissive = m.emissive * value.xyz();
-            }
-        },
-    ),
-    (|m| &m.specular_texture, |p, m, value| p.specular = unit(m.specular * value.w)),
-    (
-        |m| &m.specular_color_texture,
-        |p, m, value| p.specular_color = m.specular_color * value.xyz(),
-    ),
-    (|m| &m.transmission_texture, |p, m, value| p.transmission = unit(m.transmission * value.x)),
-    (
-        |m| &m.diffuse_transmission_texture,
-        |p, m, value| p.diffuse_transmission = unit(m.diffuse_transmission * value.w),
-    ),
-    (
-        |m| &m.diffuse_transmission_color_texture,
-        |p, m, value| {
-            p.diffuse_transmission_color = m.diffuse_transmission_color * value.xyz();
-        },
-    ),
-    (|m| &m.anisotropy_texture, |p, m, value| p.anisotropy = unit(m.anisotropy * value.z)),
-    (|m| &m.iridescence_texture, |p, m, value| p.iridescence = unit(m.iridescence * value.x)),
-    (
-        |m| &m.iridescence_thickness_texture,
-        |p, m, value| {
-            let [thinnest, thickest] = m.iridescence_thickness;
-            p.iridescence_thickness = thinnest + (thickest - thinnest) * value.y;
-        },
-    ),
-    (|m| &m.sheen_color_texture, |p, m, value| p.sheen_color = m.sheen_color * value.xyz()),
-    (
-        |m| &m.sheen_roughness_texture,
-        |p, m, value| p.sheen_roughness = unit(m.sheen_roughness * value.w),
-    ),
-    (|m| &m.clearcoat_texture, |p, m, value| p.clearcoat = unit(m.clearcoat * value.x)),
-    (
-        |m| &m.clearcoat_roughness_texture,
-        |p, m, value| p.clearcoat_roughness = unit(m.clearcoat_roughness * value.y),
-    ),
+const VARIATIONS: [(Slot, Variation); 14] = [
+    (Slot::MetallicRoughness, |p, m, value| {
+        p.metallic = unit(m.metallic * value.z);
+        p.roughness = unit(m.roughness * value.y);
+    }),
+    (Slot::Emissive, |p, m, value| {
+        // What is unlit shows its base colour.
+        if !m.unlit {
+            p.emissive = m.emissive * value.xyz();
+        }
+    }),
+    (Slot::Specular, |p, m, value| p.specular = unit(m.specular * value.w)),
+    (Slot::SpecularColor, |p, m, value| p.specular_color = m.specular_color * value.xyz()),
+    (Slot::Transmission, |p, m, value| p.transmission = unit(m.transmission * value.x)),
+    (Slot::DiffuseTransmission, |p, m, value| {
+        p.diffuse_transmission = unit(m.diffuse_transmission * value.w);
+    }),
+    (Slot::DiffuseTransmissionColor, |p, m, value| {
+        p.diffuse_transmission_color = m.diffuse_transmission_color * value.xyz();
+    }),
+    (Slot::Anisotropy, |p, m, value| p.anisotropy = unit(m.anisotropy * value.z)),
+    (Slot::Iridescence, |p, m, value| p.iridescence = unit(m.iridescence * value.x)),
+    (Slot::IridescenceThickness, |p, m, value| {
+        let [thinnest, thickest] = m.iridescence_thickness;
+        p.iridescence_thickness = thinnest + (thickest - thinnest) * value.y;
+    }),
+    (Slot::SheenColor, |p, m, value| p.sheen_color = m.sheen_color * value.xyz()),
+    (Slot::SheenRoughness, |p, m, value| p.sheen_roughness = unit(m.sheen_roughness * value.w)),
+    (Slot::Clearcoat, |p, m, value| p.clearcoat = unit(m.clearcoat * value.x)),
+    (Slot::ClearcoatRoughness, |p, m, value| {
+        p.clearcoat_roughness = unit(m.clearcoat_roughness * value.y);
+    }),
 ];
 
 /// What the points of a material have in common, and what tells them apart.
@@ -159,11 +136,11 @@ impl SharedParameters {
             ..SurfaceParameters::default()
         };
         parameters.set_base_color(material, material.base_color);
-        for (_, vary) in SLOTS {
+        for (_, vary) in VARIATIONS {
             vary(&mut parameters, material, Vec4::ONE);
         }
-        let present = |(texture, vary): Slot| Some((*texture(material).as_deref()?, vary));
-        Self { parameters, variations: SLOTS.into_iter().filter_map(present).collect() }
+        let present = |(slot, vary)| Some((*material.texture(slot)?, vary));
+        Self { parameters, variations: VARIATIONS.into_iter().filter_map(present).collect() }
     }
 }
 
@@ -238,7 +215,7 @@ impl<'a> SurfacePoint<'a> {
         let facing = Facing { geometric_normal, to_viewer: -ray_direction };
         let unmapped = corner.smooth_normal().unwrap_or(front_normal);
         corner.vary(variations, &mut parameters);
-        let (texture, scale) = (material.normal_texture.as_deref(), material.normal_scale);
+        let (texture, scale) = (material.texture(Slot::Normal), material.normal_scale);
         let mut normal = facing.turned(corner.mapped(unmapped, texture, scale), unmapped);
         // What is not metal hardly needs its reflection, but its diffuse light needs the slope.
         if parameters.metallic > 0.0 {
@@ -250,9 +227,9 @@ impl<'a> SurfacePoint<'a> {
             let local = shading_frame.local_from_world(world);
             parameters.to_mut().anisotropy_axis = Vec2::new(local.x, local.y).normalize_or(Vec2::X);
         }
-        if parameters.clearcoat > 0.0 && has_normal_map(material) {
+        if parameters.clearcoat > 0.0 && material.has_normal_map() {
             let (texture, scale) =
-                (material.clearcoat_normal_texture.as_deref(), material.clearcoat_normal_scale);
+                (material.texture(Slot::ClearcoatNormal), material.clearcoat_normal_scale);
             let coat = facing.turned(corner.mapped(unmapped, texture, scale), unmapped);
             let local = shading_frame.local_from_world(facing.mirroring(coat));
             parameters.to_mut().clearcoat_normal = local;
@@ -283,10 +260,6 @@ fn opacity(mode: AlphaMode, alpha: f32) -> f32 {
         AlphaMode::Mask { cutoff } => f32::from(alpha >= cutoff),
         AlphaMode::Blend => alpha.clamp(0.0, 1.0),
     }
-}
-
-fn has_normal_map(material: &Material) -> bool {
-    material.normal_texture.is_some() || material.clearcoat_normal_texture.is_some()
 }
 
 /// A point of a triangle, ready to interpolate what its corners have.
@@ -357,7 +330,7 @@ impl<'a> Corner<'a> {
 
     fn base_color(&self) -> Vec4 {
         let material = self.material();
-        let color = material.base_color * self.read(material.base_color_texture.as_deref());
+        let color = material.base_color * self.read(material.texture(Slot::BaseColor));
         if self.scene.colors.is_empty() {
             return color;
         }
@@ -393,7 +366,7 @@ impl<'a> Corner<'a> {
         let m = self.material();
         let bitangent = normal.cross(tangent) * handedness;
         let read = |t| self.read(Some(t)).xy() * 2.0 - 1.0;
-        let direction = m.anisotropy_texture.as_deref().map_or(Vec2::X, read);
+        let direction = m.texture(Slot::Anisotropy).map_or(Vec2::X, read);
         let direction = Vec2::from_angle(m.anisotropy_rotation).rotate(direction);
         tangent * direction.x + bitangent * direction.y
     }
@@ -405,7 +378,7 @@ impl<'a> Corner<'a> {
         parameters: &mut Cow<'_, SurfaceParameters>,
     ) {
         let m = self.material();
-        if m.base_color_texture.is_some() || !self.scene.colors.is_empty() {
+        if m.texture(Slot::BaseColor).is_some() || !self.scene.colors.is_empty() {
             parameters.to_mut().set_base_color(m, self.base_color());
         }
         for (texture, vary) in variations {

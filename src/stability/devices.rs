@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::maps::sun;
 use super::reference::Reference;
 use super::scenes::{
-    first_texture, glass, lambert, light, mean, render, room, sky, view, with_texel,
+    FIRST_TEXTURE, glass, lambert, light, mean, render, room, sky, view, with_texel,
 };
 use super::{Case, On, Outcome, Setting};
 use crate::environment::Environment;
@@ -16,7 +16,7 @@ use crate::path::{World, WorldBuilder};
 use crate::render::film::{Film, Pixel};
 use crate::render::gpu::{Gpu, UploadedScene};
 use crate::render::{Sampling, Session, View};
-use crate::scene::{Camera, Material};
+use crate::scene::{Camera, Material, TextureSlot};
 
 const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
     Case { group: "devices", name, on, run }
@@ -190,8 +190,8 @@ fn glasses() -> (WorldBuilder, Camera) {
 
 /// A floor with a normal map beside the room's block.
 fn textured() -> (WorldBuilder, Camera) {
-    let mapped =
-        Material { normal_texture: first_texture(), metallic: 0.5, roughness: 0.4, ..lambert(0.8) };
+    let mapped = Material { metallic: 0.5, roughness: 0.4, ..lambert(0.8) }
+        .with_texture(TextureSlot::Normal, FIRST_TEXTURE);
     let builder =
         with_texel(WorldBuilder::default().floor(&mapped, Vec3::ZERO, 4.0), [170, 110, 220, 255]);
     (builder, Camera::look_at(Vec3::new(0.5, 1.5, 1.5), Vec3::ZERO, 0.8))

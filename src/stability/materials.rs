@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::random::Random;
 use super::scenes::{
-    Mean, SIGMAS, constant, deviation, first_texture, glass, lambert, learned, mean, render, room,
+    FIRST_TEXTURE, Mean, SIGMAS, constant, deviation, glass, lambert, learned, mean, render, room,
     view, with_texel,
 };
 use super::{Case, On, Outcome, Setting};
@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::path::{World, WorldBuilder};
 use crate::render::film::Film;
 use crate::render::{Sampling, View};
-use crate::scene::{Camera, Material, Medium};
+use crate::scene::{Camera, Material, Medium, TextureSlot};
 
 const fn case(name: &'static str, run: fn(&Setting) -> Result<Outcome>) -> Case {
     Case { group: "materials", name, on: On::Any, run }
@@ -149,7 +149,7 @@ fn buried_normals(setting: &Setting) -> Result<Outcome> {
         [255, 255, 128, 255],
     ] {
         for base in [lambert(1.0), metal(0.0), metal(0.5), plastic(0.2)] {
-            let material = Material { normal_texture: first_texture(), ..base };
+            let material = base.with_texture(TextureSlot::Normal, FIRST_TEXTURE);
             let builder =
                 with_texel(WorldBuilder::default().floor(&material, Vec3::ZERO, 100.0), texel);
             let camera = Camera::look_at(Vec3::new(0.0, 1.0, 2.0), Vec3::ZERO, 0.4);

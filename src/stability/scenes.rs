@@ -40,9 +40,8 @@ pub(super) fn with_texel(mut builder: WorldBuilder, texel: [u8; 4]) -> WorldBuil
 }
 
 /// Texture 0 at the first texture coordinates.
-pub(super) fn first_texture() -> Option<Box<TextureRef>> {
-    Some(TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY }.into())
-}
+pub(super) const FIRST_TEXTURE: TextureRef =
+    TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY };
 
 /// A room of 4 x 2.5 x 3 units, `scale` metres each, around `center`, with a window in its +X wall
 /// and a block on the floor; a camera that looks at the block.

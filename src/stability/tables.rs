@@ -6,7 +6,7 @@
 use super::maps::{scaled, sun};
 use super::random::Random;
 use super::{Case, On, Outcome, Setting};
-use crate::environment::{Lookup, SatReportRow, TableKind, sat_report, sky};
+use crate::environment::{SatReportRow, TableKind, sat_report, sky};
 use crate::error::{Error, Result};
 use crate::image::Image;
 
@@ -40,7 +40,7 @@ type Measure = fn(&SatReportRow) -> f64;
 fn everywhere(setting: &Setting, table: TableKind) -> Result<Outcome> {
     let mut rows: Vec<(&str, SatReportRow)> = Vec::new();
     for (name, map) in maps(setting)? {
-        let report = sat_report(&map, Lookup::Bilinear, 0)?;
+        let report = sat_report(&map, 0)?;
         let row = report.rows.into_iter().find(|row| row.table == table);
         rows.push((name, row.ok_or_else(|| Error::new("a table is missing from the report"))?));
     }

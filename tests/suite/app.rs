@@ -130,7 +130,7 @@ fn a_small_window_has_one_panel() {
     compare("small-material", &studio.take().expect("drawn"))
         .expect("its settings come into sight");
     let error = studio.choose_material("ivory").expect_err("the office has none").to_string();
-    assert!(error.contains("office: no material is called ivory"), "{error}");
+    assert!(error.contains("office: no material is called \"ivory\"; there are "), "{error}");
 }
 
 /// What a cell knows and what is true there, in a window high enough for both.

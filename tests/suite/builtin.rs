@@ -9,7 +9,7 @@ use lightgrid::bvh::{Bvh, Ray};
 use lightgrid::environment::sky;
 use lightgrid::math::{direction_from_uv, texel_solid_angle};
 use lightgrid::noise::Stream;
-use lightgrid::scene::{Projection, Scene, SceneOptions, builtin};
+use lightgrid::scene::{Projection, Scene, SceneOptions, TextureSlot, builtin};
 use lightgrid::sources;
 
 fn corners(scene: &Scene, triangle: usize) -> [Vec3; 3] {
@@ -45,7 +45,7 @@ fn scenes_are_complete_and_well_formed() {
                 "{name}: {} is not used",
                 material.name
             );
-            if let Some(texture) = &material.base_color_texture {
+            if let Some(texture) = material.texture(TextureSlot::BaseColor) {
                 let image = scene.textures[texture.texture as usize].image;
                 assert!(scene.images[image as usize].width <= 1024);
             } else if material.metallic == 0.0 && material.transmission == 0.0 {
@@ -300,5 +300,5 @@ fn a_material_of_a_built_in_scene_can_be_left_out() {
     let without = load("wall").expect("there are walls").triangles.len();
     assert!(without < all, "{without} of {all} triangles");
     let says = load("cheese").expect_err("there is none").to_string();
-    assert!(says.contains("office: no material to hide is called cheese"), "{says}");
+    assert!(says.contains("office: no material is called \"cheese\"; there are "), "{says}");
 }

@@ -139,7 +139,7 @@ fn materials_are_changed_by_name() {
     assert!(without > 2.0 * r, "the sky comes in: {without} {r}");
     let refusal = |rest: &str, status| bench.refusal(&line(rest), status);
     let says = refusal("-o a.exr --material marble:roughness=1", 1);
-    assert!(says.contains("office: no material is called marble"), "{says}");
+    assert!(says.contains("office: no material is called \"marble\""), "{says}");
     let painted = SCENE.replace("\"POSITION\": 0}", "\"POSITION\": 0}, \"material\": 0");
     let painted = painted.replace("\"asset\"", "\"materials\": [{\"name\": \"paint\"}], \"asset\"");
     fs::write(bench.path("painted.gltf"), painted).expect("written");

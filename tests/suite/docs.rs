@@ -221,12 +221,10 @@ fn every_option_that_is_spoken_of_exists() {
         "--features",
         "--no-default-features",
     ];
-    // What was tried and left out.
-    let past = ["--lookup"];
     for page in pages() {
         for code in inline(&split(&page).1) {
             let Some(option) = code.split([' ', '=', ',']).next() else { continue };
-            if option.starts_with("--") && !others.contains(&option) && !past.contains(&option) {
+            if option.starts_with("--") && !others.contains(&option) {
                 assert!(known.iter().any(|o| o == option), "{}: {option}", page.name);
             }
         }

@@ -6,7 +6,7 @@ use std::f32::consts::TAU;
 
 use glam::{DVec3, Vec2, Vec3};
 use lightgrid::color::importance;
-use lightgrid::environment::{Environment, EnvironmentOptions, Lookup, TableKind};
+use lightgrid::environment::{Environment, EnvironmentOptions, TableKind};
 use lightgrid::image::Image;
 use lightgrid::math::{direction_from_uv, rotate_y, texel_solid_angle, uv_from_direction};
 use lightgrid::metrics::hypothesis::chi_square_test;
@@ -84,20 +84,16 @@ fn maps() -> Vec<(&'static str, Image)> {
     ]
 }
 
-fn environment(map: &Image, table: TableKind, lookup: Lookup) -> Environment {
-    let options =
-        EnvironmentOptions { table, lookup, rotation_radians: 1.2345, ..Default::default() };
+fn environment(map: &Image, table: TableKind) -> Environment {
+    let options = EnvironmentOptions { table, rotation_radians: 1.2345, ..Default::default() };
     Environment::new(map.clone(), &options).expect("a sanitised map")
 }
 
-/// All maps, tables and look-ups.
+/// All maps and tables.
 fn for_each_case(mut f: impl FnMut(&str, &Image, &Environment, TableKind)) {
     for (name, map) in maps() {
         for table in TableKind::ALL {
-            for lookup in [Lookup::Bilinear, Lookup::Nearest] {
-                let case = format!("{name}, {table}, {lookup}");
-                f(&case, &map, &environment(&map, table, lookup), table);
-            }
+            f(&format!("{name}, {table}"), &map, &environment(&map, table), table);
         }
     }
 }
@@ -181,31 +177,29 @@ fn samples_are_found_in_their_tile_on_maps_as_fine_as_f32_directions_allow() {
     for (width, height) in [(16384, 16), (16, 8192), (4096, 2048)] {
         let map = random(width, height, 21);
         let mut random = Random(SplitMix(22));
-        for lookup in [Lookup::Bilinear, Lookup::Nearest] {
-            let mut environment = environment(&map, TableKind::TileLocal, lookup);
-            let (mut strays, mut off) = (0, 0.0_f64);
-            const SAMPLES: u32 = 60_000;
-            for _ in 0..SAMPLES {
-                let u = random.words();
-                let tile = (random.next() * environment.tile_count() as f32) as u32;
-                environment.set_rotation(7.0 * random.next());
-                let sample = environment.sample_in_tile(tile, u).unwrap();
-                let (found, pdf) = tile_pdf(&environment, sample.direction);
-                strays += u32::from(found != tile);
-                off += f64::from((pdf / sample.pdf_solid_angle - 1.0).abs());
-            }
-            assert!(strays <= 1, "{width} x {height}: {strays}");
-            // Texels differ by half of their mean; a place is known to 1e-3 of the finest.
-            let off = off / f64::from(SAMPLES);
-            assert!(off < 5e-3, "{width} x {height}, {lookup}: {off}");
+        let mut environment = environment(&map, TableKind::TileLocal);
+        let (mut strays, mut off) = (0, 0.0_f64);
+        const SAMPLES: u32 = 60_000;
+        for _ in 0..SAMPLES {
+            let u = random.words();
+            let tile = (random.next() * environment.tile_count() as f32) as u32;
+            environment.set_rotation(7.0 * random.next());
+            let sample = environment.sample_in_tile(tile, u).unwrap();
+            let (found, pdf) = tile_pdf(&environment, sample.direction);
+            strays += u32::from(found != tile);
+            off += f64::from((pdf / sample.pdf_solid_angle - 1.0).abs());
         }
+        assert!(strays <= 1, "{width} x {height}: {strays}");
+        // Texels differ by half of their mean; a place is known to 1e-3 of the finest.
+        let off = off / f64::from(SAMPLES);
+        assert!(off < 5e-3, "{width} x {height}: {off}");
     }
 }
 
 #[test]
 fn samples_follow_their_density() {
     const SAMPLES: u32 = 60_000;
-    let cases = maps().len() * 8;
+    let cases = maps().len() * TableKind::ALL.len();
     for_each_case(|case, _, environment, table| {
         // Where rounding moves more than a test of this size can see, the table report says so.
         let exact = matches!(table, TableKind::TileLocal | TableKind::F64);
@@ -248,52 +242,49 @@ fn samples_follow_their_density() {
 fn places_in_a_patch_follow_the_radiance_read_there() {
     const SAMPLES: u32 = 200_000;
     const SIDE: u32 = 4;
-    let cases = maps().len() * 2;
+    let cases = maps().len();
     for (name, map) in maps().into_iter().filter(|(name, _)| *name != "black") {
-        for lookup in [Lookup::Bilinear, Lookup::Nearest] {
-            let environment = environment(&map, TableKind::TileLocal, lookup);
-            let energies = environment.tile_energies();
-            let brightest =
-                |a: &u32, b: &u32| energies[*a as usize].total_cmp(&energies[*b as usize]);
-            let tile = (0..environment.tile_count()).max_by(brightest).unwrap();
-            let (columns, rows) = environment.patch_grid();
-            let mut observed = vec![0.0; (columns * rows * SIDE * SIDE) as usize];
-            let mut expected = Vec::new();
-            for y in 0..rows {
-                let share = f64::from(environment.patch_solid_angle(y)) / f64::from(SIDE * SIDE);
-                for (x, place) in (0..columns).flat_map(|x| (0..SIDE * SIDE).map(move |p| (x, p))) {
-                    let within = Vec2::new((place % SIDE) as f32, (place / SIDE) as f32) + 0.5;
-                    let at = environment.direction_in_patch((x, y), within / SIDE as f32);
-                    let (found, pdf) = tile_pdf(&environment, at);
-                    let is_here = f64::from(u8::from(found == tile));
-                    expected.push(is_here * f64::from(pdf) * share * f64::from(SAMPLES));
-                }
+        let environment = environment(&map, TableKind::TileLocal);
+        let energies = environment.tile_energies();
+        let brightest = |a: &u32, b: &u32| energies[*a as usize].total_cmp(&energies[*b as usize]);
+        let tile = (0..environment.tile_count()).max_by(brightest).unwrap();
+        let (columns, rows) = environment.patch_grid();
+        let mut observed = vec![0.0; (columns * rows * SIDE * SIDE) as usize];
+        let mut expected = Vec::new();
+        for y in 0..rows {
+            let share = f64::from(environment.patch_solid_angle(y)) / f64::from(SIDE * SIDE);
+            for (x, place) in (0..columns).flat_map(|x| (0..SIDE * SIDE).map(move |p| (x, p))) {
+                let within = Vec2::new((place % SIDE) as f32, (place / SIDE) as f32) + 0.5;
+                let at = environment.direction_in_patch((x, y), within / SIDE as f32);
+                let (found, pdf) = tile_pdf(&environment, at);
+                let is_here = f64::from(u8::from(found == tile));
+                expected.push(is_here * f64::from(pdf) * share * f64::from(SAMPLES));
             }
-            let (mut random, mut strays) = (Random(SplitMix(41)), 0);
-            for _ in 0..SAMPLES {
-                let sample = environment.sample_in_tile(tile, random.words()).unwrap();
-                let (x, y) = environment.patch_of(sample.direction);
-                if environment.tile_of(sample.direction) != tile {
-                    strays += 1;
-                    continue;
-                }
-                // The place, by the corners of the patch's longitudes and cosines.
-                let edge = |within| environment.direction_in_patch((x, y), within);
-                let u = uv_from_direction(sample.direction).x;
-                let from = uv_from_direction(edge(Vec2::new(0.0, 0.5))).x;
-                // Less than none, by rounding, is none.
-                let turn = (u - from).rem_euclid(1.0);
-                let across = if turn > 0.5 && columns > 1 { 0.0 } else { turn * columns as f32 };
-                let (top, bottom) = (edge(Vec2::new(0.5, 0.0)).y, edge(Vec2::new(0.5, 1.0)).y);
-                let down = (sample.direction.y - top) / (bottom - top);
-                let bin = |t: f32| ((t * SIDE as f32).max(0.0) as u32).min(SIDE - 1);
-                let patch = (y * columns + x) * SIDE * SIDE;
-                observed[(patch + bin(down) * SIDE + bin(across)) as usize] += 1.0;
-            }
-            let test = chi_square_test(&observed, &expected, sidak(0.01, cases)).unwrap();
-            assert!(test.passed, "{name}, {lookup}: {test:?}");
-            assert!(strays <= 3, "{name}, {lookup}: {strays} beyond the tile's edge");
         }
+        let (mut random, mut strays) = (Random(SplitMix(41)), 0);
+        for _ in 0..SAMPLES {
+            let sample = environment.sample_in_tile(tile, random.words()).unwrap();
+            let (x, y) = environment.patch_of(sample.direction);
+            if environment.tile_of(sample.direction) != tile {
+                strays += 1;
+                continue;
+            }
+            // The place, by the corners of the patch's longitudes and cosines.
+            let edge = |within| environment.direction_in_patch((x, y), within);
+            let u = uv_from_direction(sample.direction).x;
+            let from = uv_from_direction(edge(Vec2::new(0.0, 0.5))).x;
+            // Less than none, by rounding, is none.
+            let turn = (u - from).rem_euclid(1.0);
+            let across = if turn > 0.5 && columns > 1 { 0.0 } else { turn * columns as f32 };
+            let (top, bottom) = (edge(Vec2::new(0.5, 0.0)).y, edge(Vec2::new(0.5, 1.0)).y);
+            let down = (sample.direction.y - top) / (bottom - top);
+            let bin = |t: f32| ((t * SIDE as f32).max(0.0) as u32).min(SIDE - 1);
+            let patch = (y * columns + x) * SIDE * SIDE;
+            observed[(patch + bin(down) * SIDE + bin(across)) as usize] += 1.0;
+        }
+        let test = chi_square_test(&observed, &expected, sidak(0.01, cases)).unwrap();
+        assert!(test.passed, "{name}: {test:?}");
+        assert!(strays <= 3, "{name}: {strays} beyond the tile's edge");
     }
 }
 
@@ -303,7 +294,7 @@ fn places_are_uniform_in_solid_angle_under_a_constant_map() {
     for (width, height) in [(1, 1), (2, 1), (3, 2)] {
         let map = Image::filled(width, height, [1.0; 3]);
         for table in TableKind::ALL {
-            let environment = environment(&map, table, Lookup::Bilinear);
+            let environment = environment(&map, table);
             let (columns, rows) = (14, 10);
             let mut observed = vec![0.0; columns * rows];
             let mut random = Random(SplitMix(41));
@@ -483,7 +474,7 @@ fn the_largest_and_smallest_radiance_can_be_sampled() {
         for table in TableKind::ALL {
             let mut map = Image::filled(64, 32, [dim; 3]);
             map.pixels[700] = [bright; 3];
-            let mut environment = environment(&map, table, Lookup::Bilinear);
+            let mut environment = environment(&map, table);
             environment.set_intensity(10.0);
             assert!(!environment.is_black() && environment.mean_radiance().is_finite());
             let mut random = Random(SplitMix(1));

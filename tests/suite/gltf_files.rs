@@ -7,7 +7,7 @@ mod ktx2;
 
 use std::path::Path;
 
-use lightgrid::scene::{Projection, gltf};
+use lightgrid::scene::{Projection, TextureSlot, gltf};
 
 use crate::shared::{SplitMix, shared};
 use builder::{check_consistency, square, textured_material};
@@ -111,7 +111,7 @@ fn made_tangents_agree_with_the_files_own() {
         own.triangles.iter().zip(&made.triangles).enumerate()
     {
         let material = &own.materials[own.triangle_materials[index] as usize];
-        if material.normal_texture.is_some() || material.clearcoat_normal_texture.is_some() {
+        if material.has_normal_map() {
             mapped += 1;
             for (&a, &b) in own_corners.iter().zip(made_corners) {
                 let (a, b) = (own.tangents[a as usize], made.tangents[b as usize]);
@@ -132,7 +132,9 @@ fn cameras_and_glass_of_the_kitchen() {
     };
     assert!(fov_y_radians > 0.2 && fov_y_radians < 2.0);
     assert!(scene.materials.iter().any(|material| material.transmission > 0.9));
-    assert!(scene.materials.iter().any(|material| material.base_color_texture.is_some()));
+    assert!(
+        scene.materials.iter().any(|material| material.texture(TextureSlot::BaseColor).is_some())
+    );
 }
 
 #[test]

@@ -75,7 +75,7 @@ fn a_models_looks_are_chosen_by_name_and_materials_hidden() {
         load(&text, &options).map(|_| ()).unwrap_err()
     };
     assert!(hidden("a").contains("all of it is hidden"));
-    assert!(hidden("glass").contains("no material to hide is called glass"));
+    assert!(hidden("glass").contains("no material is called \"glass\""));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use crate::app::document::Document;
 use crate::app::interface::Interface;
 use crate::app::loader::LoadedScene;
 use crate::app::theme;
-use crate::scene::{Material, MaterialEdit};
+use crate::scene::{Material, MaterialEdit, TextureSlot};
 
 /// Draws the section.
 pub(super) fn show(
@@ -61,13 +61,13 @@ pub(super) fn show(
 
 fn change(ui: &mut Ui, edit: &mut MaterialEdit, material: &Material) {
     let has = |texture: bool| if texture { "Its texture is multiplied by this" } else { "" };
-    theme::row(ui, "Colour", has(material.base_color_texture.is_some()), |ui| {
+    theme::row(ui, "Colour", has(material.texture(TextureSlot::BaseColor).is_some()), |ui| {
         let mut rgb = edit.color.unwrap_or(material.base_color.truncate()).to_array();
         if theme::color(ui, &mut rgb) {
             edit.color = Some(Vec3::from(rgb));
         }
     });
-    let of_texture = has(material.metallic_roughness_texture.is_some());
+    let of_texture = has(material.texture(TextureSlot::MetallicRoughness).is_some());
     let share = |ui: &mut Ui, value: &mut Option<f32>, own: f32| {
         let mut now = value.unwrap_or(own);
         if ui.add(Slider::new(&mut now, 0.0..=1.0).fixed_decimals(2)).changed() {

@@ -253,7 +253,6 @@ impl RenderArguments {
             rotation_radians: self.env_rotation.to_radians() as f32,
             intensity: self.env_intensity,
             sun: self.env_sun,
-            ..EnvironmentOptions::default()
         }
     }
 
@@ -374,7 +373,21 @@ impl RenderArguments {
         let mut camera = self.place.with_fov(camera)?;
         camera.lens_radius = self.lens_radius.unwrap_or(camera.lens_radius);
         camera.focus_distance = self.focus.map_or(camera.focus_distance, |f| f as f32);
+        if self.focus.is_some() && camera.lens_radius == 0.0 {
+            notices.add("--focus changes nothing: the lens has no radius (--lens-radius)");
+        }
         Ok(camera)
+    }
+
+    /// Says what is asked of a fog that there is not.
+    pub(super) fn check_fog(&self, scene: &Scene, notices: &mut Notices) {
+        let is_shaped = self.fog_anisotropy.is_some() || self.fog_box.is_some();
+        let medium = self.medium(scene);
+        let is_clear =
+            |medium: &Medium| (medium.scattering, medium.absorption) == Default::default();
+        if is_shaped && medium.as_ref().is_some_and(is_clear) {
+            notices.add("--fog-box and --fog-anisotropy change nothing: the air is clear (--fog, --fog-absorption)");
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use super::super::filter::PixelFilter;
 use super::super::{Gi, Sampling, View};
 use super::kernel::Kernel;
 use super::shader::Constants;
-use crate::environment::{Environment, Lookup, TableKind};
+use crate::environment::{Environment, TableKind};
 use crate::features::Features;
 use crate::light_grid::Recording;
 use crate::path::{Background, World};
@@ -79,7 +79,7 @@ impl Features {
         let options = view.distribution_options();
         let recording = options.map(|options| options.recording);
         let cosine_power = recording.map_or(0, Recording::cosine_power);
-        let (table, lookup) = environment.kind();
+        let table = environment.table_kind();
         let scatters = world.needs.has(Self::SCATTERING_SOLIDS) || view.fog(world).is_some();
         let mut features = Self::of_world(world);
         for (feature, is_needed) in [
@@ -94,7 +94,6 @@ impl Features {
             (Self::MAP, !environment.is_black()),
             (Self::MAP_SAMPLING, samples_map),
             (Self::MEDIUM, scatters),
-            (Self::NEAREST_LOOKUP, lookup == Lookup::Nearest),
             (Self::RADIANCE_CACHE, view.gi == Gi::Cached),
             (Self::RECORD_COSINE, cosine_power == 1),
             (Self::RECORD_RATIO, recording.is_some_and(Recording::is_ratio)),

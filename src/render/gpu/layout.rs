@@ -337,7 +337,7 @@ pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
             normal_scale: m.normal_scale,
             clearcoat_normal_scale: m.clearcoat_normal_scale,
             flags: flags(m, world.may_pass_light(index)),
-            textures: m.textures().map(&mut reference),
+            textures: m.textures.each_ref().map(|texture| reference(texture.as_deref())),
             scattering: m.scattering,
             scatter_mean_cosine: Phase::new(m.scatter_anisotropy).mean_cosine(),
             anisotropy: m.anisotropy,
@@ -367,7 +367,7 @@ fn flags(m: &scene::Material, partial: bool) -> u32 {
         (UNLIT, m.unlit),
         (THIN, m.thickness <= 0.0),
         (PARTIAL, partial),
-        (NORMAL_MAPPED, m.normal_texture.is_some() || m.clearcoat_normal_texture.is_some()),
+        (NORMAL_MAPPED, m.has_normal_map()),
     ]
     .into_iter()
     .filter(|(_, set)| *set)

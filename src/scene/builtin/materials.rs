@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 
-use crate::scene::{Material, TextureRef};
+use crate::scene::{Material, TextureRef, TextureSlot};
 
 /// A dielectric of linear albedo `rgb`.
 pub(super) fn matte(name: &str, rgb: [f32; 3], roughness: f32) -> Material {
@@ -17,12 +17,12 @@ pub(super) fn matte(name: &str, rgb: [f32; 3], roughness: f32) -> Material {
 
 /// A dielectric whose albedo comes from a texture.
 pub(super) fn textured(name: &str, texture: TextureRef, roughness: f32) -> Material {
-    Material { base_color_texture: Some(texture.into()), ..matte(name, [1.0; 3], roughness) }
+    matte(name, [1.0; 3], roughness).with_texture(TextureSlot::BaseColor, texture)
 }
 
 /// A material with a normal map.
 pub(super) fn embossed(material: Material, normals: TextureRef) -> Material {
-    Material { normal_texture: Some(normals.into()), ..material }
+    material.with_texture(TextureSlot::Normal, normals)
 }
 
 /// A thin cloth or leaf, seen from both sides.

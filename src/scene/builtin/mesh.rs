@@ -34,7 +34,7 @@ impl Builder {
 
     /// The scene as built, with tangents if it has normal maps.
     pub(super) fn finish(mut self) -> Scene {
-        if self.scene.materials.iter().any(|material| material.normal_texture.is_some()) {
+        if self.scene.materials.iter().any(Material::has_normal_map) {
             self.add_tangents();
         }
         self.scene

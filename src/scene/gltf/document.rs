@@ -87,7 +87,7 @@ impl<'a> Document<'a> {
         let [lights] = members(lights.unwrap_or("{}"), ["lights"])?;
         let [variants] = members(variants.unwrap_or("{}"), ["variants"])?;
         if of("animations").is_some() {
-            notices.add("the file has animations; its rest pose is shown");
+            notices.add("the file has animations: cameras alone follow theirs, in --frames; all else is at rest");
         }
         let scene = of("scene").map(read).transpose();
         Ok(Self {

@@ -4,7 +4,7 @@ use super::Fallible;
 use super::objects::Objects;
 use crate::error::Notices;
 
-/// Extensions that are rendered, wholly or (specular-glossiness) nearly.
+/// Extensions that are rendered.
 const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -27,6 +27,7 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
+    "KHR_node_visibility",
     "KHR_texture_basisu",
     "KHR_texture_transform",
 ];

@@ -7,7 +7,7 @@ use super::buffers::File;
 use super::part::{Part, Tally};
 use super::primitive::Source;
 use super::{Fallible, tangents};
-use crate::scene::{Material, TextureRef};
+use crate::scene::{Material, TextureRef, TextureSlot};
 
 /// What a material reads of its vertices.
 pub(super) struct Needs {
@@ -23,12 +23,13 @@ impl Needs {
     /// Looks through the texture slots.
     pub(super) fn of(material: &Material) -> Self {
         let mut uv_sets = [false; 2];
-        for reference in material.textures().into_iter().flatten() {
+        for reference in material.textures.iter().flatten() {
             uv_sets[usize::from(reference.uv_set)] = true;
         }
-        let normal_map =
-            material.normal_texture.as_deref().or(material.clearcoat_normal_texture.as_deref());
-        let tangent_map = normal_map.or(material.anisotropy_texture.as_deref()).copied();
+        let normal_map = material
+            .texture(TextureSlot::Normal)
+            .or(material.texture(TextureSlot::ClearcoatNormal));
+        let tangent_map = normal_map.or(material.texture(TextureSlot::Anisotropy)).copied();
         let tangents = normal_map.is_some() || material.anisotropy > 0.0;
         uv_sets[0] |= tangents && tangent_map.is_none();
         Self { uv_sets, tangents, tangent_map }

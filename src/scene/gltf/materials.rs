@@ -14,7 +14,7 @@ use super::document::Document;
 use super::medium;
 use super::textures::Wanted;
 use crate::error::Notices;
-use crate::scene::{AlphaMode, Material, Texture, TextureImage, TextureRef};
+use crate::scene::{AlphaMode, Material, Texture, TextureImage, TextureRef, TextureSlot as Slot};
 
 /// Largest radiance a surface may emit: its square is far from overflow.
 pub(super) const BRIGHTEST: f32 = 1e12;
@@ -38,6 +38,7 @@ impl Materials {
         let mut wanted = Wanted::default();
         let mut materials: Vec<Material> = Vec::with_capacity(used.len());
         let mut places = BTreeMap::new();
+        let mut glossy = Vec::new();
         for &number in used {
             places.insert(number, materials.len() as u32);
             materials.push(match number {
@@ -45,44 +46,26 @@ impl Materials {
                 Some(number) => {
                     let source = file.document.materials.get(json::Index::new(number))?;
                     let mut reader = Reader::new(file, &source, number, &mut wanted, notices);
-                    reader
+                    let material = reader
                         .material(&source)
-                        .map_err(|cause| format!("material {number} ({}): {cause}", reader.name))?
+                        .map_err(|cause| format!("material {number} ({}): {cause}", reader.name))?;
+                    glossy.extend(reader.glossiness.map(|factor| (materials.len(), factor)));
+                    material
                 }
             });
         }
-        let decoded = wanted.decode(file, notices);
-        for slot in materials.iter_mut().flat_map(slots) {
+        let mut decoded = wanted.decode(file, notices);
+        for slot in materials.iter_mut().flat_map(|material| &mut material.textures) {
             *slot = slot.take().and_then(|reference| {
                 let texture = decoded.texture_map[reference.texture as usize]?;
                 Some(Box::new(TextureRef { texture, ..*reference }))
             });
         }
+        for (place, factor) in glossy {
+            decoded.make_rough(&mut materials[place], factor);
+        }
         Ok(Self { materials, textures: decoded.textures, images: decoded.images, places })
     }
-}
-
-/// Every texture slot of a material.
-fn slots(material: &mut Material) -> [&mut Option<Box<TextureRef>>; 17] {
-    [
-        &mut material.base_color_texture,
-        &mut material.metallic_roughness_texture,
-        &mut material.normal_texture,
-        &mut material.emissive_texture,
-        &mut material.specular_texture,
-        &mut material.specular_color_texture,
-        &mut material.transmission_texture,
-        &mut material.clearcoat_texture,
-        &mut material.clearcoat_roughness_texture,
-        &mut material.clearcoat_normal_texture,
-        &mut material.anisotropy_texture,
-        &mut material.sheen_color_texture,
-        &mut material.sheen_roughness_texture,
-        &mut material.diffuse_transmission_texture,
-        &mut material.diffuse_transmission_color_texture,
-        &mut material.iridescence_texture,
-        &mut material.iridescence_thickness_texture,
-    ]
 }
 
 /// Where a texture of the file is read.
@@ -117,6 +100,8 @@ fn parsed<T: for<'de> serde::Deserialize<'de>>(value: &Value) -> Option<T> {
 pub(super) struct Reader<'a> {
     document: &'a Document<'a>,
     name: String,
+    /// Factor on the alpha of a texture that is read for roughness, and says how smooth the surface is.
+    glossiness: Option<f32>,
     wanted: &'a mut Wanted,
     notices: &'a mut Notices,
 }
@@ -130,7 +115,7 @@ impl<'a> Reader<'a> {
         notices: &'a mut Notices,
     ) -> Self {
         let name = source.name.clone().unwrap_or_else(|| format!("material {number}"));
-        Self { document: &file.document, name, wanted, notices }
+        Self { document: &file.document, name, glossiness: None, wanted, notices }
     }
 
     fn material(&mut self, source: &json::Material) -> Fallible<Material> {
@@ -138,27 +123,38 @@ impl<'a> Reader<'a> {
         let mut material = Material {
             name: self.name.clone(),
             base_color: Vec4::from_array(self.units(pbr.base_color_factor.0)),
-            base_color_texture: self.colour(pbr.base_color_texture.as_ref())?,
             metallic: self.unit(pbr.metallic_factor.0),
             roughness: self.unit(pbr.roughness_factor.0),
-            metallic_roughness_texture: self.data(pbr.metallic_roughness_texture.as_ref())?,
-            normal_texture: self.data(source.normal_texture.as_ref())?,
             normal_scale: self.finite(source.normal_texture.as_ref().map_or(1.0, |map| map.scale)),
             // Older files put lamps' strengths here.
             emissive: Vec3::from_array(
                 source.emissive_factor.0.map(|x| self.within(x, 0.0, BRIGHTEST)),
             ),
-            emissive_texture: self.colour(source.emissive_texture.as_ref())?,
             alpha_mode: match source.alpha_mode {
                 Checked::Valid(json::material::AlphaMode::Mask) => {
                     AlphaMode::Mask { cutoff: source.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0) }
                 }
                 Checked::Valid(json::material::AlphaMode::Blend) => AlphaMode::Blend,
-                _ => AlphaMode::Opaque,
+                Checked::Valid(json::material::AlphaMode::Opaque) => AlphaMode::Opaque,
+                Checked::Invalid => {
+                    self.notices.add(format!(
+                        "material {} has an alpha mode that glTF does not know: it is opaque",
+                        self.name
+                    ));
+                    AlphaMode::Opaque
+                }
             },
             double_sided: source.double_sided,
             ..Material::default()
         };
+        self.texture(&mut material, Slot::BaseColor, pbr.base_color_texture.as_ref())?;
+        self.texture(
+            &mut material,
+            Slot::MetallicRoughness,
+            pbr.metallic_roughness_texture.as_ref(),
+        )?;
+        self.texture(&mut material, Slot::Normal, source.normal_texture.as_ref())?;
+        self.texture(&mut material, Slot::Emissive, source.emissive_texture.as_ref())?;
         (material.scattering, material.scatter_anisotropy) =
             medium::inside(&source.extras, &self.name, self.notices);
         if let Some(extensions) = &source.extensions {
@@ -183,16 +179,14 @@ impl<'a> Reader<'a> {
         }
         if let Some(specular) = &source.specular {
             material.specular = self.unit(specular.specular_factor.0);
-            material.specular_texture = self.data(specular.specular_texture.as_ref())?;
+            self.texture(material, Slot::Specular, specular.specular_texture.as_ref())?;
             let tint = specular.specular_color_factor.0;
             material.specular_color = Vec3::from_array(tint.map(|x| self.at_least(x, 0.0)));
-            material.specular_color_texture =
-                self.colour(specular.specular_color_texture.as_ref())?;
+            self.texture(material, Slot::SpecularColor, specular.specular_color_texture.as_ref())?;
         }
         if let Some(transmission) = &source.transmission {
             material.transmission = self.unit(transmission.transmission_factor.0);
-            material.transmission_texture =
-                self.data(transmission.transmission_texture.as_ref())?;
+            self.texture(material, Slot::Transmission, transmission.transmission_texture.as_ref())?;
         }
         if let Some(volume) = &source.volume {
             material.thickness = self.at_least(volume.thickness_factor.0, 0.0);
@@ -229,13 +223,16 @@ impl<'a> Reader<'a> {
     fn clearcoat(&mut self, coat: &Map<String, Value>, material: &mut Material) -> Fallible<()> {
         material.clearcoat = self.unit(number(coat, "clearcoatFactor", 0.0));
         material.clearcoat_roughness = self.unit(number(coat, "clearcoatRoughnessFactor", 0.0));
-        material.clearcoat_texture = self.data(texture(coat, "clearcoatTexture").as_ref())?;
-        material.clearcoat_roughness_texture =
-            self.data(texture(coat, "clearcoatRoughnessTexture").as_ref())?;
+        self.texture(material, Slot::Clearcoat, texture(coat, "clearcoatTexture"))?;
+        self.texture(
+            material,
+            Slot::ClearcoatRoughness,
+            texture(coat, "clearcoatRoughnessTexture"),
+        )?;
         let normal: Option<json::material::NormalTexture> =
             coat.get("clearcoatNormalTexture").and_then(parsed);
         material.clearcoat_normal_scale = self.finite(normal.as_ref().map_or(1.0, |map| map.scale));
-        material.clearcoat_normal_texture = self.data(normal.as_ref())?;
+        self.texture(material, Slot::ClearcoatNormal, normal.as_ref())?;
         Ok(())
     }
 
@@ -248,43 +245,28 @@ impl<'a> Reader<'a> {
     ) -> Fallible<()> {
         let diffuse: Option<[f32; 4]> = old.get("diffuseFactor").and_then(parsed);
         material.base_color = Vec4::from_array(self.units(diffuse.unwrap_or([1.0; 4])));
-        material.base_color_texture = self.colour(texture(old, "diffuseTexture").as_ref())?;
+        self.texture(material, Slot::BaseColor, texture(old, "diffuseTexture"))?;
         let specular: Option<[f32; 3]> = old.get("specularFactor").and_then(parsed);
         material.specular_color = Vec3::from_array(self.units(specular.unwrap_or([1.0; 3])));
-        let gloss = texture(old, "specularGlossinessTexture");
-        material.specular_color_texture = self.colour(gloss.as_ref())?;
-        material.metallic_roughness_texture = None;
-        material.metallic = 0.0;
-        material.ior = 0.0;
-        material.roughness = 1.0 - self.unit(number(old, "glossinessFactor", 1.0));
-        if gloss.is_some() {
-            // Its alpha would need an image of its own; half of the factor is its likely middle.
-            material.roughness = 0.5 + 0.5 * material.roughness;
-            self.notices.add(format!(
-                "material {} has a glossiness texture, which is replaced by its middle value",
-                self.name
-            ));
+        let glossiness = self.unit(number(old, "glossinessFactor", 1.0));
+        for slot in [Slot::SpecularColor, Slot::MetallicRoughness] {
+            self.texture(material, slot, texture(old, "specularGlossinessTexture"))?;
         }
+        (material.metallic, material.ior, material.roughness) = (0.0, 0.0, 1.0 - glossiness);
+        self.glossiness = Some(glossiness);
         Ok(())
     }
 
-    /// A texture whose RGB is sRGB-encoded.
-    pub(super) fn colour(
+    /// Reads the texture of a slot, if the file has one.
+    pub(super) fn texture(
         &mut self,
+        material: &mut Material,
+        slot: Slot,
         info: Option<impl Into<Info>>,
-    ) -> Fallible<Option<Box<TextureRef>>> {
-        info.map_or(Ok(None), |info| self.texture(&info.into(), true))
-    }
-
-    /// A texture of plain numbers.
-    pub(super) fn data(
-        &mut self,
-        info: Option<impl Into<Info>>,
-    ) -> Fallible<Option<Box<TextureRef>>> {
-        info.map_or(Ok(None), |info| self.texture(&info.into(), false))
-    }
-
-    fn texture(&mut self, info: &Info, srgb: bool) -> Fallible<Option<Box<TextureRef>>> {
+    ) -> Fallible<()> {
+        use Slot::{BaseColor, DiffuseTransmissionColor, Emissive, SheenColor, SpecularColor};
+        material.textures[slot as usize] = None;
+        let Some(info) = info.map(Into::<Info>::into) else { return Ok(()) };
         let transform = info.transform.as_ref();
         let uv_set = transform.and_then(|it| it.tex_coord).unwrap_or(info.tex_coord);
         if uv_set > 1 {
@@ -292,13 +274,18 @@ impl<'a> Reader<'a> {
                 "material {} has a texture on UV set {uv_set}, which is left out: sets 0 and 1 are read",
                 self.name
             ));
-            return Ok(None);
+            return Ok(());
         }
-        Ok(Some(Box::new(TextureRef {
+        let srgb = matches!(
+            slot,
+            BaseColor | DiffuseTransmissionColor | Emissive | SheenColor | SpecularColor
+        );
+        material.textures[slot as usize] = Some(Box::new(TextureRef {
             texture: self.wanted.add(self.document, info.index, srgb)?,
             uv_set: uv_set as u8,
             transform: transform.map_or(Affine2::IDENTITY, uv_transform),
-        })))
+        }));
+        Ok(())
     }
 
     /// A factor clamped to `[0,1]`.
@@ -344,6 +331,6 @@ pub(super) fn number(object: &Map<String, Value>, key: &str, default: f32) -> f3
     object.get(key).and_then(Value::as_f64).map_or(default, |value| value as f32)
 }
 
-pub(super) fn texture(object: &Map<String, Value>, key: &str) -> Option<json::texture::Info> {
-    object.get(key).and_then(parsed)
+pub(super) fn texture(object: &Map<String, Value>, key: &str) -> Option<Info> {
+    object.get(key).and_then(parsed).map(|info: json::texture::Info| Info::from(&info))
 }

@@ -5,7 +5,7 @@ use serde_json::{Map, Value};
 
 use super::Fallible;
 use super::materials::{Reader, number, texture};
-use crate::scene::Material;
+use crate::scene::{Material, TextureSlot as Slot};
 
 type Object = Map<String, Value>;
 
@@ -14,16 +14,16 @@ impl Reader<'_> {
     pub(super) fn anisotropy(&mut self, from: &Object, to: &mut Material) -> Fallible<()> {
         to.anisotropy = self.unit(number(from, "anisotropyStrength", 0.0));
         to.anisotropy_rotation = self.finite(number(from, "anisotropyRotation", 0.0));
-        to.anisotropy_texture = self.data(texture(from, "anisotropyTexture").as_ref())?;
+        self.texture(to, Slot::Anisotropy, texture(from, "anisotropyTexture"))?;
         Ok(())
     }
 
     /// `KHR_materials_sheen`.
     pub(super) fn sheen(&mut self, from: &Object, to: &mut Material) -> Fallible<()> {
         to.sheen_color = self.unit_color(from, "sheenColorFactor", Vec3::ZERO);
-        to.sheen_color_texture = self.colour(texture(from, "sheenColorTexture").as_ref())?;
+        self.texture(to, Slot::SheenColor, texture(from, "sheenColorTexture"))?;
         to.sheen_roughness = self.unit(number(from, "sheenRoughnessFactor", 0.0));
-        to.sheen_roughness_texture = self.data(texture(from, "sheenRoughnessTexture").as_ref())?;
+        self.texture(to, Slot::SheenRoughness, texture(from, "sheenRoughnessTexture"))?;
         Ok(())
     }
 
@@ -34,25 +34,26 @@ impl Reader<'_> {
         to: &mut Material,
     ) -> Fallible<()> {
         to.diffuse_transmission = self.unit(number(from, "diffuseTransmissionFactor", 0.0));
-        to.diffuse_transmission_texture =
-            self.data(texture(from, "diffuseTransmissionTexture").as_ref())?;
+        self.texture(to, Slot::DiffuseTransmission, texture(from, "diffuseTransmissionTexture"))?;
         to.diffuse_transmission_color =
             self.unit_color(from, "diffuseTransmissionColorFactor", Vec3::ONE);
-        to.diffuse_transmission_color_texture =
-            self.colour(texture(from, "diffuseTransmissionColorTexture").as_ref())?;
+        self.texture(
+            to,
+            Slot::DiffuseTransmissionColor,
+            texture(from, "diffuseTransmissionColorTexture"),
+        )?;
         Ok(())
     }
 
     /// `KHR_materials_iridescence`.
     pub(super) fn iridescence(&mut self, from: &Object, to: &mut Material) -> Fallible<()> {
         to.iridescence = self.unit(number(from, "iridescenceFactor", 0.0));
-        to.iridescence_texture = self.data(texture(from, "iridescenceTexture").as_ref())?;
+        self.texture(to, Slot::Iridescence, texture(from, "iridescenceTexture"))?;
         to.iridescence_ior = self.at_least(number(from, "iridescenceIor", 1.3), 1.0);
         let ends = [("iridescenceThicknessMinimum", 100.0), ("iridescenceThicknessMaximum", 400.0)];
         to.iridescence_thickness =
             ends.map(|(key, default)| self.within(number(from, key, default), 0.0, 1e6));
-        to.iridescence_thickness_texture =
-            self.data(texture(from, "iridescenceThicknessTexture").as_ref())?;
+        self.texture(to, Slot::IridescenceThickness, texture(from, "iridescenceThicknessTexture"))?;
         Ok(())
     }
 

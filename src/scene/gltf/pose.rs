@@ -180,8 +180,8 @@ fn places(
     marks: &mut [u8],
 ) -> Fallible<Vec<(u32, DAffine3)>> {
     let (mut places, mut visited) = (Vec::new(), 0);
-    // World from node of those above, from the top down.
-    let mut above: Vec<DAffine3> = Vec::new();
+    // World from node of those above, from the top down, and whether they are hidden.
+    let mut above: Vec<(DAffine3, bool)> = Vec::new();
     let mut failure = None;
     for top in hierarchy.tops() {
         hierarchy.walk(top, |number, depth| {
@@ -195,10 +195,12 @@ fn places(
             };
             above.truncate(depth);
             let local = local_transform(&node);
-            let world = above.last().map_or(local, |parent| *parent * local);
-            above.push(world);
+            let (parent, is_below_hidden) =
+                above.last().copied().unwrap_or((DAffine3::IDENTITY, false));
+            let (world, is_hidden) = (parent * local, is_below_hidden || is_hidden(&node));
+            above.push((world, is_hidden));
             let mark = &mut marks[number];
-            *mark |= shows(&node);
+            *mark |= shows(&node) & if is_hidden { !(MESH | LIGHT) } else { u8::MAX };
             if *mark & IS_JOINT != 0 || (*mark & IS_SHOWN != 0 && *mark & ANYTHING != 0) {
                 places.push((number as u32, world));
             }
@@ -226,6 +228,13 @@ fn shows(node: &json::Node) -> u8 {
         (EXTRAS, node.extras.is_some()),
     ];
     there.iter().filter(|(_, is_there)| *is_there).map(|(what, _)| what).sum()
+}
+
+/// `KHR_node_visibility`: whether what is at a node and below it is not to be seen.
+fn is_hidden(node: &json::Node) -> bool {
+    let extension = node.extensions.as_ref();
+    let extension = extension.and_then(|all| all.others.get("KHR_node_visibility"));
+    extension.and_then(|it| it.get("visible")?.as_bool()) == Some(false)
 }
 
 /// Roots of the default scene, else of the first one; `None` if the file has no scenes.

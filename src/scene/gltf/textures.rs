@@ -16,7 +16,7 @@ use super::uri::{self, Place};
 use crate::error::Notices;
 use crate::image::ldr::{LdrHeader, LdrImage, decode_ldr};
 use crate::memory;
-use crate::scene::{Texture, TextureImage, Wrap};
+use crate::scene::{Material, Texture, TextureImage, TextureSlot, Wrap};
 
 /// Most texels all images may have together: 4 GiB of 8 bits a channel.
 const MAX_TEXELS: u64 = 1 << 30;
@@ -126,6 +126,26 @@ impl Wanted {
         };
         let texture_map = self.textures.iter().map(place).collect();
         Decoded { textures, images, texture_map }
+    }
+}
+
+impl Decoded {
+    /// Puts roughness in place of the glossiness in the alpha of the texture that a material reads for it.
+    pub(super) fn make_rough(&mut self, material: &mut Material, factor: f32) {
+        let slot = &mut material.textures[TextureSlot::MetallicRoughness as usize];
+        let Some(reference) = slot else { return };
+        let texture = self.textures[reference.texture as usize];
+        let glossy = &self.images[texture.image as usize];
+        let Some(texels) = glossy.texels.map_alpha(|alpha| 1.0 - factor * alpha) else {
+            // It is the same everywhere.
+            *slot = None;
+            return;
+        };
+        let image = self.images.len() as u32;
+        self.images.push(TextureImage { texels, ..*glossy });
+        reference.texture = self.textures.len() as u32;
+        self.textures.push(Texture { image, ..texture });
+        material.roughness = 1.0;
     }
 }
 

@@ -2,7 +2,9 @@
 
 use glam::{Affine2, Vec2, Vec3, Vec4};
 use lightgrid::scene::surface::{SurfacePoint, alpha_at};
-use lightgrid::scene::{AlphaMode, Material, Scene, Texture, TextureImage, TextureRef, Wrap};
+use lightgrid::scene::{
+    AlphaMode, Material, Scene, Texture, TextureImage, TextureRef, TextureSlot, Wrap,
+};
 
 use super::Random;
 use crate::shared::SplitMix;
@@ -71,7 +73,7 @@ fn normal_maps_use_tangent_handedness_and_scale() {
     let mut scene = triangle(Material { metallic: 0.0, ..two_sided() });
     let map = add_texel(&mut scene, [255, 204, 255, 255], false); // (1, 0.6, 1)
     scene.normals = vec![Vec3::Z; 3];
-    scene.materials[0].normal_texture = Some(map.into());
+    scene.materials[0].textures[TextureSlot::Normal as usize] = Some(map.into());
     let normal =
         |scene: &Scene, direction| SurfacePoint::at(scene, 0, CENTRE, direction).shading_frame.z;
     assert_eq!(normal(&scene, DOWN), Vec3::Z, "without tangents there is no map");
@@ -92,13 +94,13 @@ fn the_coat_has_its_own_normal() {
     let map = add_texel(&mut scene, [255, 128, 255, 255], false);
     scene.normals = vec![Vec3::Z; 3];
     scene.tangents = vec![Vec4::new(1.0, 0.0, 0.0, 1.0); 3];
-    scene.materials[0].normal_texture = Some(map.into());
+    scene.materials[0].textures[TextureSlot::Normal as usize] = Some(map.into());
     let point = SurfacePoint::at(&scene, 0, CENTRE, DOWN);
     let coat = point.shading_frame.world_from_local(point.parameters.clearcoat_normal);
     assert!((coat - Vec3::Z).length() < 1e-6, "{coat}");
     assert!(point.shading_frame.z.x > 0.7);
-    scene.materials[0].normal_texture = None;
-    scene.materials[0].clearcoat_normal_texture = Some(map.into());
+    scene.materials[0].textures[TextureSlot::Normal as usize] = None;
+    scene.materials[0].textures[TextureSlot::ClearcoatNormal as usize] = Some(map.into());
     let point = SurfacePoint::at(&scene, 0, CENTRE, DOWN);
     let coat = point.shading_frame.world_from_local(point.parameters.clearcoat_normal);
     assert!(coat.x > 0.7 && point.shading_frame.z == Vec3::Z, "{coat}");
@@ -109,7 +111,7 @@ fn shading_never_turns_away() {
     let mut random = Random(SplitMix(11));
     let mut scene = triangle(Material { clearcoat: 1.0, ..two_sided() });
     let map = add_texel(&mut scene, [0, 0, 0, 255], false);
-    scene.materials[0].normal_texture = Some(map.into());
+    scene.materials[0].textures[TextureSlot::Normal as usize] = Some(map.into());
     let mut bent = 0;
     for _ in 0..20_000 {
         scene.normals = (0..3).map(|_| random.direction()).collect();
@@ -171,9 +173,9 @@ fn factors_textures_and_vertex_colours_multiply() {
     let base = add_texel(&mut scene, [255, 188, 255, 128], true);
     let packed = add_texel(&mut scene, [9, 51, 102, 9], false);
     scene.colors = vec![Vec4::new(1.0, 1.0, 0.25, 0.5); 3];
-    scene.materials[0].base_color_texture = Some(base.into());
-    scene.materials[0].metallic_roughness_texture = Some(packed.into());
-    scene.materials[0].emissive_texture = Some(base.into());
+    scene.materials[0].textures[TextureSlot::BaseColor as usize] = Some(base.into());
+    scene.materials[0].textures[TextureSlot::MetallicRoughness as usize] = Some(packed.into());
+    scene.materials[0].textures[TextureSlot::Emissive as usize] = Some(base.into());
     let p = SurfacePoint::at(&scene, 0, CENTRE, DOWN).parameters;
     assert!((p.base_color - Vec3::new(0.5, 0.503, 0.25)).abs().max_element() < 1e-3);
     assert!((p.alpha - 0.8 * 128.0 / 255.0 * 0.5).abs() < 1e-6);

@@ -1,6 +1,6 @@
 //! What each importance table keeps of a map.
 
-use lightgrid::environment::{Lookup, SatReport, SatReportRow, TableKind, sat_report};
+use lightgrid::environment::{SatReport, SatReportRow, TableKind, sat_report};
 use lightgrid::image::Image;
 
 use super::{Random, sun};
@@ -23,7 +23,7 @@ fn cloudy(width: u32, height: u32) -> Image {
 
 #[test]
 fn rounding_f64_sums_to_u32_beats_f32_sums_on_an_ordinary_map() {
-    let report = sat_report(&cloudy(2048, 1024), Lookup::Nearest, 0).unwrap();
+    let report = sat_report(&cloudy(2048, 1024), 0).unwrap();
     let [rounded, single] = [TableKind::U32, TableKind::F32].map(|kind| row(&report, kind));
     assert!(rounded.mean_squared_error * 100.0 < single.mean_squared_error, "{report}");
     assert!(row(&report, TableKind::F64).mean_squared_error < 1e-12, "{report}");
@@ -31,26 +31,24 @@ fn rounding_f64_sums_to_u32_beats_f32_sums_on_an_ordinary_map() {
 
 #[test]
 fn rounded_sums_lose_dim_texels_beside_a_sun_and_tile_local_ones_do_not() {
-    for lookup in [Lookup::Bilinear, Lookup::Nearest] {
-        let report = sat_report(&sun(1024, 512, 1e10), lookup, 0).unwrap();
-        let rounded = row(&report, TableKind::U32);
-        assert!(rounded.missed_share > 0.05, "{report}");
-        assert!(rounded.missed_energy_share > 1e-6, "{report}");
-        assert!(rounded.falling_share > 0.005, "{report}");
-        assert!(rounded.misreported_share > 1e-8, "{report}");
-        let local = row(&report, TableKind::TileLocal);
-        assert!(local.mean_squared_error < 1e-6, "{report}");
-        assert_eq!(local.missed_share, 0.0, "{report}");
-        assert_eq!(local.missed_energy_share, 0.0, "{report}");
-        assert_eq!(local.falling_share, 0.0, "{report}");
-        assert_eq!(local.misreported_share, 0.0, "{report}");
-    }
+    let report = sat_report(&sun(1024, 512, 1e10), 0).unwrap();
+    let rounded = row(&report, TableKind::U32);
+    assert!(rounded.missed_share > 0.05, "{report}");
+    assert!(rounded.missed_energy_share > 1e-6, "{report}");
+    assert!(rounded.falling_share > 0.005, "{report}");
+    assert!(rounded.misreported_share > 1e-8, "{report}");
+    let local = row(&report, TableKind::TileLocal);
+    assert!(local.mean_squared_error < 1e-6, "{report}");
+    assert_eq!(local.missed_share, 0.0, "{report}");
+    assert_eq!(local.missed_energy_share, 0.0, "{report}");
+    assert_eq!(local.falling_share, 0.0, "{report}");
+    assert_eq!(local.misreported_share, 0.0, "{report}");
 }
 
 #[test]
 fn a_report_reads_back_and_takes_black_and_tiny_maps() {
     for map in [Image::filled(1, 1, [1.0; 3]), Image::filled(8, 4, [0.0; 3]), cloudy(64, 32)] {
-        let report = sat_report(&map, Lookup::Bilinear, 10).unwrap();
+        let report = sat_report(&map, 10).unwrap();
         assert_eq!(report.rows.len(), TableKind::ALL.len());
         for row in &report.rows {
             assert!(row.mean_squared_error.is_finite(), "{report}");
@@ -62,5 +60,5 @@ fn a_report_reads_back_and_takes_black_and_tiny_maps() {
         assert_eq!(back.rows.len(), report.rows.len());
         assert!(report.to_string().contains("tile-local"));
     }
-    assert!(sat_report(&Image::filled(0, 0, [0.0; 3]), Lookup::Nearest, 1).is_err());
+    assert!(sat_report(&Image::filled(0, 0, [0.0; 3]), 1).is_err());
 }

@@ -1,9 +1,10 @@
 //! Panes, solids and partial coverage, against closed forms.
 
+use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
 
 use glam::{Vec3, Vec4};
-use lightgrid::environment::{Environment, EnvironmentOptions, Lookup};
+use lightgrid::environment::{Environment, EnvironmentOptions};
 use lightgrid::image::Image;
 use lightgrid::path::{PathLimits, World, WorldBuilder};
 use lightgrid::render::{Sampling, Session, View};
@@ -100,7 +101,7 @@ fn shadow_rays_pass_panes_and_veils() {
             .light(sunlight(Vec3::NEG_Y, 3.0))
             .build()
     };
-    let full = 0.6 * 3.0 / std::f64::consts::PI;
+    let full = 0.6 * 3.0 / PI;
     // Off the diagonals, where rays meet both triangles of a quad by rounding.
     let floor_at = |x: f32| probe([x + 0.1, 0.5, 0.2], [x, 0.0, 0.3]);
     let lit = |world: &World, x: f32| {
@@ -150,12 +151,15 @@ fn a_glazed_shaft_is_lit_alike_by_every_mode() {
 #[test]
 fn the_sun_shines_through_a_pane_with_every_tile_distribution() {
     let map = Image::from_fn(128, 64, |x, y| [if (x, y) == (77, 0) { 1e5 } else { 0.0 }; 3]);
-    let options = EnvironmentOptions { lookup: Lookup::Nearest, ..Default::default() };
-    let environment = Environment::new(map, &options).expect("a sound map");
-    // The topmost texel reaches 2.8 degrees from the zenith, where the cosine is 1 within 0.2 %.
-    let edge = std::f64::consts::PI / 64.0;
-    let irradiance = 1e5 * std::f64::consts::TAU / 128.0 * 0.5 * edge.sin().powi(2);
-    let expected = 0.7 / std::f64::consts::PI * irradiance * pane_transmittance(1.0);
+    let environment = Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+    // As bright as at its centre up to the zenith, the topmost texel fades in the next row, linearly in
+    // the cosine: until 4.2 degrees, where the pane is as clear as at the zenith. Across it is a tent,
+    // whose integral is that of one texel.
+    let [center, end] = [1.0, 3.0].map(|halves: f64| (PI / 128.0 * halves).cos());
+    let within = 0.5 * (1.0 - center * center);
+    let fading = (center - end) * (2.0 * center + end) / 6.0;
+    let irradiance = 1e5 * 2.0 * PI / 128.0 * (within + fading);
+    let expected = 0.7 / PI * irradiance * pane_transmittance(1.0);
     let glazed = shaft(WorldBuilder::default(), 0.7, Some(&pane()));
     for mode in [Sampling::Plain, Sampling::Talk, Sampling::Adaptive] {
         let film = render(&glazed, &environment, view(at_the_origin(), mode, 1), 256);

@@ -8,8 +8,8 @@ use lightgrid::path::{PathLimits, World, WorldBuilder};
 use lightgrid::render::{Sampling, View};
 use lightgrid::scene::{Camera, Material};
 
-use super::scenes::{lambert, room, unlit};
-use super::{MODES, constant, environment, expect, expect_same_mean, probe, render, view};
+use super::scenes::{lambert, lamp, room, unlit};
+use super::{MODES, constant, environment, expect, expect_same_mean, mean, probe, render, view};
 
 #[test]
 fn a_white_corner_vanishes_in_uniform_light() {
@@ -77,6 +77,28 @@ fn unlit_surfaces_show_their_colour_and_end_paths() {
         let camera = probe([0.3, 1.0, 0.2], [0.0; 3]);
         let film = render(&world, &constant(9.0), view(camera, Sampling::Plain, bounces), 4);
         expect("unlit", &film, 0.42, 1e-6);
+    }
+}
+
+/// By Schlick's approximation of an index of 1.5, as `KHR_materials_clearcoat` says.
+#[test]
+fn a_coat_keeps_back_what_it_reflects_of_emitted_light() {
+    let coated = Material { clearcoat: 0.5, ..lamp(2.0) };
+    let world = WorldBuilder::default().quad(
+        &coated,
+        [-50.0, -50.0, 0.0],
+        [100.0, 0.0, 0.0],
+        [0.0, 100.0, 0.0],
+    );
+    let world = world.build();
+    for cosine in [1.0_f32, 0.5, 0.25] {
+        let eye = Vec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine) * 4.0;
+        let camera = Camera::look_at(eye, Vec3::ZERO, 0.001);
+        let film = render(&world, &constant(0.0), view(camera, Sampling::Plain, 1), 1);
+        let fresnel = 0.04 + 0.96 * (1.0 - cosine).powi(5);
+        let expected = f64::from(2.0 * (1.0 - 0.5 * fresnel));
+        let found = mean(&film).luminance;
+        assert!((found / expected - 1.0).abs() < 0.01, "{cosine}: {found}, not {expected}");
     }
 }
 

@@ -4,7 +4,7 @@ use glam::{Affine2, Affine3A, Mat3, Vec3};
 use lightgrid::path::{World, WorldBuilder};
 use lightgrid::scene::{
     AlphaMode, Camera, Material, Projection, PunctualKind, PunctualLight, Texture, TextureImage,
-    TextureRef, Wrap,
+    TextureRef, TextureSlot, Wrap,
 };
 
 /// [`Material::lambert`].
@@ -45,11 +45,8 @@ pub(crate) fn smoked_glass() -> Material {
 /// [`with_half_texture`].
 pub(crate) fn half_masked(material: Material) -> Material {
     let texture = TextureRef { texture: 0, uv_set: 0, transform: Affine2::IDENTITY };
-    Material {
-        base_color_texture: Some(texture.into()),
-        alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
-        ..material
-    }
+    Material { alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..material }
+        .with_texture(TextureSlot::BaseColor, texture)
 }
 
 pub(crate) fn blended(material: Material, alpha: f32) -> Material {

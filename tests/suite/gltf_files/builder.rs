@@ -141,8 +141,10 @@ pub(crate) fn check_consistency(scene: &Scene) {
         assert!((tangent.truncate().length() - 1.0).abs() < 1e-4 && tangent.w.abs() == 1.0);
     }
     for material in &scene.materials {
-        for reference in material.textures() {
-            assert!(reference.is_none_or(|it| (it.texture as usize) < scene.textures.len()));
+        for reference in &material.textures {
+            assert!(
+                reference.as_ref().is_none_or(|it| (it.texture as usize) < scene.textures.len())
+            );
         }
     }
 }

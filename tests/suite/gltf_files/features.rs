@@ -1,9 +1,14 @@
 //! One small file made here for each feature of the format.
 
 use glam::{Vec2, Vec3, Vec4};
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder as _};
 use lightgrid::features::Features;
 use lightgrid::scene::needs::SceneNeeds;
-use lightgrid::scene::{AlphaMode, Medium, Projection, PunctualKind, Scene, Wrap, gltf};
+use lightgrid::scene::texture::sample_texture;
+use lightgrid::scene::{
+    AlphaMode, Medium, Projection, PunctualKind, Scene, TextureSlot, Wrap, gltf,
+};
 
 use super::builder::{Builder, ONE_MESH, SQUARE, square, textured_material};
 
@@ -148,7 +153,7 @@ fn texture_transform_sampler_and_double_use_of_an_image() {
     let material = &scene.materials[0];
     assert_eq!(material.alpha_mode, AlphaMode::Mask { cutoff: 0.25 });
     assert!(material.double_sided && material.base_color.x == 0.5);
-    let reference = material.base_color_texture.as_ref().unwrap();
+    let reference = material.texture(TextureSlot::BaseColor).unwrap();
     assert_eq!(reference.uv_set, 1);
     // Scaled to (2, 4), turned counter-clockwise with v downwards to (4, -2), then moved.
     let uv = reference.transform.transform_point2(Vec2::ONE);
@@ -157,7 +162,7 @@ fn texture_transform_sampler_and_double_use_of_an_image() {
     let texture = scene.textures[reference.texture as usize];
     assert!(texture.srgb && texture.nearest);
     assert_eq!((texture.wrap_u, texture.wrap_v), (Wrap::ClampToEdge, Wrap::MirroredRepeat));
-    let data = material.metallic_roughness_texture.as_ref().unwrap();
+    let data = material.texture(TextureSlot::MetallicRoughness).unwrap();
     assert!(!scene.textures[data.texture as usize].srgb);
     assert_eq!(scene.images[0].texels.rgba()[..], [[255, 0, 0, 255]]);
     assert_eq!((scene.uvs[0].len(), scene.uvs[1].len()), (0, 4));
@@ -322,11 +327,10 @@ fn newer_material_extensions() {
     assert_eq!((material.anisotropy, material.anisotropy_rotation), (0.5, 2.0));
     assert_eq!(material.sheen_color, Vec3::new(1.0, 0.5, 0.0));
     assert_eq!(material.sheen_roughness, 0.3);
-    let srgb = |texture: &Option<Box<lightgrid::scene::TextureRef>>| {
-        scene.textures[texture.as_ref().expect("it is read").texture as usize].srgb
-    };
-    assert!(srgb(&material.sheen_color_texture));
-    assert!(!srgb(&material.sheen_roughness_texture) && !srgb(&material.anisotropy_texture));
+    let srgb =
+        |slot| scene.textures[material.texture(slot).expect("it is read").texture as usize].srgb;
+    assert!(srgb(TextureSlot::SheenColor));
+    assert!(!srgb(TextureSlot::SheenRoughness) && !srgb(TextureSlot::Anisotropy));
     // The file has no tangents, and the direction needs them: u grows along +X.
     assert!(scene.tangents.iter().all(|t| t.truncate().abs_diff_eq(Vec3::X, 1e-5)));
     let needs = SceneNeeds::of(&scene);
@@ -349,10 +353,10 @@ fn newer_material_extensions() {
     assert_eq!(material.iridescence_thickness, [50.0, 600.0]);
     assert_eq!(material.diffuse_transmission, 0.4);
     assert_eq!(material.diffuse_transmission_color, Vec3::new(0.1, 0.2, 0.3));
-    assert!(material.iridescence_texture.is_some());
-    assert!(material.iridescence_thickness_texture.is_some());
-    assert!(material.diffuse_transmission_texture.is_some());
-    assert!(material.diffuse_transmission_color_texture.is_some());
+    assert!(material.texture(TextureSlot::Iridescence).is_some());
+    assert!(material.texture(TextureSlot::IridescenceThickness).is_some());
+    assert!(material.texture(TextureSlot::DiffuseTransmission).is_some());
+    assert!(material.texture(TextureSlot::DiffuseTransmissionColor).is_some());
     assert!(scene.tangents.is_empty());
 
     let glass = r#""KHR_materials_transmission":{"transmissionFactor":1},
@@ -384,6 +388,49 @@ fn specular_glossiness_is_converted() {
     assert_eq!(material.base_color, Vec4::new(0.1, 0.2, 0.3, 1.0));
     assert_eq!((material.metallic, material.roughness, material.ior), (0.0, 0.25, 0.0));
     assert_eq!(material.specular_color, Vec3::new(0.4, 0.5, 0.6));
+}
+
+/// A texture's alpha is how smooth the surface is there.
+#[test]
+fn a_glossiness_texture_becomes_one_of_roughness() {
+    let mut png = Vec::new();
+    let pixels = [[255, 0, 0, 255_u8], [0, 0, 255, 51]];
+    let encoder = PngEncoder::new(&mut png);
+    encoder.write_image(pixels.as_flattened(), 2, 1, ExtendedColorType::Rgba8).expect("encoded");
+    let bytes: String = png.iter().map(|byte| format!("%{byte:02X}")).collect();
+    let uri = format!("data:image/png,{bytes}");
+    let scene = square().load(&format!(
+        r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,"material":0}}]}}],
+        "nodes":[{{"mesh":0}}],"images":[{{"uri":"{uri}"}}],"textures":[{{"source":0}}],
+        "materials":[{{"extensions":{{"KHR_materials_pbrSpecularGlossiness":
+        {{"glossinessFactor":0.5,"specularGlossinessTexture":{{"index":0}}}}}}}}]"#
+    ));
+    assert!(scene.notices.is_empty(), "{:?}", scene.notices);
+    let material = &scene.materials[0];
+    let texture = material.texture(TextureSlot::MetallicRoughness).expect("of roughness");
+    for (u, roughness) in [(0.25, 0.5), (0.75, 0.9)] {
+        let value = sample_texture(&scene, texture, Vec2::new(u, 0.5));
+        assert!((material.roughness * value.y - roughness).abs() < 0.003, "{u}: {value}");
+    }
+    let color = material.texture(TextureSlot::SpecularColor).expect("of its colour");
+    assert_ne!(
+        scene.textures[color.texture as usize].image,
+        scene.textures[texture.texture as usize].image
+    );
+}
+
+#[test]
+fn hidden_nodes_and_what_is_below_them_are_not_seen() {
+    let scene = square().load(
+        r#""extensionsUsed":["KHR_node_visibility"],"cameras":[{"type":"perspective",
+        "perspective":{"yfov":0.5,"znear":0.1}}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+        "nodes":[{"mesh":0,"extensions":{"KHR_node_visibility":{"visible":true}}},
+        {"extensions":{"KHR_node_visibility":{"visible":false}},"children":[2,3]},
+        {"mesh":0,"translation":[5,0,0],"extensions":{"KHR_node_visibility":{"visible":true}}},{"camera":0}]"#,
+    );
+    assert!(scene.notices.is_empty(), "{:?}", scene.notices);
+    assert_eq!((scene.triangles.len(), scene.cameras.len()), (2, 1));
 }
 
 #[test]
@@ -463,7 +510,7 @@ fn external_files_data_uris_and_missing_images() {
     let scene = gltf::load(&path).unwrap();
     assert_eq!((scene.triangles.len(), scene.name.as_str()), (2, "scene.gltf"));
     // The missing picture is named, and its material falls back to its factors.
-    assert!(scene.materials[0].base_color_texture.is_none());
+    assert!(scene.materials[0].texture(TextureSlot::BaseColor).is_none());
     let notice = scene.notices.iter().next().unwrap();
     assert!(notice.contains("`gone.png`: there is no such file"), "{notice}");
     // Damaged pictures and WebP ones.

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use lightgrid::image::ldr::{LdrHeader, LdrImage, decode_ldr};
-use lightgrid::scene::{Scene, Wrap, gltf};
+use lightgrid::scene::{Scene, TextureSlot, Wrap, gltf};
 
 use super::builder::{Builder, ONE_MESH, square};
 
@@ -281,7 +281,7 @@ fn textures_are_of_basis_pictures() {
     let expected = decode_ldr(&encoded("uastc-rgba-14x9"), "it").expect("a sound file");
     assert_eq!((scene.images[0].width, scene.images[0].height), (14, 9));
     assert_eq!(scene.images[0].texels, expected.pixels);
-    let placed = scene.materials[0].base_color_texture.as_ref().expect("a texture").transform;
+    let placed = scene.materials[0].texture(TextureSlot::BaseColor).expect("a texture").transform;
     assert_eq!(placed.transform_point2(glam::Vec2::ONE), glam::Vec2::new(2.0, 3.0));
 }
 
@@ -317,12 +317,14 @@ fn what_cannot_be_read_is_replaced() {
                 Image 0 (data URI) is used instead";
     assert_eq!(notices(&scene), [said]);
     assert_eq!((scene.images.len(), scene.images[0].width), (1, 1));
-    assert!(scene.materials[0].base_color_texture.is_some());
+    assert!(scene.materials[0].texture(TextureSlot::BaseColor).is_some());
 
     let scene =
         textured(&builder, BASE, both, &format!(r#"{{"uri":"gone.png"}},{}"#, ktx2(spoilt)));
     assert!(notices(&scene)[0].ends_with("200 bytes; materials do without it"));
-    assert!(scene.materials[0].base_color_texture.is_none() && scene.images.is_empty());
+    assert!(
+        scene.materials[0].texture(TextureSlot::BaseColor).is_none() && scene.images.is_empty()
+    );
 
     let view = builder.view(&Made { flags: 1, ..Made::rgba() }.bytes());
     let scene = textured(&builder, BASE, r#"{"source":0}"#, &ktx2(view));

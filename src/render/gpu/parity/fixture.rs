@@ -1,4 +1,4 @@
-//! What probes run on: a scene with one of everything, and maps with each table and look-up.
+//! What probes run on: a scene with one of everything, and maps with each table.
 
 use std::f32::consts::PI;
 
@@ -6,7 +6,7 @@ use glam::{Affine2, DAffine3, DMat3, DQuat, DVec3, Quat, UVec2, Vec2, Vec3, Vec4
 
 use super::cases::Random;
 use crate::bvh::Ray;
-use crate::environment::{Environment, EnvironmentOptions, Lookup, TableKind};
+use crate::environment::{Environment, EnvironmentOptions, TableKind};
 use crate::image::{Image, Texels};
 use crate::light_grid::LightGrid;
 use crate::light_grid::cells::SphericalGrid;
@@ -43,8 +43,7 @@ pub(in super::super) fn instanced_one() -> Fixture {
 }
 
 /// First the one with everything, whose map has tile-local sums; then one for each other table, with
-/// other look-ups, cameras, filters and cells; then the widest and the tallest map; then the first one
-/// with instances.
+/// other cameras, filters and cells; then the widest and the tallest map; then the first one with instances.
 pub(super) fn all() -> [Fixture; 7] {
     use PixelFilter::{BlackmanHarris, Box, Gauss};
     use Sampling::{Adaptive, Plain, Talk};
@@ -72,11 +71,11 @@ pub(super) fn all() -> [Fixture; 7] {
         let grid = grid.expect("the map is not black");
         Fixture { world, environment, view, rays, grid }
     };
-    let map = |table| environment((61, 37), table, Lookup::Bilinear);
-    let large = |size| environment(size, TileLocal, Lookup::Bilinear);
+    let map = |table| environment((61, 37), table);
+    let large = |size| environment(size, TileLocal);
     [
         fixture(foggy(scene(300)), map(TileLocal), thin_lens, BlackmanHarris, Adaptive),
-        fixture(scene(1), environment((61, 37), U32, Lookup::Nearest), camera(), Box, Talk),
+        fixture(scene(1), map(U32), camera(), Box, Talk),
         fixture(scene(1), map(F32), Camera { projection: parallel, ..camera() }, Gauss, Adaptive),
         fixture(scene(1), map(F64), camera(), Gauss, Plain),
         fixture(scene(1), large((16384, 8)), camera(), Box, Plain),
@@ -153,7 +152,7 @@ pub(in super::super) fn view_of(world: &World, sampling: Sampling) -> View {
 
 /// Tiles of unequal size, one of them black, dim ones beside a sun. Radiance is what the device can
 /// hold, so that packing (which has a test of its own) is no part of what is compared.
-fn environment((width, height): (u32, u32), table: TableKind, lookup: Lookup) -> Environment {
+fn environment((width, height): (u32, u32), table: TableKind) -> Environment {
     let mut random = Random::default();
     let map = Image::from_fn(width, height, |x, y| {
         let radiance = match (x, y) {
@@ -165,7 +164,6 @@ fn environment((width, height): (u32, u32), table: TableKind, lookup: Lookup) ->
     });
     let options = EnvironmentOptions {
         table,
-        lookup,
         tile_columns: 7,
         tile_rows: 5,
         rotation_radians: 2.0,
@@ -295,28 +293,8 @@ fn add_textures(scene: &mut Scene, random: &mut Random) {
         let transform = Affine2::from_scale_angle_translation(scale, angle, random.unit2());
         random.below(2).eq(&0).then_some(TextureRef { texture, uv_set, transform }.into())
     };
-    for m in &mut scene.materials {
-        for texture in [
-            &mut m.base_color_texture,
-            &mut m.metallic_roughness_texture,
-            &mut m.normal_texture,
-            &mut m.emissive_texture,
-            &mut m.specular_texture,
-            &mut m.specular_color_texture,
-            &mut m.transmission_texture,
-            &mut m.clearcoat_texture,
-            &mut m.clearcoat_roughness_texture,
-            &mut m.clearcoat_normal_texture,
-            &mut m.anisotropy_texture,
-            &mut m.sheen_color_texture,
-            &mut m.sheen_roughness_texture,
-            &mut m.diffuse_transmission_texture,
-            &mut m.diffuse_transmission_color_texture,
-            &mut m.iridescence_texture,
-            &mut m.iridescence_thickness_texture,
-        ] {
-            *texture = reference();
-        }
+    for texture in scene.materials.iter_mut().flat_map(|m| &mut m.textures) {
+        *texture = reference();
     }
 }
 

@@ -7,12 +7,12 @@ use super::cases::{case, cases, edge_directions, edge_words};
 use super::fixture::Fixture;
 use super::functions::camera;
 use super::twin::{Bound, EXACT, Twin, ulps};
-use crate::environment::{Environment, Lookup, TableKind};
+use crate::environment::{Environment, TableKind};
 use crate::light_grid::WHOLE_MAP;
 use crate::light_grid::cells::dominant_face;
 use crate::render::gpu::layout::unpack_radiance;
 
-/// The probes that depend on the table, the look-up, the cells or the camera.
+/// The probes that depend on the table, the cells or the camera.
 pub(super) fn probes(fixture: &Fixture) -> Vec<Probe<'_>> {
     let mut probes = look_ups(&fixture.environment);
     probes.extend(samples(&fixture.environment));
@@ -46,7 +46,7 @@ fn density_bound(environment: &Environment, direction: Vec3, tile: u32) -> Bound
     let (_, row) = environment.patch_of(direction);
     let (_, intensity) = environment.rotation_and_intensity();
     let brightest = contrast(environment, direction) / intensity / energies[tile as usize] as f32;
-    if environment.kind().0 != TableKind::F64 {
+    if environment.table_kind() != TableKind::F64 {
         return ulps(8.0).of(brightest);
     }
     let share = energies[tile as usize] / energies.iter().sum::<f64>();
@@ -64,10 +64,7 @@ fn polar(environment: &Environment, direction: Vec3) -> f32 {
 fn look_ups(environment: &Environment) -> Vec<Probe<'_>> {
     let map = environment.map();
     let directions = || edge_directions().into_iter().map(|d| case(&[&d]));
-    let is_nearest = environment.kind().1 == Lookup::Nearest;
-    let radiance_bound = move |direction| {
-        if is_nearest { ulps(2.0) } else { ulps(4.0).of(contrast(environment, direction)) }
-    };
+    let radiance_bound = move |direction| ulps(4.0).of(contrast(environment, direction));
     vec![
         Probe::new(
             "unpack_radiance",
@@ -181,7 +178,7 @@ pub(super) fn samples(environment: &Environment) -> Vec<Probe<'_>> {
         },
     );
     // Places at the edges of a dim tile are known to 2^-48 of all energy.
-    let flips = if environment.kind().0 == TableKind::F64 { 300 } else { 500 };
+    let flips = if environment.table_kind() == TableKind::F64 { 300 } else { 500 };
     vec![sample.flips(flips), density.flips(500)]
 }
 

@@ -199,7 +199,7 @@ fn ask(renderer: &mut Renderer, index: usize, probe: &Probe<'_>) -> Vec<u32> {
 /// A fixture, what its probes' WGSL shares, and the probes.
 type Group<'a> = (&'a Fixture, &'static [&'static str], Vec<Probe<'a>>);
 
-/// All probes: most on a scene with everything, those of the map with each table and look-up.
+/// All probes: most on a scene with everything, those of the map with each table.
 fn groups(fixtures: &[Fixture]) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = vec![
         (&fixtures[0], &[], functions::probes(&fixtures[0])),

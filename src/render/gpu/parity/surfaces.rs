@@ -37,7 +37,7 @@ fn place(r: &mut Random, scene: &Scene) -> (u32, Vec2) {
 
 fn textures(scene: &Scene) -> Vec<Probe<'_>> {
     let references: Vec<TextureRef> =
-        scene.materials.iter().flat_map(|m| m.textures()).flatten().copied().collect();
+        scene.materials.iter().flat_map(|m| &m.textures).flatten().map(|t| **t).collect();
     let count = references.len() as u32;
     let edge_uvs = [0.0, 0.5, 1.0, -1.0, 1e9].map(|x| Vec4::new(x, -x, x, x));
     let edges = (0..count).flat_map(move |i| edge_uvs.map(|uvs| case(&[&i, &uvs])));
