@@ -283,6 +283,12 @@ impl Film {
         self.pixels.iter().map(Pixel::samples).min().unwrap_or(0)
     }
 
+    /// What it takes.
+    #[cfg(feature = "window")]
+    pub(crate) fn memory_bytes(&self) -> usize {
+        size_of_val(&*self.pixels) + size_of_val(&*self.surfaces)
+    }
+
     /// All samples taken.
     pub fn total_samples(&self) -> u64 {
         self.pixels.iter().map(|p| u64::from(p.samples)).sum()

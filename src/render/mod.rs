@@ -19,6 +19,8 @@ pub(crate) use gi::CacheTraining;
 pub use gi::Gi;
 use pass::Pass;
 pub use progress::{Figures, Phase, StopRule};
+#[cfg(feature = "window")]
+pub(crate) use session::Suspended;
 pub use session::{Doubling, Session};
 pub use sharing::Sharing;
 pub use view::{Crop, Sampling, View};

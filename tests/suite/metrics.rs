@@ -16,7 +16,7 @@ fn tails_are_the_distributions() {
     for (z, want) in
         [(1.0, 0.317310507862914), (2.0, 0.0455002638963584), (20.0, 5.50724823721247e-89)]
     {
-        assert_relative(two_sided_p(z), want, 1e-12);
+        assert_relative(two_sided_p(z), want, 1e-9);
     }
     assert_eq!((two_sided_p(0.0), two_sided_p(f64::NAN)), (1.0, 0.0));
     for (degrees, want) in [(1, 12.706), (2, 4.303), (9, 2.262), (30, 2.042), (1000, 1.962)] {

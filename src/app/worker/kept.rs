@@ -2,14 +2,14 @@
 
 use std::sync::{Arc, Mutex};
 
-use super::Request;
 use super::device::Device;
+use super::{Point, Request};
 use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::render::film::Film;
 use crate::render::gpu::{Gpu, RayChoice};
-use crate::render::{CacheTraining, Session};
+use crate::render::{CacheTraining, Session, Suspended};
 
 /// What one job leaves for the next.
 pub(super) struct Kept {
@@ -26,7 +26,28 @@ pub(super) struct Kept {
     pub(super) backdrop: Option<(Arc<Request>, Arc<Film>)>,
     /// What paths have trained the radiance cache, and where.
     pub(super) training: Option<(CacheTraining, Arc<Request>)>,
+    /// Pictures that were left for others, oldest first.
+    left: Vec<Left>,
 }
+
+/// A picture that was left for another one: whoever comes back to it finds it as it was.
+pub(super) struct Left {
+    pub(super) request: Arc<Request>,
+    pub(super) session: Suspended,
+    /// What learning had counted, for inspection.
+    pub(super) counters: Option<Arc<LearningGrid>>,
+    /// How its error fell.
+    pub(super) curve: Vec<Point>,
+    /// Seconds that a picture by cached light took beside it.
+    pub(super) cached_seconds: f64,
+}
+
+/// Pictures that were left are kept for one step back and forth.
+const MOST_LEFT: usize = 2;
+/// As long as they take no more than this together.
+const MOST_LEFT_BYTES: usize = 512 << 20;
+/// And have taken at least so long: others are soon made again.
+const LEAST_LEFT_SECONDS: f64 = 1.0;
 
 /// The last distributions that learning ended with.
 pub(super) struct Learned {
@@ -50,7 +71,27 @@ impl Kept {
             snapshots: 0,
             backdrop: None,
             training: None,
+            left: Vec::new(),
         }
+    }
+
+    /// Keeps a picture that is left for another, if it is worth it.
+    pub(super) fn leave(&mut self, left: Left) {
+        if left.session.elapsed_seconds() < LEAST_LEFT_SECONDS {
+            return;
+        }
+        self.left.push(left);
+        let bytes =
+            |all: &[Left]| all.iter().map(|left| left.session.memory_bytes()).sum::<usize>();
+        while self.left.len() > MOST_LEFT || bytes(&self.left) > MOST_LEFT_BYTES {
+            self.left.remove(0);
+        }
+    }
+
+    /// The picture that was left of the very same.
+    pub(super) fn come_back(&mut self, request: &Request) -> Option<Left> {
+        let found = self.left.iter().position(|left| left.request.is_resumed_by(request))?;
+        Some(self.left.remove(found))
     }
 
     /// Lets go of all that is of another scene, which is large. What is seen from where stays right when
@@ -60,6 +101,7 @@ impl Kept {
         let is_other = |of: &Request| !Arc::ptr_eq(&of.world, world);
         self.backdrop.take_if(|(of, _)| is_other(of));
         self.training.take_if(|(_, of)| is_other(of));
+        self.left.retain(|left| !is_other(&left.request));
         self.counted.take_if(|(_, of)| !of.world.is_seen_through_like(world));
         if let Some((_, of)) = self.counted.as_mut().filter(|(_, of)| is_other(of)) {
             *of = Arc::new(Request { world: Arc::clone(world), ..(**of).clone() });

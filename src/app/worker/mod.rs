@@ -306,6 +306,28 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn whoever_comes_back_to_a_picture_finds_it_as_it_was() {
+        let Some(worker) = worker() else { return };
+        let request = request_of("office", [320, 240]);
+        worker.submit(request.clone());
+        let is_worth_it = |now: &Snapshot| now.seconds() > 1.5 && now.is_whole();
+        let before = wait_for(&worker, is_worth_it).now.samples;
+        let crop = crate::render::Crop { corner: [0, 0], whole: [320, 240] };
+        let view = View { width: 80, height: 60, crop: Some(crop), ..request.view.clone() };
+        worker.submit(Request { view, ..request.clone() });
+        wait_for(&worker, |now| now.is_whole() && now.request.view.crop.is_some());
+        // The map was turned and turned back.
+        let environment = Arc::new((*request.environment).clone());
+        worker.submit(Request { environment, ..request.clone() });
+        let after = wait_for(&worker, |now| now.request.view.crop.is_none());
+        assert!(after.now.samples >= before, "{} and then {}", before, after.now.samples);
+        // Begun again by hand it is begun again.
+        worker.submit(Request { run: 1, ..request });
+        let again = wait_for(&worker, |now| now.request.run == 1);
+        assert!(again.now.samples < before);
+    }
+
+    #[test]
     fn a_movement_is_seen_while_it_goes_on() {
         let Some(worker) = worker() else { return };
         let mut request = Request { moving: true, ..request_of("office", [640, 480]) };

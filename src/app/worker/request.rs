@@ -51,6 +51,17 @@ impl Request {
             || self.run != new.run
     }
 
+    /// Whether the very same picture is rendered for both, by a map that may have been turned back meanwhile.
+    pub(super) fn is_resumed_by(&self, new: &Self) -> bool {
+        let (map, other) = (&self.environment, &new.environment);
+        let is_as_lit = map.shares_map_with(other)
+            && map.rotation_and_intensity() == other.rotation_and_intensity();
+        let environment = Arc::clone(other);
+        is_as_lit
+            && self.is_frozen == new.is_frozen
+            && !Self { environment, ..self.clone() }.restarts(new)
+    }
+
     /// Whether `new` is only the next moment of a movement, for which a picture of this one is worth to be seen:
     /// were each ended by the next, none would be seen before the movement ends.
     pub(super) fn is_followed_by(&self, new: &Self) -> bool {

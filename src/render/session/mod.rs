@@ -12,11 +12,15 @@ use std::time::{Duration, Instant};
 mod host_film;
 mod learning;
 mod noise;
+#[cfg(feature = "window")]
+mod suspended;
 
 use host_film::HostFilm;
 use learning::{Learning, Stage};
 pub use noise::Doubling;
 use noise::LEAST_SAMPLES_OF_NOISE;
+#[cfg(feature = "window")]
+pub(crate) use suspended::Suspended;
 
 use super::film::{BEGINNINGS, Film};
 use super::gi::{CacheTraining, PATHS_AT_A_TIME};

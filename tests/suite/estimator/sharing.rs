@@ -40,20 +40,23 @@ fn render(world: &World, environment: &Environment, view: View, samples: u32) ->
 
 /// Mean over seeds of the picture's mean, and its standard error: pixels that share vary together, so
 /// their own spread does not tell it.
-fn over_seeds(picture: impl Fn(u32) -> f64 + Send + Sync) -> (f64, f64) {
-    let means: Vec<f64> = (0..48).into_par_iter().map(picture).collect();
+fn over_seeds(seeds: u32, picture: impl Fn(u32) -> f64 + Send + Sync) -> (f64, f64) {
+    let means: Vec<f64> = (0..seeds).into_par_iter().map(picture).collect();
     let count = means.len() as f64;
     let mean = means.iter().sum::<f64>() / count;
     let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (count - 1.0);
     (mean, (variance / count).sqrt())
 }
 
-/// Asserts that sharing changes no pixel's expectation, and none of the picture's mean within
-/// `precision`.
-fn expect_unbiased(what: &str, world: &World, map: &Environment, camera: &Camera, precision: f64) {
+/// A world, the map above it and where it is seen from.
+type Place<'a> = (&'a World, &'a Environment, &'a Camera);
+
+/// Asserts that sharing changes no pixel's expectation, and none of the picture's mean, whose error over so
+/// many seeds is below `precision`.
+fn expect_unbiased(what: &str, (world, map, camera): Place<'_>, seeds: u32, precision: f64) {
     let alone = picture(camera, Sampling::Plain, Sharing::Off, 1);
     let means = |sharing, first: u32| {
-        over_seeds(|seed| {
+        over_seeds(seeds, |seed| {
             let view = picture(camera, Sampling::Plain, sharing, first + seed);
             mean(&render(world, map, view, 32)).luminance
         })
@@ -85,22 +88,25 @@ fn changed(world: &World, change: impl FnOnce(&mut Scene)) -> World {
 #[test]
 fn in_a_room_open_glazed_and_behind_leaves() {
     let leaf = |material: Material| Material { double_sided: true, ..material };
-    for (what, window) in [
-        ("open", None),
-        ("pane", Some(pane())),
-        ("veil", Some(blended(leaf(lambert(0.6)), 0.4))),
-        (
-            "mask",
-            Some(Material {
-                alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
-                ..leaf(blended(lambert(0.6), 0.4))
-            }),
-        ),
-        // Nothing at all is there, but rays meet it.
-        ("nothing", Some(blended(leaf(lambert(0.6)), 0.0))),
-    ] {
+    for (what, window) in
+        [("open", None), ("pane", Some(pane())), ("veil", Some(blended(leaf(lambert(0.6)), 0.4)))]
+    {
         let (world, camera) = room(0.7, window.as_ref());
-        expect_unbiased(what, &world, &overcast(), &camera, 0.006);
+        expect_unbiased(what, (&world, &overcast(), &camera), 48, 0.006);
+    }
+    // Nothing at all is there, but rays meet it.
+    let masked = Material {
+        alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
+        ..leaf(blended(lambert(0.6), 0.4))
+    };
+    let (open, camera) = room(0.7, None);
+    for nothing in [masked, blended(leaf(lambert(0.6)), 0.0)] {
+        for sharing in SHARED {
+            let film = |world| {
+                render(world, &overcast(), picture(&camera, Sampling::Plain, sharing, 5), 16)
+            };
+            assert!(film(&room(0.7, Some(&nothing)).0).pixels() == film(&open).pixels());
+        }
     }
 }
 
@@ -128,7 +134,7 @@ fn where_normals_are_bent_and_metal_is_bumpy() {
             }
             scene.normals = normals;
         });
-        expect_unbiased(what, &world, &overcast(), &camera, 0.01);
+        expect_unbiased(what, (&world, &overcast(), &camera), 24, 0.01);
     }
 }
 
@@ -151,7 +157,7 @@ fn with_a_lamp_and_wires() {
             quad(1 + wire % 2, corner, Vec3::Y * 0.012, Vec3::Z * 1.8);
         }
     });
-    expect_unbiased("lamp and wires", &world, &overcast(), &camera, 0.006);
+    expect_unbiased("lamp and wires", (&world, &overcast(), &camera), 48, 0.006);
 }
 
 #[test]
@@ -172,7 +178,7 @@ fn in_fog_of_all_kinds() {
     };
     for (what, medium) in [("haze", haze), ("smoke", smoke), ("coloured, below", coloured)] {
         let world = changed(&world, |scene| scene.medium = Some(medium));
-        expect_unbiased(what, &world, &overcast(), &camera, 0.01);
+        expect_unbiased(what, (&world, &overcast(), &camera), 24, 0.01);
     }
 }
 
@@ -187,7 +193,7 @@ fn in_scenes_of_all_kinds() {
         let world = World::new(builtin::build(name).expect("a scene"));
         let map = sky::build(map, 256, 128).expect("a sky");
         let map = Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
-        expect_unbiased(name, &world, &map, &world.scene.cameras[0], 0.03);
+        expect_unbiased(name, (&world, &map, &world.scene.cameras[0]), 12, 0.01);
     }
 }
 
@@ -214,7 +220,7 @@ fn the_error_has_no_floor() {
     let (world, camera) = room(0.7, Some(&pane()));
     let environment = overcast();
     let reference =
-        render(&world, &environment, picture(&camera, Sampling::Plain, Sharing::Off, 1), 1 << 14);
+        render(&world, &environment, picture(&camera, Sampling::Plain, Sharing::Off, 1), 1 << 13);
     let error = |samples: u32| -> f64 {
         let film = render(
             &world,
@@ -246,7 +252,7 @@ fn with_garbage_in_place_of_what_was_learned() {
         LightGrid::with_garbage_distributions(grid, map.tile_energies(), seed).expect("light")
     };
     let means = |sharing, first: u32, is_garbage: bool| {
-        over_seeds(|seed| {
+        over_seeds(48, |seed| {
             let view = picture(&camera, Sampling::Plain, sharing, first + seed);
             let mut session = Session::new(&world, &map, view);
             if is_garbage {

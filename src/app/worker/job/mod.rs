@@ -4,7 +4,6 @@ mod cached;
 mod publishing;
 mod sessions;
 
-use std::borrow::Cow;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError, Weak};
 use std::time::{Duration, Instant};
@@ -12,7 +11,7 @@ use std::time::{Duration, Instant};
 use cached::{CachedPicture, worth};
 use publishing::Reading;
 
-use super::kept::{Kept, Learned};
+use super::kept::{Kept, Learned, Left};
 use super::{Activity, Point, Request, Shared};
 use crate::alarm::Alarm;
 use crate::app::lock;
@@ -99,7 +98,7 @@ impl<'a> Job<'a> {
                 break;
             }
             self.measure(&session);
-            self.keep_backdrop(Cow::Borrowed(session.film()));
+            self.keep_backdrop(session.film());
             self.publish(Activity::Moving, &session, None, &mut CachedPicture::default());
             if session.samples() >= 64 {
                 self.rest();
@@ -113,7 +112,9 @@ impl<'a> Job<'a> {
         let view = self.request.view.clone();
         let keeps_distributions =
             self.request.is_frozen && self.kept.distributions_for(&self.request).is_some();
-        let mut main = if keeps_distributions {
+        let mut main = if let Some(session) = self.session_of_before(world, environment) {
+            session
+        } else if keeps_distributions {
             self.experienced_session(world, environment, view.clone())
         } else {
             self.learning_session(world, environment, view.clone())
@@ -192,8 +193,23 @@ impl<'a> Job<'a> {
         }
         cached.end(|session| self.kept.keep_training(session, &self.request));
         if self.request.previews {
-            self.keep_backdrop(Cow::Owned(main.into_film()));
+            self.leave(main);
         }
+    }
+
+    /// Puts the picture aside for another one.
+    fn leave(&mut self, main: Session<'_>) {
+        let session = main.suspend();
+        if let Some(film) = session.film() {
+            self.keep_backdrop(film);
+        }
+        self.kept.leave(Left {
+            request: Arc::clone(&self.request),
+            session,
+            counters: self.counters.take(),
+            curve: std::mem::take(&mut self.curves[MAIN]),
+            cached_seconds: self.cached_seconds,
+        });
     }
 
     /// Some samples of the picture that is next: the plain one at equal time, learning included, the cached

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use super::Job;
+use super::{Job, MAIN};
 use crate::app::lock;
 use crate::environment::Environment;
 use crate::error::Result;
@@ -34,6 +34,18 @@ impl Job<'_> {
             view.gi = Gi::Cached;
         }
         self.experienced_session(world, environment, view)
+    }
+
+    /// The session of this very picture that was left for another one, if it was not long ago.
+    pub(super) fn session_of_before<'b>(
+        &mut self,
+        world: &'b World,
+        environment: &'b Environment,
+    ) -> Option<Session<'b>> {
+        let left = self.kept.come_back(&self.request)?;
+        (self.counters, self.cached_seconds) = (left.counters, left.cached_seconds);
+        self.curves[MAIN] = left.curve;
+        Some(Session::resume(world, environment, left.session))
     }
 
     /// A session that learns, from what is known of the scene if the camera has not gone far.

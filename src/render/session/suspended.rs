@@ -1,0 +1,133 @@
+//! A session that is put aside: without the world and the map, which it borrows, and without a GPU.
+
+use std::sync::Mutex;
+
+use super::host_film::HostFilm;
+use super::learning::Learning;
+use super::{Doubling, Session};
+use crate::environment::Environment;
+use crate::light_grid::LightGrid;
+use crate::path::World;
+use crate::path::camera::CameraRays;
+use crate::render::film::Film;
+use crate::render::gi::CacheTraining;
+use crate::render::{Figures, View};
+use crate::sampler::Sequence;
+
+/// All that a [`Session`] has of its own.
+pub(crate) struct Suspended {
+    view: View,
+    rays: CameraRays,
+    film: HostFilm,
+    samples: u32,
+    skipped: u32,
+    doubling: Mutex<Doubling>,
+    whole_map: Option<LightGrid>,
+    learned: Option<LightGrid>,
+    sequence: Sequence,
+    learning: Option<Learning>,
+    training: Option<CacheTraining>,
+    figures: Figures,
+}
+
+impl<'a> Session<'a> {
+    /// Puts it aside, with what a GPU has as far as it can still be read.
+    pub(crate) fn suspend(mut self) -> Suspended {
+        self.continue_on_cpu();
+        self.film();
+        Suspended {
+            view: self.view,
+            rays: self.rays,
+            film: self.film,
+            samples: self.samples,
+            skipped: self.skipped,
+            doubling: self.doubling,
+            whole_map: self.whole_map,
+            learned: self.learned,
+            sequence: self.sequence,
+            learning: self.learning,
+            training: self.training,
+            figures: self.figures,
+        }
+    }
+
+    /// Goes on, on the CPU, with what was put aside, in the same world under the same map.
+    pub(crate) fn resume(
+        world: &'a World,
+        environment: &'a Environment,
+        suspended: Suspended,
+    ) -> Self {
+        Self {
+            world,
+            environment,
+            gpu: None,
+            view: suspended.view,
+            rays: suspended.rays,
+            film: suspended.film,
+            samples: suspended.samples,
+            skipped: suspended.skipped,
+            doubling: suspended.doubling,
+            whole_map: suspended.whole_map,
+            learned: suspended.learned,
+            sequence: suspended.sequence,
+            learning: suspended.learning,
+            training: suspended.training,
+            figures: suspended.figures,
+        }
+    }
+}
+
+impl Suspended {
+    /// The film; it was read when the session was put aside.
+    pub(crate) fn film(&self) -> Option<&Film> {
+        self.film.known()
+    }
+
+    /// Seconds of learning and rendering.
+    pub(crate) fn elapsed_seconds(&self) -> f64 {
+        self.figures.elapsed_seconds()
+    }
+
+    /// Bytes of film, distributions and counters.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        let grid = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
+        let counters = self.learning.as_ref().map_or(0, |l| l.grid.counters.memory_bytes());
+        self.film().map_or(0, Film::memory_bytes) + grid + counters
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+    use crate::environment::{EnvironmentOptions, sky};
+    use crate::render::Sampling;
+    use crate::scene::builtin;
+
+    #[test]
+    fn what_was_put_aside_goes_on_to_the_same_picture() {
+        let world = World::new(builtin::build("crack").expect("built in"));
+        let map = sky::build("day", 64, 32).expect("a sky");
+        let environment =
+            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        for sampling in [Sampling::Adaptive, Sampling::Talk, Sampling::Plain] {
+            let view = View {
+                sampling,
+                learning_paths: 4096,
+                ..View::new(world.scene.cameras[0].clone(), [24, 16])
+            };
+            let render = |is_put_aside: bool| {
+                let mut session = Session::new(&world, &environment, view.clone());
+                while session.samples() < 7 {
+                    session.advance(1, &AtomicBool::new(false)).expect("the CPU does not fail");
+                    if is_put_aside {
+                        session = Session::resume(&world, &environment, session.suspend());
+                    }
+                }
+                session.film().clone()
+            };
+            assert!(render(true) == render(false), "{sampling:?}");
+        }
+    }
+}
