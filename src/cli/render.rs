@@ -16,7 +16,7 @@ use super::progress::Progress;
 use crate::alarm::Alarm;
 use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
-use crate::light_grid::{LearningGrid, LightGrid};
+use crate::light_grid::LearningGrid;
 use crate::memory;
 use crate::output::record::{Phases, Record};
 use crate::output::{self, Exposure};
@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     let (world, load_scene_seconds, build_bvh_seconds) = world?;
     let (environment, map_notices, load_map_seconds, build_table_seconds) = light?;
     if let Some(path) = &arguments.distributions
-        && LightGrid::whole_map(environment.tile_energies()).is_none()
+        && environment.is_black()
     {
         return Err(outputs::without_distributions(path));
     }

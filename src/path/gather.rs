@@ -106,7 +106,7 @@ impl Path<'_> {
 
     fn light_of_lamps(&mut self, vertex: &Vertex<'_>, bits: [u32; 2]) -> Option<Arriving> {
         let world = self.tracer.world;
-        let sample = world.lights.sample(&world.scene, &vertex.receiver(), bits)?;
+        let sample = world.lights.sample(world, &vertex.receiver(), bits)?;
         let (f, own_pdf) = vertex.scatterer.scattered(sample.direction)?;
         let transmittance = self.transmittance(vertex, sample.direction, sample.distance);
         if transmittance == Vec3::ZERO {

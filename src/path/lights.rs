@@ -4,8 +4,10 @@ use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
+use super::World;
 use super::light_tree::{Light, LightTree, Moments, Receiver, TreeArrays};
 use crate::bsdf;
+use crate::bvh::Hit;
 use crate::color::importance;
 use crate::sampler::unit_from_bits;
 use crate::scene::needs::is_emitter;
@@ -96,10 +98,11 @@ impl LocalLights {
     /// Samples a light as seen from a place. `None` where it does not shine that way.
     pub fn sample(
         &self,
-        scene: &Scene,
+        world: &World,
         receiver: &Receiver,
         bits: [u32; 2],
     ) -> Option<LightSample> {
+        let scene = &world.scene;
         let choice = self.tree.sample(receiver, bits[0]);
         let probability = choice.probability;
         let Some(&triangle) = self.triangles.get(choice.light as usize) else {
@@ -117,7 +120,7 @@ impl LocalLights {
         let direction = to_light / distance;
         let pdf_solid_angle =
             probability * area_to_solid_angle(&corners, direction, distance * distance)?;
-        let point = SurfacePoint::at(scene, triangle, barycentric, direction);
+        let point = world.point(&Hit { t: distance, triangle, barycentric }, direction);
         let radiance = emitted(scene, &point, -direction);
         (radiance.max_element() > 0.0).then(|| LightSample {
             direction,

@@ -15,7 +15,7 @@ use crate::huge_pages::on_huge_pages;
 use crate::memory;
 use crate::scene::needs::SceneNeeds;
 use crate::scene::surface::{SurfacePoint, alpha_at};
-use crate::scene::{AlphaMode, Material, Scene, TextureImage};
+use crate::scene::{AlphaMode, Material, PunctualKind, PunctualLight, Scene, TextureImage};
 
 /// Everything about the scene that paths ask for.
 pub struct World {
@@ -93,6 +93,18 @@ impl World {
         let emissive = self.scene.materials.iter().map(|material| material.emissive.max_element());
         let lights = self.scene.lights.iter().map(|light| light.intensity.max_element());
         emissive.chain(lights).fold(map, f32::max)
+    }
+
+    /// The same, and what lamps make of surfaces that are no nearer to them than this.
+    pub(crate) fn brightest_lit(&self, environment: &Environment, nearest: f32) -> f32 {
+        let irradiance = |light: &PunctualLight| match light.kind {
+            PunctualKind::Directional => light.intensity.max_element(),
+            PunctualKind::Point | PunctualKind::Spot { .. } => {
+                light.intensity.max_element() / (nearest * nearest)
+            }
+        };
+        let of_lamps = self.scene.lights.iter().map(irradiance);
+        of_lamps.fold(self.brightest(environment), f32::max)
     }
 
     /// Times all rays from now on, which slows them down a little.

@@ -126,6 +126,9 @@ pub(super) fn render(
     };
     let mut done = (0, 0);
     for sample in film.min_samples()..pass.target {
+        if cancel.load(Ordering::Relaxed) {
+            break;
+        }
         let seed = pass.sequence.seed(view.seed);
         let tiling = tile.tiling([film.width, film.height], seed, sample);
         let tiles = film.tiles(tile.side, tile.side, tiling.before).into_par_iter();

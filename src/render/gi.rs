@@ -55,16 +55,16 @@ impl CacheTraining {
         view: &View,
         rays: &CameraRays,
     ) -> Option<Self> {
-        let brightest = world.brightest(environment);
-        if view.gi == Gi::Exact || view.limits.bounces < 2 || brightest <= 0.0 {
+        if view.gi == Gi::Exact || view.limits.bounces < 2 {
             return None;
         }
         let distance = middle_distance(world, [view.width, view.height], rays)?;
-        let cells = CacheCells {
-            center: rays.position(),
-            edge: EDGE * distance,
-            least_distance: 0.5 * distance,
-        };
+        let edge = EDGE * distance;
+        let brightest = world.brightest_lit(environment, edge);
+        if brightest <= 0.0 {
+            return None;
+        }
+        let cells = CacheCells { center: rays.position(), edge, least_distance: 0.5 * distance };
         let sums = RadianceSums::new(cells, brightest);
         Some(Self { sums, paths: 0, wanted: 0, cache: None, brightest })
     }

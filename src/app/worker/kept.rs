@@ -101,7 +101,9 @@ impl Kept {
         let is_other = |of: &Request| !Arc::ptr_eq(&of.world, world);
         self.backdrop.take_if(|(of, _)| is_other(of));
         self.training.take_if(|(_, of)| is_other(of));
-        self.left.retain(|left| !is_other(&left.request));
+        let (map, is_lit_by) = (&request.environment, Environment::shares_map_with);
+        self.left
+            .retain(|left| !is_other(&left.request) && is_lit_by(&left.request.environment, map));
         self.counted.take_if(|(_, of)| !of.world.is_seen_through_like(world));
         if let Some((_, of)) = self.counted.as_mut().filter(|(_, of)| is_other(of)) {
             *of = Arc::new(Request { world: Arc::clone(world), ..(**of).clone() });

@@ -222,12 +222,17 @@ impl Assignment {
         if stopped || self.has_learned_enough(session) {
             session.finish_learning();
         }
-        if has_samples && (stopped || session.is_done(&self.rule)) {
+        // A pass that the clock has cut short says nothing of when noise is looked at.
+        let noise = self.rule.noise.filter(|_| session.samples() >= self.target);
+        if has_samples && (stopped || session.is_done(&StopRule { noise, ..self.rule })) {
             session.settle()?;
             return Ok(true);
         }
         let never = AtomicBool::new(false);
-        let cancel = if stopped { &never } else { &**interrupt.asked() };
+        // What is learned of half a pass is not what is learned of it when it is gone on with.
+        let is_counting = session.phase() == Phase::Rendering && !session.has_final_distributions();
+        let is_whole = self.checkpoint.is_some() && self.deadline.is_none() && is_counting;
+        let cancel = if stopped || is_whole { &never } else { &**interrupt.asked() };
         match self.beginning(session) {
             Some(every) => session.begin(every, cancel),
             None => session.advance(self.next_pass(session), cancel)?,

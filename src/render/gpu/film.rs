@@ -42,9 +42,12 @@ pub(crate) struct DeviceFilm {
 }
 
 /// A power of two that brings radiance of this size to where neither sums nor squares leave the range
-/// of f32; 1 for anything between 2^-40 and 2^40.
+/// of f32; 1 for anything between 2^-40 and 2^40, and where nothing shines but unlit colours.
 pub(super) fn scale_for(brightest: f32) -> f32 {
     const REACH: i32 = 40;
+    if brightest <= 0.0 {
+        return 1.0;
+    }
     let exponent = (brightest.clamp(f32::MIN_POSITIVE, f32::MAX).to_bits() >> 23) as i32 - 127;
     2.0_f32.powi(exponent.clamp(-REACH, REACH) - exponent)
 }
@@ -216,7 +219,8 @@ mod tests {
             assert_eq!(scale.to_bits() & 0x7f_ffff, 0, "a power of two");
             let scaled = f64::from(brightest) * f64::from(scale);
             assert!(scaled < 2.3e12 && (scaled > 9e-13 || brightest == 0.0), "{brightest}");
-            assert!(!(1e-12..=1e12).contains(&brightest) || scale == 1.0, "{brightest}");
+            let is_usual = brightest == 0.0 || (1e-12..=1e12).contains(&brightest);
+            assert!(!is_usual || scale == 1.0, "{brightest}");
         }
     }
 

@@ -57,7 +57,9 @@ impl UploadedScene {
             constants: self.constants,
             environment: environment.clone(),
         };
-        if environment.shares_map_with(&self.environment) {
+        // A black map was never uploaded.
+        let is_there = environment.is_black() || !self.environment.is_black();
+        if environment.shares_map_with(&self.environment) && is_there {
             uploaded.globals.set_environment(environment);
         } else {
             upload_map(&mut uploaded.buffers, &mut uploaded.globals, environment)?;

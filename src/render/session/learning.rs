@@ -119,10 +119,17 @@ impl Session<'_> {
             }
             Some(renderer) => renderer.learn(range.clone(), &learning.grid, cancel)?,
         };
-        if cancel.load(Ordering::Relaxed) {
+        if self.gpu.is_some() && rays == 0 {
+            // Cancelled, its counters are as before.
+            return Ok(());
+        }
+        if self.gpu.is_none() && cancel.load(Ordering::Relaxed) {
             // Which paths of the pass were counted depends on the threads: start over.
             self.learned = None;
             self.learning = Learning::new(self.world, self.environment, &self.view, &self.rays);
+            let figures = &mut self.figures;
+            (figures.learning_paths, figures.distribution_paths) = (0, 0);
+            (figures.visited_cells, figures.learned_cells, figures.grid_bytes) = (0, 0, 0);
             return self.take_up_distributions();
         }
         self.figures.learning_rays += rays;

@@ -71,6 +71,7 @@ impl<'a> Session<'a> {
         let rays = view.rays();
         let whole_map = match view.sampling {
             Sampling::Bsdf => None,
+            _ if environment.is_black() => None,
             _ => LightGrid::whole_map(environment.tile_energies()),
         };
         let learning = Learning::new(world, environment, &view, &rays);
@@ -276,7 +277,7 @@ impl<'a> Session<'a> {
     /// If it does not fit on the GPU.
     pub fn set_grid(&mut self, grid: LightGrid) -> Result<()> {
         self.learning = None;
-        self.learned = Some(grid);
+        self.learned = Some(grid).filter(|_| !self.environment.is_black());
         self.take_up_distributions()
     }
 

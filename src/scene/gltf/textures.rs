@@ -43,6 +43,8 @@ pub(super) struct Decoded {
     pub(super) textures: Vec<Texture>,
     pub(super) images: Vec<TextureImage>,
     pub(super) texture_map: Vec<Option<u32>>,
+    /// Textures of roughness by those of glossiness that they were made of, and the bits of the factor on it.
+    rough: HashMap<(u32, u32), u32>,
 }
 
 impl Wanted {
@@ -125,7 +127,7 @@ impl Wanted {
             Some(textures.len() as u32 - 1)
         };
         let texture_map = self.textures.iter().map(place).collect();
-        Decoded { textures, images, texture_map }
+        Decoded { textures, images, texture_map, rough: HashMap::new() }
     }
 }
 
@@ -134,18 +136,30 @@ impl Decoded {
     pub(super) fn make_rough(&mut self, material: &mut Material, factor: f32) {
         let slot = &mut material.textures[TextureSlot::MetallicRoughness as usize];
         let Some(reference) = slot else { return };
-        let texture = self.textures[reference.texture as usize];
-        let glossy = &self.images[texture.image as usize];
-        let Some(texels) = glossy.texels.map_alpha(|alpha| 1.0 - factor * alpha) else {
-            // It is the same everywhere.
+        let glossy = (reference.texture, factor.to_bits());
+        let known = self.rough.get(&glossy).copied();
+        let made = known.or_else(|| self.rough_texture(reference.texture, factor));
+        let Some(rough) = made else {
+            // It is the same everywhere, or there is no memory for it.
             *slot = None;
             return;
         };
-        let image = self.images.len() as u32;
-        self.images.push(TextureImage { texels, ..*glossy });
-        reference.texture = self.textures.len() as u32;
-        self.textures.push(Texture { image, ..texture });
+        self.rough.insert(glossy, rough);
+        reference.texture = rough;
         material.roughness = 1.0;
+    }
+
+    /// A texture of roughness made of the glossiness in another one's alpha, if it has any.
+    fn rough_texture(&mut self, glossy: u32, factor: f32) -> Option<u32> {
+        let texture = self.textures[glossy as usize];
+        let image = &self.images[texture.image as usize];
+        memory::check(image.texels.bytes().len() as u64).ok()?;
+        let texels = image.texels.map_alpha(|alpha| 1.0 - factor * alpha)?;
+        let rough = TextureImage { texels, ..*image };
+        let image = self.images.len() as u32;
+        self.images.push(rough);
+        self.textures.push(Texture { image, ..texture });
+        Some(self.textures.len() as u32 - 1)
     }
 }
 

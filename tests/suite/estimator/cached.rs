@@ -7,9 +7,9 @@ use lightgrid::environment::sky;
 use lightgrid::path::{Background, PathLimits, World, WorldBuilder};
 use lightgrid::render::film::Film;
 use lightgrid::render::{Gi, Sampling, Session, Sharing, View};
-use lightgrid::scene::Camera;
+use lightgrid::scene::{Camera, PunctualKind, PunctualLight};
 
-use super::scenes::{lambert, lamp, room};
+use super::scenes::{lambert, lamp, room, sunlight};
 use super::{constant, environment, learned, mean, render, view};
 
 fn picture(camera: &Camera, gi: Gi, seed: u32) -> View {
@@ -71,6 +71,24 @@ fn a_glowing_box_is_as_bright_as_its_bounces_make_it() {
         eprintln!("{bounces} bounces: {found:.4} for {expected:.4}");
         assert!((found / expected - 1.0).abs() < 0.01, "{bounces}: {found} for {expected}");
     }
+}
+
+/// A lamp without size makes what is near it far brighter than its intensity is a number.
+#[test]
+fn what_a_near_lamp_shines_on_is_not_cut_short() {
+    let side = Vec3::splat(0.05);
+    // Fronts inside.
+    let bulb = PunctualLight {
+        kind: PunctualKind::Point,
+        position: Vec3::new(0.0, 0.038, 0.0),
+        ..sunlight(Vec3::Y, 10.0)
+    };
+    let world = WorldBuilder::default().faces(&lambert(0.7), side, -side, 0..6).light(bulb).build();
+    let camera = Camera::look_at(Vec3::new(0.0, 0.0, 0.045), Vec3::new(0.0, -0.02, 0.0), 1.2);
+    let means = [Gi::Exact, Gi::Cached]
+        .map(|gi| mean(&render(&world, &constant(0.0), picture(&camera, gi, 1), 128)).luminance);
+    eprintln!("{:.3} for {:.3}", means[1], means[0]);
+    assert!(means[0] > 0.0 && (means[1] / means[0] - 1.0).abs() < 0.05, "{means:?}");
 }
 
 /// Two closed rooms with a wall of 5 cm between them, a lamp in one, and a camera that sees both, for it

@@ -31,6 +31,11 @@ impl<'s> CachedPicture<'s> {
         matches!(self, Self::Absent)
     }
 
+    /// Whether it has all its samples.
+    pub(super) fn is_complete(&self) -> bool {
+        matches!(self, Self::Complete(..))
+    }
+
     /// What renders it.
     pub(super) fn session(&self) -> Option<&Session<'s>> {
         match self {

@@ -127,7 +127,10 @@ impl<'a> Job<'a> {
         let mut went_on = Instant::now();
         while let Some(activity) = self.next_activity(&main, plain.as_ref()) {
             if !self.wants_cached(&main) {
-                cached.end(|session| self.kept.keep_training(session, &self.request));
+                // One that is complete may be wanted again with the next key.
+                if !(cached.is_complete() && self.may_want_cached(&main)) {
+                    cached.end(|session| self.kept.keep_training(session, &self.request));
+                }
             } else if cached.is_absent() && self.is_time_for_cached(&main) {
                 let view = View { gi: Gi::Cached, ..view.clone() };
                 let session = self.experienced_session(world, environment, view);
@@ -242,8 +245,12 @@ impl<'a> Job<'a> {
     /// Whether light from a radiance cache is to be shown beside what there is: not where a real GPU has
     /// many samples in a moment, nor where pictures are compared.
     fn wants_cached(&self, main: &Session<'_>) -> bool {
-        self.request.wants_cached
-            && !self.request.split
+        self.request.wants_cached && self.may_want_cached(main)
+    }
+
+    /// Whether it would be, if it was asked for.
+    fn may_want_cached(&self, main: &Session<'_>) -> bool {
+        !self.request.split
             && !self.kept.device.is_quick(&self.request)
             && worth(main.samples()) > 0.0
     }

@@ -153,7 +153,8 @@ impl Job<'_> {
         let before = self.backdrop().filter(|_| !self.kept.backdrop.as_ref().is_some_and(is_own));
         let seen = before.as_ref().map_or(0, |film| film.total_samples());
         let says_more = |samples: u64| 2 * samples > 3 * seen;
-        match cached.film(says_more, rests) {
+        let film = cached.film(says_more, rests).filter(|_| self.request.wants_cached);
+        match film {
             Some((samples, film)) => {
                 let worth = worth(main.samples());
                 Some(Backdrop { film, samples, worth, is_cached: true })

@@ -166,7 +166,7 @@ fn lights(fixture: &Fixture) -> Vec<Probe<'_>> {
             }),
             move |t| {
                 let receiver = take_receiver(t);
-                match world.lights.sample(scene, &receiver, [t.take_word(), t.take_word()]) {
+                match world.lights.sample(world, &receiver, [t.take_word(), t.take_word()]) {
                     Some(light) => {
                         let largest = light.radiance_over_pdf.max_element();
                         t.near(light.radiance_over_pdf, ulps(512.0).of(largest));
