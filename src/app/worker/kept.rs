@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use super::device::Device;
+use super::job::CompletePicture;
 use super::{Point, Request};
 use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid};
@@ -34,12 +35,21 @@ pub(super) struct Kept {
 pub(super) struct Left {
     pub(super) request: Arc<Request>,
     pub(super) session: Suspended,
+    /// The whole picture by cached light, if there was one.
+    pub(super) cached: Option<CompletePicture>,
     /// What learning had counted, for inspection.
     pub(super) counters: Option<Arc<LearningGrid>>,
     /// How its error fell.
     pub(super) curve: Vec<Point>,
     /// Seconds that a picture by cached light took beside it.
     pub(super) cached_seconds: f64,
+}
+
+impl Left {
+    fn memory_bytes(&self) -> usize {
+        let cached = self.cached.as_ref().map_or(0, |(_, film)| film.memory_bytes());
+        self.session.memory_bytes() + cached
+    }
 }
 
 /// Pictures that were left are kept for one step back and forth.
@@ -81,8 +91,7 @@ impl Kept {
             return;
         }
         self.left.push(left);
-        let bytes =
-            |all: &[Left]| all.iter().map(|left| left.session.memory_bytes()).sum::<usize>();
+        let bytes = |all: &[Left]| all.iter().map(Left::memory_bytes).sum::<usize>();
         while self.left.len() > MOST_LEFT || bytes(&self.left) > MOST_LEFT_BYTES {
             self.left.remove(0);
         }

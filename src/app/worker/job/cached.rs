@@ -13,6 +13,9 @@ const SAMPLES: u32 = 16;
 /// falls no further.)
 const WORTH: f32 = 4.0;
 
+/// All of its samples, and its film.
+pub(in crate::app::worker) type CompletePicture = (u64, Arc<Film>);
+
 /// How far it is.
 #[derive(Default)]
 pub(super) enum CachedPicture<'s> {
@@ -25,6 +28,12 @@ pub(super) enum CachedPicture<'s> {
     Complete(u64, Arc<Film>),
 }
 
+impl From<Option<CompletePicture>> for CachedPicture<'_> {
+    fn from(complete: Option<CompletePicture>) -> Self {
+        complete.map_or(Self::Absent, |(samples, film)| Self::Complete(samples, film))
+    }
+}
+
 impl<'s> CachedPicture<'s> {
     /// Whether it has not been begun.
     pub(super) fn is_absent(&self) -> bool {
@@ -34,6 +43,14 @@ impl<'s> CachedPicture<'s> {
     /// Whether it has all its samples.
     pub(super) fn is_complete(&self) -> bool {
         matches!(self, Self::Complete(..))
+    }
+
+    /// What of it another picture may be left for: all, or nothing.
+    pub(super) fn into_complete(self) -> Option<CompletePicture> {
+        match self {
+            Self::Complete(samples, film) => Some((samples, film)),
+            Self::Absent | Self::UnderWay(..) => None,
+        }
     }
 
     /// What renders it.

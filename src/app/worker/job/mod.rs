@@ -8,6 +8,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
+pub(super) use cached::CompletePicture;
 use cached::{CachedPicture, worth};
 use publishing::Reading;
 
@@ -112,7 +113,10 @@ impl<'a> Job<'a> {
         let view = self.request.view.clone();
         let keeps_distributions =
             self.request.is_frozen && self.kept.distributions_for(&self.request).is_some();
-        let mut main = if let Some(session) = self.session_of_before(world, environment) {
+        let (before, mut cached) = self.picture_of_before(world, environment);
+        let mut main = if let Some(session) = before {
+            // Before it goes on.
+            self.publish(Activity::Rendering, &session, None, &mut cached);
             session
         } else if keeps_distributions {
             self.experienced_session(world, environment, view.clone())
@@ -120,7 +124,6 @@ impl<'a> Job<'a> {
             self.learning_session(world, environment, view.clone())
         };
         let mut plain: Option<Session<'_>> = None;
-        let mut cached = CachedPicture::default();
         // Of the cached picture, one after the other.
         let mut turns = 0;
         // When the picture went on last.
@@ -194,14 +197,16 @@ impl<'a> Job<'a> {
                 plain.iter().for_each(|plain| self.note(PLAIN, plain));
             }
         }
-        cached.end(|session| self.kept.keep_training(session, &self.request));
+        if !cached.is_complete() {
+            cached.end(|session| self.kept.keep_training(session, &self.request));
+        }
         if self.request.previews {
-            self.leave(main);
+            self.leave(main, cached);
         }
     }
 
     /// Puts the picture aside for another one.
-    fn leave(&mut self, main: Session<'_>) {
+    fn leave(&mut self, main: Session<'_>, cached: CachedPicture<'_>) {
         let session = main.suspend();
         if let Some(film) = session.film() {
             self.keep_backdrop(film);
@@ -209,6 +214,7 @@ impl<'a> Job<'a> {
         self.kept.leave(Left {
             request: Arc::clone(&self.request),
             session,
+            cached: cached.into_complete(),
             counters: self.counters.take(),
             curve: std::mem::take(&mut self.curves[MAIN]),
             cached_seconds: self.cached_seconds,

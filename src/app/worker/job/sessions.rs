@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+use super::cached::CachedPicture;
 use super::{Job, MAIN};
 use crate::app::lock;
 use crate::environment::Environment;
@@ -36,16 +37,19 @@ impl Job<'_> {
         self.experienced_session(world, environment, view)
     }
 
-    /// The session of this very picture that was left for another one, if it was not long ago.
-    pub(super) fn session_of_before<'b>(
+    /// The session of this very picture that was left for another one, if it was not long ago, and the cached
+    /// picture beside it.
+    pub(super) fn picture_of_before<'b>(
         &mut self,
         world: &'b World,
         environment: &'b Environment,
-    ) -> Option<Session<'b>> {
-        let left = self.kept.come_back(&self.request)?;
+    ) -> (Option<Session<'b>>, CachedPicture<'b>) {
+        let Some(left) = self.kept.come_back(&self.request) else {
+            return (None, CachedPicture::default());
+        };
         (self.counters, self.cached_seconds) = (left.counters, left.cached_seconds);
         self.curves[MAIN] = left.curve;
-        Some(Session::resume(world, environment, left.session))
+        (Some(Session::resume(world, environment, left.session)), left.cached.into())
     }
 
     /// A session that learns, from what is known of the scene if the camera has not gone far.
