@@ -1,6 +1,6 @@
 //! How the estimated error fell, run by run.
 
-use super::worker::{Point, Snapshot};
+use super::worker::Point;
 use crate::render::Sampling;
 
 /// Earlier runs kept.
@@ -11,6 +11,8 @@ const MOST_RUNS: usize = 8;
 pub(crate) struct Run {
     /// What was rendered how.
     pub name: String,
+    /// Of this window, from 1 on.
+    pub number: usize,
     /// In order of time.
     pub points: Vec<Point>,
 }
@@ -19,29 +21,36 @@ pub(crate) struct Run {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Convergence {
     runs: Vec<Run>,
+    /// Runs by now, those that are no longer kept included.
+    count: usize,
     plain: Option<Run>,
     /// Whether the plot's axis is samples rather than seconds.
     pub by_samples: bool,
 }
 
 impl Convergence {
-    /// Takes over what a snapshot says.
-    pub(crate) fn add(&mut self, snapshot: &Snapshot) {
-        let [main, plain] = &snapshot.curves;
+    /// Takes over how the errors of the picture, sampled so, and of the plain one beside it fell.
+    pub(crate) fn add(&mut self, sampling: Sampling, [main, plain]: &[Vec<Point>; 2]) {
         let Some(first) = main.first() else { return };
-        let is_new = self.runs.last().and_then(|run| run.points.first()) != Some(first);
-        if is_new {
-            self.runs
-                .push(Run { name: name_of(snapshot.main.sampling).to_owned(), points: Vec::new() });
-            if self.runs.len() > MOST_RUNS {
-                self.runs.remove(0);
+        // The last one, or one that somebody has come back to.
+        let is_known =
+            |run: &Run| run.points.first().is_some_and(|old| old.seconds == first.seconds);
+        let mut run = match self.runs.iter().rposition(is_known) {
+            Some(at) => self.runs.remove(at),
+            None => {
+                self.count += 1;
+                let name = name_of(sampling).to_owned();
+                Run { name, number: self.count, points: Vec::new() }
             }
+        };
+        run.points.clone_from(main);
+        let number = run.number;
+        self.runs.push(run);
+        if self.runs.len() > MOST_RUNS {
+            self.runs.remove(0);
         }
-        if let Some(run) = self.runs.last_mut() {
-            run.points.clone_from(main);
-        }
-        self.plain =
-            (!plain.is_empty()).then(|| Run { name: "plain".to_owned(), points: plain.clone() });
+        let of_plain = || Run { name: "plain".to_owned(), number, points: plain.clone() };
+        self.plain = (!plain.is_empty()).then(of_plain);
     }
 
     /// Runs, oldest first; the last one is going on.
@@ -60,5 +69,29 @@ pub(crate) fn name_of(sampling: Sampling) -> &'static str {
     match sampling {
         Sampling::Bsdf => "BSDF",
         other => other.name(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_goes_on_later_keeps_its_number() {
+        let mut convergence = Convergence::default();
+        let mut add = |seconds: f64, points: usize| {
+            let point =
+                |i| Point { seconds: seconds + i as f64, samples: 1.0, noise: 0.5, error: None };
+            convergence.add(Sampling::Plain, &[(0..points).map(point).collect(), Vec::new()]);
+            let runs = convergence.runs().iter();
+            runs.map(|run| (run.number, run.points.len())).collect::<Vec<_>>()
+        };
+        assert_eq!(add(1.0, 1), [(1, 1)]);
+        assert_eq!(add(1.0, 2), [(1, 2)]);
+        assert_eq!(add(1.5, 1), [(1, 2), (2, 1)]);
+        assert_eq!(add(1.0, 3), [(2, 1), (1, 3)]);
+        let last = (0..9).map(|i| add(2.0 + 0.1 * f64::from(i), 1)).last().unwrap_or_default();
+        assert_eq!(last.len(), MOST_RUNS);
+        assert_eq!(last.last(), Some(&(11, 1)));
     }
 }

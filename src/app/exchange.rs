@@ -113,7 +113,7 @@ impl App {
         if let Some(snapshot) = snapshot
             && self.snapshot.as_ref().is_none_or(|old| old.number != snapshot.number)
         {
-            self.convergence.add(&snapshot);
+            self.convergence.add(snapshot.main.sampling, &snapshot.curves);
             let plain = snapshot.plain.as_ref();
             self.speed_up = plain.and_then(|plain| SpeedUp::of(&snapshot.main, plain));
             self.snapshot = Some(snapshot);

@@ -121,9 +121,9 @@ fn tick(mark: GridMark, range: &RangeInclusive<f64>, factor: f64) -> String {
 fn lines(convergence: &Convergence, by_samples: bool) -> Vec<Line<'static>> {
     let count = convergence.runs().len();
     let mut lines: Vec<Line<'static>> = Vec::new();
-    let mut add = |run: &Run, number: usize, color: Color32, width: f32| {
+    let mut add = |run: &Run, color: Color32, width: f32| {
         if run.points.len() > 1 {
-            let name = format!("{} · run {number}", run.name);
+            let name = format!("{} · run {}", run.name, run.number);
             let estimate = run.points.iter().map(|point| place(point, point.noise, by_samples));
             let estimate: PlotPoints<'static> = estimate.collect();
             lines.push(Line::new(name.clone(), estimate).color(color).width(width));
@@ -139,11 +139,11 @@ fn lines(convergence: &Convergence, by_samples: bool) -> Vec<Line<'static>> {
     };
     for (i, run) in convergence.runs().iter().enumerate() {
         let is_current = i + 1 == count;
-        let color = if is_current { theme::ACCENT } else { faded(i) };
-        add(run, i + 1, color, if is_current { 2.0 } else { 1.2 });
+        let color = if is_current { theme::ACCENT } else { faded(run.number - 1) };
+        add(run, color, if is_current { 2.0 } else { 1.2 });
     }
     if let Some(run) = convergence.plain() {
-        add(run, count, theme::SECOND, 2.0);
+        add(run, theme::SECOND, 2.0);
     }
     lines
 }

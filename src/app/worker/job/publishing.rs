@@ -187,7 +187,7 @@ impl Job<'_> {
             curve.pop();
         }
         match curve.last_mut() {
-            Some(last) if point.samples <= last.samples => *last = point,
+            Some(last) if point.samples <= last.samples => last.error = point.error.or(last.error),
             _ => curve.push(point),
         }
     }
