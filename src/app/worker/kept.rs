@@ -46,6 +46,12 @@ pub(super) struct Left {
 }
 
 impl Left {
+    /// Whether it has taken long, and there is room for it.
+    pub(super) fn is_worth_it(&self) -> bool {
+        self.session.elapsed_seconds() >= LEAST_LEFT_SECONDS
+            && self.memory_bytes() <= MOST_LEFT_BYTES
+    }
+
     fn memory_bytes(&self) -> usize {
         let cached = self.cached.as_ref().map_or(0, |(_, film)| film.memory_bytes());
         self.session.memory_bytes() + cached
@@ -85,11 +91,8 @@ impl Kept {
         }
     }
 
-    /// Keeps a picture that is left for another, if it is worth it.
+    /// Keeps a picture that is left for another.
     pub(super) fn leave(&mut self, left: Left) {
-        if left.session.elapsed_seconds() < LEAST_LEFT_SECONDS {
-            return;
-        }
         self.left.push(left);
         let bytes = |all: &[Left]| all.iter().map(Left::memory_bytes).sum::<usize>();
         while self.left.len() > MOST_LEFT || bytes(&self.left) > MOST_LEFT_BYTES {

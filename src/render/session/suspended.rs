@@ -83,6 +83,11 @@ impl Suspended {
         self.film.known()
     }
 
+    /// The film alone.
+    pub(crate) fn into_film(mut self) -> Film {
+        self.film.take(&self.view)
+    }
+
     /// Seconds of learning and rendering.
     pub(crate) fn elapsed_seconds(&self) -> f64 {
         self.figures.elapsed_seconds()

@@ -4,6 +4,7 @@ mod cached;
 mod publishing;
 mod sessions;
 
+use std::borrow::Cow;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError, Weak};
 use std::time::{Duration, Instant};
@@ -99,7 +100,7 @@ impl<'a> Job<'a> {
                 break;
             }
             self.measure(&session);
-            self.keep_backdrop(session.film());
+            self.keep_backdrop(Cow::Borrowed(session.film()));
             self.publish(Activity::Moving, &session, None, &mut CachedPicture::default());
             if session.samples() >= 64 {
                 self.rest();
@@ -207,18 +208,21 @@ impl<'a> Job<'a> {
 
     /// Puts the picture aside for another one.
     fn leave(&mut self, main: Session<'_>, cached: CachedPicture<'_>) {
-        let session = main.suspend();
-        if let Some(film) = session.film() {
-            self.keep_backdrop(film);
-        }
-        self.kept.leave(Left {
+        let left = Left {
             request: Arc::clone(&self.request),
-            session,
+            session: main.suspend(),
             cached: cached.into_complete(),
             counters: self.counters.take(),
             curve: std::mem::take(&mut self.curves[MAIN]),
             cached_seconds: self.cached_seconds,
-        });
+        };
+        if !left.is_worth_it() {
+            return self.keep_backdrop(Cow::Owned(left.session.into_film()));
+        }
+        if let Some(film) = left.session.film() {
+            self.keep_backdrop(Cow::Borrowed(film));
+        }
+        self.kept.leave(left);
     }
 
     /// Some samples of the picture that is next: the plain one at equal time, learning included, the cached

@@ -1,5 +1,6 @@
 //! What the window gets of a job.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -52,10 +53,11 @@ impl Job<'_> {
     }
 
     /// Keeps the film for the next one's first moments, unless there is a better one of the same view.
-    pub(super) fn keep_backdrop(&mut self, film: &Film) {
+    pub(super) fn keep_backdrop(&mut self, film: Cow<'_, Film>) {
         let known = self.backdrop().map_or(0, |film| film.total_samples());
         if film.min_samples() > 0 && film.total_samples() > known {
-            self.kept.backdrop = Some((Arc::clone(&self.request), Arc::new(film.clone())));
+            let film = Arc::new(film.into_owned());
+            self.kept.backdrop = Some((Arc::clone(&self.request), film));
         }
     }
 
