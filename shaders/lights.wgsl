@@ -104,9 +104,12 @@ fn emitted(point: SurfacePoint, to_viewer: vec3f) -> vec3f {
     if !(point.front_face || both_sides) {
         return vec3f(0.0);
     }
+    var radiance = point.parameters.emissive * point.parameters.alpha;
+//#if COATED_EMITTERS
     let wo = local_from_world(point.shading_frame, to_viewer);
-    let left = coat_attenuation(coat_new(point.parameters, point.front_face), wo);
-    return point.parameters.emissive * point.parameters.alpha * left;
+    radiance *= coat_attenuation(coat_new(point.parameters, point.front_face), wo);
+//#end
+    return radiance;
 }
 //#end
 

@@ -133,6 +133,8 @@ bitflags::bitflags! {
         /// Textures that few materials have.
         const UNCOMMON_TEXTURES = 1 << 62;
         // Of the scene, again.
+        /// Emissive triangles under a clearcoat.
+        const COATED_EMITTERS = 1 << 49;
         /// Meshes that instances share.
         const INSTANCES = 1 << 63;
     }

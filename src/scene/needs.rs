@@ -17,7 +17,7 @@ pub struct SceneNeeds {
 }
 
 /// A feature of scenes, what it is called, and what is left out without it, with the reason.
-const WORDS: [(Features, &str, Option<&str>); 23] = [
+const WORDS: [(Features, &str, Option<&str>); 24] = [
     (Features::TEXTURES, "Textures", Some("texture reads: no material has a texture")),
     (Features::NORMAL_MAPS, "Normal maps", Some("tangent frames: no material has a normal map")),
     (
@@ -72,6 +72,7 @@ const WORDS: [(Features, &str, Option<&str>); 23] = [
         "Point, spot or directional lights",
         Some("punctual lights: the scene has none"),
     ),
+    (Features::COATED_EMITTERS, "Emissive triangles under a clearcoat", None),
     (Features::INSTANCES, "Meshes shared by instances", None),
 ];
 
@@ -122,6 +123,7 @@ impl SceneNeeds {
             (Features::CLEARCOAT, m.clearcoat > 0.0),
             (Features::UNLIT, m.unlit),
             (Features::EMITTERS, is_emitter(m)),
+            (Features::COATED_EMITTERS, is_emitter(m) && m.clearcoat > 0.0),
         ] {
             *features |= feature.only_if(is_needed);
         }
