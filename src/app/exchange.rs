@@ -142,14 +142,12 @@ impl App {
         self.messages.notices(&scene.world.scene.notices);
         self.settings.recent_scene(&scene.name);
         let is_first = self.scene.is_none();
-        if self.document.viewpoint.is_none() {
-            self.document.viewpoint = Some(first_viewpoint(&scene));
-        }
+        self.scene = Some(scene);
+        self.fill_in_viewpoint();
         if is_first {
             // An empty window is nothing to go back to.
             self.undo.amend(&self.document);
         }
-        self.scene = Some(scene);
         self.inspector.forget();
     }
 

@@ -20,7 +20,7 @@ pub use gi::Gi;
 use pass::Pass;
 pub use progress::{Figures, Phase, StopRule};
 #[cfg(feature = "window")]
-pub(crate) use session::Suspended;
+pub(crate) use session::SessionState;
 pub use session::{Doubling, Session};
 pub use sharing::Sharing;
 pub use view::{Crop, Sampling, View};

@@ -94,6 +94,9 @@ pub struct Crop {
 }
 
 impl View {
+    /// Most pixels of a picture: 40 bytes each stay under 5.4 GB.
+    pub const MAX_PIXELS: u64 = 1 << 27;
+
     /// The same in so many pixels, at least one each way.
     pub fn of_size(&self, width: u32, height: u32) -> Self {
         let mut view = Self { width: width.max(1), height: height.max(1), ..self.clone() };
@@ -111,9 +114,6 @@ impl View {
         }
         view
     }
-
-    /// Most pixels of a picture: 40 bytes each stay under 5.4 GB.
-    pub const MAX_PIXELS: u64 = 1 << 27;
 
     /// What `lightgrid render` takes where nothing else is asked for.
     pub fn new(camera: Camera, [width, height]: [u32; 2]) -> Self {

@@ -10,7 +10,7 @@ use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::render::film::Film;
 use crate::render::gpu::{Gpu, RayChoice};
-use crate::render::{CacheTraining, Session, Suspended};
+use crate::render::{CacheTraining, Session, SessionState};
 
 /// What one job leaves for the next.
 pub(super) struct Kept {
@@ -34,7 +34,7 @@ pub(super) struct Kept {
 /// A picture that was left for another one: whoever comes back to it finds it as it was.
 pub(super) struct Left {
     pub(super) request: Arc<Request>,
-    pub(super) session: Suspended,
+    pub(super) session: SessionState,
     /// The whole picture by cached light, if there was one.
     pub(super) cached: Option<CompletePicture>,
     /// What learning had counted, for inspection.

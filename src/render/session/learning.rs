@@ -84,11 +84,18 @@ impl Session<'_> {
     /// # Errors
     /// If it does not fit on the GPU.
     pub(crate) fn continue_learning(&mut self, counted: &LearningGrid) -> Result<bool> {
-        let goes_on = self.view.distribution_options().is_some_and(|options| options.goes_on());
-        let Some(learning) = self.learning.as_mut().filter(|_| goes_on) else { return Ok(false) };
-        let moved = self.rays.position().distance(counted.grid.center);
-        let is_near = middle_distance(self.world, [self.view.width, self.view.height], &self.rays)
-            .is_some_and(|distance| moved <= MOST_MOVED * distance);
+        let goes_on =
+            self.state.view.distribution_options().is_some_and(|options| options.goes_on());
+        let Some(learning) = self.state.learning.as_mut().filter(|_| goes_on) else {
+            return Ok(false);
+        };
+        let moved = self.state.rays.position().distance(counted.grid.center);
+        let is_near = middle_distance(
+            self.world,
+            [self.state.view.width, self.state.view.height],
+            &self.state.rays,
+        )
+        .is_some_and(|distance| moved <= MOST_MOVED * distance);
         if !is_near || !counted.is_like(&learning.grid) {
             return Ok(false);
         }
@@ -101,21 +108,21 @@ impl Session<'_> {
 
     /// Whether rendered paths count when learning paths have been traced.
     pub(super) fn counts_rendered(&self) -> bool {
-        self.view.distribution_options().is_some_and(|options| {
+        self.state.view.distribution_options().is_some_and(|options| {
             let is_everywhere = options.rendered_paths == RenderedPaths::Everywhere;
-            let is_room = || enclosure(self.world, &self.view) >= ROOM_ENCLOSURE;
+            let is_room = || enclosure(self.world, &self.state.view) >= ROOM_ENCLOSURE;
             options.goes_on() && (is_everywhere || is_room())
         })
     }
 
     /// One learning pass.
     pub(super) fn learn(&mut self, cancel: &AtomicBool) -> Result<()> {
-        let Some(learning) = &self.learning else { return Ok(()) };
-        let range = cpu::learning_range(&self.view, learning.pass);
+        let Some(learning) = &self.state.learning else { return Ok(()) };
+        let range = cpu::learning_range(&self.state.view, learning.pass);
         let rays = match &mut self.gpu {
             None => {
                 let tracer = self.tracer(Some(&learning.grid));
-                cpu::learn(&tracer, &self.rays, &self.view, range.clone(), cancel)
+                cpu::learn(&tracer, &self.state.rays, &self.state.view, range.clone(), cancel)
             }
             Some(renderer) => renderer.learn(range.clone(), &learning.grid, cancel)?,
         };
@@ -125,20 +132,21 @@ impl Session<'_> {
         }
         if self.gpu.is_none() && cancel.load(Ordering::Relaxed) {
             // Which paths of the pass were counted depends on the threads: start over.
-            self.learned = None;
-            self.learning = Learning::new(self.world, self.environment, &self.view, &self.rays);
-            let figures = &mut self.figures;
+            self.state.learned = None;
+            self.state.learning =
+                Learning::new(self.world, self.environment, &self.state.view, &self.state.rays);
+            let figures = &mut self.state.figures;
             (figures.learning_paths, figures.distribution_paths) = (0, 0);
             (figures.visited_cells, figures.learned_cells, figures.grid_bytes) = (0, 0, 0);
             return self.take_up_distributions();
         }
-        self.figures.learning_rays += rays;
-        self.figures.learning_paths = range.end;
-        if let Some(learning) = &mut self.learning {
+        self.state.figures.learning_rays += rays;
+        self.state.figures.learning_paths = range.end;
+        if let Some(learning) = &mut self.state.learning {
             learning.pass += 1;
         }
         self.update_distributions();
-        if range.end >= self.view.learning_paths {
+        if range.end >= self.state.view.learning_paths {
             self.finish_learning();
         }
         self.take_up_distributions()
@@ -146,32 +154,33 @@ impl Session<'_> {
 
     /// Makes distributions of what all passes so far counted: the next pass draws from them.
     pub(super) fn update_distributions(&mut self) {
-        let Some(learning) = &mut self.learning else { return };
+        let Some(learning) = &mut self.state.learning else { return };
         let start = Instant::now();
         learning.grid.counters.end_pass();
         learning.paths_of_pass = 0;
-        self.figures.distribution_paths = self.figures.learning_paths + self.figures.counted_paths;
+        self.state.figures.distribution_paths =
+            self.state.figures.learning_paths + self.state.figures.counted_paths;
         // The old distributions go first: both together would not fit the budget.
-        self.learned = None;
-        self.learned = learning.grid.distributions(self.environment);
-        let distributions = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
+        self.state.learned = None;
+        self.state.learned = learning.grid.distributions(self.environment);
+        let distributions = self.state.learned.as_ref().map_or(0, LightGrid::memory_bytes);
         let held = learning.grid.counters.memory_bytes() + distributions;
-        self.figures.grid_bytes = held;
-        self.figures.grid_peak_bytes = self.figures.grid_peak_bytes.max(held);
-        self.figures.visited_cells = learning.grid.counters.visited_cells();
-        self.figures.learned_cells =
-            self.learned.as_ref().map_or(0, |grid| grid.distributions().len() as usize - 1);
-        self.figures.distribution_seconds += start.elapsed().as_secs_f64();
+        self.state.figures.grid_bytes = held;
+        self.state.figures.grid_peak_bytes = self.state.figures.grid_peak_bytes.max(held);
+        self.state.figures.visited_cells = learning.grid.counters.visited_cells();
+        self.state.figures.learned_cells =
+            self.state.learned.as_ref().map_or(0, |grid| grid.distributions().len() as usize - 1);
+        self.state.figures.distribution_seconds += start.elapsed().as_secs_f64();
     }
 
     /// Makes room in the counters for a pass of so many samples a pixel; returns of how many one
     /// can be counted.
     pub(super) fn prepare_counting(&mut self, samples: u32) -> u32 {
-        let most = cpu::most_paths_per_pass(&self.view);
-        let pixels = u64::from(self.view.width) * u64::from(self.view.height);
+        let most = cpu::most_paths_per_pass(&self.state.view);
+        let pixels = u64::from(self.state.view.width) * u64::from(self.state.view.height);
         let paths = pixels * u64::from(samples);
         let stride = paths.div_ceil(most).max(1);
-        if let Some(learning) = self.learning.as_mut().filter(|learning| !learning.is_over())
+        if let Some(learning) = self.state.learning.as_mut().filter(|learning| !learning.is_over())
             && learning.paths_of_pass + paths.div_ceil(stride) > most
         {
             learning.grid.counters.end_pass();
@@ -184,20 +193,21 @@ impl Session<'_> {
     /// as those in use were made of, where each pixel has a power of two of samples: the points of the
     /// sequences that then end and begin are evenly spread.
     pub(super) fn learn_from_rendered(&mut self, paths: u64, is_whole: bool) -> Result<()> {
-        let Some(learning) = self.learning.as_mut().filter(|learning| !learning.is_over()) else {
+        let Some(learning) = self.state.learning.as_mut().filter(|learning| !learning.is_over())
+        else {
             return Ok(());
         };
-        self.figures.counted_paths += paths;
+        self.state.figures.counted_paths += paths;
         learning.paths_of_pass += paths;
-        let all = self.figures.learning_paths + self.figures.counted_paths;
-        let samples = self.samples;
+        let all = self.state.figures.learning_paths + self.state.figures.counted_paths;
+        let samples = self.state.samples;
         if !is_whole || !samples.is_power_of_two() {
             return Ok(());
         }
         if all >= ENOUGH_PATHS || samples >= LAST_LEARNING_SAMPLE {
             learning.stage = Stage::Over;
         }
-        if all < 2 * self.figures.distribution_paths {
+        if all < 2 * self.state.figures.distribution_paths {
             return Ok(());
         }
         self.update_distributions();
@@ -279,7 +289,7 @@ mod tests {
             let session = Session::on_gpu(&world, &environment, view.clone(), &uploaded);
             let mut session = session.expect("it fits");
             while !session.is_done(&rule) {
-                session.figures.render_seconds = seconds[usize::from(session.samples() > 2)];
+                session.state.figures.render_seconds = seconds[usize::from(session.samples() > 2)];
                 let samples = session.next_pass(&rule);
                 session.advance(samples, &AtomicBool::new(false)).expect("rendered");
             }

@@ -12,15 +12,13 @@ use std::time::{Duration, Instant};
 mod host_film;
 mod learning;
 mod noise;
-#[cfg(feature = "window")]
-mod suspended;
+mod state;
 
 use host_film::HostFilm;
 use learning::{Learning, Stage};
 pub use noise::Doubling;
 use noise::LEAST_SAMPLES_OF_NOISE;
-#[cfg(feature = "window")]
-pub(crate) use suspended::Suspended;
+pub(crate) use state::SessionState;
 
 use super::film::{BEGINNINGS, Film};
 use super::gi::{CacheTraining, PATHS_AT_A_TIME};
@@ -29,7 +27,6 @@ use super::{Figures, Phase, Sampling, StopRule, View, cpu, gpu};
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
-use crate::path::camera::CameraRays;
 use crate::path::{PathTracer, World};
 use crate::sampler::Sequence;
 
@@ -44,24 +41,9 @@ const LEARNING_TIME_SHARE: f64 = 0.05;
 pub struct Session<'a> {
     world: &'a World,
     environment: &'a Environment,
-    view: View,
-    rays: CameraRays,
     /// Does the work, if it is there, in place of the CPU.
     gpu: Option<Box<gpu::Renderer>>,
-    film: HostFilm,
-    /// Fewest samples of any pixel.
-    samples: u32,
-    /// So many first samples of each pixel are others'.
-    skipped: u32,
-    /// The film with half its samples.
-    doubling: Mutex<Doubling>,
-    whole_map: Option<LightGrid>,
-    learned: Option<LightGrid>,
-    sequence: Sequence,
-    /// `None` if nothing is to be learned, or everything has been by others.
-    learning: Option<Learning>,
-    training: Option<CacheTraining>,
-    figures: Figures,
+    state: SessionState,
 }
 
 impl<'a> Session<'a> {
@@ -76,23 +58,21 @@ impl<'a> Session<'a> {
         };
         let learning = Learning::new(world, environment, &view, &rays);
         let training = CacheTraining::new(world, environment, &view, &rays);
-        Self {
-            training,
+        let state = SessionState {
+            view,
+            rays,
             film: HostFilm::new(),
             samples: 0,
             skipped: 0,
             doubling: Mutex::default(),
-            world,
-            environment,
-            view,
-            rays,
-            gpu: None,
             whole_map,
             learned: None,
             sequence: Sequence::default(),
             learning,
+            training,
             figures: Figures::default(),
-        }
+        };
+        Self { world, environment, gpu: None, state }
     }
 
     /// Starts a session on a GPU, to which this world and this environment are uploaded.
@@ -122,7 +102,7 @@ impl<'a> Session<'a> {
             Phase::Learning => {
                 let start = Instant::now();
                 let result = self.learn(cancel);
-                self.figures.learning_seconds += start.elapsed().as_secs_f64();
+                self.state.figures.learning_seconds += start.elapsed().as_secs_f64();
                 result
             }
             Phase::Rendering => {
@@ -139,7 +119,7 @@ impl<'a> Session<'a> {
     /// pixel its next one alone. Does nothing on a GPU, whose first samples come all at once.
     pub fn begin(&mut self, every: u32, cancel: &AtomicBool) {
         let every = every.max(1);
-        if (self.samples == 0 || every == 1) && !self.is_on_gpu() {
+        if (self.state.samples == 0 || every == 1) && !self.is_on_gpu() {
             // Only a GPU fails.
             let _ = self.train(every, cancel);
             let _ = self.render_timed(1, Coverage::Every(every), cancel);
@@ -149,20 +129,21 @@ impl<'a> Session<'a> {
     /// How far apart the pixels are that [`Self::begin`] should give their first sample next: nearer and
     /// nearer. `None` when enough have one to go on with all, and on a GPU.
     pub fn next_beginning(&self) -> Option<u32> {
-        if self.samples > 0 || self.is_on_gpu() {
+        if self.state.samples > 0 || self.is_on_gpu() {
             return None;
         }
         let pixels = |every| {
-            let [columns, rows] = [self.view.width, self.view.height].map(|n| n.div_ceil(every));
+            let [columns, rows] =
+                [self.state.view.width, self.state.view.height].map(|n| n.div_ceil(every));
             u64::from(columns) * u64::from(rows)
         };
-        BEGINNINGS.into_iter().find(|every| self.figures.samples < pixels(*every))
+        BEGINNINGS.into_iter().find(|every| self.state.figures.samples < pixels(*every))
     }
 
     /// Whether pixels all over the picture have a sample: those that [`Self::begin`] begins with or, on a
     /// GPU, all.
     pub fn is_begun(&self) -> bool {
-        self.samples > 0 || (!self.is_on_gpu() && self.film().is_begun())
+        self.state.samples > 0 || (!self.is_on_gpu() && self.film().is_begun())
     }
 
     /// Waits for what a GPU is still at work on and reads its film, so that film and figures are those
@@ -174,8 +155,8 @@ impl<'a> Session<'a> {
         let start = Instant::now();
         if let Some(renderer) = &mut self.gpu {
             renderer.settle()?;
-            self.film.update(&self.view, |film| renderer.read_film(film))?;
-            self.figures.render_seconds += start.elapsed().as_secs_f64();
+            self.state.film.update(&self.state.view, |film| renderer.read_film(film))?;
+            self.state.figures.render_seconds += start.elapsed().as_secs_f64();
         }
         Ok(())
     }
@@ -187,11 +168,12 @@ impl<'a> Session<'a> {
             return;
         }
         let film = self.film();
-        let skipped = u64::from(self.skipped) * film.pixels().len() as u64;
-        (self.samples, self.figures.samples) = (film.min_samples(), film.total_samples() - skipped);
-        self.figures.rays = self.figures().rays;
+        let skipped = u64::from(self.state.skipped) * film.pixels().len() as u64;
+        (self.state.samples, self.state.figures.samples) =
+            (film.min_samples(), film.total_samples() - skipped);
+        self.state.figures.rays = self.figures().rays;
         // With a device goes what was done since its film was read.
-        self.sequence.first_sample = self.sequence.first_sample.min(self.samples);
+        self.state.sequence.first_sample = self.state.sequence.first_sample.min(self.state.samples);
         self.gpu = None;
     }
 
@@ -202,11 +184,17 @@ impl<'a> Session<'a> {
     /// If it does not fit on the device; the session stays where it is.
     pub fn continue_on_gpu(&mut self, uploaded: &gpu::UploadedScene) -> Result<()> {
         let (world, environment) = (self.world, self.environment);
-        let film = (self.figures.samples > 0).then(|| self.film());
-        let mut renderer =
-            gpu::Renderer::new(uploaded, world, environment, &self.view, &self.rays, film)?;
-        renderer.set_grid(self.learned.as_ref().or(self.whole_map.as_ref()))?;
-        renderer.set_cache(self.training.as_ref().and_then(CacheTraining::cache))?;
+        let film = (self.state.figures.samples > 0).then(|| self.film());
+        let mut renderer = gpu::Renderer::new(
+            uploaded,
+            world,
+            environment,
+            &self.state.view,
+            &self.state.rays,
+            film,
+        )?;
+        renderer.set_grid(self.state.learned.as_ref().or(self.state.whole_map.as_ref()))?;
+        renderer.set_cache(self.state.training.as_ref().and_then(CacheTraining::cache))?;
         self.gpu = Some(Box::new(renderer));
         Ok(())
     }
@@ -221,14 +209,14 @@ impl<'a> Session<'a> {
     /// something is learned of what is rendered, it depends on counts alone, so that the picture is
     /// repeatable; else a GPU takes as many as it can in a moment.
     pub fn next_pass(&self, rule: &StopRule) -> u32 {
-        let samples = self.samples;
+        let samples = self.state.samples;
         let is_counting =
-            self.learning.as_ref().is_some_and(|learning| learning.stage == Stage::Counting);
+            self.state.learning.as_ref().is_some_and(|learning| learning.stage == Stage::Counting);
         let pass = match self.gpu {
             // Each look at the noise reads the film.
             Some(_) if rule.noise.is_some() => (samples / 8).clamp(1, 64),
             Some(_) if !is_counting => {
-                let each = self.figures.render_seconds / f64::from(samples.max(1));
+                let each = self.state.figures.render_seconds / f64::from(samples.max(1));
                 let affordable = (GPU_PASS_SECONDS / each.max(1e-9)) as u32;
                 affordable.max(samples / 16).min(samples).clamp(1, 64)
             }
@@ -242,12 +230,12 @@ impl<'a> Session<'a> {
 
     /// Fewest samples any pixel has: [`Film::min_samples`] without a film.
     pub fn samples(&self) -> u32 {
-        self.samples
+        self.state.samples
     }
 
     /// What the next [`Self::advance`] will do.
     pub fn phase(&self) -> Phase {
-        match &self.learning {
+        match &self.state.learning {
             Some(Learning { stage: Stage::Tracing, .. }) => Phase::Learning,
             _ => Phase::Rendering,
         }
@@ -257,7 +245,7 @@ impl<'a> Session<'a> {
     /// seconds asked for.
     pub fn has_learned_enough(&self, rule: &StopRule) -> bool {
         let share = |seconds| LEARNING_TIME_SHARE * seconds;
-        rule.seconds.is_some_and(|s| 2.0 * self.figures.learning_seconds >= share(s))
+        rule.seconds.is_some_and(|s| 2.0 * self.state.figures.learning_seconds >= share(s))
     }
 
     /// Goes over to rendering with what was learned so far.
@@ -266,7 +254,7 @@ impl<'a> Session<'a> {
             return;
         }
         let stage = if self.counts_rendered() { Stage::Counting } else { Stage::Over };
-        if let Some(learning) = &mut self.learning {
+        if let Some(learning) = &mut self.state.learning {
             learning.stage = stage;
         }
     }
@@ -276,8 +264,8 @@ impl<'a> Session<'a> {
     /// # Errors
     /// If it does not fit on the GPU.
     pub fn set_grid(&mut self, grid: LightGrid) -> Result<()> {
-        self.learning = None;
-        self.learned = Some(grid).filter(|_| !self.environment.is_black());
+        self.state.learning = None;
+        self.state.learned = Some(grid).filter(|_| !self.environment.is_black());
         self.take_up_distributions()
     }
 
@@ -287,25 +275,25 @@ impl<'a> Session<'a> {
     /// # Errors
     /// If it does not fit on the GPU.
     pub(crate) fn set_training(&mut self, training: CacheTraining) -> Result<()> {
-        let training = self.training.insert(training);
+        let training = self.state.training.insert(training);
         self.gpu.as_mut().map_or(Ok(()), |renderer| renderer.set_cache(training.cache()))
     }
 
     /// The training of the radiance cache so far, for another session; this one follows all paths to
     /// their end from now on.
     pub(crate) fn take_training(&mut self) -> Option<CacheTraining> {
-        self.training.take()
+        self.state.training.take()
     }
 
     /// The radiance cache in the making, for inspection.
     pub(crate) fn training(&self) -> Option<&CacheTraining> {
-        self.training.as_ref()
+        self.state.training.as_ref()
     }
 
     /// Whether no samples to come change what is sampled by: each is then a matter of its pixel and its
     /// index alone.
     pub fn has_final_distributions(&self) -> bool {
-        self.learning.as_ref().is_none_or(Learning::is_over)
+        self.state.learning.as_ref().is_none_or(Learning::is_over)
     }
 
     /// Goes on from another film of this view with what was learned so far, as if its samples were
@@ -318,18 +306,18 @@ impl<'a> Session<'a> {
     pub(crate) fn continue_from(&mut self, mut film: Film, skipped: u32) -> Result<()> {
         // A GPU counts its rays on its film; if it fails, it will be heard of below.
         let _ = self.settle();
-        self.figures.rays = self.figures().rays;
+        self.state.figures.rays = self.figures().rays;
         film.skip(skipped);
-        self.skipped = skipped;
-        self.samples = film.min_samples();
+        self.state.skipped = skipped;
+        self.state.samples = film.min_samples();
         let set = self.gpu.as_mut().map_or(Ok(()), |renderer| renderer.set_film(&film));
-        self.film.put(film);
+        self.state.film.put(film);
         set
     }
 
     /// Counts what an earlier process did for the film that is gone on from.
     pub(crate) fn add_figures(&mut self, before: &Figures) {
-        let figures = &mut self.figures;
+        let figures = &mut self.state.figures;
         figures.samples += before.samples;
         figures.rays += before.rays;
         figures.learning_rays += before.learning_rays;
@@ -340,14 +328,14 @@ impl<'a> Session<'a> {
 
     /// What was counted, for inspection.
     pub fn counters(&self) -> Option<&LearningGrid> {
-        self.learning.as_ref().map(|learning| &learning.grid)
+        self.state.learning.as_ref().map(|learning| &learning.grid)
     }
 
     /// The film so far. A GPU's is read back at the first call after an [`Self::advance`], which takes
     /// its time; should the GPU fail meanwhile, it is the film as it was read last, and the next call of
     /// [`Self::advance`] or [`Self::settle`] says why.
     pub fn film(&self) -> &Film {
-        self.film.get(&self.view, |film| {
+        self.state.film.get(&self.state.view, |film| {
             if let Some(renderer) = &self.gpu {
                 // What fails is heard of at the next call.
                 let _ = renderer.read_film(film);
@@ -358,7 +346,7 @@ impl<'a> Session<'a> {
     /// The film, of which nobody needs a copy then.
     pub(crate) fn into_film(mut self) -> Film {
         self.film();
-        self.film.take(&self.view)
+        self.state.film.take(&self.state.view)
     }
 
     /// Whether a GPU is at work.
@@ -373,29 +361,29 @@ impl<'a> Session<'a> {
 
     /// What is rendered; it is decided whether pixels share.
     pub fn view(&self) -> &View {
-        &self.view
+        &self.state.view
     }
 
     /// The grid in use, once learning has ended.
     pub fn grid(&self) -> Option<&LightGrid> {
-        self.learned.as_ref().or(self.whole_map.as_ref())
+        self.state.learned.as_ref().or(self.state.whole_map.as_ref())
     }
 
     /// What has been done so far. A GPU's rays are those up to the last reading of its film.
     pub fn figures(&self) -> Figures {
         let rays = self.gpu.as_ref().map_or(0, |renderer| renderer.rays());
         let variance_saved = self.doubling().saved();
-        Figures { rays: self.figures.rays + rays, variance_saved, ..self.figures }
+        Figures { rays: self.state.figures.rays + rays, variance_saved, ..self.state.figures }
     }
 
     /// Seconds of learning and rendering so far.
     pub fn elapsed_seconds(&self) -> f64 {
-        self.figures.elapsed_seconds()
+        self.state.figures.elapsed_seconds()
     }
 
     /// Whether a rule says to stop. Noise is only asked for from 16 samples on.
     pub fn is_done(&self, rule: &StopRule) -> bool {
-        let samples = self.samples;
+        let samples = self.state.samples;
         rule.samples.is_some_and(|limit| samples >= limit)
             || (samples > 0 && rule.seconds.is_some_and(|limit| self.elapsed_seconds() >= limit))
             || (samples >= LEAST_SAMPLES_OF_NOISE
@@ -403,8 +391,8 @@ impl<'a> Session<'a> {
     }
 
     fn tracer<'b>(&'b self, counts: Option<&'b LearningGrid>) -> PathTracer<'b> {
-        let cache = self.training.as_ref().and_then(CacheTraining::cache);
-        let tracer = self.view.tracer(self.world, self.environment, self.grid());
+        let cache = self.state.training.as_ref().and_then(CacheTraining::cache);
+        let tracer = self.state.view.tracer(self.world, self.environment, self.grid());
         PathTracer { counts, cache, ..tracer }
     }
 
@@ -412,10 +400,10 @@ impl<'a> Session<'a> {
     /// every `every`-th pixel of every `every`-th row. What has been cut short goes on at the next call.
     fn train(&mut self, every: u32, cancel: &AtomicBool) -> Result<()> {
         let start = Instant::now();
-        if let Some(training) = &mut self.training {
-            training.begin(&self.view, self.samples, every);
+        if let Some(training) = &mut self.state.training {
+            training.begin(&self.state.view, self.state.samples, every);
         }
-        while let Some(training) = &self.training
+        while let Some(training) = &self.state.training
             && let Some(paths) = training.next()
             && !cancel.load(Ordering::Relaxed)
         {
@@ -423,33 +411,38 @@ impl<'a> Session<'a> {
             let (done, rays) = match &mut self.gpu {
                 None => {
                     let paths = paths.start..paths.end.min(paths.start + PATHS_AT_A_TIME);
-                    let rays =
-                        cpu::train(&self.tracer(None), &self.rays, &self.view, paths.clone(), sums);
+                    let rays = cpu::train(
+                        &self.tracer(None),
+                        &self.state.rays,
+                        &self.state.view,
+                        paths.clone(),
+                        sums,
+                    );
                     (paths.end, rays)
                 }
                 Some(renderer) => renderer.train(paths, sums, cancel)?,
             };
-            self.figures.learning_rays += rays;
-            self.figures.training_paths = done;
-            if let Some(training) = &mut self.training {
+            self.state.figures.learning_rays += rays;
+            self.state.figures.training_paths = done;
+            if let Some(training) = &mut self.state.training {
                 training.advance(done);
                 if let Some(renderer) = &mut self.gpu {
                     renderer.set_cache(training.cache())?;
                 }
             }
         }
-        self.figures.learning_seconds += start.elapsed().as_secs_f64();
+        self.state.figures.learning_seconds += start.elapsed().as_secs_f64();
         Ok(())
     }
 
     /// Begins the sequence that goes with the distributions in use, and gives them to the GPU, if one is at
     /// work.
     fn take_up_distributions(&mut self) -> Result<()> {
-        let grid = self.learned.as_ref().or(self.whole_map.as_ref());
+        let grid = self.state.learned.as_ref().or(self.state.whole_map.as_ref());
         let generation = grid.map_or(0, LightGrid::generation);
-        if generation != self.sequence.generation {
+        if generation != self.state.sequence.generation {
             // Pixels that are ahead begin later in it.
-            self.sequence = Sequence { generation, first_sample: self.samples };
+            self.state.sequence = Sequence { generation, first_sample: self.state.samples };
         }
         self.gpu.as_mut().map_or(Ok(()), |renderer| renderer.set_grid(grid))
     }
@@ -461,48 +454,55 @@ impl<'a> Session<'a> {
         coverage: Coverage,
         cancel: &AtomicBool,
     ) -> Result<()> {
-        let (start, before) = (Instant::now(), self.figures.distribution_seconds);
-        let result = self.render(self.samples.saturating_add(samples), coverage, cancel);
-        let distributions = self.figures.distribution_seconds - before;
-        self.figures.learning_seconds += distributions;
-        self.figures.render_seconds += start.elapsed().as_secs_f64() - distributions;
+        let (start, before) = (Instant::now(), self.state.figures.distribution_seconds);
+        let result = self.render(self.state.samples.saturating_add(samples), coverage, cancel);
+        let distributions = self.state.figures.distribution_seconds - before;
+        self.state.figures.learning_seconds += distributions;
+        self.state.figures.render_seconds += start.elapsed().as_secs_f64() - distributions;
         result
     }
 
     fn render(&mut self, target: u32, coverage: Coverage, cancel: &AtomicBool) -> Result<()> {
-        let stride = self.prepare_counting(target - self.samples);
-        let pass = Pass { target, coverage, stride, sequence: self.sequence };
-        let learning = self.learning.as_ref().filter(|learning| !learning.is_over());
+        let stride = self.prepare_counting(target - self.state.samples);
+        let pass = Pass { target, coverage, stride, sequence: self.state.sequence };
+        let learning = self.state.learning.as_ref().filter(|learning| !learning.is_over());
         let counts = learning.map(|learning| &learning.grid);
         let samples = match &mut self.gpu {
             None => {
-                let mut film = self.film.take(&self.view);
+                let mut film = self.state.film.take(&self.state.view);
                 let tracer = self.tracer(counts);
-                let (samples, rays) =
-                    cpu::render(&tracer, &self.rays, &self.view, pass, &mut film, cancel);
-                self.samples = film.min_samples();
-                self.film.put(film);
-                self.figures.rays += rays;
+                let (samples, rays) = cpu::render(
+                    &tracer,
+                    &self.state.rays,
+                    &self.state.view,
+                    pass,
+                    &mut film,
+                    cancel,
+                );
+                self.state.samples = film.min_samples();
+                self.state.film.put(film);
+                self.state.figures.rays += rays;
                 samples
             }
             Some(renderer) => {
-                self.film.outdate();
+                self.state.film.outdate();
                 let done = renderer.render(pass, counts, cancel)?;
-                self.samples = done.least;
-                if self.film.is_older_than(KEPT_SECONDS) {
+                self.state.samples = done.least;
+                if self.state.film.is_older_than(KEPT_SECONDS) {
                     // What is on the host outlives the device; what fails is heard of at the next call.
-                    let _ = self.film.update(&self.view, |film| renderer.read_film(film));
+                    let _ =
+                        self.state.film.update(&self.state.view, |film| renderer.read_film(film));
                 }
                 done.samples
             }
         };
-        self.figures.samples += samples;
+        self.state.figures.samples += samples;
         // A GPU's film may have been read for the clock's sake: noise does not depend on that.
-        let is_noted = self.skipped == 0 && !self.is_on_gpu();
-        if let Some(film) = self.film.known().filter(|_| is_noted) {
+        let is_noted = self.state.skipped == 0 && !self.is_on_gpu();
+        if let Some(film) = self.state.film.known().filter(|_| is_noted) {
             self.note_doubling(film);
         }
-        let is_whole = self.samples >= target;
+        let is_whole = self.state.samples >= target;
         self.learn_from_rendered(samples.div_ceil(u64::from(stride)), is_whole)
     }
 }

@@ -66,7 +66,7 @@ impl Session<'_> {
     /// [`Film::noise`] of [`Self::film`], which looks at every pixel once, less what low-discrepancy samples
     /// save ([`crate::render::Figures::variance_saved`]); infinite if some of its samples are others'.
     pub fn noise(&self) -> f64 {
-        let noise = || match self.skipped {
+        let noise = || match self.state.skipped {
             0 => {
                 let film = self.film();
                 self.note_doubling(film);
@@ -74,7 +74,7 @@ impl Session<'_> {
             }
             _ => f64::INFINITY,
         };
-        self.film.noise(noise)
+        self.state.film.noise(noise)
     }
 
     /// What noise is found by, for a checkpoint.
@@ -84,11 +84,11 @@ impl Session<'_> {
 
     /// Goes on with what noise was found by.
     pub(crate) fn set_noted(&mut self, noted: Doubling) {
-        self.doubling = Mutex::new(noted);
+        self.state.doubling = Mutex::new(noted);
     }
 
     pub(super) fn doubling(&self) -> MutexGuard<'_, Doubling> {
-        self.doubling.lock().unwrap_or_else(PoisonError::into_inner)
+        self.state.doubling.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Takes note of the film where it has twice the samples of the one noted before. A GPU's is not read for
@@ -96,7 +96,7 @@ impl Session<'_> {
     /// noise can end a picture.
     pub(super) fn note_doubling(&self, film: &Film) {
         let first = if self.is_on_gpu() { LEAST_SAMPLES_OF_NOISE } else { FIRST_NOTED };
-        self.doubling().note(film, self.samples, first);
+        self.doubling().note(film, self.state.samples, first);
     }
 }
 

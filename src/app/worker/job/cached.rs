@@ -90,8 +90,8 @@ impl<'s> CachedPicture<'s> {
         Some(session)
     }
 
-    /// Its film and how many samples that has, if there is enough of it. A copy is made unless there is a new one already or, if it `rests`,
-    /// any: it is megabytes and is soon complete.
+    /// Its film and how many samples that has, if there is enough of it. A copy is made unless there is a new one
+    /// already or, if it `rests`, any: it is megabytes and is soon complete.
     pub(super) fn film(
         &mut self,
         suffices: impl Fn(u64) -> bool,

@@ -1,4 +1,5 @@
-//! A session that is put aside: without the world and the map, which it borrows, and without a GPU.
+//! What a session has of its own: without the world and the map, which it borrows, and without a GPU. It can be put
+//! aside, and gone on with.
 
 use std::sync::Mutex;
 
@@ -15,69 +16,46 @@ use crate::render::{Figures, View};
 use crate::sampler::Sequence;
 
 /// All that a [`Session`] has of its own.
-pub(crate) struct Suspended {
-    view: View,
-    rays: CameraRays,
-    film: HostFilm,
-    samples: u32,
-    skipped: u32,
-    doubling: Mutex<Doubling>,
-    whole_map: Option<LightGrid>,
-    learned: Option<LightGrid>,
-    sequence: Sequence,
-    learning: Option<Learning>,
-    training: Option<CacheTraining>,
-    figures: Figures,
+pub(crate) struct SessionState {
+    pub(super) view: View,
+    pub(super) rays: CameraRays,
+    pub(super) film: HostFilm,
+    /// Fewest samples of any pixel.
+    pub(super) samples: u32,
+    /// So many first samples of each pixel are others'.
+    pub(super) skipped: u32,
+    /// The film with half its samples.
+    pub(super) doubling: Mutex<Doubling>,
+    pub(super) whole_map: Option<LightGrid>,
+    pub(super) learned: Option<LightGrid>,
+    pub(super) sequence: Sequence,
+    /// `None` if nothing is to be learned, or everything has been by others.
+    pub(super) learning: Option<Learning>,
+    pub(super) training: Option<CacheTraining>,
+    pub(super) figures: Figures,
 }
 
+#[cfg(feature = "window")]
 impl<'a> Session<'a> {
     /// Puts it aside, with what a GPU has as far as it can still be read.
-    pub(crate) fn suspend(mut self) -> Suspended {
+    pub(crate) fn suspend(mut self) -> SessionState {
         self.continue_on_cpu();
         self.film();
-        Suspended {
-            view: self.view,
-            rays: self.rays,
-            film: self.film,
-            samples: self.samples,
-            skipped: self.skipped,
-            doubling: self.doubling,
-            whole_map: self.whole_map,
-            learned: self.learned,
-            sequence: self.sequence,
-            learning: self.learning,
-            training: self.training,
-            figures: self.figures,
-        }
+        self.state
     }
 
     /// Goes on, on the CPU, with what was put aside, in the same world under the same map.
     pub(crate) fn resume(
         world: &'a World,
         environment: &'a Environment,
-        suspended: Suspended,
+        state: SessionState,
     ) -> Self {
-        Self {
-            world,
-            environment,
-            gpu: None,
-            view: suspended.view,
-            rays: suspended.rays,
-            film: suspended.film,
-            samples: suspended.samples,
-            skipped: suspended.skipped,
-            doubling: suspended.doubling,
-            whole_map: suspended.whole_map,
-            learned: suspended.learned,
-            sequence: suspended.sequence,
-            learning: suspended.learning,
-            training: suspended.training,
-            figures: suspended.figures,
-        }
+        Self { world, environment, gpu: None, state }
     }
 }
 
-impl Suspended {
+#[cfg(feature = "window")]
+impl SessionState {
     /// The film; it was read when the session was put aside.
     pub(crate) fn film(&self) -> Option<&Film> {
         self.film.known()
@@ -101,7 +79,7 @@ impl Suspended {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "window"))]
 mod tests {
     use std::sync::atomic::AtomicBool;
 
