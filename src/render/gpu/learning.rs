@@ -12,20 +12,20 @@ use crate::radiance_cache::RadianceSums;
 
 impl Renderer {
     /// Traces the learning paths in `paths`, drawing from the distributions last set; returns the number of
-    /// rays. The counters are as before if it is cancelled or fails.
+    /// rays, or `None` if it is cancelled: the counters are then, or if it fails, as before.
     pub(crate) fn learn(
         &mut self,
         paths: Range<u64>,
         learning: &LearningGrid,
         cancel: &AtomicBool,
-    ) -> Result<u64> {
+    ) -> Result<Option<u64>> {
         self.put_counters(learning)?;
         let (done, rays) = self.trace_anywhere(Kernel::Learn, paths.clone(), cancel)?;
         if done < paths.end {
-            return Ok(0);
+            return Ok(None);
         }
         self.take_counters(learning)?;
-        Ok(rays)
+        Ok(Some(rays))
     }
 
     /// Traces paths that train the radiance cache; what was set of it last is what is known by now.
@@ -145,7 +145,9 @@ pub(super) mod tests {
                     renderer.set_grid(distributions.as_ref()).expect("uploaded");
                     let counts = Some(&learning);
                     match (paths, rendered) {
-                        (Some(paths), _) => renderer.learn(paths, &learning, &never),
+                        (Some(paths), _) => {
+                            renderer.learn(paths, &learning, &never).map(Option::unwrap_or_default)
+                        }
                         (None, Some(pass)) => {
                             renderer.render(pass, counts, &never).and_then(|_| {
                                 renderer.read_film(&mut film)?;

@@ -122,24 +122,18 @@ impl Session<'_> {
         let rays = match &mut self.gpu {
             None => {
                 let tracer = self.tracer(Some(&learning.grid));
-                cpu::learn(&tracer, &self.state.rays, &self.state.view, range.clone(), cancel)
+                let rays =
+                    cpu::learn(&tracer, &self.state.rays, &self.state.view, range.clone(), cancel);
+                if cancel.load(Ordering::Relaxed) {
+                    return self.begin_learning_again();
+                }
+                rays
             }
-            Some(renderer) => renderer.learn(range.clone(), &learning.grid, cancel)?,
+            Some(renderer) => match renderer.learn(range.clone(), &learning.grid, cancel)? {
+                Some(rays) => rays,
+                None => return Ok(()),
+            },
         };
-        if self.gpu.is_some() && rays == 0 {
-            // Cancelled, its counters are as before.
-            return Ok(());
-        }
-        if self.gpu.is_none() && cancel.load(Ordering::Relaxed) {
-            // Which paths of the pass were counted depends on the threads: start over.
-            self.state.learned = None;
-            self.state.learning =
-                Learning::new(self.world, self.environment, &self.state.view, &self.state.rays);
-            let figures = &mut self.state.figures;
-            (figures.learning_paths, figures.distribution_paths) = (0, 0);
-            (figures.visited_cells, figures.learned_cells, figures.grid_bytes) = (0, 0, 0);
-            return self.take_up_distributions();
-        }
         self.state.figures.learning_rays += rays;
         self.state.figures.learning_paths = range.end;
         if let Some(learning) = &mut self.state.learning {
@@ -149,6 +143,17 @@ impl Session<'_> {
         if range.end >= self.state.view.learning_paths {
             self.finish_learning();
         }
+        self.take_up_distributions()
+    }
+
+    /// Forgets a pass that was cancelled: which of its paths were counted depends on the threads.
+    fn begin_learning_again(&mut self) -> Result<()> {
+        let state = &mut self.state;
+        state.learned = None;
+        state.learning = Learning::new(self.world, self.environment, &state.view, &state.rays);
+        let figures = &mut state.figures;
+        (figures.learning_paths, figures.distribution_paths) = (0, 0);
+        (figures.visited_cells, figures.learned_cells, figures.grid_bytes) = (0, 0, 0);
         self.take_up_distributions()
     }
 
