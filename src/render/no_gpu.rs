@@ -143,7 +143,12 @@ impl Renderer {
         match *self {}
     }
 
-    pub(crate) fn learn(&mut self, _: Range<u64>, _: &LearningGrid, _: &AtomicBool) -> Result<u64> {
+    pub(crate) fn learn(
+        &mut self,
+        _: Range<u64>,
+        _: &LearningGrid,
+        _: &AtomicBool,
+    ) -> Result<Option<u64>> {
         match *self {}
     }
 
