@@ -17,8 +17,13 @@ pub(crate) fn print(text: impl Display) -> Result<()> {
     match stdout.write_all(line.as_bytes()).and_then(|()| stdout.flush()) {
         Ok(()) => Ok(()),
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => std::process::exit(0),
-        Err(error) => Err(Error::new(format!("what was asked for cannot be printed: {error}"))),
+        Err(error) => Err(not_printed(&error)),
     }
+}
+
+/// Why stdout did not take what was asked for.
+pub(crate) fn not_printed(cause: &io::Error) -> Error {
+    Error::new(format!("what was asked for cannot be printed: {cause}"))
 }
 
 /// Says a line on stderr, if anybody is there to be told. It stays one, whatever names are in it.

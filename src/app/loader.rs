@@ -88,12 +88,23 @@ pub enum Loaded {
     Map(String, Result<LoadedMap>),
 }
 
+/// What is under way.
+struct InFlight {
+    name: String,
+    /// Whether the scene is there and only its materials change.
+    is_edit: bool,
+    number: u64,
+}
+
 /// Loads one scene and one map at a time; results are collected with [`Loader::take`].
 pub struct Loader {
-    sender: Sender<Loaded>,
-    receiver: Receiver<Loaded>,
+    /// Results with the number of what was under way.
+    sender: Sender<(u64, Loaded)>,
+    receiver: Receiver<(u64, Loaded)>,
     wake: Wake,
-    in_flight: [Option<String>; 2],
+    in_flight: [Option<InFlight>; 2],
+    /// So many were begun.
+    begun: u64,
     /// What is asked of scenes.
     options: SceneOptions,
     /// One scene and one map at a time, side by side as on the command line: two large scenes together
@@ -106,16 +117,16 @@ impl Loader {
     pub fn start(document: &Document, options: SceneOptions, wake: Wake) -> Self {
         let (sender, receiver) = channel();
         let (in_flight, turns) = ([None, None], Default::default());
-        let mut loader = Self { sender, receiver, wake, in_flight, options, turns };
+        let mut loader = Self { sender, receiver, wake, in_flight, begun: 0, options, turns };
         loader.load_scene(&document.scene);
         loader.load_map(&document.map, document.sun);
         loader
     }
 
-    /// Starts to load a scene unless it is being loaded.
+    /// Starts to load a scene unless it is being loaded; a change to its materials is given up.
     pub fn load_scene(&mut self, name: &str) {
         let options = self.options.clone();
-        self.spawn(Kind::Scene, name, move |name| {
+        self.spawn(Kind::Scene, name, false, move |name| {
             Loaded::Scene(name.to_owned(), load_scene(name, &options))
         });
     }
@@ -124,34 +135,29 @@ impl Loader {
     pub fn edit_scene(&mut self, scene: &LoadedScene, edits: &BTreeMap<u32, MaterialEdit>) {
         let (scene, edits) = (scene.clone(), edits.clone());
         let name = scene.name.clone();
-        self.spawn(Kind::Scene, &name, move |name| {
+        self.spawn(Kind::Scene, &name, true, move |name| {
             Loaded::Edited(name.to_owned(), scene.edited(edits))
         });
     }
 
     /// Starts to load a map unless it is being loaded.
     pub fn load_map(&mut self, name: &str, sun_factor: f32) {
-        self.spawn(Kind::Map, name, move |name| {
+        self.spawn(Kind::Map, name, false, move |name| {
             Loaded::Map(name.to_owned(), load_map(name, sun_factor))
         });
     }
 
     /// What is being loaded.
     pub fn busy_with(&self) -> impl Iterator<Item = &str> {
-        self.in_flight.iter().flatten().map(String::as_str)
+        self.in_flight.iter().flatten().map(|in_flight| in_flight.name.as_str())
     }
 
     /// What has been loaded since the last call; results nobody waits for any more are dropped.
     pub fn take(&mut self) -> Vec<Loaded> {
         let mut results = Vec::new();
-        for loaded in self.receiver.try_iter() {
-            let (kind, name) = match &loaded {
-                Loaded::Scene(name, _) | Loaded::Edited(name, _) => (Kind::Scene, name),
-                Loaded::Map(name, _) => (Kind::Map, name),
-            };
-            let in_flight = &mut self.in_flight[kind as usize];
-            if in_flight.as_ref() == Some(name) {
-                *in_flight = None;
+        for (number, loaded) in self.receiver.try_iter() {
+            let is_this = |in_flight: &mut InFlight| in_flight.number == number;
+            if self.in_flight.iter_mut().any(|slot| slot.take_if(is_this).is_some()) {
                 results.push(loaded);
             }
         }
@@ -162,13 +168,16 @@ impl Loader {
         &mut self,
         kind: Kind,
         name: &str,
+        is_edit: bool,
         load: impl FnOnce(&str) -> Loaded + Send + 'static,
     ) {
         let in_flight = &mut self.in_flight[kind as usize];
-        if in_flight.as_deref() == Some(name) {
+        if in_flight.as_ref().is_some_and(|it| it.name == name && (is_edit || !it.is_edit)) {
             return;
         }
-        *in_flight = Some(name.to_owned());
+        self.begun += 1;
+        let number = self.begun;
+        *in_flight = Some(InFlight { name: name.to_owned(), is_edit, number });
         let (sender, wake) = (self.sender.clone(), self.wake.clone());
         let turn = Arc::clone(&self.turns[kind as usize]);
         let name = name.to_owned();
@@ -181,7 +190,7 @@ impl Loader {
                 Kind::Map => Loaded::Map(name.clone(), Err(failed())),
             });
             // The window may have gone meanwhile.
-            let _ = sender.send(loaded);
+            let _ = sender.send((number, loaded));
             wake();
         });
         if thread.is_err() {

@@ -13,6 +13,7 @@ use crate::image::{ExrPicture, Image, read_picture, write_exr};
 use crate::memory;
 use crate::render::StopRule;
 use crate::render::gpu::DeviceChoice;
+use crate::scene::MaterialEdit;
 
 fn studio(scene: &str) -> Option<Studio> {
     let defaults = Document::default();
@@ -144,6 +145,25 @@ fn a_scene_is_looked_at_from_somewhere_and_known_by_any_of_its_paths() {
     studio.asks(Command::TogglePause);
     studio.asks(Command::OpenScene("open".to_owned()));
     studio.settle().expect("rendered");
+}
+
+#[test]
+fn a_scene_is_read_again_while_a_material_of_it_changes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("triangle.gltf");
+    std::fs::write(&file, TRIANGLE).expect("written");
+    let Some(mut studio) = studio(&file.display().to_string()) else { return };
+    studio.settle().expect("rendered");
+    let larger = TRIANGLE.replace(r#"{"mesh": 0}"#, r#"{"mesh": 0, "scale": [2, 2, 2]}"#);
+    std::fs::write(&file, larger).expect("written");
+    let edit = MaterialEdit { roughness: Some(0.25), ..MaterialEdit::default() };
+    studio.app.document.materials.insert(0, edit);
+    studio.frame().expect("drawn");
+    studio.asks(Command::ReadAgain);
+    studio.settle().expect("rendered");
+    let scene = &studio.app.scene.as_ref().expect("it is there").world.scene;
+    assert!(scene.positions.iter().any(|position| position.max_element() == 2.0));
+    assert_eq!(scene.materials[0].roughness, 0.25);
 }
 
 #[test]

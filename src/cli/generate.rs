@@ -44,7 +44,7 @@ pub(super) fn completions(arguments: &CompletionsArguments) -> Result<()> {
 pub(super) fn man(arguments: &ManArguments) -> Result<()> {
     let ManArguments { folder } = arguments;
     if !folder.is_dir() {
-        return Err(Error::at(folder, "there is no such folder"));
+        return Err(Error::at(folder, "is no folder that exists"));
     }
     let mut command = Arguments::command().disable_help_subcommand(true);
     command.build();

@@ -6,7 +6,7 @@ use clap::{Parser, Subcommand};
 
 use crate::error::Result;
 use crate::image;
-use crate::memory;
+use crate::{memory, terminal};
 
 #[cfg(not(all(feature = "window", feature = "report")))]
 mod absent;
@@ -92,16 +92,32 @@ enum Command {
 
 /// Runs the command line; errors become one sentence on stderr and a non-zero exit.
 pub fn main() -> ExitCode {
-    match run(Arguments::parse()) {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(answer) => return say(&answer),
+    };
+    match run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             // Else another thread is about to end the process.
             while !memory::has_last_word() {
                 std::thread::park();
             }
-            crate::terminal::tell(format_args!("lightgrid: {error}"));
+            terminal::tell(format_args!("lightgrid: {error}"));
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Prints help, a version or what is wrong with the arguments.
+fn say(answer: &clap::Error) -> ExitCode {
+    match answer.print() {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            let error = terminal::not_printed(&error);
+            terminal::tell(format_args!("lightgrid: {error}"));
+            ExitCode::FAILURE
+        }
+        _ => ExitCode::from(u8::try_from(answer.exit_code()).unwrap_or(1)),
     }
 }
 

@@ -346,7 +346,7 @@ fn shells_and_man_know_every_command() {
         assert!(bench.path("man1/lightgrid-report-talk.1").exists());
     }
     let says = bench.refusal("man nowhere", 1);
-    assert_eq!(says, "lightgrid: nowhere: there is no such folder\n");
+    assert_eq!(says, "lightgrid: nowhere: is no folder that exists\n");
     assert!(bench.refusal("render --sp 3 -o a.png", 2).contains("'--spp'"), "did you mean");
 }
 

@@ -228,9 +228,11 @@ fn results_that_cannot_be_printed_are_a_sentence_or_silence() {
     assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()));
     #[cfg(target_os = "linux")]
     {
-        let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-        let output = bench.command("info open").stdout(full).output().unwrap();
-        assert!(sentence(&output).contains("cannot be printed"));
+        for line in ["info open", "--help"] {
+            let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+            let output = bench.command(line).stdout(full).output().unwrap();
+            assert!(sentence(&output).contains("cannot be printed"));
+        }
     }
 }
 

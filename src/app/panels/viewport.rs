@@ -151,7 +151,7 @@ fn part_rect(whole: Rect, view: &View) -> Rect {
     Rect::from_min_size(whole.min + corner * scale, size * scale)
 }
 
-/// Draws the picture; a part lies on the last whole one, which steps back.
+/// Draws the picture; a part lies on the last whole one, which steps back until the region is left.
 fn picture(
     ui: &Ui,
     (whole, rect): (Rect, Rect),
@@ -170,12 +170,16 @@ fn picture(
         scope.textures.part = None;
         return;
     }
+    let is_left = scope.document.region.is_none();
     if let Some(main) = &scope.textures.main {
-        painter.image(main.id, whole, full, Color32::from_gray(90));
+        let tint = if is_left { Color32::WHITE } else { Color32::from_gray(90) };
+        painter.image(main.id, whole, full, tint);
     }
     let texture = Developed::update(&mut scope.textures.part, scope.screen, recipe, changes);
     painter.image(texture, rect, full, Color32::WHITE);
-    painter.rect_stroke(rect, 0.0, Stroke::new(1.0, theme::ACCENT), StrokeKind::Outside);
+    if !is_left {
+        painter.rect_stroke(rect, 0.0, Stroke::new(1.0, theme::ACCENT), StrokeKind::Outside);
+    }
 }
 
 /// Whether a picture is another one in every frame; then there is a next frame. Software would do
