@@ -247,10 +247,7 @@ impl Place<'_> {
 
     fn session(&self, uploaded: Option<&UploadedScene>, view: View) -> Result<Session<'_>> {
         let Subject { world, environment, .. } = self.subject;
-        match uploaded {
-            Some(uploaded) => Session::on_gpu(world, environment, view, uploaded),
-            None => Ok(Session::new(world, environment, view)),
-        }
+        Session::on(world, environment, view, uploaded)
     }
 
     /// The defaults of `lightgrid render`.

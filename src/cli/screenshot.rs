@@ -118,11 +118,10 @@ pub(super) struct ScreenshotArguments {
 }
 
 fn place(text: &str) -> std::result::Result<Vec2, String> {
-    let numbers: Vec<f32> = text.split(',').filter_map(|t| t.trim().parse().ok()).collect();
-    match numbers[..] {
-        [x, y] if (0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y) => Ok(Vec2::new(x, y)),
-        _ => Err("expected two numbers from 0 to 1 like 0.25,0.7".to_owned()),
-    }
+    values::list(text)
+        .filter(|place| place.iter().all(|share| (0.0..=1.0).contains(share)))
+        .map(Vec2::from_array)
+        .ok_or_else(|| "expected two numbers from 0 to 1 like 0.25,0.7".to_owned())
 }
 
 /// Draws the window's content and writes it.

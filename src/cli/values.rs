@@ -1,6 +1,7 @@
 //! Argument values: sizes, vectors, positive numbers, each refused with the reason.
 
 use std::ops::RangeInclusive;
+use std::str::FromStr;
 
 use glam::Vec3;
 
@@ -20,16 +21,16 @@ pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
     Ok((width, height))
 }
 
+/// So many numbers joined by commas, and nothing else.
+pub(super) fn list<T: FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
+    let numbers = text.split(',').map(|number| number.trim().parse().ok());
+    numbers.collect::<Option<Vec<T>>>()?.try_into().ok()
+}
+
 /// `X,Y,Z` in metres.
 pub(super) fn vector(text: &str) -> Result<Vec3, String> {
-    let numbers: Vec<f32> = text
-        .split(',')
-        .filter_map(|t| t.trim().parse().ok().filter(|x: &f32| x.is_finite()))
-        .collect();
-    match numbers[..] {
-        [x, y, z] if text.split(',').count() == 3 => Ok(Vec3::new(x, y, z)),
-        _ => Err("expected three numbers like 1.5,2,-3".to_owned()),
-    }
+    let vector = list(text).map(Vec3::from_array).filter(|vector| vector.is_finite());
+    vector.ok_or_else(|| "expected three numbers like 1.5,2,-3".to_owned())
 }
 
 /// One number of at least zero, or three joined by commas (linear RGB).
@@ -58,11 +59,9 @@ pub(super) fn noise(text: &str) -> Result<f64, String> {
 
 /// `X,Y,WIDTH,HEIGHT` in pixels.
 pub(super) fn region(text: &str) -> Result<[u32; 4], String> {
-    let numbers: Vec<u32> = text.split(',').filter_map(|t| t.trim().parse().ok()).collect();
-    match numbers[..] {
-        [x, y, w, h] if text.split(',').count() == 4 && w > 0 && h > 0 => Ok([x, y, w, h]),
-        _ => Err("expected four numbers like 100,50,320,180, the last two not 0".to_owned()),
-    }
+    list(text)
+        .filter(|[_, _, width, height]| *width > 0 && *height > 0)
+        .ok_or_else(|| "expected four numbers like 100,50,320,180, the last two not 0".to_owned())
 }
 
 /// `I/N`, the first part being 1.

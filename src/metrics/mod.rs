@@ -5,7 +5,7 @@ mod flip;
 pub mod hypothesis;
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::color::luminance;
 use crate::error::{Error, Result};
@@ -14,7 +14,7 @@ use crate::tone::auto_exposure_ev;
 
 /// How far a picture is from its reference. All but `flip` are in units of the reference's mean, so
 /// that they do not depend on the exposure. 0 is equal (1 for `mean_ratio`).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// Mean over pixels and channels of `(a - r)^2`.
     pub mse: f64,

@@ -10,7 +10,7 @@ use crate::environment::Environment;
 use crate::error::Result;
 use crate::image::Image;
 use crate::light_grid::LightGrid;
-use crate::metrics::compare;
+use crate::metrics::{Comparison, compare};
 use crate::path::World;
 use crate::render::{Figures, Phase, Session, StopRule, gpu};
 use crate::scene::Camera;
@@ -32,10 +32,7 @@ impl<'a> Place<'a> {
     /// A session of one method.
     pub(super) fn session(&self, settings: &Settings, seed: u32) -> Result<Session<'a>> {
         let view = settings.view(self.camera, self.frame, seed);
-        match self.upload {
-            None => Ok(Session::new(self.world, self.environment, view)),
-            Some(upload) => Session::on_gpu(self.world, self.environment, view, upload),
-        }
+        Session::on(self.world, self.environment, view, self.upload)
     }
 
     /// Learns and renders a little, so that all kernels are built.
@@ -67,23 +64,6 @@ impl<'a> Place<'a> {
     }
 }
 
-/// How far a picture is from the reference; see [`crate::metrics::Comparison`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Errors {
-    /// Mean squared error.
-    pub mse: f64,
-    /// Relative mean squared error.
-    pub rel_mse: f64,
-    /// The same without the worst 0.1 % of the pixels.
-    pub trimmed_rel_mse: f64,
-    /// Trimmed relMSE of the means of 8x8 pixels.
-    pub block_rel_mse: f64,
-    /// Mean LDR-FLIP.
-    pub flip: f64,
-    /// Mean over the reference's mean.
-    pub mean_ratio: f64,
-}
-
 /// A moment of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Point {
@@ -96,7 +76,7 @@ pub struct Point {
     /// Rays of rendering, shadow rays included.
     pub rays: u64,
     /// Its errors, once there is a reference.
-    pub errors: Option<Errors>,
+    pub errors: Option<Comparison>,
 }
 
 /// Bytes of what a run holds.
@@ -236,16 +216,7 @@ impl Run {
         reference: &Image,
     ) -> Result<()> {
         for (point, film) in self.points.iter_mut().zip(films) {
-            let found = compare(film, reference)?;
-            point.errors = Some(Errors {
-                mse: found.mse,
-                rel_mse: found.rel_mse,
-                trimmed_rel_mse: found.trimmed_rel_mse,
-                block_rel_mse: found.block_rel_mse,
-                // The feature `report` brings `flip`.
-                flip: found.flip.unwrap_or(f64::NAN),
-                mean_ratio: found.mean_ratio,
-            });
+            point.errors = Some(compare(film, reference)?);
         }
         self.denoised_flip = compare(denoised, reference)?.flip;
         Ok(())

@@ -27,7 +27,7 @@ pub use bias::Bias;
 pub use conduct::{Options, check, make};
 pub use machine::Machine;
 pub(crate) use machine::OpenDevice;
-pub use measure::{Errors, Memory, Point, Run};
+pub use measure::{Memory, Point, Run};
 pub use pages::{duration, markdown_table, row_sentence};
 pub use plan::{Device, Effort, Frame, Method, Plan, Row, Settings};
 pub use reference::{Noise, ReferenceFacts};

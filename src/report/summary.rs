@@ -3,12 +3,13 @@
 use serde::Serialize;
 
 use super::bias::Bias;
-use super::measure::{Errors, Memory, Run};
+use super::measure::{Memory, Run};
 use super::plan::{Device, Method, Plan, Row};
 use super::reference::{Noise, ReferenceFacts};
 use super::shares::Shares;
 use super::statistics::{Bundle, Curve, Estimate, SpeedUp, power_law_slope};
 use crate::image::Image;
+use crate::metrics::Comparison;
 
 /// A measure of error that falls with time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -43,13 +44,14 @@ impl Measure {
     }
 
     /// The value.
-    pub fn of(self, errors: &Errors) -> f64 {
+    pub fn of(self, errors: &Comparison) -> f64 {
         match self {
             Self::TrimmedRelMse => errors.trimmed_rel_mse,
             Self::RelMse => errors.rel_mse,
             Self::Mse => errors.mse,
             Self::Blocks => errors.block_rel_mse,
-            Self::Flip => errors.flip,
+            // The feature `report` brings `flip`.
+            Self::Flip => errors.flip.unwrap_or(f64::NAN),
         }
     }
 }

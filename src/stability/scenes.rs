@@ -110,13 +110,8 @@ pub(super) fn session<'a>(
     environment: &'a Environment,
     view: View,
 ) -> Result<Session<'a>> {
-    match &setting.gpu {
-        None => Ok(Session::new(world, environment, view)),
-        Some(gpu) => {
-            let uploaded = UploadedScene::new(gpu, world, environment)?;
-            Session::on_gpu(world, environment, view, &uploaded)
-        }
-    }
+    let upload = |gpu| UploadedScene::new(gpu, world, environment);
+    Session::on(world, environment, view, setting.gpu.as_ref().map(upload).transpose()?.as_ref())
 }
 
 /// A session that has done its learning.

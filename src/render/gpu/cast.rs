@@ -54,7 +54,7 @@ impl Renderer {
             let groups = self.flights.units(kernel).min(MAX_GROUPS);
             let groups = groups.min(u64::from(count - first).div_ceil(GROUP)) as u32;
             let work = Work { first, count, ..Work::default() };
-            self.dispatch(kernel, &work, groups, u64::from(groups))?;
+            self.dispatch(&[kernel], &work, groups, u64::from(groups))?;
             first += groups * GROUP as u32;
         }
         self.settle()?;

@@ -66,7 +66,7 @@ impl Renderer {
                 ..Work::default()
             };
             let groups = count.div_ceil(GROUP);
-            self.dispatch(kernel, &work, groups as u32, groups)?;
+            self.dispatch(&[kernel], &work, groups as u32, groups)?;
             first += count;
         }
         self.settle()?;

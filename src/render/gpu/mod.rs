@@ -333,7 +333,7 @@ impl Renderer {
                     ..Work::default()
                 };
                 let units = count * u64::from(samples);
-                self.dispatch(Kernel::Render, &work, count as u32, units)?;
+                self.dispatch(&[Kernel::Render], &work, count as u32, units)?;
                 self.progress.group_samples += samples;
             }
             let tile = first + count;
@@ -449,10 +449,11 @@ impl Renderer {
         bound.current(gpu, buffers)
     }
 
-    /// Sets a kernel going.
-    fn dispatch(&mut self, kernel: Kernel, work: &Work, groups: u32, units: u64) -> Result<()> {
-        let kernels = [self.bound(kernel)?];
+    /// Sets kernels going, one after another; by the first one's speed the work was sized.
+    fn dispatch(&mut self, order: &[Kernel], work: &Work, groups: u32, units: u64) -> Result<()> {
+        let kernels = order.iter().map(|kernel| self.bound(*kernel)).collect::<Result<Vec<_>>>()?;
         self.buffers.write("globals", 0, bytemuck::bytes_of(work));
+        let kernel = order[0];
         let job = Job { kernel, kernels: &kernels, steps: 1, groups, units, report: None };
         self.flights.start(&self.gpu, &job)
     }

@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::super::Pass;
 use super::buffers::Buffers;
-use super::flight::Job;
 use super::kernel::Kernel;
 use super::layout::{Globals, Work};
 use super::{GROUP, LEAST_TILES, Progress, Renderer};
@@ -76,13 +75,14 @@ impl Renderer {
                 }
                 let affordable = self.flights.units(Kernel::FindSeconds).max(least);
                 let count = affordable.min(most_groups).min(groups - first);
-                self.dispatch_shared(&Work {
+                let work = Work {
                     first: first as u32,
                     count: count as u32,
                     sample,
                     stride,
                     ..Work::default()
-                })?;
+                };
+                self.dispatch(&Kernel::OF_SHARING, &work, count as u32, count)?;
                 let tiles = [first, first + count].map(|group| group * tiles_of_group(tile));
                 self.progress.surplus += tiling.pixels(tiles[0]..tiles[1]);
                 first = self.goes_on_at(first + count);
@@ -99,20 +99,5 @@ impl Renderer {
             sharing.next_group = group;
         }
         group
-    }
-
-    fn dispatch_shared(&mut self, work: &Work) -> Result<()> {
-        let kernels = Kernel::OF_SHARING.map(|kernel| self.bound(kernel));
-        let kernels = kernels.into_iter().collect::<Result<Vec<_>>>()?;
-        self.buffers.write("globals", 0, bytemuck::bytes_of(work));
-        let job = Job {
-            kernel: Kernel::FindSeconds,
-            kernels: &kernels,
-            steps: 1,
-            groups: work.count,
-            units: u64::from(work.count),
-            report: None,
-        };
-        self.flights.start(&self.gpu, &job)
     }
 }

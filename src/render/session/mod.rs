@@ -85,8 +85,23 @@ impl<'a> Session<'a> {
         view: View,
         uploaded: &gpu::UploadedScene,
     ) -> Result<Self> {
+        Self::on(world, environment, view, Some(uploaded))
+    }
+
+    /// Starts a session on the CPU or, if this world and this environment are uploaded to one, on a GPU.
+    ///
+    /// # Errors
+    /// If it does not fit on the device.
+    pub fn on(
+        world: &'a World,
+        environment: &'a Environment,
+        view: View,
+        uploaded: Option<&gpu::UploadedScene>,
+    ) -> Result<Self> {
         let mut session = Self::new(world, environment, view);
-        session.continue_on_gpu(uploaded)?;
+        if let Some(uploaded) = uploaded {
+            session.continue_on_gpu(uploaded)?;
+        }
         Ok(session)
     }
 

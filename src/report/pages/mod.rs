@@ -87,7 +87,7 @@ fn csv(report: &Report) -> String {
                                     e.rel_mse,
                                     e.trimmed_rel_mse,
                                     e.block_rel_mse,
-                                    e.flip,
+                                    e.flip.unwrap_or(f64::NAN),
                                     e.mean_ratio,
                                 ];
                                 values.map(|v| v.to_string()).join(",")

@@ -192,7 +192,7 @@ fn ask(renderer: &mut Renderer, index: usize, probe: &Probe<'_>) -> Vec<u32> {
         .expect("it fits");
     let count = probe.cases.len() as u32;
     let work = Work { first: index as u32, count, ..Work::default() };
-    renderer.dispatch(Kernel::Render, &work, count.div_ceil(64), 1).expect("it runs");
+    renderer.dispatch(&[Kernel::Render], &work, count.div_ceil(64), 1).expect("it runs");
     renderer.read_words("probe_answers", words.len()).expect("it can be read")
 }
 
