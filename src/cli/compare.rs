@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::image::{Image, is_film, is_linear, read_picture};
+use crate::image::{Image, is_film, read_with_linearity};
 use crate::metrics::{Comparison, compare};
 use crate::output::film_file::read_film;
 use crate::terminal::print;
@@ -55,6 +55,6 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<()> {
 fn read(path: &Path) -> Result<(Image, bool)> {
     match is_film(path) {
         true => Ok((read_film(path)?.1.image(), true)),
-        false => Ok((read_picture(path)?, is_linear(path)?)),
+        false => read_with_linearity(path),
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::values;
 use crate::denoise::Denoiser;
 use crate::error::{Error, Result};
-use crate::image::is_same_file;
+use crate::image::{is_same_file, name_of_process};
 use crate::output::{self, Exposure, LayerName, PictureOptions};
 use crate::render::film::Film;
 use crate::terminal::{notice, tell};
@@ -131,7 +131,7 @@ impl PictureArguments {
             return Ok(());
         };
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let rescued = std::env::temp_dir().join(format!("lightgrid-{}-{name}", std::process::id()));
+        let rescued = std::env::temp_dir().join(format!("lightgrid-{}-{name}", name_of_process()));
         Err(match output::write_picture(&rescued, &options, film, metadata.to_vec()) {
             Ok(()) => {
                 Error::new(format!("{failure}; the picture is kept as {}", rescued.display()))

@@ -55,7 +55,10 @@ impl Denoiser {
     pub fn denoise(self, film: &Film, other: Option<(&Film, f32)>) -> Result<Image> {
         match self {
             Self::ATrous => Ok(quick(film, other)),
-            Self::Oidn => oidn::denoise(&Samples { film, other }),
+            Self::Oidn => {
+                let samples = Samples::of(film, other);
+                oidn::denoise(&samples).map(|image| samples.restored(image))
+            }
         }
     }
 }
@@ -65,5 +68,6 @@ pub fn quick(film: &Film, other: Option<(&Film, f32)>) -> Image {
     if !film.has_layers() {
         return film.image();
     }
-    a_trous::denoise(&Samples { film, other })
+    let samples = Samples::of(film, other);
+    samples.restored(a_trous::denoise(&samples))
 }

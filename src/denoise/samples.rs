@@ -12,6 +12,9 @@ use crate::render::film::{Film, Pixel};
 pub(super) struct Samples<'a> {
     pub(super) film: &'a Film,
     pub(super) other: Option<(&'a Film, f32)>,
+    /// What light is multiplied by, a power of two: 1 unless it is so strong that its squares leave the range
+    /// of f32.
+    scale: f64,
 }
 
 /// What is known of a pixel's light.
@@ -21,7 +24,32 @@ pub(super) struct Mean {
     pub(super) variance: Option<f32>,
 }
 
-impl Samples<'_> {
+/// Light up to `2^40` is taken as it is.
+const REACH: i32 = 40;
+
+impl<'a> Samples<'a> {
+    pub(super) fn of(film: &'a Film, other: Option<(&'a Film, f32)>) -> Self {
+        let of_pixel = |pixel: &Pixel| pixel.mean().into_iter().fold(0.0, f64::max);
+        let films = [Some(film), other.map(|(other, _)| other)];
+        let pixels = films.into_iter().flatten().flat_map(|film| film.pixels());
+        let brightest = pixels.map(of_pixel).fold(0.0, f64::max);
+        let scale = match brightest.log2().ceil() {
+            exponent if exponent > f64::from(REACH) => 2.0_f64.powf(f64::from(REACH) - exponent),
+            _ => 1.0,
+        };
+        Self { film, other, scale }
+    }
+
+    /// A picture made of these samples, as bright as the film is.
+    pub(super) fn restored(&self, mut image: Image) -> Image {
+        if self.scale != 1.0 {
+            for value in image.pixels.as_flattened_mut() {
+                *value = (f64::from(*value) / self.scale) as f32;
+            }
+        }
+        image
+    }
+
     /// Samples of a pixel that are independent: those of the film that has more, for both begin with the same points.
     pub(super) fn count(&self, index: usize) -> u32 {
         self.fuller(index).pixels()[index].samples()
@@ -58,9 +86,10 @@ impl Samples<'_> {
 
     pub(super) fn mean(&self, index: usize) -> Mean {
         let own = &self.film.pixels()[index];
-        let vec3 = |pixel: &Pixel| Vec3::from(pixel.mean().map(|c| c as f32));
+        let vec3 = |pixel: &Pixel| Vec3::from(pixel.mean().map(|c| (self.scale * c) as f32));
+        let variance = |pixel: &Pixel| (self.scale * self.scale * pixel.variance_of_mean()) as f32;
         let Some((film, worth)) = self.other else {
-            let variance = (own.samples() > 1).then(|| own.variance_of_mean() as f32);
+            let variance = (own.samples() > 1).then(|| variance(own));
             return Mean { rgb: vec3(own), variance };
         };
         let other = &film.pixels()[index];
@@ -74,7 +103,7 @@ impl Samples<'_> {
         for (pixel, worth) in [(own, 1.0), (other, worth)] {
             if pixel.samples() > 1 {
                 let (count, others) = (pixel.samples() as f32, (pixel.samples() - 1) as f32);
-                squares += worth * pixel.variance_of_mean() as f32 * others * count;
+                squares += worth * variance(pixel) * others * count;
                 freedom += others;
             }
         }
@@ -103,7 +132,7 @@ mod tests {
             film
         };
         let (own, other) = (film(&[1.0, 3.0]), film(&[4.0, 6.0, 5.0, 5.0]));
-        let mean = |worth| Samples { film: &own, other: Some((&other, worth)) }.mean(0);
+        let mean = |worth| Samples::of(&own, Some((&other, worth))).mean(0);
         assert_eq!(mean(1.0).rgb, Vec3::splat(4.0));
         assert!((mean(4.0).rgb - Vec3::splat(84.0 / 18.0)).length() < 1e-6);
         // Squared deviations 2 and 2, of which four are free, and means that are 3 apart.
@@ -111,8 +140,9 @@ mod tests {
         assert!((variance(1.0) - (2.0 + 2.0 + 9.0 / 0.75) / 5.0 / 6.0).abs() < 1e-6);
         assert!((variance(4.0) - (2.0 + 8.0 + 9.0 / 0.5625) / 5.0 / 18.0).abs() < 1e-6);
         let single = film(&[2.0]);
-        assert_eq!(Samples { film: &single, other: None }.mean(0).variance, None);
-        let both = Samples { film: &single, other: Some((&film(&[4.0]), 1.0)) };
+        assert_eq!(Samples::of(&single, None).mean(0).variance, None);
+        let four = film(&[4.0]);
+        let both = Samples::of(&single, Some((&four, 1.0)));
         assert_eq!((both.mean(0).rgb, both.mean(0).variance), (Vec3::splat(3.0), None));
         assert_eq!(both.count(0), 1);
     }

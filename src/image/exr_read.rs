@@ -12,14 +12,14 @@ use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, ChannelList, IntegerBounds, SampleType};
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::f16;
-use glam::{Mat3, Vec3};
+use glam::{DVec2, Mat3, Vec3};
 use rayon::prelude::*;
 
 use super::exr_channels::{Channels, select};
 use super::exr_patch::patch;
 use super::file::{open_file, read_cause, read_file};
 use super::guard::catch_panic;
-use super::primaries::rec709_conversion;
+use super::primaries::{Primaries, REC709, rec709_conversion};
 use super::{Image, Rgb8, check_size};
 use crate::error::{Decoded, Error, Notices, Result};
 use crate::memory;
@@ -125,11 +125,18 @@ fn decode<R: Read + Seek>(
     let is_subsampled = |all: &Vec<[usize; 2]>| all.iter().any(|step| *step != [1, 1]);
     let sampling = sampling.filter(|all| selection.part == 0 && is_subsampled(all));
     let placement = Placement::of(&header, &mut notices)?;
+    let chromaticities = header.shared_attributes.chromaticities;
+    let primaries =
+        chromaticities.map(|of| Primaries([of.red, of.green, of.blue, of.white].map(point)));
+    let adopted = header.own_attributes.adopted_neutral.map(point);
     let block_decoder = BlockDecoder {
         channels: selection.channels,
         layout: ChannelLayout::of(&header),
         sampling,
-        to_rec709: rec709_conversion(&header, selection.channels, &mut notices),
+        weights: primaries.unwrap_or(Primaries(REC709)).luminance(),
+        to_rec709: primaries
+            .filter(|_| !matches!(selection.channels, Channels::Grey(_)))
+            .and_then(|primaries| rec709_conversion(primaries, adopted, &mut notices)),
     };
     let (width, height) = (placement.width, placement.height);
     let mut image = Image { width, height, pixels: Vec::new() };
@@ -163,6 +170,11 @@ fn decode<R: Read + Seek>(
         block_decoder.hold(&mut image);
     }
     Ok(Exr { image, notices, is_cube_map: is_cube_map(&header) })
+}
+
+/// A chromaticity `xy`.
+fn point(v: Vec2<f32>) -> DVec2 {
+    DVec2::new(f64::from(v.0), f64::from(v.1))
 }
 
 /// Largest tile, or group of rows, that is decoded as one.
@@ -328,6 +340,8 @@ struct BlockDecoder {
     layout: ChannelLayout,
     /// Set if channels have lower resolutions: pixels that a sample of each stands for.
     sampling: Option<Vec<[usize; 2]>>,
+    /// Luminance of the file's own red, green and blue.
+    weights: Vec3,
     to_rec709: Option<Mat3>,
 }
 
@@ -439,14 +453,16 @@ impl BlockDecoder {
     }
 
     /// Makes a picture of blocks with channels of lower resolution: samples are held from line to line,
-    /// across blocks.
+    /// across blocks. Where the picture begins between two lines, the second one's stand for the first's.
     fn hold(&self, image: &mut Image) {
-        let width = image.width as usize;
-        for at in width..image.pixels.len() {
-            let above = image.pixels[at - width];
-            for (value, above) in image.pixels[at].iter_mut().zip(above) {
+        let (width, count) = (image.width as usize, image.pixels.len());
+        let downwards = (width..count).map(|at| (at, at - width));
+        let upwards = (width..count).rev().map(|at| (at - width, at));
+        for (at, beside) in downwards.chain(upwards) {
+            let beside = image.pixels[beside];
+            for (value, beside) in image.pixels[at].iter_mut().zip(beside) {
                 if value.is_nan() {
-                    *value = above;
+                    *value = beside;
                 }
             }
         }
@@ -458,7 +474,9 @@ impl BlockDecoder {
         match self.channels {
             Channels::Rgb(_) => {}
             Channels::Grey(_) => pixels.iter_mut().for_each(|p| *p = [p[0]; 3]),
-            Channels::LumaChroma { .. } => pixels.iter_mut().for_each(|p| *p = rgb_from_ycc(*p)),
+            Channels::LumaChroma { .. } => {
+                pixels.iter_mut().for_each(|p| *p = rgb_from_ycc(*p, self.weights));
+            }
         }
         if let Some(matrix) = self.to_rec709 {
             pixels.iter_mut().for_each(|p| *p = (matrix * Vec3::from(*p)).to_array());
@@ -508,11 +526,11 @@ fn planes_of_b44(
     Some(planes)
 }
 
-/// RGB from luminance and the colour differences `(R-Y)/Y`, `(B-Y)/Y`, with Rec.709 weights (OpenEXR
+/// RGB from luminance, of these weights, and the colour differences `(R-Y)/Y`, `(B-Y)/Y` (OpenEXR
 /// `ImfRgbaYca`).
-fn rgb_from_ycc([y, ry, by]: [f32; 3]) -> [f32; 3] {
+fn rgb_from_ycc([y, ry, by]: [f32; 3], weights: Vec3) -> [f32; 3] {
     let (r, b) = ((ry + 1.0) * y, (by + 1.0) * y);
-    [r, (y - 0.2126 * r - 0.0722 * b) / 0.7152, b]
+    [r, (y - weights.x * r - weights.z * b) / weights.y, b]
 }
 
 /// Whether the `envmap` attribute says cube.
@@ -552,9 +570,10 @@ mod tests {
     fn colour_differences_give_back_the_colour() {
         let rgb = [0.5f32, 0.25, 2.0];
         let y = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-        let back = rgb_from_ycc([y, (rgb[0] - y) / y, (rgb[2] - y) / y]);
+        let weights = Vec3::new(0.2126, 0.7152, 0.0722);
+        let back = rgb_from_ycc([y, (rgb[0] - y) / y, (rgb[2] - y) / y], weights);
         assert!(back.iter().zip(&rgb).all(|(a, b)| (a - b).abs() < 1e-6), "{back:?}");
-        assert_eq!(rgb_from_ycc([0.0, 3.0, 4.0]), [0.0; 3]);
+        assert_eq!(rgb_from_ycc([0.0, 3.0, 4.0], weights), [0.0; 3]);
     }
 
     /// Blocks left of, right of and across each edge of a picture with an offset data window.

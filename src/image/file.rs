@@ -2,11 +2,13 @@
 
 #[cfg(unix)]
 use std::ffi::CString;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, Metadata, OpenOptions, Permissions};
+use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io::{self, BufWriter, Read, Write};
 #[cfg(unix)]
-use std::os::unix::ffi::OsStrExt as _;
+use std::os::unix::{ffi::OsStrExt as _, fs as unix};
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 #[cfg(unix)]
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -31,9 +33,8 @@ pub fn write_beside_and_rename(
     let written = temporary
         .create()
         .and_then(|file| {
-            // Who may read the old content may read the new, and nobody else.
             if let Ok(existing) = fs::metadata(&target) {
-                file.set_permissions(existing.permissions())?;
+                file.set_permissions(kept_permissions(&file, &existing))?;
             }
             let mut buffered = BufWriter::with_capacity(1 << 20, file);
             write(&mut buffered)?;
@@ -47,6 +48,36 @@ pub fn write_beside_and_rename(
         let _ = folder.sync_all();
     }
     Ok(())
+}
+
+/// Gives a file the owner and the group of the one that it takes the place of, as far as the system allows;
+/// the permissions that it is to get. Who may read the old content may read the new, and nobody else.
+fn kept_permissions(file: &File, existing: &Metadata) -> Permissions {
+    let permissions = existing.permissions();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
+        let group = Some(existing.gid());
+        let kept = unix::fchown(file, Some(existing.uid()), group)
+            .or_else(|_| unix::fchown(file, None, group));
+        match kept {
+            Ok(()) => permissions,
+            Err(_) => Permissions::from_mode(permissions.mode() & !0o070),
+        }
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = file;
+        permissions
+    }
+}
+
+/// What no other process calls itself that writes into the same folder. Of several machines, or in several
+/// containers, two may have the same number.
+pub(crate) fn name_of_process() -> &'static str {
+    static NAME: LazyLock<String> =
+        LazyLock::new(|| format!("{:016x}", RandomState::new().build_hasher().finish()));
+    &NAME
 }
 
 /// Whether [`write_beside_and_rename`] could write `path` now: asked before long work, so that it is
@@ -205,11 +236,8 @@ impl Temporary {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let [begin, end] = TEMPORARY;
-        let name = format!("{begin}{}-{number}{end}", std::process::id());
-        let path = folder_of(target).join(name);
-        // A leftover of a crashed process that had our id.
-        let _ = fs::remove_file(&path);
-        Self { path }
+        let name = format!("{begin}{}-{number}{end}", name_of_process());
+        Self { path: folder_of(target).join(name) }
     }
 
     fn create(&self) -> io::Result<File> {

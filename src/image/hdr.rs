@@ -2,21 +2,23 @@
 //!
 //! Format: Greg Ward, "Real Pixels", Graphics Gems II; Radiance's `color.c` and `resolu.c`.
 
+use super::primaries::{Primaries, rec709_conversion};
 use super::{Image, check_size};
 use crate::color::REC709_FROM_XYZ;
-use crate::error::Decoded;
+use crate::error::{Decoded, Notices};
 use crate::memory;
-use glam::Vec3;
+use glam::{DVec2, Mat3, Vec3};
 
 /// Decodes a whole `.hdr` file. Header lines `EXPOSURE` and `COLORCORR` are undone, so that pixels
-/// are radiance again; `XYZE` is converted to Rec.709.
+/// are radiance again; `XYZE`, and RGBE of other `PRIMARIES`, are converted to Rec.709.
 ///
 /// # Errors
 /// The cause, without the file's name: no Radiance header, an unknown pixel format or resolution
 /// line, an implausible size, damaged or missing rows.
-pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<Image> {
+pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<(Image, Notices)> {
     let mut cursor = Cursor { rest: bytes };
-    let header = Header::parse(&mut cursor)?;
+    let mut notices = Notices::default();
+    let header = Header::parse(&mut cursor, &mut notices)?;
     let (major, minor) = (header.major, header.minor);
     // A row takes four bytes at the very least.
     if (cursor.rest.len() as u64) < 4 * u64::from(major.count) {
@@ -27,7 +29,7 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<Image> {
             header.height()
         ));
     }
-    let decoder = PixelDecoder::new(&header);
+    let decoder = PixelDecoder::new(&header, &mut notices);
     let mut line = vec![[0u8; 4]; minor.count as usize];
     let mut pixels: Vec<[f32; 3]> = Vec::new();
     // All at once if the file can hold it in runs, else as it is read: old runs have no bound, and a
@@ -48,7 +50,7 @@ pub(crate) fn decode_hdr(bytes: &[u8]) -> Decoded<Image> {
             .map_err(|cause| format!("{cause}: only {row} of {} rows can be read", major.count))?;
         pixels.extend(line.iter().map(|&rgbe| decoder.decode(rgbe)));
     }
-    Ok(header.upright(pixels))
+    Ok((header.upright(pixels), notices))
 }
 
 /// Most pixels that a byte of new run lengths stands for: 127 in two bytes for each of four channels.
@@ -85,18 +87,21 @@ struct Header {
     is_xyz: bool,
     /// What pixels are to be divided by.
     exposure: [f64; 3],
+    /// Of RGBE pixels, if the file says so.
+    primaries: Option<Primaries>,
     /// The axis of whole lines, then the axis along a line.
     major: Axis,
     minor: Axis,
 }
 
 impl Header {
-    fn parse(cursor: &mut Cursor<'_>) -> Decoded<Self> {
+    fn parse(cursor: &mut Cursor<'_>, notices: &mut Notices) -> Decoded<Self> {
         if !cursor.line().is_some_and(|line| line.starts_with("#?")) {
             return Err("is not a Radiance picture: it does not begin with #?".into());
         }
         let mut is_xyz = false;
         let mut exposure = [1.0f64; 3];
+        let mut primaries = None;
         loop {
             let line = cursor.line().ok_or("ends within its header")?;
             if line.is_empty() {
@@ -112,16 +117,30 @@ impl Header {
                     "32-bit_rle_xyze" => is_xyz = true,
                     other => return Err(format!("has pixels of the unknown format '{other}'")),
                 },
-                "EXPOSURE" => scale(&mut exposure, &[value; 3]),
-                "COLORCORR" => {
-                    scale(&mut exposure, &value.split_whitespace().collect::<Vec<_>>());
+                key @ ("EXPOSURE" | "COLORCORR") => {
+                    let factors = match key {
+                        "EXPOSURE" => numbers(value).map(|[factor]| [factor; 3]),
+                        _ => numbers(value),
+                    };
+                    match factors.filter(|all| all.iter().all(|x| x.is_normal() && *x > 0.0)) {
+                        Some(factors) => (0..3).for_each(|i| exposure[i] *= factors[i]),
+                        None => {
+                            notices
+                                .add(format!("{key} of the file makes no sense; it is left out"));
+                        }
+                    }
+                }
+                "PRIMARIES" => {
+                    let all = numbers::<8>(value);
+                    primaries = all
+                        .map(|all| Primaries([0, 2, 4, 6].map(|i| DVec2::new(all[i], all[i + 1]))));
                 }
                 _ => {}
             }
         }
         let line = cursor.line().ok_or("has no resolution line")?;
         let (major, minor) = parse_resolution(&line)?;
-        Ok(Self { is_xyz, exposure, major, minor })
+        Ok(Self { is_xyz, exposure, primaries, major, minor })
     }
 
     /// The picture of pixels in file order.
@@ -150,15 +169,19 @@ impl Header {
     }
 }
 
-/// Multiplies the factors by three values given as text; values that make no sense are ignored.
-fn scale(factors: &mut [f64; 3], values: &[&str]) {
-    let parsed: Vec<f64> = values.iter().filter_map(|v| v.trim().parse().ok()).collect();
-    if let [r, g, b] = parsed[..]
-        && parsed.iter().all(|v| v.is_normal() && *v > 0.0)
-    {
-        *factors = [factors[0] * r, factors[1] * g, factors[2] * b];
-    }
+/// Numbers that a line of the header begins with, if there are so many; some programs write more behind them.
+fn numbers<const N: usize>(value: &str) -> Option<[f64; N]> {
+    let words = value.split_whitespace().take(N).map(|word| word.parse().ok());
+    words.collect::<Option<Vec<_>>>()?.try_into().ok()
 }
+
+/// What Radiance's own programs assume, and say of pixels that others take for Rec.709.
+const RADIANCE: [DVec2; 4] = [
+    DVec2::new(0.640, 0.330),
+    DVec2::new(0.290, 0.600),
+    DVec2::new(0.150, 0.060),
+    DVec2::new(0.333_3, 0.333_3),
+];
 
 /// The axes of a line like `-Y 512 +X 1024`.
 fn parse_resolution(line: &str) -> Decoded<(Axis, Axis)> {
@@ -190,23 +213,29 @@ struct PixelDecoder {
     /// What a mantissa of each channel counts for, by exponent: `2^(e - 136)` without the exposure;
     /// 0 for exponent 0, which means black.
     scale: Vec<[f32; 3]>,
-    is_xyz: bool,
+    to_rec709: Option<Mat3>,
 }
 
 impl PixelDecoder {
-    fn new(header: &Header) -> Self {
+    fn new(header: &Header, notices: &mut Notices) -> Self {
         let mut scale: Vec<[f32; 3]> = (0..256)
             .map(|e| header.exposure.map(|exposure| (2f64.powi(e - 136) / exposure) as f32))
             .collect();
         scale[0] = [0.0; 3];
-        Self { scale, is_xyz: header.is_xyz }
+        let primaries = header.primaries.filter(|primaries| !primaries.is(RADIANCE));
+        let to_rec709 = match primaries {
+            _ if header.is_xyz => Some(REC709_FROM_XYZ),
+            Some(primaries) => rec709_conversion(primaries, None, notices),
+            None => None,
+        };
+        Self { scale, to_rec709 }
     }
 
     /// The mantissas are taken as they are, as all but Radiance itself do (it adds one half).
     fn decode(&self, [r, g, b, e]: [u8; 4]) -> [f32; 3] {
         let scale = self.scale[e as usize];
         let rgb = [f32::from(r) * scale[0], f32::from(g) * scale[1], f32::from(b) * scale[2]];
-        if self.is_xyz { (REC709_FROM_XYZ * Vec3::from(rgb)).to_array() } else { rgb }
+        self.to_rec709.map_or(rgb, |matrix| (matrix * Vec3::from(rgb)).to_array())
     }
 }
 

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, Cursor, Read};
 use std::path::Path;
 
+use image::ImageDecoder as _;
 use rayon::prelude::*;
 
 use super::exr_read::{Exr, read_exr};
@@ -14,6 +15,7 @@ use super::ldr::{decoder_bytes, decoder_cause};
 use super::{Image, MAX_PIXELS, MAX_SIDE, check_size, tiff};
 use crate::color::linear_from_srgb;
 use crate::error::{Decoded, Error, Notices, Result};
+use crate::memory;
 
 /// An environment map: finite, non-negative radiance, and what had to be done to get it.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,8 +42,8 @@ pub fn read_map(path: &Path) -> Result<LoadedMap> {
             }
             Exr { image, notices, .. } => LoadedMap { image, notices },
         },
-        Format::Hdr => LoadedMap { image: read_hdr(path)?, notices: Notices::default() },
-        Format::Other => read_ldr_map(path)?,
+        Format::Hdr => read_hdr(path)?,
+        Format::Other => read_ldr_map(path)?.0,
     };
     notices.extend(&sanitise(&mut image));
     if image.width != 2 * image.height {
@@ -58,19 +60,23 @@ pub fn read_map(path: &Path) -> Result<LoadedMap> {
 /// # Errors
 /// As [`read_map`].
 pub fn read_picture(path: &Path) -> Result<Image> {
-    match format_of(path)? {
-        Format::Exr => Ok(read_exr(path)?.image),
-        Format::Hdr => read_hdr(path),
-        Format::Other => Ok(read_ldr_map(path)?.image),
-    }
+    read_with_linearity(path).map(|(image, _)| image)
 }
 
-/// Whether a picture holds linear values, rather than what was made of them for a display.
+/// As [`read_picture`], and whether the file holds linear values rather than what was made of them for a
+/// display.
 ///
 /// # Errors
-/// If the file cannot be read.
-pub fn is_linear(path: &Path) -> Result<bool> {
-    Ok(matches!(format_of(path)?, Format::Exr | Format::Hdr))
+/// As [`read_map`].
+pub fn read_with_linearity(path: &Path) -> Result<(Image, bool)> {
+    Ok(match format_of(path)? {
+        Format::Exr => (read_exr(path)?.image, true),
+        Format::Hdr => (read_hdr(path)?.image, true),
+        Format::Other => {
+            let (map, is_linear) = read_ldr_map(path)?;
+            (map.image, is_linear)
+        }
+    })
 }
 
 /// Whether these are the first bytes of a glTF scene.
@@ -105,16 +111,23 @@ pub(crate) fn looks_like_picture(bytes: &[u8]) -> bool {
     starts.into_iter().any(|start| bytes.starts_with(start))
 }
 
+/// Above it, what other programs write becomes infinite.
+const LARGEST_HALF: f32 = 65_504.0;
+
 /// Makes a map usable as a light: NaN and negative values become 0, infinite ones the largest finite
-/// value of the map. One notice says how many pixels were changed.
+/// value of the map, or of half floats if it has none above 0. One notice says how many pixels were changed.
 pub fn sanitise(image: &mut Image) -> Notices {
     const CHUNK: usize = 1 << 14;
     let defects =
         image.pixels.par_chunks(CHUNK).map(Defects::of).reduce(Defects::default, Defects::and);
     let mut notices = Notices::default();
+    let (largest, largest_is) = match defects.largest {
+        0.0 => (LARGEST_HALF, "infinite (now 65504)"),
+        largest => (largest, "infinite (now the largest finite value)"),
+    };
     let found: Vec<String> = [
         (defects.nan, "NaN (now 0)"),
-        (defects.infinite, "infinite (now the largest finite value)"),
+        (defects.infinite, largest_is),
         (defects.negative, "negative (now 0)"),
     ]
     .iter()
@@ -124,7 +137,7 @@ pub fn sanitise(image: &mut Image) -> Notices {
     if !found.is_empty() {
         image.pixels.par_chunks_mut(CHUNK).for_each(|pixels| {
             for v in pixels.as_flattened_mut() {
-                *v = if *v == f32::INFINITY { defects.largest } else { v.max(0.0) };
+                *v = if *v == f32::INFINITY { largest } else { v.max(0.0) };
             }
         });
         notices.add(format!("pixels of the map were repaired: {}", found.join(", ")));
@@ -154,8 +167,8 @@ impl Defects {
         };
         Self {
             nan: count(f32::is_nan),
-            infinite: count(f32::is_infinite),
-            negative: count(|v| v.is_finite() && v < 0.0),
+            infinite: count(|v| v == f32::INFINITY),
+            negative: count(|v| v < 0.0),
             largest: values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f32::max),
         }
     }
@@ -202,12 +215,14 @@ fn format_of(path: &Path) -> Result<Format> {
     })
 }
 
-fn read_hdr(path: &Path) -> Result<Image> {
-    read_file(path).and_then(|bytes| decode_hdr(&bytes)).map_err(|cause| Error::at(path, cause))
+fn read_hdr(path: &Path) -> Result<LoadedMap> {
+    let decoded = read_file(path).and_then(|bytes| decode_hdr(&bytes));
+    let (image, notices) = decoded.map_err(|cause| Error::at(path, cause))?;
+    Ok(LoadedMap { image, notices })
 }
 
-/// Reads an sRGB-encoded picture, or a float TIFF as it is.
-fn read_ldr_map(path: &Path) -> Result<LoadedMap> {
+/// Reads an sRGB-encoded picture, or a float TIFF as it is; whether it is the latter.
+fn read_ldr_map(path: &Path) -> Result<(LoadedMap, bool)> {
     let decoded = catch_panic(|| decode_ldr_file(path))
         .unwrap_or_else(|| Err("is damaged: its decoder failed".into()))
         .map_err(|cause| Error::at(path, cause))?;
@@ -230,8 +245,11 @@ fn read_ldr_map(path: &Path) -> Result<LoadedMap> {
     if bits < 32 {
         notices.add(format!("the map is {bits}-bit sRGB: it holds no lights brighter than white"));
     }
-    Ok(LoadedMap { image: Image { width, height, pixels }, notices })
+    Ok((LoadedMap { image: Image { width, height, pixels }, notices }, bits == 32))
 }
+
+/// Most that a pixel takes: four floats.
+const BYTES_PER_PIXEL: u64 = 16;
 
 fn decode_ldr_file(path: &Path) -> Decoded<image::DynamicImage> {
     let bytes = read_file(path)?;
@@ -252,12 +270,14 @@ fn decode_ldr_file(path: &Path) -> Decoded<image::DynamicImage> {
     }
     tiff::check(&bytes)?;
     let cause = |e| format!("cannot be decoded: {}", decoder_cause(&e, file_bytes));
-    let (width, height) = reader()?.into_dimensions().map_err(cause)?;
+    let decoder = reader()?.into_decoder().map_err(cause)?;
+    let (width, height) = decoder.dimensions();
     check_size(u64::from(width), u64::from(height))?;
+    memory::check(decoder.total_bytes())?;
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MAX_SIDE as u32);
     limits.max_image_height = Some(MAX_SIDE as u32);
-    limits.max_alloc = Some((MAX_PIXELS * 4).min(decoder_bytes(file_bytes)));
+    limits.max_alloc = Some((MAX_PIXELS * BYTES_PER_PIXEL).min(decoder_bytes(file_bytes)));
     reader_of_pixels.limits(limits);
     reader_of_pixels.decode().map_err(cause)
 }

@@ -1,29 +1,41 @@
-//! Conversion from the primaries an OpenEXR file declares to Rec.709.
+//! Conversion from the primaries a file declares to Rec.709.
 
-use exr::math::Vec2;
-use exr::meta::header::Header;
-use glam::{DMat3, DVec2, DVec3, Mat3};
+use glam::{DMat3, DVec2, DVec3, Mat3, Vec3};
 
-use super::exr_channels::Channels;
 use crate::error::Notices;
 
-/// The matrix to linear Rec.709 if the file says that its primaries are others.
+/// Red, green, blue and white as `xy`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Primaries(pub(crate) [DVec2; 4]);
+
+impl Primaries {
+    /// Luminance of its red, green and blue; that of Rec.709 if these make no sense.
+    pub(crate) fn luminance(self) -> Vec3 {
+        let weights = |primaries| xyz_from_rgb(primaries).row(1).as_vec3();
+        let own = weights(self.0);
+        if own.is_finite() && own.y != 0.0 { own } else { weights(REC709) }
+    }
+
+    /// Whether these are others' but for rounding.
+    pub(crate) fn is(self, others: [DVec2; 4]) -> bool {
+        self.0.iter().zip(&others).all(|(a, b)| (*a - *b).abs().max_element() < 2e-3)
+    }
+}
+
+/// The matrix to linear Rec.709 of a file that says that its primaries are others, and perhaps which white is
+/// neutral in it.
 pub(crate) fn rec709_conversion(
-    header: &Header,
-    channels: Channels,
+    given: Primaries,
+    neutral: Option<DVec2>,
     notices: &mut Notices,
 ) -> Option<Mat3> {
-    let given = header.shared_attributes.chromaticities?;
-    let point = |v: Vec2<f32>| DVec2::new(f64::from(v.0), f64::from(v.1));
-    let given = [given.red, given.green, given.blue, given.white].map(point);
-    let same = given.iter().zip(&REC709).all(|(a, b)| (*a - *b).abs().max_element() < 2e-3);
-    if same || matches!(channels, Channels::Grey(_)) {
+    if given.is(REC709) {
         return None;
     }
+    let Primaries(given) = given;
     // Primaries at the corners of the diagram: the pixels are XYZ, which knows no white of its own.
     let is_xyz = given[..3] == [DVec2::X, DVec2::Y, DVec2::ZERO];
-    let neutral = header.own_attributes.adopted_neutral.map_or(given[3], point);
-    let white = if is_xyz { REC709[3] } else { neutral };
+    let white = if is_xyz { REC709[3] } else { neutral.unwrap_or(given[3]) };
     let matrix = xyz_from_rgb(REC709).inverse() * bradford(white, REC709[3]) * xyz_from_rgb(given);
     if !matrix.is_finite() {
         notices.add("the chromaticities of the file make no sense; it is read as Rec.709");
@@ -34,7 +46,7 @@ pub(crate) fn rec709_conversion(
 }
 
 /// Rec.709 primaries and white D65 as `xy`.
-const REC709: [DVec2; 4] = [
+pub(crate) const REC709: [DVec2; 4] = [
     DVec2::new(0.64, 0.33),
     DVec2::new(0.30, 0.60),
     DVec2::new(0.15, 0.06),

@@ -144,11 +144,12 @@ pub fn write_picture(
             ExrPicture { image: &image, layers, metadata: &metadata, preview: None },
         );
     }
-    let image = match options.denoiser {
-        // Filters would take the copies that fill gaps for samples that agree.
-        Some(_) if film.min_samples() == 0 => blend(film, None),
-        Some(denoiser) => denoiser.denoise(&whole, None)?,
-        None => image,
+    // Filters would take the copies that fill gaps for samples that agree.
+    let filter = options.denoiser.filter(|_| film.min_samples() > 0);
+    let image = match (filter, options.denoiser) {
+        (Some(filter), _) => filter.denoise(&whole, None)?,
+        (None, Some(_)) => blend(film, None),
+        (None, None) => image,
     };
     let image = options.white_balance.apply(image);
     let stops = options.exposure.of(film, &image);
@@ -157,8 +158,8 @@ pub fn write_picture(
         let WhiteBalance { kelvin, tint } = options.white_balance;
         metadata.push(("lightgrid.white_balance".to_owned(), format!("{kelvin},{tint}")));
     }
-    if let Some(denoiser) = options.denoiser {
-        metadata.push(("lightgrid.denoiser".to_owned(), denoiser.name().to_owned()));
+    if let Some(filter) = filter {
+        metadata.push(("lightgrid.denoiser".to_owned(), filter.name().to_owned()));
     }
     metadata.push(("lightgrid.tonemap".to_owned(), options.tone_curve.name().to_owned()));
     write_png(path, &display_rgb8(&image, stops, options.tone_curve), &metadata)

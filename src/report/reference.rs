@@ -14,7 +14,7 @@ use super::measure::Place;
 use super::plan::{LEAST_PICTURES, Settings};
 use crate::digest::Digest;
 use crate::error::{Error, Result};
-use crate::image::{Image, is_linear, read_picture, write_beside_and_rename};
+use crate::image::{Image, read_with_linearity, write_beside_and_rename};
 use crate::metrics::{REL_MSE_EPSILON, trimmed_mean};
 use crate::render::film::Film;
 use crate::render::{Sampling, StopRule};
@@ -234,12 +234,12 @@ impl Reference {
 /// # Errors
 /// If it cannot be read, is not linear, has another size, or is black.
 pub(super) fn read_reference(path: &Path, size: (u32, u32)) -> Result<Image> {
-    if !is_linear(path)? {
+    let (image, is_linear) = read_with_linearity(path)?;
+    if !is_linear {
         let cause =
             "is developed for a display, and errors are those of linear light: give an .exr";
         return Err(Error::at(path, cause));
     }
-    let image = read_picture(path)?;
     if (image.width, image.height) != size {
         return Err(Error::at(
             path,

@@ -11,7 +11,7 @@ use glam::{Affine3A, Vec3};
 use super::RenderArguments;
 use crate::cli::picture::say_written;
 use crate::error::{Error, Result};
-use crate::image::write_beside_and_rename;
+use crate::image::{name_of_process, write_beside_and_rename};
 use crate::path::{World, framing};
 use crate::scene::Camera;
 use crate::scene::camera_path::CameraPath;
@@ -187,9 +187,7 @@ impl Reel {
     /// # Errors
     /// If it cannot be made.
     pub(super) fn new() -> Result<Self> {
-        let folder = std::env::temp_dir().join(format!("lightgrid-{}-frames", std::process::id()));
-        // An earlier process of this number may have been killed: its frames are none of this video's.
-        let _ = fs::remove_dir_all(&folder);
+        let folder = std::env::temp_dir().join(format!("lightgrid-{}-frames", name_of_process()));
         fs::create_dir(&folder).map_err(|error| Error::at(&folder, error))?;
         Ok(Self { folder, count: 0 })
     }
