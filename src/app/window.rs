@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 
 use egui::ViewportId;
 use egui_wgpu::winit::Painter;
-use egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
+use egui_wgpu::{SurfaceErrorAction, WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use winit::application::ApplicationHandler;
-use winit::dpi::LogicalSize;
+use winit::dpi::{LogicalSize, PhysicalSize};
 use winit::event::WindowEvent;
 use winit::event_loop::{
     ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy, OwnedDisplayHandle,
@@ -134,6 +134,8 @@ struct Running {
     /// There is none only while one is exchanged for another.
     painter: Option<Painter>,
     copies: TextureCopies,
+    /// Whether the surface is to be configured before it is painted on.
+    is_stale: Arc<AtomicBool>,
     /// When a device was lost last, and how many were in a row.
     lost: Option<(Instant, u32)>,
     /// When the last frame was drawn.
@@ -153,8 +155,11 @@ fn paint_on(
     display: &OwnedDisplayHandle,
     adapter: Option<&str>,
     copies: &TextureCopies,
+    is_stale: &Arc<AtomicBool>,
 ) -> Result<(Painter, Screen)> {
     let gpu = Gpu::open_for_window(adapter, display, window)?;
+    let usual = WgpuConfiguration::default();
+    let (answer, is_stale) = (usual.on_surface_status.clone(), Arc::clone(is_stale));
     let config = WgpuConfiguration {
         wgpu_setup: WgpuSetup::Existing(WgpuSetupExisting {
             instance: gpu.instance.clone(),
@@ -162,7 +167,18 @@ fn paint_on(
             device: gpu.device.clone(),
             queue: gpu.queue.clone(),
         }),
-        ..WgpuConfiguration::default()
+        on_surface_status: Arc::new(move |status| match answer(status) {
+            SurfaceErrorAction::SkipFrame => SurfaceErrorAction::SkipFrame,
+            action => {
+                is_stale.store(true, Ordering::Relaxed);
+                match action {
+                    // The next frame does it, when no other thread submits.
+                    SurfaceErrorAction::Reconfigure => SurfaceErrorAction::SkipFrame,
+                    other => other,
+                }
+            }
+        }),
+        ..usual
     };
     let options = renderer_options();
     let mut painter = pollster::block_on(Painter::new(context.clone(), config, false, options));
@@ -207,9 +223,10 @@ impl Runner {
         });
         let display = event_loop.owned_display_handle();
         let adapter = start.adapter.clone();
-        let copies = TextureCopies::default();
-        let (painter, screen) = paint_on(&window, &context, &display, adapter.as_deref(), &copies)
-            .map_err(|e| cannot(&e))?;
+        let (copies, is_stale) = (TextureCopies::default(), Arc::default());
+        let (painter, screen) =
+            paint_on(&window, &context, &display, adapter.as_deref(), &copies, &is_stale)
+                .map_err(|e| cannot(&e))?;
         let input = egui_winit::State::new(
             context.clone(),
             ViewportId::ROOT,
@@ -228,6 +245,7 @@ impl Runner {
             adapter,
             painter: Some(painter),
             copies,
+            is_stale,
             lost: None,
             drawn_at: Instant::now(),
             touched_at: None,
@@ -269,6 +287,12 @@ impl Running {
     /// # Errors
     /// If there is no other.
     fn draw(&mut self) -> Result<()> {
+        let PhysicalSize { width, height } = self.window.inner_size();
+        let size = NonZeroU32::new(width).zip(NonZeroU32::new(height));
+        let Some(size) = size.filter(|_| self.window.is_minimized() != Some(true)) else {
+            // There is nothing to draw on; it is asked for again when there is.
+            return Ok(());
+        };
         let start = Instant::now();
         if let Err(loss) = self.app.screen().gpu().check() {
             self.replace_device(&loss)?;
@@ -289,21 +313,32 @@ impl Running {
         let points = output.pixels_per_point;
         let primitives = self.context.tessellate(output.shapes, points);
         self.copies.follow(&output.textures_delta);
-        // egui's renderer panics if the device is lost while it draws.
-        let drawn = catch_unwind(AssertUnwindSafe(|| {
-            if let Some(painter) = &mut self.painter {
-                painter.paint_and_update_textures(
-                    ViewportId::ROOT,
-                    points,
-                    theme::BACKGROUND.to_normalized_gamma_f32(),
-                    &primitives,
-                    &mut output.textures_delta,
-                    Vec::new(),
-                    &self.window,
-                );
+        let gpu = self.app.screen().gpu().clone();
+        let is_stale = self.is_stale.swap(false, Ordering::Relaxed);
+        let mut paint = || {
+            let Some(painter) = &mut self.painter else { return };
+            if is_stale {
+                painter.on_window_resized(ViewportId::ROOT, size.0, size.1);
             }
+            painter.paint_and_update_textures(
+                ViewportId::ROOT,
+                points,
+                theme::BACKGROUND.to_normalized_gamma_f32(),
+                &primitives,
+                &mut output.textures_delta,
+                Vec::new(),
+                &self.window,
+            );
+        };
+        // egui's renderer panics if the device is lost while it draws.
+        let drawn = catch_unwind(AssertUnwindSafe(|| match is_stale {
+            true => gpu.alone(paint),
+            false => paint(),
         }));
         output.textures_delta.clear();
+        if self.is_stale.load(Ordering::Relaxed) {
+            self.context.request_repaint();
+        }
         if self.app.screen().gpu().check().is_err() {
             self.context.request_repaint();
         } else if let Err(panic) = drawn {
@@ -348,9 +383,15 @@ impl Running {
         // Two surfaces of one window exclude each other.
         self.painter = None;
         let adapter = self.adapter.as_deref();
-        let (painter, screen) =
-            paint_on(&self.window, &self.context, &self.display, adapter, &self.copies)
-                .map_err(|e| closes(&e))?;
+        let (painter, screen) = paint_on(
+            &self.window,
+            &self.context,
+            &self.display,
+            adapter,
+            &self.copies,
+            &self.is_stale,
+        )
+        .map_err(|e| closes(&e))?;
         self.painter = Some(painter);
         self.app.move_to(screen, loss);
         Ok(())
@@ -403,11 +444,12 @@ impl ApplicationHandler<Call> for Runner {
                 return;
             }
             WindowEvent::Resized(size) => {
-                let size = (NonZeroU32::new(size.width), NonZeroU32::new(size.height));
-                if let (Some(width), Some(height)) = size
+                let size = NonZeroU32::new(size.width).zip(NonZeroU32::new(size.height));
+                if let Some((width, height)) = size
                     && let Some(painter) = &mut running.painter
                 {
-                    painter.on_window_resized(ViewportId::ROOT, width, height);
+                    let gpu = running.app.screen().gpu();
+                    gpu.alone(|| painter.on_window_resized(ViewportId::ROOT, width, height));
                 }
             }
             WindowEvent::KeyboardInput { .. }

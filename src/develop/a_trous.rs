@@ -118,7 +118,7 @@ impl Passes {
         }
         pass(&self.mend, &one, &[]);
         pass(&self.dress, &one, &[entry(2, &film.counts), entry(7, &counts)]);
-        gpu.queue.submit([commands.finish()]);
+        gpu.submit([commands.finish()]);
         let [width, height] = size;
         Some(DeviceFilm { sum: light, counts, surfaces: None, width, height, scale: 1.0 })
     }

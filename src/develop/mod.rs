@@ -215,7 +215,7 @@ impl Developer {
         let entries = [self.inputs(picture, &settings).as_slice(), &[entry(6, &small)]].concat();
         let mut commands = self.gpu.device.create_command_encoder(&Default::default());
         dispatch(&self.gpu, &mut commands, &self.shrink, &entries, [width, height]);
-        self.gpu.queue.submit([commands.finish()]);
+        self.gpu.submit([commands.finish()]);
         let bytes = self.gpu.read_back(&small, bytes)?;
         let pixels = bytemuck::pod_collect_to_vec::<u8, [f32; 4]>(&bytes);
         let pixels = pixels.into_iter().map(|[r, g, b, _]| [r, g, b]).collect();
@@ -258,7 +258,7 @@ impl Developer {
         let entries = [self.inputs(picture, &settings).as_slice(), &textures].concat();
         let mut commands = self.gpu.device.create_command_encoder(&Default::default());
         dispatch(&self.gpu, &mut commands, &self.develop, &entries, picture.size());
-        self.gpu.queue.submit([commands.finish()]);
+        self.gpu.submit([commands.finish()]);
     }
 
     /// The levels of a developed picture; waits for the device.

@@ -14,7 +14,7 @@ impl Developer {
     /// A film's sums; `layers` asks for its layers too, where it has them. A film that does not fit
     /// on the device becomes a smaller picture.
     pub(crate) fn upload_film(&self, film: &Film, layers: bool) -> LinearPicture {
-        if self.most_width(film.width, film.height) < film.width {
+        if !self.can_show(film.width, film.height) {
             return self.upload_image(&film.image());
         }
         let pixels = film.pixels();
@@ -76,6 +76,11 @@ impl Developer {
             .map(Option::unwrap_or_default)
             .collect();
         texture(&self.gpu, picture.size(), &texels)
+    }
+
+    /// Whether a picture of this size fits on the device.
+    pub(crate) fn can_show(&self, width: u32, height: u32) -> bool {
+        self.most_width(width, height) >= width
     }
 
     /// Most pixels across for a picture of this shape to fit on the device.

@@ -318,6 +318,26 @@ fn a_real_window_moves_opens_saves_and_remembers() {
 }
 
 #[test]
+fn a_window_whose_size_changes_keeps_the_gpu_that_renders() {
+    let Some(mut desk) = Desk::open() else { return };
+    desk.start("view open --env sky:day@64x32 --size 96x64 --device gpu --settings window.json");
+    let device = |name: &str| {
+        desk.save(name);
+        let device = desk.metadata(name, "device");
+        std::fs::remove_file(desk.path(name)).expect("removed");
+        device.filter(|device| device != "CPU")
+    };
+    desk.wait_for("picture from the GPU", || device("gpu.exr"));
+    // Each has its surface made anew, while the GPU has work to do.
+    for step in 0..12 {
+        let (width, height) = (1000 - 20 * step, 700 - 10 * step);
+        desk.xdotool(&format!("windowsize --sync {} {width} {height}", desk.id));
+        std::thread::sleep(Duration::from_millis(150));
+    }
+    assert!(device("resized.exr").is_some(), "{}", desk.says());
+}
+
+#[test]
 fn a_scene_shown_in_place_of_a_damaged_one_keeps_its_viewpoints() {
     let Some(mut desk) = Desk::open() else { return };
     std::fs::write(desk.path("bad.gltf"), "{").expect("written");

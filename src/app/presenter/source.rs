@@ -109,8 +109,10 @@ impl Source {
         let film = &self.session.film;
         let is_here = |(gpu, _): &&(Gpu, DeviceFilm)| gpu.is_same(developer.gpu());
         let noisy = |layers| match self.session.on_device.as_ref().filter(is_here) {
-            Some((_, on_device)) => LinearPicture::live(on_device.clone()),
-            None => developer.upload_film(film, layers),
+            Some((_, on_device)) if developer.can_show(film.width, film.height) => {
+                LinearPicture::live(on_device.clone())
+            }
+            _ => developer.upload_film(film, layers),
         };
         let backdrop = self.backdrop.as_ref().map(|backdrop| (&*backdrop.film, backdrop.worth));
         let ahead = backdrop.filter(|(before, _)| self.is_behind(before));

@@ -1,12 +1,12 @@
 //! The scene's triangles and instances in a tree of the driver's own, for the device's ray queries.
 
-use wgpu::util::DeviceExt as _;
 use wgpu::{
     AccelerationStructureFlags, AccelerationStructureGeometryFlags,
     AccelerationStructureUpdateMode, BlasBuildEntry, BlasGeometries, BlasGeometrySizeDescriptors,
     BlasTriangleGeometry, BlasTriangleGeometrySizeDescriptor, BufferUsages,
 };
 
+use super::buffers::PIECE_BYTES;
 use super::device::Gpu;
 use super::layout::material_flags::{ALPHA_MASK, PARTIAL};
 use crate::bvh::InstanceWords;
@@ -74,25 +74,18 @@ impl Acceleration {
         for (words, instance) in instances.iter_mut().zip(scene.instances.iter()) {
             words[7][3] = of_mesh(instance.mesh).opaque;
         }
-        let tlas = build(gpu, scene, &triangles, &lower);
+        let tlas = build(gpu, scene, &triangles, &lower)?;
         gpu.check()?;
         Ok(Self { tlas, triangles, opaque: lower[0].opaque, instances })
     }
 }
 
-fn build(gpu: &Gpu, scene: &Scene, triangles: &[u32], lower: &[Lower]) -> wgpu::Tlas {
+fn build(gpu: &Gpu, scene: &Scene, triangles: &[u32], lower: &[Lower]) -> Result<wgpu::Tlas> {
     let device = &gpu.device;
     let corners = triangles.iter().map(|triangle| scene.triangles[*triangle as usize]);
     let indices: Vec<[u32; 3]> = corners.collect();
-    let buffer = |label, contents: &[u8]| {
-        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents: if contents.is_empty() { &[0; 12] } else { contents },
-            usage: BufferUsages::BLAS_INPUT,
-        })
-    };
-    let vertex_buffer = buffer("positions", bytemuck::cast_slice(&scene.positions));
-    let index_buffer = buffer("triangles", bytemuck::cast_slice(&indices));
+    let vertex_buffer = input(gpu, "positions", bytemuck::cast_slice(&scene.positions))?;
+    let index_buffer = input(gpu, "triangles", bytemuck::cast_slice(&indices))?;
     let flags = AccelerationStructureFlags::PREFER_FAST_TRACE;
     let update_mode = AccelerationStructureUpdateMode::Build;
     let parts = lower.iter().map(|&Lower { first, count, opaque }| {
@@ -158,6 +151,32 @@ fn build(gpu: &Gpu, scene: &Scene, triangles: &[u32], lower: &[Lower]) -> wgpu::
     let entries: Vec<_> = entries.collect();
     let mut commands = device.create_command_encoder(&Default::default());
     commands.build_acceleration_structures(&entries, [&tlas]);
-    gpu.queue.submit([commands.finish()]);
-    tlas
+    gpu.submit([commands.finish()]);
+    Ok(tlas)
+}
+
+/// A buffer that trees are built from.
+fn input(gpu: &Gpu, name: &str, contents: &[u8]) -> Result<wgpu::Buffer> {
+    let size = contents.len().max(12) as u64;
+    if size > gpu.limits.max_buffer_size {
+        return Err(Error::new(format!(
+            "the scene's {name} take {} MiB: {} allows {} MiB for them",
+            size >> 20,
+            gpu.facts().name,
+            gpu.limits.max_buffer_size >> 20
+        )));
+    }
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(name),
+        size,
+        usage: BufferUsages::BLAS_INPUT | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    gpu.check()?;
+    let offsets = (0..).step_by(PIECE_BYTES);
+    for (offset, piece) in offsets.zip(contents.chunks(PIECE_BYTES)) {
+        gpu.queue.write_buffer(&buffer, offset, piece);
+        gpu.finish_copies()?;
+    }
+    Ok(buffer)
 }

@@ -32,7 +32,7 @@ pub(super) struct Buffers {
 const SMALL_ROWS: u64 = 64;
 
 /// Most bytes written to the device at once: they are copied in host memory first.
-const PIECE_BYTES: usize = 16 << 20;
+pub(super) const PIECE_BYTES: usize = 16 << 20;
 
 impl Buffers {
     pub(super) fn new(gpu: &Gpu) -> Self {
@@ -211,12 +211,6 @@ impl Buffers {
         Ok(rows)
     }
 
-    /// Waits for what was written, so that staging memory is given back.
-    fn finish_copies(&self) -> Result<()> {
-        self.gpu.queue.submit([]);
-        self.gpu.wait_for(None)
-    }
-
     fn create_array(&self, kind: ArrayKind, rows: u32) -> wgpu::Texture {
         self.gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some(kind.name),
@@ -240,12 +234,17 @@ impl Buffers {
         })
     }
 
+    /// Waits for what was written, as [`Gpu::finish_copies`].
+    pub(super) fn finish_copies(&self) -> Result<()> {
+        self.gpu.finish_copies()
+    }
+
     /// Fills a buffer that exists with zeros.
     pub(super) fn clear(&self, name: &str) {
         if let Some(buffer) = self.get(name) {
             let mut commands = self.gpu.device.create_command_encoder(&Default::default());
             commands.clear_buffer(buffer, 0, None);
-            self.gpu.queue.submit([commands.finish()]);
+            self.gpu.submit([commands.finish()]);
         }
     }
 

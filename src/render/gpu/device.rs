@@ -1,6 +1,6 @@
 //! Adapters: what there is, which one to take, and a connection to it.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use wgpu::wgt::WgpuHasDisplayHandle;
 use wgpu::{Adapter, Backends, DeviceType, Features, Instance, InstanceDescriptor, Limits};
@@ -104,6 +104,8 @@ pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     trouble: Arc<Mutex<Option<String>>>,
+    /// Held by whoever submits, and alone by whoever needs a device with nothing to do.
+    submitting: Arc<RwLock<()>>,
     /// Whether frames of a window are drawn on it too.
     pub(super) has_window: bool,
     hardware_rays: bool,
@@ -114,8 +116,11 @@ pub struct Gpu {
     pub(super) schedule: Option<Schedule>,
 }
 
-/// Storage buffers that a kernel has at most, arrays among them.
-const MOST_STORAGE_BUFFERS: u32 = 32;
+/// Storage buffers that a kernel has at most, arrays among them. Metal allows 29.
+pub(super) const MOST_STORAGE_BUFFERS: u32 = 28;
+
+/// What wgpu 30 says where [`Gpu::alone`] should have been asked, but egui's painter cannot.
+const SURFACE_IS_BUSY: &str = "come idle before reconfiguring the Surface";
 
 impl Gpu {
     /// Opens the best adapter, or the best of those whose name or backend contains `name` (in any
@@ -184,9 +189,11 @@ impl Gpu {
             };
             let mut found = enumerate(&instance, Some(&surface));
             found.sort_by_key(|(facts, _)| !facts.is_called(name));
-            if let Some((facts, adapter)) = found.into_iter().next() {
-                let gpu = Self::connect(facts, instance, adapter)?;
-                return Ok(Self { has_window: true, ..gpu });
+            for (facts, adapter) in found {
+                match Self::connect(facts, instance.clone(), adapter) {
+                    Ok(gpu) => return Ok(Self { has_window: true, ..gpu }),
+                    Err(error) => reason = error.to_string(),
+                }
             }
         }
         Err(Error::new(reason))
@@ -221,13 +228,14 @@ impl Gpu {
             note(&lost, format!("the device was lost{cause}"));
         });
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            note(
-                &failed,
-                match error {
-                    wgpu::Error::OutOfMemory { .. } => "it is out of memory".to_owned(),
-                    other => one_line(&other.to_string()),
-                },
-            );
+            let sentence = match error {
+                wgpu::Error::OutOfMemory { .. } => "it is out of memory".to_owned(),
+                other => one_line(&other.to_string()),
+            };
+            // Of a surface that could be better, which is as it was and will be configured again.
+            if !sentence.contains(SURFACE_IS_BUSY) {
+                note(&failed, sentence);
+            }
         }));
         let prefers_buffers = !facts.is_software() && facts.storage_buffers >= MOST_STORAGE_BUFFERS;
         let gpu = Self {
@@ -238,6 +246,7 @@ impl Gpu {
             device,
             queue,
             trouble,
+            submitting: Arc::default(),
             has_window: false,
             hardware_rays: false,
             pipelines: Arc::default(),
@@ -323,6 +332,31 @@ impl Gpu {
             self.device.poll(PollType::Wait { submission_index: submission, timeout: None });
         self.check()?;
         waited.map(|_| ()).map_err(|e| Error::new(format!("{}: {e}", self.facts.name)))
+    }
+
+    /// Submits commands.
+    pub(crate) fn submit(
+        &self,
+        commands: impl IntoIterator<Item = wgpu::CommandBuffer>,
+    ) -> SubmissionIndex {
+        let _one_of_many = self.submitting.read().unwrap_or_else(PoisonError::into_inner);
+        self.queue.submit(commands)
+    }
+
+    /// Waits for what was written, so that staging memory is given back.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub(super) fn finish_copies(&self) -> Result<()> {
+        self.submit([]);
+        self.wait_for(None)
+    }
+
+    /// Does something while no other thread submits: wgpu 30 configures a window's surface once the device has
+    /// nothing to do, and fails if it is given something meanwhile.
+    pub(crate) fn alone<T>(&self, work: impl FnOnce() -> T) -> T {
+        let _alone = self.submitting.write().unwrap_or_else(PoisonError::into_inner);
+        work()
     }
 
     /// Gives the device up, as a driver reset would; for tests of what happens then.

@@ -82,7 +82,7 @@ impl Sums {
         }
         let sums = Self { width, height, layers, scale, rays: AtomicU64::new(0) };
         if let Some(film) = film {
-            sums.write(buffers, film);
+            sums.write(buffers, film)?;
         }
         Ok(sums)
     }
@@ -137,7 +137,7 @@ impl Sums {
     }
 
     /// Puts a film in the place of what is there.
-    pub(super) fn write(&self, buffers: &Buffers, film: &Film) {
+    pub(super) fn write(&self, buffers: &Buffers, film: &Film) -> Result<()> {
         self.rays.store(0, Ordering::Relaxed);
         for (piece, pixels) in film.pixels.chunks(PIECE_PIXELS).enumerate() {
             let at = (piece * PIECE_PIXELS) as u64 * PIXEL_BYTES;
@@ -147,13 +147,16 @@ impl Sums {
             buffers.write(PIXELS[0], at, bytemuck::cast_slice(&high));
             buffers.write(PIXELS[1], at, bytemuck::cast_slice(&low));
             buffers.write(PIXELS[2], at, bytemuck::cast_slice(&counts));
+            buffers.finish_copies()?;
         }
         for (piece, surfaces) in film.surfaces.chunks(PIECE_PIXELS).enumerate() {
             let at = (piece * PIECE_PIXELS) as u64 * SURFACE_BYTES;
             let (high, low) = split(surfaces.iter().map(Surface::sums));
             buffers.write(SURFACES[0], at, bytemuck::cast_slice(&high));
             buffers.write(SURFACES[1], at, bytemuck::cast_slice(&low));
+            buffers.finish_copies()?;
         }
+        Ok(())
     }
 }
 

@@ -128,7 +128,7 @@ impl Flights {
             &all[slot]
         });
         let submitted = Instant::now();
-        let submission = gpu.queue.submit([commands.finish()]);
+        let submission = gpu.submit([commands.finish()]);
         if let Some(clock) = &self.clock {
             clock.ask(slot);
         }

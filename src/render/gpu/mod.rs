@@ -71,8 +71,10 @@ const TILE: u32 = 8;
 const GROUP: u64 = 64;
 /// Most workgroups of one dispatch (WebGPU's limit along an axis).
 const MAX_GROUPS: u64 = 65_535;
-/// Tiles of a dispatch that keep a device busy: the cores of a software one, and all of a real one.
-const LEAST_TILES: [u64; 2] = [4, 1024];
+/// Tiles of a dispatch that keep a software device's cores busy.
+const LEAST_TILES_OF_SOFTWARE: u64 = 4;
+/// Tiles of a dispatch that keep a small and a large real device busy.
+const LEAST_TILES: [u64; 2] = [64, 1024];
 /// Most samples of a pixel in one dispatch.
 const MOST_SAMPLES: u32 = 64;
 
@@ -226,7 +228,7 @@ impl Renderer {
     pub(super) fn set_film(&mut self, film: &Film) -> Result<()> {
         self.settle()?;
         self.forget_paths()?;
-        self.film.write(&self.buffers, film);
+        self.film.write(&self.buffers, film)?;
         self.progress = Progress::of(film);
         self.told = self.total_samples();
         Ok(())
@@ -302,18 +304,28 @@ impl Renderer {
         Ok(Advance { samples, least: self.progress.least })
     }
 
+    /// How many tiles a dispatch has at least, if the device affords so many units of work: what takes a large
+    /// one no time may take a small one so long that a desktop stutters.
+    fn least_tiles(&self, units: u64) -> u64 {
+        let [small, large] = LEAST_TILES;
+        match self.gpu.facts().is_software() {
+            true => LEAST_TILES_OF_SOFTWARE,
+            false => units.clamp(small, large),
+        }
+    }
+
     /// Dispatches until all tiles are ahead. Each pixel takes its samples in order, so that its sums do
     /// not depend on how the work is cut.
     fn render_tiles(&mut self, pass: Pass, stride: u32, cancel: &AtomicBool) -> Result<()> {
         let tiles = self.tiles();
-        let least_tiles = LEAST_TILES[usize::from(!self.gpu.facts().is_software())];
         let missing = pass.target.saturating_sub(self.progress.least);
         while self.progress.tile < tiles && missing > 0 {
             let first = self.progress.tile;
             if self.progress.group == 0 {
                 let units = self.flights.units(Kernel::Render);
                 let affordable = units / u64::from(missing.min(MOST_SAMPLES));
-                let count = affordable.clamp(least_tiles, MAX_GROUPS).min(tiles - first);
+                let count = affordable.clamp(self.least_tiles(units), MAX_GROUPS);
+                let count = count.min(tiles - first);
                 self.progress.group = count;
             }
             let count = self.progress.group;

@@ -29,7 +29,7 @@ impl Pacer {
         let affordable = units as f64 * self.target_seconds / seconds.max(1e-6);
         // A dispatch much smaller than allowed says little about larger ones.
         let says_more = units as f64 >= 0.5 * self.units;
-        let most = if says_more { 2.0 * self.units } else { self.units };
+        let most = if says_more { 2.0 * self.units.max(units as f64) } else { self.units };
         self.units = affordable.min(most).clamp(1.0, 1e9);
     }
 }

@@ -75,7 +75,7 @@ impl Gpu {
         let failed = |e: &dyn std::fmt::Display| {
             Error::new(format!("{}: results cannot be read back: {e}", self.facts().name))
         };
-        self.queue.submit([commands.finish()]);
+        self.submit([commands.finish()]);
         let (sender, receiver) = channel();
         staging.map_async(wgpu::MapMode::Read, ..bytes, move |result| {
             // The receiver waits below, unless the device has failed.

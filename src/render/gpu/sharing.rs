@@ -7,7 +7,7 @@ use super::super::Pass;
 use super::buffers::Buffers;
 use super::kernel::Kernel;
 use super::layout::{Globals, Work};
-use super::{GROUP, LEAST_TILES, Progress, Renderer};
+use super::{GROUP, Progress, Renderer};
 use crate::error::Result;
 use crate::features::Features;
 use crate::path::sharing::SharedTile;
@@ -64,7 +64,6 @@ impl Renderer {
         let Some(Sharing { tile, most_groups, next_group: mut first }) = self.sharing else {
             return Ok(());
         };
-        let least = LEAST_TILES[usize::from(!self.gpu.facts().is_software())];
         while self.progress.least < pass.target {
             let sample = self.progress.least;
             let tiling = tile.tiling([width, height], seed, sample);
@@ -73,7 +72,8 @@ impl Renderer {
                 if cancel.load(Ordering::Relaxed) {
                     return Ok(());
                 }
-                let affordable = self.flights.units(Kernel::FindSeconds).max(least);
+                let units = self.flights.units(Kernel::FindSeconds);
+                let affordable = units.max(self.least_tiles(units));
                 let count = affordable.min(most_groups).min(groups - first);
                 let work = Work {
                     first: first as u32,
