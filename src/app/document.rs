@@ -259,7 +259,6 @@ impl Viewpoint {
                 Some(degrees) => Projection::Perspective { fov_y_radians: degrees.to_radians() },
                 None => Projection::Orthographic { half_height: self.half_height },
             },
-            aspect: None,
             lens_radius: self.lens_radius,
             focus_distance: self.focus_distance,
         }

@@ -100,7 +100,8 @@ fn share(text: &str) -> Result<f32, String> {
 
 /// Linear RGB of `#rrggbb`.
 fn color_of(text: &str) -> Result<Vec3, String> {
-    let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.is_ascii());
+    let is_hex = |digits: &&str| digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+    let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6).filter(is_hex);
     let bytes = digits.and_then(|digits| u32::from_str_radix(digits, 16).ok());
     let bytes = bytes.ok_or_else(|| format!("{text} is no color like #c8a070"))?;
     let [_, r, g, b] = bytes.to_be_bytes();

@@ -412,8 +412,6 @@ pub struct Camera {
     pub world_from_camera: Affine3A,
     /// Projection.
     pub projection: Projection,
-    /// Width over height the camera was made for, if the file says so.
-    pub aspect: Option<f32>,
     /// Radius of the thin lens in metres; 0 is a pinhole.
     pub lens_radius: f32,
     /// Distance in metres along the view axis at which the picture is sharp.
@@ -437,7 +435,6 @@ impl Camera {
             name: String::new(),
             world_from_camera: Affine3A::from_mat3_translation(rotation, eye),
             projection: Projection::Perspective { fov_y_radians },
-            aspect: None,
             lens_radius: 0.0,
             focus_distance: (eye - target).length(),
         }

@@ -43,7 +43,10 @@ struct Shape {
 /// materials there are.
 fn inward_shapes(scene: &Scene) -> Vec<Option<Shape>> {
     let shape = |material: &Material| {
-        let may_be = !material.double_sided && material.alpha_mode == AlphaMode::Opaque;
+        let lets_light_through = material.transmission > 0.0 || material.diffuse_transmission > 0.0;
+        let may_be = !material.double_sided
+            && material.alpha_mode == AlphaMode::Opaque
+            && !lets_light_through;
         may_be.then_some(Shape { low: Vec3::MAX, high: Vec3::MIN, count: 0, volume: 0.0 })
     };
     let mut shapes: Vec<Option<Shape>> = scene.materials.iter().map(shape).collect();

@@ -81,7 +81,6 @@ impl Builder {
         let mut camera =
             Camera::look_at(Vec3::from(eye), Vec3::from(target), fov_y_degrees.to_radians());
         name.clone_into(&mut camera.name);
-        camera.aspect = Some(16.0 / 9.0);
         self.scene.cameras.push(camera);
     }
 

@@ -6,14 +6,24 @@ use glam::DAffine3;
 use gltf::json;
 use json::Index;
 use json::accessor::Type;
-use json::animation::{Interpolation as Written, Property, Sampler};
+use json::animation::{Channel, Interpolation as Written, Property, Sampler};
 use json::validation::Checked;
+use serde::Deserialize;
+use serde_json::Value;
 
 use super::Fallible;
 use super::accessor::Elements;
 use super::buffers::File;
 use super::pose::{Nodes, local_transform};
 use crate::scene::camera_path::{CameraPath, Interpolation, Link, Track};
+
+/// Members of an animation. Channels are read one by one, for some are of no node: those of
+/// `KHR_animation_pointer`.
+#[derive(Deserialize)]
+struct Animation {
+    channels: Vec<Value>,
+    samplers: Vec<Sampler>,
+}
 
 /// What is animated of the nodes of a file.
 pub(super) struct Channels<'a> {
@@ -35,8 +45,10 @@ impl<'a> Channels<'a> {
     pub(super) fn new(file: &'a File<'a>) -> Self {
         let mut samplers = BTreeMap::new();
         let animations = &file.document.animations;
-        for animation in animations.indices().filter_map(|index| animations.get(index).ok()) {
-            for channel in &animation.channels {
+        let read = |index| animations.get_as::<Animation>(index).ok();
+        for animation in animations.indices().filter_map(read) {
+            for channel in animation.channels.iter().filter_map(|it| Channel::deserialize(it).ok())
+            {
                 let Checked::Valid(property) = channel.target.path else { continue };
                 if let Some(sampler) = animation.samplers.get(channel.sampler.value()) {
                     let target = (channel.target.node.value() as u32, property as u8);

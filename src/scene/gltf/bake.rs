@@ -55,8 +55,9 @@ pub(super) fn append_skinned(
         }
         Placing::new(blend)
     };
-    // Joints of one skin mirror together or not at all.
-    let mirrors = joints.first().is_some_and(|&joint| Placing::new(joint).mirrors());
+    // Joints of one skin mirror together or not at all, but for those that hide a limb.
+    let shown = joints.iter().find(|joint| joint.matrix3.determinant() != 0.0);
+    let mirrors = shown.is_some_and(|&joint| Placing::new(joint).mirrors());
     append(scene, part, placing, mirrors, tally);
     Ok(())
 }
@@ -65,7 +66,7 @@ pub(super) fn append_skinned(
 /// is asked for at once.
 const TRIANGLE_BYTES: u64 = 250;
 const VERTEX_BYTES: u64 = 72;
-const STEP: u64 = 1 << 26;
+pub(super) const STEP: u64 = 1 << 26;
 
 fn check_limits(scene: &Scene, part: &Part, copies: usize) -> Fallible<()> {
     let total = |present: usize, added: usize| {

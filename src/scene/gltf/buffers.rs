@@ -157,7 +157,10 @@ impl<'a> File<'a> {
     /// Bytes of all buffers that can be read together.
     pub(super) fn total_bytes(&self) -> usize {
         let indices = self.document.buffers.indices();
-        indices.filter_map(|index| self.buffer(index).ok()).map(<[u8]>::len).sum()
+        let buffers = indices.filter_map(|index| self.buffer(index).ok());
+        // Several may be of one file.
+        let lengths: BTreeMap<_, _> = buffers.map(|bytes| (bytes.as_ptr(), bytes.len())).collect();
+        lengths.values().sum()
     }
 
     /// The bytes of a buffer view and its stride, if it gives one.

@@ -5,7 +5,7 @@ use super::objects::Objects;
 use crate::error::Notices;
 
 /// Extensions that are rendered.
-const SUPPORTED: &[&str] = &[
+pub(super) const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",

@@ -8,6 +8,7 @@ use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess,
 use serde_json::Value;
 
 use super::Fallible;
+use super::extensions::SUPPORTED;
 
 /// Keys whose whole numbers say which object of the file is meant.
 const INDICES: &[&str] = &[
@@ -40,7 +41,7 @@ const INDICES: &[&str] = &[
 pub(super) fn check_indices(text: &str) -> Fallible<u64> {
     let mut reader = serde_json::Deserializer::from_str(text);
     let values = Cell::new(0);
-    Check { is_index: false, of_objects: false, values: &values }
+    Check { is_index: false, of_objects: false, of_extensions: false, values: &values }
         .deserialize(&mut reader)
         .and_then(|()| reader.end())
         .map(|()| values.get())
@@ -56,6 +57,8 @@ struct Check<'c> {
     is_index: bool,
     /// The same for the values of objects in it, whatever their keys.
     of_objects: bool,
+    /// Whether it has extensions, of which those that are not read may hold anything.
+    of_extensions: bool,
     /// Counts them.
     values: &'c Cell<u64>,
 }
@@ -113,12 +116,13 @@ impl<'de> Visitor<'de> for Check<'_> {
 
     fn visit_map<A: MapAccess<'de>>(self, mut object: A) -> Result<(), A::Error> {
         while let Some(key) = object.next_key::<Cow<'de, str>>()? {
-            if key == "extras" {
+            if key == "extras" || (self.of_extensions && !SUPPORTED.contains(&&*key)) {
                 object.next_value::<IgnoredAny>()?;
             } else {
                 let is_index = self.of_objects || INDICES.contains(&&*key);
                 let of_objects = matches!(&*key, "attributes" | "targets");
-                object.next_value_seed(Self { is_index, of_objects, ..self })?;
+                let of_extensions = key == "extensions";
+                object.next_value_seed(Self { is_index, of_objects, of_extensions, ..self })?;
             }
         }
         Ok(())

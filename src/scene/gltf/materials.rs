@@ -42,7 +42,7 @@ impl Materials {
         for &number in used {
             places.insert(number, materials.len() as u32);
             materials.push(match number {
-                None => Material::default(),
+                None => Material { name: "default".to_owned(), ..Material::default() },
                 Some(number) => {
                     let source = file.document.materials.get(json::Index::new(number))?;
                     let mut reader = Reader::new(file, &source, number, &mut wanted, notices);
@@ -132,7 +132,8 @@ impl<'a> Reader<'a> {
             ),
             alpha_mode: match source.alpha_mode {
                 Checked::Valid(json::material::AlphaMode::Mask) => {
-                    AlphaMode::Mask { cutoff: source.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0) }
+                    // Above 1 all is cut out, as what a person hides is by a cutoff of its own.
+                    AlphaMode::Mask { cutoff: source.alpha_cutoff.map_or(0.5, |it| it.0.min(1.5)) }
                 }
                 Checked::Valid(json::material::AlphaMode::Blend) => AlphaMode::Blend,
                 Checked::Valid(json::material::AlphaMode::Opaque) => AlphaMode::Opaque,

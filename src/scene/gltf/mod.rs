@@ -43,6 +43,7 @@ use gltf::json;
 
 use crate::error::{Error, Notices, Result};
 use crate::image::{IS_A_FILM, looks_like_film, looks_like_picture, read_file};
+use crate::memory;
 use crate::scene::copies::{copies, hash_of};
 use crate::scene::needs::is_emitter;
 use crate::scene::{Outlines, Scene, SceneOptions};
@@ -191,6 +192,7 @@ struct Placement {
 /// The shown nodes with meshes, by mesh, so that each mesh is read once.
 fn placements(file: &File<'_>, nodes: &Nodes) -> Fallible<BTreeMap<u32, Vec<Placement>>> {
     let mut placements: BTreeMap<u32, Vec<Placement>> = BTreeMap::new();
+    let mut shown = 0;
     for number in nodes.showing(MESH) {
         let node = file.document.nodes.get(number)?;
         let Some(mesh) = node.mesh else { continue };
@@ -199,6 +201,11 @@ fn placements(file: &File<'_>, nodes: &Nodes) -> Fallible<BTreeMap<u32, Vec<Plac
         let instances = pose::instances(file, &node)
             .map_err(|cause| format!("node {number}: {cause}"))?
             .map_or_else(|| vec![world], |all| all.iter().map(|&one| world * one).collect());
+        shown += instances.len() as u64;
+        if shown > MAX_TRIANGLES {
+            let millions = MAX_TRIANGLES / 1_000_000;
+            return Err(format!("there are more than {millions} million instances"));
+        }
         let placement = Placement { skin: node.skin, weights: node.weights, instances };
         placements.entry(mesh.value() as u32).or_default().push(placement);
     }
@@ -326,13 +333,26 @@ impl Reading<'_> {
 
     fn read_parts(&self, mesh: &Mesh, weights: &[f32], tally: &mut Tally) -> Fallible<Vec<Part>> {
         let mut parts = Vec::new();
+        let (mut triangles, mut bytes, mut asked) = (0, 0, 0);
         for (number, primitive) in mesh.primitives().enumerate() {
             let primitive = primitive?;
             let material = self.materials.places[&self.look.material(&primitive)];
             let needs = Needs::of(&self.materials.materials[material as usize]);
             let part = geometry::read_part(self.file, &primitive, weights, material, &needs, tally)
                 .map_err(|cause| format!("primitive {number}: {cause}"))?;
-            parts.extend(part);
+            let Some(part) = part else { continue };
+            // Many may share the same long list of corners.
+            triangles += part.triangles.len() as u64;
+            if triangles > MAX_TRIANGLES {
+                let millions = MAX_TRIANGLES / 1_000_000;
+                return Err(format!("it has more than {millions} million triangles"));
+            }
+            bytes += part.bytes();
+            if bytes > asked {
+                asked = bytes + bake::STEP;
+                memory::check(bake::STEP)?;
+            }
+            parts.push(part);
         }
         Ok(parts)
     }

@@ -21,6 +21,14 @@ pub(super) struct Part {
 }
 
 impl Part {
+    /// Bytes that it takes, about.
+    pub(super) fn bytes(&self) -> u64 {
+        const BYTES_OF_VERTEX: usize = 72;
+        let influences = size_of_val(&self.influences[..]);
+        let bytes = size_of_val(&self.triangles[..]) + BYTES_OF_VERTEX * self.positions.len();
+        (bytes + influences) as u64
+    }
+
     /// Appends a copy of a vertex and returns its number.
     pub(super) fn copy_vertex(&mut self, vertex: u32) -> u32 {
         fn copy<T: Copy>(values: &mut Vec<T>, index: usize) {

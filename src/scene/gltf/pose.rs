@@ -15,6 +15,7 @@ use super::buffers::File;
 use super::document::Document;
 use super::objects::Objects;
 use crate::error::Notices;
+use crate::memory;
 
 /// In place of a node that is not there.
 const NONE: u32 = u32::MAX;
@@ -302,6 +303,7 @@ pub(super) fn instances(file: &File<'_>, node: &json::Node) -> Fallible<Option<V
     if counts.any(|other| other != count) {
         return Err("instance attributes differ in length".into());
     }
+    memory::check((count * size_of::<DAffine3>()) as u64)?;
     // Files may forget to mark integer quaternions as normalized; the length does not matter here.
     let transform = |element| {
         local_transform(&json::Node {

@@ -14,6 +14,7 @@ use super::draco::Unpacked;
 use super::objects::{not_gltf, read};
 use super::part::{Part, Tally};
 use super::{Fallible, MAX_TRIANGLES};
+use crate::memory;
 use crate::scene::placing::unit;
 
 /// What a mesh has. Its primitives are read one by one.
@@ -218,6 +219,8 @@ impl<'a> Source<'a> {
             sets.push((joints, weights.with_fractions()));
         }
         part.influences_per_vertex = 4 * sets.len();
+        let influences = vertices.len() * part.influences_per_vertex;
+        memory::check((influences * size_of::<(u32, f32)>()) as u64)?;
         for &vertex in vertices {
             let first = part.influences.len();
             for (joints, weights) in &sets {

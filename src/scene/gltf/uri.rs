@@ -32,7 +32,7 @@ impl Folder<'_> {
     /// Where the data of a URI are. A file must lie in the folder or below it, links followed: a scene
     /// that somebody sent must not make a picture of what is private.
     pub(super) fn place(self, uri: Cow<'_, str>) -> Fallible<Place<'_>> {
-        if uri.starts_with(DATA) {
+        if is_data(&uri) {
             return Ok(Place::Embedded(uri));
         }
         let path = percent_decoded(&uri);
@@ -72,10 +72,15 @@ impl Place<'_> {
     }
 }
 
+/// Whether the data are in the URI itself; schemes are written in either case (RFC 3986, section 3.1).
+fn is_data(uri: &str) -> bool {
+    uri.get(..DATA.len()).is_some_and(|scheme| scheme.eq_ignore_ascii_case(DATA))
+}
+
 /// A URI as it is shown to a person: data URIs, and some others, would fill pages.
 pub(super) fn shown(uri: &str) -> String {
     const MOST: usize = 100;
-    if uri.starts_with(DATA) {
+    if is_data(uri) {
         return "data URI".to_owned();
     }
     match uri.char_indices().nth(MOST) {

@@ -59,22 +59,22 @@ fn camera(
     notices: &mut Notices,
 ) -> Camera {
     let mut usable = world_from_camera.is_finite();
-    let (projection, aspect) = match (&source.perspective, &source.orthographic) {
+    let projection = match (&source.perspective, &source.orthographic) {
         (Some(perspective), _) => {
             let fits = perspective.yfov > 0.0 && perspective.yfov < PI;
             usable &= fits;
             let fov_y_radians = if fits { perspective.yfov } else { DEFAULT_FOV_Y_RADIANS };
-            (Projection::Perspective { fov_y_radians }, perspective.aspect_ratio)
+            Projection::Perspective { fov_y_radians }
         }
         (None, Some(parallel)) => {
-            let (x, y) = (parallel.xmag.abs(), parallel.ymag.abs());
+            let y = parallel.ymag.abs();
             let fits = y > 0.0 && y.is_finite();
             usable &= fits;
-            (Projection::Orthographic { half_height: if fits { y } else { 1.0 } }, Some(x / y))
+            Projection::Orthographic { half_height: if fits { y } else { 1.0 } }
         }
         (None, None) => {
             usable = false;
-            (Projection::Perspective { fov_y_radians: DEFAULT_FOV_Y_RADIANS }, None)
+            Projection::Perspective { fov_y_radians: DEFAULT_FOV_Y_RADIANS }
         }
     };
     if !usable {
@@ -86,7 +86,6 @@ fn camera(
         name,
         world_from_camera: world_from_camera.as_affine3a(),
         projection,
-        aspect: aspect.filter(|aspect| aspect.is_finite() && *aspect > 0.0),
         lens_radius: 0.0,
         focus_distance: 1.0,
     }
