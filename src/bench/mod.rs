@@ -312,8 +312,8 @@ impl Place<'_> {
                 return Err(Error::new("cancelled"));
             }
         }
-        let gpu = session.gpu_figures();
         session.settle()?;
+        let gpu = session.gpu_figures();
         let after = session.figures();
         let elapsed = after.render_seconds - before.render_seconds;
         let stop_milliseconds = 1e3 * slowest_stop(&mut session)?;

@@ -81,8 +81,10 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
             devices.push(Device::Gpu);
         }
     }
-    let has_real_gpu =
-        devices.contains(&Device::Gpu) && adapters.iter().any(|adapter| !adapter.is_software());
+    let has_real_gpu = devices.contains(&Device::Gpu)
+        && adapters.iter().any(|adapter| {
+            adapter.is_called(arguments.adapter.as_deref()) && !adapter.is_software()
+        });
     let suitable_size = if has_real_gpu { (1920, 1080) } else { (640, 360) };
     let interrupt = interrupt::Interrupt::watch("stopping after this scene");
     let progress = Progress::start("loading");

@@ -324,7 +324,8 @@ fn is_set(flag: &AtomicBool) -> bool {
 fn command_line() -> String {
     let quoted = |word: String| {
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=@".contains(c);
-        if word.chars().all(is_plain) { word } else { format!("'{word}'") }
+        let is_plain = !word.is_empty() && word.chars().all(is_plain);
+        if is_plain { word } else { format!("'{}'", word.replace('\'', r"'\''")) }
     };
     let words = std::env::args_os().skip(1).map(|word| quoted(word.to_string_lossy().into_owned()));
     std::iter::once("lightgrid".to_owned()).chain(words).collect::<Vec<_>>().join(" ")

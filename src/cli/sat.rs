@@ -8,7 +8,7 @@ use crate::terminal::{notice, one_line, print};
 /// Arguments of `sat`.
 #[derive(Debug, clap::Args)]
 pub(super) struct SatArguments {
-    /// Maps: files or built-in skies; without any, the talk's four cases and an extreme one.
+    /// Maps: files or built-in skies; without any, the talk's four cases.
     maps: Vec<String>,
     /// Print JSON instead of tables.
     #[arg(long)]

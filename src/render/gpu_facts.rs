@@ -61,6 +61,17 @@ pub struct AdapterFacts {
 }
 
 impl AdapterFacts {
+    /// Name and backend.
+    pub(crate) fn title(&self) -> String {
+        format!("{} ({})", self.name, self.backend)
+    }
+
+    /// Whether name or backend contain `name` (in any case); everything is called nothing.
+    pub(crate) fn is_called(&self, name: Option<&str>) -> bool {
+        let title = self.title().to_lowercase();
+        name.is_none_or(|name| title.contains(&name.to_lowercase()))
+    }
+
     /// The name without what stands in brackets.
     pub fn short_name(&self) -> &str {
         self.name.split(" (").next().unwrap_or(&self.name)

@@ -59,6 +59,7 @@ pub fn make(plan: &Plan, options: &Options<'_>) -> Result<Report> {
         plan,
         store,
         devices,
+        file_digest: file_reference.as_ref().map(digest_of),
         file_reference,
         options,
         pages_written: None,
@@ -85,6 +86,7 @@ struct Conductor<'a> {
     devices: Vec<OpenDevice>,
     machine_digest: Digest,
     file_reference: Option<Image>,
+    file_digest: Option<Digest>,
     report: Report,
     pages_written: Option<Instant>,
 }
@@ -100,8 +102,6 @@ struct Work {
     runs: Vec<Vec<Vec<(String, Run)>>>,
     /// Why a device cannot do this row.
     refusals: Vec<Option<String>>,
-    /// Methods that the GPU is ready for.
-    is_ready: Vec<bool>,
 }
 
 impl Conductor<'_> {
@@ -130,7 +130,6 @@ impl Conductor<'_> {
         let mut work = Work {
             runs: vec![vec![Vec::new(); self.plan.methods.len()]; self.devices.len()],
             refusals: vec![None; self.devices.len()],
-            is_ready: vec![false; self.plan.methods.len()],
             prepared,
             reference,
         };
@@ -141,9 +140,13 @@ impl Conductor<'_> {
         if work.refusals.iter().all(Option::is_some) {
             return self.update(&mut work);
         }
-        let is_whole = self.grow_reference(&mut work, LEAST_PICTURES)?
-            && self.all_runs(&mut work)?
-            && self.judge_well(&mut work)?;
+        let mut is_whole = self.grow_reference(&mut work, LEAST_PICTURES)?;
+        while is_whole {
+            is_whole = self.all_runs(&mut work)? && self.judge_well(&mut work)?;
+            if !is_whole || !self.forget_outdated(&mut work) {
+                break;
+            }
+        }
         self.update(&mut work)?;
         if is_whole && self.take_apart(&work)? {
             self.find_biases(&work)?;
@@ -219,15 +222,14 @@ impl Conductor<'_> {
         Ok(!self.is_cancelled())
     }
 
-    /// Builds what a GPU needs for a method, once; `false` if it cannot do it.
+    /// Builds what a GPU needs for a method, if it did not keep it from the last run; `false` if it cannot do it.
     fn make_ready(&self, work: &mut Work, device: usize, method: usize) -> bool {
-        if self.devices[device].gpu.is_none() || work.is_ready[method] {
+        if self.devices[device].gpu.is_none() {
             return true;
         }
         let settings = &self.plan.methods[method].settings;
         let place = work.prepared.place(self.plan, &self.devices[device], settings);
         let ready = place.warm_up(settings);
-        work.is_ready[method] = ready.is_ok();
         self.can(work, device, &ready)
     }
 
@@ -253,14 +255,26 @@ impl Conductor<'_> {
         self.store.read_pictures(key, self.plan.effort.frame.size)?.pop()
     }
 
-    /// Keeps the last pictures of first runs only (all of them for a given reference, whose noise is
-    /// judged by them).
+    /// Forgets all runs, and for ever those that were judged by an older reference and have no pictures to be
+    /// judged by again; whether there was one.
+    fn forget_outdated(&self, work: &mut Work) -> bool {
+        let pictures = self.reference(work).and_then(|(_, pictures)| pictures);
+        let is_outdated = |(_, run): &&(String, Run)| run.reference_pictures != pictures;
+        let outdated: Vec<_> = work.runs.iter().flatten().flatten().filter(is_outdated).collect();
+        outdated.iter().for_each(|(key, _)| self.store.remove(key));
+        let is_one = !outdated.is_empty();
+        if is_one {
+            work.runs.iter_mut().flatten().for_each(Vec::clear);
+        }
+        is_one
+    }
+
+    /// Keeps the last picture of each run, and what it is without noise of the first ones (of all for a given
+    /// reference, whose noise is judged by them).
     fn forget_pictures(&self, work: &Work) {
         for (key, run) in work.runs.iter().flatten().flatten() {
             if run.seed > 0 && self.file_reference.is_none() {
-                self.store.remove_pictures(key);
                 self.store.remove_pictures(&denoised(key));
-                continue;
             }
             let films =
                 self.store.read_pictures(key, self.plan.effort.frame.size).unwrap_or_default();
@@ -319,6 +333,7 @@ impl Conductor<'_> {
             &device.name,
             self.plan.effort.seconds,
             seed,
+            self.file_digest,
         ));
         let readable = format!("{}-{}-{}", work.prepared.title, device.device.title(), method.name);
         let readable: String = readable
@@ -374,6 +389,11 @@ pub fn check(plan: &Plan) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// What runs that are judged by a given picture depend on.
+fn digest_of(picture: &Image) -> Digest {
+    Digest::new().bytes(bytemuck::cast_slice(picture.pixels.as_flattened()))
 }
 
 /// Under which name a run's last picture without noise is kept.

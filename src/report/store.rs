@@ -79,6 +79,12 @@ impl Store {
         })
     }
 
+    /// Forgets what is kept under a name.
+    pub(super) fn remove(&self, key: &str) {
+        // What is still there is measured again all the same, and written over.
+        let _ = fs::remove_file(self.path(key, "json"));
+    }
+
     /// Forgets the pictures kept under a name.
     pub(super) fn remove_pictures(&self, key: &str) {
         // Nothing depends on it: it only frees the disk.

@@ -282,7 +282,8 @@ fn irradiance_error(environment: &Environment) -> f64 {
             let error = variance.sqrt().hypot(5e-4 * exact[c]);
             if mean[c] == exact[c] { 0.0 } else { (mean[c] - exact[c]).abs() / error }
         })
-        .fold(0.0, f64::max)
+        // Unlike `max` this keeps what is no number.
+        .fold(0.0, |worst, x| if x.is_nan() || x > worst { x } else { worst })
 }
 
 /// Irradiance in f64 by the midpoint rule, on one side of a surface or on both together, with some
@@ -328,7 +329,10 @@ pub(super) fn bilinear(map: &Image, x: f64, y: f64) -> DVec3 {
     let y = y.clamp(0.0, f64::from(map.height - 1));
     let (left, top) = (x.floor(), y.floor());
     let cosine = |row: f64| (PI * (row + 0.5) / f64::from(map.height)).cos();
+    // Below the last row there is none, and its cosine would be the last one's.
+    let is_last = top >= f64::from(map.height - 1);
     let down = (cosine(top) - cosine(y)) / (cosine(top) - cosine(top + 1.0));
+    let down = if is_last { 0.0 } else { down };
     let across = x - left;
     let column = |i: i64| i.rem_euclid(i64::from(map.width)) as u32;
     let (a, b) = (column(left as i64), column(left as i64 + 1));

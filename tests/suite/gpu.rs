@@ -88,17 +88,22 @@ fn compare_views(gpu: &Gpu, what: &str, world: &World, environment: &Environment
     let gpu_film = finish(session, samples);
     let same = render(world, environment, view.clone(), samples);
     let share = differing(&same, &gpu_film);
-    let ratio = mean(&gpu_film).luminance / mean(&same).luminance;
-    eprintln!(
-        "{what}, {sampling:?}: {:.1} % of pixels differ, mean ratio {ratio:.4}",
-        100.0 * share
-    );
+    let what = format!("{what}, {sampling:?}");
+    eprintln!("{what}: {:.1} % of pixels differ", 100.0 * share);
+    expect_same_mean(&what, &gpu_film, &same);
     // One path that is counted elsewhere moves the distributions of sixteen cells, hence all samples there.
     let learns = matches!(sampling, Sampling::Adaptive | Sampling::Talk);
     let most = if learns { 0.5 } else { 0.05 };
-    assert!(share < most, "{what}, {sampling:?}: {share} of the pixels differ");
+    assert!(share < most, "{what}: {share} of the pixels differ");
     let other = render(world, environment, View { seed: 77, ..view }, 4 * samples);
-    expect_same_pixels(&format!("{what}, {sampling:?}"), &other, &gpu_film, ALPHA);
+    expect_same_pixels(&what, &other, &gpu_film, ALPHA);
+}
+
+/// Both have the same random numbers: of their noise next to nothing is left.
+fn expect_same_mean(what: &str, gpu: &Film, cpu: &Film) {
+    let ratio = mean(gpu).luminance / mean(cpu).luminance;
+    eprintln!("{what}: mean ratio {ratio:.5}");
+    assert!((ratio - 1.0).abs() < 0.01, "{what}: the GPU's mean is {ratio} of the CPU's");
 }
 
 #[test]
@@ -300,6 +305,7 @@ fn pixels_share_the_same_vertices() {
         let share = difference_over_noise(&gpu_film, &same);
         eprintln!("{name}, {sharing:?}: differences are {share:.4} of the noise");
         assert!(share < 0.1, "{name}, {sharing:?}: {share}");
+        expect_same_mean(&format!("{name}, {sharing:?}"), &gpu_film, &same);
         let alone = View { seed: 77, sharing: Sharing::Off, ..view.clone() };
         expect_same_pixels(name, &render(&world, &environment, alone, 128), &gpu_film, ALPHA);
 
@@ -335,6 +341,7 @@ fn paths_end_in_the_same_cache() {
         let share = difference_over_noise(&gpu_film, &same);
         eprintln!("{name}: differences are {share:.4} of the noise");
         assert!(share < 0.1, "{name}: {share}");
+        expect_same_mean(name, &gpu_film, &same);
 
         // Cut short while it trains, and taken over by the CPU.
         let never = AtomicBool::new(false);
@@ -369,6 +376,7 @@ fn instances_look_the_same() {
         let share = difference_over_noise(&gpu_film, &same);
         eprintln!("{sharing:?}, {gi:?}: differences are {share:.4} of the noise");
         assert!(share < 0.1, "{sharing:?}, {gi:?}: {share}");
+        expect_same_mean(&format!("{sharing:?}, {gi:?}"), &gpu_film, &same);
     }
 }
 

@@ -37,16 +37,6 @@ impl AdapterFacts {
         }
     }
 
-    fn title(&self) -> String {
-        format!("{} ({})", self.name, self.backend)
-    }
-
-    /// Whether name or backend contain `name` (in any case); everything is called nothing.
-    fn is_called(&self, name: Option<&str>) -> bool {
-        let title = self.title().to_lowercase();
-        name.is_none_or(|name| title.contains(&name.to_lowercase()))
-    }
-
     /// Discrete before integrated before the rest, Vulkan, Metal and DX12 before OpenGL.
     fn rank(&self) -> (u32, bool) {
         let kind = match self.kind {

@@ -136,11 +136,12 @@ impl Conductor<'_> {
 
     /// How far what each method converges to is from the reference, with two runs or more.
     pub(super) fn find_biases(&mut self, work: &Work) -> Result<()> {
-        let Some((reference, _)) = self.reference(work) else { return Ok(()) };
+        let Some((reference, pictures)) = self.reference(work) else { return Ok(()) };
+        let pictures = pictures.unwrap_or_default();
         for (device, methods) in work.runs.iter().enumerate() {
             for (method, runs) in self.plan.methods.iter().zip(methods) {
                 let Some((key, _)) = runs.first() else { continue };
-                let key = format!("{key}_bias_of_{}", runs.len());
+                let key = format!("{key}_bias_of_{}_by_{pictures}", runs.len());
                 let found = match self.store.read(&key) {
                     Some(found) => Some(found),
                     None => {

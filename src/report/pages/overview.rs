@@ -84,8 +84,9 @@ fn ablation_table(report: &Report, html: &mut String) {
             .map(|(_, d)| d.method(&method.name)?.speed_up(last, Measure::TrimmedRelMse))
             .collect();
         let known: Vec<f64> = found.iter().flatten().map(|s| s.ratio.ln()).collect();
-        let mean =
-            (!known.is_empty()).then(|| (known.iter().sum::<f64>() / known.len() as f64).exp());
+        // Of some of them it would not be that of the others' methods.
+        let is_whole = !known.is_empty() && known.len() == found.len();
+        let mean = is_whole.then(|| (known.iter().sum::<f64>() / known.len() as f64).exp());
         let mut cells = vec![method.name.clone()];
         cells.push(mean.map_or_else(String::new, words::ratio));
         cells.extend(found.into_iter().map(|s| s.map_or_else(String::new, words::speed_up)));

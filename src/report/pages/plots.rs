@@ -5,17 +5,19 @@ use super::super::summary::{DeviceReport, Measure, curves};
 use super::svg::{Anchor, FAINT, GREY, INK, LogAxis, Svg, spread};
 
 /// Inks that people with any kind of colour vision tell apart (Okabe and Ito 2008).
-const INKS: [&str; 7] =
-    ["#d55e00", "#0072b2", "#009e73", "#cc79a7", "#8a6d00", "#5d4fb3", "#444444"];
+const INKS: [&str; 9] = [
+    "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#8a6d00", "#5d4fb3", "#444444", "#56b4e9",
+    "#e69f00",
+];
 
-/// The ink of a method.
+/// The ink of a method, of which this is the so-manyth.
 pub(super) fn ink(name: &str, index: usize) -> &'static str {
     match name {
         "plain" => INKS[0],
         "talk" => INKS[1],
         "adaptive" => INKS[2],
         "bsdf" => INKS[3],
-        _ => INKS[4 + index % 3],
+        _ => INKS[4 + index % 5],
     }
 }
 
@@ -137,20 +139,20 @@ pub(super) fn ratio_plot(title: &str, baseline: &str, entries: &[Entry]) -> Opti
             names.push(name);
         }
     }
-    // With many names each entry is one of them, and its title says so.
-    let has_legend = names.len() <= 4;
+    // Where each entry is one of them its title says so.
+    let has_legend = entries.iter().any(|entry| entry.ratios.len() > 1) || names.len() <= 4;
+    let marks = if has_legend { legend(&names, entries) } else { Vec::new() };
     let lanes = |entry: &Entry| entry.ratios.len().max(1) as f64;
     let gap = if has_legend { 14.0 } else { 5.0 };
     let height: f64 = entries.iter().map(|entry| lanes(entry) * LANE + gap).sum();
-    let (top, widest) = (64.0, entries.iter().map(|e| e.title.chars().count()).max()?);
+    let top = 20.0 + marks.last().map_or(FIRST_LINE, |mark| mark.at.1);
+    let widest = entries.iter().map(|e| e.title.chars().count()).max()?;
     let from = (widest as f64 * 6.6 + 24.0).clamp(110.0, 300.0);
     let mut svg = Svg::new(820.0, top + height + 50.0);
     let x = LogAxis { low: low.min(0.8) * 0.9, high: high.max(1.6) * 1.1, from, to: 790.0 };
     let (bottom, mut y) = (top + height, top);
     svg.bold_text((16.0, 24.0), Anchor::Start, INK, title);
-    if has_legend {
-        legend(&mut svg, &names, entries);
-    }
+    marks.iter().for_each(|mark| mark.draw(&mut svg));
     for (value, name) in x.ticks() {
         svg.line((x.at(value), top), (x.at(value), bottom), FAINT, 1.0, "");
         if let Some(name) = name {
@@ -168,7 +170,8 @@ pub(super) fn ratio_plot(title: &str, baseline: &str, entries: &[Entry]) -> Opti
             svg.line((at, y - 2.0), (at, y + lanes(entry) * LANE + 2.0), GREY, 2.0, "2 2");
         }
         for (lane, (name, ratio, interval)) in entry.ratios.iter().enumerate() {
-            let (ink, at) = (ink(name, 0), y + (lane as f64 + 0.5) * LANE);
+            let number = names.iter().position(|other| other == name).unwrap_or_default();
+            let (ink, at) = (ink(name, number), y + (lane as f64 + 0.5) * LANE);
             if let Some(Interval { low, high }) = interval {
                 svg.line((x.at(*low), at), (x.at(*high), at), ink, 2.2, "");
             }
@@ -182,22 +185,63 @@ pub(super) fn ratio_plot(title: &str, baseline: &str, entries: &[Entry]) -> Opti
     Some(svg.finish())
 }
 
-fn legend(svg: &mut Svg, names: &[&str], entries: &[Entry]) {
-    let mut x = 24.0;
-    for name in names {
-        svg.dot((x, 44.0), 4.6, ink(name, 0));
-        svg.bold_text((x + 9.0, 48.5), Anchor::Start, ink(name, 0), name);
-        x += 32.0 + 7.5 * name.len() as f64;
+/// Where the first line of a legend lies, and where each ends.
+const FIRST_LINE: f64 = 44.0;
+const END_OF_LINE: f64 = 800.0;
+
+/// One mark of a legend and what it stands for.
+struct Mark<'a> {
+    at: (f64, f64),
+    ink: &'a str,
+    sign: Sign,
+    text: &'a str,
+}
+
+#[derive(PartialEq)]
+enum Sign {
+    Dot,
+    None,
+    Diamond,
+    Dashes,
+}
+
+impl Mark<'_> {
+    fn draw(&self, svg: &mut Svg) {
+        let (x, y) = self.at;
+        match self.sign {
+            Sign::Dot => svg.dot((x, y), 4.6, self.ink),
+            Sign::None => {}
+            Sign::Diamond => svg.diamond((x, y), 5.0, self.ink),
+            Sign::Dashes => svg.line((x, y - 7.0), (x, y + 7.0), self.ink, 2.0, "2 2"),
+        }
+        let at = (x + 9.0, y + 4.5);
+        match self.sign {
+            Sign::Dot => svg.bold_text(at, Anchor::Start, self.ink, self.text),
+            _ => svg.text(at, Anchor::Start, self.ink, self.text),
+        }
     }
-    svg.text((x, 48.5), Anchor::Start, GREY, "bar: 95 % interval");
-    x += 130.0;
+}
+
+/// The marks of a legend, line by line.
+fn legend<'a>(names: &[&'a str], entries: &[Entry]) -> Vec<Mark<'a>> {
+    let mut signs: Vec<(&str, Sign, &str)> = Vec::new();
+    signs.extend(names.iter().zip(0..).map(|(name, i)| (ink(name, i), Sign::Dot, *name)));
+    signs.push((GREY, Sign::None, "bar: 95 % interval"));
     if entries.iter().any(|entry| entry.published.is_some()) {
-        svg.diamond((x, 44.0), 5.0, GREY);
-        svg.text((x + 10.0, 48.5), Anchor::Start, GREY, "the talk's figure");
-        x += 130.0;
+        signs.push((GREY, Sign::Diamond, "the talk's figure"));
     }
     if entries.iter().any(|entry| entry.target.is_some()) {
-        svg.line((x, 37.0), (x, 51.0), GREY, 2.0, "2 2");
-        svg.text((x + 8.0, 48.5), Anchor::Start, GREY, "target");
+        signs.push((GREY, Sign::Dashes, "target"));
     }
+    let mut at = (24.0, FIRST_LINE);
+    let place = |(ink, sign, text): (&'a str, Sign, &'a str)| {
+        let width = 32.0 + 7.5 * text.chars().count() as f64;
+        if at.0 + width > END_OF_LINE {
+            at = (24.0, at.1 + 20.0);
+        }
+        let mark = Mark { at, ink, sign, text };
+        at.0 += width;
+        mark
+    };
+    signs.into_iter().map(place).collect()
 }

@@ -35,7 +35,8 @@ pub(super) fn error(value: f64) -> String {
 pub(super) fn estimate(estimate: Estimate) -> String {
     let Some(s) = estimate.standard_error else { return error(estimate.mean) };
     if estimate.mean >= 0.01 {
-        return format!("{:.3} ± {s:.3}", estimate.mean);
+        let digits = if s < 5e-4 { 4 } else { 3 };
+        return format!("{:.digits$} ± {s:.digits$}", estimate.mean);
     }
     // Both in the same power of ten.
     let exponent = estimate.mean.abs().max(f64::MIN_POSITIVE).log10().floor() as i32;
