@@ -117,7 +117,7 @@ fn nan_inf_negative(setting: &Setting) -> Result<Outcome> {
     map.pixels[70] = [f32::INFINITY, 1.0, 0.0];
     map.pixels[900] = [-1.0, f32::NEG_INFINITY, 0.5];
     map.pixels[901] = [0.5, -1e30, 0.5];
-    repaired(setting, map, &["1 NaN", "2 infinite", "2 negative"])
+    repaired(setting, map, &["1 NaN", "1 infinite", "2 negative"])
 }
 
 /// The renderer refuses such a map; what reading files does about it is told, and then sound.

@@ -476,7 +476,7 @@ fn short_memory_of_any_size_is_a_sentence_or_a_picture() {
     let starts = |kilobytes: &u32| with_memory(&bench, *kilobytes, "--version").status.success();
     let least = (20_000..).step_by(1_000).find(starts).expect("it starts");
     let (mut sentences, mut pictures) = (0, 0);
-    for kilobytes in (least..1_000_000).step_by(6_000) {
+    for kilobytes in (least..1_000_000).step_by(12_000) {
         let line = format!("ulimit -v {kilobytes}; exec timeout 60 {binary} {line} -o a.png");
         let output = Command::new("sh")
             .current_dir(bench.path(""))
@@ -519,7 +519,7 @@ fn a_finished_picture_is_not_lost_for_want_of_memory() {
     let bench = Bench::new();
     let line = format!("{QUICK} --size 1200x800 --layers all --threads 2 -o a.png -o b.exr");
     let (mut refused, mut written) = (0, 0);
-    for kilobytes in (200_000..2_000_000).step_by(9_000) {
+    for kilobytes in (200_000..2_000_000).step_by(20_000) {
         let output = with_memory(&bench, kilobytes, &line);
         let says = text(&output.stderr);
         let are_there = ["a.png", "b.exr"].map(|name| fs::remove_file(bench.path(name)).is_ok());

@@ -188,6 +188,21 @@ fn hdr_headers_of_many_programs_are_accepted() {
     }
     let exposed = flat_hdr("#?RADIANCE\nEXPOSURE=2\nEXPOSURE=4\nCOLORCORR=0.5 1 1\n\n-Y 2 +X 4\n");
     assert_eq!(reds(&read_hdr_bytes(&exposed).unwrap())[0], 10.0 / 4.0);
+    let exposed = flat_hdr("#?RADIANCE\nEXPOSURE=8 (by me)\nEXPOSURE=soon\n\n-Y 2 +X 4\n");
+    let exposed = read_hdr_bytes(&exposed).unwrap();
+    assert_eq!(reds(&exposed)[0], 10.0 / 8.0);
+    assert!(notices(&exposed).contains("EXPOSURE of the file makes no sense"));
+    // Radiance's own primaries are taken for Rec.709, as everyone does; those of Rec.2020 are not.
+    let of = |primaries: &str| {
+        let header = format!("#?RADIANCE\nPRIMARIES={primaries}\n\n-Y 2 +X 4\n");
+        read_hdr_bytes(&flat_hdr(&header)).unwrap()
+    };
+    assert_eq!(reds(&of(".64 .33 .29 .6 .15 .06 .333 .333")), plain);
+    let wide = of("0.708 0.292 0.170 0.797 0.131 0.046 0.3127 0.3290");
+    assert!(notices(&wide).contains("own primaries"), "{}", notices(&wide));
+    let [r, g, b] = of(".64 .33 .29 .6 .15 .06 .333 .333").image.pixels[3];
+    let expected = 1.6605 * r - 0.5876 * g - 0.0728 * b;
+    assert!((wide.image.pixels[3][0] - expected).abs() < 0.01, "{:?}", wide.image.pixels[3]);
 }
 
 #[test]
@@ -278,8 +293,11 @@ fn sanitise_repairs_and_counts() {
     let notices = sanitise(&mut image);
     assert_eq!(image.pixels[..2], [[0.0; 3], [9.0, 9.0, 0.0]]);
     let sentence = notices.iter().next().unwrap();
-    assert!(sentence.contains("1 NaN") && sentence.contains("2 infinite"), "{sentence}");
+    assert!(sentence.contains("1 NaN") && sentence.contains("1 infinite"), "{sentence}");
     assert!(sentence.contains("1 negative"), "{sentence}");
+    let mut infinite = Image::filled(1, 1, [f32::INFINITY, f32::NEG_INFINITY, 0.0]);
+    assert!(sanitise(&mut infinite).iter().next().unwrap().contains("65504"));
+    assert_eq!(infinite.pixels[0], [65_504.0, 0.0, 0.0]);
 }
 
 /// HDR and negative values, and sides that are no multiple of a block.

@@ -164,6 +164,7 @@ mod tests {
         );
         assert_eq!(check(json!({"bufferViews": [{"byteLength": large}]})), Ok(()));
         assert_eq!(check(json!({"extras": {"node": large}})), Ok(()));
+        assert_eq!(check(json!({"extensions": {"VENDOR_ids": {"node": large}}})), Ok(()));
         for wrong in [
             json!({"scenes": [{"nodes": [large]}]}),
             json!({"meshes": [{"primitives": [{"attributes": {"POSITION": large}}]}]}),

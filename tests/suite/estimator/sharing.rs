@@ -1,5 +1,6 @@
 //! Second vertices shared between pixels: the same picture, only sooner.
 
+use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
@@ -214,13 +215,22 @@ fn a_cancelled_pass_and_threads_change_nothing() {
     assert_eq!(session.film().pixels(), whole.pixels());
 }
 
+/// The room with a pane under an overcast sky, nearly without noise.
+fn behind_a_pane() -> &'static Film {
+    static FILM: OnceLock<Film> = OnceLock::new();
+    FILM.get_or_init(|| {
+        let (world, camera) = room(0.7, Some(&pane()));
+        let view = picture(&camera, Sampling::Plain, Sharing::Off, 1);
+        render(&world, &overcast(), view, 1 << 13)
+    })
+}
+
 /// Error times samples does not rise: there is no floor of bias below the noise.
 #[test]
 fn the_error_has_no_floor() {
     let (world, camera) = room(0.7, Some(&pane()));
     let environment = overcast();
-    let reference =
-        render(&world, &environment, picture(&camera, Sampling::Plain, Sharing::Off, 1), 1 << 13);
+    let reference = behind_a_pane();
     let error = |samples: u32| -> f64 {
         let film = render(
             &world,
@@ -281,8 +291,7 @@ fn the_noise_is_told_as_it_is() {
         let view = picture(&camera, Sampling::Plain, sharing, seed);
         render(&world, &environment, view, samples)
     };
-    let truth = film(Sharing::Off, 1, 1 << 13);
-    let truth = truth.image();
+    let truth = behind_a_pane().image();
     let error = |film: &Film| {
         relative_rms_error(&film.image(), &truth).expect("of a size, and not black").powi(2)
     };

@@ -119,13 +119,18 @@ fn learned_distributions_agree_with_plain_sampling_in_the_living_room() {
     builtin_agrees("living-room", "day", &[Sampling::Adaptive], 0.05);
 }
 
-/// Mean over seeds of a picture's mean luminance, and its standard error.
-fn over_seeds(seeds: u32, picture: impl Fn(u32) -> f64 + Send + Sync) -> (f64, f64) {
-    let means: Vec<f64> = (1..=seeds).into_par_iter().map(picture).collect();
+/// Means over seeds of pictures' mean luminances, and their standard errors.
+fn over_seeds<const N: usize>(
+    seeds: u32,
+    pictures: impl Fn(u32) -> [f64; N] + Send + Sync,
+) -> [(f64, f64); N] {
+    let means: Vec<[f64; N]> = (1..=seeds).into_par_iter().map(pictures).collect();
     let count = f64::from(seeds);
-    let mean = means.iter().sum::<f64>() / count;
-    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    (mean, (variance / count).sqrt())
+    std::array::from_fn(|i| {
+        let mean = means.iter().map(|m| m[i]).sum::<f64>() / count;
+        let variance = means.iter().map(|m| (m[i] - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        (mean, (variance / count).sqrt())
+    })
 }
 
 /// One pixel, or sixteen, see a cell of their own of which nothing was learned before: all that its
@@ -169,16 +174,16 @@ fn distributions_made_of_a_pixel_s_own_samples_do_not_bias_it() {
             assert!(session.figures().counted_paths > 0, "rendered paths count");
             (light, session.grid().cloned().expect("it has learned"))
         };
-        let plain = over_seeds(seeds, |seed| {
+        let [plain] = over_seeds(seeds, |seed| {
             let view = view_of(Sampling::Plain, seed);
-            mean(&render(&world, &environment, view, SAMPLES)).luminance
+            [mean(&render(&world, &environment, view, SAMPLES)).luminance]
         });
-        let adaptive = over_seeds(seeds, |seed| learning(seed).0);
-        let frozen = over_seeds(seeds, |seed| {
+        let [adaptive, frozen] = over_seeds(seeds, |seed| {
+            let (light, grid) = learning(seed);
             let view = view_of(Sampling::Adaptive, seed);
             let mut session = Session::new(&world, &environment, view);
-            session.set_grid(learning(seed).1).expect("the CPU does not fail");
-            finish(&mut session)
+            session.set_grid(grid).expect("the CPU does not fail");
+            [light, finish(&mut session)]
         });
         for (what, found) in [("learning", adaptive), ("frozen", frozen)] {
             let off = found.0 / plain.0 - 1.0;

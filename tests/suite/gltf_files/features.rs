@@ -532,9 +532,11 @@ fn external_files_data_uris_and_missing_images() {
     assert_eq!((scene.images.len(), scene.images[0].width), (1, 1));
     let escaped: String = builder.data.iter().map(|byte| format!("%{byte:02X}")).collect();
     let uri = format!(r#","uri":"data:application/octet-stream,{escaped}""#);
-    let text = builder.json(ONE_MESH, &uri);
-    let scene = gltf::load_slice(text.as_bytes(), None, "text.gltf").unwrap();
-    assert_eq!(scene.triangles.len(), 2);
+    for uri in [uri.clone(), uri.replace("data:", "DATA:")] {
+        let text = builder.json(ONE_MESH, &uri);
+        let scene = gltf::load_slice(text.as_bytes(), None, "text.gltf").unwrap();
+        assert_eq!(scene.triangles.len(), 2);
+    }
 }
 
 #[test]
