@@ -12,7 +12,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::summed_area::RectangleTable;
+use super::summed_area::SummedArea;
 use super::table::Table;
 use super::tile_local::TileLocal;
 use super::tiles::{TileGrid, TilePatches};
@@ -155,7 +155,7 @@ impl Deviation {
 /// How a table samples the whole map, row by row.
 enum Distribution<'a> {
     TileLocal { table: &'a TileLocal, grid: &'a TileGrid, tile_probabilities: Vec<f64> },
-    SummedArea { table: &'a dyn RectangleTable, whole: TilePatches, row_probabilities: Vec<f64> },
+    SummedArea { table: &'a SummedArea, whole: TilePatches, row_probabilities: Vec<f64> },
 }
 
 impl<'a> Distribution<'a> {
@@ -170,7 +170,7 @@ impl<'a> Distribution<'a> {
             Table::SummedArea(table) => {
                 let whole = grid.whole();
                 let row_probabilities = table.row_distribution(&whole);
-                Self::SummedArea { table: &**table, whole, row_probabilities }
+                Self::SummedArea { table, whole, row_probabilities }
             }
         }
     }

@@ -16,152 +16,82 @@ use super::patches::PatchSample;
 use super::tiles::TilePatches;
 use super::weights::Weights;
 
-/// A corner's storage type; all three convert to f64 exactly.
-pub(crate) trait Corner: Copy + Default + Into<f64> + std::fmt::Debug + Send + Sync {
-    /// The table of such corners.
-    const KIND: TableKind;
-
-    /// The corner as 32-bit words, given the table's last corner.
-    fn words(self, total: Self) -> impl Iterator<Item = u32>;
+/// Sums at the corners of patches, as they are kept; all convert to f64 exactly.
+#[derive(Debug)]
+enum Corners {
+    U32(Vec<u32>),
+    F32(Vec<f32>),
+    F64(Vec<f64>),
 }
 
-impl Corner for u32 {
-    const KIND: TableKind = TableKind::U32;
-
-    fn words(self, _: Self) -> impl Iterator<Item = Self> {
-        [self].into_iter()
-    }
-}
-
-impl Corner for f32 {
-    const KIND: TableKind = TableKind::F32;
-
-    fn words(self, _: Self) -> impl Iterator<Item = u32> {
-        [self.to_bits()].into_iter()
-    }
-}
-
-impl Corner for f64 {
-    const KIND: TableKind = TableKind::F64;
-
-    /// Share of the total as two f32 that add up to it to 48 bits, the larger one first.
-    fn words(self, total: Self) -> impl Iterator<Item = u32> {
-        let share = if total > 0.0 { self / total } else { 0.0 };
-        let high = share as f32;
-        [high.to_bits(), ((share - Self::from(high)) as f32).to_bits()].into_iter()
-    }
-}
-
-/// Sums of all patches left of and above each patch corner, `(width + 1) * (height + 1)` of them.
-#[derive(Debug, Clone)]
-pub(crate) struct SummedArea<T> {
+/// Sums of all patches left of and above each patch corner, `(width + 1) * (height + 1)` of them: a table from
+/// which any rectangle of patches can be sampled.
+#[derive(Debug)]
+pub(crate) struct SummedArea {
     stride: usize,
-    corners: Vec<T>,
+    corners: Corners,
     /// Importance x steradian of a unit of mass.
     unit: f64,
 }
 
-impl SummedArea<f64> {
-    /// Sums in f64.
-    pub(crate) fn build(weights: &Weights<'_>) -> Self {
-        let mut table = Self::zero(weights, 1.0);
-        let mut rows = table.corners.chunks_exact_mut(table.stride).skip(1);
-        for_each_corner_row(weights, |corners| {
+impl SummedArea {
+    /// Sums in f64, row by row of corners.
+    pub(crate) fn in_f64(weights: &Weights<'_>) -> Self {
+        let mut corners = zero(weights);
+        let mut rows = corners.chunks_exact_mut(stride(weights)).skip(1);
+        for_each_corner_row(weights, |sums| {
             if let Some(row) = rows.next() {
-                row.copy_from_slice(corners);
+                row.copy_from_slice(sums);
             }
         });
-        table
+        Self { stride: stride(weights), corners: Corners::F64(corners), unit: 1.0 }
     }
-}
 
-impl SummedArea<u32> {
     /// Sums in f64, then maps `[0, total]` to the integers `[0, 2^32 - 1]`: the talk's table.
-    pub(crate) fn build(weights: &Weights<'_>) -> Self {
+    pub(crate) fn in_u32(weights: &Weights<'_>) -> Self {
         let total = total(weights);
-        let mut table = Self::zero(weights, total / f64::from(u32::MAX));
-        let mut rows = table.corners.chunks_exact_mut(table.stride).skip(1);
-        for_each_corner_row(weights, |corners| {
+        let mut corners = zero(weights);
+        let mut rows = corners.chunks_exact_mut(stride(weights)).skip(1);
+        for_each_corner_row(weights, |sums| {
             if let Some(row) = rows.next() {
-                for (rounded, corner) in row.iter_mut().zip(corners) {
+                for (rounded, sum) in row.iter_mut().zip(sums) {
                     // 0 / 0 of a black map converts to 0.
-                    *rounded = (corner / total * f64::from(u32::MAX)).round() as u32;
+                    *rounded = (sum / total * f64::from(u32::MAX)).round() as u32;
                 }
             }
         });
-        table
+        let unit = total / f64::from(u32::MAX);
+        Self { stride: stride(weights), corners: Corners::U32(corners), unit }
     }
-}
 
-impl SummedArea<f32> {
     /// Sums in f32 by the usual recurrence `w + left + above - diagonal`, of weights scaled to a
     /// mean of 1 so that nothing overflows.
-    pub(crate) fn build(weights: &Weights<'_>) -> Self {
+    pub(crate) fn in_f32(weights: &Weights<'_>) -> Self {
         let (width, height) = weights.size();
         let total = total(weights);
         let mean = total / (f64::from(width) * f64::from(height));
-        let mut table = Self::zero(weights, if total > 0.0 { mean } else { 1.0 });
-        let (stride, unit) = (table.stride, table.unit);
+        let unit = if total > 0.0 { mean } else { 1.0 };
+        let (stride, mut corners) = (stride(weights), zero::<f32>(weights));
         let mut first = stride;
         weights.for_each_row(|row| {
             for (x, weight) in row.iter().enumerate() {
                 let here = first + x + 1;
-                table.corners[here] =
-                    (weight / unit) as f32 + table.corners[here - 1] + table.corners[here - stride]
-                        - table.corners[here - stride - 1];
+                corners[here] = (weight / unit) as f32 + corners[here - 1] + corners[here - stride]
+                    - corners[here - stride - 1];
             }
             first += stride;
         });
-        table
+        Self { stride, corners: Corners::F32(corners), unit }
     }
-}
 
-impl<T: Corner> SummedArea<T> {
-    fn zero(weights: &Weights<'_>, unit: f64) -> Self {
-        let (width, height) = weights.size();
-        let stride = width as usize + 1;
-        Self { stride, corners: vec![T::default(); stride * (height as usize + 1)], unit }
-    }
-}
-
-/// A table from which any rectangle of patches can be sampled.
-pub(crate) trait RectangleTable: std::fmt::Debug + Send + Sync {
     /// Energy of a rectangle, importance x steradian, never negative.
-    fn energy(&self, patches: &TilePatches) -> f64;
-
-    /// Chooses a patch of the rectangle: a row by `u.y`, then a column by `u.x`, both in `[0,1)`.
-    /// `None` if the table has no mass where the search ends.
-    fn sample(&self, patches: &TilePatches, u: DVec2) -> Option<PatchSample>;
-
-    /// Probability of [`Self::sample`] to choose this patch of the rectangle, exact as far as the
-    /// table's sums never fall.
-    fn sample_probability(&self, patches: &TilePatches, x: u32, y: u32) -> f64;
-
-    /// With what probability [`Self::sample`] really ends in each row of the rectangle.
-    fn row_distribution(&self, patches: &TilePatches) -> Vec<f64>;
-
-    /// With what probability [`Self::sample`], once in row `y`, really ends in each column.
-    fn column_distribution(&self, patches: &TilePatches, y: u32) -> Vec<f64>;
-
-    /// Mass of a rectangle, as the table has it: may be negative through rounding.
-    fn mass(&self, x: &Range<u32>, y: &Range<u32>) -> f64;
-
-    /// Which table it is.
-    fn kind(&self) -> TableKind;
-
-    /// The corners as 32-bit words; f64 ones as two f32 a corner, in shares of the last one.
-    fn words(&self) -> Vec<u32>;
-
-    /// Bytes of the table.
-    fn memory_bytes(&self) -> usize;
-}
-
-impl<T: Corner> RectangleTable for SummedArea<T> {
-    fn energy(&self, patches: &TilePatches) -> f64 {
+    pub(crate) fn energy(&self, patches: &TilePatches) -> f64 {
         (self.mass(&patches.x, &patches.y) * self.unit).max(0.0)
     }
 
-    fn sample(&self, patches: &TilePatches, u: DVec2) -> Option<PatchSample> {
+    /// Chooses a patch of the rectangle: a row by `u.y`, then a column by `u.x`, both in `[0,1)`.
+    /// `None` if the table has no mass where the search ends.
+    pub(crate) fn sample(&self, patches: &TilePatches, u: DVec2) -> Option<PatchSample> {
         let row = search(&patches.y, u.y, |end| self.mass(&patches.x, &(patches.y.start..end)))?;
         let in_row = row.index..row.index + 1;
         let column = search(&patches.x, u.x, |end| self.mass(&(patches.x.start..end), &in_row))?;
@@ -174,40 +104,83 @@ impl<T: Corner> RectangleTable for SummedArea<T> {
         })
     }
 
-    fn sample_probability(&self, patches: &TilePatches, x: u32, y: u32) -> f64 {
+    /// Probability of [`Self::sample`] to choose this patch of the rectangle, exact as far as the
+    /// table's sums never fall.
+    pub(crate) fn sample_probability(&self, patches: &TilePatches, x: u32, y: u32) -> f64 {
         let total = self.mass(&patches.x, &patches.y);
         let mass = self.mass(&(x..x + 1), &(y..y + 1));
         if total > 0.0 && mass > 0.0 { mass / total } else { 0.0 }
     }
 
-    fn row_distribution(&self, patches: &TilePatches) -> Vec<f64> {
+    /// With what probability [`Self::sample`] really ends in each row of the rectangle.
+    pub(crate) fn row_distribution(&self, patches: &TilePatches) -> Vec<f64> {
         let sum = |y| self.mass(&patches.x, &(patches.y.start..y + 1));
         search_distribution(&patches.y.clone().map(sum).collect::<Vec<_>>())
     }
 
-    fn column_distribution(&self, patches: &TilePatches, y: u32) -> Vec<f64> {
+    /// With what probability [`Self::sample`], once in row `y`, really ends in each column.
+    pub(crate) fn column_distribution(&self, patches: &TilePatches, y: u32) -> Vec<f64> {
         let sum = |x| self.mass(&(patches.x.start..x + 1), &(y..y + 1));
         search_distribution(&patches.x.clone().map(sum).collect::<Vec<_>>())
     }
 
-    fn mass(&self, x: &Range<u32>, y: &Range<u32>) -> f64 {
-        let at =
-            |x: u32, y: u32| -> f64 { self.corners[y as usize * self.stride + x as usize].into() };
+    /// Mass of a rectangle, as the table has it: may be negative through rounding.
+    pub(crate) fn mass(&self, x: &Range<u32>, y: &Range<u32>) -> f64 {
+        let at = |x: u32, y: u32| {
+            let index = y as usize * self.stride + x as usize;
+            match &self.corners {
+                Corners::U32(corners) => f64::from(corners[index]),
+                Corners::F32(corners) => f64::from(corners[index]),
+                Corners::F64(corners) => corners[index],
+            }
+        };
         (at(x.end, y.end) - at(x.start, y.end)) - (at(x.end, y.start) - at(x.start, y.start))
     }
 
-    fn kind(&self) -> TableKind {
-        T::KIND
+    /// Which table it is.
+    pub(crate) fn kind(&self) -> TableKind {
+        match self.corners {
+            Corners::U32(_) => TableKind::U32,
+            Corners::F32(_) => TableKind::F32,
+            Corners::F64(_) => TableKind::F64,
+        }
     }
 
-    fn words(&self) -> Vec<u32> {
-        let total = self.corners[self.corners.len() - 1];
-        self.corners.iter().flat_map(|corner| corner.words(total)).collect()
+    /// The corners as 32-bit words; f64 ones as shares of the last one, each of two f32 that add up to it to 48
+    /// bits, the larger one first.
+    pub(crate) fn words(&self) -> Vec<u32> {
+        match &self.corners {
+            Corners::U32(corners) => corners.clone(),
+            Corners::F32(corners) => corners.iter().map(|corner| corner.to_bits()).collect(),
+            Corners::F64(corners) => {
+                let total = corners.last().copied().unwrap_or_default();
+                let halves = |corner: &f64| {
+                    let share = if total > 0.0 { corner / total } else { 0.0 };
+                    let high = share as f32;
+                    [high.to_bits(), ((share - f64::from(high)) as f32).to_bits()]
+                };
+                corners.iter().flat_map(halves).collect()
+            }
+        }
     }
 
-    fn memory_bytes(&self) -> usize {
-        self.corners.len() * size_of::<T>()
+    /// Bytes of the table.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        match &self.corners {
+            Corners::U32(corners) => size_of_val(&corners[..]),
+            Corners::F32(corners) => size_of_val(&corners[..]),
+            Corners::F64(corners) => size_of_val(&corners[..]),
+        }
     }
+}
+
+/// Corners of a row.
+fn stride(weights: &Weights<'_>) -> usize {
+    weights.size().0 as usize + 1
+}
+
+fn zero<T: Clone + Default>(weights: &Weights<'_>) -> Vec<T> {
+    vec![T::default(); stride(weights) * (weights.size().1 as usize + 1)]
 }
 
 struct Choice {
@@ -319,7 +292,7 @@ mod tests {
             let sky = 0.1 + ((x * 7919 + y * 104_729) % 97) as f32 / 97.0;
             if (x, y) == (20, 10) { [1e10; 3] } else { [sky; 3] }
         });
-        let table = SummedArea::<u32>::build(&Weights::new(&map));
+        let table = SummedArea::in_u32(&Weights::new(&map));
         let sky = TilePatches { x: 10..40, y: 12..21 };
         let mut expected = Vec::new();
         for (row, y) in table.row_distribution(&sky).into_iter().zip(sky.y.clone()) {

@@ -7,7 +7,7 @@ use glam::DVec2;
 
 use super::TableKind;
 use super::patches::PatchSample;
-use super::summed_area::{RectangleTable, SummedArea};
+use super::summed_area::SummedArea;
 use super::tile_local::{self, TileLocal};
 use super::tiles::TileGrid;
 use super::weights::Weights;
@@ -16,7 +16,7 @@ use super::weights::Weights;
 #[derive(Debug, Clone)]
 pub(crate) enum Table {
     TileLocal(TileLocal),
-    SummedArea(Arc<dyn RectangleTable>),
+    SummedArea(Arc<SummedArea>),
 }
 
 /// A patch that is being chosen.
@@ -33,17 +33,17 @@ impl Table {
         weights: &Weights<'_>,
         grid: &TileGrid,
     ) -> (Self, Vec<f64>) {
-        let table: Arc<dyn RectangleTable> = match kind {
+        let table = match kind {
             TableKind::TileLocal => {
                 let (table, energies) = TileLocal::build(weights, grid);
                 return (Self::TileLocal(table), energies);
             }
-            TableKind::U32 => Arc::new(SummedArea::<u32>::build(weights)),
-            TableKind::F32 => Arc::new(SummedArea::<f32>::build(weights)),
-            TableKind::F64 => Arc::new(SummedArea::<f64>::build(weights)),
+            TableKind::U32 => SummedArea::in_u32(weights),
+            TableKind::F32 => SummedArea::in_f32(weights),
+            TableKind::F64 => SummedArea::in_f64(weights),
         };
         let energies = (0..grid.count()).map(|tile| table.energy(grid.patches(tile))).collect();
-        (Self::SummedArea(table), energies)
+        (Self::SummedArea(Arc::new(table)), energies)
     }
 
     /// Begins to choose a patch of a tile by 64-bit fractions of one; `None` where the table has no mass.

@@ -82,9 +82,9 @@ impl Pipeline {
     }
 }
 
-/// Most kernels that are kept for those who may want them again: those of some two scenes. Each is a megabyte
+/// Most kernels that are kept for those who may want them again: those of some four scenes. Each is a megabyte
 /// or so where software runs it.
-const MOST_UNUSED: usize = 16;
+const MOST: usize = 32;
 
 /// Kernels that were compiled, the last one used at the end.
 #[derive(Default)]
@@ -99,17 +99,12 @@ impl Pipelines {
         Some(found)
     }
 
-    /// Keeps another one, and of those that nobody uses the last ones.
+    /// Keeps another one in the place of that which nobody has asked for the longest.
     fn keep(&mut self, pipeline: Arc<Pipeline>) {
-        let is_unused = |pipeline: &Arc<Pipeline>| Arc::strong_count(pipeline) == 1;
+        if self.0.len() == MOST {
+            self.0.remove(0);
+        }
         self.0.push(pipeline);
-        let unused = self.0.iter().filter(|pipeline| is_unused(pipeline)).count();
-        let mut excess = unused.saturating_sub(MOST_UNUSED);
-        self.0.retain(|pipeline| {
-            let stays = excess == 0 || !is_unused(pipeline);
-            excess -= usize::from(!stays);
-            stays
-        });
     }
 }
 
@@ -154,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn kernels_in_use_and_the_last_others_are_kept() {
+    fn the_last_kernels_are_kept() {
         let Some(gpu) = Gpu::for_test() else { return };
         let kernel = |number: usize| {
             let source =
@@ -162,15 +157,11 @@ mod tests {
             let program = Program { source, bindings: Vec::new() };
             gpu.pipeline(Kernel::Render, program).expect("compiled")
         };
-        let in_use = kernel(0);
-        let first = Arc::downgrade(&kernel(1));
-        let second = Arc::downgrade(&kernel(2));
-        assert!(Arc::ptr_eq(&in_use, &kernel(0)), "not compiled again");
-        (3..=MOST_UNUSED).for_each(|number| drop(kernel(number)));
-        drop(kernel(1));
-        // Those are counted that nobody used when another one was made.
-        (100..102).for_each(|number| drop(kernel(number)));
-        assert!(second.upgrade().is_none(), "the longest unused");
-        assert!(first.upgrade().is_some() && Arc::ptr_eq(&in_use, &kernel(0)));
+        let [first, second] = [kernel(0), kernel(1)].map(|kernel| Arc::downgrade(&kernel));
+        (2..MOST).for_each(|number| drop(kernel(number)));
+        let again = kernel(0);
+        assert!(first.upgrade().is_some_and(|first| Arc::ptr_eq(&first, &again)), "not compiled");
+        drop(kernel(MOST));
+        assert!(second.upgrade().is_none() && first.upgrade().is_some(), "the longest unused goes");
     }
 }
