@@ -131,7 +131,8 @@ impl Header {
                     }
                 }
                 "PRIMARIES" => {
-                    let all = numbers::<8>(value);
+                    // Many write nothing but zeros.
+                    let all = numbers::<8>(value).filter(|all| *all != [0.0; 8]);
                     primaries = all
                         .map(|all| Primaries([0, 2, 4, 6].map(|i| DVec2::new(all[i], all[i + 1]))));
                 }
