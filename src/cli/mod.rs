@@ -6,7 +6,8 @@ use clap::{Parser, Subcommand};
 
 use crate::error::Result;
 use crate::image;
-use crate::{memory, terminal};
+use crate::memory;
+use crate::terminal;
 
 #[cfg(not(all(feature = "window", feature = "report")))]
 mod absent;

@@ -50,7 +50,7 @@ const MAPS: [Expected; 25] = [
     ("env/studio_small_05_1k.hdr", [1024, 512], 0.564, 86.5, ""),
     ("env/vestibule_1k.hdr", [1024, 512], 0.991, 195.2, ""),
     ("odd/Bonita.exr", [550, 832], 0.305, 81.33, "550 x 832"),
-    ("odd/BrightRingsNanInf.exr", [800, 800], 29.7, 1025.0, "4 NaN (now 0), 8 infinite"),
+    ("odd/BrightRingsNanInf.exr", [800, 800], 29.7, 1025.0, "4 NaN (now 0), 4 infinite"),
     ("odd/Garden.exr", [874, 493], 0.453, 10.21, "'Y' is read as grey"),
     ("odd/GrayRampsDiagonal.exr", [800, 800], 0.562, 18.0, "'Y' is read as grey"),
     ("odd/WavyLinesSphere.exr", [480, 480], 0.131, 0.9814, "480 x 480"),
