@@ -100,7 +100,7 @@ fn compare_views(gpu: &Gpu, what: &str, world: &World, environment: &Environment
 }
 
 /// Both have the same random numbers: of their noise next to nothing is left. Mesa 22 compiles roulette wrongly in
-/// some kernels of the exterior, which are up to 3.3 % too bright by it; by Mesa 25 they are the CPU's to five digits.
+/// some kernels of the exterior, which are up to 3.3 % too bright by it; by Mesa 25 they are the CPU's to 0.005 %.
 fn expect_same_mean(gpu: &Gpu, what: &str, on_gpu: &Film, on_cpu: &Film) {
     let ratio = mean(on_gpu).luminance / mean(on_cpu).luminance;
     eprintln!("{what}: mean ratio {ratio:.5}");
