@@ -107,7 +107,7 @@ pub struct Gpu {
 }
 
 /// Storage buffers that a kernel has at most, arrays among them. Metal allows 29.
-pub(super) const MOST_STORAGE_BUFFERS: u32 = 28;
+const MOST_STORAGE_BUFFERS: u32 = 28;
 
 /// What wgpu 30 says where [`Gpu::alone`] should have been asked, but egui's painter cannot.
 const SURFACE_IS_BUSY: &str = "come idle before reconfiguring the Surface";

@@ -197,7 +197,6 @@ struct Mark<'a> {
     text: &'a str,
 }
 
-#[derive(PartialEq)]
 enum Sign {
     Dot,
     None,

@@ -4,8 +4,7 @@ use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 
 use super::part::{Part, Tally};
 use super::tangents::NO_TANGENT;
-use super::{Fallible, MAX_TRIANGLES};
-use crate::memory;
+use super::{Fallible, MAX_TRIANGLES, check_count, check_growth};
 use crate::scene::{Placing, Scene};
 
 /// Appends a part once for each instance. Memory is reserved only after the limits are checked.
@@ -62,35 +61,27 @@ pub(super) fn append_skinned(
     Ok(())
 }
 
-/// Bytes of a triangle with its place in the tree while that is built, of a vertex, and how much of both
-/// is asked for at once.
+/// Bytes of a triangle with its place in the tree while that is built, and of a vertex.
 const TRIANGLE_BYTES: u64 = 250;
 const VERTEX_BYTES: u64 = 72;
-pub(super) const STEP: u64 = 1 << 26;
+/// How a refusal of them begins.
+const WITH_INSTANCES: &str = "with all instances there are";
 
 fn check_limits(scene: &Scene, part: &Part, copies: usize) -> Fallible<()> {
     let total = |present: usize, added: usize| {
         (added as u64).saturating_mul(copies as u64).saturating_add(present as u64)
     };
-    if total(scene.triangles.len(), part.triangles.len()) > MAX_TRIANGLES {
-        let millions = MAX_TRIANGLES / 1_000_000;
-        return Err(format!("with all instances there are more than {millions} million triangles"));
-    }
-    // Grown in steps, so that many small parts do not each ask for memory.
+    let triangles = total(scene.triangles.len(), part.triangles.len());
+    check_count(triangles, MAX_TRIANGLES, WITH_INSTANCES, "triangles")?;
     let bytes = |triangles: usize, vertices: usize| {
         TRIANGLE_BYTES * triangles as u64 + VERTEX_BYTES * vertices as u64
     };
     let present = bytes(scene.triangles.len(), scene.positions.len());
     let added = bytes(part.triangles.len(), part.positions.len()).saturating_mul(copies as u64);
-    if present / STEP != present.saturating_add(added) / STEP {
-        memory::check(added.max(STEP))?;
-    }
+    check_growth(present, added)?;
     // Three per triangle, unless most triangles of a part were dropped; far below 2^32.
-    if total(scene.positions.len(), part.positions.len()) > 3 * MAX_TRIANGLES {
-        let millions = 3 * MAX_TRIANGLES / 1_000_000;
-        return Err(format!("with all instances there are more than {millions} million vertices"));
-    }
-    Ok(())
+    let vertices = total(scene.positions.len(), part.positions.len());
+    check_count(vertices, 3 * MAX_TRIANGLES, WITH_INSTANCES, "vertices")
 }
 
 /// Appends vertices as they are; the number of the first.

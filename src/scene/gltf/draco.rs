@@ -13,7 +13,7 @@ use serde::Deserialize;
 
 use super::accessor::Elements;
 use super::buffers::File;
-use super::{Fallible, MAX_TRIANGLES};
+use super::{Fallible, MAX_TRIANGLES, check_count};
 use crate::image::catch_panic;
 use crate::memory;
 
@@ -132,10 +132,7 @@ fn limits(file: &File<'_>, primitive: &json::mesh::Primitive) -> Fallible<Decode
         // A closed mesh has two of them for each vertex.
         None => vertices.saturating_mul(2),
     };
-    if triangles.max(vertices / 3) > MAX_TRIANGLES {
-        let millions = MAX_TRIANGLES / 1_000_000;
-        return Err(format!("it has more than {millions} million triangles"));
-    }
+    check_count(triangles.max(vertices / 3), MAX_TRIANGLES, "it has", "triangles")?;
     let mut vertex_bytes = OTHER_BYTES;
     for index in primitive.attributes.values() {
         if let Checked::Valid(kind) = accessor(*index)?.type_ {

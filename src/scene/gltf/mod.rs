@@ -62,6 +62,25 @@ use variants::Look;
 /// Most triangles a scene may hold, baked instances counted one by one.
 const MAX_TRIANGLES: u64 = 200_000_000;
 
+/// Refuses more than so many of something.
+fn check_count(count: u64, most: u64, there_are: &str, what: &str) -> Fallible<()> {
+    match count > most {
+        true => Err(format!("{there_are} more than {} million {what}", most / 1_000_000)),
+        false => Ok(()),
+    }
+}
+
+/// Memory is asked for so much at once: in steps, so that many small things do not each ask for it.
+const STEP: u64 = 1 << 26;
+
+/// Whether there is memory for so many more bytes of what grows bit by bit.
+fn check_growth(present: u64, added: u64) -> Fallible<()> {
+    match present / STEP == present.saturating_add(added) / STEP {
+        true => Ok(()),
+        false => memory::check(added.max(STEP)),
+    }
+}
+
 /// A result whose error is the cause alone; the file's name is put before it in one place.
 type Fallible<T> = std::result::Result<T, String>;
 
@@ -202,10 +221,7 @@ fn placements(file: &File<'_>, nodes: &Nodes) -> Fallible<BTreeMap<u32, Vec<Plac
             .map_err(|cause| format!("node {number}: {cause}"))?
             .map_or_else(|| vec![world], |all| all.iter().map(|&one| world * one).collect());
         shown += instances.len() as u64;
-        if shown > MAX_TRIANGLES {
-            let millions = MAX_TRIANGLES / 1_000_000;
-            return Err(format!("there are more than {millions} million instances"));
-        }
+        check_count(shown, MAX_TRIANGLES, "there are", "instances")?;
         let placement = Placement { skin: node.skin, weights: node.weights, instances };
         placements.entry(mesh.value() as u32).or_default().push(placement);
     }
@@ -333,7 +349,7 @@ impl Reading<'_> {
 
     fn read_parts(&self, mesh: &Mesh, weights: &[f32], tally: &mut Tally) -> Fallible<Vec<Part>> {
         let mut parts = Vec::new();
-        let (mut triangles, mut bytes, mut asked) = (0, 0, 0);
+        let (mut triangles, mut bytes) = (0, 0);
         for (number, primitive) in mesh.primitives().enumerate() {
             let primitive = primitive?;
             let material = self.materials.places[&self.look.material(&primitive)];
@@ -343,15 +359,9 @@ impl Reading<'_> {
             let Some(part) = part else { continue };
             // Many may share the same long list of corners.
             triangles += part.triangles.len() as u64;
-            if triangles > MAX_TRIANGLES {
-                let millions = MAX_TRIANGLES / 1_000_000;
-                return Err(format!("it has more than {millions} million triangles"));
-            }
+            check_count(triangles, MAX_TRIANGLES, "it has", "triangles")?;
+            check_growth(bytes, part.bytes())?;
             bytes += part.bytes();
-            if bytes > asked {
-                asked = bytes + bake::STEP;
-                memory::check(bake::STEP)?;
-            }
             parts.push(part);
         }
         Ok(parts)

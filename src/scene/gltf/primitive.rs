@@ -13,7 +13,7 @@ use super::buffers::File;
 use super::draco::Unpacked;
 use super::objects::{not_gltf, read};
 use super::part::{Part, Tally};
-use super::{Fallible, MAX_TRIANGLES};
+use super::{Fallible, MAX_TRIANGLES, check_count};
 use crate::memory;
 use crate::scene::placing::unit;
 
@@ -109,12 +109,7 @@ impl<'a> Source<'a> {
             return Err("its indices are not unsigned integers".into());
         }
         let corners = indices.as_ref().map_or(vertices, |indices| indices.count);
-        if corners as u64 > 3 * MAX_TRIANGLES {
-            return Err(format!(
-                "it has more than {} million triangles",
-                MAX_TRIANGLES / 1_000_000
-            ));
-        }
+        check_count(corners.div_ceil(3) as u64, MAX_TRIANGLES, "it has", "triangles")?;
         let vertex = |corner| match &indices {
             Some(indices) => indices.integers::<1>(corner)[0],
             None => corner as u32,
