@@ -1,8 +1,8 @@
 // Summed-area tables over the whole map: twin of src/environment/summed_area.rs. Masses are pairs
 // of f32 that add up to them (48 bits), for want of f64; so are their sums and differences.
 
-// `x` as an f32 of its own: drivers (Mesa, for one) take `(a + b) - a` for `b` and fuse products with
-// sums, which would leave nothing of the errors computed below.
+// `x` as an f32 of its own: drivers (Mesa, for one) take `(a + b) - a` for `b`, fuse products with sums and,
+// where their maths is fast (Metal's), add in any order, which would leave nothing of the errors below.
 fn rounded(x: f32) -> f32 {
     return bitcast<f32>(bitcast<u32>(x) ^ globals.zero);
 }
@@ -11,7 +11,7 @@ fn rounded(x: f32) -> f32 {
 fn two_sum(a: f32, b: f32) -> vec2f {
     let s = rounded(a + b);
     let v = rounded(s - a);
-    return vec2f(s, (a - rounded(s - v)) + (b - v));
+    return vec2f(s, rounded(a - rounded(s - v)) + rounded(b - v));
 }
 
 fn pair_difference(a: vec2f, b: vec2f) -> vec2f {
@@ -88,7 +88,8 @@ fn product_error(a: f32, b: f32, p: f32) -> f32 {
     let b_high = bitcast<f32>(bitcast<u32>(b) & 0xfffff000u);
     let a_low = a - a_high;
     let b_low = b - b_high;
-    return ((a_high * b_high - p) + a_high * b_low + a_low * b_high) + a_low * b_low;
+    let high = rounded(a_high * b_high - p);
+    return rounded(rounded(high + a_high * b_low) + a_low * b_high) + a_low * b_low;
 }
 
 fn sample_patch(tile: u32, u: array<vec2u, 2>) -> PatchSample {

@@ -70,25 +70,31 @@ impl Passes {
     }
 
     /// The film filtered, with one sample a pixel that has any; `None` without layers or where they
-    /// do not fit.
+    /// or what the filter needs do not fit.
     pub(super) fn run(&self, gpu: &Gpu, film: &DeviceFilm) -> Option<DeviceFilm> {
         let surfaces = film.surfaces.as_ref()?;
         if !self.fits(gpu, film.width, film.height) {
             return None;
         }
         let size = [film.width, film.height];
-        let make = |label: &str, bytes: u64| {
-            gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: u64::from(film.width) * u64::from(film.height) * bytes,
-                usage: wgpu::BufferUsages::STORAGE,
-                mapped_at_creation: false,
+        // The film's own counts may have gone on when the result is looked at.
+        let planes = [
+            ("guides", GUIDE_BYTES),
+            ("light", LIGHT_BYTES),
+            ("light", LIGHT_BYTES),
+            ("counts", LIGHT_BYTES),
+        ];
+        let made = gpu.make(|device| {
+            planes.map(|(label, bytes)| {
+                device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some(label),
+                    size: u64::from(film.width) * u64::from(film.height) * bytes,
+                    usage: wgpu::BufferUsages::STORAGE,
+                    mapped_at_creation: false,
+                })
             })
-        };
-        let guides = make("guides", GUIDE_BYTES);
-        let (mut light, mut result) = (make("light", LIGHT_BYTES), make("light", LIGHT_BYTES));
-        // The film's own may have gone on when the result is looked at.
-        let counts = make("counts", LIGHT_BYTES);
+        });
+        let [guides, mut light, mut result, counts] = made.ok()?;
         let settings = |step: u32| {
             let words = [film.width, film.height, step, film.scale.recip().to_bits()];
             filled(gpu, wgpu::BufferUsages::UNIFORM, bytemuck::cast_slice(&words))

@@ -69,6 +69,11 @@ impl World {
             && materials.into_iter().all(|(a, b)| a.lets_pass_like(b))
     }
 
+    /// The identity of its geometry, whatever its surfaces are made of.
+    pub(crate) fn geometry(&self) -> &Arc<()> {
+        &self.geometry
+    }
+
     /// About what it holds: geometry, textures and tree.
     fn memory_bytes(&self) -> u64 {
         let scene = &self.scene;

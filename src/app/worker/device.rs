@@ -1,11 +1,12 @@
 //! Where sessions run: the GPU that was asked for, as long as it does what it should, else the CPU.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, Weak};
 
 use super::Request;
 use crate::app::lock;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
+use crate::image::Image;
 use crate::path::World;
 use crate::render::Session;
 use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, UploadedScene};
@@ -21,6 +22,22 @@ pub(super) struct Device {
     gpu: Option<Gpu>,
     uploaded: Option<Uploaded>,
     failure: Option<String>,
+    /// What the GPU failed with.
+    refused: Option<Subject>,
+}
+
+/// Identities of a scene's geometry and of a map.
+struct Subject(Weak<()>, Weak<Image>);
+
+impl Subject {
+    fn of(request: &Request) -> Self {
+        Self(Arc::downgrade(request.world.geometry()), request.environment.map_identity())
+    }
+
+    fn is_of(&self, request: &Request) -> bool {
+        let Self(geometry, map) = Self::of(request);
+        self.0.ptr_eq(&geometry) && self.1.ptr_eq(&map)
+    }
 }
 
 /// What is on the GPU.
@@ -35,12 +52,23 @@ impl Device {
         (adapter, rays): (Option<String>, RayChoice),
         screen: Arc<Mutex<Gpu>>,
     ) -> Self {
-        Self { adapter, rays, screen, choice: None, gpu: None, uploaded: None, failure: None }
+        Self {
+            adapter,
+            rays,
+            screen,
+            choice: None,
+            gpu: None,
+            uploaded: None,
+            failure: None,
+            refused: None,
+        }
     }
 
-    /// Chooses the device that the request names, which may be none but the CPU.
+    /// Chooses the device that the request names, which may be none but the CPU. A GPU that failed with
+    /// something else, for which it may have been too small, is chosen again.
     pub(super) fn choose_for(&mut self, request: &Request) {
-        if self.choice != Some(request.device) {
+        let failed_with_another = self.refused.as_ref().is_some_and(|it| !it.is_of(request));
+        if self.choice != Some(request.device) || failed_with_another {
             self.choose(request.device);
         }
     }
@@ -70,14 +98,19 @@ impl Device {
         let placed =
             self.upload(&gpu, request).and_then(|uploaded| session.continue_on_gpu(uploaded));
         if let Err(failure) = placed {
-            self.give_up(&failure);
+            self.give_up(&failure, request);
         }
     }
 
-    /// Does without the GPU until something else is chosen.
-    pub(super) fn give_up(&mut self, failure: &Error) {
-        self.failure.get_or_insert_with(|| format!("{failure}; the CPU renders"));
+    /// Does without the GPU until another one, another scene or another map is chosen.
+    pub(super) fn give_up(&mut self, failure: &Error, request: &Request) {
+        self.tell(failure);
         (self.gpu, self.uploaded) = (None, None);
+        self.refused = Some(Subject::of(request));
+    }
+
+    fn tell(&mut self, failure: &Error) {
+        self.failure.get_or_insert_with(|| format!("{failure}; the CPU renders"));
     }
 
     /// What went wrong since this was asked last.
@@ -87,14 +120,14 @@ impl Device {
 
     fn choose(&mut self, choice: DeviceChoice) {
         self.choice = Some(choice);
-        (self.gpu, self.uploaded) = (None, None);
+        (self.gpu, self.uploaded, self.refused) = (None, None, None);
         // The name only says which GPU is meant.
         let adapter = self.adapter.as_deref().filter(|_| choice != DeviceChoice::Cpu);
         let screen = lock(&self.screen).clone();
         let opened = choice.open_or_share(adapter, Some(&screen));
         match opened.and_then(|gpu| gpu.map(|gpu| gpu.with_rays(self.rays)).transpose()) {
             Ok(gpu) => self.gpu = gpu,
-            Err(failure) => self.give_up(&failure),
+            Err(failure) => self.tell(&failure),
         }
     }
 
@@ -109,5 +142,33 @@ impl Device {
         };
         let (world, environment) = (Arc::clone(world), Arc::clone(environment));
         Ok(&self.uploaded.insert(Uploaded { world, environment, scene }).scene)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::request_of;
+    use super::*;
+
+    #[test]
+    fn a_gpu_that_failed_with_one_scene_is_asked_again_for_another() {
+        let Some(screen) = Gpu::for_test() else { return };
+        let rays = RayChoice::default();
+        let mut device = Device::new((None, rays), Arc::new(Mutex::new(screen)));
+        let of = |scene| Request { device: DeviceChoice::Gpu, ..request_of(scene, [32, 24]) };
+        let first = of("crack");
+        device.choose_for(&first);
+        assert!(device.gpu.is_some());
+        device.give_up(&Error::new("it takes too much"), &first);
+        assert_eq!(device.take_failure().as_deref(), Some("it takes too much; the CPU renders"));
+        let materials = first.world.scene.materials.clone();
+        let edited = first.world.with_materials(materials).expect("there is memory");
+        let mut turned = (*first.environment).clone();
+        turned.set_rotation(1.0);
+        let (world, environment) = (Arc::new(edited), Arc::new(turned));
+        device.choose_for(&Request { world, environment, ..first });
+        assert!(device.gpu.is_none(), "it is as large as before");
+        device.choose_for(&of("crack"));
+        assert!(device.gpu.is_some(), "nobody knows that it is the same");
     }
 }

@@ -75,13 +75,11 @@ impl Acceleration {
             words[7][3] = of_mesh(instance.mesh).opaque;
         }
         let tlas = build(gpu, scene, &triangles, &lower)?;
-        gpu.check()?;
         Ok(Self { tlas, triangles, opaque: lower[0].opaque, instances })
     }
 }
 
 fn build(gpu: &Gpu, scene: &Scene, triangles: &[u32], lower: &[Lower]) -> Result<wgpu::Tlas> {
-    let device = &gpu.device;
     let corners = triangles.iter().map(|triangle| scene.triangles[*triangle as usize]);
     let indices: Vec<[u32; 3]> = corners.collect();
     let vertex_buffer = input(gpu, "positions", bytemuck::cast_slice(&scene.positions))?;
@@ -108,21 +106,20 @@ fn build(gpu: &Gpu, scene: &Scene, triangles: &[u32], lower: &[Lower]) -> Result
             })
         })
         .collect();
-    let trees: Vec<_> = sizes
-        .iter()
-        .map(|sizes| {
-            device.create_blas(
-                &wgpu::CreateBlasDescriptor { label: Some("scene"), flags, update_mode },
-                BlasGeometrySizeDescriptors::Triangles { descriptors: sizes.to_vec() },
-            )
-        })
-        .collect();
-    let mut tlas = device.create_tlas(&wgpu::CreateTlasDescriptor {
-        label: Some("scene"),
-        max_instances: 1 + scene.instances.len() as u32,
-        flags,
-        update_mode,
-    });
+    let (trees, mut tlas) = gpu.make(|device| {
+        let lower = wgpu::CreateBlasDescriptor { label: Some("scene"), flags, update_mode };
+        let upper = wgpu::CreateTlasDescriptor {
+            label: Some("scene"),
+            max_instances: 1 + scene.instances.len() as u32,
+            flags,
+            update_mode,
+        };
+        let trees = sizes.iter().map(|sizes| {
+            let descriptors = sizes.to_vec();
+            device.create_blas(&lower, BlasGeometrySizeDescriptors::Triangles { descriptors })
+        });
+        (trees.collect::<Vec<_>>(), device.create_tlas(&upper))
+    })?;
     const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     tlas[0] = Some(wgpu::TlasInstance::new(&trees[0], IDENTITY, 0, 0xff));
     for (number, instance) in (1..).zip(scene.instances.iter()) {
@@ -149,9 +146,12 @@ fn build(gpu: &Gpu, scene: &Scene, triangles: &[u32], lower: &[Lower]) -> Result
         BlasBuildEntry { blas, geometry: BlasGeometries::TriangleGeometries(geometry.collect()) }
     });
     let entries: Vec<_> = entries.collect();
-    let mut commands = device.create_command_encoder(&Default::default());
-    commands.build_acceleration_structures(&entries, [&tlas]);
-    gpu.submit([commands.finish()]);
+    // What trees are built in is taken where they are.
+    gpu.make(|device| {
+        let mut commands = device.create_command_encoder(&Default::default());
+        commands.build_acceleration_structures(&entries, [&tlas]);
+        gpu.submit([commands.finish()]);
+    })?;
     Ok(tlas)
 }
 
@@ -166,13 +166,14 @@ fn input(gpu: &Gpu, name: &str, contents: &[u8]) -> Result<wgpu::Buffer> {
             gpu.limits.max_buffer_size >> 20
         )));
     }
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(name),
-        size,
-        usage: BufferUsages::BLAS_INPUT | BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    gpu.check()?;
+    let buffer = gpu.make(|device| {
+        device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(name),
+            size,
+            usage: BufferUsages::BLAS_INPUT | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    })?;
     let offsets = (0..).step_by(PIECE_BYTES);
     for (offset, piece) in offsets.zip(contents.chunks(PIECE_BYTES)) {
         gpu.queue.write_buffer(&buffer, offset, piece);

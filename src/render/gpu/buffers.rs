@@ -82,10 +82,10 @@ impl Buffers {
     /// does not fit.
     pub(super) fn make(&mut self, name: &'static str, bytes: u64, what: &str) -> Result<()> {
         self.fits(bytes, what)?;
-        let buffer = self.create(name, bytes);
-        self.by_name.insert(name, buffer);
+        let buffer = self.gpu.make(|device| create(device, name, bytes));
+        self.by_name.insert(name, buffer.map_err(|e| for_want_of(bytes, what, &e))?);
         self.version += 1;
-        self.gpu.check()
+        Ok(())
     }
 
     /// Makes a buffer of these bytes, or reuses the one of this name if they fit into it.
@@ -125,14 +125,12 @@ impl Buffers {
                 (width * u64::from(most) * kind.format.bytes()) >> 20
             )));
         }
-        let texture = self.create_array(kind, rows as u32);
-        self.gpu.check().map_err(|e| {
-            let mebibytes = (rows * width * kind.format.bytes()).div_ceil(1 << 20);
-            Error::new(format!("{e} ({what} takes {mebibytes} MiB)"))
-        })?;
+        let bytes = rows * width * kind.format.bytes();
+        let texture = self.gpu.make(|device| create_array(device, kind, width as u32, rows as u32));
+        let texture = texture.map_err(|e| for_want_of(bytes, what, &e))?;
         self.upload(&texture, kind.format.bytes(), parts)?;
         self.by_name.remove(name);
-        self.arrays.insert(name, (texture, rows * width * kind.format.bytes()));
+        self.arrays.insert(name, (texture, bytes));
         self.version += 1;
         Ok(())
     }
@@ -211,29 +209,6 @@ impl Buffers {
         Ok(rows)
     }
 
-    fn create_array(&self, kind: ArrayKind, rows: u32) -> wgpu::Texture {
-        self.gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(kind.name),
-            size: wgpu::Extent3d {
-                width: 1 << self.width_log2,
-                height: rows,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: match kind.format {
-                TexelFormat::Words1 => wgpu::TextureFormat::R32Uint,
-                TexelFormat::Words2 => wgpu::TextureFormat::Rg32Uint,
-                TexelFormat::Words4 => wgpu::TextureFormat::Rgba32Uint,
-                TexelFormat::Floats4 => wgpu::TextureFormat::Rgba32Float,
-                TexelFormat::Bytes4 => wgpu::TextureFormat::Rgba8Unorm,
-            },
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        })
-    }
-
     /// Waits for what was written, as [`Gpu::finish_copies`].
     pub(super) fn finish_copies(&self) -> Result<()> {
         self.gpu.finish_copies()
@@ -264,7 +239,7 @@ impl Buffers {
     ) -> Result<R> {
         self.gpu.check()?;
         let bytes = parts.iter().map(|(.., bytes)| bytes).sum();
-        let staging = self.staging(bytes);
+        let staging = self.staging(bytes)?;
         let mut commands = self.gpu.device.create_command_encoder(&Default::default());
         let mut at = 0;
         for &(name, offset, bytes) in parts {
@@ -290,9 +265,12 @@ impl Buffers {
     }
 
     /// A buffer the host can read, kept from one reading to the next. It is made anew after a failure.
-    fn staging(&self, bytes: u64) -> Buffer {
+    fn staging(&self, bytes: u64) -> Result<Buffer> {
         let kept = self.staging.lock().unwrap_or_else(PoisonError::into_inner).take();
-        kept.filter(|kept| kept.size() >= bytes).unwrap_or_else(|| self.gpu.staging(bytes))
+        match kept.filter(|kept| kept.size() >= bytes) {
+            Some(kept) => Ok(kept),
+            None => self.gpu.make(|_| self.gpu.staging(bytes)),
+        }
     }
 
     /// Bytes read back so far.
@@ -321,13 +299,37 @@ impl Buffers {
             self.most_bytes() >> 20
         )))
     }
+}
 
-    fn create(&self, name: &str, bytes: u64) -> Buffer {
-        self.gpu.device.create_buffer(&BufferDescriptor {
-            label: Some(name),
-            size: bytes.next_multiple_of(16).max(16),
-            usage: BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        })
-    }
+/// What is said if so many bytes could not be had.
+fn for_want_of(bytes: u64, what: &str, error: &Error) -> Error {
+    Error::new(format!("{error} ({what} takes {} MiB)", bytes.div_ceil(1 << 20)))
+}
+
+fn create(device: &wgpu::Device, name: &str, bytes: u64) -> Buffer {
+    device.create_buffer(&BufferDescriptor {
+        label: Some(name),
+        size: bytes.next_multiple_of(16).max(16),
+        usage: BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
+        mapped_at_creation: false,
+    })
+}
+
+fn create_array(device: &wgpu::Device, kind: ArrayKind, width: u32, height: u32) -> wgpu::Texture {
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(kind.name),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: match kind.format {
+            TexelFormat::Words1 => wgpu::TextureFormat::R32Uint,
+            TexelFormat::Words2 => wgpu::TextureFormat::Rg32Uint,
+            TexelFormat::Words4 => wgpu::TextureFormat::Rgba32Uint,
+            TexelFormat::Floats4 => wgpu::TextureFormat::Rgba32Float,
+            TexelFormat::Bytes4 => wgpu::TextureFormat::Rgba8Unorm,
+        },
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    })
 }

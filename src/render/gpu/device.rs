@@ -3,8 +3,8 @@
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use wgpu::wgt::WgpuHasDisplayHandle;
-use wgpu::{Adapter, Backends, DeviceType, Features, Instance, InstanceDescriptor, Limits};
-use wgpu::{PollType, SubmissionIndex, Surface};
+use wgpu::{Adapter, Backends, DeviceType, ErrorFilter, Features, Instance, InstanceDescriptor};
+use wgpu::{Limits, PollType, SubmissionIndex, Surface};
 
 use super::pipeline::Pipelines;
 use crate::error::{Error, Result};
@@ -107,7 +107,7 @@ pub struct Gpu {
 }
 
 /// Storage buffers that a kernel has at most, arrays among them. Metal allows 29.
-const MOST_STORAGE_BUFFERS: u32 = 28;
+pub(super) const MOST_STORAGE_BUFFERS: u32 = 28;
 
 /// What wgpu 30 says where [`Gpu::alone`] should have been asked, but egui's painter cannot.
 const SURFACE_IS_BUSY: &str = "come idle before reconfiguring the Surface";
@@ -218,10 +218,7 @@ impl Gpu {
             note(&lost, format!("the device was lost{cause}"));
         });
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            let sentence = match error {
-                wgpu::Error::OutOfMemory { .. } => "it is out of memory".to_owned(),
-                other => one_line(&other.to_string()),
-            };
+            let sentence = sentence(&error);
             // Of a surface that could be better, which is as it was and will be configured again.
             if !sentence.contains(SURFACE_IS_BUSY) {
                 note(&failed, sentence);
@@ -312,6 +309,25 @@ impl Gpu {
         }
     }
 
+    /// Makes something on the device. What it has no room for, or will not take, is an error of that alone: the
+    /// device stays of use.
+    ///
+    /// # Errors
+    /// Why it could not be made, or as [`Self::check`].
+    pub(crate) fn make<T>(&self, make: impl FnOnce(&wgpu::Device) -> T) -> Result<T> {
+        let filters = [ErrorFilter::Internal, ErrorFilter::Validation, ErrorFilter::OutOfMemory];
+        let scopes = filters.map(|filter| self.device.push_error_scope(filter));
+        let made = make(&self.device);
+        let errors = scopes.into_iter().rev().map(|scope| pollster::block_on(scope.pop()));
+        // All are ended, whatever the first one says.
+        let errors: Vec<_> = errors.collect();
+        self.check()?;
+        match errors.iter().flatten().next() {
+            None => Ok(made),
+            Some(error) => Err(Error::new(format!("{}: {}", self.facts.name, sentence(error)))),
+        }
+    }
+
     /// Waits until everything submitted so far is done.
     ///
     /// # Errors
@@ -356,7 +372,39 @@ impl Gpu {
     }
 }
 
+/// What is said of an error.
+fn sentence(error: &wgpu::Error) -> String {
+    match error {
+        wgpu::Error::OutOfMemory { .. } => "it is out of memory".to_owned(),
+        other => one_line(&other.to_string()),
+    }
+}
+
 /// A message of several lines as one sentence.
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_device_refuses_does_not_cost_the_device() {
+        let Some(gpu) = Gpu::for_test() else { return };
+        let buffer = |size: u64| {
+            gpu.make(|device| {
+                device.create_buffer(&wgpu::BufferDescriptor {
+                    label: None,
+                    size,
+                    usage: wgpu::BufferUsages::STORAGE,
+                    mapped_at_creation: false,
+                })
+            })
+        };
+        let refused = buffer(gpu.limits.max_buffer_size + 4).map(|_| ());
+        let reason = refused.expect_err("more than there may be").to_string();
+        assert!(reason.starts_with(&gpu.facts.name) && !reason.contains('\n'), "{reason}");
+        assert!(buffer(16).is_ok() && gpu.check().is_ok(), "it is as it was");
+    }
 }

@@ -35,7 +35,6 @@ impl Pipeline {
     /// If the driver refuses it.
     pub(super) fn new(gpu: &Gpu, entry: &str, program: Program) -> Result<Arc<Self>> {
         let start = Instant::now();
-        let device = &gpu.device;
         let entries: Vec<_> = program
             .bindings
             .iter()
@@ -47,36 +46,38 @@ impl Pipeline {
                 count: None,
             })
             .collect();
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some(entry),
-            entries: &entries,
-        });
-        let source = wgpu::ShaderModuleDescriptor {
-            label: Some(entry),
-            source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(&program.source)),
-        };
-        // SAFETY: indices are checked as ever. All loops end: walks take each group of a finite tree
-        // once, searches halve what is left, paths are bounded by bounces and passes, slots take
-        // each pixel once, all others count or clear bits. No divisor is zero: see `no_integer_is_divided_by_zero`.
-        let module = unsafe { device.create_shader_module_trusted(source, RUNTIME_CHECKS) };
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(entry),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(entry),
-            layout: Some(&pipeline_layout),
-            module: &module,
-            entry_point: Some(entry),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                // No walk reads of its stack what it has not written.
-                zero_initialize_workgroup_memory: false,
-                ..wgpu::PipelineCompilationOptions::default()
-            },
-            cache: None,
-        });
-        gpu.check()?;
+        let (layout, pipeline) = gpu.make(|device| {
+            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(entry),
+                entries: &entries,
+            });
+            let source = wgpu::ShaderModuleDescriptor {
+                label: Some(entry),
+                source: wgpu::ShaderSource::Wgsl(Cow::Borrowed(&program.source)),
+            };
+            // SAFETY: indices are checked as ever. All loops end: walks take each group of a finite tree
+            // once, searches halve what is left, paths are bounded by bounces and passes, slots take
+            // each pixel once, all others count or clear bits. No divisor is zero: see `no_integer_is_divided_by_zero`.
+            let module = unsafe { device.create_shader_module_trusted(source, RUNTIME_CHECKS) };
+            let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(entry),
+                bind_group_layouts: &[Some(&layout)],
+                immediate_size: 0,
+            });
+            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(entry),
+                layout: Some(&pipeline_layout),
+                module: &module,
+                entry_point: Some(entry),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    // No walk reads of its stack what it has not written.
+                    zero_initialize_workgroup_memory: false,
+                    ..wgpu::PipelineCompilationOptions::default()
+                },
+                cache: None,
+            });
+            (layout, pipeline)
+        })?;
         let compile_seconds = start.elapsed().as_secs_f64();
         Ok(Arc::new(Self { pipeline, layout, program, compile_seconds }))
     }

@@ -17,7 +17,7 @@ impl Gpu {
     /// As [`Self::check`].
     pub(crate) fn read_back(&self, source: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>> {
         let mut commands = self.device.create_command_encoder(&Default::default());
-        let staging = self.staging(bytes);
+        let staging = self.make(|_| self.staging(bytes))?;
         commands.copy_buffer_to_buffer(source, 0, &staging, 0, bytes);
         self.read_staged(&staging, bytes, commands, <[u8]>::to_vec)
     }
@@ -30,7 +30,7 @@ impl Gpu {
         let (width, height) = (texture.width(), texture.height());
         let bytes_per_row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let bytes = u64::from(bytes_per_row) * u64::from(height);
-        let staging = self.staging(bytes);
+        let staging = self.make(|_| self.staging(bytes))?;
         let mut commands = self.device.create_command_encoder(&Default::default());
         let layout = wgpu::TexelCopyBufferLayout {
             offset: 0,

@@ -478,6 +478,7 @@ fn keep_lines(text: &str, features: Features, source: &mut String) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::device::MOST_STORAGE_BUFFERS;
     use super::*;
 
     #[test]
@@ -513,6 +514,9 @@ mod tests {
             .unwrap_or_else(|e| panic!("{names:?}: {e}"));
         let entries: Vec<_> = module.entry_points.iter().map(|e| e.name.as_str()).collect();
         assert_eq!(entries, [kernel.name()]);
+        let is_buffer = |binding: &&Binding| matches!(binding, Binding::Buffer { .. });
+        let buffers = program.bindings.iter().filter(is_buffer).count();
+        assert!(buffers as u32 <= MOST_STORAGE_BUFFERS, "{names:?}: {buffers} storage buffers");
     }
 
     /// Divisions and remainders of integers by what is no constant. naga does not guard them (see

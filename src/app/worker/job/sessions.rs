@@ -163,7 +163,7 @@ impl Job<'_> {
     pub(super) fn go_on(&mut self, session: &mut Session<'_>, outcome: Result<()>) {
         if let Err(failure) = outcome {
             session.continue_on_cpu();
-            self.kept.device.give_up(&failure);
+            self.kept.device.give_up(&failure, &self.request);
             self.tell_failure();
         }
     }
