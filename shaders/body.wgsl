@@ -1,4 +1,4 @@
-// What a ray is in: twin of `Body` in src/path/mod.rs.
+// What a ray is in: twin of `Body` in src/path/body.rs and of `ReadyMaterial::behind` in src/path/materials.rs.
 
 struct Body {
 //#if MEDIUM

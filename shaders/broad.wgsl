@@ -1,5 +1,5 @@
 // Whether a surface scatters much the same to and from places side by side, all on one side: twin of
-// `SurfaceScatterer::is_broad`.
+// `SurfaceScatterer::is_broad` in src/path/vertex.rs and of `Path::is_in_air` in src/path/mod.rs.
 fn is_broad(vertex: Vertex, least_alpha: f32) -> bool {
 //#if MEDIUM
     if vertex.is_in_medium {

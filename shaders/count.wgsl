@@ -1,4 +1,4 @@
-// What samples of the map see, counted: twin of light_grid/counters.rs and part of src/path/learn.rs.
+// What samples of the map see, counted: twin of src/light_grid/counters.rs and of part of src/path/learn.rs.
 
 const NO_SLOT = 0xffffffffu;
 

@@ -1,4 +1,4 @@
-// Light that next event estimation finds: twin of src/path/lights.rs.
+// Light that next event estimation finds: twin of src/path/gather.rs.
 
 // Light that may reach a vertex from a direction.
 struct Arriving {

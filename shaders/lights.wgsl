@@ -1,9 +1,5 @@
 // Light sources inside the scene: twin of src/path/lights.rs.
 
-const POINT_LIGHT = 0u;
-const SPOT_LIGHT = 1u;
-const DIRECTIONAL_LIGHT = 2u;
-
 struct LightSample {
     direction: vec3f,
     distance: f32,

@@ -1,4 +1,4 @@
-// Frames and directions on the lat-long map: twin of src/math.rs.
+// Frames, directions on the lat-long map, and luminance: twin of src/math.rs and src/color.rs.
 
 const PI = 3.14159265358979;
 const TAU = 6.28318530717959;

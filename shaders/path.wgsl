@@ -1,4 +1,4 @@
-// The path tracing loop, one ray a step: twin of src/path/mod.rs, the same random numbers.
+// The path tracing loop, one ray a step: twin of src/path/mod.rs and src/path/vertex.rs, the same random numbers.
 
 struct Path {
     sampler: Sampler,

@@ -15,7 +15,7 @@ fn stretch_ahead(
 }
 
 //#if SOLID_TRANSMISSION
-// Twin of `Body::stretch`.
+// Twin of `Body::stretch` in src/path/body.rs.
 fn stretch_in(body: Body, origin: vec3f, direction: vec3f, distance: f32) -> Stretch {
     if !body.is_solid {
         return fog_stretch(origin, direction, distance);

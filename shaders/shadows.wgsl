@@ -1,4 +1,4 @@
-// Rays towards lights: twin of src/path/lights.rs.
+// Rays towards lights: twin of `Path::transmittance` in src/path/mod.rs, which src/path/gather.rs asks.
 
 // A ray towards a light. It waits until the path has chosen where to go on: so nothing of the vertex
 // takes registers while it is followed.

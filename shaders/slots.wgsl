@@ -16,8 +16,7 @@ struct Queue {
     padding: u32,
 }
 
-// What a slot's path is.
-const IS_NONE = 0u;
+// What a slot's path is; 0 where there is none.
 // There are no more pixels.
 const IS_IDLE = 1u;
 const HAS_ENDED = 2u;
@@ -166,9 +165,6 @@ fn write_path(slot: u32, pixel: u32, path: ptr<function, Path>) {
 }
 
 //#if SHADOW_RAYS
-// Texels of a ray towards a light.
-const SHADOW_TEXELS = 4u;
-
 fn read_shadow(slot: u32, texel: u32) -> Shadow {
     var shadow: Shadow;
     let origin = slot_read(slot, texel);

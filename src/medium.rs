@@ -26,9 +26,9 @@ pub const MAX_ANISOTROPY: f32 = 0.99;
 /// What a medium does to light, wherever it is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Interior {
-    /// Scattering coefficient per metre.
+    /// Scattering coefficient per metre, linear RGB.
     pub scattering: Vec3,
-    /// Share of light lost to scattering and absorption per metre.
+    /// Coefficient per metre of what scattering and absorption take, linear RGB.
     pub extinction: Vec3,
     /// How scattered light is spread.
     pub phase: Phase,
@@ -97,8 +97,8 @@ impl Interior {
 /// A straight way, as one of those that [`Interior::fly`] chooses from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
-    /// Share of light that is left at its end; if that lies in the medium, times what is scattered there, per
-    /// metre.
+    /// Share of light that is left at its end, linear RGB; if that lies in the medium, times what is scattered
+    /// there, per metre.
     pub weight: Vec3,
     /// Probability that light comes to its end or, per metre, is scattered there.
     pub density: f32,
@@ -114,7 +114,7 @@ impl Crossing {
 pub struct Flight {
     /// Metres to where it was scattered; `None` if it came through.
     pub scattered_at: Option<f32>,
-    /// What the throughput is to be multiplied with.
+    /// What the throughput is to be multiplied with, linear RGB.
     pub weight: Vec3,
 }
 

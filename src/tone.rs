@@ -2,15 +2,11 @@
 
 mod white_balance;
 
-use std::fmt;
-use std::str::FromStr;
-
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::color::{luminance, srgb_from_linear};
-use crate::error::Error;
 use crate::image::{Image, Rgb8};
 
 pub use white_balance::{DAYLIGHT_KELVIN, KELVIN, TINT, WhiteBalance};
@@ -36,7 +32,7 @@ impl ToneCurve {
     /// All curves.
     pub const ALL: [Self; 5] = [Self::Agx, Self::Aces, Self::Neutral, Self::Reinhard, Self::None];
 
-    /// The name that [`FromStr`] reads.
+    /// What the command line and files call it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Agx => "agx",
@@ -64,23 +60,6 @@ impl ToneCurve {
 
 /// Beyond what any curve tells from white, and small enough that its square is finite.
 const BRIGHTEST: f32 = 1e6;
-
-impl fmt::Display for ToneCurve {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for ToneCurve {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self, Error> {
-        Self::ALL.into_iter().find(|curve| curve.name() == name).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            Error::new(format!("there is no tone curve '{name}'; there are {names}"))
-        })
-    }
-}
 
 /// The 8-bit sRGB picture of `image * 2^exposure_ev` under a tone curve.
 ///

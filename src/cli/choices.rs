@@ -8,6 +8,7 @@ use clap::builder::PossibleValue;
 #[cfg(feature = "window")]
 use crate::app::{interface::TileView, overlays::Overlay};
 use crate::denoise::Denoiser;
+use crate::environment::TableKind;
 use crate::output::LayerName;
 use crate::render::filter::PixelFilter;
 use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
@@ -15,6 +16,7 @@ use crate::render::{Gi, Sampling, Sharing};
 #[cfg(feature = "report")]
 use crate::report::Device;
 use crate::scene::{MaterialEdit, Outlines, SceneOptions};
+use crate::tone::ToneCurve;
 
 /// What is asked of a scene's file.
 #[derive(Debug, Clone, Default, PartialEq, clap::Args)]
@@ -97,6 +99,19 @@ choices! {
         Small = "4x4": "In tiles of 4x4 pixels, all of which keep their own: less of the noise is shared"
         Large = "8x8": "In tiles of 8x8 pixels, of which every fourth keeps its own"
     }
+    TableKind {
+        TileLocal = "tile-local": "Exact integer sums tile by tile"
+        U32 = "u32": "The talk's: a summed-area table in f64, rounded to u32"
+        F32 = "f32": "A summed-area table computed in f32"
+        F64 = "f64": "A summed-area table in f64"
+    }
+    ToneCurve {
+        Agx = "agx": "Troy Sobotka's AgX"
+        Aces = "aces": "The ACES transforms in Stephen Hill's fit"
+        Neutral = "neutral": "Khronos PBR Neutral: keeps base colours below 0.8 as they are"
+        Reinhard = "reinhard": "L / (1 + L) of the luminance"
+        None = "none": "Clipped at 1"
+    }
     DeviceChoice {
         Auto = "auto": "A real GPU if there is one and everything fits on it, else the CPU"
         Gpu = "gpu": "A GPU, be it a software one, or an error"
@@ -158,5 +173,21 @@ choices! {
         Energy = "energy": "Share of the map's energy"
         Learned = "learned": "Share of what all cells together have learned to sample"
         EqualEnergy = "equal-energy": "Tiles of equal energy, which are not used"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Files and reports have names of their own, which are read back.
+    #[test]
+    fn names_read_back() {
+        for kind in TableKind::ALL {
+            assert_eq!(TableKind::from_str(&kind.to_string(), false), Ok(kind));
+        }
+        for curve in ToneCurve::ALL {
+            assert_eq!(ToneCurve::from_str(curve.name(), false), Ok(curve));
+        }
     }
 }

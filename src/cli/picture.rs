@@ -17,8 +17,8 @@ pub(super) struct PictureArguments {
     /// Exposure of .png pictures in stops, or `auto`.
     #[arg(long, default_value = "auto", value_parser = parse_exposure, allow_hyphen_values = true, value_name = "EV|auto", help_heading = "Picture")]
     exposure: Exposure,
-    /// Tone curve of .png pictures: agx, aces, neutral, reinhard, none.
-    #[arg(long, default_value = "agx", value_name = "CURVE", help_heading = "Picture")]
+    /// Tone curve of .png pictures.
+    #[arg(long, default_value = "agx", value_enum, value_name = "CURVE", help_heading = "Picture")]
     tonemap: ToneCurve,
     /// Takes noise out of .png pictures: a-trous (our own filter) or oidn (Open Image Denoise, if its
     /// library is installed).

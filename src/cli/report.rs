@@ -106,7 +106,7 @@ struct EffortArguments {
     /// Picture size in pixels.
     #[arg(long, default_value = "240x135", value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
     size: (u32, u32),
-    /// Surface vertices at which a path gathers light; 1 is direct light only.
+    /// Vertices, on surfaces and in fog, at which a path gathers light; 1 is direct light only.
     #[arg(long, default_value = "5", value_parser = values::whole::<u32>(1..=1000), value_name = "N")]
     bounces: u32,
     /// The reference is rendered until its noise is this share of the smallest error.
@@ -310,7 +310,7 @@ fn tables(arguments: &SatArguments) -> Result<()> {
     progress.finish();
     let measured = measured?;
     print(format_args!("{}\n{}", sat::markdown(&measured), sat::REMARK))?;
-    if measured.len() < sat::CASES.len() {
+    if measured.len() < sat::cases().len() {
         return Err(Error::new("stopped before the end"));
     }
     Ok(())

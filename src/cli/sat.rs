@@ -1,7 +1,7 @@
 //! `lightgrid sat`.
 
 use crate::environment::landmarks::Sun;
-use crate::environment::sat_report;
+use crate::environment::{TALKS_MAPS, TIMED_SAMPLES, sat_report};
 use crate::error::{Error, Result};
 use crate::terminal::{notice, one_line, print};
 
@@ -15,20 +15,12 @@ pub(super) struct SatArguments {
     json: bool,
 }
 
-/// The talk's maps: sizes from its table, contents from our skies.
-const TALKS_CASES: [&str; 4] =
-    ["sky:hallway@10000x5000", "sky:day@15000x7500", "sky:night@3000x1500", "sky:sunset@3000x1500"];
-
-/// Samples drawn to time a table.
-const SAMPLES: u32 = 1 << 20;
-
 /// Prints one table a map.
 pub(super) fn run(arguments: &SatArguments) -> Result<()> {
-    let maps: Vec<&str> = if arguments.maps.is_empty() {
-        TALKS_CASES.to_vec()
-    } else {
-        arguments.maps.iter().map(String::as_str).collect()
-    };
+    let talks = TALKS_MAPS.map(|(title, (width, height), _)| {
+        format!("sky:{}@{width}x{height}", title.to_lowercase())
+    });
+    let maps = if arguments.maps.is_empty() { &talks[..] } else { &arguments.maps[..] };
     let mut reports = serde_json::Map::new();
     for name in maps {
         let (map, notices) = crate::sources::map(name)?;
@@ -36,7 +28,7 @@ pub(super) fn run(arguments: &SatArguments) -> Result<()> {
         if Sun::of(&map).is_none() {
             notice(format_args!("{name}: the map is black, so there is nothing to be sampled"));
         }
-        let report = sat_report(&map, SAMPLES).map_err(|e| Error::at(name, e))?;
+        let report = sat_report(&map, TIMED_SAMPLES).map_err(|e| Error::at(name, e))?;
         if arguments.json {
             reports.insert(name.to_owned(), crate::output::record::to_value(&report)?);
         } else {

@@ -9,13 +9,14 @@ use crate::error::{Error, Result};
 use crate::image::check_writable;
 use crate::output::record::write_json;
 use crate::render::gpu::Gpu;
+use crate::report::Device;
 use crate::stability::{Case, Report, Setting, Verdict, cases, run as run_case};
 use crate::terminal::print;
 
 /// Arguments of `stability`.
 #[derive(Debug, clap::Args)]
 pub(super) struct StabilityArguments {
-    /// What renders.
+    /// What renders: on the CPU all cases but those about a GPU, on a GPU the cases that render.
     #[arg(long, default_value = "cpu", value_enum)]
     device: Device,
     /// The GPU whose name or backend contains this; `lightgrid devices` lists them.
@@ -33,14 +34,6 @@ pub(super) struct StabilityArguments {
     /// Prints the names of the cases and runs none.
     #[arg(long)]
     list: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Device {
-    /// All cases but those about a GPU.
-    Cpu,
-    /// The cases that render, on a GPU.
-    Gpu,
 }
 
 /// Runs the cases, prints a line for each; an error if one fails.

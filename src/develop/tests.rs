@@ -96,8 +96,8 @@ fn pictures_are_those_of_the_cpu_within_one_level() {
                     .zip(&expected.pixels)
                     .position(|(a, b)| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 1));
                 let worst = worst.map(|i| (image.pixels[i], found.pixels[i], expected.pixels[i]));
-                assert!(most <= 1, "{curve} {exposure_ev} EV {kelvin} K: {worst:?}");
-                assert!(share < 0.005, "{curve} {exposure_ev} EV {kelvin} K: {share} differ");
+                assert!(most <= 1, "{curve:?} {exposure_ev} EV {kelvin} K: {worst:?}");
+                assert!(share < 0.005, "{curve:?} {exposure_ev} EV {kelvin} K: {share} differ");
             }
         }
     }

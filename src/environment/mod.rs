@@ -31,7 +31,7 @@ use rayon::prelude::*;
 
 pub use self::options::{EnvironmentOptions, TableKind};
 use self::patches::{PatchRows, sample_linear};
-pub use self::sat_report::{SatReport, SatReportRow, sat_report};
+pub use self::sat_report::{SatReport, SatReportRow, TALKS_MAPS, TIMED_SAMPLES, sat_report};
 use self::table::{Search, Table};
 use self::tiles::TileGrid;
 use self::weights::Weights;

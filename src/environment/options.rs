@@ -1,7 +1,6 @@
 //! How a map is turned into a light.
 
 use std::fmt;
-use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
@@ -34,16 +33,6 @@ impl fmt::Display for TableKind {
             Self::U32 => "u32",
             Self::F32 => "f32",
             Self::F64 => "f64",
-        })
-    }
-}
-
-impl FromStr for TableKind {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|kind| kind.to_string() == name).ok_or_else(|| {
-            Error::new(format!("no importance table \"{name}\": tile-local, u32, f32 or f64"))
         })
     }
 }
@@ -93,18 +82,5 @@ impl EnvironmentOptions {
             return Ok(());
         };
         Err(Error::new(complaint))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_read_back() {
-        for kind in TableKind::ALL {
-            assert_eq!(kind.to_string().parse(), Ok(kind));
-        }
-        assert!("u64".parse::<TableKind>().is_err());
     }
 }

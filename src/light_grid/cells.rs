@@ -13,7 +13,7 @@ pub const MEDIUM_FACE: u32 = 6;
 /// the whole gain over it in direct light, because a floor and the wall behind it see other tiles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SphericalGrid {
-    /// World position all cells are seen from; the camera when learning started.
+    /// World position in metres that all cells are seen from; the camera when learning started.
     pub center: Vec3,
     /// Cells around the horizon.
     pub columns: u32,

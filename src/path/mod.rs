@@ -3,8 +3,9 @@
 //! A path is a chain of vertices on surfaces and in media. At each of at most `bounces` vertices
 //! light is gathered by next event estimation (NEE) from the environment map, and from local lights
 //! if there are any, and the path goes on in a direction the BSDF or the phase function chooses; what
-//! a path then runs into counts with the balance heuristic. Alpha and smooth thin glass are passed straight through, by paths and shadow
-//! rays alike, and are no vertices: so NEE and BSDF sampling see the same light behind a pane.
+//! a path then runs into counts with the balance heuristic. Alpha and smooth thin glass are passed
+//! straight through, by paths and shadow rays alike, and are no vertices: so NEE and BSDF sampling see
+//! the same light behind a pane.
 
 use std::borrow::Cow;
 
@@ -52,8 +53,8 @@ use crate::scene::surface::SurfacePoint;
 /// What bounds a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PathLimits {
-    /// Most vertices, on surfaces or in a medium, that scatter light; 1 is direct light only, 0 sees emitters and the
-    /// environment alone.
+    /// Most vertices, on surfaces or in a medium, that scatter light; 1 is direct light only, 0 sees emitters
+    /// and the environment alone.
     pub bounces: u32,
     /// Whether dim paths are ended at random.
     pub russian_roulette: bool,

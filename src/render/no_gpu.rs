@@ -23,6 +23,19 @@ pub use super::gpu_facts::{AdapterFacts, FlightFigures, GpuFigures, RayChoice, S
 /// What is said where a GPU is asked for.
 pub(crate) const NO_GPU: &str = "this lightgrid was built without GPU rendering (feature `gpu`)";
 
+/// Methods of what there cannot be one of. They get `self` from the caller: a macro's own is another.
+macro_rules! never {
+    ($this:ident; impl $type:ty {
+        $($(#[$attribute:meta])* $visibility:vis fn $name:ident $arguments:tt $(-> $result:ty)?;)+
+    }) => {
+        impl $type {
+            $($(#[$attribute])* $visibility fn $name $arguments $(-> $result)? {
+                match *$this {}
+            })+
+        }
+    };
+}
+
 /// All adapters: none.
 pub fn adapters() -> Vec<AdapterFacts> {
     Vec::new()
@@ -45,11 +58,6 @@ impl Gpu {
         Err(Error::new(NO_GPU))
     }
 
-    /// What it is.
-    pub fn facts(&self) -> &AdapterFacts {
-        match *self {}
-    }
-
     /// The same connection with rays traced as is asked for.
     ///
     /// # Errors
@@ -63,17 +71,16 @@ impl Gpu {
     pub fn with_schedule(self, _: Option<Schedule>) -> Self {
         match self {}
     }
-
-    /// Gives the device up.
-    pub fn lose(&self) {
-        match *self {}
-    }
-
-    /// Whether its own ray queries find what rays hit.
-    pub fn has_hardware_rays(&self) -> bool {
-        match *self {}
-    }
 }
+
+never! { self; impl Gpu {
+    /// What it is.
+    pub fn facts(&self) -> &AdapterFacts;
+    /// Gives the device up.
+    pub fn lose(&self);
+    /// Whether its own ray queries find what rays hit.
+    pub fn has_hardware_rays(&self) -> bool;
+} }
 
 /// A scene and a map on a device.
 pub enum UploadedScene {}
@@ -130,75 +137,27 @@ impl Renderer {
     ) -> Result<Self> {
         match *uploaded {}
     }
-
-    pub(super) fn set_film(&mut self, _: &Film) -> Result<()> {
-        match *self {}
-    }
-
-    pub(crate) fn set_grid(&mut self, _: Option<&LightGrid>) -> Result<()> {
-        match *self {}
-    }
-
-    pub(crate) fn set_cache(&mut self, _: Option<&RadianceCache>) -> Result<()> {
-        match *self {}
-    }
-
-    pub(crate) fn learn(
-        &mut self,
-        _: Range<u64>,
-        _: &LearningGrid,
-        _: &AtomicBool,
-    ) -> Result<Option<u64>> {
-        match *self {}
-    }
-
-    pub(crate) fn train(
-        &mut self,
-        _: Range<u64>,
-        _: &RadianceSums,
-        _: &AtomicBool,
-    ) -> Result<(u64, u64)> {
-        match *self {}
-    }
-
-    pub(super) fn render(
-        &mut self,
-        _: Pass,
-        _: Option<&LearningGrid>,
-        _: &AtomicBool,
-    ) -> Result<Advance> {
-        match *self {}
-    }
-
-    pub(super) fn settle(&mut self) -> Result<()> {
-        match *self {}
-    }
-
-    pub(super) fn read_film(&self, _: &mut Film) -> Result<()> {
-        match *self {}
-    }
-
-    pub(super) fn rays(&self) -> u64 {
-        match *self {}
-    }
-
-    pub(crate) fn film_on_device(&self) -> Option<(Gpu, DeviceFilm)> {
-        match *self {}
-    }
-
-    pub(crate) fn figures(&self) -> GpuFigures {
-        match *self {}
-    }
-
-    pub(crate) fn put_rays(&mut self, _: &[Ray]) -> Result<()> {
-        match *self {}
-    }
-
-    pub(crate) fn cast(&mut self, _: Question, _: u32) -> Result<f64> {
-        match *self {}
-    }
-
-    pub(crate) fn cast_results(&self, _: usize) -> Result<Vec<(f32, u32)>> {
-        match *self {}
-    }
 }
+
+never! { self; impl Renderer {
+    pub(super) fn set_film(&mut self, _: &Film) -> Result<()>;
+    pub(crate) fn set_grid(&mut self, _: Option<&LightGrid>) -> Result<()>;
+    pub(crate) fn set_cache(&mut self, _: Option<&RadianceCache>) -> Result<()>;
+    pub(crate) fn learn(
+        &mut self, _: Range<u64>, _: &LearningGrid, _: &AtomicBool,
+    ) -> Result<Option<u64>>;
+    pub(crate) fn train(
+        &mut self, _: Range<u64>, _: &RadianceSums, _: &AtomicBool,
+    ) -> Result<(u64, u64)>;
+    pub(super) fn render(
+        &mut self, _: Pass, _: Option<&LearningGrid>, _: &AtomicBool,
+    ) -> Result<Advance>;
+    pub(super) fn settle(&mut self) -> Result<()>;
+    pub(super) fn read_film(&self, _: &mut Film) -> Result<()>;
+    pub(super) fn rays(&self) -> u64;
+    pub(crate) fn film_on_device(&self) -> Option<(Gpu, DeviceFilm)>;
+    pub(crate) fn figures(&self) -> GpuFigures;
+    pub(crate) fn put_rays(&mut self, _: &[Ray]) -> Result<()>;
+    pub(crate) fn cast(&mut self, _: Question, _: u32) -> Result<f64>;
+    pub(crate) fn cast_results(&self, _: usize) -> Result<Vec<(f32, u32)>>;
+} }

@@ -148,7 +148,7 @@ impl Method {
 pub struct Frame {
     /// Pixels per row, and rows.
     pub size: (u32, u32),
-    /// Most surface vertices that scatter light.
+    /// Most vertices, on surfaces or in a medium, that scatter light; 1 is direct light only.
     pub bounces: u32,
 }
 

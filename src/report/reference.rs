@@ -22,9 +22,10 @@ use crate::render::{Sampling, StopRule};
 /// A picture's own expected squared error, in the units of [`crate::metrics::Comparison`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Noise {
-    /// Mean squared error.
+    /// Mean over pixels and channels of the squared error, in units of the reference's squared mean.
     pub mse: f64,
-    /// Relative mean squared error.
+    /// Mean over pixels and channels of the squared error over `r^2 + 0.01`, `r` the reference in units of its
+    /// mean.
     pub rel_mse: f64,
     /// The same without the worst 0.1 % of the pixels.
     pub trimmed_rel_mse: f64,
@@ -35,22 +36,31 @@ impl Noise {
     pub(super) fn of(variances: &[[f64; 3]], reference: &Image) -> Self {
         let count = variances.len() as f64;
         let mean = crate::metrics::mean(reference);
-        let (mut squared, mut relative) = (0.0, Vec::with_capacity(variances.len()));
-        for (variance, pixel) in variances.iter().zip(&reference.pixels) {
-            let mut sum = 0.0;
-            for (v, r) in variance.iter().zip(pixel) {
-                let (v, r) = (v / (mean * mean), f64::from(*r) / mean);
-                squared += v / 3.0;
-                sum += v / (r * r + REL_MSE_EPSILON) / 3.0;
-            }
-            relative.push(sum);
-        }
+        let pixels = variances.iter().zip(&reference.pixels);
+        let mut relative: Vec<f64> = pixels.map(|(v, pixel)| relative(v, pixel, mean)).collect();
         Self {
-            mse: squared / count,
+            mse: variances.as_flattened().iter().sum::<f64>() / (3.0 * count * mean * mean),
             rel_mse: relative.iter().sum::<f64>() / count,
             trimmed_rel_mse: trimmed_mean(&mut relative),
         }
     }
+}
+
+/// Relative squared error of a pixel whose channels have these variances, in a picture of this mean.
+pub(super) fn relative(variances: &[f64; 3], pixel: &[f32; 3], mean: f64) -> f64 {
+    let of_channel = |(v, r): (&f64, &f32)| {
+        let r = f64::from(*r) / mean;
+        v / (mean * mean) / (r * r + REL_MSE_EPSILON) / 3.0
+    };
+    variances.iter().zip(pixel).map(of_channel).sum()
+}
+
+/// Variances of the mean of `count` pictures, by the sums of their values and of their squares.
+pub(super) fn variances_of_mean(sums: &[f64; 3], squares: &[f64; 3], count: f64) -> [f64; 3] {
+    [0, 1, 2].map(|i| {
+        let mean = sums[i] / count;
+        (squares[i] / count - mean * mean).max(0.0) / (count - 1.0)
+    })
 }
 
 /// Facts about a reference, as its file begins.
@@ -127,8 +137,8 @@ impl Reference {
         })
     }
 
-    /// Renders one more picture with the default sampling and keeps it; the first one
-    /// renders for `seconds` (and at least as long as it learned), the others as many samples. `false` if it was cancelled.
+    /// Renders one more picture with the default sampling and keeps it; the first one renders for `seconds`
+    /// (and at least as long as it learned), the others as many samples. `false` if it was cancelled.
     ///
     /// # Errors
     /// If the device fails or the file cannot be written.
@@ -203,17 +213,9 @@ impl Reference {
             };
         }
         let count = f64::from(self.facts.pictures);
-        let variances: Vec<[f64; 3]> = self
-            .sums
-            .iter()
-            .zip(&self.squares)
-            .map(|(sum, square)| {
-                [0, 1, 2].map(|i| {
-                    let mean = sum[i] / count;
-                    (square[i] / count - mean * mean).max(0.0) / (count - 1.0)
-                })
-            })
-            .collect();
+        let sums = self.sums.iter().zip(&self.squares);
+        let variances: Vec<[f64; 3]> =
+            sums.map(|(sum, square)| variances_of_mean(sum, square, count)).collect();
         Noise::of(&variances, &self.image())
     }
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::machine::Machine;
 use super::store::Store;
-use crate::environment::{SatReport, TableKind, sat_report};
+use crate::environment::{SatReport, TALKS_MAPS, TIMED_SAMPLES, TableKind, sat_report, sky};
 use crate::error::Result;
 use crate::image::{Image, write_beside_and_rename};
 use crate::math::direction_from_uv;
@@ -17,22 +17,18 @@ use crate::math::direction_from_uv;
 pub struct Case {
     /// What to call it.
     pub title: &'static str,
-    /// A built-in sky, or `None` for the extreme map.
-    sky: Option<&'static str>,
     /// Columns and rows.
     pub size: (u32, u32),
-    /// Mean squared error in the talk's unit, u32 and f32.
+    /// Mean squared error in the talk's unit, u32 and f32; `None` for the extreme map.
     pub published: Option<[f64; 2]>,
 }
 
 /// The talk's maps, made by our skies, and the extreme one.
-pub const CASES: [Case; 5] = [
-    Case::new("Hallway", Some("hallway"), (10_000, 5000), Some([1.0e-5, 3.8e-1])),
-    Case::new("Day", Some("day"), (15_000, 7500), Some([4.9e-7, 8.6e-3])),
-    Case::new("Night", Some("night"), (3000, 1500), Some([1.4e-8, 4.1e-4])),
-    Case::new("Sunset", Some("sunset"), (3000, 1500), Some([1.1e-8, 3.6e-4])),
-    Case::new("Extreme", None, (10_000, 5000), None),
-];
+pub fn cases() -> Vec<Case> {
+    let talks =
+        TALKS_MAPS.map(|(title, size, mse)| Case { title, size, published: Some(mse) }).to_vec();
+    [talks, vec![Case { title: "Extreme", size: (10_000, 5000), published: None }]].concat()
+}
 
 /// A finished case.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,19 +41,7 @@ pub struct Measured {
     pub report: SatReport,
 }
 
-/// Samples drawn to time a table.
-const SAMPLES: u32 = 1 << 20;
-
 impl Case {
-    const fn new(
-        title: &'static str,
-        sky: Option<&'static str>,
-        size: (u32, u32),
-        published: Option<[f64; 2]>,
-    ) -> Self {
-        Self { title, sky, size, published }
-    }
-
     /// Measures it with sides `scale` times as long.
     ///
     /// # Errors
@@ -65,11 +49,11 @@ impl Case {
     pub fn measure(&self, scale: f64) -> Result<Measured> {
         let side = |length: u32| ((f64::from(length) * scale).round() as u32).max(2);
         let (width, height) = (side(self.size.0), side(self.size.1));
-        let map = match self.sky {
-            Some(sky) => crate::environment::sky::build(sky, width, height)?,
+        let map = match self.published {
+            Some(_) => sky::build(&self.title.to_lowercase(), width, height)?,
             None => extreme(width, height),
         };
-        let report = sat_report(&map, SAMPLES)?;
+        let report = sat_report(&map, TIMED_SAMPLES)?;
         Ok(Measured { title: self.title.to_owned(), published: self.published, report })
     }
 }
@@ -103,7 +87,7 @@ pub fn measure_all(
     let store = folder.map(|folder| Store::open(folder, None)).transpose()?;
     let machine = Machine::here().digest();
     let mut all = Vec::new();
-    for case in &CASES {
+    for case in &cases() {
         if is_cancelled(case) {
             break;
         }

@@ -10,9 +10,10 @@ use serde::{Deserialize, Serialize};
 
 use super::measure::Place;
 use super::plan::{Frame, Settings};
+use super::reference::{relative, variances_of_mean};
 use crate::error::Result;
 use crate::image::Image;
-use crate::metrics::REL_MSE_EPSILON;
+use crate::metrics;
 use crate::render::Session;
 use crate::render::film::Pixel;
 
@@ -127,25 +128,15 @@ fn finish(
 /// Variance over pictures of each part, relative, averaged without the worst pixels.
 fn trimmed(sums: &[Sums], reference: &Image) -> [f64; 4] {
     let count = f64::from(PICTURES);
-    let mean = crate::metrics::mean(reference);
-    let mut pixels: Vec<[f64; 4]> = sums
-        .iter()
-        .zip(&reference.pixels)
-        .map(|(sums, pixel)| {
-            [0, 1, 2, 3].map(|part| {
-                let channel = |c: usize| {
-                    let average = sums.value[part][c] / count;
-                    let spread = sums.square[part][c] / count - average * average;
-                    let r = f64::from(pixel[c]) / mean;
-                    spread.max(0.0) * count
-                        / (count - 1.0)
-                        / (mean * mean * (r * r + REL_MSE_EPSILON))
-                };
-                (channel(0) + channel(1) + channel(2)) / 3.0
-            })
+    let mean = metrics::mean(reference);
+    let of_pixel = |(sums, pixel): (&Sums, &[f32; 3])| {
+        [0, 1, 2, 3].map(|part| {
+            let variances = variances_of_mean(&sums.value[part], &sums.square[part], count);
+            count * relative(&variances, pixel, mean)
         })
-        .collect();
+    };
+    let mut pixels: Vec<[f64; 4]> = sums.iter().zip(&reference.pixels).map(of_pixel).collect();
     pixels.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
-    let kept = pixels.len() - (pixels.len() / 1000).max(1).min(pixels.len() - 1);
+    let kept = metrics::kept_of(pixels.len());
     [0, 1, 2, 3].map(|part| pixels[..kept].iter().map(|p| p[part]).sum::<f64>() / kept as f64)
 }

@@ -83,9 +83,9 @@ fn power_law(a: f64, b: f64, t: f64) -> f64 {
 /// Error against time of several runs, at common times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bundle {
-    /// Ascending, the last one is the end.
+    /// When the errors are known: ascending, the last one is the end.
     pub seconds: Vec<f64>,
-    /// One row of errors a run.
+    /// Runs x times: a row a run, in it an error for each of `seconds`.
     pub errors: Vec<Vec<f64>>,
 }
 
@@ -144,7 +144,8 @@ pub struct SpeedUp {
     pub ratio: f64,
     /// Where it is with 95 % confidence, by bootstrap over runs; `None` with a single run.
     pub interval: Option<Interval>,
-    /// The error both are compared at: the larger of what they reach at the end.
+    /// The error both are compared at, by the measure that their curves are of: the larger of the mean errors
+    /// that they reach at the end.
     pub error: f64,
     /// Whether one was there before its first measured point, so that the ratio is a bound only.
     pub is_bound: bool,

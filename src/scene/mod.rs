@@ -205,7 +205,7 @@ pub struct Material {
     pub metallic: f32,
     /// Perceptual roughness in `[0,1]`; GGX alpha is its square.
     pub roughness: f32,
-    /// Scale of the normal map's x and y.
+    /// Scale of the normal map's x and y; finite, of any sign, 1 is the map as it is.
     pub normal_scale: f32,
     /// Emitted radiance, linear, `KHR_materials_emissive_strength` included.
     pub emissive: Vec3,
@@ -229,13 +229,14 @@ pub struct Material {
     pub diffuse_transmission: f32,
     /// Colour of what comes through, linear, in `[0,1]`.
     pub diffuse_transmission_color: Vec3,
-    /// `KHR_materials_volume` thickness; 0 is a thin wall, more is a solid body with an inside.
+    /// `KHR_materials_volume` thickness in the mesh's units, not negative. Only whether it is 0 counts: 0 is a
+    /// thin wall, more is a solid body with an inside.
     pub thickness: f32,
-    /// Colour that white light becomes after `attenuation_distance` inside the body.
+    /// Colour that white light becomes after `attenuation_distance` inside the body, linear, in `[0,1]`.
     pub attenuation_color: Vec3,
-    /// Metres; infinite is no absorption.
+    /// Metres, above 0; infinite is no absorption.
     pub attenuation_distance: f32,
-    /// Scattering coefficient per metre inside the body.
+    /// Scattering coefficient per metre inside the body, linear RGB, not negative.
     pub scattering: Vec3,
     /// Mean cosine of scattering inside the body, as [`Medium::anisotropy`].
     pub scatter_anisotropy: f32,
@@ -260,9 +261,9 @@ pub struct Material {
     pub sheen_roughness: f32,
     /// `KHR_materials_clearcoat` strength in `[0,1]`.
     pub clearcoat: f32,
-    /// Perceptual roughness of the coat.
+    /// Perceptual roughness of the coat in `[0,1]`; GGX alpha is its square.
     pub clearcoat_roughness: f32,
-    /// Scale of the coat normal map's x and y.
+    /// Scale of the coat normal map's x and y, as [`Self::normal_scale`].
     pub clearcoat_normal_scale: f32,
     /// Textures by [`TextureSlot`].
     pub textures: [Option<Box<TextureRef>>; 17],
@@ -384,7 +385,7 @@ pub struct TextureImage {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// `width * height` of them, row after row.
+    /// `width * height` of them, row after row, each of one to four channels.
     pub texels: Texels,
 }
 
@@ -466,7 +467,7 @@ pub struct PunctualLight {
     pub kind: PunctualKind,
     /// World position in metres (unused by directional lights).
     pub position: Vec3,
-    /// World direction the light travels in (unused by point lights).
+    /// Unit world direction the light travels in (unused by point lights).
     pub direction: Vec3,
     /// Linear colour times radiant intensity (point, spot) or irradiance (directional).
     pub intensity: Vec3,

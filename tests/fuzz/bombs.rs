@@ -2,6 +2,7 @@
 //! allocated.
 
 use crate::corpus::container;
+use crate::shared::exr_header;
 
 /// File name (whose extension says what it is) and content.
 pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
@@ -91,28 +92,8 @@ fn crc32(bytes: &[u8]) -> u32 {
 /// Scan lines of half floats, uncompressed, with zeros after the header. The windows of data and of what is
 /// seen end at these pixels.
 fn exr(data: [u32; 2], display: [u32; 2], zeros: usize) -> Vec<u8> {
-    let mut file = vec![0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
-    let mut attribute = |name: &str, kind: &str, value: &[u8]| {
-        file.extend(name.bytes().chain([0]).chain(kind.bytes()).chain([0]));
-        file.extend((value.len() as u32).to_le_bytes());
-        file.extend(value);
-    };
-    let mut channels = Vec::new();
-    for name in [b'B', b'G', b'R'] {
-        channels.extend([name, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
-    }
-    channels.push(0);
-    attribute("channels", "chlist", &channels);
-    attribute("compression", "compression", &[0]);
-    let window =
-        |last: [u32; 2]| [[0; 4], [0; 4], last[0].to_le_bytes(), last[1].to_le_bytes()].concat();
-    attribute("dataWindow", "box2i", &window(data));
-    attribute("displayWindow", "box2i", &window(display));
-    attribute("lineOrder", "lineOrder", &[0]);
-    attribute("pixelAspectRatio", "float", &1.0_f32.to_le_bytes());
-    attribute("screenWindowCenter", "v2f", &[0; 8]);
-    attribute("screenWindowWidth", "float", &1.0_f32.to_le_bytes());
-    file.resize(file.len() + 1 + zeros, 0);
+    let mut file = exr_header(&[("B", 1), ("G", 1), ("R", 1)], data, display);
+    file.resize(file.len() + zeros, 0);
     file
 }
 

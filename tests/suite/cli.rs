@@ -109,6 +109,12 @@ pub(crate) fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
+#[cfg(unix)]
+pub(crate) fn send(child: &std::process::Child, signal: &str) {
+    let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
+    assert!(sent.expect("kill is there").success());
+}
+
 /// What is changed on the command line is what is changed in the window.
 #[test]
 fn materials_are_changed_by_name() {
@@ -399,6 +405,7 @@ fn wrong_values_are_refused_with_the_reason() {
         ("--eye 0,0,0", "--target"),
         ("--layers foo", "albedo, normal, depth"),
         ("--table foo", "tile-local"),
+        ("--tonemap filmic", "reinhard"),
         ("--fog -1", "must not be negative"),
         ("--fog 1,2", "one number or three"),
         ("--fog-anisotropy 2", "between -1 and 1"),
@@ -558,11 +565,6 @@ mod signals {
 
     fn start(bench: &Bench, rest: &str) -> std::process::Child {
         start_with(bench, rest, libc::SIG_DFL)
-    }
-
-    fn send(child: &std::process::Child, signal: &str) {
-        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
-        assert!(sent.expect("kill is there").success());
     }
 
     #[test]

@@ -382,21 +382,11 @@ fn an_irradiance_estimate_agrees_with_quadrature() {
         let mean = sum / f64::from(SAMPLES);
         let error = ((squares / f64::from(SAMPLES) - mean * mean).max(DVec3::ZERO)
             / f64::from(SAMPLES))
-        .map_sqrt();
+        .sqrt();
         let off = (mean - exact).abs();
         // Four and a half standard errors, and the quadrature's own error.
         assert!(off.cmple(4.5 * error + 2e-3 * exact).all(), "{case}: {mean} {exact} {error}");
     });
-}
-
-trait MapSqrt {
-    fn map_sqrt(self) -> Self;
-}
-
-impl MapSqrt for DVec3 {
-    fn map_sqrt(self) -> Self {
-        Self::new(self.x.sqrt(), self.y.sqrt(), self.z.sqrt())
-    }
 }
 
 /// Irradiance on both sides of a surface, by the midpoint rule with 4 x 32 points a texel (near a pole

@@ -681,13 +681,7 @@ fn files_that_vanish_while_they_are_read_are_refused_by_name() {
 #[cfg(unix)]
 mod signals {
     use super::*;
-
-    fn send(child: &std::process::Child, signal: &str) {
-        let id = child.id().to_string();
-        assert!(
-            Command::new("kill").args([signal, &id]).status().expect("kill is there").success()
-        );
-    }
+    use crate::cli::send;
 
     #[test]
     fn before_there_is_anything_to_keep_a_signal_ends_at_once() {

@@ -462,18 +462,12 @@ fn tone_curves_have_their_known_values() {
         let mut last = -1.0;
         for i in 0..400 {
             let shown = luminance(curve.apply(glam::Vec3::splat((i as f32 / 20.0 - 12.0).exp2())));
-            assert!(shown >= last - 1e-6, "{curve} falls at step {i}");
+            assert!(shown >= last - 1e-6, "{curve:?} falls at step {i}");
             last = shown;
         }
         near(apply(curve, 0.0), 0.0, 2e-4);
         near(apply(curve, 1e30), 1.0, 0.02);
-        assert_eq!(curve.name().parse(), Ok(curve));
     }
-    let error = "filmic".parse::<ToneCurve>().unwrap_err().to_string();
-    assert_eq!(
-        error,
-        "there is no tone curve 'filmic'; there are agx, aces, neutral, reinhard, none"
-    );
 }
 
 #[test]

@@ -8,7 +8,7 @@ use lightgrid::scene::{Scene, SceneOptions};
 
 use crate::cli::{Bench, text};
 use crate::packed;
-use crate::shared::shared;
+use crate::shared::{exr_header, shared};
 
 /// One triangle with what comes `before` and `after` in the file, its corners as given.
 fn triangle(corners: [f32; 9], before: &str, material: &str, after: &str) -> String {
@@ -188,28 +188,8 @@ fn exr_channels_need_not_be_sorted() {
 fn exr_colour_may_have_half_the_resolution() {
     use exr::prelude::f16;
     let (width, height) = (8_u32, 4_u32);
-    let mut file = vec![0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
-    let mut attribute = |name: &str, kind: &str, value: &[u8]| {
-        file.extend(name.bytes().chain([0]).chain(kind.bytes()).chain([0]));
-        file.extend((value.len() as u32).to_le_bytes());
-        file.extend(value);
-    };
-    let mut channels = Vec::new();
-    for (name, step) in [("BY", 2), ("RY", 2), ("Y", 1)] {
-        channels.extend(name.bytes());
-        channels.extend([0, 1, 0, 0, 0, 0, 0, 0, 0, step, 0, 0, 0, step, 0, 0, 0]);
-    }
-    channels.push(0);
-    attribute("channels", "chlist", &channels);
-    attribute("compression", "compression", &[0]);
-    let window = [&[0; 8][..], &(width - 1).to_le_bytes(), &(height - 1).to_le_bytes()].concat();
-    attribute("dataWindow", "box2i", &window);
-    attribute("displayWindow", "box2i", &window);
-    attribute("lineOrder", "lineOrder", &[0]);
-    attribute("pixelAspectRatio", "float", &1.0_f32.to_le_bytes());
-    attribute("screenWindowCenter", "v2f", &[0; 8]);
-    attribute("screenWindowWidth", "float", &1.0_f32.to_le_bytes());
-    file.push(0);
+    let last = [width - 1, height - 1];
+    let mut file = exr_header(&[("BY", 2), ("RY", 2), ("Y", 1)], last, last);
     // A colour for each two by two pixels: (R-Y)/Y and (B-Y)/Y; luminance for each pixel.
     let chroma = |x: u32, y: u32| [0.25 * x as f32, 0.125 * y as f32];
     let luminance = |x: u32, y: u32| 1.0 + (x + y) as f32;

@@ -1,4 +1,5 @@
-//! Where the shared test data lies, how its absence is said, how much is tried, and random numbers for tests.
+//! Where the shared test data lies, how its absence is said, how much is tried, random numbers for tests, and
+//! how an .exr begins.
 
 use std::path::PathBuf;
 
@@ -48,4 +49,32 @@ impl SplitMix {
     pub(crate) fn next_f64(&mut self) -> f64 {
         (self.next_bits() >> 11) as f64 / (1u64 << 53) as f64
     }
+}
+
+/// What an .exr begins with: half floats in scan lines, not compressed. Channels have names and, of pixels, one
+/// in so many each way; the windows of data and of what is seen end at these pixels.
+pub(crate) fn exr_header(channels: &[(&str, u8)], data: [u32; 2], display: [u32; 2]) -> Vec<u8> {
+    let mut file = vec![0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
+    let mut attribute = |name: &str, kind: &str, value: &[u8]| {
+        file.extend(name.bytes().chain([0]).chain(kind.bytes()).chain([0]));
+        file.extend((value.len() as u32).to_le_bytes());
+        file.extend(value);
+    };
+    let mut list = Vec::new();
+    for &(name, step) in channels {
+        list.extend(name.bytes());
+        list.extend([0, 1, 0, 0, 0, 0, 0, 0, 0, step, 0, 0, 0, step, 0, 0, 0]);
+    }
+    list.push(0);
+    attribute("channels", "chlist", &list);
+    attribute("compression", "compression", &[0]);
+    let window = |[x, y]: [u32; 2]| [0, 0, x, y].map(u32::to_le_bytes).concat();
+    attribute("dataWindow", "box2i", &window(data));
+    attribute("displayWindow", "box2i", &window(display));
+    attribute("lineOrder", "lineOrder", &[0]);
+    attribute("pixelAspectRatio", "float", &1.0_f32.to_le_bytes());
+    attribute("screenWindowCenter", "v2f", &[0; 8]);
+    attribute("screenWindowWidth", "float", &1.0_f32.to_le_bytes());
+    file.push(0);
+    file
 }

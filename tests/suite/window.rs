@@ -434,8 +434,7 @@ fn a_request_to_end_closes_a_window_as_a_person_would() {
         "view open --env sky:day@64x32 --size 96x64 --samples 2 --device cpu --settings w.json",
     );
     let mut child = desk.window.take().expect("started");
-    let kill = Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
-    assert!(kill.expect("kill is there").success());
+    crate::cli::send(&child, "-TERM");
     let status = desk.wait_for("end", || child.try_wait().expect("asked"));
     assert!(status.success(), "{}", desk.says());
     assert!(desk.path("w.json").exists(), "the settings are kept");

@@ -136,10 +136,16 @@ pub(in crate::cli) struct RenderArguments {
         help_heading = "Light"
     )]
     pub(super) gi: Gi,
-    /// Importance table of the map: tile-local, u32, f32, f64.
-    #[arg(long, default_value = "tile-local", value_name = "KIND", help_heading = "Light")]
+    /// Importance table of the map.
+    #[arg(
+        long,
+        default_value = "tile-local",
+        value_enum,
+        value_name = "KIND",
+        help_heading = "Light"
+    )]
     pub(super) table: TableKind,
-    /// Surface vertices at which a path gathers light; 1 is direct light only, 0 lamps
+    /// Vertices, on surfaces and in fog, at which a path gathers light; 1 is direct light only, 0 lamps
     /// and the map alone.
     #[arg(long, default_value = "8", value_parser = values::whole::<u32>(0..=PathLimits::MOST_BOUNCES), value_name = "N", help_heading = "Light")]
     pub(super) bounces: u32,

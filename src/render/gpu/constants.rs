@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::layout::{NO_TEXTURE, PUNCTUAL_WORDS, material_flags as material, texture_flags};
+use super::layout::{DIRECTIONAL_LIGHT, NO_TEXTURE, PUNCTUAL_WORDS, SPOT_LIGHT};
+use super::layout::{material_flags as material, texture_flags};
 use crate::bsdf::{albedo, coat, interface, microfacet, sheen};
 use crate::light_grid::{WHOLE_MAP, cells, counters};
 use crate::path::{self, cached, light_tree, sharing, train};
@@ -67,6 +68,7 @@ constants! {
     CACHE_WORDS: cache::WORDS,
     COAT_F0: coat::F0,
     DEEP: texture_flags::DEEP,
+    DIRECTIONAL_LIGHT: DIRECTIONAL_LIGHT,
     DOUBLE_SIDED: material::DOUBLE_SIDED,
     FILTER_RADIUS: filter::FILTER_RADIUS,
     FILTER_STEPS: filter::STEPS,
@@ -99,6 +101,7 @@ constants! {
     SHEEN_TYPICAL: sheen::Sheen::TYPICAL,
     SECOND_UV_SET: texture_flags::SECOND_UV_SET,
     SMOOTH_ALPHA: microfacet::SMOOTH_ALPHA,
+    SPOT_LIGHT: SPOT_LIGHT,
     SRGB: texture_flags::SRGB,
     STRAIGHT_ETA: interface::STRAIGHT_ETA,
     THIN: material::THIN,

@@ -104,7 +104,7 @@ pub(crate) struct Globals {
     pub(crate) padding_1: u32,
 }
 
-/// Twin of `Material` in `surface.wgsl`.
+/// A material, in texels that `surface.wgsl` numbers.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Material {
@@ -139,7 +139,7 @@ pub(crate) struct Material {
     pub(crate) iridescence_thickness: [f32; 2],
 }
 
-/// Twin of `TextureRef` in `texture.wgsl`.
+/// Where a texture lies and how it is read, in three texels that `texture.wgsl` takes apart.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct TextureRef {
@@ -152,7 +152,7 @@ pub(crate) struct TextureRef {
     pub(crate) padding: Vec2,
 }
 
-/// Flags of `Material`, as in `surface.wgsl`.
+/// Flags of `Material`; `constants.rs` writes them into the shaders.
 pub(super) mod material_flags {
     pub(in super::super) const ALPHA_MASK: u32 = 1;
     pub(in super::super) const ALPHA_BLEND: u32 = 2;
@@ -163,7 +163,7 @@ pub(super) mod material_flags {
     pub(in super::super) const NORMAL_MAPPED: u32 = 64;
 }
 
-/// Flags of `TextureRef`, as in `texture.wgsl`.
+/// Flags of `TextureRef`; `constants.rs` writes them into the shaders.
 pub(super) mod texture_flags {
     pub(in super::super) const SECOND_UV_SET: u32 = 1;
     pub(in super::super) const NEAREST: u32 = 2;
@@ -410,6 +410,10 @@ fn wrap_code(wrap: Wrap) -> u32 {
     }
 }
 
+/// Kinds of lights as shaders know them; 0 is a point.
+pub(super) const SPOT_LIGHT: u32 = 1;
+pub(super) const DIRECTIONAL_LIGHT: u32 = 2;
+
 /// Words of a light that is no triangle.
 pub(super) const PUNCTUAL_WORDS: usize = 16;
 
@@ -424,9 +428,9 @@ pub(crate) fn light_words(world: &World, globals: &mut Globals) -> Vec<u32> {
         let (kind, cosines) = match light.kind {
             PunctualKind::Point => (0, [0.0; 2]),
             PunctualKind::Spot { inner_radians, outer_radians } => {
-                (1, [inner_radians.cos(), outer_radians.cos()])
+                (SPOT_LIGHT, [inner_radians.cos(), outer_radians.cos()])
             }
-            PunctualKind::Directional => (2, [0.0; 2]),
+            PunctualKind::Directional => (DIRECTIONAL_LIGHT, [0.0; 2]),
         };
         let mut record = [0_u32; PUNCTUAL_WORDS];
         record[0] = kind;

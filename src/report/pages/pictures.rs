@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::image::{Image, Rgb8, encode_png};
+use crate::metrics;
 use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
 
 /// A picture as the value of an `src` attribute.
@@ -44,10 +45,11 @@ impl Window {
     /// pixels cannot decide, for each counts at most 1.
     pub(super) fn most_telling(noisy: &Image, reference: &Image) -> Self {
         let (width, height) = (noisy.width.div_ceil(3), noisy.height.div_ceil(3));
-        let mean = crate::metrics::mean(reference) as f32;
+        let mean = metrics::mean(reference) as f32;
+        let floor = metrics::REL_MSE_EPSILON as f32 * mean * mean;
         let error = |x: u32, y: u32| -> f32 {
             let (a, r) = (noisy.at(x, y), reference.at(x, y));
-            let squared = |c: usize| (a[c] - r[c]).powi(2) / (r[c] * r[c] + 0.01 * mean * mean);
+            let squared = |c: usize| (a[c] - r[c]).powi(2) / (r[c] * r[c] + floor);
             ((squared(0) + squared(1) + squared(2)) / 3.0).min(1.0)
         };
         let (step_x, step_y) = ((noisy.width / 12).max(1), (noisy.height / 12).max(1));

@@ -8,6 +8,7 @@ use exr::prelude::{
 };
 use image::{DynamicImage, ImageFormat, Rgba, RgbaImage};
 
+use crate::shared::exr_header;
 use crate::{corpus, packed, targets};
 
 /// The seeds of a target.
@@ -108,28 +109,7 @@ fn exrs() -> Vec<Vec<u8>> {
 
 /// Luminance of every pixel, and the colour of every fourth: four lines, not compressed.
 fn subsampled() -> Vec<u8> {
-    let mut file = vec![0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0];
-    let mut attribute = |name: &str, kind: &str, value: &[u8]| {
-        file.extend(name.bytes().chain([0]).chain(kind.bytes()).chain([0]));
-        file.extend((value.len() as u32).to_le_bytes());
-        file.extend(value);
-    };
-    let mut channels = Vec::new();
-    for (name, step) in [("BY", 2), ("RY", 2), ("Y", 1)] {
-        channels.extend(name.bytes());
-        channels.extend([0, 1, 0, 0, 0, 0, 0, 0, 0, step, 0, 0, 0, step, 0, 0, 0]);
-    }
-    channels.push(0);
-    attribute("channels", "chlist", &channels);
-    attribute("compression", "compression", &[0]);
-    let window: Vec<u8> = [0_u32, 0, 3, 3].iter().flat_map(|side| side.to_le_bytes()).collect();
-    attribute("dataWindow", "box2i", &window);
-    attribute("displayWindow", "box2i", &window);
-    attribute("lineOrder", "lineOrder", &[0]);
-    attribute("pixelAspectRatio", "float", &1.0_f32.to_le_bytes());
-    attribute("screenWindowCenter", "v2f", &[0; 8]);
-    attribute("screenWindowWidth", "float", &1.0_f32.to_le_bytes());
-    file.push(0);
+    let mut file = exr_header(&[("BY", 2), ("RY", 2), ("Y", 1)], [3; 2], [3; 2]);
     let bytes = |line: usize| if line % 2 == 0 { 16 } else { 8 };
     let mut offset = file.len() + 4 * 8;
     for line in 0..4 {

@@ -272,8 +272,10 @@ fn importance_tables_are_compared_and_kept() {
 #[cfg(unix)]
 #[test]
 fn an_interrupted_report_says_so_and_goes_on() {
-    use std::process::{Command, Stdio};
+    use std::process::Stdio;
     use std::time::{Duration, Instant};
+
+    use crate::cli::send;
 
     let bench = Bench::new();
     let child = bench.command(LINE).stderr(Stdio::piped()).stdout(Stdio::null()).spawn();
@@ -288,8 +290,7 @@ fn an_interrupted_report_says_so_and_goes_on() {
         assert!(start.elapsed() < Duration::from_secs(120), "the first run takes too long");
         std::thread::sleep(Duration::from_millis(10));
     }
-    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
-    assert!(sent.expect("kill is there").success());
+    send(&child, "-INT");
     let output = child.wait_with_output().expect("it ends");
     let message = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{message}");

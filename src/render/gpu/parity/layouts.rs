@@ -6,7 +6,7 @@ use naga::{Expression, Literal, Module, ScalarKind, Type, TypeInner};
 
 use super::super::cast::CastRay;
 use super::super::kernel::Kernel;
-use super::super::layout::{Globals, Material, TextureRef, Work, material_flags, texture_flags};
+use super::super::layout::{Globals, Material, TextureRef, Work};
 use super::super::shader::{ArrayPlaces, Constants, Program, VertexTexels};
 use crate::features::Features;
 
@@ -192,28 +192,4 @@ fn packed_arrays_are_laid_out_as_the_shaders_number_them() {
     ];
     assert_eq!(reference, [0, 4, 8, 12, 16, 32]);
     assert_eq!(size_of::<TextureRef>(), 3 * TEXEL);
-}
-
-#[test]
-fn flags_are_the_same_bits() {
-    use material_flags as m;
-    use texture_flags as t;
-    let module = module();
-    for (name, value) in [
-        ("ALPHA_MASK", m::ALPHA_MASK),
-        ("ALPHA_BLEND", m::ALPHA_BLEND),
-        ("DOUBLE_SIDED", m::DOUBLE_SIDED),
-        ("UNLIT", m::UNLIT),
-        ("THIN", m::THIN),
-        ("PARTIAL", m::PARTIAL),
-        ("NORMAL_MAPPED", m::NORMAL_MAPPED),
-        ("SECOND_UV_SET", t::SECOND_UV_SET),
-        ("NEAREST", t::NEAREST),
-        ("SRGB", t::SRGB),
-        ("DEEP", t::DEEP),
-        ("WRAP_U_SHIFT", t::WRAP_U_SHIFT),
-        ("WRAP_V_SHIFT", t::WRAP_V_SHIFT),
-    ] {
-        assert_eq!(constant(&module, name), value as usize, "{name}");
-    }
 }

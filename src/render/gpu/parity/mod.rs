@@ -1,4 +1,4 @@
-//! Every WGSL function with a Rust twin against it, on the device at hand.
+//! WGSL functions of the kernels that render and learn against their Rust twins, on the device at hand.
 //!
 //! A [`Probe`] is a few lines of WGSL that read the words of a case, call functions of the shaders and
 //! write what they return; its twin reads the same words and says what is right and how near the
@@ -262,7 +262,8 @@ fn program_of(fixture: &Fixture, kernel: Kernel) -> Program {
 const COMPARED_ELSEWHERE: [&str; 6] =
     ["add_to_film", "learn", "look_at_map", "path_anywhere", "pixel_in_tile", "render"];
 
-/// Whatever the shaders define runs in some probe.
+/// Whatever those two kernels define runs in some probe. What only others have is compared by the pictures,
+/// counters and hits that come of it.
 #[test]
 fn no_function_is_left_out() {
     let fixtures = fixture::all();
