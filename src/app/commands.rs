@@ -105,6 +105,10 @@ pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 19] = [
     (control(Key::Q), "Quit", Command::Quit),
 ];
 
+/// Another key for [`Command::Redo`].
+const REDO_TOO: KeyboardShortcut =
+    KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
+
 /// What the mouse and held keys do in the picture.
 pub(crate) const GESTURES: [(&str, &str); 7] = [
     ("Drag", "Orbit around the pivot"),
@@ -146,12 +150,14 @@ pub(crate) fn pressed(context: &egui::Context, is_modal: bool) -> Vec<Command> {
         input.events.retain(
             |event| !matches!(event, egui::Event::Key { key, repeat: true, .. } if asks_again(key)),
         );
-        let mut commands: Vec<Command> = SHORTCUTS
+        // As macOS and Blender have it; it comes before Undo, whose key lets Shift pass.
+        let redoes = input.consume_shortcut(&REDO_TOO).then_some(Command::Redo);
+        let pressed = SHORTCUTS
             .iter()
             .rev()
             .filter(|(shortcut, _, _)| input.consume_shortcut(shortcut))
-            .map(|(_, _, command)| command.clone())
-            .collect();
+            .map(|(_, _, command)| command.clone());
+        let mut commands: Vec<Command> = redoes.into_iter().chain(pressed).collect();
         let asks = input.events.iter().any(|e| matches!(e, egui::Event::Text(t) if t == "?"));
         if asks || input.consume_key(Modifiers::NONE, Key::F1) {
             commands.push(Command::ToggleShortcuts);
@@ -186,5 +192,6 @@ mod tests {
         assert_eq!(held(Key::K, Modifiers::NONE, false), [Command::KeepPicture]);
         assert_eq!(held(Key::K, Modifiers::NONE, true), []);
         assert_eq!(held(Key::Z, Modifiers::COMMAND, true), [Command::Undo]);
+        assert_eq!(held(Key::Z, Modifiers::COMMAND | Modifiers::SHIFT, true), [Command::Redo]);
     }
 }

@@ -10,7 +10,7 @@ use crate::denoise::Denoiser;
 use crate::path::{Background, PathLimits};
 use crate::render::gpu::DeviceChoice;
 use crate::render::{Crop, Sampling, Sharing, StopRule, View};
-use crate::scene::{Camera, MaterialEdit, Medium, Projection, builtin};
+use crate::scene::{Camera, Material, MaterialEdit, Medium, Projection, builtin};
 use crate::tone::{ToneCurve, WhiteBalance};
 
 /// Everything a person sets about the picture.
@@ -59,7 +59,7 @@ pub struct Light {
     pub sampling: Sampling,
     /// Whether the plain method runs beside it for comparison.
     pub split: bool,
-    /// Surface vertices at which a path gathers light.
+    /// Vertices, on surfaces and in media, at which a path gathers light.
     pub bounces: u32,
     /// Seed of the random numbers.
     pub seed: u32,
@@ -148,6 +148,28 @@ impl Document {
             && self.materials.values().all(MaterialEdit::is_sound)
     }
 
+    /// Whether both show the same from the same place, whatever is made of it.
+    pub(super) fn shows_like(&self, other: &Self) -> bool {
+        let light = |of: &Self| (of.rotation_degrees, of.intensity, of.sun, of.light.bounces);
+        let things = |of: &Self| (of.background, of.fog);
+        (&self.scene, &self.map, &self.viewpoint) == (&other.scene, &other.map, &other.viewpoint)
+            && self.materials == other.materials
+            && (light(self), things(self)) == (light(other), things(other))
+    }
+
+    /// Keeps to the same materials, by their names, where a scene has come anew; those that lost theirs are told.
+    pub(super) fn renumber(&mut self, before: &[Material], now: &[Material]) -> Vec<String> {
+        let mut gone = Vec::new();
+        let edits = std::mem::take(&mut self.materials);
+        for (number, edit) in edits {
+            match number_now(number, before, now) {
+                Some(number) => drop(self.materials.insert(number, edit)),
+                None => gone.push(before[number as usize].name.clone()),
+            }
+        }
+        gone
+    }
+
     /// So few that the first picture does not wait for them: rendered paths teach the rest. Whatever ends the
     /// picture, for that may be changed while it is made.
     fn learning_paths(&self, size: [u32; 2]) -> u64 {
@@ -178,6 +200,17 @@ impl Document {
             ..View::new(self.viewpoint.as_ref()?.camera(), [width, height])
         })
     }
+}
+
+/// Which material has the name now that this one had: of several, the one of the same place among them.
+pub(super) fn number_now(number: u32, before: &[Material], now: &[Material]) -> Option<u32> {
+    let name = &before.get(number as usize)?.name;
+    let alike = |all: &[Material]| -> Vec<u32> {
+        let numbered = (0..).zip(all);
+        numbered.filter(|(_, material)| material.name == *name).map(|(number, _)| number).collect()
+    };
+    let place = alike(before).iter().position(|other| *other == number)?;
+    alike(now).get(place).copied()
 }
 
 /// Corner and size in pixels of a part of a picture; at least one pixel.
@@ -288,6 +321,27 @@ impl Viewpoint {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn changes_stay_with_the_names_of_materials() {
+        let materials = |names: &[&str]| -> Vec<Material> {
+            names
+                .iter()
+                .map(|name| Material { name: (*name).to_owned(), ..Material::default() })
+                .collect()
+        };
+        let before = materials(&["wall", "oak", "", "oak", "gone"]);
+        let now = materials(&["new", "", "oak", "wall", "oak"]);
+        let edit =
+            |roughness: f32| MaterialEdit { roughness: Some(roughness), ..Default::default() };
+        let numbered = |list: &[(u32, f32)]| list.iter().map(|(n, r)| (*n, edit(*r))).collect();
+        let mut document = Document {
+            materials: numbered(&[(0, 0.1), (2, 0.2), (3, 0.3), (4, 0.4)]),
+            ..Default::default()
+        };
+        assert_eq!(document.renumber(&before, &now), ["gone"]);
+        assert_eq!(document.materials, numbered(&[(3, 0.1), (1, 0.2), (4, 0.3)]));
+    }
 
     #[test]
     fn what_ends_a_picture_does_not_change_it() {

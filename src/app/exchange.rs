@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::comparison::Comparison;
-use super::document::{Document, PictureSize, Viewpoint};
+use super::document::{Document, PictureSize, Viewpoint, number_now};
 use super::interface::Chosen;
 use super::loader::{Kind, Loaded, LoadedMap, LoadedScene};
 use super::presenter::{Order, Shown};
@@ -17,6 +17,7 @@ use crate::environment::Environment;
 use crate::memory;
 use crate::path::framing;
 use crate::render::gpu::DeviceChoice;
+use crate::sources;
 
 /// What a pixel of the picture takes: films of its exact and of its cached light, copies of both that are shown
 /// and that will be, and what takes noise out (measured: 630).
@@ -54,6 +55,7 @@ impl App {
                     }
                     self.messages.opened(Kind::Map);
                     self.settings.recent_map(&map.name);
+                    self.has_news |= self.settings.recent_maps != self.settings_before.recent_maps;
                     self.map = Some(map);
                     self.inspector.forget();
                 }
@@ -63,7 +65,7 @@ impl App {
                         Some(_) => self.messages.not_opened(Kind::Scene, error.to_string()),
                         None => self.messages.error(error.to_string()),
                     }
-                    self.save_nothing();
+                    self.give_up_saving("its scene cannot be read");
                     self.stay_in_scene();
                 }
                 Loaded::Map(_, Err(error)) => {
@@ -79,7 +81,9 @@ impl App {
                             (map, sun)
                         }
                     };
-                    self.save_nothing();
+                    if self.snapshot.is_none() {
+                        self.give_up_saving("there is no picture");
+                    }
                     self.put_back(|document| (document.map, document.sun) = (map, sun));
                 }
             }
@@ -99,7 +103,9 @@ impl App {
             }
         }
         let arrived = lock(&self.arriving).take();
-        self.reference = arrived.or(self.reference.take());
+        if arrived.is_some() {
+            (self.reference, self.reference_of) = (arrived, None);
+        }
         for sentence in self.worker.take_failures() {
             self.messages.error(sentence);
             // Asked for again, it is tried again. The worker does without by itself where none was asked for.
@@ -141,7 +147,11 @@ impl App {
         self.messages.opened(Kind::Scene);
         self.messages.notices(&scene.world.scene.notices);
         self.settings.recent_scene(&scene.name);
+        self.has_news |= self.settings.recent_scenes != self.settings_before.recent_scenes;
         let is_first = self.scene.is_none();
+        if let Some(before) = self.scene.take().filter(|before| before.name == scene.name) {
+            self.renumber(&before, &scene);
+        }
         self.scene = Some(scene);
         self.fill_in_viewpoint();
         if is_first {
@@ -149,6 +159,23 @@ impl App {
             self.undo.amend(&self.document);
         }
         self.inspector.forget();
+    }
+
+    /// Keeps what was changed with the materials that have its name, where a scene was read again: another program
+    /// may have put them in another order.
+    fn renumber(&mut self, before: &LoadedScene, now: &LoadedScene) {
+        let (before, now, name) = (&before.materials, &now.materials, &now.name);
+        for material in self.document.renumber(before, now) {
+            let sentence = format!("{name} has no material {material} any more, which was changed");
+            self.messages.notice(sentence);
+        }
+        self.undo.change_all(|document| {
+            if document.scene == *name {
+                document.renumber(before, now);
+            }
+        });
+        let material = self.interface.material;
+        self.interface.material = material.and_then(|number| number_now(number, before, now));
     }
 
     /// Gives the document what belongs to the scene that is shown, after another could not be read.
@@ -161,14 +188,17 @@ impl App {
             return;
         };
         let before = self.undo.present();
+        let brought_its_sky = sources::is_built_in_scene(&self.document.scene);
         if before.scene == scene.name {
             self.document.scene.clone_from(&before.scene);
             self.document.viewpoint.clone_from(&before.viewpoint);
             self.document.bookmarks.clone_from(&before.bookmarks);
             (self.document.region, self.document.fog) = (before.region, before.fog);
             self.document.materials.clone_from(&before.materials);
-            // The sky that came with the other one goes with it.
-            self.document.map.clone_from(&before.map);
+            // The sky that came with the other one goes with it; a map that somebody chose stays.
+            if brought_its_sky {
+                self.document.map.clone_from(&before.map);
+            }
         } else {
             // Somebody went back to a file that is no longer there.
             self.document.scene.clone_from(&scene.name);
@@ -190,7 +220,7 @@ impl App {
     }
 
     /// The scene that the document names, if it is there.
-    fn scene_of_document(&self) -> Option<&LoadedScene> {
+    pub(super) fn scene_of_document(&self) -> Option<&LoadedScene> {
         self.scene.as_ref().filter(|scene| scene.name == self.document.scene)
     }
 
@@ -287,6 +317,9 @@ impl App {
 
     fn request(&mut self, now: f64) -> Option<Request> {
         self.check_size();
+        if self.reference.is_some() && self.reference_of.is_none() && self.has_sources() {
+            self.reference_of = Some(self.document.clone());
+        }
         let scene = self.scene.as_ref()?;
         let world = Arc::clone(&scene.world);
         let environment = self.environment()?;
@@ -309,10 +342,15 @@ impl App {
             inspects_cache: self.interface.inspects_cache(),
             rule: self.document.stop,
             is_frozen: self.interface.is_frozen,
-            reference: self.reference.clone(),
+            reference: self.reference.clone().filter(|_| self.is_like_reference()),
             paused: self.interface.paused,
             run: self.interface.run,
         })
+    }
+
+    /// Whether the document shows what it did when the reference came: that is of nothing else.
+    pub(super) fn is_like_reference(&self) -> bool {
+        self.reference_of.as_ref().is_some_and(|of| of.shows_like(&self.document))
     }
 
     /// The map as the document turns and scales it; made anew only when that changes.

@@ -7,7 +7,9 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::commands::Command;
+use super::completion::in_home;
 use super::document::{Document, Viewpoint};
+use super::dropped::Dropped;
 use super::history;
 use super::interface::{Chosen, Cursor, Dock, Interface, Prompt, Purpose, Tab};
 use super::screen::color_image;
@@ -57,6 +59,7 @@ impl App {
             Command::ForgetBookmark(index) => {
                 if index < self.document.bookmarks.len() {
                     self.document.bookmarks.remove(index);
+                    self.has_news = true;
                 }
             }
             Command::FrameAll => {
@@ -92,7 +95,8 @@ impl App {
             }
             Command::ToggleSplit => self.document.light.split = !self.document.light.split,
             Command::ToggleDevice => {
-                let is_on_gpu = self.snapshot.as_ref().is_some_and(|s| s.main.gpu.is_some());
+                let is_on_gpu = self.worker.is_preparing()
+                    || self.snapshot.as_ref().is_some_and(|s| s.main.gpu.is_some());
                 self.document.light.device =
                     if is_on_gpu { DeviceChoice::Cpu } else { DeviceChoice::Gpu };
             }
@@ -136,8 +140,8 @@ impl App {
             Some(scene) if lasting_scene(&scene.name) == lasting_scene(&name) => scene.name.clone(),
             _ => name,
         };
-        self.interface.paused = false;
         if self.scene.as_ref().is_some_and(|scene| scene.name == name) {
+            self.interface.paused = false;
             if self.document.scene == name {
                 self.read_scene_again();
             } else {
@@ -177,19 +181,40 @@ impl App {
 
     /// Takes all settings of a document. What was chosen in another scene is not in this one.
     fn go_to(&mut self, document: Document) {
+        let is_as_before = (&document.scene, &document.map, document.sun)
+            == (&self.document.scene, &self.document.map, self.document.sun);
+        // The old one is not to be looked at for ever.
+        self.interface.paused &= is_as_before;
         if document.scene != self.document.scene {
+            self.give_up_saving("another scene was opened before its picture was there");
             self.settings.keep_viewpoints(&self.document);
             (self.interface.material, self.interface.pinned) = (None, None);
         }
         self.document = document;
     }
 
-    /// Files dropped onto the window: scenes and maps are told apart by their extension.
+    /// Files dropped onto the window: one scene and one map of them are opened. With a scene come files that belong
+    /// to it, pictures among them, of which none but those in linear radiance are taken for maps.
     pub(super) fn dropped_files(&mut self, context: &egui::Context) -> Vec<Command> {
         let paths: Vec<PathBuf> = context.input(|input| {
             input.raw.dropped_files.iter().map(|f| f.path().to_path_buf()).collect()
         });
-        paths.iter().map(|path| open_command(path)).collect()
+        if paths.is_empty() {
+            return Vec::new();
+        }
+        // Or they would be opened behind it.
+        self.interface.prompt = None;
+        let chosen = Dropped::of(&paths);
+        let left = chosen.left.iter().map(|name| theme::file_name(name)).collect::<Vec<_>>();
+        if !left.is_empty() {
+            self.messages.notice(format!("Not opened: {}", left.join(", ")));
+        }
+        chosen
+            .scene
+            .map(Command::OpenScene)
+            .into_iter()
+            .chain(chosen.map.map(Command::OpenMap))
+            .collect()
     }
 
     /// Keeps what is on the screen, without overlays.
@@ -241,6 +266,7 @@ impl App {
         let is_new = |name: &String| bookmarks.iter().all(|kept| kept.name != *name);
         let name = (1..).map(|number| format!("View {number}")).find(is_new).unwrap_or_default();
         bookmarks.push(Viewpoint { name, ..viewpoint.clone() });
+        self.has_news = true;
     }
 
     fn frame(&mut self, bounds: Option<(glam::Vec3, glam::Vec3)>) {
@@ -250,17 +276,18 @@ impl App {
         }
     }
 
-    /// The box around all surfaces of the material at the pinned or pointed place.
+    /// The box around all surfaces of the material that was chosen, or is at the pinned or pointed place.
     fn selected_bounds(&self) -> Option<(glam::Vec3, glam::Vec3)> {
-        let place = self.interface.inspected()?;
-        let request = &self.snapshot.as_ref()?.request;
-        let scene = &request.world.scene;
-        let spot = surface_map::look_at_place(&request.world, &request.view, place)?;
-        let corners = scene.hull_points(|material| material == spot.material);
-        Some(
-            corners
-                .fold((spot.position, spot.position), |(low, high), p| (low.min(p), high.max(p))),
-        )
+        let pointed = || {
+            let place = self.interface.inspected()?;
+            let request = &self.snapshot.as_ref()?.request;
+            surface_map::look_at_place(&request.world, &request.view, place)
+        };
+        let chosen = self.interface.material.or_else(|| Some(pointed()?.material))?;
+        let scene = &self.scene_of_document()?.world.scene;
+        let mut corners = scene.hull_points(|material| material == chosen);
+        let first = corners.next()?;
+        Some(corners.fold((first, first), |(low, high), p| (low.min(p), high.max(p))))
     }
 
     fn suggested_file(&self) -> String {
@@ -272,10 +299,15 @@ impl App {
 
     /// Writes the picture, or remembers to when there is none as yet or only a small one.
     pub(super) fn save(&mut self, path: PathBuf) {
-        self.settings.save_folder = path.parent().map(Path::to_path_buf);
+        let folder = std::path::absolute(&path).ok();
+        let folder = folder.and_then(|path| path.parent().map(Path::to_path_buf));
+        self.settings.save_folder = folder.or(self.settings.save_folder.take());
         self.waiting_saves.push(path);
         if self.picture().is_none() {
-            self.messages.notice("The picture will be saved once it has its full size");
+            let paused =
+                if self.interface.paused { ", for which it must go on (Space)" } else { "" };
+            let sentence = format!("The picture will be saved once it has its full size{paused}");
+            self.messages.notice(sentence);
         }
     }
 
@@ -298,13 +330,10 @@ impl App {
         }
     }
 
-    /// Gives up saving a picture of which nothing was seen: what it was to show cannot be read.
-    pub(super) fn save_nothing(&mut self) {
-        if self.snapshot.is_some() {
-            return;
-        }
+    /// Gives up what waits to be saved, and says why.
+    pub(super) fn give_up_saving(&mut self, why: &str) {
         for path in std::mem::take(&mut self.waiting_saves) {
-            self.messages.error(format!("{}: there is no picture to be saved", path.display()));
+            self.messages.error(format!("{}: not saved: {why}", path.display()));
         }
     }
 
@@ -386,7 +415,20 @@ impl App {
     /// Opens the system's file dialogue for the prompt; its answer comes as a command.
     fn browse(&mut self, purpose: Purpose) {
         let (kind, extensions) = purpose.files();
-        let dialog = rfd::AsyncFileDialog::new().add_filter(kind, extensions);
+        let mut dialog = rfd::AsyncFileDialog::new().add_filter(kind, extensions);
+        // From where what was typed leads to.
+        let typed = self.interface.prompt.as_ref().map(|prompt| in_home(prompt.path.trim()));
+        let typed = typed.and_then(|path| std::path::absolute(path).ok());
+        if let Some(path) = typed {
+            let folder = if path.is_dir() { Some(&*path) } else { path.parent() };
+            if let Some(folder) = folder.filter(|folder| folder.is_dir()) {
+                dialog = dialog.set_directory(folder);
+            }
+            let file = path.file_name().filter(|_| purpose.is_output() && !path.is_dir());
+            if let Some(file) = file {
+                dialog = dialog.set_file_name(file.to_string_lossy());
+            }
+        }
         let (sender, wake) = (self.later.0.clone(), self.wake.clone());
         let chosen: std::pin::Pin<Box<dyn Future<Output = Option<rfd::FileHandle>> + Send>> =
             match purpose.is_output() {
@@ -396,7 +438,7 @@ impl App {
         let thread = std::thread::Builder::new().name("dialogue".to_owned()).spawn(move || {
             let start = Instant::now();
             let later = match pollster::block_on(chosen) {
-                Some(file) => Later::Chosen(purpose, file.path().display().to_string()),
+                Some(file) => Later::Chosen(purpose, purpose.named(file.path())),
                 // Nobody closes a dialogue so soon: none was opened.
                 None if start.elapsed() < QUICKEST_ANSWER => Later::Failed(
                     "this system offers no file dialogue; a path can be typed instead".to_owned(),
@@ -429,17 +471,17 @@ impl App {
 /// A person takes longer to close a file dialogue.
 const QUICKEST_ANSWER: Duration = Duration::from_millis(500);
 
-/// How to open a file: what is not a glTF file is taken for a map.
-fn open_command(path: &Path) -> Command {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let name = path.display().to_string();
-    match extension.as_deref() {
-        Some("gltf" | "glb") => Command::OpenScene(name),
-        _ => Command::OpenMap(name),
-    }
-}
-
 impl Purpose {
+    /// A path that was chosen; not every dialogue adds what a file's name ends in.
+    fn named(self, path: &Path) -> String {
+        let (_, extensions) = self.files();
+        let path = path.display().to_string();
+        match Path::new(&path).extension() {
+            None if self.is_output() => format!("{path}.{}", extensions[0]),
+            _ => path,
+        }
+    }
+
     /// What to do with the path.
     pub fn command(self, path: &str) -> Command {
         match self {

@@ -71,6 +71,17 @@ pub struct Chosen {
 }
 
 impl Chosen {
+    /// Keeps to the same pictures when one of the list goes; without the left one nothing is compared.
+    pub(super) fn without(&mut self, gone: usize) {
+        if self.left == Some(gone) {
+            *self = Self::default();
+        }
+        self.right.take_if(|right| *right == gone);
+        for index in self.left.iter_mut().chain(&mut self.right) {
+            *index -= usize::from(*index > gone);
+        }
+    }
+
     /// Keeps to the same pictures when so many come before them.
     pub(super) fn shift(&mut self, count: usize) {
         for index in self.left.iter_mut().chain(&mut self.right) {
@@ -139,6 +150,10 @@ pub enum Cursor {
 pub enum Objection {
     /// Nothing can be opened there.
     Missing,
+    /// Nothing can be written there.
+    NoFolder,
+    /// Its name does not say of what kind it is to be.
+    Unknown,
     /// A file would be written over.
     Replaces,
 }
@@ -164,7 +179,9 @@ impl Purpose {
         match self {
             Self::Scene => ("glTF scene", &["gltf", "glb"]),
             Self::Map => {
-                ("Map", &["exr", "hdr", "png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp"])
+                const KINDS: &[&str] =
+                    &["exr", "hdr", "png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "tga"];
+                ("Map", KINDS)
             }
             Self::Picture => ("Picture", &["png", "exr"]),
             Self::Distributions => ("Distributions", &["csv", "json", "exr"]),

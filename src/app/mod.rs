@@ -17,6 +17,7 @@ mod completion;
 pub(crate) mod convergence;
 pub mod document;
 pub mod drag;
+mod dropped;
 mod exchange;
 mod execute;
 pub(crate) mod history;
@@ -105,6 +106,10 @@ pub struct App {
     start: Document,
     interface: Interface,
     settings: Settings,
+    /// As they were at the start.
+    settings_before: Settings,
+    /// Whether something came that is to be kept at once.
+    has_news: bool,
     messages: Messages,
     history: History,
     convergence: Convergence,
@@ -124,6 +129,8 @@ pub struct App {
     textures: panels::scope::Textures,
     /// What errors are measured against, and one that has just been read.
     reference: Option<Arc<Reference>>,
+    /// What was shown when it came.
+    reference_of: Option<Document>,
     arriving: Arc<Mutex<Option<Arc<Reference>>>>,
     /// Results of files being chosen and written.
     later: (Sender<Later>, Receiver<Later>),
@@ -188,7 +195,9 @@ impl App {
             start: start.document.clone(),
             document: start.document,
             interface: start.interface,
+            settings_before: start.settings.clone(),
             settings: start.settings,
+            has_news: false,
             messages: Messages::default(),
             history,
             convergence: Convergence::default(),
@@ -205,6 +214,7 @@ impl App {
             screen,
             textures: panels::scope::Textures::default(),
             reference: None,
+            reference_of: None,
             arriving: Arc::default(),
             later,
             wake,
@@ -306,11 +316,20 @@ impl App {
         failures.chain(self.waiting_saves.drain(..).map(unsaved)).collect()
     }
 
-    /// What is to be kept for the next window.
-    pub fn settings(&self) -> Settings {
+    /// What is to be kept for the next window, on top of what is kept by now, if that is understood.
+    pub fn settings(&self, kept: Option<Settings>) -> Settings {
+        let mut kept = kept.unwrap_or_else(|| self.settings_before.clone());
         let mut settings = self.settings.clone();
-        settings.remember(&self.document, &self.start, &self.interface);
-        settings
+        settings.keep_viewpoints(&self.document);
+        kept.take_lists(&self.settings_before, &settings);
+        kept.remember(&self.document, &self.start, &self.interface);
+        kept
+    }
+
+    /// Whether viewpoints or files have come that are to be kept, since this was asked last: nobody knows whether
+    /// there will be time for it at the end.
+    pub fn has_news_to_keep(&mut self) -> bool {
+        std::mem::take(&mut self.has_news)
     }
 
     /// Title of the window.
@@ -375,11 +394,10 @@ impl App {
 
     /// The panels beside the picture.
     fn sides(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
-        let sources = panels::left::Sources {
-            scene: self.scene.as_ref(),
-            map: self.map.as_ref(),
-            settings: &self.settings,
-        };
+        // While another one is read, nothing is to be chosen in the one that is shown.
+        let scene = self.scene.as_ref().filter(|scene| scene.name == self.document.scene);
+        let sources =
+            panels::left::Sources { scene, map: self.map.as_ref(), settings: &self.settings };
         if !theme::is_small(ui) {
             let (document, interface) = (&mut self.document, &mut self.interface);
             panels::left::show(ui, document, interface, sources, commands);
@@ -412,9 +430,10 @@ impl App {
 
     fn dock(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
         let scene = self.scene.as_ref();
+        let is_of_view = self.reference_of.is_none() || self.is_like_reference();
         panels::dock::show(ui, &mut self.interface, |ui, dock| match dock {
             interface::Dock::Convergence => {
-                let reference = self.reference.as_deref();
+                let reference = self.reference.as_deref().map(|it| (it, is_of_view));
                 let hides_clock = self.is_repeatable;
                 panels::convergence::show(
                     ui,
@@ -430,6 +449,7 @@ impl App {
 
     fn viewport(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) -> egui::Rect {
         let settings = self.develop_settings();
+        let scene = self.scene.as_ref().filter(|scene| scene.name == self.document.scene);
         let mut scope = panels::scope::Scope {
             document: &mut self.document,
             interface: &mut self.interface,
@@ -439,7 +459,7 @@ impl App {
             settings,
             snapshot: self.snapshot.as_deref(),
             speed_up: self.speed_up,
-            scene: self.scene.as_ref(),
+            scene,
             loading: self.loader.busy_with().next().is_some(),
             commands,
         };

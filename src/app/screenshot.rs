@@ -12,7 +12,7 @@ use wgpu::{Extent3d, TextureFormat, TextureUsages};
 use super::interface::Interface;
 use super::loader::Loader;
 use super::screen::{Screen, TextureCopies, renderer_options};
-use super::{App, Start, Wake, Wakes};
+use super::{App, Start, Wake, Wakes, theme};
 use crate::error::{Error, Result};
 use crate::image::Rgb8;
 use crate::render::gpu::{DeviceChoice, Gpu};
@@ -240,6 +240,7 @@ impl Canvas {
         let mut commands =
             renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);
         let view = self.target.create_view(&wgpu::TextureViewDescriptor::default());
+        let [r, g, b, a] = theme::BACKGROUND.to_normalized_gamma_f32().map(f64::from);
         {
             let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("window"),
@@ -248,7 +249,7 @@ impl Canvas {
                     depth_slice: None,
                     resolve_target: None,
                     ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                        load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
                         store: wgpu::StoreOp::Store,
                     },
                 })],

@@ -214,19 +214,50 @@ impl Settings {
         take(&mut stop.noise, now.noise, &before.noise);
         self.tab = interface.tab;
         self.dock = interface.dock;
-        self.keep_viewpoints(document);
+    }
+
+    /// Takes over the lists that a window began with as `before` and left as `after`: another window may have
+    /// changed these here meanwhile.
+    pub(super) fn take_lists(&mut self, before: &Self, after: &Self) {
+        let lists = [
+            (&mut self.recent_scenes, &before.recent_scenes, &after.recent_scenes),
+            (&mut self.recent_maps, &before.recent_maps, &after.recent_maps),
+        ];
+        for (kept, before, after) in lists {
+            // What this window opened came to the front; the rest is what it found, in its order.
+            let is_rest = |rest: &[String]| {
+                let mut found = before.iter();
+                rest.iter().all(|name| found.any(|other| other == name))
+            };
+            let opened = (0..after.len()).find(|count| is_rest(&after[*count..]));
+            let opened = &after[..opened.unwrap_or(after.len())];
+            opened.iter().rev().for_each(|name| put_first(kept, name));
+        }
+        if after.save_folder != before.save_folder {
+            self.save_folder.clone_from(&after.save_folder);
+        }
+        for of in after.viewpoints.iter().rev().chain(&before.viewpoints) {
+            let now = after.viewpoints_of(&of.scene);
+            if now != before.viewpoints_of(&of.scene) {
+                self.set_viewpoints(&of.scene, &now);
+            }
+        }
     }
 
     /// Takes over the viewpoints that a document has of its scene.
     pub(super) fn keep_viewpoints(&mut self, document: &Document) {
-        let viewpoints = &document.bookmarks;
-        if self.viewpoints_of(&document.scene) == *viewpoints {
+        self.set_viewpoints(&document.scene, &document.bookmarks);
+    }
+
+    fn set_viewpoints(&mut self, scene: &str, viewpoints: &[Viewpoint]) {
+        if self.viewpoints_of(scene) == viewpoints {
             return;
         }
-        let scene = lasting_scene(&document.scene);
+        let scene = lasting_scene(scene);
         self.viewpoints.retain(|other| other.scene != scene);
         if !viewpoints.is_empty() {
-            self.viewpoints.insert(0, SceneViewpoints { scene, viewpoints: viewpoints.clone() });
+            let viewpoints = viewpoints.to_vec();
+            self.viewpoints.insert(0, SceneViewpoints { scene, viewpoints });
             self.viewpoints.truncate(MOST_SCENES);
         }
     }
@@ -364,6 +395,30 @@ mod tests {
         assert_eq!(settings.viewpoints_of("office"), []);
         settings.viewpoints[0].viewpoints[0].lens_radius = f32::NAN;
         assert_eq!(settings.within_bounds().viewpoints_of("room.glb"), []);
+    }
+
+    #[test]
+    fn two_windows_keep_what_each_has_brought() {
+        let lists = |recent: &[&str], views: &[(&str, &str)]| {
+            let mut settings = Settings::default();
+            recent.iter().rev().for_each(|name| settings.recent_map(name));
+            for (scene, name) in views {
+                let camera = &crate::scene::builtin::build("office").expect("built in").cameras[0];
+                let view = Viewpoint { name: (*name).to_owned(), ..Viewpoint::of(camera, 3.0) };
+                settings.set_viewpoints(scene, &[view]);
+            }
+            settings
+        };
+        let before = lists(&["/a.hdr", "/b.hdr"], &[("crack", "old")]);
+        let mut kept = before.clone();
+        let first = lists(&["/c.hdr", "/a.hdr", "/b.hdr"], &[("crack", "old"), ("office", "desk")]);
+        let second = lists(&["/b.hdr", "/a.hdr"], &[("open", "hill")]);
+        kept.take_lists(&before, &first);
+        kept.take_lists(&before, &second);
+        assert_eq!(kept.recent_maps, ["/b.hdr", "/c.hdr", "/a.hdr"]);
+        let names = |scene: &str| kept.viewpoints_of(scene).into_iter().map(|view| view.name);
+        assert!(names("office").eq(["desk"]) && names("open").eq(["hill"]));
+        assert_eq!(names("crack").len(), 0, "the second has forgotten it");
     }
 
     #[test]

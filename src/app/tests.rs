@@ -5,15 +5,17 @@ use std::time::Duration;
 
 use super::commands::Command;
 use super::document::{Document, Light, Look, PictureSize};
-use super::interface::Interface;
+use super::interface::{Interface, Tab};
 use super::overlays::Overlay;
 use super::screenshot::{Shot, Studio};
 use super::{Start, exchange};
 use crate::image::{ExrPicture, Image, read_picture, write_exr};
 use crate::memory;
+use crate::path::Background;
 use crate::render::StopRule;
 use crate::render::gpu::DeviceChoice;
-use crate::scene::MaterialEdit;
+use crate::scene::{MaterialEdit, Medium};
+use crate::tone::WhiteBalance;
 
 fn studio(scene: &str) -> Option<Studio> {
     let defaults = Document::default();
@@ -175,6 +177,58 @@ fn a_tile_that_a_smaller_map_does_not_have_is_shown_nowhere() {
     studio.settle().expect("rendered");
     studio.asks(Command::OpenMap("sky:day@4x2".to_owned()));
     studio.settle().expect("rendered");
+}
+
+/// Values that no slider stands at stay as they are until one is moved.
+#[test]
+fn what_is_only_looked_at_stays_as_it_is() {
+    let Some(mut studio) = studio("office") else { return };
+    studio.settle().expect("rendered");
+    let document = &mut studio.app.document;
+    let viewpoint = document.viewpoint.as_mut().expect("there is a camera");
+    viewpoint.fov_y_degrees = Some(22.945);
+    (viewpoint.lens_radius, viewpoint.focus_distance) = (0.000_437, 0.003);
+    (document.rotation_degrees, document.intensity, document.sun) = (22.517, 0.123_456, 1.062_5);
+    document.background = Background::Blurred(0.123_456);
+    let scattering = glam::Vec3::new(1.234e-7, 20.0, 0.123_456_7);
+    document.fog = Some(Medium { scattering, anisotropy: 0.987_65, ..Medium::default() });
+    document.look.exposure_ev = 9.126;
+    document.look.white_balance = WhiteBalance { kelvin: 5_003.7, tint: 0.123_4 };
+    document.light.bounces = 70;
+    document.stop = StopRule { samples: Some(2_000_000), noise: Some(1e-6), seconds: Some(0.05) };
+    let edit = MaterialEdit { roughness: Some(0.437_5), ..MaterialEdit::default() };
+    document.materials.insert(0, edit);
+    let before = document.clone();
+    for tab in [Tab::Picture, Tab::Inspect, Tab::Scene] {
+        studio.arrange(Interface { tab, material: Some(0), ..Interface::default() });
+        (0..4).for_each(|_| studio.frame().expect("drawn"));
+        assert_eq!(studio.app.document, before, "{tab:?}");
+    }
+    // One that has not been changed is not changed by being chosen, either.
+    studio.arrange(Interface { material: Some(1), ..Interface::default() });
+    (0..4).for_each(|_| studio.frame().expect("drawn"));
+    assert_eq!(studio.app.document, before);
+}
+
+#[test]
+fn errors_are_measured_against_a_reference_where_it_shows_the_same() {
+    let Some(mut studio) = studio("open") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("reference.exr");
+    let grey = Image::filled(48, 32, [0.5; 3]);
+    let picture = ExrPicture { image: &grey, layers: Vec::new(), metadata: &[], preview: None };
+    write_exr(&file, picture).expect("written");
+    studio.asks(Command::OpenReference(file.display().to_string()));
+    while studio.app.reference.is_none() {
+        studio.frame().expect("drawn");
+    }
+    // The light comes from elsewhere meanwhile.
+    for (degrees, is_measured) in [(0.0, true), (30.0, false), (0.0, true)] {
+        studio.app.document.rotation_degrees = degrees;
+        studio.settle().expect("rendered");
+        let request = &studio.app.snapshot.as_ref().expect("it is there").request;
+        assert_eq!(request.reference.is_some(), is_measured, "{degrees}");
+    }
 }
 
 /// A triangle, its positions in the file itself.

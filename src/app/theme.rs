@@ -1,8 +1,11 @@
 //! Colours, spacing and small pieces of layout that all panels share.
 
+use std::ops::RangeInclusive;
+
+use egui::emath::Numeric;
 use egui::{
-    Align2, Color32, CornerRadius, FontId, Margin, Pos2, Rect, RichText, Shape, Stroke, TextStyle,
-    Ui, Vec2, Visuals,
+    Align2, Color32, CornerRadius, DragValue, FontId, Margin, Pos2, Rect, RichText, Shape, Slider,
+    SliderClamping, Stroke, SurrenderFocusOn, TextStyle, Ui, Vec2, Visuals,
 };
 use glam::Vec3;
 
@@ -47,7 +50,13 @@ pub(super) fn apply(context: &egui::Context) {
         style.visuals = visuals();
     });
     // Where frames take long, a press and its release are far apart and are a click all the same.
-    context.options_mut(|options| options.input_options.max_click_duration = f64::INFINITY);
+    context.options_mut(|options| {
+        options.input_options.max_click_duration = f64::INFINITY;
+        // The picture is as large as the room it has; panels are as large as the screen's scale says.
+        options.zoom_with_keyboard = false;
+        // Who drags in the picture has done with the field.
+        options.input_options.surrender_focus_on = SurrenderFocusOn::Presses;
+    });
 }
 
 fn visuals() -> Visuals {
@@ -108,11 +117,27 @@ pub(super) fn row<R>(ui: &mut Ui, name: &str, hint: &str, add: impl FnOnce(&mut 
             TEXT,
         );
         if !hint.is_empty() {
-            response.on_hover_text(hint);
+            response.on_hover_text(keys(hint));
         }
         add(ui)
     })
     .inner
+}
+
+/// A slider from end to end of a range. What lies beyond or between its decimals stays until it is moved: a
+/// panel that is only looked at changes nothing.
+pub(super) fn slider<N: Numeric>(value: &mut N, range: RangeInclusive<N>) -> Slider<'_> {
+    Slider::new(value, range).clamping(SliderClamping::Edits)
+}
+
+/// A number to be dragged or typed, as [`slider`] is.
+pub(super) fn number<N: Numeric>(value: &mut N, range: RangeInclusive<N>) -> DragValue<'_> {
+    DragValue::new(value).range(range).clamp_existing_to_range(false)
+}
+
+/// What is said of keys, by this system's name of the one that commands.
+pub(super) fn keys(text: &str) -> String {
+    if cfg!(target_os = "macos") { text.replace("Ctrl", "⌘") } else { text.to_owned() }
 }
 
 /// Width of the names of settings, in points.

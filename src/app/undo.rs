@@ -47,6 +47,12 @@ impl<T: Clone + PartialEq> Undo<T> {
         }
     }
 
+    /// Changes every state alike: what they speak of is called otherwise now.
+    pub(super) fn change_all(&mut self, mut change: impl FnMut(&mut T)) {
+        self.past.iter_mut().chain(&mut self.future).for_each(&mut change);
+        change(&mut self.present);
+    }
+
     /// The state at rest.
     pub(super) fn present(&self) -> &T {
         &self.present

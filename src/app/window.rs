@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU32;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -18,10 +18,13 @@ use winit::event::WindowEvent;
 use winit::event_loop::{
     ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy, OwnedDisplayHandle,
 };
+#[cfg(target_os = "linux")]
+use winit::platform::wayland::WindowAttributesExtWayland as _;
 use winit::window::{Window, WindowId};
 
 use super::loader::Loader;
 use super::screen::{Screen, TextureCopies, renderer_options};
+use super::settings_file::Settings;
 use super::{App, Start, Wake, Wakes, theme, turns};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -87,7 +90,14 @@ pub(crate) fn run(
         repaint_at: None,
         asked: Arc::default(),
     };
-    event_loop.run_app(&mut runner).map_err(|e| no_display(&e))?;
+    if let Err(error) = event_loop.run_app(&mut runner) {
+        if runner.running.is_none() {
+            return Err(no_display(&error));
+        }
+        // What it was shown on has gone.
+        runner.end();
+        return Ok(Some(Error::new(format!("the window was closed: {error}"))));
+    }
     runner.failure.map_or(Ok(runner.loss), Err)
 }
 
@@ -204,6 +214,9 @@ impl Runner {
             .with_title("lightgrid")
             .with_min_inner_size(LogicalSize::new(720.0, 480.0))
             .with_inner_size(LogicalSize::new(width.max(720.0), height.max(480.0)));
+        // By that a desktop finds its icon.
+        #[cfg(target_os = "linux")]
+        let attributes = attributes.with_name("lightgrid", "lightgrid");
         let window = Arc::new(event_loop.create_window(attributes).map_err(|e| cannot(&e))?);
         let wake = |call: Call| -> Wake {
             let proxy = self.proxy.clone();
@@ -265,23 +278,36 @@ impl Runner {
             // A GPU that is being made ready cannot be stopped; nobody has to look at that.
             running.window.set_visible(false);
         }
-        if let (Some(running), Some(path)) = (&self.running, &self.settings_path) {
-            let mut settings = running.app.settings();
-            let size = running.window.inner_size().to_logical(running.window.scale_factor());
-            settings.window_size = [size.width, size.height];
-            if let Err(error) = settings.write(path) {
-                crate::terminal::notice(error);
-            }
-        }
-        if let Some(running) = &mut self.running {
-            running.app.finish().iter().for_each(crate::terminal::notice);
-        }
-        self.running = None;
+        self.end();
         event_loop.exit();
+    }
+
+    /// Keeps what is to be kept, and waits until all files are written.
+    fn end(&mut self) {
+        let Some(mut running) = self.running.take() else { return };
+        if let Err(error) = running.keep_settings(self.settings_path.as_deref()) {
+            crate::terminal::notice(error);
+        }
+        running.app.finish().iter().for_each(crate::terminal::notice);
     }
 }
 
 impl Running {
+    /// Writes the settings for the next window, on top of what others have written meanwhile.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    fn keep_settings(&self, path: Option<&Path>) -> Result<()> {
+        let Some(path) = path else { return Ok(()) };
+        let mut settings = self.app.settings(Settings::read(path).ok());
+        let size = self.window.inner_size();
+        if size.width > 0 && size.height > 0 && self.window.is_minimized() != Some(true) {
+            let size = size.to_logical(self.window.scale_factor());
+            settings.window_size = [size.width, size.height];
+        }
+        settings.write(path)
+    }
+
     /// One frame, on another device if that of the last one was lost.
     ///
     /// # Errors
@@ -437,6 +463,11 @@ impl ApplicationHandler<Call> for Runner {
             }
             WindowEvent::RedrawRequested => {
                 let drawn = running.draw();
+                if running.app.has_news_to_keep()
+                    && let Err(error) = running.keep_settings(self.settings_path.as_deref())
+                {
+                    running.app.say(error.to_string());
+                }
                 if drawn.is_err() || running.app.is_closing() {
                     self.loss = drawn.err();
                     self.close(event_loop);

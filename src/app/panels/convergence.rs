@@ -10,12 +10,13 @@ use crate::app::convergence::{Convergence, Run};
 use crate::app::theme;
 use crate::app::worker::{Point, Reference};
 
-/// Draws the plot of all runs; `by_samples_only` leaves the clock out.
+/// Draws the plot of all runs; `by_samples_only` leaves the clock out. A reference comes with whether it shows what
+/// is rendered now.
 pub(in crate::app) fn show(
     ui: &mut Ui,
     convergence: &mut Convergence,
     by_samples_only: bool,
-    reference: Option<&Reference>,
+    reference: Option<(&Reference, bool)>,
     commands: &mut Vec<Command>,
 ) {
     let by_samples = by_samples_only || convergence.by_samples;
@@ -29,10 +30,15 @@ pub(in crate::app) fn show(
         if ui.button("Reference…").on_hover_text(hint).clicked() {
             commands.push(Command::ChooseReference);
         }
-        if let Some(reference) = reference
-            && ui.button("Forget it").on_hover_text(&reference.name).clicked()
-        {
-            commands.push(Command::ForgetReference);
+        if let Some((reference, is_of_view)) = reference {
+            if ui.button("Forget it").on_hover_text(&reference.name).clicked() {
+                commands.push(Command::ForgetReference);
+            }
+            if !is_of_view {
+                let hint =
+                    "Nothing is measured against it until scene, light and view are as they were";
+                ui.label(theme::quiet("It shows something else")).on_hover_text(hint);
+            }
         }
     });
     let lines = lines(convergence, by_samples);

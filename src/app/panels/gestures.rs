@@ -1,5 +1,7 @@
 //! Moving about in the picture, and marking a part of it.
 
+use std::sync::Arc;
+
 use egui::{
     Align2, CursorIcon, Key, Modifiers, PointerButton, Pos2, Rect, Response, Stroke, StrokeKind, Ui,
 };
@@ -147,8 +149,10 @@ fn orbit(viewpoint: &mut Viewpoint, drag: glam::Vec2, scene: Option<&LoadedScene
 /// The surface under a click.
 fn clicked_spot(rect: Rect, response: &Response, scope: &Scope<'_>) -> Option<Spot> {
     let place = place_of(rect, response.interact_pointer_pos()?);
-    let request = &scope.snapshot?.request;
-    look_at_place(&request.world, &request.view, place)
+    let (scene, request) = (scope.scene?, &scope.snapshot?.request);
+    // The last picture of another scene says nothing about this one.
+    let is_of_scene = Arc::ptr_eq(request.world.geometry(), scene.world.geometry());
+    is_of_scene.then(|| look_at_place(&request.world, &request.view, place))?
 }
 
 /// Does something with the surface under a click.

@@ -59,7 +59,7 @@ pub(in crate::app) fn show(
     }
     if let Some(index) = removed {
         history.remove(index);
-        *chosen = Chosen::default();
+        chosen.without(index);
     }
 }
 

@@ -154,7 +154,8 @@ fn tiles(
             + (Vec2::new(sun.texel[0] as f32, sun.texel[1] as f32) + Vec2::splat(0.5)) * scale;
         ui.painter_at(rect).circle_stroke(at, 4.5, Stroke::new(1.2, Color32::WHITE));
     }
-    if let Some(tile) = interface.tile {
+    // A smaller map has fewer.
+    if let Some(tile) = interface.tile.filter(|tile| *tile < size.0 * size.1) {
         mark(ui, map_view::tile_rect(rect, size, tile), theme::ACCENT);
     }
     let pointed = response.hover_pos().and_then(|at| map_view::tile_at(rect, size, at));

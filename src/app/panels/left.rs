@@ -1,7 +1,7 @@
 //! The left panel: scene, cameras, environment, fog, material. Where there is no room for it, the right one
 //! shows the same.
 
-use egui::{Margin, Panel, RichText, ScrollArea, Slider, SliderClamping, Ui};
+use egui::{Margin, Panel, RichText, ScrollArea, SliderClamping, Ui};
 
 use glam::Vec3;
 
@@ -66,10 +66,12 @@ pub(in crate::app) fn sections(
     environment(ui, document, interface, sources, commands);
     ui.add_space(4.0);
     ui.separator();
-    fog(ui, &mut document.fog, sources.scene);
-    ui.add_space(4.0);
-    ui.separator();
-    material::show(ui, document, interface, sources.scene);
+    if let Some(scene) = sources.scene {
+        fog(ui, &mut document.fog, scene.world.scene.medium);
+        ui.add_space(4.0);
+        ui.separator();
+        material::show(ui, document, interface, scene);
+    }
 }
 
 fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut Vec<Command>) {
@@ -151,22 +153,21 @@ fn cameras(
     let Some(viewpoint) = &mut document.viewpoint else { return };
     if let Some(degrees) = &mut viewpoint.fov_y_degrees {
         theme::row(ui, "Field of view", "Vertical", |ui| {
-            ui.add(Slider::new(degrees, 5.0..=120.0).suffix("°").fixed_decimals(0));
+            ui.add(theme::slider(degrees, 1.0..=170.0).suffix("°").max_decimals(1));
         });
     }
     theme::row(ui, "Lens radius", "0 keeps everything sharp", |ui| {
         let mut millimetres = viewpoint.lens_radius * 1000.0;
-        let slider = Slider::new(&mut millimetres, 0.0..=100.0).suffix(" mm");
-        if ui.add(slider.fixed_decimals(0)).changed() {
+        let slider = theme::slider(&mut millimetres, 0.0..=100.0).logarithmic(true);
+        let slider = slider.smallest_positive(0.1).suffix(" mm").max_decimals(1);
+        if ui.add(slider).changed() {
             viewpoint.lens_radius = millimetres / 1000.0;
         }
     });
     if viewpoint.lens_radius > 0.0 {
         theme::row(ui, "Focus at", "Ctrl click on the picture sets it", |ui| {
-            let range = 0.05..=1000.0;
-            ui.add(
-                Slider::new(&mut viewpoint.focus_distance, range).logarithmic(true).suffix(" m"),
-            );
+            let slider = theme::slider(&mut viewpoint.focus_distance, 0.01..=1000.0);
+            ui.add(slider.logarithmic(true).suffix(" m"));
         });
     }
 }
@@ -213,7 +214,7 @@ fn environment(
     }
     theme::row(ui, "Rotation", "Turns the map about the vertical", |ui| {
         let degrees = &mut document.rotation_degrees;
-        let slider = Slider::new(degrees, 0.0..=360.0).suffix("°").fixed_decimals(0);
+        let slider = theme::slider(degrees, 0.0..=360.0).suffix("°").max_decimals(1);
         let response = ui.add(slider.clamping(SliderClamping::Never));
         // Somebody may type -90.
         if !(0.0..=360.0).contains(degrees) {
@@ -224,7 +225,7 @@ fn environment(
         }
     });
     theme::row(ui, "Intensity", "Multiplies the map's light", |ui| {
-        let slider = Slider::new(&mut document.intensity, 0.0..=10.0).logarithmic(true);
+        let slider = theme::slider(&mut document.intensity, 0.0..=10.0).logarithmic(true);
         let slider = slider.smallest_positive(0.01).fixed_decimals(2).prefix("× ");
         if ui.add(slider).dragged() {
             interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
@@ -246,7 +247,7 @@ fn sun(ui: &mut Ui, sun: &mut f32) {
     theme::row(ui, "Sun", hint, |ui| {
         let id = ui.scope_id().with("sun");
         let mut value = ui.data(|data| data.get_temp(id)).unwrap_or(*sun);
-        let slider = Slider::new(&mut value, 0.0..=10.0).logarithmic(true);
+        let slider = theme::slider(&mut value, 0.0..=10.0).logarithmic(true);
         let slider = slider.smallest_positive(0.01).fixed_decimals(2).prefix("× ");
         let response = ui.add(slider);
         if response.dragged() || response.has_focus() {
@@ -289,7 +290,7 @@ fn background(ui: &mut Ui, background: &mut Background) {
         Background::Blurred(radians) => {
             theme::row(ui, "Blur", "How far the map is out of focus", |ui| {
                 let mut degrees = radians.to_degrees();
-                let slider = Slider::new(&mut degrees, 0.1..=90.0).logarithmic(true).suffix("°");
+                let slider = theme::slider(&mut degrees, 0.1..=90.0).logarithmic(true).suffix("°");
                 if ui.add(slider.fixed_decimals(1)).changed() {
                     *radians = degrees.to_radians();
                 }
@@ -304,12 +305,16 @@ fn background(ui: &mut Ui, background: &mut Background) {
 }
 
 /// Fog: the scene's own until something is changed.
-fn fog(ui: &mut Ui, fog: &mut Option<Medium>, scene: Option<&LoadedScene>) {
-    let own = scene.and_then(|scene| scene.world.scene.medium);
+fn fog(ui: &mut Ui, fog: &mut Option<Medium>, own: Option<Medium>) {
     let clear = Medium::default();
     let now = fog.or(own).unwrap_or(clear);
     let mut edited = now;
-    let mut is_on = now.scattering != clear.scattering || now.absorption != clear.absorption;
+    let id = ui.scope_id().with("fog");
+    // Whoever pulls the last coefficient to nothing wants to pull on.
+    let is_held = ui.data(|data| data.get_temp(id)).unwrap_or(false);
+    let mut is_on =
+        is_held || now.scattering != clear.scattering || now.absorption != clear.absorption;
+    let mut holds = false;
     theme::heading(ui, "FOG");
     ui.horizontal(|ui| {
         let hint = "A medium that scatters and swallows light";
@@ -323,11 +328,13 @@ fn fog(ui: &mut Ui, fog: &mut Option<Medium>, scene: Option<&LoadedScene>) {
         }
     });
     if is_on {
-        let coefficient = |ui: &mut Ui, value: &mut Vec3| {
+        let mut coefficient = |ui: &mut Ui, value: &mut Vec3| {
             let mut mean = value.element_sum() / 3.0;
-            let slider = Slider::new(&mut mean, 0.0..=10.0).logarithmic(true);
+            let slider = theme::slider(&mut mean, 0.0..=10.0).logarithmic(true);
             let slider = slider.smallest_positive(1e-5).suffix(" /m").max_decimals(5);
-            if ui.add(slider).changed() {
+            let response = ui.add(slider);
+            holds |= response.dragged() || response.has_focus();
+            if response.changed() {
                 // The colour stays, if there is one.
                 let old = value.element_sum() / 3.0;
                 *value = if old > 0.0 { *value * (mean / old) } else { Vec3::splat(mean) };
@@ -339,9 +346,10 @@ fn fog(ui: &mut Ui, fog: &mut Option<Medium>, scene: Option<&LoadedScene>) {
         theme::row(ui, "Absorption", hint, |ui| coefficient(ui, &mut edited.absorption));
         let hint = "-1 scatters back, 0 to all sides alike, 1 straight on";
         theme::row(ui, "Anisotropy", hint, |ui| {
-            ui.add(Slider::new(&mut edited.anisotropy, -0.95..=0.95).fixed_decimals(2));
+            ui.add(theme::slider(&mut edited.anisotropy, -0.95..=0.95).fixed_decimals(2));
         });
     }
+    ui.data_mut(|data| data.insert_temp(id, holds));
     if edited != now {
         *fog = Some(edited);
     }

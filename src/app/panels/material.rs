@@ -1,6 +1,6 @@
 //! The material that was clicked: its colour, roughness and metalness, and whether it is there at all.
 
-use egui::{Align, RichText, Slider, Ui};
+use egui::{Align, RichText, Ui};
 use glam::Vec3;
 
 use crate::app::document::Document;
@@ -14,10 +14,9 @@ pub(super) fn show(
     ui: &mut Ui,
     document: &mut Document,
     interface: &mut Interface,
-    scene: Option<&LoadedScene>,
+    scene: &LoadedScene,
 ) {
     theme::heading(ui, "MATERIAL");
-    let Some(scene) = scene else { return };
     let title = |number: u32, material: &Material| {
         let name = match material.name.as_str() {
             "" => format!("Material {}", number + 1),
@@ -70,7 +69,7 @@ fn change(ui: &mut Ui, edit: &mut MaterialEdit, material: &Material) {
     let of_texture = has(material.texture(TextureSlot::MetallicRoughness).is_some());
     let share = |ui: &mut Ui, value: &mut Option<f32>, own: f32| {
         let mut now = value.unwrap_or(own);
-        if ui.add(Slider::new(&mut now, 0.0..=1.0).fixed_decimals(2)).changed() {
+        if ui.add(theme::slider(&mut now, 0.0..=1.0).fixed_decimals(2)).changed() {
             *value = Some(now);
         }
     };

@@ -19,7 +19,10 @@ pub(in crate::app) fn show(context: &Context, room: Rect, messages: &mut Message
     if messages.list().is_empty() {
         return;
     }
-    context.request_repaint_after(std::time::Duration::from_secs(1));
+    // Errors go when they are closed.
+    if messages.list().iter().any(|message| !message.is_error) {
+        context.request_repaint_after(std::time::Duration::from_secs(1));
+    }
     if messages.list().iter().any(|message| message.since.is_none()) {
         // How high they are is known once they are laid out: until then they would lie too low.
         context.request_discard("a message is new");

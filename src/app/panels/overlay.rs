@@ -1,6 +1,6 @@
 //! Choosing an overlay, and what its colours mean.
 
-use egui::{Color32, Sense, Slider, Ui, Vec2};
+use egui::{Color32, Sense, Ui, Vec2};
 
 use super::color_bar;
 use crate::app::interface::Interface;
@@ -25,7 +25,7 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
     ui.label(theme::quiet(overlay.description()));
     if !overlay.is_opaque() {
         theme::row(ui, "Opacity", "", |ui| {
-            ui.add(Slider::new(&mut interface.overlay_opacity, 0.0..=1.0).fixed_decimals(2));
+            ui.add(theme::slider(&mut interface.overlay_opacity, 0.0..=1.0).fixed_decimals(2));
         });
     }
     let shown = shown.filter(|s| s.order.overlay == Some(overlay));

@@ -1,6 +1,6 @@
 //! Settings of the picture: how it is developed, how light is found, when it is done.
 
-use egui::{DragValue, Slider, Ui};
+use egui::{DragValue, Ui};
 
 use crate::app::commands::Command;
 use crate::app::document::{Document, PictureSize};
@@ -23,11 +23,11 @@ pub(in crate::app) fn show(
     ui.add_space(4.0);
     ui.separator();
     theme::heading(ui, "LIGHT");
-    theme::row(ui, "Bounces", "Surfaces at which a path gathers light; 1 is direct light", |ui| {
-        ui.add(Slider::new(&mut document.light.bounces, 0..=32));
+    theme::row(ui, "Bounces", "How often light turns on its way; 1 is direct light", |ui| {
+        ui.add(theme::slider(&mut document.light.bounces, 0..=32));
     });
     theme::row(ui, "Seed", "The same seed gives the same picture", |ui| {
-        ui.add(DragValue::new(&mut document.light.seed).range(0..=u32::MAX));
+        ui.add(theme::number(&mut document.light.seed, 0..=u32::MAX));
     });
     ui.add_space(4.0);
     ui.separator();
@@ -73,7 +73,12 @@ fn denoiser(ui: &mut Ui, document: &mut Document) {
 fn exposure(ui: &mut Ui, document: &mut Document, exposure_ev: Option<f32>) {
     let look = &mut document.look;
     theme::row(ui, "Exposure", "Stops; double the light is one more", |ui| {
-        ui.add(Slider::new(&mut look.exposure_ev, -8.0..=8.0).suffix(" EV").fixed_decimals(1));
+        ui.add(
+            theme::slider(&mut look.exposure_ev, -8.0..=8.0)
+                .suffix(" EV")
+                .min_decimals(1)
+                .max_decimals(2),
+        );
     });
     theme::row(ui, "", "", |ui| {
         ui.checkbox(&mut look.auto_exposure, "Automatic")
@@ -107,11 +112,11 @@ fn curve_name(curve: ToneCurve) -> &'static str {
 
 fn white_balance(ui: &mut Ui, balance: &mut WhiteBalance) {
     theme::row(ui, "White", "Colour temperature of the light that looks white", |ui| {
-        let slider = Slider::new(&mut balance.kelvin, KELVIN).suffix(" K");
+        let slider = theme::slider(&mut balance.kelvin, KELVIN).suffix(" K");
         ui.add(slider.fixed_decimals(0).logarithmic(true));
     });
     theme::row(ui, "Tint", "Green to magenta", |ui| {
-        ui.add(Slider::new(&mut balance.tint, TINT).fixed_decimals(2));
+        ui.add(theme::slider(&mut balance.tint, TINT).fixed_decimals(2));
     });
     let is_changed = *balance != WhiteBalance::default();
     if is_changed && ui.button(format!("Daylight, {DAYLIGHT_KELVIN:.0} K")).clicked() {
@@ -137,9 +142,9 @@ fn size(ui: &mut Ui, size: &mut PictureSize) {
     });
     if let PictureSize::Fixed(width, height) = size {
         theme::row(ui, "", "", |ui| {
-            ui.add(DragValue::new(width).range(1..=16384).speed(4));
+            ui.add(theme::number(width, 1..=16384).speed(4));
             ui.label("x");
-            ui.add(DragValue::new(height).range(1..=8192).speed(4));
+            ui.add(theme::number(height, 1..=16384).speed(4));
         });
     }
 }
@@ -158,12 +163,12 @@ fn region(ui: &mut Ui, has_region: bool, commands: &mut Vec<Command>) {
 fn stop(ui: &mut Ui, document: &mut Document) {
     let stop = &mut document.stop;
     let mut percent = stop.noise.map(|noise| noise * 100.0);
-    optional(ui, "Samples", &mut stop.samples, 256, |v| DragValue::new(v).range(1..=1_000_000));
+    optional(ui, "Samples", &mut stop.samples, 256, |v| theme::number(v, 1..=1_000_000));
     optional(ui, "Time", &mut stop.seconds, 60.0, |v| {
-        DragValue::new(v).range(0.1..=1e6).suffix(" s").speed(1.0)
+        theme::number(v, 0.1..=1e6).suffix(" s").speed(1.0)
     });
     optional(ui, "Noise", &mut percent, 5.0, |v| {
-        DragValue::new(v).range(0.01..=100.0).suffix(" %").speed(0.1)
+        theme::number(v, 0.01..=100.0).suffix(" %").speed(0.1)
     });
     stop.noise = percent.map(|percent| percent / 100.0);
     if stop.samples.is_none() && stop.seconds.is_none() && stop.noise.is_none() {

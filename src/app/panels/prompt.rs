@@ -3,7 +3,7 @@
 use std::path::{MAIN_SEPARATOR, Path, is_separator};
 
 use egui::text::{CCursor, CCursorRange};
-use egui::{Context, Id, Key, Modal, Modifiers, RichText, TextEdit};
+use egui::{Context, Id, Key, Modal, Modifiers, Response, RichText, TextEdit, Ui};
 
 use crate::app::commands::Command;
 use crate::app::completion::{Completion, complete, in_home};
@@ -16,6 +16,15 @@ use crate::sources;
 fn objection(purpose: Purpose, path: &str) -> Option<Objection> {
     let is_there = Path::new(path).exists();
     if purpose.is_output() {
+        let (_, extensions) = purpose.files();
+        let extension = Path::new(path).extension().map(|e| e.to_string_lossy().to_lowercase());
+        if !extension.is_some_and(|extension| extensions.contains(&&*extension)) {
+            return Some(Objection::Unknown);
+        }
+        let folder = Path::new(path).parent().filter(|folder| !folder.as_os_str().is_empty());
+        if folder.is_some_and(|folder| !folder.is_dir()) {
+            return Some(Objection::NoFolder);
+        }
         return is_there.then_some(Objection::Replaces);
     }
     (!is_there && !is_built_in(purpose, path)).then_some(Objection::Missing)
@@ -29,10 +38,14 @@ fn is_built_in(purpose: Purpose, name: &str) -> bool {
     }
 }
 
-fn sentence(objection: Objection) -> &'static str {
+fn sentence(objection: Objection, purpose: Purpose) -> String {
     match objection {
-        Objection::Missing => "There is no such file.",
-        Objection::Replaces => "This file is there already: Enter again replaces it.",
+        Objection::Missing => "There is no such file.".to_owned(),
+        Objection::NoFolder => "There is no such folder.".to_owned(),
+        Objection::Unknown => {
+            format!("It must end in .{}.", purpose.files().1.join(" or ."))
+        }
+        Objection::Replaces => "This file is there already: Enter again replaces it.".to_owned(),
     }
 }
 
@@ -119,11 +132,11 @@ pub(in crate::app) fn show(
         let objection = prompt.objection.as_ref().filter(|(of, _)| of == prompt.path.trim());
         let objection = objection.map(|(_, objection)| *objection);
         if let Some(objection) = objection {
-            ui.label(RichText::new(sentence(objection)).color(theme::ALERT));
+            ui.label(RichText::new(sentence(objection, prompt.purpose)).color(theme::ALERT));
         }
         let mut taken = None;
         for offer in prompt.offers.iter().take(MOST_OFFERS) {
-            if ui.link(RichText::new(offer).size(12.5)).clicked() {
+            if path_link(ui, offer).clicked() {
                 taken = Some(offer.clone());
             }
         }
@@ -137,7 +150,7 @@ pub(in crate::app) fn show(
         }
         let recent = if prompt.offers.is_empty() { recent } else { &[] };
         for name in recent {
-            if ui.link(RichText::new(name).size(12.5)).clicked() {
+            if path_link(ui, name).clicked() {
                 prompt.path.clone_from(name);
                 is_done = true;
             }
@@ -162,7 +175,7 @@ pub(in crate::app) fn show(
     } else if is_done && !typed.is_empty() {
         let is_known = prompt.objection.as_ref().is_some_and(|(of, _)| of == typed);
         match objection(prompt.purpose, path) {
-            Some(objection) if objection == Objection::Missing || !is_known => {
+            Some(objection) if objection != Objection::Replaces || !is_known => {
                 prompt.objection = Some((typed.to_owned(), objection));
             }
             _ => {
@@ -174,6 +187,16 @@ pub(in crate::app) fn show(
     if is_closed || response.should_close() {
         interface.prompt = None;
     }
+}
+
+/// A path on one line, which gives its end where there is little room.
+fn path_link(ui: &mut Ui, path: &str) -> Response {
+    const MOST: usize = 74;
+    let hidden = path.chars().count().saturating_sub(MOST);
+    let end: String = path.chars().skip(hidden).collect();
+    let text = if hidden > 0 { format!("…{end}") } else { end };
+    let link = ui.link(RichText::new(text).size(12.5));
+    if hidden > 0 { link.on_hover_text(path) } else { link }
 }
 
 #[cfg(test)]
@@ -192,12 +215,14 @@ mod tests {
                 (None, Some(Objection::Missing))
             );
         }
-        for purpose in [Purpose::Picture, Purpose::Distributions] {
-            assert_eq!(
-                (asked(purpose, &there), asked(purpose, &gone)),
-                (Some(Objection::Replaces), None)
-            );
-        }
+        assert_eq!(
+            (asked(Purpose::Picture, &there), asked(Purpose::Picture, &gone)),
+            (Some(Objection::Replaces), None)
+        );
+        let nowhere = folder.path().join("gone").join("b.png");
+        assert_eq!(asked(Purpose::Picture, &nowhere), Some(Objection::NoFolder));
+        let nameless = folder.path().join("b");
+        assert_eq!(asked(Purpose::Picture, &nameless), Some(Objection::Unknown));
         assert_eq!(objection(Purpose::Scene, "office"), None);
         assert_eq!(objection(Purpose::Map, "sky:day@64x32"), None);
     }

@@ -47,11 +47,11 @@ fn keys(ui: &mut Ui) {
 }
 
 fn gestures(ui: &mut Ui) {
-    let gestures = GESTURES.iter().map(|(how, what)| ((*how).to_owned(), *what));
+    let gestures = GESTURES.iter().map(|(how, what)| (theme::keys(how), *what));
     list(ui, "gestures", gestures);
     ui.add_space(10.0);
     let more = [("? or F1", "This sheet"), ("Ctrl+C", "Copy the picture")];
-    list(ui, "more", more.into_iter().map(|(k, w)| (k.to_owned(), w)));
+    list(ui, "more", more.into_iter().map(|(keys, what)| (theme::keys(keys), what)));
 }
 
 fn list<'a>(ui: &mut Ui, id: &str, lines: impl Iterator<Item = (String, &'a str)>) {

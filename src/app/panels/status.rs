@@ -27,23 +27,30 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
     Panel::bottom("status").frame(frame).show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 18.0;
-            phase(ui, status);
-            if let Some(snapshot) = status.snapshot {
-                figures(ui, snapshot, status.hides_clock);
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            // What is at the right comes first, and what then has no room ends there.
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                if let Some(snapshot) = status.snapshot {
                     device(ui, snapshot, status.threads);
                     if let Some(place) = status.pointed.filter(|_| !theme::is_narrow(ui)) {
                         pixel(ui, snapshot, place);
                     }
+                }
+                ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                    ui.shrink_clip_rect(ui.max_rect());
+                    phase(ui, status);
+                    if let Some(snapshot) = status.snapshot {
+                        figures(ui, snapshot, status.hides_clock);
+                    }
                 });
-            }
+            });
         });
     });
 }
 
 fn phase(ui: &mut Ui, status: &Status<'_>) {
     if let Some(name) = status.loading.first() {
-        ui.label(RichText::new(format!("Loading {name}…")).color(theme::ACCENT));
+        let text = format!("Loading {}…", theme::file_name(name));
+        ui.label(RichText::new(text).color(theme::ACCENT)).on_hover_text(*name);
         return;
     }
     if status.is_preparing {
@@ -97,7 +104,10 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
             "Learning and rendering, cached light included",
         );
         let rate = snapshot.now.rays as f64 / snapshot.now.render_seconds.max(1e-9);
-        number(ui, &theme::figure(rate), "rays/s", "Rays, shadow rays included, while rendering");
+        if !theme::is_small(ui) {
+            let hint = "Rays, shadow rays included, while rendering";
+            number(ui, &theme::figure(rate), "rays/s", hint);
+        }
     }
     if let Some(backdrop) = snapshot.backdrop.as_ref().filter(|backdrop| backdrop.is_cached) {
         let share = format!("{:.0} %", 100.0 * backdrop.share(session.samples));
@@ -182,7 +192,13 @@ fn device(ui: &mut Ui, snapshot: &Snapshot, threads: usize) {
                 adapter.driver,
                 theme::bytes(gpu.device_bytes as usize)
             );
-            (format!("GPU, {}", adapter.short_name()), hint)
+            // Its name has no room where there is little.
+            let name = if theme::is_small(ui) {
+                "GPU".to_owned()
+            } else {
+                format!("GPU, {}", adapter.short_name())
+            };
+            (name, hint)
         }
         None => {
             let word = if threads == 1 { "thread" } else { "threads" };

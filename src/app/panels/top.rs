@@ -72,7 +72,7 @@ const TIGHT: f32 = 800.0;
 const TIGHTEST: f32 = 480.0;
 
 fn button(ui: &mut Ui, (text, hint): (&str, &str), commands: &mut Vec<Command>, command: Command) {
-    if ui.button(text).on_hover_text(hint).clicked() {
+    if ui.button(text).on_hover_text(theme::keys(hint)).clicked() {
         commands.push(command);
     }
 }
@@ -107,7 +107,7 @@ fn pause(ui: &mut Ui, interface: &Interface, commands: &mut Vec<Command>) {
 fn steps(ui: &mut Ui, undo: &Undo<Document>, commands: &mut Vec<Command>) {
     let mut button = |is_enabled: bool, text: &str, hint: &str, command: Command| {
         let button = ui.add_enabled(is_enabled, egui::Button::new(text));
-        if button.on_hover_text(hint).clicked() {
+        if button.on_hover_text(theme::keys(hint)).clicked() {
             commands.push(command);
         }
     };

@@ -8,6 +8,7 @@ use egui::{
 use super::gestures;
 use super::scope::Scope;
 use crate::app::comparison::AMPLIFIED;
+use crate::app::dropped::Dropped;
 use crate::app::interface::{Interface, Tab};
 use crate::app::presenter::Shown;
 use crate::app::screen::{Developed, Recipe};
@@ -18,8 +19,8 @@ use crate::render::View;
 
 /// Draws the picture and takes gestures; the room it has.
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
-    let frame = egui::Frame::new().fill(theme::BACKGROUND);
-    let panel = CentralPanel::default().frame(frame).show(ui, |ui| {
+    // What is drawn on has the colour of the ground: software is slow to draw it once more.
+    let panel = CentralPanel::default().frame(egui::Frame::new()).show(ui, |ui| {
         let area = ui.max_rect();
         measure(ui, area, scope);
         let response = ui.interact(area, ui.scope_id().with("picture"), Sense::click_and_drag());
@@ -83,14 +84,14 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
 
 /// What happens if the files that are held over the window are let go.
 fn what_would_open(ui: &Ui, area: Rect) {
-    let name = |file: &egui::HoveredFile| {
-        file.path.as_ref()?.file_name().map(|name| name.to_string_lossy().into_owned())
-    };
-    let names =
-        ui.input(|input| input.raw.hovered_files.iter().filter_map(name).collect::<Vec<_>>());
-    if names.is_empty() {
+    let paths: Vec<_> = ui.input(|input| {
+        input.raw.hovered_files.iter().filter_map(|file| file.path.clone()).collect()
+    });
+    if paths.is_empty() {
         return;
     }
+    let Dropped { scene, map, .. } = Dropped::of(&paths);
+    let names: Vec<_> = scene.iter().chain(&map).map(|name| theme::file_name(name)).collect();
     let painter = ui.painter();
     painter.rect_filled(area, 0.0, Color32::from_black_alpha(150));
     let edge = Stroke::new(2.0, theme::ACCENT);

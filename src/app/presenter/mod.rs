@@ -6,6 +6,7 @@ mod order;
 mod rest;
 mod source;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -138,9 +139,12 @@ fn run(shared: &Shared) {
         let (start, kept) = (Instant::now(), order.clone());
         let work = Work::start();
         order.snapshot.rest.set_end(start + LONGEST);
-        // Where the device is lost, the window orders again on another.
-        if let Ok(shown) = memory.present(order) {
-            *lock(&shared.shown) = Some(Arc::new(shown));
+        match catch_unwind(AssertUnwindSafe(|| memory.present(order))) {
+            Ok(Ok(shown)) => *lock(&shared.shown) = Some(Arc::new(shown)),
+            // Where the device is lost, the window orders again on another.
+            Ok(Err(_)) => {}
+            // The panic is on the terminal; the next picture is another try.
+            Err(_) => memory = Memory::default(),
         }
         let rest = rest_after(work.time(start.elapsed()), kept.snapshot.seconds());
         let end = Instant::now() + rest;

@@ -5,6 +5,7 @@
 //! pixel of every eighth row, then every fourth and second, so that there is a picture of the whole
 //! view at once and no sample is lost.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -82,7 +83,7 @@ impl Worker {
         let (inside, render_pool) = (Arc::clone(&shared), Arc::clone(&pool));
         let thread = std::thread::Builder::new()
             .name("worker".to_owned())
-            .spawn(move || run(&inside, &render_pool, gpu))
+            .spawn(move || run(&inside, &render_pool, &gpu))
             .map_err(|e| no_thread(&e))?;
         Ok(Self { shared, thread: Some(thread), pool })
     }
@@ -159,8 +160,9 @@ fn lower_priority() {
     }
 }
 
-fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: (Option<String>, RayChoice)) {
-    let mut kept = Kept::new(gpu, Arc::clone(&shared.screen));
+fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, RayChoice)) {
+    let fresh = || Kept::new(gpu.clone(), Arc::clone(&shared.screen));
+    let mut kept = fresh();
     let alarm = Alarm::start(Arc::clone(&shared.cancel));
     let mut done: Option<Arc<Request>> = None;
     loop {
@@ -185,15 +187,26 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: (Option<String>, Ray
         let world = Arc::clone(&request.world);
         let environment = Arc::clone(&request.environment);
         kept.leave_other_worlds(&request);
-        let mut job = Job::new(shared, &alarm, &mut kept, request);
-        pool.install(|| {
-            if job.is_moving() {
-                job.follow(&world, &environment);
-            } else {
-                job.render(&world, &environment);
-            }
-        });
-        done = Some(job.into_request());
+        let asked = Arc::clone(&request);
+        let worked = catch_unwind(AssertUnwindSafe(|| {
+            let mut job = Job::new(shared, &alarm, &mut kept, request);
+            pool.install(|| {
+                if job.is_moving() {
+                    job.follow(&world, &environment);
+                } else {
+                    job.render(&world, &environment);
+                }
+            });
+            job.into_request()
+        }));
+        done = Some(worked.unwrap_or_else(|_| {
+            // The panic is on the terminal. Nothing of what it left is trusted.
+            kept = fresh();
+            shared.is_preparing.store(false, Ordering::Relaxed);
+            lock(&shared.failures).push("rendering has failed; R begins again".to_owned());
+            (shared.wake)();
+            asked
+        }));
     }
 }
 

@@ -1,0 +1,52 @@
+//! What files let go over the window stand for.
+
+use std::path::{Path, PathBuf};
+
+use crate::sources;
+
+/// What of dropped files is opened, by name.
+#[derive(Debug, PartialEq)]
+pub(super) struct Dropped {
+    pub(super) scene: Option<String>,
+    pub(super) map: Option<String>,
+    /// Other scenes and maps.
+    pub(super) left: Vec<String>,
+}
+
+impl Dropped {
+    /// What is not a scene is taken for a map; beside a scene only what is in linear radiance, for its textures and
+    /// buffers may come along.
+    pub(super) fn of(paths: &[PathBuf]) -> Self {
+        let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+        let (scenes, others): (Vec<_>, Vec<_>) =
+            names.into_iter().partition(|name| sources::is_scene(name));
+        let is_linear = |name: &String| {
+            let extension = Path::new(name).extension().map(|e| e.to_string_lossy().to_lowercase());
+            matches!(extension.as_deref(), Some("exr" | "hdr"))
+        };
+        let has_scene = !scenes.is_empty();
+        // What else comes with a scene is read with it.
+        let maps = others.into_iter().filter(|name| !has_scene || is_linear(name));
+        let (mut scenes, mut maps) = (scenes.into_iter(), maps);
+        let (scene, map) = (scenes.next(), maps.next());
+        Self { scene, map, left: scenes.chain(maps).collect() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_files_dropped_together_a_scene_and_its_light_are_opened() {
+        let dropped =
+            |names: &[&str]| Dropped::of(&names.iter().map(PathBuf::from).collect::<Vec<_>>());
+        let some = |name: &str| Some(name.to_owned());
+        let all = dropped(&["room.gltf", "room.bin", "oak.png", "sky.hdr"]);
+        let both = Dropped { scene: some("room.gltf"), map: some("sky.hdr"), left: Vec::new() };
+        assert_eq!(all, both, "textures are no skies");
+        assert_eq!(dropped(&["street.jpg"]).map, some("street.jpg"));
+        let two = dropped(&["a.exr", "b.exr"]);
+        assert_eq!((two.map, two.left), (some("a.exr"), vec!["b.exr".to_owned()]));
+    }
+}
