@@ -38,6 +38,9 @@ fn gather(path: ptr<function, Path>, vertex: Vertex) {
         return;
     }
 //#end
+    if (*path).bounces > MOST_COUNTED {
+        return;
+    }
     let tries = globals.tries_per_vertex;
     for (var i = 0u; i < tries; i++) {
         var stream = sampler_of_estimate((*path).sampler, tries, i);

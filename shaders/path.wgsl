@@ -293,6 +293,12 @@ fn escape(path: ptr<function, Path>) {
 //#if MAP_SAMPLING
     if (*path).departure_pdf_solid_angle < F32_MAX {
         let seen = radiance_and_tile_pdf(direction);
+//#if MEDIUM
+        if (*path).departure_distribution == NO_ARRAY {
+            (*path).radiance += (*path).throughput * seen.radiance;
+            return;
+        }
+//#end
         var nee = choice_probability((*path).departure_distribution, seen.tile) * seen.pdf_solid_angle;
 //#if SHARING
         nee *= (*path).departure_map_samples;

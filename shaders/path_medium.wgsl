@@ -38,13 +38,14 @@ fn medium_vertex(path: ptr<function, Path>, position: vec3f, mean_cosine: f32) -
     vertex.point.position = position;
     vertex.is_in_medium = true;
     vertex.mean_cosine = mean_cosine;
-    vertex.distribution = WHOLE_MAP;
-//#if LIGHT_GRID
-    // From inside of a solid the map is not seen anyway.
+    // From inside of a solid the map is not seen: it is not asked in vain.
+    vertex.distribution = NO_ARRAY;
     if !is_in_solid(path) {
+        vertex.distribution = WHOLE_MAP;
+//#if LIGHT_GRID
         vertex.cell = cell_in_medium(position);
         vertex.distribution = distribution_of_cell(vertex.cell);
-    }
 //#end
+    }
     return vertex;
 }

@@ -33,9 +33,15 @@ fn slot_to_train(key: CacheKey) -> u32 {
     return NO_CACHE_SLOT;
 }
 
-// A whole number near `value`, as often above as makes the mean right, in floats.
-fn dithered(value: f32, most: f32) -> f32 {
-    let bounded = clamp(value, 0.0, most);
+// Bits that differ from place to place, for what may be the same everywhere.
+fn dice(position: vec3f) -> u32 {
+    let bits = bitcast<vec3u>(position);
+    return hash(bits.x ^ hash(bits.y ^ hash(bits.z)));
+}
+
+// A whole number near `value`, of which no two are alike, as often above as makes the mean right, in floats.
+fn dithered(value: f32) -> f32 {
+    let bounded = clamp(value, 0.0, MOST_UNITS);
     return floor(bounded + unit_from_bits(hash(bitcast<u32>(bounded))));
 }
 
@@ -61,13 +67,18 @@ fn training_vertex_at(path: ptr<function, Path>, vertex: Vertex) -> TrainingVert
     let albedo = bsdf_albedo(vertex.bsdf);
     atomicStore(&cache_sums[words + 1u], parent + 1u);
     atomicAdd(&cache_sums[words + 2u], 1u);
+    let bits = dice(position);
     for (var channel = 0u; channel < 3u; channel++) {
-        let units = u32(dithered(albedo[channel] * ALBEDO_ONE, ALBEDO_ONE));
-        atomicAdd(&cache_sums[words + 3u + channel], units);
+        let units = clamp(albedo[channel] * ALBEDO_ONE, 0.0, ALBEDO_ONE);
+        let dithered_units = u32(units + unit_from_bits(hash(bits ^ channel)));
+        atomicAdd(&cache_sums[words + 3u + channel], dithered_units);
     }
     if globals.cache_is_known != 0u {
-        let known = cached_radiance_over_albedo(position, normal) * albedo;
-        trained.most = MOST_TIMES * luminance(known);
+        let known = luminance(cached_radiance_over_albedo(position, normal) * albedo);
+        // Where nothing was found, nothing is known.
+        if known > 0.0 {
+            trained.most = MOST_TIMES * known;
+        }
     }
     trained.slot = slot;
     trained.throughput = throughput;
@@ -91,7 +102,7 @@ fn end_training_vertex(path: ptr<function, Path>, index: u32) {
         radiance *= trained.most / own;
     }
     for (var channel = 0u; channel < 3u; channel++) {
-        let units = dithered(radiance[channel] * globals.cache_scale, MOST_UNITS);
+        let units = dithered(radiance[channel] * globals.cache_scale);
         let high = floor(units / TWO_TO_32);
         let low = u32(units - high * TWO_TO_32);
         let at = trained.slot * CACHE_WORDS + 6u + 2u * channel;

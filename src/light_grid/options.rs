@@ -54,7 +54,7 @@ pub struct DistributionOptions {
     /// Karlik et al. 2019, on tiles).
     pub compensation: f64,
     /// Samples of the map that each vertex of a learning path tries: another shadow ray is cheaper
-    /// than another path. A rendered path tries one.
+    /// than another path. A rendered path tries one, or three where pixels share what is behind.
     pub tries_per_vertex: u32,
     /// Where rendered paths count too, until the distributions hardly get better.
     pub rendered_paths: RenderedPaths,

@@ -9,6 +9,10 @@ use crate::color::{importance, luminance};
 use crate::light_grid::LearningGrid;
 use crate::sampler::Sampler;
 
+/// First vertices of a path whose samples of the map count. Counters hold so many of a pass; the others, of which
+/// there are few, would make passes short.
+pub(crate) const MOST_COUNTED: u32 = 64;
+
 impl PathTracer<'_> {
     /// Traces one camera path and counts at each vertex, in [`PathTracer::counts`], whether samples
     /// of the map are visible, drawn half from the whole map and half from what [`PathTracer::grid`]
@@ -23,7 +27,8 @@ impl PathTracer<'_> {
                 break;
             }
             path.bounces += 1;
-            if !vertex.scatterer.is_delta_only() && vertex.cell.is_some() {
+            let counts = vertex.cell.is_some() && path.bounces <= MOST_COUNTED;
+            if !vertex.scatterer.is_delta_only() && counts {
                 for number in 0..tries {
                     let bits = path.sampler.of_estimate(tries, number).next_pair_bits();
                     path.look_at_map(&vertex, bits);
@@ -44,16 +49,21 @@ fn phase_weight(phase: f32) -> f32 {
 }
 
 impl Path<'_> {
+    /// Where this vertex counts, if it does.
+    fn counts(&self) -> Option<&LearningGrid> {
+        self.tracer.counts.filter(|_| self.bounces <= MOST_COUNTED)
+    }
+
     /// Says that a try of a tile will be counted once its shadow ray is traced.
     pub(super) fn expect_count(&self, vertex: &Vertex<'_>, tile: u32) {
-        if let (Some(learning), Some(cell)) = (self.tracer.counts, vertex.cell) {
+        if let (Some(learning), Some(cell)) = (self.counts(), vertex.cell) {
             learning.counters.prefetch(cell, tile);
         }
     }
 
     /// Counts a try of a tile of the map, if anything is counted.
     pub(super) fn count(&self, vertex: &Vertex<'_>, tile: u32, weight: f32) {
-        if let (Some(learning), Some(cell)) = (self.tracer.counts, vertex.cell) {
+        if let (Some(learning), Some(cell)) = (self.counts(), vertex.cell) {
             learning.counters.record(cell, tile, weight);
         }
     }

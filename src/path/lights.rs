@@ -1,6 +1,6 @@
 //! Light sources inside the scene: emissive triangles and punctual lights.
 
-use std::f32::consts::PI;
+use std::f64::consts::PI;
 
 use glam::{Vec2, Vec3};
 
@@ -60,12 +60,12 @@ impl LocalLights {
             {
                 lights.push(Light { index: triangles.len() as u32, moments });
                 triangles.push(triangle);
-                total += f64::from(power);
+                total += power;
             }
         }
         let radius = 0.5 * (bounds.1 - bounds.0).length();
         for (index, light) in (triangles.len() as u32..).zip(&scene.lights) {
-            let power = f64::from(punctual_power(light, radius));
+            let power = punctual_power(light, radius);
             if power <= 0.0 {
                 continue;
             }
@@ -186,7 +186,7 @@ fn area_to_solid_angle(corners: &[Vec3; 3], direction: Vec3, squared: f32) -> Op
 }
 
 /// Moments and power of an emissive triangle; `None` if nothing comes from it.
-fn triangle_moments(scene: &Scene, triangle: u32) -> Option<(Moments, f32)> {
+fn triangle_moments(scene: &Scene, triangle: u32) -> Option<(Moments, f64)> {
     let corners = scene.corners(triangle);
     let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
     let area = 0.5 * normal.length();
@@ -200,7 +200,7 @@ fn triangle_moments(scene: &Scene, triangle: u32) -> Option<(Moments, f32)> {
         .map(|point| importance(point.parameters.emissive))
         .sum::<f32>()
         / probes.len() as f32;
-    let intensity = area * (probed + 0.02 * importance(material.emissive));
+    let intensity = (area * (probed + 0.02 * importance(material.emissive))).min(f32::MAX);
     let center = (corners[0] + corners[1] + corners[2]) / 3.0;
     let variance = corners.iter().map(|c| c.distance_squared(center)).sum::<f32>() / 12.0;
     let place = Moments {
@@ -217,7 +217,7 @@ fn triangle_moments(scene: &Scene, triangle: u32) -> Option<(Moments, f32)> {
     } else {
         (place, 1.0)
     };
-    let power = PI * sides * intensity;
+    let power = PI * sides * f64::from(intensity);
     (power > 0.0).then_some((moments, power))
 }
 
@@ -228,17 +228,20 @@ fn punctual_moments(light: &PunctualLight) -> Moments {
         PunctualKind::Spot { .. } => (light.direction, 1.0, 0.0),
         PunctualKind::Point | PunctualKind::Directional => (Vec3::ZERO, 0.0, 1.0),
     };
-    let intensity = importance(light.intensity);
+    let intensity = importance(light.intensity).min(f32::MAX);
     Moments { intensity, center: light.position, variance: 0.0, axis, aimed, around }
 }
 
-fn punctual_power(light: &PunctualLight, scene_radius: f32) -> f32 {
+/// In f64: the product may be more than f32 can hold, and a narrow cone less than it can tell from none.
+fn punctual_power(light: &PunctualLight, scene_radius: f32) -> f64 {
     let solid_angle = match light.kind {
         PunctualKind::Point => 4.0 * PI,
-        PunctualKind::Spot { outer_radians, .. } => 2.0 * PI * (1.0 - outer_radians.cos()),
-        PunctualKind::Directional => PI * scene_radius * scene_radius,
+        PunctualKind::Spot { outer_radians, .. } => {
+            4.0 * PI * (0.5 * f64::from(outer_radians)).sin().powi(2)
+        }
+        PunctualKind::Directional => PI * f64::from(scene_radius).powi(2),
     };
-    solid_angle * importance(light.intensity)
+    solid_angle * f64::from(importance(light.intensity).min(f32::MAX))
 }
 
 fn sample_punctual(light: &PunctualLight, position: Vec3, probability: f32) -> Option<LightSample> {

@@ -30,6 +30,7 @@ mod world;
 mod world_builder;
 
 pub use background::Background;
+pub(crate) use learn::MOST_COUNTED;
 pub use light_tree::Receiver;
 pub use lights::{LightSample, LocalLights};
 pub(crate) use train::TRAINING_VERTICES;
@@ -310,7 +311,10 @@ impl<'a> Path<'a> {
         let flight = interior.fly(self.throughput, to - from, bits);
         self.throughput *= flight.weight;
         let position = origin + direction * (from + flight.scattered_at?);
-        // From inside of a solid the map is not seen: its vertices would spoil what fog learns.
+        // From inside of a solid the map is not seen: it is not asked in vain, and what fog learns is not spoilt.
+        if !self.is_in_air() {
+            self.map_samples = 0;
+        }
         let cells = self.tracer.cells().filter(|_| self.is_in_air());
         let cell = cells.map(|cells| cells.cell_in_medium(position));
         let distribution = self.tracer.distribution(cell);

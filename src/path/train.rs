@@ -80,7 +80,9 @@ impl TrainingVertex {
         let radiance = (path.radiance - self.radiance_before) / self.throughput;
         let times = known.map_or(1.0, |cache| {
             let known = cache.radiance_over_albedo(self.position, self.normal) * self.albedo;
-            (MOST_TIMES * luminance(known) / luminance(radiance)).min(1.0)
+            let most = MOST_TIMES * luminance(known);
+            // Where nothing was found, nothing is known.
+            if most > 0.0 { (most / luminance(radiance)).min(1.0) } else { 1.0 }
         });
         sums.add(self.position, self.normal, radiance * times, self.albedo);
     }

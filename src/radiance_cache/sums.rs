@@ -85,10 +85,12 @@ impl RadianceSums {
         let words = &self.words[slot * WORDS..][..WORDS];
         words[PARENT_AT].store(parent as u32 + 1, Ordering::Relaxed);
         words[COUNT_AT].fetch_add(1, Ordering::Relaxed);
+        let dice = dice(position);
         for channel in 0..3 {
-            let albedo = dithered(albedo[channel] * ALBEDO_ONE, ALBEDO_ONE);
+            let units = (albedo[channel] * ALBEDO_ONE).clamp(0.0, ALBEDO_ONE);
+            let albedo = units + unit_from_bits(hash(dice ^ channel as u32));
             words[ALBEDO_AT + channel].fetch_add(albedo as u32, Ordering::Relaxed);
-            let units = dithered(radiance[channel] * self.scale, MOST);
+            let units = dithered(radiance[channel] * self.scale);
             let (low, high) = (units as u32, (units >> 32) as u32);
             let at = RADIANCE_AT + 2 * channel;
             let carry = words[at].fetch_add(low, Ordering::Relaxed).checked_add(low).is_none();
@@ -214,8 +216,35 @@ impl Tally {
     }
 }
 
-/// A whole number near `value`, as often above as makes the mean right; at most `most`.
-fn dithered(value: f32, most: f32) -> u64 {
-    let value = value.clamp(0.0, most);
+/// Bits that differ from place to place, for what may be the same everywhere.
+fn dice(position: Vec3) -> u32 {
+    let [x, y, z] = position.to_array().map(f32::to_bits);
+    hash(x ^ hash(y ^ hash(z)))
+}
+
+/// A whole number near `value`, of which no two are alike, as often above as makes the mean right.
+fn dithered(value: f32) -> u64 {
+    let value = value.clamp(0.0, MOST);
     (value + unit_from_bits(hash(value.to_bits()))) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of surfaces without texture all estimates have the same albedo.
+    #[test]
+    fn an_albedo_between_two_units_is_right_in_the_mean() {
+        let cells = CacheCells { center: Vec3::ZERO, edge: 100.0, least_distance: 100.0 };
+        for albedo in [0.005, 0.01, 0.03, 0.05] {
+            let sums = RadianceSums::new(cells, 1.0);
+            for place in 0..4000 {
+                let position = Vec3::new(place as f32 * 1e-3, 1.0, 1.0);
+                sums.add(position, Vec3::Y, Vec3::splat(0.5 * albedo), Vec3::splat(albedo));
+            }
+            let cache = sums.cache().expect("there is room");
+            let known = cache.radiance_over_albedo(Vec3::ONE, Vec3::Y);
+            assert!((known - 0.5).abs().max_element() < 0.01, "{albedo}: {known}");
+        }
+    }
 }

@@ -39,7 +39,9 @@ const EDGE: f32 = 0.025;
 /// A radiance cache in the making. It outlives the picture, for it lies in the world.
 pub(crate) struct CacheTraining {
     sums: RadianceSums,
-    /// Paths that have trained it, and that are to have before the next pass.
+    /// The first path of those that have trained it: what bounds them was found by others.
+    first: u64,
+    /// How many have, and how many are to have before the next pass.
     paths: u64,
     wanted: u64,
     /// Until others have trained it, what a few have found.
@@ -66,7 +68,7 @@ impl CacheTraining {
         }
         let cells = CacheCells { center: rays.position(), edge, least_distance: 0.5 * distance };
         let sums = RadianceSums::new(cells, brightest);
-        Some(Self { sums, paths: 0, wanted: 0, cache: None, brightest })
+        Some(Self { sums, first: 0, paths: 0, wanted: 0, cache: None, brightest })
     }
 
     /// Decides how many paths are to have trained it before the next pass, which is about every `every`-th
@@ -86,7 +88,7 @@ impl CacheTraining {
 
     /// Paths that are to train next; `None` if enough have.
     pub(super) fn next(&self) -> Option<Range<u64>> {
-        let paths = self.paths..self.end();
+        let paths = self.first + self.paths..self.first + self.end();
         (!paths.is_empty()).then_some(paths)
     }
 
@@ -99,11 +101,11 @@ impl CacheTraining {
         &self.sums
     }
 
-    /// Takes note that paths up to this one have trained. After the last of them there is a new cache; if
+    /// Takes note that paths up to this one of [`Self::next`] have trained. After the last of them there is a new cache; if
     /// the table has no room for so many cells, they begin anew with larger ones.
-    pub(super) fn advance(&mut self, paths: u64) {
-        self.paths = paths;
-        if paths < self.end() {
+    pub(super) fn advance(&mut self, path: u64) {
+        self.paths = path - self.first;
+        if self.paths < self.end() {
             return;
         }
         let cells = *self.sums.cells();
@@ -116,6 +118,7 @@ impl CacheTraining {
         };
         if let Some(cells) = cells {
             self.sums = RadianceSums::new(cells, self.brightest);
+            self.first += self.paths;
             self.paths = 0;
         }
         self.cache = cache;

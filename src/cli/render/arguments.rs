@@ -156,7 +156,7 @@ pub(in crate::cli) struct RenderArguments {
     #[arg(long, default_value = "16x8", value_parser = tile_grid, allow_hyphen_values = true, value_name = "CxR", help_heading = "Light")]
     pub(super) tiles: (u32, u32),
     /// Light Grid cells around the horizon; half as many from top to bottom.
-    #[arg(long, default_value = "64", value_parser = values::whole::<u32>(2..=512), value_name = "N", help_heading = "Light")]
+    #[arg(long, default_value = "64", value_parser = values::whole::<u32>(2..=256), value_name = "N", help_heading = "Light")]
     pub(super) grid: u32,
     /// Camera paths to learn from before rendering, which goes on learning; without it, as many as
     /// suit the picture.
