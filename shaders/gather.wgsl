@@ -20,9 +20,11 @@ struct Arriving {
 fn light_of_map(path: ptr<function, Path>, vertex: Vertex, bits: vec2u) -> Arriving {
     var arriving: Arriving;
 //#if MEDIUM
+//#if SOLID_TRANSMISSION
     if vertex.distribution == NO_ARRAY {
         return arriving;
     }
+//#end
 //#end
     let choice = choose_tile(vertex.distribution, bits, globals.whole_map_share);
     let sample = sample_in_tile(choice.tile, vec2u(choice.remainder, bits.y));

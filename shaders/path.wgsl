@@ -294,10 +294,12 @@ fn escape(path: ptr<function, Path>) {
     if (*path).departure_pdf_solid_angle < F32_MAX {
         let seen = radiance_and_tile_pdf(direction);
 //#if MEDIUM
+//#if SOLID_TRANSMISSION
         if (*path).departure_distribution == NO_ARRAY {
             (*path).radiance += (*path).throughput * seen.radiance;
             return;
         }
+//#end
 //#end
         var nee = choice_probability((*path).departure_distribution, seen.tile) * seen.pdf_solid_angle;
 //#if SHARING

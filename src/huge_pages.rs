@@ -29,7 +29,8 @@ const WORTHWHILE_BYTES: usize = 4 << 20;
 /// Asks for huge pages behind memory that has not been touched yet.
 #[cfg(target_os = "linux")]
 fn advise<T>(memory: &mut Vec<T>) {
-    const PAGE: usize = 4096;
+    // As large as pages are anywhere.
+    const PAGE: usize = 1 << 16;
     let start = (memory.as_mut_ptr() as usize).next_multiple_of(PAGE);
     let end = memory.as_mut_ptr() as usize + memory.capacity() * size_of::<T>();
     if end > start {

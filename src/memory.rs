@@ -1,6 +1,8 @@
 //! Asking for memory before taking it: a program that is refused memory ends, one that asks can say so.
 
 use std::cell::Cell;
+#[cfg(target_os = "linux")]
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use crate::error::Decoded;
@@ -152,10 +154,22 @@ fn address_space() -> Option<u64> {
     Some(limit.saturating_sub(kilobytes("/proc/self/status", "VmSize:")?))
 }
 
-/// What a container's limit leaves; pages of files that were read do not count, for they go first.
+/// What the limits of a container, a batch system or a service leave: those of this process' own group and of all
+/// that it is in.
 #[cfg(target_os = "linux")]
 fn control_group() -> Option<u64> {
-    let read = |name| std::fs::read_to_string(format!("/sys/fs/cgroup/{name}")).ok();
+    const ALL: &str = "/sys/fs/cgroup";
+    let own = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+    let own = own.lines().find_map(|line| line.strip_prefix("0::/")).unwrap_or_default();
+    let own = Path::new(ALL).join(own);
+    let groups = own.ancestors().take_while(|group| group.starts_with(ALL));
+    groups.filter_map(left_in_group).min()
+}
+
+/// What is left in one; pages of files that were read do not count, for they go first.
+#[cfg(target_os = "linux")]
+fn left_in_group(group: &Path) -> Option<u64> {
+    let read = |name| std::fs::read_to_string(group.join(name)).ok();
     let number = |name| read(name)?.trim().parse::<u64>().ok();
     let (limit, used) = (number("memory.max")?, number("memory.current")?);
     let files = read("memory.stat")?;

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::environment::sky;
 use crate::error::{Error, Notices, Result};
 use crate::image::Image;
-use crate::image::{looks_like_picture, looks_like_scene, open_file, read_map, sanitise};
+use crate::image::{looks_like_picture, looks_like_scene, open_file, read_map};
 use crate::memory;
 use crate::scene::{Scene, SceneOptions, builtin, gltf};
 
@@ -121,9 +121,7 @@ pub fn map(name: &str) -> Result<(Image, Notices)> {
     if let Some(rest) = name.strip_prefix("sky:") {
         return Ok((built_in_sky(name, rest)?, Notices::default()));
     }
-    let mut loaded = read_map(Path::new(name))?;
-    let repaired = sanitise(&mut loaded.image);
-    loaded.notices.extend(&repaired);
+    let loaded = read_map(Path::new(name))?;
     // The tables made of it take as much again.
     let bytes = loaded.image.pixels.len() * size_of::<[f32; 3]>();
     memory::check(bytes as u64).map_err(|cause| Error::at(name, cause))?;

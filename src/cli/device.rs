@@ -68,24 +68,42 @@ pub(super) fn open(
     }
 }
 
-/// Starts the session on the GPU, or on the CPU if there is none or, with `auto`, if it does not fit.
+/// Puts scene and map on the GPU, for any number of pictures; `None` if there is none or, with `auto`, if they
+/// do not fit.
+pub(super) fn upload(
+    choice: DeviceChoice,
+    gpu: Option<Gpu>,
+    (world, environment): (&World, &Environment),
+    notices: &mut Notices,
+) -> Result<Option<UploadedScene>> {
+    let uploaded = gpu.map(|gpu| UploadedScene::new(&gpu, world, environment)).transpose();
+    or_without(choice, uploaded, notices)
+}
+
+/// Starts the session on the GPU, or on the CPU if nothing is there or, with `auto`, if the picture does not fit.
 pub(super) fn start<'a>(
     choice: DeviceChoice,
-    gpu: Option<&Gpu>,
-    world: &'a World,
-    environment: &'a Environment,
+    uploaded: Option<&UploadedScene>,
+    (world, environment): (&'a World, &'a Environment),
     view: View,
     notices: &mut Notices,
 ) -> Result<Session<'a>> {
-    let Some(gpu) = gpu else { return Ok(Session::new(world, environment, view)) };
-    let on_gpu = UploadedScene::new(gpu, world, environment)
-        .and_then(|uploaded| Session::on_gpu(world, environment, view.clone(), &uploaded));
-    match on_gpu {
-        Ok(session) => Ok(session),
+    let on_gpu = uploaded.map(|on| Session::on_gpu(world, environment, view.clone(), on));
+    let session = or_without(choice, on_gpu.transpose(), notices)?;
+    Ok(session.unwrap_or_else(|| Session::new(world, environment, view)))
+}
+
+/// With `auto` the CPU renders what a GPU cannot.
+fn or_without<T>(
+    choice: DeviceChoice,
+    outcome: Result<Option<T>>,
+    notices: &mut Notices,
+) -> Result<Option<T>> {
+    match outcome {
         Err(failure) if choice == DeviceChoice::Auto => {
             say(notices, format!("{failure}; the CPU renders"));
-            Ok(Session::new(world, environment, view))
+            Ok(None)
         }
-        Err(failure) => Err(failure),
+        outcome => outcome,
     }
 }

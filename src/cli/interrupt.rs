@@ -1,8 +1,9 @@
 //! Ctrl-C, requests to end and closed terminals: at once while there is nothing to keep, then once to finish early and
 //! keep what is done, twice to leave at once. A closed terminal is no hurry: its shell may say so again.
 
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -20,6 +21,8 @@ pub(super) struct Interrupt {
     /// Whether it was a signal that asked.
     signalled: Arc<AtomicBool>,
     has_work: Arc<AtomicBool>,
+    /// Where frames are that are to become a video.
+    frames: Arc<Mutex<Option<PathBuf>>>,
 }
 
 impl Interrupt {
@@ -29,13 +32,14 @@ impl Interrupt {
         let caught = Arc::new(AtomicUsize::new(0));
         let register = |signal| register_usize(signal, Arc::clone(&caught), signal as usize);
         let flags = [&asked, &signalled, &has_work].map(Arc::clone);
-        let inside = (flags, Arc::clone(&caught));
+        let frames = Arc::<Mutex<Option<PathBuf>>>::default();
+        let inside = (flags, Arc::clone(&caught), Arc::clone(&frames));
         let hang_up = hang_up();
         let mut signals = [SIGINT, SIGTERM].into_iter().chain(hang_up);
         let watching = signals.try_for_each(|s| register(s).map(|_| ()));
         let watching = watching.and_then(|()| {
             std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
-                let ([asked, signalled, has_work], caught) = inside;
+                let ([asked, signalled, has_work], caught, frames) = inside;
                 let mut was_asked = false;
                 loop {
                     std::thread::sleep(LOOK_EVERY);
@@ -49,6 +53,14 @@ impl Interrupt {
                             tell("lightgrid: interrupted before there was anything to keep");
                         }
                         remove_unfinished();
+                        let frames = frames.lock().unwrap_or_else(PoisonError::into_inner).take();
+                        match frames.filter(|folder| folder.exists()) {
+                            Some(folder) if was_asked => {
+                                tell(format_args!("the frames are kept in {}", folder.display()));
+                            }
+                            Some(folder) => drop(std::fs::remove_dir_all(folder)),
+                            None => {}
+                        }
                         std::process::exit(128 + signal as i32);
                     }
                     was_asked = true;
@@ -62,12 +74,18 @@ impl Interrupt {
         if watching.is_err() {
             notice("Ctrl-C cannot be caught here and will end the process at once");
         }
-        Self { asked, signalled, has_work }
+        Self { asked, signalled, has_work, frames }
     }
 
     /// From now on there is something to keep.
     pub(super) fn keep(&self) {
         self.has_work.store(true, Ordering::Relaxed);
+    }
+
+    /// Frames of a video come into this folder: it goes with them, or is named, should the process be left at once.
+    pub(super) fn has_frames_in(&self, folder: &Path) {
+        let mut frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
+        *frames = Some(folder.to_owned());
     }
 
     /// Becomes true when the work is to end early. Others may set it, too.

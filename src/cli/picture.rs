@@ -93,15 +93,15 @@ impl PictureArguments {
         self.is_denoised(pictures) || self.layers.iter().any(is_surface)
     }
 
-    /// The exposure that a film's picture gets, to be that of others, too.
-    pub(super) fn exposure_of(&self, film: &Film) -> Exposure {
-        match self.exposure {
-            Exposure::Stops(stops) => Exposure::Stops(stops),
-            Exposure::Auto => {
-                let image = self.white.unwrap_or_default().apply(film.without_gaps().image());
-                Exposure::Stops(self.exposure.of(film, &image))
-            }
-        }
+    /// Takes the exposure of a film's picture, to be that of others, too; where noise cannot be taken out, there
+    /// is no picture that has one.
+    pub(super) fn take_exposure(&mut self, film: &Film) {
+        self.exposure = output::exposure_of(&self.options(), film).unwrap_or(self.exposure);
+    }
+
+    /// The exposure of its pictures.
+    pub(super) fn exposure(&self) -> Exposure {
+        self.exposure
     }
 
     /// Takes this exposure.

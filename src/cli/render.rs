@@ -22,7 +22,7 @@ use crate::output::record::{Phases, Record};
 use crate::output::{self, Exposure};
 use crate::path::World;
 use crate::render::film::Film;
-use crate::render::gpu::{DeviceChoice, Gpu};
+use crate::render::gpu::{DeviceChoice, UploadedScene};
 use crate::render::{Figures, Session};
 use crate::scene::Camera;
 use crate::terminal::notice;
@@ -30,10 +30,12 @@ pub(super) use arguments::RenderArguments;
 use assignment::Assignment;
 use frames::{Frames, Reel};
 
-/// Bytes of a pixel in the film, and in what is made of it to be written.
-const BYTES_OF_PIXEL: [u64; 2] = [40, 40];
+/// Bytes of a pixel in the film, those by which noise is told among them, and in what is made of it to be written.
+const BYTES_OF_PIXEL: [u64; 2] = [56, 40];
 /// The same with layers.
-const BYTES_WITH_LAYERS: [u64; 2] = [104, 72];
+const BYTES_WITH_LAYERS: [u64; 2] = [120, 72];
+/// What takes noise out of a film with layers, or makes a part of it, takes.
+const BYTES_OF_COPY: u64 = 136;
 
 /// Bytes that encoders take for themselves.
 const BYTES_OF_ENCODERS: u64 = 8 << 20;
@@ -71,7 +73,9 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
         (arguments.rays, arguments.schedule),
         &mut notices,
     )?;
-    let job = Job { world: &world, environment: &environment, phases, notices, gpu, interrupt };
+    let uploaded = device::upload(arguments.device, gpu, (&world, &environment), &mut notices)?;
+    let job =
+        Job { world: &world, environment: &environment, phases, notices, uploaded, interrupt };
     match frames {
         None => {
             let progress = Progress::start("learning");
@@ -85,8 +89,13 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
 fn needed_bytes(arguments: &RenderArguments) -> [u64; 2] {
     let [width, height] = arguments.size();
     let has_layers = arguments.wants_surfaces();
-    let of_pixel = if has_layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
-    let [film, writing] = of_pixel.map(|bytes| u64::from(width) * u64::from(height) * bytes);
+    let [film, mut writing] = if has_layers { BYTES_WITH_LAYERS } else { BYTES_OF_PIXEL };
+    if has_layers
+        && (arguments.part.is_some() || arguments.picture.is_denoised(arguments.pictures()))
+    {
+        writing = BYTES_OF_COPY;
+    }
+    let [film, writing] = [film, writing].map(|bytes| u64::from(width) * u64::from(height) * bytes);
     [film, writing + BYTES_OF_ENCODERS + rayon::current_num_threads() as u64 * STACK_BYTES]
 }
 
@@ -108,7 +117,7 @@ struct Job<'a> {
     environment: &'a Environment,
     phases: Phases,
     notices: Notices,
-    gpu: Option<Gpu>,
+    uploaded: Option<UploadedScene>,
     interrupt: Interrupt,
 }
 
@@ -131,9 +140,9 @@ impl Job<'_> {
         let rule = arguments.stop_rule();
         let mut assignment = Assignment::open(arguments, rule, (world, environment), &view)?;
         assignment.say(&mut notices);
-        let gpu = self.gpu.as_ref();
+        let uploaded = self.uploaded.as_ref();
         let mut session =
-            device::start(arguments.device, gpu, world, environment, view, &mut notices)?;
+            device::start(arguments.device, uploaded, (world, environment), view, &mut notices)?;
         let (nothing, not_yet) = (Film::new(0, 0, false), Figures::default());
         let record = self.record(arguments, &session, (&nothing, &not_yet), &notices);
         assignment.set_metadata(record.metadata());
@@ -155,6 +164,17 @@ impl Job<'_> {
         let remarks = output::remarks(&film, environment);
         remarks.iter().for_each(|sentence| notices.add(sentence));
 
+        let of_frame;
+        let arguments = match &known {
+            // What the first frame has is what all have.
+            Some(_) => {
+                let mut frame = arguments.clone();
+                frame.picture.take_exposure(&film);
+                of_frame = frame;
+                &of_frame
+            }
+            None => arguments,
+        };
         let figures = session.figures();
         let record = self.record(arguments, &session, (&film, &figures), &notices);
         let mut failures = outputs::write(arguments, &assignment, &record, session.grid());
@@ -167,7 +187,7 @@ impl Job<'_> {
             return Error::all(failures).map(|()| Vec::new());
         }
         if let Some(known) = known {
-            known.exposure = Some(arguments.picture.exposure_of(&film));
+            known.exposure = Some(arguments.picture.exposure());
             known.counted = session.counters().map(LearningGrid::snapshot);
         }
         Ok(failures)
@@ -208,6 +228,7 @@ impl Job<'_> {
         let (videos, pictures): (Vec<_>, Vec<_>) =
             arguments.outputs.iter().partition(|path| frames::is_video(path));
         let mut reel = if videos.is_empty() { None } else { Some(Reel::new()?) };
+        reel.iter().for_each(|reel| self.interrupt.has_frames_in(reel.folder()));
         let mut failures = Vec::new();
         let mut known = Known::default();
         let mut progress = Progress::start("");
@@ -235,9 +256,14 @@ impl Job<'_> {
             }
         }
         // What there is of them, should a frame have failed.
-        let reel = reel.as_ref().filter(|reel| reel.has_frames());
-        let write = |video: &PathBuf| reel.and_then(|reel| reel.write(video, arguments.fps).err());
-        failures.extend(videos.into_iter().filter_map(write));
+        if let Some(reel) = reel.filter(Reel::has_frames) {
+            let write = |video: &PathBuf| reel.write(video, arguments.fps).err();
+            let unwritten: Vec<Error> = videos.into_iter().filter_map(write).collect();
+            if !unwritten.is_empty() {
+                notice(format_args!("the frames are kept in {}", reel.keep().display()));
+            }
+            failures.extend(unwritten);
+        }
         Error::all(failures)
     }
 }

@@ -10,6 +10,7 @@ use crate::app::document::{Document, PictureSize};
 use crate::app::settings_file::Settings;
 use crate::app::window;
 use crate::error::Result;
+use crate::memory;
 use crate::render::gpu::{DeviceChoice, RayChoice};
 use crate::render::{Sampling, StopRule};
 use crate::scene::builtin;
@@ -96,6 +97,8 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
             let error = error.to_string();
             let error = error.trim_end_matches('.');
             tell(format_args!("lightgrid: {error}; rendering into {picture} instead"));
+            // As every other command does.
+            memory::refusal_ends();
             super::render::run(&headless(arguments)?)
         }
     }

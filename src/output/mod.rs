@@ -135,34 +135,52 @@ pub fn write_picture(
     mut metadata: Vec<(String, String)>,
 ) -> Result<()> {
     check_extension(path)?;
-    let whole = film.without_gaps();
-    let image = whole.image();
     if holds_layers(path) {
-        let layers = layers(film, &whole, &options.layers);
-        return write_exr(
-            path,
-            ExrPicture { image: &image, layers, metadata: &metadata, preview: None },
-        );
+        let whole = film.without_gaps();
+        let (image, layers) = (whole.image(), layers(film, &whole, &options.layers));
+        let picture = ExrPicture { image: &image, layers, metadata: &metadata, preview: None };
+        return write_exr(path, picture);
     }
-    // Filters would take the copies that fill gaps for samples that agree.
-    let filter = options.denoiser.filter(|_| film.min_samples() > 0);
-    let image = match (filter, options.denoiser) {
-        (Some(filter), _) => filter.denoise(&whole, None)?,
-        (None, Some(_)) => blend(film, None),
-        (None, None) => image,
-    };
-    let image = options.white_balance.apply(image);
+    let image = balanced(options, film)?;
     let stops = options.exposure.of(film, &image);
     metadata.push(("lightgrid.exposure_ev".to_owned(), format!("{stops:.3}")));
     if options.white_balance != WhiteBalance::default() {
         let WhiteBalance { kelvin, tint } = options.white_balance;
         metadata.push(("lightgrid.white_balance".to_owned(), format!("{kelvin},{tint}")));
     }
-    if let Some(filter) = filter {
+    if let Some(filter) = options.filter_of(film) {
         metadata.push(("lightgrid.denoiser".to_owned(), filter.name().to_owned()));
     }
     metadata.push(("lightgrid.tonemap".to_owned(), options.tone_curve.name().to_owned()));
     write_png(path, &display_rgb8(&image, stops, options.tone_curve), &metadata)
+}
+
+/// The exposure of a film's picture, for that of others, too.
+///
+/// # Errors
+/// If its noise cannot be taken out.
+pub fn exposure_of(options: &PictureOptions, film: &Film) -> Result<Exposure> {
+    Ok(match options.exposure {
+        Exposure::Auto => Exposure::Stops(options.exposure.of(film, &balanced(options, film)?)),
+        Exposure::Stops(stops) => Exposure::Stops(stops),
+    })
+}
+
+/// The film's picture under the light that looks white, without noise if that is asked for.
+fn balanced(options: &PictureOptions, film: &Film) -> Result<Image> {
+    let image = match (options.filter_of(film), options.denoiser) {
+        (Some(filter), _) => filter.denoise(&film.without_gaps(), None)?,
+        (None, Some(_)) => blend(film, None),
+        (None, None) => film.without_gaps().image(),
+    };
+    Ok(options.white_balance.apply(image))
+}
+
+impl PictureOptions {
+    /// What takes noise out of a film: filters would take the copies that fill gaps for samples that agree.
+    fn filter_of(&self, film: &Film) -> Option<Denoiser> {
+        self.denoiser.filter(|_| film.min_samples() > 0)
+    }
 }
 
 /// What surfaces look like is that of the film without gaps.

@@ -302,18 +302,22 @@ impl Film {
     /// Mean luminance of every pixel and those around it. What a pixel's error is measured against must
     /// not be its own mean: a lone bright sample raises both, and would hide.
     pub(crate) fn luminance_around(&self) -> Vec<f64> {
+        (0..self.pixels.len())
+            .into_par_iter()
+            .map(|index| self.luminance_around_one(index))
+            .collect()
+    }
+
+    fn luminance_around_one(&self, index: usize) -> f64 {
         let (width, height) = (self.width as usize, self.height as usize);
-        let mean = |index: usize| {
-            let (x, y) = (index % width, index / width);
-            let rows = y.saturating_sub(1)..(y + 2).min(height);
-            let columns = x.saturating_sub(1)..(x + 2).min(width);
-            let count = (rows.len() * columns.len()) as f64;
-            rows.flat_map(|row| &self.pixels[row * width..][columns.clone()])
-                .map(Pixel::mean_luminance)
-                .sum::<f64>()
-                / count
-        };
-        (0..self.pixels.len()).into_par_iter().map(mean).collect()
+        let (x, y) = (index % width, index / width);
+        let rows = y.saturating_sub(1)..(y + 2).min(height);
+        let columns = x.saturating_sub(1)..(x + 2).min(width);
+        let count = (rows.len() * columns.len()) as f64;
+        rows.flat_map(|row| &self.pixels[row * width..][columns.clone()])
+            .map(Pixel::mean_luminance)
+            .sum::<f64>()
+            / count
     }
 
     /// Estimated root of the trimmed relative mean squared error of the picture: the root of the mean over
@@ -324,18 +328,19 @@ impl Film {
     /// It is an estimate from the samples' own spread: conservative for low-discrepancy samples,
     /// blind to light no sample has met yet. Infinite below two samples a pixel.
     pub fn noise(&self) -> f64 {
-        let pixels = self.pixels.iter().zip(self.error_scales());
+        let pixels = self.pixels.iter().zip(self.error_scales(1));
         let relative = |(pixel, scale): (&Pixel, f64)| relative(pixel.variance_of_mean(), scale);
         trimmed_mean(&mut pixels.map(relative).collect::<Vec<_>>()).sqrt()
     }
 
-    /// By what squared errors of pixels are divided: `luminance^2 + 0.01 mean_luminance^2`, with the luminance
-    /// of the pixel and those around it.
-    pub(super) fn error_scales(&self) -> impl Iterator<Item = f64> {
+    /// By what squared errors of every `stride`-th pixel are divided: `luminance^2 + 0.01 mean_luminance^2`, with
+    /// the luminance of the pixel and those around it.
+    pub(super) fn error_scales(&self, stride: usize) -> Vec<f64> {
         let count = self.pixels.len() as f64;
         let mean = self.pixels.iter().map(Pixel::mean_luminance).sum::<f64>() / count;
         let floor = REL_MSE_EPSILON * mean * mean;
-        self.luminance_around().into_iter().map(move |light| light.powi(2) + floor)
+        let scale = |index| self.luminance_around_one(index).powi(2) + floor;
+        (0..self.pixels.len()).into_par_iter().step_by(stride).map(scale).collect()
     }
 
     /// Albedo, normal and depth of each pixel; `None` unless layers were asked for. Where nothing

@@ -139,6 +139,11 @@ fn a_picture_of_a_checkpoint_says_what_it_is_of() {
     let output = bench.render("--spp 2 --checkpoint c.film -o a.exr --seed 77");
     let says = text(&output.stderr);
     assert!(says.contains("goes on from 3 samples a pixel, which is more than is asked"), "{says}");
+    // Nothing was learned for that, and nothing is forgotten by it.
+    bench.render("--spp 6 --checkpoint c.film -o a.exr --seed 77 --json a.json");
+    let file = fs::read(bench.path("a.json")).expect("written");
+    let record = serde_json::from_slice::<serde_json::Value>(&file).expect("JSON");
+    assert!(record["session"]["learned_cells"].as_u64() > Some(0), "{}", record["session"]);
 }
 
 #[cfg(unix)]
@@ -323,6 +328,57 @@ fn videos_need_ffmpeg_and_say_so() {
     assert_eq!(&start("a.mp4")[4..8], b"ftyp");
     assert_eq!(&start("b.gif")[..6], b"GIF89a");
     assert_eq!(&start("c.webm")[..4], [0x1a, 0x45, 0xdf, 0xa3]);
+}
+
+/// ffmpeg as a script that fails where it says.
+#[cfg(unix)]
+fn with_ffmpeg(bench: &Bench, script: &str, line: &str) -> std::process::Output {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = bench.path("bin");
+    fs::create_dir_all(&folder).expect("made");
+    let program = folder.join("ffmpeg");
+    fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("written");
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("allowed");
+    fs::create_dir_all(bench.path("tmp")).expect("made");
+    let path = std::env::var("PATH").unwrap_or_default();
+    let mut command = bench.command(&render_line(line));
+    command.env("PATH", format!("{}:{path}", folder.display())).env("TMPDIR", bench.path("tmp"));
+    command.output().expect("the binary starts")
+}
+
+/// Frames take hours: whatever becomes of their video, they are there.
+#[cfg(unix)]
+#[test]
+fn frames_of_a_video_that_cannot_be_made_are_kept() {
+    let bench = Bench::new();
+    let line = "--turntable 2 -o a.mp4 --size 32x18 --device cpu";
+    let cannot = with_ffmpeg(&bench, "echo 'Unknown encoder libx264' >&2; exit 1", line);
+    let says = text(&cannot.stderr);
+    assert!(says.contains("a.mp4: ffmpeg cannot make it: Unknown encoder libx264"), "{says}");
+    let fails_later =
+        "case \"$*\" in *null*) cat > /dev/null ;; *) echo 'no space' >&2; exit 1 ;; esac";
+    let fails = with_ffmpeg(&bench, fails_later, line);
+    let says = text(&fails.stderr);
+    assert_eq!(fails.status.code(), Some(1), "{says}");
+    assert!(says.contains("a.mp4: ffmpeg failed: no space"), "{says}");
+    let folder = says.lines().find_map(|line| Some(line.split_once("the frames are kept in ")?.1));
+    let folder = std::path::Path::new(folder.expect("it says where"));
+    let frames = fs::read_dir(folder).expect("it is there").flatten();
+    let frames = frames.filter(|file| file.path().extension().is_some_and(|end| end == "png"));
+    assert_eq!(frames.count(), 2, "{says}");
+}
+
+/// The automatic exposure of the first frame is that of all, without noise, too.
+#[test]
+fn all_frames_have_one_exposure() {
+    let bench = Bench::new();
+    bench.render("--turntable 3 --denoise -o f.#.png --size 40x24 --device cpu");
+    let exposure = |frame: u32| {
+        let file = fs::read(bench.path(&format!("f.{frame}.png"))).expect("written");
+        let at = file.windows(21).position(|bytes| bytes == b"lightgrid.exposure_ev");
+        file[at.expect("it is said")..][22..].iter().copied().take(6).collect::<Vec<_>>()
+    };
+    assert_eq!([exposure(1), exposure(2)], [exposure(0), exposure(0)]);
 }
 
 #[test]

@@ -517,10 +517,17 @@ fn short_memory_of_any_size_is_a_sentence_or_a_picture() {
 #[test]
 fn a_finished_picture_is_not_lost_for_want_of_memory() {
     let bench = Bench::new();
-    let line = format!("{QUICK} --size 1200x800 --layers all --threads 2 -o a.png -o b.exr");
+    for picture in ["--layers all", "--denoise"] {
+        of_two_pictures_both_or_none(&bench, picture);
+    }
+}
+
+#[cfg(target_os = "linux")]
+fn of_two_pictures_both_or_none(bench: &Bench, picture: &str) {
+    let line = format!("{QUICK} --size 1200x800 {picture} --threads 2 -o a.png -o b.exr");
     let (mut refused, mut written) = (0, 0);
     for kilobytes in (200_000..2_000_000).step_by(20_000) {
-        let output = with_memory(&bench, kilobytes, &line);
+        let output = with_memory(bench, kilobytes, &line);
         let says = text(&output.stderr);
         let are_there = ["a.png", "b.exr"].map(|name| fs::remove_file(bench.path(name)).is_ok());
         assert_eq!(are_there, [output.status.success(); 2], "{kilobytes}: {says}");

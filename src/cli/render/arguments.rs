@@ -284,7 +284,7 @@ impl RenderArguments {
         self.picture.wants_surfaces(self.pictures())
     }
 
-    fn pictures(&self) -> impl Iterator<Item = &PathBuf> {
+    pub(super) fn pictures(&self) -> impl Iterator<Item = &PathBuf> {
         self.outputs.iter().chain(&self.frame_of_video)
     }
 

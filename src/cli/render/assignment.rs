@@ -326,6 +326,8 @@ impl Assignment {
         let kept = self.checkpoint.as_ref().filter(|_| session.has_final_distributions());
         let due = kept.and_then(|kept| kept.written.checked_add(kept.every));
         if due.is_some_and(|due| due <= Instant::now()) {
+            // A late one would be taken for a person's wish to end.
+            alarm.set(None);
             if let Err(failure) = self.keep(session) {
                 say(notices, failure.to_string());
             }

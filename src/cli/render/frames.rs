@@ -1,7 +1,7 @@
 //! Many pictures by one command: a camera that moves, one picture a frame, or a video of them.
 
 use std::fs;
-use std::io;
+use std::io::{self, Write as _};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -158,20 +158,44 @@ pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
                 format!("frames need a number in their names, as {name}.####.{extension} has"),
             ));
         }
-        if is_video(path) && !has_ffmpeg() {
-            return Err(Error::at(
-                path,
-                "ffmpeg, which makes videos, is not found: install it, or ask for .####.png",
-            ));
+        if let Some(codec) = codec(path) {
+            try_ffmpeg(codec).map_err(|cause| Error::at(path, cause))?;
+        }
+        if has_number && path.file_name().is_some_and(|name| name.to_str().is_none()) {
+            return Err(Error::at(path, "its name is not Unicode: no number can be put into it"));
         }
     }
     Ok(())
 }
 
-fn has_ffmpeg() -> bool {
-    let mut version = Command::new("ffmpeg");
-    version.arg("-version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    version.status().is_ok_and(|status| status.success())
+/// Makes a video of one black frame and throws it away: hours of rendering are not to find that ffmpeg cannot.
+fn try_ffmpeg(codec: &[&str]) -> std::result::Result<(), String> {
+    const SIDE: usize = 64;
+    let cannot = |cause: &dyn std::fmt::Display| format!("ffmpeg cannot make it: {cause}");
+    let child = Command::new("ffmpeg")
+        .args(["-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"])
+        .args(["-s", &format!("{SIDE}x{SIDE}"), "-i", "-"])
+        .args(codec)
+        .args(["-f", "null", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn();
+    let mut child = child.map_err(|_| {
+        "ffmpeg, which makes videos, is not found: install it, or ask for .####.png".to_owned()
+    })?;
+    if let Some(mut input) = child.stdin.take() {
+        // One that refuses reads nothing.
+        let _ = input.write_all(&[0; 3 * SIDE * SIDE]);
+    }
+    let output = child.wait_with_output().map_err(|error| cannot(&error))?;
+    if output.status.success() { Ok(()) } else { Err(cannot(&said(&output.stderr))) }
+}
+
+/// The last line of what a program says.
+fn said(text: &[u8]) -> String {
+    let text = String::from_utf8_lossy(text);
+    text.lines().last().unwrap_or("no reason given").to_owned()
 }
 
 /// A folder for the frames of a video, gone when this value is.
@@ -192,6 +216,11 @@ impl Reel {
         Ok(Self { folder, count: 0 })
     }
 
+    /// Where they are.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// Where the next frame is to be written: in the place of the last if that could not be, for videos are
     /// made of frames without gaps.
     pub(super) fn next(&mut self) -> PathBuf {
@@ -210,26 +239,37 @@ impl Reel {
         self.frame(0).exists()
     }
 
+    /// Leaves the frames where they are; there.
+    pub(super) fn keep(mut self) -> PathBuf {
+        std::mem::take(&mut self.folder)
+    }
+
     /// Makes a video of the frames.
     ///
     /// # Errors
     /// If ffmpeg fails or the file cannot be written.
     pub(super) fn write(&self, path: &Path, frames_per_second: f64) -> Result<()> {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
-        let made = self.folder.join(format!("video.{extension}"));
-        let output = Command::new("ffmpeg")
-            .args(["-y", "-v", "error", "-framerate", &frames_per_second.to_string(), "-i"])
-            .arg(self.folder.join("%08d.png"))
+        let made = format!("video.{extension}");
+        let mut command = Command::new("ffmpeg");
+        command
+            .args(["-y", "-v", "error", "-framerate", &frames_per_second.to_string()])
+            .args(["-i", "%08d.png"])
             .args(codec(path).unwrap_or_default())
             .arg(&made)
-            .stdin(Stdio::null())
-            .output()
-            .map_err(|e| Error::at(path, format!("ffmpeg cannot be started: {e}")))?;
+            // Names of folders may have what it would take for numbers.
+            .current_dir(&self.folder)
+            .stdin(Stdio::null());
+        // Ctrl-C ends the rendering, not the video of what there is.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let output = command.output();
+        let output =
+            output.map_err(|e| Error::at(path, format!("ffmpeg cannot be started: {e}")))?;
         if !output.status.success() {
-            let says = String::from_utf8_lossy(&output.stderr);
-            let cause = says.lines().last().unwrap_or("no reason given");
-            return Err(Error::at(path, format!("ffmpeg failed: {cause}")));
+            return Err(Error::at(path, format!("ffmpeg failed: {}", said(&output.stderr))));
         }
+        let made = self.folder.join(made);
         write_beside_and_rename(path, |file| {
             io::copy(&mut fs::File::open(&made)?, file).map(|_| ())
         })?;
@@ -240,7 +280,10 @@ impl Reel {
 
 impl Drop for Reel {
     fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.folder);
+        // Kept, it is no longer this value's.
+        if !self.folder.as_os_str().is_empty() {
+            let _ = fs::remove_dir_all(&self.folder);
+        }
     }
 }
 

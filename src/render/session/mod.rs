@@ -334,6 +334,8 @@ impl<'a> Session<'a> {
     pub(crate) fn add_figures(&mut self, before: &Figures) {
         let figures = &mut self.state.figures;
         figures.samples += before.samples;
+        // Paths that taught what it was made with, though nothing may have been learned again.
+        figures.learning_paths = figures.learning_paths.max(before.learning_paths);
         figures.rays += before.rays;
         figures.learning_rays += before.learning_rays;
         figures.learning_seconds += before.learning_seconds;
