@@ -8,11 +8,12 @@
 use criterion::{Criterion, criterion_group};
 
 mod bvh;
+mod denoise;
 mod efficiency;
 mod environment;
 mod path;
 
-criterion_group!(benches, bvh::bench, environment::bench, path::bench);
+criterion_group!(benches, bvh::bench, denoise::bench, environment::bench, path::bench);
 
 fn main() {
     if std::env::args().any(|argument| argument == "efficiency") {

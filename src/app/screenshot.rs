@@ -240,7 +240,7 @@ impl Canvas {
         let mut commands =
             renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);
         let view = self.target.create_view(&wgpu::TextureViewDescriptor::default());
-        let [r, g, b, a] = theme::BACKGROUND.to_normalized_gamma_f32().map(f64::from);
+        let [r, g, b, a] = theme::PANEL.to_normalized_gamma_f32().map(f64::from);
         {
             let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("window"),

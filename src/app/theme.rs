@@ -9,9 +9,9 @@ use egui::{
 };
 use glam::Vec3;
 
-/// Behind everything.
+/// Around the picture.
 pub(super) const BACKGROUND: Color32 = Color32::from_rgb(24, 25, 28);
-/// Panels.
+/// Panels. A frame begins with it, and they do not draw it: software is slow to fill what lies under all else.
 pub(super) const PANEL: Color32 = Color32::from_rgb(33, 34, 38);
 /// Fields and buttons.
 pub(super) const FIELD: Color32 = Color32::from_rgb(48, 50, 56);

@@ -349,7 +349,7 @@ impl Running {
             painter.paint_and_update_textures(
                 ViewportId::ROOT,
                 points,
-                theme::BACKGROUND.to_normalized_gamma_f32(),
+                theme::PANEL.to_normalized_gamma_f32(),
                 &primitives,
                 &mut output.textures_delta,
                 Vec::new(),

@@ -3,7 +3,6 @@
 use egui::{Align, Layout, Margin, Panel, ScrollArea, Ui};
 
 use crate::app::interface::{Dock, Interface, Tab};
-use crate::app::theme;
 
 /// Draws the tabs and what `content` draws for the chosen one; nothing when closed.
 pub(in crate::app) fn show(
@@ -14,7 +13,7 @@ pub(in crate::app) fn show(
     if interface.dock.is_none() && interface.tab != Tab::Inspect {
         return;
     }
-    let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 6));
+    let frame = egui::Frame::new().inner_margin(Margin::symmetric(12, 6));
     let Some(dock) = interface.dock else {
         // Of another name: panels remember how high they were.
         Panel::bottom("closed dock").frame(frame).show(ui, |ui| tabs(ui, interface));

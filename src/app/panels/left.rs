@@ -35,7 +35,7 @@ pub(in crate::app) fn show(
     sources: Sources<'_>,
     commands: &mut Vec<Command>,
 ) {
-    let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 8));
+    let frame = egui::Frame::new().inner_margin(Margin::symmetric(12, 8));
     let is_narrow = theme::is_narrow(ui);
     let width = if is_narrow { 258.0 } else { 286.0 };
     Panel::left("left").frame(frame).exact_size(width).show(ui, |ui| {

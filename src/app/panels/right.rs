@@ -18,7 +18,7 @@ pub(in crate::app) fn show(
     } else if has_scene && interface.is_material_new && interface.tab == Tab::Picture {
         interface.tab = Tab::Scene;
     }
-    let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 8));
+    let frame = egui::Frame::new().inner_margin(Margin::symmetric(12, 8));
     Panel::right("right").frame(frame).exact_size(300.0).show(ui, |ui| {
         ui.horizontal(|ui| {
             if has_scene {

@@ -23,7 +23,7 @@ pub(in crate::app) struct Status<'a> {
 
 /// Draws the line.
 pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
-    let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(12, 5));
+    let frame = egui::Frame::new().inner_margin(Margin::symmetric(12, 5));
     Panel::bottom("status").frame(frame).show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 18.0;

@@ -18,7 +18,7 @@ pub(in crate::app) fn show(
     is_on_gpu: bool,
     commands: &mut Vec<Command>,
 ) {
-    let frame = egui::Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(10, 7));
+    let frame = egui::Frame::new().inner_margin(Margin::symmetric(10, 7));
     Panel::top("top").frame(frame).show(ui, |ui| {
         let width = ui.ctx().content_rect().width();
         let is_tight = width < TIGHT;

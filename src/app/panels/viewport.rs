@@ -19,12 +19,12 @@ use crate::render::View;
 
 /// Draws the picture and takes gestures; the room it has.
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
-    // What is drawn on has the colour of the ground: software is slow to draw it once more.
     let panel = CentralPanel::default().frame(egui::Frame::new()).show(ui, |ui| {
         let area = ui.max_rect();
         measure(ui, area, scope);
         let response = ui.interact(area, ui.scope_id().with("picture"), Sense::click_and_drag());
         let Some((shown, settings)) = scope.shown.zip(scope.settings) else {
+            ui.painter().rect_filled(area, 0.0, theme::BACKGROUND);
             waiting(ui, area, scope.loading);
             return;
         };
@@ -39,6 +39,8 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
             }
         };
         let ground = if compared.is_some() { rect } else { whole };
+        let is_part = shown.order.snapshot.request.view.crop.is_some();
+        surround(ui, area, if is_part { Rect::NOTHING } else { ground });
         picture(ui, (ground, rect), shown, settings, scope);
         labels(ui, rect, shown);
         let mut handle = Rect::NOTHING;
@@ -80,6 +82,26 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
     let area = panel.response.rect;
     what_would_open(ui, area);
     area
+}
+
+/// Fills what the picture leaves of its room, and no more: software is slow to fill.
+fn surround(ui: &Ui, area: Rect, covered: Rect) {
+    // A bit under its edges, which lie between pixels.
+    let covered = covered.shrink(1.0);
+    let rows = area.y_range().intersection(covered.y_range());
+    let bars = if covered.is_positive() && covered.intersects(area) {
+        [
+            area.with_max_y(covered.top()),
+            area.with_min_y(covered.bottom()),
+            Rect::from_x_y_ranges(area.left()..=covered.left(), rows),
+            Rect::from_x_y_ranges(covered.right()..=area.right(), rows),
+        ]
+    } else {
+        [area, Rect::NOTHING, Rect::NOTHING, Rect::NOTHING]
+    };
+    for bar in bars.into_iter().filter(|bar| bar.is_positive()) {
+        ui.painter().rect_filled(bar, 0.0, theme::BACKGROUND);
+    }
 }
 
 /// What happens if the files that are held over the window are let go.

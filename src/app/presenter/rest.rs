@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 /// After a picture of work that goes on it rests so many times as long as that took: little at first, when each
-/// is much better than the last, and most after [`MOST_AFTER`]. With half of the cores it then takes a
-/// twenty-sixth of the machine, and in the first minute less than a tenth.
-const REST: [f64; 2] = [3.0, 12.0];
+/// is much better than the last, and most after [`MOST_AFTER`]. With all of the cores it then takes a
+/// seventeenth of the machine.
+const REST: [f64; 2] = [3.0, 16.0];
 /// Seconds of work on a view after which pictures change slowly.
 const MOST_AFTER: f64 = 12.0;
 
@@ -60,7 +60,7 @@ mod tests {
         assert_eq!(between(seconds(0.5), seconds(0.5)), seconds(0.5));
         assert_eq!(between(seconds(0.25), seconds(4.0)), seconds(1.0));
         assert_eq!(rest_after(seconds(0.5), 0.0), seconds(1.5));
-        assert_eq!(rest_after(seconds(0.5), 1e9), seconds(6.0));
+        assert_eq!(rest_after(seconds(0.5), 1e9), seconds(8.0));
         // Who sleeps is not at work.
         if let Some(before) = time_at_work() {
             std::thread::sleep(Duration::from_millis(200));
