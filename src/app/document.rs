@@ -152,7 +152,9 @@ impl Document {
     pub(super) fn shows_like(&self, other: &Self) -> bool {
         let light = |of: &Self| (of.rotation_degrees, of.intensity, of.sun, of.light.bounces);
         let things = |of: &Self| (of.background, of.fog);
-        (&self.scene, &self.map, &self.viewpoint) == (&other.scene, &other.map, &other.viewpoint)
+        let views = [self, other].map(|of| of.viewpoint.as_ref().map(Viewpoint::seen));
+        (&self.scene, &self.map) == (&other.scene, &other.map)
+            && views[0] == views[1]
             && self.materials == other.materials
             && (light(self), things(self)) == (light(other), things(other))
     }
@@ -164,7 +166,7 @@ impl Document {
         for (number, edit) in edits {
             match number_now(number, before, now) {
                 Some(number) => drop(self.materials.insert(number, edit)),
-                None => gone.push(before[number as usize].name.clone()),
+                None => gone.push(called(number, before)),
             }
         }
         gone
@@ -200,6 +202,12 @@ impl Document {
             ..View::new(self.viewpoint.as_ref()?.camera(), [width, height])
         })
     }
+}
+
+/// What a material is called in sentences.
+pub(super) fn called(number: u32, materials: &[Material]) -> String {
+    let name = materials.get(number as usize).map_or("", |material| &material.name);
+    if name.is_empty() { format!("Material {}", number + 1) } else { name.to_owned() }
 }
 
 /// Which material has the name now that this one had: of several, the one of the same place among them.
@@ -249,6 +257,13 @@ pub struct Viewpoint {
 }
 
 impl Viewpoint {
+    /// What the picture depends on.
+    fn seen(&self) -> impl PartialEq + use<> {
+        let projection = self.fov_y_degrees.map_or((0.0, self.half_height), |fov| (fov, 0.0));
+        let focus = if self.lens_radius > 0.0 { self.focus_distance } else { 0.0 };
+        (self.eye, self.rotation, projection, self.lens_radius, focus)
+    }
+
     /// Whether all numbers are in range.
     pub(super) fn is_sound(&self) -> bool {
         let lengths = [self.pivot_distance, self.half_height, self.focus_distance];

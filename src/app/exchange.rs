@@ -65,7 +65,10 @@ impl App {
                         Some(_) => self.messages.not_opened(Kind::Scene, error.to_string()),
                         None => self.messages.error(error.to_string()),
                     }
-                    self.give_up_saving("its scene cannot be read");
+                    // One that is read again is still shown.
+                    if self.scene_of_document().is_none() {
+                        self.give_up_saving("its scene cannot be read");
+                    }
                     self.stay_in_scene();
                 }
                 Loaded::Map(_, Err(error)) => {
@@ -92,7 +95,11 @@ impl App {
             match later {
                 Later::Chosen(purpose, path) => {
                     self.interface.prompt.take_if(|prompt| prompt.purpose == purpose);
-                    self.execute(purpose.command(&path), context);
+                    match purpose.completed(&path) {
+                        // Nobody was asked whether a file of that name may be replaced.
+                        Some(path) => self.interface.ask(purpose, path),
+                        None => self.execute(purpose.command(&path), context),
+                    }
                 }
                 Later::Done(sentence) => self.messages.notice(sentence),
                 Later::Failed(sentence) => self.messages.error(sentence),
@@ -105,6 +112,11 @@ impl App {
         let arrived = lock(&self.arriving).take();
         if arrived.is_some() {
             (self.reference, self.reference_of) = (arrived, None);
+        }
+        if let Some(sentence) = self.worker.take_panic() {
+            self.messages.error(sentence);
+            // It would end so again.
+            self.interface.paused = true;
         }
         for sentence in self.worker.take_failures() {
             self.messages.error(sentence);
@@ -166,7 +178,7 @@ impl App {
     fn renumber(&mut self, before: &LoadedScene, now: &LoadedScene) {
         let (before, now, name) = (&before.materials, &now.materials, &now.name);
         for material in self.document.renumber(before, now) {
-            let sentence = format!("{name} has no material {material} any more, which was changed");
+            let sentence = format!("{name}: {material}, which was changed, is no longer there");
             self.messages.notice(sentence);
         }
         self.undo.change_all(|document| {
@@ -174,6 +186,9 @@ impl App {
                 document.renumber(before, now);
             }
         });
+        if let Some(of) = self.reference_of.as_mut().filter(|of| of.scene == *name) {
+            of.renumber(before, now);
+        }
         let material = self.interface.material;
         self.interface.material = material.and_then(|number| number_now(number, before, now));
     }
@@ -342,7 +357,10 @@ impl App {
             inspects_cache: self.interface.inspects_cache(),
             rule: self.document.stop,
             is_frozen: self.interface.is_frozen,
-            reference: self.reference.clone().filter(|_| self.is_like_reference()),
+            reference: self
+                .reference
+                .clone()
+                .filter(|_| self.has_sources() && self.is_like_reference()),
             paused: self.interface.paused,
             run: self.interface.run,
         })

@@ -438,7 +438,7 @@ impl App {
         let thread = std::thread::Builder::new().name("dialogue".to_owned()).spawn(move || {
             let start = Instant::now();
             let later = match pollster::block_on(chosen) {
-                Some(file) => Later::Chosen(purpose, purpose.named(file.path())),
+                Some(file) => Later::Chosen(purpose, file.path().display().to_string()),
                 // Nobody closes a dialogue so soon: none was opened.
                 None if start.elapsed() < QUICKEST_ANSWER => Later::Failed(
                     "this system offers no file dialogue; a path can be typed instead".to_owned(),
@@ -472,14 +472,11 @@ impl App {
 const QUICKEST_ANSWER: Duration = Duration::from_millis(500);
 
 impl Purpose {
-    /// A path that was chosen; not every dialogue adds what a file's name ends in.
-    fn named(self, path: &Path) -> String {
+    /// A path that was chosen with what its file's name ends in, where that is missing: not every dialogue adds it.
+    pub(super) fn completed(self, path: &str) -> Option<String> {
         let (_, extensions) = self.files();
-        let path = path.display().to_string();
-        match Path::new(&path).extension() {
-            None if self.is_output() => format!("{path}.{}", extensions[0]),
-            _ => path,
-        }
+        let is_missing = self.is_output() && Path::new(path).extension().is_none();
+        is_missing.then(|| format!("{path}.{}", extensions[0]))
     }
 
     /// What to do with the path.
@@ -495,7 +492,7 @@ impl Purpose {
 }
 
 impl Interface {
-    fn ask(&mut self, purpose: Purpose, path: String) {
+    pub(super) fn ask(&mut self, purpose: Purpose, path: String) {
         let cursor = Some(Cursor::OverAll);
         let offers = Vec::new();
         self.prompt = Some(Prompt { purpose, path, cursor, objection: None, offers });

@@ -106,7 +106,7 @@ pub struct App {
     start: Document,
     interface: Interface,
     settings: Settings,
-    /// As they were at the start.
+    /// As they were when they were kept last.
     settings_before: Settings,
     /// Whether something came that is to be kept at once.
     has_news: bool,
@@ -316,13 +316,18 @@ impl App {
         failures.chain(self.waiting_saves.drain(..).map(unsaved)).collect()
     }
 
-    /// What is to be kept for the next window, on top of what is kept by now, if that is understood.
-    pub fn settings(&self, kept: Option<Settings>) -> Settings {
+    /// What is to be kept for the next window, on top of what is kept by now, if that is understood: lists of files and
+    /// viewpoints, and at the end what was set.
+    pub fn settings(&mut self, kept: Option<Settings>, is_end: bool) -> Settings {
         let mut kept = kept.unwrap_or_else(|| self.settings_before.clone());
         let mut settings = self.settings.clone();
         settings.keep_viewpoints(&self.document);
         kept.take_lists(&self.settings_before, &settings);
-        kept.remember(&self.document, &self.start, &self.interface);
+        // What was kept now is what is changed from now on.
+        self.settings_before = settings;
+        if is_end {
+            kept.remember(&self.document, &self.start, &self.interface);
+        }
         kept
     }
 

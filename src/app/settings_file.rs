@@ -237,10 +237,15 @@ impl Settings {
             self.save_folder.clone_from(&after.save_folder);
         }
         for of in after.viewpoints.iter().rev().chain(&before.viewpoints) {
-            let now = after.viewpoints_of(&of.scene);
-            if now != before.viewpoints_of(&of.scene) {
-                self.set_viewpoints(&of.scene, &now);
+            let (then, now) = (before.viewpoints_of(&of.scene), after.viewpoints_of(&of.scene));
+            let mut kept = self.viewpoints_of(&of.scene);
+            kept.retain(|view| now.contains(view) || !then.contains(view));
+            for view in now {
+                if !(then.contains(&view) || kept.contains(&view)) {
+                    kept.push(view);
+                }
             }
+            self.set_viewpoints(&of.scene, &kept);
         }
     }
 
@@ -419,6 +424,10 @@ mod tests {
         let names = |scene: &str| kept.viewpoints_of(scene).into_iter().map(|view| view.name);
         assert!(names("office").eq(["desk"]) && names("open").eq(["hill"]));
         assert_eq!(names("crack").len(), 0, "the second has forgotten it");
+        // What one has kept meanwhile is no longer there if it takes it back.
+        let mut kept = first.clone();
+        kept.take_lists(&first, &before);
+        assert!(kept.viewpoints_of("office").is_empty());
     }
 
     #[test]

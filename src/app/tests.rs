@@ -221,6 +221,7 @@ fn errors_are_measured_against_a_reference_where_it_shows_the_same() {
     studio.asks(Command::OpenReference(file.display().to_string()));
     while studio.app.reference.is_none() {
         studio.frame().expect("drawn");
+        assert_eq!(studio.app.failure(), None);
     }
     // The light comes from elsewhere meanwhile.
     for (degrees, is_measured) in [(0.0, true), (30.0, false), (0.0, true)] {

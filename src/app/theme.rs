@@ -127,12 +127,27 @@ pub(super) fn row<R>(ui: &mut Ui, name: &str, hint: &str, add: impl FnOnce(&mut 
 /// A slider from end to end of a range. What lies beyond or between its decimals stays until it is moved: a
 /// panel that is only looked at changes nothing.
 pub(super) fn slider<N: Numeric>(value: &mut N, range: RangeInclusive<N>) -> Slider<'_> {
-    Slider::new(value, range).clamping(SliderClamping::Edits)
+    let now = value.to_f64();
+    let slider = Slider::new(value, range).clamping(SliderClamping::Edits);
+    slider.custom_parser(move |text| typed(text, now))
 }
 
 /// A number to be dragged or typed, as [`slider`] is.
 pub(super) fn number<N: Numeric>(value: &mut N, range: RangeInclusive<N>) -> DragValue<'_> {
-    DragValue::new(value).range(range).clamp_existing_to_range(false)
+    let now = value.to_f64();
+    let number = DragValue::new(value).range(range).clamp_existing_to_range(false);
+    number.custom_parser(move |text| typed(text, now))
+}
+
+/// The number that a field holds; `None` if it is what there is to the decimals written, for whoever only clicks into
+/// a field or goes through it changes nothing.
+fn typed(text: &str, now: f64) -> Option<f64> {
+    let text: String = text.chars().filter(|c| !c.is_whitespace()).collect();
+    let text = text.replace('\u{2212}', "-");
+    let number: f64 = text.parse().ok()?;
+    let decimals = text.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let is_what_there_is = format!("{now:.decimals$}").parse() == Ok(number);
+    (!is_what_there_is).then_some(number)
 }
 
 /// What is said of keys, by this system's name of the one that commands.
@@ -288,5 +303,15 @@ mod tests {
         assert_eq!((bytes(10), bytes(3 << 20)), ("10 B".into(), "3.0 MB".into()));
         assert_eq!((clock(4.25), clock(187.0)), ("4.2 s".into(), "3:07".into()));
         assert_eq!(clock(3723.0), "1:02:03");
+    }
+
+    #[test]
+    fn a_field_that_is_only_gone_through_changes_nothing() {
+        for (text, now) in [("0.44", 0.4375), ("22.9", 22.945), ("70", 70.0), ("", 1.0), ("x", 1.0)]
+        {
+            assert_eq!(typed(text, now), None, "{text}");
+        }
+        assert_eq!(typed("0.45", 0.4375), Some(0.45));
+        assert_eq!(typed(" \u{2212}3", 70.0), Some(-3.0));
     }
 }

@@ -285,7 +285,7 @@ impl Runner {
     /// Keeps what is to be kept, and waits until all files are written.
     fn end(&mut self) {
         let Some(mut running) = self.running.take() else { return };
-        if let Err(error) = running.keep_settings(self.settings_path.as_deref()) {
+        if let Err(error) = running.keep_settings(self.settings_path.as_deref(), true) {
             crate::terminal::notice(error);
         }
         running.app.finish().iter().for_each(crate::terminal::notice);
@@ -297,9 +297,9 @@ impl Running {
     ///
     /// # Errors
     /// If the file cannot be written.
-    fn keep_settings(&self, path: Option<&Path>) -> Result<()> {
+    fn keep_settings(&mut self, path: Option<&Path>, is_end: bool) -> Result<()> {
         let Some(path) = path else { return Ok(()) };
-        let mut settings = self.app.settings(Settings::read(path).ok());
+        let mut settings = self.app.settings(Settings::read(path).ok(), is_end);
         let size = self.window.inner_size();
         if size.width > 0 && size.height > 0 && self.window.is_minimized() != Some(true) {
             let size = size.to_logical(self.window.scale_factor());
@@ -464,7 +464,7 @@ impl ApplicationHandler<Call> for Runner {
             WindowEvent::RedrawRequested => {
                 let drawn = running.draw();
                 if running.app.has_news_to_keep()
-                    && let Err(error) = running.keep_settings(self.settings_path.as_deref())
+                    && let Err(error) = running.keep_settings(self.settings_path.as_deref(), false)
                 {
                     running.app.say(error.to_string());
                 }

@@ -94,8 +94,15 @@ impl PictureArguments {
     }
 
     /// Takes the exposure of a film's picture, to be that of others, too; where noise cannot be taken out, there
-    /// is no picture that has one.
-    pub(super) fn take_exposure(&mut self, film: &Film) {
+    /// is no picture that has one, as there is none where all hold what was rendered.
+    pub(super) fn take_exposure<'a>(
+        &mut self,
+        film: &Film,
+        pictures: impl IntoIterator<Item = &'a PathBuf>,
+    ) {
+        if pictures.into_iter().all(|path| output::holds_layers(path)) {
+            return;
+        }
         self.exposure = output::exposure_of(&self.options(), film).unwrap_or(self.exposure);
     }
 

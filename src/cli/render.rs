@@ -169,7 +169,7 @@ impl Job<'_> {
             // What the first frame has is what all have.
             Some(_) => {
                 let mut frame = arguments.clone();
-                frame.picture.take_exposure(&film);
+                frame.picture.take_exposure(&film, arguments.pictures());
                 of_frame = frame;
                 &of_frame
             }

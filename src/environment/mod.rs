@@ -24,7 +24,7 @@ mod weights;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::ops::Range;
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 
 use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
@@ -389,11 +389,6 @@ impl Environment {
     /// Whether both are one map with one table, turned or scaled differently.
     pub fn shares_map_with(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.map, &other.map) && Arc::ptr_eq(&self.table, &other.table)
-    }
-
-    /// The map's identity, whichever way it is turned.
-    pub(crate) fn map_identity(&self) -> Weak<Image> {
-        Arc::downgrade(&self.map)
     }
 
     /// Where the map shows a unit world direction.

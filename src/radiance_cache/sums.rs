@@ -140,11 +140,17 @@ impl RadianceSums {
         })
     }
 
+    /// Whether cells no longer find a slot for sure.
+    pub(crate) fn is_full(&self) -> bool {
+        let used = self.words.iter().step_by(WORDS);
+        let used = used.filter(|check| check.load(Ordering::Relaxed) != 0).count();
+        used as f64 > FULL * SLOTS as f64
+    }
+
     /// What each slot holds, parents what all their cells do, and all together.
     fn tallies(&self) -> Option<(Vec<Tally>, Tally)> {
         let mut tallies: Vec<Tally> = self.words.chunks_exact(WORDS).map(Tally::new).collect();
-        let used = tallies.iter().filter(|tally| tally.check != 0).count();
-        if used as f64 > FULL * SLOTS as f64 {
+        if self.is_full() {
             return None;
         }
         let mut all = Tally::default();

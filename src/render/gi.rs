@@ -102,11 +102,12 @@ impl CacheTraining {
     }
 
     /// Takes note that paths up to this one of [`Self::next`] have trained. After the last of them there is a new cache; if
-    /// the table has no room for so many cells, they begin anew with larger ones.
-    pub(super) fn advance(&mut self, path: u64) {
+    /// the table has no room for so many cells, they begin anew with larger ones. Returns how many have trained it.
+    pub(super) fn advance(&mut self, path: u64) -> u64 {
         self.paths = path - self.first;
-        if self.paths < self.end() {
-            return;
+        let paths = self.paths;
+        if paths < self.end() && !self.sums.is_full() {
+            return paths;
         }
         let cells = *self.sums.cells();
         let cache = self.sums.cache();
@@ -122,6 +123,7 @@ impl CacheTraining {
             self.paths = 0;
         }
         self.cache = cache;
+        paths
     }
 
     /// Whether its cells are as large as those for a camera at `position` would be, or nearly so.

@@ -6,7 +6,6 @@ use super::Request;
 use crate::app::lock;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::image::Image;
 use crate::path::World;
 use crate::render::Session;
 use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, UploadedScene};
@@ -22,22 +21,8 @@ pub(super) struct Device {
     gpu: Option<Gpu>,
     uploaded: Option<Uploaded>,
     failure: Option<String>,
-    /// What the GPU failed with.
-    refused: Option<Subject>,
-}
-
-/// Identities of a scene's geometry and of a map.
-struct Subject(Weak<()>, Weak<Image>);
-
-impl Subject {
-    fn of(request: &Request) -> Self {
-        Self(Arc::downgrade(request.world.geometry()), request.environment.map_identity())
-    }
-
-    fn is_of(&self, request: &Request) -> bool {
-        let Self(geometry, map) = Self::of(request);
-        self.0.ptr_eq(&geometry) && self.1.ptr_eq(&map)
-    }
+    /// The geometry that the GPU failed with.
+    refused: Option<Weak<()>>,
 }
 
 /// What is on the GPU.
@@ -67,7 +52,8 @@ impl Device {
     /// Chooses the device that the request names, which may be none but the CPU. A GPU that failed with
     /// something else, for which it may have been too small, is chosen again.
     pub(super) fn choose_for(&mut self, request: &Request) {
-        let failed_with_another = self.refused.as_ref().is_some_and(|it| !it.is_of(request));
+        let geometry = Arc::downgrade(request.world.geometry());
+        let failed_with_another = self.refused.as_ref().is_some_and(|it| !it.ptr_eq(&geometry));
         if self.choice != Some(request.device) || failed_with_another {
             self.choose(request.device);
         }
@@ -102,11 +88,11 @@ impl Device {
         }
     }
 
-    /// Does without the GPU until another one, another scene or another map is chosen.
+    /// Does without the GPU until another one or another scene is chosen.
     pub(super) fn give_up(&mut self, failure: &Error, request: &Request) {
         self.tell(failure);
         (self.gpu, self.uploaded) = (None, None);
-        self.refused = Some(Subject::of(request));
+        self.refused = Some(Arc::downgrade(request.world.geometry()));
     }
 
     fn tell(&mut self, failure: &Error) {

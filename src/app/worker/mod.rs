@@ -35,6 +35,8 @@ struct Shared {
     rest: Arc<Rest>,
     is_preparing: AtomicBool,
     failures: Mutex<Vec<String>>,
+    /// What is said of a panic.
+    panic: Mutex<Option<String>>,
     /// The device the window is drawn on.
     screen: Arc<Mutex<Gpu>>,
     wake: Wake,
@@ -77,6 +79,7 @@ impl Worker {
             rest: Arc::new(Rest::new()),
             is_preparing: AtomicBool::default(),
             failures: Mutex::default(),
+            panic: Mutex::default(),
             screen: Arc::new(Mutex::new(screen)),
             wake,
         });
@@ -126,6 +129,11 @@ impl Worker {
     /// Whether a GPU is being opened, filled or programmed.
     pub(crate) fn is_preparing(&self) -> bool {
         self.shared.is_preparing.load(Ordering::Relaxed)
+    }
+
+    /// What there is to say if rendering has ended with a panic since this was asked last.
+    pub(crate) fn take_panic(&self) -> Option<String> {
+        lock(&self.shared.panic).take()
     }
 
     /// Failures of GPUs since this was asked last, a sentence each.
@@ -203,7 +211,8 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
             // The panic is on the terminal. Nothing of what it left is trusted.
             kept = fresh();
             shared.is_preparing.store(false, Ordering::Relaxed);
-            lock(&shared.failures).push("rendering has failed; R begins again".to_owned());
+            alarm.set(None);
+            *lock(&shared.panic) = Some("rendering has failed; R begins again".to_owned());
             (shared.wake)();
             asked
         }));

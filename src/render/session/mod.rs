@@ -440,9 +440,8 @@ impl<'a> Session<'a> {
                 Some(renderer) => renderer.train(paths, sums, cancel)?,
             };
             self.state.figures.learning_rays += rays;
-            self.state.figures.training_paths = done;
             if let Some(training) = &mut self.state.training {
-                training.advance(done);
+                self.state.figures.training_paths = training.advance(done);
                 if let Some(renderer) = &mut self.gpu {
                     renderer.set_cache(training.cache())?;
                 }
