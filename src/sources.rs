@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::environment::sky;
 use crate::error::{Error, Notices, Result};
 use crate::image::Image;
-use crate::image::{looks_like_picture, looks_like_scene, open_file, read_map};
+use crate::image::{extension, looks_like_picture, looks_like_scene, open_file, read_map};
 use crate::memory;
 use crate::scene::{Scene, SceneOptions, builtin, gltf};
 
@@ -76,7 +76,7 @@ pub(crate) fn is_scene(name: &str) -> bool {
     if looks_like_picture(&start[..count]) {
         return false;
     }
-    let extension = Path::new(name).extension().map(|e| e.to_string_lossy().to_lowercase());
+    let extension = extension(Path::new(name));
     is_built_in_scene(name)
         || matches!(extension.as_deref(), Some("gltf" | "glb"))
         || (extension.is_none() && !is_built_in_map(name))

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::image::extension;
 use crate::sources;
 
 /// What of dropped files is opened, by name.
@@ -20,10 +21,8 @@ impl Dropped {
         let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
         let (scenes, others): (Vec<_>, Vec<_>) =
             names.into_iter().partition(|name| sources::is_scene(name));
-        let is_linear = |name: &String| {
-            let extension = Path::new(name).extension().map(|e| e.to_string_lossy().to_lowercase());
-            matches!(extension.as_deref(), Some("exr" | "hdr"))
-        };
+        let is_linear =
+            |name: &String| matches!(extension(Path::new(name)).as_deref(), Some("exr" | "hdr"));
         let has_scene = !scenes.is_empty();
         // What else comes with a scene is read with it.
         let maps = others.into_iter().filter(|name| !has_scene || is_linear(name));

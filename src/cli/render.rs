@@ -5,6 +5,7 @@ mod assignment;
 mod frames;
 mod outputs;
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -164,20 +165,14 @@ impl Job<'_> {
         let remarks = output::remarks(&film, environment);
         remarks.iter().for_each(|sentence| notices.add(sentence));
 
-        let of_frame;
-        let arguments = match &known {
+        let (asked, mut arguments) = (arguments, Cow::Borrowed(arguments));
+        if known.is_some() {
             // What the first frame has is what all have.
-            Some(_) => {
-                let mut frame = arguments.clone();
-                frame.picture.take_exposure(&film, arguments.pictures());
-                of_frame = frame;
-                &of_frame
-            }
-            None => arguments,
-        };
+            arguments.to_mut().picture.take_exposure(&film, asked.pictures());
+        }
         let figures = session.figures();
-        let record = self.record(arguments, &session, (&film, &figures), &notices);
-        let mut failures = outputs::write(arguments, &assignment, &record, session.grid());
+        let record = self.record(&arguments, &session, (&film, &figures), &notices);
+        let mut failures = outputs::write(&arguments, &assignment, &record, session.grid());
         // Another device may have taken over.
         assignment.set_metadata(record.metadata());
         failures.extend(assignment.keep(&session).err());

@@ -108,6 +108,11 @@ pub(crate) fn make_folder(path: &Path) -> Result<()> {
     })
 }
 
+/// What a file's name ends in, in small letters, without the dot.
+pub(crate) fn extension(path: &Path) -> Option<String> {
+    path.extension().map(|extension| extension.to_string_lossy().to_lowercase())
+}
+
 /// Whether two paths name the same file, there already or yet to be written.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let place = |path: &Path| {

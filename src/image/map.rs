@@ -8,7 +8,7 @@ use image::ImageDecoder as _;
 use rayon::prelude::*;
 
 use super::exr_read::{Exr, read_exr};
-use super::file::{open_file, read_cause, read_file};
+use super::file::{extension, open_file, read_cause, read_file};
 use super::guard::catch_panic;
 use super::hdr::decode_hdr;
 use super::ldr::{decoder_bytes, decoder_cause};
@@ -205,7 +205,7 @@ fn format_of(path: &Path) -> Result<Format> {
     if known && looks_like_scene(&magic) {
         return Err(Error::at(path, "is a glTF scene, where a map or a picture is expected"));
     }
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let extension = extension(path);
     Ok(match (&magic, extension.as_deref()) {
         (b"\x76\x2f\x31\x01", _) if known => Format::Exr,
         ([b'#', b'?', ..], _) if known => Format::Hdr,

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::record;
 use crate::error::{Error, Result};
-use crate::image::{ExrPicture, Image, Layer, write_beside_and_rename, write_exr};
+use crate::image::{ExrPicture, Image, Layer, extension, write_beside_and_rename, write_exr};
 use crate::light_grid::{LightGrid, WHOLE_MAP};
 
 /// Writes the distributions of all cells: `.csv` (distribution, tile, probability), `.json`, or `.exr` (one row
@@ -75,8 +75,4 @@ pub fn check_distributions_extension(path: &Path) -> Result<()> {
         Some("csv" | "json" | "exr") => Ok(()),
         _ => Err(Error::at(path, "distributions are written as .csv, .json or .exr")),
     }
-}
-
-fn extension(path: &Path) -> Option<String> {
-    path.extension().map(|e| e.to_string_lossy().to_lowercase())
 }

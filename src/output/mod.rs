@@ -10,7 +10,7 @@ use crate::color::luminance;
 use crate::denoise::{Denoiser, blend};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::image::{ExrPicture, Image, Layer, write_exr, write_png};
+use crate::image::{ExrPicture, Image, Layer, extension, write_exr, write_png};
 use crate::render::film::{Film, Pixel};
 use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev, display_rgb8};
 
@@ -85,8 +85,7 @@ impl Default for PictureOptions {
 /// # Errors
 /// One sentence that names the file.
 pub fn check_extension(path: &Path) -> Result<()> {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    match extension.as_deref() {
+    match extension(path).as_deref() {
         Some("png" | "exr") => Ok(()),
         _ => Err(Error::at(path, "pictures are written as .png or .exr")),
     }

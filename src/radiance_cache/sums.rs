@@ -1,6 +1,6 @@
 //! What paths bring back to the cells of the cache.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
 use glam::{DVec3, Vec3};
 
@@ -33,6 +33,8 @@ pub struct RadianceSums {
     /// Units a radiance of 1 counts.
     scale: f32,
     words: Box<[AtomicU32]>,
+    /// Slots in use, which somebody asks for after every few paths.
+    used: AtomicUsize,
 }
 
 /// What a slot holds.
@@ -49,7 +51,8 @@ impl RadianceSums {
     /// Empty. `brightest` is about the largest radiance that anything emits.
     pub fn new(cells: CacheCells, brightest: f32) -> Self {
         let scale = BRIGHTEST / brightest.clamp(f32::MIN_POSITIVE * BRIGHTEST, f32::MAX);
-        Self { cells, scale, words: (0..SLOTS * WORDS).map(|_| AtomicU32::new(0)).collect() }
+        let words = (0..SLOTS * WORDS).map(|_| AtomicU32::new(0)).collect();
+        Self { cells, scale, words, used: AtomicUsize::new(0) }
     }
 
     /// Where its cells lie.
@@ -68,6 +71,8 @@ impl RadianceSums {
             .iter()
             .zip(words)
             .for_each(|(word, value)| word.store(*value, Ordering::Relaxed));
+        let used = words.iter().step_by(WORDS).filter(|check| **check != 0).count();
+        self.used.store(used, Ordering::Relaxed);
     }
 
     /// Counts an estimate of the radiance that a surface with this unit normal and albedo reflects.
@@ -112,7 +117,10 @@ impl RadianceSums {
         key.probes().find(|slot| {
             let check = &self.words[slot * WORDS];
             match check.compare_exchange(0, key.check, Ordering::Relaxed, Ordering::Relaxed) {
-                Ok(_) => true,
+                Ok(_) => {
+                    self.used.fetch_add(1, Ordering::Relaxed);
+                    true
+                }
                 Err(found) => found == key.check,
             }
         })
@@ -142,9 +150,7 @@ impl RadianceSums {
 
     /// Whether cells no longer find a slot for sure.
     pub(crate) fn is_full(&self) -> bool {
-        let used = self.words.iter().step_by(WORDS);
-        let used = used.filter(|check| check.load(Ordering::Relaxed) != 0).count();
-        used as f64 > FULL * SLOTS as f64
+        self.used.load(Ordering::Relaxed) as f64 > FULL * SLOTS as f64
     }
 
     /// What each slot holds, parents what all their cells do, and all together.

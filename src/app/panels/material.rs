@@ -3,7 +3,7 @@
 use egui::{Align, RichText, Ui};
 use glam::Vec3;
 
-use crate::app::document::Document;
+use crate::app::document::{Document, called};
 use crate::app::interface::Interface;
 use crate::app::loader::LoadedScene;
 use crate::app::theme;
@@ -17,11 +17,8 @@ pub(super) fn show(
     scene: &LoadedScene,
 ) {
     theme::heading(ui, "MATERIAL");
-    let title = |number: u32, material: &Material| {
-        let name = match material.name.as_str() {
-            "" => format!("Material {}", number + 1),
-            name => name.to_owned(),
-        };
+    let title = |number: u32| {
+        let name = called(number, &scene.materials);
         match document.materials.get(&number) {
             Some(edit) if edit.hidden => format!("{name} (hidden)"),
             Some(_) => format!("{name} (changed)"),
@@ -30,13 +27,13 @@ pub(super) fn show(
     };
     let chosen = interface.material.and_then(|number| scene.materials.get(number as usize));
     let text = match (interface.material, chosen) {
-        (Some(number), Some(material)) => title(number, material),
+        (Some(number), Some(_)) => title(number),
         _ => "Click a surface".to_owned(),
     };
     theme::choice(ui, "material").selected_text(text).show_ui(ui, |ui| {
-        for (number, material) in (0..).zip(scene.materials.iter()) {
+        for number in 0..scene.materials.len() as u32 {
             let is_chosen = interface.material == Some(number);
-            if ui.selectable_label(is_chosen, title(number, material)).clicked() {
+            if ui.selectable_label(is_chosen, title(number)).clicked() {
                 interface.material = Some(number);
             }
         }

@@ -10,6 +10,7 @@ use crate::app::completion::{Completion, complete, in_home};
 use crate::app::interface::{Cursor, Interface, Objection, Prompt, Purpose};
 use crate::app::settings_file::Settings;
 use crate::app::theme;
+use crate::image::extension;
 use crate::sources;
 
 /// What is to be known of a path before it is taken.
@@ -17,8 +18,7 @@ fn objection(purpose: Purpose, path: &str) -> Option<Objection> {
     let is_there = Path::new(path).exists();
     if purpose.is_output() {
         let (_, extensions) = purpose.files();
-        let extension = Path::new(path).extension().map(|e| e.to_string_lossy().to_lowercase());
-        if !extension.is_some_and(|extension| extensions.contains(&&*extension)) {
+        if !extension(Path::new(path)).is_some_and(|extension| extensions.contains(&&*extension)) {
             return Some(Objection::Unknown);
         }
         let folder = Path::new(path).parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -217,6 +217,12 @@ mod tests {
         }
         assert_eq!(
             (asked(Purpose::Picture, &there), asked(Purpose::Picture, &gone)),
+            (Some(Objection::Replaces), None)
+        );
+        let [there, gone] = ["a.csv", "b.csv"].map(|name| folder.path().join(name));
+        std::fs::write(&there, "").expect("written");
+        assert_eq!(
+            (asked(Purpose::Distributions, &there), asked(Purpose::Distributions, &gone)),
             (Some(Objection::Replaces), None)
         );
         let nowhere = folder.path().join("gone").join("b.png");

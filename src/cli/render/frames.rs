@@ -11,7 +11,7 @@ use glam::{Affine3A, Vec3};
 use super::RenderArguments;
 use crate::cli::picture::say_written;
 use crate::error::{Error, Result};
-use crate::image::{name_of_process, write_beside_and_rename};
+use crate::image::{extension, name_of_process, write_beside_and_rename};
 use crate::path::{World, framing};
 use crate::scene::Camera;
 use crate::scene::camera_path::CameraPath;
@@ -122,8 +122,7 @@ pub(super) fn is_video(path: &Path) -> bool {
 /// What ffmpeg is told for a kind of video. Those of the first two have an even size.
 fn codec(path: &Path) -> Option<&'static [&'static str]> {
     const EVEN: &str = "crop=trunc(iw/2)*2:trunc(ih/2)*2";
-    let extension = path.extension()?.to_string_lossy().to_lowercase();
-    match extension.as_str() {
+    match extension(path)?.as_str() {
         "mp4" => Some(&["-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", "-vf", EVEN]),
         "webm" => Some(&[
             "-c:v",
