@@ -11,6 +11,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 mod album;
+mod blit;
 pub(crate) mod commands;
 mod comparison;
 mod completion;

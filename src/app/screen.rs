@@ -1,14 +1,13 @@
-//! What the window is drawn on: a device, egui's renderer and our own developer there. All three are
-//! made anew when the device is lost; nothing else of the window depends on them.
+//! What the window is drawn on: a device, and what develops and draws pictures there. All are made anew when the device is lost; nothing else of the window depends on them.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use egui::epaint::{ImageData, ImageDelta};
-use egui::mutex::RwLock;
 use egui::{Color32, ColorImage, TextureId, TexturesDelta};
 use egui_wgpu::{Renderer, RendererOptions};
 
+use super::blit::{Blit, Source};
 use crate::develop::{DevelopSettings, Developer, DisplayTexture, LinearPicture, OverlayTexture};
 use crate::error::Result;
 use crate::image::Rgb8;
@@ -17,17 +16,20 @@ use crate::render::gpu::Gpu;
 /// The device and what draws there; clones share it.
 #[derive(Clone)]
 pub struct Screen {
-    renderer: Arc<RwLock<Renderer>>,
     pub(super) developer: Arc<Developer>,
+    blit: Arc<Blit>,
 }
 
 impl Screen {
-    /// Makes the device ready for developing pictures.
+    /// Makes the device ready for developing pictures and drawing them into frames of a format.
     ///
     /// # Errors
     /// If the driver refuses what is needed.
-    pub(super) fn new(gpu: &Gpu, renderer: Arc<RwLock<Renderer>>) -> Result<Self> {
-        Ok(Self { renderer, developer: Arc::new(Developer::new(gpu)?) })
+    pub(super) fn new(gpu: &Gpu, frames: wgpu::TextureFormat) -> Result<Self> {
+        let blit = Arc::new(Blit::new(gpu, frames));
+        // It asks whether the driver took both.
+        let developer = Arc::new(Developer::new(gpu)?);
+        Ok(Self { developer, blit })
     }
 
     /// The device.
@@ -69,23 +71,22 @@ impl Recipe {
     }
 }
 
-/// A developed picture that egui can draw; it is forgotten when dropped.
+/// A developed picture that can be drawn.
 pub(super) struct Developed {
-    screen: Screen,
     pub(super) display: DisplayTexture,
-    pub(super) id: TextureId,
+    pub(super) source: Source,
     recipe: Recipe,
 }
 
 impl Developed {
     /// Develops `recipe` into the slot's texture, unless it holds that already and it cannot have
-    /// changed; returns what egui calls it.
+    /// changed; returns what draws it.
     pub(super) fn update(
         slot: &mut Option<Self>,
         screen: &Screen,
         recipe: Recipe,
         changes: bool,
-    ) -> TextureId {
+    ) -> Source {
         let developer = &screen.developer;
         let size = recipe.picture.size();
         let develop = |display: &DisplayTexture, recipe: &Recipe| {
@@ -97,23 +98,13 @@ impl Developed {
                 develop(&old.display, &recipe);
                 old.recipe = recipe;
             }
-            return old.id;
+            return old.source.clone();
         }
         let display = developer.display_texture(size);
         develop(&display, &recipe);
-        let id = screen.renderer.write().register_native_texture(
-            &screen.gpu().device,
-            display.view(),
-            wgpu::FilterMode::Linear,
-        );
-        *slot = Some(Self { screen: screen.clone(), display, id, recipe });
-        id
-    }
-}
-
-impl Drop for Developed {
-    fn drop(&mut self) {
-        self.screen.renderer.write().free_texture(&self.id);
+        let source = screen.blit.source(screen.gpu(), &display);
+        *slot = Some(Self { display, source: source.clone(), recipe });
+        source
     }
 }
 

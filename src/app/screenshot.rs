@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use egui::mutex::RwLock;
 use egui_wgpu::{Renderer, ScreenDescriptor};
 use wgpu::{Extent3d, TextureFormat, TextureUsages};
 
@@ -58,7 +57,7 @@ impl Studio {
             )));
         }
         let canvas = Canvas::new(gpu, shot.size, TextureCopies::default());
-        let screen = Screen::new(&canvas.gpu, Arc::clone(&canvas.renderer))?;
+        let screen = Screen::new(&canvas.gpu, FORMAT)?;
         let context = egui::Context::default();
         let (sender, news) = channel();
         let wake: Wake = Arc::new(move || {
@@ -148,7 +147,7 @@ impl Studio {
             let size = (self.canvas.target.width(), self.canvas.target.height());
             let copies = std::mem::take(&mut self.canvas.copies);
             self.canvas = Canvas::new(gpu, size, copies);
-            let screen = Screen::new(&self.canvas.gpu, Arc::clone(&self.canvas.renderer))?;
+            let screen = Screen::new(&self.canvas.gpu, FORMAT)?;
             self.app.move_to(screen, &loss);
         }
         self.canvas.draw(&self.context, &mut self.app, self.time);
@@ -188,30 +187,32 @@ fn open(adapter: Option<&str>) -> Result<Gpu> {
     })
 }
 
+/// Of the texture that stands for the window.
+const FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
+
 /// The texture that stands for the window.
 struct Canvas {
     gpu: Gpu,
-    renderer: Arc<RwLock<Renderer>>,
+    renderer: Renderer,
     target: wgpu::Texture,
     copies: TextureCopies,
 }
 
 impl Canvas {
     fn new(gpu: Gpu, (width, height): (u32, u32), copies: TextureCopies) -> Self {
-        let format = TextureFormat::Rgba8Unorm;
         let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("window"),
             size: Extent3d { width, height, depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format,
+            format: FORMAT,
             usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
             view_formats: &[],
         });
-        let mut renderer = Renderer::new(&gpu.device, format, renderer_options());
+        let mut renderer = Renderer::new(&gpu.device, FORMAT, renderer_options());
         copies.upload(&gpu, &mut renderer);
-        Self { gpu, renderer: Arc::new(RwLock::new(renderer)), target, copies }
+        Self { gpu, renderer, target, copies }
     }
 
     /// One frame of the application.
@@ -229,7 +230,7 @@ impl Canvas {
         let primitives = context.tessellate(output.shapes, output.pixels_per_point);
         self.copies.follow(&output.textures_delta);
         let Gpu { device, queue, .. } = &self.gpu;
-        let mut renderer = self.renderer.write();
+        let renderer = &mut self.renderer;
         for (id, deltas) in output.textures_delta.set.drain() {
             for delta in deltas {
                 renderer.update_texture(device, queue, id, &delta);

@@ -196,7 +196,7 @@ fn paint_on(
         .map_err(|e| Error::new(e.to_string()))?;
     let state = painter.render_state().ok_or_else(|| Error::new("nothing can be drawn"))?;
     copies.upload(&gpu, &mut state.renderer.write());
-    let screen = Screen::new(&gpu, state.renderer)?;
+    let screen = Screen::new(&gpu, state.target_format)?;
     Ok((painter, screen))
 }
 

@@ -1,12 +1,13 @@
 //! The picture.
 
 use egui::{
-    Align2, CentralPanel, Color32, CursorIcon, FontId, Pos2, Rect, Sense, Stroke, StrokeKind,
-    TextureId, Ui, Vec2,
+    Align2, CentralPanel, Color32, CursorIcon, FontId, Pos2, Rect, Sense, Stroke, StrokeKind, Ui,
+    Vec2,
 };
 
 use super::gestures;
 use super::scope::Scope;
+use crate::app::blit::Source;
 use crate::app::comparison::AMPLIFIED;
 use crate::app::dropped::Dropped;
 use crate::app::interface::{Interface, Tab};
@@ -21,6 +22,7 @@ use crate::render::View;
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
     let panel = CentralPanel::default().frame(egui::Frame::new()).show(ui, |ui| {
         let area = ui.max_rect();
+        let scale = ui.ctx().pixels_per_point();
         measure(ui, area, scope);
         let response = ui.interact(area, ui.scope_id().with("picture"), Sense::click_and_drag());
         let Some((shown, settings)) = scope.shown.zip(scope.settings) else {
@@ -32,9 +34,9 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
         let compared = shown.order.compared.as_ref();
         let (whole, rect) = match compared {
             // A kept picture may be of another shape, or of a part.
-            Some(compared) => kept_rects(area, shown.picture.size(), compared.regions[1]),
+            Some(compared) => kept_rects((area, scale), shown.picture.size(), compared.regions[1]),
             None => {
-                let whole = fitted(area, view.whole_size());
+                let whole = fitted((area, scale), view.whole_size());
                 (whole, part_rect(whole, &shown.order.snapshot.request.view))
             }
         };
@@ -47,10 +49,10 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
         if let Some(other) = &shown.other {
             let recipe = Recipe::new(other, None, settings, shown.order.snapshot.number);
             let changes = changes(ui, other, scope);
-            let texture =
+            let source =
                 Developed::update(&mut scope.textures.other, scope.screen, recipe, changes);
             let of_left = compared.map_or(rect, |compared| {
-                let (of_whole, part) = kept_rects(area, other.size(), compared.regions[0]);
+                let (of_whole, part) = kept_rects((area, scale), other.size(), compared.regions[0]);
                 if !is_alike(of_whole, whole) {
                     // Beside another shape nothing is to be seen of what lies under it.
                     let hidden = left_of(rect, rect, scope.interface.wipe);
@@ -58,7 +60,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
                 }
                 part
             });
-            handle = wipe(ui, (rect, of_left), texture, scope.interface);
+            handle = wipe(ui, (rect, of_left), &source, scope.interface);
             match &shown.order.compared {
                 Some(compared) => wipe_labels(ui, rect, &compared.names, None),
                 None => split_labels(ui, rect, scope),
@@ -136,13 +138,13 @@ fn measure(ui: &Ui, area: Rect, scope: &mut Scope<'_>) {
 }
 
 /// Where a kept picture and the whole that it may be a part of lie.
-fn kept_rects(area: Rect, size: [u32; 2], region: Option<[f32; 4]>) -> (Rect, Rect) {
+fn kept_rects(room: (Rect, f32), size: [u32; 2], region: Option<[f32; 4]>) -> (Rect, Rect) {
     let Some([left, top, right, bottom]) = region else {
-        let whole = fitted(area, size);
+        let whole = fitted(room, size);
         return (whole, whole);
     };
     let whole = |pixels: u32, low: f32, high: f32| (pixels as f32 / (high - low)).round() as u32;
-    let whole = fitted(area, [whole(size[0], left, right), whole(size[1], top, bottom)]);
+    let whole = fitted(room, [whole(size[0], left, right), whole(size[1], top, bottom)]);
     let at = |x: f32, y: f32| whole.min + Vec2::new(x, y) * whole.size();
     (whole, Rect::from_min_max(at(left, top), at(right, bottom)))
 }
@@ -157,11 +159,18 @@ fn left_of(all: Rect, rect: Rect, wipe: f32) -> Rect {
     all.with_max_x((rect.left() + rect.width() * wipe).max(all.left()))
 }
 
-/// The picture as large as fits, in its own shape.
-fn fitted(area: Rect, [width, height]: [u32; 2]) -> Rect {
+/// The picture as large as fits into an area with so many pixels per point, in its own shape; its pixels are those of
+/// the screen where it has about as many, or all would be blurred.
+fn fitted((area, pixels_per_point): (Rect, f32), [width, height]: [u32; 2]) -> Rect {
     let size = Vec2::new(width as f32, height as f32);
     let scale = (area.width() / size.x).min(area.height() / size.y);
-    Rect::from_center_size(area.center(), size * scale)
+    let rect = Rect::from_center_size(area.center(), size * scale);
+    let missing = rect.size() * pixels_per_point - size;
+    if missing.abs().max_elem() >= 1.0 {
+        return rect;
+    }
+    let corner = (rect.min.to_vec2() * pixels_per_point).round().to_pos2();
+    Rect::from_min_size(corner, size) / pixels_per_point
 }
 
 /// Where in the whole picture's rectangle the view's part of it lies.
@@ -182,24 +191,25 @@ fn picture(
     settings: DevelopSettings,
     scope: &mut Scope<'_>,
 ) {
-    let full = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
     let painter = ui.painter();
     let number = shown.order.snapshot.number;
     let recipe = Recipe::new(&shown.picture, shown.overlay.as_ref(), settings, number);
     let changes = changes(ui, &shown.picture, scope);
     if shown.order.snapshot.request.view.crop.is_none() {
-        let texture = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);
-        painter.image(texture, whole, full, Color32::WHITE);
+        let source = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);
+        painter.add(source.shape(whole));
         scope.textures.part = None;
         return;
     }
     let is_left = scope.document.region.is_none();
     if let Some(main) = &scope.textures.main {
-        let tint = if is_left { Color32::WHITE } else { Color32::from_gray(90) };
-        painter.image(main.id, whole, full, tint);
+        painter.add(main.source.shape(whole));
+        if !is_left {
+            painter.rect_filled(whole, 0.0, Color32::from_black_alpha(165));
+        }
     }
-    let texture = Developed::update(&mut scope.textures.part, scope.screen, recipe, changes);
-    painter.image(texture, rect, full, Color32::WHITE);
+    let source = Developed::update(&mut scope.textures.part, scope.screen, recipe, changes);
+    painter.add(source.shape(rect));
     if !is_left {
         painter.rect_stroke(rect, 0.0, Stroke::new(1.0, theme::ACCENT), StrokeKind::Outside);
     }
@@ -245,13 +255,12 @@ fn waiting(ui: &Ui, area: Rect, is_loading: bool) {
 fn wipe(
     ui: &Ui,
     (rect, of_left): (Rect, Rect),
-    texture: TextureId,
+    source: &Source,
     interface: &mut Interface,
 ) -> Rect {
     let x = rect.left() + rect.width() * interface.wipe;
-    let uv = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
     let left = left_of(of_left, rect, interface.wipe);
-    ui.painter_at(left).image(texture, of_left, uv, Color32::WHITE);
+    ui.painter_at(left).add(source.shape(of_left));
     let handle =
         Rect::from_center_size(Pos2::new(x, rect.center().y), Vec2::new(14.0, rect.height()));
     let response = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());
@@ -317,14 +326,27 @@ mod tests {
     #[test]
     fn kept_pictures_keep_their_shape_and_parts_their_place() {
         let area = Rect::from_min_size(Pos2::new(10.0, 20.0), Vec2::new(400.0, 200.0));
-        let (whole, part) = kept_rects(area, [100, 100], None);
+        let (whole, part) = kept_rects((area, 1.0), [100, 100], None);
         assert!(
             whole == part && whole == Rect::from_center_size(area.center(), Vec2::splat(200.0))
         );
         // The right half of a picture of 100 x 50 pixels.
-        let (whole, part) = kept_rects(area, [50, 50], Some([0.5, 0.0, 1.0, 1.0]));
+        let (whole, part) = kept_rects((area, 1.0), [50, 50], Some([0.5, 0.0, 1.0, 1.0]));
         assert_eq!(whole, area);
         assert_eq!(part, area.with_min_x(210.0));
         assert_eq!(left_of(area, part, 0.25).right(), 260.0);
+    }
+
+    #[test]
+    fn pixels_of_a_picture_of_the_room_s_size_are_those_of_the_screen() {
+        let area = Rect::from_min_size(Pos2::new(10.2, 20.4), Vec2::new(300.3, 200.9));
+        for (pixels_per_point, size) in [(1.0, [300, 200]), (2.0, [600, 401]), (1.5, [450, 301])] {
+            let pixels = fitted((area, pixels_per_point), size) * pixels_per_point;
+            let whole = |v: f32| (v - v.round()).abs() < 1e-3;
+            assert!(whole(pixels.min.x) && whole(pixels.min.y), "{pixels:?}");
+            let missing = pixels.size() - Vec2::new(size[0] as f32, size[1] as f32);
+            assert!(missing.length() < 1e-3, "{pixels:?}");
+        }
+        assert_eq!(fitted((area, 1.0), [150, 100]).width(), 300.3);
     }
 }
