@@ -56,6 +56,8 @@ pub enum Command {
     ToggleDenoise,
     /// Show or hide the panels.
     TogglePanels,
+    /// Let the window fill the screen, or no longer.
+    ToggleFullScreen,
     /// Show or hide the developer's panel.
     ToggleDeveloper,
     /// Show or hide the list of keys.
@@ -83,7 +85,7 @@ pub enum Command {
 }
 
 /// Keys, what they do, and the command.
-pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 19] = [
+pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 20] = [
     (plain(Key::Space), "Pause, resume", Command::TogglePause),
     (plain(Key::R), "Restart the picture", Command::Restart),
     (plain(Key::F), "Frame the whole scene", Command::FrameAll),
@@ -95,6 +97,7 @@ pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 19] = [
     (plain(Key::G), "CPU or GPU", Command::ToggleDevice),
     (plain(Key::N), "Denoise, before and after", Command::ToggleDenoise),
     (plain(Key::H), "Hide or show the panels", Command::TogglePanels),
+    (plain(Key::F11), "Fill the screen, or no longer", Command::ToggleFullScreen),
     (plain(Key::F12), "Hide or show the developer's panel", Command::ToggleDeveloper),
     (control(Key::S), "Save the picture", Command::ChooseSave),
     (control(Key::O), "Open a scene", Command::ChooseScene),

@@ -125,6 +125,7 @@ impl App {
                     self.go_to(document);
                 }
             }
+            Command::ToggleFullScreen => self.toggles_full_screen ^= true,
             Command::Quit => self.is_closing = true,
             Command::MeasureTruth => {
                 if let Some(snapshot) = &self.snapshot {

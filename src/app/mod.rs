@@ -141,6 +141,7 @@ pub struct App {
     /// Threads that write files.
     writing: Vec<std::thread::JoinHandle<()>>,
     is_repeatable: bool,
+    toggles_full_screen: bool,
     is_closing: bool,
     /// The size of the picture for which there is memory, and the region.
     affordable: (document::PictureSize, Option<[f32; 4]>),
@@ -222,6 +223,7 @@ impl App {
             waiting_saves: Vec::new(),
             writing: Vec::new(),
             is_repeatable: start.is_repeatable,
+            toggles_full_screen: false,
             is_closing: false,
             affordable: (document::PictureSize::Viewport(1), None),
         })
@@ -284,6 +286,11 @@ impl App {
             && self.shown.is_some()
             && self.presenter.is_settled()
             && !self.inspector.is_busy()
+    }
+
+    /// Whether somebody asked to fill the screen, or no longer, since this was asked last.
+    pub fn toggles_full_screen(&mut self) -> bool {
+        std::mem::take(&mut self.toggles_full_screen)
     }
 
     /// Whether somebody asked to close the window.

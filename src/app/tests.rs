@@ -29,7 +29,7 @@ fn studio(scene: &str) -> Option<Studio> {
         ..defaults
     };
     let start = Start { document, ..Start::default() };
-    let shot = Shot { start, size: (800, 500), patience: Duration::from_secs(300) };
+    let shot = Shot { start, size: (800, 500), patience: Duration::from_secs(3000) };
     let studio = Studio::open(shot);
     let studio = studio.inspect_err(|error| crate::terminal::notice(format!("SKIPPED: {error}")));
     studio.ok()

@@ -20,7 +20,7 @@ use winit::event_loop::{
 };
 #[cfg(target_os = "linux")]
 use winit::platform::wayland::WindowAttributesExtWayland as _;
-use winit::window::{Window, WindowId};
+use winit::window::{Fullscreen, Window, WindowId};
 
 use super::loader::Loader;
 use super::screen::{Screen, TextureCopies, renderer_options};
@@ -301,7 +301,9 @@ impl Running {
         let Some(path) = path else { return Ok(()) };
         let mut settings = self.app.settings(Settings::read(path).ok(), is_end);
         let size = self.window.inner_size();
-        if size.width > 0 && size.height > 0 && self.window.is_minimized() != Some(true) {
+        let is_usual =
+            self.window.is_minimized() != Some(true) && self.window.fullscreen().is_none();
+        if size.width > 0 && size.height > 0 && is_usual {
             let size = size.to_logical(self.window.scale_factor());
             settings.window_size = [size.width, size.height];
         }
@@ -369,6 +371,10 @@ impl Running {
             self.context.request_repaint();
         } else if let Err(panic) = drawn {
             resume_unwind(panic);
+        }
+        if self.app.toggles_full_screen() {
+            let fills = self.window.fullscreen().is_some();
+            self.window.set_fullscreen((!fills).then_some(Fullscreen::Borderless(None)));
         }
         let title = self.app.title();
         if title != self.title {

@@ -344,7 +344,7 @@ mod tests {
     /// What everyday files have: a doubled import, instances at one place, sheets of paper.
     #[test]
     fn coincident_and_stacked_triangles_take_linear_time() {
-        let count = 100_000;
+        let count = 300_000;
         for step in [0.0, 1e-3] {
             let positions: Vec<_> = (0..count)
                 .flat_map(|i| [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p + Vec3::Z * step * i as f32))
@@ -354,7 +354,7 @@ mod tests {
             check(&positions, &triangles);
             let seconds = start.elapsed().as_secs_f64();
             println!("{count} triangles {step} apart: {seconds:.2} s");
-            assert!(seconds < 10.0, "{step}: {seconds}");
+            assert!(seconds < 40.0, "{step}: {seconds}");
         }
     }
 

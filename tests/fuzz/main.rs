@@ -41,7 +41,7 @@ const TASK: &str = "LIGHTGRID_FUZZ";
 const ALLOWANCE_BYTES: u64 = 64 << 20;
 
 /// How long an input may take.
-const PATIENCE: Duration = Duration::from_secs(10);
+const PATIENCE: Duration = Duration::from_secs(40);
 
 /// What is spoilt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

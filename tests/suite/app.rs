@@ -35,7 +35,7 @@ fn start() -> Start {
 }
 
 fn studio(start: Start, size: (u32, u32)) -> Option<Studio> {
-    let shot = Shot { start, size, patience: Duration::from_secs(300) };
+    let shot = Shot { start, size, patience: Duration::from_secs(3000) };
     match Studio::open(shot) {
         Ok(studio) => Some(studio),
         Err(error) => {

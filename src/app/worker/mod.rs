@@ -332,7 +332,7 @@ pub(super) mod tests {
         let Some(worker) = worker() else { return };
         let request = request_of("office", [320, 240]);
         worker.submit(request.clone());
-        let is_worth_it = |now: &Snapshot| now.seconds() > 1.5 && now.is_whole();
+        let is_worth_it = |now: &Snapshot| now.now.samples > 16 * 320 * 240 && now.is_whole();
         let before = wait_for(&worker, is_worth_it).now.samples;
         let crop = crate::render::Crop { corner: [0, 0], whole: [320, 240] };
         let view = View { width: 80, height: 60, crop: Some(crop), ..request.view.clone() };
@@ -392,7 +392,7 @@ pub(super) mod tests {
         let first = wait_for(&worker, |snapshot| snapshot.main.samples > 1);
         first.rest.set_end(Instant::now() + Duration::from_secs(600));
         // One may have been under way.
-        let number = first.number + 1;
+        let number = worker.snapshot().expect("there was one").number + 1;
         let resting = wait_for(&worker, |snapshot| snapshot.number > number);
         let later = wait_for(&worker, |now| now.now.samples > 2 * resting.now.samples);
         assert!(Arc::ptr_eq(&later.main.film, &resting.main.film), "nobody wants another");

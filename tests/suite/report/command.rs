@@ -51,7 +51,9 @@ fn number(value: &Value) -> f64 {
 #[test]
 fn a_report_has_all_its_parts_and_goes_on_where_it_stopped() {
     let bench = Bench::new();
-    let output = succeed(&bench, LINE);
+    // No reference is so noisy that it had to grow, upon which all runs are measured anew.
+    let line = &LINE.replace("--reference-noise 0.2", "--reference-noise 1");
+    let output = succeed(&bench, line);
     let table = text(&output.stdout);
     assert!(table.contains("| scene.gltf / map.exr | CPU |"), "{table}");
     assert!(text(&output.stderr).contains("2 methods x 2 runs of 0.4 s"));
@@ -105,14 +107,13 @@ fn a_report_has_all_its_parts_and_goes_on_where_it_stopped() {
     let outside = html.replace("http://www.w3.org/2000/svg", "");
     assert!(!outside.contains("http") && !outside.contains("src=\"/"), "readable offline");
 
-    // Nothing is missing: nothing is measured. One run is: it alone is measured (and what is found from all
-    // of them may be found anew, for a better run asks for a better reference).
+    // Nothing is missing: nothing is measured. One run is: it alone is measured.
     let before = runs(&bench);
-    succeed(&bench, LINE);
+    succeed(&bench, line);
     assert_eq!(runs(&bench), before);
     let (lost, _) = before.iter().find(|(_, seconds)| !seconds.is_empty()).expect("a run");
     fs::remove_file(lost).expect("removed");
-    succeed(&bench, LINE);
+    succeed(&bench, line);
     let after = runs(&bench);
     assert!(after.iter().any(|(path, _)| path == lost), "measured again");
     for run in &before {
@@ -120,7 +121,7 @@ fn a_report_has_all_its_parts_and_goes_on_where_it_stopped() {
     }
     // A file cut short is as good as none.
     fs::write(lost, "{\"method\":").expect("written");
-    succeed(&bench, LINE);
+    succeed(&bench, line);
     assert!(fs::read_to_string(lost).expect("readable").contains("points"));
 }
 
@@ -133,13 +134,15 @@ fn the_reference_grows_until_it_is_good_enough() {
     let (path, first) = reference_facts(&bench);
     let share =
         |bench: &Bench| number(&bench.json("out/report.json")["rows"][0]["reference"]["share"]);
-    assert!(share(&bench) <= 0.5001);
-    succeed(&bench, &line("0.04"));
+    let noisy = share(&bench);
+    assert!(noisy <= 0.5001);
+    // Less than it happens to be.
+    succeed(&bench, &line(&format!("{:.5}", 0.3 * noisy)));
     let (same, second) = reference_facts(&bench);
     assert_eq!(same, path);
     let pictures = |facts: &Value| facts["pictures"].as_u64().expect("a count");
     assert!(pictures(&second) > pictures(&first), "{first} {second}");
-    assert!(share(&bench) <= 0.0401, "{}", share(&bench));
+    assert!(share(&bench) <= 0.301 * noisy, "{} {noisy}", share(&bench));
     // The first ones were kept: a picture more or less could not hide this many.
     assert!(number(&second["seconds"]) > number(&first["seconds"]));
     assert_eq!(second["samples_per_picture"], first["samples_per_picture"]);
