@@ -13,6 +13,8 @@ use crate::render::gpu::Gpu;
 pub(super) struct Blit {
     pipeline: Arc<wgpu::RenderPipeline>,
     sampler: wgpu::Sampler,
+    /// Most pixels of a viewport's side.
+    most: f32,
 }
 
 impl Blit {
@@ -52,7 +54,8 @@ impl Blit {
             min_filter: wgpu::FilterMode::Linear,
             ..wgpu::SamplerDescriptor::default()
         });
-        Self { pipeline: Arc::new(pipeline), sampler }
+        let most = gpu.limits.max_texture_dimension_2d as f32;
+        Self { pipeline: Arc::new(pipeline), sampler, most }
     }
 
     /// A picture for [`shape`].
@@ -71,7 +74,7 @@ impl Blit {
                 },
             ],
         });
-        Source { pipeline: Arc::clone(&self.pipeline), picture }
+        Source { pipeline: Arc::clone(&self.pipeline), picture, most: self.most }
     }
 }
 
@@ -80,10 +83,11 @@ impl Blit {
 pub(super) struct Source {
     pipeline: Arc<wgpu::RenderPipeline>,
     picture: wgpu::BindGroup,
+    most: f32,
 }
 
 impl Source {
-    /// The whole picture in a rectangle, in points, which lies within the frame.
+    /// The whole picture in a rectangle, in points; nothing of one that is larger than any frame.
     pub(super) fn shape(&self, rect: Rect) -> Shape {
         Callback::new_paint_callback(rect, self.clone()).into()
     }
@@ -98,6 +102,9 @@ impl CallbackTrait for Source {
     ) {
         // Not between whole pixels, as egui sets it: a picture that grows would jump.
         let Rect { min, max } = info.viewport * info.pixels_per_point;
+        if (max - min).max_elem() > self.most {
+            return;
+        }
         pass.set_viewport(min.x, min.y, max.x - min.x, max.y - min.y, 0.0, 1.0);
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.picture, &[]);

@@ -37,12 +37,17 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
             Some(compared) => kept_rects((area, scale), shown.picture.size(), compared.regions[1]),
             None => {
                 let whole = fitted((area, scale), view.whole_size());
-                (whole, part_rect(whole, &shown.order.snapshot.request.view))
+                let view = &shown.order.snapshot.request.view;
+                let rect = match view.crop {
+                    Some(_) => part_rect(whole, view),
+                    None => middle_rect(whole, shown.picture.size()),
+                };
+                (whole, rect)
             }
         };
         let ground = if compared.is_some() { rect } else { whole };
         let is_part = shown.order.snapshot.request.view.crop.is_some();
-        surround(ui, area, if is_part { Rect::NOTHING } else { ground });
+        surround(ui, area, if is_part { Rect::NOTHING } else { ground.intersect(rect) });
         picture(ui, (ground, rect), shown, settings, scope);
         labels(ui, rect, shown);
         let mut handle = Rect::NOTHING;
@@ -173,6 +178,15 @@ fn fitted((area, pixels_per_point): (Rect, f32), [width, height]: [u32; 2]) -> R
     Rect::from_min_size(corner, size) / pixels_per_point
 }
 
+/// Where a picture that may be from before the view got another shape lies beside the whole: the field of view is
+/// vertical, so that they share their middle.
+fn middle_rect(whole: Rect, [width, height]: [u32; 2]) -> Rect {
+    let size = Vec2::new(whole.height() * width as f32 / height as f32, whole.height());
+    // Small pictures are of whole pixels.
+    let is_alike = (size.x / whole.width() - 1.0).abs() < 0.05;
+    if is_alike { whole } else { Rect::from_center_size(whole.center(), size) }
+}
+
 /// Where in the whole picture's rectangle the view's part of it lies.
 fn part_rect(whole: Rect, view: &View) -> Rect {
     let Some(crop) = view.crop else { return whole };
@@ -197,13 +211,14 @@ fn picture(
     let changes = changes(ui, &shown.picture, scope);
     if shown.order.snapshot.request.view.crop.is_none() {
         let source = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);
-        painter.add(source.shape(whole));
+        ui.painter_at(whole).add(source.shape(rect));
         scope.textures.part = None;
         return;
     }
     let is_left = scope.document.region.is_none();
     if let Some(main) = &scope.textures.main {
-        painter.add(main.source.shape(whole));
+        let rect = middle_rect(whole, main.display.size());
+        ui.painter_at(whole).add(main.source.shape(rect));
         if !is_left {
             painter.rect_filled(whole, 0.0, Color32::from_black_alpha(165));
         }
@@ -335,6 +350,10 @@ mod tests {
         assert_eq!(whole, area);
         assert_eq!(part, area.with_min_x(210.0));
         assert_eq!(left_of(area, part, 0.25).right(), 260.0);
+        // From before the view got wider or narrower, and a small one of the same.
+        assert_eq!(middle_rect(area, [100, 100]).size(), Vec2::splat(200.0));
+        assert_eq!(middle_rect(area, [300, 100]).size(), Vec2::new(600.0, 200.0));
+        assert_eq!(middle_rect(area, [51, 25]), area);
     }
 
     #[test]

@@ -350,6 +350,21 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn what_a_picture_begins_with_is_shown_when_it_is_everywhere() {
+        let Some(worker) = worker() else { return };
+        let before = request_of("office", [320, 240]);
+        worker.submit(before.clone());
+        wait_for(&worker, Snapshot::is_whole);
+        // What there was is the middle of what is asked for now.
+        let view = View { width: 4000, height: 1200, ..before.view.clone() };
+        worker.submit(Request { view, wants_cached: true, ..before });
+        let is_shown = |now: &Snapshot| now.request.view.width == 4000 && now.has_picture();
+        let first = wait_for(&worker, is_shown);
+        let cached = first.backdrop.as_ref().is_some_and(|backdrop| backdrop.film.is_begun());
+        assert!(cached || first.main.film.is_begun(), "not in streaks");
+    }
+
+    #[test]
     fn a_movement_is_seen_while_it_goes_on() {
         let Some(worker) = worker() else { return };
         let mut request = Request { moving: true, ..request_of("office", [640, 480]) };

@@ -185,6 +185,7 @@ impl Snapshot {
 
     /// Whether there is anything to be seen.
     pub(crate) fn has_picture(&self) -> bool {
-        self.main.figures.samples > 0 || self.backdrop.is_some()
+        // Before its first pixels are everywhere, there would be streaks.
+        self.main.samples > 0 || self.backdrop.is_some() || self.main.film.is_begun()
     }
 }

@@ -90,23 +90,19 @@ impl<'s> CachedPicture<'s> {
         Some(session)
     }
 
-    /// Its film and how many samples that has, if there is enough of it. A copy is made unless there is a new one
-    /// already or, if it `rests`, any: it is megabytes and is soon complete.
-    pub(super) fn film(
-        &mut self,
-        suffices: impl Fn(u64) -> bool,
-        rests: bool,
-    ) -> Option<(u64, Arc<Film>)> {
+    /// Its film and how many samples that has, if these are more than so many and all over the picture. A copy is
+    /// made unless there is a new one already or, if it `rests`, any: it is megabytes and is soon complete.
+    pub(super) fn film(&mut self, least: u64, rests: bool) -> Option<(u64, Arc<Film>)> {
         match self {
-            Self::UnderWay(session, copy) if suffices(session.figures().samples) => {
+            Self::UnderWay(session, copy)
+                if session.figures().samples > least && session.is_begun() =>
+            {
                 let samples = session.figures().samples;
                 let kept = copy.take().filter(|(of, _)| rests || *of == samples);
                 let kept = kept.unwrap_or_else(|| (samples, Arc::new(session.film().clone())));
                 Some(copy.insert(kept).clone())
             }
-            Self::Complete(samples, film) if suffices(*samples) => {
-                Some((*samples, Arc::clone(film)))
-            }
+            Self::Complete(samples, film) if *samples > least => Some((*samples, Arc::clone(film))),
             _ => None,
         }
     }

@@ -154,8 +154,7 @@ impl Job<'_> {
         let is_own = |(of, _): &(Arc<Request>, Arc<Film>)| Arc::ptr_eq(of, &self.request);
         let before = self.backdrop().filter(|_| !self.kept.backdrop.as_ref().is_some_and(is_own));
         let seen = before.as_ref().map_or(0, |film| film.total_samples());
-        let says_more = |samples: u64| 2 * samples > 3 * seen;
-        let film = cached.film(says_more, rests).filter(|_| self.request.wants_cached);
+        let film = cached.film(3 * seen / 2, rests).filter(|_| self.request.wants_cached);
         match film {
             Some((samples, film)) => {
                 let worth = worth(main.samples());
@@ -276,8 +275,8 @@ impl Job<'_> {
     ) -> Option<&Reading> {
         self.readings[role].as_ref().filter(|reading| match (&reading.of, of) {
             (Some(read), Some(of)) => is_same(read, of) && reading.at.elapsed() < reading.gap,
-            // Before the first sample it was another picture.
-            (None, None) => rests && reading.figures.samples > 0,
+            // Before the first sample it was another picture, and none before pixels everywhere have one.
+            (None, None) => rests && reading.figures.samples > 0 && reading.film.is_begun(),
             _ => false,
         })
     }
