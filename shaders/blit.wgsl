@@ -1,4 +1,4 @@
-// A developed picture into the viewport, which is the rectangle that it is shown in.
+// A developed picture into the viewport, which is the rectangle that it is shown in: for src/app/blit.rs.
 
 @group(0) @binding(0) var picture: texture_2d<f32>;
 @group(0) @binding(1) var between: sampler;

@@ -1,9 +1,7 @@
 //! Developed pictures in egui's frame, drawn by a shader that does nothing else: in egui's own, which has more
 //! to choose from and blends, software spends most of a frame.
 
-use std::sync::Arc;
-
-use egui::{PaintCallbackInfo, Rect, Shape};
+use egui::{PaintCallbackInfo, Pos2, Rect, Shape};
 use egui_wgpu::{Callback, CallbackResources, CallbackTrait};
 
 use crate::develop::DisplayTexture;
@@ -11,7 +9,7 @@ use crate::render::gpu::Gpu;
 
 /// What draws pictures on one device into one format.
 pub(super) struct Blit {
-    pipeline: Arc<wgpu::RenderPipeline>,
+    pipeline: wgpu::RenderPipeline,
     sampler: wgpu::Sampler,
     /// Most pixels of a viewport's side.
     most: f32,
@@ -55,7 +53,7 @@ impl Blit {
             ..wgpu::SamplerDescriptor::default()
         });
         let most = gpu.limits.max_texture_dimension_2d as f32;
-        Self { pipeline: Arc::new(pipeline), sampler, most }
+        Self { pipeline, sampler, most }
     }
 
     /// A picture for [`shape`].
@@ -74,14 +72,14 @@ impl Blit {
                 },
             ],
         });
-        Source { pipeline: Arc::clone(&self.pipeline), picture, most: self.most }
+        Source { pipeline: self.pipeline.clone(), picture, most: self.most }
     }
 }
 
 /// A picture that can be drawn; clones share it.
 #[derive(Clone)]
 pub(super) struct Source {
-    pipeline: Arc<wgpu::RenderPipeline>,
+    pipeline: wgpu::RenderPipeline,
     picture: wgpu::BindGroup,
     most: f32,
 }
@@ -100,8 +98,11 @@ impl CallbackTrait for Source {
         pass: &mut wgpu::RenderPass<'static>,
         _: &CallbackResources,
     ) {
-        // Not between whole pixels, as egui sets it: a picture that grows would jump.
+        // As egui sets it, it would be of whole pixels, and a picture that grows would jump. OpenGL takes what is
+        // next below: what is meant to be whole is.
+        let whole = |at: f32| if (at - at.round()).abs() < 0.01 { at.round() } else { at };
         let Rect { min, max } = info.viewport * info.pixels_per_point;
+        let [min, max] = [min, max].map(|at| Pos2::new(whole(at.x), whole(at.y)));
         if (max - min).max_elem() > self.most {
             return;
         }

@@ -288,7 +288,8 @@ impl App {
             if request.moving {
                 context.request_repaint_after(std::time::Duration::from_millis(60));
             }
-            self.inspector.update(&self.interface, self.snapshot.as_ref());
+            let seen = self.shown.as_ref().map(|shown| &shown.order.snapshot);
+            self.inspector.update(&self.interface, seen.or(self.snapshot.as_ref()));
             self.worker.submit(request);
         }
         self.save_when_whole();
@@ -335,8 +336,8 @@ impl App {
         if self.reference.is_some() && self.reference_of.is_none() && self.has_sources() {
             self.reference_of = Some(self.document.clone());
         }
-        let scene = self.scene.as_ref()?;
-        let world = Arc::clone(&scene.world);
+        // Another scene would be seen from this one's viewpoint.
+        let world = Arc::clone(&self.scene_of_document()?.world);
         let environment = self.environment()?;
         let (width, height) = match self.document.size {
             PictureSize::Fixed(width, height) => (width, height),

@@ -79,6 +79,8 @@ impl App {
                 interface.is_marking = self.document.region.is_none() && !interface.is_marking;
                 self.document.region = None;
                 interface.pinned = None;
+                // A part of what is rendered is marked there.
+                (interface.compared.right, interface.compared.is_difference) = (None, false);
             }
             Command::Undo => {
                 // What has just been changed may not have been noted as yet.
@@ -222,7 +224,13 @@ impl App {
     fn keep(&mut self) {
         let Some(shown) = &self.shown else { return };
         let snapshot = &shown.order.snapshot;
-        if !(snapshot.is_whole() && self.is_of_document(snapshot)) {
+        let view = &snapshot.request.view;
+        // As long as a smaller picture says more, it is that which is shown.
+        let is_of_size = shown
+            .image
+            .as_ref()
+            .is_none_or(|image| (image.width, image.height) == (view.width, view.height));
+        if !(snapshot.is_lasting() && is_of_size && self.is_of_document(snapshot)) {
             self.messages.notice("A picture can be kept once it has its full size");
             return;
         }
@@ -281,7 +289,7 @@ impl App {
     fn selected_bounds(&self) -> Option<(glam::Vec3, glam::Vec3)> {
         let pointed = || {
             let place = self.interface.inspected()?;
-            let request = &self.snapshot.as_ref()?.request;
+            let request = &self.shown.as_ref()?.order.snapshot.request;
             surface_map::look_at_place(&request.world, &request.view, place)
         };
         let chosen = self.interface.material.or_else(|| Some(pointed()?.material))?;
@@ -340,7 +348,7 @@ impl App {
 
     /// The whole picture of what the document says, if it is there.
     fn picture(&self) -> Option<save::Picture> {
-        let snapshot = self.snapshot.as_ref().filter(|snapshot| snapshot.is_whole())?;
+        let snapshot = self.snapshot.as_ref().filter(|snapshot| snapshot.is_lasting())?;
         // Its exposure is that of what is shown.
         let of_shown = &self.shown.as_ref()?.order.snapshot;
         if ![snapshot, of_shown].iter().all(|snapshot| self.is_of_document(snapshot)) {

@@ -369,6 +369,7 @@ impl App {
             );
             let status = panels::status::Status {
                 snapshot,
+                shown: self.shown.as_ref().map(|shown| &*shown.order.snapshot),
                 loading: self.loader.busy_with().collect(),
                 threads: self.worker.threads(),
                 is_preparing: self.worker.is_preparing(),

@@ -1,4 +1,5 @@
-//! What the window is drawn on: a device, and what develops and draws pictures there. All are made anew when the device is lost; nothing else of the window depends on them.
+//! What the window is drawn on: a device, and what develops and draws pictures there. All are made anew when the
+//! device is lost; nothing else of the window depends on them.
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -9,6 +9,7 @@ use glam::Vec3;
 
 use super::scope::Scope;
 use crate::app::commands::Command;
+use crate::app::comparison::Comparison;
 use crate::app::document::Viewpoint;
 use crate::app::drag::{Drag, Step};
 use crate::app::interface::Tab;
@@ -68,6 +69,12 @@ fn mark_region(ui: &Ui, whole: Rect, steps: &[Step], scope: &mut Scope<'_>) {
 
 /// Where the pointer is, and what a click does there.
 fn point(rect: Rect, response: &Response, modifiers: Modifiers, scope: &mut Scope<'_>) {
+    let compared = scope.shown.and_then(|shown| shown.order.compared.as_ref());
+    if compared.is_some_and(Comparison::covers_now) {
+        // A kept picture has colours and no more.
+        scope.interface.pointed = None;
+        return;
+    }
     scope.interface.pointed =
         response.hover_pos().filter(|at| rect.contains(*at)).map(|at| place_of(rect, at));
     if response.double_clicked() {
@@ -149,7 +156,7 @@ fn orbit(viewpoint: &mut Viewpoint, drag: glam::Vec2, scene: Option<&LoadedScene
 /// The surface under a click.
 fn clicked_spot(rect: Rect, response: &Response, scope: &Scope<'_>) -> Option<Spot> {
     let place = place_of(rect, response.interact_pointer_pos()?);
-    let (scene, request) = (scope.scene?, &scope.snapshot?.request);
+    let (scene, request) = (scope.scene?, &scope.shown?.order.snapshot.request);
     // The last picture of another scene says nothing about this one.
     let is_of_scene = Arc::ptr_eq(request.world.geometry(), scene.world.geometry());
     is_of_scene.then(|| look_at_place(&request.world, &request.view, place))?

@@ -1,5 +1,7 @@
 //! What the viewport is drawn from.
 
+use std::sync::Arc;
+
 use crate::app::commands::Command;
 use crate::app::document::Document;
 use crate::app::interface::Interface;
@@ -9,12 +11,15 @@ use crate::app::screen::{Developed, Screen};
 use crate::app::speed_up::SpeedUp;
 use crate::app::worker::Snapshot;
 use crate::develop::DevelopSettings;
+use crate::scene::Camera;
 
 /// Developed pictures.
 #[derive(Default)]
 pub(in crate::app) struct Textures {
     /// The last whole picture.
     pub(super) main: Option<Developed>,
+    /// What it is of, unless it is a kept one: the geometry, and from where.
+    pub(super) main_of: Option<(Arc<()>, Camera)>,
     /// A part of it that is rendered alone.
     pub(super) part: Option<Developed>,
     pub(super) other: Option<Developed>,

@@ -9,6 +9,8 @@ use crate::app::worker::{Activity, Snapshot};
 pub(in crate::app) struct Status<'a> {
     /// The latest picture.
     pub(in crate::app) snapshot: Option<&'a Snapshot>,
+    /// That of the picture on the screen.
+    pub(in crate::app) shown: Option<&'a Snapshot>,
     /// Files being loaded.
     pub(in crate::app) loading: Vec<&'a str>,
     /// Whether a GPU is being made ready.
@@ -31,8 +33,9 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 if let Some(snapshot) = status.snapshot {
                     device(ui, snapshot, status.threads);
-                    if let Some(place) = status.pointed.filter(|_| !theme::is_narrow(ui)) {
-                        pixel(ui, snapshot, place);
+                    let pointed = status.pointed.filter(|_| !theme::is_narrow(ui));
+                    if let Some((place, shown)) = pointed.zip(status.shown) {
+                        pixel(ui, shown, place);
                     }
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {

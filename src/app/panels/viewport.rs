@@ -1,5 +1,7 @@
 //! The picture.
 
+use std::sync::Arc;
+
 use egui::{
     Align2, CentralPanel, Color32, CursorIcon, FontId, Pos2, Rect, Sense, Stroke, StrokeKind, Ui,
     Vec2,
@@ -39,7 +41,7 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
                 let whole = fitted((area, scale), view.whole_size());
                 let view = &shown.order.snapshot.request.view;
                 let rect = match view.crop {
-                    Some(_) => part_rect(whole, view),
+                    Some(crop) => part_rect(middle_rect(whole, crop.whole), view),
                     None => middle_rect(whole, shown.picture.size()),
                 };
                 (whole, rect)
@@ -170,8 +172,8 @@ fn fitted((area, pixels_per_point): (Rect, f32), [width, height]: [u32; 2]) -> R
     let size = Vec2::new(width as f32, height as f32);
     let scale = (area.width() / size.x).min(area.height() / size.y);
     let rect = Rect::from_center_size(area.center(), size * scale);
-    let missing = rect.size() * pixels_per_point - size;
-    if missing.abs().max_elem() >= 1.0 {
+    let room = area.size() * pixels_per_point - size;
+    if room.min_elem() <= -1.0 || room.abs().min_elem() >= 1.0 {
         return rect;
     }
     let corner = (rect.min.to_vec2() * pixels_per_point).round().to_pos2();
@@ -183,7 +185,8 @@ fn fitted((area, pixels_per_point): (Rect, f32), [width, height]: [u32; 2]) -> R
 fn middle_rect(whole: Rect, [width, height]: [u32; 2]) -> Rect {
     let size = Vec2::new(whole.height() * width as f32 / height as f32, whole.height());
     // Small pictures are of whole pixels.
-    let is_alike = (size.x / whole.width() - 1.0).abs() < 0.05;
+    let rounding = 1.0 / width as f32 + 1.0 / height as f32;
+    let is_alike = (size.x / whole.width() - 1.0).abs() < 0.01 + rounding;
     if is_alike { whole } else { Rect::from_center_size(whole.center(), size) }
 }
 
@@ -209,11 +212,18 @@ fn picture(
     let number = shown.order.snapshot.number;
     let recipe = Recipe::new(&shown.picture, shown.overlay.as_ref(), settings, number);
     let changes = changes(ui, &shown.picture, scope);
-    if shown.order.snapshot.request.view.crop.is_none() {
+    let request = &shown.order.snapshot.request;
+    let of = Some((Arc::clone(request.world.geometry()), request.view.camera.clone()));
+    if request.view.crop.is_none() {
+        let is_now = shown.order.compared.as_ref().is_none_or(|compared| !compared.covers_now());
+        scope.textures.main_of = of.filter(|_| is_now);
         let source = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);
         ui.painter_at(whole).add(source.shape(rect));
         scope.textures.part = None;
         return;
+    }
+    if scope.textures.main_of != of {
+        scope.textures.main = None;
     }
     let is_left = scope.document.region.is_none();
     if let Some(main) = &scope.textures.main {
@@ -275,7 +285,7 @@ fn wipe(
 ) -> Rect {
     let x = rect.left() + rect.width() * interface.wipe;
     let left = left_of(of_left, rect, interface.wipe);
-    ui.painter_at(left).add(source.shape(of_left));
+    ui.painter_at(left.intersect(ui.max_rect())).add(source.shape(of_left));
     let handle =
         Rect::from_center_size(Pos2::new(x, rect.center().y), Vec2::new(14.0, rect.height()));
     let response = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());
@@ -359,7 +369,13 @@ mod tests {
     #[test]
     fn pixels_of_a_picture_of_the_room_s_size_are_those_of_the_screen() {
         let area = Rect::from_min_size(Pos2::new(10.2, 20.4), Vec2::new(300.3, 200.9));
-        for (pixels_per_point, size) in [(1.0, [300, 200]), (2.0, [600, 401]), (1.5, [450, 301])] {
+        let wide = Rect::from_min_size(area.min, Vec2::new(3840.1, 999.6));
+        for (area, pixels_per_point, size) in [
+            (area, 1.0, [300, 200]),
+            (area, 2.0, [600, 401]),
+            (area, 1.5, [450, 301]),
+            (wide, 1.0, [3840, 1000]),
+        ] {
             let pixels = fitted((area, pixels_per_point), size) * pixels_per_point;
             let whole = |v: f32| (v - v.round()).abs() < 1e-3;
             assert!(whole(pixels.min.x) && whole(pixels.min.y), "{pixels:?}");

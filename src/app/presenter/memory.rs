@@ -38,6 +38,8 @@ impl<K: PartialEq, V: Clone> Last<K, V> {
 /// The exposure of the last whole picture.
 struct Metered {
     environment: Arc<Environment>,
+    /// Of the scene.
+    geometry: Arc<()>,
     white_balance: WhiteBalance,
     ev: f32,
 }
@@ -100,11 +102,14 @@ impl Memory {
         if order.snapshot.request.view.crop.is_none() {
             self.whole = order.metered.map(|white_balance| Metered {
                 environment: Arc::clone(&order.snapshot.request.environment),
+                geometry: Arc::clone(order.snapshot.request.world.geometry()),
                 white_balance,
                 ev: automatic_ev,
             });
         }
-        let painted = order.overlay.map_or(Ok(None), |overlay| {
+        // What is kept has no overlays.
+        let is_now = order.compared.as_ref().is_none_or(|compared| !compared.covers_now());
+        let painted = order.overlay.filter(|_| is_now).map_or(Ok(None), |overlay| {
             let mut last = std::mem::take(&mut self.uploads.overlay);
             let look = order.look.map(|look| (look, automatic_ev));
             let key = (order.snapshot.number, overlay, order.tile, look);
@@ -152,11 +157,12 @@ impl Memory {
     }
 
     /// The exposure a part of a picture has from the whole one it lies on: it does not become brighter or
-    /// darker because less is rendered. Under another map it is measured.
+    /// darker because less is rendered. In another scene and under another map it is measured.
     fn whole_ev(&self, order: &Order) -> Option<f32> {
         let (request, whole) = (&order.snapshot.request, self.whole.as_ref()?);
         request.view.crop?;
         let is_alike = whole.environment.shares_map_with(&request.environment)
+            && Arc::ptr_eq(&whole.geometry, request.world.geometry())
             && Some(whole.white_balance) == order.metered;
         is_alike.then_some(whole.ev)
     }

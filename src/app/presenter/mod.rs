@@ -146,7 +146,7 @@ fn run(shared: &Shared) {
             // The panic is on the terminal; the next picture is another try.
             Err(_) => memory = Memory::default(),
         }
-        let rest = rest_after(work.time(start.elapsed()), kept.snapshot.seconds());
+        let rest = rest_after(work.time(start.elapsed()), kept.snapshot.youngest_seconds());
         let end = Instant::now() + rest;
         kept.snapshot.rest.set_end(end);
         last = Some((kept, end));

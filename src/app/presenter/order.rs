@@ -57,7 +57,10 @@ impl Order {
     /// sample in every pixel does not.
     pub(super) fn only_follows(&self, before: &Self) -> bool {
         let is_over = matches!(self.snapshot.activity, Activity::Done | Activity::Paused);
-        let is_first = self.snapshot.is_whole() && !before.snapshot.is_whole();
+        let has_plain =
+            |snapshot: &Snapshot| snapshot.plain.as_ref().is_some_and(|p| p.samples > 0);
+        let (now, then) = (&self.snapshot, &before.snapshot);
+        let is_first = now.is_whole() && !then.is_whole() || has_plain(now) && !has_plain(then);
         let (request, old) = (&self.snapshot.request, &before.snapshot.request);
         let is_same_work = Arc::ptr_eq(request, old) || (request.moving && old.moving);
         let snapshot = Arc::clone(&before.snapshot);

@@ -73,6 +73,9 @@ impl Source {
 
     pub(super) fn plain(order: &Order) -> Option<Self> {
         let session = order.snapshot.plain.clone()?;
+        if session.samples == 0 && !session.film.is_begun() {
+            return None;
+        }
         let is_whole = session.samples > 0;
         Some(Self { session, backdrop: None, denoiser: order.denoiser, is_whole })
     }

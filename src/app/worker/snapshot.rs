@@ -177,15 +177,27 @@ impl Snapshot {
         self.now.elapsed_seconds() + self.cached_seconds
     }
 
+    /// Seconds of the picture that was begun last, of those that are shown.
+    pub(crate) fn youngest_seconds(&self) -> f64 {
+        let plain = self.plain.as_ref().map(|plain| plain.figures.elapsed_seconds());
+        plain.map_or(self.seconds(), |seconds| seconds.min(self.seconds()))
+    }
+
     /// Whether the picture has its full size and every pixel a sample: it has not at first and while
     /// the camera moves.
     pub(crate) fn is_whole(&self) -> bool {
         self.main.samples > 0 && self.main.film.width == self.request.view.width
     }
 
+    /// Whether it may be saved and kept: a movement's pictures are of less, whatever their size.
+    pub(crate) fn is_lasting(&self) -> bool {
+        self.is_whole() && !self.request.moving
+    }
+
     /// Whether there is anything to be seen.
     pub(crate) fn has_picture(&self) -> bool {
         // Before its first pixels are everywhere, there would be streaks.
-        self.main.samples > 0 || self.backdrop.is_some() || self.main.film.is_begun()
+        let is_paused = self.activity == Activity::Paused && self.main.figures.samples > 0;
+        self.main.samples > 0 || self.backdrop.is_some() || is_paused || self.main.film.is_begun()
     }
 }

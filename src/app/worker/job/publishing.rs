@@ -206,13 +206,15 @@ impl Job<'_> {
         // The first picture with a sample in every pixel is shown at once.
         let is_due = session.samples() > 0
             && self.readings[role].as_ref().is_some_and(|reading| reading.samples == 0);
-        let kept =
-            self.reading(role, in_place.as_ref(), rests && !is_due).filter(|_| !is_final).cloned();
+        let kept = self
+            .reading(role, in_place.as_ref(), rests && !is_due)
+            .filter(|_| !is_final && !is_due)
+            .cloned();
         let (reading, cost) = match kept {
             Some(reading) => (reading, Duration::ZERO),
             None => {
                 let start = Instant::now();
-                let film = self.film_of(session);
+                let film = self.film_of(role, session);
                 let (noise, figures) = (session.noise(), session.figures());
                 let invalid_samples = film.invalid_samples();
                 let cost = if is_in_place { start.elapsed() } else { Duration::ZERO };
@@ -242,9 +244,10 @@ impl Job<'_> {
         (snapshot, cost)
     }
 
-    /// The session's film; before the first sample, one of the same view from before.
-    fn film_of(&self, session: &Session<'_>) -> Arc<Film> {
-        let before = if session.figures().samples == 0 { self.backdrop() } else { None };
+    /// The session's film; before the main one's first sample, one of the same view from before.
+    fn film_of(&self, role: usize, session: &Session<'_>) -> Arc<Film> {
+        let is_empty = role == MAIN && session.figures().samples == 0;
+        let before = if is_empty { self.backdrop() } else { None };
         before.unwrap_or_else(|| Arc::new(session.film().clone()))
     }
 
