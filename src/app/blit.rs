@@ -112,3 +112,82 @@ impl CallbackTrait for Source {
         pass.draw(0..4, 0..1);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use wgpu::TextureFormat;
+
+    use super::*;
+    use crate::develop::DevelopSettings;
+    use crate::develop::tests::developer;
+    use crate::image::{Image, Rgb8};
+    use crate::tone::{ToneCurve, WhiteBalance};
+
+    /// A black frame of 24 x 20 pixels with a shape drawn at 1.25 pixels a point.
+    fn frame(gpu: &Gpu, format: TextureFormat, source: &Source, viewport: Rect) -> Rgb8 {
+        let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d { width: 24, height: 20, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let mut commands = gpu.device.create_command_encoder(&Default::default());
+        let pass = commands.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &target.create_view(&Default::default()),
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations::default(),
+            })],
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        let info = PaintCallbackInfo {
+            viewport,
+            clip_rect: Rect::EVERYTHING,
+            pixels_per_point: 1.25,
+            screen_size_px: [24, 20],
+        };
+        source.paint(info, &mut pass.forget_lifetime(), &CallbackResources::default());
+        gpu.submit([commands.finish()]);
+        gpu.read_texture(&target).expect("read")
+    }
+
+    #[test]
+    fn a_picture_is_drawn_pixel_for_pixel_however_frames_are_encoded() {
+        let Some(developer) = developer() else { return };
+        let gpu = developer.gpu();
+        let pixels = (0..16 * 8).map(|i| [i as f32 / 127.0, (i % 16) as f32 / 15.0, 0.3]).collect();
+        let picture = developer.upload_image(&Image { width: 16, height: 8, pixels });
+        let settings = DevelopSettings {
+            white_balance: WhiteBalance::default(),
+            exposure_ev: 0.0,
+            curve: ToneCurve::None,
+            opacity: [0.0; 2],
+        };
+        let display = developer.display_texture([16, 8]);
+        developer.develop(&picture, None, &settings, &display);
+        let levels = developer.read(&display).expect("read");
+        for format in [TextureFormat::Rgba8Unorm, TextureFormat::Rgba8UnormSrgb] {
+            let source = Blit::new(gpu, format).source(gpu, &display);
+            let corner = Pos2::new(5.0, 7.0) / 1.25;
+            let drawn = Rect::from_min_size(corner, egui::Vec2::new(16.0, 8.0) / 1.25);
+            let frame = frame(gpu, format, &source, drawn);
+            for (at, level) in (0..).zip(&frame.pixels) {
+                let (x, y) = (at % 24 - 5, at / 24 - 7);
+                let is_inside = (0..16).contains(&x) && (0..8).contains(&y);
+                let there = is_inside.then(|| levels.pixels[(16 * y + x) as usize]);
+                let there = there.unwrap_or_default();
+                let is_it = level.iter().zip(there).all(|(a, b)| a.abs_diff(b) <= 1);
+                assert!(is_it, "{format:?} at {x}, {y}: {level:?} and not {there:?}");
+            }
+        }
+        let wide = Rect::from_min_size(Pos2::ZERO, egui::Vec2::new(1e6, 8.0));
+        let source = Blit::new(gpu, TextureFormat::Rgba8Unorm).source(gpu, &display);
+        let frame = frame(gpu, TextureFormat::Rgba8Unorm, &source, wide);
+        assert!(frame.pixels.iter().all(|level| *level == [0; 3]), "refused, and no error");
+    }
+}
