@@ -140,6 +140,7 @@ impl App {
         let is_here =
             |shown: &Arc<Shown>| Arc::ptr_eq(&shown.order.developer, &self.screen.developer);
         self.shown = self.presenter.shown().filter(is_here);
+        self.inspect();
         let shown = self.shown.as_deref();
         if let Some(failure) = shown.and_then(|shown| shown.failure.clone()) {
             self.messages.error(failure);
@@ -288,8 +289,7 @@ impl App {
             if request.moving {
                 context.request_repaint_after(std::time::Duration::from_millis(60));
             }
-            let seen = self.shown.as_ref().map(|shown| &shown.order.snapshot);
-            self.inspector.update(&self.interface, seen.or(self.snapshot.as_ref()));
+            self.inspect();
             self.worker.submit(request);
         }
         self.save_when_whole();
@@ -365,6 +365,17 @@ impl App {
             paused: self.interface.paused,
             run: self.interface.run,
         })
+    }
+
+    /// What the picture on the screen is of or, before there is one, the newest.
+    pub(super) fn seen(&self) -> Option<&Arc<Snapshot>> {
+        let shown = self.shown.as_ref().map(|shown| &shown.order.snapshot);
+        shown.or(self.snapshot.as_ref())
+    }
+
+    fn inspect(&mut self) {
+        let seen = self.seen().cloned();
+        self.inspector.update(&self.interface, seen.as_ref());
     }
 
     /// Whether the document shows what it did when the reference came: that is of nothing else.

@@ -14,7 +14,7 @@ use super::history;
 use super::interface::{Chosen, Cursor, Dock, Interface, Prompt, Purpose, Tab};
 use super::screen::color_image;
 use super::settings_file::lasting_scene;
-use super::worker::Reference;
+use super::worker::{Activity, Reference};
 use super::{App, Later, convergence, lock, save, surface_map, theme};
 use crate::error::Result;
 use crate::image::read_picture;
@@ -130,8 +130,8 @@ impl App {
             Command::ToggleFullScreen => self.toggles_full_screen ^= true,
             Command::Quit => self.is_closing = true,
             Command::MeasureTruth => {
-                if let Some(snapshot) = &self.snapshot {
-                    self.inspector.measure(snapshot);
+                if let Some(snapshot) = self.seen().cloned() {
+                    self.inspector.measure(&snapshot);
                 }
             }
         }
@@ -225,17 +225,18 @@ impl App {
         let Some(shown) = &self.shown else { return };
         let snapshot = &shown.order.snapshot;
         let view = &snapshot.request.view;
+        let of_size = shown.image.clone();
+        let of_size =
+            of_size.filter(|image| (image.width, image.height) == (view.width, view.height));
         // As long as a smaller picture says more, it is that which is shown.
-        let is_of_size = shown
-            .image
-            .as_ref()
-            .is_none_or(|image| (image.width, image.height) == (view.width, view.height));
-        if !(snapshot.is_lasting() && is_of_size && self.is_of_document(snapshot)) {
+        let is_small =
+            shown.image.is_some() && of_size.is_none() && snapshot.activity != Activity::Done;
+        if !snapshot.is_lasting() || is_small || !self.is_of_document(snapshot) {
             self.messages.notice("A picture can be kept once it has its full size");
             return;
         }
         let main = &snapshot.main;
-        let image = shown.image.clone().unwrap_or_else(|| Arc::new(shown.order.image()));
+        let image = of_size.unwrap_or_else(|| Arc::new(shown.order.image()));
         let samples = match main.film.min_samples() {
             0 => format!("{} samples", theme::samples(main.mean_samples())),
             1 => "1 sample".to_owned(),
@@ -289,8 +290,8 @@ impl App {
     fn selected_bounds(&self) -> Option<(glam::Vec3, glam::Vec3)> {
         let pointed = || {
             let place = self.interface.inspected()?;
-            let request = &self.shown.as_ref()?.order.snapshot.request;
-            surface_map::look_at_place(&request.world, &request.view, place)
+            let seen = self.seen()?;
+            surface_map::look_at_place(&seen.request.world, &seen.view(), place)
         };
         let chosen = self.interface.material.or_else(|| Some(pointed()?.material))?;
         let scene = &self.scene_of_document()?.world.scene;

@@ -177,7 +177,7 @@ impl Inspector {
 
 fn inspect(snapshot: &Snapshot, place: Vec2) -> Option<Inspected> {
     let world = &snapshot.request.world;
-    let spot = look_at_place(world, &snapshot.request.view, place)?;
+    let spot = look_at_place(world, &snapshot.view(), place)?;
     let material = world.scene.materials[spot.material as usize].name.clone();
     let mut inspected = Inspected {
         spot,

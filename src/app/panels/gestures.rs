@@ -156,10 +156,11 @@ fn orbit(viewpoint: &mut Viewpoint, drag: glam::Vec2, scene: Option<&LoadedScene
 /// The surface under a click.
 fn clicked_spot(rect: Rect, response: &Response, scope: &Scope<'_>) -> Option<Spot> {
     let place = place_of(rect, response.interact_pointer_pos()?);
-    let (scene, request) = (scope.scene?, &scope.shown?.order.snapshot.request);
+    let (scene, snapshot) = (scope.scene?, &scope.shown?.order.snapshot);
+    let world = &snapshot.request.world;
     // The last picture of another scene says nothing about this one.
-    let is_of_scene = Arc::ptr_eq(request.world.geometry(), scene.world.geometry());
-    is_of_scene.then(|| look_at_place(&request.world, &request.view, place))?
+    let is_of_scene = Arc::ptr_eq(world.geometry(), scene.world.geometry());
+    is_of_scene.then(|| look_at_place(world, &snapshot.view(), place))?
 }
 
 /// Does something with the surface under a click.

@@ -3,6 +3,7 @@
 use egui::{Color32, Sense, Ui, Vec2};
 
 use super::color_bar;
+use crate::app::comparison::Comparison;
 use crate::app::interface::Interface;
 use crate::app::overlays::{Legend, Overlay, palette};
 use crate::app::presenter::Shown;
@@ -37,6 +38,11 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
         }
         None if overlay == Overlay::Tile && interface.tile.is_none() => {
             ui.label(theme::quiet("Choose a tile on the map below."));
+        }
+        None if shown
+            .is_some_and(|s| s.order.compared.as_ref().is_some_and(Comparison::covers_now)) =>
+        {
+            ui.label(theme::quiet("Kept pictures have no overlays."));
         }
         None => {
             ui.label(theme::quiet("Waiting for a grid with cells."));

@@ -19,6 +19,7 @@ use crate::app::theme;
 use crate::app::worker::{Activity, SessionSnapshot, Snapshot};
 use crate::develop::{DevelopSettings, LinearPicture};
 use crate::render::View;
+use crate::scene::Camera;
 
 /// Draws the picture and takes gestures; the room it has.
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
@@ -213,18 +214,18 @@ fn picture(
     let recipe = Recipe::new(&shown.picture, shown.overlay.as_ref(), settings, number);
     let changes = changes(ui, &shown.picture, scope);
     let request = &shown.order.snapshot.request;
-    let of = Some((Arc::clone(request.world.geometry()), request.view.camera.clone()));
+    let of = (Arc::clone(request.world.geometry()), request.view.camera.clone());
     if request.view.crop.is_none() {
         let is_now = shown.order.compared.as_ref().is_none_or(|compared| !compared.covers_now());
-        scope.textures.main_of = of.filter(|_| is_now);
+        scope.textures.main_of = is_now.then_some(of);
         let source = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);
         ui.painter_at(whole).add(source.shape(rect));
         scope.textures.part = None;
         return;
     }
-    if scope.textures.main_of != of {
-        scope.textures.main = None;
-    }
+    scope.textures.main.take_if(|_| {
+        scope.textures.main_of.as_ref().is_none_or(|main_of| !shows_like(main_of, &of))
+    });
     let is_left = scope.document.region.is_none();
     if let Some(main) = &scope.textures.main {
         let rect = middle_rect(whole, main.display.size());
@@ -238,6 +239,15 @@ fn picture(
     if !is_left {
         painter.rect_stroke(rect, 0.0, Stroke::new(1.0, theme::ACCENT), StrokeKind::Outside);
     }
+}
+
+/// Whether one sees the same of the same geometry.
+fn shows_like(a: &(Arc<()>, Camera), b: &(Arc<()>, Camera)) -> bool {
+    let seen = |camera: &Camera| {
+        let focus = if camera.lens_radius > 0.0 { camera.focus_distance } else { 0.0 };
+        (camera.world_from_camera, camera.projection, camera.lens_radius, focus)
+    };
+    Arc::ptr_eq(&a.0, &b.0) && seen(&a.1) == seen(&b.1)
 }
 
 /// Whether a picture is another one in every frame; then there is a next frame. Software would do

@@ -9,7 +9,7 @@ use crate::light_grid::{LearningGrid, LightGrid};
 use crate::radiance_cache::CacheFacts;
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu, GpuFigures};
-use crate::render::{Figures, Sampling};
+use crate::render::{Figures, Sampling, View};
 
 /// What the worker is doing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -175,6 +175,12 @@ impl Snapshot {
     /// Seconds of learning and rendering, cached light included.
     pub(crate) fn seconds(&self) -> f64 {
         self.now.elapsed_seconds() + self.cached_seconds
+    }
+
+    /// What is seen in the film: before the first sample it may be one of another size.
+    pub(crate) fn view(&self) -> View {
+        let (view, film) = (&self.request.view, &self.main.film);
+        if view.crop.is_some() { view.clone() } else { view.of_size(film.width, film.height) }
     }
 
     /// Seconds of the picture that was begun last, of those that are shown.
