@@ -1,4 +1,4 @@
-// A developed picture into the viewport, which is the rectangle that it is shown in: for src/app/blit.rs.
+// A developed picture into a rectangle of the frame: for src/app/blit.rs.
 
 @group(0) @binding(0) var picture: texture_2d<f32>;
 @group(0) @binding(1) var between: sampler;
@@ -8,11 +8,10 @@ struct Corner {
     @location(0) uv: vec2f,
 }
 
-// The corners of a strip of two triangles, from above left.
+// Corners of a strip of two triangles: where in the frame, and where in the picture.
 @vertex
-fn corner(@builtin(vertex_index) index: u32) -> Corner {
-    let uv = vec2f(f32(index & 1u), f32(index >> 1u));
-    return Corner(vec4f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, 0.0, 1.0), uv);
+fn corner(@location(0) at: vec4f) -> Corner {
+    return Corner(vec4f(at.xy, 0.0, 1.0), at.zw);
 }
 
 // Into a target that is written as it is.

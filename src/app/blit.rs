@@ -1,8 +1,10 @@
 //! Developed pictures in egui's frame, drawn by a shader that does nothing else: in egui's own, which has more
 //! to choose from and blends, software spends most of a frame.
 
+use std::sync::OnceLock;
+
 use egui::{PaintCallbackInfo, Pos2, Rect, Shape};
-use egui_wgpu::{Callback, CallbackResources, CallbackTrait};
+use egui_wgpu::{Callback, CallbackResources, CallbackTrait, ScreenDescriptor};
 
 use crate::develop::DisplayTexture;
 use crate::render::gpu::Gpu;
@@ -10,9 +12,8 @@ use crate::render::gpu::Gpu;
 /// What draws pictures on one device into one format.
 pub(super) struct Blit {
     pipeline: wgpu::RenderPipeline,
-    sampler: wgpu::Sampler,
-    /// Most pixels of a viewport's side.
-    most: f32,
+    /// Between pixels, and the nearest one.
+    samplers: [wgpu::Sampler; 2],
 }
 
 impl Blit {
@@ -29,7 +30,11 @@ impl Blit {
                 module: &module,
                 entry_point: Some("corner"),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: &[],
+                buffers: &[Some(wgpu::VertexBufferLayout {
+                    array_stride: size_of::<[f32; 4]>() as u64,
+                    step_mode: wgpu::VertexStepMode::Vertex,
+                    attributes: &wgpu::vertex_attr_array![0 => Float32x4],
+                })],
             },
             primitive: wgpu::PrimitiveState {
                 topology: wgpu::PrimitiveTopology::TriangleStrip,
@@ -46,33 +51,37 @@ impl Blit {
             multiview_mask: None,
             cache: None,
         });
-        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("blit"),
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            ..wgpu::SamplerDescriptor::default()
+        let samplers = [wgpu::FilterMode::Linear, wgpu::FilterMode::Nearest].map(|filter| {
+            gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("blit"),
+                mag_filter: filter,
+                min_filter: wgpu::FilterMode::Linear,
+                ..wgpu::SamplerDescriptor::default()
+            })
         });
-        let most = gpu.limits.max_texture_dimension_2d as f32;
-        Self { pipeline, sampler, most }
+        Self { pipeline, samplers }
     }
 
-    /// A picture for [`shape`].
+    /// A picture that can be drawn.
     pub(super) fn source(&self, gpu: &Gpu, display: &DisplayTexture) -> Source {
-        let picture = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("blit"),
-            layout: &self.pipeline.get_bind_group_layout(0),
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: wgpu::BindingResource::TextureView(display.view()),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::Sampler(&self.sampler),
-                },
-            ],
+        let layout = self.pipeline.get_bind_group_layout(0);
+        let pictures = self.samplers.each_ref().map(|sampler| {
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("blit"),
+                layout: &layout,
+                entries: &[
+                    wgpu::BindGroupEntry {
+                        binding: 0,
+                        resource: wgpu::BindingResource::TextureView(display.view()),
+                    },
+                    wgpu::BindGroupEntry {
+                        binding: 1,
+                        resource: wgpu::BindingResource::Sampler(sampler),
+                    },
+                ],
+            })
         });
-        Source { pipeline: self.pipeline.clone(), picture, most: self.most }
+        Source { pipeline: self.pipeline.clone(), pictures }
     }
 }
 
@@ -80,35 +89,79 @@ impl Blit {
 #[derive(Clone)]
 pub(super) struct Source {
     pipeline: wgpu::RenderPipeline,
-    picture: wgpu::BindGroup,
-    most: f32,
+    pictures: [wgpu::BindGroup; 2],
 }
 
 impl Source {
-    /// The whole picture in a rectangle, in points; nothing of one that is larger than any frame.
-    pub(super) fn shape(&self, rect: Rect) -> Shape {
-        Callback::new_paint_callback(rect, self.clone()).into()
+    /// The whole picture in a rectangle, in points, of which the painter's clip is seen; magnified, with its pixels as
+    /// squares if it `has_squares`.
+    pub(super) fn shape(&self, rect: Rect, has_squares: bool) -> Shape {
+        let [between, nearest] = &self.pictures;
+        let picture = if has_squares { nearest } else { between }.clone();
+        let drawn =
+            Drawn { pipeline: self.pipeline.clone(), picture, rect, corners: OnceLock::new() };
+        // egui draws what meets the clip; where in it is not its concern.
+        Callback::new_paint_callback(rect, drawn).into()
     }
 }
 
-impl CallbackTrait for Source {
+/// A picture in one frame.
+struct Drawn {
+    pipeline: wgpu::RenderPipeline,
+    picture: wgpu::BindGroup,
+    /// In points.
+    rect: Rect,
+    corners: OnceLock<wgpu::Buffer>,
+}
+
+impl CallbackTrait for Drawn {
+    fn prepare(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        screen: &ScreenDescriptor,
+        _: &mut wgpu::CommandEncoder,
+        _: &mut CallbackResources,
+    ) -> Vec<wgpu::CommandBuffer> {
+        let size = screen.size_in_pixels.map(|pixels| pixels.max(1) as f32);
+        // What is meant to be whole is.
+        let whole = |at: f32| if (at - at.round()).abs() < 0.01 { at.round() } else { at };
+        let at = |corner: Pos2| {
+            let x = 2.0 * whole(corner.x * screen.pixels_per_point) / size[0] - 1.0;
+            let y = 1.0 - 2.0 * whole(corner.y * screen.pixels_per_point) / size[1];
+            [x, y]
+        };
+        let ([left, top], [right, bottom]) = (at(self.rect.min), at(self.rect.max));
+        let corners = [
+            [left, top, 0.0, 0.0],
+            [right, top, 1.0, 0.0],
+            [left, bottom, 0.0, 1.0],
+            [right, bottom, 1.0, 1.0_f32],
+        ];
+        let buffer = self.corners.get_or_init(|| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("blit"),
+                size: size_of_val(&corners) as u64,
+                usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        });
+        queue.write_buffer(buffer, 0, bytemuck::cast_slice(&corners));
+        Vec::new()
+    }
+
     fn paint(
         &self,
         info: PaintCallbackInfo,
         pass: &mut wgpu::RenderPass<'static>,
         _: &CallbackResources,
     ) {
-        // As egui sets it, it would be of whole pixels, and a picture that grows would jump. OpenGL takes what is
-        // next below: what is meant to be whole is.
-        let whole = |at: f32| if (at - at.round()).abs() < 0.01 { at.round() } else { at };
-        let Rect { min, max } = info.viewport * info.pixels_per_point;
-        let [min, max] = [min, max].map(|at| Pos2::new(whole(at.x), whole(at.y)));
-        if (max - min).max_elem() > self.most {
-            return;
-        }
-        pass.set_viewport(min.x, min.y, max.x - min.x, max.y - min.y, 0.0, 1.0);
+        let Some(corners) = self.corners.get() else { return };
+        let [width, height] = info.screen_size_px.map(|pixels| pixels as f32);
+        pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.picture, &[]);
+        pass.set_vertex_buffer(0, corners.slice(..));
         pass.draw(0..4, 0..1);
     }
 }
@@ -124,7 +177,7 @@ mod tests {
     use crate::tone::{ToneCurve, WhiteBalance};
 
     /// A black frame of 24 x 20 pixels with a shape drawn at 1.25 pixels a point.
-    fn frame(gpu: &Gpu, format: TextureFormat, source: &Source, viewport: Rect) -> Rgb8 {
+    fn frame(gpu: &Gpu, format: TextureFormat, source: &Source, rect: Rect) -> Rgb8 {
         let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: None,
             size: wgpu::Extent3d { width: 24, height: 20, depth_or_array_layers: 1 },
@@ -136,6 +189,12 @@ mod tests {
             view_formats: &[],
         });
         let mut commands = gpu.device.create_command_encoder(&Default::default());
+        let picture = source.pictures[1].clone();
+        let pipeline = source.pipeline.clone();
+        let drawn = Drawn { pipeline, picture, rect, corners: OnceLock::new() };
+        let screen = ScreenDescriptor { size_in_pixels: [24, 20], pixels_per_point: 1.25 };
+        let mut resources = CallbackResources::default();
+        drawn.prepare(&gpu.device, &gpu.queue, &screen, &mut commands, &mut resources);
         let pass = commands.begin_render_pass(&wgpu::RenderPassDescriptor {
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view: &target.create_view(&Default::default()),
@@ -146,12 +205,12 @@ mod tests {
             ..wgpu::RenderPassDescriptor::default()
         });
         let info = PaintCallbackInfo {
-            viewport,
+            viewport: rect,
             clip_rect: Rect::EVERYTHING,
             pixels_per_point: 1.25,
             screen_size_px: [24, 20],
         };
-        source.paint(info, &mut pass.forget_lifetime(), &CallbackResources::default());
+        drawn.paint(info, &mut pass.forget_lifetime(), &CallbackResources::default());
         gpu.submit([commands.finish()]);
         gpu.read_texture(&target).expect("read")
     }
@@ -185,9 +244,12 @@ mod tests {
                 assert!(is_it, "{format:?} at {x}, {y}: {level:?} and not {there:?}");
             }
         }
-        let wide = Rect::from_min_size(Pos2::ZERO, egui::Vec2::new(1e6, 8.0));
+        // Far beyond the frame, a pixel of it is a square.
         let source = Blit::new(gpu, TextureFormat::Rgba8Unorm).source(gpu, &display);
-        let frame = frame(gpu, TextureFormat::Rgba8Unorm, &source, wide);
-        assert!(frame.pixels.iter().all(|level| *level == [0; 3]), "refused, and no error");
+        let corner = Pos2::new(-400.0 * 8.0, -400.0 * 4.0) / 1.25;
+        let large = Rect::from_min_size(corner, egui::Vec2::new(400.0 * 16.0, 400.0 * 8.0) / 1.25);
+        let frame = frame(gpu, TextureFormat::Rgba8Unorm, &source, large);
+        let middle = levels.pixels[16 * 4 + 8];
+        assert!(frame.pixels.iter().all(|level| *level == middle), "{middle:?}");
     }
 }

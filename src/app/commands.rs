@@ -56,6 +56,8 @@ pub enum Command {
     ToggleDenoise,
     /// Show or hide the panels.
     TogglePanels,
+    /// Show pixels at their size or larger, or what fits.
+    ToggleZoom,
     /// Let the window fill the screen, or no longer.
     ToggleFullScreen,
     /// Show or hide the developer's panel.
@@ -85,7 +87,7 @@ pub enum Command {
 }
 
 /// Keys, what they do, and the command.
-pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 20] = [
+pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 21] = [
     (plain(Key::Space), "Pause, resume", Command::TogglePause),
     (plain(Key::R), "Restart the picture", Command::Restart),
     (plain(Key::F), "Frame the whole scene", Command::FrameAll),
@@ -93,6 +95,7 @@ pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 20] = [
     (plain(Key::B), "Keep this viewpoint", Command::Bookmark),
     (plain(Key::K), "Keep this picture for comparison", Command::KeepPicture),
     (plain(Key::X), "Render a region: drag it; again for the whole", Command::ToggleRegion),
+    (plain(Key::Z), "Zoom to the pixels, or fit", Command::ToggleZoom),
     (plain(Key::V), "Split view: plain | adaptive", Command::ToggleSplit),
     (plain(Key::G), "CPU or GPU", Command::ToggleDevice),
     (plain(Key::N), "Denoise, before and after", Command::ToggleDenoise),
@@ -113,7 +116,7 @@ const REDO_TOO: KeyboardShortcut =
     KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
 
 /// What the mouse and held keys do in the picture.
-pub(crate) const GESTURES: [(&str, &str); 7] = [
+pub(crate) const GESTURES: [(&str, &str); 9] = [
     ("Drag", "Orbit around the pivot"),
     ("Shift drag, middle drag", "Pan"),
     ("Right drag", "Look around"),
@@ -121,6 +124,8 @@ pub(crate) const GESTURES: [(&str, &str); 7] = [
     ("W A S D, E Q", "Fly; Shift is faster"),
     ("Double click", "Orbit around this point"),
     ("Ctrl click", "Focus on this point"),
+    ("Ctrl wheel, pinch", "Zoom into the picture"),
+    ("Ctrl drag", "Move the zoomed picture"),
 ];
 
 const fn plain(key: Key) -> KeyboardShortcut {

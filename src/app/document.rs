@@ -92,6 +92,16 @@ pub enum PictureSize {
     Fixed(u32, u32),
 }
 
+impl PictureSize {
+    /// Pixels across and down in a room of so many, if there is one as yet.
+    pub(super) fn pixels(self, room: Option<[u32; 2]>) -> [u32; 2] {
+        match self {
+            Self::Viewport(divisor) => room.unwrap_or([1, 1]).map(|n| (n / divisor.max(1)).max(1)),
+            Self::Fixed(width, height) => [width, height],
+        }
+    }
+}
+
 /// Paths to learn from before the first sample.
 const MOST_LEARNING_PATHS: u64 = 1 << 13;
 

@@ -339,13 +339,11 @@ impl App {
         // Another scene would be seen from this one's viewpoint.
         let world = Arc::clone(&self.scene_of_document()?.world);
         let environment = self.environment()?;
-        let (width, height) = match self.document.size {
-            PictureSize::Fixed(width, height) => (width, height),
-            PictureSize::Viewport(divisor) => {
-                let size = self.interface.viewport_pixels?;
-                ((size[0] / divisor).max(1), (size[1] / divisor).max(1))
-            }
-        };
+        let room = self.interface.viewport_pixels;
+        if room.is_none() && matches!(self.document.size, PictureSize::Viewport(_)) {
+            return None;
+        }
+        let [width, height] = self.document.size.pixels(room);
         Some(Request {
             world,
             environment,

@@ -15,6 +15,7 @@ use super::interface::{Chosen, Cursor, Dock, Interface, Prompt, Purpose, Tab};
 use super::screen::color_image;
 use super::settings_file::lasting_scene;
 use super::worker::{Activity, Reference};
+use super::zoom::Zoom;
 use super::{App, Later, convergence, lock, save, surface_map, theme};
 use crate::error::Result;
 use crate::image::read_picture;
@@ -126,6 +127,10 @@ impl App {
                     }
                     self.go_to(document);
                 }
+            }
+            Command::ToggleZoom => {
+                let pixels = self.document.size.pixels(interface.viewport_pixels);
+                interface.toggle_zoom(pixels);
             }
             Command::ToggleFullScreen => self.toggles_full_screen ^= true,
             Command::Quit => self.is_closing = true,
@@ -517,6 +522,20 @@ impl Interface {
             self.dock = Some(Dock::Convergence);
             self.tab = Tab::Inspect;
         }
+    }
+
+    /// To a pixel of the picture for one of the screen, or four where that is what fits, around the pointer; or
+    /// back.
+    fn toggle_zoom(&mut self, [width, height]: [u32; 2]) {
+        let [across, down] = self.viewport_pixels.unwrap_or([width, height]).map(|n| n as f32);
+        let least = (width as f32 / across).max(height as f32 / down);
+        let times = if least > 1.05 { least } else { 4.0 * least };
+        self.zoom = match self.zoom.is_some() {
+            true => Zoom::default(),
+            false => {
+                Zoom::new(times, self.pointed.unwrap_or(glam::Vec2::splat(0.5)).to_array().into())
+            }
+        };
     }
 
     fn aspect(&self) -> f32 {

@@ -3,8 +3,10 @@
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
 
+use super::document::PictureSize;
 use super::drag::Drag;
 use super::overlays::Overlay;
+use super::zoom::Zoom;
 
 /// State of the window that is not the picture's.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +39,8 @@ pub struct Interface {
     pub is_material_new: bool,
     /// What of the history is compared.
     pub compared: Chosen,
+    /// How large the picture is shown.
+    pub zoom: Zoom,
     /// Where the wipe is, `[0,1]` across the picture.
     pub wipe: f32,
     /// Whether what was learned is kept as it is.
@@ -212,6 +216,7 @@ impl Default for Interface {
             material: None,
             is_material_new: false,
             compared: Chosen::default(),
+            zoom: Zoom::default(),
             wipe: 0.5,
             is_frozen: false,
             is_marking: false,
@@ -253,6 +258,13 @@ impl Interface {
     /// Whether anything tells what is in the radiance cache.
     pub fn inspects_cache(&self) -> bool {
         self.overlay.is_some_and(Overlay::is_of_cache) || (self.panels && self.tab == Tab::Inspect)
+    }
+
+    /// Pixels of the screen for one of a picture of this size, where it is magnified.
+    pub(super) fn magnification(&self, size: PictureSize) -> Option<f32> {
+        let room = self.viewport_pixels.filter(|_| self.zoom.is_some())?;
+        let ([width, height], [across, down]) = (size.pixels(Some(room)), room.map(|n| n as f32));
+        Some(self.zoom.times() * (across / width as f32).min(down / height as f32))
     }
 
     /// The place that is inspected.

@@ -44,6 +44,7 @@ mod turns;
 mod undo;
 pub(crate) mod window;
 pub(crate) mod worker;
+pub mod zoom;
 
 use crate::develop::DevelopSettings;
 use crate::error::{Error, Result};
@@ -373,6 +374,8 @@ impl App {
                 loading: self.loader.busy_with().collect(),
                 threads: self.worker.threads(),
                 is_preparing: self.worker.is_preparing(),
+                overlay: self.interface.overlay,
+                magnification: self.interface.magnification(self.document.size),
                 pointed: self.interface.pointed.filter(|_| !self.is_repeatable),
                 hides_clock: self.is_repeatable,
             };

@@ -262,6 +262,16 @@ impl Film {
         !self.surfaces.is_empty()
     }
 
+    /// Mean albedo, unit normal and distance in metres of what a pixel sees; `None` without layers, and where it
+    /// has met no surface.
+    pub(crate) fn surface_of(&self, index: usize) -> Option<([f32; 3], [f32; 3], f32)> {
+        let surface = self.surfaces.get(index).filter(|surface| surface.hits > 0)?;
+        let samples = self.pixels.get(index)?.samples.max(1);
+        let albedo = (surface.albedo / f64::from(samples)).as_vec3().to_array();
+        let normal = surface.normal.normalize_or_zero().as_vec3().to_array();
+        Some((albedo, normal, (surface.depth / f64::from(surface.hits)) as f32))
+    }
+
     /// Sums of first hits, row after row; empty unless layers are kept.
     pub(crate) fn surfaces(&self) -> &[Surface] {
         &self.surfaces

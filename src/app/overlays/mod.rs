@@ -337,6 +337,20 @@ impl Sources<'_> {
     }
 }
 
+/// What an overlay of the film says of a pixel; of those of cells the inspector tells more.
+pub fn told(overlay: Overlay, film: &Film, index: usize) -> Option<String> {
+    let three = |values: [f32; 3]| values.map(|value| format!("{value:.2}")).join("  ");
+    Some(match overlay {
+        Overlay::Error => {
+            format!("error {:.1} %", 100.0 * relative_error(film.pixels().get(index)?)?)
+        }
+        Overlay::Albedo => format!("albedo {}", three(film.surface_of(index)?.0)),
+        Overlay::Normal => format!("normal {}", three(film.surface_of(index)?.1)),
+        Overlay::Depth => length(film.surface_of(index)?.2),
+        _ => return None,
+    })
+}
+
 fn relative_error(pixel: &Pixel) -> Option<f32> {
     let error = pixel.variance_of_mean().sqrt() / pixel.mean_luminance();
     (error.is_finite() && error > 0.0).then_some(error as f32)

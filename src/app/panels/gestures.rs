@@ -90,16 +90,38 @@ fn point(rect: Rect, response: &Response, modifiers: Modifiers, scope: &mut Scop
     }
 }
 
+/// Magnifies the picture, and moves the magnified one: `area` is its room, `shown` where the whole lies.
+pub(super) fn zoom(
+    ui: &Ui,
+    (area, shown): (Rect, Rect),
+    response: &Response,
+    scope: &mut Scope<'_>,
+) {
+    let zoom = &mut scope.interface.zoom;
+    let factor = ui.input(|input| input.zoom_delta());
+    if let Some(at) = response.hover_pos().filter(|_| factor != 1.0) {
+        *zoom = zoom.by(factor, at, area, shown);
+        ui.ctx().request_repaint();
+    }
+}
+
 /// Moves the camera.
 fn travel(ui: &Ui, whole: Rect, response: &Response, steps: &[Step], scope: &mut Scope<'_>) {
     let context = ui.ctx();
     let Some(viewpoint) = &mut scope.document.viewpoint else { return };
     // Holding still counts too: letting go ends it.
-    let mut moved = scope.interface.drag.is_some_and(|drag| drag.span().is_some());
+    let is_zoomed = scope.interface.zoom.is_some();
+    let pans = |modifiers: Modifiers| modifiers.command && is_zoomed;
+    let is_held = scope.interface.drag.is_some_and(|drag| drag.span().is_some());
+    let mut moved = is_held && !pans(context.input(|input| input.modifiers));
     for step in steps {
         let Step::Move { button, by, modifiers } = *step else { continue };
-        moved = true;
         let by = glam::Vec2::new(by.x, by.y);
+        if pans(modifiers) && button == PointerButton::Primary {
+            scope.interface.zoom = scope.interface.zoom.moved(egui::vec2(by.x, by.y), whole);
+            continue;
+        }
+        moved = true;
         if button == PointerButton::Secondary {
             viewpoint.look_around(-by);
         } else if button == PointerButton::Middle || modifiers.shift {

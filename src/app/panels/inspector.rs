@@ -243,7 +243,8 @@ fn cell(
             "Brute force finds that nothing of the map is seen from this very point".to_owned()
         } else {
             format!(
-                "Visible energy times cosine here, by brute force; total variation {distance:.2}"
+                "Visible energy times cosine here, by brute force: {:.0} % of what was learned lies elsewhere",
+                100.0 * distance
             )
         }));
     }
@@ -279,26 +280,37 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
     };
     let tries: f64 = inspected.tallies.iter().map(|t| t.tries).sum();
     Grid::new("cell").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
-        let mut line = |name: &str, value: String| {
-            ui.label(theme::quiet(name));
-            ui.label(RichText::new(value).size(12.5));
+        let mut line = |name: &str, value: String, hint: &str| {
+            ui.label(theme::quiet(name)).on_hover_text(hint);
+            ui.label(RichText::new(value).size(12.5)).on_hover_text(hint);
             ui.end_row();
         };
-        line("Cell", cell);
-        line("Distribution", distribution);
-        line("Position", format!("{:.2}, {:.2}, {:.2} m", p.x, p.y, p.z));
-        line("Material", inspected.material.clone());
+        line(
+            "Cell",
+            cell,
+            "Cells of the Light Grid lie around the camera: rows from above to below, columns all around, and one of \
+             each for every axis that surfaces may face",
+        );
+        line(
+            "Distribution",
+            distribution,
+            "What the map is sampled by from here: the cell's own, once it has learned enough",
+        );
+        line("Position", format!("{:.2}, {:.2}, {:.2} m", p.x, p.y, p.z), "In the scene; y is up");
+        line("Material", inspected.material.clone(), "As the file calls it");
         if !inspected.probabilities.is_empty() {
             let p = &inspected.probabilities;
             let entropy: f32 = p.iter().map(|p| if *p > 0.0 { -p * p.log2() } else { 0.0 }).sum();
             let support = p.iter().filter(|p| **p > 0.0).count();
-            line("Entropy", format!("{entropy:.2} bits over {support} tiles"));
+            let hint = "How widely it spreads: 0 is one tile alone, and each bit is twice as many";
+            line("Entropy", format!("{entropy:.2} bits over {support} tiles"), hint);
         }
         if tries > 0.0 {
-            line("Learned from", format!("{} tries", theme::count(tries as u64)));
+            let hint = "Shadow rays towards the map that learning has traced from the cell";
+            line("Learned from", format!("{} tries", theme::count(tries as u64)), hint);
         }
         if let Some(bytes) = inspected.memory_bytes {
-            line("Memory", theme::bytes(bytes));
+            line("Memory", theme::bytes(bytes), "What this distribution alone takes");
         }
     });
 }

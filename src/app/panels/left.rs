@@ -243,7 +243,8 @@ fn environment(
 
 /// The sun's light is taken up when the slider is let go: the map is read again.
 fn sun(ui: &mut Ui, sun: &mut f32) {
-    let hint = "Multiplies the light of the map's sun, and not that of its sky";
+    let hint = "Multiplies the light of the map's sun, and not that of its sky. The picture begins anew: apart, both would \
+                take twice the memory and time";
     theme::row(ui, "Sun", hint, |ui| {
         let id = ui.scope_id().with("sun");
         let mut value = ui.data(|data| data.get_temp(id)).unwrap_or(*sun);

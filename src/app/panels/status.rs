@@ -2,6 +2,7 @@
 
 use egui::{Align, Color32, Layout, Margin, Panel, RichText, Ui};
 
+use crate::app::overlays::{Overlay, told};
 use crate::app::theme;
 use crate::app::worker::{Activity, Snapshot};
 
@@ -15,6 +16,10 @@ pub(in crate::app) struct Status<'a> {
     pub(in crate::app) loading: Vec<&'a str>,
     /// Whether a GPU is being made ready.
     pub(in crate::app) is_preparing: bool,
+    /// What is drawn over it.
+    pub(in crate::app) overlay: Option<Overlay>,
+    /// Pixels of the screen for one of the picture, where it is magnified.
+    pub(in crate::app) magnification: Option<f32>,
     /// Place of the picture under the pointer, both coordinates in `[0,1]`.
     pub(in crate::app) pointed: Option<glam::Vec2>,
     /// Render threads.
@@ -32,10 +37,10 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
             // What is at the right comes first, and what then has no room ends there.
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 if let Some(snapshot) = status.snapshot {
-                    device(ui, snapshot, status.threads);
+                    device(ui, snapshot, status);
                     let pointed = status.pointed.filter(|_| !theme::is_narrow(ui));
                     if let Some((place, shown)) = pointed.zip(status.shown) {
-                        pixel(ui, shown, place);
+                        pixel(ui, shown, place, status.overlay);
                     }
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
@@ -150,17 +155,20 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
 }
 
 /// What the film holds under the pointer.
-fn pixel(ui: &mut Ui, snapshot: &Snapshot, place: glam::Vec2) {
+fn pixel(ui: &mut Ui, snapshot: &Snapshot, place: glam::Vec2, overlay: Option<Overlay>) {
     let film = &snapshot.main.film;
     let index = |share: f32, count: u32| ((share * count as f32) as u32).min(count.max(1) - 1);
     let (x, y) = (index(place.x, film.width), index(place.y, film.height));
-    let Some(pixel) = film.pixels().get((y * film.width + x) as usize) else { return };
+    let index = (y * film.width + x) as usize;
+    let Some(pixel) = film.pixels().get(index) else { return };
     let [r, g, b] = pixel.mean().map(theme::figure);
     let samples = match pixel.samples() {
         1 => "1 sample".to_owned(),
         all => format!("{all} samples"),
     };
-    let text = format!("{x}, {y}:  {r}  {g}  {b}  ·  {samples}");
+    let told = overlay.and_then(|overlay| told(overlay, film, index));
+    let told = told.map(|told| format!("  ·  {told}")).unwrap_or_default();
+    let text = format!("{x}, {y}:  {r}  {g}  {b}  ·  {samples}{told}");
     ui.label(theme::quiet(text)).on_hover_text("Linear radiance of the pixel, unfiltered");
 }
 
@@ -183,7 +191,8 @@ fn size(snapshot: &Snapshot) -> [u32; 2] {
     }
 }
 
-fn device(ui: &mut Ui, snapshot: &Snapshot, threads: usize) {
+fn device(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
+    let threads = status.threads;
     let [width, height] = size(snapshot);
     let (name, hint) = match &snapshot.main.gpu {
         Some(gpu) => {
@@ -211,5 +220,7 @@ fn device(ui: &mut Ui, snapshot: &Snapshot, threads: usize) {
             )
         }
     };
-    ui.label(theme::quiet(format!("{width} x {height}  ·  {name}"))).on_hover_text(hint);
+    let zoomed = status.magnification.map(|times| format!(" at {:.0} %", 100.0 * times));
+    let zoomed = zoomed.unwrap_or_default();
+    ui.label(theme::quiet(format!("{width} x {height}{zoomed}  ·  {name}"))).on_hover_text(hint);
 }

@@ -48,6 +48,9 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
                 (whole, rect)
             }
         };
+        let zoom = scope.interface.zoom;
+        let (fitting, rect) = (whole, zoom.of(area, whole, rect));
+        let whole = zoom.of(area, whole, whole);
         let ground = if compared.is_some() { rect } else { whole };
         let is_part = shown.order.snapshot.request.view.crop.is_some();
         surround(ui, area, if is_part { Rect::NOTHING } else { ground.intersect(rect) });
@@ -61,17 +64,18 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
                 Developed::update(&mut scope.textures.other, scope.screen, recipe, changes);
             let of_left = compared.map_or(rect, |compared| {
                 let (of_whole, part) = kept_rects((area, scale), other.size(), compared.regions[0]);
-                if !is_alike(of_whole, whole) {
+                if !is_alike(of_whole, fitting) {
                     // Beside another shape nothing is to be seen of what lies under it.
                     let hidden = left_of(rect, rect, scope.interface.wipe);
                     ui.painter().rect_filled(hidden, 0.0, theme::BACKGROUND);
                 }
-                part
+                zoom.of(area, of_whole, part)
             });
-            handle = wipe(ui, (rect, of_left), &source, scope.interface);
+            let seen = rect.intersect(area);
+            handle = wipe(ui, (seen, of_left), &source, scope.interface);
             match &shown.order.compared {
-                Some(compared) => wipe_labels(ui, rect, &compared.names, None),
-                None => split_labels(ui, rect, scope),
+                Some(compared) => wipe_labels(ui, seen, &compared.names, None),
+                None => split_labels(ui, seen, scope),
             }
         } else if let Some(compared) =
             shown.order.compared.as_ref().filter(|compared| compared.is_difference)
@@ -80,13 +84,15 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
             let percent = shown.difference.map(|apart| format!(", {:.1} % (RMS)", 100.0 * apart));
             let percent = percent.unwrap_or_default();
             let text = format!("{left} and {right}: difference × {AMPLIFIED:.0}{percent}");
-            let at = Pos2::new(rect.center().x, rect.top() + 14.0);
+            let seen = rect.intersect(area);
+            let at = Pos2::new(seen.center().x, seen.top() + 14.0);
             theme::badge(ui, at, Align2::CENTER_TOP, &text, theme::TEXT);
         }
         if shown.other.is_none() {
             scope.textures.other = None;
         }
         gestures::show(ui, (whole, rect), &response, handle, scope);
+        gestures::zoom(ui, (area, whole), &response, scope);
         pin(ui, rect, scope.interface);
     });
     let area = panel.response.rect;
@@ -210,6 +216,11 @@ fn picture(
     scope: &mut Scope<'_>,
 ) {
     let painter = ui.painter();
+    // Of a smaller picture squares would be seen that are none.
+    let view = &shown.order.snapshot.request.view;
+    let magnification = scope.interface.magnification(scope.document.size);
+    let has_squares = magnification.is_some_and(|times| times >= 1.9)
+        && shown.picture.size() == [view.width, view.height];
     let number = shown.order.snapshot.number;
     let recipe = Recipe::new(&shown.picture, shown.overlay.as_ref(), settings, number);
     let changes = changes(ui, &shown.picture, scope);
@@ -219,7 +230,7 @@ fn picture(
         let is_now = shown.order.compared.as_ref().is_none_or(|compared| !compared.covers_now());
         scope.textures.main_of = is_now.then_some(of);
         let source = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);
-        ui.painter_at(whole).add(source.shape(rect));
+        ui.painter_at(whole).add(source.shape(rect, has_squares));
         scope.textures.part = None;
         return;
     }
@@ -229,13 +240,13 @@ fn picture(
     let is_left = scope.document.region.is_none();
     if let Some(main) = &scope.textures.main {
         let rect = middle_rect(whole, main.display.size());
-        ui.painter_at(whole).add(main.source.shape(rect));
+        ui.painter_at(whole).add(main.source.shape(rect, has_squares));
         if !is_left {
             painter.rect_filled(whole, 0.0, Color32::from_black_alpha(165));
         }
     }
     let source = Developed::update(&mut scope.textures.part, scope.screen, recipe, changes);
-    painter.add(source.shape(rect));
+    painter.add(source.shape(rect, has_squares));
     if !is_left {
         painter.rect_stroke(rect, 0.0, Stroke::new(1.0, theme::ACCENT), StrokeKind::Outside);
     }
@@ -295,7 +306,8 @@ fn wipe(
 ) -> Rect {
     let x = rect.left() + rect.width() * interface.wipe;
     let left = left_of(of_left, rect, interface.wipe);
-    ui.painter_at(left.intersect(ui.max_rect())).add(source.shape(of_left));
+    ui.painter_at(left.intersect(ui.max_rect()))
+        .add(source.shape(of_left, interface.zoom.is_some()));
     let handle =
         Rect::from_center_size(Pos2::new(x, rect.center().y), Vec2::new(14.0, rect.height()));
     let response = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());
