@@ -177,7 +177,12 @@ mod tests {
     use crate::tone::{ToneCurve, WhiteBalance};
 
     /// A black frame of 24 x 20 pixels with a shape drawn at 1.25 pixels a point.
-    fn frame(gpu: &Gpu, format: TextureFormat, source: &Source, rect: Rect) -> Rgb8 {
+    fn frame(
+        gpu: &Gpu,
+        format: TextureFormat,
+        source: &Source,
+        (rect, has_squares): (Rect, bool),
+    ) -> Rgb8 {
         let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: None,
             size: wgpu::Extent3d { width: 24, height: 20, depth_or_array_layers: 1 },
@@ -189,7 +194,7 @@ mod tests {
             view_formats: &[],
         });
         let mut commands = gpu.device.create_command_encoder(&Default::default());
-        let picture = source.pictures[1].clone();
+        let picture = source.pictures[usize::from(has_squares)].clone();
         let pipeline = source.pipeline.clone();
         let drawn = Drawn { pipeline, picture, rect, corners: OnceLock::new() };
         let screen = ScreenDescriptor { size_in_pixels: [24, 20], pixels_per_point: 1.25 };
@@ -234,7 +239,7 @@ mod tests {
             let source = Blit::new(gpu, format).source(gpu, &display);
             let corner = Pos2::new(5.0, 7.0) / 1.25;
             let drawn = Rect::from_min_size(corner, egui::Vec2::new(16.0, 8.0) / 1.25);
-            let frame = frame(gpu, format, &source, drawn);
+            let frame = frame(gpu, format, &source, (drawn, false));
             for (at, level) in (0..).zip(&frame.pixels) {
                 let (x, y) = (at % 24 - 5, at / 24 - 7);
                 let is_inside = (0..16).contains(&x) && (0..8).contains(&y);
@@ -248,7 +253,7 @@ mod tests {
         let source = Blit::new(gpu, TextureFormat::Rgba8Unorm).source(gpu, &display);
         let corner = Pos2::new(-400.0 * 8.0, -400.0 * 4.0) / 1.25;
         let large = Rect::from_min_size(corner, egui::Vec2::new(400.0 * 16.0, 400.0 * 8.0) / 1.25);
-        let frame = frame(gpu, TextureFormat::Rgba8Unorm, &source, large);
+        let frame = frame(gpu, TextureFormat::Rgba8Unorm, &source, (large, true));
         let middle = levels.pixels[16 * 4 + 8];
         assert!(frame.pixels.iter().all(|level| *level == middle), "{middle:?}");
     }

@@ -149,14 +149,16 @@ pub(crate) fn pressed(context: &egui::Context, is_modal: bool) -> Vec<Command> {
     }
     context.input_mut(|input| {
         // A key that is held asks once; only steps back and forth are taken one after the other.
-        let asks_again = |key: &Key| {
+        let asks_again = |key: &Key, modifiers: &Modifiers| {
             let steps = [Command::Undo, Command::Redo];
             SHORTCUTS.iter().any(|(shortcut, _, command)| {
-                shortcut.logical_key == *key && !steps.contains(command)
+                shortcut.logical_key == *key
+                    && modifiers.matches_logically(shortcut.modifiers)
+                    && !steps.contains(command)
             })
         };
         input.events.retain(
-            |event| !matches!(event, egui::Event::Key { key, repeat: true, .. } if asks_again(key)),
+            |event| !matches!(event, egui::Event::Key { key, repeat: true, modifiers, .. } if asks_again(key, modifiers)),
         );
         // As macOS and Blender have it; it comes before Undo, whose key lets Shift pass.
         let redoes = input.consume_shortcut(&REDO_TOO).then_some(Command::Redo);

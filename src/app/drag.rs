@@ -18,6 +18,8 @@ pub struct Drag {
     /// Where the last step ended.
     at: Pos2,
     is_click: bool,
+    /// Whether Ctrl was held at the press: that decides what it does to its end.
+    pub(super) has_command: bool,
 }
 
 /// What happened to a drag.
@@ -61,7 +63,8 @@ impl Drag {
                     if drag.is_none() && accepts(pos) =>
                 {
                     modifiers = held;
-                    *drag = Some(Self { button, from: pos, at: pos, is_click: true });
+                    let has_command = held.command;
+                    *drag = Some(Self { button, from: pos, at: pos, is_click: true, has_command });
                 }
                 Event::PointerMoved(to) => {
                     if let Some(drag) = drag {
@@ -92,6 +95,7 @@ impl Drag {
         // What was held back while it might have been a click comes with the first step.
         let way = to - self.at;
         let count = (way.length() / LONGEST_STEP).ceil();
+        let modifiers = Modifiers { command: self.has_command, ..modifiers };
         let step = Step::Move { button: self.button, by: way / count.max(1.0), modifiers };
         steps.extend(std::iter::repeat_n(step, count as usize));
         self.at = to;

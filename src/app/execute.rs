@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use super::commands::Command;
 use super::completion::in_home;
-use super::document::{Document, Viewpoint};
+use super::document::{Document, PictureSize, Viewpoint};
 use super::dropped::Dropped;
 use super::history;
 use super::interface::{Chosen, Cursor, Dock, Interface, Prompt, Purpose, Tab};
@@ -129,8 +129,8 @@ impl App {
                 }
             }
             Command::ToggleZoom => {
-                let pixels = self.document.size.pixels(interface.viewport_pixels);
-                interface.toggle_zoom(pixels);
+                let size = self.document.size;
+                interface.toggle_zoom(size);
             }
             Command::ToggleFullScreen => self.toggles_full_screen ^= true,
             Command::Quit => self.is_closing = true,
@@ -524,18 +524,18 @@ impl Interface {
         }
     }
 
-    /// To a pixel of the picture for one of the screen, or four where that is what fits, around the pointer; or
-    /// back.
-    fn toggle_zoom(&mut self, [width, height]: [u32; 2]) {
-        let [across, down] = self.viewport_pixels.unwrap_or([width, height]).map(|n| n as f32);
-        let least = (width as f32 / across).max(height as f32 / down);
-        let times = if least > 1.05 { least } else { 4.0 * least };
-        self.zoom = match self.zoom.is_some() {
-            true => Zoom::default(),
-            false => {
-                Zoom::new(times, self.pointed.unwrap_or(glam::Vec2::splat(0.5)).to_array().into())
-            }
-        };
+    /// To a pixel of the picture for one of the screen, or four where that is about what fits, around the pointer;
+    /// or back.
+    fn toggle_zoom(&mut self, size: PictureSize) {
+        if self.zoom.is_some() {
+            self.zoom = Zoom::default();
+            return;
+        }
+        let [width, _] = size.pixels(self.viewport_pixels);
+        let least = self.fitting_pixels.map_or(1.0, |fitting| width as f32 / fitting.max(1.0));
+        let times = if least > 1.05 { least } else { (4.0 * least).max(2.0) };
+        let middle = self.pointed_in_whole.unwrap_or(glam::Vec2::splat(0.5));
+        self.zoom = Zoom::new(times, egui::vec2(middle.x, middle.y));
     }
 
     fn aspect(&self) -> f32 {

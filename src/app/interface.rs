@@ -31,6 +31,8 @@ pub struct Interface {
     pub tile: Option<u32>,
     /// Place of the picture under the pointer, both coordinates in `[0,1]`.
     pub pointed: Option<Vec2>,
+    /// The same of the whole that the picture is a part of.
+    pub pointed_in_whole: Option<Vec2>,
     /// Place the inspector stays at.
     pub pinned: Option<Vec2>,
     /// The material that is looked at.
@@ -39,6 +41,8 @@ pub struct Interface {
     pub is_material_new: bool,
     /// What of the history is compared.
     pub compared: Chosen,
+    /// Pixels of the screen that the whole picture fills from left to right where it fits, once it was drawn.
+    pub fitting_pixels: Option<f32>,
     /// How large the picture is shown.
     pub zoom: Zoom,
     /// Where the wipe is, `[0,1]` across the picture.
@@ -212,10 +216,12 @@ impl Default for Interface {
             tiles: TileView::Energy,
             tile: None,
             pointed: None,
+            pointed_in_whole: None,
             pinned: None,
             material: None,
             is_material_new: false,
             compared: Chosen::default(),
+            fitting_pixels: None,
             zoom: Zoom::default(),
             wipe: 0.5,
             is_frozen: false,
@@ -262,9 +268,9 @@ impl Interface {
 
     /// Pixels of the screen for one of a picture of this size, where it is magnified.
     pub(super) fn magnification(&self, size: PictureSize) -> Option<f32> {
-        let room = self.viewport_pixels.filter(|_| self.zoom.is_some())?;
-        let ([width, height], [across, down]) = (size.pixels(Some(room)), room.map(|n| n as f32));
-        Some(self.zoom.times() * (across / width as f32).min(down / height as f32))
+        let fitting = self.fitting_pixels.filter(|_| self.zoom.is_some())?;
+        let [width, _] = size.pixels(self.viewport_pixels);
+        Some(self.zoom.times() * fitting / width as f32)
     }
 
     /// The place that is inspected.

@@ -49,7 +49,8 @@ pub(super) fn show(
 fn mark_region(ui: &Ui, whole: Rect, steps: &[Step], scope: &mut Scope<'_>) {
     ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
     let hint = "Drag over the part that is to be rendered";
-    let top = Pos2::new(whole.center().x, whole.top() + 14.0);
+    let seen = whole.intersect(ui.max_rect());
+    let top = Pos2::new(seen.center().x, seen.top() + 14.0);
     theme::badge(ui, top, Align2::CENTER_TOP, hint, theme::ACCENT);
     let marked = |[from, to]: [Pos2; 2]| Rect::from_two_pos(from, to).intersect(whole);
     if let Some(span) = scope.interface.drag.and_then(|drag| drag.span()) {
@@ -97,9 +98,10 @@ pub(super) fn zoom(
     response: &Response,
     scope: &mut Scope<'_>,
 ) {
+    scope.interface.pointed_in_whole = response.hover_pos().map(|at| place_of(shown, at));
     let zoom = &mut scope.interface.zoom;
     let factor = ui.input(|input| input.zoom_delta());
-    if let Some(at) = response.hover_pos().filter(|_| factor != 1.0) {
+    if let Some(at) = response.hover_pos().filter(|_| factor != 1.0 && factor.is_finite()) {
         *zoom = zoom.by(factor, at, area, shown);
         ui.ctx().request_repaint();
     }
@@ -111,13 +113,13 @@ fn travel(ui: &Ui, whole: Rect, response: &Response, steps: &[Step], scope: &mut
     let Some(viewpoint) = &mut scope.document.viewpoint else { return };
     // Holding still counts too: letting go ends it.
     let is_zoomed = scope.interface.zoom.is_some();
-    let pans = |modifiers: Modifiers| modifiers.command && is_zoomed;
-    let is_held = scope.interface.drag.is_some_and(|drag| drag.span().is_some());
-    let mut moved = is_held && !pans(context.input(|input| input.modifiers));
+    let pans = |has_command: bool| has_command && is_zoomed;
+    let mut moved =
+        scope.interface.drag.is_some_and(|drag| drag.span().is_some() && !pans(drag.has_command));
     for step in steps {
         let Step::Move { button, by, modifiers } = *step else { continue };
         let by = glam::Vec2::new(by.x, by.y);
-        if pans(modifiers) && button == PointerButton::Primary {
+        if pans(modifiers.command) && button == PointerButton::Primary {
             scope.interface.zoom = scope.interface.zoom.moved(egui::vec2(by.x, by.y), whole);
             continue;
         }

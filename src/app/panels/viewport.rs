@@ -3,13 +3,12 @@
 use std::sync::Arc;
 
 use egui::{
-    Align2, CentralPanel, Color32, CursorIcon, FontId, Pos2, Rect, Sense, Stroke, StrokeKind, Ui,
-    Vec2,
+    Align2, CentralPanel, Color32, CursorIcon, FontId, Pos2, Rect, Sense, Shape, Stroke,
+    StrokeKind, Ui, Vec2,
 };
 
 use super::gestures;
 use super::scope::Scope;
-use crate::app::blit::Source;
 use crate::app::comparison::AMPLIFIED;
 use crate::app::dropped::Dropped;
 use crate::app::interface::{Interface, Tab};
@@ -49,8 +48,14 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
             }
         };
         let zoom = scope.interface.zoom;
-        let (fitting, rect) = (whole, zoom.of(area, whole, rect));
-        let whole = zoom.of(area, whole, whole);
+        scope.interface.fitting_pixels = Some(whole.width() * scale);
+        // Its corner stays one of the screen's pixels.
+        let corner = zoom.of(area, whole, whole).min.to_vec2() * scale;
+        let shift = if zoom.is_some() { (corner.round() - corner) / scale } else { Vec2::ZERO };
+        let fitting = whole;
+        let zoomed = |rect| zoom.of(area, fitting, rect).translate(shift);
+        let (whole, rect) = (zoomed(whole), zoomed(rect));
+        let seen = rect.intersect(area);
         let ground = if compared.is_some() { rect } else { whole };
         let is_part = shown.order.snapshot.request.view.crop.is_some();
         surround(ui, area, if is_part { Rect::NOTHING } else { ground.intersect(rect) });
@@ -66,13 +71,14 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
                 let (of_whole, part) = kept_rects((area, scale), other.size(), compared.regions[0]);
                 if !is_alike(of_whole, fitting) {
                     // Beside another shape nothing is to be seen of what lies under it.
-                    let hidden = left_of(rect, rect, scope.interface.wipe);
+                    let hidden = left_of(seen, seen, scope.interface.wipe);
                     ui.painter().rect_filled(hidden, 0.0, theme::BACKGROUND);
                 }
-                zoom.of(area, of_whole, part)
+                zoomed(part)
             });
-            let seen = rect.intersect(area);
-            handle = wipe(ui, (seen, of_left), &source, scope.interface);
+            let has_squares = has_squares(other, shown, scope);
+            let shape = source.shape(of_left, has_squares);
+            handle = wipe(ui, (seen, of_left), shape, scope.interface);
             match &shown.order.compared {
                 Some(compared) => wipe_labels(ui, seen, &compared.names, None),
                 None => split_labels(ui, seen, scope),
@@ -84,7 +90,6 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
             let percent = shown.difference.map(|apart| format!(", {:.1} % (RMS)", 100.0 * apart));
             let percent = percent.unwrap_or_default();
             let text = format!("{left} and {right}: difference × {AMPLIFIED:.0}{percent}");
-            let seen = rect.intersect(area);
             let at = Pos2::new(seen.center().x, seen.top() + 14.0);
             theme::badge(ui, at, Align2::CENTER_TOP, &text, theme::TEXT);
         }
@@ -216,11 +221,7 @@ fn picture(
     scope: &mut Scope<'_>,
 ) {
     let painter = ui.painter();
-    // Of a smaller picture squares would be seen that are none.
-    let view = &shown.order.snapshot.request.view;
-    let magnification = scope.interface.magnification(scope.document.size);
-    let has_squares = magnification.is_some_and(|times| times >= 1.9)
-        && shown.picture.size() == [view.width, view.height];
+    let has_squares = has_squares(&shown.picture, shown, scope);
     let number = shown.order.snapshot.number;
     let recipe = Recipe::new(&shown.picture, shown.overlay.as_ref(), settings, number);
     let changes = changes(ui, &shown.picture, scope);
@@ -261,6 +262,13 @@ fn shows_like(a: &(Arc<()>, Camera), b: &(Arc<()>, Camera)) -> bool {
     Arc::ptr_eq(&a.0, &b.0) && seen(&a.1) == seen(&b.1)
 }
 
+/// Whether a picture's pixels are seen as such: of one that is smaller than it will be they would be others.
+fn has_squares(picture: &LinearPicture, shown: &Shown, scope: &Scope<'_>) -> bool {
+    let view = &shown.order.snapshot.request.view;
+    let magnification = scope.interface.magnification(scope.document.size);
+    magnification.is_some_and(|times| times >= 1.9) && picture.size() == [view.width, view.height]
+}
+
 /// Whether a picture is another one in every frame; then there is a next frame. Software would do
 /// nothing else than draw: there it changes with the snapshots.
 fn changes(ui: &Ui, picture: &LinearPicture, scope: &Scope<'_>) -> bool {
@@ -298,16 +306,10 @@ fn waiting(ui: &Ui, area: Rect, is_loading: bool) {
 
 /// The other picture, which lies in a rectangle of its own, left of a line across `rect` that can be dragged;
 /// where that can be taken hold of.
-fn wipe(
-    ui: &Ui,
-    (rect, of_left): (Rect, Rect),
-    source: &Source,
-    interface: &mut Interface,
-) -> Rect {
+fn wipe(ui: &Ui, (rect, of_left): (Rect, Rect), picture: Shape, interface: &mut Interface) -> Rect {
     let x = rect.left() + rect.width() * interface.wipe;
     let left = left_of(of_left, rect, interface.wipe);
-    ui.painter_at(left.intersect(ui.max_rect()))
-        .add(source.shape(of_left, interface.zoom.is_some()));
+    ui.painter_at(left.intersect(ui.max_rect())).add(picture);
     let handle =
         Rect::from_center_size(Pos2::new(x, rect.center().y), Vec2::new(14.0, rect.height()));
     let response = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());
