@@ -96,12 +96,13 @@ impl Source {
     /// The whole picture in a rectangle, in points, of which the painter's clip is seen; magnified, with its pixels as
     /// squares if it `has_squares`.
     pub(super) fn shape(&self, rect: Rect, has_squares: bool) -> Shape {
-        let [between, nearest] = &self.pictures;
-        let picture = if has_squares { nearest } else { between }.clone();
-        let drawn =
-            Drawn { pipeline: self.pipeline.clone(), picture, rect, corners: OnceLock::new() };
         // egui draws what meets the clip; where in it is not its concern.
-        Callback::new_paint_callback(rect, drawn).into()
+        Callback::new_paint_callback(rect, self.drawn(rect, has_squares)).into()
+    }
+
+    fn drawn(&self, rect: Rect, has_squares: bool) -> Drawn {
+        let picture = self.pictures[usize::from(has_squares)].clone();
+        Drawn { pipeline: self.pipeline.clone(), picture, rect, corners: OnceLock::new() }
     }
 }
 
@@ -124,12 +125,9 @@ impl CallbackTrait for Drawn {
         _: &mut CallbackResources,
     ) -> Vec<wgpu::CommandBuffer> {
         let size = screen.size_in_pixels.map(|pixels| pixels.max(1) as f32);
-        // What is meant to be whole is.
-        let whole = |at: f32| if (at - at.round()).abs() < 0.01 { at.round() } else { at };
         let at = |corner: Pos2| {
-            let x = 2.0 * whole(corner.x * screen.pixels_per_point) / size[0] - 1.0;
-            let y = 1.0 - 2.0 * whole(corner.y * screen.pixels_per_point) / size[1];
-            [x, y]
+            let [x, y] = [corner.x, corner.y].map(|at| at * screen.pixels_per_point);
+            [2.0 * x / size[0] - 1.0, 1.0 - 2.0 * y / size[1]]
         };
         let ([left, top], [right, bottom]) = (at(self.rect.min), at(self.rect.max));
         let corners = [
@@ -194,9 +192,7 @@ mod tests {
             view_formats: &[],
         });
         let mut commands = gpu.device.create_command_encoder(&Default::default());
-        let picture = source.pictures[usize::from(has_squares)].clone();
-        let pipeline = source.pipeline.clone();
-        let drawn = Drawn { pipeline, picture, rect, corners: OnceLock::new() };
+        let drawn = source.drawn(rect, has_squares);
         let screen = ScreenDescriptor { size_in_pixels: [24, 20], pixels_per_point: 1.25 };
         let mut resources = CallbackResources::default();
         drawn.prepare(&gpu.device, &gpu.queue, &screen, &mut commands, &mut resources);

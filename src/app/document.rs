@@ -93,11 +93,11 @@ pub enum PictureSize {
 }
 
 impl PictureSize {
-    /// Pixels across and down in a room of so many, if there is one as yet.
-    pub(super) fn pixels(self, room: Option<[u32; 2]>) -> [u32; 2] {
+    /// Pixels across and down; `None` if they depend on the room and there is none as yet.
+    pub(super) fn pixels(self, room: Option<[u32; 2]>) -> Option<[u32; 2]> {
         match self {
-            Self::Viewport(divisor) => room.unwrap_or([1, 1]).map(|n| (n / divisor.max(1)).max(1)),
-            Self::Fixed(width, height) => [width, height],
+            Self::Viewport(divisor) => Some(room?.map(|n| (n / divisor.max(1)).max(1))),
+            Self::Fixed(width, height) => Some([width, height]),
         }
     }
 }
@@ -162,9 +162,13 @@ impl Document {
     pub(super) fn shows_like(&self, other: &Self) -> bool {
         let light = |of: &Self| (of.rotation_degrees, of.intensity, of.sun, of.light.bounces);
         let things = |of: &Self| (of.background, of.fog);
-        let views = [self, other].map(|of| of.viewpoint.as_ref().map(Viewpoint::seen));
+        let cameras = [self, other].map(|of| of.viewpoint.as_ref().map(Viewpoint::camera));
+        let is_seen_alike = match &cameras {
+            [Some(one), Some(other)] => one.sees_like(other),
+            [one, other] => one.is_none() && other.is_none(),
+        };
         (&self.scene, &self.map) == (&other.scene, &other.map)
-            && views[0] == views[1]
+            && is_seen_alike
             && self.materials == other.materials
             && (light(self), things(self)) == (light(other), things(other))
     }
@@ -267,13 +271,6 @@ pub struct Viewpoint {
 }
 
 impl Viewpoint {
-    /// What the picture depends on.
-    fn seen(&self) -> impl PartialEq + use<> {
-        let projection = self.fov_y_degrees.map_or((0.0, self.half_height), |fov| (fov, 0.0));
-        let focus = if self.lens_radius > 0.0 { self.focus_distance } else { 0.0 };
-        (self.eye, self.rotation, projection, self.lens_radius, focus)
-    }
-
     /// Whether all numbers are in range.
     pub(super) fn is_sound(&self) -> bool {
         let lengths = [self.pivot_distance, self.half_height, self.focus_distance];

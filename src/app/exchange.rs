@@ -339,11 +339,7 @@ impl App {
         // Another scene would be seen from this one's viewpoint.
         let world = Arc::clone(&self.scene_of_document()?.world);
         let environment = self.environment()?;
-        let room = self.interface.viewport_pixels;
-        if room.is_none() && matches!(self.document.size, PictureSize::Viewport(_)) {
-            return None;
-        }
-        let [width, height] = self.document.size.pixels(room);
+        let [width, height] = self.document.size.pixels(self.interface.viewport_pixels)?;
         Some(Request {
             world,
             environment,

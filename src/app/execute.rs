@@ -8,14 +8,13 @@ use std::time::{Duration, Instant};
 
 use super::commands::Command;
 use super::completion::in_home;
-use super::document::{Document, PictureSize, Viewpoint};
+use super::document::{Document, Viewpoint};
 use super::dropped::Dropped;
 use super::history;
-use super::interface::{Chosen, Cursor, Dock, Interface, Prompt, Purpose, Tab};
+use super::interface::{Chosen, Purpose, Tab};
 use super::screen::color_image;
 use super::settings_file::lasting_scene;
 use super::worker::{Activity, Reference};
-use super::zoom::Zoom;
 use super::{App, Later, convergence, lock, save, surface_map, theme};
 use crate::error::Result;
 use crate::image::read_picture;
@@ -503,42 +502,5 @@ impl Purpose {
             Self::Distributions => Command::Export(path.into()),
             Self::Reference => Command::OpenReference(path.to_owned()),
         }
-    }
-}
-
-impl Interface {
-    pub(super) fn ask(&mut self, purpose: Purpose, path: String) {
-        let cursor = Some(Cursor::OverAll);
-        let offers = Vec::new();
-        self.prompt = Some(Prompt { purpose, path, cursor, objection: None, offers });
-    }
-
-    fn toggle_developer(&mut self) {
-        if self.dock.is_some() || self.tab == Tab::Inspect {
-            self.dock = None;
-            self.tab = Tab::Picture;
-            self.overlay = None;
-        } else {
-            self.dock = Some(Dock::Convergence);
-            self.tab = Tab::Inspect;
-        }
-    }
-
-    /// To a pixel of the picture for one of the screen, or four where that is about what fits, around the pointer;
-    /// or back.
-    fn toggle_zoom(&mut self, size: PictureSize) {
-        if self.zoom.is_some() {
-            self.zoom = Zoom::default();
-            return;
-        }
-        let [width, _] = size.pixels(self.viewport_pixels);
-        let least = self.fitting_pixels.map_or(1.0, |fitting| width as f32 / fitting.max(1.0));
-        let times = if least > 1.05 { least } else { (4.0 * least).max(2.0) };
-        let middle = self.pointed_in_whole.unwrap_or(glam::Vec2::splat(0.5));
-        self.zoom = Zoom::new(times, egui::vec2(middle.x, middle.y));
-    }
-
-    fn aspect(&self) -> f32 {
-        self.viewport_pixels.map_or(16.0 / 9.0, |[w, h]| w as f32 / h.max(1) as f32)
     }
 }

@@ -268,9 +268,51 @@ impl Interface {
 
     /// Pixels of the screen for one of a picture of this size, where it is magnified.
     pub(super) fn magnification(&self, size: PictureSize) -> Option<f32> {
-        let fitting = self.fitting_pixels.filter(|_| self.zoom.is_some())?;
-        let [width, _] = size.pixels(self.viewport_pixels);
-        Some(self.zoom.times() * fitting / width as f32)
+        let fitting = self.fitting(size).filter(|_| self.zoom.is_some())?;
+        Some(self.zoom.times() * fitting)
+    }
+
+    /// The same where it fits.
+    fn fitting(&self, size: PictureSize) -> Option<f32> {
+        let [width, _] = size.pixels(self.viewport_pixels)?;
+        Some(self.fitting_pixels? / width as f32)
+    }
+
+    /// To a pixel of the picture for one of the screen, or four where that is about what fits, around the pointer;
+    /// or back.
+    pub(super) fn toggle_zoom(&mut self, size: PictureSize) {
+        if self.zoom.is_some() {
+            self.zoom = Zoom::default();
+            return;
+        }
+        let least = self.fitting(size).map_or(1.0, f32::recip);
+        let times = if least > 1.05 { least } else { (4.0 * least).max(2.0) };
+        let middle = self.pointed_in_whole.unwrap_or(Vec2::splat(0.5));
+        self.zoom = Zoom::new(times, egui::vec2(middle.x, middle.y));
+    }
+
+    /// Asks for a path.
+    pub(super) fn ask(&mut self, purpose: Purpose, path: String) {
+        let cursor = Some(Cursor::OverAll);
+        let offers = Vec::new();
+        self.prompt = Some(Prompt { purpose, path, cursor, objection: None, offers });
+    }
+
+    /// Opens what developers look at, or closes it.
+    pub(super) fn toggle_developer(&mut self) {
+        if self.dock.is_some() || self.tab == Tab::Inspect {
+            self.dock = None;
+            self.tab = Tab::Picture;
+            self.overlay = None;
+        } else {
+            self.dock = Some(Dock::Convergence);
+            self.tab = Tab::Inspect;
+        }
+    }
+
+    /// Width over height of the room.
+    pub(super) fn aspect(&self) -> f32 {
+        self.viewport_pixels.map_or(16.0 / 9.0, |[w, h]| w as f32 / h.max(1) as f32)
     }
 
     /// The place that is inspected.

@@ -31,6 +31,16 @@ pub struct Surface {
     hits: u32,
 }
 
+impl Surface {
+    /// Mean albedo, unit normal and distance in metres, of so many samples of the pixel.
+    fn mean(&self, samples: u32) -> ([f32; 3], [f32; 3], f32) {
+        let albedo = self.albedo / f64::from(samples.max(1));
+        let normal = self.normal.normalize_or_zero();
+        let depth = self.depth / f64::from(self.hits.max(1));
+        (albedo.as_vec3().to_array(), normal.as_vec3().to_array(), depth as f32)
+    }
+}
+
 /// The picture so far.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Film {
@@ -266,10 +276,7 @@ impl Film {
     /// has met no surface.
     pub(crate) fn surface_of(&self, index: usize) -> Option<([f32; 3], [f32; 3], f32)> {
         let surface = self.surfaces.get(index).filter(|surface| surface.hits > 0)?;
-        let samples = self.pixels.get(index)?.samples.max(1);
-        let albedo = (surface.albedo / f64::from(samples)).as_vec3().to_array();
-        let normal = surface.normal.normalize_or_zero().as_vec3().to_array();
-        Some((albedo, normal, (surface.depth / f64::from(surface.hits)) as f32))
+        Some(surface.mean(self.pixels.get(index)?.samples))
     }
 
     /// Sums of first hits, row after row; empty unless layers are kept.
@@ -361,10 +368,10 @@ impl Film {
         }
         let mut layers = SurfaceLayers::default();
         for (surface, pixel) in self.surfaces.iter().zip(&self.pixels) {
-            let albedo = surface.albedo / f64::from(pixel.samples.max(1));
-            layers.albedo.push(albedo.as_vec3().to_array());
-            layers.normal.push(surface.normal.normalize_or_zero().as_vec3().to_array());
-            layers.depth.push((surface.depth / f64::from(surface.hits.max(1))) as f32);
+            let (albedo, normal, depth) = surface.mean(pixel.samples);
+            layers.albedo.push(albedo);
+            layers.normal.push(normal);
+            layers.depth.push(depth);
         }
         Some(layers)
     }

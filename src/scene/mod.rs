@@ -420,6 +420,15 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// Whether the same is seen through both.
+    pub(crate) fn sees_like(&self, other: &Self) -> bool {
+        let seen = |camera: &Self| {
+            let focus = if camera.lens_radius > 0.0 { camera.focus_distance } else { 0.0 };
+            (camera.world_from_camera, camera.projection, camera.lens_radius, focus)
+        };
+        seen(self) == seen(other)
+    }
+
     /// The point straight ahead at which the picture is sharp.
     pub fn target(&self) -> Vec3 {
         let back = self.world_from_camera.matrix3.z_axis.normalize_or_zero();

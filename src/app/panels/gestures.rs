@@ -9,7 +9,6 @@ use glam::Vec3;
 
 use super::scope::Scope;
 use crate::app::commands::Command;
-use crate::app::comparison::Comparison;
 use crate::app::document::Viewpoint;
 use crate::app::drag::{Drag, Step};
 use crate::app::interface::Tab;
@@ -70,8 +69,7 @@ fn mark_region(ui: &Ui, whole: Rect, steps: &[Step], scope: &mut Scope<'_>) {
 
 /// Where the pointer is, and what a click does there.
 fn point(rect: Rect, response: &Response, modifiers: Modifiers, scope: &mut Scope<'_>) {
-    let compared = scope.shown.and_then(|shown| shown.order.compared.as_ref());
-    if compared.is_some_and(Comparison::covers_now) {
+    if scope.shown.is_some_and(|shown| shown.order.covers_now()) {
         // A kept picture has colours and no more.
         scope.interface.pointed = None;
         return;

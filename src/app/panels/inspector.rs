@@ -1,6 +1,6 @@
 //! The map with its tiles, and what the cell under the pointer knows of them.
 
-use egui::{Color32, Grid, Rect, RichText, Stroke, StrokeKind, Ui, Vec2};
+use egui::{Color32, Grid, Rect, Response, RichText, Stroke, StrokeKind, Ui, Vec2};
 
 use super::{color_bar, map_view, overlay};
 use crate::app::commands::Command;
@@ -281,9 +281,7 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
     let tries: f64 = inspected.tallies.iter().map(|t| t.tries).sum();
     Grid::new("cell").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
         let mut line = |name: &str, value: String, hint: &str| {
-            ui.label(theme::quiet(name)).on_hover_text(hint);
-            ui.label(RichText::new(value).size(12.5)).on_hover_text(hint);
-            ui.end_row();
+            fact(ui, name, value).on_hover_text(hint);
         };
         line(
             "Cell",
@@ -315,6 +313,13 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
     });
 }
 
+/// A row of a grid; both its words.
+fn fact(ui: &mut Ui, name: &str, value: String) -> Response {
+    let both = ui.label(theme::quiet(name)) | ui.label(RichText::new(value).size(12.5));
+    ui.end_row();
+    both
+}
+
 /// What the radiance cache knows there.
 fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
     let Some(snapshot) = snapshot else { return };
@@ -339,9 +344,7 @@ fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
     };
     Grid::new("cached").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
         let mut line = |name: &str, value: String| {
-            ui.label(theme::quiet(name));
-            ui.label(RichText::new(value).size(12.5));
-            ui.end_row();
+            fact(ui, name, value);
         };
         line(
             "Cache cell",

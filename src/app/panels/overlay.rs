@@ -3,7 +3,6 @@
 use egui::{Color32, Sense, Ui, Vec2};
 
 use super::color_bar;
-use crate::app::comparison::Comparison;
 use crate::app::interface::Interface;
 use crate::app::overlays::{Legend, Overlay, palette};
 use crate::app::presenter::Shown;
@@ -39,9 +38,7 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
         None if overlay == Overlay::Tile && interface.tile.is_none() => {
             ui.label(theme::quiet("Choose a tile on the map below."));
         }
-        None if shown
-            .is_some_and(|s| s.order.compared.as_ref().is_some_and(Comparison::covers_now)) =>
-        {
+        None if shown.is_some_and(|shown| shown.order.covers_now()) => {
             ui.label(theme::quiet("Kept pictures have no overlays."));
         }
         None => {

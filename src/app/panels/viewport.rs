@@ -18,7 +18,6 @@ use crate::app::theme;
 use crate::app::worker::{Activity, SessionSnapshot, Snapshot};
 use crate::develop::{DevelopSettings, LinearPicture};
 use crate::render::View;
-use crate::scene::Camera;
 
 /// Draws the picture and takes gestures; the room it has.
 pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
@@ -228,15 +227,15 @@ fn picture(
     let request = &shown.order.snapshot.request;
     let of = (Arc::clone(request.world.geometry()), request.view.camera.clone());
     if request.view.crop.is_none() {
-        let is_now = shown.order.compared.as_ref().is_none_or(|compared| !compared.covers_now());
-        scope.textures.main_of = is_now.then_some(of);
+        scope.textures.main_of = (!shown.order.covers_now()).then_some(of);
         let source = Developed::update(&mut scope.textures.main, scope.screen, recipe, changes);
         ui.painter_at(whole).add(source.shape(rect, has_squares));
         scope.textures.part = None;
         return;
     }
     scope.textures.main.take_if(|_| {
-        scope.textures.main_of.as_ref().is_none_or(|main_of| !shows_like(main_of, &of))
+        let main_of = scope.textures.main_of.as_ref();
+        main_of.is_none_or(|main_of| !Arc::ptr_eq(&main_of.0, &of.0) || !main_of.1.sees_like(&of.1))
     });
     let is_left = scope.document.region.is_none();
     if let Some(main) = &scope.textures.main {
@@ -251,15 +250,6 @@ fn picture(
     if !is_left {
         painter.rect_stroke(rect, 0.0, Stroke::new(1.0, theme::ACCENT), StrokeKind::Outside);
     }
-}
-
-/// Whether one sees the same of the same geometry.
-fn shows_like(a: &(Arc<()>, Camera), b: &(Arc<()>, Camera)) -> bool {
-    let seen = |camera: &Camera| {
-        let focus = if camera.lens_radius > 0.0 { camera.focus_distance } else { 0.0 };
-        (camera.world_from_camera, camera.projection, camera.lens_radius, focus)
-    };
-    Arc::ptr_eq(&a.0, &b.0) && seen(&a.1) == seen(&b.1)
 }
 
 /// Whether a picture's pixels are seen as such: of one that is smaller than it will be they would be others.

@@ -108,8 +108,8 @@ impl Memory {
             });
         }
         // What is kept has no overlays.
-        let is_now = order.compared.as_ref().is_none_or(|compared| !compared.covers_now());
-        let painted = order.overlay.filter(|_| is_now).map_or(Ok(None), |overlay| {
+        let overlay = order.overlay.filter(|_| !order.covers_now());
+        let painted = overlay.map_or(Ok(None), |overlay| {
             let mut last = std::mem::take(&mut self.uploads.overlay);
             let look = order.look.map(|look| (look, automatic_ev));
             let key = (order.snapshot.number, overlay, order.tile, look);

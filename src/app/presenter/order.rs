@@ -46,6 +46,11 @@ impl PartialEq for Order {
 }
 
 impl Order {
+    /// Whether what is kept is shown where the picture that is rendered would be.
+    pub(in crate::app) fn covers_now(&self) -> bool {
+        self.compared.as_ref().is_some_and(Comparison::covers_now)
+    }
+
     /// What is to be shown, made on the host.
     pub(in crate::app) fn image(&self) -> Image {
         let film = &self.snapshot.main.film;

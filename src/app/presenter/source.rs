@@ -72,10 +72,7 @@ impl Source {
     }
 
     pub(super) fn plain(order: &Order) -> Option<Self> {
-        let session = order.snapshot.plain.clone()?;
-        if session.samples == 0 && !session.film.is_begun() {
-            return None;
-        }
+        let session = order.snapshot.plain.clone().filter(SessionSnapshot::is_begun)?;
         let is_whole = session.samples > 0;
         Some(Self { session, backdrop: None, denoiser: order.denoiser, is_whole })
     }

@@ -69,6 +69,11 @@ impl SessionSnapshot {
     pub(crate) fn mean_samples(&self) -> f64 {
         self.figures.samples as f64 / self.film.pixels().len().max(1) as f64
     }
+
+    /// Whether pixels all over the picture have a sample: before, there would be streaks.
+    pub(crate) fn is_begun(&self) -> bool {
+        self.samples > 0 || self.film.is_begun()
+    }
 }
 
 /// Why there is no radiance cache to be looked at.
@@ -202,8 +207,7 @@ impl Snapshot {
 
     /// Whether there is anything to be seen.
     pub(crate) fn has_picture(&self) -> bool {
-        // Before its first pixels are everywhere, there would be streaks.
         let is_paused = self.activity == Activity::Paused && self.main.figures.samples > 0;
-        self.main.samples > 0 || self.backdrop.is_some() || is_paused || self.main.film.is_begun()
+        self.backdrop.is_some() || is_paused || self.main.is_begun()
     }
 }
