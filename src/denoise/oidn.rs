@@ -2,6 +2,7 @@
 //! (<https://www.openimagedenoise.org/documentation.html>).
 
 use std::ffi::{CStr, c_char, c_int, c_void};
+use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
 use std::sync::OnceLock;
 
@@ -18,6 +19,21 @@ const NAMES: &[&str] = if cfg!(windows) {
     &["libOpenImageDenoise.2.dylib", "libOpenImageDenoise.1.dylib", "libOpenImageDenoise.dylib"]
 } else {
     &["libOpenImageDenoise.so.2", "libOpenImageDenoise.so.1", "libOpenImageDenoise.so"]
+};
+
+/// Where the pip package `pyoidn` has the library, beside all that it needs, in a folder of packages.
+const PLACE_IN_PACKAGES: &str = "pyoidn/oidn/lib";
+
+/// How to get it. Debian has no package of it (as of Debian 13). On Windows the pip package is not looked
+/// for: that loader does not look beside a library for what it needs.
+const HOW_TO_GET: &str = if cfg!(windows) {
+    "get it from openimagedenoise.org, and name the folder of OpenImageDenoise.dll in PATH"
+} else if cfg!(target_os = "macos") {
+    "`pip install pyoidn` brings its library; or get that from openimagedenoise.org, and name its \
+     folder in DYLD_LIBRARY_PATH"
+} else {
+    "`pip install pyoidn` brings its library; or get that from openimagedenoise.org, and name its \
+     folder in LD_LIBRARY_PATH"
 };
 
 /// `OIDN_DEVICE_TYPE_CPU`: our pixels are in host memory.
@@ -47,12 +63,75 @@ type GetError = unsafe extern "C" fn(Handle, *mut *const c_char) -> c_int;
 fn library() -> Result<&'static Library> {
     static LIBRARY: OnceLock<Option<Library>> = OnceLock::new();
     let library = LIBRARY.get_or_init(|| {
-        // SAFETY: the library's initialisers are those of Intel's product.
-        NAMES.iter().find_map(|name| unsafe { Library::new(name) }.ok())
+        // Names without a folder: the loader looks in its own places.
+        let named = NAMES.iter().map(PathBuf::from);
+        first_that_loads(named.chain(installed_by_pip(python_prefixes())))
     });
-    library.as_ref().ok_or_else(|| {
-        Error::new(format!("Open Image Denoise is not installed: no {}", NAMES.join(", no ")))
-    })
+    library
+        .as_ref()
+        .ok_or_else(|| Error::new(format!("Open Image Denoise is not installed: {HOW_TO_GET}")))
+}
+
+/// The first of these that the loader takes. What is no library, or lacks another that it needs, is passed
+/// over.
+fn first_that_loads(mut candidates: impl Iterator<Item = PathBuf>) -> Option<Library> {
+    // SAFETY: the library's initialisers are those of Intel's product.
+    candidates.find_map(|path| unsafe { Library::new(path) }.ok())
+}
+
+/// The prefixes (`sys.prefix`) below which pip installs: of the environment in use, the user's, the system's.
+/// Relative ones are left out, for they lead into the current folder.
+fn python_prefixes() -> impl Iterator<Item = PathBuf> {
+    let environments = ["VIRTUAL_ENV", "CONDA_PREFIX"].into_iter().filter_map(std::env::var_os);
+    let home = std::env::home_dir();
+    let user = home.as_ref().map(|home| home.join(".local"));
+    // Apple's Python has a prefix of the user's for each of its versions.
+    let of_versions =
+        home.filter(|_| cfg!(target_os = "macos")).map(|home| home.join("Library/Python"));
+    let system: &[&str] = if cfg!(target_os = "macos") {
+        &["/opt/homebrew", "/usr/local", "/Library/Frameworks/Python.framework/Versions/Current"]
+    } else {
+        &["/usr/local", "/usr"]
+    };
+    (environments.map(PathBuf::from))
+        .chain(user)
+        .chain(of_versions.into_iter().flat_map(|folder| newest_first(&folder, "")))
+        .chain(system.iter().map(PathBuf::from))
+        .filter(|prefix| prefix.is_absolute())
+}
+
+/// The libraries of the pip package below these prefixes of Python, in their order, and of each prefix the
+/// newest Python's first: those in `lib/python3.12/site-packages`, or Debian's `lib/python3/dist-packages`.
+/// A prefix is looked into when it is reached.
+fn installed_by_pip(prefixes: impl Iterator<Item = PathBuf>) -> impl Iterator<Item = PathBuf> {
+    prefixes
+        .flat_map(|prefix| newest_first(&prefix.join("lib"), "python"))
+        .flat_map(|python| ["site-packages", "dist-packages"].map(|packages| python.join(packages)))
+        .flat_map(|packages| libraries_in(&packages.join(PLACE_IN_PACKAGES)))
+}
+
+/// What is in a folder, called so and then a version or none, the newest first: `python3.12`, `python3.9`,
+/// `python3`. Nothing if the folder cannot be read.
+fn newest_first(folder: &Path, name: &str) -> impl Iterator<Item = PathBuf> + use<> {
+    let version = |path: &Path| -> Option<Vec<u32>> {
+        let version = path.file_name()?.to_str()?.strip_prefix(name)?;
+        // Python without its lock ends with a t: `python3.14t`.
+        let numbers = version.trim_end_matches('t').split('.').filter(|number| !number.is_empty());
+        numbers.map(|number| number.parse().ok()).collect()
+    };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut found = entries
+        .filter_map(|entry| Some((version(&entry.path())?, entry.path())))
+        .collect::<Vec<_>>();
+    found.sort_by(|a, b| b.cmp(a));
+    found.into_iter().map(|(_, path)| path)
+}
+
+/// Files of the library's names in a folder, the newest version first. By their full paths the loader finds
+/// what they need beside them: so say their own search paths (`$ORIGIN`, on macOS `@loader_path`).
+fn libraries_in(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    let folder = folder.to_owned();
+    NAMES.iter().map(move |name| folder.join(name)).filter(|path| path.is_file())
 }
 
 pub(super) fn check() -> Result<()> {
@@ -153,4 +232,55 @@ fn sentence(message: *const c_char) -> Error {
         unsafe { CStr::from_ptr(message) }.to_string_lossy()
     };
     Error::new(format!("Open Image Denoise: {text}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file where pyoidn's wheel has the library, below a prefix of Python; it is no library.
+    fn put(prefix: &Path, packages: &str, name: &str) -> PathBuf {
+        let folder = prefix.join("lib").join(packages).join("pyoidn/oidn/lib");
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let path = folder.join(name);
+        std::fs::write(&path, "no library").expect("written");
+        path
+    }
+
+    #[test]
+    fn the_library_is_found_where_pip_has_it_the_newest_first() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let [own, system] = ["own", "system"].map(|name| temporary.path().join(name));
+        let (newest, last) = (NAMES[0], NAMES[NAMES.len() - 1]);
+        let of_debian = put(&system, "python3/dist-packages", newest);
+        let of_system = put(&system, "python3.9/site-packages", newest);
+        let unversioned = put(&own, "python3.9/site-packages", last);
+        let older = put(&own, "python3.9/site-packages", newest);
+        let newer = put(&own, "python3.12/site-packages", newest);
+        // The library's parts are not the library, and other folders are not Python's.
+        put(&own, "python3.12/site-packages", "libOpenImageDenoise_core.so.2.5.1");
+        put(&own, "pythonic/site-packages", newest);
+        let missing = temporary.path().join("missing");
+        let found = installed_by_pip([missing, own, system].into_iter()).collect::<Vec<_>>();
+        let mut expected = vec![newer, older, unversioned, of_system, of_debian];
+        expected.dedup();
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn a_file_that_is_no_library_is_passed_over() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let file = put(temporary.path(), "python3.12/site-packages", NAMES[0]);
+        let found = || installed_by_pip([temporary.path().to_owned()].into_iter());
+        assert_eq!(found().collect::<Vec<_>>(), [file]);
+        assert!(first_that_loads(found()).is_none());
+        if cfg!(all(target_os = "linux", target_env = "gnu")) {
+            assert!(first_that_loads(found().chain(["libm.so.6".into()])).is_some());
+        }
+    }
+
+    #[test]
+    fn prefixes_of_python_are_never_in_the_current_folder() {
+        assert!(python_prefixes().all(|prefix| prefix.is_absolute()));
+    }
 }

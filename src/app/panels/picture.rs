@@ -58,8 +58,8 @@ fn denoiser(ui: &mut Ui, document: &mut Document) {
             return;
         }
         // The library is looked for once.
-        if Denoiser::Oidn.check().is_err() {
-            ui.weak("built-in filter").on_hover_text("Open Image Denoise, Intel's trained filter, is smoother. Get its library from openimagedenoise.org, name its folder in LD_LIBRARY_PATH (PATH on Windows), and start again: then it can be chosen here");
+        if let Err(missing) = Denoiser::Oidn.check() {
+            ui.weak("built-in filter").on_hover_text(format!("Intel's trained filter is smoother. {missing}. Start again, and it can be chosen here"));
             return;
         }
         let chosen = &mut document.look.denoiser;
