@@ -11,6 +11,8 @@ mod gpu_facts;
 mod outlook;
 mod pass;
 mod progress;
+#[cfg(feature = "window")]
+mod resized;
 mod session;
 mod sharing;
 mod view;

@@ -4,7 +4,7 @@ use egui::{Align, Color32, Layout, Margin, Panel, RichText, Ui};
 
 use crate::app::overlays::{Overlay, told};
 use crate::app::theme;
-use crate::app::worker::{Activity, Snapshot};
+use crate::app::worker::{Activity, Origin, Snapshot};
 
 /// What the line is drawn from.
 pub(in crate::app) struct Status<'a> {
@@ -37,9 +37,12 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
             // What is at the right comes first, and what then has no room ends there.
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 if let Some(snapshot) = status.snapshot {
-                    device(ui, snapshot, status);
-                    let pointed = status.pointed.filter(|_| !theme::is_narrow(ui));
-                    if let Some((place, shown)) = pointed.zip(status.shown) {
+                    let pointed = status.pointed.zip(status.shown);
+                    // Where there is room for one, what is pointed at comes first.
+                    if pointed.is_none() || !theme::is_narrow(ui) {
+                        device(ui, snapshot, status);
+                    }
+                    if let Some((place, shown)) = pointed {
                         pixel(ui, shown, place, status.overlay);
                     }
                 }
@@ -117,15 +120,24 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
             number(ui, &theme::figure(rate), "rays/s", hint);
         }
     }
-    if let Some(backdrop) = snapshot.backdrop.as_ref().filter(|backdrop| backdrop.is_cached) {
-        let share = format!("{:.0} %", 100.0 * backdrop.share(session.samples));
-        number(
-            ui,
-            &share,
-            "cached light",
-            "So much of what is shown is light remembered by place: calm at once, a few percent off, \
-             gone when there are enough samples, and never in what is saved",
-        );
+    if let Some(backdrop) = &snapshot.backdrop {
+        let share = backdrop.share(session.samples);
+        let told = match backdrop.origin {
+            Origin::Cache => Some((
+                "cached light",
+                "So much of what is shown is light remembered by place: calm at once, a few percent off, \
+                 gone when there are enough samples, and never in what is saved",
+            )),
+            Origin::Resized => Some((
+                "resized",
+                "So much of what is shown is the picture from before its size changed; it goes when there are \
+                 enough samples, and is never in what is saved",
+            )),
+            Origin::Before => None,
+        };
+        if let Some((unit, hint)) = told.filter(|_| share > 0.0) {
+            number(ui, &format!("{:.0} %", 100.0 * share), unit, hint);
+        }
     }
     if session.noise.is_finite() {
         let percent = format!("{:.1} %", 100.0 * session.noise);

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::order::Order;
-use crate::app::worker::{Backdrop, SessionSnapshot};
-use crate::denoise::{Denoiser, blend};
+use crate::app::worker::{Backdrop, Origin, SessionSnapshot};
+use crate::denoise::{Denoiser, blend, together};
 use crate::develop::{Developer, LinearPicture};
 use crate::image::Image;
 use crate::render::film::Film;
@@ -119,15 +119,20 @@ impl Source {
         let (film, backdrop) = ahead.map_or((&**film, backdrop), |(before, _)| (before, None));
         let blended = || Prepared::of(developer, blend(film, backdrop));
         // Filters take whole films of one size.
+        let has_all = film.min_samples() > 0;
         let other = backdrop.filter(|(other, worth)| {
-            film.is_alike(other) && other.min_samples() > 0 && *worth > 0.0
+            film.is_alike(other) && *worth > 0.0 && (has_all || other.min_samples() > 0)
         });
-        let is_blended = other.is_some() && self.backdrop.as_ref().is_some_and(|b| b.is_cached);
+        let is_of = |origin: Origin| {
+            other.is_some() && self.backdrop.as_ref().is_some_and(|b| b.origin == origin)
+        };
+        let is_resized = is_of(Origin::Resized);
+        let is_blended = is_resized || is_of(Origin::Cache);
         let is_surpassed =
             |(other, _): (&Film, f32)| other.total_samples() <= FILTER_WORTH * film.total_samples();
-        let has_all = film.min_samples() > 0;
         let can_filter = other.is_some() || (has_all && backdrop.is_none_or(is_surpassed));
         match self.denoiser {
+            None if is_resized && has_all => Prepared::of(developer, together(film, other)),
             None if self.is_whole => Prepared::on_device(noisy(false)),
             Some(Denoiser::ATrous)
                 if self.is_whole
@@ -197,7 +202,7 @@ pub(super) mod tests {
         let Some(developer) = developer() else { return };
         let prepared = |own: Film, other: Film, is_whole| {
             let (samples, film) = (other.total_samples(), Arc::new(other));
-            let backdrop = Some(Backdrop { film, samples, worth: 4.0, is_cached: true });
+            let backdrop = Some(Backdrop { film, samples, worth: 4.0, origin: Origin::Cache });
             let (session, denoiser) = (session(own), Some(Denoiser::ATrous));
             let prepared = Source { session, backdrop, denoiser, is_whole }.prepare(&developer);
             prepared.image.expect("made on the host").pixels.clone()
@@ -217,6 +222,28 @@ pub(super) mod tests {
         assert_eq!(prepared(cached.clone(), many.clone(), true), quick(&many, None).pixels);
         let few = film_of([6, 4], 1, 3);
         assert_eq!(prepared(whole.clone(), few.clone(), true), quick(&few, None).pixels);
+    }
+
+    #[test]
+    fn a_resized_picture_is_shown_with_what_there_is_of_the_new_one() {
+        let Some(developer) = developer() else { return };
+        let resized = film(8, 1, 9).resized([12, 8]);
+        assert_eq!(resized.min_samples(), 0, "the sides are not in it");
+        let prepared = |own: &Film, denoiser, is_whole| {
+            let (samples, film) = (resized.total_samples(), Arc::new(resized.clone()));
+            let backdrop = Some(Backdrop { film, samples, worth: 0.5, origin: Origin::Resized });
+            let session = session(own.clone());
+            let prepared = Source { session, backdrop, denoiser, is_whole }.prepare(&developer);
+            prepared.image.expect("made on the host").pixels.clone()
+        };
+        let (holes, whole, denoiser) = (film(12, 2, 1), film(12, 1, 1), Some(Denoiser::ATrous));
+        let other = Some((&resized, 0.5));
+        assert_eq!(prepared(&holes, denoiser, false), blend(&holes, other).pixels);
+        assert_eq!(prepared(&whole, denoiser, true), quick(&whole, other).pixels);
+        let shown = prepared(&whole, None, true);
+        assert_eq!(shown, together(&whole, other).pixels);
+        assert_eq!(shown[0], whole.image().pixels[0], "of the sides there is nothing else");
+        assert_ne!(shown[6], whole.image().pixels[6]);
     }
 
     #[test]

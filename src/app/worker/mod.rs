@@ -20,7 +20,7 @@ use job::Job;
 use kept::Kept;
 pub(crate) use request::{Reference, Request};
 use snapshot::Rest;
-pub(crate) use snapshot::{Activity, Backdrop, NoCache, Point, SessionSnapshot, Snapshot};
+pub(crate) use snapshot::{Activity, Backdrop, NoCache, Origin, Point, SessionSnapshot, Snapshot};
 
 use super::{Wake, lock};
 use crate::alarm::Alarm;
@@ -362,6 +362,26 @@ pub(super) mod tests {
         let first = wait_for(&worker, is_shown);
         let cached = first.backdrop.as_ref().is_some_and(|backdrop| backdrop.film.is_begun());
         assert!(cached || first.main.film.is_begun(), "not in streaks");
+    }
+
+    #[test]
+    fn a_picture_in_another_size_goes_on_with_what_there_is_of_it() {
+        let Some(worker) = worker() else { return };
+        let request = Request { wants_cached: true, ..request_of("office", [48, 36]) };
+        worker.submit(request.clone());
+        let pixels = 48 * 36;
+        wait_for(&worker, |now| now.is_whole() && now.now.samples > 2 * 64 * pixels);
+        let view = View { width: 72, ..request.view.clone() };
+        worker.submit(Request { view, ..request.clone() });
+        let is_wide = |now: &Snapshot| now.request.view.width == 72;
+        let first = wait_for(&worker, |now| is_wide(now) && now.has_picture());
+        assert!(first.main.is_begun(), "its sides are not in what there is");
+        let backdrop = first.backdrop.as_ref().expect("it goes on with it");
+        assert_eq!((backdrop.origin, backdrop.film.width), (Origin::Resized, 72));
+        assert!(backdrop.share(1) > 0.9);
+        // It fades out.
+        let last = wait_for(&worker, |now| is_wide(now) && now.main.samples > 256);
+        assert!(last.backdrop.is_none());
     }
 
     #[test]

@@ -150,8 +150,19 @@ pub(crate) struct Backdrop {
     pub samples: u64,
     /// What one of its samples counts beside one of the picture's own.
     pub worth: f32,
-    /// Whether its light comes from a radiance cache.
-    pub is_cached: bool,
+    /// Where it comes from.
+    pub origin: Origin,
+}
+
+/// Where a film comes from that is shown together with the picture's own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Origin {
+    /// A radiance cache.
+    Cache,
+    /// A picture of the same view that was rendered before, in any size.
+    Before,
+    /// The same, resized to that of the picture, of which it may show less.
+    Resized,
 }
 
 impl Backdrop {
@@ -167,7 +178,7 @@ impl Backdrop {
 impl PartialEq for Backdrop {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.film, &other.film)
-            && (self.worth, self.is_cached) == (other.worth, other.is_cached)
+            && (self.worth, self.origin) == (other.worth, other.origin)
     }
 }
 
@@ -208,6 +219,8 @@ impl Snapshot {
     /// Whether there is anything to be seen.
     pub(crate) fn has_picture(&self) -> bool {
         let is_paused = self.activity == Activity::Paused && self.main.figures.samples > 0;
-        self.backdrop.is_some() || is_paused || self.main.is_begun()
+        // What is resized may lack the sides.
+        let is_backed = |backdrop: &Backdrop| backdrop.origin != Origin::Resized;
+        self.backdrop.as_ref().is_some_and(is_backed) || is_paused || self.main.is_begun()
     }
 }

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 pub(super) use cached::CompletePicture;
 use cached::{CachedPicture, worth};
-use publishing::Reading;
+use publishing::{Reading, Resized};
 
 use super::kept::{Kept, Learned, Left};
 use super::{Activity, Point, Request, Shared};
@@ -42,6 +42,8 @@ pub(super) struct Job<'a> {
     publish_gap: Duration,
     /// The films of the main and the plain picture, as they were read last; they go with the request.
     readings: [Option<Reading>; 2],
+    /// The film from before in the picture's size.
+    resized: Option<Resized>,
     /// Copies of films that somebody still has.
     films: Vec<Weak<Film>>,
     /// The distributions published last, with what tells whether they are still those in use.
@@ -71,6 +73,7 @@ impl<'a> Job<'a> {
             last: None,
             publish_gap: Duration::ZERO,
             readings: [None, None],
+            resized: None,
             films: Vec::new(),
             distributions: None,
             cached_seconds: 0.0,
@@ -115,6 +118,10 @@ impl<'a> Job<'a> {
         let keeps_distributions =
             self.request.is_frozen && self.kept.distributions_for(&self.request).is_some();
         let (before, mut cached) = self.picture_of_before(world, environment);
+        if before.is_none() && self.request.previews && !self.kept.device.is_quick(&self.request) {
+            self.resize_backdrop();
+        }
+        let is_rich = self.has_rich_backdrop();
         let mut main = if let Some(session) = before {
             // Before it goes on.
             self.publish(Activity::Rendering, &session, None, &mut cached);
@@ -135,7 +142,7 @@ impl<'a> Job<'a> {
                 if !(cached.is_complete() && self.may_want_cached(&main)) {
                     cached.end(|session| self.kept.keep_training(session, &self.request));
                 }
-            } else if cached.is_absent() && self.is_time_for_cached(&main) {
+            } else if cached.is_absent() && !is_rich && self.is_time_for_cached(&main) {
                 let view = View { gi: Gi::Cached, ..view.clone() };
                 let session = self.experienced_session(world, environment, view);
                 cached = CachedPicture::UnderWay(Box::new(session), None);

@@ -8,11 +8,13 @@ use super::cached::{CachedPicture, worth};
 use super::sessions::SLICE;
 use super::{Job, MAIN, PLAIN};
 use crate::app::lock;
-use crate::app::worker::{Activity, Backdrop, NoCache, Point, Request, SessionSnapshot, Snapshot};
+use crate::app::worker::{
+    Activity, Backdrop, NoCache, Origin, Point, Request, SessionSnapshot, Snapshot,
+};
 use crate::light_grid::LightGrid;
 use crate::metrics;
 use crate::radiance_cache::CacheFacts;
-use crate::render::film::Film;
+use crate::render::film::{Film, Pixel};
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::render::{Figures, Session, View};
 
@@ -24,6 +26,10 @@ const READING_GAP: Duration = Duration::from_millis(250);
 const OLDEST: Duration = Duration::from_secs(2);
 /// Publishing may take at most about one part in this of the time.
 const PUBLISH_SHARE: u32 = 40;
+/// A resized film is worth no more samples a pixel than this.
+const MOST_OF_RESIZED: f32 = 64.0;
+/// And needs no cached light beside it with so many.
+const RICH: u64 = 16;
 /// But a picture that changes is shown at least so often.
 const LONGEST_GAP: Duration = Duration::from_millis(800);
 
@@ -47,9 +53,32 @@ impl Job<'_> {
     /// A film of this view from before, if there is one.
     fn backdrop(&self) -> Option<Arc<Film>> {
         let (request, film) = self.kept.backdrop.as_ref()?;
+        let film = self.resized.as_ref().map_or(film, |resized| &resized.film);
         let aspect = |view: &View| f64::from(view.width) / f64::from(view.height);
         let is_as_wide = 1.02 * aspect(&request.view) >= aspect(&self.request.view);
-        (is_as_wide && request.looks_like(&self.request)).then(|| Arc::clone(film))
+        ((is_as_wide || self.resized.is_some()) && request.looks_like(&self.request))
+            .then(|| Arc::clone(film))
+    }
+
+    /// Resizes the film from before to the picture's size, if it was a whole one of about as many rows: the picture
+    /// goes on with what it shows.
+    pub(super) fn resize_backdrop(&mut self) {
+        let view = &self.request.view;
+        let size = [view.width, view.height];
+        let before = self.kept.backdrop.as_ref().filter(|(of, film)| {
+            let is_whole = !of.moving && film.width == of.view.width;
+            let is_alike = film.height <= 2 * view.height && view.height <= 2 * film.height;
+            is_whole && is_alike && size != [film.width, film.height]
+        });
+        let before = before.filter(|(of, _)| of.looks_like(&self.request));
+        self.resized = before.map(|(_, film)| Resized::of(film.resized(size)));
+    }
+
+    /// Whether the film from before says enough, so that nothing else helps the picture for now.
+    pub(super) fn has_rich_backdrop(&self) -> bool {
+        let is_rich =
+            |resized: &Resized| resized.samples >= RICH * resized.film.pixels().len() as u64;
+        self.resized.as_ref().is_some_and(is_rich)
     }
 
     /// Keeps the film for the next one's first moments, unless there is a better one of the same view.
@@ -153,17 +182,24 @@ impl Job<'_> {
         // What this job itself has kept has the same samples.
         let is_own = |(of, _): &(Arc<Request>, Arc<Film>)| Arc::ptr_eq(of, &self.request);
         let before = self.backdrop().filter(|_| !self.kept.backdrop.as_ref().is_some_and(is_own));
-        let seen = before.as_ref().map_or(0, |film| film.total_samples());
+        let resized = self.resized.as_ref().filter(|_| before.is_some());
+        let total = || before.as_ref().map_or(0, |film| film.total_samples());
+        let seen = resized.map_or_else(total, |resized| resized.samples);
         let film = cached.film(3 * seen / 2, rests).filter(|_| self.request.wants_cached);
-        match film {
+        let shown = match film {
             Some((samples, film)) => {
                 let worth = worth(main.samples());
-                Some(Backdrop { film, samples, worth, is_cached: true })
+                Some(Backdrop { film, samples, worth, origin: Origin::Cache })
             }
-            None => {
-                before.map(|film| Backdrop { film, samples: seen, worth: 1.0, is_cached: false })
-            }
-        }
+            None => before.map(|film| {
+                let (worth, origin) = match resized {
+                    Some(resized) => (resized.worth(main.samples()), Origin::Resized),
+                    None => (1.0, Origin::Before),
+                };
+                Backdrop { film, samples: seen, worth, origin }
+            }),
+        };
+        shown.filter(|backdrop| backdrop.worth > 0.0)
     }
 
     /// Brings a curve up to date: its last point is of now, those before are apart.
@@ -206,8 +242,11 @@ impl Job<'_> {
         // The first picture with a sample in every pixel is shown at once.
         let is_due = session.samples() > 0
             && self.readings[role].as_ref().is_some_and(|reading| reading.samples == 0);
-        let kept = self
-            .reading(role, in_place.as_ref(), rests && !is_due)
+        // Nobody looks at one whose first pixels are not everywhere.
+        let is_unseen = !is_in_place && !session.is_begun();
+        let unseen = self.readings[role].as_ref().filter(|_| is_unseen);
+        let kept = unseen
+            .or_else(|| self.reading(role, in_place.as_ref(), rests && !is_due))
             .filter(|_| !is_final && !is_due)
             .cloned();
         let (reading, cost) = match kept {
@@ -288,6 +327,30 @@ impl Job<'_> {
     pub(super) fn is_reading_due(&self, session: &Session<'_>) -> bool {
         session.samples() > 0
             && self.reading(MAIN, self.in_place(session).as_ref(), false).is_none()
+    }
+}
+
+/// A film from before in the size of the picture.
+pub(super) struct Resized {
+    film: Arc<Film>,
+    /// Of all its pixels.
+    samples: u64,
+    /// Of the pixel that has most.
+    most: u32,
+}
+
+impl Resized {
+    fn of(film: Film) -> Self {
+        let samples = film.total_samples();
+        let most = film.pixels().iter().map(Pixel::samples).max().unwrap_or(0);
+        Self { film: Arc::new(film), samples, most }
+    }
+
+    /// What one of its samples counts where the picture has so many of its own: all together no more than
+    /// [`MOST_OF_RESIZED`] a pixel, for it is a little blurred, and it fades out.
+    fn worth(&self, samples: u32) -> f32 {
+        let faded = (1.0 - samples as f32 / (4.0 * MOST_OF_RESIZED)).max(0.0);
+        (MOST_OF_RESIZED / self.most.max(1) as f32).min(1.0) * faded
     }
 }
 
