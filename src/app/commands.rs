@@ -24,6 +24,8 @@ pub enum Command {
     ChooseSave,
     /// Open the system's file dialogue.
     Browse(Purpose),
+    /// Show where the method was published.
+    ShowMethod,
     /// Write the picture.
     Save(PathBuf),
     /// Put the picture on the clipboard.

@@ -61,7 +61,10 @@ impl Comparison {
         let name = right.map_or("Now", |kept| &kept.name).to_owned();
         Some(Self {
             names: [left.name.clone(), name],
-            regions: [left.document.region, right.and_then(|kept| kept.document.region)],
+            regions: [
+                left.document.seen_region(),
+                right.and_then(|kept| kept.document.seen_region()),
+            ],
             left: Arc::clone(&left.pixels),
             right: right.map(|kept| Arc::clone(&kept.pixels)),
             is_difference: chosen.is_difference,

@@ -39,7 +39,8 @@ pub struct Document {
     pub look: Look,
     /// How large it is.
     pub size: PictureSize,
-    /// The part that is rendered: left, top, right, bottom as shares of the picture; `None` is all.
+    /// The part that is rendered: left, top, right, bottom as shares of the picture, which may have become narrower
+    /// than that; `None` is all.
     pub region: Option<[f32; 4]>,
     /// When it is done.
     pub stop: StopRule,
@@ -154,7 +155,7 @@ impl Document {
             && [self.intensity, self.sun].iter().all(radiance)
             && self.fog.is_none_or(|fog| fog.is_sound())
             && self.viewpoint.iter().chain(&self.bookmarks).all(Viewpoint::is_sound)
-            && self.region.iter().flatten().all(|share| (0.0..=1.0).contains(share))
+            && self.region.iter().flatten().all(|share| (-MOST_ASIDE..=MOST_ASIDE).contains(share))
             && self.materials.values().all(MaterialEdit::is_sound)
     }
 
@@ -184,6 +185,24 @@ impl Document {
             }
         }
         gone
+    }
+
+    /// Keeps the region on the same part of the scene where the room's aspect was so many times what it is now.
+    pub(super) fn follow_room(&mut self, factor: f32) {
+        if let (PictureSize::Viewport(_), Some([left, _, right, _])) = (self.size, &mut self.region)
+        {
+            for x in [&mut *left, &mut *right] {
+                *x = follow_room(*x, factor).clamp(-MOST_ASIDE, MOST_ASIDE);
+            }
+            // Nothing of it is to be seen.
+            let is_outside = *right <= 0.0 || *left >= 1.0;
+            self.region.take_if(|_| is_outside);
+        }
+    }
+
+    /// What of the region is in the picture.
+    pub(super) fn seen_region(&self) -> Option<[f32; 4]> {
+        self.region.map(|region| region.map(|share| share.clamp(0.0, 1.0)))
     }
 
     /// So few that the first picture does not wait for them: rendered paths teach the rest. Whatever ends the
@@ -233,6 +252,14 @@ pub(super) fn number_now(number: u32, before: &[Material], now: &[Material]) -> 
     };
     let place = alike(before).iter().position(|other| *other == number)?;
     alike(now).get(place).copied()
+}
+
+/// A region may be marked where a wide window shows more than the one that is there now, but not farther aside.
+const MOST_ASIDE: f32 = 100.0;
+
+/// Where a share of the width lies in a room whose aspect was so many times what it is now: pictures share their middle.
+pub(super) fn follow_room(x: f32, factor: f32) -> f32 {
+    0.5 + (x - 0.5) * factor
 }
 
 /// Corner and size in pixels of a part of a picture; at least one pixel.
@@ -378,6 +405,29 @@ mod tests {
             };
             assert!(view(None) == view(Some(4)) && view(None) == view(Some(1 << 20)));
         }
+    }
+
+    #[test]
+    fn a_region_stays_on_its_part_of_the_scene_in_a_room_of_another_shape() {
+        let mut document = Document { region: Some([0.25, 0.2, 0.5, 0.8]), ..Document::default() };
+        let camera = Camera::look_at(Vec3::ONE, Vec3::ZERO, 0.7);
+        document.viewpoint = Some(Viewpoint::of(&camera, 1.0));
+        let spans = |document: &Document, width| {
+            let view = document.view(width, 100).expect("a viewpoint");
+            let from_middle = view.crop.expect("a region").corner[0] as i64 - i64::from(width / 2);
+            (from_middle, view.width)
+        };
+        assert_eq!(spans(&document, 200), (-50, 50));
+        document.follow_room(0.5);
+        assert_eq!(spans(&document, 400), (-50, 50));
+        document.follow_room(2.0);
+        assert_eq!(document.region, Some([0.25, 0.2, 0.5, 0.8]));
+        document.follow_room(4.0);
+        assert_eq!(spans(&document, 50), (-25, 25));
+        assert_eq!(document.seen_region(), Some([0.0, 0.2, 0.5, 0.8]));
+        document.region = Some([0.0, 0.0, 0.1, 1.0]);
+        document.follow_room(4.0);
+        assert_eq!(document.region, None);
     }
 
     #[test]

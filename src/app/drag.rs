@@ -1,8 +1,8 @@
-//! Drags over the picture, followed event by event: what a drag does depends on where the pointer
+//! Drags of the picture, the wipe over it and the map, followed event by event: what a drag does depends on where the pointer
 //! went, not on how many frames were drawn meanwhile. egui's own drags begin in the frame after the
 //! press and lose what came before; where software draws, that can be all of it.
 
-use egui::{Event, Modifiers, PointerButton, Pos2, Vec2};
+use egui::{Event, Modifiers, PointerButton, Pos2, Ui, Vec2};
 
 /// A press that went no further than this is a click, in points; as egui has it.
 const CLICK_DISTANCE: f32 = 6.0;
@@ -43,10 +43,33 @@ pub(super) enum Step {
     },
 }
 
+impl Step {
+    /// Points it went to the right.
+    pub(super) fn right(&self) -> f32 {
+        match self {
+            Self::Move { by, .. } => by.x,
+            Self::End { .. } => 0.0,
+        }
+    }
+}
+
 impl Drag {
     /// From where to where it went so far; `None` while it may be a click.
     pub(super) fn span(&self) -> Option<[Pos2; 2]> {
         (!self.is_click).then_some([self.from, self.at])
+    }
+
+    /// Follows what happens to a part of what is drawn in `ui`: a drag begins where `accepts` says so, unless something
+    /// else lies over it there.
+    pub(super) fn follow_in(
+        drag: &mut Option<Self>,
+        ui: &Ui,
+        accepts: impl Fn(Pos2) -> bool,
+    ) -> Vec<Step> {
+        let (layer, context) = (ui.layer_id(), ui.ctx());
+        let (events, modifiers) = ui.input(|input| (input.events.clone(), input.modifiers));
+        let is_free = |at| context.layer_id_at(at).is_none_or(|there| there == layer);
+        Self::follow(drag, &events, modifiers, |at| accepts(at) && is_free(at))
     }
 
     /// Follows a frame's events; a drag begins where `accepts` says so.

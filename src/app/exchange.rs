@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::comparison::Comparison;
-use super::document::{Document, PictureSize, Viewpoint, number_now};
+use super::document::{Document, PictureSize, Viewpoint, follow_room, number_now};
 use super::interface::Chosen;
 use super::loader::{Kind, Loaded, LoadedMap, LoadedScene};
 use super::presenter::{Order, Shown};
@@ -56,6 +56,7 @@ impl App {
                     self.messages.opened(Kind::Map);
                     self.settings.recent_map(&map.name);
                     self.has_news |= self.settings.recent_maps != self.settings_before.recent_maps;
+                    self.keep_small_map(&map.name, Arc::clone(&map.preview));
                     self.map = Some(map);
                     self.inspector.forget();
                 }
@@ -94,12 +95,10 @@ impl App {
         while let Ok(later) = self.later.1.try_recv() {
             match later {
                 Later::Chosen(purpose, path) => {
-                    self.interface.prompt.take_if(|prompt| prompt.purpose == purpose);
-                    match purpose.completed(&path) {
-                        // Nobody was asked whether a file of that name may be replaced.
-                        Some(path) => self.interface.ask(purpose, path),
-                        None => self.execute(purpose.command(&path), context),
-                    }
+                    self.take_chosen(purpose, path.as_deref(), context);
+                }
+                Later::SmallMaps(maps) => {
+                    maps.into_iter().for_each(|map| self.small_maps.take(map, context));
                 }
                 Later::Done(sentence) => self.messages.notice(sentence),
                 Later::Failed(sentence) => self.messages.error(sentence),
@@ -275,6 +274,7 @@ impl App {
     /// Tells the loader, the worker and the presenter what is wanted now.
     pub(super) fn send_down(&mut self, context: &egui::Context) {
         self.fill_in_viewpoint();
+        self.follow_room();
         match self.scene.as_ref().filter(|scene| scene.name == self.document.scene) {
             None => self.loader.load_scene(&self.document.scene),
             Some(scene) if scene.edits != self.document.materials => {
@@ -308,6 +308,25 @@ impl App {
                 tile: self.interface.tile,
                 compared: compared.filter(|_| is_whole),
             });
+        }
+    }
+
+    /// Keeps the region and the inspected place on the same parts of the scene where the room for the picture has got
+    /// another shape: the field of view is vertical.
+    fn follow_room(&mut self) {
+        let Some(room) = self.interface.viewport_pixels else { return };
+        let before = self.room.replace(room).filter(|before| *before != room);
+        let Some(before) = before else { return };
+        let aspect = |[width, height]: [u32; 2]| width as f32 / height as f32;
+        let factor = aspect(before) / aspect(room);
+        let region = self.document.region;
+        self.document.follow_room(factor);
+        self.undo.change_all(|document| document.follow_room(factor));
+        let fills_room = matches!(self.document.size, PictureSize::Viewport(_));
+        if let Some(place) = self.interface.pinned.filter(|_| fills_room && region.is_none()) {
+            let x = follow_room(place.x, factor);
+            let is_inside = (0.0..=1.0).contains(&x);
+            self.interface.pinned = is_inside.then_some(Vec2::new(x, place.y));
         }
     }
 

@@ -4,10 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
 
 use super::commands::Command;
-use super::completion::in_home;
 use super::document::{Document, Viewpoint};
 use super::dropped::Dropped;
 use super::history;
@@ -38,19 +36,20 @@ impl App {
                 self.read_scene_again();
                 self.read_map_again();
             }
-            Command::ChooseScene => interface.ask(Purpose::Scene, String::new()),
-            Command::ChooseMap => interface.ask(Purpose::Map, String::new()),
+            Command::ChooseScene => self.ask(Purpose::Scene, String::new()),
+            Command::ChooseMap => self.ask(Purpose::Map, String::new()),
             Command::ChooseSave => {
                 let file = self.suggested_file();
-                self.interface.ask(Purpose::Picture, file);
+                self.ask(Purpose::Picture, file);
             }
             Command::ChooseExport => {
-                interface.ask(Purpose::Distributions, "distributions.csv".to_owned());
+                self.ask(Purpose::Distributions, "distributions.csv".to_owned());
             }
-            Command::ChooseReference => interface.ask(Purpose::Reference, String::new()),
+            Command::ChooseReference => self.ask(Purpose::Reference, String::new()),
             Command::OpenReference(path) => self.open_reference(path),
             Command::ForgetReference => self.reference = None,
-            Command::Browse(purpose) => self.browse(purpose),
+            Command::Browse(purpose) => self.browse(purpose, true),
+            Command::ShowMethod => self.show_method(),
             Command::Save(path) => self.save(path),
             Command::Export(path) => self.export(path),
             Command::Copy => self.copy(context),
@@ -395,77 +394,32 @@ impl App {
             );
             let name = path.clone();
             *lock(&slot) = Some(Arc::new(Reference { name, image }));
-            Ok(sentence)
+            Ok(Later::Done(sentence))
         });
     }
 
     /// Writes a file on a thread, for which the end of the window waits.
     fn write(&mut self, name: &str, work: impl FnOnce() -> Result<String> + Send + 'static) {
         self.writing.retain(|thread| !thread.is_finished());
-        let thread = self.do_later(name, work);
+        let thread = self.do_later(name, || work().map(Later::Done));
         self.writing.extend(thread);
     }
 
-    /// Runs something slow on a thread; what it says becomes a message.
-    fn do_later(
+    /// Runs something slow on a thread; what fails becomes a message.
+    pub(super) fn do_later(
         &mut self,
         name: &str,
-        work: impl FnOnce() -> Result<String> + Send + 'static,
+        work: impl FnOnce() -> Result<Later> + Send + 'static,
     ) -> Option<JoinHandle<()>> {
         let (sender, wake) = (self.later.0.clone(), self.wake.clone());
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
-            let later = match work() {
-                Ok(sentence) => Later::Done(sentence),
-                Err(error) => Later::Failed(error.to_string()),
-            };
+            let later = work().unwrap_or_else(|error| Later::Failed(error.to_string()));
             // The window may have gone meanwhile.
             let _ = sender.send(later);
             wake();
         });
         let failed = |error| self.messages.error(format!("no thread to {name}: {error}"));
         thread.map_err(failed).ok()
-    }
-
-    /// Opens the system's file dialogue for the prompt; its answer comes as a command.
-    fn browse(&mut self, purpose: Purpose) {
-        let (kind, extensions) = purpose.files();
-        let mut dialog = rfd::AsyncFileDialog::new().add_filter(kind, extensions);
-        // From where what was typed leads to.
-        let typed = self.interface.prompt.as_ref().map(|prompt| in_home(prompt.path.trim()));
-        let typed = typed.and_then(|path| std::path::absolute(path).ok());
-        if let Some(path) = typed {
-            let folder = if path.is_dir() { Some(&*path) } else { path.parent() };
-            if let Some(folder) = folder.filter(|folder| folder.is_dir()) {
-                dialog = dialog.set_directory(folder);
-            }
-            let file = path.file_name().filter(|_| purpose.is_output() && !path.is_dir());
-            if let Some(file) = file {
-                dialog = dialog.set_file_name(file.to_string_lossy());
-            }
-        }
-        let (sender, wake) = (self.later.0.clone(), self.wake.clone());
-        let chosen: std::pin::Pin<Box<dyn Future<Output = Option<rfd::FileHandle>> + Send>> =
-            match purpose.is_output() {
-                true => Box::pin(dialog.save_file()),
-                false => Box::pin(dialog.pick_file()),
-            };
-        let thread = std::thread::Builder::new().name("dialogue".to_owned()).spawn(move || {
-            let start = Instant::now();
-            let later = match pollster::block_on(chosen) {
-                Some(file) => Later::Chosen(purpose, file.path().display().to_string()),
-                // Nobody closes a dialogue so soon: none was opened.
-                None if start.elapsed() < QUICKEST_ANSWER => Later::Failed(
-                    "this system offers no file dialogue; a path can be typed instead".to_owned(),
-                ),
-                None => return,
-            };
-            // The window may have gone meanwhile.
-            let _ = sender.send(later);
-            wake();
-        });
-        if thread.is_err() {
-            self.messages.error("the file dialogue cannot be opened; a path can be typed instead");
-        }
     }
 
     /// Copies the picture as it is on the screen, overlay included.
@@ -478,29 +432,6 @@ impl App {
                 self.messages.notice(format!("Copied the picture, {width} x {height} pixels"));
             }
             Err(error) => self.messages.notice(format!("The picture cannot be copied: {error}")),
-        }
-    }
-}
-
-/// A person takes longer to close a file dialogue.
-const QUICKEST_ANSWER: Duration = Duration::from_millis(500);
-
-impl Purpose {
-    /// A path that was chosen with what its file's name ends in, where that is missing: not every dialogue adds it.
-    pub(super) fn completed(self, path: &str) -> Option<String> {
-        let (_, extensions) = self.files();
-        let is_missing = self.is_output() && Path::new(path).extension().is_none();
-        is_missing.then(|| format!("{path}.{}", extensions[0]))
-    }
-
-    /// What to do with the path.
-    pub fn command(self, path: &str) -> Command {
-        match self {
-            Self::Scene => Command::OpenScene(path.to_owned()),
-            Self::Map => Command::OpenMap(path.to_owned()),
-            Self::Picture => Command::Save(path.into()),
-            Self::Distributions => Command::Export(path.into()),
-            Self::Reference => Command::OpenReference(path.to_owned()),
         }
     }
 }

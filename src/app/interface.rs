@@ -53,6 +53,10 @@ pub struct Interface {
     pub is_marking: bool,
     /// The drag over the picture under way.
     pub drag: Option<Drag>,
+    /// That of the wipe.
+    pub wipe_drag: Option<Drag>,
+    /// That of the map.
+    pub map_drag: Option<Drag>,
     /// Whether rendering is halted.
     pub paused: bool,
     /// Counts restarts by hand.
@@ -197,6 +201,17 @@ impl Purpose {
         }
     }
 
+    /// What the question is called.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Scene => "Open a scene",
+            Self::Map => "Open a map",
+            Self::Picture => "Save the picture",
+            Self::Distributions => "Export the distributions",
+            Self::Reference => "Open a reference",
+        }
+    }
+
     /// Whether they are written.
     pub fn is_output(self) -> bool {
         matches!(self, Self::Picture | Self::Distributions)
@@ -227,6 +242,8 @@ impl Default for Interface {
             is_frozen: false,
             is_marking: false,
             drag: None,
+            wipe_drag: None,
+            map_drag: None,
             paused: false,
             run: 0,
             viewport_pixels: None,

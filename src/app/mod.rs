@@ -16,6 +16,7 @@ pub(crate) mod commands;
 mod comparison;
 mod completion;
 pub(crate) mod convergence;
+mod desktop;
 pub mod document;
 pub mod drag;
 mod dropped;
@@ -35,6 +36,7 @@ mod save;
 pub(crate) mod screen;
 pub mod screenshot;
 pub mod settings_file;
+mod small_maps;
 mod speed_up;
 pub(crate) mod surface_map;
 #[cfg(test)]
@@ -52,6 +54,7 @@ use crate::render::gpu::RayChoice;
 
 use commands::Command;
 use convergence::Convergence;
+use desktop::Desktop;
 use document::Document;
 use exchange::Lit;
 use history::History;
@@ -63,6 +66,7 @@ use messages::Messages;
 use presenter::{Presenter, Shown};
 use screen::Screen;
 use settings_file::Settings;
+use small_maps::{SmallMap, SmallMaps};
 use speed_up::SpeedUp;
 use undo::Undo;
 use worker::{Activity, Reference, Snapshot, Worker};
@@ -96,6 +100,8 @@ pub struct Start {
     pub rays: RayChoice,
     /// Where kept pictures are for the next window, if they are to be.
     pub pictures: Option<std::path::PathBuf>,
+    /// Where small pictures of maps are kept.
+    pub small_maps: Option<std::path::PathBuf>,
     /// For screenshots: no previews on the way, and no figures that depend on the clock.
     pub is_repeatable: bool,
 }
@@ -139,11 +145,15 @@ pub struct App {
     wake: Wake,
     /// Where the picture is to be written once it has its full size.
     waiting_saves: Vec<std::path::PathBuf>,
+    desktop: Desktop,
+    small_maps: SmallMaps,
     /// Threads that write files.
     writing: Vec<std::thread::JoinHandle<()>>,
     is_repeatable: bool,
     toggles_full_screen: bool,
     is_closing: bool,
+    /// Pixels of the room that the picture has had last.
+    room: Option<[u32; 2]>,
     /// The size of the picture for which there is memory, and the region.
     affordable: (document::PictureSize, Option<[f32; 4]>),
 }
@@ -155,14 +165,16 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// What comes back from a thread.
 enum Later {
-    /// Somebody chose a file.
-    Chosen(Purpose, String),
+    /// Somebody chose a file, or none.
+    Chosen(Purpose, Option<String>),
     /// A file was written.
     Done(String),
     /// Something failed.
     Failed(String),
     /// Pictures that earlier windows kept.
     Kept(Vec<KeptPicture>),
+    /// Maps in small.
+    SmallMaps(Vec<SmallMap>),
 }
 
 impl App {
@@ -193,7 +205,7 @@ impl App {
             }
             None => history,
         };
-        Ok(Self {
+        let mut app = Self {
             undo: Undo::new(start.document.clone()),
             start: start.document.clone(),
             document: start.document,
@@ -222,17 +234,23 @@ impl App {
             later,
             wake,
             waiting_saves: Vec::new(),
+            desktop: Desktop::default(),
+            small_maps: SmallMaps::default(),
             writing: Vec::new(),
             is_repeatable: start.is_repeatable,
             toggles_full_screen: false,
             is_closing: false,
+            room: None,
             affordable: (document::PictureSize::Viewport(1), None),
-        })
+        };
+        app.begin_small_maps(start.small_maps);
+        Ok(app)
     }
 
     /// One frame: collects, draws, carries out, sends down.
     pub fn show(&mut self, ui: &mut egui::Ui) {
         let context = ui.ctx().clone();
+        self.desktop.notice_focus(context.input(|input| input.focused));
         self.collect(&context);
         let mut commands = commands::pressed(&context, self.interface.is_modal());
         commands.extend(self.dropped_files(&context));
@@ -384,7 +402,8 @@ impl App {
             self.dock(ui, commands);
         }
         let area = self.viewport(ui, commands);
-        panels::prompt::show(ui.ctx(), &mut self.interface, &self.settings, commands);
+        let (settings, small_maps) = (&mut self.settings, &self.small_maps);
+        panels::prompt::show(ui.ctx(), &mut self.interface, settings, small_maps, commands);
         panels::shortcuts::show(ui.ctx(), &mut self.interface);
         panels::messages::show(ui.ctx(), area, &mut self.messages);
     }
@@ -413,8 +432,12 @@ impl App {
     fn sides(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
         // While another one is read, nothing is to be chosen in the one that is shown.
         let scene = self.scene.as_ref().filter(|scene| scene.name == self.document.scene);
-        let sources =
-            panels::left::Sources { scene, map: self.map.as_ref(), settings: &self.settings };
+        let sources = panels::left::Sources {
+            scene,
+            map: self.map.as_ref(),
+            settings: &self.settings,
+            small_maps: &self.small_maps,
+        };
         if !theme::is_small(ui) {
             let (document, interface) = (&mut self.document, &mut self.interface);
             panels::left::show(ui, document, interface, sources, commands);
@@ -431,7 +454,7 @@ impl App {
                 panels::history::show(ui, &mut self.history, &mut interface.compared, commands);
             }
             interface::Tab::Inspect => {
-                panels::method::show(ui, &mut self.document.light);
+                panels::method::show(ui, &mut self.document.light, commands);
                 panels::overlay::show(ui, interface, shown);
                 panels::inspector::show(
                     ui,

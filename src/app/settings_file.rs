@@ -41,6 +41,8 @@ pub struct Settings {
     pub viewpoints: Vec<SceneViewpoints>,
     /// Where pictures were written last.
     pub save_folder: Option<PathBuf>,
+    /// Whether whoever asks for a file gets the system's dialogue at once, where there is one.
+    pub browses_at_once: bool,
     /// Size of the window in points.
     pub window_size: [f32; 2],
     /// How the picture is developed.
@@ -65,6 +67,7 @@ impl Default for Settings {
             recent_maps: Vec::new(),
             viewpoints: Vec::new(),
             save_folder: None,
+            browses_at_once: true,
             window_size: [1440.0, 900.0],
             look: document.look,
             light: document.light,
@@ -88,6 +91,13 @@ impl Settings {
         let usual = || Some(user_folder("XDG_DATA_HOME", ".local/share")?.join("pictures"));
         let beside = |file: &Path| with_suffix(file, ".pictures");
         file.map(beside).or_else(usual)
+    }
+
+    /// Where small pictures of maps are: beside a settings file that was named, else under the user's folder for
+    /// what can be made again; `None` if there is none.
+    pub fn small_maps_folder(file: Option<&Path>) -> Option<PathBuf> {
+        let usual = || Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("maps"));
+        file.map(|file| with_suffix(file, ".maps")).or_else(usual)
     }
 
     /// Reads them; a file that is not there gives the defaults.
@@ -235,6 +245,9 @@ impl Settings {
         }
         if after.save_folder != before.save_folder {
             self.save_folder.clone_from(&after.save_folder);
+        }
+        if after.browses_at_once != before.browses_at_once {
+            self.browses_at_once = after.browses_at_once;
         }
         for of in after.viewpoints.iter().rev().chain(&before.viewpoints) {
             let (then, now) = (before.viewpoints_of(&of.scene), after.viewpoints_of(&of.scene));

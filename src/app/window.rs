@@ -156,6 +156,8 @@ struct Running {
     touched_at: Option<Instant>,
     app: App,
     title: String,
+    /// Points of the window when it had a size of its own last: neither minimised nor as large as the screen.
+    usual_size: Option<[f32; 2]>,
 }
 
 /// Draws on the window by the best device that can, which is opened with all that rendering needs.
@@ -249,6 +251,7 @@ impl Runner {
             Some(screen.gpu().limits.max_texture_dimension_2d as usize),
         );
         let mut app = App::new(start, loader, screen, &context, wakes)?;
+        app.lie_in(Arc::clone(&window));
         self.notices.drain(..).for_each(|sentence| app.say(sentence));
         Ok(Running {
             window,
@@ -265,6 +268,7 @@ impl Runner {
             rest: Duration::ZERO,
             app,
             title: String::new(),
+            usual_size: None,
         })
     }
 
@@ -300,14 +304,18 @@ impl Running {
     fn keep_settings(&mut self, path: Option<&Path>, is_end: bool) -> Result<()> {
         let Some(path) = path else { return Ok(()) };
         let mut settings = self.app.settings(Settings::read(path).ok(), is_end);
-        let size = self.window.inner_size();
+        settings.window_size = self.usual_size.unwrap_or(settings.window_size);
+        settings.write(path)
+    }
+
+    /// Notes the size for the next window.
+    fn note_size(&mut self, size: PhysicalSize<u32>) {
         let is_usual =
             self.window.is_minimized() != Some(true) && self.window.fullscreen().is_none();
         if size.width > 0 && size.height > 0 && is_usual {
             let size = size.to_logical(self.window.scale_factor());
-            settings.window_size = [size.width, size.height];
+            self.usual_size = Some([size.width, size.height]);
         }
-        settings.write(path)
     }
 
     /// One frame, on another device if that of the last one was lost.
@@ -481,6 +489,7 @@ impl ApplicationHandler<Call> for Runner {
                 return;
             }
             WindowEvent::Resized(size) => {
+                running.note_size(*size);
                 let size = NonZeroU32::new(size.width).zip(NonZeroU32::new(size.height));
                 if let Some((width, height)) = size
                     && let Some(painter) = &mut running.painter

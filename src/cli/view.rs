@@ -87,6 +87,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
         adapter: arguments.adapter.clone(),
         rays: arguments.rays,
         pictures: Settings::pictures_folder(arguments.settings.as_deref()),
+        small_maps: Settings::small_maps_folder(arguments.settings.as_deref()),
         is_repeatable: false,
     };
     match window::run(start, notice.clone().into_iter().collect(), path) {

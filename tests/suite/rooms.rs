@@ -23,7 +23,7 @@ const FLOORS: [&[&str]; 14] = [
 ];
 
 /// Crates and where alone they are named: rooms, or parts of one. Any other is named anywhere.
-const CRATES: [(&str, &[&str]); 28] = [
+const CRATES: [(&str, &[&str]); 29] = [
     ("basisu", &["image/ktx2"]),
     ("bevy_mikktspace", &["scene/gltf/tangents"]),
     ("bitflags", &["features"]),
@@ -43,15 +43,16 @@ const CRATES: [(&str, &[&str]); 28] = [
     ("meshopt", &["scene/gltf/meshopt"]),
     ("nv_flip", &["metrics/flip"]),
     ("obvhs", &["bvh"]),
+    ("open", &["app/desktop"]),
     ("png", &["image"]),
     ("pollster", &["app", "render/gpu"]),
     ("pulp", &["denoise"]),
-    ("rfd", &["app/execute"]),
+    ("rfd", &["app/desktop"]),
     ("ruzstd", &["image/ktx2"]),
     ("signal_hook", &["app/window", "cli/interrupt"]),
     ("statrs", &["metrics"]),
     ("wgpu", &["app", "develop", "render/gpu"]),
-    ("winit", &["app/window"]),
+    ("winit", &["app/desktop", "app/window"]),
 ];
 
 /// A file of the product: its place below `src` without the ending, and its code without tests.

@@ -26,16 +26,10 @@ pub(super) fn show(
     handle: Rect,
     scope: &mut Scope<'_>,
 ) {
-    let layer = ui.layer_id();
     let is_free = !scope.interface.is_modal();
-    let accepts = |at: Pos2| {
-        is_free
-            && response.rect.contains(at)
-            && !handle.contains(at)
-            && ui.ctx().layer_id_at(at).is_none_or(|there| there == layer)
-    };
-    let (events, modifiers) = ui.input(|i| (i.events.clone(), i.modifiers));
-    let steps = Drag::follow(&mut scope.interface.drag, &events, modifiers, accepts);
+    let accepts = |at: Pos2| is_free && response.rect.contains(at) && !handle.contains(at);
+    let steps = Drag::follow_in(&mut scope.interface.drag, ui, accepts);
+    let modifiers = ui.input(|input| input.modifiers);
     if scope.interface.is_marking {
         mark_region(ui, whole, &steps, scope);
         return;

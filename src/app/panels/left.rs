@@ -1,16 +1,20 @@
 //! The left panel: scene, cameras, environment, fog, material. Where there is no room for it, the right one
 //! shows the same.
 
-use egui::{Margin, Panel, RichText, ScrollArea, SliderClamping, Ui};
+use egui::{
+    Button, Margin, Panel, Response, RichText, ScrollArea, SliderClamping, TextureHandle, Ui,
+};
 
 use glam::Vec3;
 
 use super::{map_view, material};
 use crate::app::commands::Command;
 use crate::app::document::{Document, Viewpoint};
+use crate::app::drag::{Drag, Step};
 use crate::app::interface::Interface;
 use crate::app::loader::{LoadedMap, LoadedScene};
 use crate::app::settings_file::Settings;
+use crate::app::small_maps::SmallMaps;
 use crate::app::theme;
 use crate::environment::sky;
 use crate::path::Background;
@@ -25,6 +29,8 @@ pub(in crate::app) struct Sources<'a> {
     pub(in crate::app) map: Option<&'a LoadedMap>,
     /// Recent files.
     pub(in crate::app) settings: &'a Settings,
+    /// What maps look like.
+    pub(in crate::app) small_maps: &'a SmallMaps,
 }
 
 /// Draws the panel.
@@ -83,7 +89,8 @@ fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut 
                 chosen = Some((*name).to_owned());
             }
         }
-        recent(ui, &sources.settings.recent_scenes, &document.scene, &mut chosen);
+        let of_name = |_: &str| None;
+        recent(ui, &sources.settings.recent_scenes, &document.scene, of_name, &mut chosen);
     });
     commands.extend(chosen.map(Command::OpenScene));
     if let Some(scene) = sources.scene {
@@ -99,19 +106,33 @@ fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut 
     }
 }
 
-fn recent(ui: &mut Ui, list: &[String], current: &str, chosen: &mut Option<String>) {
+fn recent<'a>(
+    ui: &mut Ui,
+    list: &[String],
+    current: &str,
+    small: impl Fn(&str) -> Option<&'a TextureHandle>,
+    chosen: &mut Option<String>,
+) {
     if list.is_empty() {
         return;
     }
     ui.separator();
     ui.label(theme::quiet("Recent"));
     for name in list {
-        let label =
-            ui.selectable_label(current == name, theme::file_name(name)).on_hover_text(name);
-        if label.clicked() {
+        let label = named(ui, current == name, small(name), &theme::file_name(name));
+        if label.on_hover_text(name).clicked() {
             *chosen = Some(name.clone());
         }
     }
+}
+
+/// A row of a list, with what it looks like if that is known.
+fn named(ui: &mut Ui, is_current: bool, small: Option<&TextureHandle>, name: &str) -> Response {
+    let row = match small {
+        Some(texture) => Button::selectable(is_current, (map_view::small(texture), name)),
+        None => Button::selectable(is_current, name),
+    };
+    ui.add(row)
 }
 
 fn cameras(
@@ -182,8 +203,12 @@ fn environment(
     if let Some(map) = sources.map {
         let turn = document.rotation_degrees / 360.0;
         let response = map_view::preview(ui, map, turn);
-        if response.dragged() {
-            let degrees = response.drag_delta().x / response.rect.width() * 360.0;
+        let (is_free, seen) = (!interface.is_modal(), response.rect.intersect(ui.clip_rect()));
+        let drag = &mut interface.map_drag;
+        let steps = Drag::follow_in(drag, ui, |at| is_free && seen.contains(at));
+        if drag.is_some_and(|drag| drag.span().is_some()) || !steps.is_empty() {
+            let way: f32 = steps.iter().map(Step::right).sum();
+            let degrees = way / response.rect.width() * 360.0;
             document.rotation_degrees = (document.rotation_degrees + degrees).rem_euclid(360.0);
             interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
         }
@@ -197,11 +222,13 @@ fn environment(
         ui.label(theme::quiet("Built in"));
         for name in sky::names() {
             let name = format!("sky:{name}");
-            if ui.selectable_label(document.map == name, &name).clicked() {
+            let small = sources.small_maps.of(&name);
+            if named(ui, document.map == name, small, &name).clicked() {
                 chosen = Some(name);
             }
         }
-        recent(ui, &sources.settings.recent_maps, &document.map, &mut chosen);
+        let small = |name: &str| sources.small_maps.of(name);
+        recent(ui, &sources.settings.recent_maps, &document.map, small, &mut chosen);
     });
     commands.extend(chosen.map(Command::OpenMap));
     if let Some(map) = sources.map {

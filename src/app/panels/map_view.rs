@@ -9,6 +9,9 @@ use crate::app::screen::color_image;
 use crate::image::Image;
 use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
 
+/// Points of a small picture.
+const SMALL: Vec2 = Vec2::new(48.0, 24.0);
+
 /// Draws the map across the panel, turned by `turn` of a circle; it can be dragged.
 pub(super) fn preview(ui: &mut Ui, map: &LoadedMap, turn: f32) -> Response {
     let (rect, response) = place(ui, Sense::drag());
@@ -31,6 +34,11 @@ pub(super) fn ground(ui: &mut Ui, map: &LoadedMap) -> (Rect, Response) {
     let uv = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
     ui.painter_at(rect).image(texture.id(), rect, uv, Color32::from_gray(110));
     (rect, response)
+}
+
+/// A small picture of a map, for lists.
+pub(super) fn small(texture: &TextureHandle) -> egui::Image<'static> {
+    egui::Image::new((texture.id(), SMALL)).fit_to_exact_size(SMALL).corner_radius(2.0)
 }
 
 /// The part of `rect` that a tile covers.

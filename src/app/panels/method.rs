@@ -1,8 +1,10 @@
 //! How light is found, and two ways compared: for whoever wants to know, not for making pictures.
 
-use egui::{ComboBox, Ui};
+use egui::{ComboBox, RichText, Ui};
 
+use crate::app::commands::Command;
 use crate::app::convergence::name_of;
+use crate::app::desktop::METHOD;
 use crate::app::document::Light;
 use crate::app::theme;
 use crate::render::Sampling;
@@ -18,8 +20,12 @@ const WAYS: [(Sampling, &str); 4] = [
     (Sampling::Bsdf, "Directions of the surfaces alone, without regard to the map"),
 ];
 
+/// What was published of it.
+const TITLE: &str =
+    "Atanasov et al., Adaptive Environment Sampling on CPU and GPU, ACM SIGGRAPH 2018 Talks";
+
 /// Draws the choice.
-pub(in crate::app) fn show(ui: &mut Ui, light: &mut Light) {
+pub(in crate::app) fn show(ui: &mut Ui, light: &mut Light, commands: &mut Vec<Command>) {
     theme::row(ui, "Sampling", "How light from the map is found; the picture is the same", |ui| {
         ComboBox::from_id_salt("sampling").selected_text(capital(light.sampling)).show_ui(
             ui,
@@ -33,6 +39,10 @@ pub(in crate::app) fn show(ui: &mut Ui, light: &mut Light) {
     });
     ui.checkbox(&mut light.split, "Split view")
         .on_hover_text("Plain on the left, the chosen sampling on the right, at equal time (V)");
+    let link = ui.link(RichText::new("About the method").size(12.0));
+    if link.on_hover_text(format!("{TITLE}\n{METHOD}")).clicked() {
+        commands.push(Command::ShowMethod);
+    }
 }
 
 fn capital(sampling: Sampling) -> String {

@@ -3,12 +3,14 @@
 use std::path::{MAIN_SEPARATOR, Path, is_separator};
 
 use egui::text::{CCursor, CCursorRange};
-use egui::{Context, Id, Key, Modal, Modifiers, Response, RichText, TextEdit, Ui};
+use egui::{Align, Context, Id, Key, Layout, Modal, Modifiers, Response, RichText, TextEdit, Ui};
 
+use super::map_view;
 use crate::app::commands::Command;
 use crate::app::completion::{Completion, complete, in_home};
 use crate::app::interface::{Cursor, Interface, Objection, Prompt, Purpose};
 use crate::app::settings_file::Settings;
+use crate::app::small_maps::SmallMaps;
 use crate::app::theme;
 use crate::image::extension;
 use crate::sources;
@@ -72,37 +74,24 @@ impl Prompt {
 pub(in crate::app) fn show(
     context: &Context,
     interface: &mut Interface,
-    settings: &Settings,
+    settings: &mut Settings,
+    small_maps: &SmallMaps,
     commands: &mut Vec<Command>,
 ) {
     let Some(prompt) = &mut interface.prompt else { return };
-    let (title, hint, accept, recent): (_, _, _, &[String]) = match prompt.purpose {
-        Purpose::Scene => {
-            ("Open a scene", "Path of a .gltf or .glb file", "Open", &settings.recent_scenes)
+    let (hint, accept, recent): (_, _, &[String]) = match prompt.purpose {
+        Purpose::Scene => ("Path of a .gltf or .glb file", "Open", &settings.recent_scenes),
+        Purpose::Map => ("Path of an .exr, .hdr or 8-bit picture", "Open", &settings.recent_maps),
+        Purpose::Picture => ("Path of a .png (as shown) or .exr (linear, all layers)", "Save", &[]),
+        Purpose::Reference => {
+            ("Path of a linear .exr or .hdr picture of the same view without noise", "Open", &[])
         }
-        Purpose::Map => {
-            ("Open a map", "Path of an .exr, .hdr or 8-bit picture", "Open", &settings.recent_maps)
-        }
-        Purpose::Picture => (
-            "Save the picture",
-            "Path of a .png (as shown) or .exr (linear, all layers)",
-            "Save",
-            &[],
-        ),
-        Purpose::Reference => (
-            "Open a reference",
-            "Path of a linear .exr or .hdr picture of the same view without noise",
-            "Open",
-            &[],
-        ),
-        Purpose::Distributions => {
-            ("Export the distributions", "Path of a .csv, .json or .exr file", "Export", &[])
-        }
+        Purpose::Distributions => ("Path of a .csv, .json or .exr file", "Export", &[]),
     };
     let (mut is_done, mut is_closed) = (false, false);
     let response = Modal::new(Id::unique("prompt")).show(context, |ui| {
         ui.set_width(520.0);
-        ui.label(RichText::new(title).heading());
+        ui.label(RichText::new(prompt.purpose.title()).heading());
         ui.add_space(4.0);
         if ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab)) {
             prompt.complete();
@@ -150,10 +139,16 @@ pub(in crate::app) fn show(
         }
         let recent = if prompt.offers.is_empty() { recent } else { &[] };
         for name in recent {
-            if path_link(ui, name).clicked() {
-                prompt.path.clone_from(name);
-                is_done = true;
-            }
+            ui.horizontal(|ui| {
+                let is_map = prompt.purpose == Purpose::Map;
+                if let Some(small) = small_maps.of(name).filter(|_| is_map) {
+                    ui.add(map_view::small(small));
+                }
+                if path_link(ui, name).clicked() {
+                    prompt.path.clone_from(name);
+                    is_done = true;
+                }
+            });
         }
         ui.add_space(6.0);
         ui.horizontal(|ui| {
@@ -164,6 +159,11 @@ pub(in crate::app) fn show(
                 commands.push(Command::Browse(prompt.purpose));
             }
             is_closed |= ui.button("Cancel").clicked();
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                let is_at_once = &mut settings.browses_at_once;
+                ui.checkbox(is_at_once, theme::quiet("Browse at once"))
+                    .on_hover_text("Open the system's file dialogue together with this question");
+            });
         });
     });
     let typed = prompt.path.trim();

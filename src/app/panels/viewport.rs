@@ -10,12 +10,14 @@ use egui::{
 use super::gestures;
 use super::scope::Scope;
 use crate::app::comparison::AMPLIFIED;
+use crate::app::drag::{Drag, Step};
 use crate::app::dropped::Dropped;
 use crate::app::interface::{Interface, Tab};
 use crate::app::presenter::Shown;
 use crate::app::screen::{Developed, Recipe};
 use crate::app::theme;
 use crate::app::worker::{Activity, SessionSnapshot, Snapshot};
+use crate::app::zoom::Zoom;
 use crate::develop::{DevelopSettings, LinearPicture};
 use crate::render::View;
 
@@ -31,9 +33,53 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
             waiting(ui, area, scope.loading);
             return;
         };
-        let view = scope.snapshot.map_or(&shown.order.snapshot.request.view, |s| &s.request.view);
+        let places = Places::of((area, scale), shown, scope);
+        let (whole, rect) = (places.whole, places.rect);
         let compared = shown.order.compared.as_ref();
-        let (whole, rect) = match compared {
+        let ground = if compared.is_some() { rect } else { whole };
+        let is_part = shown.order.snapshot.request.view.crop.is_some();
+        surround(ui, area, if is_part { Rect::NOTHING } else { ground.intersect(rect) });
+        picture(ui, (ground, rect), shown, settings, scope);
+        labels(ui, rect, shown);
+        let seen = rect.intersect(area);
+        let mut handle = Rect::NOTHING;
+        if let Some(other) = &shown.other {
+            handle = beside(ui, &places, (shown, other), settings, scope);
+        } else {
+            scope.textures.other = None;
+            compared.filter(|compared| compared.is_difference).into_iter().for_each(|compared| {
+                difference_label(ui, seen, &compared.names, shown.difference);
+            });
+        }
+        gestures::show(ui, (whole, rect), &response, handle, scope);
+        gestures::zoom(ui, (area, whole), &response, scope);
+        pin(ui, rect, scope.interface);
+    });
+    let area = panel.response.rect;
+    what_would_open(ui, area);
+    area
+}
+
+/// Where things lie.
+struct Places {
+    /// The room, with its pixels for a point.
+    room: (Rect, f32),
+    /// The whole of which a part may be shown.
+    whole: Rect,
+    /// What is shown.
+    rect: Rect,
+    /// Where the whole would fit.
+    fitting: Rect,
+    zoom: Zoom,
+    /// Moves the magnified picture's corner onto one of the screen's pixels.
+    shift: Vec2,
+}
+
+impl Places {
+    /// Of what is shown in a room; the interface is told how large that would fit.
+    fn of((area, scale): (Rect, f32), shown: &Shown, scope: &mut Scope<'_>) -> Self {
+        let view = scope.snapshot.map_or(&shown.order.snapshot.request.view, |s| &s.request.view);
+        let (fitting, rect) = match &shown.order.compared {
             // A kept picture may be of another shape, or of a part.
             Some(compared) => kept_rects((area, scale), shown.picture.size(), compared.regions[1]),
             None => {
@@ -46,62 +92,61 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
                 (whole, rect)
             }
         };
+        scope.interface.fitting_pixels = Some(fitting.width() * scale);
         let zoom = scope.interface.zoom;
-        scope.interface.fitting_pixels = Some(whole.width() * scale);
-        // Its corner stays one of the screen's pixels.
-        let corner = zoom.of(area, whole, whole).min.to_vec2() * scale;
+        let corner = zoom.of(area, fitting, fitting).min.to_vec2() * scale;
         let shift = if zoom.is_some() { (corner.round() - corner) / scale } else { Vec2::ZERO };
-        let fitting = whole;
-        let zoomed = |rect| zoom.of(area, fitting, rect).translate(shift);
-        let (whole, rect) = (zoomed(whole), zoomed(rect));
-        let seen = rect.intersect(area);
-        let ground = if compared.is_some() { rect } else { whole };
-        let is_part = shown.order.snapshot.request.view.crop.is_some();
-        surround(ui, area, if is_part { Rect::NOTHING } else { ground.intersect(rect) });
-        picture(ui, (ground, rect), shown, settings, scope);
-        labels(ui, rect, shown);
-        let mut handle = Rect::NOTHING;
-        if let Some(other) = &shown.other {
-            let recipe = Recipe::new(other, None, settings, shown.order.snapshot.number);
-            let changes = changes(ui, other, scope);
-            let source =
-                Developed::update(&mut scope.textures.other, scope.screen, recipe, changes);
-            let of_left = compared.map_or(rect, |compared| {
-                let (of_whole, part) = kept_rects((area, scale), other.size(), compared.regions[0]);
-                if !is_alike(of_whole, fitting) {
-                    // Beside another shape nothing is to be seen of what lies under it.
-                    let hidden = left_of(seen, seen, scope.interface.wipe);
-                    ui.painter().rect_filled(hidden, 0.0, theme::BACKGROUND);
-                }
-                zoomed(part)
-            });
-            let has_squares = has_squares(other, shown, scope);
-            let shape = source.shape(of_left, has_squares);
-            handle = wipe(ui, (seen, of_left), shape, scope.interface);
-            match &shown.order.compared {
-                Some(compared) => wipe_labels(ui, seen, &compared.names, None),
-                None => split_labels(ui, seen, scope),
-            }
-        } else if let Some(compared) =
-            shown.order.compared.as_ref().filter(|compared| compared.is_difference)
-        {
-            let [left, right] = &compared.names;
-            let percent = shown.difference.map(|apart| format!(", {:.1} % (RMS)", 100.0 * apart));
-            let percent = percent.unwrap_or_default();
-            let text = format!("{left} and {right}: difference × {AMPLIFIED:.0}{percent}");
-            let at = Pos2::new(seen.center().x, seen.top() + 14.0);
-            theme::badge(ui, at, Align2::CENTER_TOP, &text, theme::TEXT);
+        let room = (area, scale);
+        let mut places = Self { room, whole: fitting, rect, fitting, zoom, shift };
+        (places.whole, places.rect) = (places.zoomed(fitting), places.zoomed(rect));
+        places
+    }
+
+    /// Where something lies that would lie here if all fitted.
+    fn zoomed(&self, rect: Rect) -> Rect {
+        self.zoom.of(self.room.0, self.fitting, rect).translate(self.shift)
+    }
+}
+
+/// Draws the other picture at the left of the line that wipes it, and what both are called; where the line can be
+/// taken hold of.
+fn beside(
+    ui: &Ui,
+    places: &Places,
+    (shown, other): (&Shown, &LinearPicture),
+    settings: DevelopSettings,
+    scope: &mut Scope<'_>,
+) -> Rect {
+    let recipe = Recipe::new(other, None, settings, shown.order.snapshot.number);
+    let changes = changes(ui, other, scope);
+    let source = Developed::update(&mut scope.textures.other, scope.screen, recipe, changes);
+    let seen = places.rect.intersect(places.room.0);
+    let compared = shown.order.compared.as_ref();
+    let of_left = compared.map_or(places.rect, |compared| {
+        let (of_whole, part) = kept_rects(places.room, other.size(), compared.regions[0]);
+        if !is_alike(of_whole, places.fitting) {
+            // Beside another shape nothing is to be seen of what lies under it.
+            let hidden = left_of(seen, seen, scope.interface.wipe);
+            ui.painter().rect_filled(hidden, 0.0, theme::BACKGROUND);
         }
-        if shown.other.is_none() {
-            scope.textures.other = None;
-        }
-        gestures::show(ui, (whole, rect), &response, handle, scope);
-        gestures::zoom(ui, (area, whole), &response, scope);
-        pin(ui, rect, scope.interface);
+        places.zoomed(part)
     });
-    let area = panel.response.rect;
-    what_would_open(ui, area);
-    area
+    let has_squares = has_squares(other, shown, scope);
+    let shape = source.shape(of_left, has_squares);
+    let handle = wipe(ui, (seen, of_left), shape, scope.interface);
+    match compared {
+        Some(compared) => wipe_labels(ui, seen, &compared.names, None),
+        None => split_labels(ui, seen, scope),
+    }
+    handle
+}
+
+/// Says what difference is shown, and how large it is.
+fn difference_label(ui: &Ui, seen: Rect, [left, right]: &[String; 2], apart: Option<f64>) {
+    let percent = apart.map(|apart| format!(", {:.1} % (RMS)", 100.0 * apart)).unwrap_or_default();
+    let text = format!("{left} and {right}: difference × {AMPLIFIED:.0}{percent}");
+    let at = Pos2::new(seen.center().x, seen.top() + 14.0);
+    theme::badge(ui, at, Align2::CENTER_TOP, &text, theme::TEXT);
 }
 
 /// Fills what the picture leaves of its room, and no more: software is slow to fill.
@@ -303,10 +348,18 @@ fn wipe(ui: &Ui, (rect, of_left): (Rect, Rect), picture: Shape, interface: &mut 
     let handle =
         Rect::from_center_size(Pos2::new(x, rect.center().y), Vec2::new(14.0, rect.height()));
     let response = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());
-    if let Some(at) = response.interact_pointer_pos().filter(|_| response.dragged()) {
+    let is_free = !interface.is_modal();
+    let drag = &mut interface.wipe_drag;
+    let steps = Drag::follow_in(drag, ui, |at| is_free && handle.contains(at));
+    let ended = steps.iter().find_map(|step| match step {
+        Step::End { to, .. } => Some(*to),
+        Step::Move { .. } => None,
+    });
+    let held = drag.and_then(|drag| drag.span()).map(|[_, at]| at);
+    if let Some(at) = held.or(ended) {
         interface.wipe = ((at.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
     }
-    let is_active = response.hovered() || response.dragged();
+    let is_active = response.hovered() || held.is_some();
     if is_active {
         ui.ctx().set_cursor_icon(CursorIcon::ResizeHorizontal);
     }

@@ -1,0 +1,225 @@
+//! What the desktop is asked for: its file dialogue, and its browser.
+
+use std::path::{Path, PathBuf};
+use std::pin::Pin;
+use std::sync::Arc;
+
+use rfd::{AsyncFileDialog, FileHandle};
+use winit::window::Window;
+
+use super::commands::Command;
+use super::completion::in_home;
+use super::interface::{Prompt, Purpose};
+use super::{App, Later};
+
+/// Where the method was published.
+pub(super) const METHOD: &str = "https://dl.acm.org/doi/10.1145/3214745.3214808";
+
+/// The file dialogues of the desktop.
+#[derive(Default)]
+pub(super) struct Desktop {
+    /// What a dialogue lies before.
+    window: Option<Arc<Window>>,
+    open: Option<Dialogue>,
+    /// Whether our window had the keyboard last.
+    has_focus: bool,
+    /// Whether it was found to have none.
+    has_none: bool,
+}
+
+/// A dialogue that was asked for.
+#[derive(Clone)]
+struct Dialogue {
+    purpose: Purpose,
+    /// The path that was in the prompt.
+    path: String,
+    /// Whether somebody asked for it by its own button.
+    is_by_hand: bool,
+    /// Whether our window was left for it, or for anything else: without that it was never there.
+    is_seen: bool,
+}
+
+impl Desktop {
+    /// Notes whether our window has the keyboard.
+    pub(super) fn notice_focus(&mut self, has_focus: bool) {
+        let is_left = self.has_focus && !has_focus;
+        self.has_focus = has_focus;
+        if let Some(dialogue) = &mut self.open {
+            dialogue.is_seen |= is_left;
+        }
+    }
+
+    /// The dialogue has ended without a file: what there is to say, and whether its prompt goes with it.
+    fn end(&mut self, prompt: Option<&Prompt>) -> (Option<&'static str>, bool) {
+        let Some(dialogue) = self.open.take() else { return (None, false) };
+        if dialogue.is_seen {
+            let is_untouched = |prompt: &Prompt| {
+                (prompt.purpose, &prompt.path) == (dialogue.purpose, &dialogue.path)
+            };
+            return (None, prompt.is_some_and(is_untouched));
+        }
+        self.has_none = true;
+        let sentence = "this system offers no file dialogue; a path can be typed instead";
+        (dialogue.is_by_hand.then_some(sentence), false)
+    }
+}
+
+impl App {
+    /// Says in which window of the desktop all is drawn: dialogues lie before it.
+    pub(super) fn lie_in(&mut self, window: Arc<Window>) {
+        self.desktop.window = Some(window);
+    }
+
+    /// Asks for a path: by a prompt, and by the system's dialogue before it where there is one.
+    pub(super) fn ask(&mut self, purpose: Purpose, path: String) {
+        self.interface.ask(purpose, path);
+        if self.settings.browses_at_once && !self.desktop.has_none && !self.is_repeatable {
+            self.browse(purpose, false);
+        }
+    }
+
+    /// Opens the system's file dialogue for the prompt; its answer comes later.
+    pub(super) fn browse(&mut self, purpose: Purpose, is_by_hand: bool) {
+        if let Some(dialogue) = &mut self.desktop.open {
+            if is_by_hand {
+                dialogue.is_by_hand = true;
+                self.messages.notice("The system's file dialogue has been asked for already");
+            }
+            return;
+        }
+        let path = self.interface.prompt.as_ref().map(|prompt| prompt.path.clone());
+        let path = path.unwrap_or_default();
+        let dialogue = self.dialogue(purpose, &path);
+        let chosen: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> =
+            match purpose.is_output() {
+                true => Box::pin(dialogue.save_file()),
+                false => Box::pin(dialogue.pick_file()),
+            };
+        let (sender, wake) = (self.later.0.clone(), self.wake.clone());
+        let window = self.desktop.window.clone();
+        let thread = std::thread::Builder::new().name("dialogue".to_owned()).spawn(move || {
+            let file = pollster::block_on(chosen);
+            let path = file.map(|file| file.path().display().to_string());
+            // The window may have gone meanwhile.
+            let _ = sender.send(Later::Chosen(purpose, path));
+            wake();
+            // It was needed to the end.
+            drop(window);
+        });
+        match thread {
+            Ok(_) => {
+                self.desktop.open = Some(Dialogue { purpose, path, is_by_hand, is_seen: false });
+            }
+            Err(error) => self.messages.error(format!("no thread for a file dialogue: {error}")),
+        }
+    }
+
+    /// A dialogue that begins where a path leads to.
+    fn dialogue(&self, purpose: Purpose, path: &str) -> AsyncFileDialog {
+        let (kind, extensions) = purpose.files();
+        let mut dialogue =
+            AsyncFileDialog::new().set_title(purpose.title()).add_filter(kind, extensions);
+        if let Some(window) = &self.desktop.window {
+            dialogue = dialogue.set_parent(&**window);
+        }
+        // What was opened last lies beside what is opened next.
+        let recent = match purpose {
+            Purpose::Map => &self.settings.recent_maps,
+            _ => &self.settings.recent_scenes,
+        };
+        let beside = recent.first().and_then(|name| Path::new(name).parent());
+        let path = in_home(path.trim());
+        let path = match beside.filter(|_| path.is_empty()) {
+            Some(folder) => folder.to_owned(),
+            None => PathBuf::from(path),
+        };
+        let Ok(path) = std::path::absolute(path) else { return dialogue };
+        let folder = if path.is_dir() { Some(&*path) } else { path.parent() };
+        if let Some(folder) = folder.filter(|folder| folder.is_dir()) {
+            dialogue = dialogue.set_directory(folder);
+        }
+        let file = path.file_name().filter(|_| purpose.is_output() && !path.is_dir());
+        if let Some(file) = file {
+            dialogue = dialogue.set_file_name(file.to_string_lossy());
+        }
+        dialogue
+    }
+
+    /// Takes the answer of a dialogue.
+    pub(super) fn take_chosen(
+        &mut self,
+        purpose: Purpose,
+        path: Option<&str>,
+        context: &egui::Context,
+    ) {
+        let Some(path) = path else {
+            let (sentence, is_closed) = self.desktop.end(self.interface.prompt.as_ref());
+            if let Some(sentence) = sentence {
+                self.messages.error(sentence);
+            }
+            self.interface.prompt.take_if(|_| is_closed);
+            return;
+        };
+        self.desktop.open = None;
+        self.interface.prompt.take_if(|prompt| prompt.purpose == purpose);
+        match purpose.completed(path) {
+            // Nobody was asked whether a file of that name may be replaced.
+            Some(path) => self.interface.ask(purpose, path),
+            None => self.execute(purpose.command(path), context),
+        }
+    }
+
+    /// Opens the method's publication in the browser.
+    pub(super) fn show_method(&mut self) {
+        if let Err(error) = open::that_detached(METHOD) {
+            self.messages.error(format!("no browser can be opened for {METHOD}: {error}"));
+        }
+    }
+}
+
+impl Purpose {
+    /// A path that was chosen with what its file's name ends in, where that is missing: not every dialogue adds it.
+    pub(super) fn completed(self, path: &str) -> Option<String> {
+        let (_, extensions) = self.files();
+        let is_missing = self.is_output() && Path::new(path).extension().is_none();
+        is_missing.then(|| format!("{path}.{}", extensions[0]))
+    }
+
+    /// What to do with the path.
+    pub fn command(self, path: &str) -> Command {
+        match self {
+            Self::Scene => Command::OpenScene(path.to_owned()),
+            Self::Map => Command::OpenMap(path.to_owned()),
+            Self::Picture => Command::Save(path.into()),
+            Self::Distributions => Command::Export(path.into()),
+            Self::Reference => Command::OpenReference(path.to_owned()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::interface::Interface;
+
+    #[test]
+    fn a_dialogue_that_never_came_is_told_from_one_that_was_closed() {
+        let mut interface = Interface::default();
+        interface.ask(Purpose::Map, String::new());
+        let mut prompt = interface.prompt.expect("asked");
+        let ended = |is_by_hand, has_focus, prompt: &Prompt| {
+            let open =
+                Dialogue { purpose: Purpose::Map, path: String::new(), is_by_hand, is_seen: false };
+            let mut desktop = Desktop { open: Some(open), has_focus: true, ..Desktop::default() };
+            desktop.notice_focus(has_focus);
+            desktop.notice_focus(true);
+            let (sentence, is_closed) = desktop.end(Some(prompt));
+            (sentence.is_some(), is_closed, desktop.has_none)
+        };
+        assert_eq!(ended(false, true, &prompt), (false, false, true), "none, and nobody asked");
+        assert_eq!(ended(true, true, &prompt), (true, false, true), "none, and somebody asked");
+        assert_eq!(ended(true, false, &prompt), (false, true, false), "closed");
+        prompt.path = "/a/map".to_owned();
+        assert_eq!(ended(false, false, &prompt), (false, false, false), "something was typed");
+    }
+}

@@ -1,0 +1,145 @@
+//! Small pictures of maps, by which they are recognised in lists: kept in a folder for the next window.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use egui::{Context, TextureHandle, TextureOptions};
+
+use super::screen::color_image;
+use super::settings_file::lasting_map;
+use super::{App, Later};
+use crate::digest::Digest;
+use crate::environment::sky;
+use crate::image::ldr::decode_ldr;
+use crate::image::{Image, Rgb8, read_file, write_png};
+use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
+
+/// Width in pixels; they are half as high.
+const WIDTH: u32 = 96;
+/// Most files kept.
+const MOST: usize = 64;
+
+/// A map's name and it in small.
+pub(super) type SmallMap = (String, Rgb8);
+
+/// Small pictures of maps on the device, by their lasting names.
+#[derive(Default)]
+pub(super) struct SmallMaps {
+    folder: Option<PathBuf>,
+    textures: BTreeMap<String, TextureHandle>,
+}
+
+impl SmallMaps {
+    /// The picture of a map, if there is one.
+    pub(super) fn of(&self, name: &str) -> Option<&TextureHandle> {
+        self.textures.get(name)
+    }
+
+    pub(super) fn take(&mut self, (name, small): SmallMap, context: &Context) {
+        let image = color_image(&small);
+        let texture = context.load_texture(&name, image, TextureOptions::LINEAR);
+        self.textures.insert(name, texture);
+    }
+}
+
+impl App {
+    /// Reads the pictures of maps that were opened lately, and makes those of built-in skies.
+    pub(super) fn begin_small_maps(&mut self, folder: Option<PathBuf>) {
+        let recent = self.settings.recent_maps.clone();
+        self.small_maps.folder.clone_from(&folder);
+        self.do_later("small maps", move || {
+            let skies = sky::names().iter().filter_map(|name| {
+                let map = sky::build(name, WIDTH, WIDTH / 2).ok()?;
+                Some((format!("sky:{name}"), in_small(&map)))
+            });
+            let read = |folder: &PathBuf| {
+                tidy(folder);
+                let small = |name: &String| Some((name.clone(), read_small(folder, name)?));
+                recent.iter().filter_map(small).collect()
+            };
+            let known: Vec<SmallMap> = folder.as_ref().map(read).unwrap_or_default();
+            Ok(Later::SmallMaps(known.into_iter().chain(skies).collect()))
+        });
+    }
+
+    /// Keeps the picture of a map that was opened, of which `preview` is a smaller one.
+    pub(super) fn keep_small_map(&mut self, name: &str, preview: Arc<Image>) {
+        let (name, folder) = (lasting_map(name), self.small_maps.folder.clone());
+        let is_of_file = self.settings.recent_maps.contains(&name);
+        let thread = self.do_later("small map", move || {
+            let small = in_small(&preview);
+            if let Some(folder) = folder.filter(|_| is_of_file) {
+                // Without it the list has no picture, and no more is lost.
+                let _ = std::fs::create_dir_all(&folder)
+                    .is_ok_and(|()| write_png(&file_of(&folder, &name), &small, &[]).is_ok());
+            }
+            Ok(Later::SmallMaps(vec![(name, small)]))
+        });
+        self.writing.extend(thread);
+    }
+}
+
+fn in_small(map: &Image) -> Rgb8 {
+    let small = map.shrunk(WIDTH);
+    display_rgb8(&small, auto_exposure_ev(&small) + 0.5, ToneCurve::Agx)
+}
+
+fn file_of(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{}.png", Digest::new().bytes(name.as_bytes())))
+}
+
+fn read_small(folder: &Path, name: &str) -> Option<Rgb8> {
+    let bytes = read_file(&file_of(folder, name)).ok()?;
+    let picture = decode_ldr(&bytes, name).ok().filter(|picture| picture.width <= WIDTH)?;
+    let rgba = picture.pixels.rgba();
+    let pixels = rgba.iter().map(|[r, g, b, _]| [*r, *g, *b]).collect();
+    Some(Rgb8 { width: picture.width, height: picture.height, pixels })
+}
+
+/// Removes the oldest files where there are too many.
+fn tidy(folder: &Path) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    let is_ours = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "png");
+    let mut files: Vec<(SystemTime, PathBuf)> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(is_ours)
+        .filter_map(|path| Some((path.metadata().ok()?.modified().ok()?, path)))
+        .collect();
+    files.sort();
+    for (_, path) in files.iter().rev().skip(MOST) {
+        // It may have gone by itself.
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_are_found_in_small_by_their_names_and_the_oldest_go() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let map = sky::build("day", 300, 150).expect("a sky");
+        let small = in_small(&map);
+        assert_eq!((small.width, small.height), (WIDTH, WIDTH / 2));
+        let name = "/maps/day.exr";
+        assert_eq!(read_small(folder.path(), name), None);
+        write_png(&file_of(folder.path(), name), &small, &[]).expect("written");
+        assert_eq!(read_small(folder.path(), name), Some(small.clone()));
+        assert_eq!(read_small(folder.path(), "/maps/night.exr"), None);
+        std::fs::write(file_of(folder.path(), name), "no picture").expect("written");
+        assert_eq!(read_small(folder.path(), name), None);
+        let start = SystemTime::now() - std::time::Duration::from_secs(1000);
+        for age in 0..MOST as u64 + 2 {
+            let path = folder.path().join(format!("{age}.png"));
+            let file = std::fs::File::create(path).expect("made");
+            file.set_modified(start - std::time::Duration::from_secs(age)).expect("dated");
+        }
+        tidy(folder.path());
+        let is_there = |age: usize| folder.path().join(format!("{age}.png")).exists();
+        assert!(file_of(folder.path(), name).exists(), "the newest");
+        assert!(is_there(MOST - 2) && !is_there(MOST - 1) && !is_there(MOST + 1));
+    }
+}
