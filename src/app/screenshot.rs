@@ -40,6 +40,7 @@ pub struct Studio {
     deadline: Instant,
     patience: Duration,
     time: f64,
+    pixels_per_point: f32,
 }
 
 impl Studio {
@@ -69,7 +70,28 @@ impl Studio {
         let loader = Loader::start(&start.document, start.of_scene.clone(), wakes.draw.clone());
         let app = App::new(start, loader, screen, &context, wakes)?;
         let deadline = Instant::now() + shot.patience;
-        Ok(Self { app, context, canvas, news, deadline, patience: shot.patience, time: 0.0 })
+        Ok(Self {
+            app,
+            context,
+            canvas,
+            news,
+            deadline,
+            patience: shot.patience,
+            time: 0.0,
+            pixels_per_point: 1.0,
+        })
+    }
+
+    /// Draws all but the picture so many times as large, as a screen with small pixels shows it; the window keeps its
+    /// pixels.
+    #[must_use]
+    pub fn at_scale(self, pixels_per_point: f32) -> Self {
+        Self { pixels_per_point, ..self }
+    }
+
+    /// Pixels of the picture across and down, once there is one.
+    pub fn picture_size(&self) -> Option<[u32; 2]> {
+        self.app.snapshot.as_ref().map(|snapshot| snapshot.request.view.whole_size())
     }
 
     /// Opens and chooses what `interface` says; the picture is not rendered again.
@@ -150,7 +172,7 @@ impl Studio {
             let screen = Screen::new(&self.canvas.gpu, FORMAT)?;
             self.app.move_to(screen, &loss);
         }
-        self.canvas.draw(&self.context, &mut self.app, self.time);
+        self.canvas.draw(&self.context, &mut self.app, self.time, self.pixels_per_point);
         self.time += FRAME_SECONDS;
         Ok(())
     }
@@ -216,10 +238,13 @@ impl Canvas {
     }
 
     /// One frame of the application.
-    fn draw(&mut self, context: &egui::Context, app: &mut App, time: f64) {
+    fn draw(&mut self, context: &egui::Context, app: &mut App, time: f64, pixels_per_point: f32) {
         let (width, height) = (self.target.width(), self.target.height());
-        let size = egui::Vec2::new(width as f32, height as f32);
+        let size = egui::Vec2::new(width as f32, height as f32) / pixels_per_point;
+        let native_pixels_per_point = Some(pixels_per_point);
+        let viewport = egui::ViewportInfo { native_pixels_per_point, ..Default::default() };
         let input = egui::RawInput {
+            viewports: std::iter::once((egui::ViewportId::ROOT, viewport)).collect(),
             screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, size)),
             max_texture_side: Some(self.gpu.limits.max_texture_dimension_2d as usize),
             time: Some(time),
@@ -227,7 +252,8 @@ impl Canvas {
             ..egui::RawInput::default()
         };
         let mut output = context.run_ui(input, |ui| app.show(ui));
-        let primitives = context.tessellate(output.shapes, output.pixels_per_point);
+        let pixels_per_point = output.pixels_per_point;
+        let primitives = context.tessellate(output.shapes, pixels_per_point);
         self.copies.follow(&output.textures_delta);
         let Gpu { device, queue, .. } = &self.gpu;
         let renderer = &mut self.renderer;
@@ -236,7 +262,7 @@ impl Canvas {
                 renderer.update_texture(device, queue, id, &delta);
             }
         }
-        let screen = ScreenDescriptor { size_in_pixels: [width, height], pixels_per_point: 1.0 };
+        let screen = ScreenDescriptor { size_in_pixels: [width, height], pixels_per_point };
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut commands =
             renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);

@@ -73,6 +73,9 @@ pub(super) struct ScreenshotArguments {
     /// Size of the window in pixels.
     #[arg(long, default_value = "1440x900", value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
     size: (u32, u32),
+    /// How large everything but the picture is drawn, from 0.5 to 4: at 2 as a 4K display shows it.
+    #[arg(long, default_value = "1", value_parser = scale, allow_hyphen_values = true, value_name = "FACTOR")]
+    scale: f32,
     /// How the map is sampled.
     #[arg(long, default_value = "adaptive", value_enum)]
     sampling: Sampling,
@@ -122,6 +125,12 @@ fn place(text: &str) -> std::result::Result<Vec2, String> {
         .filter(|place| place.iter().all(|share| (0.0..=1.0).contains(share)))
         .map(Vec2::from_array)
         .ok_or_else(|| "expected two numbers from 0 to 1 like 0.25,0.7".to_owned())
+}
+
+fn scale(text: &str) -> std::result::Result<f32, String> {
+    let factor = values::finite(text)? as f32;
+    let is_usual = (0.5..=4.0).contains(&factor);
+    is_usual.then_some(factor).ok_or_else(|| "must be from 0.5 to 4".to_owned())
 }
 
 /// Draws the window's content and writes it.
@@ -183,7 +192,8 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
         },
         size: arguments.size,
         patience: Duration::from_secs_f64(arguments.patience.min(1e9)),
-    })?;
+    })?
+    .at_scale(arguments.scale);
     if let Some(material) = &arguments.select {
         studio.choose_material(material)?;
     }

@@ -1,5 +1,6 @@
 //! The window's content, drawn offscreen against kept pictures.
 
+use std::ops::Range;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
@@ -131,6 +132,49 @@ fn a_small_window_has_one_panel() {
         .expect("its settings come into sight");
     let error = studio.choose_material("ivory").expect_err("the office has none").to_string();
     assert!(error.contains("office: no material is called \"ivory\"; there are "), "{error}");
+}
+
+/// On twice the pixels all lies where it did, and the picture has four times as many.
+#[test]
+fn a_screen_with_small_pixels_shows_the_same_with_more_of_them() {
+    let of_viewport = || {
+        let mut start = start();
+        start.document.scene = "open".to_owned();
+        start.document.size = PictureSize::Viewport(4);
+        start.document.stop.samples = Some(1);
+        start.document.look.denoise = false;
+        start
+    };
+    let Some(mut studio) = studio(of_viewport(), (1000, 650)) else { return };
+    let usual = studio.take().expect("drawn");
+    let [width, height] = studio.picture_size().expect("rendered");
+    let mut studio = self::studio(of_viewport(), (2000, 1300)).expect("as before").at_scale(2.0);
+    let fine = studio.take().expect("drawn");
+    let size = studio.picture_size().expect("rendered");
+    let is_twice = |fine: u32, usual: u32| fine.abs_diff(2 * usual) <= 2;
+    assert!(is_twice(size[0], width) && is_twice(size[1], height), "{size:?}, {width}x{height}");
+    // Letters fall on pixels in another way, which is hardly seen in pixels of four points. Two of them would be.
+    let (usual, fine) = (shrunk(&shrunk(&usual)), shrunk(&shrunk(&shrunk(&fine))));
+    for columns in [0..61, 177..247] {
+        let apart = |by| panels_apart(&usual, &fine, columns.clone(), by);
+        let (found, displaced) = (apart(0), apart(2));
+        println!("columns {columns:?}: {found:.2}; {displaced:.2} where they are displaced");
+        assert!(found < 0.35 * displaced, "{columns:?}: {found} of {displaced}");
+    }
+}
+
+/// Mean absolute difference of 8-bit levels between columns of one picture and those of another that lie so much
+/// further to the right, above the line below.
+fn panels_apart(a: &Rgb8, b: &Rgb8, columns: Range<u32>, by: u32) -> f64 {
+    let at = |of: &Rgb8, x: u32, y: u32| of.pixels[(y * of.width + x) as usize];
+    let pixels = (0..150).flat_map(|y| columns.clone().map(move |x| (x, y)));
+    let apart: Vec<u64> = pixels
+        .flat_map(|(x, y)| {
+            let (a, b) = (at(a, x, y), at(b, x + by, y));
+            [0, 1, 2].map(|c| u64::from(a[c].abs_diff(b[c])))
+        })
+        .collect();
+    apart.iter().sum::<u64>() as f64 / apart.len() as f64
 }
 
 /// What a cell knows and what is true there, in a window high enough for both.

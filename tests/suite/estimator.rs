@@ -5,6 +5,7 @@
 
 mod bounds;
 mod cached;
+mod few_samples;
 mod known_glass;
 mod known_light;
 mod known_media;

@@ -143,6 +143,9 @@ fn negative_values_are_refused_in_our_own_words() {
         ("view --samples -1", "-1 is not in 1.."),
         ("screenshot -o a.png --inspect -0.5,0", "two numbers from 0 to 1"),
         ("screenshot -o a.png --patience -1", "must be above 0"),
+        ("screenshot -o a.png --scale -1", "must be from 0.5 to 4"),
+        ("screenshot -o a.png --scale 4.1", "must be from 0.5 to 4"),
+        ("screenshot -o a.png --scale nan", "expected a number"),
         ("report -o out --seconds -1", "must be above 0"),
         ("bench --seconds -1", "must be above 0"),
     ] {

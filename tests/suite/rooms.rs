@@ -146,6 +146,9 @@ fn named<'a>(code: &'a str, prefix: &'a str) -> impl Iterator<Item = &'a str> {
 
 /// Whether a module of our own that is called as a crate is comes into scope.
 fn imports_namesake(code: &str, name: &str) -> bool {
+    if code.contains(&format!("\nmod {name};")) {
+        return true;
+    }
     let own = |import: &&str| import.starts_with("crate::") || import.starts_with("super::");
     let words = |c: char| !c.is_alphanumeric() && c != '_';
     let imports = code.split("use ").skip(1).filter_map(|rest| rest.split(';').next());

@@ -1,229 +1,19 @@
 //! A real window under Xvfb.
 
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+mod desk;
+mod hands;
+mod keys;
+mod memory;
+
+use std::path::Path;
+use std::time::Duration;
 
 use lightgrid::app::document::Viewpoint;
 use lightgrid::app::settings_file::{SceneViewpoints, Settings};
-use lightgrid::image::read_picture;
 use lightgrid::scene::builtin;
 use lightgrid::tone::auto_exposure_ev;
 
-/// An X server without a screen, and a window of ours in it.
-struct Desk {
-    server: Child,
-    window: Option<Child>,
-    display: String,
-    /// What the window is called by the server.
-    id: String,
-    folder: tempfile::TempDir,
-}
-
-impl Drop for Desk {
-    fn drop(&mut self) {
-        for child in self.window.iter_mut().chain([&mut self.server]) {
-            // It may have ended by itself.
-            let _ = child.kill();
-            let _ = child.wait();
-        }
-    }
-}
-
-impl Desk {
-    const WIDTH: usize = 1100;
-    const HEIGHT: usize = 760;
-
-    /// `None`, said on stderr, where Xvfb or xdotool is not installed.
-    fn open() -> Option<Self> {
-        let is_there = |tool: &str| {
-            let which = Command::new("which").arg(tool).stdout(Stdio::null()).status();
-            which.is_ok_and(|status| status.success())
-        };
-        if let Some(tool) = ["Xvfb", "xdotool"].into_iter().find(|tool| !is_there(tool)) {
-            eprintln!("SKIPPED: {tool} is not installed");
-            return None;
-        }
-        let folder = tempfile::tempdir().expect("a folder");
-        let screen = format!("{}x{}x24", Self::WIDTH, Self::HEIGHT);
-        let mut server = Command::new("Xvfb")
-            .args([
-                "-displayfd",
-                "1",
-                "-noreset",
-                "-screen",
-                "0",
-                &screen,
-                "-nolisten",
-                "tcp",
-                "-fbdir",
-            ])
-            .arg(folder.path())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("Xvfb starts");
-        let mut number = String::new();
-        let stdout = server.stdout.take().expect("piped");
-        std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut number)
-            .expect("Xvfb says its display");
-        let display = format!(":{}", number.trim());
-        let desk = Self { server, window: None, display, id: String::new(), folder };
-        // It has been seen to refuse the first connection when all cores are busy. (Nor does it take any
-        // while it starts anew after its last client, if it may.)
-        desk.wait_for("display", || (!desk.xdotool("getdisplaygeometry").is_empty()).then_some(()));
-        Some(desk)
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    /// Starts the program and waits until its window shows its buttons and has the keyboard.
-    fn start(&mut self, line: &str) {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_lightgrid"));
-        command.current_dir(self.folder.path()).args(line.split_whitespace());
-        command.env("DISPLAY", &self.display).env_remove("WAYLAND_DISPLAY");
-        command.stderr(std::fs::File::create(self.path("says.txt")).expect("a file"));
-        let mut window = command.spawn().expect("the binary starts");
-        self.id = self.wait_for("window", || {
-            let ended = window.try_wait().expect("asked");
-            assert!(ended.is_none(), "it ends with {ended:?}: {}", self.says());
-            let found = self.xdotool("search --onlyvisible --name lightgrid");
-            found.lines().next().map(str::to_owned).filter(|id| !id.is_empty())
-        });
-        self.window = Some(window);
-        self.xdotool(&format!("windowfocus {}", self.id));
-        self.wait_for("buttons", || (self.brightness() > 8.0).then_some(()));
-    }
-
-    fn xdotool(&self, line: &str) -> String {
-        let output = Command::new("xdotool")
-            .args(line.split_whitespace())
-            .env("DISPLAY", &self.display)
-            .output()
-            .expect("xdotool starts");
-        String::from_utf8_lossy(&output.stdout).trim().to_owned()
-    }
-
-    fn title(&self) -> String {
-        self.xdotool(&format!("getwindowname {}", self.id))
-    }
-
-    fn says(&self) -> String {
-        std::fs::read_to_string(self.path("says.txt")).unwrap_or_default()
-    }
-
-    /// Mean level, 0 to 255, of the corner with the first buttons, which are always there.
-    fn brightness(&self) -> f64 {
-        let (width, height) = (270, 36);
-        let file = std::fs::read(self.path("Xvfb_screen0")).expect("the server's screen");
-        let screen = &file[file.len() - 4 * Self::WIDTH * Self::HEIGHT..];
-        let rows = screen.chunks_exact(4 * Self::WIDTH).take(height);
-        let pixels = rows.flat_map(|row| row[..4 * width].chunks_exact(4));
-        pixels.map(|p| f64::from(p[0].max(p[1]).max(p[2]))).sum::<f64>() / (width * height) as f64
-    }
-
-    /// Waits for something for at most ten minutes: software draws a frame in seconds when other
-    /// tests keep all cores busy.
-    fn wait_for<T>(&self, what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
-        let start = Instant::now();
-        loop {
-            if let Some(it) = ready() {
-                return it;
-            }
-            assert!(start.elapsed() < Duration::from_secs(600), "no {what}: {}", self.says());
-            std::thread::sleep(Duration::from_millis(100));
-        }
-    }
-
-    /// Types a path into the prompt that a key opens, which takes it.
-    fn answer(&self, key: &str, path: &str) {
-        self.answer_and(key, path, "key Return");
-    }
-
-    /// Types a path into the prompt that a key opens, and what ends that. An open prompt darkens what is
-    /// behind it; what is typed before is not meant for it.
-    fn answer_and(&self, key: &str, path: &str, end: &str) {
-        let level = self.brightness();
-        self.xdotool(&format!("key {key}"));
-        self.wait_for("prompt", || (self.brightness() < 0.8 * level).then_some(()));
-        self.xdotool("key ctrl+a");
-        self.xdotool(&format!("type --delay 20 {path}"));
-        self.xdotool(end);
-        self.wait_for("end of the prompt", || (self.brightness() > 0.9 * level).then_some(()));
-    }
-
-    /// Drags with the left button, in steps with pauses between them.
-    fn drag(&self, (x, y): (i32, i32), (dx, dy): (i32, i32), pause: Duration) {
-        self.xdotool(&format!("mousemove {x} {y} mousedown 1"));
-        for _ in 0..10 {
-            std::thread::sleep(pause);
-            self.xdotool(&format!("mousemove_relative -- {} {}", dx / 10, dy / 10));
-        }
-        self.xdotool("mouseup 1");
-    }
-
-    /// The levels of the middle of the picture on the screen.
-    fn picture(&self) -> Vec<u8> {
-        let file = std::fs::read(self.path("Xvfb_screen0")).expect("the server's screen");
-        let screen = &file[file.len() - 4 * Self::WIDTH * Self::HEIGHT..];
-        let rows = screen.chunks_exact(4 * Self::WIDTH).skip(150).take(420);
-        let columns = rows.flat_map(|row| row[4 * 300..4 * 780].chunks_exact(4));
-        columns.flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
-    }
-
-    /// Seconds that the program has been at work, all cores together; none where the system does not tell.
-    fn work(&self) -> Option<f64> {
-        let id = self.window.as_ref().expect("started").id();
-        let stat = std::fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
-        let (_, numbers) = stat.rsplit_once(')')?;
-        let ticks = numbers.split_whitespace().skip(11).take(2).map(str::parse::<f64>);
-        Some(ticks.sum::<Result<f64, _>>().ok()? / 100.0)
-    }
-
-    /// What is shown every half second, and the work done by then, until nothing has changed for a while: it
-    /// is done then.
-    fn watch(&self) -> Vec<(Vec<u8>, Option<f64>)> {
-        let mut shown: Vec<(Vec<u8>, Option<f64>)> = Vec::new();
-        let mut unchanged = 0;
-        while unchanged < 20 || shown.len() < 30 {
-            std::thread::sleep(Duration::from_millis(500));
-            let now = (self.picture(), self.work());
-            let is_same = shown.last().is_some_and(|(picture, _)| *picture == now.0);
-            unchanged = if is_same { unchanged + 1 } else { 0 };
-            shown.push(now);
-            assert!(shown.len() < 1200, "it never ends");
-        }
-        shown.truncate(shown.len() - unchanged);
-        shown
-    }
-
-    /// Saves a picture and waits until it is there.
-    fn save(&self, name: &str) -> lightgrid::image::Image {
-        let path = self.path(name);
-        self.answer("ctrl+s", name);
-        self.wait_for(name, || path.exists().then(|| read_picture(&path).expect("a picture")))
-    }
-
-    /// Stops that a saved `.png` was developed with.
-    fn exposure_ev(&self, name: &str) -> f32 {
-        let bytes = std::fs::read(self.path(name)).expect("a picture");
-        let text = String::from_utf8_lossy(&bytes);
-        let (_, said) = text.split_once("lightgrid.exposure_ev\0").expect("the stops");
-        let said = said.trim_start_matches('\0');
-        let is_number = |c: char| c.is_ascii_digit() || "+-.".contains(c);
-        let end = said.find(|c| !is_number(c)).expect("an end");
-        said[..end].parse().expect("a number")
-    }
-
-    /// What a picture's file says of a key.
-    fn metadata(&self, name: &str, key: &str) -> Option<String> {
-        let metadata = lightgrid::image::read_exr_metadata(&self.path(name)).expect("metadata");
-        let key = format!("lightgrid.{key}");
-        metadata.into_iter().find(|(k, _)| *k == key).map(|(_, value)| value)
-    }
-}
+use desk::{Desk, error};
 
 #[test]
 fn a_real_window_moves_opens_saves_and_remembers() {
@@ -239,12 +29,7 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     // The other device goes on; software Vulkan takes seconds to compile for it.
     desk.xdotool("key g");
     desk.xdotool("key r");
-    desk.wait_for("picture from the GPU", || {
-        desk.save("gpu.exr");
-        let device = desk.metadata("gpu.exr", "device");
-        std::fs::remove_file(desk.path("gpu.exr")).expect("removed");
-        device.filter(|name| name != "CPU")
-    });
+    desk.save_until("picture from the GPU", |_, of| (of("device") != "CPU").then_some(()));
     desk.xdotool("key g");
 
     // A file that is not there changes nothing: the path can be mended, or the camera still be turned.
@@ -253,29 +38,17 @@ fn a_real_window_moves_opens_saves_and_remembers() {
 
     // A drag turns the camera: another picture. It is taken back, also after the list of keys was open.
     desk.drag((560, 400), (-120, 20), Duration::ZERO);
-    desk.wait_for("turned picture", || {
-        let turned = desk.save("turned.exr");
-        std::fs::remove_file(desk.path("turned.exr")).expect("removed");
-        (first.pixels != turned.pixels).then_some(())
-    });
+    desk.save_until("turned picture", |now, _| (now.pixels != first.pixels).then_some(()));
     desk.xdotool("key question");
     desk.xdotool("key Escape");
     desk.xdotool("key ctrl+z");
-    desk.wait_for("first camera", || {
-        desk.save("again.exr");
-        let eye = desk.metadata("again.exr", "eye");
-        std::fs::remove_file(desk.path("again.exr")).expect("removed");
-        (eye == of("eye")).then_some(())
-    });
+    let eye = of("eye").expect("it is said");
+    desk.save_until("first camera", |_, of| (of("eye") == eye).then_some(()));
 
     // A part of it, marked by a drag so fast that it may fall into one frame; then the whole again.
     desk.xdotool("key x");
     desk.drag((450, 300), (150, 120), Duration::ZERO);
-    desk.wait_for("part", || {
-        let part = desk.save("part.exr");
-        std::fs::remove_file(desk.path("part.exr")).expect("removed");
-        (part.width < 60 && part.height < 50).then_some(())
-    });
+    desk.save_until("part", |now, _| (now.width < 60 && now.height < 50).then_some(()));
     // It is as bright as it was in the whole, whatever it would need by itself.
     let whole_ev = auto_exposure_ev(&first);
     let part = desk.save("part.exr");
@@ -289,19 +62,11 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     triangle(&desk.path("room.gltf"), 1.0);
     desk.answer("ctrl+o", "room.gltf");
     desk.wait_for("file", || desk.title().starts_with("room.gltf").then_some(()));
-    let large = desk.wait_for("triangle", || {
-        let picture = desk.save("large.exr");
-        let scene = desk.metadata("large.exr", "scene");
-        std::fs::remove_file(desk.path("large.exr")).expect("removed");
-        (scene.as_deref() == Some("room.gltf")).then_some(picture)
-    });
+    let large = desk
+        .save_until("triangle", |now, of| (of("scene") == "room.gltf").then(|| now.pixels.clone()));
     triangle(&desk.path("room.gltf"), 0.3);
     desk.xdotool("key F5");
-    desk.wait_for("small triangle", || {
-        let small = desk.save("small.exr");
-        std::fs::remove_file(desk.path("small.exr")).expect("removed");
-        (small.pixels != large.pixels).then_some(())
-    });
+    desk.save_until("small triangle", |now, _| (now.pixels != large).then_some(()));
 
     // Another scene.
     desk.answer("ctrl+o", "crack");
@@ -309,10 +74,7 @@ fn a_real_window_moves_opens_saves_and_remembers() {
     desk.save("crack.png");
 
     desk.xdotool("key ctrl+q");
-    let mut child = desk.window.take().expect("started");
-    let status = desk.wait_for("end", || child.try_wait().expect("asked"));
-    assert!(status.success(), "{}", desk.says());
-    assert!(!desk.says().contains("panicked"), "{}", desk.says());
+    desk.ends();
     let settings = std::fs::read_to_string(desk.path("window.json")).expect("settings");
     assert!(settings.contains("window_size"), "{settings}");
 }
@@ -321,20 +83,16 @@ fn a_real_window_moves_opens_saves_and_remembers() {
 fn a_window_whose_size_changes_keeps_the_gpu_that_renders() {
     let Some(mut desk) = Desk::open() else { return };
     desk.start("view open --env sky:day@64x32 --size 96x64 --device gpu --settings window.json");
-    let device = |name: &str| {
-        desk.save(name);
-        let device = desk.metadata(name, "device");
-        std::fs::remove_file(desk.path(name)).expect("removed");
-        device.filter(|device| device != "CPU")
-    };
-    desk.wait_for("picture from the GPU", || device("gpu.exr"));
+    desk.save_until("picture from the GPU", |_, of| (of("device") != "CPU").then_some(()));
     // Each has its surface made anew, while the GPU has work to do.
     for step in 0..12 {
         let (width, height) = (1000 - 20 * step, 700 - 10 * step);
         desk.xdotool(&format!("windowsize --sync {} {width} {height}", desk.id));
         std::thread::sleep(Duration::from_millis(150));
     }
-    assert!(device("resized.exr").is_some(), "{}", desk.says());
+    desk.save("resized.exr");
+    let device = desk.metadata("resized.exr", "device");
+    assert_ne!(device.as_deref(), Some("CPU"), "{}", desk.says());
 }
 
 #[test]
@@ -355,9 +113,7 @@ fn a_scene_shown_in_place_of_a_damaged_one_keeps_its_viewpoints() {
     desk.start("view bad.gltf --size 96x64 --samples 1 --device cpu --settings w.json");
     desk.wait_for("scene", || desk.title().starts_with("living-room").then_some(()));
     desk.xdotool("key ctrl+q");
-    let mut child = desk.window.take().expect("started");
-    let status = desk.wait_for("end", || child.try_wait().expect("asked"));
-    assert!(status.success(), "{}", desk.says());
+    desk.ends();
     let kept = Settings::read(&desk.path("w.json")).expect("read").viewpoints;
     assert_eq!(kept, viewpoints);
 }
@@ -376,12 +132,6 @@ fn triangle(path: &Path, size: f32) {
         "buffers": [{{"uri": "room.bin", "byteLength": 36}}]}}"#
     );
     std::fs::write(path, text).expect("written");
-}
-
-/// Mean squared difference of levels.
-fn error(a: &[u8], b: &[u8]) -> f64 {
-    let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum();
-    sum / a.len() as f64
 }
 
 /// What is on the screen only gets better, and does not stand still while work goes on.
@@ -450,9 +200,7 @@ fn a_request_to_end_closes_a_window_as_a_person_would() {
     desk.start(
         "view open --env sky:day@64x32 --size 96x64 --samples 2 --device cpu --settings w.json",
     );
-    let mut child = desk.window.take().expect("started");
-    crate::cli::send(&child, "-TERM");
-    let status = desk.wait_for("end", || child.try_wait().expect("asked"));
-    assert!(status.success(), "{}", desk.says());
+    crate::cli::send(desk.window.as_ref().expect("started"), "-TERM");
+    desk.ends();
     assert!(desk.path("w.json").exists(), "the settings are kept");
 }
