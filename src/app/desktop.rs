@@ -21,8 +21,8 @@ pub(super) struct Desktop {
     /// What a dialogue lies before.
     window: Option<Arc<Window>>,
     open: Option<Dialogue>,
-    /// Whether our window had the keyboard last.
-    has_focus: bool,
+    /// So many were opened.
+    opened: u32,
     /// Whether it was found to have none.
     has_none: bool,
 }
@@ -30,6 +30,7 @@ pub(super) struct Desktop {
 /// A dialogue that was asked for.
 #[derive(Clone)]
 struct Dialogue {
+    number: u32,
     purpose: Purpose,
     /// The path that was in the prompt.
     path: String,
@@ -39,28 +40,34 @@ struct Dialogue {
     is_seen: bool,
 }
 
+/// What becomes of a prompt whose dialogue has ended.
+#[derive(Debug, PartialEq)]
+enum End {
+    /// The prompt stays as it is.
+    Stays,
+    /// It stays, and there is something to say.
+    Says(&'static str),
+    /// Nothing was typed in it: it goes.
+    Goes,
+}
+
 impl Desktop {
-    /// Notes whether our window has the keyboard.
-    pub(super) fn notice_focus(&mut self, has_focus: bool) {
-        let is_left = self.has_focus && !has_focus;
-        self.has_focus = has_focus;
-        if let Some(dialogue) = &mut self.open {
-            dialogue.is_seen |= is_left;
-        }
+    /// The dialogue of this number, unless the prompt that it belongs to has gone by another way.
+    fn take(&mut self, number: u32, prompt: Option<&Prompt>) -> Option<Dialogue> {
+        let dialogue = self.open.take_if(|dialogue| dialogue.number == number)?;
+        prompt.is_some_and(|prompt| prompt.purpose == dialogue.purpose).then_some(dialogue)
     }
 
-    /// The dialogue has ended without a file: what there is to say, and whether its prompt goes with it.
-    fn end(&mut self, prompt: Option<&Prompt>) -> (Option<&'static str>, bool) {
-        let Some(dialogue) = self.open.take() else { return (None, false) };
-        if dialogue.is_seen {
-            let is_untouched = |prompt: &Prompt| {
-                (prompt.purpose, &prompt.path) == (dialogue.purpose, &dialogue.path)
-            };
-            return (None, prompt.is_some_and(is_untouched));
+    /// A dialogue has ended without a file.
+    fn end(&mut self, dialogue: &Dialogue, prompt: &Prompt) -> End {
+        self.has_none = !dialogue.is_seen;
+        match (dialogue.is_seen, dialogue.is_by_hand) {
+            (true, false) if prompt.path == dialogue.path => End::Goes,
+            (false, true) => {
+                End::Says("this system offers no file dialogue; a path can be typed instead")
+            }
+            _ => End::Stays,
         }
-        self.has_none = true;
-        let sentence = "this system offers no file dialogue; a path can be typed instead";
-        (dialogue.is_by_hand.then_some(sentence), false)
     }
 }
 
@@ -70,9 +77,16 @@ impl App {
         self.desktop.window = Some(window);
     }
 
+    /// Says that the window has lost the keyboard.
+    pub(super) fn lose_focus(&mut self) {
+        self.desktop.open.iter_mut().for_each(|dialogue| dialogue.is_seen = true);
+    }
+
     /// Asks for a path: by a prompt, and by the system's dialogue before it where there is one.
     pub(super) fn ask(&mut self, purpose: Purpose, path: String) {
         self.interface.ask(purpose, path);
+        // It belongs to another prompt.
+        self.desktop.open = None;
         if self.settings.browses_at_once && !self.desktop.has_none && !self.is_repeatable {
             self.browse(purpose, false);
         }
@@ -81,10 +95,8 @@ impl App {
     /// Opens the system's file dialogue for the prompt; its answer comes later.
     pub(super) fn browse(&mut self, purpose: Purpose, is_by_hand: bool) {
         if let Some(dialogue) = &mut self.desktop.open {
-            if is_by_hand {
-                dialogue.is_by_hand = true;
-                self.messages.notice("The system's file dialogue has been asked for already");
-            }
+            dialogue.is_by_hand |= is_by_hand;
+            self.messages.notice("The system's file dialogue has been asked for already");
             return;
         }
         let path = self.interface.prompt.as_ref().map(|prompt| prompt.path.clone());
@@ -95,20 +107,23 @@ impl App {
                 true => Box::pin(dialogue.save_file()),
                 false => Box::pin(dialogue.pick_file()),
             };
+        self.desktop.opened += 1;
+        let number = self.desktop.opened;
         let (sender, wake) = (self.later.0.clone(), self.wake.clone());
         let window = self.desktop.window.clone();
         let thread = std::thread::Builder::new().name("dialogue".to_owned()).spawn(move || {
             let file = pollster::block_on(chosen);
             let path = file.map(|file| file.path().display().to_string());
             // The window may have gone meanwhile.
-            let _ = sender.send(Later::Chosen(purpose, path));
+            let _ = sender.send(Later::Chosen(number, path));
             wake();
             // It was needed to the end.
             drop(window);
         });
         match thread {
             Ok(_) => {
-                self.desktop.open = Some(Dialogue { purpose, path, is_by_hand, is_seen: false });
+                let is_seen = false;
+                self.desktop.open = Some(Dialogue { number, purpose, path, is_by_hand, is_seen });
             }
             Err(error) => self.messages.error(format!("no thread for a file dialogue: {error}")),
         }
@@ -146,26 +161,26 @@ impl App {
     }
 
     /// Takes the answer of a dialogue.
-    pub(super) fn take_chosen(
-        &mut self,
-        purpose: Purpose,
-        path: Option<&str>,
-        context: &egui::Context,
-    ) {
-        let Some(path) = path else {
-            let (sentence, is_closed) = self.desktop.end(self.interface.prompt.as_ref());
-            if let Some(sentence) = sentence {
-                self.messages.error(sentence);
-            }
-            self.interface.prompt.take_if(|_| is_closed);
+    pub(super) fn take_chosen(&mut self, number: u32, path: Option<&str>, context: &egui::Context) {
+        let prompt = self.interface.prompt.take();
+        let dialogue = self.desktop.take(number, prompt.as_ref());
+        let Some((dialogue, prompt)) = dialogue.zip(prompt.clone()) else {
+            self.interface.prompt = prompt;
             return;
         };
-        self.desktop.open = None;
-        self.interface.prompt.take_if(|prompt| prompt.purpose == purpose);
-        match purpose.completed(path) {
+        let Some(path) = path else {
+            match self.desktop.end(&dialogue, &prompt) {
+                End::Goes => return,
+                End::Stays => {}
+                End::Says(sentence) => self.messages.error(sentence),
+            }
+            self.interface.prompt = Some(prompt);
+            return;
+        };
+        match dialogue.purpose.completed(path) {
             // Nobody was asked whether a file of that name may be replaced.
-            Some(path) => self.interface.ask(purpose, path),
-            None => self.execute(purpose.command(path), context),
+            Some(path) => self.interface.ask(dialogue.purpose, path),
+            None => self.execute(dialogue.purpose.command(path), context),
         }
     }
 
@@ -207,19 +222,26 @@ mod tests {
         let mut interface = Interface::default();
         interface.ask(Purpose::Map, String::new());
         let mut prompt = interface.prompt.expect("asked");
-        let ended = |is_by_hand, has_focus, prompt: &Prompt| {
-            let open =
-                Dialogue { purpose: Purpose::Map, path: String::new(), is_by_hand, is_seen: false };
-            let mut desktop = Desktop { open: Some(open), has_focus: true, ..Desktop::default() };
-            desktop.notice_focus(has_focus);
-            desktop.notice_focus(true);
-            let (sentence, is_closed) = desktop.end(Some(prompt));
-            (sentence.is_some(), is_closed, desktop.has_none)
+        let dialogue = |is_by_hand, is_seen| {
+            let path = String::new();
+            Dialogue { number: 1, purpose: Purpose::Map, path, is_by_hand, is_seen }
         };
-        assert_eq!(ended(false, true, &prompt), (false, false, true), "none, and nobody asked");
-        assert_eq!(ended(true, true, &prompt), (true, false, true), "none, and somebody asked");
-        assert_eq!(ended(true, false, &prompt), (false, true, false), "closed");
+        let ended = |is_by_hand, is_seen, prompt: &Prompt| {
+            let mut desktop = Desktop::default();
+            let end = desktop.end(&dialogue(is_by_hand, is_seen), prompt);
+            (end, desktop.has_none)
+        };
+        assert_eq!(ended(false, false, &prompt), (End::Stays, true), "none, and nobody asked");
+        assert!(matches!(ended(true, false, &prompt), (End::Says(_), true)), "somebody asked");
+        assert_eq!(ended(false, true, &prompt), (End::Goes, false), "closed");
+        assert_eq!(ended(true, true, &prompt), (End::Stays, false), "the prompt was there before");
+        // Its answer is none to another question.
+        let mut desktop = Desktop { open: Some(dialogue(false, true)), ..Desktop::default() };
+        assert!(desktop.take(2, Some(&prompt)).is_none() && desktop.open.is_some());
+        assert!(desktop.take(1, None).is_none(), "a path was typed");
         prompt.path = "/a/map".to_owned();
-        assert_eq!(ended(false, false, &prompt), (false, false, false), "something was typed");
+        assert_eq!(ended(false, true, &prompt), (End::Stays, false), "something was typed");
+        let mut desktop = Desktop { open: Some(dialogue(false, true)), ..Desktop::default() };
+        assert!(desktop.take(1, Some(&prompt)).is_some());
     }
 }

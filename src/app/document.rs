@@ -191,18 +191,17 @@ impl Document {
     pub(super) fn follow_room(&mut self, factor: f32) {
         if let (PictureSize::Viewport(_), Some([left, _, right, _])) = (self.size, &mut self.region)
         {
-            for x in [&mut *left, &mut *right] {
-                *x = follow_room(*x, factor).clamp(-MOST_ASIDE, MOST_ASIDE);
+            for x in [left, right] {
+                *x = in_other_shape(*x, factor).clamp(-MOST_ASIDE, MOST_ASIDE);
             }
-            // Nothing of it is to be seen.
-            let is_outside = *right <= 0.0 || *left >= 1.0;
-            self.region.take_if(|_| is_outside);
         }
     }
 
-    /// What of the region is in the picture.
+    /// What of the region is in the picture, if anything.
     pub(super) fn seen_region(&self) -> Option<[f32; 4]> {
-        self.region.map(|region| region.map(|share| share.clamp(0.0, 1.0)))
+        let region = self.region?.map(|share| share.clamp(0.0, 1.0));
+        let [left, top, right, bottom] = region;
+        (left < right && top < bottom).then_some(region)
     }
 
     /// So few that the first picture does not wait for them: rendered paths teach the rest. Whatever ends the
@@ -218,7 +217,7 @@ impl Document {
     /// The render settings that follow for a picture of this size; `None` without a viewpoint.
     pub fn view(&self, width: u32, height: u32) -> Option<View> {
         let whole = [width, height];
-        let crop = self.region.map(|region| pixels_of(region, whole));
+        let crop = self.seen_region().map(|region| pixels_of(region, whole));
         let [width, height] = crop.map_or(whole, |(_, size)| size);
         Some(View {
             sampling: self.light.sampling,
@@ -257,8 +256,8 @@ pub(super) fn number_now(number: u32, before: &[Material], now: &[Material]) -> 
 /// A region may be marked where a wide window shows more than the one that is there now, but not farther aside.
 const MOST_ASIDE: f32 = 100.0;
 
-/// Where a share of the width lies in a room whose aspect was so many times what it is now: pictures share their middle.
-pub(super) fn follow_room(x: f32, factor: f32) -> f32 {
+/// What a share of the width is where the aspect was so many times what it is now: pictures share their middle.
+pub(super) fn in_other_shape(x: f32, factor: f32) -> f32 {
     0.5 + (x - 0.5) * factor
 }
 
@@ -427,7 +426,9 @@ mod tests {
         assert_eq!(document.seen_region(), Some([0.0, 0.2, 0.5, 0.8]));
         document.region = Some([0.0, 0.0, 0.1, 1.0]);
         document.follow_room(4.0);
-        assert_eq!(document.region, None);
+        assert_eq!(document.seen_region(), None, "it is outside");
+        document.follow_room(0.25);
+        assert!(document.seen_region().is_some(), "and comes back");
     }
 
     #[test]

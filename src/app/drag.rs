@@ -4,12 +4,12 @@
 
 use egui::{Event, Modifiers, PointerButton, Pos2, Ui, Vec2};
 
-/// A press that went no further than this is a click, in points; as egui has it.
-const CLICK_DISTANCE: f32 = 6.0;
+/// A press over the picture that went no further than this is a click, in points; as egui has it.
+pub(super) const CLICK_DISTANCE: f32 = 6.0;
 /// Longest step that is told, in points: long ones are cut, so that a fast pointer does the same.
 const LONGEST_STEP: f32 = 4.0;
 
-/// A button held over the picture.
+/// A button held.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drag {
     button: PointerButton,
@@ -18,6 +18,8 @@ pub struct Drag {
     /// Where the last step ended.
     at: Pos2,
     is_click: bool,
+    /// As long as it went no further than this, in points, it is a click.
+    slack: f32,
     /// Whether Ctrl was held at the press: that decides what it does to its end.
     pub(super) has_command: bool,
 }
@@ -60,23 +62,37 @@ impl Drag {
     }
 
     /// Follows what happens to a part of what is drawn in `ui`: a drag begins where `accepts` says so, unless something
-    /// else lies over it there.
+    /// else lies over it there, and once it went further than `slack` points.
     pub(super) fn follow_in(
         drag: &mut Option<Self>,
         ui: &Ui,
+        slack: f32,
         accepts: impl Fn(Pos2) -> bool,
     ) -> Vec<Step> {
         let (layer, context) = (ui.layer_id(), ui.ctx());
-        let (events, modifiers) = ui.input(|input| (input.events.clone(), input.modifiers));
+        let is_of_pointer = |event: &&Event| {
+            matches!(
+                event,
+                Event::PointerButton { .. } | Event::PointerMoved(_) | Event::WindowFocused(_)
+            )
+        };
+        let (events, modifiers, is_held) = ui.input(|input| {
+            let events: Vec<_> = input.events.iter().filter(is_of_pointer).cloned().collect();
+            (events, input.modifiers, input.pointer.any_down())
+        });
         let is_free = |at| context.layer_id_at(at).is_none_or(|there| there == layer);
-        Self::follow(drag, &events, modifiers, |at| accepts(at) && is_free(at))
+        let steps =
+            Self::follow(drag, &events, (modifiers, slack), |at| accepts(at) && is_free(at));
+        // It may have been let go while nobody followed.
+        drag.take_if(|_| !is_held);
+        steps
     }
 
     /// Follows a frame's events; a drag begins where `accepts` says so.
-    pub(super) fn follow(
+    fn follow(
         drag: &mut Option<Self>,
         events: &[Event],
-        mut modifiers: Modifiers,
+        (mut modifiers, slack): (Modifiers, f32),
         accepts: impl Fn(Pos2) -> bool,
     ) -> Vec<Step> {
         let mut steps = Vec::new();
@@ -87,7 +103,8 @@ impl Drag {
                 {
                     modifiers = held;
                     let has_command = held.command;
-                    *drag = Some(Self { button, from: pos, at: pos, is_click: true, has_command });
+                    let (from, at, is_click) = (pos, pos, true);
+                    *drag = Some(Self { button, from, at, is_click, slack, has_command });
                 }
                 Event::PointerMoved(to) => {
                     if let Some(drag) = drag {
@@ -111,7 +128,7 @@ impl Drag {
     }
 
     fn move_to(&mut self, to: Pos2, modifiers: Modifiers, steps: &mut Vec<Step>) {
-        self.is_click &= self.from.distance(to) < CLICK_DISTANCE;
+        self.is_click &= self.from.distance(to) < self.slack;
         if self.is_click {
             return;
         }
@@ -143,8 +160,9 @@ mod tests {
     /// The steps of a drag whose events come in frames of so many.
     fn steps(events_per_frame: usize) -> Vec<Step> {
         let mut drag = None;
-        let follow =
-            |events: &[Event]| Drag::follow(&mut drag, events, Modifiers::NONE, |at| at.x < 11.0);
+        let follow = |events: &[Event]| {
+            Drag::follow(&mut drag, events, (Modifiers::NONE, CLICK_DISTANCE), |at| at.x < 11.0)
+        };
         way().chunks(events_per_frame).flat_map(follow).collect()
     }
 
@@ -173,7 +191,9 @@ mod tests {
         let elsewhere = [press(far, true), Event::PointerMoved(near), press(near, false)];
         for events in [&click[..], &elsewhere[..]] {
             let mut drag = None;
-            let steps = Drag::follow(&mut drag, events, Modifiers::NONE, |at| at.x < 50.0);
+            let steps = Drag::follow(&mut drag, events, (Modifiers::NONE, CLICK_DISTANCE), |at| {
+                at.x < 50.0
+            });
             assert_eq!((steps, drag), (Vec::new(), None));
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::comparison::Comparison;
-use super::document::{Document, PictureSize, Viewpoint, follow_room, number_now};
+use super::document::{Document, PictureSize, Viewpoint, in_other_shape, number_now};
 use super::interface::Chosen;
 use super::loader::{Kind, Loaded, LoadedMap, LoadedScene};
 use super::presenter::{Order, Shown};
@@ -56,7 +56,10 @@ impl App {
                     self.messages.opened(Kind::Map);
                     self.settings.recent_map(&map.name);
                     self.has_news |= self.settings.recent_maps != self.settings_before.recent_maps;
-                    self.keep_small_map(&map.name, Arc::clone(&map.preview));
+                    // Not as it is with another sun.
+                    if map.sun_factor == 1.0 {
+                        self.keep_small_map(&map.name, Arc::clone(&map.preview));
+                    }
                     self.map = Some(map);
                     self.inspector.forget();
                 }
@@ -94,8 +97,8 @@ impl App {
         }
         while let Ok(later) = self.later.1.try_recv() {
             match later {
-                Later::Chosen(purpose, path) => {
-                    self.take_chosen(purpose, path.as_deref(), context);
+                Later::Chosen(number, path) => {
+                    self.take_chosen(number, path.as_deref(), context);
                 }
                 Later::SmallMaps(maps) => {
                     maps.into_iter().for_each(|map| self.small_maps.take(map, context));
@@ -139,6 +142,7 @@ impl App {
         let is_here =
             |shown: &Arc<Shown>| Arc::ptr_eq(&shown.order.developer, &self.screen.developer);
         self.shown = self.presenter.shown().filter(is_here);
+        self.follow_shape();
         self.inspect();
         let shown = self.shown.as_deref();
         if let Some(failure) = shown.and_then(|shown| shown.failure.clone()) {
@@ -311,22 +315,30 @@ impl App {
         }
     }
 
-    /// Keeps the region and the inspected place on the same parts of the scene where the room for the picture has got
-    /// another shape: the field of view is vertical.
+    /// Keeps the region on the same part of the scene where the room for the picture has got another shape: the field
+    /// of view is vertical.
     fn follow_room(&mut self) {
         let Some(room) = self.interface.viewport_pixels else { return };
         let before = self.room.replace(room).filter(|before| *before != room);
         let Some(before) = before else { return };
         let aspect = |[width, height]: [u32; 2]| width as f32 / height as f32;
         let factor = aspect(before) / aspect(room);
-        let region = self.document.region;
         self.document.follow_room(factor);
         self.undo.change_all(|document| document.follow_room(factor));
-        let fills_room = matches!(self.document.size, PictureSize::Viewport(_));
-        if let Some(place) = self.interface.pinned.filter(|_| fills_room && region.is_none()) {
-            let x = follow_room(place.x, factor);
-            let is_inside = (0.0..=1.0).contains(&x);
-            self.interface.pinned = is_inside.then_some(Vec2::new(x, place.y));
+    }
+
+    /// Keeps the inspected place there, too, where another picture is shown.
+    fn follow_shape(&mut self) {
+        let Some(shown) = &self.shown else { return };
+        let view = shown.order.snapshot.view();
+        if view.crop.is_some() {
+            return;
+        }
+        let aspect = view.width as f32 / view.height.max(1) as f32;
+        let before = self.shown_aspect.replace(aspect).filter(|before| *before != aspect);
+        if let Some((before, place)) = before.zip(self.interface.pinned) {
+            let place = Vec2::new(in_other_shape(place.x, before / aspect), place.y);
+            self.interface.pinned = Some(place).filter(|place| (0.0..=1.0).contains(&place.x));
         }
     }
 

@@ -12,7 +12,7 @@ use super::history;
 use super::interface::{Chosen, Purpose, Tab};
 use super::screen::color_image;
 use super::settings_file::lasting_scene;
-use super::worker::{Activity, Reference};
+use super::worker::{Activity, Origin, Reference};
 use super::{App, Later, convergence, lock, save, surface_map, theme};
 use crate::error::Result;
 use crate::image::read_picture;
@@ -228,12 +228,16 @@ impl App {
         let Some(shown) = &self.shown else { return };
         let snapshot = &shown.order.snapshot;
         let view = &snapshot.request.view;
-        let of_size = shown.image.clone();
+        // One that was resized is shown with it for a moment, and is none of it.
+        let is_resized = snapshot.backdrop.as_ref().is_some_and(|b| b.origin == Origin::Resized);
+        let of_size = shown.image.clone().filter(|_| !is_resized);
         let of_size =
             of_size.filter(|image| (image.width, image.height) == (view.width, view.height));
         // As long as a smaller picture says more, it is that which is shown.
-        let is_small =
-            shown.image.is_some() && of_size.is_none() && snapshot.activity != Activity::Done;
+        let is_small = shown.image.is_some()
+            && of_size.is_none()
+            && !is_resized
+            && snapshot.activity != Activity::Done;
         if !snapshot.is_lasting() || is_small || !self.is_of_document(snapshot) {
             self.messages.notice("A picture can be kept once it has its full size");
             return;
@@ -400,8 +404,17 @@ impl App {
 
     /// Writes a file on a thread, for which the end of the window waits.
     fn write(&mut self, name: &str, work: impl FnOnce() -> Result<String> + Send + 'static) {
+        self.write_later(name, || work().map(Later::Done));
+    }
+
+    /// The same of one that brings something else than a sentence.
+    pub(super) fn write_later(
+        &mut self,
+        name: &str,
+        work: impl FnOnce() -> Result<Later> + Send + 'static,
+    ) {
         self.writing.retain(|thread| !thread.is_finished());
-        let thread = self.do_later(name, || work().map(Later::Done));
+        let thread = self.do_later(name, work);
         self.writing.extend(thread);
     }
 

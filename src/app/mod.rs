@@ -59,7 +59,7 @@ use document::Document;
 use exchange::Lit;
 use history::History;
 use inspect::Inspector;
-use interface::{Interface, Purpose};
+use interface::Interface;
 use kept_picture::KeptPicture;
 use loader::{LoadedMap, LoadedScene, Loader};
 use messages::Messages;
@@ -154,6 +154,8 @@ pub struct App {
     is_closing: bool,
     /// Pixels of the room that the picture has had last.
     room: Option<[u32; 2]>,
+    /// Width over height of the whole picture that was shown last.
+    shown_aspect: Option<f32>,
     /// The size of the picture for which there is memory, and the region.
     affordable: (document::PictureSize, Option<[f32; 4]>),
 }
@@ -165,8 +167,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// What comes back from a thread.
 enum Later {
-    /// Somebody chose a file, or none.
-    Chosen(Purpose, Option<String>),
+    /// Somebody chose a file in the dialogue of this number, or none.
+    Chosen(u32, Option<String>),
     /// A file was written.
     Done(String),
     /// Something failed.
@@ -241,6 +243,7 @@ impl App {
             toggles_full_screen: false,
             is_closing: false,
             room: None,
+            shown_aspect: None,
             affordable: (document::PictureSize::Viewport(1), None),
         };
         app.begin_small_maps(start.small_maps);
@@ -250,7 +253,6 @@ impl App {
     /// One frame: collects, draws, carries out, sends down.
     pub fn show(&mut self, ui: &mut egui::Ui) {
         let context = ui.ctx().clone();
-        self.desktop.notice_focus(context.input(|input| input.focused));
         self.collect(&context);
         let mut commands = commands::pressed(&context, self.interface.is_modal());
         commands.extend(self.dropped_files(&context));

@@ -3,6 +3,8 @@
 use glam::{Quat, Vec2, Vec3};
 
 use super::document::Viewpoint;
+use crate::bvh::Ray;
+use crate::path::World;
 
 /// Radians of a turn for one point of dragging.
 const RADIANS_PER_POINT: f32 = 0.006;
@@ -11,12 +13,56 @@ const NEAREST: f32 = 0.02;
 /// Share of the picture that framing fills.
 const FRAME_FILL: f32 = 0.9;
 
+/// Directions in which one looks for the walls of a room.
+const LOOKS: usize = 64;
+/// Share of them that meet something in a room.
+const ENCLOSED: f32 = 0.85;
+
+/// Whether something is within so many metres.
+fn is_met(world: &World, origin: Vec3, direction: Vec3, metres: f32) -> bool {
+    let ray = Ray { origin, direction, t_min: 0.0, t_max: metres };
+    direction != Vec3::ZERO && world.bvh.any_hit(&ray, |_| true)
+}
+
+/// Whether there are walls nearly everywhere around a place.
+fn is_in_room(world: &World, place: Vec3) -> bool {
+    // A Fibonacci lattice: even, and the same every time.
+    let golden_angle = std::f32::consts::PI * (3.0 - 5.0_f32.sqrt());
+    let direction = |i: usize| {
+        let y = 1.0 - (2 * i + 1) as f32 / LOOKS as f32;
+        let (sin, cos) = (golden_angle * i as f32).sin_cos();
+        let radius = (1.0 - y * y).sqrt();
+        Vec3::new(radius * cos, y, radius * sin)
+    };
+    let met = (0..LOOKS).filter(|i| is_met(world, place, direction(*i), f32::INFINITY)).count();
+    met as f32 >= ENCLOSED * LOOKS as f32
+}
+
 impl Viewpoint {
     /// Turns about the pivot: `drag` in points, right and down.
     pub(super) fn orbit(&mut self, drag: Vec2) {
         let pivot = self.pivot();
         self.turn(drag);
         self.eye = (pivot - self.forward() * self.pivot_distance).to_array();
+    }
+
+    /// Orbits, unless a wall is in the way or the way leads out of a room, through a window: then the camera turns where
+    /// it is.
+    pub(super) fn orbit_within(&mut self, world: Option<&World>, drag: Vec2) {
+        let mut moved = self.clone();
+        moved.orbit(drag);
+        let is_blocked = world.is_some_and(|world| {
+            let way = moved.eye() - self.eye();
+            // Some room to the wall is kept.
+            let margin = 0.1 * way.length() + 0.02 * self.pivot_distance;
+            is_met(world, self.eye(), way.normalize_or_zero(), way.length() + margin)
+                || is_in_room(world, self.eye()) && !is_in_room(world, moved.eye())
+        });
+        if is_blocked {
+            self.look_around(drag);
+        } else {
+            *self = moved;
+        }
     }
 
     /// Turns about the eye: `drag` in points, right and down.
@@ -156,5 +202,35 @@ mod tests {
                 assert!(seen.x.abs() < slope * aspect * -seen.z, "{corner} at {aspect}");
             }
         }
+    }
+
+    #[test]
+    fn who_orbits_in_a_room_leaves_it_neither_through_walls_nor_windows() {
+        for scene in ["office", "living-room", "crack"] {
+            let world = World::new(crate::scene::builtin::build(scene).expect("built in"));
+            let (low, high) = world.bvh.bounds();
+            for camera in &world.scene.cameras {
+                for way in [Vec2::X, -Vec2::X, Vec2::new(0.9, 0.4), Vec2::new(-0.6, -0.8)] {
+                    let mut viewpoint = Viewpoint::of(camera, 4.0);
+                    let before = viewpoint.rotation();
+                    for _ in 0..300 {
+                        viewpoint.orbit_within(Some(&world), 4.0 * way);
+                        let eye = viewpoint.eye();
+                        assert!(eye.cmpge(low).all() && eye.cmple(high).all(), "{scene}: {eye}");
+                        assert!(is_in_room(&world, eye), "{scene}: {eye} is outside");
+                    }
+                    assert!(viewpoint.rotation().angle_between(before) > 0.1, "{scene}: it turns");
+                }
+            }
+        }
+        // Around a thing one goes as one likes.
+        let world = World::new(crate::scene::builtin::build("open").expect("built in"));
+        let mut viewpoint = Viewpoint::of(&world.scene.cameras[0], 4.0);
+        let mut free = viewpoint.clone();
+        for _ in 0..100 {
+            viewpoint.orbit_within(Some(&world), Vec2::new(4.0, 0.0));
+            free.orbit(Vec2::new(4.0, 0.0));
+        }
+        assert!(viewpoint.eye().distance(free.eye()) < 1e-3);
     }
 }

@@ -68,22 +68,25 @@ impl App {
     pub(super) fn keep_small_map(&mut self, name: &str, preview: Arc<Image>) {
         let (name, folder) = (lasting_map(name), self.small_maps.folder.clone());
         let is_of_file = self.settings.recent_maps.contains(&name);
-        let thread = self.do_later("small map", move || {
+        self.write_later("small map", move || {
             let small = in_small(&preview);
             if let Some(folder) = folder.filter(|_| is_of_file) {
                 // Without it the list has no picture, and no more is lost.
-                let _ = std::fs::create_dir_all(&folder)
-                    .is_ok_and(|()| write_png(&file_of(&folder, &name), &small, &[]).is_ok());
+                let _ = std::fs::create_dir_all(&folder);
+                let _ = write_png(&file_of(&folder, &name), &small, &[]);
             }
             Ok(Later::SmallMaps(vec![(name, small)]))
         });
-        self.writing.extend(thread);
     }
 }
 
 fn in_small(map: &Image) -> Rgb8 {
-    let small = map.shrunk(WIDTH);
-    display_rgb8(&small, auto_exposure_ev(&small) + 0.5, ToneCurve::Agx)
+    displayed(&map.shrunk(WIDTH))
+}
+
+/// A map as panels and lists show it.
+pub(super) fn displayed(map: &Image) -> Rgb8 {
+    display_rgb8(map, auto_exposure_ev(map) + 0.5, ToneCurve::Agx)
 }
 
 fn file_of(folder: &Path, name: &str) -> PathBuf {
@@ -101,7 +104,11 @@ fn read_small(folder: &Path, name: &str) -> Option<Rgb8> {
 /// Removes the oldest files where there are too many.
 fn tidy(folder: &Path) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
-    let is_ours = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "png");
+    let is_ours = |path: &PathBuf| {
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default();
+        let is_digest = stem.len() == 16 && stem.chars().all(|digit| digit.is_ascii_hexdigit());
+        is_digest && path.extension().is_some_and(|extension| extension == "png")
+    };
     let mut files: Vec<(SystemTime, PathBuf)> = entries
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(is_ours)
@@ -133,12 +140,16 @@ mod tests {
         assert_eq!(read_small(folder.path(), name), None);
         let start = SystemTime::now() - std::time::Duration::from_secs(1000);
         for age in 0..MOST as u64 + 2 {
-            let path = folder.path().join(format!("{age}.png"));
+            let path = folder.path().join(format!("{age:016x}.png"));
             let file = std::fs::File::create(path).expect("made");
             file.set_modified(start - std::time::Duration::from_secs(age)).expect("dated");
         }
+        let other = folder.path().join("holiday.png");
+        let file = std::fs::File::create(&other).expect("made");
+        file.set_modified(SystemTime::UNIX_EPOCH).expect("dated");
         tidy(folder.path());
-        let is_there = |age: usize| folder.path().join(format!("{age}.png")).exists();
+        assert!(other.exists(), "it is somebody's");
+        let is_there = |age: usize| folder.path().join(format!("{age:016x}.png")).exists();
         assert!(file_of(folder.path(), name).exists(), "the newest");
         assert!(is_there(MOST - 2) && !is_there(MOST - 1) && !is_there(MOST + 1));
     }

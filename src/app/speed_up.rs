@@ -71,14 +71,18 @@ fn block_errors(session: &SessionSnapshot, lights: &[f64]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
+    use std::sync::{Arc, OnceLock};
 
     use glam::Vec3;
 
     use super::*;
-    use crate::path::PathResult;
+    use crate::environment::{Environment, EnvironmentOptions, sky};
+    use crate::metrics::compare;
+    use crate::path::{PathResult, World};
     use crate::render::film::Film;
-    use crate::render::{Figures, Sampling};
+    use crate::render::{Figures, Phase, Sampling, Session, Sharing, StopRule, View};
+    use crate::scene::builtin;
 
     /// A picture of so many samples a pixel whose logarithms are normal with deviation `sigma`.
     fn rendered(seed: u64, samples: u32, sigma: f32) -> SessionSnapshot {
@@ -132,5 +136,71 @@ mod tests {
             SpeedUp::of(&rendered(1, 64, 0.7), &rendered(2, 16, 0.7)).expect("enough samples");
         assert!((found.ratio / 4.0).ln().abs() <= found.factor.ln().max(0.1), "{found:?}");
         assert_eq!(SpeedUp::of(&rendered(1, 7, 0.7), &rendered(2, 16, 0.7)), None);
+    }
+
+    const SIZE: [u32; 2] = [48, 32];
+
+    /// The office under the sun, rendered as the window does.
+    fn office(sampling: Sampling, seed: u32, samples: u32) -> SessionSnapshot {
+        static SCENE: OnceLock<(World, Environment)> = OnceLock::new();
+        let (world, environment) = SCENE.get_or_init(|| {
+            let map = sky::build("day", 256, 128).expect("a sky");
+            let environment = Environment::new(map, &EnvironmentOptions::default());
+            let world = World::new(builtin::build("office").expect("built in"));
+            (world, environment.expect("a sound map"))
+        });
+        let camera = world.scene.cameras[0].clone();
+        let learning_paths = 1 << 13;
+        let view = View {
+            sampling,
+            seed,
+            sharing: Sharing::Off,
+            learning_paths,
+            ..View::new(camera, SIZE)
+        };
+        let mut session = Session::new(world, environment, view);
+        let rule = StopRule { samples: Some(samples), ..StopRule::default() };
+        while session.phase() == Phase::Learning || !session.is_done(&rule) {
+            let pass = session.next_pass(&rule);
+            session.advance(pass, &AtomicBool::new(false)).expect("no GPU");
+        }
+        let figures = session.figures();
+        SessionSnapshot {
+            samples: session.samples(),
+            film: Arc::new(session.film().clone()),
+            // What is compared does not depend on the clock.
+            figures: Figures { render_seconds: 1.0, learning_seconds: 0.0, ..figures },
+            ..rendered(0, 1, 1.0)
+        }
+    }
+
+    #[test]
+    fn a_real_method_against_itself_is_as_fast() {
+        let runs = 16;
+        let covered = (0..runs).filter(|run| {
+            let [one, other] = [2 * run, 2 * run + 1].map(|s| office(Sampling::Adaptive, s, 16));
+            let found = SpeedUp::of(&one, &other).expect("enough samples");
+            println!("{found:?}");
+            found.ratio.ln().abs() <= found.factor.ln()
+        });
+        // One in a hundred such tests would find fewer.
+        assert!(covered.count() >= 13);
+    }
+
+    #[test]
+    fn what_is_told_of_one_run_is_what_a_reference_tells_of_many() {
+        let reference = office(Sampling::Adaptive, 100, 1024).film.image();
+        let (mut told, mut found) = (0.0, [0.0; 2]);
+        let seeds = 6;
+        for seed in 0..seeds {
+            let takes = [Sampling::Adaptive, Sampling::Plain].map(|how| office(how, seed, 32));
+            told += SpeedUp::of(&takes[0], &takes[1]).expect("enough samples").ratio.ln();
+            for (sum, take) in found.iter_mut().zip(&takes) {
+                *sum += compare(&take.film.image(), &reference).expect("of a size").trimmed_rel_mse;
+            }
+        }
+        let (told, found) = ((told / f64::from(seeds)).exp(), found[1] / found[0]);
+        println!("{told:.2} told, {found:.2} found");
+        assert!(found > 2.0 && (told / found).ln().abs() < 1.4_f64.ln(), "{told}, {found}");
     }
 }

@@ -232,6 +232,27 @@ fn errors_are_measured_against_a_reference_where_it_shows_the_same() {
     }
 }
 
+#[test]
+fn the_truth_of_another_map_is_never_shown() {
+    let Some(mut studio) = studio("open") else { return };
+    studio.app.interface.tab = Tab::Inspect;
+    studio.app.interface.pinned = Some(glam::Vec2::new(0.5, 0.9));
+    let measured = |studio: &mut Studio| {
+        studio.measure_truth().expect("rendered");
+        studio.settle().expect("measured");
+        studio.app.inspector.truth().expect("there").shares.clone()
+    };
+    let day = measured(&mut studio);
+    // One that is still being measured when the map changes, too.
+    studio.asks(Command::MeasureTruth);
+    studio.asks(Command::OpenMap("sky:overcast@64x32".to_owned()));
+    studio.settle().expect("rendered");
+    studio.frame().expect("drawn");
+    assert!(studio.app.inspector.inspected().is_some());
+    assert!(studio.app.inspector.truth().is_none(), "it is the old map's");
+    assert_ne!(measured(&mut studio), day);
+}
+
 /// A triangle, its positions in the file itself.
 const TRIANGLE: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],

@@ -7,8 +7,8 @@ use std::mem::discriminant;
 use egui::{Event, Key};
 
 /// Leaves in `events` what may be taken in one frame: presses of keys or of buttons, not both, no button let go
-/// that was pressed in it, and Tab, which completes what is typed, without anything typed before or after it.
-/// The rest is returned; it is meant for the next frame.
+/// that was pressed in it, Tab, which completes what is typed, without anything typed before or after it, and nothing
+/// typed after Enter, which ends that. The rest is returned; it is meant for the next frame.
 pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
     let is_press = |event: &&Event| {
         matches!(
@@ -18,7 +18,7 @@ pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
     };
     let first = events.iter().find(is_press).map(discriminant);
     let is_other = |event: &Event| is_press(&event) && first != Some(discriminant(event));
-    let (mut is_down, mut typed) = (false, None);
+    let (mut is_down, mut typed, mut is_entered) = (false, None, false);
     let ends = |event: &Event| {
         let is_button =
             |down| matches!(event, Event::PointerButton { pressed, .. } if *pressed == down);
@@ -28,9 +28,11 @@ pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
             event,
             Event::Text(_) | Event::Paste(_) | Event::Ime(_) | Event::Key { pressed: true, .. }
         );
+        let is_after_enter = is_typing && is_entered;
+        is_entered |= matches!(event, Event::Key { key: Key::Enter, pressed: true, .. });
         let is_beside_tab = is_typing && typed.is_some_and(|was_tab| was_tab || is_tab);
         typed = if is_typing { Some(is_tab) } else { typed };
-        is_other(event) || (is_down && is_button(false)) || is_beside_tab
+        is_other(event) || (is_down && is_button(false)) || is_beside_tab || is_after_enter
     };
     let end = events.iter().position(ends).unwrap_or(events.len());
     events.split_off(end)
@@ -67,6 +69,7 @@ mod tests {
             vec![key(Key::Tab)],
             vec![key(Key::Tab)],
             vec![key(Key::C), text("c"), key(Key::Enter)],
+            vec![key(Key::D), text("d"), key(Key::Enter)],
         ];
         check(&turns);
     }

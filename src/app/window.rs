@@ -312,6 +312,7 @@ impl Running {
     fn note_size(&mut self, size: PhysicalSize<u32>) {
         let is_usual =
             self.window.is_minimized() != Some(true) && self.window.fullscreen().is_none();
+        let is_usual = is_usual && !self.window.is_maximized();
         if size.width > 0 && size.height > 0 && is_usual {
             let size = size.to_logical(self.window.scale_factor());
             self.usual_size = Some([size.width, size.height]);
@@ -498,6 +499,7 @@ impl ApplicationHandler<Call> for Runner {
                     gpu.alone(|| painter.on_window_resized(ViewportId::ROOT, width, height));
                 }
             }
+            WindowEvent::Focused(false) => running.app.lose_focus(),
             WindowEvent::KeyboardInput { .. }
             | WindowEvent::MouseInput { .. }
             | WindowEvent::MouseWheel { .. }

@@ -101,11 +101,13 @@ fn python_prefixes() -> impl Iterator<Item = PathBuf> {
 }
 
 /// The libraries of the pip package below these prefixes of Python, in their order, and of each prefix the
-/// newest Python's first: those in `lib/python3.12/site-packages`, or Debian's `lib/python3/dist-packages`.
+/// newest Python's first: those in `lib/python3.12/site-packages`, Fedora's `lib64/…` or Debian's
+/// `lib/python3/dist-packages`.
 /// A prefix is looked into when it is reached.
 fn installed_by_pip(prefixes: impl Iterator<Item = PathBuf>) -> impl Iterator<Item = PathBuf> {
     prefixes
-        .flat_map(|prefix| newest_first(&prefix.join("lib"), "python"))
+        .flat_map(|prefix| ["lib", "lib64"].map(|lib| prefix.join(lib)))
+        .flat_map(|lib| newest_first(&lib, "python"))
         .flat_map(|python| ["site-packages", "dist-packages"].map(|packages| python.join(packages)))
         .flat_map(|packages| libraries_in(&packages.join(PLACE_IN_PACKAGES)))
 }

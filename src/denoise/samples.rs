@@ -61,9 +61,11 @@ impl<'a> Samples<'a> {
     }
 
     fn fuller(&self, index: usize) -> &Film {
-        let count = |film: &Film| film.pixels()[index].samples();
-        let other = self.other.map(|(other, _)| other);
-        other.filter(|other| count(other) > count(self.film)).unwrap_or(self.film)
+        let count = |film: &Film| film.pixels()[index].samples() as f32;
+        // What counts less than its number is not as sharp.
+        let is_fuller =
+            |(other, worth): &(&Film, f32)| worth.min(1.0) * count(other) > count(self.film);
+        self.other.filter(is_fuller).map_or(self.film, |(other, _)| other)
     }
 
     /// The picture as it is.

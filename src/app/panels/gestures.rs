@@ -10,12 +10,10 @@ use glam::Vec3;
 use super::scope::Scope;
 use crate::app::commands::Command;
 use crate::app::document::Viewpoint;
-use crate::app::drag::{Drag, Step};
+use crate::app::drag::{CLICK_DISTANCE, Drag, Step};
 use crate::app::interface::Tab;
-use crate::app::loader::LoadedScene;
 use crate::app::surface_map::{Spot, look_at_place};
 use crate::app::theme;
-use crate::bvh::Ray;
 
 /// Takes gestures in the picture: `whole` is all of it, `rect` the part that is rendered, and what
 /// begins on `handle` is not meant for it.
@@ -28,7 +26,7 @@ pub(super) fn show(
 ) {
     let is_free = !scope.interface.is_modal();
     let accepts = |at: Pos2| is_free && response.rect.contains(at) && !handle.contains(at);
-    let steps = Drag::follow_in(&mut scope.interface.drag, ui, accepts);
+    let steps = Drag::follow_in(&mut scope.interface.drag, ui, CLICK_DISTANCE, accepts);
     let modifiers = ui.input(|input| input.modifiers);
     if scope.interface.is_marking {
         mark_region(ui, whole, &steps, scope);
@@ -121,7 +119,7 @@ fn travel(ui: &Ui, whole: Rect, response: &Response, steps: &[Step], scope: &mut
         } else if button == PointerButton::Middle || modifiers.shift {
             viewpoint.pan(by, whole.height());
         } else {
-            orbit(viewpoint, by, scope.scene);
+            viewpoint.orbit_within(scope.scene.map(|scene| &*scene.world), by);
         }
     }
     if response.hovered() {
@@ -147,26 +145,6 @@ fn travel(ui: &Ui, whole: Rect, response: &Response, steps: &[Step], scope: &mut
 fn place_of(rect: Rect, at: Pos2) -> glam::Vec2 {
     let place = (at - rect.min) / rect.size();
     glam::Vec2::new(place.x, place.y)
-}
-
-/// Orbits, unless a wall is in the way: then the camera turns where it is, and stays in its room.
-fn orbit(viewpoint: &mut Viewpoint, drag: glam::Vec2, scene: Option<&LoadedScene>) {
-    let mut moved = viewpoint.clone();
-    moved.orbit(drag);
-    let step = moved.eye() - viewpoint.eye();
-    let is_blocked = scene.is_some_and(|scene| {
-        // Some room to the wall is kept.
-        let margin = 0.1 * step.length() + 0.02 * viewpoint.pivot_distance;
-        let direction = step.normalize_or_zero();
-        let ray =
-            Ray { origin: viewpoint.eye(), direction, t_min: 0.0, t_max: step.length() + margin };
-        direction != Vec3::ZERO && scene.world.bvh.any_hit(&ray, |_| true)
-    });
-    if is_blocked {
-        viewpoint.look_around(drag);
-    } else {
-        *viewpoint = moved;
-    }
 }
 
 /// The surface under a click.

@@ -89,8 +89,8 @@ fn scene(ui: &mut Ui, document: &Document, sources: Sources<'_>, commands: &mut 
                 chosen = Some((*name).to_owned());
             }
         }
-        let of_name = |_: &str| None;
-        recent(ui, &sources.settings.recent_scenes, &document.scene, of_name, &mut chosen);
+        let files = &sources.settings.recent_scenes;
+        recent(ui, files, &document.scene, |_| None, &mut chosen);
     });
     commands.extend(chosen.map(Command::OpenScene));
     if let Some(scene) = sources.scene {
@@ -204,8 +204,10 @@ fn environment(
         let turn = document.rotation_degrees / 360.0;
         let response = map_view::preview(ui, map, turn);
         let (is_free, seen) = (!interface.is_modal(), response.rect.intersect(ui.clip_rect()));
+        // The panel's scroll bar lies over its edge.
+        let seen = seen.with_max_x(seen.right() - ui.spacing().scroll.bar_width);
         let drag = &mut interface.map_drag;
-        let steps = Drag::follow_in(drag, ui, |at| is_free && seen.contains(at));
+        let steps = Drag::follow_in(drag, ui, 0.0, |at| is_free && seen.contains(at));
         if drag.is_some_and(|drag| drag.span().is_some()) || !steps.is_empty() {
             let way: f32 = steps.iter().map(Step::right).sum();
             let degrees = way / response.rect.width() * 360.0;

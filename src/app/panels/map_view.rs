@@ -6,8 +6,8 @@ use egui::{Color32, Pos2, Rect, Response, Sense, TextureHandle, TextureOptions, 
 
 use crate::app::loader::LoadedMap;
 use crate::app::screen::color_image;
+use crate::app::small_maps::displayed;
 use crate::image::Image;
-use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
 
 /// Points of a small picture.
 const SMALL: Vec2 = Vec2::new(48.0, 24.0);
@@ -69,8 +69,8 @@ fn texture(ui: &Ui, image: &Arc<Image>) -> TextureHandle {
     if let Some((texture, _)) = kept.filter(|(_, of)| Arc::ptr_eq(of, image)) {
         return texture;
     }
-    let rgb = display_rgb8(image, auto_exposure_ev(image) + 0.5, ToneCurve::Agx);
-    let texture = ui.ctx().load_texture("map", color_image(&rgb), TextureOptions::LINEAR);
+    let picture = color_image(&displayed(image));
+    let texture = ui.ctx().load_texture("map", picture, TextureOptions::LINEAR);
     ui.ctx().data_mut(|data| data.insert_temp(id, (texture.clone(), Arc::clone(image))));
     texture
 }

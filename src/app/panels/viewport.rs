@@ -47,9 +47,9 @@ pub(in crate::app) fn show(ui: &mut Ui, scope: &mut Scope<'_>) -> Rect {
             handle = beside(ui, &places, (shown, other), settings, scope);
         } else {
             scope.textures.other = None;
-            compared.filter(|compared| compared.is_difference).into_iter().for_each(|compared| {
+            if let Some(compared) = compared.filter(|compared| compared.is_difference) {
                 difference_label(ui, seen, &compared.names, shown.difference);
-            });
+            }
         }
         gestures::show(ui, (whole, rect), &response, handle, scope);
         gestures::zoom(ui, (area, whole), &response, scope);
@@ -68,11 +68,7 @@ struct Places {
     whole: Rect,
     /// What is shown.
     rect: Rect,
-    /// Where the whole would fit.
-    fitting: Rect,
-    zoom: Zoom,
-    /// Moves the magnified picture's corner onto one of the screen's pixels.
-    shift: Vec2,
+    zoomed: Zoomed,
 }
 
 impl Places {
@@ -96,15 +92,26 @@ impl Places {
         let zoom = scope.interface.zoom;
         let corner = zoom.of(area, fitting, fitting).min.to_vec2() * scale;
         let shift = if zoom.is_some() { (corner.round() - corner) / scale } else { Vec2::ZERO };
-        let room = (area, scale);
-        let mut places = Self { room, whole: fitting, rect, fitting, zoom, shift };
-        (places.whole, places.rect) = (places.zoomed(fitting), places.zoomed(rect));
-        places
+        let zoomed = Zoomed { area, fitting, zoom, shift };
+        let (whole, rect) = (zoomed.of(fitting), zoomed.of(rect));
+        Self { room: (area, scale), whole, rect, zoomed }
     }
+}
 
+/// How the picture is magnified.
+struct Zoomed {
+    area: Rect,
+    /// Where the whole would fit.
+    fitting: Rect,
+    zoom: Zoom,
+    /// Moves the magnified picture's corner onto one of the screen's pixels.
+    shift: Vec2,
+}
+
+impl Zoomed {
     /// Where something lies that would lie here if all fitted.
-    fn zoomed(&self, rect: Rect) -> Rect {
-        self.zoom.of(self.room.0, self.fitting, rect).translate(self.shift)
+    fn of(&self, rect: Rect) -> Rect {
+        self.zoom.of(self.area, self.fitting, rect).translate(self.shift)
     }
 }
 
@@ -124,12 +131,12 @@ fn beside(
     let compared = shown.order.compared.as_ref();
     let of_left = compared.map_or(places.rect, |compared| {
         let (of_whole, part) = kept_rects(places.room, other.size(), compared.regions[0]);
-        if !is_alike(of_whole, places.fitting) {
+        if !is_alike(of_whole, places.zoomed.fitting) {
             // Beside another shape nothing is to be seen of what lies under it.
             let hidden = left_of(seen, seen, scope.interface.wipe);
             ui.painter().rect_filled(hidden, 0.0, theme::BACKGROUND);
         }
-        places.zoomed(part)
+        places.zoomed.of(part)
     });
     let has_squares = has_squares(other, shown, scope);
     let shape = source.shape(of_left, has_squares);
@@ -350,7 +357,8 @@ fn wipe(ui: &Ui, (rect, of_left): (Rect, Rect), picture: Shape, interface: &mut 
     let response = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());
     let is_free = !interface.is_modal();
     let drag = &mut interface.wipe_drag;
-    let steps = Drag::follow_in(drag, ui, |at| is_free && handle.contains(at));
+    let seen = handle.intersect(ui.clip_rect());
+    let steps = Drag::follow_in(drag, ui, 0.0, |at| is_free && seen.contains(at));
     let ended = steps.iter().find_map(|step| match step {
         Step::End { to, .. } => Some(*to),
         Step::Move { .. } => None,

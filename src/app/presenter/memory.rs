@@ -119,7 +119,8 @@ impl Memory {
         })?;
         let (mut other, mut difference, mut uncompared) = (None, None, None);
         if let Some(comparison) = &order.compared {
-            let now = || image.clone().unwrap_or_else(|| Arc::new(source.session.film.image()));
+            let own = image.clone().filter(|_| !source.is_resized());
+            let now = || own.unwrap_or_else(|| Arc::new(source.session.film.image()));
             let of = comparison.shows_now().then(|| source.clone());
             let compare = || Ok(comparison.prepare(&developer, now));
             let compared = self.uploads.compared.or_make((comparison.clone(), of), compare)?;

@@ -104,6 +104,15 @@ impl Source {
             }
     }
 
+    /// Whether a picture from before its size changed counts with it.
+    pub(super) fn is_resized(&self) -> bool {
+        self.is_of(Origin::Resized)
+    }
+
+    fn is_of(&self, origin: Origin) -> bool {
+        self.backdrop.as_ref().is_some_and(|backdrop| backdrop.origin == origin)
+    }
+
     /// The picture on the device, without noise if that is asked for.
     pub(super) fn prepare(&self, developer: &Developer) -> Prepared {
         let film = &self.session.film;
@@ -123,11 +132,8 @@ impl Source {
         let other = backdrop.filter(|(other, worth)| {
             film.is_alike(other) && *worth > 0.0 && (has_all || other.min_samples() > 0)
         });
-        let is_of = |origin: Origin| {
-            other.is_some() && self.backdrop.as_ref().is_some_and(|b| b.origin == origin)
-        };
-        let is_resized = is_of(Origin::Resized);
-        let is_blended = is_resized || is_of(Origin::Cache);
+        let is_resized = other.is_some() && self.is_resized();
+        let is_blended = other.is_some() && !self.is_of(Origin::Before);
         let is_surpassed =
             |(other, _): (&Film, f32)| other.total_samples() <= FILTER_WORTH * film.total_samples();
         let can_filter = other.is_some() || (has_all && backdrop.is_none_or(is_surpassed));

@@ -159,9 +159,9 @@ pub(crate) struct Backdrop {
 pub(crate) enum Origin {
     /// A radiance cache.
     Cache,
-    /// A picture of the same view that was rendered before, in any size.
+    /// A picture of the same view that was rendered before, as it is: it may be a small one.
     Before,
-    /// The same, resized to that of the picture, of which it may show less.
+    /// One of another size, resized to that of the picture, of which it may show less.
     Resized,
 }
 
@@ -220,7 +220,8 @@ impl Snapshot {
     pub(crate) fn has_picture(&self) -> bool {
         let is_paused = self.activity == Activity::Paused && self.main.figures.samples > 0;
         // What is resized may lack the sides.
-        let is_backed = |backdrop: &Backdrop| backdrop.origin != Origin::Resized;
+        let is_backed =
+            |backdrop: &Backdrop| backdrop.origin != Origin::Resized || backdrop.film.is_begun();
         self.backdrop.as_ref().is_some_and(is_backed) || is_paused || self.main.is_begun()
     }
 }

@@ -8,7 +8,7 @@ use crate::render::film::Film;
 
 /// Samples a pixel of it: with them it is as good, denoised, as the exact one with twice as many, in half the
 /// time.
-const SAMPLES: u32 = 16;
+pub(super) const SAMPLES: u32 = 16;
 /// What one of them counts beside an exact one. (Before filtering it is worth five to ten; but its error
 /// falls no further.)
 const WORTH: f32 = 4.0;

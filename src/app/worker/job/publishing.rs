@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::cached::{CachedPicture, worth};
+use super::cached::{self, CachedPicture, worth};
 use super::sessions::SLICE;
 use super::{Job, MAIN, PLAIN};
 use crate::app::lock;
@@ -26,10 +26,8 @@ const READING_GAP: Duration = Duration::from_millis(250);
 const OLDEST: Duration = Duration::from_secs(2);
 /// Publishing may take at most about one part in this of the time.
 const PUBLISH_SHARE: u32 = 40;
-/// A resized film is worth no more samples a pixel than this.
+/// A resized film is worth no more samples a pixel than this, for it is a little blurred.
 const MOST_OF_RESIZED: f32 = 64.0;
-/// And needs no cached light beside it with so many.
-const RICH: u64 = 16;
 /// But a picture that changes is shown at least so often.
 const LONGEST_GAP: Duration = Duration::from_millis(800);
 
@@ -53,11 +51,15 @@ impl Job<'_> {
     /// A film of this view from before, if there is one.
     fn backdrop(&self) -> Option<Arc<Film>> {
         let (request, film) = self.kept.backdrop.as_ref()?;
-        let film = self.resized.as_ref().map_or(film, |resized| &resized.film);
+        if !request.looks_like(&self.request) {
+            return None;
+        }
+        if let Some(resized) = &self.resized {
+            return resized.film.clone();
+        }
         let aspect = |view: &View| f64::from(view.width) / f64::from(view.height);
         let is_as_wide = 1.02 * aspect(&request.view) >= aspect(&self.request.view);
-        ((is_as_wide || self.resized.is_some()) && request.looks_like(&self.request))
-            .then(|| Arc::clone(film))
+        is_as_wide.then(|| Arc::clone(film))
     }
 
     /// Resizes the film from before to the picture's size, if it was a whole one of about as many rows: the picture
@@ -66,24 +68,28 @@ impl Job<'_> {
         let view = &self.request.view;
         let size = [view.width, view.height];
         let before = self.kept.backdrop.as_ref().filter(|(of, film)| {
-            let is_whole = !of.moving && film.width == of.view.width;
+            let is_whole = !of.moving && film.width == of.view.width && view.crop.is_none();
             let is_alike = film.height <= 2 * view.height && view.height <= 2 * film.height;
             is_whole && is_alike && size != [film.width, film.height]
         });
         let before = before.filter(|(of, _)| of.looks_like(&self.request));
-        self.resized = before.map(|(_, film)| Resized::of(film.resized(size)));
+        self.resized = before.map(|(_, film)| Resized::of(film, size));
     }
 
-    /// Whether the film from before says enough, so that nothing else helps the picture for now.
+    /// Whether the film from before says so much that no cached light is needed beside it.
     pub(super) fn has_rich_backdrop(&self) -> bool {
-        let is_rich =
-            |resized: &Resized| resized.samples >= RICH * resized.film.pixels().len() as u64;
+        let is_rich = |resized: &Resized| {
+            3 * resized.samples >= 2 * u64::from(cached::SAMPLES) * resized.pixels
+        };
         self.resized.as_ref().is_some_and(is_rich)
     }
 
     /// Keeps the film for the next one's first moments, unless there is a better one of the same view.
     pub(super) fn keep_backdrop(&mut self, film: Cow<'_, Film>) {
-        let known = self.backdrop().map_or(0, |film| film.total_samples());
+        let known = match &self.resized {
+            Some(resized) => resized.known(),
+            None => self.backdrop().map_or(0, |film| film.total_samples()),
+        };
         if film.min_samples() > 0 && film.total_samples() > known {
             let film = Arc::new(film.into_owned());
             self.kept.backdrop = Some((Arc::clone(&self.request), film));
@@ -113,6 +119,10 @@ impl Job<'_> {
     ) {
         let start = Instant::now();
         self.kept.snapshots += 1;
+        if let Some(resized) = self.resized.as_mut().filter(|r| r.worth(main.samples()) == 0.0) {
+            resized.film = None;
+            self.kept.backdrop = None;
+        }
         let is_final = matches!(activity, Activity::Paused | Activity::Done);
         let rests = !is_final && (self.shared.rest.lasts(LONGEST_GAP) || self.is_ahead());
         let (main_snapshot, main_cost) = self.session_snapshot(MAIN, main, is_final, rests);
@@ -127,7 +137,7 @@ impl Job<'_> {
             now: main.figures(),
             plain: plain_snapshot.map(|(snapshot, _)| snapshot),
             counters: self.counters.clone(),
-            backdrop: self.shown_backdrop(main, cached, rests),
+            backdrop: self.shown_backdrop(activity, main, cached, rests),
             cached_seconds: self.cached_seconds,
             cache: self.cache_facts(cached.session().unwrap_or(main)),
             curves: self.curves.clone(),
@@ -175,6 +185,7 @@ impl Job<'_> {
     /// than what was seen before, as chance and gaps between its first pixels count against it.
     fn shown_backdrop(
         &self,
+        activity: Activity,
         main: &Session<'_>,
         cached: &mut CachedPicture<'_>,
         rests: bool,
@@ -182,7 +193,7 @@ impl Job<'_> {
         // What this job itself has kept has the same samples.
         let is_own = |(of, _): &(Arc<Request>, Arc<Film>)| Arc::ptr_eq(of, &self.request);
         let before = self.backdrop().filter(|_| !self.kept.backdrop.as_ref().is_some_and(is_own));
-        let resized = self.resized.as_ref().filter(|_| before.is_some());
+        let resized = self.resized.as_ref();
         let total = || before.as_ref().map_or(0, |film| film.total_samples());
         let seen = resized.map_or_else(total, |resized| resized.samples);
         let film = cached.film(3 * seen / 2, rests).filter(|_| self.request.wants_cached);
@@ -199,7 +210,12 @@ impl Job<'_> {
                 Backdrop { film, samples: seen, worth, origin }
             }),
         };
-        shown.filter(|backdrop| backdrop.worth > 0.0)
+        // What is compared, and what is done, is what will be saved.
+        let is_plain = self.request.split || activity == Activity::Done;
+        let is_wanted = |backdrop: &Backdrop| {
+            backdrop.worth > 0.0 && !(is_plain && backdrop.origin == Origin::Resized)
+        };
+        shown.filter(is_wanted)
     }
 
     /// Brings a curve up to date: its last point is of now, those before are apart.
@@ -332,25 +348,39 @@ impl Job<'_> {
 
 /// A film from before in the size of the picture.
 pub(super) struct Resized {
-    film: Arc<Film>,
+    /// Until there are enough other samples.
+    film: Option<Arc<Film>>,
+    pixels: u64,
     /// Of all its pixels.
     samples: u64,
-    /// Of the pixel that has most.
-    most: u32,
+    /// Of the pixel that has fewest, and of that which has most.
+    span: [u32; 2],
+    /// What it is worth at most in samples a pixel.
+    most: f32,
 }
 
 impl Resized {
-    fn of(film: Film) -> Self {
-        let samples = film.total_samples();
-        let most = film.pixels().iter().map(Pixel::samples).max().unwrap_or(0);
-        Self { film: Arc::new(film), samples, most }
+    fn of(before: &Film, size: [u32; 2]) -> Self {
+        let film = before.resized(size);
+        let counts = || film.pixels().iter().map(Pixel::samples);
+        let span = [counts().min().unwrap_or(0), counts().max().unwrap_or(0)];
+        let (pixels, samples) = (film.pixels().len() as u64, film.total_samples());
+        // What is enlarged is blurred.
+        let enlarged = (size[1] as f32 / before.height as f32).max(1.0);
+        let most = MOST_OF_RESIZED / (enlarged * enlarged);
+        Self { film: Some(Arc::new(film)), pixels, samples, span, most }
     }
 
-    /// What one of its samples counts where the picture has so many of its own: all together no more than
-    /// [`MOST_OF_RESIZED`] a pixel, for it is a little blurred, and it fades out.
+    /// What one of its samples counts where the picture has so many of its own: it fades out.
     fn worth(&self, samples: u32) -> f32 {
-        let faded = (1.0 - samples as f32 / (4.0 * MOST_OF_RESIZED)).max(0.0);
-        (MOST_OF_RESIZED / self.most.max(1) as f32).min(1.0) * faded
+        let faded = (1.0 - samples as f32 / (4.0 * self.most)).max(0.0);
+        (self.most / self.span[1].max(1) as f32).min(1.0) * faded
+    }
+
+    /// Samples that another film must have more than to take its place.
+    fn known(&self) -> u64 {
+        let most = (f64::from(self.most) * self.pixels as f64) as u64;
+        if self.film.is_none() || self.span[0] == 0 { 0 } else { self.samples.min(most) }
     }
 }
 
