@@ -107,25 +107,7 @@ impl App {
             Command::ToggleShortcuts => interface.shortcuts = !interface.shortcuts,
             Command::CloseSheets => (interface.shortcuts, interface.is_marking) = (false, false),
             Command::KeepPicture => self.keep(),
-            Command::SetAsKept(index) => {
-                if let Some(kept) = self.history.get(index) {
-                    let mut document = kept.document.clone();
-                    // Those kept since are no part of the picture, and would be lost.
-                    document.bookmarks = self.viewpoints_of(&document.scene);
-                    // Pictures name a file by its whole path.
-                    if lasting_scene(&document.scene) == lasting_scene(&self.document.scene) {
-                        document.scene.clone_from(&self.document.scene);
-                    }
-                    if self.history.is_of_other_options(kept) {
-                        self.messages.notice(format!(
-                            "{}: its scene was opened with other options than now (--variant, --outlines, \
-                             --hide, --material), which only the command line gives",
-                            kept.name
-                        ));
-                    }
-                    self.go_to(document);
-                }
-            }
+            Command::SetAsKept(index) => self.set_as_kept(index),
             Command::ToggleZoom => {
                 let size = self.document.size;
                 interface.toggle_zoom(size);
@@ -138,6 +120,34 @@ impl App {
                 }
             }
         }
+    }
+
+    /// Takes the settings that a kept picture was made with.
+    fn set_as_kept(&mut self, index: usize) {
+        let Some(kept) = self.history.get(index) else { return };
+        let mut document = kept.document.clone();
+        // Those kept since are no part of the picture, and would be lost.
+        document.bookmarks = self.viewpoints_of(&document.scene);
+        // Pictures name a file by its whole path.
+        if lasting_scene(&document.scene) == lasting_scene(&self.document.scene) {
+            document.scene.clone_from(&self.document.scene);
+        }
+        // The room may have had another shape then.
+        if let Some([left, top, right, bottom]) = document.seen_region()
+            && let Ok(image) = kept.pixels.get()
+        {
+            let part = image.width as f32 / image.height as f32;
+            let whole = part * (bottom - top) / (right - left);
+            document.follow_room(whole / self.interface.aspect());
+        }
+        if self.history.is_of_other_options(kept) {
+            self.messages.notice(format!(
+                "{}: its scene was opened with other options than now (--variant, --outlines, \
+                 --hide, --material), which only the command line gives",
+                kept.name
+            ));
+        }
+        self.go_to(document);
     }
 
     /// Goes over to another scene; one that is shown already is read again, for its file may have changed.
