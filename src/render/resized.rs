@@ -1,10 +1,30 @@
-//! A film in another size, to be looked at.
+//! Films made of others, to be looked at.
 
 use rayon::prelude::*;
 
 use super::film::{Film, Pixel, Surface};
 
 impl Film {
+    /// It and another one of its size and layers, each of whose samples counts as so many.
+    pub(crate) fn together(&self, other: &Self, times: u32) -> Self {
+        let factor = f64::from(times);
+        let add = |sum: f64, more: f64| sum + factor * more;
+        let pixels = self.pixels().par_iter().zip(other.pixels());
+        let pixels = pixels.map(|(own, other)| {
+            let [sums, more] = [own, other].map(Pixel::sums);
+            let sums = std::array::from_fn(|i| add(sums[i], more[i]));
+            let count = |own: u32, other: u32| own.saturating_add(times.saturating_mul(other));
+            let samples = count(own.samples(), other.samples());
+            Pixel::of_sums(sums, samples, count(own.invalid(), other.invalid()))
+        });
+        let surfaces = self.surfaces().par_iter().zip(other.surfaces());
+        let surfaces = surfaces.map(|(own, other)| {
+            let [sums, more] = [own, other].map(Surface::sums);
+            Surface::of_sums(std::array::from_fn(|i| add(sums[i], more[i])))
+        });
+        Self::of_pixels([self.width, self.height], pixels.collect(), surfaces.collect())
+    }
+
     /// What it knows of a picture of another size through the same camera: the field of view is vertical, so that
     /// both share their middle. Between pixels sums are interpolated; where it shows nothing there are no samples.
     pub(crate) fn resized(&self, [width, height]: [u32; 2]) -> Self {
@@ -77,6 +97,15 @@ mod tests {
             (0..5).for_each(|_| film.add(x, y, &result));
         }
         film
+    }
+
+    #[test]
+    fn two_films_together_have_the_samples_of_both() {
+        let (one, two) = (film(4, 2), film(4, 2));
+        assert_eq!(one.together(&Film::new(4, 2, true), 3), one);
+        let mut thrice = one.clone();
+        (0..2).for_each(|_| thrice.add_film(&two));
+        assert_eq!(one.together(&two, 2), thrice);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::order::Order;
 use crate::app::worker::{Backdrop, Origin, SessionSnapshot};
 use crate::denoise::{Denoiser, blend, together};
 use crate::develop::{Developer, LinearPicture};
+use crate::error::Result;
 use crate::image::Image;
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
@@ -150,6 +151,12 @@ impl Source {
             }
             // A picture with holes or in other pixels is there to see where one is going.
             None => blended(),
+            Some(denoiser) if !can_filter && self.is_resized() => {
+                match continued(denoiser, film, backdrop) {
+                    Ok(image) => Prepared::of(developer, image),
+                    Err(failure) => Prepared { failure: Some(failure.to_string()), ..blended() },
+                }
+            }
             Some(_) if !can_filter => blended(),
             Some(denoiser) => match denoiser.denoise(film, other) {
                 Ok(image) => Prepared::of(developer, image),
@@ -157,6 +164,18 @@ impl Source {
             },
         }
     }
+}
+
+/// A picture whose sides have only been begun, and whose middle is that of a resized one, of which it is filtered.
+fn continued(denoiser: Denoiser, film: &Film, resized: Option<(&Film, f32)>) -> Result<Image> {
+    let mut image = blend(film, resized);
+    if let Some((middle, _)) = resized {
+        let filtered = denoiser.denoise(&film.without_gaps(), resized)?;
+        let both = image.pixels.iter_mut().zip(filtered.pixels).zip(middle.pixels());
+        both.filter(|(_, pixel)| pixel.samples() > 0)
+            .for_each(|((shown, filtered), _)| *shown = filtered);
+    }
+    Ok(image)
 }
 
 #[cfg(test)]
@@ -244,7 +263,11 @@ pub(super) mod tests {
         };
         let (holes, whole, denoiser) = (film(12, 2, 1), film(12, 1, 1), Some(Denoiser::ATrous));
         let other = Some((&resized, 0.5));
-        assert_eq!(prepared(&holes, denoiser, false), blend(&holes, other).pixels);
+        let (sides, middle) =
+            (blend(&holes, other).pixels, quick(&holes.without_gaps(), other).pixels);
+        let shown = prepared(&holes, denoiser, false);
+        assert_eq!((shown[0], shown[6]), (sides[0], middle[6]));
+        assert!(sides[6] != middle[6], "it is filtered");
         assert_eq!(prepared(&whole, denoiser, true), quick(&whole, other).pixels);
         let shown = prepared(&whole, None, true);
         assert_eq!(shown, together(&whole, other).pixels);

@@ -53,6 +53,15 @@ impl<'s> CachedPicture<'s> {
         }
     }
 
+    /// Its film, once all of its pixels have a sample.
+    pub(super) fn film_so_far(&self) -> Option<&Film> {
+        match self {
+            Self::UnderWay(session, _) if session.samples() > 0 => Some(session.film()),
+            Self::Complete(_, film) => Some(film),
+            _ => None,
+        }
+    }
+
     /// What renders it.
     pub(super) fn session(&self) -> Option<&Session<'s>> {
         match self {

@@ -215,6 +215,10 @@ impl<'a> Job<'a> {
 
     /// Puts the picture aside for another one.
     fn leave(&mut self, main: Session<'_>, cached: CachedPicture<'_>) {
+        // What is seen of it is better than the film alone.
+        let times = worth(main.samples()).round() as u32;
+        let shown = cached.film_so_far().filter(|_| times > 0 && main.samples() > 0);
+        let shown = shown.map(|cached| main.film().together(cached, times));
         let left = Left {
             request: Arc::clone(&self.request),
             session: main.suspend(),
@@ -223,13 +227,14 @@ impl<'a> Job<'a> {
             curve: std::mem::take(&mut self.curves[MAIN]),
             cached_seconds: self.cached_seconds,
         };
-        if !left.is_worth_it() {
-            return self.keep_backdrop(Cow::Owned(left.session.into_film()));
+        if left.is_worth_it() {
+            if let Some(film) = shown.map(Cow::Owned).or(left.session.film().map(Cow::Borrowed)) {
+                self.keep_backdrop(film);
+            }
+            self.kept.leave(left);
+        } else {
+            self.keep_backdrop(Cow::Owned(shown.unwrap_or_else(|| left.session.into_film())));
         }
-        if let Some(film) = left.session.film() {
-            self.keep_backdrop(Cow::Borrowed(film));
-        }
-        self.kept.leave(left);
     }
 
     /// Some samples of the picture that is next: the plain one at equal time, learning included, the cached
