@@ -170,7 +170,7 @@ impl Source {
 fn continued(denoiser: Denoiser, film: &Film, resized: Option<(&Film, f32)>) -> Result<Image> {
     let mut image = blend(film, resized);
     if let Some((middle, _)) = resized {
-        let filtered = denoiser.denoise(&film.without_gaps(), resized)?;
+        let filtered = denoiser.denoise(&film.without_gaps_beside(middle), resized)?;
         let both = image.pixels.iter_mut().zip(filtered.pixels).zip(middle.pixels());
         both.filter(|(_, pixel)| pixel.samples() > 0)
             .for_each(|((shown, filtered), _)| *shown = filtered);
@@ -263,8 +263,10 @@ pub(super) mod tests {
         };
         let (holes, whole, denoiser) = (film(12, 2, 1), film(12, 1, 1), Some(Denoiser::ATrous));
         let other = Some((&resized, 0.5));
-        let (sides, middle) =
-            (blend(&holes, other).pixels, quick(&holes.without_gaps(), other).pixels);
+        let (sides, middle) = (
+            blend(&holes, other).pixels,
+            quick(&holes.without_gaps_beside(&resized), other).pixels,
+        );
         let shown = prepared(&holes, denoiser, false);
         assert_eq!((shown[0], shown[6]), (sides[0], middle[6]));
         assert!(sides[6] != middle[6], "it is filtered");
