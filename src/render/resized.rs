@@ -5,13 +5,16 @@ use rayon::prelude::*;
 use super::film::{Film, Pixel, Surface};
 
 impl Film {
-    /// It and another one of its size and layers, each of whose samples counts as so many.
+    /// It and another one of its size and layers, each of whose samples counts as so many: they spread so many times
+    /// less than its own would, or they would not.
     pub(crate) fn together(&self, other: &Self, times: u32) -> Self {
         let factor = f64::from(times);
         let add = |sum: f64, more: f64| sum + factor * more;
         let pixels = self.pixels().par_iter().zip(other.pixels());
         let pixels = pixels.map(|(own, other)| {
-            let [sums, more] = [own, other].map(Pixel::sums);
+            let [sums, mut more] = [own, other].map(Pixel::sums);
+            let least = f64::from(other.samples()) * other.mean_luminance().powi(2);
+            more[3] = least + factor * (more[3] - least).max(0.0);
             let sums = std::array::from_fn(|i| add(sums[i], more[i]));
             let count = |own: u32, other: u32| own.saturating_add(times.saturating_mul(other));
             let samples = count(own.samples(), other.samples());
@@ -116,11 +119,19 @@ mod tests {
 
     #[test]
     fn two_films_together_have_the_samples_of_both() {
-        let (one, two) = (film(4, 2), film(4, 2));
-        assert_eq!(one.together(&Film::new(4, 2, true), 3), one);
-        let mut thrice = one.clone();
-        (0..2).for_each(|_| thrice.add_film(&two));
-        assert_eq!(one.together(&two, 2), thrice);
+        let (one, none) = (film(4, 2), Film::new(4, 2, true));
+        assert_eq!(one.together(&none, 3), one);
+        let both = film(4, 2).together(&one, 2);
+        assert_eq!((both.pixels()[3].samples(), both.pixels()[3].mean()), (15, [3.0; 3]));
+        assert_eq!(both.surface_of(3), one.surface_of(3));
+        // What is uncertain stays so, however much it counts.
+        let mut spread = Film::new(1, 1, false);
+        for light in (0..100).map(|sample| (sample % 2) as f32) {
+            spread.add(0, 0, &PathResult { radiance: Vec3::splat(light), ..PathResult::default() });
+        }
+        let counted = Film::new(1, 1, false).together(&spread, 4);
+        let [before, now] = [&spread, &counted].map(|film| film.pixels()[0].variance_of_mean());
+        assert!((now / before - 1.0).abs() < 0.02, "{before}, {now}");
     }
 
     #[test]
