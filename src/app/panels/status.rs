@@ -28,6 +28,10 @@ pub(in crate::app) struct Status<'a> {
     pub(in crate::app) hides_clock: bool,
 }
 
+/// With fewer samples a pixel noise is told too small where light is hard to find: by half with two to four in the
+/// office.
+const FEW: u32 = 8;
+
 /// Draws the line.
 pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
     let frame = egui::Frame::new().inner_margin(Margin::symmetric(12, 5));
@@ -140,13 +144,17 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
         }
     }
     if session.noise.is_finite() {
-        let percent = format!("{:.1} %", 100.0 * session.noise);
-        number(
-            ui,
-            &percent,
-            "noise",
-            "Estimated relative RMS error of the pixels, from the samples' own spread",
-        );
+        let (is_more, hint) = match session.samples < FEW {
+            true => (
+                "> ",
+                "Least relative RMS error of the pixels: so few samples may not have met what is bright",
+            ),
+            false => {
+                ("", "Estimated relative RMS error of the pixels, from the samples' own spread")
+            }
+        };
+        let percent = format!("{is_more}{:.1} %", 100.0 * session.noise);
+        number(ui, &percent, "noise", hint);
     }
     let invalid = session.invalid_samples;
     if invalid > 0 {
