@@ -24,11 +24,20 @@ pub(super) struct Kept {
     pub(super) shrink: Option<u32>,
     pub(super) snapshots: u64,
     /// A film of what was seen last, and what it was rendered for.
-    pub(super) backdrop: Option<(Arc<Request>, Arc<Film>)>,
+    pub(super) backdrop: Option<Seen>,
     /// What paths have trained the radiance cache, and where.
     pub(super) training: Option<(CacheTraining, Arc<Request>)>,
     /// Pictures that were left for others, oldest first.
     left: Vec<Left>,
+}
+
+/// A film of what was seen.
+pub(super) struct Seen {
+    /// What it was rendered for.
+    pub(super) request: Arc<Request>,
+    pub(super) film: Arc<Film>,
+    /// What one of its samples counts beside an exact one: more where there is cached light in it.
+    pub(super) worth: f32,
 }
 
 /// A picture that was left for another one: whoever comes back to it finds it as it was.
@@ -111,7 +120,7 @@ impl Kept {
     pub(super) fn leave_other_worlds(&mut self, request: &Request) {
         let world = &request.world;
         let is_other = |of: &Request| !Arc::ptr_eq(&of.world, world);
-        self.backdrop.take_if(|(of, _)| is_other(of));
+        self.backdrop.take_if(|seen| is_other(&seen.request));
         self.training.take_if(|(_, of)| is_other(of));
         let (map, is_lit_by) = (&request.environment, Environment::shares_map_with);
         self.left

@@ -103,7 +103,7 @@ impl<'a> Job<'a> {
                 break;
             }
             self.measure(&session);
-            self.keep_backdrop(Cow::Borrowed(session.film()));
+            self.keep_backdrop(Cow::Borrowed(session.film()), 1.0);
             self.publish(Activity::Moving, &session, None, &mut CachedPicture::default());
             if session.samples() >= 64 {
                 self.rest();
@@ -216,9 +216,9 @@ impl<'a> Job<'a> {
     /// Puts the picture aside for another one.
     fn leave(&mut self, main: Session<'_>, cached: CachedPicture<'_>) {
         // What is seen of it is better than the film alone.
-        let times = worth(main.samples()).round() as u32;
-        let shown = cached.film_so_far().filter(|_| times > 0 && main.samples() > 0);
-        let shown = shown.map(|cached| main.film().together(cached, times));
+        let times = worth(main.samples());
+        let shown = cached.film_so_far().filter(|_| times >= 1.0 && main.samples() > 0);
+        let shown = shown.map(|cached| cached.together(main.film(), times));
         let left = Left {
             request: Arc::clone(&self.request),
             session: main.suspend(),
@@ -227,13 +227,20 @@ impl<'a> Job<'a> {
             curve: std::mem::take(&mut self.curves[MAIN]),
             cached_seconds: self.cached_seconds,
         };
-        if left.is_worth_it() {
-            if let Some(film) = shown.map(Cow::Owned).or(left.session.film().map(Cow::Borrowed)) {
-                self.keep_backdrop(film);
+        let is_worth_it = left.is_worth_it();
+        match shown {
+            Some(shown) => self.keep_backdrop(Cow::Owned(shown), times),
+            None if !is_worth_it => {
+                return self.keep_backdrop(Cow::Owned(left.session.into_film()), 1.0);
             }
+            None => {
+                if let Some(film) = left.session.film() {
+                    self.keep_backdrop(Cow::Borrowed(film), 1.0);
+                }
+            }
+        }
+        if is_worth_it {
             self.kept.leave(left);
-        } else {
-            self.keep_backdrop(Cow::Owned(shown.unwrap_or_else(|| left.session.into_film())));
         }
     }
 

@@ -8,9 +8,8 @@ use super::cached::{self, CachedPicture, worth};
 use super::sessions::SLICE;
 use super::{Job, MAIN, PLAIN};
 use crate::app::lock;
-use crate::app::worker::{
-    Activity, Backdrop, NoCache, Origin, Point, Request, SessionSnapshot, Snapshot,
-};
+use crate::app::worker::kept::Seen;
+use crate::app::worker::{Activity, Backdrop, NoCache, Origin, Point, SessionSnapshot, Snapshot};
 use crate::light_grid::LightGrid;
 use crate::metrics;
 use crate::radiance_cache::CacheFacts;
@@ -50,7 +49,7 @@ pub(super) struct Reading {
 impl Job<'_> {
     /// A film of this view from before, if there is one.
     fn backdrop(&self) -> Option<Arc<Film>> {
-        let (request, film) = self.kept.backdrop.as_ref()?;
+        let Seen { request, film, .. } = self.kept.backdrop.as_ref()?;
         if !request.looks_like(&self.request) {
             return None;
         }
@@ -67,32 +66,36 @@ impl Job<'_> {
     pub(super) fn resize_backdrop(&mut self) {
         let view = &self.request.view;
         let size = [view.width, view.height];
-        let before = self.kept.backdrop.as_ref().filter(|(of, film)| {
+        let before = self.kept.backdrop.as_ref().filter(|Seen { request: of, film, .. }| {
             let is_whole = !of.moving && film.width == of.view.width && view.crop.is_none();
             let is_alike = film.height <= 2 * view.height && view.height <= 2 * film.height;
             is_whole && is_alike && size != [film.width, film.height]
         });
-        let before = before.filter(|(of, _)| of.looks_like(&self.request));
-        self.resized = before.map(|(_, film)| Resized::of(film, size));
+        let before = before.filter(|seen| seen.request.looks_like(&self.request));
+        self.resized = before.map(|seen| Resized::of(seen, size));
     }
 
     /// Whether the film from before says so much that no cached light is needed beside it.
     pub(super) fn has_rich_backdrop(&self) -> bool {
+        let enough = 2.0 / 3.0 * cached::SAMPLES as f32;
         let is_rich = |resized: &Resized| {
-            3 * resized.samples >= 2 * u64::from(cached::SAMPLES) * resized.pixels
+            resized.worth * resized.samples as f32 >= enough * resized.pixels as f32
         };
         self.resized.as_ref().is_some_and(is_rich)
     }
 
     /// Keeps the film for the next one's first moments, unless there is a better one of the same view.
-    pub(super) fn keep_backdrop(&mut self, film: Cow<'_, Film>) {
+    pub(super) fn keep_backdrop(&mut self, film: Cow<'_, Film>, worth: f32) {
         let known = match &self.resized {
             Some(resized) => resized.known(),
-            None => self.backdrop().map_or(0, |film| film.total_samples()),
+            None => {
+                let worth = self.kept.backdrop.as_ref().map_or(1.0, |seen| seen.worth);
+                self.backdrop().map_or(0.0, |film| worth * film.total_samples() as f32)
+            }
         };
-        if film.min_samples() > 0 && film.total_samples() > known {
-            let film = Arc::new(film.into_owned());
-            self.kept.backdrop = Some((Arc::clone(&self.request), film));
+        if film.min_samples() > 0 && worth * film.total_samples() as f32 > known {
+            let (request, film) = (Arc::clone(&self.request), Arc::new(film.into_owned()));
+            self.kept.backdrop = Some(Seen { request, film, worth });
         }
     }
 
@@ -191,7 +194,7 @@ impl Job<'_> {
         rests: bool,
     ) -> Option<Backdrop> {
         // What this job itself has kept has the same samples.
-        let is_own = |(of, _): &(Arc<Request>, Arc<Film>)| Arc::ptr_eq(of, &self.request);
+        let is_own = |seen: &Seen| Arc::ptr_eq(&seen.request, &self.request);
         let before = self.backdrop().filter(|_| !self.kept.backdrop.as_ref().is_some_and(is_own));
         let resized = self.resized.as_ref();
         let total = || before.as_ref().map_or(0, |film| film.total_samples());
@@ -205,7 +208,7 @@ impl Job<'_> {
             None => before.map(|film| {
                 let (worth, origin) = match resized {
                     Some(resized) => (resized.worth(main.samples()), Origin::Resized),
-                    None => (1.0, Origin::Before),
+                    None => (self.kept.backdrop.as_ref().map_or(1.0, |s| s.worth), Origin::Before),
                 };
                 Backdrop { film, samples: seen, worth, origin }
             }),
@@ -353,6 +356,8 @@ pub(super) struct Resized {
     pixels: u64,
     /// Of all its pixels.
     samples: u64,
+    /// What one of them counts at most.
+    worth: f32,
     /// Of the pixel that has fewest, and of that which has most.
     span: [u32; 2],
     /// What it is worth at most in samples a pixel.
@@ -360,27 +365,28 @@ pub(super) struct Resized {
 }
 
 impl Resized {
-    fn of(before: &Film, size: [u32; 2]) -> Self {
-        let film = before.resized(size);
+    fn of(before: &Seen, size: [u32; 2]) -> Self {
+        let film = before.film.resized(size);
         let counts = || film.pixels().iter().map(Pixel::samples);
         let span = [counts().min().unwrap_or(0), counts().max().unwrap_or(0)];
         let (pixels, samples) = (film.pixels().len() as u64, film.total_samples());
         // What is enlarged is blurred.
-        let enlarged = (size[1] as f32 / before.height as f32).max(1.0);
+        let enlarged = (size[1] as f32 / before.film.height as f32).max(1.0);
         let most = MOST_OF_RESIZED / (enlarged * enlarged);
-        Self { film: Some(Arc::new(film)), pixels, samples, span, most }
+        Self { film: Some(Arc::new(film)), pixels, samples, worth: before.worth, span, most }
     }
 
     /// What one of its samples counts where the picture has so many of its own: it fades out.
     fn worth(&self, samples: u32) -> f32 {
         let faded = (1.0 - samples as f32 / (4.0 * self.most)).max(0.0);
-        (self.most / self.span[1].max(1) as f32).min(1.0) * faded
+        (self.most / self.span[1].max(1) as f32).min(self.worth) * faded
     }
 
-    /// Samples that another film must have more than to take its place.
-    fn known(&self) -> u64 {
-        let most = (f64::from(self.most) * self.pixels as f64) as u64;
-        if self.film.is_none() || self.span[0] == 0 { 0 } else { self.samples.min(most) }
+    /// What another film must be worth more than to take its place.
+    fn known(&self) -> f32 {
+        let most = self.most * self.pixels as f32;
+        let own = self.worth * self.samples as f32;
+        if self.film.is_none() || self.span[0] == 0 { 0.0 } else { own.min(most) }
     }
 }
 
