@@ -109,24 +109,15 @@ impl App {
             };
         self.desktop.opened += 1;
         let number = self.desktop.opened;
-        let (sender, wake) = (self.later.0.clone(), self.wake.clone());
         let window = self.desktop.window.clone();
-        let thread = std::thread::Builder::new().name("dialogue".to_owned()).spawn(move || {
+        let thread = self.do_later("dialogue", move || {
             let file = pollster::block_on(chosen);
-            let path = file.map(|file| file.path().display().to_string());
-            // The window may have gone meanwhile.
-            let _ = sender.send(Later::Chosen(number, path));
-            wake();
             // It was needed to the end.
             drop(window);
+            Ok(Later::Chosen(number, file.map(|file| file.path().display().to_string())))
         });
-        match thread {
-            Ok(_) => {
-                let is_seen = false;
-                self.desktop.open = Some(Dialogue { number, purpose, path, is_by_hand, is_seen });
-            }
-            Err(error) => self.messages.error(format!("no thread for a file dialogue: {error}")),
-        }
+        self.desktop.open =
+            thread.map(|_| Dialogue { number, purpose, path, is_by_hand, is_seen: false });
     }
 
     /// A dialogue that begins where a path leads to.
@@ -162,21 +153,18 @@ impl App {
 
     /// Takes the answer of a dialogue.
     pub(super) fn take_chosen(&mut self, number: u32, path: Option<&str>, context: &egui::Context) {
-        let prompt = self.interface.prompt.take();
-        let dialogue = self.desktop.take(number, prompt.as_ref());
-        let Some((dialogue, prompt)) = dialogue.zip(prompt.clone()) else {
-            self.interface.prompt = prompt;
-            return;
-        };
+        let prompt = self.interface.prompt.as_ref();
+        let dialogue = self.desktop.take(number, prompt);
+        let Some((dialogue, prompt)) = dialogue.zip(prompt) else { return };
         let Some(path) = path else {
-            match self.desktop.end(&dialogue, &prompt) {
-                End::Goes => return,
+            match self.desktop.end(&dialogue, prompt) {
+                End::Goes => self.interface.prompt = None,
                 End::Stays => {}
                 End::Says(sentence) => self.messages.error(sentence),
             }
-            self.interface.prompt = Some(prompt);
             return;
         };
+        self.interface.prompt = None;
         match dialogue.purpose.completed(path) {
             // Nobody was asked whether a file of that name may be replaced.
             Some(path) => self.interface.ask(dialogue.purpose, path),

@@ -1,6 +1,6 @@
-//! Drags of the picture, the wipe over it and the map, followed event by event: what a drag does depends on where the pointer
-//! went, not on how many frames were drawn meanwhile. egui's own drags begin in the frame after the
-//! press and lose what came before; where software draws, that can be all of it.
+//! Drags of the picture, the wipe over it and the map, followed event by event: what a drag does depends
+//! on where the pointer went, not on how many frames were drawn meanwhile. egui's own drags begin in the
+//! frame after the press and lose what came before; where software draws, that can be all of it.
 
 use egui::{Event, Modifiers, PointerButton, Pos2, Ui, Vec2};
 

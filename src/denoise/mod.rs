@@ -65,7 +65,7 @@ impl Denoiser {
 
 /// The film's picture with its noise and the samples of `other`, as by [`Denoiser::denoise`].
 #[cfg(feature = "window")]
-pub(crate) fn together(film: &Film, other: Option<(&Film, f32)>) -> Image {
+pub(crate) fn unfiltered(film: &Film, other: Option<(&Film, f32)>) -> Image {
     let samples = Samples::of(film, other);
     samples.restored(samples.image())
 }

@@ -4,6 +4,7 @@ mod cpu;
 mod devices;
 pub mod film;
 pub mod filter;
+mod gaps;
 mod gi;
 #[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;

@@ -38,21 +38,6 @@ impl Film {
         Self::of_pixels(size, pixels.map(of_pixel).collect(), surfaces.collect())
     }
 
-    /// It with its gaps filled, as by [`Self::without_gaps`], where another one of its size and layers has no samples
-    /// either.
-    pub(crate) fn without_gaps_beside(&self, other: &Self) -> Self {
-        let mut filled = self.without_gaps().into_owned();
-        for (index, of_other) in other.pixels().iter().enumerate() {
-            if of_other.samples() > 0 {
-                filled.pixels[index] = self.pixels[index];
-                if let Some(surface) = filled.surfaces.get_mut(index) {
-                    *surface = self.surfaces[index];
-                }
-            }
-        }
-        filled
-    }
-
     /// What it knows of a picture of another size through the same camera: the field of view is vertical, so that
     /// both share their middle. Between pixels sums are interpolated; where it shows nothing there are no samples.
     pub(crate) fn resized(&self, [width, height]: [u32; 2]) -> Self {
@@ -147,17 +132,6 @@ mod tests {
         let counted = Film::new(1, 1, false).together(&spread, 4.0);
         let [before, now] = [&spread, &counted].map(|film| film.pixels()[0].variance_of_mean());
         assert!((now / before - 1.0).abs() < 0.04, "{before}, {now}");
-    }
-
-    #[test]
-    fn gaps_are_filled_where_another_film_has_no_samples_either() {
-        let mut begun = Film::new(4, 1, true);
-        begun.add(0, 0, &PathResult { radiance: Vec3::ONE, ..PathResult::default() });
-        let mut other = Film::new(4, 1, true);
-        other.add(2, 0, &PathResult::default());
-        let filled = begun.without_gaps_beside(&other);
-        let counts: Vec<u32> = filled.pixels().iter().map(Pixel::samples).collect();
-        assert_eq!(counts, [1, 1, 0, 1]);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::order::Order;
 use crate::app::worker::{Backdrop, Origin, SessionSnapshot};
-use crate::denoise::{Denoiser, blend, together};
+use crate::denoise::{Denoiser, blend, unfiltered};
 use crate::develop::{Developer, LinearPicture};
 use crate::error::Result;
 use crate::image::Image;
@@ -139,7 +139,7 @@ impl Source {
             |(other, _): (&Film, f32)| other.total_samples() <= FILTER_WORTH * film.total_samples();
         let can_filter = other.is_some() || (has_all && backdrop.is_none_or(is_surpassed));
         match self.denoiser {
-            None if is_resized && has_all => Prepared::of(developer, together(film, other)),
+            None if is_resized && has_all => Prepared::of(developer, unfiltered(film, other)),
             None if self.is_whole => Prepared::on_device(noisy(false)),
             Some(Denoiser::ATrous)
                 if self.is_whole
@@ -272,7 +272,7 @@ pub(super) mod tests {
         assert!(sides[6] != middle[6], "it is filtered");
         assert_eq!(prepared(&whole, denoiser, true), quick(&whole, other).pixels);
         let shown = prepared(&whole, None, true);
-        assert_eq!(shown, together(&whole, other).pixels);
+        assert_eq!(shown, unfiltered(&whole, other).pixels);
         assert_eq!(shown[0], whole.image().pixels[0], "of the sides there is nothing else");
         assert_ne!(shown[6], whole.image().pixels[6]);
     }

@@ -25,10 +25,10 @@ const READING_GAP: Duration = Duration::from_millis(250);
 const OLDEST: Duration = Duration::from_secs(2);
 /// Publishing may take at most about one part in this of the time.
 const PUBLISH_SHARE: u32 = 40;
-/// A resized film is worth no more samples a pixel than this, for it is a little blurred.
-const MOST_OF_RESIZED: f32 = 64.0;
 /// But a picture that changes is shown at least so often.
 const LONGEST_GAP: Duration = Duration::from_millis(800);
+/// A resized film is worth no more samples a pixel than this, for it is a little blurred.
+const MOST_OF_RESIZED: f32 = 64.0;
 
 /// A film as it was copied, or read back from the window's device, last.
 #[derive(Clone)]
@@ -61,6 +61,11 @@ impl Job<'_> {
         is_as_wide.then(|| Arc::clone(film))
     }
 
+    /// What one of its samples counts as it is.
+    fn backdrop_worth(&self) -> f32 {
+        self.kept.backdrop.as_ref().map_or(1.0, |seen| seen.worth)
+    }
+
     /// Resizes the film from before to the picture's size, if it was a whole one of about as many rows: the picture
     /// goes on with what it shows.
     pub(super) fn resize_backdrop(&mut self) {
@@ -89,8 +94,8 @@ impl Job<'_> {
         let known = match &self.resized {
             Some(resized) => resized.known(),
             None => {
-                let worth = self.kept.backdrop.as_ref().map_or(1.0, |seen| seen.worth);
-                self.backdrop().map_or(0.0, |film| worth * film.total_samples() as f32)
+                let samples = self.backdrop().map_or(0, |film| film.total_samples());
+                self.backdrop_worth() * samples as f32
             }
         };
         if film.min_samples() > 0 && worth * film.total_samples() as f32 > known {
@@ -208,7 +213,7 @@ impl Job<'_> {
             None => before.map(|film| {
                 let (worth, origin) = match resized {
                     Some(resized) => (resized.worth(main.samples()), Origin::Resized),
-                    None => (self.kept.backdrop.as_ref().map_or(1.0, |s| s.worth), Origin::Before),
+                    None => (self.backdrop_worth(), Origin::Before),
                 };
                 Backdrop { film, samples: seen, worth, origin }
             }),
