@@ -18,7 +18,7 @@ use crate::light_grid::LightGrid;
 use crate::metrics;
 use crate::path::{World, framing};
 use crate::render::gpu::{AdapterFacts, Gpu, KernelFacts, RayChoice, Schedule, UploadedScene};
-use crate::render::{Phase, Sampling, Session, StopRule, View};
+use crate::render::{Phase, Sampling, Session, Sharing, StopRule, View};
 use crate::report::{Device, Machine, OpenDevice};
 
 pub use rays::{RayFigures, RayKind};
@@ -34,6 +34,8 @@ pub struct Options {
     pub rays: RayChoice,
     /// How its kernels share the work; `None` is what suits a scene.
     pub schedule: Option<Schedule>,
+    /// Whether neighbouring pixels share vertices; then kernels do not take turns.
+    pub sharing: Sharing,
     /// Width and height of the pictures.
     pub size: (u32, u32),
     /// Seconds of rendering a scene on a device.
@@ -255,7 +257,8 @@ impl Place<'_> {
         let world = &self.subject.world;
         let camera = world.scene.cameras.first().cloned();
         let aspect = width as f32 / height as f32;
-        View::new(camera.unwrap_or_else(|| framing::frame(world, aspect)), [width, height])
+        let camera = camera.unwrap_or_else(|| framing::frame(world, aspect));
+        View { sharing: self.options.sharing, ..View::new(camera, [width, height]) }
     }
 
     /// Seconds to the first picture of another view with distributions learned before, the median of a few.

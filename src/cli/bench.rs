@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::image::check_writable;
 use crate::output::record::write_json;
 use crate::path::World;
+use crate::render::Sharing;
 use crate::render::gpu::{RayChoice, Schedule, adapters};
 use crate::report::Device;
 use crate::scene::builtin;
@@ -49,6 +50,9 @@ pub(super) struct BenchArguments {
     /// scene. The picture is the same.
     #[arg(long, value_enum)]
     schedule: Option<Schedule>,
+    /// Whether pixels of a tile share what their paths find, as `render` does, or not, as the window does.
+    #[arg(long, default_value = "auto", value_enum, value_name = "off|4x4|8x8|auto")]
+    sharing: Sharing,
     /// Picture size in pixels; without it, 1920x1080 with a real GPU, else 640x360.
     #[arg(long, value_parser = values::size, allow_hyphen_values = true, value_name = "WxH")]
     size: Option<(u32, u32)>,
@@ -107,6 +111,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         adapter: arguments.adapter.clone(),
         rays: arguments.rays,
         schedule: arguments.schedule,
+        sharing: arguments.sharing,
         size: arguments.size.unwrap_or(suitable_size),
         seconds: arguments.seconds,
     };

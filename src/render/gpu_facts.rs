@@ -105,7 +105,7 @@ pub struct GpuFigures {
     pub bytes_read: u64,
     /// What its dispatches took.
     pub flights: FlightFigures,
-    /// Seconds in which the driver compiled its kernels, when it did.
+    /// Seconds of waiting for the driver to compile its kernels.
     pub compile_seconds: f64,
     /// How its kernels share the work.
     pub schedule: Schedule,

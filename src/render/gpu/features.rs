@@ -171,23 +171,4 @@ impl Features {
         }
         features
     }
-
-    /// Whether shading takes so many registers that walks in the same kernel run in half of the waves
-    /// that would otherwise fit, or in less.
-    pub(crate) fn shading_is_large(self) -> bool {
-        // What features add to the registers, roughly, in steps of 8 to 12. Compiled by RADV for RDNA2,
-        // kernels of 6 steps or more took over 168 and ran in 4 waves, others in 6 or 8.
-        let weights = [
-            (Self::DIFFUSE_TRANSMISSION, 1),
-            (Self::DISPERSION, 1),
-            (Self::IRIDESCENCE, 2),
-            (Self::LAYERS, 1),
-            (Self::PARTIAL, 1),
-            (Self::SHEEN, 1),
-            (Self::LOCAL_LIGHTS | Self::MAP_SAMPLING, 1),
-            (Self::MEDIUM | Self::SOLID_TRANSMISSION, 2),
-        ];
-        let steps = weights.iter().filter(|(features, _)| self.contains(*features));
-        steps.map(|(_, weight)| weight).sum::<u32>() >= 6
-    }
 }

@@ -32,6 +32,7 @@ mod uploaded_scene;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use glam::Vec3;
 
@@ -86,6 +87,8 @@ pub(crate) struct Renderer {
     features: Features,
     constants: Constants,
     kernels: BTreeMap<Kernel, Bound>,
+    /// Seconds of waiting for them.
+    compile_seconds: f64,
     flights: Flights,
     /// If kernels take turns.
     queue: Option<Queue>,
@@ -136,7 +139,7 @@ impl Renderer {
         film: Option<&Film>,
     ) -> Result<Self> {
         let mut renderer = Self::without_kernels(uploaded, (world, environment), view, rays, film)?;
-        let is_queue = Schedule::of(&uploaded.gpu, renderer.features) == Schedule::Queue;
+        let is_queue = Schedule::of(&uploaded.gpu) == Schedule::Queue;
         let takes_turns =
             renderer.sharing.is_none() && !renderer.features.contains(Features::RADIANCE_CACHE);
         if is_queue && takes_turns {
@@ -144,9 +147,13 @@ impl Renderer {
             let queue = Queue::new(&mut renderer.buffers, renderer.features, tiles)?;
             renderer.queue = Some(queue);
         }
-        for kernel in renderer.render_kernels() {
-            renderer.compiled(*kernel)?;
+        let mut kernels = renderer.render_kernels().to_vec();
+        for (kernel, feature) in
+            [(Kernel::Learn, Features::LIGHT_GRID), (Kernel::Train, Features::RADIANCE_CACHE)]
+        {
+            kernels.extend(renderer.features.contains(feature).then_some(kernel));
         }
+        renderer.compile(&kernels)?;
         Ok(renderer)
     }
 
@@ -204,6 +211,7 @@ impl Renderer {
             .transpose()?;
         let mut renderer = Self {
             kernels: BTreeMap::new(),
+            compile_seconds: 0.0,
             flights: Flights::new(&uploaded.gpu),
             queue: None,
             sharing,
@@ -411,7 +419,7 @@ impl Renderer {
             device_bytes: self.buffers.bytes(),
             bytes_read: self.buffers.bytes_read(),
             flights: self.flights.figures(),
-            compile_seconds: self.kernels.values().map(|k| k.pipeline.compile_seconds).sum(),
+            compile_seconds: self.compile_seconds,
             schedule: if self.queue.is_some() { Schedule::Queue } else { Schedule::Whole },
             kernel: self.kernel_facts.clone(),
         }
@@ -442,8 +450,20 @@ impl Renderer {
         }
     }
 
-    /// A kernel, compiled if this is the first time, and what it is to be bound with.
-    fn compiled(&mut self, kernel: Kernel) -> Result<(&mut Bound, &Gpu, &Buffers)> {
+    /// Compiles kernels, all of them at once: a real GPU's driver takes seconds for each.
+    fn compile(&mut self, kernels: &[Kernel]) -> Result<()> {
+        let start = Instant::now();
+        let places = self.buffers.array_places();
+        let program = |kernel| Program::new(kernel, self.features, &self.constants, &places);
+        let programs = kernels.iter().map(|kernel| (*kernel, program(*kernel))).collect();
+        let compiled = self.gpu.pipelines(programs)?;
+        self.kernels.extend(kernels.iter().copied().zip(compiled.into_iter().map(Bound::new)));
+        self.compile_seconds += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// A kernel, compiled if this is the first time, and what binds the buffers as they are now.
+    fn bound(&mut self, kernel: Kernel) -> Result<(wgpu::ComputePipeline, wgpu::BindGroup)> {
         let Self { gpu, buffers, features, constants, kernels, .. } = self;
         let bound = match kernels.entry(kernel) {
             Entry::Occupied(known) => known.into_mut(),
@@ -452,12 +472,6 @@ impl Renderer {
                 vacant.insert(Bound::new(gpu.pipeline(kernel, program)?))
             }
         };
-        Ok((bound, gpu, buffers))
-    }
-
-    /// A kernel and what binds the buffers as they are now.
-    fn bound(&mut self, kernel: Kernel) -> Result<(wgpu::ComputePipeline, wgpu::BindGroup)> {
-        let (bound, gpu, buffers) = self.compiled(kernel)?;
         bound.current(gpu, buffers)
     }
 

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::sync::{Arc, PoisonError};
-use std::time::Instant;
+use std::thread::ScopedJoinHandle;
 
 use super::device::Gpu;
 use super::kernel::Kernel;
@@ -24,8 +24,6 @@ pub(super) struct Pipeline {
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) layout: wgpu::BindGroupLayout,
     pub(super) program: Program,
-    /// Seconds of compiling.
-    pub(super) compile_seconds: f64,
 }
 
 impl Pipeline {
@@ -34,7 +32,6 @@ impl Pipeline {
     /// # Errors
     /// If the driver refuses it.
     pub(super) fn new(gpu: &Gpu, entry: &str, program: Program) -> Result<Arc<Self>> {
-        let start = Instant::now();
         let entries: Vec<_> = program
             .bindings
             .iter()
@@ -78,8 +75,7 @@ impl Pipeline {
             });
             (layout, pipeline)
         })?;
-        let compile_seconds = start.elapsed().as_secs_f64();
-        Ok(Arc::new(Self { pipeline, layout, program, compile_seconds }))
+        Ok(Arc::new(Self { pipeline, layout, program }))
     }
 }
 
@@ -115,13 +111,28 @@ impl Gpu {
     /// # Errors
     /// If the driver refuses it.
     pub(super) fn pipeline(&self, kernel: Kernel, program: Program) -> Result<Arc<Pipeline>> {
-        let mut known = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(pipeline) = known.find(&program.source) {
+        let known = || self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pipeline) = known().find(&program.source) {
             return Ok(pipeline);
         }
         let pipeline = Pipeline::new(self, kernel.name(), program)?;
-        known.keep(Arc::clone(&pipeline));
+        known().keep(Arc::clone(&pipeline));
         Ok(pipeline)
+    }
+
+    /// The same of several, which are compiled at the same time.
+    ///
+    /// # Errors
+    /// If the driver refuses one.
+    pub(super) fn pipelines(&self, programs: Vec<(Kernel, Program)>) -> Result<Vec<Arc<Pipeline>>> {
+        std::thread::scope(|scope| {
+            let compile = |(kernel, program)| scope.spawn(move || self.pipeline(kernel, program));
+            let compiling: Vec<_> = programs.into_iter().map(compile).collect();
+            let wait = |thread: ScopedJoinHandle<'_, _>| {
+                thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            };
+            compiling.into_iter().map(wait).collect()
+        })
     }
 }
 

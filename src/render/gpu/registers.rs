@@ -140,20 +140,6 @@ fn compile() {
     }
 }
 
-/// Half of the waves of a small kernel, or less.
-const FEW_WAVES: u64 = 4;
-
-#[test]
-fn a_queue_is_for_kernels_of_few_waves() {
-    let table = parse(include_str!("../../../tests/gpu/registers.txt"));
-    for name in builtin::names() {
-        let world = World::new(builtin::build(name).expect("built in"));
-        let waves = table[&((*name).to_owned(), Kernel::Render.name().to_owned())][WAVES];
-        let is_large = Features::by_default(&world).shading_is_large();
-        assert_eq!(is_large, waves <= FEW_WAVES, "{name}: {waves} waves");
-    }
-}
-
 /// A scene's kernel, with arrays where GPUs have them.
 fn program_of(world: &World, kernel: Kernel, features: Features) -> Program {
     // Where the tables begin is of no account, nor is how deep the tree is: none here is deeper.

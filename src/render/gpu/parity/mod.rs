@@ -8,8 +8,8 @@
 //!
 //! Bounds were measured on software Vulkan (llvmpipe), where two thirds are taken up at most, save
 //! for whole paths. It computes most functions bit by bit as the CPU does; their bounds of some units
-//! in the last place are for devices that divide, take roots and fuse products with sums otherwise,
-//! as WGSL allows. `cargo test gpu::parity -- --nocapture` prints how much of its bound each probe
+//! in the last place are for devices that divide and take roots otherwise, as WGSL allows. GPUs also fuse
+//! products with sums, which changes more where terms cancel: [`OF_GPUS`] was measured on an H200. `cargo test gpu::parity -- --nocapture` prints how much of its bound each probe
 //! takes up.
 
 mod cases;
@@ -36,6 +36,21 @@ use twin::Twin;
 const STRIDE: usize = 64;
 /// What an answer is filled with beforehand.
 const UNTOUCHED: u32 = 0xdead_beef;
+
+/// What a device may do otherwise than its twin.
+#[derive(Debug, Clone, Copy)]
+struct Tolerance {
+    /// So many times a [`twin::Bound`].
+    bounds: f32,
+    /// One case in so many may be decided otherwise, whatever the probe allows.
+    share_of_flips: usize,
+}
+
+/// Of software.
+const OF_SOFTWARE: Tolerance = Tolerance { bounds: 1.0, share_of_flips: usize::MAX };
+/// Of GPUs: 7.8 times a bound and one case in 59 (rays towards corners) were seen, and cases that
+/// are nothing but rounding: a triangle without area, Fresnel's equations where nothing is refracted.
+const OF_GPUS: Tolerance = Tolerance { bounds: 12.0, share_of_flips: 40 };
 
 /// WGSL that runs with every case, and the same in Rust.
 struct Probe<'a> {
@@ -65,10 +80,10 @@ impl<'a> Probe<'a> {
     }
 
     /// Compares the device's answers; `Err` says what was wrong first.
-    fn compare(&self, answers: &[u32]) -> Result<String, String> {
+    fn compare(&self, answers: &[u32], tolerance: Tolerance) -> Result<String, String> {
         let (mut worst, mut wrong) = (0.0_f32, Vec::new());
         for (case, answer) in self.cases.iter().zip(answers.chunks_exact(STRIDE)) {
-            let mut twin = Twin::new(case, answer);
+            let mut twin = Twin::new(case, answer, tolerance.bounds);
             (self.twin)(&mut twin);
             match twin.finish() {
                 Ok(share) => worst = worst.max(share),
@@ -79,7 +94,7 @@ impl<'a> Probe<'a> {
         let count = cases.len();
         let summary =
             format!("{name}: {count} cases, {} flips, {worst:.2} of the bound", wrong.len());
-        if wrong.len() <= *flips {
+        if wrong.len() <= (*flips).max(count / tolerance.share_of_flips) {
             return Ok(summary);
         }
         let some: String = wrong.iter().take(4).map(|w| format!("\n    {w}")).collect();
@@ -168,9 +183,10 @@ fn run(fixture: &Fixture, preludes: &[&str], probes: &[Probe<'_>], places: Place
         })
         .expect("it compiles");
     renderer.set_grid(Some(grid)).expect("it fits");
+    let tolerance = if gpu.facts().is_software() { OF_SOFTWARE } else { OF_GPUS };
     let mut complaints = Vec::new();
     for (index, probe) in probes.iter().enumerate() {
-        match probe.compare(&ask(&mut renderer, index, probe)) {
+        match probe.compare(&ask(&mut renderer, index, probe), tolerance) {
             Ok(line) => eprintln!("{line}"),
             Err(complaint) => complaints.push(complaint),
         }

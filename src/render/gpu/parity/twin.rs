@@ -77,6 +77,8 @@ numbers_of_vectors!(Vec2, Vec3, Vec4);
 pub(super) struct Twin<'a> {
     case: &'a [u32],
     answer: &'a [u32],
+    /// So many times each bound is allowed.
+    slack: f32,
     read: usize,
     compared: usize,
     worst: f32,
@@ -84,8 +86,8 @@ pub(super) struct Twin<'a> {
 }
 
 impl<'a> Twin<'a> {
-    pub(super) fn new(case: &'a [u32], answer: &'a [u32]) -> Self {
-        Self { case, answer, read: 0, compared: 0, worst: 0.0, wrong: None }
+    pub(super) fn new(case: &'a [u32], answer: &'a [u32], slack: f32) -> Self {
+        Self { case, answer, slack, read: 0, compared: 0, worst: 0.0, wrong: None }
     }
 
     pub(super) fn take_word(&mut self) -> u32 {
@@ -139,7 +141,7 @@ impl<'a> Twin<'a> {
             let device = self.device();
             let share = bound.share(right, device);
             self.worst = self.worst.max(share);
-            self.check(share <= 1.0, || {
+            self.check(share <= self.slack, || {
                 format!("{device:e} instead of {right:e}, {share:.2} of {bound:?}")
             });
         }
