@@ -46,8 +46,8 @@ pub(super) struct BenchArguments {
     /// What finds the surfaces that rays hit on a GPU.
     #[arg(long, default_value = "auto", value_enum)]
     rays: RayChoice,
-    /// How a GPU's kernels share the work: one does all, or three take turns; without it, what suits the
-    /// scene. The picture is the same.
+    /// How a GPU's kernels share the work: one does all, or three take turns; without it, what suits the GPU.
+    /// The picture is the same. Where pixels share vertices, kernels always take turns.
     #[arg(long, value_enum)]
     schedule: Option<Schedule>,
     /// Whether pixels of a tile share what their paths find, as `render` does, or not, as the window does.

@@ -81,6 +81,12 @@ impl AdapterFacts {
     pub fn is_software(&self) -> bool {
         self.kind == "software"
     }
+
+    /// Whether it is part of a processor.
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code, reason = "only queues ask"))]
+    pub(crate) fn is_integrated(&self) -> bool {
+        self.kind == "integrated"
+    }
 }
 
 /// What dispatches took.

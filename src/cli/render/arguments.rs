@@ -175,8 +175,8 @@ pub(in crate::cli) struct RenderArguments {
     /// What finds the surfaces that rays hit on a GPU.
     #[arg(long, default_value = "auto", value_enum, help_heading = "Run")]
     pub(in crate::cli) rays: RayChoice,
-    /// How a GPU's kernels share the work: one does all, or three take turns; without it, what suits the
-    /// scene. The picture is the same.
+    /// How a GPU's kernels share the work: one does all, or three take turns; without it, what suits the GPU.
+    /// The picture is the same. Where pixels share vertices, kernels always take turns.
     #[arg(long, value_enum, help_heading = "Run")]
     pub(super) schedule: Option<Schedule>,
     /// Threads; 0 uses every core.

@@ -256,7 +256,7 @@ impl Gpu {
         self
     }
 
-    /// The same connection with kernels that share the work so, whatever suits the picture; `None` is
+    /// The same connection with kernels that share the work so, whatever suits the device; `None` is
     /// what suits it.
     #[must_use]
     pub fn with_schedule(mut self, schedule: Option<Schedule>) -> Self {

@@ -144,7 +144,8 @@ impl Renderer {
             renderer.sharing.is_none() && !renderer.features.contains(Features::RADIANCE_CACHE);
         if is_queue && takes_turns {
             let tiles = renderer.tiles();
-            let queue = Queue::new(&mut renderer.buffers, renderer.features, tiles)?;
+            let Self { buffers, gpu, features, .. } = &mut renderer;
+            let queue = Queue::new(buffers, gpu, *features, tiles)?;
             renderer.queue = Some(queue);
         }
         let mut kernels = renderer.render_kernels().to_vec();

@@ -7,7 +7,7 @@ use std::thread::ScopedJoinHandle;
 use super::device::Gpu;
 use super::kernel::Kernel;
 use super::shader::{Binding, Program};
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// What naga adds to the kernels so that they cannot do harm, whatever they read. Counters that end
 /// loops and guards of divisions, of which there are many, cost registers and up to a third of the
@@ -98,6 +98,10 @@ impl Pipelines {
 
     /// Keeps another one in the place of that which nobody has asked for the longest.
     fn keep(&mut self, pipeline: Arc<Pipeline>) {
+        // Two may have compiled it at the same time.
+        if self.find(&pipeline.program.source).is_some() {
+            return;
+        }
         if self.0.len() == MOST {
             self.0.remove(0);
         }
@@ -125,9 +129,15 @@ impl Gpu {
     /// # Errors
     /// If the driver refuses one.
     pub(super) fn pipelines(&self, programs: Vec<(Kernel, Program)>) -> Result<Vec<Arc<Pipeline>>> {
+        let no_thread = |e| Error::new(format!("a kernel cannot be compiled: {e}"));
         std::thread::scope(|scope| {
-            let compile = |(kernel, program)| scope.spawn(move || self.pipeline(kernel, program));
-            let compiling: Vec<_> = programs.into_iter().map(compile).collect();
+            let compile = |(kernel, program): (Kernel, Program)| {
+                std::thread::Builder::new()
+                    .name(kernel.name().to_owned())
+                    .spawn_scoped(scope, move || self.pipeline(kernel, program))
+                    .map_err(no_thread)
+            };
+            let compiling = programs.into_iter().map(compile).collect::<Result<Vec<_>>>()?;
             let wait = |thread: ScopedJoinHandle<'_, _>| {
                 thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
             };

@@ -16,8 +16,11 @@ use crate::error::Result;
 use crate::features::Features;
 use crate::render::gpu_facts::Schedule;
 
-/// Most workgroups of slots: they keep the largest devices busy and fit their caches.
+/// Most workgroups of slots, which all take a step at a time: they keep the largest devices busy and fit their
+/// caches.
 const MOST_GROUPS: u64 = 4096;
+/// The same where a processor draws as well: so many steps would make a desktop stutter.
+const MOST_GROUPS_INTEGRATED: u64 = 512;
 /// Most steps of all slots in one submission.
 const MOST_STEPS: u64 = 64;
 
@@ -41,8 +44,14 @@ pub(super) struct Queue {
 
 impl Queue {
     /// Makes the buffers for a picture of so many tiles.
-    pub(super) fn new(buffers: &mut Buffers, features: Features, tiles: u64) -> Result<Self> {
-        let groups = tiles.min(MOST_GROUPS);
+    pub(super) fn new(
+        buffers: &mut Buffers,
+        gpu: &Gpu,
+        features: Features,
+        tiles: u64,
+    ) -> Result<Self> {
+        let is_integrated = gpu.facts().is_integrated();
+        let groups = tiles.min(if is_integrated { MOST_GROUPS_INTEGRATED } else { MOST_GROUPS });
         let slot_bytes = 16 * u64::from(SlotTexels::of(features).count);
         buffers.make("slots", groups * GROUP * slot_bytes, "the set of paths")?;
         buffers.make("queue", REPORT_BYTES, "a count")?;

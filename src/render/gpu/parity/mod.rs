@@ -9,8 +9,8 @@
 //! Bounds were measured on software Vulkan (llvmpipe), where two thirds are taken up at most, save
 //! for whole paths. It computes most functions bit by bit as the CPU does; their bounds of some units
 //! in the last place are for devices that divide and take roots otherwise, as WGSL allows. GPUs also fuse
-//! products with sums, which changes more where terms cancel: [`OF_GPUS`] was measured on an H200. `cargo test gpu::parity -- --nocapture` prints how much of its bound each probe
-//! takes up.
+//! products with sums, which changes more where terms cancel: [`OF_GPUS`] was measured on an H200.
+//! `cargo test gpu::parity -- --nocapture` prints how much of its bound each probe takes up.
 
 mod cases;
 pub(super) mod fixture;
