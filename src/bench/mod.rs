@@ -32,7 +32,7 @@ pub struct Options {
     pub adapter: Option<String>,
     /// What finds the surfaces that rays hit on it.
     pub rays: RayChoice,
-    /// How its kernels share the work; `None` is what suits a scene.
+    /// How its kernels share the work; `None` is what suits it.
     pub schedule: Option<Schedule>,
     /// Whether neighbouring pixels share vertices; then kernels do not take turns.
     pub sharing: Sharing,
