@@ -96,10 +96,14 @@ impl App {
             }
             Command::ToggleSplit => self.document.light.split = !self.document.light.split,
             Command::ToggleDevice => {
-                let is_on_gpu = self.worker.is_preparing()
-                    || self.snapshot.as_ref().is_some_and(|s| s.main.gpu.is_some());
-                self.document.light.device =
-                    if is_on_gpu { DeviceChoice::Cpu } else { DeviceChoice::Gpu };
+                let is_on_gpu = self.snapshot.as_ref().is_some_and(|s| s.main.gpu.is_some());
+                let device = &mut self.document.light.device;
+                let is_asked_for = match device {
+                    DeviceChoice::Cpu => false,
+                    DeviceChoice::Gpu => true,
+                    DeviceChoice::Auto => is_on_gpu || self.worker.is_preparing(),
+                };
+                *device = if is_asked_for { DeviceChoice::Cpu } else { DeviceChoice::Gpu };
             }
             Command::ToggleDenoise => self.document.look.denoise = !self.document.look.denoise,
             Command::TogglePanels => interface.panels = !interface.panels,

@@ -50,7 +50,7 @@ pub mod zoom;
 
 use crate::develop::DevelopSettings;
 use crate::error::{Error, Result};
-use crate::render::gpu::RayChoice;
+use crate::render::gpu::{DeviceChoice, RayChoice};
 
 use commands::Command;
 use convergence::Convergence;
@@ -379,7 +379,9 @@ impl App {
     fn panels(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
         let snapshot = self.snapshot.as_deref();
         if self.interface.panels {
-            let is_on_gpu = snapshot.is_some_and(|s| s.main.gpu.is_some());
+            let is_preparing = self.worker.is_preparing();
+            let is_on_gpu = snapshot.is_some_and(|s| s.main.gpu.is_some())
+                || is_preparing && self.document.light.device != DeviceChoice::Cpu;
             panels::top::show(
                 ui,
                 &mut self.document,
@@ -393,7 +395,7 @@ impl App {
                 shown: self.shown.as_ref().map(|shown| &*shown.order.snapshot),
                 loading: self.loader.busy_with().collect(),
                 threads: self.worker.threads(),
-                is_preparing: self.worker.is_preparing(),
+                is_preparing,
                 overlay: self.interface.overlay,
                 magnification: self.interface.magnification(self.document.size),
                 pointed: self.interface.pointed.filter(|_| !self.is_repeatable),

@@ -19,7 +19,7 @@ pub(super) struct SpeedUp {
 }
 
 impl SpeedUp {
-    /// From relative squared errors times seconds; `None` below eight samples a pixel.
+    /// From relative squared errors times seconds; `None` below eight samples a pixel, and while seconds are not known.
     pub(super) fn of(main: &SessionSnapshot, plain: &SessionSnapshot) -> Option<Self> {
         if main.samples < 8 || plain.samples < 8 {
             return None;
@@ -33,7 +33,7 @@ impl SpeedUp {
             .map(|(a, b)| 0.5 * (a + b))
             .collect();
         let (a, p) = (block_errors(main, &lights), block_errors(plain, &lights));
-        let seconds = plain.figures.elapsed_seconds() / main.figures.elapsed_seconds();
+        let seconds = plain.comparable_seconds? / main.comparable_seconds?;
         let (sum_a, sum_p) = (a.iter().sum::<f64>(), p.iter().sum::<f64>());
         let ratio = |a: f64, p: f64| p / a * seconds;
         let whole = ratio(sum_a, sum_p);
@@ -104,7 +104,8 @@ mod tests {
             samples,
             sampling: Sampling::Plain,
             film: Arc::new(film),
-            figures: Figures { render_seconds: 1.0, ..Figures::default() },
+            figures: Figures::default(),
+            comparable_seconds: Some(1.0),
             noise: 0.0,
             invalid_samples: 0,
             grid: None,
@@ -164,12 +165,11 @@ mod tests {
             let pass = session.next_pass(&rule);
             session.advance(pass, &AtomicBool::new(false)).expect("no GPU");
         }
-        let figures = session.figures();
         SessionSnapshot {
             samples: session.samples(),
             film: Arc::new(session.film().clone()),
+            figures: session.figures(),
             // What is compared does not depend on the clock.
-            figures: Figures { render_seconds: 1.0, learning_seconds: 0.0, ..figures },
             ..rendered(0, 1, 1.0)
         }
     }

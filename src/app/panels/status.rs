@@ -70,10 +70,9 @@ fn phase(ui: &mut Ui, status: &Status<'_>) {
     }
     if status.is_preparing {
         ui.label(RichText::new("Preparing the GPU…").color(theme::ACCENT)).on_hover_text(
-            "The scene is uploaded and the kernels are compiled; software Vulkan takes some \
-             seconds for it",
+            "The scene is uploaded and kernels are compiled, which takes some seconds; the CPU goes on \
+             meanwhile",
         );
-        return;
     }
     let Some(snapshot) = status.snapshot else {
         ui.label(RichText::new("Starting").color(theme::ACCENT));

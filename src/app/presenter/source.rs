@@ -194,6 +194,7 @@ pub(super) mod tests {
             sampling: Sampling::Plain,
             film: Arc::new(film),
             figures: Figures::default(),
+            comparable_seconds: None,
             noise: 0.0,
             invalid_samples: 0,
             grid: None,

@@ -7,8 +7,8 @@ use crate::app::lock;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::World;
-use crate::render::Session;
-use crate::render::gpu::{DeviceChoice, Gpu, RayChoice, UploadedScene};
+use crate::render::gpu::{DeviceChoice, Gpu, Held, RayChoice, UploadedScene};
+use crate::render::{Session, View};
 
 /// The device in use and what is on it.
 pub(super) struct Device {
@@ -20,9 +20,20 @@ pub(super) struct Device {
     choice: Option<DeviceChoice>,
     gpu: Option<Gpu>,
     uploaded: Option<Uploaded>,
+    /// The kernels that a session waits for on the CPU.
+    awaited: Option<Awaited>,
     failure: Option<String>,
     /// The geometry that the GPU failed with.
     refused: Option<Weak<()>>,
+}
+
+/// Kernels that are being compiled, and what for.
+struct Awaited {
+    world: Weak<World>,
+    environment: Weak<Environment>,
+    view: View,
+    /// What is held until then.
+    held: Weak<Held>,
 }
 
 /// What is on the GPU.
@@ -44,6 +55,7 @@ impl Device {
             choice: None,
             gpu: None,
             uploaded: None,
+            awaited: None,
             failure: None,
             refused: None,
         }
@@ -59,8 +71,8 @@ impl Device {
         }
     }
 
-    /// Whether a GPU was chosen that has to be prepared for it, which takes long.
-    pub(super) fn needs_preparation(&self, request: &Request) -> bool {
+    /// Whether a GPU was chosen to which the scene has to be uploaded.
+    pub(super) fn needs_upload(&self, request: &Request) -> bool {
         let is_uploaded =
             self.uploaded.as_ref().is_some_and(|on| Arc::ptr_eq(&on.world, &request.world));
         self.gpu.is_some() && !is_uploaded
@@ -69,29 +81,72 @@ impl Device {
     /// Whether a GPU is ready that has all first samples in a moment; software has not.
     pub(super) fn is_quick(&self, request: &Request) -> bool {
         let is_real = self.gpu.as_ref().is_some_and(|gpu| !gpu.facts().is_software());
-        is_real && self.choice == Some(request.device) && !self.needs_preparation(request)
+        is_real
+            && self.choice == Some(request.device)
+            && !self.needs_upload(request)
+            && !self.is_compiling()
     }
 
-    /// Lets the session run on the device that was chosen; what it has so far is kept.
-    pub(super) fn place(&mut self, session: &mut Session<'_>, request: &Request) {
+    /// Whether kernels are being compiled that a session waits for on the CPU.
+    pub(super) fn is_compiling(&self) -> bool {
+        self.awaited.as_ref().is_some_and(|awaited| awaited.held.strong_count() > 0)
+    }
+
+    /// Whether there were any when this was last [noted](Self::note_compiled).
+    pub(super) fn was_compiling(&self) -> bool {
+        self.awaited.is_some()
+    }
+
+    /// Has a look at whether they still are.
+    pub(super) fn note_compiled(&mut self) {
+        self.awaited.take_if(|awaited| awaited.held.strong_count() == 0);
+    }
+
+    /// Lets the session run on the device that was chosen, as soon as its kernels are compiled; what it has so far
+    /// is kept. `preparation` begins what is told of for as long.
+    pub(super) fn place(
+        &mut self,
+        session: &mut Session<'_>,
+        request: &Request,
+        preparation: impl FnOnce() -> Arc<Held>,
+    ) {
         let Some(gpu) = self.gpu.clone() else {
             session.continue_on_cpu();
             return;
         };
-        if session.is_on_gpu() {
+        if session.is_on_gpu() || self.awaits(session, request) {
             return;
         }
-        let placed =
-            self.upload(&gpu, request).and_then(|uploaded| session.continue_on_gpu(uploaded));
-        if let Err(failure) = placed {
-            self.give_up(&failure, request);
+        let placed = self
+            .upload(&gpu, request)
+            .and_then(|uploaded| session.continue_on_gpu_if_compiled(uploaded, preparation));
+        match placed {
+            Ok(held) => {
+                self.awaited = held.map(|held| Awaited {
+                    world: Arc::downgrade(&request.world),
+                    environment: Arc::downgrade(&request.environment),
+                    view: session.view().clone(),
+                    held,
+                });
+            }
+            Err(failure) => self.give_up(&failure, request),
         }
+    }
+
+    /// Whether the kernels of this very session are being compiled.
+    fn awaits(&self, session: &Session<'_>, request: &Request) -> bool {
+        let is_of_session = |awaited: &Awaited| {
+            awaited.world.as_ptr() == Arc::as_ptr(&request.world)
+                && awaited.environment.as_ptr() == Arc::as_ptr(&request.environment)
+                && awaited.view == *session.view()
+        };
+        self.is_compiling() && self.awaited.as_ref().is_some_and(is_of_session)
     }
 
     /// Does without the GPU until another one or another scene is chosen.
     pub(super) fn give_up(&mut self, failure: &Error, request: &Request) {
         self.tell(failure);
-        (self.gpu, self.uploaded) = (None, None);
+        (self.gpu, self.uploaded, self.awaited) = (None, None, None);
         self.refused = Some(Arc::downgrade(request.world.geometry()));
     }
 
@@ -106,7 +161,7 @@ impl Device {
 
     fn choose(&mut self, choice: DeviceChoice) {
         self.choice = Some(choice);
-        (self.gpu, self.uploaded, self.refused) = (None, None, None);
+        (self.gpu, self.uploaded, self.awaited, self.refused) = (None, None, None, None);
         // The name only says which GPU is meant.
         let adapter = self.adapter.as_deref().filter(|_| choice != DeviceChoice::Cpu);
         let screen = lock(&self.screen).clone();

@@ -18,8 +18,8 @@ pub(super) struct Kept {
     pub(super) learned: Option<Learned>,
     /// What was counted, if it came to its end, and what for.
     pub(super) counted: Option<(Arc<LearningGrid>, Arc<Request>)>,
-    /// Seconds one camera path takes, all threads together.
-    pub(super) seconds_per_path: Option<f64>,
+    /// Seconds one camera path takes on the CPU, all threads together, and on the GPU.
+    pub(super) seconds_per_path: [Option<f64>; 2],
     /// By what the last moving picture's sides were divided.
     pub(super) shrink: Option<u32>,
     pub(super) snapshots: u64,
@@ -91,7 +91,7 @@ impl Kept {
             device: Device::new(gpu, screen),
             learned: None,
             counted: None,
-            seconds_per_path: None,
+            seconds_per_path: [None, None],
             shrink: None,
             snapshots: 0,
             backdrop: None,

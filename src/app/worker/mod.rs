@@ -6,13 +6,14 @@
 //! view at once and no sample is lost.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 mod device;
 mod job;
 mod kept;
+mod preparation;
 mod request;
 mod snapshot;
 
@@ -27,19 +28,25 @@ use crate::alarm::Alarm;
 use crate::error::{Error, Result};
 use crate::render::gpu::{Gpu, RayChoice};
 
-struct Shared {
+/// What there is to do.
+struct Orders {
     slot: Mutex<Slot>,
     changed: Condvar,
+    /// How many [`preparation::Preparation`]s are under way.
+    preparations: AtomicUsize,
+    wake: Wake,
+}
+
+struct Shared {
+    orders: Arc<Orders>,
     cancel: Arc<AtomicBool>,
     snapshot: Mutex<Option<Arc<Snapshot>>>,
     rest: Arc<Rest>,
-    is_preparing: AtomicBool,
     failures: Mutex<Vec<String>>,
     /// What is said of a panic.
     panic: Mutex<Option<String>>,
     /// The device the window is drawn on.
     screen: Arc<Mutex<Gpu>>,
-    wake: Wake,
 }
 
 #[derive(Default)]
@@ -71,17 +78,20 @@ impl Worker {
             .build()
             .map_err(|e| no_thread(&e))?;
         let pool = Arc::new(pool);
-        let shared = Arc::new(Shared {
+        let orders = Orders {
             slot: Mutex::default(),
             changed: Condvar::new(),
+            preparations: AtomicUsize::default(),
+            wake,
+        };
+        let shared = Arc::new(Shared {
+            orders: Arc::new(orders),
             cancel: Arc::default(),
             snapshot: Mutex::default(),
             rest: Arc::new(Rest::new()),
-            is_preparing: AtomicBool::default(),
             failures: Mutex::default(),
             panic: Mutex::default(),
             screen: Arc::new(Mutex::new(screen)),
-            wake,
         });
         let (inside, render_pool) = (Arc::clone(&shared), Arc::clone(&pool));
         let thread = std::thread::Builder::new()
@@ -98,7 +108,7 @@ impl Worker {
 
     /// Asks for a picture; the latest request counts.
     pub(crate) fn submit(&self, request: Request) {
-        let mut slot = lock(&self.shared.slot);
+        let mut slot = lock(&self.shared.orders.slot);
         if slot.request.as_ref().is_some_and(|old| old.is_same(&request)) {
             return;
         }
@@ -106,7 +116,7 @@ impl Worker {
             self.shared.cancel.store(true, Ordering::Relaxed);
         }
         slot.request = Some(Arc::new(request));
-        self.shared.changed.notify_all();
+        self.shared.orders.changed.notify_all();
     }
 
     /// The latest picture.
@@ -116,19 +126,19 @@ impl Worker {
 
     /// Whether a picture is what was asked for last.
     pub(super) fn has_answered(&self, snapshot: &Snapshot) -> bool {
-        let slot = lock(&self.shared.slot);
+        let slot = lock(&self.shared.orders.slot);
         slot.request.as_ref().is_some_and(|latest| snapshot.request.is_same(latest))
     }
 
     /// Whether a picture is of what was asked for last, whatever else is wanted with it.
     pub(super) fn is_of_latest(&self, snapshot: &Snapshot) -> bool {
-        let slot = lock(&self.shared.slot);
+        let slot = lock(&self.shared.orders.slot);
         slot.request.as_ref().is_some_and(|latest| !snapshot.request.restarts(latest))
     }
 
     /// Whether a GPU is being opened, filled or programmed.
     pub(crate) fn is_preparing(&self) -> bool {
-        self.shared.is_preparing.load(Ordering::Relaxed)
+        self.shared.orders.preparations.load(Ordering::Relaxed) > 0
     }
 
     /// What there is to say if rendering has ended with a panic since this was asked last.
@@ -149,12 +159,17 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        lock(&self.shared.slot).quit = true;
+        lock(&self.shared.orders.slot).quit = true;
         self.shared.cancel.store(true, Ordering::Relaxed);
-        self.shared.changed.notify_all();
+        self.shared.orders.changed.notify_all();
         if let Some(thread) = self.thread.take() {
             // A panic there was reported there.
             let _ = thread.join();
+        }
+        // Drivers do not stand it that the process ends while they compile.
+        let mut slot = lock(&self.shared.orders.slot);
+        while self.is_preparing() {
+            slot = self.shared.orders.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
         }
     }
 }
@@ -175,7 +190,7 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
     let mut done: Option<Arc<Request>> = None;
     loop {
         let request = {
-            let mut slot = lock(&shared.slot);
+            let mut slot = lock(&shared.orders.slot);
             loop {
                 if slot.quit {
                     return;
@@ -187,7 +202,11 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
                         break Arc::clone(new);
                     }
                     _ => {
-                        slot = shared.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
+                        slot = shared
+                            .orders
+                            .changed
+                            .wait(slot)
+                            .unwrap_or_else(PoisonError::into_inner);
                     }
                 }
             }
@@ -210,10 +229,9 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
         done = Some(worked.unwrap_or_else(|_| {
             // The panic is on the terminal. Nothing of what it left is trusted.
             kept = fresh();
-            shared.is_preparing.store(false, Ordering::Relaxed);
             alarm.set(None);
             *lock(&shared.panic) = Some("rendering has failed; R begins again".to_owned());
-            (shared.wake)();
+            (shared.orders.wake)();
             asked
         }));
     }
@@ -382,6 +400,58 @@ pub(super) mod tests {
         // It fades out.
         let last = wait_for(&worker, |now| is_wide(now) && now.main.samples > 256);
         assert!(last.backdrop.is_none());
+    }
+
+    #[test]
+    fn the_cpu_goes_on_until_a_gpu_is_ready() {
+        let Some(worker) = worker() else { return };
+        let request = Request { device: DeviceChoice::Gpu, ..request_of("office", [96, 72]) };
+        worker.submit(request.clone());
+        let (start, mut counts) = (Instant::now(), std::collections::BTreeSet::new());
+        while worker.snapshot().is_none_or(|snapshot| snapshot.main.gpu.is_none()) {
+            assert!(start.elapsed() < Duration::from_secs(120), "it is never ready");
+            let snapshot = worker.snapshot().filter(|_| worker.is_preparing());
+            counts.extend(snapshot.map(|snapshot| snapshot.now.samples));
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert!(counts.len() > 3, "it stood still: {counts:?}");
+        let now = worker.snapshot().expect("there was one").now;
+        assert!(counts.iter().all(|count| *count <= now.samples), "nothing of it is lost");
+        // The next moments of the same scene have their kernels.
+        let view = View { seed: 7, ..request.view.clone() };
+        worker.submit(Request { view, ..request });
+        wait_for(&worker, |now| now.request.view.seed == 7 && now.main.gpu.is_some());
+    }
+
+    #[test]
+    fn a_picture_that_is_done_moves_to_the_gpu_that_is_asked_for() {
+        let Some(worker) = worker() else { return };
+        let rule = StopRule { samples: Some(2), ..StopRule::default() };
+        let request = Request { rule, ..request_of("crack", [32, 24]) };
+        let is_done = |now: &Snapshot| now.activity == Activity::Done;
+        worker.submit(request.clone());
+        let before = wait_for(&worker, is_done);
+        let request = Request { device: DeviceChoice::Gpu, ..request };
+        worker.submit(request.clone());
+        let after = wait_for(&worker, |now| is_done(now) && now.main.gpu.is_some());
+        assert_eq!(after.now.samples, before.now.samples);
+        assert!(after.main.film == before.main.film, "the same picture");
+        worker.submit(Request { device: DeviceChoice::Cpu, ..request });
+        wait_for(&worker, |now| is_done(now) && now.main.gpu.is_none());
+    }
+
+    #[test]
+    fn nothing_is_left_under_way_when_the_window_closes() {
+        let Some(worker) = worker() else { return };
+        worker.submit(Request { device: DeviceChoice::Gpu, ..request_of("crack", [32, 24]) });
+        let start = Instant::now();
+        while !worker.is_preparing() {
+            assert!(start.elapsed() < Duration::from_secs(120), "it is never prepared");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let shared = Arc::clone(&worker.shared);
+        drop(worker);
+        assert_eq!(shared.orders.preparations.load(Ordering::Relaxed), 0);
     }
 
     #[test]

@@ -52,6 +52,8 @@ pub(crate) struct SessionSnapshot {
     pub samples: u32,
     /// What was done for them.
     pub figures: Figures,
+    /// [`crate::render::Session::comparable_seconds`].
+    pub comparable_seconds: Option<f64>,
     /// [`crate::render::Session::noise`].
     pub noise: f64,
     /// [`Film::invalid_samples`].

@@ -5,6 +5,8 @@
 //! the film, whose sums lose nothing at any number of samples, only when somebody asks for it.
 
 mod acceleration;
+#[cfg(feature = "window")]
+mod ahead;
 mod bound;
 mod buffers;
 mod cast;
@@ -30,7 +32,7 @@ mod sharing;
 mod uploaded_scene;
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -40,18 +42,21 @@ use super::film::Film;
 use super::{Pass, View};
 use crate::bsdf::{albedo, sheen};
 use crate::environment::Environment;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::features::Features;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::path::camera::CameraRays;
 use crate::radiance_cache::RadianceCache;
+#[cfg(feature = "window")]
+pub(crate) use ahead::{Held, OrHeld};
 use bound::Bound;
 use buffers::Buffers;
 use film::Sums;
 use flight::{Flights, Job};
 use kernel::Kernel;
 use layout::{Globals, Work};
+use pipeline::{Pipeline, Programs};
 use queue::Queue;
 use shader::{Constants, Program};
 use sharing::Sharing;
@@ -126,7 +131,7 @@ pub(super) struct Advance {
 }
 
 impl Renderer {
-    /// Builds the kernel for a view of what is uploaded; goes on from `film` if there is one.
+    /// Builds the kernels for a view of what is uploaded; goes on from `film` if there is one.
     ///
     /// # Errors
     /// If something does not fit on the device, with the numbers.
@@ -138,7 +143,50 @@ impl Renderer {
         rays: &CameraRays,
         film: Option<&Film>,
     ) -> Result<Self> {
-        let mut renderer = Self::without_kernels(uploaded, (world, environment), view, rays, film)?;
+        let mut renderer = Self::with_buffers(uploaded, (world, environment), view, rays, film)?;
+        renderer.compile(&renderer.own_kernels())?;
+        Ok(renderer)
+    }
+
+    /// [`Self::new`] if the kernels are there already. Otherwise a thread compiles them, which holds what
+    /// `until_then` gave, unless it has begun before, for as long.
+    ///
+    /// # Errors
+    /// As [`Self::new`], or if the driver has refused one of the kernels.
+    #[cfg(feature = "window")]
+    pub(crate) fn new_or_held(
+        uploaded: &UploadedScene,
+        world: &World,
+        environment: &Environment,
+        view: &View,
+        rays: &CameraRays,
+        film: Option<&Film>,
+        until_then: impl FnOnce() -> Arc<Held>,
+    ) -> Result<OrHeld<Self>> {
+        // A film is large, and uploaded when it is wanted.
+        let lit = (world, environment);
+        let mut renderer = Self::with_buffers(uploaded, lit, view, rays, None)?;
+        let kernels = renderer.own_kernels();
+        let programs = renderer.programs(&kernels);
+        match renderer.gpu.pipelines_or_held(programs, until_then)? {
+            OrHeld::Held(held) => Ok(OrHeld::Held(held)),
+            OrHeld::Ready(compiled) => {
+                renderer.take_up(&kernels, compiled);
+                film.map_or(Ok(()), |film| renderer.set_film(film))?;
+                Ok(OrHeld::Ready(renderer))
+            }
+        }
+    }
+
+    /// All but its kernels.
+    fn with_buffers(
+        uploaded: &UploadedScene,
+        lit: (&World, &Environment),
+        view: &View,
+        rays: &CameraRays,
+        film: Option<&Film>,
+    ) -> Result<Self> {
+        let mut renderer = Self::without_kernels(uploaded, lit, view, rays, film)?;
         let is_queue = Schedule::of(&uploaded.gpu) == Schedule::Queue;
         let takes_turns =
             renderer.sharing.is_none() && !renderer.features.contains(Features::RADIANCE_CACHE);
@@ -148,13 +196,6 @@ impl Renderer {
             let queue = Queue::new(buffers, gpu, *features, tiles)?;
             renderer.queue = Some(queue);
         }
-        let mut kernels = renderer.render_kernels().to_vec();
-        for (kernel, feature) in
-            [(Kernel::Learn, Features::LIGHT_GRID), (Kernel::Train, Features::RADIANCE_CACHE)]
-        {
-            kernels.extend(renderer.features.contains(feature).then_some(kernel));
-        }
-        renderer.compile(&kernels)?;
         Ok(renderer)
     }
 
@@ -165,7 +206,7 @@ impl Renderer {
         (world, environment): (&World, &Environment),
         view: &View,
         rays: &CameraRays,
-        compile: impl FnOnce(&Gpu, Program) -> Result<std::sync::Arc<pipeline::Pipeline>>,
+        compile: impl FnOnce(&Gpu, Program) -> Result<Arc<Pipeline>>,
     ) -> Result<Self> {
         let mut renderer = Self::without_kernels(uploaded, (world, environment), view, rays, None)?;
         let Self { features, constants, buffers, .. } = &renderer;
@@ -451,28 +492,41 @@ impl Renderer {
         }
     }
 
+    /// The kernels that it is going to need.
+    fn own_kernels(&self) -> Vec<Kernel> {
+        let learning =
+            [(Kernel::Learn, Features::LIGHT_GRID), (Kernel::Train, Features::RADIANCE_CACHE)];
+        let learning = learning.into_iter().filter(|(_, feature)| self.features.contains(*feature));
+        let rendering = self.render_kernels().iter().copied();
+        rendering.chain(learning.map(|(kernel, _)| kernel)).collect()
+    }
+
+    fn programs(&self, kernels: &[Kernel]) -> Programs {
+        let places = self.buffers.array_places();
+        let program = |kernel| Program::new(kernel, self.features, &self.constants, &places);
+        kernels.iter().map(|kernel| (*kernel, program(*kernel))).collect()
+    }
+
     /// Compiles kernels, all of them at once: a real GPU's driver takes seconds for each.
     fn compile(&mut self, kernels: &[Kernel]) -> Result<()> {
         let start = Instant::now();
-        let places = self.buffers.array_places();
-        let program = |kernel| Program::new(kernel, self.features, &self.constants, &places);
-        let programs = kernels.iter().map(|kernel| (*kernel, program(*kernel))).collect();
-        let compiled = self.gpu.pipelines(programs)?;
-        self.kernels.extend(kernels.iter().copied().zip(compiled.into_iter().map(Bound::new)));
+        let compiled = self.gpu.pipelines(self.programs(kernels))?;
+        self.take_up(kernels, compiled);
         self.compile_seconds += start.elapsed().as_secs_f64();
         Ok(())
     }
 
+    fn take_up(&mut self, kernels: &[Kernel], compiled: Vec<Arc<Pipeline>>) {
+        self.kernels.extend(kernels.iter().copied().zip(compiled.into_iter().map(Bound::new)));
+    }
+
     /// A kernel, compiled if this is the first time, and what binds the buffers as they are now.
     fn bound(&mut self, kernel: Kernel) -> Result<(wgpu::ComputePipeline, wgpu::BindGroup)> {
-        let Self { gpu, buffers, features, constants, kernels, .. } = self;
-        let bound = match kernels.entry(kernel) {
-            Entry::Occupied(known) => known.into_mut(),
-            Entry::Vacant(vacant) => {
-                let program = Program::new(kernel, *features, constants, &buffers.array_places());
-                vacant.insert(Bound::new(gpu.pipeline(kernel, program)?))
-            }
-        };
+        if !self.kernels.contains_key(&kernel) {
+            self.compile(&[kernel])?;
+        }
+        let Self { gpu, buffers, kernels, .. } = self;
+        let bound = kernels.get_mut(&kernel).ok_or_else(|| Error::new("a kernel is missing"))?;
         bound.current(gpu, buffers)
     }
 
@@ -517,8 +571,6 @@ fn upload_tables(
 
 #[cfg(test)]
 pub(super) mod tests {
-    use std::sync::Arc;
-
     use super::*;
     use crate::environment::EnvironmentOptions;
     use crate::light_grid::DistributionOptions;

@@ -1,7 +1,7 @@
 //! Kernels ready to run.
 
 use std::borrow::Cow;
-use std::sync::{Arc, PoisonError};
+use std::sync::{Arc, MutexGuard, PoisonError};
 use std::thread::ScopedJoinHandle;
 
 use super::device::Gpu;
@@ -83,16 +83,21 @@ impl Pipeline {
 /// or so where software runs it.
 const MOST: usize = 32;
 
-/// Kernels that were compiled, the last one used at the end.
+/// Kernels that were compiled.
 #[derive(Default)]
-pub(super) struct Pipelines(Vec<Arc<Pipeline>>);
+pub(super) struct Pipelines {
+    /// The last one used at the end.
+    kept: Vec<Arc<Pipeline>>,
+    #[cfg(feature = "window")]
+    pub(super) ahead: super::ahead::Ahead,
+}
 
 impl Pipelines {
     /// The kernel of this source, if there is one.
-    fn find(&mut self, source: &str) -> Option<Arc<Pipeline>> {
-        let at = self.0.iter().position(|pipeline| pipeline.program.source == source)?;
-        let found = self.0.remove(at);
-        self.0.push(Arc::clone(&found));
+    pub(super) fn find(&mut self, source: &str) -> Option<Arc<Pipeline>> {
+        let at = self.kept.iter().position(|pipeline| pipeline.program.source == source)?;
+        let found = self.kept.remove(at);
+        self.kept.push(Arc::clone(&found));
         Some(found)
     }
 
@@ -102,34 +107,37 @@ impl Pipelines {
         if self.find(&pipeline.program.source).is_some() {
             return;
         }
-        if self.0.len() == MOST {
-            self.0.remove(0);
+        if self.kept.len() == MOST {
+            self.kept.remove(0);
         }
-        self.0.push(pipeline);
+        self.kept.push(pipeline);
     }
 }
 
+/// Kernels to be compiled.
+pub(super) type Programs = Vec<(Kernel, Program)>;
+
 impl Gpu {
+    pub(super) fn known_pipelines(&self) -> MutexGuard<'_, Pipelines> {
+        self.pipelines.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// A kernel, compiled unless this device ran it lately.
-    ///
-    /// # Errors
-    /// If the driver refuses it.
-    pub(super) fn pipeline(&self, kernel: Kernel, program: Program) -> Result<Arc<Pipeline>> {
-        let known = || self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(pipeline) = known().find(&program.source) {
+    fn pipeline(&self, kernel: Kernel, program: Program) -> Result<Arc<Pipeline>> {
+        let known = self.known_pipelines().find(&program.source);
+        if let Some(pipeline) = known {
             return Ok(pipeline);
         }
         let pipeline = Pipeline::new(self, kernel.name(), program)?;
-        known().keep(Arc::clone(&pipeline));
+        self.known_pipelines().keep(Arc::clone(&pipeline));
         Ok(pipeline)
     }
 
-    /// The same of several, which are compiled at the same time.
+    /// Kernels; those that this device did not run lately are compiled, all at the same time.
     ///
     /// # Errors
     /// If the driver refuses one.
-    pub(super) fn pipelines(&self, programs: Vec<(Kernel, Program)>) -> Result<Vec<Arc<Pipeline>>> {
-        let no_thread = |e| Error::new(format!("a kernel cannot be compiled: {e}"));
+    pub(super) fn pipelines(&self, programs: Programs) -> Result<Vec<Arc<Pipeline>>> {
         std::thread::scope(|scope| {
             let compile = |(kernel, program): (Kernel, Program)| {
                 std::thread::Builder::new()
@@ -144,6 +152,10 @@ impl Gpu {
             compiling.into_iter().map(wait).collect()
         })
     }
+}
+
+pub(super) fn no_thread(error: std::io::Error) -> Error {
+    Error::new(format!("a kernel cannot be compiled: {error}"))
 }
 
 fn binding_type(binding: &Binding) -> wgpu::BindingType {

@@ -283,6 +283,7 @@ mod tests {
     fn how_fast_a_gpu_is_changes_nothing_of_what_is_learned() {
         use crate::render::StopRule;
         use crate::render::gpu::{Gpu, UploadedScene};
+        use crate::render::session::state::Spent;
 
         let Some(gpu) = Gpu::for_test() else { return };
         let (world, environment) = office();
@@ -294,7 +295,8 @@ mod tests {
             let session = Session::on_gpu(&world, &environment, view.clone(), &uploaded);
             let mut session = session.expect("it fits");
             while !session.is_done(&rule) {
-                session.state.figures.render_seconds = seconds[usize::from(session.samples() > 2)];
+                let seconds = seconds[usize::from(session.samples() > 2)];
+                session.state.here = Spent { seconds, samples: 2000 };
                 let samples = session.next_pass(&rule);
                 session.advance(samples, &AtomicBool::new(false)).expect("rendered");
             }

@@ -7,6 +7,8 @@
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+#[cfg(feature = "window")]
+use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
 mod host_film;
@@ -19,6 +21,7 @@ use learning::{Learning, Stage};
 pub use noise::Doubling;
 use noise::LEAST_SAMPLES_OF_NOISE;
 pub(crate) use state::SessionState;
+use state::Spent;
 
 use super::film::{BEGINNINGS, Film};
 use super::gi::{CacheTraining, PATHS_AT_A_TIME};
@@ -71,6 +74,7 @@ impl<'a> Session<'a> {
             learning,
             training,
             figures: Figures::default(),
+            here: Spent::default(),
         };
         Self { world, environment, gpu: None, state }
     }
@@ -171,7 +175,7 @@ impl<'a> Session<'a> {
         if let Some(renderer) = &mut self.gpu {
             renderer.settle()?;
             self.state.film.update(&self.state.view, |film| renderer.read_film(film))?;
-            self.state.figures.render_seconds += start.elapsed().as_secs_f64();
+            self.spend(start.elapsed().as_secs_f64(), 0);
         }
         Ok(())
     }
@@ -190,6 +194,7 @@ impl<'a> Session<'a> {
         // With a device goes what was done since its film was read.
         self.state.sequence.first_sample = self.state.sequence.first_sample.min(self.state.samples);
         self.gpu = None;
+        self.state.here = Spent::default();
     }
 
     /// Lets a GPU take over from the CPU, to which this session's world and environment are uploaded, with
@@ -199,18 +204,39 @@ impl<'a> Session<'a> {
     /// If it does not fit on the device; the session stays where it is.
     pub fn continue_on_gpu(&mut self, uploaded: &gpu::UploadedScene) -> Result<()> {
         let (world, environment) = (self.world, self.environment);
-        let film = (self.state.figures.samples > 0).then(|| self.film());
-        let mut renderer = gpu::Renderer::new(
-            uploaded,
-            world,
-            environment,
-            &self.state.view,
-            &self.state.rays,
-            film,
-        )?;
+        let (view, rays, film) = (&self.state.view, &self.state.rays, self.film_to_go_on());
+        let renderer = gpu::Renderer::new(uploaded, world, environment, view, rays, film)?;
+        self.move_to(renderer)
+    }
+
+    /// [`Self::continue_on_gpu`] if that need not wait for kernels. Otherwise a thread compiles them, which holds what
+    /// `until_then` gave, unless it has begun before, for as long; it is returned.
+    ///
+    /// # Errors
+    /// As [`Self::continue_on_gpu`]; or, once, if kernels were refused that were to be compiled.
+    #[cfg(feature = "window")]
+    pub(crate) fn continue_on_gpu_if_compiled(
+        &mut self,
+        uploaded: &gpu::UploadedScene,
+        until_then: impl FnOnce() -> Arc<gpu::Held>,
+    ) -> Result<Option<Weak<gpu::Held>>> {
+        let (world, env) = (self.world, self.environment);
+        let (view, rays, film) = (&self.state.view, &self.state.rays, self.film_to_go_on());
+        match gpu::Renderer::new_or_held(uploaded, world, env, view, rays, film, until_then)? {
+            gpu::OrHeld::Held(held) => Ok(Some(held)),
+            gpu::OrHeld::Ready(renderer) => self.move_to(renderer).map(|()| None),
+        }
+    }
+
+    fn film_to_go_on(&self) -> Option<&Film> {
+        (self.state.figures.samples > 0).then(|| self.film())
+    }
+
+    fn move_to(&mut self, mut renderer: gpu::Renderer) -> Result<()> {
         renderer.set_grid(self.state.learned.as_ref().or(self.state.whole_map.as_ref()))?;
         renderer.set_cache(self.state.training.as_ref().and_then(CacheTraining::cache))?;
         self.gpu = Some(Box::new(renderer));
+        self.state.here = Spent::default();
         Ok(())
     }
 
@@ -231,8 +257,10 @@ impl<'a> Session<'a> {
             // Each look at the noise reads the film.
             Some(_) if rule.noise.is_some() => (samples / 8).clamp(1, 64),
             Some(_) if !is_counting => {
-                let each = self.state.figures.render_seconds / f64::from(samples.max(1));
-                let affordable = (GPU_PASS_SECONDS / each.max(1e-9)) as u32;
+                let pixels = f64::from(self.state.view.width) * f64::from(self.state.view.height);
+                let affordable = self
+                    .seconds_per_sample()
+                    .map_or(1, |each| (GPU_PASS_SECONDS / (each * pixels).max(1e-9)) as u32);
                 affordable.max(samples / 16).min(samples).clamp(1, 64)
             }
             _ => (samples / 16).clamp(1, 64),
@@ -398,6 +426,12 @@ impl<'a> Session<'a> {
         self.state.figures.elapsed_seconds()
     }
 
+    /// Seconds that a sample takes on the device at work; `None` until it has taken a thousand.
+    pub(crate) fn seconds_per_sample(&self) -> Option<f64> {
+        let Spent { seconds, samples } = self.state.here;
+        (samples > 1000).then(|| seconds / samples as f64)
+    }
+
     /// Whether a rule says to stop. Noise is only asked for from 16 samples on.
     pub fn is_done(&self, rule: &StopRule) -> bool {
         let samples = self.state.samples;
@@ -470,12 +504,20 @@ impl<'a> Session<'a> {
         coverage: Coverage,
         cancel: &AtomicBool,
     ) -> Result<()> {
-        let (start, before) = (Instant::now(), self.state.figures.distribution_seconds);
+        let (start, figures) = (Instant::now(), self.state.figures);
         let result = self.render(self.state.samples.saturating_add(samples), coverage, cancel);
-        let distributions = self.state.figures.distribution_seconds - before;
+        let distributions = self.state.figures.distribution_seconds - figures.distribution_seconds;
         self.state.figures.learning_seconds += distributions;
-        self.state.figures.render_seconds += start.elapsed().as_secs_f64() - distributions;
+        let samples = self.state.figures.samples - figures.samples;
+        self.spend(start.elapsed().as_secs_f64() - distributions, samples);
         result
+    }
+
+    /// Notes seconds of rendering and the samples taken in them.
+    fn spend(&mut self, seconds: f64, samples: u64) {
+        self.state.figures.render_seconds += seconds;
+        self.state.here.seconds += seconds;
+        self.state.here.samples += samples;
     }
 
     fn render(&mut self, target: u32, coverage: Coverage, cancel: &AtomicBool) -> Result<()> {

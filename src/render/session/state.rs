@@ -33,10 +33,30 @@ pub(crate) struct SessionState {
     pub(super) learning: Option<Learning>,
     pub(super) training: Option<CacheTraining>,
     pub(super) figures: Figures,
+    pub(super) here: Spent,
+}
+
+/// What rendering on the device at work took.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Spent {
+    pub(super) seconds: f64,
+    /// In all pixels together.
+    pub(super) samples: u64,
 }
 
 #[cfg(feature = "window")]
 impl<'a> Session<'a> {
+    /// [`Session::elapsed_seconds`] as if all samples had been taken on the device at work: another may be tens of
+    /// times as fast. `None` while it is not known what they take there.
+    pub(crate) fn comparable_seconds(&self) -> Option<f64> {
+        let Figures { samples, render_seconds, learning_seconds, .. } = self.state.figures;
+        let rendering = match samples - samples.min(self.state.here.samples) {
+            0 => render_seconds,
+            _ => self.seconds_per_sample()? * samples as f64,
+        };
+        Some(learning_seconds + rendering)
+    }
+
     /// Puts it aside, with what a GPU has as far as it can still be read.
     pub(crate) fn suspend(mut self) -> SessionState {
         self.continue_on_cpu();
@@ -87,6 +107,26 @@ mod tests {
     use crate::environment::{EnvironmentOptions, sky};
     use crate::render::Sampling;
     use crate::scene::builtin;
+
+    #[test]
+    fn samples_of_another_device_count_as_if_they_were_of_this_one() {
+        let world = World::new(builtin::build("crack").expect("built in"));
+        let map = sky::build("day", 64, 32).expect("a sky");
+        let environment =
+            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let view = View::new(world.scene.cameras[0].clone(), [24, 16]);
+        let mut session = Session::new(&world, &environment, view);
+        session.state.figures.learning_seconds = 0.5;
+        session.spend(10.0, 2000);
+        session.state.figures.samples = 2000;
+        assert_eq!(session.comparable_seconds(), Some(10.5), "all are of this one");
+        session.state.here = Spent::default();
+        assert_eq!(session.comparable_seconds(), None);
+        session.spend(1.0, 4000);
+        session.state.figures.samples = 6000;
+        assert_eq!(session.comparable_seconds(), Some(2.0));
+        assert_eq!(session.elapsed_seconds(), 11.5);
+    }
 
     #[test]
     fn what_was_put_aside_goes_on_to_the_same_picture() {

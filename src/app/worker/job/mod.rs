@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 pub(super) use cached::CompletePicture;
 use cached::{CachedPicture, worth};
 use publishing::{Reading, Resized};
+use sessions::Placed;
 
 use super::kept::{Kept, Learned, Left};
 use super::{Activity, Point, Request, Shared};
@@ -31,7 +32,7 @@ const PLAIN: usize = 1;
 const STANDSTILL: Duration = Duration::from_millis(400);
 
 pub(super) struct Job<'a> {
-    shared: &'a Shared,
+    shared: &'a Arc<Shared>,
     alarm: &'a Alarm,
     kept: &'a mut Kept,
     request: Arc<Request>,
@@ -58,7 +59,7 @@ pub(super) struct Job<'a> {
 
 impl<'a> Job<'a> {
     pub(super) fn new(
-        shared: &'a Shared,
+        shared: &'a Arc<Shared>,
         alarm: &'a Alarm,
         kept: &'a mut Kept,
         request: Arc<Request>,
@@ -94,7 +95,13 @@ impl<'a> Job<'a> {
 
     /// Small pictures for as long as the camera rests at this very place.
     pub(super) fn follow(&mut self, world: &World, environment: &Environment) {
-        let mut session = self.small_session(world, environment);
+        let was_quick = self.kept.device.is_quick(&self.request);
+        let mut session = self.small_session(world, environment, was_quick);
+        self.place(&mut session);
+        if was_quick && !session.is_on_gpu() {
+            // The CPU affords less until there are kernels for it.
+            session = self.small_session(world, environment, false);
+        }
         while !self.is_superseded() {
             // The first pass is never cut short: some picture is better than none.
             let cut = session.samples() > 0;
@@ -171,7 +178,15 @@ impl<'a> Job<'a> {
                         self.note(PLAIN, plain);
                     }
                     self.publish(activity, &main, plain.as_ref(), &mut cached);
-                    self.rest();
+                    // A GPU may be ready now, or asked for.
+                    let was_on_gpu = main.is_on_gpu();
+                    self.place(&mut main);
+                    if let Some(plain) = &mut plain {
+                        self.place(plain);
+                    }
+                    if main.is_on_gpu() == was_on_gpu {
+                        self.rest();
+                    }
                     continue;
                 }
                 // A picture first, and one that goes on.
@@ -253,11 +268,22 @@ impl<'a> Job<'a> {
         cached: &mut CachedPicture<'_>,
         turns: &mut u32,
     ) {
-        if let Some(plain) = plain.filter(|plain| !is_level(plain, main)) {
+        let plain = match plain {
+            // What they take is compared on the same device.
+            Some(plain) => {
+                if self.place(main) == Placed::TooLate || self.place(plain) == Placed::TooLate {
+                    return;
+                }
+                (!self.is_level(plain, main)).then_some(plain)
+            }
+            None => None,
+        };
+        if let Some(plain) = plain {
             self.advance(plain, None, true);
         } else if let Some(cached) = cached.next(main, *turns) {
             let start = Instant::now();
-            self.advance(cached, None, self.request.previews);
+            // Where it is shown no GPU is quicker, and one that is being made ready will show none.
+            self.advance_in_place(cached, None, self.request.previews);
             self.cached_seconds += start.elapsed().as_secs_f64();
             *turns += 1;
         } else {
@@ -304,7 +330,7 @@ impl<'a> Job<'a> {
         plain: Option<&Session<'_>>,
     ) -> Option<Activity> {
         {
-            let slot = lock(&self.shared.slot);
+            let slot = lock(&self.shared.orders.slot);
             if slot.quit {
                 return None;
             }
@@ -317,7 +343,8 @@ impl<'a> Job<'a> {
             self.shared.cancel.store(false, Ordering::Relaxed);
         }
         // Begun later, it has the same time to come.
-        let is_compared = !self.request.split || plain.is_some_and(|plain| is_level(plain, main));
+        let is_compared =
+            !self.request.split || plain.is_some_and(|plain| self.is_level(plain, main));
         Some(if self.request.paused {
             Activity::Paused
         } else if main.phase() == Phase::Learning {
@@ -331,7 +358,9 @@ impl<'a> Job<'a> {
 
     /// One learning pass.
     fn learn(&mut self, main: &mut Session<'_>) {
-        self.place(main);
+        if self.place(main) == Placed::TooLate {
+            return;
+        }
         let learned = main.advance(1, &self.shared.cancel);
         self.go_on(main, learned);
         let is_done = main.phase() == Phase::Rendering;
@@ -356,6 +385,16 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// Whether the plain picture of a split view has had the time of the main one, learning included. What that is
+    /// must be known of both: whichever has moved to another device has the next turn.
+    fn is_level(&self, plain: &Session<'_>, main: &Session<'_>) -> bool {
+        match (plain.comparable_seconds(), main.comparable_seconds()) {
+            (None, _) => false,
+            (Some(plain), Some(main)) => plain >= main,
+            (Some(_), None) => !main.is_done(&self.rule()) || plain.samples() >= main.samples(),
+        }
+    }
+
     fn is_superseded(&self) -> bool {
         self.is_left_for(Request::restarts)
     }
@@ -366,22 +405,31 @@ impl<'a> Job<'a> {
     }
 
     fn is_left_for(&self, is_other: impl Fn(&Request, &Request) -> bool) -> bool {
-        let slot = lock(&self.shared.slot);
+        let slot = lock(&self.shared.orders.slot);
         slot.quit || slot.request.as_ref().is_some_and(|new| is_other(&self.request, new))
     }
 
-    /// Waits until something else is asked for.
-    fn rest(&self) {
-        let mut slot = lock(&self.shared.slot);
+    /// Waits until something else is asked for, or kernels are there that were not.
+    fn rest(&self) -> Rested {
+        let device = &self.kept.device;
+        let mut slot = lock(&self.shared.orders.slot);
         while !slot.quit && slot.request.as_ref().is_some_and(|new| self.request.is_same(new)) {
-            slot = self.shared.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
+            if device.was_compiling() && !device.is_compiling() {
+                return Rested::ForKernels;
+            }
+            slot = self.shared.orders.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
         }
+        Rested::ForRequest
     }
 }
 
-/// Whether the plain picture of a split view has had the time of the main one, learning included.
-fn is_level(plain: &Session<'_>, main: &Session<'_>) -> bool {
-    plain.elapsed_seconds() >= main.elapsed_seconds()
+/// What a job has waited for.
+#[derive(PartialEq, Eq)]
+enum Rested {
+    /// Something else is asked for.
+    ForRequest,
+    /// Kernels that sessions can be placed with.
+    ForKernels,
 }
 
 fn learned_share(session: &Session<'_>) -> f32 {

@@ -39,6 +39,7 @@ pub(super) struct Reading {
     /// Of the moment it was read, so that all belong together.
     samples: u32,
     figures: Figures,
+    comparable_seconds: Option<f64>,
     noise: f64,
     invalid_samples: u64,
     at: Instant,
@@ -152,7 +153,7 @@ impl Job<'_> {
             rest: Arc::clone(&self.shared.rest),
         };
         *lock(&self.shared.snapshot) = Some(Arc::new(snapshot));
-        (self.shared.wake)();
+        (self.shared.orders.wake)();
         self.published = Instant::now();
         if !rests {
             let cost = (self.published - start).saturating_sub(reading);
@@ -279,12 +280,22 @@ impl Job<'_> {
                 let start = Instant::now();
                 let film = self.film_of(role, session);
                 let (noise, figures) = (session.noise(), session.figures());
+                let comparable_seconds = session.comparable_seconds();
                 let invalid_samples = film.invalid_samples();
                 let cost = if is_in_place { start.elapsed() } else { Duration::ZERO };
                 let (at, gap) = (Instant::now(), gap_after(cost).max(READING_GAP));
                 let (of, samples) = (in_place, session.samples());
-                let reading =
-                    Reading { of, film, samples, figures, noise, invalid_samples, at, gap };
+                let reading = Reading {
+                    of,
+                    film,
+                    samples,
+                    figures,
+                    comparable_seconds,
+                    noise,
+                    invalid_samples,
+                    at,
+                    gap,
+                };
                 self.readings[role] = Some(reading.clone());
                 if session.figures().samples > 0 {
                     self.films.push(Arc::downgrade(&reading.film));
@@ -300,6 +311,7 @@ impl Job<'_> {
             invalid_samples: reading.invalid_samples,
             film: reading.film,
             figures: reading.figures,
+            comparable_seconds: reading.comparable_seconds,
             gpu: session.gpu_figures().map(Arc::new),
             on_device: session.film_on_device(),
             grid: self.distributions_of(session),

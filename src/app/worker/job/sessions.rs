@@ -5,11 +5,13 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::cached::CachedPicture;
-use super::{Job, MAIN};
+use super::{Job, MAIN, Rested};
 use crate::app::lock;
+use crate::app::worker::preparation::Preparation;
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::path::World;
+use crate::render::gpu::Held;
 use crate::render::{Gi, Phase, Session, StopRule, View};
 
 /// Longest piece of rendering between two looks at requests and clocks.
@@ -19,19 +21,28 @@ const MOVING_SECONDS: f64 = 0.07;
 /// What a camera path takes, until it has been measured.
 const LIKELY_SECONDS_PER_PATH: f64 = 1e-5;
 
+/// Whether a session is where it is to be.
+#[derive(PartialEq, Eq)]
+pub(super) enum Placed {
+    InTime,
+    /// Something else was asked for before it could be there.
+    TooLate,
+}
+
 impl Job<'_> {
     /// A session for a picture so small that a pass takes a moment, with what was learned before.
     pub(super) fn small_session<'b>(
         &mut self,
         world: &'b World,
         environment: &'b Environment,
+        is_quick: bool,
     ) -> Session<'b> {
         let request = Arc::clone(&self.request);
-        let shrink = self.shrink(&request.view);
+        let shrink = self.shrink(&request.view, is_quick);
         let mut view =
             request.view.of_size(request.view.width / shrink, request.view.height / shrink);
-        // Learning would take longer than the picture.
-        if self.request.wants_cached && self.kept.has_training_for(&self.request) {
+        // Learning would take longer than the picture. Where cached light is not wanted, there are no kernels for it.
+        if self.request.wants_cached && !is_quick && self.kept.has_training_for(&self.request) {
             view.gi = Gi::Cached;
         }
         self.experienced_session(world, environment, view)
@@ -98,18 +109,30 @@ impl Job<'_> {
 
     /// By what a moving picture's sides are divided: as for the last one, unless that took far too long or
     /// could have been much larger, for sizes that come and go are seen.
-    fn shrink(&mut self, view: &View) -> u32 {
+    fn shrink(&mut self, view: &View, is_quick: bool) -> u32 {
         let pixels = f64::from(view.width) * f64::from(view.height);
-        let seconds_per_path = self.kept.seconds_per_path.unwrap_or(LIKELY_SECONDS_PER_PATH);
+        let seconds_per_path = self.kept.seconds_per_path[usize::from(is_quick)];
+        let seconds_per_path = seconds_per_path.unwrap_or(LIKELY_SECONDS_PER_PATH);
         let shrink = (pixels * seconds_per_path / MOVING_SECONDS).sqrt();
         let is_right = |last: &u32| (0.6..=1.8).contains(&(f64::from(*last) / shrink));
         let last = self.kept.shrink.filter(is_right);
         *self.kept.shrink.insert(last.unwrap_or((shrink.ceil() as u32).clamp(1, 16)))
     }
 
-    /// One pass, cut short after a slice if asked for.
+    /// One pass on the device that is asked for, cut short after a slice if asked for.
     pub(super) fn advance(&mut self, session: &mut Session<'_>, rule: Option<StopRule>, cut: bool) {
-        self.place(session);
+        if self.place(session) == Placed::InTime {
+            self.advance_in_place(session, rule, cut);
+        }
+    }
+
+    /// One pass on the device that the session is on.
+    pub(super) fn advance_in_place(
+        &mut self,
+        session: &mut Session<'_>,
+        rule: Option<StopRule>,
+        cut: bool,
+    ) {
         self.alarm.set(cut.then(|| Instant::now() + SLICE));
         let advanced = match self.beginning(session) {
             Some(every) => {
@@ -123,7 +146,7 @@ impl Job<'_> {
         };
         self.alarm.set(None);
         self.go_on(session, advanced);
-        let slot = lock(&self.shared.slot);
+        let slot = lock(&self.shared.orders.slot);
         if !slot.quit && slot.request.as_ref().is_none_or(|new| !self.request.restarts(new)) {
             self.shared.cancel.store(false, Ordering::Relaxed);
         }
@@ -137,25 +160,44 @@ impl Job<'_> {
     }
 
     /// Lets the session run on the device that is asked for now.
-    pub(super) fn place(&mut self, session: &mut Session<'_>) {
-        // A GPU that is not ready, or is none, comes when there is something to be seen.
+    pub(super) fn place(&mut self, session: &mut Session<'_>) -> Placed {
+        self.kept.device.note_compiled();
+        // A GPU that is not ready, or is none, comes when there is something to be seen. Cached light is shown where
+        // none is quicker.
         let is_fresh = session.samples() == 0 && !session.is_on_gpu();
         let is_learning = session.phase() == Phase::Learning;
         let begins =
             self.request.moving || is_fresh && (is_learning || self.beginning(session).is_some());
-        if begins && self.request.previews && !self.kept.device.is_quick(&self.request) {
+        let waits = begins && !self.kept.device.is_quick(&self.request);
+        if self.request.previews && (waits || session.view().gi == Gi::Cached) {
             session.continue_on_cpu();
-            return;
+            return Placed::InTime;
         }
         self.kept.device.choose_for(&self.request);
-        if self.kept.device.needs_preparation(&self.request) {
-            self.shared.is_preparing.store(true, Ordering::Relaxed);
-            (self.shared.wake)();
-            // The other device's speed says nothing.
-            self.kept.seconds_per_path = None;
+        let needs_upload = self.kept.device.needs_upload(&self.request);
+        let uploading = needs_upload.then(|| Preparation::begin(&self.shared.orders));
+        if needs_upload {
+            // With another one or another scene it was different.
+            self.kept.seconds_per_path[1] = None;
         }
-        self.kept.device.place(session, &self.request);
-        self.shared.is_preparing.store(false, Ordering::Relaxed);
+        self.place_if_compiled(session);
+        drop(uploading);
+        // Pictures that are compared, or are to be repeatable, come from one device.
+        let is_patient = self.request.split && !self.request.moving || !self.request.previews;
+        while is_patient && !session.is_on_gpu() && self.kept.device.was_compiling() {
+            if self.rest() == Rested::ForRequest {
+                return Placed::TooLate;
+            }
+            self.kept.device.note_compiled();
+            self.place_if_compiled(session);
+        }
+        Placed::InTime
+    }
+
+    fn place_if_compiled(&mut self, session: &mut Session<'_>) {
+        let orders = &self.shared.orders;
+        let preparation = || Arc::new(Preparation::begin(orders)) as Arc<Held>;
+        self.kept.device.place(session, &self.request, preparation);
         self.tell_failure();
     }
 
@@ -171,14 +213,13 @@ impl Job<'_> {
     fn tell_failure(&mut self) {
         if let Some(sentence) = self.kept.device.take_failure() {
             lock(&self.shared.failures).push(sentence);
-            (self.shared.wake)();
+            (self.shared.orders.wake)();
         }
     }
 
     pub(super) fn measure(&mut self, session: &Session<'_>) {
-        let figures = session.figures();
-        if figures.samples > 1000 {
-            self.kept.seconds_per_path = Some(figures.render_seconds / figures.samples as f64);
+        if let Some(seconds) = session.seconds_per_sample() {
+            self.kept.seconds_per_path[usize::from(session.is_on_gpu())] = Some(seconds);
         }
     }
 }
