@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::values;
 use crate::error::{Error, Result};
 use crate::render::gpu::adapters;
-use crate::render::{Gi, Sampling};
+use crate::render::{Gi, Sampling, Sharing};
 use crate::report::{
     Device, Effort, Frame, Method, Options, Plan, Report, Row, ablations, check, duration, make,
     markdown_table, sat, talk,
@@ -57,6 +57,9 @@ struct FreeArguments {
     /// Whether paths are followed to their end, end in the radiance cache, or are measured both ways.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "exact", value_name = "LIST")]
     gi: Vec<Gi>,
+    /// Whether pixels of a tile share what their paths find, as `render` does, or not, as the window does.
+    #[arg(long, default_value = "auto", value_enum, value_name = "off|4x4|8x8|auto")]
+    sharing: Sharing,
     /// A picture to take as the reference, linear, of the size of the runs (box filter, as many
     /// bounces); without it one is computed and kept.
     #[arg(long, value_name = "FILE")]
@@ -217,7 +220,9 @@ fn rows(places: &PlaceArguments) -> Vec<Row> {
 fn free(arguments: &FreeArguments, command: String) -> Plan {
     let mut methods: Vec<Method> = Vec::new();
     for gi in &arguments.gi {
-        for method in arguments.sampling.iter().map(|sampling| Method::of(*sampling).with_gi(*gi)) {
+        for sampling in &arguments.sampling {
+            let mut method = Method::of(*sampling).with_gi(*gi);
+            method.settings.sharing = arguments.sharing;
             if !methods.contains(&method) {
                 methods.push(method);
             }
@@ -329,4 +334,29 @@ fn command_line() -> String {
     };
     let words = std::env::args_os().skip(1).map(|word| quoted(word.to_string_lossy().into_owned()));
     std::iter::once("lightgrid".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        arguments: ReportArguments,
+    }
+
+    #[test]
+    fn pixels_share_as_is_asked_for() {
+        let methods = |line: &str| {
+            let words = format!("report office -o out --sampling plain,adaptive {line}");
+            let arguments = Line::try_parse_from(words.split_whitespace()).expect("as it is shown");
+            free(&arguments.arguments.free, String::new()).methods
+        };
+        assert_eq!(methods(""), [Sampling::Plain, Sampling::Adaptive].map(Method::of));
+        let sharing: Vec<_> = methods("--sharing off").iter().map(|m| m.settings.sharing).collect();
+        assert_eq!(sharing, [Sharing::Off; 2]);
+    }
 }
