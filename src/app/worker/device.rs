@@ -66,7 +66,11 @@ impl Device {
     pub(super) fn choose_for(&mut self, request: &Request) {
         let geometry = Arc::downgrade(request.world.geometry());
         let failed_with_another = self.refused.as_ref().is_some_and(|it| !it.ptr_eq(&geometry));
-        if self.choice != Some(request.device) || failed_with_another {
+        // A real one is what both choices of a GPU mean.
+        let is_meant = request.device != DeviceChoice::Cpu && self.has_real_gpu();
+        if is_meant {
+            self.choice = Some(request.device);
+        } else if self.choice != Some(request.device) || failed_with_another {
             self.choose(request.device);
         }
     }
@@ -80,11 +84,14 @@ impl Device {
 
     /// Whether a GPU is ready that has all first samples in a moment; software has not.
     pub(super) fn is_quick(&self, request: &Request) -> bool {
-        let is_real = self.gpu.as_ref().is_some_and(|gpu| !gpu.facts().is_software());
-        is_real
+        self.has_real_gpu()
             && self.choice == Some(request.device)
             && !self.needs_upload(request)
             && !self.is_compiling()
+    }
+
+    fn has_real_gpu(&self) -> bool {
+        self.gpu.as_ref().is_some_and(|gpu| !gpu.facts().is_software())
     }
 
     /// Whether kernels are being compiled that a session waits for on the CPU.

@@ -47,14 +47,17 @@ pub(super) struct Spent {
 #[cfg(feature = "window")]
 impl<'a> Session<'a> {
     /// [`Session::elapsed_seconds`] as if all samples had been taken on the device at work: another may be tens of
-    /// times as fast. `None` while it is not known what they take there.
+    /// times as fast. `None` while it is not known what they take there: until each pixel has had two, or so.
     pub(crate) fn comparable_seconds(&self) -> Option<f64> {
         let Figures { samples, render_seconds, learning_seconds, .. } = self.state.figures;
-        let rendering = match samples - samples.min(self.state.here.samples) {
-            0 => render_seconds,
-            _ => self.seconds_per_sample()? * samples as f64,
+        let pixels = u64::from(self.state.view.width) * u64::from(self.state.view.height);
+        let here = self.state.here.samples;
+        let rendering = match here {
+            here if here >= samples => Some(render_seconds),
+            here if here < 2 * pixels => None,
+            _ => self.seconds_per_sample().map(|seconds| seconds * samples as f64),
         };
-        Some(learning_seconds + rendering)
+        rendering.map(|seconds| learning_seconds + seconds)
     }
 
     /// Puts it aside, with what a GPU has as far as it can still be read.

@@ -178,11 +178,12 @@ impl<'a> Job<'a> {
                         self.note(PLAIN, plain);
                     }
                     self.publish(activity, &main, plain.as_ref(), &mut cached);
-                    // A GPU may be ready now, or asked for.
+                    // A GPU may be ready now, or asked for. What is compared stays comparable.
                     let was_on_gpu = main.is_on_gpu();
-                    self.place(&mut main);
-                    if let Some(plain) = &mut plain {
-                        self.place(plain);
+                    if self.request.split {
+                        self.kept.device.note_compiled();
+                    } else {
+                        self.place(&mut main);
                     }
                     if main.is_on_gpu() == was_on_gpu {
                         self.rest();
