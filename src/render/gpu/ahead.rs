@@ -73,7 +73,10 @@ impl Gpu {
             drop(gpu);
             drop(held);
         };
-        std::thread::Builder::new().name("kernels".to_owned()).spawn(compile).map_err(no_thread)?;
+        std::thread::Builder::new()
+            .name("kernels".to_owned())
+            .spawn(compile)
+            .map_err(|error| no_thread(&error))?;
         Ok(OrHeld::Held(holder))
     }
 }

@@ -143,7 +143,7 @@ impl Gpu {
                 std::thread::Builder::new()
                     .name(kernel.name().to_owned())
                     .spawn_scoped(scope, move || self.pipeline(kernel, program))
-                    .map_err(no_thread)
+                    .map_err(|error| no_thread(&error))
             };
             let compiling = programs.into_iter().map(compile).collect::<Result<Vec<_>>>()?;
             let wait = |thread: ScopedJoinHandle<'_, _>| {
@@ -154,7 +154,7 @@ impl Gpu {
     }
 }
 
-pub(super) fn no_thread(error: std::io::Error) -> Error {
+pub(super) fn no_thread(error: &std::io::Error) -> Error {
     Error::new(format!("a kernel cannot be compiled: {error}"))
 }
 
