@@ -352,7 +352,7 @@ impl App {
         if let PictureSize::Fixed(width, height) = asked.0 {
             // A region of how many pixels is known once there is a camera.
             let Some(view) = self.document.view(width, height) else { return };
-            let bytes = u64::from(view.width) * u64::from(view.height) * BYTES_PER_PIXEL;
+            let bytes = view.pixels() * BYTES_PER_PIXEL;
             if let Err(cause) = memory::check(bytes) {
                 self.messages.error(format!("a picture of {width} x {height} pixels {cause}"));
                 let (size, region) = self.affordable;

@@ -97,6 +97,11 @@ impl View {
     /// Most pixels of a picture: 40 bytes each stay under 5.4 GB.
     pub const MAX_PIXELS: u64 = 1 << 27;
 
+    /// How many pixels it has.
+    pub fn pixels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+
     /// The same in so many pixels, at least one each way.
     pub fn of_size(&self, width: u32, height: u32) -> Self {
         let mut view = Self { width: width.max(1), height: height.max(1), ..self.clone() };

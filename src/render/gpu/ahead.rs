@@ -99,6 +99,11 @@ mod tests {
             vec![program(Kernel::Trace), program(Kernel::Shade)]
         };
         let ask = |body: &str| gpu.pipelines_or_held(programs(body), || Arc::new(()));
+        let wait_for = |held: &Weak<Held>| {
+            while held.strong_count() > 0 {
+                std::thread::sleep(std::time::Duration::from_millis(1));
+            }
+        };
         let compile = |body: &str| {
             let Ok(OrHeld::Held(held)) = ask(body) else { panic!("it is there") };
             let again = match ask(body) {
@@ -107,9 +112,7 @@ mod tests {
                 _ => true,
             };
             assert!(again, "twice at a time");
-            while held.strong_count() > 0 {
-                std::thread::sleep(std::time::Duration::from_millis(1));
-            }
+            wait_for(&held);
         };
         let is_ready =
             |body: &str| matches!(ask(body), Ok(OrHeld::Ready(found)) if found.len() == 2);
@@ -120,9 +123,7 @@ mod tests {
         // Nobody else's kernels are blamed.
         assert!(is_ready("return;"));
         if let Ok(OrHeld::Held(held)) = begun {
-            while held.strong_count() > 0 {
-                std::thread::sleep(std::time::Duration::from_millis(1));
-            }
+            wait_for(&held);
         }
         let refused = ask("return 1;").err().expect("it is no program").to_string();
         assert!(refused.starts_with(&gpu.facts().name), "{refused}");

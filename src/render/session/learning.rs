@@ -182,8 +182,7 @@ impl Session<'_> {
     /// can be counted.
     pub(super) fn prepare_counting(&mut self, samples: u32) -> u32 {
         let most = cpu::most_paths_per_pass(&self.state.view);
-        let pixels = u64::from(self.state.view.width) * u64::from(self.state.view.height);
-        let paths = pixels * u64::from(samples);
+        let paths = self.state.view.pixels() * u64::from(samples);
         let stride = paths.div_ceil(most).max(1);
         if let Some(learning) = self.state.learning.as_mut().filter(|learning| !learning.is_over())
             && learning.paths_of_pass + paths.div_ceil(stride) > most

@@ -257,7 +257,7 @@ impl<'a> Session<'a> {
             // Each look at the noise reads the film.
             Some(_) if rule.noise.is_some() => (samples / 8).clamp(1, 64),
             Some(_) if !is_counting => {
-                let pixels = f64::from(self.state.view.width) * f64::from(self.state.view.height);
+                let pixels = self.state.view.pixels() as f64;
                 let affordable = self
                     .seconds_per_sample()
                     .map_or(1, |each| (GPU_PASS_SECONDS / (each * pixels).max(1e-9)) as u32);

@@ -50,11 +50,9 @@ impl<'a> Session<'a> {
     /// times as fast. `None` while it is not known what they take there: until each pixel has had two, or so.
     pub(crate) fn comparable_seconds(&self) -> Option<f64> {
         let Figures { samples, render_seconds, learning_seconds, .. } = self.state.figures;
-        let pixels = u64::from(self.state.view.width) * u64::from(self.state.view.height);
-        let here = self.state.here.samples;
-        let rendering = match here {
+        let rendering = match self.state.here.samples {
             here if here >= samples => Some(render_seconds),
-            here if here < 2 * pixels => None,
+            here if here < 2 * self.state.view.pixels() => None,
             _ => self.seconds_per_sample().map(|seconds| seconds * samples as f64),
         };
         rendering.map(|seconds| learning_seconds + seconds)
@@ -111,12 +109,16 @@ mod tests {
     use crate::render::Sampling;
     use crate::scene::builtin;
 
-    #[test]
-    fn samples_of_another_device_count_as_if_they_were_of_this_one() {
+    fn lit() -> (World, Environment) {
         let world = World::new(builtin::build("crack").expect("built in"));
         let map = sky::build("day", 64, 32).expect("a sky");
-        let environment =
-            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let environment = Environment::new(map, &EnvironmentOptions::default());
+        (world, environment.expect("a sound map"))
+    }
+
+    #[test]
+    fn samples_of_another_device_count_as_if_they_were_of_this_one() {
+        let (world, environment) = lit();
         let view = View::new(world.scene.cameras[0].clone(), [24, 16]);
         let mut session = Session::new(&world, &environment, view);
         session.state.figures.learning_seconds = 0.5;
@@ -133,10 +135,7 @@ mod tests {
 
     #[test]
     fn what_was_put_aside_goes_on_to_the_same_picture() {
-        let world = World::new(builtin::build("crack").expect("built in"));
-        let map = sky::build("day", 64, 32).expect("a sky");
-        let environment =
-            Environment::new(map, &EnvironmentOptions::default()).expect("a sound map");
+        let (world, environment) = lit();
         for sampling in [Sampling::Adaptive, Sampling::Talk, Sampling::Plain] {
             let view = View {
                 sampling,

@@ -280,7 +280,7 @@ impl<'a> Job<'a> {
             None => None,
         };
         if let Some(plain) = plain {
-            self.advance(plain, None, true);
+            self.advance_in_place(plain, None, true);
         } else if let Some(cached) = cached.next(main, *turns) {
             let start = Instant::now();
             // Where it is shown no GPU is quicker, and one that is being made ready will show none.

@@ -30,7 +30,10 @@ pub(super) enum Placed {
 }
 
 impl Job<'_> {
-    /// A session for a picture so small that a pass takes a moment, with what was learned before.
+    /// A session for a picture so small that a pass takes a moment on a GPU that [is quick], else on the CPU, with
+    /// what was learned before.
+    ///
+    /// [is quick]: crate::app::worker::device::Device::is_quick
     pub(super) fn small_session<'b>(
         &mut self,
         world: &'b World,
@@ -110,10 +113,9 @@ impl Job<'_> {
     /// By what a moving picture's sides are divided: as for the last one, unless that took far too long or
     /// could have been much larger, for sizes that come and go are seen.
     fn shrink(&mut self, view: &View, is_quick: bool) -> u32 {
-        let pixels = f64::from(view.width) * f64::from(view.height);
         let seconds_per_path = self.kept.seconds_per_path[usize::from(is_quick)];
         let seconds_per_path = seconds_per_path.unwrap_or(LIKELY_SECONDS_PER_PATH);
-        let shrink = (pixels * seconds_per_path / MOVING_SECONDS).sqrt();
+        let shrink = (view.pixels() as f64 * seconds_per_path / MOVING_SECONDS).sqrt();
         let is_right = |last: &u32| (0.6..=1.8).contains(&(f64::from(*last) / shrink));
         let last = self.kept.shrink.filter(is_right);
         *self.kept.shrink.insert(last.unwrap_or((shrink.ceil() as u32).clamp(1, 16)))
