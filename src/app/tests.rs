@@ -3,9 +3,12 @@
 use std::path::Path;
 use std::time::Duration;
 
+use egui::Id;
+use egui::containers::PanelState;
+
 use super::commands::Command;
 use super::document::{Document, Light, Look, PictureSize};
-use super::interface::{Interface, Tab};
+use super::interface::{Dock, Interface, Tab};
 use super::overlays::Overlay;
 use super::screenshot::{Shot, Studio};
 use super::{Start, exchange};
@@ -18,6 +21,10 @@ use crate::scene::{MaterialEdit, Medium};
 use crate::tone::WhiteBalance;
 
 fn studio(scene: &str) -> Option<Studio> {
+    studio_of(scene, (800, 500))
+}
+
+fn studio_of(scene: &str, size: (u32, u32)) -> Option<Studio> {
     let defaults = Document::default();
     let document = Document {
         scene: scene.to_owned(),
@@ -29,7 +36,7 @@ fn studio(scene: &str) -> Option<Studio> {
         ..defaults
     };
     let start = Start { document, ..Start::default() };
-    let shot = Shot { start, size: (800, 500), patience: Duration::from_secs(3000) };
+    let shot = Shot { start, size, patience: Duration::from_secs(3000) };
     let studio = Studio::open(shot);
     let studio = studio.inspect_err(|error| crate::terminal::notice(format!("SKIPPED: {error}")));
     studio.ok()
@@ -261,3 +268,46 @@ const TRIANGLE: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]
     "bufferViews": [{"buffer": 0, "byteLength": 36}],
     "buffers": [{"byteLength": 36, "uri":
         "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+
+/// As many messages as there can be, in long sentences, beside all that may be open.
+#[test]
+fn messages_lie_on_the_picture_alone() {
+    for (size, scale) in
+        [((720, 480), 1.0), ((1000, 650), 1.0), ((1440, 900), 1.0), ((3840, 2160), 2.0)]
+    {
+        let Some(studio) = studio_of("open", size) else { return };
+        let mut studio = studio.at_scale(scale);
+        studio.settle().expect("rendered");
+        for dock in [None, Some(Dock::Needs), Some(Dock::Convergence)] {
+            studio.arrange(Interface { dock, ..Interface::default() });
+            for name in ["kitchen", "meadow", "bath", "hall", "attic"] {
+                studio.app.messages.error(format!(
+                    "/home/somebody/projects/an interior/{name}.glb: accessor 17 of the mesh \"curtain\" takes \
+                     1234 bytes from buffer 0, which ends after 1230 of them"
+                ));
+            }
+            (0..4).for_each(|_| studio.frame().expect("drawn"));
+            let area = |memory: &egui::Memory| memory.area_rect(Id::unique("messages"));
+            let messages = studio.context.memory(area).expect("they are drawn");
+            let mut panels = Vec::new();
+            let _ = studio.context.run_ui(egui::RawInput::default(), |ui| {
+                for name in ["top", "left", "right", "status", "dock", "closed dock"] {
+                    let state = PanelState::load(ui.ctx(), ui.make_persistent_id(name));
+                    panels.extend(state.map(|state| (name, state.outer_rect)));
+                }
+            });
+            println!("{size:?}, {dock:?}: {messages} {panels:?}");
+            let has_dock = panels.iter().any(|(name, _)| *name == "dock");
+            assert!(panels.len() >= 3 && has_dock == dock.is_some(), "{panels:?}");
+            for (name, panel) in panels {
+                let is_apart = !panel.shrink(0.5).intersects(messages);
+                assert!(is_apart, "{size:?}, {dock:?}: messages on {messages}, {name} on {panel}");
+            }
+            let screen = egui::Rect::from_min_size(
+                egui::Pos2::ZERO,
+                egui::vec2(size.0 as f32, size.1 as f32) / scale,
+            );
+            assert!(screen.contains_rect(messages), "{size:?}, {dock:?}: {messages}");
+        }
+    }
+}

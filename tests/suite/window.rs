@@ -4,6 +4,7 @@ mod desk;
 mod hands;
 mod keys;
 mod memory;
+mod watch;
 
 use std::path::Path;
 use std::time::Duration;
@@ -13,7 +14,7 @@ use lightgrid::app::settings_file::{SceneViewpoints, Settings};
 use lightgrid::scene::builtin;
 use lightgrid::tone::auto_exposure_ev;
 
-use desk::{Desk, error};
+use desk::Desk;
 
 #[test]
 fn a_real_window_moves_opens_saves_and_remembers() {
@@ -133,65 +134,6 @@ fn triangle(path: &Path, size: f32) {
     );
     std::fs::write(path, text).expect("written");
 }
-
-/// What is on the screen only gets better, and does not stand still while work goes on.
-#[test]
-fn the_picture_on_the_screen_never_gets_worse() {
-    let Some(mut desk) = Desk::open() else { return };
-    desk.start(
-        "view office --env sky:day@256x128 --size 240x160 --samples 32 --device cpu --settings window.json",
-    );
-    check(&desk, "at the start").unwrap_or_else(|why| panic!("{why}"));
-    // Where frames take a second it may have seemed to end under way; not twice.
-    let moved = |way| {
-        desk.drag((560, 400), way, Duration::from_millis(50));
-        check(&desk, "after a move")
-    };
-    if let Err(why) = moved((60, 10)) {
-        println!("once more: {why}");
-        moved((-60, 10)).unwrap_or_else(|why| panic!("{why}"));
-    }
-}
-
-/// Whether what is shown until the picture is done only gets better and never stands still.
-fn check(desk: &Desk, when: &str) -> Result<(), String> {
-    let shown = desk.watch();
-    let (last, _) = shown.last().expect("something is shown");
-    let errors: Vec<f64> = shown.iter().map(|(picture, _)| error(picture, last).sqrt()).collect();
-    println!("{when}: {errors:.2?}");
-    let first = errors[0];
-    if !errors.iter().any(|error| *error < 0.5 * first) {
-        return Err(format!("{when}: it got no better: {errors:.2?}"));
-    }
-    for (at, pair) in errors.windows(2).enumerate() {
-        // Two per cent, and a fifth of a level for rounding.
-        if pair[1] > 1.02 * pair[0] + 0.2 {
-            return Err(format!("{when}: worse at {at}: {errors:.2?}"));
-        }
-    }
-    // How long a picture is shown depends on how long it took: what counts is its share of the work, for at
-    // least three seconds of clock. Without a clock of work, that of frames will do.
-    let worked: Option<Vec<f64>> = shown.iter().map(|(_, work)| *work).collect();
-    let works = worked.unwrap_or_else(|| (0..shown.len()).map(|at| at as f64).collect());
-    let all = works[works.len() - 1] - works[0];
-    if all <= 0.0 {
-        return Err(format!("{when}: nothing is done"));
-    }
-    let is_begun = |at: usize| when != "at the start" || error(&shown[at].0, &shown[0].0) > 0.0;
-    for begin in (0..shown.len()).filter(|at| is_begun(*at)) {
-        let same = shown[begin..].iter().take_while(|(picture, _)| *picture == shown[begin].0);
-        let end = begin + same.count() - 1;
-        let share = (works[end] - works[begin]) / all;
-        let stands = end - begin >= 6 && share > MOST_OF_THE_WORK;
-        if stands {
-            return Err(format!("{when}: the picture stands still, {share:.2}: {errors:.2?}"));
-        }
-    }
-    Ok(())
-}
-
-/// Share of the work that may pass without another picture.
-const MOST_OF_THE_WORK: f64 = 0.4;
 
 #[cfg(unix)]
 #[test]

@@ -9,6 +9,9 @@ use lightgrid::image::{Image, read_exr_metadata, read_picture};
 
 /// An X server without a screen, and a window of ours in it.
 pub(super) struct Desk {
+    /// Pixels of the screen, which the window fills.
+    width: usize,
+    height: usize,
     server: Child,
     pub(super) window: Option<Child>,
     display: String,
@@ -28,11 +31,13 @@ impl Drop for Desk {
 }
 
 impl Desk {
-    const WIDTH: usize = 1100;
-    const HEIGHT: usize = 760;
-
-    /// `None`, said on stderr, where Xvfb or xdotool is not installed.
+    /// One of 1100x760 pixels. `None`, said on stderr, where Xvfb or xdotool is not installed.
     pub(super) fn open() -> Option<Self> {
+        Self::of_size(1100, 760)
+    }
+
+    /// One of so many pixels, as [`Self::open`].
+    pub(super) fn of_size(width: usize, height: usize) -> Option<Self> {
         let is_there = |tool: &str| {
             let which = Command::new("which").arg(tool).stdout(Stdio::null()).status();
             which.is_ok_and(|status| status.success())
@@ -42,7 +47,7 @@ impl Desk {
             return None;
         }
         let folder = tempfile::tempdir().expect("a folder");
-        let screen = format!("{}x{}x24", Self::WIDTH, Self::HEIGHT);
+        let screen = format!("{width}x{height}x24");
         let mut server = Command::new("Xvfb")
             .args([
                 "-displayfd",
@@ -65,7 +70,8 @@ impl Desk {
         std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut number)
             .expect("Xvfb says its display");
         let display = format!(":{}", number.trim());
-        let desk = Self { server, window: None, display, id: String::new(), folder };
+        let (window, id) = (None, String::new());
+        let desk = Self { width, height, server, window, display, id, folder };
         // It has been seen to refuse the first connection when all cores are busy. (Nor does it take any
         // while it starts anew after its last client, if it may.)
         desk.wait_for("display", || (!desk.xdotool("getdisplaygeometry").is_empty()).then_some(()));
@@ -123,8 +129,8 @@ impl Desk {
     /// The levels of a part of the screen.
     pub(super) fn levels(&self, columns: Range<usize>, rows: Range<usize>) -> Vec<u8> {
         let file = std::fs::read(self.path("Xvfb_screen0")).expect("the server's screen");
-        let screen = &file[file.len() - 4 * Self::WIDTH * Self::HEIGHT..];
-        let rows = screen.chunks_exact(4 * Self::WIDTH).skip(rows.start).take(rows.len());
+        let screen = &file[file.len() - 4 * self.width * self.height..];
+        let rows = screen.chunks_exact(4 * self.width).skip(rows.start).take(rows.len());
         let pixels = rows.flat_map(|row| row[4 * columns.start..4 * columns.end].chunks_exact(4));
         pixels.flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect()
     }
@@ -195,7 +201,7 @@ impl Desk {
 
     /// The levels of the middle of the picture on the screen.
     pub(super) fn picture(&self) -> Vec<u8> {
-        self.levels(300..780, 150..570)
+        self.levels(300..self.width - 320, 150..self.height - 190)
     }
 
     /// Megabytes of memory that the program has; none where the system does not tell.
@@ -207,29 +213,26 @@ impl Desk {
     }
 
     /// Seconds that the program has been at work, all cores together; none where the system does not tell.
-    fn work(&self) -> Option<f64> {
+    pub(super) fn work(&self) -> Option<f64> {
         let id = self.window.as_ref().expect("started").id();
         let stat = std::fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
-        let (_, numbers) = stat.rsplit_once(')')?;
-        let ticks = numbers.split_whitespace().skip(11).take(2).map(str::parse::<f64>);
-        Some(ticks.sum::<Result<f64, _>>().ok()? / 100.0)
+        seconds(&stat)
     }
 
-    /// What is shown every half second, and the work done by then, until nothing has changed for a while: it
-    /// is done then.
-    pub(super) fn watch(&self) -> Vec<(Vec<u8>, Option<f64>)> {
-        let mut shown: Vec<(Vec<u8>, Option<f64>)> = Vec::new();
-        let mut unchanged = 0;
-        while unchanged < 20 || shown.len() < 30 {
-            std::thread::sleep(Duration::from_millis(500));
-            let now = (self.picture(), self.work());
-            let is_same = shown.last().is_some_and(|(picture, _)| *picture == now.0);
-            unchanged = if is_same { unchanged + 1 } else { 0 };
-            shown.push(now);
-            assert!(shown.len() < 1200, "it never ends");
-        }
-        shown.truncate(shown.len() - unchanged);
-        shown
+    /// Seconds of those that it has spent on showing what there is: preparing pictures, and drawing with software.
+    pub(super) fn work_for_showing(&self) -> Option<f64> {
+        let id = self.window.as_ref().expect("started").id();
+        let shows = |name: &str, thread: &str| {
+            let is_windows = thread.parse() == Ok(id);
+            is_windows || name.starts_with("present") || name.starts_with("llvmpipe")
+        };
+        let of_thread = |path: PathBuf| {
+            let stat = std::fs::read_to_string(path.join("stat")).ok()?;
+            let name = stat.split_once('(')?.1.rsplit_once(')')?.0;
+            shows(name, path.file_name()?.to_str()?).then(|| seconds(&stat)).flatten()
+        };
+        let threads = std::fs::read_dir(format!("/proc/{id}/task")).ok()?;
+        Some(threads.filter_map(|entry| of_thread(entry.ok()?.path())).sum())
     }
 
     /// Saves a picture and waits until it is there.
@@ -272,8 +275,9 @@ impl Desk {
     }
 }
 
-/// Mean squared difference of levels.
-pub(super) fn error(a: &[u8], b: &[u8]) -> f64 {
-    let sum: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum();
-    sum / a.len() as f64
+/// Seconds at work that the system tells of a program or a thread (`man 5 proc_pid_stat`).
+fn seconds(stat: &str) -> Option<f64> {
+    let (_, numbers) = stat.rsplit_once(')')?;
+    let ticks = numbers.split_whitespace().skip(11).take(2).map(str::parse::<f64>);
+    Some(ticks.sum::<Result<f64, _>>().ok()? / 100.0)
 }
