@@ -285,8 +285,8 @@ fn messages_lie_on_the_picture_alone() {
                     "/home/somebody/projects/an interior/{name}.glb: accessor 17 of the mesh \"curtain\" takes \
                      1234 bytes from buffer 0, which ends after 1230 of them"
                 ));
+                (0..4).for_each(|_| studio.frame().expect("drawn"));
             }
-            (0..4).for_each(|_| studio.frame().expect("drawn"));
             let area = |memory: &egui::Memory| memory.area_rect(Id::unique("messages"));
             let messages = studio.context.memory(area).expect("they are drawn");
             let mut panels = Vec::new();
@@ -299,6 +299,13 @@ fn messages_lie_on_the_picture_alone() {
             println!("{size:?}, {dock:?}: {messages} {panels:?}");
             let has_dock = panels.iter().any(|(name, _)| *name == "dock");
             assert!(panels.len() >= 3 && has_dock == dock.is_some(), "{panels:?}");
+            let of = |name: &str| panels.iter().find(|panel| panel.0 == name).map(|panel| panel.1);
+            let [Some(above), Some(below)] = [of("top"), of("dock").or(of("status"))] else {
+                panic!("{panels:?}")
+            };
+            // Four of two lines, or as many as there is room for.
+            let least = (below.top() - above.bottom() - 30.0).min(4.0 * 44.0);
+            assert!(messages.height() > least, "{size:?}, {dock:?}: {messages}, {least}");
             for (name, panel) in panels {
                 let is_apart = !panel.shrink(0.5).intersects(messages);
                 assert!(is_apart, "{size:?}, {dock:?}: messages on {messages}, {name} on {panel}");

@@ -87,8 +87,10 @@ impl Desk {
         let mut command = Command::new(env!("CARGO_BIN_EXE_lightgrid"));
         command.current_dir(self.folder.path()).args(line.split_whitespace());
         command.env("DISPLAY", &self.display).env_remove("WAYLAND_DISPLAY");
-        // No file dialogue of the desktop that this runs on: of no portal, and of no program.
-        command.env("DBUS_SESSION_BUS_ADDRESS", "unix:path=/nowhere").env("PATH", "");
+        // No file dialogue of the desktop that this runs on: of no portal, and of no program. Of those there is
+        // what may be put into a folder.
+        command.env("DBUS_SESSION_BUS_ADDRESS", "unix:path=/nowhere");
+        command.env("PATH", self.path("programs"));
         command.stderr(std::fs::File::create(self.path("says.txt")).expect("a file"));
         let mut window = command.spawn().expect("the binary starts");
         self.id = self.wait_for("window", || {

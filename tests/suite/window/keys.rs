@@ -10,12 +10,27 @@ use super::Desk;
 /// How long nothing else is typed where a prompt is expected to go.
 const PATIENCE: Duration = Duration::from_secs(20);
 
+/// A browser for the window, which writes down what it is to show.
+#[cfg(unix)]
+fn install_browser(desk: &Desk) {
+    use std::os::unix::fs::PermissionsExt;
+    let (programs, page) = (desk.path("programs"), desk.path("page.txt"));
+    std::fs::create_dir(&programs).expect("a folder");
+    let browser = programs.join("xdg-open");
+    let script = format!("#!/bin/sh\necho \"$1\" > '{}'\n", page.display());
+    std::fs::write(&browser, script).expect("written");
+    let mode = std::fs::Permissions::from_mode(0o755);
+    std::fs::set_permissions(browser, mode).expect("a program");
+}
+
 #[test]
 fn sheets_prompts_and_panels_come_and_go_by_keys_and_the_film_stays() {
     let Some(mut desk) = Desk::open() else { return };
     // It is as large as the room that panels leave it.
     let settings = Settings { size: PictureSize::Viewport(4), ..Settings::default() };
     settings.write(&desk.path("w.json")).expect("written");
+    #[cfg(unix)]
+    install_browser(&desk);
     desk.start("view crack --env sky:day@64x32 --samples 2 --device cpu --settings w.json");
     let film = |what: &str| {
         desk.save_until(what, |now, of| {
@@ -56,6 +71,18 @@ fn sheets_prompts_and_panels_come_and_go_by_keys_and_the_film_stays() {
             desk.wait_for("developer's panel", || (tabs() != before).then_some(()));
         }
         assert!(film(key) == kept, "{key}: another film");
+    }
+
+    // What is known of the method lies one click away.
+    #[cfg(unix)]
+    {
+        let before = tabs();
+        desk.xdotool("key F12");
+        desk.wait_for("developer's panel", || (tabs() != before).then_some(()));
+        desk.xdotool("mousemove 862 160 sleep 1 click 1");
+        let shown = || std::fs::read_to_string(desk.path("page.txt")).ok();
+        let page = desk.wait_for("browser", || shown().filter(|page| page.ends_with('\n')));
+        assert_eq!(page.trim(), "https://dl.acm.org/doi/10.1145/3214745.3214808");
     }
 
     desk.ask("ctrl+o");
