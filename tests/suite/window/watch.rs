@@ -37,10 +37,10 @@ fn the_picture_on_the_screen_never_gets_worse() {
 
 /// As a person meets it: the default scene in a window of usual size, on two cores with software Vulkan.
 #[test]
-#[ignore = "half an hour of a quiet machine; run it in release"]
+#[ignore = "a quarter of an hour of a quiet machine; run it in release"]
 fn the_first_minute_and_a_move_lead_to_the_converged_picture() {
     let Some(mut desk) = Desk::of_size(1440, 900) else { return };
-    desk.start("view --samples 64 --device cpu --settings window.json");
+    desk.start("view --samples 32 --device cpu --settings window.json");
     let minute = || -> Vec<Moment> { (0..120).map(|_| Moment::next(&desk)).collect() };
     for when in ["at the start", "after a move"] {
         if when == "after a move" {
