@@ -66,7 +66,7 @@ pub(crate) fn report() {
     }
 }
 
-fn advance(session: &mut Session, samples: u32) {
+fn advance(session: &mut Session<'_>, samples: u32) {
     let never = AtomicBool::new(false);
     while session.phase() == Phase::Learning {
         session.advance(1, &never).expect("the CPU does not fail");
