@@ -462,11 +462,7 @@ impl ApplicationHandler<Call> for Runner {
         let Some(running) = &mut self.running else { return };
         let at = match call {
             Call::Repaint(at) => at.max(running.least_rested_at()),
-            Call::Draw => {
-                // What has been read is rendered before it is said.
-                running.app.relay(&running.context);
-                running.rested_at()
-            }
+            Call::Draw => running.rested_at(),
             Call::Relay if running.app.relay(&running.context) => running.rested_at(),
             Call::Relay => running.rested_at().max(running.drawn_at + STATUS_GAP),
         };
