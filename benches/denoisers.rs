@@ -1,21 +1,21 @@
-//! How good denoised pictures are: FLIP and levels of the built-in filter beside Open
-//! Image Denoise, where its library is found, after few and many samples.
+//! How good denoised pictures are: FLIP and levels of the built-in filter beside Open Image Denoise, where its library
+//! is found, after few and many samples.
 //!
 //! FLIP through the ACES curve at the reference's automatic exposure; root mean square of 8-bit levels through AgX
 //! at the same. References share second vertices, are of another seed, and keep some noise: both figures have a
 //! floor.
-
-use std::sync::atomic::AtomicBool;
 
 use lightgrid::denoise::Denoiser;
 use lightgrid::environment::{Environment, EnvironmentOptions};
 use lightgrid::image::Image;
 use lightgrid::metrics::compare;
 use lightgrid::path::World;
-use lightgrid::render::{Phase, Session, Sharing, View};
+use lightgrid::render::{Session, Sharing, View};
 use lightgrid::scene::builtin;
 use lightgrid::sources;
 use lightgrid::tone::{ToneCurve, display_rgb8};
+
+use super::advance;
 
 const SIZE: [u32; 2] = [480, 270];
 const SAMPLES: [u32; 4] = [1, 4, 16, 64];
@@ -44,17 +44,14 @@ pub(crate) fn report() {
 
         let view = View { sharing: Sharing::Off, ..view };
         let mut session = Session::new(&world, &environment, view);
-        let filters = [None, Some(Denoiser::ATrous), Some(Denoiser::Oidn)];
-        let usable = filters.map(|filter| filter.is_none_or(|f| f.check().is_ok()));
-        let mut lines = filters.map(|filter| filter.map_or("none", Denoiser::name).to_owned());
+        let mut filters = vec![None, Some(Denoiser::ATrous), Some(Denoiser::Oidn)];
+        filters.retain(|filter| filter.is_none_or(|filter| filter.check().is_ok()));
+        let name = |filter: &Option<Denoiser>| filter.map_or("none", Denoiser::name).to_owned();
+        let mut lines: Vec<String> = filters.iter().map(name).collect();
         for samples in SAMPLES {
             let more = samples - session.samples();
             advance(&mut session, more);
-            for ((filter, line), usable) in filters.iter().zip(&mut lines).zip(usable) {
-                if !usable {
-                    line.push_str("  -");
-                    continue;
-                }
+            for (filter, line) in filters.iter().zip(&mut lines) {
                 let picture = match filter {
                     None => Ok(session.film().image()),
                     Some(filter) => filter.denoise(session.film(), None),
@@ -64,14 +61,6 @@ pub(crate) fn report() {
         }
         lines.iter().for_each(|line| println!("{scene:12} {line}"));
     }
-}
-
-fn advance(session: &mut Session<'_>, samples: u32) {
-    let never = AtomicBool::new(false);
-    while session.phase() == Phase::Learning {
-        session.advance(1, &never).expect("the CPU does not fail");
-    }
-    session.advance(samples, &never).expect("the CPU does not fail");
 }
 
 fn differences(picture: &Image, reference: &Image) -> String {

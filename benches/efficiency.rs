@@ -6,13 +6,13 @@
 //! Errors are relMSE against a long render with another seed, over three seeds; "trimmed" drops the
 //! worst 0.1 % of pixels of each picture.
 
-use std::sync::atomic::AtomicBool;
-
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::path::{PathLimits, World};
 use lightgrid::render::filter::PixelFilter;
-use lightgrid::render::{Figures, Phase, Sampling, Session, View};
+use lightgrid::render::{Figures, Sampling, Session, View};
 use lightgrid::scene::builtin;
+
+use super::advance;
 
 const SIZE: (u32, u32) = (128, 72);
 const SAMPLES: u32 = 32;
@@ -128,12 +128,8 @@ impl Case<'_> {
             learning_paths: LEARNING_PATHS,
             ..View::new(self.world.scene.cameras[0].clone(), [SIZE.0, SIZE.1])
         };
-        let never = AtomicBool::new(false);
         let mut session = Session::new(self.world, self.environment, view);
-        while session.phase() == Phase::Learning {
-            session.advance(1, &never).expect("the CPU does not fail");
-        }
-        session.advance(samples, &never).expect("the CPU does not fail");
+        advance(&mut session, samples);
         (session.film().pixels().iter().map(|p| p.mean()).collect(), session.figures())
     }
 }

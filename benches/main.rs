@@ -5,7 +5,10 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "who runs this reads it")]
 
+use std::sync::atomic::AtomicBool;
+
 use criterion::{Criterion, criterion_group};
+use lightgrid::render::{Phase, Session};
 
 mod bvh;
 mod denoise;
@@ -13,6 +16,15 @@ mod denoisers;
 mod efficiency;
 mod environment;
 mod path;
+
+/// Learns, and adds samples to every pixel.
+fn advance(session: &mut Session<'_>, samples: u32) {
+    let never = AtomicBool::new(false);
+    while session.phase() == Phase::Learning {
+        session.advance(1, &never).expect("the CPU does not fail");
+    }
+    session.advance(samples, &never).expect("the CPU does not fail");
+}
 
 criterion_group!(benches, bvh::bench, denoise::bench, environment::bench, path::bench);
 

@@ -297,9 +297,9 @@ fn messages_lie_on_the_picture_alone() {
                 }
             });
             println!("{size:?}, {dock:?}: {messages} {panels:?}");
-            let has_dock = panels.iter().any(|(name, _)| *name == "dock");
-            assert!(panels.len() >= 3 && has_dock == dock.is_some(), "{panels:?}");
             let of = |name: &str| panels.iter().find(|panel| panel.0 == name).map(|panel| panel.1);
+            let has_dock = of("dock").is_some();
+            assert!(panels.len() >= 3 && has_dock == dock.is_some(), "{panels:?}");
             let [Some(above), Some(below)] = [of("top"), of("dock").or(of("status"))] else {
                 panic!("{panels:?}")
             };

@@ -109,6 +109,17 @@ pub(crate) fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
+/// Puts a program into a folder, which may not be there yet: a script of the shell.
+#[cfg(unix)]
+pub(crate) fn install(folder: &Path, name: &str, script: &str) {
+    use std::os::unix::fs::PermissionsExt;
+    fs::create_dir_all(folder).expect("made");
+    let program = folder.join(name);
+    fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("written");
+    let mode = fs::Permissions::from_mode(0o755);
+    fs::set_permissions(&program, mode).expect("allowed");
+}
+
 #[cfg(unix)]
 pub(crate) fn send(child: &std::process::Child, signal: &str) {
     let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();

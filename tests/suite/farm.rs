@@ -333,12 +333,8 @@ fn videos_need_ffmpeg_and_say_so() {
 /// ffmpeg as a script that fails where it says.
 #[cfg(unix)]
 fn with_ffmpeg(bench: &Bench, script: &str, line: &str) -> std::process::Output {
-    use std::os::unix::fs::PermissionsExt;
     let folder = bench.path("bin");
-    fs::create_dir_all(&folder).expect("made");
-    let program = folder.join("ffmpeg");
-    fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("written");
-    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("allowed");
+    crate::cli::install(&folder, "ffmpeg", script);
     fs::create_dir_all(bench.path("tmp")).expect("made");
     let path = std::env::var("PATH").unwrap_or_default();
     let mut command = bench.command(&render_line(line));

@@ -36,7 +36,7 @@ pub(in crate::app) fn show(context: &Context, room: Rect, messages: &mut Message
     let area = Area::new(Id::unique("messages")).pivot(Align2::CENTER_BOTTOM).fixed_pos(foot);
     let width = (room.width() - 60.0).clamp(160.0, 620.0);
     area.show(context, |ui| {
-        let most = room.height() - 2.0 * MARGIN;
+        let most = (room.height() - 2.0 * MARGIN).max(0.0);
         // Or it is no higher than it was with fewer messages.
         let scroll = ScrollArea::vertical().min_scrolled_height(most).max_height(most);
         scroll.stick_to_bottom(true).show(ui, |ui| list(ui, width, now, messages));

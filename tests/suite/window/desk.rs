@@ -1,5 +1,6 @@
 //! A desk of its own for a real window.
 
+use std::ffi::OsStr;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
@@ -206,34 +207,37 @@ impl Desk {
         self.levels(300..self.width - 320, 150..self.height - 190)
     }
 
+    /// Where the system tells of the program.
+    fn process(&self) -> PathBuf {
+        let id = self.window.as_ref().expect("started").id();
+        format!("/proc/{id}").into()
+    }
+
     /// Megabytes of memory that the program has; none where the system does not tell.
     pub(super) fn megabytes(&self) -> Option<f64> {
-        let id = self.window.as_ref().expect("started").id();
-        let status = std::fs::read_to_string(format!("/proc/{id}/status")).ok()?;
+        let status = std::fs::read_to_string(self.process().join("status")).ok()?;
         let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
         Some(line.trim().trim_end_matches(" kB").parse::<f64>().ok()? / 1024.0)
     }
 
     /// Seconds that the program has been at work, all cores together; none where the system does not tell.
     pub(super) fn work(&self) -> Option<f64> {
-        let id = self.window.as_ref().expect("started").id();
-        let stat = std::fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
-        seconds(&stat)
+        seconds(&std::fs::read_to_string(self.process().join("stat")).ok()?)
     }
 
     /// Seconds of those that it has spent on showing what there is: preparing pictures, and drawing with software.
     pub(super) fn work_for_showing(&self) -> Option<f64> {
-        let id = self.window.as_ref().expect("started").id();
-        let shows = |name: &str, thread: &str| {
-            let is_windows = thread.parse() == Ok(id);
+        let process = self.process();
+        let shows = |name: &str, thread: &OsStr| {
+            let is_windows = process.file_name() == Some(thread);
             is_windows || name.starts_with("present") || name.starts_with("llvmpipe")
         };
         let of_thread = |path: PathBuf| {
             let stat = std::fs::read_to_string(path.join("stat")).ok()?;
             let name = stat.split_once('(')?.1.rsplit_once(')')?.0;
-            shows(name, path.file_name()?.to_str()?).then(|| seconds(&stat)).flatten()
+            shows(name, path.file_name()?).then(|| seconds(&stat)).flatten()
         };
-        let threads = std::fs::read_dir(format!("/proc/{id}/task")).ok()?;
+        let threads = std::fs::read_dir(process.join("task")).ok()?;
         Some(threads.filter_map(|entry| of_thread(entry.ok()?.path())).sum())
     }
 

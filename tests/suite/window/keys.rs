@@ -10,27 +10,18 @@ use super::Desk;
 /// How long nothing else is typed where a prompt is expected to go.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// A browser for the window, which writes down what it is to show.
-#[cfg(unix)]
-fn install_browser(desk: &Desk) {
-    use std::os::unix::fs::PermissionsExt;
-    let (programs, page) = (desk.path("programs"), desk.path("page.txt"));
-    std::fs::create_dir(&programs).expect("a folder");
-    let browser = programs.join("xdg-open");
-    let script = format!("#!/bin/sh\necho \"$1\" > '{}'\n", page.display());
-    std::fs::write(&browser, script).expect("written");
-    let mode = std::fs::Permissions::from_mode(0o755);
-    std::fs::set_permissions(browser, mode).expect("a program");
-}
-
 #[test]
 fn sheets_prompts_and_panels_come_and_go_by_keys_and_the_film_stays() {
     let Some(mut desk) = Desk::open() else { return };
     // It is as large as the room that panels leave it.
     let settings = Settings { size: PictureSize::Viewport(4), ..Settings::default() };
     settings.write(&desk.path("w.json")).expect("written");
+    // A browser, which writes down what it is to show.
     #[cfg(unix)]
-    install_browser(&desk);
+    {
+        let script = format!("echo \"$1\" > '{}'", desk.path("page.txt").display());
+        crate::cli::install(&desk.path("programs"), "xdg-open", &script);
+    }
     desk.start("view crack --env sky:day@64x32 --samples 2 --device cpu --settings w.json");
     let film = |what: &str| {
         desk.save_until(what, |now, of| {

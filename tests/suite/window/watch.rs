@@ -28,51 +28,64 @@ fn the_picture_on_the_screen_never_gets_worse() {
         println!("once more: {why}");
         moved((-60, 10)).unwrap_or_else(|why| panic!("{why}"));
     }
-    if let Some((work, showing)) = desk.work().zip(desk.work_for_showing()) {
-        let share = showing / work;
-        println!("showing takes {share:.3} of the work");
-        assert!(share < MOST_FOR_SHOWING, "showing takes {share:.3} of the work");
-    }
+    check_showing(&desk, None, MOST_FOR_SHOWING);
 }
 
 /// As a person meets it: the default scene in a window of usual size, on two cores with software Vulkan.
 #[test]
-#[ignore = "a quarter of an hour of a quiet machine; run it in release"]
+#[ignore = "six minutes of a quiet machine; run it in release"]
 fn the_first_minute_and_a_move_lead_to_the_converged_picture() {
     let Some(mut desk) = Desk::of_size(1440, 900) else { return };
     desk.start("view --samples 32 --device cpu --settings window.json");
-    let minute = || -> Vec<Moment> { (0..120).map(|_| Moment::next(&desk)).collect() };
-    for when in ["at the start", "after a move"] {
-        if when == "after a move" {
-            desk.drag((700, 400), (60, 10), Duration::from_millis(50));
-        }
-        let before = desk.work().zip(desk.work_for_showing());
-        let shown = minute();
-        let after = desk.work().zip(desk.work_for_showing());
+    let watch = |when: &str| {
+        let before = Effort::of(&desk);
+        let shown: Vec<Moment> = (0..120).map(|at| Moment::next(&desk, at)).collect();
+        println!("{when}:");
+        check_showing(&desk, before, MOST_OF_A_MINUTE);
         while !is_idle(&desk) {}
         let errors = errors_beside(&shown, &desk.picture());
-        let stands = stands(&shown).map(|at| at.len()).max().unwrap_or_default();
-        println!("{when}: {errors:.2?}; longest without a change: {} s", stands as f64 / 2.0);
+        let longest = stands(&shown).map(<[_]>::len).max().unwrap_or_default();
+        println!("{errors:.2?}; longest without a change: {} s", longest as f64 / 2.0);
         never_worse(&errors).unwrap_or_else(|why| panic!("{when}: {why}"));
-        if let Some(((work, showing), (worked, shown))) = before.zip(after) {
-            let share = (shown - showing) / (worked - work);
-            println!("{when}: showing takes {share:.3} of the work");
-            assert!(share < MOST_OF_A_MINUTE, "{when}: showing takes {share:.3} of the work");
-        }
+    };
+    watch("at the start");
+    desk.drag((700, 400), (60, 10), Duration::from_millis(50));
+    watch("after a move");
+}
+
+/// Seconds of all cores.
+struct Effort {
+    work: f64,
+    showing: f64,
+}
+
+impl Effort {
+    /// `None` where the system does not tell.
+    fn of(desk: &Desk) -> Option<Self> {
+        Some(Self { work: desk.work()?, showing: desk.work_for_showing()? })
     }
+}
+
+/// Asserts that showing takes less than so much of the work since then, or of all.
+fn check_showing(desk: &Desk, since: Option<Effort>, most: f64) {
+    let Some(now) = Effort::of(desk) else { return };
+    let since = since.unwrap_or(Effort { work: 0.0, showing: 0.0 });
+    let share = (now.showing - since.showing) / (now.work - since.work);
+    println!("showing takes {share:.3} of the work");
+    assert!(share < most, "showing takes {share:.3} of the work");
 }
 
 /// What is shown, and the seconds of all cores by then.
 struct Moment {
     picture: Vec<u8>,
-    work: Option<f64>,
+    work: f64,
 }
 
 impl Moment {
-    /// In half a second.
-    fn next(desk: &Desk) -> Self {
+    /// In half a second, after so many others. Without a clock of work, that of moments will do.
+    fn next(desk: &Desk, before: usize) -> Self {
         std::thread::sleep(Duration::from_millis(500));
-        Self { picture: desk.picture(), work: desk.work() }
+        Self { picture: desk.picture(), work: desk.work().unwrap_or(before as f64) }
     }
 }
 
@@ -81,7 +94,7 @@ fn until_it_is_done(desk: &Desk) -> Vec<Moment> {
     let mut shown: Vec<Moment> = Vec::new();
     let mut unchanged = 0;
     while unchanged < 20 || shown.len() < 30 {
-        let now = Moment::next(desk);
+        let now = Moment::next(desk, shown.len());
         let is_same = shown.last().is_some_and(|last| last.picture == now.picture);
         unchanged = if is_same { unchanged + 1 } else { 0 };
         shown.push(now);
@@ -118,14 +131,14 @@ fn never_worse(errors: &[f64]) -> Result<(), String> {
     Ok(())
 }
 
-/// Where the same is shown, from moment to moment.
-fn stands(shown: &[Moment]) -> impl Iterator<Item = std::ops::Range<usize>> {
-    let mut begin = 0;
-    shown.chunk_by(|a, b| a.picture == b.picture).map(move |same| {
-        let stand = begin..begin + same.len();
-        begin = stand.end;
-        stand
-    })
+/// Moments at which the same is shown.
+fn stands(shown: &[Moment]) -> impl Iterator<Item = &[Moment]> {
+    shown.chunk_by(|a, b| a.picture == b.picture)
+}
+
+/// Seconds of work from the first to the last.
+fn work_in(moments: &[Moment]) -> f64 {
+    moments[moments.len() - 1].work - moments[0].work
 }
 
 /// Whether what is shown until the picture is done only gets better and never stands still.
@@ -139,17 +152,14 @@ fn check_all(when: &str, shown: &[Moment]) -> Result<(), String> {
     }
     never_worse(&errors).map_err(|why| format!("{when}: {why}"))?;
     // How long a picture is shown depends on how long it took: what counts is its share of the work, for at
-    // least three seconds of clock. Without a clock of work, that of frames will do.
-    let worked: Option<Vec<f64>> = shown.iter().map(|moment| moment.work).collect();
-    let works = worked.unwrap_or_else(|| (0..shown.len()).map(|at| at as f64).collect());
-    let all = works[works.len() - 1] - works[0];
+    // least three seconds of clock.
+    let all = work_in(shown);
     if all <= 0.0 {
         return Err(format!("{when}: nothing is done"));
     }
     // At the start there is nothing to be seen at first.
-    for stand in stands(shown).filter(|stand| when != "at the start" || stand.start > 0) {
-        let end = stand.end - 1;
-        let share = (works[end] - works[stand.start]) / all;
+    for stand in stands(shown).skip(usize::from(when == "at the start")) {
+        let share = work_in(stand) / all;
         if stand.len() > 6 && share > MOST_OF_THE_WORK {
             return Err(format!("{when}: the picture stands still, {share:.2}: {errors:.2?}"));
         }
