@@ -51,7 +51,7 @@ fn luminance(rgb: vec3f) -> f32 {
 }
 
 fn compared_luminance(rgb: vec3f) -> f32 {
-    return min(luminance(rgb), LARGEST_LUMINANCE);
+    return min(luminance(rgb), MAX_LUMINANCE);
 }
 
 // Tukey's biweight.
@@ -79,7 +79,7 @@ fn likeness(a: Guide, b: Guide, offset: vec2i) -> f32 {
     let covered = a.coverage - b.coverage;
     let chances = CHANCES * (a.chance + b.chance);
     let depth = (a.nearness - b.nearness)
-        / (growth * max(a.nearness, b.nearness) + slopes * max(a.slope, b.slope) + LEAST_NEARNESS);
+        / (growth * max(a.nearness, b.nearness) + slopes * max(a.slope, b.slope) + MIN_NEARNESS);
     return falling(dot(albedo, albedo) * (1.0 / ALBEDO_TOLERANCE))
         * falling(dot(normal, normal) / (NORMAL_TOLERANCE + doubts))
         * falling(covered * covered / (COVERAGE_TOLERANCE + chances))
@@ -97,7 +97,7 @@ fn undress(@builtin(global_invocation_id) id: vec3u) {
     var guide = Guide();
     guide.coverage = hit.hits / samples;
     let albedo = hit.albedo / samples + (1.0 - guide.coverage);
-    guide.albedo = max(albedo, vec3f(LEAST_ALBEDO));
+    guide.albedo = max(albedo, vec3f(MIN_ALBEDO));
     guide.normal = hit.normal / samples;
     if hit.depth > 0.0 {
         guide.nearness = guide.coverage * hit.hits / hit.depth;
@@ -113,7 +113,7 @@ fn undress(@builtin(global_invocation_id) id: vec3u) {
         let squared = sum[index].w / samples * settings.unscale * settings.unscale;
         let spread = max(squared - brightness * brightness, 0.0);
         let scale = 1.0 / luminance(guide.albedo);
-        variance = min(spread / (samples - 1.0) * scale * scale, LARGEST_VARIANCE);
+        variance = min(spread / (samples - 1.0) * scale * scale, MAX_VARIANCE);
     }
     light[index] = vec4f(mean / guide.albedo, variance);
 }
@@ -186,7 +186,7 @@ fn share_errors(@builtin(global_invocation_id) id: vec3u) {
             }
             let other = index_of(place);
             let alike = likeness(guide, guides[other], vec2i(dx, dy));
-            let weight = alike + LEAST_LIKENESS;
+            let weight = alike + MIN_LIKENESS;
             let there = light[other];
             if there.w >= 0.0 {
                 known += weight * vec2f(1.0, there.w);
@@ -203,10 +203,10 @@ fn share_errors(@builtin(global_invocation_id) id: vec3u) {
     let chance = SINGLE * pow(FEWER, f32(max(counts[index].x, 1u) - 1u)) * off * off;
     var variance = max(max(own.w, known.y / max(known.x, TINY)), chance);
     if own.w < 0.0 {
-        let spread = max(moments.y / all_weights - mean * mean, LEAST_SPREAD * mean * mean);
+        let spread = max(moments.y / all_weights - mean * mean, MIN_SPREAD * mean * mean);
         variance = SINGLE * max(spread, off * off);
     }
-    variance = min(variance, LARGEST_VARIANCE);
+    variance = min(variance, MAX_VARIANCE);
     result[index] = vec4f(own.xyz, variance);
     // The pixel itself is its like.
     guides[index].support = support - 1.0;
@@ -245,7 +245,7 @@ fn smooth_light(@builtin(global_invocation_id) id: vec3u) {
             var weight = kernel(dx) * kernel(dy);
             if other != index {
                 let difference = compared_luminance(there.xyz) - own_luminance;
-                let tolerance = own.w + there.w + LEAST_VARIANCE;
+                let tolerance = own.w + there.w + MIN_VARIANCE;
                 weight *= likeness(guide, guides[other], offset) * falling(
                     difference * difference * (1.0 / (ERRORS_TOLERATED * ERRORS_TOLERATED)) / tolerance
                 );
@@ -275,7 +275,7 @@ fn witness(own: Guide, own_light: f32, index: u32, offset: vec2i) -> Witness {
     let bright = compared_luminance(witness.rgb);
     let relative = RELATIVE_ERROR * RELATIVE_ERROR * (bright * bright + own_light * own_light);
     let dressed = luminance(guide.albedo);
-    witness.weight = near / (there.w * dressed * dressed + relative + LEAST_VARIANCE);
+    witness.weight = near / (there.w * dressed * dressed + relative + MIN_VARIANCE);
     let normal = guide.normal - own.normal;
     let nearness = (guide.nearness - own.nearness)
         / max(DEPTH_SCALE * max(own.nearness, guide.nearness), TINY);
@@ -294,7 +294,7 @@ fn mend(@builtin(global_invocation_id) id: vec3u) {
     let index = index_of(centre);
     let own = guides[index];
     let shown = light[index].xyz * own.albedo;
-    if own.support >= LEAST_ALIKE {
+    if own.support >= MIN_ALIKE {
         result[index] = vec4f(shown, 0.0);
         return;
     }

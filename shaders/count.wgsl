@@ -11,7 +11,7 @@ struct Visibility {
 // Counts a try of a tile of the map, if this path's are counted; returns the counter of its weight, 0
 // if there is none.
 fn count_try(path: ptr<function, Path>, vertex: Vertex, tile: u32) -> u32 {
-    if !(*path).is_counted || (*path).bounces > MOST_COUNTED {
+    if !(*path).is_counted || (*path).bounces > MAX_COUNTED {
         return 0u;
     }
 //#if MEDIUM

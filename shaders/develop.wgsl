@@ -30,7 +30,7 @@ struct Develop {
 // Beyond what any curve tells from white, and small enough that its square is finite.
 const BRIGHTEST = 1e6;
 // Sums of so large values are finite.
-const LARGEST = 1e30;
+const MAX_COMPONENT = 1e30;
 // What an overlay says nothing about becomes this: it steps back.
 const BACKGROUND = vec3f(24.0, 25.0, 28.0);
 const INFINITY_BITS = 0x7f800000u;
@@ -47,7 +47,7 @@ fn radiance(pixel: vec2u) -> vec3f {
 }
 
 fn finite(x: f32) -> f32 {
-    return select(clamp(x, -LARGEST, LARGEST), 0.0, is_nan(x));
+    return select(clamp(x, -MAX_COMPONENT, MAX_COMPONENT), 0.0, is_nan(x));
 }
 
 fn balanced(rgb: vec3f) -> vec3f {

@@ -38,7 +38,7 @@ fn gather(path: ptr<function, Path>, vertex: Vertex) {
         return;
     }
 //#end
-    if (*path).bounces > MOST_COUNTED {
+    if (*path).bounces > MAX_COUNTED {
         return;
     }
     let tries = globals.tries_per_vertex;

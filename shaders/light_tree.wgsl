@@ -35,10 +35,10 @@ fn light_importance(node: u32, receiver: Receiver) -> f32 {
     let scatter = center_variance.w * inverse_squared;
     let known = squares_around.y * (1.0 - scatter);
     let aimed = clamped_mean(-dot(axis_intensity.xyz, direction), squares_around.x - known);
-    let emitted = max(squares_around.z + aimed, LEAST_COSINE);
+    let emitted = max(squares_around.z + aimed, MIN_COSINE);
     var received = 1.0;
     if any(receiver.normal != vec3f(0.0)) {
-        received = max(clamped_mean(dot(receiver.normal, direction), scatter), LEAST_COSINE);
+        received = max(clamped_mean(dot(receiver.normal, direction), scatter), MIN_COSINE);
     }
     return axis_intensity.w * emitted * received * inverse_squared;
 }

@@ -69,7 +69,7 @@ fn phase_pdf_solid_angle(g: f32, cosine: f32) -> f32 {
 
 // Twin of `Fog::stretch`.
 fn fog_stretch(origin: vec3f, direction: vec3f, distance: f32) -> Stretch {
-    let size = max(abs(direction), vec3f(LEAST_COMPONENT));
+    let size = max(abs(direction), vec3f(MIN_COMPONENT));
     let inverse = 1.0 / select(size, -size, direction < vec3f(0.0));
     let a = (globals.fog_low - origin) * inverse;
     let b = (globals.fog_high - origin) * inverse;

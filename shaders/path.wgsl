@@ -413,5 +413,5 @@ fn roulette_probability(path: ptr<function, Path>) -> f32 {
 //#if SHARING
     in_air *= (*path).throughput_before;
 //#end
-    return clamp(ROULETTE_MILDNESS * in_air, LEAST_SURVIVAL, 1.0);
+    return clamp(ROULETTE_MILDNESS * in_air, MIN_SURVIVAL, 1.0);
 }

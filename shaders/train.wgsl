@@ -2,7 +2,7 @@
 // src/radiance_cache/sums.rs.
 
 const NO_CACHE_SLOT = 0xffffffffu;
-const MOST_UNITS = 1099511627776.0;
+const MAX_UNITS = 1099511627776.0;
 const TWO_TO_32 = 4294967296.0;
 
 // A vertex of the path that has not yet brought back all that the cache is to learn from it.
@@ -41,7 +41,7 @@ fn dice(position: vec3f) -> u32 {
 
 // A whole number near `value`, of which no two are alike, as often above as makes the mean right, in floats.
 fn dithered(value: f32) -> f32 {
-    let bounded = clamp(value, 0.0, MOST_UNITS);
+    let bounded = clamp(value, 0.0, MAX_UNITS);
     return floor(bounded + unit_from_bits(hash(bitcast<u32>(bounded))));
 }
 
@@ -50,8 +50,8 @@ fn training_vertex_at(path: ptr<function, Path>, vertex: Vertex) -> TrainingVert
     let throughput = (*path).throughput;
     let least = min(min(throughput.x, throughput.y), throughput.z);
     let trains = is_in_air(path)
-        && is_broad(vertex, LEAST_CACHED_ALPHA)
-        && least > LEAST_SHARE * max_element(throughput);
+        && is_broad(vertex, MIN_CACHED_ALPHA)
+        && least > MIN_SHARE * max_element(throughput);
     if !trains {
         return trained;
     }
@@ -77,7 +77,7 @@ fn training_vertex_at(path: ptr<function, Path>, vertex: Vertex) -> TrainingVert
         let known = luminance(cached_radiance_over_albedo(position, normal) * albedo);
         // Where nothing was found, nothing is known.
         if known > 0.0 {
-            trained.most = MOST_TIMES * known;
+            trained.most = MAX_TIMES * known;
         }
     }
     trained.slot = slot;

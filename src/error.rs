@@ -58,15 +58,15 @@ pub struct Notices {
 
 impl Notices {
     /// More than so many nobody reads.
-    const MOST: usize = 100;
+    const MAX_NOTICES: usize = 100;
 
     /// Adds a sentence unless it is already there.
     pub fn add(&mut self, sentence: impl Into<String>) {
         let sentence = match self.sentences.len() {
-            0..Self::MOST => sentence.into(),
+            0..Self::MAX_NOTICES => sentence.into(),
             _ => "there is more of the kind, left out here".to_owned(),
         };
-        if self.sentences.len() <= Self::MOST && !self.sentences.contains(&sentence) {
+        if self.sentences.len() <= Self::MAX_NOTICES && !self.sentences.contains(&sentence) {
             self.sentences.push(sentence);
         }
     }

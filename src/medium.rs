@@ -18,7 +18,7 @@ use crate::scene::{Material, Medium};
 const MARGIN: f32 = 0.02;
 
 /// A direction's components are taken for at least this large.
-pub(crate) const LEAST_COMPONENT: f32 = 1e-18;
+pub(crate) const MIN_COMPONENT: f32 = 1e-18;
 
 /// Largest mean cosine of scattering, either way.
 pub const MAX_ANISOTROPY: f32 = 0.99;
@@ -197,7 +197,7 @@ impl Fog {
     /// The stretch of a ray inside of the box, up to `distance` metres.
     pub fn stretch(&self, origin: Vec3, direction: Vec3, distance: f32) -> Option<(f32, f32)> {
         // No division by zero: on a face it would be NaN.
-        let direction = direction.map(|d| d.abs().max(LEAST_COMPONENT).copysign(d));
+        let direction = direction.map(|d| d.abs().max(MIN_COMPONENT).copysign(d));
         let (a, b) = ((self.bounds[0] - origin) / direction, (self.bounds[1] - origin) / direction);
         let from = a.min(b).max_element().max(0.0);
         let to = a.max(b).min_element().min(distance);

@@ -87,7 +87,7 @@ pub(crate) fn filled<T: Clone>(count: u64, value: T) -> Decoded<Vec<T>> {
 
 /// Arenas of the GNU allocator: what works on pixels seldom asks it for memory.
 #[cfg(all(feature = "window", target_os = "linux", target_env = "gnu"))]
-const MOST_ARENAS: libc::c_int = 2;
+const MAX_ARENAS: libc::c_int = 2;
 
 /// Has large arrays, such as films, given back to the system as soon as they are freed. The GNU allocator
 /// would take the first one as a sign to keep those of up to 32 MiB, two to an arena, which then is seldom
@@ -98,7 +98,7 @@ pub(crate) fn return_large_arrays() {
     // SAFETY: numbers for the allocator, which may be set at any time.
     unsafe {
         libc::mallopt(libc::M_MMAP_THRESHOLD, SMALL as libc::c_int);
-        libc::mallopt(libc::M_ARENA_MAX, MOST_ARENAS);
+        libc::mallopt(libc::M_ARENA_MAX, MAX_ARENAS);
     }
 }
 

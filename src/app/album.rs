@@ -12,7 +12,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use egui::{Color32, ColorImage};
 
 use super::document::Document;
-use super::history::{MOST, SMALL_WIDTH};
+use super::history::{MAX_PICTURES, SMALL_WIDTH};
 use super::kept_picture::{KeptPicture, Pixels};
 use super::screen::color_image;
 use super::settings_file;
@@ -28,7 +28,7 @@ const DOCUMENT: &str = "lightgrid.kept.document";
 const OF_SCENE: &str = "lightgrid.kept.scene-options";
 
 /// Most files that are looked at for those that can be read.
-const MOST_TRIED: usize = 64;
+const MAX_TRIED: usize = 64;
 
 /// The folder of kept pictures.
 pub(super) struct Album {
@@ -151,7 +151,7 @@ fn read_all(folder: &Path) -> (Vec<KeptPicture>, Option<Error>) {
             Ok(kept) => found.push(kept),
             Err(error) => failures.push(error),
         }
-        if found.len() == MOST {
+        if found.len() == MAX_PICTURES {
             break;
         }
     }
@@ -174,7 +174,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
         .filter(|path| path.extension().is_some_and(|extension| extension == "exr"))
         .collect();
     files.sort();
-    files.split_off(files.len().saturating_sub(MOST_TRIED))
+    files.split_off(files.len().saturating_sub(MAX_TRIED))
 }
 
 /// A kept picture but its pixels, which are read when they are needed.
@@ -352,7 +352,7 @@ mod tests {
         let temporary = tempfile::tempdir().expect("a folder");
         let folder = temporary.path();
         let (mut album, _report) = open(folder);
-        let files: Vec<_> = (0..MOST + 2)
+        let files: Vec<_> = (0..MAX_PICTURES + 2)
             .map(|number| write(&mut album, &format!("Picture {number}"), document()))
             .collect();
         drop(album);
@@ -364,9 +364,10 @@ mod tests {
         let (_album, report) = open(folder);
         let kept = next(&report).expect("read");
         let names: Vec<_> = kept.iter().map(|kept| kept.name.clone()).collect();
-        let newest: Vec<_> = (2..MOST + 2).map(|number| format!("Picture {number}")).collect();
+        let newest: Vec<_> =
+            (2..MAX_PICTURES + 2).map(|number| format!("Picture {number}")).collect();
         assert_eq!(names, newest);
-        assert_eq!(kept[MOST - 1].small.size, [1, 1]);
+        assert_eq!(kept[MAX_PICTURES - 1].small.size, [1, 1]);
         assert!(files.iter().all(|file| file.exists()), "nothing of others is removed");
     }
 }

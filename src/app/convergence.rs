@@ -4,7 +4,7 @@ use super::worker::Point;
 use crate::render::Sampling;
 
 /// Earlier runs kept.
-const MOST_RUNS: usize = 8;
+const MAX_RUNS: usize = 8;
 
 /// One picture from its start on.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,7 +46,7 @@ impl Convergence {
         run.points.clone_from(main);
         let number = run.number;
         self.runs.push(run);
-        if self.runs.len() > MOST_RUNS {
+        if self.runs.len() > MAX_RUNS {
             self.runs.remove(0);
         }
         let of_plain = || Run { name: "plain".to_owned(), number, points: plain.clone() };
@@ -91,7 +91,7 @@ mod tests {
         assert_eq!(add(1.5, 1), [(1, 2), (2, 1)]);
         assert_eq!(add(1.0, 3), [(2, 1), (1, 3)]);
         let last = (0..9).map(|i| add(2.0 + 0.1 * f64::from(i), 1)).last().unwrap_or_default();
-        assert_eq!(last.len(), MOST_RUNS);
+        assert_eq!(last.len(), MAX_RUNS);
         assert_eq!(last.last(), Some(&(11, 1)));
     }
 }

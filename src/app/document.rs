@@ -104,7 +104,7 @@ impl PictureSize {
 }
 
 /// Paths to learn from before the first sample.
-const MOST_LEARNING_PATHS: u64 = 1 << 13;
+const MAX_LEARNING_PATHS: u64 = 1 << 13;
 
 impl Default for Document {
     fn default() -> Self {
@@ -155,7 +155,7 @@ impl Document {
             && [self.intensity, self.sun].iter().all(radiance)
             && self.fog.is_none_or(|fog| fog.is_sound())
             && self.viewpoint.iter().chain(&self.bookmarks).all(Viewpoint::is_sound)
-            && self.region.iter().flatten().all(|share| (-MOST_ASIDE..=MOST_ASIDE).contains(share))
+            && self.region.iter().flatten().all(|share| (-MAX_ASIDE..=MAX_ASIDE).contains(share))
             && self.materials.values().all(MaterialEdit::is_sound)
     }
 
@@ -192,7 +192,7 @@ impl Document {
         if let (PictureSize::Viewport(_), Some([left, _, right, _])) = (self.size, &mut self.region)
         {
             for x in [left, right] {
-                *x = in_other_shape(*x, factor).clamp(-MOST_ASIDE, MOST_ASIDE);
+                *x = in_other_shape(*x, factor).clamp(-MAX_ASIDE, MAX_ASIDE);
             }
         }
     }
@@ -209,7 +209,7 @@ impl Document {
     fn learning_paths(&self, size: [u32; 2]) -> u64 {
         let paths = View::suitable_learning_paths(self.light.sampling, size, None);
         match self.light.sampling {
-            Sampling::Adaptive => paths.min(MOST_LEARNING_PATHS),
+            Sampling::Adaptive => paths.min(MAX_LEARNING_PATHS),
             _ => paths,
         }
     }
@@ -254,7 +254,7 @@ pub(super) fn number_now(number: u32, before: &[Material], now: &[Material]) -> 
 }
 
 /// A region may be marked where a wide window shows more than the one that is there now, but not farther aside.
-const MOST_ASIDE: f32 = 100.0;
+const MAX_ASIDE: f32 = 100.0;
 
 /// What a share of the width is where the aspect was so many times what it is now: pictures share their middle.
 pub(super) fn in_other_shape(x: f32, factor: f32) -> f32 {

@@ -7,7 +7,7 @@ use egui::{Event, Modifiers, PointerButton, Pos2, Ui, Vec2};
 /// A press over the picture that went no further than this is a click, in points; as egui has it.
 pub(super) const CLICK_DISTANCE: f32 = 6.0;
 /// Longest step that is told, in points: long ones are cut, so that a fast pointer does the same.
-const LONGEST_STEP: f32 = 4.0;
+const MAX_STEP: f32 = 4.0;
 
 /// A button held.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,7 +134,7 @@ impl Drag {
         }
         // What was held back while it might have been a click comes with the first step.
         let way = to - self.at;
-        let count = (way.length() / LONGEST_STEP).ceil();
+        let count = (way.length() / MAX_STEP).ceil();
         let modifiers = Modifiers { command: self.has_command, ..modifiers };
         let step = Step::Move { button: self.button, by: way / count.max(1.0), modifiers };
         steps.extend(std::iter::repeat_n(step, count as usize));

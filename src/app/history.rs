@@ -12,7 +12,7 @@ use crate::image::{Image, Rgb8};
 use crate::scene::SceneOptions;
 
 /// Most pictures kept.
-pub(super) const MOST: usize = 12;
+pub(super) const MAX_PICTURES: usize = 12;
 
 /// Width in pixels at which they are shown in the list.
 pub(crate) const SMALL_WIDTH: u32 = 128;
@@ -97,7 +97,7 @@ impl History {
             Err(error) => (None, Err(error)),
         };
         self.list.push(KeptPicture { file, ..kept });
-        while self.list.len() > MOST {
+        while self.list.len() > MAX_PICTURES {
             self.remove(0);
         }
         (self.list.len() - 1, failure)
@@ -134,12 +134,12 @@ mod tests {
     #[test]
     fn the_oldest_picture_goes_and_names_are_not_given_again() {
         let mut history = History::default();
-        for _ in 0..=MOST {
+        for _ in 0..=MAX_PICTURES {
             let image = Arc::new(Image::filled(1, 1, [0.0; 3]));
             let small = Rgb8 { width: 1, height: 1, pixels: vec![[0; 3]] };
             history.keep(String::new(), &image, Document::default(), &small).1.expect("kept");
         }
-        assert_eq!(history.list_mut().len(), MOST);
+        assert_eq!(history.list_mut().len(), MAX_PICTURES);
         assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 2"));
         history.remove(0);
         assert_eq!(history.get(0).map(|kept| kept.name.as_str()), Some("Picture 3"));
@@ -164,19 +164,19 @@ mod tests {
         };
         let (mut history, earlier) = open();
         assert!(earlier.is_empty());
-        (0..MOST).for_each(|_| keep(&mut history));
+        (0..MAX_PICTURES).for_each(|_| keep(&mut history));
         history.finish();
         let (mut history, earlier) = open();
         // Before the earlier ones are taken over.
         keep(&mut history);
-        assert_eq!(history.take_over(earlier), MOST);
-        assert_eq!(history.list_mut().len(), MOST + 1);
+        assert_eq!(history.take_over(earlier), MAX_PICTURES);
+        assert_eq!(history.list_mut().len(), MAX_PICTURES + 1);
         keep(&mut history);
         let names: Vec<_> = history.list_mut().iter().map(|kept| kept.name.clone()).collect();
         assert_eq!(names[0], "Picture 3");
-        assert_eq!(names[MOST - 1], format!("Picture {}", MOST + 2));
+        assert_eq!(names[MAX_PICTURES - 1], format!("Picture {}", MAX_PICTURES + 2));
         history.finish();
-        assert_eq!(open().1.len(), MOST);
-        assert_eq!(std::fs::read_dir(temporary.path()).expect("a folder").count(), MOST);
+        assert_eq!(open().1.len(), MAX_PICTURES);
+        assert_eq!(std::fs::read_dir(temporary.path()).expect("a folder").count(), MAX_PICTURES);
     }
 }

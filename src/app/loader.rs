@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use super::document::Document;
 use super::{Wake, lock};
-use crate::environment::landmarks::{Sun, equal_energy_tiles};
+use crate::environment::sun::{Sun, equal_energy_tiles};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{Error, Notices, Result};
 use crate::image::{Image, catch_panic};

@@ -4,7 +4,7 @@ use super::loader::Kind;
 use crate::error::Notices;
 
 /// Most messages shown at a time.
-const MOST: usize = 4;
+const MAX_MESSAGES: usize = 4;
 /// Seconds a notice stays.
 pub(crate) const NOTICE_SECONDS: f64 = 8.0;
 
@@ -36,7 +36,7 @@ impl Messages {
     /// What is worth knowing of one file: the first of it, where it is much.
     pub(crate) fn notices(&mut self, sentences: &Notices) {
         let count = sentences.iter().count();
-        let told = if count < MOST { count } else { MOST - 2 };
+        let told = if count < MAX_MESSAGES { count } else { MAX_MESSAGES - 2 };
         sentences.iter().take(told).for_each(|sentence| self.notice(sentence));
         if told < count {
             self.notice(format!("{} more remarks: lightgrid info tells them", count - told));
@@ -61,7 +61,7 @@ impl Messages {
     fn add(&mut self, sentence: String, is_error: bool, not_opened: Option<Kind>) {
         self.list.retain(|message| message.sentence != sentence);
         self.list.push(Message { sentence, is_error, since: None, not_opened });
-        if self.list.len() > MOST {
+        if self.list.len() > MAX_MESSAGES {
             // Errors stay until somebody closes them, as long as there is room.
             let first_notice = self.list.iter().position(|message| !message.is_error);
             self.list.remove(first_notice.unwrap_or(0));

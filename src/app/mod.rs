@@ -20,9 +20,9 @@ mod desktop;
 pub mod document;
 pub mod drag;
 mod dropped;
-mod exchange;
 mod execute;
 pub(crate) mod history;
+mod input_order;
 mod inspect;
 pub mod interface;
 pub(crate) mod kept_picture;
@@ -39,10 +39,10 @@ pub mod settings_file;
 mod small_maps;
 mod speed_up;
 pub(crate) mod surface_map;
+mod sync;
 #[cfg(test)]
 mod tests;
 mod theme;
-mod turns;
 mod undo;
 pub(crate) mod window;
 pub(crate) mod worker;
@@ -56,7 +56,6 @@ use commands::Command;
 use convergence::Convergence;
 use desktop::Desktop;
 use document::Document;
-use exchange::Lit;
 use history::History;
 use inspect::Inspector;
 use interface::Interface;
@@ -68,6 +67,7 @@ use screen::Screen;
 use settings_file::Settings;
 use small_maps::{SmallMap, SmallMaps};
 use speed_up::SpeedUp;
+use sync::TransformedMap;
 use undo::Undo;
 use worker::{Activity, Reference, Snapshot, Worker};
 
@@ -128,7 +128,7 @@ pub struct App {
     scene: Option<LoadedScene>,
     map: Option<LoadedMap>,
     /// The map turned and scaled as the document says.
-    lit: Option<Lit>,
+    lit: Option<TransformedMap>,
     snapshot: Option<Arc<Snapshot>>,
     /// Of its two halves.
     speed_up: Option<SpeedUp>,
@@ -174,7 +174,7 @@ enum Later {
     /// Something failed.
     Failed(String),
     /// Pictures that earlier windows kept.
-    Kept(Vec<KeptPicture>),
+    SessionCache(Vec<KeptPicture>),
     /// Maps in small.
     SmallMaps(Vec<SmallMap>),
 }
@@ -199,7 +199,8 @@ impl App {
             Some(folder) => {
                 let (sender, wake): (Sender<Later>, _) = (later.0.clone(), wake.clone());
                 history.of_folder(folder, move |found| {
-                    let later = found.map_or_else(|e| Later::Failed(e.to_string()), Later::Kept);
+                    let later =
+                        found.map_or_else(|e| Later::Failed(e.to_string()), Later::SessionCache);
                     // The window may have gone meanwhile.
                     let _ = sender.send(later);
                     wake();

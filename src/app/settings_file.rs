@@ -16,9 +16,9 @@ use crate::sources;
 use crate::tone::{KELVIN, TINT};
 
 /// Recent files kept.
-const MOST_RECENT: usize = 8;
+const MAX_RECENT: usize = 8;
 /// Scenes whose viewpoints are kept.
-const MOST_SCENES: usize = 100;
+const MAX_SCENES: usize = 100;
 
 /// What was kept of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -160,7 +160,7 @@ impl Settings {
         let (balance, usual) = (&mut look.white_balance, &usual.white_balance);
         balance.kelvin = finite(balance.kelvin, usual.kelvin).clamp(*KELVIN.start(), *KELVIN.end());
         balance.tint = finite(balance.tint, usual.tint).clamp(*TINT.start(), *TINT.end());
-        self.light.bounces = self.light.bounces.min(PathLimits::MOST_BOUNCES);
+        self.light.bounces = self.light.bounces.min(PathLimits::MAX_BOUNCES);
         let positive = |x: &f64| *x > 0.0 && x.is_finite();
         self.stop.seconds = self.stop.seconds.filter(positive);
         self.stop.noise = self.stop.noise.filter(positive);
@@ -276,7 +276,7 @@ impl Settings {
         if !viewpoints.is_empty() {
             let viewpoints = viewpoints.to_vec();
             self.viewpoints.insert(0, SceneViewpoints { scene, viewpoints });
-            self.viewpoints.truncate(MOST_SCENES);
+            self.viewpoints.truncate(MAX_SCENES);
         }
     }
 
@@ -366,7 +366,7 @@ fn take_over(whole: &mut Value, place: &str, found: &Value) {
 fn put_first(list: &mut Vec<String>, name: &str) {
     list.retain(|other| other != name);
     list.insert(0, name.to_owned());
-    list.truncate(MOST_RECENT);
+    list.truncate(MAX_RECENT);
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use crate::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
 /// Width in pixels; they are half as high.
 const WIDTH: u32 = 96;
 /// Most files kept.
-const MOST: usize = 64;
+const MAX_FILES: usize = 64;
 
 /// A map's name and it in small.
 pub(super) type SmallMap = (String, Rgb8);
@@ -115,7 +115,7 @@ fn tidy(folder: &Path) {
         .filter_map(|path| Some((path.metadata().ok()?.modified().ok()?, path)))
         .collect();
     files.sort();
-    for (_, path) in files.iter().rev().skip(MOST) {
+    for (_, path) in files.iter().rev().skip(MAX_FILES) {
         // It may have gone by itself.
         let _ = std::fs::remove_file(path);
     }
@@ -139,7 +139,7 @@ mod tests {
         std::fs::write(file_of(folder.path(), name), "no picture").expect("written");
         assert_eq!(read_small(folder.path(), name), None);
         let start = SystemTime::now() - std::time::Duration::from_secs(1000);
-        for age in 0..MOST as u64 + 2 {
+        for age in 0..MAX_FILES as u64 + 2 {
             let path = folder.path().join(format!("{age:016x}.png"));
             let file = std::fs::File::create(path).expect("made");
             file.set_modified(start - std::time::Duration::from_secs(age)).expect("dated");
@@ -151,6 +151,6 @@ mod tests {
         assert!(other.exists(), "it is somebody's");
         let is_there = |age: usize| folder.path().join(format!("{age:016x}.png")).exists();
         assert!(file_of(folder.path(), name).exists(), "the newest");
-        assert!(is_there(MOST - 2) && !is_there(MOST - 1) && !is_there(MOST + 1));
+        assert!(is_there(MAX_FILES - 2) && !is_there(MAX_FILES - 1) && !is_there(MAX_FILES + 1));
     }
 }

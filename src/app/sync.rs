@@ -24,7 +24,7 @@ use crate::sources;
 pub(super) const BYTES_PER_PIXEL: u64 = 640;
 
 /// An environment and what it was made from.
-pub(super) struct Lit {
+pub(super) struct TransformedMap {
     map: Arc<Environment>,
     rotation_degrees: f32,
     intensity: f32,
@@ -105,7 +105,7 @@ impl App {
                 }
                 Later::Done(sentence) => self.messages.notice(sentence),
                 Later::Failed(sentence) => self.messages.error(sentence),
-                Later::Kept(earlier) => {
+                Later::SessionCache(earlier) => {
                     let count = self.history.take_over(earlier);
                     self.interface.compared.shift(count);
                 }
@@ -423,7 +423,12 @@ impl App {
             environment.set_rotation(rotation_degrees.to_radians());
             environment.set_intensity(intensity);
             let environment = Arc::new(environment);
-            self.lit = Some(Lit { map: Arc::clone(map), rotation_degrees, intensity, environment });
+            self.lit = Some(TransformedMap {
+                map: Arc::clone(map),
+                rotation_degrees,
+                intensity,
+                environment,
+            });
         }
         self.lit.as_ref().map(|lit| Arc::clone(&lit.environment))
     }

@@ -11,7 +11,7 @@ use super::document::{Document, Light, Look, PictureSize};
 use super::interface::{Dock, Interface, Tab};
 use super::overlays::Overlay;
 use super::screenshot::{Shot, Studio};
-use super::{Start, exchange};
+use super::{Start, sync};
 use crate::image::{ExrPicture, Image, read_picture, write_exr};
 use crate::memory;
 use crate::path::Background;
@@ -79,7 +79,7 @@ fn what_is_saved_is_what_was_asked_for_and_not_what_was_there_before() {
 #[test]
 fn a_size_without_memory_is_refused_and_undo_goes_on() {
     const HUGE: PictureSize = PictureSize::Fixed(16_384, 8_192);
-    if memory::check((16_384 * 8_192) * exchange::BYTES_PER_PIXEL).is_ok() {
+    if memory::check((16_384 * 8_192) * sync::BYTES_PER_PIXEL).is_ok() {
         crate::terminal::notice("SKIPPED: there is memory for everything");
         return;
     }

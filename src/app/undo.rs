@@ -1,7 +1,7 @@
 //! Undo and redo by comparing snapshots.
 
 /// Snapshots kept.
-const MOST: usize = 200;
+const MAX_STEPS: usize = 200;
 
 /// What was, what is, and what was taken back.
 #[derive(Debug, Clone)]
@@ -24,7 +24,7 @@ impl<T: Clone + PartialEq> Undo<T> {
         }
         self.past.push(std::mem::replace(&mut self.present, now.clone()));
         self.future.clear();
-        if self.past.len() > MOST {
+        if self.past.len() > MAX_STEPS {
             self.past.remove(0);
         }
     }

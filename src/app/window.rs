@@ -25,7 +25,7 @@ use winit::window::{Fullscreen, Window, WindowId};
 use super::loader::Loader;
 use super::screen::{Screen, TextureCopies, renderer_options};
 use super::settings_file::Settings;
-use super::{App, Start, Wake, Wakes, theme, turns};
+use super::{App, Start, Wake, Wakes, input_order, theme};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::render::gpu::Gpu;
@@ -45,12 +45,12 @@ enum Call {
 /// new: frames take the renderer's time.
 const REST: u32 = 19;
 /// But it rests no longer than this, and less in the first seconds of a view, of which there are few pictures.
-const LONGEST_REST: Duration = Duration::from_millis(900);
+const MAX_REST: Duration = Duration::from_millis(900);
 /// So much of each second that a view has been worked on.
 const REST_OF_A_SECOND: f64 = 0.1;
 /// And never less, for new widgets ask for frame after frame, unless a hand has been at the window: then as long
 /// as a frame takes.
-const LEAST_REST: Duration = Duration::from_millis(150);
+const MIN_REST: Duration = Duration::from_millis(150);
 /// For how long after that.
 const TOUCH: Duration = Duration::from_millis(500);
 /// While a picture is made ready, figures go on in steps of this.
@@ -59,7 +59,7 @@ const STATUS_GAP: Duration = Duration::from_millis(950);
 /// Losses of a device sooner after one another than this belong together.
 const LOSS_GAP: Duration = Duration::from_secs(10);
 /// After so many of them, another device is not worth trying.
-const MOST_LOSSES: u32 = 5;
+const MAX_LOSSES: u32 = 5;
 
 /// Opens the window and stays until it is closed; then settings are written to `settings_path`.
 /// Returns what closed it, if it was not a person.
@@ -335,7 +335,7 @@ impl Running {
             self.replace_device(&loss)?;
         }
         let mut input = self.input.take_egui_input(&self.window);
-        let later = turns::first_turn(&mut input.events);
+        let later = input_order::first_turn(&mut input.events);
         if !later.is_empty() {
             self.input.egui_input_mut().events = later;
             self.context.request_repaint();
@@ -393,14 +393,14 @@ impl Running {
         self.drawn_at = Instant::now();
         self.rest = Duration::ZERO;
         if self.app.screen().gpu().facts().is_software() {
-            self.rest = (REST * start.elapsed()).min(LONGEST_REST);
+            self.rest = (REST * start.elapsed()).min(MAX_REST);
         }
         Ok(())
     }
 
     /// When the next frame of what is new can be afforded.
     fn rested_at(&self) -> Instant {
-        let longest = LONGEST_REST.as_secs_f64().min(REST_OF_A_SECOND * self.app.seconds());
+        let longest = MAX_REST.as_secs_f64().min(REST_OF_A_SECOND * self.app.seconds());
         self.least_rested_at().max(self.drawn_at + self.rest.min(Duration::from_secs_f64(longest)))
     }
 
@@ -408,7 +408,7 @@ impl Running {
     fn least_rested_at(&self) -> Instant {
         let is_touched = self.touched_at.is_some_and(|at| at.elapsed() < TOUCH)
             || self.context.egui_is_using_pointer();
-        self.drawn_at + self.rest.min(if is_touched { self.rest / REST } else { LEAST_REST })
+        self.drawn_at + self.rest.min(if is_touched { self.rest / REST } else { MIN_REST })
     }
 
     /// Opens a device anew; the application and what it shows stay as they are.
@@ -417,7 +417,7 @@ impl Running {
             Error::new(format!("{loss}, and the window cannot be drawn otherwise: {why}"))
         };
         let before = self.lost.filter(|(at, _)| at.elapsed() < LOSS_GAP).map_or(0, |(_, n)| n);
-        if before == MOST_LOSSES {
+        if before == MAX_LOSSES {
             return Err(closes(&"it is lost again and again"));
         }
         self.lost = Some((Instant::now(), before + 1));

@@ -3,9 +3,9 @@
 use egui::{Pos2, Rect, Vec2};
 
 /// Times as large as it fits that it is shown at most.
-const MOST: f32 = 32.0;
+const MAX_ZOOM: f32 = 32.0;
 /// Less than this is none.
-const LEAST: f32 = 1.01;
+const MIN_ZOOM: f32 = 1.01;
 
 /// A magnification of the picture that fits its room.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,11 +25,11 @@ impl Default for Zoom {
 impl Zoom {
     /// So many times as large as it fits, with this place in the middle.
     pub(super) fn new(times: f32, middle: Vec2) -> Self {
-        let times = times.clamp(1.0, MOST);
+        let times = times.clamp(1.0, MAX_ZOOM);
         // Half of what is seen at each side of the middle: the edges of the picture stay those of the room.
         let margin = 0.5 / times;
         let middle = middle.clamp(Vec2::splat(margin), Vec2::splat(1.0 - margin));
-        if times < LEAST { Self::default() } else { Self { times, middle } }
+        if times < MIN_ZOOM { Self::default() } else { Self { times, middle } }
     }
 
     /// Times as large as it fits, from 1.
@@ -54,7 +54,7 @@ impl Zoom {
     /// Larger by a factor, such that what is seen `at` a point of the room stays there; `shown` is where the whole
     /// picture lies now.
     pub(super) fn by(self, factor: f32, at: Pos2, area: Rect, shown: Rect) -> Self {
-        let times = (self.times * factor).clamp(1.0, MOST);
+        let times = (self.times * factor).clamp(1.0, MAX_ZOOM);
         let place = (at - shown.min) / shown.size();
         let size = shown.size() * (times / self.times);
         Self::new(times, place + (area.center() - at) / size)

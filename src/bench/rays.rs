@@ -68,7 +68,7 @@ pub(super) type Answers = Vec<(f32, u32)>;
 /// Rays of a kind are traced again and again for so many seconds.
 const SECONDS: f64 = 0.3;
 /// Most rays of a kind: enough to fill any device.
-const MOST_RAYS: u32 = 1 << 21;
+const MAX_RAYS: u32 = 1 << 21;
 /// Pixels along a side of the squares that primary rays come in, as kernels take them.
 const TILE: u32 = 8;
 
@@ -150,7 +150,7 @@ fn primary(place: &Place<'_>) -> Vec<Ray> {
         UVec2::new(tile % across * TILE + lane % TILE, tile / across * TILE + lane / TILE)
     });
     let inside = pixels.filter(|pixel| pixel.x < view.width && pixel.y < view.height);
-    let rays = inside.take(MOST_RAYS as usize);
+    let rays = inside.take(MAX_RAYS as usize);
     rays.map(|pixel| camera.ray(pixel.as_vec2() + 0.5, Vec2::ZERO)).collect()
 }
 

@@ -42,10 +42,10 @@ pub struct Instance {
 
 /// Most that `|M| |M^-1|` may be (the norm of largest row sums). Rounding makes boxes larger by this
 /// times `2^-19` of the way to them, less than a per cent.
-const MOST_CONDITION: f64 = 4096.0;
+const MAX_CONDITION: f64 = 4096.0;
 
 /// Largest coordinates of a map's matrix, and the inverse of the least: their squares stay within f32.
-const MOST_SCALE: f64 = 1e9;
+const MAX_SCALE: f64 = 1e9;
 
 impl Instance {
     /// Whether a ray can be brought into the space of a mesh that is placed by this map: it has an
@@ -55,9 +55,9 @@ impl Instance {
         let (size, inverse_size) = (norm(world_from_mesh), norm(inverse));
         world_from_mesh.is_finite()
             && inverse.is_finite()
-            && size <= MOST_SCALE
-            && inverse_size <= MOST_SCALE
-            && size * inverse_size <= MOST_CONDITION
+            && size <= MAX_SCALE
+            && inverse_size <= MAX_SCALE
+            && size * inverse_size <= MAX_CONDITION
     }
 }
 

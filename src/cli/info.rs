@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::choices::SceneArguments;
-use crate::environment::landmarks::Sun;
+use crate::environment::sun::Sun;
 use crate::error::{Notices, Result};
 use crate::image::Image;
 use crate::path::World;

@@ -117,7 +117,7 @@ fn missing_parts(parts: &[(&Path, FilmFacts)]) -> Vec<String> {
     let is_there = |number: &u32| parts.iter().any(|(_, facts)| facts.part.number == *number);
     let mut missing = (1..=count).filter(|number| !is_there(number));
     let shown: Vec<String> =
-        missing.by_ref().take(MOST_NAMED).map(|number| number.to_string()).collect();
+        missing.by_ref().take(MAX_NAMED).map(|number| number.to_string()).collect();
     let more = missing.count();
     match &shown[..] {
         [] => Vec::new(),
@@ -130,7 +130,7 @@ fn missing_parts(parts: &[(&Path, FilmFacts)]) -> Vec<String> {
 }
 
 /// Numbers of missing parts that are said.
-const MOST_NAMED: usize = 20;
+const MAX_NAMED: usize = 20;
 
 /// What a part that was ended early has too few of, in words.
 fn missing_samples(facts: &FilmFacts, film: &Film) -> Option<String> {

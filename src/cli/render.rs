@@ -1,9 +1,9 @@
 //! `lightgrid render`.
 
 mod arguments;
-mod assignment;
 mod frames;
 mod outputs;
+mod render_job;
 
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -28,8 +28,8 @@ use crate::render::{Figures, Session};
 use crate::scene::Camera;
 use crate::terminal::notice;
 pub(super) use arguments::RenderArguments;
-use assignment::Assignment;
 use frames::{Frames, Reel};
+use render_job::RenderJob;
 
 /// Bytes of a pixel in the film, those by which noise is told among them, and in what is made of it to be written.
 const BYTES_OF_PIXEL: [u64; 2] = [56, 40];
@@ -139,7 +139,7 @@ impl Job<'_> {
             memory::reserved(needed_bytes(arguments)[1]).map_err(|cause| too_large(&cause))?;
         let view = arguments.view(world, camera);
         let rule = arguments.stop_rule();
-        let mut assignment = Assignment::open(arguments, rule, (world, environment), &view)?;
+        let mut assignment = RenderJob::open(arguments, rule, (world, environment), &view)?;
         assignment.say(&mut notices);
         let uploaded = self.uploaded.as_ref();
         let mut session =
@@ -337,7 +337,7 @@ impl TakeOver<'_> {
 /// with what it has.
 fn work(
     session: &mut Session<'_>,
-    assignment: &mut Assignment,
+    assignment: &mut RenderJob,
     interrupt: &Interrupt,
     progress: &Progress,
     cpu: &mut TakeOver<'_>,

@@ -1,6 +1,6 @@
 //! `lightgrid sat`.
 
-use crate::environment::landmarks::Sun;
+use crate::environment::sun::Sun;
 use crate::environment::{TALKS_MAPS, TIMED_SAMPLES, sat_report};
 use crate::error::{Error, Result};
 use crate::terminal::{notice, one_line, print};

@@ -23,17 +23,17 @@ pub(crate) const STEPS: [u32; 7] = [1, 2, 4, 8, 16, 3, 1];
 /// Luminances have nothing in common that are so many of their standard errors apart.
 pub(crate) const ERRORS_TOLERATED: f32 = 4.0;
 /// The same of no variance: not zero.
-pub(crate) const LEAST_VARIANCE: f32 = 1e-12;
+pub(crate) const MIN_VARIANCE: f32 = 1e-12;
 /// No variance and no luminance that is compared is larger, so that sums of them are finite.
-pub(crate) const LARGEST_VARIANCE: f32 = 1e30;
-pub(crate) const LARGEST_LUMINANCE: f32 = 1e15;
+pub(crate) const MAX_VARIANCE: f32 = 1e30;
+pub(crate) const MAX_LUMINANCE: f32 = 1e15;
 /// Columns and rows around a pixel that share its error.
 const REACH: isize = 2;
 /// What a pixel on another surface counts there, so that somebody always does: one that has met no light and has
 /// no like knows nothing of its error.
-pub(crate) const LEAST_LIKENESS: f32 = 0.05;
+pub(crate) const MIN_LIKENESS: f32 = 0.05;
 /// Squared light of which a single sample's variance is so much at least.
-pub(crate) const LEAST_SPREAD: f32 = 0.1;
+pub(crate) const MIN_SPREAD: f32 = 0.1;
 /// The variance of a single sample.
 const UNKNOWN: f32 = -1.0;
 /// By how much more a variance is tolerated that is known of one sample only by those around it.
@@ -75,7 +75,7 @@ impl Light {
             let (albedo, mean) = (guides.at(index).albedo, samples.mean(index));
             let scale = 1.0 / luminance(albedo);
             let variance = mean.variance.map_or(UNKNOWN, |variance| variance * scale * scale);
-            (mean.rgb / albedo, variance.min(LARGEST_VARIANCE))
+            (mean.rgb / albedo, variance.min(MAX_VARIANCE))
         };
         let pixels: Vec<(Vec3, f32)> =
             (0..guides.width * guides.height).into_par_iter().map(undressed).collect();
@@ -101,7 +101,7 @@ impl Light {
 
 /// Luminance for comparisons.
 pub(super) fn compared_luminance(rgb: Vec3) -> f32 {
-    luminance(rgb).min(LARGEST_LUMINANCE)
+    luminance(rgb).min(MAX_LUMINANCE)
 }
 
 /// What the pixels around one know, each in proportion to its likeness.
@@ -124,7 +124,7 @@ struct Around {
 /// Returns how many of the 24 pixels around each are its like.
 fn share_errors(light: &mut Light, guides: &Guides, samples: &Samples<'_>) -> Vec<f32> {
     let width = guides.width;
-    let told = |y: usize| {
+    let pooled_row = |y: usize| {
         let mut likeness = vec![0.0; width];
         let mut sums = vec![Around::default(); width];
         for offset in square(REACH) {
@@ -132,7 +132,7 @@ fn share_errors(light: &mut Light, guides: &Guides, samples: &Samples<'_>) -> Ve
             let likeness = &mut likeness[..columns.len()];
             guides.compare([y * width + columns.start, there], offset, likeness);
             for ((x, other), likeness) in columns.zip(there..).zip(likeness) {
-                let (weight, sums) = (*likeness + LEAST_LIKENESS, &mut sums[x]);
+                let (weight, sums) = (*likeness + MIN_LIKENESS, &mut sums[x]);
                 if light.variance[other] >= 0.0 {
                     sums.known += weight;
                     sums.variance += weight * light.variance[other];
@@ -145,15 +145,15 @@ fn share_errors(light: &mut Light, guides: &Guides, samples: &Samples<'_>) -> Ve
         }
         let own = y * width..(y + 1) * width;
         let own = own.map(|i| (light.variance[i], light.luminance[i], samples.count(i)));
-        let told = |(around, (variance, luminance, count)): (Around, (f32, f32, u32))| {
+        let pooled = |(around, (variance, luminance, count)): (Around, (f32, f32, u32))| {
             // The pixel itself is its like.
             (around.variance_for(variance, luminance, count), around.support - 1.0)
         };
-        sums.into_iter().zip(own).map(told).collect::<Vec<_>>()
+        sums.into_iter().zip(own).map(pooled).collect::<Vec<_>>()
     };
     let lanes = Arch::new();
-    let told = |y| lanes.dispatch(|| told(y));
-    let (variance, support) = (0..guides.height).into_par_iter().flat_map(told).unzip();
+    let pooled_row = |y| lanes.dispatch(|| pooled_row(y));
+    let (variance, support) = (0..guides.height).into_par_iter().flat_map(pooled_row).unzip();
     light.variance = variance;
     support
 }
@@ -165,12 +165,12 @@ impl Around {
         let off = (luminance - mean).powi(2);
         let variance = if own < 0.0 {
             let spread = self.second / self.all - mean * mean;
-            SINGLE * spread.max(LEAST_SPREAD * mean * mean).max(off)
+            SINGLE * spread.max(MIN_SPREAD * mean * mean).max(off)
         } else {
             let chance = SINGLE * FEWER.powf(samples.max(1) as f32 - 1.0) * off;
             own.max(self.variance / self.known).max(chance)
         };
-        variance.min(LARGEST_VARIANCE)
+        variance.min(MAX_VARIANCE)
     }
 }
 
@@ -244,7 +244,7 @@ impl Light {
         let [luminance, variance] = planes.map(|plane| pairs(plane, at));
         for (i, weight) in weights.iter_mut().enumerate() {
             let difference = luminance.0[i] - luminance.1[i];
-            let variance = variance.0[i] + variance.1[i] + LEAST_VARIANCE;
+            let variance = variance.0[i] + variance.1[i] + MIN_VARIANCE;
             *weight *= falling(
                 difference * difference * (1.0 / (ERRORS_TOLERATED * ERRORS_TOLERATED)) / variance,
             );

@@ -8,7 +8,7 @@ use crate::render::film::{Pixel, Surface};
 
 /// Albedo below which surfaces count as this bright: what they mirror, divided by theirs, would shine on
 /// what is beside them.
-const LEAST_ALBEDO: f32 = 0.1;
+const MIN_ALBEDO: f32 = 0.1;
 /// Relative difference of depths at which two neighbouring pixels are half alike.
 const DEPTH_TOLERANCE: f32 = 0.02;
 /// Squared means over their variance from which, and up to which, a cell is more and more believed that it is
@@ -55,7 +55,7 @@ impl Cell {
         let [ar, ag, ab, depth, nx, ny, nz, hits] = sums;
         // What does not come from a surface, from the sky or from fog, is as it is.
         let as_it_is = Vec3::splat(samples - hits);
-        let albedo = ((Vec3::new(ar, ag, ab) + as_it_is) / samples).max(Vec3::splat(LEAST_ALBEDO));
+        let albedo = ((Vec3::new(ar, ag, ab) + as_it_is) / samples).max(Vec3::splat(MIN_ALBEDO));
         let mean = 0.2126 * r + 0.7152 * g + 0.0722 * b;
         let deviation = (squared - mean * mean / f64::from(samples)).max(0.0) as f32;
         let whole = Self {
@@ -124,7 +124,7 @@ impl Cell {
         let mixed = self.albedo / self.samples;
         let of_surface = (mixed - (1.0 - own)) / own.max(f32::MIN_POSITIVE);
         let albedo = if own > 0.0 { of_surface * coverage + (1.0 - coverage) } else { Vec3::ONE };
-        (albedo.max(Vec3::splat(LEAST_ALBEDO)), coverage)
+        (albedo.max(Vec3::splat(MIN_ALBEDO)), coverage)
     }
 
     fn is_sky(&self) -> bool {

@@ -15,7 +15,7 @@ use crate::color::luminance;
 use crate::image::Image;
 
 /// With fewer like pixels than this, of 24, a pixel's light is taken from a regression.
-pub(crate) const LEAST_ALIKE: f32 = 8.0;
+pub(crate) const MIN_ALIKE: f32 = 8.0;
 /// With fewer than this it is on an edge.
 pub(crate) const WHOLE: f32 = 18.0;
 /// Columns and rows around a pixel that tell its light.
@@ -24,7 +24,7 @@ const REACH: usize = 2;
 /// proportion.
 pub(crate) const RELATIVE_ERROR: f32 = 0.1;
 /// The same of no light: not zero.
-const LEAST_VARIANCE: f32 = 1e-12;
+const MIN_VARIANCE: f32 = 1e-12;
 /// By how much coefficients are drawn to zero where guides say little.
 pub(crate) const RIDGE: f32 = 1e-3;
 /// Relative difference of depths that counts as much as one of normals of 1.
@@ -45,24 +45,24 @@ pub(super) fn mended(
         .into_par_iter()
         .map(|index| Radiance::of(guides, light, index))
         .collect();
-    let told = |index: usize| {
-        if support[index] < LEAST_ALIKE { told(guides, &pixels, index) } else { pixels[index].rgb }
+    let filled = |index: usize| {
+        if support[index] < MIN_ALIKE { regress(guides, &pixels, index) } else { pixels[index].rgb }
     };
-    let told: Vec<Vec3> = (0..pixels.len()).into_par_iter().map(told).collect();
+    let filled: Vec<Vec3> = (0..pixels.len()).into_par_iter().map(filled).collect();
     let smooth = |index: usize| {
-        let own = told[index];
+        let own = filled[index];
         if support[index] >= WHOLE {
             return own.to_array();
         }
         let (mut sum, mut total) = (Vec3::ZERO, 0.0);
         for (other, [column, row]) in around(index, size, 1) {
             let weight = ((2 - column) * (2 - row)) as f32;
-            (sum, total) = (sum + told[other] * weight, total + weight);
+            (sum, total) = (sum + filled[other] * weight, total + weight);
         }
         let share = 1.0 / samples.count(index).max(1) as f32;
         own.lerp(sum / total, share).to_array()
     };
-    let pixels = (0..told.len()).into_par_iter().map(smooth).collect();
+    let pixels = (0..filled.len()).into_par_iter().map(smooth).collect();
     Image { width: width as u32, height: height as u32, pixels }
 }
 
@@ -81,7 +81,7 @@ impl Radiance {
 }
 
 /// What the pixels around one say it shows, blended with what it shows.
-fn told(guides: &Guides, pixels: &[Radiance], index: usize) -> Vec3 {
+fn regress(guides: &Guides, pixels: &[Radiance], index: usize) -> Vec3 {
     let size = [guides.width, guides.height];
     let own = guides.at(index);
     let own_light = compared_luminance(pixels[index].rgb);
@@ -90,7 +90,7 @@ fn told(guides: &Guides, pixels: &[Radiance], index: usize) -> Vec3 {
         let near = 1.0 - (column * column + row * row) as f32 / (REACH + 1).pow(2) as f32;
         let light = compared_luminance(pixels[other].rgb);
         let relative = RELATIVE_ERROR.powi(2) * (light * light + own_light * own_light);
-        let error = pixels[other].variance + relative + LEAST_VARIANCE;
+        let error = pixels[other].variance + relative + MIN_VARIANCE;
         *witness = (near / error, terms(&own, &guides.at(other)), pixels[other].rgb);
     }
     let mut system = [[0.0; TERMS]; TERMS];

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::samples::Samples;
 
 /// Albedo that counts as none: black surfaces are smoothed as they are.
-pub(crate) const LEAST_ALBEDO: f32 = 0.02;
+pub(crate) const MIN_ALBEDO: f32 = 0.02;
 /// Squared difference of albedos at which pixels have nothing in common. Light is compared without albedo, so this
 /// is loose: patterns do not stop the filter, black beside white does.
 pub(crate) const ALBEDO_TOLERANCE: f32 = 0.5;
@@ -26,7 +26,7 @@ pub(crate) const DEPTH_TOLERANCE: f32 = 0.007;
 /// Share by which that grows with every pixel of distance.
 pub(crate) const DEPTH_GROWTH: f32 = 0.25;
 /// Nearness that counts as none: a sky's.
-pub(crate) const LEAST_NEARNESS: f32 = 1e-9;
+pub(crate) const MIN_NEARNESS: f32 = 1e-9;
 /// How much of the difference that the slope explains is tolerated.
 pub(crate) const SLOPE_TOLERANCE: f32 = 0.8;
 
@@ -71,7 +71,7 @@ impl Guide {
             (coverage - normal.length_squared() / coverage.max(f32::MIN_POSITIVE)).max(0.0);
         let others = (samples - 1.0).max(1.0);
         Self {
-            albedo: albedo.max(Vec3::splat(LEAST_ALBEDO)),
+            albedo: albedo.max(Vec3::splat(MIN_ALBEDO)),
             normal,
             doubt: spread / others,
             coverage,
@@ -164,7 +164,7 @@ impl Guides {
             let depth = (nearness.0[i] - nearness.1[i])
                 / (growth * nearness.0[i].max(nearness.1[i])
                     + slopes * slope.0[i].max(slope.1[i])
-                    + LEAST_NEARNESS);
+                    + MIN_NEARNESS);
             *likeness = falling(squared(&albedo, i) * (1.0 / ALBEDO_TOLERANCE))
                 * falling(squared(&normal, i) / (NORMAL_TOLERANCE + doubts))
                 * falling(covered * covered / (COVERAGE_TOLERANCE + chances))

@@ -19,9 +19,9 @@ use crate::render::film::{Film, Pixel};
 /// The coarsest scale's cells are 2^7 pixels wide.
 const SCALES: usize = 8;
 /// What neighbours on another surface count, so that somebody always does.
-const LEAST_LIKENESS: f32 = 1e-3;
+const MIN_LIKENESS: f32 = 1e-3;
 /// Whether chance decides what a sample meets is seen in cells 2^3 pixels wide: in smaller ones an edge does.
-const LEAST_SCALE_OF_CHANCE: usize = 3;
+const MIN_CHANCE_SCALE: usize = 3;
 /// The spread around a cell counts as much as so many samples of its own, at least.
 const SPREAD_SAMPLES: f32 = 2.0;
 /// A pixel is no brighter than so many times what is usual, five stops, unless its samples agree: the sun in
@@ -235,7 +235,7 @@ fn refined(
         });
         if cell.samples > 0.0 {
             let mean = cell.light / cell.samples;
-            if number >= LEAST_SCALE_OF_CHANCE || coarser.is_none() {
+            if number >= MIN_CHANCE_SCALE || coarser.is_none() {
                 estimate.chance = cell.chance / cell.samples;
             }
             let chance = if coarser.is_some() { estimate.chance } else { 0.0 };
@@ -293,7 +293,7 @@ fn from_parents(
     let mut sum = Filtered::default();
     let mut total = 0.0;
     for (x, y, share) in [(px, py, 9.0), (qx, py, 3.0), (px, qy, 3.0), (qx, qy, 1.0)] {
-        let weight = share * (LEAST_LIKENESS + guide.likeness(guides.at(x, y), 2.0 * pixels));
+        let weight = share * (MIN_LIKENESS + guide.likeness(guides.at(x, y), 2.0 * pixels));
         sum.add(estimates.at(x, y), weight);
         total += weight;
     }

@@ -10,12 +10,12 @@
 //! Rotation turns the map about +Y as [`crate::math::rotate_y`] turns directions: what the map
 //! shows at `u` is seen at lat-long `u + rotation / 2pi`. Tiles turn with the map.
 
-pub mod landmarks;
 mod options;
 mod patches;
 mod sat_report;
 pub mod sky;
 mod summed_area;
+pub mod sun;
 mod table;
 mod tile_local;
 mod tiles;
@@ -118,7 +118,7 @@ impl Environment {
     pub fn new(map: Image, options: &EnvironmentOptions) -> Result<Self> {
         options.check()?;
         check_size(&map)?;
-        let map = if options.sun == 1.0 { map } else { landmarks::with_sun(map, options.sun) };
+        let map = if options.sun == 1.0 { map } else { sun::with_sun(map, options.sun) };
         let statistics = Statistics::of(&map)?;
         let weights = Weights::new(&map);
         let (columns, rows) = weights.size();

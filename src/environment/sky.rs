@@ -20,11 +20,11 @@ use disc::{Disc, add_disc};
 /// Widest grid that the smooth part is computed on; clouds have no finer detail.
 const SMOOTH_WIDTH: u32 = 2048;
 /// Smaller maps average at least this many directions across.
-const LEAST_SAMPLES: u32 = 512;
+const MIN_SAMPLES: u32 = 512;
 /// Sine of an elevation that hills stay below.
-const HIGHEST_HILL: f32 = 0.062;
+const MAX_HILL_ALTITUDE: f32 = 0.062;
 /// Largest side of a map.
-const LARGEST: u32 = 16_384;
+const MAX_SIDE: u32 = 16_384;
 
 /// Names of the built-in skies.
 pub fn names() -> &'static [&'static str] {
@@ -40,9 +40,9 @@ pub(crate) fn unknown(name: &str) -> Error {
 /// Builds the sky called `name` as a lat-long map. An error lists the names there are, or the
 /// sizes there can be (1 to 16384).
 pub fn build(name: &str, width: u32, height: u32) -> Result<Image> {
-    if !(1..=LARGEST).contains(&width) || !(1..=LARGEST).contains(&height) {
+    if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
         return Err(Error::new(format!(
-            "a built-in sky can be from 1x1 to {LARGEST}x{LARGEST} pixels, not {width}x{height}"
+            "a built-in sky can be from 1x1 to {MAX_SIDE}x{MAX_SIDE} pixels, not {width}x{height}"
         )));
     }
     let (smooth, discs): (fn(Vec3) -> Vec3, Vec<Disc>) = match name {
@@ -117,7 +117,7 @@ fn clouds(d: Vec3, amount: f32, scale: f32, seed: u32) -> (f32, f32) {
 
 /// What lies below the horizon: `near` at the nadir, fading into `haze` at the horizon.
 fn ground(d: Vec3, near: Vec3, haze: Vec3) -> Vec3 {
-    if d.y > HIGHEST_HILL {
+    if d.y > MAX_HILL_ALTITUDE {
         return haze;
     }
     let fields = 0.75 + 0.5 * solid_fbm(Vec3::new(d.x, 0.0, d.z) * (1.5 / (0.06 - d.y)), 4, 13);
@@ -126,7 +126,7 @@ fn ground(d: Vec3, near: Vec3, haze: Vec3) -> Vec3 {
 
 /// Joins sky and ground by two ranges of hills, `far` and `near`, up to 3 degrees above the horizon.
 fn horizon(d: Vec3, above: Vec3, far: Vec3, near: Vec3, below: Vec3) -> Vec3 {
-    if d.y.abs() > HIGHEST_HILL {
+    if d.y.abs() > MAX_HILL_ALTITUDE {
         return if d.y > 0.0 { above } else { below };
     }
     let around = Vec3::new(d.x, 0.0, d.z).normalize_or(Vec3::X);
@@ -263,7 +263,7 @@ fn smooth_part(radiance: fn(Vec3) -> Vec3, width: u32, height: u32) -> Image {
 
 /// Means of `radiance` over the solid angle of each texel.
 fn averaged(radiance: fn(Vec3) -> Vec3, width: u32, height: u32) -> Image {
-    let (nx, ny) = (LEAST_SAMPLES.div_ceil(width), (LEAST_SAMPLES / 2).div_ceil(height));
+    let (nx, ny) = (MIN_SAMPLES.div_ceil(width), (MIN_SAMPLES / 2).div_ceil(height));
     rows(width, height, |x, y| {
         let (mut sum, mut weight) = (Vec3::ZERO, 0.0);
         for j in 0..ny {

@@ -95,7 +95,7 @@ pub fn write_exr(path: &Path, picture: ExrPicture<'_>) -> Result<()> {
         })?;
         file.rewind()?;
         let mut start = Vec::new();
-        file.get_ref().take(MOST_OF_HEADER).read_to_end(&mut start)?;
+        file.get_ref().take(MAX_HEADER_BYTES).read_to_end(&mut start)?;
         if sort_attributes(&mut start).is_some() {
             file.rewind()?;
             file.write_all(&start)?;
@@ -105,7 +105,7 @@ pub fn write_exr(path: &Path, picture: ExrPicture<'_>) -> Result<()> {
 }
 
 /// Longer headers than any of ours.
-const MOST_OF_HEADER: u64 = 1 << 18;
+const MAX_HEADER_BYTES: u64 = 1 << 18;
 
 /// What the `software` attribute says.
 const SOFTWARE: &str = concat!("lightgrid ", env!("CARGO_PKG_VERSION"));

@@ -150,7 +150,7 @@ fn is_stream(path: &Path) -> bool {
 }
 
 /// Links one after another that are followed, as many as systems do.
-const MOST_LINKS: usize = 40;
+const MAX_LINKS: usize = 40;
 
 /// The file that a path means, be it there or yet to be written: symbolic links are followed.
 fn followed(path: &Path) -> PathBuf {
@@ -163,7 +163,7 @@ fn followed(path: &Path) -> PathBuf {
 /// A path and the links that it leads through, one after the other, the last of which is none.
 fn links(path: &Path) -> impl Iterator<Item = PathBuf> {
     let next = |path: &PathBuf| Some(path.with_file_name(fs::read_link(path).ok()?));
-    std::iter::successors(Some(path.to_owned()), next).take(MOST_LINKS + 1)
+    std::iter::successors(Some(path.to_owned()), next).take(MAX_LINKS + 1)
 }
 
 /// Why `target` cannot be written, as far as can be known before trying.

@@ -249,8 +249,8 @@ impl<'a> Cursor<'a> {
     /// The next line without its end (LF or CR LF); `None` at the end of the file or if it is too
     /// long to be text.
     fn line(&mut self) -> Option<String> {
-        const LONGEST: usize = 1 << 16;
-        let end = self.rest.iter().take(LONGEST).position(|&b| b == b'\n')?;
+        const MAX_LINE: usize = 1 << 16;
+        let end = self.rest.iter().take(MAX_LINE).position(|&b| b == b'\n')?;
         let line = &self.rest[..end];
         self.rest = &self.rest[end + 1..];
         Some(String::from_utf8_lossy(line.strip_suffix(b"\r").unwrap_or(line)).into_owned())

@@ -33,7 +33,7 @@ const UASTC_RED_GREEN: u8 = 5;
 const ALWAYS: u64 = 64 << 20;
 
 /// A frame of Zstandard may look back so far, whatever it makes: what all its readers must bear.
-const LEAST_WINDOW: u64 = 8 << 20;
+const MIN_WINDOW: u64 = 8 << 20;
 
 /// Whether these bytes are of such a file.
 pub(super) fn is_ktx2(bytes: &[u8]) -> bool {
@@ -274,7 +274,7 @@ impl<'a> File<'a> {
         let damaged = |_| format!("holds damaged pixels, or too few for {} rows", self.height);
         let unpacked = || {
             let mut decoder = FrameDecoder::new();
-            decoder.set_max_window_size((bytes as u64).max(LEAST_WINDOW));
+            decoder.set_max_window_size((bytes as u64).max(MIN_WINDOW));
             StreamingDecoder::new_with_decoder(self.level, decoder)
                 .map_err(|cause| format!("holds no Zstandard data ({cause})"))
         };

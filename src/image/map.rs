@@ -112,7 +112,7 @@ pub(crate) fn looks_like_picture(bytes: &[u8]) -> bool {
 }
 
 /// Above it, what other programs write becomes infinite.
-const LARGEST_HALF: f32 = 65_504.0;
+const MAX_HALF: f32 = 65_504.0;
 
 /// Makes a map usable as a light: NaN and negative values become 0, infinite ones the largest finite
 /// value of the map, or of half floats if it has none above 0. One notice says how many pixels were changed.
@@ -122,7 +122,7 @@ pub fn sanitise(image: &mut Image) -> Notices {
         image.pixels.par_chunks(CHUNK).map(Defects::of).reduce(Defects::default, Defects::and);
     let mut notices = Notices::default();
     let (largest, largest_is) = match defects.largest {
-        0.0 => (LARGEST_HALF, "infinite (now 65504)"),
+        0.0 => (MAX_HALF, "infinite (now 65504)"),
         largest => (largest, "infinite (now the largest finite value)"),
     };
     let found: Vec<String> = [

@@ -19,7 +19,7 @@ const POOL: u32 = 4;
 const BYTES_AT_ONCE: usize = 1 << 19;
 
 /// Distribution entries left over by MIS compensation must carry at least this much of the distribution.
-const LEAST_COMPENSATED: f64 = 0.05;
+const MIN_COMPENSATED: f64 = 0.05;
 
 /// How a slot's counters, those around it and the map become weights of tiles.
 pub(super) struct DistributionBuilder<'a> {
@@ -196,7 +196,7 @@ impl<'a> DistributionBuilder<'a> {
         let excess =
             |weight: f64, share: f64| (weight - self.options.compensation * share * total).max(0.0);
         let left: f64 = weights.iter().zip(diffuse).map(|(w, d)| excess(*w, *d)).sum();
-        if left >= LEAST_COMPENSATED * total {
+        if left >= MIN_COMPENSATED * total {
             weights.iter_mut().zip(diffuse).for_each(|(w, d)| *w = excess(*w, *d));
         }
     }

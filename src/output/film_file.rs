@@ -104,7 +104,7 @@ struct Header {
 /// Version of the format.
 const FORMAT: u32 = 1;
 /// Longer first lines than any of ours.
-const MOST_OF_HEADER: u64 = 1 << 20;
+const MAX_HEADER_BYTES: u64 = 1 << 20;
 const DAMAGED: &str = "is damaged: its checksum does not fit";
 const CUT_SHORT: &str = "is cut short";
 const PIXEL_WORDS: usize = 5;
@@ -166,7 +166,7 @@ pub fn read_facts(path: &Path) -> Result<FilmFacts> {
     let read = || {
         let (file, _) = open_file(path)?;
         let mut start = Vec::new();
-        file.take(MOST_OF_HEADER).read_to_end(&mut start).map_err(|e| read_cause(&e))?;
+        file.take(MAX_HEADER_BYTES).read_to_end(&mut start).map_err(|e| read_cause(&e))?;
         Ok(header(&start)?.1.facts)
     };
     read().map_err(|cause: String| Error::at(path, cause))
@@ -178,7 +178,7 @@ fn header(start: &[u8]) -> Decoded<(&[u8], Header)> {
     if start.is_empty() {
         return Err(CUT_SHORT.into());
     }
-    let start = &start[..start.len().min(MOST_OF_HEADER as usize)];
+    let start = &start[..start.len().min(MAX_HEADER_BYTES as usize)];
     let [cut, damaged] = if looks_like_film(start) { [CUT_SHORT, DAMAGED] } else { [other, other] };
     let length = start.iter().position(|byte| *byte == b'\n').ok_or(cut)?;
     let line = &start[..length];

@@ -4,12 +4,12 @@ use super::Path;
 use super::vertex::{Scatterer, SurfaceScatterer, Vertex};
 
 /// Least GGX alpha of a surface that sends back much the same to all sides.
-pub(crate) const LEAST_ALPHA: f32 = 0.05;
+pub(crate) const MIN_ALPHA: f32 = 0.05;
 
 impl SurfaceScatterer<'_> {
     /// Whether what it sends back may be kept in a cache.
     pub(super) fn is_cacheable(&self) -> bool {
-        self.is_broad(LEAST_ALPHA)
+        self.is_broad(MIN_ALPHA)
     }
 }
 

@@ -17,7 +17,7 @@ const SHARE_INSIDE: f32 = 0.6;
 
 /// Triangles that rays from the middle may cross: some 150 each. Where surfaces lie on one another by the
 /// thousand each ray takes long, and no place is better than another.
-const MOST_CROSSINGS: u32 = 1 << 19;
+const MAX_CROSSINGS: u32 = 1 << 19;
 
 /// Frames the scene for a picture of `aspect` (width over height): a room from inside, anything else
 /// from outside, a little from above and the right, filling the picture.
@@ -60,7 +60,7 @@ fn is_dense(world: &World) -> bool {
             let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
             world.bvh.any_hit(&ray, |_| {
                 crossings += 1;
-                crossings > MOST_CROSSINGS
+                crossings > MAX_CROSSINGS
             })
         })
     })

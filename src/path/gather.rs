@@ -13,7 +13,7 @@ use crate::math::balance_heuristic;
 #[derive(Default)]
 pub(super) struct ChosenLights {
     /// Tiles of the map, and where in them.
-    of_map: [Option<(TileChoice, TileSearch)>; SharedTile::MOST_MAP_SAMPLES],
+    of_map: [Option<(TileChoice, TileSearch)>; SharedTile::MAX_MAP_SAMPLES],
     /// By which numbers a lamp will be chosen.
     of_lamps: Option<[u32; 2]>,
 }

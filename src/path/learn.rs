@@ -11,7 +11,7 @@ use crate::sampler::Sampler;
 
 /// First vertices of a path whose samples of the map count. Counters hold so many of a pass; the others, of which
 /// there are few, would make passes short.
-pub(crate) const MOST_COUNTED: u32 = 64;
+pub(crate) const MAX_COUNTED: u32 = 64;
 
 impl PathTracer<'_> {
     /// Traces one camera path and counts at each vertex, in [`PathTracer::counts`], whether samples
@@ -27,7 +27,7 @@ impl PathTracer<'_> {
                 break;
             }
             path.bounces += 1;
-            let counts = vertex.cell.is_some() && path.bounces <= MOST_COUNTED;
+            let counts = vertex.cell.is_some() && path.bounces <= MAX_COUNTED;
             if !vertex.scatterer.is_delta_only() && counts {
                 for number in 0..tries {
                     let bits = path.sampler.of_estimate(tries, number).next_pair_bits();
@@ -51,7 +51,7 @@ fn phase_weight(phase: f32) -> f32 {
 impl Path<'_> {
     /// Where this vertex counts, if it does.
     fn counts(&self) -> Option<&LearningGrid> {
-        self.tracer.counts.filter(|_| self.bounces <= MOST_COUNTED)
+        self.tracer.counts.filter(|_| self.bounces <= MAX_COUNTED)
     }
 
     /// Says that a try of a tile will be counted once its shadow ray is traced.

@@ -15,7 +15,7 @@ use crate::scene::surface::SurfacePoint;
 use crate::scene::{PunctualKind, PunctualLight, Scene};
 
 /// Least intensity of a light relative to that of all.
-const LEAST_INTENSITY: f32 = 1e-30;
+const MIN_INTENSITY: f32 = 1e-30;
 
 /// A sampled point on a light, seen from a shading point.
 #[derive(Debug, Clone, Copy)]
@@ -152,7 +152,7 @@ fn relate(lights: &mut [Light]) {
     let total: f64 = lights.iter().map(|light| f64::from(light.moments.intensity)).sum();
     for light in lights {
         let share = f64::from(light.moments.intensity) / total;
-        light.moments.intensity = (share as f32).max(LEAST_INTENSITY);
+        light.moments.intensity = (share as f32).max(MIN_INTENSITY);
     }
 }
 

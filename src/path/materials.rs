@@ -232,14 +232,14 @@ mod tests {
             let materials = before.scene.materials.iter();
             let change = |m: &Material| if m.name == name { edit.apply(m) } else { m.clone() };
             let world = before.with_materials(materials.map(change).collect());
-            world.expect("there is memory").is_seen_through_like(&before)
+            world.expect("there is memory").has_same_visibility(&before)
         };
         let red = MaterialEdit { color: Some(Vec3::X), ..MaterialEdit::default() };
         let hidden = MaterialEdit { hidden: true, ..MaterialEdit::default() };
         assert!(changed("wall", red) && !changed("wall", hidden));
         assert!(!changed("oak", red), "light gets through, now as glass");
         let other = World::new(builtin::build("office").expect("built in"));
-        assert!(!other.is_seen_through_like(&before), "nobody knows that it is the same");
+        assert!(!other.has_same_visibility(&before), "nobody knows that it is the same");
     }
 
     /// A world with changed materials is the one that is loaded with them.

@@ -30,7 +30,7 @@ mod world;
 mod world_builder;
 
 pub use background::Background;
-pub(crate) use learn::MOST_COUNTED;
+pub(crate) use learn::MAX_COUNTED;
 pub use light_tree::Receiver;
 pub use lights::{LightSample, LocalLights};
 pub(crate) use train::TRAINING_VERTICES;
@@ -63,7 +63,7 @@ pub struct PathLimits {
 
 impl PathLimits {
     /// Most [`Self::bounces`] that may be asked for.
-    pub const MOST_BOUNCES: u32 = 100_000;
+    pub const MAX_BOUNCES: u32 = 100_000;
 }
 
 /// All that a path reads.
@@ -120,7 +120,7 @@ pub(crate) const ROULETTE_AFTER: u32 = 3;
 pub(crate) const ROULETTE_MILDNESS: f32 = 3.0;
 
 /// Least probability of surviving it: a path that carries little is not made to count for too much.
-pub(crate) const LEAST_SURVIVAL: f32 = 0.05;
+pub(crate) const MIN_SURVIVAL: f32 = 0.05;
 
 /// Share of the way to a light, or to a vertex, that a shadow ray goes: it stops short of that surface.
 pub(crate) const SHADOW_RAY_SHARE: f32 = 1.0 - 1e-4;
@@ -508,7 +508,7 @@ impl<'a> Path<'a> {
         }
         let in_air = self.throughput.max_element() * self.body.squared_index;
         let carried = self.throughput_before * in_air;
-        let probability = (ROULETTE_MILDNESS * carried).clamp(LEAST_SURVIVAL, 1.0);
+        let probability = (ROULETTE_MILDNESS * carried).clamp(MIN_SURVIVAL, 1.0);
         let survives = probability >= 1.0 || self.sampler.next_pair()[1] < probability;
         survives.then_some(probability)
     }

@@ -43,18 +43,18 @@ impl SharedTile {
         side: 8,
         owner_side: 2,
         continuations: 4,
-        map_samples: Self::MOST_MAP_SAMPLES as u32,
+        map_samples: Self::MAX_MAP_SAMPLES as u32,
     };
     /// All keep their own: less noise is shared.
     pub const SMALL: Self = Self {
         side: 4,
         owner_side: 1,
         continuations: 1,
-        map_samples: Self::MOST_MAP_SAMPLES as u32,
+        map_samples: Self::MAX_MAP_SAMPLES as u32,
     };
 
     /// Most samples of the map at one vertex.
-    pub(super) const MOST_MAP_SAMPLES: usize = 3;
+    pub(super) const MAX_MAP_SAMPLES: usize = 3;
 
     /// Most samples of the map that one path takes, with `bounces` vertices.
     pub fn most_map_samples(&self, bounces: u32) -> u32 {
@@ -75,7 +75,7 @@ pub struct Start<'a> {
 }
 
 /// Least GGX alpha of a vertex that takes part: narrower reflections are not seen alike from two pixels.
-pub(crate) const LEAST_ALPHA: f32 = 0.01;
+pub(crate) const MIN_ALPHA: f32 = 0.01;
 
 /// A normal is seen as it is where the viewer's cosine with it is at least this share of that with the geometric
 /// normal: beyond where bending begins, so that what is bent is not taken for true.
@@ -224,7 +224,7 @@ impl Scatterer<'_> {
     /// Whether it scatters much the same to and from places side by side.
     fn is_alike_nearby(&self) -> bool {
         match self {
-            Self::Surface(surface) => surface.is_broad(LEAST_ALPHA),
+            Self::Surface(surface) => surface.is_broad(MIN_ALPHA),
             Self::Medium(_) => true,
         }
     }

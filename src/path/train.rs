@@ -14,9 +14,9 @@ pub(crate) const TRAINING_VERTICES: u32 = 3;
 /// An estimate so many times as bright as what is known of its cell counts as if it were just that: one
 /// path in a million would make a cell shine. Less costs light (1 % at 64, 5 % at 16, of a living room
 /// at sunset).
-pub(crate) const MOST_TIMES: f32 = 128.0;
+pub(crate) const MAX_TIMES: f32 = 128.0;
 /// A path that carries less of one channel than this share of the largest says too little about it.
-pub(crate) const LEAST_SHARE: f32 = 1e-3;
+pub(crate) const MIN_SHARE: f32 = 1e-3;
 
 /// A vertex of a path that has not yet brought back all that the cache is to learn from it.
 struct TrainingVertex {
@@ -65,7 +65,7 @@ impl TrainingVertex {
         let trains = path.bounces < TRAINING_VERTICES
             && path.is_in_air()
             && surface.is_cacheable()
-            && throughput.min_element() > LEAST_SHARE * throughput.max_element();
+            && throughput.min_element() > MIN_SHARE * throughput.max_element();
         trains.then(|| Self {
             vertex: path.bounces,
             position: vertex.position,
@@ -80,7 +80,7 @@ impl TrainingVertex {
         let radiance = (path.radiance - self.radiance_before) / self.throughput;
         let times = known.map_or(1.0, |cache| {
             let known = cache.radiance_over_albedo(self.position, self.normal) * self.albedo;
-            let most = MOST_TIMES * luminance(known);
+            let most = MAX_TIMES * luminance(known);
             // Where nothing was found, nothing is known.
             if most > 0.0 { (most / luminance(radiance)).min(1.0) } else { 1.0 }
         });

@@ -63,7 +63,7 @@ impl World {
 
     /// Whether rays meet the same in both worlds, and as much light gets through: they were made of one
     /// another, and only what surfaces scatter differs.
-    pub(crate) fn is_seen_through_like(&self, other: &Self) -> bool {
+    pub(crate) fn has_same_visibility(&self, other: &Self) -> bool {
         let materials = self.scene.materials.iter().zip(&other.scene.materials);
         Arc::ptr_eq(&self.geometry, &other.geometry)
             && materials.into_iter().all(|(a, b)| a.lets_pass_like(b))

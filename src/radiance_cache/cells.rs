@@ -2,12 +2,12 @@
 
 use glam::Vec3;
 
-use super::{MOST_PROBES, SLOTS};
+use super::{MAX_PROBES, SLOTS};
 use crate::light_grid::cells::dominant_face;
 use crate::sampler::hash;
 
 /// Most doublings of cells.
-const MOST_LEVELS: u32 = 31;
+const MAX_LEVELS: u32 = 31;
 /// Marks the cells four times as large that others lean on.
 pub(crate) const PARENT: u32 = 1 << 8;
 /// Keeps check words apart from places in the table.
@@ -50,7 +50,7 @@ impl CacheCells {
     fn level_at(&self, position: Vec3) -> u32 {
         let times = (position - self.center).length() / self.least_distance;
         // The exponent: not a logarithm, which devices round each in their own way.
-        (times.max(1.0).to_bits() >> 23).saturating_sub(127).min(MOST_LEVELS)
+        (times.max(1.0).to_bits() >> 23).saturating_sub(127).min(MAX_LEVELS)
     }
 
     fn edge_of_level(&self, level: u32) -> f32 {
@@ -93,6 +93,6 @@ impl Cell {
 impl Key {
     /// The slots that it may be in.
     pub(super) fn probes(self) -> impl Iterator<Item = usize> {
-        (0..MOST_PROBES).map(move |probe| (self.place as usize + probe) % SLOTS)
+        (0..MAX_PROBES).map(move |probe| (self.place as usize + probe) % SLOTS)
     }
 }

@@ -20,19 +20,19 @@ use cells::Key;
 pub(crate) use cells::{CHECK_SEED, PARENT};
 pub use facts::{CacheFacts, KnownCell};
 pub use sums::RadianceSums;
-pub(crate) use sums::{ALBEDO_ONE, MOST_PATHS, WORDS};
+pub(crate) use sums::{ALBEDO_ONE, MAX_PATHS, WORDS};
 
 /// Slots of the table: a power of two.
 pub(crate) const SLOTS: usize = 1 << 16;
 /// Slots in a row that are looked through for a cell: more than any cell needs before the table counts as full, for
 /// which of them find a slot must not depend on who comes first.
-pub(crate) const MOST_PROBES: usize = 512;
+pub(crate) const MAX_PROBES: usize = 512;
 /// What a parent says counts in a cell as much as so many paths of its own.
 const PARENTS_PATHS: f64 = 8.0;
 /// The same of the mean of all cells in a parent: what few paths see is often brighter or darker.
 const PATHS_OF_ALL: f64 = 1.0;
 /// Least albedo that radiance is divided by.
-const LEAST_ALBEDO: f64 = 1.0 / 256.0;
+const MIN_ALBEDO: f64 = 1.0 / 256.0;
 
 /// What has been learned, to be read by any number of threads.
 #[derive(Debug, Clone)]

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::cells::{CacheCells, Key};
 use super::facts::{CacheFacts, Training};
-use super::{LEAST_ALBEDO, PARENTS_PATHS, PATHS_OF_ALL, RadianceCache, SLOTS};
+use super::{MIN_ALBEDO, PARENTS_PATHS, PATHS_OF_ALL, RadianceCache, SLOTS};
 use crate::sampler::{hash, unit_from_bits};
 
 /// Words of a slot: check word, slot of the parent plus one, number of paths, albedo (three), radiance
@@ -21,11 +21,11 @@ pub(crate) const ALBEDO_ONE: f32 = 255.0;
 /// Units of the brightest radiance there is in the scene, and most of one estimate: so many times 2^24
 /// do not overflow two words.
 const BRIGHTEST: f32 = (1_u64 << 36) as f32;
-const MOST: f32 = (1_u64 << 40) as f32;
+const MAX_SUM: f32 = (1_u64 << 40) as f32;
 /// Share of slots in use beyond which cells no longer find one for sure.
 const FULL: f64 = 0.75;
 /// Most paths that may train it in all.
-pub(crate) const MOST_PATHS: u64 = 1 << 22;
+pub(crate) const MAX_PATHS: u64 = 1 << 22;
 
 /// Sums of what paths have brought back, cell by cell.
 pub struct RadianceSums {
@@ -216,7 +216,7 @@ impl Tally {
         let paths = (self.count > 0).then_some(self.count as f64)?;
         Some(DVec3::from_array([0, 1, 2].map(|channel| {
             let albedo = self.albedo[channel] as f64 / f64::from(ALBEDO_ONE);
-            self.radiance[channel] as f64 / scale / albedo.max(LEAST_ALBEDO * paths)
+            self.radiance[channel] as f64 / scale / albedo.max(MIN_ALBEDO * paths)
         })))
     }
 
@@ -236,7 +236,7 @@ fn dice(position: Vec3) -> u32 {
 
 /// A whole number near `value`, of which no two are alike, as often above as makes the mean right.
 fn dithered(value: f32) -> u64 {
-    let value = value.clamp(0.0, MOST);
+    let value = value.clamp(0.0, MAX_SUM);
     (value + unit_from_bits(hash(value.to_bits()))) as u64
 }
 

@@ -13,7 +13,7 @@ use crate::bvh::Ray;
 use crate::light_grid::counters::MAX_RECORDS_PER_PASS;
 use crate::path::camera::CameraRays;
 use crate::path::sharing::{SharedTile, Start, radiance_of_tile};
-use crate::path::{MOST_COUNTED, PathTracer};
+use crate::path::{MAX_COUNTED, PathTracer};
 use crate::radiance_cache::RadianceSums;
 use crate::sampler::Sampler;
 
@@ -98,7 +98,7 @@ fn anywhere(rays: &CameraRays, view: &View, seed: u32, path: u64) -> (Ray, Sampl
 /// Most paths that can be counted in one pass, at one try a vertex where second vertices are not
 /// shared.
 pub(super) fn most_paths_per_pass(view: &View) -> u64 {
-    let bounces = view.limits.bounces.clamp(1, MOST_COUNTED);
+    let bounces = view.limits.bounces.clamp(1, MAX_COUNTED);
     let tries = view.shared_tile().map_or(bounces, |tile| tile.most_map_samples(bounces));
     (MAX_RECORDS_PER_PASS / u64::from(tries)).max(1)
 }

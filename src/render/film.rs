@@ -9,7 +9,7 @@ use crate::metrics::{REL_MSE_EPSILON, trimmed_mean};
 use crate::path::PathResult;
 
 /// Fewer pixels with light than one in so many are chance.
-const LEAST_LIT: usize = 1000;
+const MIN_LIT: usize = 1000;
 
 /// Sums of one pixel in f64: at 1e6 samples an f32 sum would have lost half its digits.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -195,7 +195,7 @@ impl Film {
     pub(crate) fn is_dark(&self) -> bool {
         let lit = || self.pixels.iter().filter(|pixel| pixel.mean_luminance() > 0.0);
         // Of most pictures the first pixels tell.
-        if lit().nth(self.pixels.len() / LEAST_LIT).is_some() {
+        if lit().nth(self.pixels.len() / MIN_LIT).is_some() {
             return false;
         }
         let sampled = self.pixels.iter().filter(|pixel| pixel.samples > 0).count();
@@ -204,7 +204,7 @@ impl Film {
             sum * sum > 1.5 * pixel.luminance_squared
         });
         let (lit, by_more) = (lit().count(), by_more.count());
-        lit * LEAST_LIT < sampled && 10 * by_more <= lit
+        lit * MIN_LIT < sampled && 10 * by_more <= lit
     }
 
     /// Whether another film has the same size and the same layers.

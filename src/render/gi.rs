@@ -6,11 +6,11 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use super::View;
-use super::outlook::middle_distance;
+use super::view_probe::middle_distance;
 use crate::environment::Environment;
 use crate::path::World;
 use crate::path::camera::CameraRays;
-use crate::radiance_cache::{CacheCells, CacheFacts, MOST_PATHS, RadianceCache, RadianceSums};
+use crate::radiance_cache::{CacheCells, CacheFacts, MAX_PATHS, RadianceCache, RadianceSums};
 
 /// How light that has met several surfaces is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -29,7 +29,7 @@ const TRAINING_SHARE: u64 = 8;
 /// Paths that find out how bright it is about where, before others train it.
 const PILOT_PATHS: u64 = 1 << 12;
 /// Fewest paths that train it.
-const LEAST_PATHS: u64 = 1 << 14;
+const MIN_PATHS: u64 = 1 << 14;
 /// Paths that the CPU traces between two looks at whether to stop.
 pub(super) const PATHS_AT_A_TIME: u64 = 1 << 12;
 /// Edge of the smallest cells over the middle distance of what the camera sees, which is twice that
@@ -78,7 +78,7 @@ impl CacheTraining {
         let pixels = [view.width, view.height].map(|length| u64::from(length.div_ceil(every)));
         let pixels: u64 = pixels.iter().product();
         let wanted = pixels * (u64::from(samples) + 1) / TRAINING_SHARE;
-        let wanted = wanted.clamp(LEAST_PATHS, MOST_PATHS);
+        let wanted = wanted.clamp(MIN_PATHS, MAX_PATHS);
         // Where passes end between powers of two is a matter of time.
         let is_time = samples == 0 || samples.is_power_of_two();
         if is_time && self.paths >= self.wanted && wanted >= 2 * self.wanted {

@@ -9,7 +9,6 @@ mod gi;
 #[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;
 mod gpu_facts;
-mod outlook;
 mod pass;
 mod progress;
 #[cfg(feature = "window")]
@@ -17,6 +16,7 @@ mod resized;
 mod session;
 mod sharing;
 mod view;
+mod view_probe;
 
 pub(crate) use gi::CacheTraining;
 pub use gi::Gi;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::outlook::{ROOM_ENCLOSURE, enclosure};
+use super::view_probe::{ROOM_ENCLOSURE, enclosure};
 use super::{Gi, Sampling, View};
 use crate::path::World;
 use crate::path::sharing::SharedTile;
@@ -26,10 +26,10 @@ pub enum Sharing {
 
 /// Least width and height of a picture whose pixels share unasked: in a smaller one a tile is much of
 /// what is seen, and what its pixels have in common shows.
-const LEAST_SIZE: u32 = 64;
+const MIN_SIZE: u32 = 64;
 /// Least [`enclosure`] where pixels share unasked. At equal time and 32 samples small tiles have 0.76 to
 /// 0.96 of the efficiency of paths of their own where it is 0.27 to 0.48, and 1.64 where it is 0.54.
-const LEAST_ENCLOSURE: f32 = 0.5;
+const MIN_ENCLOSURE: f32 = 0.5;
 /// The same for large tiles: small ones have 1.25 times their efficiency where it is 0.54 to 0.83, and 0.74
 /// to 0.97 of it where it is 0.94 to 0.99.
 const LARGE_ENCLOSURE: f32 = ROOM_ENCLOSURE;
@@ -46,13 +46,13 @@ impl Sharing {
         let [width, height] = view.whole_size();
         let suits = view.sampling == Sampling::Adaptive
             && view.limits.bounces >= 2
-            && width.min(height) >= LEAST_SIZE;
+            && width.min(height) >= MIN_SIZE;
         if !suits {
             return Self::Off;
         }
         match enclosure(world, view) {
             LARGE_ENCLOSURE.. => Self::Large,
-            LEAST_ENCLOSURE.. => Self::Small,
+            MIN_ENCLOSURE.. => Self::Small,
             // Light comes from all sides: 0.97 to 2 times the efficiency where it is 0.4, by how thick it is.
             _ if view.fog(world).is_some() => Self::Small,
             _ => Self::Off,

@@ -8,7 +8,6 @@
 
 pub mod ablations;
 mod bias;
-mod conduct;
 mod digest;
 mod machine;
 mod measure;
@@ -16,6 +15,7 @@ mod pages;
 mod plan;
 mod prepared_row;
 mod reference;
+mod runner;
 pub mod sat;
 mod shares;
 pub mod statistics;
@@ -24,13 +24,13 @@ mod summary;
 pub mod talk;
 
 pub use bias::Bias;
-pub use conduct::{Options, check, make};
 pub use machine::Machine;
 pub(crate) use machine::OpenDevice;
 pub use measure::{Memory, Point, Run};
 pub use pages::{duration, markdown_table, row_sentence};
 pub use plan::{Device, Effort, Frame, Method, Plan, Row, Settings};
 pub use reference::{Noise, ReferenceFacts};
+pub use runner::{Options, check, make};
 pub use shares::Shares;
 pub use summary::{
     Costs, DeviceReport, Measure, MethodReport, Pictures, ReferenceReport, Report, RowReport,

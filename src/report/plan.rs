@@ -13,7 +13,7 @@ use crate::sampler::Points;
 use crate::scene::Camera;
 
 /// Fewest pictures: their spread must be worth something.
-pub(super) const LEAST_PICTURES: u32 = 8;
+pub(super) const MIN_PICTURES: u32 = 8;
 
 /// A device to measure on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -227,7 +227,7 @@ impl Plan {
     /// The same for one row.
     pub(super) fn expected_row_seconds(&self) -> f64 {
         let runs = self.methods.len() * self.effort.devices.len() * self.effort.seeds as usize;
-        let pictures = (1.0 / self.effort.reference_noise).max(f64::from(LEAST_PICTURES));
+        let pictures = (1.0 / self.effort.reference_noise).max(f64::from(MIN_PICTURES));
         let reference = if self.reference.is_some() { 0.0 } else { pictures };
         let shares = SHARE_RUNS * self.compared().len() as f64;
         (runs as f64 + reference + shares) * self.effort.seconds * OVERHEAD

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::{Deserialize, Serialize};
 
 use super::measure::Place;
-use super::plan::{LEAST_PICTURES, Settings};
+use super::plan::{MIN_PICTURES, Settings};
 use crate::digest::Digest;
 use crate::error::{Error, Result};
 use crate::image::{Image, read_with_linearity, write_beside_and_rename};
@@ -227,7 +227,7 @@ impl Reference {
         } else {
             (1.0 / share).ceil() as u32
         };
-        enough.max(LEAST_PICTURES).saturating_sub(pictures)
+        enough.max(MIN_PICTURES).saturating_sub(pictures)
     }
 }
 

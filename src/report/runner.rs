@@ -1,7 +1,7 @@
 //! Going through a plan: what is on disk is taken, what is missing is measured, pages are kept up to
 //! date.
 
-mod judging;
+mod evaluate;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use super::machine::{Machine, OpenDevice};
 use super::measure::{Run, measure};
 use super::pages::{duration, row_sentence};
-use super::plan::{LEAST_PICTURES, Method, Plan, Row};
+use super::plan::{MIN_PICTURES, Method, Plan, Row};
 use super::prepared_row::PreparedRow;
 use super::reference::{Reference, read_reference};
 use super::store::Store;
@@ -53,7 +53,7 @@ pub fn make(plan: &Plan, options: &Options<'_>) -> Result<Report> {
         .iter()
         .map(|device| OpenDevice::open(*device, options.adapter, &machine))
         .collect::<Result<Vec<_>>>()?;
-    let mut conductor = Conductor {
+    let mut runner = Runner {
         machine_digest: machine.digest(),
         report: Report { plan: plan.clone(), machine, rows: Vec::new(), is_finished: false },
         plan,
@@ -65,21 +65,21 @@ pub fn make(plan: &Plan, options: &Options<'_>) -> Result<Report> {
         pages_written: None,
     };
     for row in &plan.rows {
-        conductor.row(row)?;
-        if let Some(row) = conductor.report.rows.last() {
-            (options.tell)(row_sentence(&conductor.report, row));
+        runner.row(row)?;
+        if let Some(row) = runner.report.rows.last() {
+            (options.tell)(row_sentence(&runner.report, row));
         }
-        conductor.write_pages()?;
-        if conductor.is_cancelled() {
-            return Ok(conductor.report);
+        runner.write_pages()?;
+        if runner.is_cancelled() {
+            return Ok(runner.report);
         }
     }
-    conductor.report.is_finished = true;
-    conductor.write_pages()?;
-    Ok(conductor.report)
+    runner.report.is_finished = true;
+    runner.write_pages()?;
+    Ok(runner.report)
 }
 
-struct Conductor<'a> {
+struct Runner<'a> {
     plan: &'a Plan,
     options: &'a Options<'a>,
     store: Store,
@@ -104,7 +104,7 @@ struct Work {
     refusals: Vec<Option<String>>,
 }
 
-impl Conductor<'_> {
+impl Runner<'_> {
     fn is_cancelled(&self) -> bool {
         self.options.cancel.load(Ordering::Relaxed)
     }
@@ -140,7 +140,7 @@ impl Conductor<'_> {
         if work.refusals.iter().all(Option::is_some) {
             return self.update(&mut work);
         }
-        let mut is_whole = self.grow_reference(&mut work, LEAST_PICTURES)?;
+        let mut is_whole = self.grow_reference(&mut work, MIN_PICTURES)?;
         while is_whole {
             is_whole = self.all_runs(&mut work)? && self.judge_well(&mut work)?;
             if !is_whole || !self.forget_outdated(&mut work) {

@@ -18,7 +18,7 @@ const FEW: usize = 64;
 const BITS: usize = 8;
 
 /// Things of one hash that are told apart; what comes after so many is kept.
-const MOST_ALIKE: usize = 16;
+const MAX_ALIKE: usize = 16;
 
 /// Numbers of what is a copy of something with a lower number, given how many things there are and a hash that is
 /// the same for copies. Takes little time where there are none.
@@ -39,7 +39,7 @@ pub(super) fn copies(
         for &(_, number) in alike {
             if firsts.iter().any(|&first| is_copy(first, number)) {
                 found.push(number);
-            } else if firsts.len() < MOST_ALIKE {
+            } else if firsts.len() < MAX_ALIKE {
                 firsts.push(number);
             }
         }

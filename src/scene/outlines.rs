@@ -177,15 +177,15 @@ impl Scene {
 
     /// Says that no material is called so, and what there is instead.
     pub(crate) fn without_material(&self, name: &str) -> String {
-        const MOST_NAMED: usize = 12;
+        const MAX_NAMED: usize = 12;
         let mut names: Vec<&str> = self.materials.iter().map(|m| m.name.as_str()).collect();
         names.sort_unstable();
         names.dedup();
-        let more = match names.len().saturating_sub(MOST_NAMED) {
+        let more = match names.len().saturating_sub(MAX_NAMED) {
             0 => String::new(),
             count => format!(" and {count} more, which lightgrid info names"),
         };
-        names.truncate(MOST_NAMED);
+        names.truncate(MAX_NAMED);
         format!("no material is called \"{name}\"; there are {}{more}", names.join(", "))
     }
 

@@ -81,7 +81,7 @@ fn against_f64(setting: &Setting) -> Result<Outcome> {
                 .sound(&film)
                 .at_most(format!("{what}: mean deviation from f64"), found.mean, 1e-3)
                 .at_most(format!("{what}: pixels off by 0.2 %"), found.apart, 0.02)
-                .told(format!("{what}: worst deviation from f64"), found.worst);
+                .info(format!("{what}: worst deviation from f64"), found.worst);
         }
     }
     Ok(outcome)
@@ -112,8 +112,8 @@ fn compare(
         // Paths that rounding sends to another triangle, texel or side of a lobe.
         .at_most("share of pixels off by 0.2 %", found.apart, 0.05)
         .at_most("mean of the picture off, relative", (ratio - 1.0).abs(), 5e-3)
-        .told("mean deviation of a pixel", found.mean)
-        .told("worst deviation of a pixel", found.worst))
+        .info("mean deviation of a pixel", found.mean)
+        .info("worst deviation of a pixel", found.worst))
 }
 
 /// The work so far is kept and the CPU goes on. The device is one of its own: the others go on too.

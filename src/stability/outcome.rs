@@ -12,7 +12,7 @@ pub enum Limit {
     /// This or more.
     AtLeast(f64),
     /// Anything: it is told, not judged.
-    Told,
+    Info,
 }
 
 /// One measured number and its limit.
@@ -32,7 +32,7 @@ impl Figure {
         match self.limit {
             Limit::AtMost(most) => self.value <= most,
             Limit::AtLeast(least) => self.value >= least,
-            Limit::Told => !self.value.is_nan(),
+            Limit::Info => !self.value.is_nan(),
         }
     }
 
@@ -43,7 +43,7 @@ impl Figure {
             Limit::AtMost(most) if most > 0.0 => (self.value / most).max(0.0),
             // Lower limits mostly say that the case had something to judge.
             Limit::AtMost(_) | Limit::AtLeast(_) => 0.0,
-            Limit::Told => -1.0,
+            Limit::Info => -1.0,
         }
     }
 }
@@ -109,8 +109,8 @@ impl Outcome {
     }
 
     /// Adds a figure that is not judged.
-    pub(super) fn told(mut self, what: impl Into<String>, value: f64) -> Self {
-        self.figures.push(Figure { what: what.into(), value, limit: Limit::Told });
+    pub(super) fn info(mut self, what: impl Into<String>, value: f64) -> Self {
+        self.figures.push(Figure { what: what.into(), value, limit: Limit::Info });
         self
     }
 
@@ -152,7 +152,7 @@ impl Outcome {
             let (bound, limit) = match figure.limit {
                 Limit::AtMost(most) => ("at most", number(most)),
                 Limit::AtLeast(least) => ("at least", number(least)),
-                Limit::Told => ("told", Value::Null),
+                Limit::Info => ("info", Value::Null),
             };
             json!({
                 "what": figure.what,
@@ -175,7 +175,7 @@ impl fmt::Display for Limit {
         match self {
             Self::AtMost(most) => f.pad(&format!("<= {}", number(*most))),
             Self::AtLeast(least) => f.pad(&format!(">= {}", number(*least))),
-            Self::Told => f.pad("told"),
+            Self::Info => f.pad("info"),
         }
     }
 }
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn what_fails_decides_and_nothing_measured_is_no_pass() {
-        let sound = Outcome::new().at_most("a", 1.0, 10.0).at_least("b", 2.0, 1.0).told("c", 9e9);
+        let sound = Outcome::new().at_most("a", 1.0, 10.0).at_least("b", 2.0, 1.0).info("c", 9e9);
         assert_eq!(sound.verdict(), Verdict::Passed);
         assert_eq!(sound.decisive().map(|f| f.what.as_str()), Some("a"));
         let failed = sound.clone().at_most("d", 1.0, 0.0).at_most("e", 1.0, 1.0);

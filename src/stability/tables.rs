@@ -59,7 +59,7 @@ fn everywhere(setting: &Setting, table: TableKind) -> Result<Outcome> {
             // Rounding to integers of 2^-32 of a tile, at most.
             TableKind::TileLocal if what.contains("error") => outcome.at_most(told, value, 1e-6),
             TableKind::TileLocal => outcome.at_most(told, value, 0.0),
-            _ => outcome.told(told, value),
+            _ => outcome.info(told, value),
         };
     }
     Ok(outcome)

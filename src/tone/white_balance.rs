@@ -51,7 +51,8 @@ impl WhiteBalance {
     pub fn apply(&self, mut image: Image) -> Image {
         let matrix = self.matrix();
         if matrix != Mat3::IDENTITY {
-            let finite = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(-LARGEST, LARGEST) };
+            let finite =
+                |x: f32| if x.is_nan() { 0.0 } else { x.clamp(-MAX_COMPONENT, MAX_COMPONENT) };
             image.pixels.par_iter_mut().for_each(|rgb| {
                 *rgb = (matrix * Vec3::from(rgb.map(finite))).max(Vec3::ZERO).to_array();
             });
@@ -61,7 +62,7 @@ impl WhiteBalance {
 }
 
 /// Sums of so large values are finite.
-const LARGEST: f32 = 1e30;
+const MAX_COMPONENT: f32 = 1e30;
 
 /// Cone responses from XYZ (Lam 1985, the Bradford transform).
 const BRADFORD: Mat3 = Mat3::from_cols_array(&[

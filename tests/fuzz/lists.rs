@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 /// Room for the largest of them.
-pub(crate) const MOST_BYTES: usize = 64 << 20;
+pub(crate) const MAX_BYTES: usize = 64 << 20;
 
 /// Writes an object of a list, given its number.
 type Object = fn(&mut String, usize) -> std::fmt::Result;

@@ -40,7 +40,7 @@ pub(crate) fn work(kind: Kind, first: u64, count: u64) {
         }
     }
     // Taken before anything is measured.
-    let mut text = String::with_capacity(if kind == Kind::Lists { lists::MOST_BYTES } else { 0 });
+    let mut text = String::with_capacity(if kind == Kind::Lists { lists::MAX_BYTES } else { 0 });
     let mut tally = Tally { worst_excess_bytes: i64::MIN, ..Tally::default() };
     for number in first..first + count {
         println!("{number}");

@@ -32,11 +32,11 @@ const BLOCK: u32 = 8;
 const ALPHA: f64 = 1e-4;
 /// Least standard error of a pixel in units of the picture's mean: one that has met none of its rare light yet
 /// knows nothing of its variance.
-const LEAST_ERROR: f64 = 1e-3;
+const MIN_ERROR: f64 = 1e-3;
 /// The same in shares of all pixels' mean variance.
-const LEAST_SHARE: f64 = 0.1;
+const MIN_SHARE: f64 = 0.1;
 /// Standard errors that a mean may be off by.
-const MOST_SIGMAS: f64 = 4.5;
+const MAX_SIGMAS: f64 = 4.5;
 
 /// What is rendered.
 struct Place<'a> {
@@ -176,7 +176,7 @@ fn deviations(a: &[Values], b: &[Values], least_error: f64) -> Values {
     let (freedom_a, freedom_b) = (freedom(a), freedom(b));
     let moments = |parts: &[Values]| {
         let (means, variances) = moments(parts, least_error);
-        let floor = LEAST_SHARE * mean(&variances);
+        let floor = MIN_SHARE * mean(&variances);
         (means, variances.iter().map(|variance| variance + floor).collect::<Values>())
     };
     let (a, b) = (moments(a), moments(b));
@@ -215,7 +215,7 @@ fn examine(what: &str, place: &Place<'_>, reference: Option<f64>) -> Vec<String>
         |parts: &[Values]| -> Vec<Values> { parts.iter().map(|part| place.blocks(part)).collect() };
     let picture = |parts: &[Values]| spread(&parts.iter().map(|p| mean(p)).collect::<Values>());
     let (own, other, spoilt) = (picture(&ours), picture(&theirs), picture(&noisy));
-    let least = LEAST_ERROR * other.0;
+    let least = MIN_ERROR * other.0;
     let mut wrong = Vec::new();
     let mut check = |is_right: bool, what: String| {
         if !is_right {
@@ -236,7 +236,7 @@ fn examine(what: &str, place: &Place<'_>, reference: Option<f64>) -> Vec<String>
     let mut ratios = Vec::new();
     for (which, (found, error)) in [("learned", own), ("garbage", spoilt)] {
         let (off, noise) = (found / other.0 - 1.0, error.hypot(other.1) / other.0);
-        let is_near = off.abs() <= MOST_SIGMAS * noise;
+        let is_near = off.abs() <= MAX_SIGMAS * noise;
         check(is_near, format!("{what}: {which}, the mean is off by {off} +- {noise}"));
         ratios.push((1.0 + off, noise));
     }
@@ -295,11 +295,11 @@ fn examine(what: &str, place: &Place<'_>, reference: Option<f64>) -> Vec<String>
         })
         .collect();
     let (bias, noise) = spread(&place.blocks(&products));
-    check(bias <= MOST_SIGMAS * noise, format!("{what}: squared bias {bias} +- {noise}"));
+    check(bias <= MAX_SIGMAS * noise, format!("{what}: squared bias {bias} +- {noise}"));
     let against = reference.map_or_else(String::new, |r| format!("{:.4}", own.0 / r));
     if let Some(reference) = reference {
         let (off, noise) = (own.0 / reference - 1.0, own.1 / reference);
-        let is_near = off.abs() <= 0.005_f64.max(MOST_SIGMAS * noise);
+        let is_near = off.abs() <= 0.005_f64.max(MAX_SIGMAS * noise);
         check(is_near, format!("{what}: off the reference by {off} +- {noise}"));
     }
     println!(

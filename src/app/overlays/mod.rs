@@ -338,7 +338,7 @@ impl Sources<'_> {
 }
 
 /// What an overlay of the film says of a pixel; of those of cells the inspector tells more.
-pub fn told(overlay: Overlay, film: &Film, index: usize) -> Option<String> {
+pub fn value_text(overlay: Overlay, film: &Film, index: usize) -> Option<String> {
     let three = |values: [f32; 3]| values.map(|value| format!("{value:.2}")).join("  ");
     Some(match overlay {
         Overlay::Error => {
@@ -433,7 +433,7 @@ enum Range {
 }
 
 /// What a logarithmic scale spans at most: a few cells that see next to nothing must not take it all.
-const LARGEST_RATIO: f32 = 1e4;
+const MAX_RATIO: f32 = 1e4;
 
 fn scaled(values: impl Iterator<Item = Option<f32>>, range: Range, unit: &'static str) -> Painted {
     let values: Vec<Option<f32>> = values.collect();
@@ -448,8 +448,8 @@ fn scaled(values: impl Iterator<Item = Option<f32>>, range: Range, unit: &'stati
         Range::Fixed(low, high) => (low, high),
         Range::Whole => (0.0, sorted[sorted.len() - 1].max(1.0)),
         Range::Logarithmic => {
-            let high = percentile(0.98).max(f32::MIN_POSITIVE * LARGEST_RATIO);
-            let low = percentile(0.02).max(high / LARGEST_RATIO);
+            let high = percentile(0.98).max(f32::MIN_POSITIVE * MAX_RATIO);
+            let low = percentile(0.02).max(high / MAX_RATIO);
             (low, high.max(low * 1.01))
         }
     };

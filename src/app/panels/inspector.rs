@@ -10,7 +10,7 @@ use crate::app::loader::LoadedMap;
 use crate::app::overlays::{length, palette};
 use crate::app::theme;
 use crate::app::worker::Snapshot;
-use crate::environment::landmarks::Sun;
+use crate::environment::sun::Sun;
 
 /// Axes that surfaces face.
 const FACES: [&str; 6] = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
@@ -173,23 +173,23 @@ fn tiles(
         ));
     }
     if !shares.is_empty() {
-        color_bar::show(ui, (LEAST, most), true, percent);
+        color_bar::show(ui, (MIN_SHARE, most), true, percent);
     }
 }
 
 /// Shares up to this are not drawn.
-const LEAST: f32 = 1e-4;
+const MIN_SHARE: f32 = 1e-4;
 
 /// The largest share, for the upper end of a scale.
 fn largest(shares: &[f32]) -> f32 {
-    shares.iter().copied().fold(LEAST * 10.0, f32::max)
+    shares.iter().copied().fold(MIN_SHARE * 10.0, f32::max)
 }
 
 /// Logarithmic shares over the map: 0.01 % is transparent, `largest` opaque.
 fn heatmap(ui: &Ui, rect: Rect, size: (u32, u32), shares: &[f32], largest: f32) {
     let painter = ui.painter_at(rect);
-    for (tile, share) in shares.iter().enumerate().filter(|(_, share)| **share > LEAST) {
-        let t = (share / LEAST).ln() / (largest / LEAST).ln();
+    for (tile, share) in shares.iter().enumerate().filter(|(_, share)| **share > MIN_SHARE) {
+        let t = (share / MIN_SHARE).ln() / (largest / MIN_SHARE).ln();
         let [r, g, b] = palette::viridis(t);
         let color = Color32::from_rgba_unmultiplied(r, g, b, (90.0 + 150.0 * t) as u8);
         painter.rect_filled(map_view::tile_rect(rect, size, tile as u32), 0.0, color);
@@ -231,7 +231,7 @@ fn cell(
     if !inspected.probabilities.is_empty() {
         let (rect, _) = map_view::ground(ui, map);
         heatmap(ui, rect, size, &inspected.probabilities, most);
-        color_bar::show(ui, (LEAST, most), true, percent);
+        color_bar::show(ui, (MIN_SHARE, most), true, percent);
         ui.label(theme::quiet("Probability of each tile, learned"));
     }
     if let Some(truth) = truth {

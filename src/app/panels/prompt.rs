@@ -52,7 +52,7 @@ fn sentence(objection: Objection, purpose: Purpose) -> String {
 }
 
 /// Ways to go on that are shown.
-const MOST_OFFERS: usize = 12;
+const MAX_OFFERS: usize = 12;
 
 impl Prompt {
     /// Goes on with what is typed as far as there is one way, and offers the ways where there are several.
@@ -124,7 +124,7 @@ pub(in crate::app) fn show(
             ui.label(RichText::new(sentence(objection, prompt.purpose)).color(theme::ALERT));
         }
         let mut taken = None;
-        for offer in prompt.offers.iter().take(MOST_OFFERS) {
+        for offer in prompt.offers.iter().take(MAX_OFFERS) {
             if path_link(ui, offer).clicked() {
                 taken = Some(offer.clone());
             }
@@ -133,7 +133,7 @@ pub(in crate::app) fn show(
             prompt.go_on(offer);
             ui.ctx().request_repaint();
         }
-        let hidden = prompt.offers.len().saturating_sub(MOST_OFFERS);
+        let hidden = prompt.offers.len().saturating_sub(MAX_OFFERS);
         if hidden > 0 {
             ui.label(theme::quiet(format!("and {hidden} more")));
         }
@@ -191,8 +191,8 @@ pub(in crate::app) fn show(
 
 /// A path on one line, which gives its end where there is little room.
 fn path_link(ui: &mut Ui, path: &str) -> Response {
-    const MOST: usize = 74;
-    let hidden = path.chars().count().saturating_sub(MOST);
+    const MAX_CHARACTERS: usize = 74;
+    let hidden = path.chars().count().saturating_sub(MAX_CHARACTERS);
     let end: String = path.chars().skip(hidden).collect();
     let text = if hidden > 0 { format!("…{end}") } else { end };
     let link = ui.link(RichText::new(text).size(12.5));

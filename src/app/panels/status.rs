@@ -2,7 +2,7 @@
 
 use egui::{Align, Color32, Layout, Margin, Panel, RichText, Ui};
 
-use crate::app::overlays::{Overlay, told};
+use crate::app::overlays::{Overlay, value_text};
 use crate::app::theme;
 use crate::app::worker::{Activity, Origin, Snapshot};
 
@@ -185,7 +185,7 @@ fn pixel(ui: &mut Ui, snapshot: &Snapshot, place: glam::Vec2, overlay: Option<Ov
         1 => "1 sample".to_owned(),
         all => format!("{all} samples"),
     };
-    let told = overlay.and_then(|overlay| told(overlay, film, index));
+    let told = overlay.and_then(|overlay| value_text(overlay, film, index));
     let told = told.map(|told| format!("  ·  {told}")).unwrap_or_default();
     let text = format!("{x}, {y}:  {r}  {g}  {b}  ·  {samples}{told}");
     ui.label(theme::quiet(text)).on_hover_text("Linear radiance of the pixel, unfiltered");

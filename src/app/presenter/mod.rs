@@ -19,7 +19,7 @@ use super::{Wake, lock};
 use crate::error::{Error, Result};
 
 /// No picture takes longer to be made ready.
-const LONGEST: Duration = Duration::from_secs(60);
+const MAX_WAIT: Duration = Duration::from_secs(60);
 
 /// Memory that was freed is given back so often, while pictures come: old ones, and their scenes, are gone then.
 const RETURN: Duration = Duration::from_secs(10);
@@ -138,7 +138,7 @@ fn run(shared: &Shared) {
         };
         let (start, kept) = (Instant::now(), order.clone());
         let work = Work::start();
-        order.snapshot.rest.set_end(start + LONGEST);
+        order.snapshot.rest.set_end(start + MAX_WAIT);
         match catch_unwind(AssertUnwindSafe(|| memory.present(order))) {
             Ok(Ok(shown)) => *lock(&shared.shown) = Some(Arc::new(shown)),
             // Where the device is lost, the window orders again on another.

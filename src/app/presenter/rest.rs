@@ -3,16 +3,16 @@
 use std::time::Duration;
 
 /// After a picture of work that goes on it rests so many times as long as that took: little at first, when each
-/// is much better than the last, and most after [`MOST_AFTER`]. With all of the cores it then takes a
+/// is much better than the last, and most after [`MAX_REST_AFTER`]. With all of the cores it then takes a
 /// seventeenth of the machine.
 const REST: [f64; 2] = [3.0, 16.0];
 /// Seconds of work on a view after which pictures change slowly.
-const MOST_AFTER: f64 = 12.0;
+const MAX_REST_AFTER: f64 = 12.0;
 
 /// For how long it rests after a picture that took so long, of so many seconds of work.
 pub(super) fn rest_after(took: Duration, seconds: f64) -> Duration {
     let [least, most] = REST;
-    took.mul_f64(least + (most - least) * (seconds / MOST_AFTER).clamp(0.0, 1.0))
+    took.mul_f64(least + (most - least) * (seconds / MAX_REST_AFTER).clamp(0.0, 1.0))
 }
 
 /// What a picture took, for its rest. By the clock that would be far too long where other programs take the

@@ -7,7 +7,7 @@ use crate::app::lock;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::World;
-use crate::render::gpu::{DeviceChoice, Gpu, Held, RayChoice, UploadedScene};
+use crate::render::gpu::{CompileGuard, DeviceChoice, Gpu, RayChoice, UploadedScene};
 use crate::render::{Session, View};
 
 /// The device in use and what is on it.
@@ -33,7 +33,7 @@ struct Awaited {
     environment: Weak<Environment>,
     view: View,
     /// What is held until then.
-    held: Weak<Held>,
+    held: Weak<CompileGuard>,
 }
 
 /// What is on the GPU.
@@ -115,7 +115,7 @@ impl Device {
         &mut self,
         session: &mut Session<'_>,
         request: &Request,
-        preparation: impl FnOnce() -> Arc<Held>,
+        preparation: impl FnOnce() -> Arc<CompileGuard>,
     ) {
         let Some(gpu) = self.gpu.clone() else {
             session.continue_on_cpu();

@@ -13,7 +13,7 @@ use crate::render::gpu::{Gpu, RayChoice};
 use crate::render::{CacheTraining, Session, SessionState};
 
 /// What one job leaves for the next.
-pub(super) struct Kept {
+pub(super) struct SessionCache {
     pub(super) device: Device,
     pub(super) learned: Option<Learned>,
     /// What was counted, if it came to its end, and what for.
@@ -24,15 +24,15 @@ pub(super) struct Kept {
     pub(super) shrink: Option<u32>,
     pub(super) snapshots: u64,
     /// A film of what was seen last, and what it was rendered for.
-    pub(super) backdrop: Option<Seen>,
+    pub(super) backdrop: Option<PreviousFilm>,
     /// What paths have trained the radiance cache, and where.
     pub(super) training: Option<(CacheTraining, Arc<Request>)>,
     /// Pictures that were left for others, oldest first.
-    left: Vec<Left>,
+    left: Vec<SuspendedPicture>,
 }
 
 /// A film of what was seen.
-pub(super) struct Seen {
+pub(super) struct PreviousFilm {
     /// What it was rendered for.
     pub(super) request: Arc<Request>,
     pub(super) film: Arc<Film>,
@@ -41,7 +41,7 @@ pub(super) struct Seen {
 }
 
 /// A picture that was left for another one: whoever comes back to it finds it as it was.
-pub(super) struct Left {
+pub(super) struct SuspendedPicture {
     pub(super) request: Arc<Request>,
     pub(super) session: SessionState,
     /// The whole picture by cached light, if there was one.
@@ -54,11 +54,10 @@ pub(super) struct Left {
     pub(super) cached_seconds: f64,
 }
 
-impl Left {
+impl SuspendedPicture {
     /// Whether it has taken long, and there is room for it.
     pub(super) fn is_worth_it(&self) -> bool {
-        self.session.elapsed_seconds() >= LEAST_LEFT_SECONDS
-            && self.memory_bytes() <= MOST_LEFT_BYTES
+        self.session.elapsed_seconds() >= MIN_LEFT_SECONDS && self.memory_bytes() <= MAX_LEFT_BYTES
     }
 
     fn memory_bytes(&self) -> usize {
@@ -68,11 +67,11 @@ impl Left {
 }
 
 /// Pictures that were left are kept for one step back and forth.
-const MOST_LEFT: usize = 2;
+const MAX_LEFT: usize = 2;
 /// As long as they take no more than this together.
-const MOST_LEFT_BYTES: usize = 512 << 20;
+const MAX_LEFT_BYTES: usize = 512 << 20;
 /// And have taken at least so long: others are soon made again.
-const LEAST_LEFT_SECONDS: f64 = 1.0;
+const MIN_LEFT_SECONDS: f64 = 1.0;
 
 /// The last distributions that learning ended with.
 pub(super) struct Learned {
@@ -84,7 +83,7 @@ pub(super) struct Learned {
     pub(super) is_complete: bool,
 }
 
-impl Kept {
+impl SessionCache {
     /// Of a worker that has done nothing yet.
     pub(super) fn new(gpu: (Option<String>, RayChoice), screen: Arc<Mutex<Gpu>>) -> Self {
         Self {
@@ -101,16 +100,18 @@ impl Kept {
     }
 
     /// Keeps a picture that is left for another.
-    pub(super) fn leave(&mut self, left: Left) {
+    pub(super) fn leave(&mut self, left: SuspendedPicture) {
         self.left.push(left);
-        let bytes = |all: &[Left]| all.iter().map(Left::memory_bytes).sum::<usize>();
-        while self.left.len() > MOST_LEFT || bytes(&self.left) > MOST_LEFT_BYTES {
+        let bytes = |all: &[SuspendedPicture]| {
+            all.iter().map(SuspendedPicture::memory_bytes).sum::<usize>()
+        };
+        while self.left.len() > MAX_LEFT || bytes(&self.left) > MAX_LEFT_BYTES {
             self.left.remove(0);
         }
     }
 
     /// The picture that was left of the very same.
-    pub(super) fn come_back(&mut self, request: &Request) -> Option<Left> {
+    pub(super) fn come_back(&mut self, request: &Request) -> Option<SuspendedPicture> {
         let found = self.left.iter().position(|left| left.request.is_resumed_by(request))?;
         Some(self.left.remove(found))
     }
@@ -125,11 +126,11 @@ impl Kept {
         let (map, is_lit_by) = (&request.environment, Environment::shares_map_with);
         self.left
             .retain(|left| !is_other(&left.request) && is_lit_by(&left.request.environment, map));
-        self.counted.take_if(|(_, of)| !of.world.is_seen_through_like(world));
+        self.counted.take_if(|(_, of)| !of.world.has_same_visibility(world));
         if let Some((_, of)) = self.counted.as_mut().filter(|(_, of)| is_other(of)) {
             *of = Arc::new(Request { world: Arc::clone(world), ..(**of).clone() });
         }
-        self.learned.take_if(|learned| !learned.world.is_seen_through_like(world));
+        self.learned.take_if(|learned| !learned.world.has_same_visibility(world));
         if let Some(learned) = &mut self.learned {
             learned.world = Arc::clone(world);
         }
@@ -201,7 +202,7 @@ mod tests {
         let request = request(Arc::clone(&world), lit("overcast"), [16, 9]);
         let view = View { gi: Gi::Cached, ..request.view.clone() };
         let request = Request { view, wants_cached: true, ..request };
-        let mut kept = Kept::new((None, RayChoice::default()), Arc::new(Mutex::new(gpu)));
+        let mut kept = SessionCache::new((None, RayChoice::default()), Arc::new(Mutex::new(gpu)));
         let mut session = Session::new(&world, &request.environment, request.view.clone());
         kept.keep_training(&mut session, &Arc::new(request.clone()));
         let serves = |change: &dyn Fn(&mut Request)| {

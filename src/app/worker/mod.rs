@@ -19,10 +19,10 @@ mod snapshot;
 #[cfg(test)]
 pub(super) mod tests;
 
-use job::Job;
-use kept::Kept;
+use job::PictureTask;
+use kept::SessionCache;
 pub(crate) use request::{Reference, Request};
-use snapshot::Rest;
+use snapshot::PublishThrottle;
 pub(crate) use snapshot::{Activity, Backdrop, NoCache, Origin, Point, SessionSnapshot, Snapshot};
 
 use super::{Wake, lock};
@@ -43,7 +43,7 @@ struct Shared {
     orders: Arc<Orders>,
     cancel: Arc<AtomicBool>,
     snapshot: Mutex<Option<Arc<Snapshot>>>,
-    rest: Arc<Rest>,
+    rest: Arc<PublishThrottle>,
     failures: Mutex<Vec<String>>,
     /// What is said of a panic.
     panic: Mutex<Option<String>>,
@@ -90,7 +90,7 @@ impl Worker {
             orders: Arc::new(orders),
             cancel: Arc::default(),
             snapshot: Mutex::default(),
-            rest: Arc::new(Rest::new()),
+            rest: Arc::new(PublishThrottle::new()),
             failures: Mutex::default(),
             panic: Mutex::default(),
             screen: Arc::new(Mutex::new(screen)),
@@ -186,7 +186,7 @@ fn lower_priority() {
 }
 
 fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, RayChoice)) {
-    let fresh = || Kept::new(gpu.clone(), Arc::clone(&shared.screen));
+    let fresh = || SessionCache::new(gpu.clone(), Arc::clone(&shared.screen));
     let mut kept = fresh();
     let alarm = Alarm::start(Arc::clone(&shared.cancel));
     let mut done: Option<Arc<Request>> = None;
@@ -218,7 +218,7 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
         kept.leave_other_worlds(&request);
         let asked = Arc::clone(&request);
         let worked = catch_unwind(AssertUnwindSafe(|| {
-            let mut job = Job::new(shared, &alarm, &mut kept, request);
+            let mut job = PictureTask::new(shared, &alarm, &mut kept, request);
             pool.install(|| {
                 if job.is_moving() {
                     job.follow(&world, &environment);

@@ -78,7 +78,7 @@ impl Request {
 
     /// Whether the same light falls on the same scene, whatever its surfaces make of it.
     pub(super) fn is_lit_like(&self, other: &Self) -> bool {
-        self.world.is_seen_through_like(&other.world)
+        self.world.has_same_visibility(&other.world)
             && Arc::ptr_eq(&self.environment, &other.environment)
             && (self.view.medium, self.view.limits) == (other.view.medium, other.view.limits)
     }

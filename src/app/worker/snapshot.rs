@@ -121,13 +121,13 @@ pub(crate) struct Snapshot {
     /// Seconds spent on a backdrop whose light comes from a radiance cache, which are none of `main`'s.
     pub cached_seconds: f64,
     /// Whoever shows it says here when the next one will be wanted.
-    pub(in crate::app) rest: Arc<Rest>,
+    pub(in crate::app) rest: Arc<PublishThrottle>,
 }
 
 /// How long no newer picture will be shown: films are large, and none is copied for nothing.
-pub(in crate::app) struct Rest(Mutex<Instant>);
+pub(in crate::app) struct PublishThrottle(Mutex<Instant>);
 
-impl Rest {
+impl PublishThrottle {
     pub(super) fn new() -> Self {
         Self(Mutex::new(Instant::now()))
     }

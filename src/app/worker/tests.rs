@@ -43,7 +43,7 @@ pub(in crate::app) fn snapshot_of(request: &Arc<Request>, main: SessionSnapshot)
         curves: [Vec::new(), Vec::new()],
         backdrop: None,
         cached_seconds: 0.0,
-        rest: Arc::new(Rest::new()),
+        rest: Arc::new(PublishThrottle::new()),
     }
 }
 

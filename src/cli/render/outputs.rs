@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::assignment::Assignment;
+use super::render_job::RenderJob;
 use super::{RenderArguments, frames};
 use crate::cli::picture::{check_kept, say_written};
 use crate::error::{Error, Result};
@@ -88,7 +88,7 @@ pub(super) fn without_distributions(path: &Path) -> Error {
 /// failed.
 pub(super) fn write(
     arguments: &RenderArguments,
-    assignment: &Assignment,
+    assignment: &RenderJob,
     record: &Record<'_>,
     grid: Option<&LightGrid>,
 ) -> Vec<Error> {

@@ -28,7 +28,7 @@ use crate::sources;
 const RESERVE: f64 = 2.0;
 
 /// What one process renders of a picture.
-pub(super) struct Assignment {
+pub(super) struct RenderJob {
     part: Part,
     /// Samples a pixel before those of this part.
     first: u32,
@@ -66,7 +66,7 @@ struct Checkpoint {
     written: Instant,
 }
 
-impl Assignment {
+impl RenderJob {
     /// What the arguments ask for, without what a checkpoint says is done.
     ///
     /// # Errors

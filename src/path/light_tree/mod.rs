@@ -20,14 +20,14 @@ use super::draw::{ALL, Draw, Interval, share_of};
 pub(crate) const LEAF: u32 = 1 << 31;
 
 /// Least cosine that lights are counted with: some of them shine where the mean does not.
-pub(crate) const LEAST_COSINE: f32 = 1.0 / 64.0;
+pub(crate) const MIN_COSINE: f32 = 1.0 / 64.0;
 
 /// Squared distance in square metres below which lights are not nearer: keeps importance finite.
 pub(crate) const NEAREST_SQUARED: f32 = 1e-20;
 
 /// Both the lights with a place and those without get at least an eighth of the samples, if there
 /// are any: power does not know which of them are seen.
-const LEAST_SHARE: f64 = 1.0 / 8.0;
+const MIN_SHARE: f64 = 1.0 / 8.0;
 
 /// A place at which light is gathered.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -168,10 +168,10 @@ impl LightTree {
     }
 }
 
-/// By power, but for [`LEAST_SHARE`]. `power` is that of the lights with a place, if there are any.
+/// By power, but for [`MIN_SHARE`]. `power` is that of the lights with a place, if there are any.
 fn distant_shares(distant: &[(u32, f64)], power: Option<f64>) -> Vec<DistantLight> {
     let mut left: f64 = distant.iter().map(|(_, power)| power).sum();
-    let ratio = (1.0 - LEAST_SHARE) / LEAST_SHARE;
+    let ratio = (1.0 - MIN_SHARE) / MIN_SHARE;
     let placed = power.map(|power| power.clamp(left / ratio, left * ratio));
     let mut shares = Vec::with_capacity(distant.len());
     for (index, &(light, power)) in distant.iter().enumerate() {
@@ -204,11 +204,11 @@ impl Node {
         let scatter = self.variance * inverse_squared;
         let known = self.axis_squared * (1.0 - scatter);
         let aimed = clamped_mean(-self.axis.dot(direction), self.aimed_squared - known);
-        let emitted = (self.around + aimed).max(LEAST_COSINE);
+        let emitted = (self.around + aimed).max(MIN_COSINE);
         let received = if receiver.normal == Vec3::ZERO {
             1.0
         } else {
-            clamped_mean(receiver.normal.dot(direction), scatter).max(LEAST_COSINE)
+            clamped_mean(receiver.normal.dot(direction), scatter).max(MIN_COSINE)
         };
         self.intensity * emitted * received * inverse_squared
     }

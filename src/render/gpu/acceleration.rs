@@ -37,7 +37,7 @@ struct Lower {
 const BYTES_OF_POSITION: u64 = 12;
 
 /// Most that a number in an instance may be, one more than which it is.
-const MOST_INSTANCES: usize = (1 << 24) - 2;
+const MAX_INSTANCES: usize = (1 << 24) - 2;
 
 impl Acceleration {
     /// Builds the tree; `flags_of` are those of a triangle's material.
@@ -64,7 +64,7 @@ impl Acceleration {
             return Err(Error::new(sentence));
         }
         let count = scene.instances.len();
-        let most = MOST_INSTANCES.min(gpu.limits.max_tlas_instance_count as usize - 1);
+        let most = MAX_INSTANCES.min(gpu.limits.max_tlas_instance_count as usize - 1);
         if count > most {
             let sentence = format!("{count} instances: {name}'s ray queries take {most}");
             return Err(Error::new(sentence));

@@ -9,20 +9,20 @@ use super::pipeline::{Pipeline, Programs, no_thread};
 use crate::error::{Error, Result};
 
 /// What is held for as long as a thread compiles.
-pub(crate) type Held = dyn Any + Send + Sync;
+pub(crate) type CompileGuard = dyn Any + Send + Sync;
 
 /// Kernels that are to be compiled ahead.
 #[derive(Default)]
 pub(super) struct Ahead {
     /// The sources that threads compile, and what those hold.
-    under_way: Vec<(Vec<String>, Weak<Held>)>,
+    under_way: Vec<(Vec<String>, Weak<CompileGuard>)>,
     /// Sources that were refused last, and why.
     refused: Option<(Vec<String>, Error)>,
 }
 
 impl Ahead {
     /// What the thread holds that compiles these, if there is one.
-    fn holder_of(&mut self, sources: &[String]) -> Option<Weak<Held>> {
+    fn holder_of(&mut self, sources: &[String]) -> Option<Weak<CompileGuard>> {
         self.under_way.retain(|(_, held)| held.strong_count() > 0);
         let found = self.under_way.iter().find(|(others, _)| others == sources);
         found.map(|(_, held)| Weak::clone(held))
@@ -30,9 +30,9 @@ impl Ahead {
 }
 
 /// Kernels, or what is held by the thread that compiles them.
-pub(crate) enum OrHeld<T> {
+pub(crate) enum MaybeReady<T> {
     Ready(T),
-    Held(Weak<Held>),
+    CompileGuard(Weak<CompileGuard>),
 }
 
 impl Gpu {
@@ -44,8 +44,8 @@ impl Gpu {
     pub(super) fn pipelines_or_held(
         &self,
         programs: Programs,
-        until_then: impl FnOnce() -> Arc<Held>,
-    ) -> Result<OrHeld<Vec<Arc<Pipeline>>>> {
+        until_then: impl FnOnce() -> Arc<CompileGuard>,
+    ) -> Result<MaybeReady<Vec<Arc<Pipeline>>>> {
         let sources: Vec<_> = programs.iter().map(|(_, program)| program.source.clone()).collect();
         let mut known = self.known_pipelines();
         if let Some((_, error)) = known.ahead.refused.take_if(|(of, _)| *of == sources) {
@@ -53,10 +53,10 @@ impl Gpu {
         }
         let found: Option<Vec<_>> = sources.iter().map(|source| known.find(source)).collect();
         if let Some(found) = found {
-            return Ok(OrHeld::Ready(found));
+            return Ok(MaybeReady::Ready(found));
         }
         if let Some(held) = known.ahead.holder_of(&sources) {
-            return Ok(OrHeld::Held(held));
+            return Ok(MaybeReady::CompileGuard(held));
         }
         let (gpu, held) = (self.clone(), until_then());
         let holder = Arc::downgrade(&held);
@@ -77,7 +77,7 @@ impl Gpu {
             .name("kernels".to_owned())
             .spawn(compile)
             .map_err(|error| no_thread(&error))?;
-        Ok(OrHeld::Held(holder))
+        Ok(MaybeReady::CompileGuard(holder))
     }
 }
 
@@ -99,15 +99,15 @@ mod tests {
             vec![program(Kernel::Trace), program(Kernel::Shade)]
         };
         let ask = |body: &str| gpu.pipelines_or_held(programs(body), || Arc::new(()));
-        let wait_for = |held: &Weak<Held>| {
+        let wait_for = |held: &Weak<CompileGuard>| {
             while held.strong_count() > 0 {
                 std::thread::sleep(std::time::Duration::from_millis(1));
             }
         };
         let compile = |body: &str| {
-            let Ok(OrHeld::Held(held)) = ask(body) else { panic!("it is there") };
+            let Ok(MaybeReady::CompileGuard(held)) = ask(body) else { panic!("it is there") };
             let again = match ask(body) {
-                Ok(OrHeld::Held(again)) => again.ptr_eq(&held),
+                Ok(MaybeReady::CompileGuard(again)) => again.ptr_eq(&held),
                 // It may be there already.
                 _ => true,
             };
@@ -115,18 +115,21 @@ mod tests {
             wait_for(&held);
         };
         let is_ready =
-            |body: &str| matches!(ask(body), Ok(OrHeld::Ready(found)) if found.len() == 2);
+            |body: &str| matches!(ask(body), Ok(MaybeReady::Ready(found)) if found.len() == 2);
         compile("return;");
         assert!(is_ready("return;"));
         let begun = ask("return 1;");
-        assert!(matches!(begun, Ok(OrHeld::Held(_))));
+        assert!(matches!(begun, Ok(MaybeReady::CompileGuard(_))));
         // Nobody else's kernels are blamed.
         assert!(is_ready("return;"));
-        if let Ok(OrHeld::Held(held)) = begun {
+        if let Ok(MaybeReady::CompileGuard(held)) = begun {
             wait_for(&held);
         }
         let refused = ask("return 1;").err().expect("it is no program").to_string();
         assert!(refused.starts_with(&gpu.facts().name), "{refused}");
-        assert!(matches!(ask("return 1;"), Ok(OrHeld::Held(_))), "said once, it is tried again");
+        assert!(
+            matches!(ask("return 1;"), Ok(MaybeReady::CompileGuard(_))),
+            "said once, it is tried again"
+        );
     }
 }

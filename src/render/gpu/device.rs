@@ -107,7 +107,7 @@ pub struct Gpu {
 }
 
 /// Storage buffers that a kernel has at most, arrays among them. Metal allows 29.
-pub(super) const MOST_STORAGE_BUFFERS: u32 = 28;
+pub(super) const MAX_STORAGE_BUFFERS: u32 = 28;
 
 /// What wgpu 30 says where [`Gpu::alone`] should have been asked, but egui's painter cannot.
 const SURFACE_IS_BUSY: &str = "come idle before reconfiguring the Surface";
@@ -224,7 +224,7 @@ impl Gpu {
                 note(&failed, sentence);
             }
         }));
-        let prefers_buffers = !facts.is_software() && facts.storage_buffers >= MOST_STORAGE_BUFFERS;
+        let prefers_buffers = !facts.is_software() && facts.storage_buffers >= MAX_STORAGE_BUFFERS;
         let gpu = Self {
             facts,
             instance,

@@ -17,7 +17,7 @@ use crate::render::gpu_facts::FlightFigures;
 pub(super) const REPORT_BYTES: u64 = 16;
 
 /// Dispatches under way at a time: one runs, one waits, one is being made.
-const MOST: usize = 3;
+const MAX_IN_FLIGHT: usize = 3;
 /// So many times the time a dispatch should take on the host's clock, and the device's is not believed.
 const FAR_TOO_LONG: f64 = 10.0;
 /// Waiting for something that has ended takes less.
@@ -33,7 +33,7 @@ pub(super) struct Flights {
     last_landing: Instant,
     clock: Option<Clock>,
     /// For words of a buffer that a job reports.
-    staging: Option<[Buffer; MOST]>,
+    staging: Option<[Buffer; MAX_IN_FLIGHT]>,
     report: Option<[u32; 4]>,
     started: usize,
     figures: FlightFigures,
@@ -100,10 +100,10 @@ impl Flights {
 
     /// Submits a job, once there is room for it.
     pub(super) fn start(&mut self, gpu: &Gpu, job: &Job<'_>) -> Result<()> {
-        while self.under_way.len() >= MOST {
+        while self.under_way.len() >= MAX_IN_FLIGHT {
             self.land(gpu)?;
         }
-        let slot = self.started % MOST;
+        let slot = self.started % MAX_IN_FLIGHT;
         self.started += 1;
         let mut commands = gpu.device.create_command_encoder(&Default::default());
         {
@@ -217,7 +217,7 @@ impl Flights {
 struct Clock {
     queries: wgpu::QuerySet,
     resolved: Buffer,
-    staging: [Buffer; MOST],
+    staging: [Buffer; MAX_IN_FLIGHT],
     seconds_per_tick: f64,
 }
 
@@ -236,11 +236,11 @@ impl Clock {
             queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("timestamps"),
                 ty: wgpu::QueryType::Timestamp,
-                count: 2 * MOST as u32,
+                count: 2 * MAX_IN_FLIGHT as u32,
             }),
             resolved: gpu.device.create_buffer(&BufferDescriptor {
                 label: Some("timestamps"),
-                size: SLOT_BYTES * MOST as u64,
+                size: SLOT_BYTES * MAX_IN_FLIGHT as u64,
                 usage: BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC,
                 mapped_at_creation: false,
             }),

@@ -6,7 +6,7 @@
 
 mod acceleration;
 #[cfg(feature = "window")]
-mod ahead;
+mod background_compile;
 mod bound;
 mod buffers;
 mod cast;
@@ -49,7 +49,7 @@ use crate::path::World;
 use crate::path::camera::CameraRays;
 use crate::radiance_cache::RadianceCache;
 #[cfg(feature = "window")]
-pub(crate) use ahead::{Held, OrHeld};
+pub(crate) use background_compile::{CompileGuard, MaybeReady};
 use bound::Bound;
 use buffers::Buffers;
 use film::Sums;
@@ -78,11 +78,11 @@ const GROUP: u64 = 64;
 /// Most workgroups of one dispatch (WebGPU's limit along an axis).
 const MAX_GROUPS: u64 = 65_535;
 /// Tiles of a dispatch that keep a software device's cores busy.
-const LEAST_TILES_OF_SOFTWARE: u64 = 4;
+const MIN_TILES_ON_SOFTWARE: u64 = 4;
 /// Tiles of a dispatch that keep a small and a large real device busy.
-const LEAST_TILES: [u64; 2] = [64, 1024];
+const MIN_TILES: [u64; 2] = [64, 1024];
 /// Most samples of a pixel in one dispatch.
-const MOST_SAMPLES: u32 = 64;
+const MAX_SAMPLES: u32 = 64;
 
 /// What the device holds of a picture in the making.
 pub(crate) struct Renderer {
@@ -101,8 +101,8 @@ pub(crate) struct Renderer {
     sharing: Option<Sharing>,
     film: Sums,
     progress: Progress,
-    /// Samples that the film began with and those that [`Advance`] has told of.
-    told: u64,
+    /// Samples that the film began with and those that [`Advance`] has reported_samples of.
+    reported_samples: u64,
     kernel_facts: KernelFacts,
     seed: u32,
 }
@@ -161,19 +161,19 @@ impl Renderer {
         view: &View,
         rays: &CameraRays,
         film: Option<&Film>,
-        until_then: impl FnOnce() -> Arc<Held>,
-    ) -> Result<OrHeld<Self>> {
+        until_then: impl FnOnce() -> Arc<CompileGuard>,
+    ) -> Result<MaybeReady<Self>> {
         // A film is large, and uploaded when it is wanted.
         let lit = (world, environment);
         let mut renderer = Self::with_buffers(uploaded, lit, view, rays, None)?;
         let kernels = renderer.own_kernels();
         let programs = renderer.programs(&kernels);
         match renderer.gpu.pipelines_or_held(programs, until_then)? {
-            OrHeld::Held(held) => Ok(OrHeld::Held(held)),
-            OrHeld::Ready(compiled) => {
+            MaybeReady::CompileGuard(held) => Ok(MaybeReady::CompileGuard(held)),
+            MaybeReady::Ready(compiled) => {
                 renderer.take_up(&kernels, compiled);
                 film.map_or(Ok(()), |film| renderer.set_film(film))?;
-                Ok(OrHeld::Ready(renderer))
+                Ok(MaybeReady::Ready(renderer))
             }
         }
     }
@@ -259,7 +259,7 @@ impl Renderer {
             sharing,
             film: sums,
             progress,
-            told: 0,
+            reported_samples: 0,
             gpu: uploaded.gpu.clone(),
             buffers,
             globals,
@@ -270,7 +270,7 @@ impl Renderer {
         };
         renderer.set_cache(None)?;
         renderer.write_globals();
-        renderer.told = renderer.total_samples();
+        renderer.reported_samples = renderer.total_samples();
         Ok(renderer)
     }
 
@@ -280,7 +280,7 @@ impl Renderer {
         self.forget_paths()?;
         self.film.write(&self.buffers, film)?;
         self.progress = Progress::of(film);
-        self.told = self.total_samples();
+        self.reported_samples = self.total_samples();
         Ok(())
     }
 
@@ -349,17 +349,17 @@ impl Renderer {
         if let Some(learning) = counts {
             self.take_counters(learning)?;
         }
-        let samples = self.total_samples().saturating_sub(self.told);
-        self.told += samples;
+        let samples = self.total_samples().saturating_sub(self.reported_samples);
+        self.reported_samples += samples;
         Ok(Advance { samples, least: self.progress.least })
     }
 
     /// How many tiles a dispatch has at least, if the device affords so many units of work: what takes a large
     /// one no time may take a small one so long that a desktop stutters.
     fn least_tiles(&self, units: u64) -> u64 {
-        let [small, large] = LEAST_TILES;
+        let [small, large] = MIN_TILES;
         match self.gpu.facts().is_software() {
-            true => LEAST_TILES_OF_SOFTWARE,
+            true => MIN_TILES_ON_SOFTWARE,
             false => units.clamp(small, large),
         }
     }
@@ -373,7 +373,7 @@ impl Renderer {
             let first = self.progress.tile;
             if self.progress.group == 0 {
                 let units = self.flights.units(Kernel::Render);
-                let affordable = units / u64::from(missing.min(MOST_SAMPLES));
+                let affordable = units / u64::from(missing.min(MAX_SAMPLES));
                 let count = affordable.clamp(self.least_tiles(units), MAX_GROUPS);
                 let count = count.min(tiles - first);
                 self.progress.group = count;
@@ -384,7 +384,7 @@ impl Renderer {
                     return Ok(());
                 }
                 let affordable = (self.flights.units(Kernel::Render) / count)
-                    .clamp(1, u64::from(MOST_SAMPLES)) as u32;
+                    .clamp(1, u64::from(MAX_SAMPLES)) as u32;
                 let samples = affordable.min(missing - self.progress.group_samples);
                 let work = Work {
                     first: first as u32,

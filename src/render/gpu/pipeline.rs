@@ -81,7 +81,7 @@ impl Pipeline {
 
 /// Most kernels that are kept for those who may want them again: those of some four scenes. Each is a megabyte
 /// or so where software runs it.
-const MOST: usize = 32;
+const MAX_KEPT_KERNELS: usize = 32;
 
 /// Kernels that were compiled.
 #[derive(Default)]
@@ -89,7 +89,7 @@ pub(super) struct Pipelines {
     /// The last one used at the end.
     kept: Vec<Arc<Pipeline>>,
     #[cfg(feature = "window")]
-    pub(super) ahead: super::ahead::Ahead,
+    pub(super) ahead: super::background_compile::Ahead,
 }
 
 impl Pipelines {
@@ -107,7 +107,7 @@ impl Pipelines {
         if self.find(&pipeline.program.source).is_some() {
             return;
         }
-        if self.kept.len() == MOST {
+        if self.kept.len() == MAX_KEPT_KERNELS {
             self.kept.remove(0);
         }
         self.kept.push(pipeline);
@@ -192,10 +192,10 @@ mod tests {
             gpu.pipeline(Kernel::Render, program).expect("compiled")
         };
         let [first, second] = [kernel(0), kernel(1)].map(|kernel| Arc::downgrade(&kernel));
-        (2..MOST).for_each(|number| drop(kernel(number)));
+        (2..MAX_KEPT_KERNELS).for_each(|number| drop(kernel(number)));
         let again = kernel(0);
         assert!(first.upgrade().is_some_and(|first| Arc::ptr_eq(&first, &again)), "not compiled");
-        drop(kernel(MOST));
+        drop(kernel(MAX_KEPT_KERNELS));
         assert!(second.upgrade().is_none() && first.upgrade().is_some(), "the longest unused goes");
     }
 }

@@ -18,11 +18,11 @@ use crate::render::gpu_facts::Schedule;
 
 /// Most workgroups of slots, which all take a step at a time: they keep the largest devices busy and fit their
 /// caches.
-const MOST_GROUPS: u64 = 4096;
+const MAX_GROUPS: u64 = 4096;
 /// The same where a processor draws as well: so many steps would make a desktop stutter.
-const MOST_GROUPS_INTEGRATED: u64 = 512;
+const MAX_GROUPS_INTEGRATED: u64 = 512;
 /// Most steps of all slots in one submission.
-const MOST_STEPS: u64 = 64;
+const MAX_STEPS: u64 = 64;
 
 impl Schedule {
     /// What suits a device. Small kernels run in more waves, and lanes whose paths have ended take others:
@@ -51,7 +51,7 @@ impl Queue {
         tiles: u64,
     ) -> Result<Self> {
         let is_integrated = gpu.facts().is_integrated();
-        let groups = tiles.min(if is_integrated { MOST_GROUPS_INTEGRATED } else { MOST_GROUPS });
+        let groups = tiles.min(if is_integrated { MAX_GROUPS_INTEGRATED } else { MAX_GROUPS });
         let slot_bytes = 16 * u64::from(SlotTexels::of(features).count);
         buffers.make("slots", groups * GROUP * slot_bytes, "the set of paths")?;
         buffers.make("queue", REPORT_BYTES, "a count")?;
@@ -78,7 +78,7 @@ impl Renderer {
             if cancel.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let steps = (self.flights.units(Kernel::Trace) / groups).clamp(1, MOST_STEPS);
+            let steps = (self.flights.units(Kernel::Trace) / groups).clamp(1, MAX_STEPS);
             let kernels = self.render_kernels().iter().map(|kernel| self.bound(*kernel));
             let kernels = kernels.collect::<Result<Vec<_>>>()?;
             self.buffers.write("globals", 0, bytemuck::bytes_of(&work));

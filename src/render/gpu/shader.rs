@@ -478,7 +478,7 @@ fn keep_lines(text: &str, features: Features, source: &mut String) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::device::MOST_STORAGE_BUFFERS;
+    use super::super::device::MAX_STORAGE_BUFFERS;
     use super::*;
 
     #[test]
@@ -516,7 +516,7 @@ mod tests {
         assert_eq!(entries, [kernel.name()]);
         let is_buffer = |binding: &&Binding| matches!(binding, Binding::Buffer { .. });
         let buffers = program.bindings.iter().filter(is_buffer).count();
-        assert!(buffers as u32 <= MOST_STORAGE_BUFFERS, "{names:?}: {buffers} storage buffers");
+        assert!(buffers as u32 <= MAX_STORAGE_BUFFERS, "{names:?}: {buffers} storage buffers");
     }
 
     /// Divisions and remainders of integers by what is no constant. naga does not guard them (see

@@ -13,7 +13,7 @@ use crate::features::Features;
 use crate::path::sharing::SharedTile;
 
 /// Most workgroups whose vertices are kept at a time: they keep the largest devices busy.
-const MOST_GROUPS: u64 = 4096;
+const MAX_GROUPS: u64 = 4096;
 
 /// What a renderer keeps of pixels that share.
 #[derive(Debug, Clone, Copy)]
@@ -34,7 +34,7 @@ impl Sharing {
     ) -> Result<Self> {
         // Tiles stick out of the picture on all sides.
         let tiles = size.map(|pixels| u64::from(pixels.div_ceil(tile.side)) + 1);
-        let most_groups = (tiles[0] * tiles[1]).div_ceil(tiles_of_group(tile)).min(MOST_GROUPS);
+        let most_groups = (tiles[0] * tiles[1]).div_ceil(tiles_of_group(tile)).min(MAX_GROUPS);
         let first_texels = if features.contains(Features::LAYERS) { 5 } else { 3 };
         let lights = [Features::MAP_SAMPLING, Features::LOCAL_LIGHTS]
             .map(|feature| u64::from(features.contains(feature)));

@@ -10,7 +10,7 @@ use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid, RenderedPaths};
 use crate::path::World;
 use crate::path::camera::CameraRays;
-use crate::render::outlook::{ROOM_ENCLOSURE, enclosure, middle_distance};
+use crate::render::view_probe::{ROOM_ENCLOSURE, enclosure, middle_distance};
 use crate::render::{View, cpu};
 
 /// Learning under way, or over.
@@ -45,7 +45,7 @@ const LAST_LEARNING_SAMPLE: u32 = 4;
 
 /// How far the camera may be from the centre of cells that were learned in, over the middle distance of
 /// what it sees.
-const MOST_MOVED: f32 = 0.5;
+const MAX_MOVED: f32 = 0.5;
 
 impl Learning {
     /// Whether nothing is counted any more.
@@ -95,7 +95,7 @@ impl Session<'_> {
             [self.state.view.width, self.state.view.height],
             &self.state.rays,
         )
-        .is_some_and(|distance| moved <= MOST_MOVED * distance);
+        .is_some_and(|distance| moved <= MAX_MOVED * distance);
         if !is_near || !counted.is_like(&learning.grid) {
             return Ok(false);
         }

@@ -19,7 +19,7 @@ mod state;
 use host_film::HostFilm;
 use learning::{Learning, Stage};
 pub use noise::Doubling;
-use noise::LEAST_SAMPLES_OF_NOISE;
+use noise::MIN_SAMPLES_FOR_NOISE;
 pub(crate) use state::SessionState;
 use state::Spent;
 
@@ -218,13 +218,13 @@ impl<'a> Session<'a> {
     pub(crate) fn continue_on_gpu_if_compiled(
         &mut self,
         uploaded: &gpu::UploadedScene,
-        until_then: impl FnOnce() -> Arc<gpu::Held>,
-    ) -> Result<Option<Weak<gpu::Held>>> {
+        until_then: impl FnOnce() -> Arc<gpu::CompileGuard>,
+    ) -> Result<Option<Weak<gpu::CompileGuard>>> {
         let (world, env) = (self.world, self.environment);
         let (view, rays, film) = (&self.state.view, &self.state.rays, self.film_to_go_on());
         match gpu::Renderer::new_or_held(uploaded, world, env, view, rays, film, until_then)? {
-            gpu::OrHeld::Held(held) => Ok(Some(held)),
-            gpu::OrHeld::Ready(renderer) => self.move_to(renderer).map(|()| None),
+            gpu::MaybeReady::CompileGuard(held) => Ok(Some(held)),
+            gpu::MaybeReady::Ready(renderer) => self.move_to(renderer).map(|()| None),
         }
     }
 
@@ -437,7 +437,7 @@ impl<'a> Session<'a> {
         let samples = self.state.samples;
         rule.samples.is_some_and(|limit| samples >= limit)
             || (samples > 0 && rule.seconds.is_some_and(|limit| self.elapsed_seconds() >= limit))
-            || (samples >= LEAST_SAMPLES_OF_NOISE
+            || (samples >= MIN_SAMPLES_FOR_NOISE
                 && rule.noise.is_some_and(|limit| self.noise() <= limit))
     }
 

@@ -14,14 +14,14 @@ use crate::metrics::trimmed_mean;
 use crate::render::film::{Film, Pixel, relative};
 
 /// Fewest samples a pixel with which noise ends a picture.
-pub(super) const LEAST_SAMPLES_OF_NOISE: u32 = 16;
+pub(super) const MIN_SAMPLES_FOR_NOISE: u32 = 16;
 /// Fewest samples a pixel of a picture on the CPU that a later one is compared with, to find its noise.
 const FIRST_NOTED: u32 = 2;
 /// Of how many pixels at most, spread over the picture.
-const MOST_PIXELS: usize = 1 << 14;
+const MAX_PIXELS: usize = 1 << 14;
 /// Fewer pixels tell too little of what is saved: of few squares, the largest left out, the mean is too small (0.65 of
 /// it for 4, 0.98 for 256).
-const FEWEST_PIXELS: usize = 1 << 8;
+const MIN_PIXELS: usize = 1 << 8;
 
 /// Some pixels as they were when they had at most half their samples. A checkpoint keeps it, to the bit.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -45,7 +45,7 @@ impl Doubling {
         if samples < first.max(self.samples.saturating_mul(2)) {
             return;
         }
-        let stride = film.pixels().len().div_ceil(MOST_PIXELS).max(1);
+        let stride = film.pixels().len().div_ceil(MAX_PIXELS).max(1);
         let chosen = film.pixels().iter().step_by(stride);
         let scales = film.error_scales(stride);
         let (mut found, mut told) = (Vec::new(), Vec::new());
@@ -56,7 +56,7 @@ impl Doubling {
             }
         }
         let saved = 1.0 - trimmed_mean(&mut found) / trimmed_mean(&mut told);
-        if saved.is_finite() && found.len() >= FEWEST_PIXELS {
+        if saved.is_finite() && found.len() >= MIN_PIXELS {
             self.saved = saved.to_bits();
         }
         let noted = |pixel: &Pixel| (pixel.samples(), pixel.mean_luminance().to_bits());
@@ -98,7 +98,7 @@ impl Session<'_> {
     /// this: it is noted when somebody asks, which is after equal samples only from those on with which
     /// noise can end a picture.
     pub(super) fn note_doubling(&self, film: &Film) {
-        let first = if self.is_on_gpu() { LEAST_SAMPLES_OF_NOISE } else { FIRST_NOTED };
+        let first = if self.is_on_gpu() { MIN_SAMPLES_FOR_NOISE } else { FIRST_NOTED };
         self.doubling().note(film, self.state.samples, first);
     }
 }

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::super::summary::{DeviceReport, Measure, Report};
+use super::format;
 use super::tables::Table;
-use super::words;
 
 pub(super) fn errors(report: &Report, device: &DeviceReport, html: &mut String) {
     let title = device.device.title();
@@ -16,12 +16,12 @@ pub(super) fn errors(report: &Report, device: &DeviceReport, html: &mut String) 
     for method in device.methods.iter().filter(|m| !m.runs.is_empty()) {
         let mut cells = vec![method.method.name.clone(), method.runs.len().to_string()];
         cells.extend(
-            Measure::ALL.map(|m| method.error(m).map_or_else(String::new, words::estimate)),
+            Measure::ALL.map(|m| method.error(m).map_or_else(String::new, format::estimate)),
         );
-        cells.push(words::plain_estimate(method.denoised_flip, 4));
+        cells.push(format::plain_estimate(method.denoised_flip, 4));
         let slope = method.slopes.iter().find(|(m, _)| *m == Measure::TrimmedRelMse);
-        cells.push(words::plain_estimate(slope.map(|(_, s)| *s), 2));
-        cells.push(words::plain_estimate(method.mean_ratio, 4));
+        cells.push(format::plain_estimate(slope.map(|(_, s)| *s), 2));
+        cells.push(format::plain_estimate(method.mean_ratio, 4));
         table.row(&cells);
     }
     html.push_str(&table.finish());
@@ -37,10 +37,10 @@ pub(super) fn errors(report: &Report, device: &DeviceReport, html: &mut String) 
     let mut table = Table::new(&head.iter().map(String::as_str).collect::<Vec<_>>());
     for method in device.methods.iter().filter(|m| !m.runs.is_empty()) {
         let mut cells = vec![method.method.name.clone()];
-        let over = |name: &str, measure| words::speed_up_cell(method, name, measure);
+        let over = |name: &str, measure| format::speed_up_cell(method, name, measure);
         cells.extend(names.iter().skip(1).map(|name| over(name, Measure::TrimmedRelMse)));
         cells.extend(Measure::ALL.iter().map(|m| over(names[0], *m)));
-        cells.push(method.without_learning.map_or_else(String::new, words::ratio));
+        cells.push(method.without_learning.map_or_else(String::new, format::ratio));
         table.row(&cells);
     }
     html.push_str(&table.finish());
@@ -104,12 +104,12 @@ fn memory(device: &DeviceReport, html: &mut String) {
         let m = &method.memory;
         table.row(&[
             method.method.name.clone(),
-            words::megabytes(m.grid_bytes),
-            words::megabytes(m.grid_peak_bytes),
+            format::megabytes(m.grid_bytes),
+            format::megabytes(m.grid_peak_bytes),
             format!("{:.0}", method.costs.learned_cells),
-            words::megabytes(m.table_bytes),
-            words::megabytes(m.bvh_bytes),
-            m.device_bytes.map_or_else(String::new, words::megabytes),
+            format::megabytes(m.table_bytes),
+            format::megabytes(m.bvh_bytes),
+            m.device_bytes.map_or_else(String::new, format::megabytes),
         ]);
     }
     html.push_str(&table.finish());

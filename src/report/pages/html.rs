@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::super::plan::device_names;
 use super::super::summary::Report;
-use super::words::percent;
+use super::format::percent;
 use super::{escape, overview, sections};
 use crate::error::Result;
 

@@ -5,6 +5,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 mod devices;
+mod format;
 mod html;
 mod overview;
 mod pictures;
@@ -12,9 +13,8 @@ mod plots;
 mod sections;
 mod svg;
 mod tables;
-mod words;
 
-pub use words::{duration, markdown_table, row_sentence};
+pub use format::{duration, markdown_table, row_sentence};
 
 use super::summary::{Measure, Report};
 use crate::error::Result;

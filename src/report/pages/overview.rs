@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use super::super::summary::{DeviceReport, Measure, MethodReport, Report, RowReport};
 use super::escape;
+use super::format::{self, baseline, is_long};
 use super::plots::{Entry, ratio_plot};
 use super::tables::Table;
-use super::words::{self, baseline, is_long};
 
 /// What came out, in one table and one plot.
 pub(super) fn overview(report: &Report, html: &mut String) {
@@ -18,14 +18,14 @@ pub(super) fn overview(report: &Report, html: &mut String) {
     if let Some(plot) = overview_plot(report) {
         let _ = writeln!(html, "<div class=\"plots\">{plot}</div>");
     }
-    let mut table = Table::new(&words::results_head(report));
+    let mut table = Table::new(&format::results_head(report));
     for row in &report.rows {
         for device in &row.devices {
             if let Some(reason) = &device.not_measured {
                 table.remark(&row.row.title, &format!("{}: {reason}", device.device.title()));
                 continue;
             }
-            table.row(&words::results_cells(report, row, device));
+            table.row(&format::results_cells(report, row, device));
         }
     }
     let _ = writeln!(
@@ -53,7 +53,7 @@ pub(super) fn overview_plot(report: &Report) -> Option<String> {
             entries.push(Entry {
                 title: format!("{}, {}", row.row.title, device.device.title()),
                 ratios: ratios.collect(),
-                published: words::published(row, device.device),
+                published: format::published(row, device.device),
                 target: row.row.target,
             });
         }
@@ -88,8 +88,8 @@ fn ablation_table(report: &Report, html: &mut String) {
         let is_whole = !known.is_empty() && known.len() == found.len();
         let mean = is_whole.then(|| (known.iter().sum::<f64>() / known.len() as f64).exp());
         let mut cells = vec![method.name.clone()];
-        cells.push(mean.map_or_else(String::new, words::ratio));
-        cells.extend(found.into_iter().map(|s| s.map_or_else(String::new, words::speed_up)));
+        cells.push(mean.map_or_else(String::new, format::ratio));
+        cells.extend(found.into_iter().map(|s| s.map_or_else(String::new, format::speed_up)));
         table.row(&cells);
         if let Some(mean) = mean {
             let ratios = vec![(method.name.clone(), mean, None)];

@@ -4,13 +4,14 @@ use std::fmt::Write as _;
 
 use super::super::statistics::Estimate;
 use super::super::summary::{Measure, Report, RowReport};
+use super::format;
 use super::pictures::{Window, data_uri, developed};
 use super::plots::error_plot;
 use super::tables::Table;
-use super::words;
 use super::{
-    devices, escape, overview,
-    words::{baseline, is_long, percent},
+    devices, escape,
+    format::{baseline, is_long, percent},
+    overview,
 };
 use crate::error::Result;
 use crate::image::Rgb8;
@@ -57,7 +58,7 @@ fn biases(row: &RowReport, html: &mut String) {
             bias.method.clone(),
             bias.device.clone(),
             percent(bias.root()),
-            words::estimate(squared),
+            format::estimate(squared),
         ]);
     }
     html.push_str(&table.finish());
@@ -80,7 +81,7 @@ fn facts(row: &RowReport) -> String {
             " Reference: {} pictures of {} samples per pixel, rendered in {} on {}.",
             facts.pictures,
             facts.samples_per_picture,
-            words::duration(facts.seconds),
+            format::duration(facts.seconds),
             facts.device
         );
     }
@@ -92,7 +93,7 @@ fn facts(row: &RowReport) -> String {
             let _ = write!(
                 text,
                 " Its own trimmed relMSE is {}, {} of the smallest error{}.",
-                words::error(noise.trimmed_rel_mse),
+                format::error(noise.trimmed_rel_mse),
                 percent(share),
                 if reference.is_good { "" } else { ": too much" }
             );
@@ -123,7 +124,7 @@ fn pictures(report: &Report, row: &RowReport, html: &mut String) -> Result<()> {
             let last = device.method(name).and_then(|m| m.runs.first()?.points.last().copied());
             let caption = last.map_or_else(String::new, |point| {
                 let error = point.errors.map_or_else(String::new, |e| {
-                    format!(", trimmed relMSE {}", words::error(e.trimmed_rel_mse))
+                    format!(", trimmed relMSE {}", format::error(e.trimmed_rel_mse))
                 });
                 format!("{:.1} s, {} samples{error}", point.seconds, point.samples)
             });
@@ -170,17 +171,17 @@ fn what_is_left(report: &Report, row: &RowReport, html: &mut String) {
         &against[1],
     ]);
     for s in &row.shares {
-        let part = |value: f64| format!("{} ({})", words::error(value), percent(value / s.total));
+        let part = |value: f64| format!("{} ({})", format::error(value), percent(value / s.total));
         table.row(&[
             s.method.clone(),
             s.samples.to_string(),
-            words::error(s.total),
+            format::error(s.total),
             part(s.first_vertex),
             part(s.later_vertices),
             part(s.filter),
             percent(s.together() / s.total),
-            words::ratio(first.first_vertex / s.first_vertex),
-            words::ratio(first.later_vertices / s.later_vertices),
+            format::ratio(first.first_vertex / s.first_vertex),
+            format::ratio(first.later_vertices / s.later_vertices),
         ]);
     }
     html.push_str(&table.finish());
@@ -192,16 +193,16 @@ fn what_is_left(report: &Report, row: &RowReport, html: &mut String) {
                 html,
                 "<p><b>{}: {} of the target of {target}</b> ({}).</p>",
                 device.device.title(),
-                words::verdict(found, target),
-                words::speed_up(found)
+                format::verdict(found, target),
+                format::speed_up(found)
             );
         }
     }
     for shares in &row.shares {
-        let _ = writeln!(html, "<p>{}</p>", escape(&words::shares_sentence(shares)));
+        let _ = writeln!(html, "<p>{}</p>", escape(&format::shares_sentence(shares)));
     }
     for device in &row.devices {
-        if let Some(sentence) = words::bound_sentence(row, device, baseline) {
+        if let Some(sentence) = format::bound_sentence(row, device, baseline) {
             let _ = writeln!(html, "<p>{}</p>", escape(&sentence));
         }
     }

@@ -2,18 +2,18 @@
 
 use super::super::bias::Bias;
 use super::super::measure::Run;
-use super::super::plan::LEAST_PICTURES;
+use super::super::plan::MIN_PICTURES;
 use super::super::plan::{SHARE_RUNS, Settings};
 use super::super::reference::Noise;
 use super::super::shares::shares;
 use super::super::summary::{Measure, ReferenceReport};
-use super::{Conductor, Work};
+use super::{Runner, Work};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::metrics::compare;
 use crate::render::Sampling;
 
-impl Conductor<'_> {
+impl Runner<'_> {
     /// The device that references are made on: a real GPU that can do the row, or the first.
     fn fastest(&self, work: &Work) -> usize {
         let can = |index: &usize| work.refusals[*index].is_none();
@@ -28,7 +28,7 @@ impl Conductor<'_> {
         }
         let reference = work.reference.as_ref()?;
         let pictures = reference.facts.pictures;
-        (pictures >= LEAST_PICTURES).then(|| (reference.image(), Some(pictures)))
+        (pictures >= MIN_PICTURES).then(|| (reference.image(), Some(pictures)))
     }
 
     /// Adds pictures to the reference until there are so many; `false` if it was cancelled.
@@ -170,7 +170,7 @@ impl Conductor<'_> {
         let error = smallest_error(work);
         let noise = match &work.reference {
             Some(reference) => {
-                if reference.facts.pictures < LEAST_PICTURES {
+                if reference.facts.pictures < MIN_PICTURES {
                     return Ok(None);
                 }
                 Some(reference.noise())

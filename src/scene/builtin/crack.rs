@@ -2,12 +2,12 @@
 
 use glam::{Vec2, Vec3};
 
-use super::materials::{self as make, matte, textured};
+use super::materials::{self, matte, textured};
 use super::mesh::placed;
 use super::mesh::{Builder, Mat};
-use super::objects as thing;
+use super::objects;
 use super::room::{self, Hole, Shell};
-use super::textures as paint;
+use super::textures;
 use crate::scene::Scene;
 
 const SIZE: [f32; 3] = [4.0, 2.5, 3.0];
@@ -18,17 +18,17 @@ const SLIT: [f32; 4] = [0.75, 1.6, 2.25, 1.62];
 pub(super) fn build() -> Scene {
     let b = &mut Builder::new("crack");
     let bricks = b.texture(
-        paint::bricks([0.62, 0.42, 0.32], [0.60, 0.57, 0.52], 6, 18),
+        textures::bricks([0.62, 0.42, 0.32], [0.60, 0.57, 0.52], 6, 18),
         Vec2::new(1.5, 1.35),
     );
-    let slabs = b.texture(paint::stones([0.46, 0.43, 0.39], 4, 3, 0.02), Vec2::splat(2.0));
-    let pine = b.texture(paint::timber([0.58, 0.42, 0.25]), Vec2::new(1.2, 0.6));
+    let slabs = b.texture(textures::stones([0.46, 0.43, 0.39], 4, 3, 0.02), Vec2::splat(2.0));
+    let pine = b.texture(textures::timber([0.58, 0.42, 0.25]), Vec2::new(1.2, 0.6));
     let brick = b.material(textured("brick", bricks, 0.9));
     let floor = b.material(textured("stone floor", slabs, 0.7));
     let ceiling = b.material(matte("lime wash", [0.74, 0.72, 0.68], 0.95));
     let wood = b.material(textured("pine", pine, 0.6));
-    let iron = b.material(make::metal("iron", [0.30, 0.28, 0.27], 0.5));
-    let copper = b.material(make::copper());
+    let iron = b.material(materials::metal("iron", [0.30, 0.28, 0.27], 0.5));
+    let copper = b.material(materials::copper());
     let clay = b.material(matte("glazed clay", [0.50, 0.26, 0.14], 0.25));
     let sack = b.material(matte("sackcloth", [0.56, 0.46, 0.31], 0.95));
 
@@ -50,11 +50,11 @@ pub(super) fn build() -> Scene {
         b.standing(Vec3::new(x, 0.0, z), 30.0, |b| barrel(b, wood, iron, 0.85 * s));
     }
     b.standing(Vec3::new(0.62, 0.461, 0.20), 30.0, |b| {
-        thing::vase(b, clay, 0.34, &[0.20, 0.34, 0.38, 0.26, 0.11, 0.14]);
+        objects::vase(b, clay, 0.34, &[0.20, 0.34, 0.38, 0.26, 0.11, 0.14]);
     });
-    b.standing(Vec3::new(0.88, 0.461, 0.28), 0.0, |b| thing::bowl(b, copper, 0.11, 0.07));
+    b.standing(Vec3::new(0.88, 0.461, 0.28), 0.0, |b| objects::bowl(b, copper, 0.11, 0.07));
     b.standing(Vec3::new(-0.50, 0.982, -0.62), 0.0, |b| {
-        thing::vase(b, copper, 0.24, &[0.3, 0.42, 0.36, 0.2, 0.24]);
+        objects::vase(b, copper, 0.24, &[0.3, 0.42, 0.36, 0.2, 0.24]);
     });
     for (x, y, z, yaw, half) in [
         (0.55, 0.15, -1.15, 10.0, 0.30),

@@ -3,15 +3,15 @@
 
 use glam::{Vec2, Vec3};
 
-use super::furniture as piece;
-use super::materials::{self as make, embossed, matte, textured, two_sided, varnished};
+use super::furniture;
+use super::materials::{self, embossed, matte, textured, two_sided, varnished};
 use super::mesh::placed;
 use super::mesh::{Builder, LIFT, Mat};
-use super::objects as thing;
+use super::objects;
 use super::plants;
 use super::reliefs as relief;
 use super::room::{self, Hole, Shell};
-use super::textures as paint;
+use super::textures;
 use super::{fittings, lamps, seating};
 use crate::scene::{Material, Scene};
 
@@ -56,30 +56,30 @@ struct Palette {
 impl Palette {
     fn new(b: &mut Builder, lamps: [f32; 3]) -> Self {
         let size = Vec2::splat(1.9);
-        let parquet = b.texture(paint::herringbone([0.46, 0.29, 0.16]), size);
+        let parquet = b.texture(textures::herringbone([0.46, 0.29, 0.16]), size);
         let blocks = b.data(relief::herringbone(size), size);
         let size = Vec2::new(1.4, 0.7);
-        let oak = b.texture(paint::timber([0.50, 0.34, 0.19]), size);
-        let walnut = b.texture(paint::timber([0.23, 0.13, 0.075]), size);
+        let oak = b.texture(textures::timber([0.50, 0.34, 0.19]), size);
+        let walnut = b.texture(textures::timber([0.23, 0.13, 0.075]), size);
         let grain = b.data(relief::timber(size), size);
         let size = Vec2::splat(2.5);
-        let plaster = b.texture(paint::plaster([0.78, 0.75, 0.69], 0.10), size);
-        let accent = b.texture(paint::plaster([0.24, 0.33, 0.30], 0.16), size);
+        let plaster = b.texture(textures::plaster([0.78, 0.75, 0.69], 0.10), size);
+        let accent = b.texture(textures::plaster([0.24, 0.33, 0.30], 0.16), size);
         let trowel = b.data(relief::plaster(size), size);
         let size = Vec2::splat(0.20);
-        let velvet = b.texture(paint::weave([0.52, 0.20, 0.085], 64), size);
+        let velvet = b.texture(textures::weave([0.52, 0.20, 0.085], 64), size);
         let pile = b.data(relief::weave(size, 64), size);
         let size = Vec2::splat(0.16);
-        let boucle = b.texture(paint::weave([0.74, 0.69, 0.60], 32), size);
+        let boucle = b.texture(textures::weave([0.74, 0.69, 0.60], 32), size);
         let loops = b.data(relief::weave(size, 32), size);
-        let linen = b.texture(paint::weave([0.72, 0.66, 0.56], 128), Vec2::splat(0.30));
-        let ochre = b.texture(paint::weave([0.58, 0.45, 0.27], 128), Vec2::splat(0.30));
+        let linen = b.texture(textures::weave([0.72, 0.66, 0.56], 128), Vec2::splat(0.30));
+        let ochre = b.texture(textures::weave([0.58, 0.45, 0.27], 128), Vec2::splat(0.30));
         let rug = b.texture(
-            paint::rug([0.66, 0.60, 0.50], [0.09, 0.14, 0.22], [0.46, 0.17, 0.09]),
+            textures::rug([0.66, 0.60, 0.50], [0.09, 0.14, 0.22], [0.46, 0.17, 0.09]),
             Vec2::new(2.9, 2.0),
         );
         let arts = [0, 1, 2].map(|k| {
-            let art = b.texture(paint::painting(k), Vec2::ONE);
+            let art = b.texture(textures::painting(k), Vec2::ONE);
             b.material(textured("painting", art, 0.55))
         });
         Self {
@@ -108,16 +108,16 @@ impl Palette {
             cotton: b.material(embossed(textured("cotton", boucle, 0.9), loops)),
             curtain: b.material(two_sided(textured("ochre linen", ochre, 0.9))),
             rug: b.material(two_sided(textured("rug", rug, 0.95))),
-            brass: b.material(make::brass()),
-            copper: b.material(make::copper()),
-            steel: b.material(make::steel()),
-            ceramic: b.material(make::ceramic()),
+            brass: b.material(materials::brass()),
+            copper: b.material(materials::copper()),
+            steel: b.material(materials::steel()),
+            ceramic: b.material(materials::ceramic()),
             stone: b.material(matte("marble", [0.70, 0.69, 0.67], 0.2)),
             clay: b.material(matte("terracotta", [0.52, 0.24, 0.14], 0.8)),
             soil: b.material(matte("soil", [0.06, 0.04, 0.03], 1.0)),
             leaf: b.material(two_sided(matte("leaf", [0.10, 0.24, 0.07], 0.4))),
             bark: b.material(matte("bark", [0.22, 0.15, 0.10], 0.9)),
-            glass: b.material(make::glass("vase glass", [0.86, 0.95, 0.93])),
+            glass: b.material(materials::glass("vase glass", [0.86, 0.95, 0.93])),
             black: b.material(matte("black metal", [0.03, 0.03, 0.03], 0.45)),
             cover: b.material(matte("book cover", [0.95; 3], 0.7)),
             paper: b.material(matte("paper", [0.78, 0.75, 0.68], 0.9)),
@@ -215,7 +215,7 @@ fn window(b: &mut Builder, m: &Palette) {
                     let soil = plants::pot(b, m.ceramic, m.soil, 0.065, 0.11);
                     b.standing(Vec3::Y * soil, 0.0, |b| plants::blades(b, m.leaf, 9, 0.26, 4));
                 }
-                1 => thing::vase(b, m.ceramic, 0.19, &[0.20, 0.33, 0.30, 0.13, 0.17]),
+                1 => objects::vase(b, m.ceramic, 0.19, &[0.20, 0.33, 0.30, 0.13, 0.17]),
                 _ => {
                     let soil = plants::pot(b, m.clay, m.soil, 0.07, 0.12);
                     b.standing(Vec3::Y * soil, 0.0, |b| plants::big_leaves(b, m.leaf, 9, 0.22, 9));
@@ -235,14 +235,14 @@ fn pictures(b: &mut Builder, m: &Palette) {
         {
             let frame = if k == 0 { m.brass } else { m.walnut };
             b.part(placed([u, v, 0.0], [0.0; 3]), |b| {
-                thing::picture(b, [frame, m.white, m.arts[k]], [w, h], 0.07);
+                objects::picture(b, [frame, m.white, m.arts[k]], [w, h], 0.07);
             });
         }
     });
 }
 
 fn seating(b: &mut Builder, m: &Palette) {
-    b.standing(Vec3::new(-0.1, 0.0, 0.05), 0.0, |b| piece::rug(b, m.rug, m.linen, [2.9, 2.0]));
+    b.standing(Vec3::new(-0.1, 0.0, 0.05), 0.0, |b| furniture::rug(b, m.rug, m.linen, [2.9, 2.0]));
     b.standing(Vec3::new(-0.45, 0.0, -1.92), 0.0, |b| {
         seating::sofa(b, m.velvet, m.walnut, 2.35, 3);
         for (k, (x, turn, tone)) in [
@@ -268,49 +268,45 @@ fn seating(b: &mut Builder, m: &Palette) {
         b.drum(m.black, [0.01, 0.50], [0.012, 0.012], 0.002);
         b.drum(m.walnut, [0.49, 0.512], [0.21, 0.21], 0.006);
         b.standing(Vec3::new(-0.05, 0.512, 0.02), 24.0, |b| {
-            thing::book_stack(b, [m.cover, m.paper], 2, 8);
+            objects::book_stack(b, [m.cover, m.paper], 2, 8);
         });
-        b.standing(Vec3::new(0.11, 0.512, 0.09), 140.0, |b| thing::mug(b, m.ceramic, m.soil));
+        b.standing(Vec3::new(0.11, 0.512, 0.09), 140.0, |b| objects::mug(b, m.ceramic, m.soil));
     });
 }
 
 fn coffee_table(b: &mut Builder, m: &Palette) {
     b.standing(Vec3::new(-0.35, 0.011, -0.10), 0.0, |b| {
-        piece::round_table(b, m.walnut, m.walnut, 0.52, 0.40);
+        furniture::round_table(b, m.walnut, m.walnut, 0.52, 0.40);
         b.standing(Vec3::new(-0.16, 0.40, -0.18), 0.0, |b| {
-            thing::vase(b, m.glass, 0.24, &[0.19, 0.26, 0.24, 0.13, 0.15]);
+            objects::vase(b, m.glass, 0.24, &[0.19, 0.26, 0.24, 0.13, 0.15]);
             b.standing(Vec3::Y * 0.012, 0.0, |b| plants::twigs(b, m.bark, m.leaf, 0.50, 12));
         });
         b.standing(Vec3::new(0.21, 0.40, -0.10), 0.0, |b| {
-            thing::bowl(b, m.brass, 0.15, 0.075);
-            thing::fruit(b, m.skin, m.bark, 0.15, 0.008);
+            objects::bowl(b, m.brass, 0.15, 0.075);
+            objects::fruit(b, m.skin, m.bark, 0.15, 0.008);
         });
         b.standing(Vec3::new(0.02, 0.40, 0.24), 12.0, |b| {
-            thing::book_stack(b, [m.cover, m.paper], 3, 21);
+            objects::book_stack(b, [m.cover, m.paper], 3, 21);
         });
-        b.standing(Vec3::new(-0.28, 0.40, 0.14), 200.0, |b| thing::mug(b, m.ceramic, m.soil));
+        b.standing(Vec3::new(-0.28, 0.40, 0.14), 200.0, |b| objects::mug(b, m.ceramic, m.soil));
     });
 }
 
 fn library(b: &mut Builder, m: &Palette) {
     b.standing(Vec3::new(-2.83, 0.0, -0.45), 90.0, |b| {
-        piece::bookcase(
-            b,
-            [m.oak, m.cover, m.paper],
-            [2.1, 2.15, 0.30],
-            5,
-            |b, row, free| match row {
-                0 => b.standing(Vec3::ZERO, 0.0, |b| thing::basket(b, m.linen)),
-                1 => thing::vase(b, m.ceramic, 0.26, &[0.18, 0.30, 0.36, 0.26, 0.12, 0.15]),
-                2 => thing::book_stack(b, [m.cover, m.paper], 4, 31),
+        furniture::bookcase(b, [m.oak, m.cover, m.paper], [2.1, 2.15, 0.30], 5, |b, row, free| {
+            match row {
+                0 => b.standing(Vec3::ZERO, 0.0, |b| objects::basket(b, m.linen)),
+                1 => objects::vase(b, m.ceramic, 0.26, &[0.18, 0.30, 0.36, 0.26, 0.12, 0.15]),
+                2 => objects::book_stack(b, [m.cover, m.paper], 4, 31),
                 3 => b.ball(m.copper, Vec3::Y * (0.09 - LIFT), 0.09),
                 _ if free > 0.2 => {
                     let soil = plants::pot(b, m.clay, m.soil, 0.07, 0.11);
                     b.standing(Vec3::Y * soil, 0.0, |b| plants::trailing(b, m.leaf, 0.07, 0.42, 2));
                 }
-                _ => thing::bowl(b, m.ceramic, 0.1, 0.06),
-            },
-        );
+                _ => objects::bowl(b, m.ceramic, 0.1, 0.06),
+            }
+        });
     });
 }
 
@@ -325,7 +321,7 @@ fn corners(b: &mut Builder, m: &Palette) {
     b.standing(Vec3::new(2.45, 0.0, -2.05), 0.0, |b| {
         b.drum(m.steel, [0.0, 0.42], [0.17, 0.17], 0.01);
         b.standing(Vec3::Y * 0.42, 0.0, |b| {
-            thing::vase(b, m.ceramic, 0.5, &[0.14, 0.22, 0.25, 0.18, 0.09, 0.12]);
+            objects::vase(b, m.ceramic, 0.5, &[0.14, 0.22, 0.25, 0.18, 0.09, 0.12]);
         });
     });
     b.part(placed([-0.35, SIZE[1], -0.1], [0.0; 3]), |b| {
@@ -337,16 +333,16 @@ fn corners(b: &mut Builder, m: &Palette) {
     });
     // A console by the door with a lamp.
     b.standing(Vec3::new(-1.4, 0.0, 2.28), 180.0, |b| {
-        piece::table(b, m.walnut, m.walnut, [1.2, 0.36, 0.78]);
+        furniture::table(b, m.walnut, m.walnut, [1.2, 0.36, 0.78]);
         b.standing(Vec3::new(-0.38, 0.78, 0.0), 0.0, |b| {
-            thing::vase(b, m.ceramic, 0.30, &[0.22, 0.34, 0.30, 0.16, 0.06]);
+            objects::vase(b, m.ceramic, 0.30, &[0.22, 0.34, 0.30, 0.16, 0.06]);
             b.part(placed([0.0, 0.56, 0.0], [0.0; 3]), |b| {
                 lamps::drum_shade(b, m.shade, 0.17, 0.13, 0.22);
             });
             b.rod(m.brass, Vec3::Y * 0.28, Vec3::Y * 0.56, 0.006);
         });
         b.standing(Vec3::new(0.30, 0.78, 0.02), 5.0, |b| {
-            thing::book_stack(b, [m.cover, m.paper], 4, 3);
+            objects::book_stack(b, [m.cover, m.paper], 4, 3);
         });
     });
 }

@@ -3,15 +3,15 @@
 
 use glam::{Vec2, Vec3};
 
-use super::furniture as piece;
-use super::materials::{self as make, embossed, matte, metal, textured, two_sided, varnished};
+use super::furniture;
+use super::materials::{self, embossed, matte, metal, textured, two_sided, varnished};
 use super::mesh::placed;
 use super::mesh::{Builder, Mat};
-use super::objects as thing;
+use super::objects;
 use super::plants;
 use super::reliefs as relief;
 use super::room::{self, Hole, Shell};
-use super::textures as paint;
+use super::textures;
 use super::{desktop, fittings, lamps, seating};
 use crate::scene::Scene;
 
@@ -50,26 +50,26 @@ struct Palette {
 impl Palette {
     fn new(b: &mut Builder) -> Self {
         let size = Vec2::new(2.6, 1.6);
-        let boards = b.texture(paint::planks([0.40, 0.27, 0.16], 10, 2), size);
+        let boards = b.texture(textures::planks([0.40, 0.27, 0.16], 10, 2), size);
         let joints = b.data(relief::planks(size, 10, 2), size);
         let size = Vec2::new(1.4, 0.7);
-        let oak = b.texture(paint::timber([0.52, 0.36, 0.21]), size);
+        let oak = b.texture(textures::timber([0.52, 0.36, 0.21]), size);
         let grain = b.data(relief::timber(size), size);
         let size = Vec2::splat(2.5);
-        let plaster = b.texture(paint::plaster([0.76, 0.74, 0.70], 0.10), size);
-        let feature = b.texture(paint::plaster([0.60, 0.41, 0.31], 0.14), size);
+        let plaster = b.texture(textures::plaster([0.76, 0.74, 0.70], 0.10), size);
+        let feature = b.texture(textures::plaster([0.60, 0.41, 0.31], 0.14), size);
         let trowel = b.data(relief::plaster(size), size);
         let size = Vec2::splat(0.19);
-        let blue = b.texture(paint::weave([0.16, 0.24, 0.36], 64), size);
-        let grey = b.texture(paint::weave([0.44, 0.43, 0.41], 64), size);
+        let blue = b.texture(textures::weave([0.16, 0.24, 0.36], 64), size);
+        let grey = b.texture(textures::weave([0.44, 0.43, 0.41], 64), size);
         let threads = b.data(relief::weave(size, 64), size);
-        let linen = b.texture(paint::weave([0.62, 0.55, 0.44], 128), Vec2::splat(0.3));
+        let linen = b.texture(textures::weave([0.62, 0.55, 0.44], 128), Vec2::splat(0.3));
         let rug = b.texture(
-            paint::rug([0.55, 0.52, 0.47], [0.14, 0.20, 0.28], [0.62, 0.42, 0.16]),
+            textures::rug([0.55, 0.52, 0.47], [0.14, 0.20, 0.28], [0.62, 0.42, 0.16]),
             Vec2::new(2.6, 1.7),
         );
         let arts = [1, 0].map(|k| {
-            let art = b.texture(paint::painting(k), Vec2::ONE);
+            let art = b.texture(textures::painting(k), Vec2::ONE);
             b.material(textured("painting", art, 0.55))
         });
         Self {
@@ -90,10 +90,10 @@ impl Palette {
             plastic: b.material(matte("black plastic", [0.035, 0.036, 0.04], 0.4)),
             keys: b.material(matte("keys", [0.62, 0.62, 0.61], 0.45)),
             screen: b.material(matte("screen", [0.012, 0.013, 0.016], 0.12)),
-            steel: b.material(make::steel()),
-            brass: b.material(make::brass()),
+            steel: b.material(materials::steel()),
+            brass: b.material(materials::brass()),
             lamp: b.material(metal("green enamel", [0.10, 0.22, 0.17], 0.25)),
-            ceramic: b.material(make::ceramic()),
+            ceramic: b.material(materials::ceramic()),
             clay: b.material(matte("terracotta", [0.52, 0.24, 0.14], 0.8)),
             soil: b.material(matte("soil", [0.06, 0.04, 0.03], 1.0)),
             leaf: b.material(two_sided(matte("leaf", [0.10, 0.24, 0.07], 0.4))),
@@ -146,7 +146,7 @@ fn shell(b: &mut Builder, m: &Palette) {
             fittings::curtain(b, m.curtain, [u1 - 0.0, u1 + 0.30], [0.95, 2.36], 0.10, 4.0);
             fittings::curtain_rod(b, m.brass, [u0 - 0.36, u1 + 0.36], 2.38, 0.10);
             b.part(placed([0.5 * (u0 + u1), 0.0, 0.0], [0.0; 3]), |b| {
-                piece::radiator(b, m.white, 0.95, 0.78);
+                furniture::radiator(b, m.white, 0.95, 0.78);
             });
         }
         let [u0, v0, ..] = WINDOWS[1];
@@ -170,11 +170,11 @@ fn wall_things(b: &mut Builder, m: &Palette) {
             [[0.62, 1.38, 0.62, 0.82], [2.36, 1.46, 0.50, 0.66]].into_iter().enumerate()
         {
             b.part(placed([u, v, 0.0], [0.0; 3]), |b| {
-                thing::picture(b, [m.oak, m.white, m.arts[k]], [w, h], 0.06);
+                objects::picture(b, [m.oak, m.white, m.arts[k]], [w, h], 0.06);
             });
         }
         b.part(placed([1.83, 1.95, 0.0], [0.0; 3]), |b| {
-            thing::clock(b, m.steel, m.white, m.plastic, 0.16);
+            objects::clock(b, m.steel, m.white, m.plastic, 0.16);
         });
         for (y, seed) in [(1.52, 5), (1.92, 9)] {
             b.slab(m.oak, [3.15, y, -0.01], [5.25, y + 0.03, 0.25], 0.004);
@@ -193,11 +193,11 @@ fn wall_things(b: &mut Builder, m: &Palette) {
                 );
             }
             b.standing(Vec3::new(3.22, y + 0.03, 0.13), 0.0, |b| {
-                thing::books(b, [m.cover, m.paper], 1.25, 0.30, 0.22, seed);
+                objects::books(b, [m.cover, m.paper], 1.25, 0.30, 0.22, seed);
             });
         }
         b.standing(Vec3::new(4.85, 1.55, 0.12), 0.0, |b| {
-            thing::vase(b, m.ceramic, 0.22, &[0.2, 0.33, 0.28, 0.12, 0.16]);
+            objects::vase(b, m.ceramic, 0.22, &[0.2, 0.33, 0.28, 0.12, 0.16]);
         });
         b.standing(Vec3::new(4.85, 1.95, 0.12), 0.0, |b| {
             let soil = plants::pot(b, m.clay, m.soil, 0.075, 0.12);
@@ -210,9 +210,9 @@ fn desk(b: &mut Builder, m: &Palette, x: f32, seed: u32) {
     let height = 0.74;
     let mirror = if seed == 1 { 1.0 } else { -1.0 };
     b.standing(Vec3::new(x, 0.0, -1.45), 0.0, |b| {
-        piece::table(b, m.oak, m.oak, [1.6, 0.8, height]);
+        furniture::table(b, m.oak, m.oak, [1.6, 0.8, height]);
         b.standing(Vec3::new(0.52 * mirror, 0.0, -0.04), 0.0, |b| {
-            piece::drawers(b, m.white, m.steel, [0.36, 0.58, 0.52], [1, 3]);
+            furniture::drawers(b, m.white, m.steel, [0.36, 0.58, 0.52], [1, 3]);
         });
         let mut on_top = |x: f32, z: f32, yaw: f32, build: &mut dyn FnMut(&mut Builder)| {
             b.standing(Vec3::new(x * mirror, height, z), yaw, |b| build(b));
@@ -224,15 +224,17 @@ fn desk(b: &mut Builder, m: &Palette, x: f32, seed: u32) {
         on_top(0.34 * mirror, 0.17, -6.0, &mut |b| desktop::mouse(b, m.plastic));
         on_top(-0.62, -0.22, 40.0 * mirror, &mut |b| lamps::desk_lamp(b, m.lamp, m.white));
         on_top(-0.48, 0.18, 14.0, &mut |b| desktop::papers(b, m.paper, 5, seed));
-        on_top(0.60, 0.10, 60.0, &mut |b| thing::mug(b, m.ceramic, m.soil));
+        on_top(0.60, 0.10, 60.0, &mut |b| objects::mug(b, m.ceramic, m.soil));
         on_top(0.66, -0.24, 0.0, &mut |b| desktop::pencils(b, m.steel, m.cover));
-        on_top(0.46, -0.26, 80.0, &mut |b| thing::book_stack(b, [m.cover, m.paper], 3, seed + 40));
+        on_top(0.46, -0.26, 80.0, &mut |b| {
+            objects::book_stack(b, [m.cover, m.paper], 3, seed + 40)
+        });
     });
-    b.standing(Vec3::new(x - 0.95 * mirror, 0.0, -1.35), 0.0, |b| thing::basket(b, m.steel));
+    b.standing(Vec3::new(x - 0.95 * mirror, 0.0, -1.35), 0.0, |b| objects::basket(b, m.steel));
 }
 
 fn lounge(b: &mut Builder, m: &Palette) {
-    b.standing(Vec3::new(-0.5, 0.0, 0.75), 0.0, |b| piece::rug(b, m.rug, m.fringe, [2.6, 1.7]));
+    b.standing(Vec3::new(-0.5, 0.0, 0.75), 0.0, |b| furniture::rug(b, m.rug, m.fringe, [2.6, 1.7]));
     b.standing(Vec3::new(-0.2, 0.0, 1.48), 180.0, |b| {
         seating::sofa(b, m.sofa, m.oak, 1.9, 2);
         b.part(placed([-0.55, 0.69, 0.0], [68.0, -16.0, 0.0]), |b| {
@@ -241,19 +243,25 @@ fn lounge(b: &mut Builder, m: &Palette) {
     });
     b.standing(Vec3::new(-1.75, 0.0, 1.25), 120.0, |b| seating::side_chair(b, m.oak, m.cloth));
     b.standing(Vec3::new(2.82, 0.0, -0.85), -90.0, |b| {
-        piece::bookcase(b, [m.oak, m.cover, m.paper], [1.9, 2.0, 0.32], 5, |b, row, _| match row {
-            0 => thing::basket(b, m.fringe),
-            2 => thing::vase(b, m.clay, 0.24, &[0.18, 0.30, 0.34, 0.2, 0.13]),
-            4 => b.ball(m.brass, Vec3::Y * 0.08, 0.08),
-            _ => thing::book_stack(b, [m.cover, m.paper], 3, row + 60),
-        });
+        furniture::bookcase(
+            b,
+            [m.oak, m.cover, m.paper],
+            [1.9, 2.0, 0.32],
+            5,
+            |b, row, _| match row {
+                0 => objects::basket(b, m.fringe),
+                2 => objects::vase(b, m.clay, 0.24, &[0.18, 0.30, 0.34, 0.2, 0.13]),
+                4 => b.ball(m.brass, Vec3::Y * 0.08, 0.08),
+                _ => objects::book_stack(b, [m.cover, m.paper], 3, row + 60),
+            },
+        );
     });
     b.standing(Vec3::new(-2.58, 0.0, -1.55), 0.0, |b| {
         let soil = plants::pot(b, m.ceramic, m.soil, 0.19, 0.34);
         b.standing(Vec3::Y * soil, 0.0, |b| plants::big_leaves(b, m.leaf, 15, 1.15, 5));
     });
     b.standing(Vec3::new(-2.70, 0.0, 0.0), 90.0, |b| {
-        piece::drawers(b, m.white, m.steel, [0.7, 0.95, 0.40], [1, 3]);
+        furniture::drawers(b, m.white, m.steel, [0.7, 0.95, 0.40], [1, 3]);
         b.standing(Vec3::new(-0.15, 0.95, 0.0), 10.0, |b| desktop::papers(b, m.paper, 4, 9));
         b.standing(Vec3::new(0.18, 0.95, -0.02), 0.0, |b| {
             let soil = plants::pot(b, m.clay, m.soil, 0.08, 0.13);

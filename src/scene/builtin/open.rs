@@ -4,26 +4,26 @@ use std::f32::consts::TAU;
 
 use glam::{Affine3A, Vec2, Vec3};
 
-use super::materials::{self as make, matte, textured};
+use super::materials::{self, matte, textured};
 use super::mesh::placed;
 use super::mesh::{Builder, Mat};
-use super::objects as thing;
-use super::textures as paint;
+use super::objects;
+use super::textures;
 use crate::scene::Scene;
 
 /// Builds the scene.
 pub(super) fn build() -> Scene {
     let b = &mut Builder::new("open");
-    let paving = b.texture(paint::stones([0.62, 0.55, 0.45], 4, 4, 0.012), Vec2::splat(3.6));
-    let oak = b.texture(paint::timber([0.46, 0.30, 0.17]), Vec2::new(1.4, 0.7));
+    let paving = b.texture(textures::stones([0.62, 0.55, 0.45], 4, 4, 0.012), Vec2::splat(3.6));
+    let oak = b.texture(textures::timber([0.46, 0.30, 0.17]), Vec2::new(1.4, 0.7));
     let ground = b.material(textured("paving", paving, 0.75));
     let stone = b.material(matte("limestone", [0.66, 0.63, 0.57], 0.8));
     let red = b.material(matte("red lacquer", [0.62, 0.07, 0.05], 0.22));
     let blue = b.material(matte("blue glaze", [0.06, 0.17, 0.36], 0.15));
     let wood = b.material(textured("oak", oak, 0.5));
-    let bronze = b.material(make::metal("bronze", [0.66, 0.46, 0.26], 0.30));
-    let steel = b.material(make::metal("polished steel", [0.72, 0.72, 0.73], 0.12));
-    let ceramic = b.material(make::ceramic());
+    let bronze = b.material(materials::metal("bronze", [0.66, 0.46, 0.26], 0.30));
+    let steel = b.material(materials::metal("polished steel", [0.72, 0.72, 0.73], 0.12));
+    let ceramic = b.material(materials::ceramic());
 
     b.quad(ground, Vec3::new(-50.0, 0.0, 50.0), Vec3::X * 100.0, Vec3::NEG_Z * 100.0);
     plinth(b, stone, [0.0, 0.0, 0.0], 0.0, [0.9, 0.32, 0.9]);
@@ -33,7 +33,7 @@ pub(super) fn build() -> Scene {
     b.standing(Vec3::new(1.75, 0.0, -0.9), 25.0, |b| {
         b.slab(stone, [-0.55, 0.0, -0.55], [0.55, 1.1, 0.55], 0.03);
         b.standing(Vec3::Y * 1.1, 0.0, |b| {
-            thing::vase(b, blue, 0.62, &[0.2, 0.36, 0.40, 0.27, 0.11, 0.17]);
+            objects::vase(b, blue, 0.62, &[0.2, 0.36, 0.40, 0.27, 0.11, 0.17]);
         });
     });
     b.standing(Vec3::new(1.35, 0.0, 0.75), -20.0, |b| bench(b, wood, steel));
@@ -46,7 +46,7 @@ pub(super) fn build() -> Scene {
         }
     });
     b.standing(Vec3::new(3.6, 0.0, -3.2), 0.0, |b| {
-        thing::vase(b, ceramic, 1.5, &[0.14, 0.25, 0.30, 0.22, 0.10, 0.13]);
+        objects::vase(b, ceramic, 1.5, &[0.14, 0.25, 0.30, 0.22, 0.10, 0.13]);
     });
     b.camera("terrace", [0.6, 1.6, 6.0], [0.0, 0.78, 0.0], 40.0);
     std::mem::replace(b, Builder::new("")).finish()

@@ -4,17 +4,15 @@ use std::f32::consts::FRAC_PI_2;
 
 use glam::{Vec2, Vec3};
 
-use super::furniture as piece;
-use super::materials::{
-    self as make, embossed, glass, matte, metal, textured, two_sided, varnished,
-};
+use super::furniture;
+use super::materials::{self, embossed, glass, matte, metal, textured, two_sided, varnished};
 use super::mesh::{Builder, placed};
-use super::objects as thing;
+use super::objects;
 use super::plants;
 use super::reliefs as relief;
 use super::seating;
 use super::tableware as ware;
-use super::textures as paint;
+use super::textures;
 use crate::scene::{AlphaMode, Material, Scene};
 
 /// Width, height and depth of the sideboard.
@@ -46,19 +44,19 @@ pub(super) fn build() -> Scene {
 /// Wood and plaster, with normal maps.
 fn room(b: &mut Builder) {
     let size = Vec2::new(1.4, 0.7);
-    let oak = b.texture(paint::timber([0.42, 0.27, 0.145]), size);
+    let oak = b.texture(textures::timber([0.42, 0.27, 0.145]), size);
     let grain = b.data(relief::timber(size), size);
     let oak = b.material(embossed(varnished(textured("oak", oak, 0.55), 0.3, 0.25), grain));
     let size = Vec2::splat(1.6);
-    let plaster = b.texture(paint::plaster([0.20, 0.29, 0.30], 0.22), size);
+    let plaster = b.texture(textures::plaster([0.20, 0.29, 0.30], 0.22), size);
     let trowel = b.data(relief::plaster(size), size);
     let wall = b.material(embossed(textured("plaster", plaster, 0.8), trowel));
     let floor = b.material(matte("floor", [0.30, 0.21, 0.13], 0.5));
-    let brass = b.material(make::brass());
+    let brass = b.material(materials::brass());
     b.quad(floor, Vec3::new(-4.0, 0.0, 4.0), Vec3::X * 8.0, Vec3::NEG_Z * 8.0);
     b.slab(wall, [-1.9, -0.01, -0.50], [1.9, 2.2, -0.30], 0.0);
     b.standing(Vec3::ZERO, 0.0, |b| {
-        piece::drawers(b, oak, brass, [BOARD[0], BOARD[1] - 0.012, BOARD[2]], [4, 3]);
+        furniture::drawers(b, oak, brass, [BOARD[0], BOARD[1] - 0.012, BOARD[2]], [4, 3]);
     });
     b.slab(
         oak,
@@ -103,7 +101,7 @@ fn tea(b: &mut Builder) {
     b.scaled(Vec3::new(-0.30, on_cloth, 0.03), -24.0, 1.35, |b| ware::teapot(b, lacquer, black));
     for (x, z) in [(-0.06, 0.08), (-0.04, 0.195)] {
         b.scaled(Vec3::new(x, on_cloth, z), 0.0, 1.2, |b| {
-            thing::bowl(b, glaze, 0.045, 0.048);
+            objects::bowl(b, glaze, 0.045, 0.048);
             b.lathe(tea, 40, &[(0.0425, 0.036), (0.0, 0.036)]);
         });
     }
@@ -125,8 +123,8 @@ fn metals(b: &mut Builder) {
         ..metal("anodised titanium", [0.54, 0.50, 0.45], 0.15)
     });
     b.scaled(Vec3::new(0.37, 0.0, 0.02), 0.0, 1.15, |b| {
-        thing::bowl(b, copper, 0.15, 0.085);
-        thing::fruit(b, skin, stalk, 0.15, 0.010);
+        objects::bowl(b, copper, 0.15, 0.085);
+        objects::fruit(b, skin, stalk, 0.15, 0.010);
     });
     b.standing(Vec3::new(0.60, 0.0, 0.15), 0.0, |b| {
         b.ball(titanium, Vec3::Y * 0.048, 0.048);
@@ -204,7 +202,7 @@ fn glasses(b: &mut Builder) {
 /// Velvet, and mother of pearl upon it.
 fn cloths(b: &mut Builder) {
     let size = Vec2::splat(0.10);
-    let weave = b.texture(paint::weave([0.30, 0.035, 0.10], 40), size);
+    let weave = b.texture(textures::weave([0.30, 0.035, 0.10], 40), size);
     let threads = b.data(relief::weave(size, 40), size);
     let velvet = b.material(Material {
         sheen_color: Vec3::new(0.75, 0.45, 0.55),
@@ -246,7 +244,7 @@ fn translucent(b: &mut Builder) {
         ..matte("wax", [0.95, 0.92, 0.85], 0.45)
     });
     let black = b.material(matte("wick", [0.02; 3], 0.9));
-    let ceramic = b.material(make::ceramic());
+    let ceramic = b.material(materials::ceramic());
     let soil = b.material(matte("soil", [0.06, 0.04, 0.03], 1.0));
     b.scaled(Vec3::new(-0.85, 0.0, -0.05), 0.0, 1.1, |b| {
         let ground = plants::pot(b, ceramic, soil, 0.085, 0.14);

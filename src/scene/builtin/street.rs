@@ -6,12 +6,12 @@ use std::f32::consts::TAU;
 use glam::{Vec2, Vec3};
 
 use super::facade::{self, HouseMats, Rhythm};
-use super::materials::{self as make, matte, textured, two_sided};
+use super::materials::{self, matte, textured, two_sided};
 use super::mesh::{Builder, Mat};
-use super::objects as thing;
+use super::objects;
 use super::plants;
 use super::room::Wall;
-use super::textures as paint;
+use super::textures;
 use super::{lamps, seating};
 use crate::scene::{Medium, Scene};
 
@@ -39,20 +39,21 @@ struct Palette {
 impl Palette {
     fn new(b: &mut Builder) -> Self {
         let cobbles =
-            b.texture(paint::stones([0.40, 0.38, 0.35], 16, 10, 0.07), Vec2::new(2.4, 2.0));
-        let flags = b.texture(paint::stones([0.50, 0.48, 0.44], 4, 3, 0.012), Vec2::splat(2.4));
+            b.texture(textures::stones([0.40, 0.38, 0.35], 16, 10, 0.07), Vec2::new(2.4, 2.0));
+        let flags = b.texture(textures::stones([0.50, 0.48, 0.44], 4, 3, 0.012), Vec2::splat(2.4));
         let bricks = b.texture(
-            paint::bricks([0.52, 0.26, 0.18], [0.52, 0.48, 0.42], 8, 24),
+            textures::bricks([0.52, 0.26, 0.18], [0.52, 0.48, 0.42], 8, 24),
             Vec2::new(2.0, 1.8),
         );
-        let ochre = b.texture(paint::plaster([0.72, 0.52, 0.28], 0.30), Vec2::splat(4.0));
-        let pale = b.texture(paint::plaster([0.74, 0.68, 0.57], 0.28), Vec2::splat(4.0));
-        let ashlar = b.texture(paint::stones([0.60, 0.56, 0.49], 6, 4, 0.01), Vec2::new(3.0, 2.4));
+        let ochre = b.texture(textures::plaster([0.72, 0.52, 0.28], 0.30), Vec2::splat(4.0));
+        let pale = b.texture(textures::plaster([0.74, 0.68, 0.57], 0.28), Vec2::splat(4.0));
+        let ashlar =
+            b.texture(textures::stones([0.60, 0.56, 0.49], 6, 4, 0.01), Vec2::new(3.0, 2.4));
         let stripes = b.texture(
-            paint::stripes([0.74, 0.70, 0.62], [0.50, 0.10, 0.07], 4),
+            textures::stripes([0.74, 0.70, 0.62], [0.50, 0.10, 0.07], 4),
             Vec2::new(1.6, 1.0),
         );
-        let teak = b.texture(paint::timber([0.42, 0.27, 0.15]), Vec2::new(1.4, 0.7));
+        let teak = b.texture(textures::timber([0.42, 0.27, 0.15]), Vec2::new(1.4, 0.7));
         let brick = b.material(textured("brick", bricks, 0.9));
         let ochre = b.material(textured("ochre plaster", ochre, 0.9));
         let pale = b.material(textured("pale plaster", pale, 0.9));
@@ -74,7 +75,7 @@ impl Palette {
             wood: b.material(textured("teak", teak, 0.55)),
             cane: b.material(matte("cane", [0.58, 0.42, 0.22], 0.6)),
             marble: b.material(matte("marble", [0.70, 0.69, 0.67], 0.2)),
-            ceramic: b.material(make::ceramic()),
+            ceramic: b.material(materials::ceramic()),
             coffee: b.material(matte("coffee", [0.04, 0.02, 0.01], 0.1)),
             clay: b.material(matte("terracotta", [0.52, 0.24, 0.14], 0.8)),
             soil: b.material(matte("soil", [0.06, 0.04, 0.03], 1.0)),
@@ -235,9 +236,11 @@ fn cafe(b: &mut Builder, m: &Palette) {
             b.drum(m.iron, [0.0, 0.03], [0.22, 0.20], 0.008);
             b.drum(m.iron, [0.02, 0.70], [0.025, 0.022], 0.004);
             b.drum(m.marble, [0.70, 0.728], [0.36, 0.36], 0.008);
-            b.standing(Vec3::new(0.12, 0.728, 0.05), 60.0, |b| thing::mug(b, m.ceramic, m.coffee));
+            b.standing(Vec3::new(0.12, 0.728, 0.05), 60.0, |b| {
+                objects::mug(b, m.ceramic, m.coffee)
+            });
             b.standing(Vec3::new(-0.15, 0.728, 0.10), 200.0, |b| {
-                thing::mug(b, m.ceramic, m.coffee);
+                objects::mug(b, m.ceramic, m.coffee);
             });
             b.standing(Vec3::new(-0.02, 0.728, -0.10), 0.0, |b| {
                 b.drum(m.ceramic, [0.0, 0.05], [0.03, 0.04], 0.003);

@@ -33,7 +33,7 @@ pub(super) const SUPPORTED: &[&str] = &[
 ];
 
 /// So many that are not supported are named.
-const MOST_NAMED: usize = 10;
+const MAX_NAMED: usize = 10;
 
 /// Refuses a file that requires what is not supported; a notice where it is only used.
 pub(super) fn check(
@@ -58,5 +58,5 @@ fn unsupported(names: &Objects<'_, String>) -> Fallible<Vec<String>> {
     let names = names.indices().map(|index| names.get(index));
     let is_unknown =
         |name: &Fallible<String>| name.as_ref().map_or(true, |it| !SUPPORTED.contains(&&**it));
-    names.filter(is_unknown).take(MOST_NAMED).collect()
+    names.filter(is_unknown).take(MAX_NAMED).collect()
 }

@@ -47,7 +47,7 @@ enum Filter {
 }
 
 /// More bytes than the codec makes of one: a block of 256 bytes can take a quarter of one.
-const MOST_OF_A_BYTE: u64 = 1100;
+const MAX_BYTE_VALUES: u64 = 1100;
 
 impl Packed {
     /// What is packed in a view; `None` if it is a plain one.
@@ -77,7 +77,8 @@ impl Packed {
             Filter::Quaternion => stride == 8,
             Filter::Exponential => stride.is_multiple_of(4),
         };
-        let is_plausible = total <= (1 << 16) + (bytes.len() as u64).saturating_mul(MOST_OF_A_BYTE);
+        let is_plausible =
+            total <= (1 << 16) + (bytes.len() as u64).saturating_mul(MAX_BYTE_VALUES);
         if !is_sound || !is_plausible || count > u64::from(u32::MAX) {
             return Err("its meshopt compression makes no sense".into());
         }

@@ -21,11 +21,11 @@ use crate::memory;
 use crate::scene::{Instance, Instances, MAX_SHOWN, Placing, Scene};
 
 /// Meshes are shared if that spares so many triangles, 0.3 GB of them, and half of all.
-const LEAST_SPARED: u64 = 1 << 20;
+const MIN_SPARED: u64 = 1 << 20;
 
 /// Triangles of a mesh that is shared: an instance takes the memory of a few, and entering it the time
 /// of many.
-const LEAST_TRIANGLES: u64 = 64;
+const MIN_TRIANGLES: u64 = 64;
 
 /// Bytes of an instance, in the scene and in the tree while that is built.
 const INSTANCE_BYTES: u64 = 800;
@@ -59,12 +59,12 @@ impl Sharing {
             all = all.saturating_add(triangles.saturating_mul(instances));
             let weights = &placements[0].weights;
             let is_alike = |one: &Placement| one.skin.is_none() && one.weights == *weights;
-            if instances > 1 && triangles >= LEAST_TRIANGLES && placements.iter().all(is_alike) {
+            if instances > 1 && triangles >= MIN_TRIANGLES && placements.iter().all(is_alike) {
                 spared = spared.saturating_add(triangles.saturating_mul(instances - 1));
                 wanted.insert(number);
             }
         }
-        let pays = spared >= LEAST_SPARED && spared >= all / 2;
+        let pays = spared >= MIN_SPARED && spared >= all / 2;
         Ok(Self { wanted: if pays { wanted } else { BTreeSet::new() }, ..Self::default() })
     }
 

@@ -22,7 +22,7 @@ use crate::scene::{Material, Texture, TextureImage, TextureSlot, Wrap};
 const MAX_TEXELS: u64 = 1 << 30;
 
 /// So many images that cannot be used are named.
-const MOST_FAILURES: usize = 10;
+const MAX_FAILURES: usize = 10;
 
 /// How the JSON types say that a texture names no image.
 const NO_IMAGE: u32 = u32::MAX;
@@ -115,8 +115,8 @@ impl Wanted {
                     .push(format!("{name} cannot be used: {cause}; materials do without it")),
             }
         }
-        let unnamed = failures.len().saturating_sub(MOST_FAILURES);
-        failures.into_iter().take(MOST_FAILURES).for_each(|failure| notices.add(failure));
+        let unnamed = failures.len().saturating_sub(MAX_FAILURES);
+        failures.into_iter().take(MAX_FAILURES).for_each(|failure| notices.add(failure));
         if unnamed > 0 {
             notices.add(format!("{unnamed} more images cannot be used"));
         }

@@ -79,11 +79,11 @@ fn is_data(uri: &str) -> bool {
 
 /// A URI as it is shown to a person: data URIs, and some others, would fill pages.
 pub(super) fn shown(uri: &str) -> String {
-    const MOST: usize = 100;
+    const MAX_SHOWN: usize = 100;
     if is_data(uri) {
         return "data URI".to_owned();
     }
-    match uri.char_indices().nth(MOST) {
+    match uri.char_indices().nth(MAX_SHOWN) {
         Some((end, _)) => format!("{}...", &uri[..end]),
         None => uri.to_owned(),
     }

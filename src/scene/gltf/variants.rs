@@ -11,7 +11,7 @@ use crate::error::Notices;
 pub(super) const EXTENSION: &str = "KHR_materials_variants";
 
 /// So many looks are named.
-const MOST_NAMED: usize = 50;
+const MAX_NAMED: usize = 50;
 
 /// A look of a model.
 #[derive(Deserialize)]
@@ -36,8 +36,8 @@ impl Look {
         let variants = &document.variants;
         let names = || variants.indices().map(|index| variants.get(index).map(|it| it.name));
         let list = || {
-            let first = names().take(MOST_NAMED).collect::<Fallible<Vec<String>>>()?.join(", ");
-            Fallible::Ok(match variants.len().saturating_sub(MOST_NAMED) {
+            let first = names().take(MAX_NAMED).collect::<Fallible<Vec<String>>>()?.join(", ");
+            Fallible::Ok(match variants.len().saturating_sub(MAX_NAMED) {
                 0 => first,
                 more => format!("{first} and {more} more"),
             })

@@ -21,7 +21,7 @@ use crate::scene::{Camera, Projection, PunctualKind, PunctualLight};
 const DEFAULT_FOV_Y_RADIANS: f32 = 0.8;
 
 /// More moving cameras than any scene has: each keeps all keys of the nodes above it.
-const MOST_MOVING: usize = 64;
+const MAX_MOVING: usize = 64;
 
 /// Cameras of the shown nodes, in the order of the file's cameras, and how each moves.
 pub(super) fn cameras(
@@ -38,7 +38,7 @@ pub(super) fn cameras(
         let source = document.cameras.get(index)?;
         let name = source.name.clone().or_else(|| node.name.clone());
         let name = name.unwrap_or_else(|| format!("camera {index}"));
-        let path = match cameras.len() < MOST_MOVING {
+        let path = match cameras.len() < MAX_MOVING {
             true => channels.get_or_insert_with(|| Channels::new(file)).camera_path(nodes, number),
             false => Ok(None),
         };

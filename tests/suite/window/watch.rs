@@ -5,11 +5,11 @@ use std::time::Duration;
 use super::Desk;
 
 /// Share of the work that may pass without another picture.
-const MOST_OF_THE_WORK: f64 = 0.4;
+const MAX_SHARE_OF_WORK: f64 = 0.4;
 /// Share of the work that showing may take where others want the cores, too: it goes by the clock.
-const MOST_FOR_SHOWING: f64 = 0.3;
+const MAX_SHARE_FOR_SHOWING: f64 = 0.3;
 /// The same on a quiet machine of two cores, in the first minute.
-const MOST_OF_A_MINUTE: f64 = 0.1;
+const MAX_SHARE_OF_A_MINUTE: f64 = 0.1;
 
 #[test]
 fn the_picture_on_the_screen_never_gets_worse() {
@@ -28,7 +28,7 @@ fn the_picture_on_the_screen_never_gets_worse() {
         println!("once more: {why}");
         moved((-60, 10)).unwrap_or_else(|why| panic!("{why}"));
     }
-    check_showing(&desk, None, MOST_FOR_SHOWING);
+    check_showing(&desk, None, MAX_SHARE_FOR_SHOWING);
 }
 
 /// As a person meets it: the default scene in a window of usual size, on two cores with software Vulkan.
@@ -41,7 +41,7 @@ fn the_first_minute_and_a_move_lead_to_the_converged_picture() {
         let before = Effort::of(&desk);
         let shown: Vec<Moment> = (0..120).map(|at| Moment::next(&desk, at)).collect();
         println!("{when}:");
-        check_showing(&desk, before, MOST_OF_A_MINUTE);
+        check_showing(&desk, before, MAX_SHARE_OF_A_MINUTE);
         while !is_idle(&desk) {}
         let errors = errors_beside(&shown, &desk.picture());
         let longest = stands(&shown).map(<[_]>::len).max().unwrap_or_default();
@@ -160,7 +160,7 @@ fn check_all(when: &str, shown: &[Moment]) -> Result<(), String> {
     // At the start there is nothing to be seen at first.
     for stand in stands(shown).skip(usize::from(when == "at the start")) {
         let share = work_in(stand) / all;
-        if stand.len() > 6 && share > MOST_OF_THE_WORK {
+        if stand.len() > 6 && share > MAX_SHARE_OF_WORK {
             return Err(format!("{when}: the picture stands still, {share:.2}: {errors:.2?}"));
         }
     }

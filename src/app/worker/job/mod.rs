@@ -11,10 +11,10 @@ use std::time::{Duration, Instant};
 
 pub(super) use cached::CompletePicture;
 use cached::{CachedPicture, worth};
-use publishing::{Reading, Resized};
+use publishing::{FilmReadback, Resized};
 use sessions::Placed;
 
-use super::kept::{Kept, Learned, Left};
+use super::kept::{Learned, SessionCache, SuspendedPicture};
 use super::{Activity, Point, Request, Shared};
 use crate::alarm::Alarm;
 use crate::app::lock;
@@ -31,10 +31,10 @@ const PLAIN: usize = 1;
 /// While there is much to learn the picture goes on a little this often.
 const STANDSTILL: Duration = Duration::from_millis(400);
 
-pub(super) struct Job<'a> {
+pub(super) struct PictureTask<'a> {
     shared: &'a Arc<Shared>,
     alarm: &'a Alarm,
-    kept: &'a mut Kept,
+    kept: &'a mut SessionCache,
     request: Arc<Request>,
     counters: Option<Arc<LearningGrid>>,
     /// When what was published last, and when there may be something new.
@@ -42,7 +42,7 @@ pub(super) struct Job<'a> {
     last: Option<(Activity, u64)>,
     publish_gap: Duration,
     /// The films of the main and the plain picture, as they were read last; they go with the request.
-    readings: [Option<Reading>; 2],
+    readings: [Option<FilmReadback>; 2],
     /// The film from before in the picture's size.
     resized: Option<Resized>,
     /// Copies of films that somebody still has.
@@ -57,11 +57,11 @@ pub(super) struct Job<'a> {
     curves: [Vec<Point>; 2],
 }
 
-impl<'a> Job<'a> {
+impl<'a> PictureTask<'a> {
     pub(super) fn new(
         shared: &'a Arc<Shared>,
         alarm: &'a Alarm,
-        kept: &'a mut Kept,
+        kept: &'a mut SessionCache,
         request: Arc<Request>,
     ) -> Self {
         Self {
@@ -235,7 +235,7 @@ impl<'a> Job<'a> {
         let times = worth(main.samples());
         let shown = cached.film_so_far().filter(|_| times >= 1.0 && main.samples() > 0);
         let shown = shown.map(|cached| cached.together(main.film(), times));
-        let left = Left {
+        let left = SuspendedPicture {
             request: Arc::clone(&self.request),
             session: main.suspend(),
             cached: cached.into_complete(),

@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use super::cached::{self, CachedPicture, worth};
 use super::sessions::SLICE;
-use super::{Job, MAIN, PLAIN};
+use super::{MAIN, PLAIN, PictureTask};
 use crate::app::lock;
-use crate::app::worker::kept::Seen;
+use crate::app::worker::kept::PreviousFilm;
 use crate::app::worker::{Activity, Backdrop, NoCache, Origin, Point, SessionSnapshot, Snapshot};
 use crate::light_grid::LightGrid;
 use crate::metrics;
@@ -26,13 +26,13 @@ const OLDEST: Duration = Duration::from_secs(2);
 /// Publishing may take at most about one part in this of the time.
 const PUBLISH_SHARE: u32 = 40;
 /// But a picture that changes is shown at least so often.
-const LONGEST_GAP: Duration = Duration::from_millis(800);
+const MAX_GAP: Duration = Duration::from_millis(800);
 /// A resized film is worth no more samples a pixel than this, for it is a little blurred.
-const MOST_OF_RESIZED: f32 = 64.0;
+const MAX_RESIZED_WEIGHT: f32 = 64.0;
 
 /// A film as it was copied, or read back from the window's device, last.
 #[derive(Clone)]
-pub(super) struct Reading {
+pub(super) struct FilmReadback {
     /// Where it is shown in place meanwhile.
     of: Option<(Gpu, DeviceFilm)>,
     film: Arc<Film>,
@@ -47,10 +47,10 @@ pub(super) struct Reading {
     gap: Duration,
 }
 
-impl Job<'_> {
+impl PictureTask<'_> {
     /// A film of this view from before, if there is one.
     fn backdrop(&self) -> Option<Arc<Film>> {
-        let Seen { request, film, .. } = self.kept.backdrop.as_ref()?;
+        let PreviousFilm { request, film, .. } = self.kept.backdrop.as_ref()?;
         if !request.looks_like(&self.request) {
             return None;
         }
@@ -72,11 +72,12 @@ impl Job<'_> {
     pub(super) fn resize_backdrop(&mut self) {
         let view = &self.request.view;
         let size = [view.width, view.height];
-        let before = self.kept.backdrop.as_ref().filter(|Seen { request: of, film, .. }| {
-            let is_whole = !of.moving && film.width == of.view.width && view.crop.is_none();
-            let is_alike = film.height <= 2 * view.height && view.height <= 2 * film.height;
-            is_whole && is_alike && size != [film.width, film.height]
-        });
+        let before =
+            self.kept.backdrop.as_ref().filter(|PreviousFilm { request: of, film, .. }| {
+                let is_whole = !of.moving && film.width == of.view.width && view.crop.is_none();
+                let is_alike = film.height <= 2 * view.height && view.height <= 2 * film.height;
+                is_whole && is_alike && size != [film.width, film.height]
+            });
         let before = before.filter(|seen| seen.request.looks_like(&self.request));
         self.resized = before.map(|seen| Resized::of(seen, size));
     }
@@ -101,7 +102,7 @@ impl Job<'_> {
         };
         if film.min_samples() > 0 && worth * film.total_samples() as f32 > known {
             let (request, film) = (Arc::clone(&self.request), Arc::new(film.into_owned()));
-            self.kept.backdrop = Some(Seen { request, film, worth });
+            self.kept.backdrop = Some(PreviousFilm { request, film, worth });
         }
     }
 
@@ -133,7 +134,7 @@ impl Job<'_> {
             self.kept.backdrop = None;
         }
         let is_final = matches!(activity, Activity::Paused | Activity::Done);
-        let rests = !is_final && (self.shared.rest.lasts(LONGEST_GAP) || self.is_ahead());
+        let rests = !is_final && (self.shared.rest.lasts(MAX_GAP) || self.is_ahead());
         let (main_snapshot, main_cost) = self.session_snapshot(MAIN, main, is_final, rests);
         let plain_snapshot =
             plain.map(|session| self.session_snapshot(PLAIN, session, is_final, rests));
@@ -200,7 +201,7 @@ impl Job<'_> {
         rests: bool,
     ) -> Option<Backdrop> {
         // What this job itself has kept has the same samples.
-        let is_own = |seen: &Seen| Arc::ptr_eq(&seen.request, &self.request);
+        let is_own = |seen: &PreviousFilm| Arc::ptr_eq(&seen.request, &self.request);
         let before = self.backdrop().filter(|_| !self.kept.backdrop.as_ref().is_some_and(is_own));
         let resized = self.resized.as_ref();
         let total = || before.as_ref().map_or(0, |film| film.total_samples());
@@ -285,7 +286,7 @@ impl Job<'_> {
                 let cost = if is_in_place { start.elapsed() } else { Duration::ZERO };
                 let (at, gap) = (Instant::now(), gap_after(cost).max(READING_GAP));
                 let (of, samples) = (in_place, session.samples());
-                let reading = Reading {
+                let reading = FilmReadback {
                     of,
                     film,
                     samples,
@@ -339,7 +340,7 @@ impl Job<'_> {
     fn is_ahead(&mut self) -> bool {
         self.films.retain(|film| film.strong_count() > 0);
         let of_session = self.readings.iter().flatten().count().max(1);
-        let is_fresh = |reading: &Reading| reading.at.elapsed() < OLDEST;
+        let is_fresh = |reading: &FilmReadback| reading.at.elapsed() < OLDEST;
         self.films.len() > of_session && self.readings.iter().flatten().any(is_fresh)
     }
 
@@ -350,7 +351,7 @@ impl Job<'_> {
         role: usize,
         of: Option<&(Gpu, DeviceFilm)>,
         rests: bool,
-    ) -> Option<&Reading> {
+    ) -> Option<&FilmReadback> {
         self.readings[role].as_ref().filter(|reading| match (&reading.of, of) {
             (Some(read), Some(of)) => is_same(read, of) && reading.at.elapsed() < reading.gap,
             // Before the first sample it was another picture, and none before pixels everywhere have one.
@@ -382,14 +383,14 @@ pub(super) struct Resized {
 }
 
 impl Resized {
-    fn of(before: &Seen, size: [u32; 2]) -> Self {
+    fn of(before: &PreviousFilm, size: [u32; 2]) -> Self {
         let film = before.film.resized(size);
         let counts = || film.pixels().iter().map(Pixel::samples);
         let span = [counts().min().unwrap_or(0), counts().max().unwrap_or(0)];
         let (pixels, samples) = (film.pixels().len() as u64, film.total_samples());
         // What is enlarged is blurred.
         let enlarged = (size[1] as f32 / before.film.height as f32).max(1.0);
-        let most = MOST_OF_RESIZED / (enlarged * enlarged);
+        let most = MAX_RESIZED_WEIGHT / (enlarged * enlarged);
         Self { film: Some(Arc::new(film)), pixels, samples, worth: before.worth, span, most }
     }
 
@@ -413,5 +414,5 @@ fn is_same((gpu, film): &(Gpu, DeviceFilm), other: &(Gpu, DeviceFilm)) -> bool {
 
 /// Time until something that took `cost` may be done again.
 fn gap_after(cost: Duration) -> Duration {
-    (cost * PUBLISH_SHARE).clamp(SLICE, LONGEST_GAP)
+    (cost * PUBLISH_SHARE).clamp(SLICE, MAX_GAP)
 }

@@ -5,13 +5,13 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::cached::CachedPicture;
-use super::{Job, MAIN, Rested};
+use super::{MAIN, PictureTask, Rested};
 use crate::app::lock;
 use crate::app::worker::preparation::Preparation;
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::path::World;
-use crate::render::gpu::Held;
+use crate::render::gpu::CompileGuard;
 use crate::render::{Gi, Phase, Session, StopRule, View};
 
 /// Longest piece of rendering between two looks at requests and clocks.
@@ -29,7 +29,7 @@ pub(super) enum Placed {
     TooLate,
 }
 
-impl Job<'_> {
+impl PictureTask<'_> {
     /// A session for a picture so small that a pass takes a moment on a GPU that [is quick], else on the CPU, with
     /// what was learned before.
     ///
@@ -198,7 +198,7 @@ impl Job<'_> {
 
     fn place_if_compiled(&mut self, session: &mut Session<'_>) {
         let orders = &self.shared.orders;
-        let preparation = || Arc::new(Preparation::begin(orders)) as Arc<Held>;
+        let preparation = || Arc::new(Preparation::begin(orders)) as Arc<CompileGuard>;
         self.kept.device.place(session, &self.request, preparation);
         self.tell_failure();
     }
