@@ -174,7 +174,7 @@ enum Later {
     /// Something failed.
     Failed(String),
     /// Pictures that earlier windows kept.
-    SessionCache(Vec<KeptPicture>),
+    KeptPictures(Vec<KeptPicture>),
     /// Maps in small.
     SmallMaps(Vec<SmallMap>),
 }
@@ -200,7 +200,7 @@ impl App {
                 let (sender, wake): (Sender<Later>, _) = (later.0.clone(), wake.clone());
                 history.of_folder(folder, move |found| {
                     let later =
-                        found.map_or_else(|e| Later::Failed(e.to_string()), Later::SessionCache);
+                        found.map_or_else(|e| Later::Failed(e.to_string()), Later::KeptPictures);
                     // The window may have gone meanwhile.
                     let _ = sender.send(later);
                     wake();

@@ -105,7 +105,7 @@ impl App {
                 }
                 Later::Done(sentence) => self.messages.notice(sentence),
                 Later::Failed(sentence) => self.messages.error(sentence),
-                Later::SessionCache(earlier) => {
+                Later::KeptPictures(earlier) => {
                     let count = self.history.take_over(earlier);
                     self.interface.compared.shift(count);
                 }
