@@ -78,6 +78,10 @@ fn uris_stay_below_the_scenes_folder_unless_they_may_leave_it() {
         ("../scene.bin", "`../scene.bin` lies outside of the scene's folder"),
         ("%2e%2e%2fscene.bin", "`../scene.bin` lies outside of the scene's folder"),
         (absolute.as_str(), "lies outside of the scene's folder"),
+        (r"\\\\host\\share\\own.bin", "lies outside of the scene's folder"),
+        ("deep/own.bin:x", "`deep/own.bin:x` names a device or a stream"),
+        ("", "its URI is empty"),
+        (r"deep\\own.bin?x", ""),
         ("deep", "`deep` is a folder, not a file"),
         (&"a".repeat(5000), "aaa...`: "),
     ] {

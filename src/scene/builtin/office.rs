@@ -227,7 +227,7 @@ fn desk(b: &mut Builder, m: &Palette, x: f32, seed: u32) {
         on_top(0.60, 0.10, 60.0, &mut |b| objects::mug(b, m.ceramic, m.soil));
         on_top(0.66, -0.24, 0.0, &mut |b| desktop::pencils(b, m.steel, m.cover));
         on_top(0.46, -0.26, 80.0, &mut |b| {
-            objects::book_stack(b, [m.cover, m.paper], 3, seed + 40)
+            objects::book_stack(b, [m.cover, m.paper], 3, seed + 40);
         });
     });
     b.standing(Vec3::new(x - 0.95 * mirror, 0.0, -1.35), 0.0, |b| objects::basket(b, m.steel));

@@ -237,7 +237,7 @@ fn cafe(b: &mut Builder, m: &Palette) {
             b.drum(m.iron, [0.02, 0.70], [0.025, 0.022], 0.004);
             b.drum(m.marble, [0.70, 0.728], [0.36, 0.36], 0.008);
             b.standing(Vec3::new(0.12, 0.728, 0.05), 60.0, |b| {
-                objects::mug(b, m.ceramic, m.coffee)
+                objects::mug(b, m.ceramic, m.coffee);
             });
             b.standing(Vec3::new(-0.15, 0.728, 0.10), 200.0, |b| {
                 objects::mug(b, m.ceramic, m.coffee);

@@ -236,7 +236,7 @@ fn image_name(document: &Document<'_>, number: u32) -> String {
     let index = json::Index::new(number);
     let name = document.images.get_as::<Label>(index).ok().and_then(|label| label.name);
     let uri = || document.images.text(index).and_then(uri_of).ok().flatten();
-    match name.map(Cow::Owned).or_else(uri) {
+    match name.map(Cow::Owned).or_else(uri).filter(|name| !name.is_empty()) {
         Some(name) => format!("Image {number} ({})", uri::shown(&name)),
         None => format!("Image {number}"),
     }

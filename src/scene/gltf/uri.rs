@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use super::Fallible;
 use crate::image::{read_cause, read_file};
@@ -31,32 +31,132 @@ pub(super) enum Place<'u> {
 impl Folder<'_> {
     /// Where the data of a URI are. A file must lie in the folder or below it, links followed: a scene
     /// that somebody sent must not make a picture of what is private.
+    ///
+    /// # Errors
+    /// A cause: the URI is empty, names no file beside the scene, or a file that is not there.
     pub(super) fn place(self, uri: Cow<'_, str>) -> Fallible<Place<'_>> {
         if is_data(&uri) {
             return Ok(Place::Embedded(uri));
         }
-        let path = percent_decoded(&uri);
-        let path =
-            String::from_utf8(path).map_err(|_| format!("`{}` is not UTF-8", shown(&uri)))?;
-        let name = shown(&path);
-        if path.contains("://") {
+        let names = file_names(&uri)?;
+        let Some(first) = names.first() else { return Err("its URI is empty".into()) };
+        let name = shown(first);
+        if first.contains("://") {
             return Err(format!("`{name}` is not a file beside it, and nothing is fetched"));
         }
-        let Some(folder) = self.path else {
+        let Some(path) = self.path else {
             return Err(format!("`{name}` cannot be looked up: the file's folder is unknown"));
         };
-        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        let found = |path: &Path| {
-            fs::canonicalize(path).map_err(|e| format!("`{name}`: {}", read_cause(&e)))
-        };
-        let file = found(&folder.join(&path))?;
-        if !self.allow_outside && !file.starts_with(found(folder)?) {
-            return Err(format!(
-                "`{name}` lies outside of the scene's folder; --allow-outside would read it"
-            ));
+        let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
+        let folder = resolved(path)
+            .and_then(|real| Ok([real, std::path::absolute(path).map_err(|e| read_cause(&e))?]));
+        let folder = folder.map_err(|cause| format!("`{name}`: {cause}"))?;
+        let mut failure = String::new();
+        for candidate in &names {
+            match self.file(&folder, candidate) {
+                Ok(file) => return Ok(Place::File(file)),
+                Err(cause) => failure = cause,
+            }
         }
-        Ok(Place::File(file))
+        Err(format!("`{name}`{failure}"))
     }
+
+    /// The file of a name in the folder, which is given by its one path without links and as it was named.
+    /// What the name alone forbids is refused before the system sees it: on Windows a look at
+    /// `\\host\share` already sends the user's credentials to that host.
+    fn file(self, folder: &[PathBuf; 2], name: &str) -> Fallible<PathBuf> {
+        const OUTSIDE: &str = " lies outside of the scene's folder; --allow-outside would read it";
+        let [real, _] = folder;
+        if !self.allow_outside {
+            let is_below = folder.iter().any(|folder| is_below(&folder.join(name), folder));
+            if names_host_or_drive(name) || !is_below {
+                return Err(OUTSIDE.into());
+            }
+            if name.split(SLASHES).any(names_device_or_stream) {
+                return Err(" names a device or a stream; --allow-outside would read it".into());
+            }
+        }
+        let file = resolved(&real.join(name)).map_err(|cause| match other_case(real, name) {
+            Some(other) => format!(": {cause}; there is {other}"),
+            None => format!(": {cause}"),
+        })?;
+        if !self.allow_outside && !file.starts_with(real) {
+            return Err(OUTSIDE.into());
+        }
+        Ok(file)
+    }
+}
+
+const SLASHES: [char; 2] = ['/', '\\'];
+
+/// The one path of a file, without links.
+fn resolved(path: &Path) -> Fallible<PathBuf> {
+    fs::canonicalize(path).map_err(|e| read_cause(&e))
+}
+
+/// Names of files that a URI may mean, in the order in which they are looked for: as it is written, then
+/// without `?query` and `#fragment`; each also with slashes for the backslashes of programs on Windows.
+fn file_names(uri: &str) -> Fallible<Vec<String>> {
+    let path = uri.split(['?', '#']).next().unwrap_or_default();
+    let mut names = Vec::new();
+    for text in [uri, path] {
+        let name = String::from_utf8(percent_decoded(text))
+            .map_err(|_| format!("`{}` is not UTF-8", shown(uri)))?;
+        let with_slashes = name.replace('\\', "/");
+        names.extend([name, with_slashes]);
+    }
+    names.retain(|name| !name.is_empty());
+    names.dedup();
+    Ok(names)
+}
+
+/// Whether a path stays in a folder, by its components alone.
+fn is_below(path: &Path, folder: &Path) -> bool {
+    let mut plain = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::ParentDir => drop(plain.pop()),
+            Component::CurDir => {}
+            other => plain.push(other),
+        }
+    }
+    plain.starts_with(folder)
+}
+
+/// Whether Windows takes a name for one on another machine, of a device (`\\.\`) or on a drive of its own.
+fn names_host_or_drive(name: &str) -> bool {
+    let is_drive = matches!(name.as_bytes(), [letter, b':', ..] if letter.is_ascii_alphabetic());
+    is_drive || (name.starts_with(SLASHES) && name[1..].starts_with(SLASHES))
+}
+
+/// Whether Windows takes a part of a path for a device, whatever its ending, or for a stream of a file
+/// ("Naming Files, Paths, and Namespaces" of Microsoft's documentation).
+fn names_device_or_stream(part: &str) -> bool {
+    const DEVICES: [&str; 7] = ["CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$", "CLOCK$"];
+    let stem = part.split('.').next().unwrap_or_default().trim_end().to_uppercase();
+    let port = stem.strip_prefix("COM").or_else(|| stem.strip_prefix("LPT"));
+    let mut digits = port.unwrap_or_default().chars();
+    let is_port =
+        digits.next().is_some_and(|c| c.is_ascii_digit() || "\u{b9}\u{b2}\u{b3}".contains(c));
+    part.contains(':') || DEVICES.contains(&&*stem) || (is_port && digits.next().is_none())
+}
+
+/// What there is in the folder under a name that differs in the case of its letters alone.
+fn other_case(folder: &Path, name: &str) -> Option<String> {
+    let mut found = PathBuf::new();
+    for component in Path::new(name).components() {
+        match component {
+            Component::CurDir => {}
+            Component::Normal(part) => {
+                let wanted = part.to_string_lossy().to_lowercase();
+                let entries = fs::read_dir(folder.join(&found)).ok()?.flatten();
+                let mut names = entries.map(|entry| entry.file_name());
+                found.push(names.find(|it| it.to_string_lossy().to_lowercase() == wanted)?);
+            }
+            _ => return None,
+        }
+    }
+    Some(found.display().to_string())
 }
 
 impl Place<'_> {
@@ -91,7 +191,8 @@ pub(super) fn shown(uri: &str) -> String {
 
 fn read_data_uri(uri: &str) -> Fallible<Vec<u8>> {
     let (kind, payload) = uri.split_once(',').ok_or("a data URI has no comma before its data")?;
-    if kind.ends_with(";base64") {
+    let coding = kind.rsplit_once(';').map(|(_, coding)| coding);
+    if coding.is_some_and(|coding| coding.eq_ignore_ascii_case("base64")) {
         base64_decoded(payload.as_bytes()).ok_or_else(|| "a data URI is not valid base64".into())
     } else {
         Ok(percent_decoded(payload))
@@ -185,7 +286,97 @@ mod tests {
         let nowhere = Folder { path: None, allow_outside: false };
         let read = |uri: &'static str| nowhere.place(uri.into()).and_then(|place| place.read());
         assert_eq!(read("data:text/plain,a%00b").unwrap(), b"a\0b");
+        assert_eq!(read("DATA:image/png;BASE64,Zm9v").unwrap(), b"foo");
         assert!(read("data:nothing").unwrap_err().contains("comma"));
         assert!(read("https://example.org/a.bin").unwrap_err().contains("nothing is fetched"));
+        assert_eq!(read("").unwrap_err(), "its URI is empty");
+    }
+
+    /// A folder with `tex/plain.png` and what a URI means in it: the file's content, or the cause.
+    fn looked_up(uri: &str, allow_outside: bool) -> Fallible<Vec<u8>> {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("tex")).unwrap();
+        fs::write(folder.path().join("tex/plain.png"), "plain").unwrap();
+        // Names that Windows does not have.
+        if cfg!(unix) {
+            fs::write(folder.path().join("tex/back\\slash?#.png"), "odd").unwrap();
+        }
+        Folder { path: Some(folder.path()), allow_outside }.place(uri.into())?.read()
+    }
+
+    /// None of these is there, so what says that it lies outside has not been looked for.
+    #[test]
+    fn names_of_hosts_drives_devices_and_streams_are_refused_before_the_system_sees_them() {
+        for uri in [
+            r"\\host\share\x.png",
+            "//host/share/x.png",
+            r"/\host\share\x.png",
+            "%5C%5Chost/share/x.png",
+            r"\\.\pipe\x",
+            r"\\?\C:\x.png",
+            r"C:\textures\x.png",
+            "c:x.png",
+            r"\textures\x.png",
+            "/net/host/x.png",
+            r"..\..\net\host\x.png",
+            "tex/../../x.png",
+        ] {
+            let cause = looked_up(uri, false).unwrap_err();
+            assert!(cause.contains("lies outside of the scene's folder"), "{uri}: {cause}");
+        }
+        for uri in [
+            "CON",
+            "tex/nul.png",
+            r"tex\Aux .x.png",
+            "com1",
+            "LPT9.bin",
+            "com\u{b9}.bin",
+            "prn/x.png",
+            "conin$",
+            "tex/plain.png:stream",
+            "tex/plain.png::$DATA",
+        ] {
+            let cause = looked_up(uri, false).unwrap_err();
+            assert!(cause.contains("names a device or a stream"), "{uri}: {cause}");
+        }
+        for uri in ["console.png", "com.png", "com10.bin", "complete1", "x.con"] {
+            assert!(looked_up(uri, false).unwrap_err().contains("no such file"), "{uri}");
+        }
+        // Where others are read, the system says what it has of them.
+        for uri in ["/nowhere/x.png", "tex/../../nowhere/x.png"] {
+            assert!(looked_up(uri, true).unwrap_err().contains("no such file"), "{uri}");
+        }
+    }
+
+    #[test]
+    fn files_are_found_by_what_programs_write_for_them() {
+        for uri in [
+            "tex/plain.png",
+            r"tex\plain.png",
+            r".\tex\plain.png",
+            "tex/../tex/plain.png",
+            "tex/plain.png?v=12:30",
+            r"tex\plain.png#top",
+            "tex%2Fplain.png?a#b",
+        ] {
+            assert_eq!(looked_up(uri, false).as_deref(), Ok(&b"plain"[..]), "{uri}");
+        }
+        if cfg!(unix) {
+            assert_eq!(looked_up(r"tex/back\slash?#.png", false).unwrap(), b"odd");
+        }
+    }
+
+    #[test]
+    fn a_name_in_other_letters_is_told() {
+        for uri in ["Tex/Plain.PNG", r"TEX\PLAIN.PNG?x", "./tex/plain.Png"] {
+            let found = looked_up(uri, false);
+            // Some systems find it.
+            let Err(cause) = found else { continue };
+            let there = Path::new("tex").join("plain.png");
+            let expected = format!(": there is no such file; there is {}", there.display());
+            assert!(cause.ends_with(&expected), "{uri}: {cause}");
+        }
+        let cause = looked_up("tex/plane.png", false).unwrap_err();
+        assert_eq!(cause, "`tex/plane.png`: there is no such file");
     }
 }
