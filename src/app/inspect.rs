@@ -5,9 +5,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use glam::{Vec2, Vec3};
 
-use super::Wake;
 use super::interface::Interface;
 use super::surface_map::{Spot, look_at_place};
+use super::threads::Wake;
 use super::worker::Snapshot;
 use crate::bvh::{Ray, offset_origin};
 use crate::color::importance;

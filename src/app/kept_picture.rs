@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use egui::{ColorImage, TextureHandle};
 
 use super::document::Document;
-use super::lock;
+use super::threads::lock;
 use crate::error::Decoded;
 use crate::image::{Image, read_picture};
 use crate::scene::SceneOptions;

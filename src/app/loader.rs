@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use super::document::Document;
-use super::{Wake, lock};
+use super::threads::{Wake, lock};
 use crate::environment::sun::{Sun, equal_energy_tiles};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{Error, Notices, Result};

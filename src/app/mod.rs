@@ -8,7 +8,7 @@
 //! that draws it. `window` shows it on a display, [`screenshot`] in a texture without one.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 mod album;
 mod blit;
@@ -43,6 +43,7 @@ mod sync;
 #[cfg(test)]
 mod tests;
 mod theme;
+pub mod threads;
 mod undo;
 pub(crate) mod window;
 pub(crate) mod worker;
@@ -68,20 +69,9 @@ use settings_file::Settings;
 use small_maps::{SmallMap, SmallMaps};
 use speed_up::SpeedUp;
 use sync::TransformedMap;
+use threads::{Wake, Wakes};
 use undo::Undo;
 use worker::{Activity, Reference, Snapshot, Worker};
-
-/// Called from any thread when there is something new.
-pub type Wake = Arc<dyn Fn() + Send + Sync>;
-
-/// Whom threads tell that there is something new.
-#[derive(Clone)]
-pub struct Wakes {
-    /// There is something to draw.
-    pub draw: Wake,
-    /// The worker has something for the presenter: see [`App::relay`].
-    pub relay: Wake,
-}
 
 /// What is shown at the start.
 #[derive(Debug, Clone, Default)]
@@ -158,11 +148,6 @@ pub struct App {
     shown_aspect: Option<f32>,
     /// The size of the picture for which there is memory, and the region.
     affordable: (document::PictureSize, Option<[f32; 4]>),
-}
-
-/// What others hold is sound even if one of them has panicked with it.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What comes back from a thread.

@@ -6,16 +6,16 @@ mod order;
 mod rest;
 mod source;
 
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
-use std::thread::JoinHandle;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use memory::Memory;
 pub(crate) use order::{Order, Shown};
 use rest::{Work, rest_after};
 
-use super::{Wake, lock};
+use super::threads::{Latest, LatestThread, Wake, lock};
 use crate::error::{Error, Result};
 
 /// No picture takes longer to be made ready.
@@ -24,23 +24,10 @@ const MAX_WAIT: Duration = Duration::from_secs(60);
 /// Memory that was freed is given back so often, while pictures come: old ones, and their scenes, are gone then.
 const RETURN: Duration = Duration::from_secs(10);
 
-#[derive(Default)]
-struct Slot {
-    order: Option<Order>,
-    quit: bool,
-}
-
-struct Shared {
-    slot: Mutex<Slot>,
-    changed: Condvar,
-    shown: Mutex<Option<Arc<Shown>>>,
-    wake: Wake,
-}
-
 /// The handle of the presenting thread; it ends when dropped.
 pub(crate) struct Presenter {
-    shared: Arc<Shared>,
-    thread: Option<JoinHandle<()>>,
+    thread: LatestThread<Order>,
+    shown: Arc<Mutex<Option<Arc<Shown>>>>,
     ordered: Option<Order>,
 }
 
@@ -57,18 +44,11 @@ impl Presenter {
             .thread_name(|i| format!("present {i}"))
             .build()
             .map_err(|e| Error::new(format!("the display threads cannot be started: {e}")))?;
-        let shared = Arc::new(Shared {
-            slot: Mutex::default(),
-            changed: Condvar::new(),
-            shown: Mutex::default(),
-            wake,
-        });
-        let inside = Arc::clone(&shared);
-        let thread = std::thread::Builder::new()
-            .name("presenter".to_owned())
-            .spawn(move || pool.install(|| run(&inside)))
-            .map_err(|e| Error::new(format!("the display thread cannot be started: {e}")))?;
-        Ok(Self { shared, thread: Some(thread), ordered: None })
+        let shown = Arc::default();
+        let inside = Arc::clone(&shown);
+        let work = move |orders: &_| pool.install(|| run(orders, &inside, &wake));
+        let thread = LatestThread::start("presenter", Arc::default(), work)?;
+        Ok(Self { thread, shown, ordered: None })
     }
 
     /// Orders a picture; the latest order counts.
@@ -77,13 +57,12 @@ impl Presenter {
             return;
         }
         self.ordered = Some(order.clone());
-        lock(&self.shared.slot).order = Some(order);
-        self.shared.changed.notify_all();
+        self.thread.latest.change(|slot| slot.value = Some(order));
     }
 
     /// What there is to show.
     pub(crate) fn shown(&self) -> Option<Arc<Shown>> {
-        lock(&self.shared.shown).clone()
+        lock(&self.shown).clone()
     }
 
     /// Whether the last order is what is shown.
@@ -93,54 +72,33 @@ impl Presenter {
     }
 }
 
-impl Drop for Presenter {
-    fn drop(&mut self) {
-        lock(&self.shared.slot).quit = true;
-        self.shared.changed.notify_all();
-        if let Some(thread) = self.thread.take() {
-            // A panic there was reported there.
-            let _ = thread.join();
-        }
-    }
-}
-
-fn run(shared: &Shared) {
+fn run(orders: &Latest<Order>, shown: &Mutex<Option<Arc<Shown>>>, wake: &Wake) {
     let mut memory = Memory::default();
     // The last order, and until when one that only follows it waits.
     let mut last: Option<(Order, Instant)> = None;
     let mut returned = Instant::now();
-    loop {
-        let order = {
-            let mut slot = lock(&shared.slot);
-            loop {
-                if slot.quit {
-                    return;
+    let next = |last: Option<&(Order, Instant)>| {
+        orders.wait(|slot| {
+            let rest = match (&slot.value, last) {
+                _ if slot.is_closed => return ControlFlow::Break(None),
+                (None, _) => return ControlFlow::Continue(None),
+                (Some(order), Some((before, until))) if order.only_follows(before) => {
+                    until.saturating_duration_since(Instant::now())
                 }
-                let rest = match (&slot.order, &last) {
-                    (Some(order), Some((before, until))) if order.only_follows(before) => {
-                        until.saturating_duration_since(Instant::now())
-                    }
-                    (Some(_), _) => Duration::ZERO,
-                    (None, _) => Duration::MAX,
-                };
-                if rest.is_zero()
-                    && let Some(order) = slot.order.take()
-                {
-                    break order;
-                }
-                slot = if rest == Duration::MAX {
-                    shared.changed.wait(slot).unwrap_or_else(PoisonError::into_inner)
-                } else {
-                    let waited = shared.changed.wait_timeout(slot, rest);
-                    waited.unwrap_or_else(PoisonError::into_inner).0
-                };
+                (Some(_), _) => Duration::ZERO,
+            };
+            match rest.is_zero() {
+                true => ControlFlow::Break(slot.value.take()),
+                false => ControlFlow::Continue(Some(rest)),
             }
-        };
+        })
+    };
+    while let Some(order) = next(last.as_ref()) {
         let (start, kept) = (Instant::now(), order.clone());
         let work = Work::start();
         order.snapshot.rest.set_end(start + MAX_WAIT);
         match catch_unwind(AssertUnwindSafe(|| memory.present(order))) {
-            Ok(Ok(shown)) => *lock(&shared.shown) = Some(Arc::new(shown)),
+            Ok(Ok(done)) => *lock(shown) = Some(Arc::new(done)),
             // Where the device is lost, the window orders again on another.
             Ok(Err(_)) => {}
             // The panic is on the terminal; the next picture is another try.
@@ -150,7 +108,7 @@ fn run(shared: &Shared) {
         let end = Instant::now() + rest;
         kept.snapshot.rest.set_end(end);
         last = Some((kept, end));
-        (shared.wake)();
+        wake();
         if returned.elapsed() > RETURN {
             crate::memory::return_freed();
             returned = Instant::now();

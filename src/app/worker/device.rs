@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, Weak};
 
 use super::Request;
-use crate::app::lock;
+use crate::app::threads::lock;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::World;

@@ -5,10 +5,10 @@
 //! pixel of every eighth row, then every fourth and second, so that there is a picture of the whole
 //! view at once and no sample is lost.
 
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
-use std::thread::JoinHandle;
+use std::sync::{Arc, Mutex};
 
 mod device;
 mod job;
@@ -25,22 +25,17 @@ pub(crate) use request::{Reference, Request};
 use snapshot::PublishThrottle;
 pub(crate) use snapshot::{Activity, Backdrop, NoCache, Origin, Point, SessionSnapshot, Snapshot};
 
-use super::{Wake, lock};
+use super::threads::{Latest, LatestThread, Wake, lock};
 use crate::alarm::Alarm;
 use crate::error::{Error, Result};
 use crate::render::gpu::{Gpu, RayChoice};
 
-/// What there is to do.
-struct Orders {
-    slot: Mutex<Slot>,
-    changed: Condvar,
+struct Shared {
+    /// What is asked for; it stays there while it is worked on.
+    orders: Arc<Latest<Arc<Request>>>,
     /// How many [`preparation::Preparation`]s are under way.
     preparations: AtomicUsize,
     wake: Wake,
-}
-
-struct Shared {
-    orders: Arc<Orders>,
     cancel: Arc<AtomicBool>,
     snapshot: Mutex<Option<Arc<Snapshot>>>,
     rest: Arc<PublishThrottle>,
@@ -51,16 +46,10 @@ struct Shared {
     screen: Arc<Mutex<Gpu>>,
 }
 
-#[derive(Default)]
-struct Slot {
-    request: Option<Arc<Request>>,
-    quit: bool,
-}
-
 /// The handle of the render thread; it ends when dropped.
 pub(crate) struct Worker {
     shared: Arc<Shared>,
-    thread: Option<JoinHandle<()>>,
+    thread: Option<LatestThread<Arc<Request>>>,
     pool: Arc<rayon::ThreadPool>,
 }
 
@@ -71,23 +60,16 @@ impl Worker {
     /// # Errors
     /// If the system gives no thread.
     pub(crate) fn start(wake: Wake, gpu: (Option<String>, RayChoice), screen: Gpu) -> Result<Self> {
-        let no_thread = |e: &dyn std::fmt::Display| {
-            Error::new(format!("the render threads cannot be started: {e}"))
-        };
         let pool = rayon::ThreadPoolBuilder::new()
             .thread_name(|i| format!("render {i}"))
             .start_handler(|_| lower_priority())
             .build()
-            .map_err(|e| no_thread(&e))?;
+            .map_err(|e| Error::new(format!("the render threads cannot be started: {e}")))?;
         let pool = Arc::new(pool);
-        let orders = Orders {
-            slot: Mutex::default(),
-            changed: Condvar::new(),
+        let shared = Arc::new(Shared {
+            orders: Arc::default(),
             preparations: AtomicUsize::default(),
             wake,
-        };
-        let shared = Arc::new(Shared {
-            orders: Arc::new(orders),
             cancel: Arc::default(),
             snapshot: Mutex::default(),
             rest: Arc::new(PublishThrottle::new()),
@@ -96,10 +78,8 @@ impl Worker {
             screen: Arc::new(Mutex::new(screen)),
         });
         let (inside, render_pool) = (Arc::clone(&shared), Arc::clone(&pool));
-        let thread = std::thread::Builder::new()
-            .name("worker".to_owned())
-            .spawn(move || run(&inside, &render_pool, &gpu))
-            .map_err(|e| no_thread(&e))?;
+        let work = move |_: &_| run(&inside, &render_pool, &gpu);
+        let thread = LatestThread::start("worker", Arc::clone(&shared.orders), work)?;
         Ok(Self { shared, thread: Some(thread), pool })
     }
 
@@ -110,15 +90,15 @@ impl Worker {
 
     /// Asks for a picture; the latest request counts.
     pub(crate) fn submit(&self, request: Request) {
-        let mut slot = lock(&self.shared.orders.slot);
-        if slot.request.as_ref().is_some_and(|old| old.is_same(&request)) {
-            return;
-        }
-        if slot.request.as_ref().is_some_and(|old| old.is_ended_by(&request)) {
-            self.shared.cancel.store(true, Ordering::Relaxed);
-        }
-        slot.request = Some(Arc::new(request));
-        self.shared.orders.changed.notify_all();
+        self.shared.orders.change(|slot| {
+            if slot.value.as_ref().is_some_and(|old| old.is_same(&request)) {
+                return;
+            }
+            if slot.value.as_ref().is_some_and(|old| old.is_ended_by(&request)) {
+                self.shared.cancel.store(true, Ordering::Relaxed);
+            }
+            slot.value = Some(Arc::new(request));
+        });
     }
 
     /// The latest picture.
@@ -128,19 +108,19 @@ impl Worker {
 
     /// Whether a picture is what was asked for last.
     pub(super) fn has_answered(&self, snapshot: &Snapshot) -> bool {
-        let slot = lock(&self.shared.orders.slot);
-        slot.request.as_ref().is_some_and(|latest| snapshot.request.is_same(latest))
+        let latest = &self.shared.orders.slot().value;
+        latest.as_ref().is_some_and(|latest| snapshot.request.is_same(latest))
     }
 
     /// Whether a picture is of what was asked for last, whatever else is wanted with it.
     pub(super) fn is_of_latest(&self, snapshot: &Snapshot) -> bool {
-        let slot = lock(&self.shared.orders.slot);
-        slot.request.as_ref().is_some_and(|latest| !snapshot.request.restarts(latest))
+        let latest = &self.shared.orders.slot().value;
+        latest.as_ref().is_some_and(|latest| !snapshot.request.restarts(latest))
     }
 
     /// Whether a GPU is being opened, filled or programmed.
     pub(crate) fn is_preparing(&self) -> bool {
-        self.shared.orders.preparations.load(Ordering::Relaxed) > 0
+        self.shared.preparations.load(Ordering::Relaxed) > 0
     }
 
     /// What there is to say if rendering has ended with a panic since this was asked last.
@@ -161,18 +141,17 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        lock(&self.shared.orders.slot).quit = true;
-        self.shared.cancel.store(true, Ordering::Relaxed);
-        self.shared.orders.changed.notify_all();
-        if let Some(thread) = self.thread.take() {
-            // A panic there was reported there.
-            let _ = thread.join();
-        }
+        let shared = &self.shared;
+        shared.orders.change(|slot| {
+            slot.is_closed = true;
+            shared.cancel.store(true, Ordering::Relaxed);
+        });
+        self.thread = None;
         // Drivers do not stand it that the process ends while they compile.
-        let mut slot = lock(&self.shared.orders.slot);
-        while self.is_preparing() {
-            slot = self.shared.orders.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
-        }
+        shared.orders.wait(|_| match self.is_preparing() {
+            true => ControlFlow::Continue(None),
+            false => ControlFlow::Break(()),
+        });
     }
 }
 
@@ -190,29 +169,18 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
     let mut kept = fresh();
     let alarm = Alarm::start(Arc::clone(&shared.cancel));
     let mut done: Option<Arc<Request>> = None;
-    loop {
-        let request = {
-            let mut slot = lock(&shared.orders.slot);
-            loop {
-                if slot.quit {
-                    return;
-                }
-                match &slot.request {
-                    Some(new) if done.as_ref().is_none_or(|old| !old.is_same(new)) => {
-                        // What was to be ended has ended.
-                        shared.cancel.store(false, Ordering::Relaxed);
-                        break Arc::clone(new);
-                    }
-                    _ => {
-                        slot = shared
-                            .orders
-                            .changed
-                            .wait(slot)
-                            .unwrap_or_else(PoisonError::into_inner);
-                    }
-                }
+    let next = |done: Option<&Request>| {
+        shared.orders.wait(|slot| match &slot.value {
+            _ if slot.is_closed => ControlFlow::Break(None),
+            Some(new) if done.is_none_or(|old| !old.is_same(new)) => {
+                // What was to be ended has ended.
+                shared.cancel.store(false, Ordering::Relaxed);
+                ControlFlow::Break(Some(Arc::clone(new)))
             }
-        };
+            _ => ControlFlow::Continue(None),
+        })
+    };
+    while let Some(request) = next(done.as_deref()) {
         let world = Arc::clone(&request.world);
         let environment = Arc::clone(&request.environment);
         kept.leave_other_worlds(&request);
@@ -233,7 +201,7 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
             kept = fresh();
             alarm.set(None);
             *lock(&shared.panic) = Some("rendering has failed; R begins again".to_owned());
-            (shared.orders.wake)();
+            (shared.wake)();
             asked
         }));
     }

@@ -3,27 +3,24 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::Orders;
-use crate::app::lock;
+use super::Shared;
 
 /// Some of it that is under way. It ends when dropped, be it by a panic.
-pub(super) struct Preparation(Arc<Orders>);
+pub(super) struct Preparation(Arc<Shared>);
 
 impl Preparation {
     /// Begins, and has that shown.
-    pub(super) fn begin(orders: &Arc<Orders>) -> Self {
-        orders.preparations.fetch_add(1, Ordering::Relaxed);
-        (orders.wake)();
-        Self(Arc::clone(orders))
+    pub(super) fn begin(shared: &Arc<Shared>) -> Self {
+        shared.preparations.fetch_add(1, Ordering::Relaxed);
+        (shared.wake)();
+        Self(Arc::clone(shared))
     }
 }
 
 impl Drop for Preparation {
     fn drop(&mut self) {
-        self.0.preparations.fetch_sub(1, Ordering::Relaxed);
-        // Whoever waits for it looks for it with the lock held: either it is gone by then, or this wakes them.
-        drop(lock(&self.0.slot));
-        self.0.changed.notify_all();
+        // Whoever waits for its end looks for it with the lock held.
+        self.0.orders.change(|_| _ = self.0.preparations.fetch_sub(1, Ordering::Relaxed));
         (self.0.wake)();
     }
 }

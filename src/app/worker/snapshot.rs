@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::request::Request;
-use crate::app::lock;
+use crate::app::threads::lock;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::radiance_cache::CacheFacts;
 use crate::render::film::Film;

@@ -207,7 +207,7 @@ fn nothing_is_left_under_way_when_the_window_closes() {
     }
     let shared = Arc::clone(&worker.shared);
     drop(worker);
-    assert_eq!(shared.orders.preparations.load(Ordering::Relaxed), 0);
+    assert_eq!(shared.preparations.load(Ordering::Relaxed), 0);
 }
 
 #[test]

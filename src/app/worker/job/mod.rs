@@ -5,8 +5,9 @@ mod publishing;
 mod sessions;
 
 use std::borrow::Cow;
+use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, PoisonError, Weak};
+use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
 pub(super) use cached::CompletePicture;
@@ -17,7 +18,6 @@ use sessions::Placed;
 use super::kept::{Learned, SessionCache, SuspendedPicture};
 use super::{Activity, Point, Request, Shared};
 use crate::alarm::Alarm;
-use crate::app::lock;
 use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
@@ -331,11 +331,11 @@ impl<'a> PictureTask<'a> {
         plain: Option<&Session<'_>>,
     ) -> Option<Activity> {
         {
-            let slot = lock(&self.shared.orders.slot);
-            if slot.quit {
+            let slot = self.shared.orders.slot();
+            if slot.is_closed {
                 return None;
             }
-            if let Some(new) = &slot.request {
+            if let Some(new) = &slot.value {
                 if self.request.restarts(new) {
                     return None;
                 }
@@ -406,21 +406,23 @@ impl<'a> PictureTask<'a> {
     }
 
     fn is_left_for(&self, is_other: impl Fn(&Request, &Request) -> bool) -> bool {
-        let slot = lock(&self.shared.orders.slot);
-        slot.quit || slot.request.as_ref().is_some_and(|new| is_other(&self.request, new))
+        let slot = self.shared.orders.slot();
+        slot.is_closed || slot.value.as_ref().is_some_and(|new| is_other(&self.request, new))
     }
 
     /// Waits until something else is asked for, or kernels are there that were not.
     fn rest(&self) -> Rested {
         let device = &self.kept.device;
-        let mut slot = lock(&self.shared.orders.slot);
-        while !slot.quit && slot.request.as_ref().is_some_and(|new| self.request.is_same(new)) {
-            if device.was_compiling() && !device.is_compiling() {
-                return Rested::ForKernels;
+        self.shared.orders.wait(|slot| {
+            let is_other = slot.value.as_ref().is_none_or(|new| !self.request.is_same(new));
+            if slot.is_closed || is_other {
+                ControlFlow::Break(Rested::ForRequest)
+            } else if device.was_compiling() && !device.is_compiling() {
+                ControlFlow::Break(Rested::ForKernels)
+            } else {
+                ControlFlow::Continue(None)
             }
-            slot = self.shared.orders.changed.wait(slot).unwrap_or_else(PoisonError::into_inner);
-        }
-        Rested::ForRequest
+        })
     }
 }
 

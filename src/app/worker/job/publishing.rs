@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::cached::{self, CachedPicture, worth};
 use super::sessions::SLICE;
 use super::{MAIN, PLAIN, PictureTask};
-use crate::app::lock;
+use crate::app::threads::lock;
 use crate::app::worker::kept::PreviousFilm;
 use crate::app::worker::{Activity, Backdrop, NoCache, Origin, Point, SessionSnapshot, Snapshot};
 use crate::light_grid::LightGrid;
@@ -154,7 +154,7 @@ impl PictureTask<'_> {
             rest: Arc::clone(&self.shared.rest),
         };
         *lock(&self.shared.snapshot) = Some(Arc::new(snapshot));
-        (self.shared.orders.wake)();
+        (self.shared.wake)();
         self.published = Instant::now();
         if !rests {
             let cost = (self.published - start).saturating_sub(reading);

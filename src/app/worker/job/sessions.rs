@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::cached::CachedPicture;
 use super::{MAIN, PictureTask, Rested};
-use crate::app::lock;
+use crate::app::threads::lock;
 use crate::app::worker::preparation::Preparation;
 use crate::environment::Environment;
 use crate::error::Result;
@@ -148,8 +148,8 @@ impl PictureTask<'_> {
         };
         self.alarm.set(None);
         self.go_on(session, advanced);
-        let slot = lock(&self.shared.orders.slot);
-        if !slot.quit && slot.request.as_ref().is_none_or(|new| !self.request.restarts(new)) {
+        let slot = self.shared.orders.slot();
+        if !slot.is_closed && slot.value.as_ref().is_none_or(|new| !self.request.restarts(new)) {
             self.shared.cancel.store(false, Ordering::Relaxed);
         }
     }
@@ -177,7 +177,7 @@ impl PictureTask<'_> {
         }
         self.kept.device.choose_for(&self.request);
         let needs_upload = self.kept.device.needs_upload(&self.request);
-        let uploading = needs_upload.then(|| Preparation::begin(&self.shared.orders));
+        let uploading = needs_upload.then(|| Preparation::begin(self.shared));
         if needs_upload {
             // With another one or another scene it was different.
             self.kept.seconds_per_path[1] = None;
@@ -197,8 +197,8 @@ impl PictureTask<'_> {
     }
 
     fn place_if_compiled(&mut self, session: &mut Session<'_>) {
-        let orders = &self.shared.orders;
-        let preparation = || Arc::new(Preparation::begin(orders)) as Arc<CompileGuard>;
+        let shared = self.shared;
+        let preparation = || Arc::new(Preparation::begin(shared)) as Arc<CompileGuard>;
         self.kept.device.place(session, &self.request, preparation);
         self.tell_failure();
     }
@@ -215,7 +215,7 @@ impl PictureTask<'_> {
     fn tell_failure(&mut self) {
         if let Some(sentence) = self.kept.device.take_failure() {
             lock(&self.shared.failures).push(sentence);
-            (self.shared.orders.wake)();
+            (self.shared.wake)();
         }
     }
 
