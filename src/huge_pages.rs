@@ -2,7 +2,7 @@
 
 /// The same values in memory that the system was asked to back by huge pages, where it can: random
 /// reads of some 10 MB and more otherwise spend much of their time on address translation.
-/// *Measured* on the BVH bench: see `docs/method.md`.
+/// *Measured* on the BVH bench: see `docs/notebook/2026-11-method.md`.
 pub(crate) fn on_huge_pages<T>(values: Vec<T>) -> Vec<T> {
     if size_of_val(values.as_slice()) < WORTHWHILE_BYTES {
         return values;
