@@ -46,7 +46,6 @@ mod develop;
 mod digest;
 pub mod environment;
 pub mod error;
-pub mod features;
 mod huge_pages;
 pub mod image;
 pub mod light_grid;

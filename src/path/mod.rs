@@ -42,13 +42,13 @@ use self::vertex::{MediumScatterer, Onward, Scatterer, SurfaceScatterer, Vertex}
 use crate::bsdf::{Bsdf, Hero};
 use crate::bvh::{Hit, Ray, offset_origin};
 use crate::environment::Environment;
-use crate::features::Features;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid, WHOLE_MAP};
 use crate::math::balance_heuristic;
 use crate::medium::Fog;
 use crate::radiance_cache::RadianceCache;
 use crate::sampler::Sampler;
+use crate::scene::needs::SceneFeatures;
 use crate::scene::surface::SurfacePoint;
 
 /// What bounds a path.
@@ -272,7 +272,7 @@ impl<'a> Path<'a> {
             };
             self.travelled += hit.t;
             let point = self.tracer.world.point(&hit, self.ray.direction);
-            if self.tracer.world.needs.has(Features::EMITTERS) {
+            if self.tracer.world.needs.has(SceneFeatures::EMITTERS) {
                 self.add_emitted(&hit, &point);
             }
             if self.passes(&point) {

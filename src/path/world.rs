@@ -10,10 +10,9 @@ use super::ray_clock::RayClock;
 use crate::bvh::{Bvh, Hit, Ray, Shared};
 use crate::environment::Environment;
 use crate::error::Decoded;
-use crate::features::Features;
 use crate::huge_pages::on_huge_pages;
 use crate::memory;
-use crate::scene::needs::SceneNeeds;
+use crate::scene::needs::{SceneFeatures, SceneNeeds};
 use crate::scene::surface::{SurfacePoint, alpha_at};
 use crate::scene::{AlphaMode, Material, PunctualKind, PunctualLight, Scene, TextureImage};
 
@@ -125,9 +124,9 @@ impl World {
     /// Nearest surface along a ray. A camera ray passes single-sided surfaces from behind.
     pub fn closest_hit(&self, ray: &Ray, from_camera: bool) -> Option<Hit> {
         let _running = self.clock.as_ref().map(RayClock::start);
-        if from_camera && self.needs.has(Features::SINGLE_SIDED) {
+        if from_camera && self.needs.has(SceneFeatures::SINGLE_SIDED) {
             self.bvh.closest_hit(ray, |hit| self.faces(hit, ray) && self.is_covered(hit))
-        } else if self.needs.has(Features::ALPHA_MASK) {
+        } else if self.needs.has(SceneFeatures::ALPHA_MASK) {
             self.bvh.closest_hit(ray, |hit| self.is_covered(hit))
         } else {
             self.bvh.closest_hit(ray, |_| true)
@@ -138,7 +137,7 @@ impl World {
     pub fn transmittance(&self, ray: &Ray) -> Vec3 {
         let _running = self.clock.as_ref().map(RayClock::start);
         let mut transmittance = Vec3::ONE;
-        let blocked = if self.needs.pass_through() {
+        let blocked = if self.needs.features.pass_through() {
             self.bvh.any_hit(ray, |hit| {
                 if !self.material_of(hit).passing.partial {
                     return self.is_covered(hit);

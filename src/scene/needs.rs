@@ -5,76 +5,139 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 
 use super::{AlphaMode, Material, Scene};
-use crate::features::Features;
+
+bitflags::bitflags! {
+    /// What a scene uses: what it does without is neither evaluated nor, on a GPU, compiled.
+    #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+    pub struct SceneFeatures: u64 {
+        /// Any texture at all.
+        const TEXTURES = 1 << 0;
+        /// A second set of texture coordinates.
+        const SECOND_UV_SET = 1 << 1;
+        /// Normal maps, hence tangents.
+        const NORMAL_MAPS = 1 << 2;
+        /// Vertex colours.
+        const VERTEX_COLORS = 1 << 3;
+        /// Surfaces cut out by an alpha threshold.
+        const ALPHA_MASK = 1 << 4;
+        /// Surfaces with partial opacity.
+        const ALPHA_BLEND = 1 << 5;
+        /// Single-sided surfaces, which camera rays pass from behind.
+        const SINGLE_SIDED = 1 << 6;
+        /// Metals.
+        const METALS = 1 << 7;
+        /// Thin-walled transmission.
+        const THIN_TRANSMISSION = 1 << 8;
+        /// Light that enters solid bodies.
+        const SOLID_TRANSMISSION = 1 << 9;
+        /// Light that comes through diffusely.
+        const DIFFUSE_TRANSMISSION = 1 << 10;
+        /// Absorption inside solid bodies.
+        const ABSORPTION = 1 << 11;
+        /// A medium of the scene's own between surfaces.
+        const FOG = 1 << 12;
+        /// Scattering inside solid bodies.
+        const SCATTERING_SOLIDS = 1 << 13;
+        /// Reflections that are wider in one direction.
+        const ANISOTROPY = 1 << 14;
+        /// Sheen.
+        const SHEEN = 1 << 15;
+        /// Thin films on surfaces.
+        const IRIDESCENCE = 1 << 16;
+        /// Solids that bend colours differently.
+        const DISPERSION = 1 << 17;
+        /// Clearcoat.
+        const CLEARCOAT = 1 << 18;
+        /// Unlit surfaces.
+        const UNLIT = 1 << 19;
+        /// Emissive triangles.
+        const EMITTERS = 1 << 20;
+        /// Point, spot or directional lights.
+        const PUNCTUAL_LIGHTS = 1 << 21;
+        /// Emissive triangles under a clearcoat.
+        const COATED_EMITTERS = 1 << 22;
+        /// Meshes that instances share.
+        const INSTANCES = 1 << 23;
+    }
+}
+
+impl SceneFeatures {
+    /// Whether a ray may pass a surface without being scattered.
+    pub fn pass_through(self) -> bool {
+        self.intersects(Self::ALPHA_MASK | Self::ALPHA_BLEND | Self::THIN_TRANSMISSION)
+    }
+}
+
+/// The name of each flag there is, and whether it is set.
+pub(crate) fn flags_by_name<F: bitflags::Flags + Copy>(
+    flags: F,
+) -> impl Iterator<Item = (&'static str, bool)> {
+    F::FLAGS.iter().map(move |flag| (flag.name(), flags.contains(*flag.value())))
+}
 
 /// What a scene uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SceneNeeds {
     /// Features of scenes alone.
-    pub features: Features,
+    pub features: SceneFeatures,
     /// Bit `i`: some material has the `i`-th of [`Material::textures`].
     pub texture_slots: u32,
 }
 
 /// A feature of scenes, what it is called, and what is left out without it, with the reason.
-const WORDS: [(Features, &str, Option<&str>); 24] = [
-    (Features::TEXTURES, "Textures", Some("texture reads: no material has a texture")),
-    (Features::NORMAL_MAPS, "Normal maps", Some("tangent frames: no material has a normal map")),
-    (
-        Features::SECOND_UV_SET,
-        "A second set of texture coordinates",
-        Some("the second set of texture coordinates: no texture uses it"),
-    ),
-    (Features::VERTEX_COLORS, "Vertex colours", Some("vertex colours: no mesh has them")),
-    (Features::ALPHA_MASK, "Alpha tests", Some("alpha tests: no material is masked")),
-    (
-        Features::ALPHA_BLEND,
-        "Opacity along rays",
-        Some("opacity along rays: no material is blended"),
-    ),
-    (Features::SINGLE_SIDED, "Single-sided surfaces", None),
-    (Features::METALS, "Metals", None),
-    (
-        Features::THIN_TRANSMISSION,
-        "Thin glass",
-        Some("thin glass: no material transmits without volume"),
-    ),
-    (
-        Features::SOLID_TRANSMISSION,
-        "Refraction",
-        Some("refraction: no material is a transmitting solid"),
-    ),
-    (
-        Features::DIFFUSE_TRANSMISSION,
-        "Diffuse transmission",
-        Some("diffuse transmission: no material has it"),
-    ),
-    (Features::ABSORPTION, "Absorption", Some("absorption: no solid absorbs")),
-    (Features::FOG, "Fog", Some("fog: the scene has none")),
-    (
-        Features::SCATTERING_SOLIDS,
-        "Scattering inside of solids",
-        Some("scattering inside of solids: none is filled"),
-    ),
-    (Features::ANISOTROPY, "Anisotropy", Some("anisotropy: no material has a direction")),
-    (Features::SHEEN, "Sheen", Some("sheen: no material has it")),
-    (Features::IRIDESCENCE, "Iridescence", Some("iridescence: no material has a film")),
-    (Features::DISPERSION, "Dispersion", Some("dispersion: no solid bends colours differently")),
-    (Features::CLEARCOAT, "Clearcoat", Some("clearcoat: no material is coated")),
-    (Features::UNLIT, "Unlit surfaces", None),
-    (
-        Features::EMITTERS,
-        "Emissive triangles",
-        Some("sampling of emissive triangles: nothing emits"),
-    ),
-    (
-        Features::PUNCTUAL_LIGHTS,
-        "Point, spot or directional lights",
-        Some("punctual lights: the scene has none"),
-    ),
-    (Features::COATED_EMITTERS, "Emissive triangles under a clearcoat", None),
-    (Features::INSTANCES, "Meshes shared by instances", None),
-];
+const WORDS: [(SceneFeatures, &str, Option<&str>); 24] = {
+    use SceneFeatures as S;
+    [
+        (S::TEXTURES, "Textures", Some("texture reads: no material has a texture")),
+        (S::NORMAL_MAPS, "Normal maps", Some("tangent frames: no material has a normal map")),
+        (
+            S::SECOND_UV_SET,
+            "A second set of texture coordinates",
+            Some("the second set of texture coordinates: no texture uses it"),
+        ),
+        (S::VERTEX_COLORS, "Vertex colours", Some("vertex colours: no mesh has them")),
+        (S::ALPHA_MASK, "Alpha tests", Some("alpha tests: no material is masked")),
+        (S::ALPHA_BLEND, "Opacity along rays", Some("opacity along rays: no material is blended")),
+        (S::SINGLE_SIDED, "Single-sided surfaces", None),
+        (S::METALS, "Metals", None),
+        (
+            S::THIN_TRANSMISSION,
+            "Thin glass",
+            Some("thin glass: no material transmits without volume"),
+        ),
+        (
+            S::SOLID_TRANSMISSION,
+            "Refraction",
+            Some("refraction: no material is a transmitting solid"),
+        ),
+        (
+            S::DIFFUSE_TRANSMISSION,
+            "Diffuse transmission",
+            Some("diffuse transmission: no material has it"),
+        ),
+        (S::ABSORPTION, "Absorption", Some("absorption: no solid absorbs")),
+        (S::FOG, "Fog", Some("fog: the scene has none")),
+        (
+            S::SCATTERING_SOLIDS,
+            "Scattering inside of solids",
+            Some("scattering inside of solids: none is filled"),
+        ),
+        (S::ANISOTROPY, "Anisotropy", Some("anisotropy: no material has a direction")),
+        (S::SHEEN, "Sheen", Some("sheen: no material has it")),
+        (S::IRIDESCENCE, "Iridescence", Some("iridescence: no material has a film")),
+        (S::DISPERSION, "Dispersion", Some("dispersion: no solid bends colours differently")),
+        (S::CLEARCOAT, "Clearcoat", Some("clearcoat: no material is coated")),
+        (S::UNLIT, "Unlit surfaces", None),
+        (S::EMITTERS, "Emissive triangles", Some("sampling of emissive triangles: nothing emits")),
+        (
+            S::PUNCTUAL_LIGHTS,
+            "Point, spot or directional lights",
+            Some("punctual lights: the scene has none"),
+        ),
+        (S::COATED_EMITTERS, "Emissive triangles under a clearcoat", None),
+        (S::INSTANCES, "Meshes shared by instances", None),
+    ]
+};
 
 impl SceneNeeds {
     /// Looks at every material that a triangle uses.
@@ -84,10 +147,10 @@ impl SceneNeeds {
             used[material as usize] = true;
         }
         let mut needs = Self::default();
-        needs.features.set(Features::VERTEX_COLORS, !scene.colors.is_empty());
-        needs.features.set(Features::PUNCTUAL_LIGHTS, !scene.lights.is_empty());
-        needs.features.set(Features::FOG, scene.medium.is_some());
-        needs.features.set(Features::INSTANCES, !scene.instances.is_empty());
+        needs.features.set(SceneFeatures::VERTEX_COLORS, !scene.colors.is_empty());
+        needs.features.set(SceneFeatures::PUNCTUAL_LIGHTS, !scene.lights.is_empty());
+        needs.features.set(SceneFeatures::FOG, scene.medium.is_some());
+        needs.features.set(SceneFeatures::INSTANCES, !scene.instances.is_empty());
         for (material, _) in scene.materials.iter().zip(used).filter(|(_, used)| *used) {
             needs.add(material);
         }
@@ -95,49 +158,42 @@ impl SceneNeeds {
     }
 
     fn add(&mut self, m: &Material) {
+        use SceneFeatures as S;
         let Self { features, texture_slots } = self;
-        for (slot, texture) in m.textures.iter().enumerate() {
-            if let Some(texture) = texture {
-                *features |= Features::TEXTURES;
-                *features |= Features::SECOND_UV_SET.only_if(texture.uv_set == 1);
-                *texture_slots |= 1 << slot;
-            }
+        for (slot, _) in m.textures.iter().enumerate().filter(|(_, texture)| texture.is_some()) {
+            *texture_slots |= 1 << slot;
         }
         let has_inside =
             (m.transmission > 0.0 || m.diffuse_transmission > 0.0) && m.thickness > 0.0;
         for (feature, is_needed) in [
-            (Features::NORMAL_MAPS, m.has_normal_map()),
-            (Features::ALPHA_MASK, matches!(m.alpha_mode, AlphaMode::Mask { .. })),
-            (Features::ALPHA_BLEND, m.alpha_mode == AlphaMode::Blend),
-            (Features::SINGLE_SIDED, !m.double_sided),
-            (Features::METALS, m.metallic > 0.0),
-            (Features::THIN_TRANSMISSION, m.transmission > 0.0 && m.thickness == 0.0),
-            (Features::DIFFUSE_TRANSMISSION, m.diffuse_transmission > 0.0),
-            (Features::SOLID_TRANSMISSION, has_inside),
-            (Features::ABSORPTION, has_inside && m.attenuation_distance.is_finite()),
-            (Features::SCATTERING_SOLIDS, has_inside && m.scattering != Vec3::ZERO),
-            (Features::ANISOTROPY, m.anisotropy > 0.0),
-            (Features::SHEEN, m.sheen_color != Vec3::ZERO),
-            (Features::IRIDESCENCE, m.iridescence > 0.0),
-            (Features::DISPERSION, m.dispersion > 0.0 && m.transmission > 0.0 && m.thickness > 0.0),
-            (Features::CLEARCOAT, m.clearcoat > 0.0),
-            (Features::UNLIT, m.unlit),
-            (Features::EMITTERS, is_emitter(m)),
-            (Features::COATED_EMITTERS, is_emitter(m) && m.clearcoat > 0.0),
+            (S::TEXTURES, m.textures.iter().any(Option::is_some)),
+            (S::SECOND_UV_SET, m.textures.iter().flatten().any(|texture| texture.uv_set == 1)),
+            (S::NORMAL_MAPS, m.has_normal_map()),
+            (S::ALPHA_MASK, matches!(m.alpha_mode, AlphaMode::Mask { .. })),
+            (S::ALPHA_BLEND, m.alpha_mode == AlphaMode::Blend),
+            (S::SINGLE_SIDED, !m.double_sided),
+            (S::METALS, m.metallic > 0.0),
+            (S::THIN_TRANSMISSION, m.transmission > 0.0 && m.thickness == 0.0),
+            (S::DIFFUSE_TRANSMISSION, m.diffuse_transmission > 0.0),
+            (S::SOLID_TRANSMISSION, has_inside),
+            (S::ABSORPTION, has_inside && m.attenuation_distance.is_finite()),
+            (S::SCATTERING_SOLIDS, has_inside && m.scattering != Vec3::ZERO),
+            (S::ANISOTROPY, m.anisotropy > 0.0),
+            (S::SHEEN, m.sheen_color != Vec3::ZERO),
+            (S::IRIDESCENCE, m.iridescence > 0.0),
+            (S::DISPERSION, m.dispersion > 0.0 && m.transmission > 0.0 && m.thickness > 0.0),
+            (S::CLEARCOAT, m.clearcoat > 0.0),
+            (S::UNLIT, m.unlit),
+            (S::EMITTERS, is_emitter(m)),
+            (S::COATED_EMITTERS, is_emitter(m) && m.clearcoat > 0.0),
         ] {
-            *features |= feature.only_if(is_needed);
+            features.set(feature, is_needed || features.contains(feature));
         }
     }
 
     /// Whether all of these are needed.
-    pub fn has(&self, features: Features) -> bool {
+    pub fn has(&self, features: SceneFeatures) -> bool {
         self.features.contains(features)
-    }
-
-    /// Whether a ray may pass a surface without being scattered.
-    pub fn pass_through(&self) -> bool {
-        let passed = Features::ALPHA_MASK | Features::ALPHA_BLEND | Features::THIN_TRANSMISSION;
-        self.features.intersects(passed)
     }
 
     /// What the scene uses, in words.
@@ -152,8 +208,7 @@ impl SceneNeeds {
 
     /// Whether each feature of scenes is needed, by name.
     pub fn by_name(&self) -> BTreeMap<String, bool> {
-        let all = WORDS.iter().fold(Features::empty(), |all, (feature, ..)| all | *feature);
-        all.iter_names().map(|(name, feature)| (name.to_lowercase(), self.has(feature))).collect()
+        flags_by_name(self.features).map(|(name, needed)| (name.to_lowercase(), needed)).collect()
     }
 }
 

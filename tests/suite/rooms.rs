@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Rooms by floor, from the ground up: each uses those below its own alone.
 const FLOORS: [&[&str]; 14] = [
-    &["alarm", "color", "error", "features", "huge_pages", "math", "prefetch", "sampler"],
+    &["alarm", "color", "error", "huge_pages", "math", "prefetch", "sampler"],
     &["bvh", "memory", "noise", "terminal"],
     &["image"],
     &["environment", "scene", "tone"],
@@ -26,7 +26,7 @@ const FLOORS: [&[&str]; 14] = [
 const CRATES: [(&str, &[&str]); 29] = [
     ("basisu", &["image/ktx2"]),
     ("bevy_mikktspace", &["scene/gltf/tangents"]),
-    ("bitflags", &["features"]),
+    ("bitflags", &["render/gpu/features", "scene/needs"]),
     ("clap", &["cli"]),
     ("clap_complete", &["cli/generate"]),
     ("clap_mangen", &["cli/generate"]),

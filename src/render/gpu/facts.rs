@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
+use super::features::Features;
 use super::kernel::Kernel;
 use super::shader::{ArrayPlaces, Constants, Program, VertexTexels};
-use crate::features::Features;
 use crate::path::World;
 
 /// What the render kernel of a picture holds and what was left out of it.
@@ -36,9 +36,11 @@ impl KernelFacts {
         };
         let (source_bytes, vertex_bytes) = bytes_of(features);
         let (full_source_bytes, full_vertex_bytes) = bytes_of(Features::most());
+        let names: Vec<_> = features.names().collect();
+        let left_out = Features::most().names().filter(|name| !names.contains(name));
         Self {
-            features: features.names().collect(),
-            left_out: (Features::most() - features).names().collect(),
+            features: names.iter().map(|name| name.to_lowercase()).collect(),
+            left_out: left_out.map(str::to_lowercase).collect(),
             source_bytes,
             full_source_bytes,
             vertex_bytes,

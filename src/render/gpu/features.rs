@@ -1,76 +1,135 @@
-//! What the kernels of a picture are built with.
+//! What the kernels of a picture are built with, by who decides it: scene, view or kernel. What follows
+//! from these is a function. A shader's `//#if NAME` asks for any of them.
 
 use super::super::filter::PixelFilter;
 use super::super::{Gi, Sampling, View};
 use super::kernel::Kernel;
 use super::shader::Constants;
 use crate::environment::{Environment, TableKind};
-use crate::features::Features;
 use crate::light_grid::Recording;
 use crate::path::{Background, World};
 use crate::sampler::Points;
+use crate::scene::needs::{SceneFeatures, flags_by_name};
 
-/// What follows from any of some others.
-const FOLLOWS: [(Features, Features); 9] = [
-    (Features::FILTERED_HITS, Features::ALPHA_MASK.union(Features::SINGLE_SIDED)),
-    (
-        Features::FILTERED_OR_PASSED,
-        Features::ALPHA_MASK.union(Features::PARTIAL).union(Features::SINGLE_SIDED),
-    ),
-    (Features::PASS_THROUGH, Features::ALPHA_MASK.union(Features::PARTIAL)),
-    (Features::SCENE_LIGHTS, Features::EMITTERS.union(Features::PUNCTUAL_LIGHTS)),
-    (Features::SHADOW_MEDIA, Features::MEDIUM.union(Features::SOLID_TRANSMISSION)),
-    (Features::SHADOW_RAYS, Features::MAP_SAMPLING.union(Features::LOCAL_LIGHTS)),
-    (Features::SUMMED_AREA, Features::TABLES),
-    (Features::TANGENTS, Features::ANISOTROPY.union(Features::NORMAL_MAPS)),
-    (
-        Features::UNCOMMON_TEXTURES,
-        Features::ANISOTROPY
-            .union(Features::DIFFUSE_TRANSMISSION)
-            .union(Features::IRIDESCENCE)
-            .union(Features::SHEEN),
-    ),
-];
+bitflags::bitflags! {
+    /// What a view, its map and its lights ask for.
+    #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+    pub(crate) struct ViewFeatures: u32 {
+        /// The camera sees the map blurred.
+        const BACKGROUND_BLUR = 1 << 0;
+        /// The camera sees a colour in place of the map.
+        const BACKGROUND_COLOR = 1 << 1;
+        /// Random points in place of Sobol's.
+        const INDEPENDENT_POINTS = 1 << 2;
+        /// Albedo, normal and depth are kept.
+        const LAYERS = 1 << 3;
+        /// A lens that is no pinhole.
+        const LENS = 1 << 4;
+        /// Something scatters between surfaces or in solids.
+        const MEDIUM = 1 << 5;
+        /// Paths end in the radiance cache, or train it.
+        const RADIANCE_CACHE = 1 << 6;
+        /// A pixel filter wider than a box.
+        const WIDE_FILTER = 1 << 7;
+        /// Lights to be sampled that are not the map.
+        const LOCAL_LIGHTS = 1 << 8;
+        /// A map that is not black.
+        const MAP = 1 << 9;
+        /// The map is sampled.
+        const MAP_SAMPLING = 1 << 10;
+        /// A summed-area table of `f32`.
+        const TABLE_F32 = 1 << 11;
+        /// One of `f64`.
+        const TABLE_F64 = 1 << 12;
+        /// One of rounded `u32`.
+        const TABLE_U32 = 1 << 13;
+        /// Tiles are chosen by the cell.
+        const LIGHT_GRID = 1 << 14;
+        /// Cells tell which way a surface faces.
+        const FACES = 1 << 15;
+        /// It is counted what samples of the map see.
+        const COUNTING = 1 << 16;
+        /// Counters hold a share of what was tried.
+        const RECORD_RATIO = 1 << 17;
+        /// The share is weighted by the cosine.
+        const RECORD_COSINE = 1 << 18;
+        /// By its square.
+        const RECORD_SQUARED_COSINE = 1 << 19;
+    }
+}
+
+bitflags::bitflags! {
+    /// What the device and the kernel decide.
+    #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+    pub(crate) struct KernelFeatures: u32 {
+        /// Paths end in the radiance cache.
+        const CACHED = 1 << 0;
+        /// A walk's stack does not fit into workgroup memory.
+        const DEEP_TREE = 1 << 1;
+        /// Second vertices are found for a tile.
+        const FINDING = 1 << 2;
+        /// The device finds what rays hit.
+        const HARDWARE_RAYS = 1 << 3;
+        /// Paths are traced to learn from.
+        const LEARNING = 1 << 4;
+        /// Second vertices are shared.
+        const SHARING = 1 << 5;
+        /// Paths train the radiance cache.
+        const TRAINING = 1 << 6;
+    }
+}
+
+/// All that a kernel is built with: what it does without is not compiled.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Features {
+    pub(crate) scene: SceneFeatures,
+    pub(crate) view: ViewFeatures,
+    pub(crate) kernel: KernelFeatures,
+}
+
+/// Features of scenes that kernels ask for by what follows from them alone.
+const NOT_ASKED_FOR: [&str; 5] =
+    ["ABSORPTION", "ALPHA_BLEND", "FOG", "SCATTERING_SOLIDS", "THIN_TRANSMISSION"];
+
+/// What follows from the others, by name.
+const DERIVED: [(&str, fn(&Features) -> bool); 12] = {
+    use {SceneFeatures as S, ViewFeatures as V};
+    [
+        // Some hits of closest-hit rays do not count.
+        ("FILTERED_HITS", |f| f.scene.intersects(S::ALPHA_MASK | S::SINGLE_SIDED)),
+        ("FILTERED_OR_PASSED", Features::filtered_or_passed),
+        // Surfaces that take a part of the light of a ray.
+        ("PARTIAL", |f| f.scene.intersects(S::ALPHA_BLEND | S::THIN_TRANSMISSION)),
+        ("PASS_THROUGH", |f| f.scene.pass_through()),
+        ("SCENE_LIGHTS", Features::scene_lights),
+        // Shadow rays lose light on their way.
+        ("SHADOW_MEDIA", |f| f.view.contains(V::MEDIUM) || f.scene.contains(S::SOLID_TRANSMISSION)),
+        ("SHADOW_RAYS", Features::shadow_rays),
+        ("SOFTWARE_WALK", Features::software_walk),
+        ("SUMMED_AREA", Features::summed_area),
+        ("TANGENTS", Features::tangents),
+        ("TRANSMISSION", Features::transmission),
+        // Textures that few materials have.
+        ("UNCOMMON_TEXTURES", |f| {
+            f.scene.intersects(S::ANISOTROPY | S::DIFFUSE_TRANSMISSION | S::IRIDESCENCE | S::SHEEN)
+        }),
+    ]
+};
 
 impl Features {
     /// Tables that are not the default.
-    pub(super) const TABLES: Self = Self::TABLE_F32.union(Self::TABLE_F64).union(Self::TABLE_U32);
-
-    /// What scenes need that kernels do not ask for by that name.
-    pub(super) const NOT_ASKED_FOR: Self = Self::ABSORPTION
-        .union(Self::ALPHA_BLEND)
-        .union(Self::FOG)
-        .union(Self::SCATTERING_SOLIDS)
-        .union(Self::THIN_TRANSMISSION);
-
-    /// What the device and the kernel decide, not the picture.
-    pub(super) const OF_KERNEL: Self = Self::CACHED
-        .union(Self::DEEP_TREE)
-        .union(Self::FINDING)
-        .union(Self::HARDWARE_RAYS)
-        .union(Self::LEARNING)
-        .union(Self::SHARING)
-        .union(Self::TRAINING);
-
-    /// What follows from others.
-    #[cfg(test)]
-    pub(super) fn following() -> Self {
-        FOLLOWS.iter().fold(Self::SOFTWARE_WALK, |all, (feature, _)| all | *feature)
-    }
+    pub(super) const TABLES: ViewFeatures =
+        ViewFeatures::TABLE_F32.union(ViewFeatures::TABLE_F64).union(ViewFeatures::TABLE_U32);
 
     /// What a scene needs: its materials and lights.
     pub(crate) fn of_world(world: &World) -> Self {
-        let needs = &world.needs;
-        let mut features = needs.features.difference(Self::NOT_ASKED_FOR);
-        let partial = Self::ALPHA_BLEND | Self::THIN_TRANSMISSION;
-        let transmits = Self::THIN_TRANSMISSION | Self::SOLID_TRANSMISSION;
-        features.set(Self::LOCAL_LIGHTS, !world.lights.is_empty());
-        features.set(Self::PARTIAL, needs.features.intersects(partial));
-        features.set(Self::TRANSMISSION, needs.features.intersects(transmits));
+        let mut scene = world.needs.features;
         if world.scene.tangents.is_empty() {
-            features.remove(Self::NORMAL_MAPS);
+            scene.remove(SceneFeatures::NORMAL_MAPS);
         }
-        features.completed()
+        let mut view = ViewFeatures::empty();
+        view.set(ViewFeatures::LOCAL_LIGHTS, !world.lights.is_empty());
+        Self { scene, view, kernel: KernelFeatures::empty() }
     }
 
     /// What a picture needs: the scene's materials and lights, the map, how it is sampled.
@@ -80,95 +139,139 @@ impl Features {
         let recording = options.map(|options| options.recording);
         let cosine_power = recording.map_or(0, Recording::cosine_power);
         let table = environment.table_kind();
-        let scatters = world.needs.has(Self::SCATTERING_SOLIDS) || view.fog(world).is_some();
+        let has_scattering_solids = world.needs.has(SceneFeatures::SCATTERING_SOLIDS);
         let mut features = Self::of_world(world);
         for (feature, is_needed) in [
-            (Self::BACKGROUND_BLUR, matches!(view.background, Background::Blurred(_))),
-            (Self::BACKGROUND_COLOR, matches!(view.background, Background::Color(_))),
-            (Self::COUNTING, samples_map && options.is_some_and(|options| options.goes_on())),
-            (Self::FACES, options.is_some_and(|options| options.faces)),
-            (Self::INDEPENDENT_POINTS, view.points == Points::Independent),
-            (Self::LAYERS, view.layers),
-            (Self::LENS, view.camera.lens_radius > 0.0),
-            (Self::LIGHT_GRID, samples_map && recording.is_some()),
-            (Self::MAP, !environment.is_black()),
-            (Self::MAP_SAMPLING, samples_map),
-            (Self::MEDIUM, scatters),
-            (Self::RADIANCE_CACHE, view.gi == Gi::Cached),
-            (Self::RECORD_COSINE, cosine_power == 1),
-            (Self::RECORD_RATIO, recording.is_some_and(Recording::is_ratio)),
-            (Self::RECORD_SQUARED_COSINE, cosine_power == 2),
-            (Self::TABLE_F32, table == TableKind::F32),
-            (Self::TABLE_F64, table == TableKind::F64),
-            (Self::TABLE_U32, table == TableKind::U32),
-            (Self::WIDE_FILTER, view.filter != PixelFilter::Box),
+            (ViewFeatures::BACKGROUND_BLUR, matches!(view.background, Background::Blurred(_))),
+            (ViewFeatures::BACKGROUND_COLOR, matches!(view.background, Background::Color(_))),
+            (ViewFeatures::COUNTING, samples_map && options.is_some_and(|o| o.goes_on())),
+            (ViewFeatures::FACES, options.is_some_and(|options| options.faces)),
+            (ViewFeatures::INDEPENDENT_POINTS, view.points == Points::Independent),
+            (ViewFeatures::LAYERS, view.layers),
+            (ViewFeatures::LENS, view.camera.lens_radius > 0.0),
+            (ViewFeatures::LIGHT_GRID, samples_map && recording.is_some()),
+            (ViewFeatures::MAP, !environment.is_black()),
+            (ViewFeatures::MAP_SAMPLING, samples_map),
+            (ViewFeatures::MEDIUM, has_scattering_solids || view.fog(world).is_some()),
+            (ViewFeatures::RADIANCE_CACHE, view.gi == Gi::Cached),
+            (ViewFeatures::RECORD_COSINE, cosine_power == 1),
+            (ViewFeatures::RECORD_RATIO, recording.is_some_and(Recording::is_ratio)),
+            (ViewFeatures::RECORD_SQUARED_COSINE, cosine_power == 2),
+            (ViewFeatures::TABLE_F32, table == TableKind::F32),
+            (ViewFeatures::TABLE_F64, table == TableKind::F64),
+            (ViewFeatures::TABLE_U32, table == TableKind::U32),
+            (ViewFeatures::WIDE_FILTER, view.filter != PixelFilter::Box),
         ] {
-            features |= feature.only_if(is_needed);
+            features.view.set(feature, is_needed);
         }
-        features.completed()
+        features
     }
 
     /// What the picture of a scene needs with a map that is not black and the defaults of `render`.
     pub(crate) fn by_default(world: &World) -> Self {
-        let of_view = Self::COUNTING
-            | Self::FACES
-            | Self::LIGHT_GRID
-            | Self::MAP
-            | Self::MAP_SAMPLING
-            | Self::RECORD_COSINE
-            | Self::RECORD_RATIO
-            | Self::WIDE_FILTER;
-        let scatters = world.needs.features.intersects(Self::SCATTERING_SOLIDS | Self::FOG);
-        (Self::of_world(world) | of_view | Self::MEDIUM.only_if(scatters)).completed()
+        let mut features = Self::of_world(world);
+        features.view |= ViewFeatures::COUNTING
+            | ViewFeatures::FACES
+            | ViewFeatures::LIGHT_GRID
+            | ViewFeatures::MAP
+            | ViewFeatures::MAP_SAMPLING
+            | ViewFeatures::RECORD_COSINE
+            | ViewFeatures::RECORD_RATIO
+            | ViewFeatures::WIDE_FILTER;
+        let scattering = SceneFeatures::SCATTERING_SOLIDS | SceneFeatures::FOG;
+        features.view.set(ViewFeatures::MEDIUM, features.scene.intersects(scattering));
+        features
     }
 
     /// Everything that a kernel asks for at once, with the table that is used by default. How deep the
     /// tree is, its stack's size says.
     pub(crate) fn most() -> Self {
-        let others = Self::NOT_ASKED_FOR | Self::OF_KERNEL | Self::TABLES;
-        let features = Self::all() - others - Self::RADIANCE_CACHE - Self::SUMMED_AREA;
-        features.completed()
-    }
-
-    /// Together with what follows from these.
-    pub(crate) fn completed(mut self) -> Self {
-        for (feature, causes) in FOLLOWS {
-            self |= feature.only_if(self.intersects(causes));
-        }
-        self | Self::SOFTWARE_WALK.only_if(!self.contains(Self::HARDWARE_RAYS))
+        let view = ViewFeatures::all() - Self::TABLES - ViewFeatures::RADIANCE_CACHE;
+        Self { scene: SceneFeatures::all(), view, kernel: KernelFeatures::empty() }
     }
 
     /// The same for a device whose own ray queries find what rays hit.
-    pub(crate) fn with_hardware_rays(self) -> Self {
-        (self - Self::SOFTWARE_WALK) | Self::HARDWARE_RAYS
+    pub(crate) fn with_hardware_rays(mut self) -> Self {
+        self.kernel |= KernelFeatures::HARDWARE_RAYS;
+        self
     }
 
     /// The same for a kernel with these constants.
-    pub(super) fn in_kernel(self, kernel: Kernel, constants: &Constants) -> Self {
-        let mut features = self;
+    pub(super) fn in_kernel(mut self, kernel: Kernel, constants: &Constants) -> Self {
         let is_deep = constants.stack_size > constants.shared_stack_size;
-        features |= Self::DEEP_TREE.only_if(is_deep);
+        let is_cached = self.view.contains(ViewFeatures::RADIANCE_CACHE);
+        for (feature, is_needed) in [
+            (KernelFeatures::CACHED, kernel == Kernel::Render && is_cached),
+            (KernelFeatures::DEEP_TREE, is_deep),
+            (KernelFeatures::FINDING, kernel == Kernel::FindSeconds),
+            (KernelFeatures::LEARNING, kernel == Kernel::Learn),
+            (KernelFeatures::SHARING, kernel.shares()),
+            (KernelFeatures::TRAINING, kernel == Kernel::Train),
+        ] {
+            self.kernel.set(feature, is_needed);
+        }
         if kernel.begins_anywhere() {
-            features -= Self::LAYERS | Self::INDEPENDENT_POINTS;
+            self.view -= ViewFeatures::LAYERS | ViewFeatures::INDEPENDENT_POINTS;
+            self.view.set(ViewFeatures::COUNTING, kernel == Kernel::Learn);
         } else if kernel.casts() {
-            features -= Self::COUNTING | Self::LAYERS;
-        } else if kernel.shares() {
-            features |= Self::SHARING;
-        }
-        match kernel {
-            Kernel::Learn => features |= Self::COUNTING | Self::LEARNING,
-            Kernel::Train => features = (features - Self::COUNTING) | Self::TRAINING,
-            Kernel::FindSeconds => features |= Self::FINDING,
+            self.view -= ViewFeatures::COUNTING | ViewFeatures::LAYERS;
+        } else if kernel == Kernel::LightSeconds {
             // Only first vertices are shown.
-            Kernel::LightSeconds => features -= Self::LAYERS,
-            Kernel::Render => {
-                features |= Self::CACHED.only_if(features.contains(Self::RADIANCE_CACHE));
-            }
-            _ => {}
+            self.view -= ViewFeatures::LAYERS;
         }
-        if !features.intersects(Self::CACHED | Self::TRAINING) {
-            features -= Self::RADIANCE_CACHE;
+        if !self.kernel.intersects(KernelFeatures::CACHED | KernelFeatures::TRAINING) {
+            self.view -= ViewFeatures::RADIANCE_CACHE;
         }
-        features
+        self
+    }
+
+    /// Each feature by the name that shaders ask for, and whether it is on.
+    pub(super) fn by_name(self) -> impl Iterator<Item = (&'static str, bool)> {
+        flags_by_name(self.scene)
+            .chain(flags_by_name(self.view))
+            .chain(flags_by_name(self.kernel))
+            .chain(DERIVED.iter().map(move |(name, is_on)| (*name, is_on(&self))))
+    }
+
+    /// Names of those that are on and that kernels ask for.
+    pub(super) fn names(self) -> impl Iterator<Item = &'static str> {
+        let is_asked_for = |name: &&str| !NOT_ASKED_FOR.contains(name);
+        self.by_name().filter(|(_, is_on)| *is_on).map(|(name, _)| name).filter(is_asked_for)
+    }
+
+    /// Some hits of closest-hit rays do not count, or rays pass them.
+    pub(super) fn filtered_or_passed(&self) -> bool {
+        self.scene.contains(SceneFeatures::SINGLE_SIDED) || self.scene.pass_through()
+    }
+
+    /// Lights that are not the map.
+    pub(super) fn scene_lights(&self) -> bool {
+        self.scene.intersects(SceneFeatures::EMITTERS | SceneFeatures::PUNCTUAL_LIGHTS)
+    }
+
+    /// There are shadow rays.
+    pub(super) fn shadow_rays(&self) -> bool {
+        self.view.intersects(ViewFeatures::MAP_SAMPLING | ViewFeatures::LOCAL_LIGHTS)
+    }
+
+    /// A kernel walks the tree.
+    pub(super) fn software_walk(&self) -> bool {
+        !self.kernel.contains(KernelFeatures::HARDWARE_RAYS)
+    }
+
+    /// A summed-area table, whatever its numbers.
+    pub(super) fn summed_area(&self) -> bool {
+        self.view.intersects(Self::TABLES)
+    }
+
+    /// Tangents of vertices.
+    pub(super) fn tangents(&self) -> bool {
+        self.scene.intersects(SceneFeatures::ANISOTROPY | SceneFeatures::NORMAL_MAPS)
+    }
+
+    /// Light that comes through undiffused.
+    pub(super) fn transmission(&self) -> bool {
+        let transmits = SceneFeatures::THIN_TRANSMISSION | SceneFeatures::SOLID_TRANSMISSION;
+        self.scene.intersects(transmits)
     }
 }

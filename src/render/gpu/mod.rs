@@ -43,15 +43,16 @@ use super::{Pass, View};
 use crate::bsdf::{albedo, sheen};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::features::Features;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::path::camera::CameraRays;
 use crate::radiance_cache::RadianceCache;
+use crate::scene::needs::SceneFeatures;
 #[cfg(feature = "window")]
 pub(crate) use background_compile::{CompileGuard, MaybeReady};
 use bound::Bound;
 use buffers::Buffers;
+use features::{Features, ViewFeatures};
 use film::Sums;
 use flight::{Flights, Job};
 use kernel::Kernel;
@@ -188,8 +189,8 @@ impl Renderer {
     ) -> Result<Self> {
         let mut renderer = Self::without_kernels(uploaded, lit, view, rays, film)?;
         let is_queue = Schedule::of(&uploaded.gpu) == Schedule::Queue;
-        let takes_turns =
-            renderer.sharing.is_none() && !renderer.features.contains(Features::RADIANCE_CACHE);
+        let takes_turns = renderer.sharing.is_none()
+            && !renderer.features.view.contains(ViewFeatures::RADIANCE_CACHE);
         if is_queue && takes_turns {
             let tiles = renderer.tiles();
             let Self { buffers, gpu, features, .. } = &mut renderer;
@@ -238,7 +239,7 @@ impl Renderer {
         globals.film_scale = film::scale_for(world.brightest(environment));
         let sums = Sums::new(&mut buffers, size, view.layers, globals.film_scale, film)?;
         let progress = film.map(Progress::of).unwrap_or_default();
-        if features.contains(Features::COUNTING) {
+        if features.view.contains(ViewFeatures::COUNTING) {
             // Until there is something to count.
             for name in ["visits", "slot_of_cell", "counters"] {
                 buffers.make(name, 4, "the learning counters")?;
@@ -286,7 +287,8 @@ impl Renderer {
 
     /// Uploads the distributions paths choose tiles by.
     pub(crate) fn set_grid(&mut self, grid: Option<&LightGrid>) -> Result<()> {
-        let Some(grid) = grid.filter(|_| self.features.contains(Features::MAP_SAMPLING)) else {
+        let Some(grid) = grid.filter(|_| self.features.view.contains(ViewFeatures::MAP_SAMPLING))
+        else {
             return Ok(());
         };
         // Paths remember which distribution they come from.
@@ -299,7 +301,7 @@ impl Renderer {
 
     /// Uploads the cache that paths end in; without one they go on.
     pub(crate) fn set_cache(&mut self, cache: Option<&RadianceCache>) -> Result<()> {
-        if !self.features.contains(Features::RADIANCE_CACHE) {
+        if !self.features.view.contains(ViewFeatures::RADIANCE_CACHE) {
             return Ok(());
         }
         let (slots, mean) = cache.map_or((&[][..], Vec3::ZERO), RadianceCache::slots_and_mean);
@@ -485,7 +487,7 @@ impl Renderer {
         if self.sharing.is_some() {
             return &Kernel::OF_SHARING;
         }
-        match (&self.queue, self.features.contains(Features::SHADOW_RAYS)) {
+        match (&self.queue, self.features.shadow_rays()) {
             (None, _) => &[Kernel::Render],
             (Some(_), true) => &Kernel::OF_QUEUE,
             (Some(_), false) => &Kernel::OF_QUEUE[..2],
@@ -494,9 +496,12 @@ impl Renderer {
 
     /// The kernels that it is going to need.
     fn own_kernels(&self) -> Vec<Kernel> {
-        let learning =
-            [(Kernel::Learn, Features::LIGHT_GRID), (Kernel::Train, Features::RADIANCE_CACHE)];
-        let learning = learning.into_iter().filter(|(_, feature)| self.features.contains(*feature));
+        let learning = [
+            (Kernel::Learn, ViewFeatures::LIGHT_GRID),
+            (Kernel::Train, ViewFeatures::RADIANCE_CACHE),
+        ];
+        let view = self.features.view;
+        let learning = learning.into_iter().filter(|(_, feature)| view.contains(*feature));
         let rendering = self.render_kernels().iter().copied();
         rendering.chain(learning.map(|(kernel, _)| kernel)).collect()
     }
@@ -559,7 +564,7 @@ fn upload_tables(
 ) -> Result<()> {
     let mut texels = albedo::texels();
     constants.sheen_at = texels.len() as u32;
-    if features.contains(Features::SHEEN) {
+    if features.scene.contains(SceneFeatures::SHEEN) {
         texels.extend(sheen::texels());
     }
     constants.filter_at = texels.len() as u32;

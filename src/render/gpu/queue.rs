@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::super::Pass;
 use super::buffers::Buffers;
 use super::device::Gpu;
+use super::features::Features;
 use super::flight::{Job, REPORT_BYTES};
 use super::kernel::Kernel;
 use super::layout::Work;
 use super::shader::SlotTexels;
 use super::{GROUP, Progress, Renderer};
 use crate::error::Result;
-use crate::features::Features;
 use crate::render::gpu_facts::Schedule;
 
 /// Most workgroups of slots, which all take a step at a time: they keep the largest devices busy and fit their

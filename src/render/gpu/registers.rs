@@ -12,11 +12,11 @@ use std::process::Command;
 
 use ash::vk;
 
+use super::features::{Features, ViewFeatures};
 use super::kernel::Kernel;
 use super::shader::{
     ARRAYS, ArrayPlaces, Binding, Constants, Program, SHARED_STACK_SIZE, VertexTexels,
 };
-use crate::features::Features;
 use crate::path::World;
 use crate::scene::builtin;
 
@@ -125,7 +125,7 @@ fn compile() {
         }
         let world = World::new(builtin::build(name).expect("built in"));
         let exact = Features::by_default(&world);
-        let cached = exact | Features::RADIANCE_CACHE;
+        let cached = Features { view: exact.view | ViewFeatures::RADIANCE_CACHE, ..exact };
         let of_exact = [Kernel::Render, Kernel::Learn].into_iter().chain(Kernel::OF_QUEUE);
         let of_exact = of_exact.chain(Kernel::OF_SHARING).map(|kernel| (kernel, exact, ""));
         let of_cached = [Kernel::Render, Kernel::Train].map(|kernel| (kernel, cached, CACHED));

@@ -6,9 +6,10 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::constants;
+use super::features::{Features, ViewFeatures};
 use super::kernel::Kernel;
-use crate::features::Features;
 use crate::path::sharing::SharedTile;
+use crate::scene::needs::SceneFeatures;
 
 /// Numbers of a shader that are known when it is built.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -41,16 +42,14 @@ pub(crate) struct VertexTexels {
 impl VertexTexels {
     pub(crate) fn of(features: Features) -> Self {
         let mut count = 2;
-        let mut next = |feature| {
+        let mut next = |is_needed| {
             let at = count;
-            count += u32::from(features.contains(feature));
+            count += u32::from(is_needed);
             at
         };
-        let (second_uv, tangent, color) = (
-            next(Features::SECOND_UV_SET),
-            next(Features::TANGENTS),
-            next(Features::VERTEX_COLORS),
-        );
+        let second_uv = next(features.scene.contains(SceneFeatures::SECOND_UV_SET));
+        let tangent = next(features.tangents());
+        let color = next(features.scene.contains(SceneFeatures::VERTEX_COLORS));
         Self { count, second_uv, tangent, color }
     }
 }
@@ -67,21 +66,19 @@ pub(crate) struct SlotTexels {
 }
 
 impl SlotTexels {
-    pub(crate) fn of(features: Features) -> Self {
+    pub(crate) fn of(Features { scene, view, .. }: Features) -> Self {
         let mut count = 7;
-        let mut next = |feature, texels| {
+        let mut next = |is_needed, texels| {
             let at = count;
-            count += if features.contains(feature) { texels } else { 0 };
+            count += if is_needed { texels } else { 0 };
             at
         };
-        let receiver = next(Features::EMITTERS, 2);
-        let body = next(
-            Features::SOLID_TRANSMISSION,
-            if features.contains(Features::MEDIUM) { 2 } else { 1 },
-        );
-        let first_hit = next(Features::LAYERS, 2);
-        let (map_shadow, lamp_shadow) =
-            (next(Features::MAP_SAMPLING, 4), next(Features::LOCAL_LIGHTS, 4));
+        let body_texels = if view.contains(ViewFeatures::MEDIUM) { 2 } else { 1 };
+        let receiver = next(scene.contains(SceneFeatures::EMITTERS), 2);
+        let body = next(scene.contains(SceneFeatures::SOLID_TRANSMISSION), body_texels);
+        let first_hit = next(view.contains(ViewFeatures::LAYERS), 2);
+        let map_shadow = next(view.contains(ViewFeatures::MAP_SAMPLING), 4);
+        let lamp_shadow = next(view.contains(ViewFeatures::LOCAL_LIGHTS), 4);
         Self { count, receiver, body, first_hit, map_shadow, lamp_shadow }
     }
 }
@@ -113,8 +110,6 @@ pub(crate) struct ArrayKind {
     /// Name of the function that reads an element.
     pub(crate) name: &'static str,
     pub(crate) format: TexelFormat,
-    /// What makes it needed, all of it.
-    features: Features,
 }
 
 /// What a texel holds.
@@ -157,34 +152,45 @@ impl TexelFormat {
 /// All arrays.
 pub(crate) const ARRAYS: [ArrayKind; 17] = {
     use TexelFormat::{Bytes4, Floats4, Words1, Words2, Words4};
-    const fn array(name: &'static str, format: TexelFormat, features: Features) -> ArrayKind {
-        ArrayKind { name, format, features }
+    const fn array(name: &'static str, format: TexelFormat) -> ArrayKind {
+        ArrayKind { name, format }
     }
     [
-        array("bvh_nodes", Words4, Features::SOFTWARE_WALK),
-        array("bvh_triangles", Words4, Features::SOFTWARE_WALK),
-        array("query_triangles", Words1, Features::HARDWARE_RAYS),
-        array("triangles", Words4, Features::empty()),
-        array("vertices", Words4, Features::empty()),
-        array("instances", Words4, Features::INSTANCES),
-        array("instance_slots", Words1, Features::INSTANCES),
-        array("materials", Words4, Features::empty()),
-        array("tables", Floats4, Features::empty()),
-        array("texture_refs", Words4, Features::TEXTURES),
-        array("texels", Bytes4, Features::TEXTURES),
-        array("map_texels", Words2, Features::MAP),
-        array("sums", Words1, Features::MAP_SAMPLING),
-        array("distributions", Words1, Features::MAP_SAMPLING),
-        array("lights", Words1, Features::SCENE_LIGHTS),
-        array("light_nodes", Words4, Features::SCENE_LIGHTS),
-        array("cache_slots", Words4, Features::RADIANCE_CACHE),
+        array("bvh_nodes", Words4),
+        array("bvh_triangles", Words4),
+        array("query_triangles", Words1),
+        array("triangles", Words4),
+        array("vertices", Words4),
+        array("instances", Words4),
+        array("instance_slots", Words1),
+        array("materials", Words4),
+        array("tables", Floats4),
+        array("texture_refs", Words4),
+        array("texels", Bytes4),
+        array("map_texels", Words2),
+        array("sums", Words1),
+        array("distributions", Words1),
+        array("lights", Words1),
+        array("light_nodes", Words4),
+        array("cache_slots", Words4),
     ]
 };
 
 impl ArrayKind {
-    /// Whether a picture with these features reads it.
-    pub(crate) fn is_needed(&self, features: Features) -> bool {
-        features.contains(self.features)
+    /// Whether kernels with these features read it.
+    fn is_needed(&self, features: Features) -> bool {
+        let Features { scene, view, .. } = features;
+        match self.name {
+            "bvh_nodes" | "bvh_triangles" => features.software_walk(),
+            "query_triangles" => !features.software_walk(),
+            "instances" | "instance_slots" => scene.contains(SceneFeatures::INSTANCES),
+            "texture_refs" | "texels" => scene.contains(SceneFeatures::TEXTURES),
+            "map_texels" => view.contains(ViewFeatures::MAP),
+            "sums" | "distributions" => view.contains(ViewFeatures::MAP_SAMPLING),
+            "lights" | "light_nodes" => features.scene_lights(),
+            "cache_slots" => view.contains(ViewFeatures::RADIANCE_CACHE),
+            _ => true,
+        }
     }
 
     /// The declaration and the function that reads an element.
@@ -243,7 +249,7 @@ impl Program {
         let features = features.in_kernel(kernel, constants);
         let bindings = bindings(kernel, features, places);
         let mut source = String::new();
-        if features.contains(Features::HARDWARE_RAYS) {
+        if !features.software_walk() {
             source.push_str("enable wgpu_ray_query;\n");
         }
         source.push_str(&constants::shared());
@@ -338,60 +344,60 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 65] {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
         };
     }
-    let (is_clear, is_translucent) = (
-        features.contains(Features::TRANSMISSION),
-        features.contains(Features::DIFFUSE_TRANSMISSION),
-    );
-    let samples_map = features.contains(Features::MAP_SAMPLING);
-    let has_shadow_rays = features.contains(Features::SHADOW_RAYS);
+    let Features { scene, view, .. } = features;
+    let is_clear = features.transmission();
+    let is_translucent = scene.contains(SceneFeatures::DIFFUSE_TRANSMISSION);
+    let has_instances = scene.contains(SceneFeatures::INSTANCES);
+    let samples_map = view.contains(ViewFeatures::MAP_SAMPLING);
+    let has_shadow_rays = features.shadow_rays();
     [
         (wgsl!("globals"), true),
         (wgsl!("math"), true),
         (wgsl!("sampler"), true),
-        (wgsl!("texture"), features.contains(Features::TEXTURES)),
-        (wgsl!("instances"), features.contains(Features::INSTANCES)),
+        (wgsl!("texture"), scene.contains(SceneFeatures::TEXTURES)),
+        (wgsl!("instances"), has_instances),
         (wgsl!("surface"), true),
         (wgsl!("fresnel"), true),
         (wgsl!("microfacet"), true),
-        (wgsl!("iridescence"), features.contains(Features::IRIDESCENCE)),
-        (wgsl!("no_iridescence"), !features.contains(Features::IRIDESCENCE)),
-        (wgsl!("sheen"), features.contains(Features::SHEEN)),
-        (wgsl!("no_sheen"), !features.contains(Features::SHEEN)),
+        (wgsl!("iridescence"), scene.contains(SceneFeatures::IRIDESCENCE)),
+        (wgsl!("no_iridescence"), !scene.contains(SceneFeatures::IRIDESCENCE)),
+        (wgsl!("sheen"), scene.contains(SceneFeatures::SHEEN)),
+        (wgsl!("no_sheen"), !scene.contains(SceneFeatures::SHEEN)),
         (wgsl!("albedo"), true),
-        (wgsl!("dispersion"), features.contains(Features::DISPERSION)),
-        (wgsl!("no_dispersion"), is_clear && !features.contains(Features::DISPERSION)),
+        (wgsl!("dispersion"), scene.contains(SceneFeatures::DISPERSION)),
+        (wgsl!("no_dispersion"), is_clear && !scene.contains(SceneFeatures::DISPERSION)),
         (wgsl!("glass"), is_clear),
         (wgsl!("no_glass"), !is_clear),
         (wgsl!("interface"), true),
         (wgsl!("diffuse"), !is_translucent),
         (wgsl!("translucent"), is_translucent),
-        (wgsl!("coat"), features.contains(Features::CLEARCOAT)),
-        (wgsl!("no_coat"), !features.contains(Features::CLEARCOAT)),
+        (wgsl!("coat"), scene.contains(SceneFeatures::CLEARCOAT)),
+        (wgsl!("no_coat"), !scene.contains(SceneFeatures::CLEARCOAT)),
         (wgsl!("bsdf"), true),
         (wgsl!("light_grid"), true),
         (wgsl!("environment"), true),
-        (wgsl!("tile_local"), samples_map && !features.contains(Features::SUMMED_AREA)),
-        (wgsl!("summed_area"), samples_map && features.contains(Features::SUMMED_AREA)),
-        (wgsl!("draw"), features.contains(Features::SCENE_LIGHTS)),
-        (wgsl!("light_tree"), features.contains(Features::SCENE_LIGHTS)),
-        (wgsl!("lights"), features.contains(Features::SCENE_LIGHTS)),
-        (wgsl!("medium"), features.contains(Features::MEDIUM)),
+        (wgsl!("tile_local"), samples_map && !features.summed_area()),
+        (wgsl!("summed_area"), samples_map && features.summed_area()),
+        (wgsl!("draw"), features.scene_lights()),
+        (wgsl!("light_tree"), features.scene_lights()),
+        (wgsl!("lights"), features.scene_lights()),
+        (wgsl!("medium"), view.contains(ViewFeatures::MEDIUM)),
         (wgsl!("bvh"), true),
-        (wgsl!("levels"), features.contains(Features::INSTANCES | Features::SOFTWARE_WALK)),
-        (wgsl!("ray_query"), features.contains(Features::HARDWARE_RAYS)),
+        (wgsl!("levels"), has_instances && features.software_walk()),
+        (wgsl!("ray_query"), !features.software_walk()),
         (wgsl!("camera"), true),
         (wgsl!("path"), true),
-        (wgsl!("body"), features.contains(Features::SOLID_TRANSMISSION)),
-        (wgsl!("path_medium"), features.contains(Features::MEDIUM)),
-        (wgsl!("passing"), features.contains(Features::FILTERED_OR_PASSED)),
-        (wgsl!("emitted"), features.contains(Features::EMITTERS)),
-        (wgsl!("background"), features.contains(Features::BACKGROUND_BLUR)),
+        (wgsl!("body"), scene.contains(SceneFeatures::SOLID_TRANSMISSION)),
+        (wgsl!("path_medium"), view.contains(ViewFeatures::MEDIUM)),
+        (wgsl!("passing"), features.filtered_or_passed()),
+        (wgsl!("emitted"), scene.contains(SceneFeatures::EMITTERS)),
+        (wgsl!("background"), view.contains(ViewFeatures::BACKGROUND_BLUR)),
         (wgsl!("shadows"), has_shadow_rays),
         (wgsl!("gather"), has_shadow_rays && kernel != Kernel::Learn),
         (wgsl!("no_lights"), !has_shadow_rays && kernel != Kernel::Learn),
-        (wgsl!("broad"), kernel.shares() || features.contains(Features::RADIANCE_CACHE)),
-        (wgsl!("radiance_cache"), features.contains(Features::RADIANCE_CACHE)),
-        (wgsl!("count"), features.contains(Features::COUNTING)),
+        (wgsl!("broad"), kernel.shares() || view.contains(ViewFeatures::RADIANCE_CACHE)),
+        (wgsl!("radiance_cache"), view.contains(ViewFeatures::RADIANCE_CACHE)),
+        (wgsl!("count"), view.contains(ViewFeatures::COUNTING)),
         (wgsl!("film"), kernel.adds_samples()),
         (wgsl!("sample"), kernel.begins_samples()),
         (wgsl!("render"), kernel == Kernel::Render),
@@ -414,9 +420,10 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 65] {
 }
 
 fn bindings(kernel: Kernel, features: Features, places: &ArrayPlaces) -> Vec<Binding> {
-    let (trains, counts) = (kernel == Kernel::Train, features.contains(Features::COUNTING));
+    let Features { view, .. } = features;
+    let (trains, counts) = (kernel == Kernel::Train, view.contains(ViewFeatures::COUNTING));
     let (renders, is_of_queue) = (kernel.adds_samples(), kernel.is_of_queue());
-    let has_layers = renders && features.contains(Features::LAYERS);
+    let has_layers = renders && view.contains(ViewFeatures::LAYERS);
     let buffers = [
         // Not a uniform: software Vulkan optimises a shader anew, for 40 ms, before each dispatch if
         // it branches on uniforms.
@@ -450,7 +457,7 @@ fn bindings(kernel: Kernel, features: Features, places: &ArrayPlaces) -> Vec<Bin
             Binding::Array(array)
         }
     });
-    let tree = features.contains(Features::HARDWARE_RAYS).then_some(Binding::Tree);
+    let tree = (!features.software_walk()).then_some(Binding::Tree);
     buffers.chain(arrays).chain(tree).collect()
 }
 
@@ -459,9 +466,9 @@ fn keep_lines(text: &str, features: Features, source: &mut String) {
     let mut conditions = Vec::new();
     for line in text.lines() {
         if let Some(name) = line.strip_prefix("//#if ") {
-            let feature = Features::from_name(name.trim());
-            debug_assert!(feature.is_some(), "{name} is no feature");
-            conditions.push(feature.is_some_and(|feature| features.contains(feature)));
+            let is_on = features.by_name().find(|(known, _)| *known == name);
+            debug_assert!(is_on.is_some(), "{name} is no feature");
+            conditions.push(is_on.is_some_and(|(_, is_on)| is_on));
         } else if line == "//#else" {
             if let Some(condition) = conditions.last_mut() {
                 *condition = !*condition;
@@ -483,7 +490,7 @@ mod tests {
 
     #[test]
     fn conditions_nest_and_have_an_else() {
-        let features = Features::MAP;
+        let features = Features { view: ViewFeatures::MAP, ..Features::default() };
         let text = "a\n//#if MAP\nb\n//#if LENS\nc\n//#else\nd\n//#end\n//#else\ne\n//#end\nf";
         let mut kept = String::new();
         keep_lines(text, features, &mut kept);
@@ -549,7 +556,7 @@ mod tests {
         let mut found = BTreeSet::new();
         let all = [Kernel::Render, Kernel::Learn, Kernel::Train, Kernel::Trace].into_iter();
         for kernel in all.chain(Kernel::OF_SHARING) {
-            for table in [Features::empty(), Features::TABLE_U32] {
+            for table in [ViewFeatures::empty(), ViewFeatures::TABLE_U32] {
                 let features = reachable(|_| true, table);
                 let constants =
                     Constants { stack_size: 20, shared_stack_size: 10, ..Constants::default() };
@@ -603,36 +610,43 @@ mod tests {
         found
     }
 
-    /// Features that a picture can have or not have on their own; the others follow from them.
+    /// Features that a picture can have or not have, each alone.
     fn independent() -> Vec<Features> {
-        let others = Features::following()
-            | Features::OF_KERNEL
-            | Features::NOT_ASKED_FOR
-            | Features::TABLES;
-        (Features::all() - others).iter().collect()
+        let none = Features::default();
+        let scene = SceneFeatures::all().iter().map(|scene| Features { scene, ..none });
+        let view = (ViewFeatures::all() - Features::TABLES).iter();
+        scene.chain(view.map(|view| Features { view, ..none })).collect()
     }
 
     /// What reachable pictures have: no map to sample without a map, no grid without sampling it.
-    fn reachable(on: impl Fn(usize) -> bool, table: Features) -> Features {
-        let mut chosen = table;
-        let chosen_ones = independent().into_iter().enumerate().filter(|(i, _)| on(*i));
-        chosen.extend(chosen_ones.map(|(_, feature)| feature));
-        let lights = Features::EMITTERS | Features::PUNCTUAL_LIGHTS;
-        for (causes, effect) in [
-            (Features::MAP, Features::MAP_SAMPLING),
-            (Features::MAP_SAMPLING, Features::LIGHT_GRID),
-            (Features::LIGHT_GRID | Features::RECORD_RATIO, Features::COUNTING),
-            (Features::SOLID_TRANSMISSION | Features::TRANSMISSION, Features::DISPERSION),
-            (Features::TEXTURES, Features::NORMAL_MAPS),
+    fn reachable(on: impl Fn(usize) -> bool, table: ViewFeatures) -> Features {
+        let (mut scene, mut view) = (SceneFeatures::empty(), table);
+        for (_, feature) in independent().into_iter().enumerate().filter(|(i, _)| on(*i)) {
+            scene |= feature.scene;
+            view |= feature.view;
+        }
+        for (cause, effect) in [
+            (ViewFeatures::MAP, ViewFeatures::MAP_SAMPLING),
+            (ViewFeatures::MAP_SAMPLING, ViewFeatures::LIGHT_GRID),
+            (ViewFeatures::LIGHT_GRID | ViewFeatures::RECORD_RATIO, ViewFeatures::COUNTING),
         ] {
-            if !chosen.contains(causes) {
-                chosen -= effect;
+            if !view.contains(cause) {
+                view -= effect;
             }
         }
-        if !chosen.intersects(lights) {
-            chosen -= Features::LOCAL_LIGHTS;
+        for (cause, effect) in [
+            (SceneFeatures::SOLID_TRANSMISSION, SceneFeatures::DISPERSION),
+            (SceneFeatures::TEXTURES, SceneFeatures::NORMAL_MAPS),
+        ] {
+            if !scene.contains(cause) {
+                scene -= effect;
+            }
         }
-        chosen.completed()
+        let features = Features { scene, view, ..Features::default() };
+        if !features.scene_lights() {
+            view -= ViewFeatures::LOCAL_LIGHTS;
+        }
+        Features { view, ..features }
     }
 
     /// Each feature alone and all but it, and 60 random sets, in which every combination of two
@@ -640,8 +654,9 @@ mod tests {
     #[test]
     fn every_variant_validates() {
         let count = independent().len();
-        let none = Features::empty();
-        let tables = [none, Features::TABLE_U32, Features::TABLE_F32, Features::TABLE_F64];
+        let none = ViewFeatures::empty();
+        let tables =
+            [none, ViewFeatures::TABLE_U32, ViewFeatures::TABLE_F32, ViewFeatures::TABLE_F64];
         let mut sets = vec![reachable(|_| false, none), reachable(|_| true, none)];
         for one in 0..count {
             sets.push(reachable(|i| i == one, none));
@@ -658,17 +673,17 @@ mod tests {
         for (features, number) in sets.into_iter().zip(0..) {
             let places = if number % 2 == 0 { &in_textures } else { &in_buffers };
             validate(Kernel::Render, features, places);
-            if features.contains(Features::LIGHT_GRID) {
+            if features.view.contains(ViewFeatures::LIGHT_GRID) {
                 validate(Kernel::Learn, features, places);
             }
-            if features.contains(Features::RADIANCE_CACHE) {
+            if features.view.contains(ViewFeatures::RADIANCE_CACHE) {
                 validate(Kernel::Train, features, places);
             }
             for kernel in Kernel::OF_SHARING {
                 validate(kernel, features, places);
             }
             for kernel in Kernel::OF_QUEUE {
-                if kernel != Kernel::FollowShadows || features.contains(Features::SHADOW_RAYS) {
+                if kernel != Kernel::FollowShadows || features.shadow_rays() {
                     validate(kernel, features, places);
                 }
             }

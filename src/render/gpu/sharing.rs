@@ -5,11 +5,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::super::Pass;
 use super::buffers::Buffers;
+use super::features::{Features, ViewFeatures};
 use super::kernel::Kernel;
 use super::layout::{Globals, Work};
 use super::{GROUP, Progress, Renderer};
 use crate::error::Result;
-use crate::features::Features;
 use crate::path::sharing::SharedTile;
 
 /// Most workgroups whose vertices are kept at a time: they keep the largest devices busy.
@@ -35,9 +35,9 @@ impl Sharing {
         // Tiles stick out of the picture on all sides.
         let tiles = size.map(|pixels| u64::from(pixels.div_ceil(tile.side)) + 1);
         let most_groups = (tiles[0] * tiles[1]).div_ceil(tiles_of_group(tile)).min(MAX_GROUPS);
-        let first_texels = if features.contains(Features::LAYERS) { 5 } else { 3 };
-        let lights = [Features::MAP_SAMPLING, Features::LOCAL_LIGHTS]
-            .map(|feature| u64::from(features.contains(feature)));
+        let first_texels = if features.view.contains(ViewFeatures::LAYERS) { 5 } else { 3 };
+        let lights = [ViewFeatures::MAP_SAMPLING, ViewFeatures::LOCAL_LIGHTS]
+            .map(|feature| u64::from(features.view.contains(feature)));
         let incidents = u64::from(tile.continuations) * (1 + lights[0] + lights[1]);
         let owners = GROUP / u64::from(tile.owner_side * tile.owner_side);
         let what = "the vertices that pixels share";

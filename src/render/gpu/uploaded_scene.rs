@@ -7,14 +7,15 @@ use rayon::prelude::*;
 use super::acceleration::Acceleration;
 use super::buffers::Buffers;
 use super::device::Gpu;
+use super::features::Features;
 use super::layout::{self, Globals};
 use super::shader::{self, Constants, SHARED_STACK_SIZE, VertexTexels};
 use crate::bvh::InstanceWords;
 use crate::bvh::compressed::CompressedTree;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::features::Features;
 use crate::path::World;
+use crate::scene::needs::SceneFeatures;
 
 /// Deepest tree a traversal's stack is made for.
 const MAX_DEPTH: u32 = 96;
@@ -101,7 +102,7 @@ fn upload_world(
     put_array(buffers, "triangles", "the scene's geometry", &layout::triangles(scene))?;
     put_array(buffers, "vertices", "the scene's geometry", &layout::vertices(scene, &vertex))?;
     put_array(buffers, "materials", "the list of materials", &materials)?;
-    if features.contains(Features::TEXTURES) {
+    if features.scene.contains(SceneFeatures::TEXTURES) {
         put_array(buffers, "texture_refs", "the list of textures", &texture_refs)?;
         let texels = scene.images.iter().map(|image| image.texels.stored_len() as u64).sum();
         // Part by part: those of fewer channels are copied.
@@ -116,7 +117,7 @@ fn upload_world(
         });
         buffers.put_array("texels", "the set of textures", texels, parts)?;
     }
-    if features.contains(Features::SCENE_LIGHTS) {
+    if features.scene_lights() {
         let lights = layout::light_words(world, globals);
         put_array(buffers, "lights", "the list of lights", &lights)?;
         put_array(buffers, "light_nodes", "the tree of lights", world.lights.arrays().1.nodes)?;
@@ -161,7 +162,7 @@ fn put_instances(
     world: &World,
     instances: &[InstanceWords],
 ) -> Result<()> {
-    if !world.needs.has(Features::INSTANCES) {
+    if !world.needs.has(SceneFeatures::INSTANCES) {
         return Ok(());
     }
     let (first, slot_log2, slots) = world.scene.instances.slots();

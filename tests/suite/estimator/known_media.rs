@@ -4,12 +4,12 @@ use std::f64::consts::PI;
 
 use glam::{Vec2, Vec3};
 use lightgrid::environment::{Environment, sky};
-use lightgrid::features::Features;
 use lightgrid::medium::Phase;
 use lightgrid::metrics::hypothesis::chi_square_test;
 use lightgrid::path::{World, WorldBuilder};
 use lightgrid::render::film::Film;
 use lightgrid::render::{Sampling, View};
+use lightgrid::scene::needs::SceneFeatures;
 use lightgrid::scene::{Medium, PunctualKind, PunctualLight};
 
 use super::scenes::{black, lamp, room, smoked_glass, sunlight, unlit};
@@ -147,7 +147,7 @@ fn a_white_solid_in_uniform_light_is_invisible() {
     };
     let world =
         WorldBuilder::default().faces(&milk, Vec3::splat(-0.5), Vec3::splat(0.5), 0..6).build();
-    assert!(world.needs.has(Features::SCATTERING_SOLIDS));
+    assert!(world.needs.has(SceneFeatures::SCATTERING_SOLIDS));
     let camera = probe([1.0, 2.0, 3.0], [0.1, 0.2, 0.0]);
     for mode in MODES {
         let film = render(&world, &constant(1.0), view(camera.clone(), mode, 1000), 64);

@@ -3,8 +3,7 @@
 use glam::{Vec2, Vec3, Vec4};
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder as _};
-use lightgrid::features::Features;
-use lightgrid::scene::needs::SceneNeeds;
+use lightgrid::scene::needs::{SceneFeatures, SceneNeeds};
 use lightgrid::scene::texture::sample_texture;
 use lightgrid::scene::{
     AlphaMode, Medium, Projection, PunctualKind, Scene, TextureSlot, Wrap, gltf,
@@ -334,8 +333,8 @@ fn newer_material_extensions() {
     // The file has no tangents, and the direction needs them: u grows along +X.
     assert!(scene.tangents.iter().all(|t| t.truncate().abs_diff_eq(Vec3::X, 1e-5)));
     let needs = SceneNeeds::of(&scene);
-    assert!(needs.has(Features::ANISOTROPY | Features::SHEEN));
-    assert!(!needs.features.intersects(Features::IRIDESCENCE | Features::DISPERSION));
+    assert!(needs.has(SceneFeatures::ANISOTROPY | SceneFeatures::SHEEN));
+    assert!(!needs.features.intersects(SceneFeatures::IRIDESCENCE | SceneFeatures::DISPERSION));
     assert!(scene.notices.is_empty());
 
     let scene = load(&format!(
@@ -363,9 +362,9 @@ fn newer_material_extensions() {
         "KHR_materials_volume":{"thicknessFactor":1},"KHR_materials_dispersion":{"dispersion":0.3}"#;
     let scene = load(glass);
     assert_eq!(scene.materials[0].dispersion, 0.3);
-    assert!(SceneNeeds::of(&scene).has(Features::DISPERSION));
+    assert!(SceneNeeds::of(&scene).has(SceneFeatures::DISPERSION));
     let thin = load(&glass.replace(r#""thicknessFactor":1"#, ""));
-    assert!(!SceneNeeds::of(&thin).has(Features::DISPERSION), "a thin wall bends nothing");
+    assert!(!SceneNeeds::of(&thin).has(SceneFeatures::DISPERSION), "a thin wall bends nothing");
 
     let odd = load(
         r#""KHR_materials_sheen":{"sheenColorFactor":[2,0,0]},"KHR_materials_iridescence":
@@ -609,7 +608,7 @@ fn fog_is_read_from_the_scene_a_node_and_a_material() {
     };
     let fog = |keys: &str| format!(r#","extras":{{"other":1,"fog":{{{keys}}}}}"#);
     let clear = load("", "", "");
-    assert!(clear.medium.is_none() && !SceneNeeds::of(&clear).has(Features::FOG));
+    assert!(clear.medium.is_none() && !SceneNeeds::of(&clear).has(SceneFeatures::FOG));
 
     let scene =
         load(&fog(r#""scattering":0.5,"absorption":[0,0.1,0.2],"anisotropy":-0.3"#), "", "");
@@ -620,7 +619,7 @@ fn fog_is_read_from_the_scene_a_node_and_a_material() {
         bounds: None,
     };
     assert_eq!(scene.medium, Some(expected));
-    assert!(SceneNeeds::of(&scene).has(Features::FOG));
+    assert!(SceneNeeds::of(&scene).has(SceneFeatures::FOG));
 
     let placed = load("", &fog(r#""scattering":2"#), "").medium.expect("a medium");
     let (low, high) = (Vec3::new(0.0, 0.0, -1.0), Vec3::new(2.0, 4.0, 7.0));
@@ -636,8 +635,8 @@ fn fog_is_read_from_the_scene_a_node_and_a_material() {
     assert_eq!(milk.materials[0].scattering, Vec3::new(1.0, 2.0, 3.0));
     assert_eq!(milk.materials[0].scatter_anisotropy, 0.5);
     assert!(
-        SceneNeeds::of(&milk).has(Features::SCATTERING_SOLIDS)
-            && !SceneNeeds::of(&milk).has(Features::FOG)
+        SceneNeeds::of(&milk).has(SceneFeatures::SCATTERING_SOLIDS)
+            && !SceneNeeds::of(&milk).has(SceneFeatures::FOG)
     );
 
     for bad in

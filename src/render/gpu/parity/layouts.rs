@@ -5,10 +5,10 @@ use std::mem::offset_of;
 use naga::{Expression, Literal, Module, ScalarKind, Type, TypeInner};
 
 use super::super::cast::CastRay;
+use super::super::features::Features;
 use super::super::kernel::Kernel;
 use super::super::layout::{Globals, Material, TextureRef, Work};
 use super::super::shader::{ArrayPlaces, Constants, Program, VertexTexels};
-use crate::features::Features;
 
 /// A struct's fields in bytes: name, offset, size.
 type Fields = Vec<(&'static str, usize, usize)>;

@@ -24,11 +24,11 @@ mod twin;
 
 use std::collections::BTreeSet;
 
+use super::features::Features;
 use super::kernel::Kernel;
 use super::pipeline::Pipeline;
 use super::shader::{ArrayPlaces, Binding, Constants, Program, VertexTexels};
 use super::{Gpu, Renderer, UploadedScene, Work};
-use crate::features::Features;
 use fixture::Fixture;
 use twin::Twin;
 
