@@ -79,8 +79,8 @@ impl CacheTraining {
         let pixels: u64 = pixels.iter().product();
         let wanted = pixels * (u64::from(samples) + 1) / TRAINING_SHARE;
         let wanted = wanted.clamp(MIN_PATHS, MAX_PATHS);
-        // Where passes end between powers of two is a matter of time.
-        let is_time = samples == 0 || samples.is_power_of_two();
+        // Where passes end between powers of two is a matter of time. A picture that goes on may have none yet.
+        let is_time = samples == 0 || samples.is_power_of_two() || self.wanted == 0;
         if is_time && self.paths >= self.wanted && wanted >= 2 * self.wanted {
             self.wanted = wanted;
         }

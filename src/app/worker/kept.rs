@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use super::device::Device;
-use super::job::CompletePicture;
+use super::snapshot::CompletePicture;
 use super::{Point, Request};
 use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid};
@@ -44,8 +44,7 @@ pub(super) struct PreviousFilm {
 pub(super) struct SuspendedPicture {
     pub(super) request: Arc<Request>,
     pub(super) session: SessionState,
-    /// The whole picture by cached light, if there was one.
-    pub(super) cached: Option<CompletePicture>,
+    pub(super) cached: SuspendedCache,
     /// What learning had counted, for inspection.
     pub(super) counters: Option<Arc<LearningGrid>>,
     /// How its error fell.
@@ -54,21 +53,48 @@ pub(super) struct SuspendedPicture {
     pub(super) cached_seconds: f64,
 }
 
+/// The picture by cached light beside a picture that was left.
+pub(super) enum SuspendedCache {
+    Absent,
+    UnderWay(Box<SessionState>),
+    Complete(CompletePicture),
+}
+
+impl SuspendedCache {
+    fn memory_bytes(&self) -> usize {
+        match self {
+            Self::Absent => 0,
+            Self::UnderWay(session) => session.memory_bytes(),
+            Self::Complete((_, film)) => film.memory_bytes(),
+        }
+    }
+}
+
 impl SuspendedPicture {
-    /// Whether it has taken long, and there is room for it.
-    pub(super) fn is_worth_it(&self) -> bool {
-        self.session.elapsed_seconds() >= MIN_LEFT_SECONDS && self.memory_bytes() <= MAX_LEFT_BYTES
+    /// Whether it has taken long, and there is room for it; if need be without the picture by cached light.
+    pub(super) fn is_worth_it(&mut self) -> bool {
+        if self.memory_bytes() > MAX_LEFT_BYTES {
+            self.cached = SuspendedCache::Absent;
+        }
+        let seconds = self.session.elapsed_seconds() + self.cached_seconds;
+        seconds >= MIN_LEFT_SECONDS && self.memory_bytes() <= MAX_LEFT_BYTES
     }
 
     fn memory_bytes(&self) -> usize {
-        let cached = self.cached.as_ref().map_or(0, |(_, film)| film.memory_bytes());
-        self.session.memory_bytes() + cached
+        self.session.memory_bytes() + self.cached.memory_bytes()
+    }
+
+    /// Bytes of its map, unless that is the one in use.
+    fn map_bytes(&self, in_use: &Environment) -> usize {
+        let map = &self.request.environment;
+        let bytes = map.memory_bytes();
+        if map.shares_map_with(in_use) { 0 } else { bytes.pixels + bytes.table }
     }
 }
 
 /// Pictures that were left are kept for one step back and forth.
 const MAX_LEFT: usize = 2;
-/// As long as they take no more than this together.
+/// As long as they take no more than this together, with maps that are no longer in use.
 const MAX_LEFT_BYTES: usize = 512 << 20;
 /// And have taken at least so long: others are soon made again.
 const MIN_LEFT_SECONDS: f64 = 1.0;
@@ -102,12 +128,6 @@ impl SessionCache {
     /// Keeps a picture that is left for another.
     pub(super) fn leave(&mut self, left: SuspendedPicture) {
         self.left.push(left);
-        let bytes = |all: &[SuspendedPicture]| {
-            all.iter().map(SuspendedPicture::memory_bytes).sum::<usize>()
-        };
-        while self.left.len() > MAX_LEFT || bytes(&self.left) > MAX_LEFT_BYTES {
-            self.left.remove(0);
-        }
     }
 
     /// The picture that was left of the very same.
@@ -116,16 +136,22 @@ impl SessionCache {
         Some(self.left.remove(found))
     }
 
-    /// Lets go of all that is of another scene, which is large. What is seen from where stays right when
+    /// Lets go of all that is of another scene, which is large, and of the oldest pictures that were left if all take
+    /// too much. What is seen from where stays right when
     /// surfaces get another colour; what they look like does not.
     pub(super) fn leave_other_worlds(&mut self, request: &Request) {
         let world = &request.world;
         let is_other = |of: &Request| !Arc::ptr_eq(&of.world, world);
         self.backdrop.take_if(|seen| is_other(&seen.request));
         self.training.take_if(|(_, of)| is_other(of));
-        let (map, is_lit_by) = (&request.environment, Environment::shares_map_with);
-        self.left
-            .retain(|left| !is_other(&left.request) && is_lit_by(&left.request.environment, map));
+        self.left.retain(|left| !is_other(&left.request));
+        let map = &request.environment;
+        let bytes = |left: &SuspendedPicture| left.memory_bytes() + left.map_bytes(map);
+        while self.left.len() > MAX_LEFT
+            || self.left.iter().map(bytes).sum::<usize>() > MAX_LEFT_BYTES
+        {
+            self.left.remove(0);
+        }
         self.counted.take_if(|(_, of)| !of.world.has_same_visibility(world));
         if let Some((_, of)) = self.counted.as_mut().filter(|(_, of)| is_other(of)) {
             *of = Arc::new(Request { world: Arc::clone(world), ..(**of).clone() });

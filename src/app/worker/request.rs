@@ -51,10 +51,11 @@ impl Request {
             || self.run != new.run
     }
 
-    /// Whether the very same picture is rendered for both, by a map that may have been turned back meanwhile.
+    /// Whether the very same picture is rendered for both. Its map may have been turned back meanwhile, or read again.
     pub(super) fn is_resumed_by(&self, new: &Self) -> bool {
         let (map, other) = (&self.environment, &new.environment);
-        let is_as_lit = map.shares_map_with(other)
+        let is_equal = || map.map() == other.map() && map.tile_energies() == other.tile_energies();
+        let is_as_lit = (map.shares_map_with(other) || is_equal())
             && map.rotation_and_intensity() == other.rotation_and_intensity();
         let environment = Arc::clone(other);
         is_as_lit

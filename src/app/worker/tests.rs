@@ -124,6 +124,38 @@ fn whoever_comes_back_to_a_picture_finds_it_as_it_was() {
 }
 
 #[test]
+fn whoever_comes_back_sees_the_cached_light_that_there_was() {
+    let Some(worker) = worker() else { return };
+    let request = Request { wants_cached: true, ..request_of("office", [640, 480]) };
+    let of_cache =
+        |now: &Snapshot| now.backdrop.clone().filter(|backdrop| backdrop.origin == Origin::Cache);
+    worker.submit(request.clone());
+    wait_for(&worker, |now| of_cache(now).is_some() && now.seconds() > 1.5);
+    let paused = Request { paused: true, ..request };
+    worker.submit(paused.clone());
+    let left = wait_for(&worker, |now| now.activity == Activity::Paused);
+    let cached = of_cache(&left).expect("it is shown");
+    assert!(cached.samples < 16 * 640 * 480, "it is under way");
+    // Under another map, and under the same one read again.
+    let lit = |sky| {
+        let map = sky::build(sky, 64, 32).expect("a sky");
+        Environment::new(map, &EnvironmentOptions::default()).expect("a sound map")
+    };
+    let other = Arc::new(lit("day"));
+    worker.submit(Request { environment: Arc::clone(&other), ..paused.clone() });
+    wait_for(&worker, |now| Arc::ptr_eq(&now.request.environment, &other));
+    let again = Arc::new(lit("overcast"));
+    worker.submit(Request { environment: Arc::clone(&again), ..paused.clone() });
+    let back = wait_for(&worker, |now| Arc::ptr_eq(&now.request.environment, &again));
+    let shown = of_cache(&back).expect("it is shown again");
+    assert!(back.main.film == left.main.film && shown.film == cached.film, "the same picture");
+    assert_eq!((shown.samples, shown.worth), (cached.samples, cached.worth));
+    // It goes on.
+    worker.submit(Request { environment: again, paused: false, ..paused });
+    wait_for(&worker, |now| of_cache(now).is_some_and(|now| now.samples > cached.samples));
+}
+
+#[test]
 fn what_a_picture_begins_with_is_shown_when_it_is_everywhere() {
     let Some(worker) = worker() else { return };
     let before = request_of("office", [320, 240]);

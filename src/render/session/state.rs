@@ -10,6 +10,8 @@ use crate::environment::Environment;
 use crate::light_grid::LightGrid;
 use crate::path::World;
 use crate::path::camera::CameraRays;
+#[cfg(feature = "window")]
+use crate::radiance_cache::CacheFacts;
 use crate::render::film::Film;
 use crate::render::gi::CacheTraining;
 use crate::render::{Figures, View};
@@ -65,12 +67,16 @@ impl<'a> Session<'a> {
         self.state
     }
 
-    /// Goes on, on the CPU, with what was put aside, in the same world under the same map.
+    /// Goes on, on the CPU, with what was put aside, in the same world under the same map. A radiance cache that was
+    /// [taken](Self::take_training) is trained anew.
     pub(crate) fn resume(
         world: &'a World,
         environment: &'a Environment,
-        state: SessionState,
+        mut state: SessionState,
     ) -> Self {
+        if state.training.is_none() {
+            state.training = CacheTraining::new(world, environment, &state.view, &state.rays);
+        }
         Self { world, environment, gpu: None, state }
     }
 }
@@ -92,11 +98,12 @@ impl SessionState {
         self.figures.elapsed_seconds()
     }
 
-    /// Bytes of film, distributions and counters.
+    /// Bytes of film, distributions, counters and radiance cache.
     pub(crate) fn memory_bytes(&self) -> usize {
         let grid = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
         let counters = self.learning.as_ref().map_or(0, |l| l.grid.counters.memory_bytes());
-        self.film().map_or(0, Film::memory_bytes) + grid + counters
+        let cache = self.training.as_ref().map_or(0, |_| CacheFacts::memory_bytes());
+        self.film().map_or(0, Film::memory_bytes) + grid + counters + cache
     }
 }
 
@@ -106,7 +113,7 @@ mod tests {
 
     use super::*;
     use crate::environment::{EnvironmentOptions, sky};
-    use crate::render::Sampling;
+    use crate::render::{Gi, Sampling};
     use crate::scene::builtin;
 
     fn lit() -> (World, Environment) {
@@ -131,6 +138,24 @@ mod tests {
         session.state.figures.samples = 6000;
         assert_eq!(session.comparable_seconds(), Some(2.0));
         assert_eq!(session.elapsed_seconds(), 11.5);
+    }
+
+    #[test]
+    fn a_radiance_cache_that_others_have_taken_is_trained_anew() {
+        let (world, environment) = lit();
+        let camera = world.scene.cameras[0].clone();
+        let view = View { gi: Gi::Cached, ..View::new(camera, [24, 16]) };
+        let mut session = Session::new(&world, &environment, view);
+        let goes_on = AtomicBool::new(false);
+        session.finish_learning();
+        for _ in 0..3 {
+            session.advance(1, &goes_on).expect("the CPU does not fail");
+        }
+        let before = session.take_training().expect("it was trained").state().0;
+        let mut session = Session::resume(&world, &environment, session.suspend());
+        session.advance(1, &goes_on).expect("the CPU does not fail");
+        let after = session.training().expect("it is trained").state().0;
+        assert!(after >= before, "{after} paths in place of {before}");
     }
 
     #[test]

@@ -3,6 +3,9 @@
 
 use std::sync::Arc;
 
+use crate::app::worker::kept::SuspendedCache;
+use crate::environment::Environment;
+use crate::path::World;
 use crate::render::Session;
 use crate::render::film::Film;
 
@@ -12,9 +15,6 @@ pub(super) const SAMPLES: u32 = 16;
 /// What one of them counts beside an exact one. (Before filtering it is worth five to ten; but its error
 /// falls no further.)
 const WORTH: f32 = 4.0;
-
-/// All of its samples, and its film.
-pub(in crate::app::worker) type CompletePicture = (u64, Arc<Film>);
 
 /// How far it is.
 #[derive(Default)]
@@ -28,13 +28,31 @@ pub(super) enum CachedPicture<'s> {
     Complete(u64, Arc<Film>),
 }
 
-impl From<Option<CompletePicture>> for CachedPicture<'_> {
-    fn from(complete: Option<CompletePicture>) -> Self {
-        complete.map_or(Self::Absent, |(samples, film)| Self::Complete(samples, film))
-    }
-}
-
 impl<'s> CachedPicture<'s> {
+    /// Goes on with what was put aside.
+    pub(super) fn resume(
+        world: &'s World,
+        environment: &'s Environment,
+        suspended: SuspendedCache,
+    ) -> Self {
+        match suspended {
+            SuspendedCache::Absent => Self::Absent,
+            SuspendedCache::UnderWay(state) => {
+                Self::UnderWay(Box::new(Session::resume(world, environment, *state)), None)
+            }
+            SuspendedCache::Complete((samples, film)) => Self::Complete(samples, film),
+        }
+    }
+
+    /// Puts it aside.
+    pub(super) fn suspend(self) -> SuspendedCache {
+        match self {
+            Self::Absent => SuspendedCache::Absent,
+            Self::UnderWay(session, _) => SuspendedCache::UnderWay(Box::new(session.suspend())),
+            Self::Complete(samples, film) => SuspendedCache::Complete((samples, film)),
+        }
+    }
+
     /// Whether it has not been begun.
     pub(super) fn is_absent(&self) -> bool {
         matches!(self, Self::Absent)
@@ -43,14 +61,6 @@ impl<'s> CachedPicture<'s> {
     /// Whether it has all its samples.
     pub(super) fn is_complete(&self) -> bool {
         matches!(self, Self::Complete(..))
-    }
-
-    /// What of it another picture may be left for: all, or nothing.
-    pub(super) fn into_complete(self) -> Option<CompletePicture> {
-        match self {
-            Self::Complete(samples, film) => Some((samples, film)),
-            Self::Absent | Self::UnderWay(..) => None,
-        }
     }
 
     /// Its film, once all of its pixels have a sample.
@@ -64,6 +74,14 @@ impl<'s> CachedPicture<'s> {
 
     /// What renders it.
     pub(super) fn session(&self) -> Option<&Session<'s>> {
+        match self {
+            Self::UnderWay(session, _) => Some(session),
+            _ => None,
+        }
+    }
+
+    /// The same, to be changed.
+    pub(super) fn session_mut(&mut self) -> Option<&mut Session<'s>> {
         match self {
             Self::UnderWay(session, _) => Some(session),
             _ => None,

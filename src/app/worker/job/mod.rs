@@ -10,7 +10,6 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
-pub(super) use cached::CompletePicture;
 use cached::{CachedPicture, worth};
 use publishing::{FilmReadback, Resized};
 use sessions::Placed;
@@ -221,24 +220,26 @@ impl<'a> PictureTask<'a> {
                 plain.iter().for_each(|plain| self.note(PLAIN, plain));
             }
         }
-        if !cached.is_complete() {
-            cached.end(|session| self.kept.keep_training(session, &self.request));
-        }
         if self.request.previews {
             self.leave(main, cached);
+        } else {
+            cached.end(|session| self.kept.keep_training(session, &self.request));
         }
     }
 
     /// Puts the picture aside for another one.
-    fn leave(&mut self, main: Session<'_>, cached: CachedPicture<'_>) {
+    fn leave(&mut self, main: Session<'_>, mut cached: CachedPicture<'_>) {
+        if let Some(session) = cached.session_mut().filter(|_| self.is_left_for_same_light()) {
+            self.kept.keep_training(session, &self.request);
+        }
         // What is seen of it is better than the film alone.
         let times = worth(main.samples());
         let shown = cached.film_so_far().filter(|_| times >= 1.0 && main.samples() > 0);
         let shown = shown.map(|cached| cached.together(main.film(), times));
-        let left = SuspendedPicture {
+        let mut left = SuspendedPicture {
             request: Arc::clone(&self.request),
             session: main.suspend(),
-            cached: cached.into_complete(),
+            cached: cached.suspend(),
             counters: self.counters.take(),
             curve: std::mem::take(&mut self.curves[MAIN]),
             cached_seconds: self.cached_seconds,
@@ -408,6 +409,15 @@ impl<'a> PictureTask<'a> {
     fn is_left_for(&self, is_other: impl Fn(&Request, &Request) -> bool) -> bool {
         let slot = self.shared.orders.slot();
         slot.is_closed || slot.value.as_ref().is_some_and(|new| is_other(&self.request, new))
+    }
+
+    /// Whether the next picture can go on with the radiance cache of this one.
+    fn is_left_for_same_light(&self) -> bool {
+        let next = &self.shared.orders.slot().value;
+        let is_lit_alike = |next: &Arc<Request>| {
+            Arc::ptr_eq(&next.world, &self.request.world) && self.request.is_lit_like(next)
+        };
+        next.as_ref().is_some_and(is_lit_alike)
     }
 
     /// Waits until something else is asked for, or kernels are there that were not.

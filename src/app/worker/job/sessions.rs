@@ -63,7 +63,13 @@ impl PictureTask<'_> {
         };
         (self.counters, self.cached_seconds) = (left.counters, left.cached_seconds);
         self.curves[MAIN] = left.curve;
-        (Some(Session::resume(world, environment, left.session)), left.cached.into())
+        // What was kept of it to be seen meanwhile has the same samples.
+        self.kept.backdrop.take_if(|seen| seen.request.is_resumed_by(&self.request));
+        let mut cached = CachedPicture::resume(world, environment, left.cached);
+        if let Some(session) = cached.session_mut() {
+            self.take_up_training(session);
+        }
+        (Some(Session::resume(world, environment, left.session)), cached)
     }
 
     /// A session that learns, from what is known of the scene if the camera has not gone far.
@@ -100,14 +106,20 @@ impl PictureTask<'_> {
             let given = session.set_grid((*distributions).clone());
             self.go_on(&mut session, given);
         }
-        if session.view().gi == Gi::Cached
-            && self.kept.has_training_for(&self.request)
+        if session.view().gi == Gi::Cached {
+            self.take_up_training(&mut session);
+        }
+        session
+    }
+
+    /// Gives a session the radiance cache that was trained for others, if it suits.
+    fn take_up_training(&mut self, session: &mut Session<'_>) {
+        if self.kept.has_training_for(&self.request)
             && let Some((training, _)) = self.kept.training.take()
         {
             let given = session.set_training(training);
-            self.go_on(&mut session, given);
+            self.go_on(session, given);
         }
-        session
     }
 
     /// By what a moving picture's sides are divided: as for the last one, unless that took far too long or
