@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::statistics::Estimate;
 use crate::image::Image;
 use crate::metrics::{REL_MSE_EPSILON, block_means, mean};
 
@@ -58,6 +59,11 @@ impl Bias {
         });
         let (device, method) = (device.to_owned(), method.to_owned());
         Some(Self { device, method, squared, standard_error })
+    }
+
+    /// Its square with the standard error.
+    pub(super) fn estimate(&self) -> Option<Estimate> {
+        Some(Estimate { mean: self.squared, standard_error: self.standard_error })
     }
 
     /// The bias; 0 where chance makes its square negative.

@@ -35,11 +35,6 @@ impl Device {
     }
 }
 
-/// Which devices a plan measures on, in words.
-pub(super) fn device_names(devices: &[Device]) -> String {
-    devices.iter().map(|d| d.title()).collect::<Vec<_>>().join(" and ")
-}
-
 /// All that a way of rendering may differ in without changing what the picture converges to.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Settings {
@@ -178,6 +173,15 @@ impl Row {
             target: None,
         }
     }
+
+    /// Speed-up in the talk on a device.
+    pub(super) fn published_on(&self, device: Device) -> Option<f64> {
+        let [cpu, gpu] = self.published?;
+        Some(match device {
+            Device::Cpu => cpu,
+            Device::Gpu => gpu,
+        })
+    }
 }
 
 /// How much work goes into a plan.
@@ -193,6 +197,13 @@ pub struct Effort {
     pub seeds: u32,
     /// The reference's noise may be this share of the smallest error.
     pub reference_noise: f64,
+}
+
+impl Effort {
+    /// The devices in words.
+    pub(super) fn device_names(&self) -> String {
+        self.devices.iter().map(|d| d.title()).collect::<Vec<_>>().join(" and ")
+    }
 }
 
 /// A whole report.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::bias::Bias;
-use super::measure::{Memory, Run};
+use super::measure::{Memory, Point, Run};
 use super::plan::{Device, Method, Plan, Row};
 use super::reference::{Noise, ReferenceFacts};
 use super::shares::Shares;
@@ -176,7 +176,87 @@ pub struct Costs {
     pub learned_cells: f64,
 }
 
+/// With more methods than this a row shows ratios instead of curves and pictures.
+const MAX_CURVES: usize = 7;
+
+impl Report {
+    /// Whether it has too many methods for curves.
+    pub(super) fn is_long(&self) -> bool {
+        self.plan.methods.len() > MAX_CURVES
+    }
+
+    /// Names of the methods that others are compared with.
+    fn baselines(&self) -> impl DoubleEndedIterator<Item = &str> {
+        self.plan.baselines.iter().map(|index| self.plan.methods[*index].name.as_str())
+    }
+
+    /// The first baseline.
+    pub(super) fn baseline(&self) -> &str {
+        self.baselines().next().unwrap_or_default()
+    }
+
+    /// The last baseline, which ablations are compared with.
+    pub(super) fn last_baseline(&self) -> &str {
+        self.baselines().next_back().unwrap_or_default()
+    }
+
+    /// All baselines but the first.
+    pub(super) fn other_baselines(&self) -> impl Iterator<Item = &str> {
+        self.baselines().skip(1)
+    }
+
+    /// Names of all methods but the first baseline.
+    pub(super) fn other_methods(&self) -> impl Iterator<Item = &str> {
+        let names = self.plan.methods.iter().map(|m| m.name.as_str());
+        names.filter(|name| *name != self.baseline())
+    }
+
+    /// The GPU's name, if one was measured.
+    pub(super) fn gpu_name(&self) -> Option<&str> {
+        let mut devices = self.rows.iter().flat_map(|row| &row.devices);
+        devices.find(|device| device.device == Device::Gpu).map(|device| device.name.as_str())
+    }
+
+    /// Titles of the rows whose reference is too noisy.
+    pub(super) fn noisy_references(&self) -> String {
+        let is_noisy = |row: &&RowReport| row.reference.as_ref().is_some_and(|r| !r.is_good);
+        let titles: Vec<&str> =
+            self.rows.iter().filter(is_noisy).map(|row| row.row.title.as_str()).collect();
+        titles.join("; ")
+    }
+}
+
+impl RowReport {
+    /// The speed-up of `adaptive`, and what it would be if its first vertex, or its later vertices, had
+    /// no noise; `None` without the shares of its error.
+    pub(super) fn bounds(&self, device: &DeviceReport, baseline: &str) -> Option<(f64, f64, f64)> {
+        let shares = self.shares.iter().find(|s| s.method == "adaptive")?;
+        let ratio = device.adaptive_speed_up(baseline)?.ratio;
+        let total = shares.total;
+        let without = |part: f64| ratio * total / (total - part).max(1e-3 * total);
+        Some((ratio, without(shares.first_vertex), without(shares.later_vertices)))
+    }
+}
+
+impl Costs {
+    /// Million rays per second of rendering a picture of this size.
+    pub(super) fn mega_rays_per_second(&self, (width, height): (u32, u32)) -> f64 {
+        let rays = self.rays_per_sample * self.samples * f64::from(width) * f64::from(height);
+        rays / self.render_seconds.max(1e-9) / 1e6
+    }
+}
+
 impl MethodReport {
+    /// Slope of the error over time.
+    pub(super) fn slope(&self, measure: Measure) -> Option<Estimate> {
+        self.slopes.iter().find(|(m, _)| *m == measure).map(|(_, slope)| *slope)
+    }
+
+    /// The last point of the first run.
+    pub(super) fn last_point(&self) -> Option<&Point> {
+        self.runs.first()?.points.last()
+    }
+
     /// Mean error at the end.
     pub fn error(&self, measure: Measure) -> Option<Estimate> {
         self.errors.iter().find(|(m, _)| *m == measure).map(|(_, e)| *e)
@@ -194,12 +274,27 @@ impl DeviceReport {
     pub fn method(&self, name: &str) -> Option<&MethodReport> {
         self.methods.iter().find(|m| m.method.name == name)
     }
+
+    /// Methods with a run.
+    pub(super) fn measured(&self) -> impl Iterator<Item = &MethodReport> {
+        self.methods.iter().filter(|m| !m.runs.is_empty())
+    }
+
+    /// Whether the time of rays is known.
+    pub(super) fn has_ray_seconds(&self) -> bool {
+        self.methods.iter().any(|m| m.costs.ray_seconds.is_some())
+    }
+
+    /// Speed-up of `adaptive`, the method that targets are set for.
+    pub(super) fn adaptive_speed_up(&self, baseline: &str) -> Option<SpeedUp> {
+        self.method("adaptive")?.speed_up(baseline, Measure::TrimmedRelMse)
+    }
 }
 
 /// Curves of error against time, of the runs that have been judged.
 pub(super) fn curves(runs: &[Run], measure: Measure) -> Vec<Curve> {
     let error = |run: &Run| {
-        let point = |p: &super::measure::Point| Some((p.seconds, measure.of(&p.errors?)));
+        let point = |p: &Point| Some((p.seconds, measure.of(&p.errors?)));
         run.points.iter().map(point).collect::<Option<Vec<_>>>()
     };
     runs.iter().filter_map(error).map(|points| Curve { points }).collect()

@@ -23,7 +23,8 @@ const FLOORS: [&[&str]; 14] = [
 ];
 
 /// Crates and where alone they are named: rooms, or parts of one. Any other is named anywhere.
-const CRATES: [(&str, &[&str]); 29] = [
+const CRATES: [(&str, &[&str]); 30] = [
+    ("askama", &["report/pages"]),
     ("basisu", &["image/ktx2"]),
     ("bevy_mikktspace", &["scene/gltf/tangents"]),
     ("bitflags", &["render/gpu/features", "scene/needs"]),

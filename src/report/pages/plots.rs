@@ -1,8 +1,18 @@
-//! The two plots: error against time, and speed-ups with their intervals.
+//! The two plots as SVG: error against time, and speed-ups with their intervals.
+
+use askama::Template;
 
 use super::super::statistics::{Bundle, Interval};
-use super::super::summary::{DeviceReport, Measure, curves};
-use super::svg::{Anchor, FAINT, GREY, INK, LogAxis, Svg, spread};
+use super::super::summary::{DeviceReport, Measure, MethodReport, Report, RowReport, curves};
+use crate::error::{Error, Result};
+
+/// The text of a template.
+///
+/// # Errors
+/// If a part of it cannot be written as text.
+pub(super) fn rendered(template: &impl Template) -> Result<String> {
+    template.render().map_err(|e| Error::new(e.to_string()))
+}
 
 /// Inks that people with any kind of colour vision tell apart (Okabe and Ito 2008).
 const INKS: [&str; 9] = [
@@ -10,8 +20,8 @@ const INKS: [&str; 9] = [
     "#e69f00",
 ];
 
-/// The ink of a method, of which this is the so-manyth.
-pub(super) fn ink(name: &str, index: usize) -> &'static str {
+/// The ink of the method of this name and index in its plan.
+fn ink(name: &str, index: usize) -> &'static str {
     match name {
         "plain" => INKS[0],
         "talk" => INKS[1],
@@ -21,226 +31,305 @@ pub(super) fn ink(name: &str, index: usize) -> &'static str {
     }
 }
 
-/// Error against time of all methods on one device; `None` before anything is known.
-pub(super) fn error_plot(device: &DeviceReport, measure: Measure, end: f64) -> Option<String> {
-    let bundles: Vec<(usize, Bundle)> = device
-        .methods
-        .iter()
-        .enumerate()
-        .filter_map(|(i, m)| Some((i, Bundle::new(&curves(&m.runs, measure), end)?)))
-        .collect();
-    let means: Vec<Vec<(f64, f64, f64)>> = bundles
-        .iter()
-        .map(|(_, bundle)| {
-            let estimates = bundle.estimates();
-            bundle
-                .seconds
-                .iter()
-                .zip(estimates)
-                .filter_map(|(t, e)| e.map(|e| (*t, e.mean, e.standard_error.unwrap_or(0.0))))
-                .filter(|(_, mean, _)| *mean > 0.0)
-                .collect()
-        })
-        .collect();
-    let all = || means.iter().flatten();
-    let start = all().map(|p| p.0).reduce(f64::min)?;
-    let low = all().map(|p| (p.1 - p.2).max(0.5 * p.1)).reduce(f64::min)?;
-    let high = all().map(|p| p.1 + p.2).reduce(f64::max)?;
-    let mut svg = Svg::new(560.0, 400.0);
+/// A coordinate to a tenth of a pixel, so that it has one digit after the point as text.
+fn pixel(coordinate: f64) -> f64 {
+    (10.0 * coordinate).round() / 10.0
+}
+
+/// A logarithmic axis: positive values from `low` to `high` onto pixels from `from` to `to`.
+#[derive(Clone, Copy)]
+struct LogAxis {
+    low: f64,
+    high: f64,
+    from: f64,
+    to: f64,
+}
+
+/// A mark on an axis: its pixel, and the number beside it, if any.
+struct Tick {
+    at: f64,
+    name: String,
+}
+
+impl LogAxis {
+    /// Pixel of a value.
+    fn at(&self, value: f64) -> f64 {
+        let share = (value / self.low).ln() / (self.high / self.low).ln();
+        pixel(self.from + share * (self.to - self.from))
+    }
+
+    /// Marks at the digits of each decade. Over less than two decades 2 and 5 are named too, over less
+    /// than 0.7 all but 7 and 9.
+    fn ticks(&self) -> Vec<Tick> {
+        let decades = (self.high / self.low).log10();
+        let exponents = self.low.log10().floor() as i32..=self.high.log10().ceil() as i32;
+        let digits = exponents.flat_map(|exponent| (1..10).map(move |digit| (digit, exponent)));
+        let tick = |(digit, exponent): (i32, i32)| {
+            let value = f64::from(digit) * 10f64.powi(exponent);
+            let is_named = match digit {
+                1 => true,
+                2 | 5 => decades < 2.0,
+                7 | 9 => false,
+                _ => decades < 0.7,
+            };
+            let name = if is_named { scientific(digit, exponent) } else { String::new() };
+            let is_inside = (self.low * 0.999..=self.high * 1.001).contains(&value);
+            is_inside.then(|| Tick { at: self.at(value), name })
+        };
+        digits.filter_map(tick).collect()
+    }
+}
+
+/// `digit` times a power of ten, such as 0.02, 5, 300, 10⁻⁴, 2·10⁻⁵.
+fn scientific(digit: i32, exponent: i32) -> String {
+    if (-2..=3).contains(&exponent) {
+        let decimals = (-exponent).max(0) as usize;
+        return format!("{:.decimals$}", f64::from(digit) * 10f64.powi(exponent));
+    }
+    let superscript = |c: char| {
+        let digit = c.to_digit(10).and_then(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize));
+        digit.unwrap_or('⁻')
+    };
+    let power: String = exponent.to_string().chars().map(superscript).collect();
+    if digit == 1 { format!("10{power}") } else { format!("{digit}·10{power}") }
+}
+
+/// Error against time of all methods on one device, with one curve a method.
+#[derive(Template)]
+#[template(path = "error_plot.svg", whitespace = "minimize")]
+struct ErrorPlot<'a> {
+    device: &'a str,
+    measure: &'a str,
+    x: LogAxis,
+    y: LogAxis,
+    /// Ends of a line of slope -1.
+    guide: ((f64, f64), (f64, f64)),
+    curves: Vec<ErrorCurve<'a>>,
+}
+
+/// A method's mean error over time: points as SVG writes them.
+struct ErrorCurve<'a> {
+    name: &'a str,
+    ink: &'static str,
+    line: String,
+    /// One standard error above and below.
+    band: String,
+    /// Height of the name beside the end of the line.
+    name_y: f64,
+}
+
+/// Least distance of two names beside their curves.
+const NAME_HEIGHT: f64 = 16.0;
+
+/// The plot of a device; `None` before there are errors. `end` is the time of a run in seconds.
+pub(super) fn error_plot(device: &DeviceReport, end: f64) -> Result<Option<String>> {
+    let measure = Measure::TrimmedRelMse;
+    let mean_errors = |(index, method): (usize, &'_ MethodReport)| {
+        let bundle = Bundle::new(&curves(&method.runs, measure), end)?;
+        let points: Vec<(f64, f64, f64)> = bundle
+            .seconds
+            .iter()
+            .zip(bundle.estimates())
+            .filter_map(|(t, e)| e.map(|e| (*t, e.mean, e.standard_error.unwrap_or(0.0))))
+            .filter(|(_, mean, _)| *mean > 0.0)
+            .collect();
+        (!points.is_empty()).then_some((index, points))
+    };
+    let means: Vec<_> = device.methods.iter().enumerate().filter_map(mean_errors).collect();
+    let all = || means.iter().flat_map(|(_, points)| points);
+    let Some(start) = all().map(|p| p.0).reduce(f64::min) else { return Ok(None) };
+    let low = all().map(|p| (p.1 - p.2).max(0.5 * p.1)).fold(f64::INFINITY, f64::min);
+    let high = all().map(|p| p.1 + p.2).fold(0.0, f64::max);
     let x = LogAxis { low: start * 0.95, high: end, from: 70.0, to: 460.0 };
     let y = LogAxis { low: low * 0.8, high: high * 1.25, from: 340.0, to: 44.0 };
-    let title = format!("{}: {}", device.device.title(), measure.title());
-    svg.bold_text((x.from, 24.0), Anchor::Start, INK, &title);
-    axes(&mut svg, x, y);
-    svg.text((265.0, 388.0), Anchor::Middle, INK, "seconds (table, learning, rendering)");
-    svg.upright_text((18.0, 192.0), INK, measure.title());
-    guide(&mut svg, x, y);
-    let mut ends: Vec<(f64, &str, &str)> = Vec::new();
-    for ((index, _), mean) in bundles.iter().zip(&means) {
+    let curve = |(index, points): &(usize, Vec<(f64, f64, f64)>)| {
+        let at = |t: f64, error: f64| format!("{},{}", x.at(t), y.at(error.max(y.low)));
+        let upper = points.iter().map(|(t, e, s)| at(*t, e + s));
+        let lower = points.iter().rev().map(|(t, e, s)| at(*t, e - s));
+        let line: Vec<String> = points.iter().map(|(t, e, _)| at(*t, *e)).collect();
         let name = device.methods[*index].method.name.as_str();
-        let ink = ink(name, *index);
-        let at = |t: f64, e: f64| (x.at(t), y.at(e.max(y.low)));
-        let upper = mean.iter().map(|(t, e, s)| at(*t, e + s));
-        let lower = mean.iter().rev().map(|(t, e, s)| at(*t, e - s));
-        svg.area(&upper.chain(lower).collect::<Vec<_>>(), ink, 0.18);
-        svg.curve(&mean.iter().map(|(t, e, _)| at(*t, *e)).collect::<Vec<_>>(), ink, 2.2);
-        if let Some((_, e, _)) = mean.last() {
-            ends.push((y.at(*e), name, ink));
+        ErrorCurve {
+            name,
+            ink: ink(name, *index),
+            line: line.join(" "),
+            band: upper.chain(lower).collect::<Vec<_>>().join(" "),
+            name_y: points.last().map_or(y.from, |(_, e, _)| y.at(*e)),
         }
-    }
-    ends.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut heights: Vec<f64> = ends.iter().map(|end| end.0).collect();
-    spread(&mut heights, 16.0);
-    for ((_, name, ink), height) in ends.iter().zip(heights) {
-        svg.bold_text((x.to + 8.0, height + 4.5), Anchor::Start, ink, name);
-    }
-    svg.text((x.to, 24.0), Anchor::End, GREY, "line: mean, band: ± standard error");
-    Some(svg.finish())
+    };
+    let mut curves: Vec<ErrorCurve<'_>> = means.iter().map(curve).collect();
+    spread_names(&mut curves, y.from);
+    let plot = ErrorPlot {
+        device: device.device.title(),
+        measure: measure.title(),
+        x,
+        y,
+        guide: guide(x, y),
+        curves,
+    };
+    rendered(&plot).map(Some)
 }
 
-fn axes(svg: &mut Svg, x: LogAxis, y: LogAxis) {
-    for (value, name) in x.ticks() {
-        let at = x.at(value);
-        svg.line((at, y.from), (at, y.to), FAINT, if name.is_some() { 1.2 } else { 0.6 }, "");
-        if let Some(name) = name {
-            svg.text((at, y.from + 20.0), Anchor::Middle, INK, &name);
-        }
+/// Moves names apart, downwards as far as `bottom` and upwards from there.
+fn spread_names(curves: &mut [ErrorCurve<'_>], bottom: f64) {
+    curves.sort_by(|a, b| a.name_y.total_cmp(&b.name_y));
+    let mut above = f64::NEG_INFINITY;
+    for curve in curves.iter_mut() {
+        curve.name_y = curve.name_y.max(above + NAME_HEIGHT);
+        above = curve.name_y;
     }
-    for (value, name) in y.ticks() {
-        let at = y.at(value);
-        svg.line((x.from, at), (x.to, at), FAINT, if name.is_some() { 1.2 } else { 0.6 }, "");
-        if let Some(name) = name {
-            svg.text((x.from - 8.0, at + 4.5), Anchor::End, INK, &name);
-        }
+    let mut below = bottom + NAME_HEIGHT;
+    for curve in curves.iter_mut().rev() {
+        curve.name_y = pixel(curve.name_y.min(below - NAME_HEIGHT));
+        below = curve.name_y;
     }
-    svg.line((x.from, y.from), (x.to, y.from), INK, 1.2, "");
-    svg.line((x.from, y.from), (x.from, y.to), INK, 1.2, "");
 }
 
-/// A line of slope -1 in the lower left, where curves are not.
-fn guide(svg: &mut Svg, x: LogAxis, y: LogAxis) {
+/// Ends of a line of slope -1 in the lower left, where no curve is.
+fn guide(x: LogAxis, y: LogAxis) -> ((f64, f64), (f64, f64)) {
     let start = x.low * (x.high / x.low).powf(0.04);
     let bottom = y.low * (y.high / y.low).powf(0.04);
     let factor = (x.high / x.low).powf(0.25).min((y.high / y.low).powf(0.3));
-    let (a, b) = ((x.at(start), y.at(bottom * factor)), (x.at(start * factor), y.at(bottom)));
-    svg.line(a, b, GREY, 1.2, "5 4");
-    svg.text(((a.0 + b.0) / 2.0 + 8.0, (a.1 + b.1) / 2.0 - 2.0), Anchor::Start, GREY, "slope −1");
+    ((x.at(start), y.at(bottom * factor)), (x.at(start * factor), y.at(bottom)))
 }
 
-/// A line of the plot of speed-ups.
-pub(super) struct Entry {
-    /// Left of the axis.
-    pub(super) title: String,
-    /// Name, ratio, interval.
-    pub(super) ratios: Vec<(String, f64, Option<Interval>)>,
+/// Speed-ups over `baseline`, a bar each, in groups.
+#[derive(Template)]
+#[template(path = "speed_up_plot.svg", whitespace = "minimize")]
+struct SpeedUpPlot<'a> {
+    title: &'a str,
+    baseline: &'a str,
+    x: LogAxis,
+    top: f64,
+    bottom: f64,
+    has_legend: bool,
+    has_published: bool,
+    has_target: bool,
+    /// Methods and their inks.
+    names: Vec<(&'a str, &'static str)>,
+    groups: Vec<Group<'a>>,
+}
+
+/// Bars under one title.
+#[derive(Default)]
+pub(super) struct Group<'a> {
+    title: String,
+    bars: Vec<Bar<'a>>,
     /// What others published.
-    pub(super) published: Option<f64>,
+    published: Option<f64>,
     /// What is asked for.
-    pub(super) target: Option<f64>,
+    target: Option<f64>,
+    top: f64,
+    bottom: f64,
 }
 
-/// Height of a marker's lane.
+struct Bar<'a> {
+    name: &'a str,
+    ink: &'static str,
+    ratio: f64,
+    interval: Option<Interval>,
+    y: f64,
+}
+
+/// Height of a bar's lane.
 const LANE: f64 = 13.0;
 
-/// Speed-ups over `baseline`, entry by entry; `None` if there are none.
-pub(super) fn ratio_plot(title: &str, baseline: &str, entries: &[Entry]) -> Option<String> {
-    let values = || {
-        entries.iter().flat_map(|entry| {
-            let ratios = entry.ratios.iter().flat_map(|(_, ratio, interval)| {
-                [Some(*ratio), interval.map(|i| i.low), interval.map(|i| i.high)]
-            });
-            ratios.chain([entry.published, entry.target]).flatten().filter(|v| *v > 0.0)
-        })
-    };
-    let (low, high) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
-    let mut names: Vec<&str> = Vec::new();
-    for (name, ..) in entries.iter().flat_map(|entry| &entry.ratios) {
-        if !names.contains(&name.as_str()) {
-            names.push(name);
+impl<'a> Group<'a> {
+    /// All methods of a row on a device.
+    pub(super) fn of_row(report: &'a Report, row: &RowReport, device: &'a DeviceReport) -> Self {
+        let methods = device.methods.iter().enumerate();
+        let bars = methods.filter_map(|(index, m)| {
+            let found = m.speed_up(report.baseline(), Measure::TrimmedRelMse)?;
+            Some(Bar::new(&m.method.name, index, found.ratio, found.interval))
+        });
+        Self {
+            title: format!("{}, {}", row.row.title, device.device.title()),
+            bars: bars.collect(),
+            published: row.row.published_on(device.device),
+            target: row.row.target,
+            ..Self::default()
         }
     }
-    // Where each entry is one of them its title says so.
-    let has_legend = entries.iter().any(|entry| entry.ratios.len() > 1) || names.len() <= 4;
-    let marks = if has_legend { legend(&names, entries) } else { Vec::new() };
-    let lanes = |entry: &Entry| entry.ratios.len().max(1) as f64;
-    let gap = if has_legend { 14.0 } else { 5.0 };
-    let height: f64 = entries.iter().map(|entry| lanes(entry) * LANE + gap).sum();
-    let top = 20.0 + marks.last().map_or(FIRST_LINE, |mark| mark.at.1);
-    let widest = entries.iter().map(|e| e.title.chars().count()).max()?;
-    let from = (widest as f64 * 6.6 + 24.0).clamp(110.0, 300.0);
-    let mut svg = Svg::new(820.0, top + height + 50.0);
-    let x = LogAxis { low: low.min(0.8) * 0.9, high: high.max(1.6) * 1.1, from, to: 790.0 };
-    let (bottom, mut y) = (top + height, top);
-    svg.bold_text((16.0, 24.0), Anchor::Start, INK, title);
-    marks.iter().for_each(|mark| mark.draw(&mut svg));
-    for (value, name) in x.ticks() {
-        svg.line((x.at(value), top), (x.at(value), bottom), FAINT, 1.0, "");
-        if let Some(name) = name {
-            svg.text((x.at(value), bottom + 18.0), Anchor::Middle, INK, &name);
-        }
+
+    /// One bar with its method's name.
+    pub(super) fn of_method(
+        name: &'a str,
+        index: usize,
+        ratio: f64,
+        interval: Option<Interval>,
+    ) -> Self {
+        let bars = vec![Bar::new(name, index, ratio, interval)];
+        Self { title: name.to_owned(), bars, ..Self::default() }
     }
-    svg.line((x.at(1.0), top - 4.0), (x.at(1.0), bottom), INK, 1.4, "");
-    let below = format!("times faster than {baseline} to the same error (1: as fast)");
-    svg.text(((x.from + x.to) / 2.0, bottom + 38.0), Anchor::Middle, INK, &below);
-    for entry in entries {
-        let middle = y + lanes(entry) * LANE / 2.0;
-        svg.text((x.from - 12.0, middle + 4.5), Anchor::End, INK, &entry.title);
-        if let Some(target) = entry.target {
-            let at = x.at(target);
-            svg.line((at, y - 2.0), (at, y + lanes(entry) * LANE + 2.0), GREY, 2.0, "2 2");
+
+    /// Places the group below `top`, and its bars in it.
+    fn place(&mut self, top: f64) {
+        self.top = top;
+        self.bottom = top + self.bars.len().max(1) as f64 * LANE;
+        let lanes = self.bars.iter_mut().zip(0..);
+        lanes.for_each(|(bar, lane)| bar.y = top + (f64::from(lane) + 0.5) * LANE);
+    }
+
+    fn middle(&self) -> f64 {
+        pixel(f64::midpoint(self.top, self.bottom))
+    }
+}
+
+impl<'a> Bar<'a> {
+    fn new(name: &'a str, index: usize, ratio: f64, interval: Option<Interval>) -> Self {
+        Self { name, ink: ink(name, index), ratio, interval, y: 0.0 }
+    }
+}
+
+/// The plot of groups; `None` if they have no bars.
+pub(super) fn speed_up_plot(
+    title: &str,
+    baseline: &str,
+    mut groups: Vec<Group<'_>>,
+) -> Result<Option<String>> {
+    let (mut low, mut high) = (0.8_f64, 1.6_f64);
+    let mut names: Vec<(&str, &str)> = Vec::new();
+    for group in &groups {
+        let ends = |bar: &Bar<'_>| {
+            let interval = bar.interval.map(|i| [i.low, i.high]);
+            [bar.ratio].into_iter().chain(interval.into_iter().flatten())
+        };
+        let values = group.bars.iter().flat_map(ends).chain(group.published).chain(group.target);
+        for value in values.filter(|v| *v > 0.0) {
+            (low, high) = (low.min(value), high.max(value));
         }
-        for (lane, (name, ratio, interval)) in entry.ratios.iter().enumerate() {
-            let number = names.iter().position(|other| other == name).unwrap_or_default();
-            let (ink, at) = (ink(name, number), y + (lane as f64 + 0.5) * LANE);
-            if let Some(Interval { low, high }) = interval {
-                svg.line((x.at(*low), at), (x.at(*high), at), ink, 2.2, "");
+        for bar in &group.bars {
+            if names.iter().all(|(name, _)| *name != bar.name) {
+                names.push((bar.name, bar.ink));
             }
-            svg.dot((x.at(*ratio), at), 4.6, ink);
-        }
-        if let Some(published) = entry.published {
-            svg.diamond((x.at(published), middle), 5.0, GREY);
-        }
-        y += lanes(entry) * LANE + gap;
-    }
-    Some(svg.finish())
-}
-
-/// Where the first line of a legend lies, and where each ends.
-const FIRST_LINE: f64 = 44.0;
-const END_OF_LINE: f64 = 800.0;
-
-/// One mark of a legend and what it stands for.
-struct Mark<'a> {
-    at: (f64, f64),
-    ink: &'a str,
-    sign: Sign,
-    text: &'a str,
-}
-
-enum Sign {
-    Dot,
-    None,
-    Diamond,
-    Dashes,
-}
-
-impl Mark<'_> {
-    fn draw(&self, svg: &mut Svg) {
-        let (x, y) = self.at;
-        match self.sign {
-            Sign::Dot => svg.dot((x, y), 4.6, self.ink),
-            Sign::None => {}
-            Sign::Diamond => svg.diamond((x, y), 5.0, self.ink),
-            Sign::Dashes => svg.line((x, y - 7.0), (x, y + 7.0), self.ink, 2.0, "2 2"),
-        }
-        let at = (x + 9.0, y + 4.5);
-        match self.sign {
-            Sign::Dot => svg.bold_text(at, Anchor::Start, self.ink, self.text),
-            _ => svg.text(at, Anchor::Start, self.ink, self.text),
         }
     }
-}
-
-/// The marks of a legend, line by line.
-fn legend<'a>(names: &[&'a str], entries: &[Entry]) -> Vec<Mark<'a>> {
-    let mut signs: Vec<(&str, Sign, &str)> = Vec::new();
-    signs.extend(names.iter().zip(0..).map(|(name, i)| (ink(name, i), Sign::Dot, *name)));
-    signs.push((GREY, Sign::None, "bar: 95 % interval"));
-    if entries.iter().any(|entry| entry.published.is_some()) {
-        signs.push((GREY, Sign::Diamond, "the talk's figure"));
-    }
-    if entries.iter().any(|entry| entry.target.is_some()) {
-        signs.push((GREY, Sign::Dashes, "target"));
-    }
-    let mut at = (24.0, FIRST_LINE);
-    let place = |(ink, sign, text): (&'a str, Sign, &'a str)| {
-        let width = 32.0 + 7.5 * text.chars().count() as f64;
-        if at.0 + width > END_OF_LINE {
-            at = (24.0, at.1 + 20.0);
-        }
-        let mark = Mark { at, ink, sign, text };
-        at.0 += width;
-        mark
+    let Some(widest) = groups.iter().map(|group| group.title.chars().count()).max() else {
+        return Ok(None);
     };
-    signs.into_iter().map(place).collect()
+    if names.is_empty() {
+        return Ok(None);
+    }
+    // Without one each group is a single method, which its title names.
+    let has_legend = groups.iter().any(|group| group.bars.len() > 1) || names.len() <= 4;
+    let (top, gap) = if has_legend { (64.0, 14.0) } else { (40.0, 5.0) };
+    let mut bottom = top;
+    for group in &mut groups {
+        group.place(bottom);
+        bottom = group.bottom + gap;
+    }
+    let from = pixel((widest as f64 * 6.6 + 24.0).clamp(110.0, 300.0));
+    let x = LogAxis { low: low * 0.9, high: high * 1.1, from, to: 790.0 };
+    let plot = SpeedUpPlot {
+        title,
+        baseline,
+        x,
+        top,
+        bottom,
+        has_legend,
+        has_published: groups.iter().any(|group| group.published.is_some()),
+        has_target: groups.iter().any(|group| group.target.is_some()),
+        names,
+        groups,
+    };
+    rendered(&plot).map(Some)
 }

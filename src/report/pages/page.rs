@@ -1,0 +1,160 @@
+//! The page `report.html`: what the template shows beside the report itself.
+
+use askama::Template;
+
+use super::super::plan::{Device, Method};
+use super::super::statistics::SpeedUp;
+use super::super::summary::{DeviceReport, Measure, MethodReport, Report, RowReport};
+use super::pictures::{Window, data_uri, developed};
+use super::plots::{Group, error_plot, rendered, speed_up_plot};
+use super::{format, results};
+use crate::error::Result;
+
+/// The page of a report.
+#[derive(Template)]
+#[template(path = "report.html", whitespace = "minimize")]
+pub(super) struct Page<'a> {
+    report: &'a Report,
+    /// The plot above all rows.
+    overview: Option<String>,
+    ablations: Vec<AblationLine<'a>>,
+    sections: Vec<Section<'a>>,
+}
+
+/// A method's speed-ups over the last baseline.
+struct AblationLine<'a> {
+    method: &'a Method,
+    /// Whether it is the first of its group.
+    begins_group: bool,
+    /// For each row and device.
+    speed_ups: Vec<Option<SpeedUp>>,
+    /// Geometric mean; `None` where some are missing, for it would be of other rows than other methods'.
+    mean: Option<f64>,
+}
+
+/// What is shown of a row.
+struct Section<'a> {
+    row: &'a RowReport,
+    error_plots: Vec<(Device, String)>,
+    /// Plots on the page.
+    plots: Vec<String>,
+    pictures: Option<Pictures<'a>>,
+}
+
+/// Pictures as values of `src`.
+struct Pictures<'a> {
+    reference: String,
+    /// The part of it that is shown of all pictures.
+    reference_crop: String,
+    /// The same part of all methods' pictures, device by device.
+    crops: Vec<(Device, Vec<(&'a MethodReport, String)>)>,
+}
+
+impl<'a> Page<'a> {
+    pub(super) fn new(report: &'a Report) -> Result<Self> {
+        let ablations = if report.is_long() { ablations(report) } else { Vec::new() };
+        let overview = if report.is_long() {
+            let mean = |(index, line): (usize, &AblationLine<'a>)| {
+                Some(Group::of_method(&line.method.name, index, line.mean?, None))
+            };
+            let groups = ablations.iter().enumerate().filter_map(mean).collect();
+            speed_up_plot("Geometric mean over all rows", report.last_baseline(), groups)
+        } else {
+            let devices =
+                report.rows.iter().flat_map(|row| row.devices.iter().map(move |d| (row, d)));
+            let groups = devices.map(|(row, device)| Group::of_row(report, row, device)).collect();
+            speed_up_plot("Time to equal error", report.baseline(), groups)
+        };
+        let sections =
+            report.rows.iter().map(|row| Section::new(report, row)).collect::<Result<_>>()?;
+        Ok(Self { report, overview: overview?, ablations, sections })
+    }
+
+    /// The plot of all rows' speed-ups.
+    pub(super) fn overview_plot(&self) -> Option<&str> {
+        self.overview.as_deref().filter(|_| !self.report.is_long())
+    }
+
+    /// Error against time, of each row and device.
+    pub(super) fn error_plots(&self) -> impl Iterator<Item = (&RowReport, Device, &str)> {
+        self.sections.iter().flat_map(|section| {
+            section.error_plots.iter().map(|(device, plot)| (section.row, *device, plot.as_str()))
+        })
+    }
+
+    /// The whole page.
+    pub(super) fn html(&self) -> Result<String> {
+        rendered(self)
+    }
+}
+
+/// All methods' speed-ups over the last baseline.
+fn ablations<'a>(report: &'a Report) -> Vec<AblationLine<'a>> {
+    let mut group = None;
+    let line = |method: &'a Method| {
+        let devices = report.rows.iter().flat_map(|row| &row.devices);
+        let speed_up = |device: &DeviceReport| {
+            device.method(&method.name)?.speed_up(report.last_baseline(), Measure::TrimmedRelMse)
+        };
+        let speed_ups: Vec<Option<SpeedUp>> = devices.map(speed_up).collect();
+        let logarithms: Option<Vec<f64>> =
+            speed_ups.iter().map(|found| found.map(|s| s.ratio.ln())).collect();
+        let mean = logarithms.filter(|all| !all.is_empty());
+        let mean = mean.map(|all| (all.iter().sum::<f64>() / all.len() as f64).exp());
+        let begins_group = method.group != group;
+        group = method.group;
+        AblationLine { method, begins_group, speed_ups, mean }
+    };
+    report.plan.methods.iter().map(line).collect()
+}
+
+impl<'a> Section<'a> {
+    fn new(report: &'a Report, row: &'a RowReport) -> Result<Self> {
+        let mut error_plots = Vec::new();
+        for device in &row.devices {
+            let plot = error_plot(device, report.plan.effort.seconds)?;
+            error_plots.extend(plot.map(|plot| (device.device, plot)));
+        }
+        if !report.is_long() {
+            let plots = error_plots.iter().map(|(_, plot)| plot.clone()).collect();
+            return Ok(Self { row, error_plots, plots, pictures: Pictures::new(row)? });
+        }
+        let mut plots = Vec::new();
+        for device in &row.devices {
+            let group = |(index, m): (usize, &'a MethodReport)| {
+                let found = m.speed_up(report.last_baseline(), Measure::TrimmedRelMse)?;
+                Some(Group::of_method(&m.method.name, index, found.ratio, found.interval))
+            };
+            let groups = device.methods.iter().enumerate().filter_map(group).collect();
+            let plot = speed_up_plot(device.device.title(), report.last_baseline(), groups);
+            plots.extend(plot?);
+        }
+        Ok(Self { row, error_plots, plots, pictures: None })
+    }
+}
+
+impl<'a> Pictures<'a> {
+    /// `None` if there is no reference or no picture.
+    fn new(row: &'a RowReport) -> Result<Option<Self>> {
+        let Some(reference) = &row.pictures.reference else { return Ok(None) };
+        let Some((.., noisiest)) = row.pictures.runs.first() else { return Ok(None) };
+        let window = Window::most_telling(noisiest, reference);
+        let whole = developed(reference, reference);
+        let mut crops = Vec::new();
+        for device in &row.devices {
+            let mut of_device = Vec::new();
+            for (_, name, picture) in row.pictures.runs.iter().filter(|(d, ..)| *d == device.device)
+            {
+                if let Some(method) = device.method(name) {
+                    let crop = window.of(&developed(picture, reference));
+                    of_device.push((method, data_uri(&crop)?));
+                }
+            }
+            if !of_device.is_empty() {
+                crops.push((device.device, of_device));
+            }
+        }
+        let reference_crop = data_uri(&window.of(&whole))?;
+        Ok(Some(Self { reference: data_uri(&whole)?, reference_crop, crops }))
+    }
+}
