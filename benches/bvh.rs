@@ -11,6 +11,7 @@ use criterion::{BenchmarkId, Criterion, Throughput};
 use glam::{Vec3, Vec3A};
 use lightgrid::bvh::{Bvh, Hit, Ray, offset_origin};
 use lightgrid::math::Frame;
+use lightgrid::sampler::SplitMix;
 use obvhs::BvhBuildParams;
 use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
 use obvhs::ray::RayHit;
@@ -144,7 +145,7 @@ impl Scene {
 /// Rays of a camera in the room, one cosine-distributed bounce each, and rays from the same points
 /// to points in an area light under the ceiling.
 fn rays(bvh: &Bvh, positions: &[Vec3], triangles: &[[u32; 3]]) -> [Vec<Ray>; 3] {
-    let mut random = Random(1);
+    let mut random = SplitMix(1);
     let mut rays = [const { Vec::new() }; 3];
     for pixel in 0..WIDTH * HEIGHT {
         let x = ((pixel % WIDTH) as f32 + 0.5) / WIDTH as f32 * 2.0 - 1.0;
@@ -161,10 +162,10 @@ fn rays(bvh: &Bvh, positions: &[Vec3], triangles: &[[u32; 3]]) -> [Vec<Ray>; 3] 
         let normal = if normal.dot(primary.direction) > 0.0 { -normal } else { normal };
         let point = primary.origin + primary.direction * hit.t;
         let origin = offset_origin(point, normal);
-        let direction = Frame::from_z(normal).world_from_local(random.cosine());
+        let direction = Frame::from_z(normal).world_from_local(cosine_direction(&mut random));
         rays[0].push(primary);
         rays[1].push(Ray { origin, direction, ..primary });
-        let light = Vec3::new(random.unit() - 0.5, 0.7, random.unit() - 0.5);
+        let light = Vec3::new(random.next_f32() - 0.5, 0.7, random.next_f32() - 0.5);
         rays[2].push(Ray { origin, direction: light - origin, t_max: 1.0, ..primary });
     }
     rays
@@ -185,10 +186,14 @@ fn displaced_room(n: usize) -> Mesh {
             });
         }
     }
-    let mut random = Random(2);
+    let mut random = SplitMix(2);
     for _ in 0..24 {
-        let centre = Vec3::new(random.unit() - 0.5, random.unit() * 0.6 - 0.7, random.unit() - 0.5);
-        let radius = 0.05 + 0.08 * random.unit();
+        let centre = Vec3::new(
+            random.next_f32() - 0.5,
+            random.next_f32() * 0.6 - 0.7,
+            random.next_f32() - 0.5,
+        );
+        let radius = 0.05 + 0.08 * random.next_f32();
         grid(&mut mesh, n / 5, n / 7, |u, v| {
             let ((sin_phi, cos_phi), (sin, cos)) = ((u * TAU).sin_cos(), (v * PI).sin_cos());
             centre + radius * Vec3::new(sin * cos_phi, cos, sin * sin_phi)
@@ -214,20 +219,8 @@ fn grid(mesh: &mut Mesh, width: usize, height: usize, surface: impl Fn(f32, f32)
     }
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014).
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / 16_777_216.0
-    }
-
-    /// Cosine-distributed about +Z.
-    fn cosine(&mut self) -> Vec3 {
-        let (r2, phi) = (self.unit(), TAU * self.unit());
-        Vec3::new(r2.sqrt() * phi.cos(), r2.sqrt() * phi.sin(), (1.0 - r2).sqrt())
-    }
+/// A direction, cosine-distributed about +Z.
+fn cosine_direction(random: &mut SplitMix) -> Vec3 {
+    let (r2, phi) = (random.next_f32(), TAU * random.next_f32());
+    Vec3::new(r2.sqrt() * phi.cos(), r2.sqrt() * phi.sin(), (1.0 - r2).sqrt())
 }

@@ -4,7 +4,11 @@
 //! its index shuffled by hashing (Burley, *Practical Hash-based Owen Scrambling*, JCGT 9(4), 2020).
 //! All arithmetic is on `u32`, so any device gets the same points.
 
+mod split_mix;
+
 use serde::{Deserialize, Serialize};
+
+pub use self::split_mix::SplitMix;
 
 /// A stream of low-discrepancy numbers for one sample of one pixel.
 #[derive(Debug, Clone)]

@@ -4,13 +4,13 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
-use super::random::Random;
 use super::scenes::{constant, learned, view};
 use super::{Case, On, Outcome, Setting};
 use crate::error::Result;
 use crate::path::{PathResult, WorldBuilder};
 use crate::render::film::Pixel;
 use crate::render::{Sampling, View};
+use crate::sampler::SplitMix;
 use crate::scene::Camera;
 
 const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
@@ -19,10 +19,10 @@ const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) 
 
 pub(super) const CASES: &[Case] = &[
     case("1e7-samples-in-a-pixel", On::Cpu, |_| {
-        Ok(sums(|random| 10.0_f32.powf(4.0 * random.unit() - 2.0)))
+        Ok(sums(|random| 10.0_f32.powf(4.0 * random.next_f32() - 2.0)))
     }),
     case("1e-8-beside-1e8", On::Cpu, |_| {
-        Ok(sums(|random| if random.bits() & 1 == 0 { 1e-8 } else { 1e8 }))
+        Ok(sums(|random| if random.next_bits() & 1 == 0 { 1e-8 } else { 1e8 }))
     }),
     case("1e7-samples-rendered", On::Any, |s| {
         rendered(s, 0.1, if s.gpu.is_some() { s.count(100_000, 10_000_000) } else { 10_000_000 })
@@ -35,9 +35,9 @@ const SAMPLES: u32 = 10_000_000;
 
 /// Ten million samples of one pixel; green is always 1e-8, so that a bright channel must not drown
 /// a dark one. Against compensated sums (Neumaier 1974) in f64.
-fn sums(draw: impl Fn(&mut Random) -> f32) -> Outcome {
+fn sums(draw: impl Fn(&mut SplitMix) -> f32) -> Outcome {
     const GREEN: f32 = 1e-8;
-    let mut random = Random(1);
+    let mut random = SplitMix(1);
     let mut pixel = Pixel::default();
     let (mut exact, mut exact_squares) = (Compensated::default(), Compensated::default());
     for _ in 0..SAMPLES {

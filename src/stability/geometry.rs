@@ -3,7 +3,6 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::random::Random;
 use super::scenes::{
     Mean, SIGMAS, constant, deviation, difference, lambert, mean, render, room, sealed, sky, view,
 };
@@ -12,6 +11,7 @@ use crate::bvh::{Bvh, Ray, offset_origin};
 use crate::error::Result;
 use crate::path::{World, WorldBuilder};
 use crate::render::{Sampling, View};
+use crate::sampler::SplitMix;
 use crate::scene::Camera;
 
 const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
@@ -59,12 +59,12 @@ fn tree(corners: &[Vec3]) -> Bvh {
 }
 
 /// How many of `count` rays meet nothing.
-fn leaks(tree: &Bvh, count: u64, ray: impl Fn(&mut Random) -> (Vec3, Vec3) + Sync) -> f64 {
+fn leaks(tree: &Bvh, count: u64, ray: impl Fn(&mut SplitMix) -> (Vec3, Vec3) + Sync) -> f64 {
     const RUN: u64 = 1 << 16;
     let missed: u64 = (0..count.div_ceil(RUN))
         .into_par_iter()
         .map(|run| {
-            let mut random = Random(run.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            let mut random = SplitMix(run.wrapping_mul(0x9e37_79b9_7f4a_7c15));
             (0..RUN.min(count - run * RUN))
                 .filter(|_| {
                     let (origin, direction) = ray(&mut random);
@@ -84,17 +84,17 @@ fn leaks_on_axes(setting: &Setting) -> Outcome {
     for n in [8_u32, 33] {
         let tree = cube(n, 1.0);
         let missed = leaks(&tree, count / 2, |random| {
-            let grid = |random: &mut Random| {
+            let grid = |random: &mut SplitMix| {
                 (1 + random.below(n as usize - 1)) as f32 / n as f32 * 2.0 - 1.0
             };
             let axis = random.below(3);
-            let mut origin = Vec3::splat(random.unit() * 1.5 - 0.75);
+            let mut origin = Vec3::splat(random.next_f32() * 1.5 - 0.75);
             let mut direction = Vec3::ZERO;
             direction[axis] = if random.below(2) == 0 { 1.0 } else { -1.0 };
             origin[(axis + 1) % 3] = grid(random);
             match random.below(4) {
                 0 => origin[(axis + 2) % 3] = grid(random),
-                1 => direction[(axis + 2) % 3] = random.unit() - 0.5,
+                1 => direction[(axis + 2) % 3] = random.next_f32() - 0.5,
                 2 => direction[(axis + 2) % 3] = 1e-30,
                 _ => direction[(axis + 2) % 3] = -0.0,
             }
@@ -111,8 +111,9 @@ fn leaks_anywhere(setting: &Setting) -> Outcome {
     let mut outcome = Outcome::new();
     for size in [1e-4, 1.0, 1e6] {
         let tree = cube(17, size);
-        let missed =
-            leaks(&tree, count, |random| (random.cube() * 0.99 * size, random.direction()));
+        let missed = leaks(&tree, count, |random| {
+            (random.next_in_cube() * 0.99 * size, random.next_direction())
+        });
         outcome =
             outcome.at_most(format!("leaks of {count} rays in a box of {size} m"), missed, 0.0);
     }
@@ -136,8 +137,8 @@ fn bouncing_leaks(setting: &Setting) -> Outcome {
 
 /// Ways out of the box around the origin that a path of `bounces` diffuse reflections found.
 fn bounce(tree: &Bvh, seed: u64, bounces: u32) -> u32 {
-    let mut random = Random(seed);
-    let (mut origin, mut direction, mut missed) = (Vec3::ZERO, random.direction(), 0);
+    let mut random = SplitMix(seed);
+    let (mut origin, mut direction, mut missed) = (Vec3::ZERO, random.next_direction(), 0);
     for _ in 0..bounces {
         let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
         let Some(hit) = tree.closest_hit(&ray, |_| true) else {
@@ -154,7 +155,7 @@ fn bounce(tree: &Bvh, seed: u64, bounces: u32) -> u32 {
         origin = point;
         origin[axis] = wall;
         origin = offset_origin(origin, inward);
-        direction = random.direction();
+        direction = random.next_direction();
         direction *= direction.dot(inward).signum();
     }
     missed
@@ -162,14 +163,14 @@ fn bounce(tree: &Bvh, seed: u64, bounces: u32) -> u32 {
 
 /// A closed box whose walls are cut into strips a millionth as wide as long.
 fn slivers(setting: &Setting) -> Outcome {
-    let mut random = Random(8);
+    let mut random = SplitMix(8);
     let mut corners = Vec::new();
     for axis in 0..3 {
         for side in [-1.0, 1.0] {
             // Cuts at random places, two millionths apart here and there.
             let mut cuts = vec![-1.0, 1.0];
             for _ in 0..100 {
-                let at = random.unit() * 1.9 - 0.95;
+                let at = random.next_f32() * 1.9 - 0.95;
                 cuts.extend([at, at + 2e-6]);
             }
             cuts.sort_by(f32::total_cmp);
@@ -188,7 +189,8 @@ fn slivers(setting: &Setting) -> Outcome {
     }
     let tree = tree(&corners);
     let count = setting.count(2_000_000, 200_000_000);
-    let missed = leaks(&tree, count, |random| (random.cube() * 0.9, random.direction()));
+    let missed =
+        leaks(&tree, count, |random| (random.next_in_cube() * 0.9, random.next_direction()));
     Outcome::new().at_most(format!("leaks of {count} rays between slivers"), missed, 0.0)
 }
 

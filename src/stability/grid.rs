@@ -7,7 +7,6 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
-use super::random::Random;
 use super::scenes::{
     SIGMAS, constant, deviation, difference, lambert, learned, mean, render, room, sealed, sky,
     view,
@@ -21,6 +20,7 @@ use crate::light_grid::{LightGrid, MEMORY_BUDGET_BYTES, WHOLE_MAP};
 use crate::path::{World, WorldBuilder};
 use crate::render::film::Film;
 use crate::render::{Sampling, View};
+use crate::sampler::SplitMix;
 use crate::scene::Camera;
 
 const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
@@ -52,7 +52,7 @@ pub(super) const CASES: &[Case] = &[
 /// Every cell's middle lies in that cell; nothing leads outside of the grid.
 fn cells() -> Outcome {
     let (mut lost, mut outside) = (0, 0);
-    let mut random = Random(3);
+    let mut random = SplitMix(3);
     for (columns, faces) in [(1, true), (2, false), (64, true), (512, true), (512, false)] {
         let rows = (columns / 2).max(1);
         for center in [Vec3::ZERO, Vec3::new(1e6, -3.0, 2e5)] {
@@ -80,10 +80,12 @@ fn cells() -> Outcome {
                 Vec3::splat(f32::NAN),
             ];
             odd.extend(
-                (0..1000).map(|_| random.direction() * 10.0_f32.powf(random.unit() * 60.0 - 30.0)),
+                (0..1000).map(|_| {
+                    random.next_direction() * 10.0_f32.powf(random.next_f32() * 60.0 - 30.0)
+                }),
             );
             for offset in odd {
-                for normal in [random.direction(), Vec3::ZERO, Vec3::splat(f32::NAN)] {
+                for normal in [random.next_direction(), Vec3::ZERO, Vec3::splat(f32::NAN)] {
                     outside +=
                         usize::from(grid.cell_of(center + offset, normal) >= grid.cell_count());
                 }

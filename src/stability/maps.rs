@@ -6,7 +6,6 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::random::Random;
 use super::scenes::{SIGMAS, deviation, lambert, mean, render, view};
 use super::{Case, On, Outcome, Setting};
 use crate::environment::{Environment, EnvironmentOptions, sky};
@@ -16,6 +15,7 @@ use crate::math::texel_solid_angle;
 use crate::metrics::hypothesis::chi_square_test;
 use crate::path::WorldBuilder;
 use crate::render::{Sampling, View};
+use crate::sampler::SplitMix;
 use crate::scene::Camera;
 
 const fn case(name: &'static str, run: fn(&Setting) -> Result<Outcome>) -> Case {
@@ -45,8 +45,8 @@ pub(super) const CASES: &[Case] = &[
 
 /// Random pixels, each channel a function of a uniform number.
 fn noise(width: u32, height: u32, f: impl Fn(f32) -> f32) -> Image {
-    let mut random = Random(7);
-    Image::from_fn(width, height, |_, _| [0; 3].map(|_| f(random.unit())))
+    let mut random = SplitMix(7);
+    Image::from_fn(width, height, |_, _| [0; 3].map(|_| f(random.next_f32())))
 }
 
 fn lit(width: u32, height: u32, texels: &[(u32, u32)]) -> Image {
@@ -77,9 +77,9 @@ pub(super) fn scaled(mut map: Image, factor: f64) -> Image {
 fn black(setting: &Setting) -> Result<Outcome> {
     let map = Image::filled(40, 20, [0.0; 3]);
     let environment = Environment::new(map, &EnvironmentOptions::default())?;
-    let mut random = Random(1);
+    let mut random = SplitMix(1);
     let drawn = (0..environment.tile_count())
-        .filter(|tile| environment.sample_in_tile(*tile, random.words()).is_some())
+        .filter(|tile| environment.sample_in_tile(*tile, random.next_words()).is_some())
         .count();
     let outcome =
         Outcome::new().at_most("tiles of a black map that can be sampled", drawn as f64, 0.0);
@@ -221,10 +221,10 @@ fn chi_square(environment: &Environment) -> Result<f64> {
         .collect();
     let per_tile = SAMPLES / lit.len().max(1);
     let mut observed = vec![0.0; (columns * rows) as usize];
-    let mut random = Random(31);
+    let mut random = SplitMix(31);
     for tile in lit {
         for _ in 0..per_tile {
-            let sample = environment.sample_in_tile(tile, random.words());
+            let sample = environment.sample_in_tile(tile, random.next_words());
             let sample = sample.ok_or_else(|| Error::new("a lit tile gives no sample"))?;
             observed[bin(environment.patch_of(sample.direction))] += 1.0;
         }
@@ -259,11 +259,11 @@ fn irradiance_error(environment: &Environment) -> f64 {
         total += energy;
         sums.push(total);
     }
-    let (mut sum, mut squares, mut random) = (DVec3::ZERO, DVec3::ZERO, Random(2));
+    let (mut sum, mut squares, mut random) = (DVec3::ZERO, DVec3::ZERO, SplitMix(2));
     for _ in 0..SAMPLES {
-        let target = random.unit_f64() * total;
+        let target = random.next_f64() * total;
         let tile = sums.partition_point(|sum| *sum <= target);
-        let u = random.words();
+        let u = random.next_words();
         let Some(sample) = environment.sample_in_tile(tile as u32, u) else { continue };
         let cosine = sample.direction.as_dvec3().dot(normal).abs();
         let pdf = energies[tile] / total * f64::from(sample.pdf_solid_angle);

@@ -4,7 +4,6 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
-use super::random::Random;
 use super::scenes::{
     FIRST_TEXTURE, Mean, SIGMAS, constant, deviation, glass, lambert, learned, mean, render, room,
     view, with_texel,
@@ -14,6 +13,7 @@ use crate::error::Result;
 use crate::path::{World, WorldBuilder};
 use crate::render::film::Film;
 use crate::render::{Sampling, View};
+use crate::sampler::SplitMix;
 use crate::scene::{Camera, Material, Medium, TextureSlot};
 
 const fn case(name: &'static str, run: fn(&Setting) -> Result<Outcome>) -> Case {
@@ -248,7 +248,7 @@ fn media(setting: &Setting) -> Result<Outcome> {
 
 /// Whatever a file may say: a ball of it in a room of it.
 fn random_materials(setting: &Setting) -> Result<Outcome> {
-    let mut random = Random(6);
+    let mut random = SplitMix(6);
     let mut furnaces = Furnaces::new();
     let count = if setting.gpu.is_some() { 4 } else { setting.count(150, 5000) };
     for _ in 0..count {

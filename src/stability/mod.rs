@@ -12,7 +12,6 @@ mod grid;
 mod maps;
 mod materials;
 mod outcome;
-mod random;
 mod reference;
 mod scenes;
 mod tables;

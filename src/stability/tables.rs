@@ -4,11 +4,11 @@
 //! they lose is told, not judged: it is the talk's finding, and ours.
 
 use super::maps::{scaled, sun};
-use super::random::Random;
 use super::{Case, On, Outcome, Setting};
 use crate::environment::{SatReportRow, TableKind, sat_report, sky};
 use crate::error::{Error, Result};
 use crate::image::Image;
+use crate::sampler::SplitMix;
 
 const fn case(name: &'static str, run: fn(&Setting) -> Result<Outcome>) -> Case {
     Case { group: "tables", name, on: On::Cpu, run }
@@ -23,8 +23,8 @@ pub(super) const CASES: &[Case] = &[
 
 fn maps(setting: &Setting) -> Result<[(&'static str, Image); 4]> {
     let width = setting.count(512, 8192);
-    let mut random = Random(5);
-    let mut decades = |_, _| [10.0_f32.powf(60.0 * random.unit() - 30.0); 3];
+    let mut random = SplitMix(5);
+    let mut decades = |_, _| [10.0_f32.powf(60.0 * random.next_f32() - 30.0); 3];
     Ok([
         ("day", sky::build("day", width, width / 2)?),
         ("a sun of 1e9", sun(512, 256, 1e9)),

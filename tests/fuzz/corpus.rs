@@ -3,8 +3,7 @@
 use std::io::Write as _;
 
 use lightgrid::image::{ExrPicture, Image, Layer, Rgb8, write_exr, write_png};
-
-use crate::shared::SplitMix;
+use lightgrid::sampler::SplitMix;
 
 /// Command lines that are accepted.
 pub(crate) const LINES: [&str; 14] = [

@@ -1,6 +1,5 @@
 //! Spoils bytes and words, always in the same way for a number.
-
-use crate::shared::SplitMix;
+use lightgrid::sampler::SplitMix;
 
 /// Sizes, counts and offsets that readers trip over.
 const NUMBERS: [u64; 16] = [

@@ -10,12 +10,12 @@ use lightgrid::image::Image;
 use lightgrid::path::{PathLimits, World, framing};
 use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::{Sampling, Session, View};
+use lightgrid::sampler::SplitMix;
 use lightgrid::scene::{Scene, gltf};
 
 use crate::read::{self, Found};
 #[cfg(feature = "window")]
 use crate::settings;
-use crate::shared::SplitMix;
 use crate::{ALLOWANCE_BYTES, Kind, Tally, bombs, corpus, kept, lists, mutate, targets};
 
 /// Reads inputs `first..first + count`, printing each number before it is read; then the tally as JSON.

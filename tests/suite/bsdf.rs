@@ -8,8 +8,7 @@ mod textures;
 
 use glam::{Vec2, Vec3};
 use lightgrid::bsdf::SurfaceParameters;
-
-use crate::shared::SplitMix;
+use lightgrid::sampler::SplitMix;
 
 /// Random numbers, points and directions.
 struct Random(SplitMix);

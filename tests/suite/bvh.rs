@@ -4,38 +4,9 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec2, Vec3};
 use lightgrid::bvh::{Bvh, Hit, Ray, offset_origin};
+use lightgrid::sampler::SplitMix;
 
 type Mesh = (Vec<Vec3>, Vec<[u32; 3]>);
-
-/// A small generator (PCG, O'Neill 2014), so that tests do not lean on the sampler they sit beside.
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u32 {
-        let state = self.0;
-        self.0 =
-            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let xored = (((state >> 18) ^ state) >> 27) as u32;
-        xored.rotate_right((state >> 59) as u32)
-    }
-    fn unit(&mut self) -> f32 {
-        (self.bits() >> 8) as f32 / 16_777_216.0
-    }
-    fn below(&mut self, count: usize) -> usize {
-        ((u64::from(self.bits()) * count as u64) >> 32) as usize
-    }
-    fn cube(&mut self) -> Vec3 {
-        Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
-    }
-    fn direction(&mut self) -> Vec3 {
-        loop {
-            let v = self.cube();
-            if v.length_squared() > 1e-4 && v.length_squared() <= 1.0 {
-                return v.normalize();
-            }
-        }
-    }
-}
 
 fn ray(origin: Vec3, direction: Vec3) -> Ray {
     Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY }
@@ -45,11 +16,11 @@ fn everything(_: &Hit) -> bool {
     true
 }
 
-fn soup(random: &mut Random, count: usize, size: f32) -> Mesh {
+fn soup(random: &mut SplitMix, count: usize, size: f32) -> Mesh {
     let mut positions = Vec::new();
     for _ in 0..count {
-        let centre = random.cube();
-        positions.extend([0; 3].map(|_| centre + random.cube() * size));
+        let centre = random.next_in_cube();
+        positions.extend([0; 3].map(|_| centre + random.next_in_cube() * size));
     }
     (positions, separate(count))
 }
@@ -163,14 +134,14 @@ fn compare_with_brute_force((positions, triangles): &Mesh, rays: impl Iterator<I
     assert!(clear as f64 > 0.9 * hits as f64, "{clear} clear hits of {hits}");
 }
 
-fn rays_through(random: &mut Random, count: usize, scale: f32) -> Vec<Ray> {
-    let new = |_| ray(random.cube() * scale * 1.5, random.direction());
+fn rays_through(random: &mut SplitMix, count: usize, scale: f32) -> Vec<Ray> {
+    let new = |_| ray(random.next_in_cube() * scale * 1.5, random.next_direction());
     (0..count).map(new).collect()
 }
 
 #[test]
 fn agrees_with_brute_force_on_soups() {
-    let mut random = Random(1);
+    let mut random = SplitMix(1);
     for (count, size) in [(1, 1.0), (7, 1.0), (8, 1.0), (9, 1.0), (60, 0.5), (2000, 0.1)] {
         let mesh = soup(&mut random, count, size);
         let rays = rays_through(&mut random, 4000, 1.0);
@@ -180,7 +151,7 @@ fn agrees_with_brute_force_on_soups() {
 
 #[test]
 fn agrees_with_brute_force_on_rooms_of_all_sizes() {
-    let mut random = Random(2);
+    let mut random = SplitMix(2);
     for scale in [1e-4, 1.0, 1e6] {
         let (mut positions, triangles) = room(12, 0.2);
         positions.iter_mut().for_each(|p| *p *= scale);
@@ -191,11 +162,15 @@ fn agrees_with_brute_force_on_rooms_of_all_sizes() {
 
 #[test]
 fn agrees_with_brute_force_on_slivers_and_long_directions() {
-    let mut random = Random(3);
+    let mut random = SplitMix(3);
     let mut positions = Vec::new();
     for _ in 0..1500 {
-        let (start, along) = (random.cube(), random.direction());
-        positions.extend([start, start + along * 2.0, start + along + random.cube() * 0.02]);
+        let (start, along) = (random.next_in_cube(), random.next_direction());
+        positions.extend([
+            start,
+            start + along * 2.0,
+            start + along + random.next_in_cube() * 0.02,
+        ]);
     }
     let mesh = (positions, separate(1500));
     let mut rays = rays_through(&mut random, 4000, 1.0);
@@ -205,11 +180,11 @@ fn agrees_with_brute_force_on_slivers_and_long_directions() {
 
 #[test]
 fn respects_the_interval() {
-    let mut random = Random(4);
+    let mut random = SplitMix(4);
     let mesh = soup(&mut random, 1500, 0.2);
     let rays = rays_through(&mut random, 4000, 1.0).into_iter().map(|r| {
-        let t_min = random.unit();
-        Ray { t_min, t_max: t_min + random.unit(), ..r }
+        let t_min = random.next_f32();
+        Ray { t_min, t_max: t_min + random.next_f32(), ..r }
     });
     compare_with_brute_force(&mesh, rays);
 
@@ -232,9 +207,9 @@ fn ties_go_to_the_lowest_index_that_is_accepted() {
         triangles.extend_from_within(..count as usize);
     }
     let bvh = Bvh::build(&positions, &triangles);
-    let mut random = Random(5);
+    let mut random = SplitMix(5);
     for _ in 0..2000 {
-        let r = ray(random.cube() * 0.5, random.direction());
+        let r = ray(random.next_in_cube() * 0.5, random.next_direction());
         let first = bvh.closest_hit(&r, everything).expect("the room is closed");
         assert!(first.triangle < count, "{first:?}");
         let other = bvh.closest_hit(&r, |hit| hit.triangle >= count).expect("there is a copy");
@@ -245,10 +220,10 @@ fn ties_go_to_the_lowest_index_that_is_accepted() {
 
 #[test]
 fn any_hit_offers_each_hit_once_until_one_blocks() {
-    let mut random = Random(6);
+    let mut random = SplitMix(6);
     let mut positions = Vec::new();
     for _ in 0..300 {
-        let z = random.unit();
+        let z = random.next_f32();
         positions.extend([[-9.0, -9.0, z], [9.0, -9.0, z], [0.0, 9.0, z]].map(Vec3::from_array));
     }
     let bvh = Bvh::build(&positions, &separate(300));
@@ -314,7 +289,7 @@ fn deep_trees_stay_within_the_stack() {
 
 #[test]
 fn building_again_gives_the_same_hits() {
-    let mut random = Random(7);
+    let mut random = SplitMix(7);
     let (positions, triangles) = soup(&mut random, 20_000, 0.05);
     let [a, b] = [1, 3].map(|threads| {
         let pool =
@@ -333,17 +308,17 @@ fn closed_rooms_do_not_leak() {
         let (mut positions, triangles) = room(40, bump);
         positions.iter_mut().for_each(|p| *p *= scale);
         let bvh = Bvh::build(&positions, &triangles);
-        let mut random = Random(8);
+        let mut random = SplitMix(8);
         let mut leaks = Vec::new();
         for i in 0..300_000 {
             let origin = inner_origin(&mut random, &positions, scale);
             let triangle = triangles[random.below(triangles.len())].map(|i| positions[i as usize]);
             let direction = match i % 5 {
                 0 => triangle[0] - origin,
-                1 => triangle[0].lerp(triangle[1], random.unit()) - origin,
+                1 => triangle[0].lerp(triangle[1], random.next_f32()) - origin,
                 2 => triangle[2].lerp(triangle[0], 0.5) - origin,
                 3 => [Vec3::X, Vec3::Y, Vec3::Z][i / 5 % 3] * [1.0, -1.0][i / 15 % 2],
-                _ => random.direction(),
+                _ => random.next_direction(),
             };
             let r = ray(origin, direction);
             if bvh.closest_hit(&r, everything).is_none() || !bvh.any_hit(&r, everything) {
@@ -355,8 +330,8 @@ fn closed_rooms_do_not_leak() {
 }
 
 /// A point well inside the room, some of whose coordinates are exactly those of a vertex, or zero.
-fn inner_origin(random: &mut Random, positions: &[Vec3], scale: f32) -> Vec3 {
-    let mut origin = random.cube() * 0.6 * scale;
+fn inner_origin(random: &mut SplitMix, positions: &[Vec3], scale: f32) -> Vec3 {
+    let mut origin = random.next_in_cube() * 0.6 * scale;
     for axis in 0..3 {
         let of_vertex = positions[random.below(positions.len())][axis];
         match random.below(4) {
@@ -401,16 +376,16 @@ fn rays_along_grid_lines_do_not_leak() {
 fn offset_origins_do_not_hit_their_own_surface() {
     let (positions, triangles) = room(30, 0.2);
     let bvh = Bvh::build(&positions, &triangles);
-    let mut random = Random(9);
+    let mut random = SplitMix(9);
     for _ in 0..50_000 {
-        let r = ray(random.cube() * 0.3, random.direction());
+        let r = ray(random.next_in_cube() * 0.3, random.next_direction());
         let hit = bvh.closest_hit(&r, everything).expect("the room is closed");
         let [a, b, c] = triangles[hit.triangle as usize].map(|i| positions[i as usize]);
         let [v, w] = hit.barycentric.to_array();
         let point = a * (1.0 - v - w) + b * v + c * w;
         let normal = (b - a).cross(c - a).normalize();
         let inward = if normal.dot(r.direction) > 0.0 { -normal } else { normal };
-        let mut away = random.direction();
+        let mut away = random.next_direction();
         away *= away.dot(inward).signum();
         let next = ray(offset_origin(point, inward), away);
         bvh.any_hit(&next, |other| {

@@ -10,30 +10,9 @@ use lightgrid::environment::{Environment, EnvironmentOptions, TableKind};
 use lightgrid::image::Image;
 use lightgrid::math::{direction_from_uv, rotate_y, texel_solid_angle, uv_from_direction};
 use lightgrid::metrics::hypothesis::chi_square_test;
+use lightgrid::sampler::SplitMix;
 
-use crate::shared::SplitMix;
 use crate::z_test::sidak;
-
-/// Random numbers, points and directions.
-struct Random(SplitMix);
-
-impl Random {
-    fn next(&mut self) -> f32 {
-        self.0.next_f32()
-    }
-
-    /// Two 32-bit fractions of one.
-    fn words(&mut self) -> [u32; 2] {
-        let bits = self.0.next_bits();
-        [bits as u32, (bits >> 32) as u32]
-    }
-
-    fn direction(&mut self) -> Vec3 {
-        let (phi, y) = (self.next() * TAU, 1.0 - 2.0 * self.next());
-        let r = (1.0 - y * y).max(0.0).sqrt();
-        Vec3::new(r * phi.cos(), y, r * phi.sin())
-    }
-}
 
 fn lit(width: u32, height: u32, texels: &[(u32, u32)]) -> Image {
     Image::from_fn(
@@ -46,8 +25,8 @@ fn lit(width: u32, height: u32, texels: &[(u32, u32)]) -> Image {
 }
 
 fn random(width: u32, height: u32, seed: u64) -> Image {
-    let mut random = Random(SplitMix(seed));
-    Image::from_fn(width, height, |_, _| std::array::from_fn(|_| random.next()))
+    let mut random = SplitMix(seed);
+    Image::from_fn(width, height, |_, _| std::array::from_fn(|_| random.next_f32()))
 }
 
 /// Dim uneven sky, a sun of one texel.
@@ -114,10 +93,10 @@ fn tile_pdf(environment: &Environment, direction: Vec3) -> (u32, f32) {
 }
 
 /// A tile drawn by energy, and its probability.
-fn choose_tile(environment: &Environment, random: &mut Random) -> Option<(u32, f64)> {
+fn choose_tile(environment: &Environment, random: &mut SplitMix) -> Option<(u32, f64)> {
     let energies = environment.tile_energies();
     let total: f64 = energies.iter().sum();
-    let mut rest = f64::from(random.next()) * total;
+    let mut rest = f64::from(random.next_f32()) * total;
     for (tile, energy) in (0..).zip(energies) {
         if *energy > 0.0 && rest < *energy {
             return Some((tile, energy / total));
@@ -133,11 +112,11 @@ fn choose_tile(environment: &Environment, random: &mut Random) -> Option<(u32, f
 fn a_sample_has_the_density_and_the_radiance_of_its_direction() {
     for_each_case(|case, map, environment, table| {
         let brightest = map.pixels.iter().flatten().fold(0.0, |a: f32, b| a.max(*b));
-        let mut random = Random(SplitMix(1));
+        let mut random = SplitMix(1);
         for tile in 0..environment.tile_count() {
             let energy = environment.tile_energies()[tile as usize];
             for _ in 0..40 {
-                let Some(sample) = environment.sample_in_tile(tile, random.words()) else {
+                let Some(sample) = environment.sample_in_tile(tile, random.next_words()) else {
                     assert!(energy == 0.0 || table != TableKind::TileLocal, "{case}");
                     continue;
                 };
@@ -176,14 +155,14 @@ fn a_sample_has_the_density_and_the_radiance_of_its_direction() {
 fn samples_are_found_in_their_tile_on_maps_as_fine_as_f32_directions_allow() {
     for (width, height) in [(16384, 16), (16, 8192), (4096, 2048)] {
         let map = random(width, height, 21);
-        let mut random = Random(SplitMix(22));
+        let mut random = SplitMix(22);
         let mut environment = environment(&map, TableKind::TileLocal);
         let (mut strays, mut off) = (0, 0.0_f64);
         const SAMPLES: u32 = 60_000;
         for _ in 0..SAMPLES {
-            let u = random.words();
-            let tile = (random.next() * environment.tile_count() as f32) as u32;
-            environment.set_rotation(7.0 * random.next());
+            let u = random.next_words();
+            let tile = (random.next_f32() * environment.tile_count() as f32) as u32;
+            environment.set_rotation(7.0 * random.next_f32());
             let sample = environment.sample_in_tile(tile, u).unwrap();
             let (found, pdf) = tile_pdf(&environment, sample.direction);
             strays += u32::from(found != tile);
@@ -214,10 +193,10 @@ fn samples_follow_their_density() {
         let (columns, rows) = environment.patch_grid();
         let index = |(x, y): (u32, u32)| (y * columns + x) as usize;
         let mut observed = vec![0.0; (columns * rows) as usize];
-        let mut random = Random(SplitMix(31));
+        let mut random = SplitMix(31);
         for &tile in &lit {
             for _ in 0..per_tile {
-                let sample = environment.sample_in_tile(tile, random.words()).unwrap();
+                let sample = environment.sample_in_tile(tile, random.next_words()).unwrap();
                 observed[index(environment.patch_of(sample.direction))] += 1.0;
             }
         }
@@ -261,9 +240,9 @@ fn places_in_a_patch_follow_the_radiance_read_there() {
                 expected.push(is_here * f64::from(pdf) * share * f64::from(SAMPLES));
             }
         }
-        let (mut random, mut strays) = (Random(SplitMix(41)), 0);
+        let (mut random, mut strays) = (SplitMix(41), 0);
         for _ in 0..SAMPLES {
-            let sample = environment.sample_in_tile(tile, random.words()).unwrap();
+            let sample = environment.sample_in_tile(tile, random.next_words()).unwrap();
             let (x, y) = environment.patch_of(sample.direction);
             if environment.tile_of(sample.direction) != tile {
                 strays += 1;
@@ -297,10 +276,11 @@ fn places_are_uniform_in_solid_angle_under_a_constant_map() {
             let environment = environment(&map, table);
             let (columns, rows) = (14, 10);
             let mut observed = vec![0.0; columns * rows];
-            let mut random = Random(SplitMix(41));
+            let mut random = SplitMix(41);
             for _ in 0..SAMPLES {
                 let (tile, _) = choose_tile(&environment, &mut random).unwrap();
-                let direction = environment.sample_in_tile(tile, random.words()).unwrap().direction;
+                let direction =
+                    environment.sample_in_tile(tile, random.next_words()).unwrap().direction;
                 let u = uv_from_direction(direction).x;
                 let row = (0.5 * (1.0 - direction.y) * rows as f32) as usize;
                 observed[row.min(rows - 1) * columns + (u * columns as f32) as usize] += 1.0;
@@ -346,9 +326,9 @@ fn what_is_lit_can_be_reached() {
         if !exact.contains(&table) {
             return;
         }
-        let mut random = Random(SplitMix(11));
+        let mut random = SplitMix(11);
         for _ in 0..20_000 {
-            let direction = random.direction();
+            let direction = random.next_direction();
             let (radiance, tile, pdf) = environment.radiance_and_tile_pdf(direction);
             if radiance.max_element() > 0.0 {
                 assert!(pdf > 0.0, "{case}: {direction}");
@@ -367,11 +347,13 @@ fn an_irradiance_estimate_agrees_with_quadrature() {
         // Its horizon crosses none of the lone lit texels: quadrature is poor there.
         let normal = Vec3::new(-0.3, 0.6, -0.75).normalize();
         let exact = irradiance(environment, map, normal);
-        let (mut sum, mut squares, mut random) = (DVec3::ZERO, DVec3::ZERO, Random(SplitMix(2)));
+        let (mut sum, mut squares, mut random) = (DVec3::ZERO, DVec3::ZERO, SplitMix(2));
         const SAMPLES: u32 = 20_000;
         for _ in 0..SAMPLES {
             let Some((tile, probability)) = choose_tile(environment, &mut random) else { continue };
-            let Some(sample) = environment.sample_in_tile(tile, random.words()) else { continue };
+            let Some(sample) = environment.sample_in_tile(tile, random.next_words()) else {
+                continue;
+            };
             let cosine = sample.direction.dot(normal).abs();
             let value = environment.sampled_radiance(&sample).as_dvec3()
                 * f64::from(cosine * sample.weight)
@@ -411,11 +393,11 @@ fn what_the_map_shows_turns_with_it() {
     let map = random(64, 32, 9);
     let mut environment = Environment::new(map.clone(), &EnvironmentOptions::default()).unwrap();
     let unturned = environment.clone();
-    let mut random = Random(SplitMix(4));
+    let mut random = SplitMix(4);
     for angle in [0.0, 0.7, -0.7, 3.0, 100.0, -1e-9] {
         environment.set_rotation(angle);
         for _ in 0..500 {
-            let direction = random.direction();
+            let direction = random.next_direction();
             let turned = rotate_y(direction, angle);
             let (a, b) = (unturned.radiance(direction), environment.radiance(turned));
             assert!(a.abs_diff_eq(b, 1e-3), "{angle}: {a} {b}");
@@ -467,11 +449,11 @@ fn the_largest_and_smallest_radiance_can_be_sampled() {
             let mut environment = environment(&map, table);
             environment.set_intensity(10.0);
             assert!(!environment.is_black() && environment.mean_radiance().is_finite());
-            let mut random = Random(SplitMix(1));
+            let mut random = SplitMix(1);
             let mut samples = 0;
             for tile in 0..environment.tile_count() {
                 assert!(environment.tile_energies()[tile as usize].is_finite());
-                if let Some(sample) = environment.sample_in_tile(tile, random.words()) {
+                if let Some(sample) = environment.sample_in_tile(tile, random.next_words()) {
                     assert!(
                         environment.sampled_radiance(&sample).is_finite()
                             && sample.pdf_solid_angle.is_finite()

@@ -6,10 +6,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use lightgrid::image::{ExrPicture, Image, read_map, write_exr};
+use lightgrid::sampler::SplitMix;
 use lightgrid::scene::gltf;
 
 use crate::cli::{Bench, text};
-use crate::shared::{SplitMix, count};
+use crate::shared::count;
 
 /// As [`Bench::command`], a small picture of a built-in scene.
 const SMALL: &str = "render open --env sky:overcast@64x32 --device cpu --size 16x9 --spp 1";

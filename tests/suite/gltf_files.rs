@@ -7,9 +7,10 @@ mod ktx2;
 
 use std::path::Path;
 
+use lightgrid::sampler::SplitMix;
 use lightgrid::scene::{Projection, TextureSlot, gltf};
 
-use crate::shared::{SplitMix, shared};
+use crate::shared::shared;
 use builder::{check_consistency, square, textured_material};
 
 /// File, triangles (instances counted), of which without area, materials used, images used.

@@ -8,11 +8,11 @@ use lightgrid::bvh::{Bvh, Hit, Ray, Shared};
 use lightgrid::environment::{Environment, EnvironmentOptions, sky};
 use lightgrid::path::{PathLimits, World};
 use lightgrid::render::{Sampling, Session, Sharing, View};
+use lightgrid::sampler::SplitMix;
 use lightgrid::scene::needs::is_emitter;
 use lightgrid::scene::{Camera, Instance, Instances, Material, Placing, Scene, builtin};
 
 use super::gltf_files::builder::Builder;
-use super::shared::SplitMix;
 
 /// Maps that turn, scale unevenly, mirror and shear, at places up to `far` metres away.
 pub(crate) fn placings(count: usize, far: f64) -> Vec<Placing> {

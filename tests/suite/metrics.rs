@@ -3,8 +3,7 @@
 use lightgrid::image::Image;
 use lightgrid::metrics::compare;
 use lightgrid::metrics::hypothesis::{chi_square_test, student_975, two_sided_p};
-
-use crate::shared::SplitMix;
+use lightgrid::sampler::SplitMix;
 
 fn assert_relative(got: f64, want: f64, tolerance: f64) {
     assert!((got - want).abs() <= tolerance * want.abs(), "got {got:e}, want {want:e}");

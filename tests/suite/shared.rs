@@ -1,5 +1,4 @@
-//! Where the shared test data lies, how its absence is said, how much is tried, random numbers for tests, and
-//! how an .exr begins.
+//! Where the shared test data lies, how its absence is said, how much is tried, and how an .exr begins.
 
 use std::path::PathBuf;
 
@@ -20,35 +19,6 @@ pub(crate) fn shared(relative: &str) -> Option<PathBuf> {
 /// How much is tried: in seconds, or where `LIGHTGRID_NIGHTLY` is set as long as that takes.
 pub(crate) fn count(quick: u64, nightly: u64) -> u64 {
     if std::env::var_os("LIGHTGRID_NIGHTLY").is_some() { nightly } else { quick }
-}
-
-/// SplitMix64: the same on every machine, and not the renderer's own sampler.
-pub(crate) struct SplitMix(pub(crate) u64);
-
-impl SplitMix {
-    /// The next 64 bits.
-    pub(crate) fn next_bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Below `count`, which is not 0.
-    pub(crate) fn below(&mut self, count: usize) -> usize {
-        ((u128::from(self.next_bits()) * count as u128) >> 64) as usize
-    }
-
-    /// The next f32 in `[0,1)`.
-    pub(crate) fn next_f32(&mut self) -> f32 {
-        (self.next_bits() >> 40) as f32 / (1u64 << 24) as f32
-    }
-
-    /// The next f64 in `[0,1)`.
-    pub(crate) fn next_f64(&mut self) -> f64 {
-        (self.next_bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
 }
 
 /// What an .exr begins with: half floats in scan lines, not compressed. Channels have names and, of pixels, one

@@ -2,6 +2,7 @@
 
 use lightgrid::metrics::hypothesis::two_sided_p;
 use lightgrid::render::film::Film;
+use lightgrid::sampler::SplitMix;
 
 /// A mean, and its variance: that of the values over their number.
 pub(crate) type Mean = (f64, f64);
@@ -67,7 +68,6 @@ pub(crate) fn expect_same_pixels(what: &str, a: &Film, b: &Film, alpha: f64) {
 
 mod tests {
     use super::*;
-    use crate::shared::SplitMix;
 
     /// Means of 64 uniform variables each, shifted by `bias`.
     fn noisy_means(seed: u64, bias: f64) -> Vec<Mean> {

@@ -1,11 +1,11 @@
 //! Changes to glTF files that leave most of them in order.
 
 use libfuzzer_sys::fuzzer_mutate;
+use lightgrid::sampler::SplitMix;
 use serde_json::Value;
 
 use crate::corpus::gltf_file;
 use crate::mutate;
-use crate::shared::SplitMix;
 
 /// A changed file in place of the first `length` bytes; its length, `most` at most.
 ///

@@ -2,10 +2,10 @@
 
 use glam::{Vec2, Vec3};
 use lightgrid::bsdf::{Bsdf, Hero, SurfaceParameters};
+use lightgrid::sampler::SplitMix;
 
 use super::physics::furnace;
 use super::{GLASS, METAL, PANE, PLASTIC, Random, WHITE, colored, spherical, viewers};
-use crate::shared::SplitMix;
 
 /// Two directions above the surface.
 fn pair(random: &mut Random) -> [Vec3; 2] {

@@ -4,11 +4,11 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::{Vec2, Vec3};
 use lightgrid::bsdf::{Bsdf, SurfaceParameters};
+use lightgrid::sampler::SplitMix;
 
 use super::{
     BLACK, GLASS, METAL, PANE, PLASTIC, Random, WHITE, cases, colored, spherical, viewers,
 };
-use crate::shared::SplitMix;
 
 #[test]
 fn reflection_is_reciprocal() {

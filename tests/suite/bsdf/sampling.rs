@@ -5,9 +5,9 @@ use std::f32::consts::TAU;
 use glam::Vec3;
 use lightgrid::bsdf::Bsdf;
 use lightgrid::metrics::hypothesis::chi_square_test;
+use lightgrid::sampler::SplitMix;
 
 use super::{METAL, PANE, Random, WHITE, cases, spherical, viewers};
-use crate::shared::SplitMix;
 
 const ROWS: usize = 32;
 const COLUMNS: usize = 32;

@@ -1,13 +1,13 @@
 //! Points on triangles: position, facing, normals, material.
 
 use glam::{Affine2, Vec2, Vec3, Vec4};
+use lightgrid::sampler::SplitMix;
 use lightgrid::scene::surface::{SurfacePoint, alpha_at};
 use lightgrid::scene::{
     AlphaMode, Material, Scene, Texture, TextureImage, TextureRef, TextureSlot, Wrap,
 };
 
 use super::Random;
-use crate::shared::SplitMix;
 
 const CENTRE: Vec2 = Vec2::splat(1.0 / 3.0);
 const DOWN: Vec3 = Vec3::NEG_Z;

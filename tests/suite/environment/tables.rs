@@ -2,9 +2,9 @@
 
 use lightgrid::environment::{SatReport, SatReportRow, TableKind, sat_report};
 use lightgrid::image::Image;
+use lightgrid::sampler::SplitMix;
 
-use super::{Random, sun};
-use crate::shared::SplitMix;
+use super::sun;
 
 fn row(report: &SatReport, table: TableKind) -> SatReportRow {
     *report.rows.iter().find(|row| row.table == table).expect("every kind is reported")
@@ -12,12 +12,12 @@ fn row(report: &SatReport, table: TableKind) -> SatReportRow {
 
 /// An outdoor map without a sun in the frame: a gradient with clouds and a dark, grainy ground.
 fn cloudy(width: u32, height: u32) -> Image {
-    let mut random = Random(SplitMix(3));
+    let mut random = SplitMix(3);
     Image::from_fn(width, height, |x, y| {
         let (u, v) = (x as f32 / width as f32, y as f32 / height as f32);
         let cloud = (40.0 * u).sin() * (25.0 * v).cos();
         let ground = if v > 0.5 { 0.05 } else { 1.0 };
-        [ground * (1.5 + cloud) * (0.9 + 0.2 * random.next()); 3]
+        [ground * (1.5 + cloud) * (0.9 + 0.2 * random.next_f32()); 3]
     })
 }
 

@@ -9,13 +9,13 @@ use lightgrid::metrics::hypothesis::chi_square_test;
 use lightgrid::path::{World, WorldBuilder};
 use lightgrid::render::film::Film;
 use lightgrid::render::{Sampling, View};
+use lightgrid::sampler::SplitMix;
 use lightgrid::scene::needs::SceneFeatures;
 use lightgrid::scene::{Medium, PunctualKind, PunctualLight};
 
 use super::scenes::{black, lamp, room, smoked_glass, sunlight, unlit};
 use super::unbiased::expect_agreement;
 use super::{MODES, constant, environment, expect, mean, probe, render, view};
-use crate::shared::SplitMix;
 
 /// A cube of side 2 around the origin.
 fn cube(scattering: f32, absorption: f32, anisotropy: f32) -> Medium {

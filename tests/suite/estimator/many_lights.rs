@@ -6,12 +6,12 @@ use glam::Vec3;
 use lightgrid::path::{World, WorldBuilder};
 use lightgrid::render::film::Pixel;
 use lightgrid::render::{Sampling, View};
+use lightgrid::sampler::SplitMix;
 use lightgrid::scene::{Camera, Material, PunctualKind, PunctualLight};
 
 use super::scenes::{lambert, lamp, sunlight, unlit};
 use super::unbiased::expect_agreement;
 use super::{constant, expect, probe, render, view};
-use crate::shared::SplitMix;
 
 /// Directions that spread evenly over the upper hemisphere, the horizon left out.
 fn over_hemisphere(count: u32) -> impl Iterator<Item = Vec3> {

@@ -1,8 +1,7 @@
 //! Slopes, curves, speed-ups and intervals whose answers are known.
 
 use lightgrid::report::statistics::{Bundle, Curve, Estimate, SpeedUp, bootstrap, power_law_slope};
-
-use crate::shared::SplitMix;
+use lightgrid::sampler::SplitMix;
 
 fn curve(start: f64, end: f64, error: impl Fn(f64) -> f64) -> Curve {
     let points = (0..40).map(|i| start * (end / start).powf(f64::from(i) / 39.0));
