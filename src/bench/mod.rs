@@ -2,149 +2,28 @@
 //!
 //! For users who choose a device, for bug reports, and for us on machines that we never see.
 
+mod figures;
+mod place;
 mod rays;
-mod words;
+mod tables;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use glam::Affine3A;
-use serde::Serialize;
 
-use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::light_grid::LightGrid;
 use crate::metrics;
-use crate::path::{World, framing};
-use crate::render::gpu::{AdapterFacts, Gpu, KernelFacts, RayChoice, Schedule, UploadedScene};
-use crate::render::{Phase, Sampling, Session, Sharing, StopRule, View};
-use crate::report::{Device, Machine, OpenDevice};
+use crate::render::gpu::{Gpu, UploadedScene};
+use crate::render::{Phase, Sampling, Session, StopRule, View};
+use crate::report::{Machine, OpenDevice};
 
+pub use figures::{Bench, DeviceFigures, Parity, PathFigures, SceneFigures};
+use place::Place;
+pub use place::{Options, Subject};
 pub use rays::{RayFigures, RayKind};
-
-/// What is to be measured.
-#[derive(Debug, Clone)]
-pub struct Options {
-    /// In this order; parity is judged between the first two.
-    pub devices: Vec<Device>,
-    /// Part of the name of the GPU to take.
-    pub adapter: Option<String>,
-    /// What finds the surfaces that rays hit on it.
-    pub rays: RayChoice,
-    /// How its kernels share the work; `None` is what suits it.
-    pub schedule: Option<Schedule>,
-    /// Whether neighbouring pixels share vertices; then kernels do not take turns.
-    pub sharing: Sharing,
-    /// Width and height of the pictures.
-    pub size: (u32, u32),
-    /// Seconds of rendering a scene on a device.
-    pub seconds: f64,
-}
-
-/// A scene and its map, ready to be measured.
-pub struct Subject {
-    /// What the scene is called.
-    pub name: String,
-    /// The scene.
-    pub world: World,
-    /// The map.
-    pub environment: Environment,
-}
-
-/// What a machine did.
-#[derive(Debug, Clone, Serialize)]
-pub struct Bench {
-    /// The machine.
-    pub machine: Machine,
-    /// Width and height of the pictures.
-    pub size: (u32, u32),
-    /// Its devices.
-    pub devices: Vec<DeviceFigures>,
-    /// Scene by scene, how alike the pictures of the first two devices are.
-    pub parity: Vec<Parity>,
-}
-
-/// What a device did.
-#[derive(Debug, Clone, Serialize)]
-pub struct DeviceFigures {
-    /// Its name.
-    pub name: String,
-    /// What it is and allows; `None` for the CPU.
-    pub adapter: Option<AdapterFacts>,
-    /// Whether its own ray queries find what rays hit.
-    pub has_hardware_rays: bool,
-    /// Scene by scene.
-    pub scenes: Vec<SceneFigures>,
-}
-
-/// What a device did with a scene.
-#[derive(Debug, Clone, Serialize)]
-pub struct SceneFigures {
-    /// What the scene is called.
-    pub scene: String,
-    /// Its triangles.
-    pub triangles: usize,
-    /// Why nothing else is known; `None` if it went well.
-    pub failure: Option<String>,
-    /// Rays a second, kind by kind.
-    pub rays: Vec<RayFigures>,
-    /// Figures of whole paths.
-    pub paths: Option<PathFigures>,
-}
-
-/// What whole paths took: the defaults of `lightgrid render`.
-#[derive(Debug, Clone, Serialize)]
-pub struct PathFigures {
-    /// Seconds until scene and map were on the device.
-    pub upload_seconds: f64,
-    /// Seconds in which the driver compiled; some compile when a kernel first runs instead.
-    pub compile_seconds: f64,
-    /// Seconds from then to the first distributions, kernels included.
-    pub first_distributions_seconds: f64,
-    /// Seconds from the same moment to the first sample of every pixel.
-    pub first_picture_seconds: f64,
-    /// Camera paths a second, all pixels together, without learning and the first pass.
-    pub samples_per_second: f64,
-    /// Rays a second, of all kinds.
-    pub rays_per_second: f64,
-    /// Passes that these figures are of.
-    pub passes: u32,
-    /// Milliseconds of a pass.
-    pub pass_milliseconds: f64,
-    /// Milliseconds a pass kept the device busy; `None` on the CPU.
-    pub device_milliseconds: Option<f64>,
-    /// Whether these are the device's own timestamps.
-    pub has_timestamps: bool,
-    /// Bytes read back from the device a pass.
-    pub bytes_read_per_pass: f64,
-    /// Milliseconds that it goes on when told to stop, at most.
-    pub stop_milliseconds: f64,
-    /// Milliseconds from turning the camera to the first sample of every pixel of a small picture, with
-    /// scene, map and kernels ready; the median of a few.
-    pub turn_milliseconds: f64,
-    /// Bytes on the device.
-    pub device_bytes: u64,
-    /// How the kernels share the work.
-    pub schedule: Option<Schedule>,
-    /// What the kernel holds.
-    pub kernel: Option<KernelFacts>,
-}
-
-/// How alike the pictures of two devices are: the same seed, few samples, no learning.
-#[derive(Debug, Clone, Serialize)]
-pub struct Parity {
-    /// What the scene is called.
-    pub scene: String,
-    /// Why it could not be judged.
-    pub failure: Option<String>,
-    /// Mean of the one by that of the other.
-    pub mean_ratio: f64,
-    /// Share of pixels that are more than 1 % apart.
-    pub share_apart: f64,
-    /// Share of rays that hit another triangle, or on one device alone none.
-    pub other_triangles: f64,
-}
 
 /// Measures; `progress` is told what is being done. Stops early, with what there is, when `cancel`
 /// becomes true.
@@ -198,14 +77,6 @@ fn is_set(cancel: &AtomicBool) -> bool {
     cancel.load(Ordering::Relaxed)
 }
 
-/// A scene on a device.
-struct Place<'a> {
-    subject: &'a Subject,
-    open: &'a OpenDevice,
-    options: &'a Options,
-    cancel: &'a AtomicBool,
-}
-
 /// What is compared between devices: a picture, and what rays hit.
 struct Compared {
     picture: Image,
@@ -247,20 +118,6 @@ impl Place<'_> {
         Ok(Compared { picture: session.film().image(), hits })
     }
 
-    fn session(&self, uploaded: Option<&UploadedScene>, view: View) -> Result<Session<'_>> {
-        let Subject { world, environment, .. } = self.subject;
-        Session::on(world, environment, view, uploaded)
-    }
-
-    /// The defaults of `lightgrid render`.
-    fn view(&self, (width, height): (u32, u32)) -> View {
-        let world = &self.subject.world;
-        let camera = world.scene.cameras.first().cloned();
-        let aspect = width as f32 / height as f32;
-        let camera = camera.unwrap_or_else(|| framing::frame(world, aspect));
-        View { sharing: self.options.sharing, ..View::new(camera, [width, height]) }
-    }
-
     /// Seconds to the first picture of another view with distributions learned before, the median of a few.
     fn turn(
         &self,
@@ -296,7 +153,7 @@ impl Place<'_> {
         let mut first_distributions = None;
         while session.samples() == 0 {
             session.advance(1, self.cancel)?;
-            if is_set(self.cancel) {
+            if self.is_cancelled() {
                 return Err(Error::new("cancelled"));
             }
             if session.phase() == Phase::Rendering || session.figures().learned_cells > 0 {
@@ -311,7 +168,7 @@ impl Place<'_> {
         while session.figures().render_seconds - before.render_seconds < self.options.seconds {
             session.advance(session.next_pass(&rule), self.cancel)?;
             passes += 1;
-            if is_set(self.cancel) {
+            if self.is_cancelled() {
                 return Err(Error::new("cancelled"));
             }
         }

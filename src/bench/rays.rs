@@ -1,5 +1,5 @@
-//! Rays alone, the same ones on every device: those of the camera, and from where they end those to the
-//! map and those of a diffuse bounce.
+//! Ray casts without shading, with the same rays on every device: camera rays, and from their hits shadow
+//! rays towards the map and rays of a diffuse bounce.
 
 use std::time::Instant;
 
@@ -7,7 +7,7 @@ use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Place, is_set};
+use super::place::Place;
 use crate::bvh::{Ray, offset_origin};
 use crate::error::{Error, Result};
 use crate::light_grid::LightGrid;
@@ -24,9 +24,9 @@ use crate::sampler::Sampler;
 pub enum RayKind {
     /// From the camera, neighbours beside one another.
     Primary,
-    /// From their ends towards the map, chosen as it shines.
+    /// Shadow rays from the hits of primary rays towards the map, importance sampled.
     Shadow,
-    /// From their ends, spread as a matte surface spreads light.
+    /// From the hits of primary rays, cosine-distributed as a diffuse surface reflects.
     Diffuse,
 }
 
@@ -56,23 +56,23 @@ impl RayKind {
 pub struct RayFigures {
     /// Which rays.
     pub kind: RayKind,
-    /// How many different ones.
+    /// Number of different rays.
     pub count: usize,
     /// Rays a second.
     pub per_second: f64,
 }
 
-/// What comes of each ray: the distance and the triangle, or the share of light and nothing.
+/// For each ray the distance and triangle of its hit, or its transmittance and 0.
 pub(super) type Answers = Vec<(f32, u32)>;
 
-/// Rays of a kind are traced again and again for so many seconds.
+/// Each kind of ray is traced repeatedly for this many seconds.
 const SECONDS: f64 = 0.3;
-/// Most rays of a kind: enough to fill any device.
+/// Maximum number of rays of a kind: enough to fill any device.
 const MAX_RAYS: u32 = 1 << 21;
-/// Pixels along a side of the squares that primary rays come in, as kernels take them.
+/// Side in pixels of the squares in which primary rays are ordered, as kernels order them.
 const TILE: u32 = 8;
 
-/// Measures each kind; returns with it what the diffuse ones hit.
+/// Measures each kind of ray; also returns the hits of the diffuse ones.
 pub(super) fn measure(
     place: &Place<'_>,
     uploaded: Option<&UploadedScene>,
@@ -80,7 +80,7 @@ pub(super) fn measure(
     let world = &place.subject.world;
     let mut caster = match uploaded {
         Some(uploaded) => {
-            // Whose kernels know nothing of the map.
+            // Kernels without environment sampling.
             let view = View { sampling: Sampling::Bsdf, ..place.view((TILE, TILE)) };
             let environment = &place.subject.environment;
             let rays = view.rays();
@@ -103,12 +103,12 @@ pub(super) fn measure(
         let (mut seconds, mut rounds, mut found) = (0.0, 0, Vec::new());
         if let Some(renderer) = &mut caster {
             renderer.put_rays(&rays)?;
-            // Compiles, and finds out how much a dispatch may hold.
+            // The first cast compiles, and finds how many rays fit into a dispatch.
             renderer.cast(kind.question(), rays.len() as u32)?;
             found = renderer.cast_results(rays.len())?;
         }
         while seconds < SECONDS {
-            if is_set(place.cancel) {
+            if place.is_cancelled() {
                 return Err(Error::new("cancelled"));
             }
             if let Some(renderer) = &mut caster {
@@ -154,8 +154,8 @@ fn primary(place: &Place<'_>) -> Vec<Ray> {
     rays.map(|pixel| camera.ray(pixel.as_vec2() + 0.5, Vec2::ZERO)).collect()
 }
 
-/// From the end of each ray one more, where `direct` finds a direction from random bits, the shading
-/// frame there, turned to the side the ray came from, and two random numbers.
+/// Continues each ray from its hit in the direction that `direct` chooses. Arguments of `direct`: random bits,
+/// the shading frame on the ray's side, and two random numbers.
 fn onward(
     world: &World,
     rays: &[Ray],
@@ -175,14 +175,14 @@ fn onward(
     rays.par_iter().enumerate().filter_map(continued).collect()
 }
 
-/// A direction with the density of the cosine.
+/// A cosine-distributed direction.
 fn spread(frame: Frame, u: [f32; 2]) -> Vec3 {
     let disk = disk_from_square(u.into());
     let height = (1.0 - disk.length_squared()).max(0.0).sqrt();
     frame.world_from_local(disk.extend(height)).normalize()
 }
 
-/// Rays to where the map is bright, above the surface.
+/// Shadow rays towards importance-sampled directions of the map that lie above the surface.
 fn towards_map(place: &Place<'_>, rays: &[Ray]) -> Vec<Ray> {
     let environment = &place.subject.environment;
     let Some(distributions) = LightGrid::whole_map(environment.tile_energies()) else {

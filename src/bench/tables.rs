@@ -1,8 +1,9 @@
-//! The figures as a table to read.
+//! The figures as tables for a terminal.
 
 use std::fmt;
 
-use super::{Bench, DeviceFigures, Parity, RayKind, SceneFigures};
+use super::figures::{Bench, DeviceFigures, Parity, SceneFigures};
+use super::rays::RayKind;
 
 impl fmt::Display for Bench {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
