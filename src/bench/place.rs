@@ -51,7 +51,11 @@ impl Place<'_> {
         self.cancel.load(Ordering::Relaxed)
     }
 
-    pub(super) fn session(&self, uploaded: Option<&UploadedScene>, view: View) -> Result<Session<'_>> {
+    pub(super) fn session(
+        &self,
+        uploaded: Option<&UploadedScene>,
+        view: View,
+    ) -> Result<Session<'_>> {
         let Subject { world, environment, .. } = self.subject;
         Session::on(world, environment, view, uploaded)
     }

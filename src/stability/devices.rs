@@ -4,12 +4,13 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
+use super::case::{Case, On, Setting};
 use super::maps::sun;
+use super::outcome::Outcome;
 use super::reference::Reference;
 use super::scenes::{
     FIRST_TEXTURE, glass, lambert, light, mean, render, room, sky, view, with_texel,
 };
-use super::{Case, On, Outcome, Setting};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::{World, WorldBuilder};
@@ -19,7 +20,7 @@ use crate::render::{Sampling, Session, View};
 use crate::scene::{Camera, Material, TextureSlot};
 
 const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case { group: "devices", name, on, run }
+    Case::new("devices", name, on, run)
 }
 
 pub(super) const CASES: &[Case] = &[

@@ -4,8 +4,9 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
+use super::case::{Case, On, Setting};
+use super::outcome::Outcome;
 use super::scenes::{constant, learned, view};
-use super::{Case, On, Outcome, Setting};
 use crate::error::Result;
 use crate::path::{PathResult, WorldBuilder};
 use crate::render::film::Pixel;
@@ -14,7 +15,7 @@ use crate::sampler::SplitMix;
 use crate::scene::Camera;
 
 const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case { group: "film", name, on, run }
+    Case::new("film", name, on, run)
 }
 
 pub(super) const CASES: &[Case] = &[

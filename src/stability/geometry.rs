@@ -3,10 +3,11 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::case::{Case, On, Setting};
+use super::outcome::Outcome;
 use super::scenes::{
     Mean, SIGMAS, constant, deviation, difference, lambert, mean, render, room, sealed, sky, view,
 };
-use super::{Case, On, Outcome, Setting};
 use crate::bvh::{Bvh, Ray, offset_origin};
 use crate::error::Result;
 use crate::path::{World, WorldBuilder};
@@ -15,7 +16,7 @@ use crate::sampler::SplitMix;
 use crate::scene::Camera;
 
 const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case { group: "geometry", name, on, run }
+    Case::new("geometry", name, on, run)
 }
 
 pub(super) const CASES: &[Case] = &[

@@ -7,11 +7,12 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
+use super::case::{Case, On, Setting};
+use super::outcome::Outcome;
 use super::scenes::{
     SIGMAS, constant, deviation, difference, lambert, learned, mean, render, room, sealed, sky,
     view,
 };
-use super::{Case, On, Outcome, Setting};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::light_grid::cells::SphericalGrid;
@@ -24,7 +25,7 @@ use crate::sampler::SplitMix;
 use crate::scene::Camera;
 
 const fn case(name: &'static str, on: On, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case { group: "grid", name, on, run }
+    Case::new("grid", name, on, run)
 }
 
 pub(super) const CASES: &[Case] = &[

@@ -6,8 +6,9 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::case::{Case, On, Setting};
+use super::outcome::Outcome;
 use super::scenes::{SIGMAS, deviation, lambert, mean, render, view};
-use super::{Case, On, Outcome, Setting};
 use crate::environment::{Environment, EnvironmentOptions, sky};
 use crate::error::{Error, Notices, Result};
 use crate::image::{Image, sanitise};
@@ -19,7 +20,7 @@ use crate::sampler::SplitMix;
 use crate::scene::Camera;
 
 const fn case(name: &'static str, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case { group: "maps", name, on: On::Any, run }
+    Case::new("maps", name, On::Any, run)
 }
 
 pub(super) const CASES: &[Case] = &[

@@ -4,11 +4,12 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
+use super::case::{Case, On, Setting};
+use super::outcome::Outcome;
 use super::scenes::{
     FIRST_TEXTURE, Mean, SIGMAS, constant, deviation, glass, lambert, learned, mean, render, room,
     view, with_texel,
 };
-use super::{Case, On, Outcome, Setting};
 use crate::error::Result;
 use crate::path::{World, WorldBuilder};
 use crate::render::film::Film;
@@ -17,7 +18,7 @@ use crate::sampler::SplitMix;
 use crate::scene::{Camera, Material, Medium, TextureSlot};
 
 const fn case(name: &'static str, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case { group: "materials", name, on: On::Any, run }
+    Case::new("materials", name, On::Any, run)
 }
 
 pub(super) const CASES: &[Case] = &[

@@ -5,6 +5,7 @@
 //! half takes seconds a case and runs in the tests; [`Setting::nightly`] asks for the counts that
 //! take minutes (1e9 rays, maps of a gigabyte).
 
+mod case;
 mod devices;
 mod film;
 mod geometry;
@@ -21,58 +22,8 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
+pub use self::case::{Case, On, Setting};
 pub use self::outcome::{Figure, Limit, Outcome, Verdict};
-use crate::error::Result;
-use crate::render::gpu::Gpu;
-
-/// How the cases are run.
-pub struct Setting {
-    /// What renders; `None` is the CPU.
-    pub gpu: Option<Gpu>,
-    /// The long counts.
-    pub nightly: bool,
-}
-
-impl Setting {
-    /// The count for the quick or for the nightly half.
-    fn count<T>(&self, quick: T, nightly: T) -> T {
-        if self.nightly { nightly } else { quick }
-    }
-}
-
-/// Where a case makes sense.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum On {
-    /// The same whatever renders: run with the CPU.
-    Cpu,
-    /// It renders: run with either.
-    Any,
-    /// It is about the GPU.
-    Gpu,
-}
-
-/// One thing to try.
-pub struct Case {
-    /// The group it belongs to.
-    pub group: &'static str,
-    /// Its name in the group.
-    pub name: &'static str,
-    /// Where it makes sense.
-    pub on: On,
-    run: fn(&Setting) -> Result<Outcome>,
-}
-
-impl Case {
-    /// `group/name`.
-    pub fn title(&self) -> String {
-        format!("{}/{}", self.group, self.name)
-    }
-
-    /// Whether it is part of a run with or without a GPU.
-    pub fn runs(&self, with_gpu: bool) -> bool {
-        matches!((self.on, with_gpu), (On::Any, _) | (On::Cpu, false) | (On::Gpu, true))
-    }
-}
 
 /// All cases, group by group.
 pub fn cases() -> impl Iterator<Item = &'static Case> {

@@ -4,7 +4,8 @@ use std::sync::atomic::AtomicBool;
 
 use glam::{Affine2, Vec2, Vec3};
 
-use super::{Outcome, Setting};
+use super::case::Setting;
+use super::outcome::Outcome;
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::Result;
 use crate::image::Image;

@@ -3,15 +3,16 @@
 //! The tile-local table must hold everywhere. The summed-area forms are kept for comparison; what
 //! they lose is told, not judged: it is the talk's finding, and ours.
 
+use super::case::{Case, On, Setting};
 use super::maps::{scaled, sun};
-use super::{Case, On, Outcome, Setting};
+use super::outcome::Outcome;
 use crate::environment::{SatReportRow, TableKind, sat_report, sky};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::sampler::SplitMix;
 
 const fn case(name: &'static str, run: fn(&Setting) -> Result<Outcome>) -> Case {
-    Case { group: "tables", name, on: On::Cpu, run }
+    Case::new("tables", name, On::Cpu, run)
 }
 
 pub(super) const CASES: &[Case] = &[
