@@ -1,4 +1,4 @@
-//! Every default of the code beside what it was chosen over.
+//! Every default of the code beside the alternatives that it was chosen over.
 
 use super::plan::{Effort, Method, Plan, Row, Settings};
 use crate::environment::TableKind;
@@ -6,7 +6,7 @@ use crate::light_grid::{DistributionOptions, Recording, RenderedPaths};
 use crate::render::{Gi, Sampling, Sharing};
 use crate::sampler::Points;
 
-/// Scenes and maps, if none are asked for: one of each kind of occlusion.
+/// Default scenes and maps: one of each kind of occlusion.
 const ROWS: [(&str, &str); 5] = [
     ("office", "sky:sunset"),
     ("living-room", "sky:day"),
@@ -29,11 +29,11 @@ pub fn plan(rows: Vec<Row>, only: &[String], effort: Effort, command: String) ->
     let mut methods = [Sampling::Plain, Sampling::Adaptive].map(Method::of).to_vec();
     methods.extend(variants().into_iter().filter(is_asked));
     Plan {
-        title: "What every choice is worth".to_owned(),
+        title: "Value of every default".to_owned(),
         introduction: vec![
-            "Each line changes one thing of adaptive, lightgrid's default, or builds up to it from the \
-             talk's form. A figure above 1 says that the change would be faster, below 1 that the \
-             default is. Choices that the intervals do not tell apart are kept as they are."
+            "Each line changes one setting of adaptive, lightgrid's default, or builds up to it from the \
+             talk's form. Above 1 the change would be faster, below 1 the default is. A default is kept \
+             where the intervals do not separate it from the change."
                 .to_owned(),
         ],
         differences: Vec::new(),
@@ -76,7 +76,7 @@ fn modes(add: &mut Add<'_>) {
     add(group, "bsdf", &|s| s.sampling = Sampling::Bsdf);
 }
 
-/// From counted visibility, without anything, to what the design study left unmeasured.
+/// Step by step from counted visibility to the full method, one addition each.
 fn steps(add: &mut Add<'_>) {
     const VISIBLE: DistributionOptions =
         DistributionOptions { recording: Recording::Visible, ..DistributionOptions::TALK };

@@ -1,4 +1,4 @@
-//! How far what a method converges to is from the reference.
+//! Bias: the distance between a method's limit and the reference.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,15 +13,16 @@ pub struct Bias {
     pub device: String,
     /// Name of the method.
     pub method: String,
-    /// Its square, the reference's own noise included; below 0 by chance where there is none.
+    /// Estimate of the squared bias, the reference's own noise included; may be below 0 by chance where there
+    /// is no bias.
     pub squared: f64,
-    /// Standard error of that, by leaving out one run after another; `None` for two runs.
+    /// Standard error of `squared` by the jackknife over runs; `None` for two runs.
     pub standard_error: Option<f64>,
 }
 
 impl Bias {
-    /// Of independent runs' pictures: the mean over pairs of runs of the product of both errors, in
-    /// which the runs' own noise cancels. `None` with fewer than two.
+    /// Estimates it from independent runs' pictures as the mean, over pairs of runs, of the product of both
+    /// errors: independent noise cancels there. `None` with fewer than two runs.
     pub(super) fn new(
         device: &str,
         method: &str,
@@ -72,7 +73,7 @@ impl Bias {
     }
 }
 
-/// Mean over pairs of different runs, and over all values, of the products.
+/// Mean of the products over pairs of different runs and over all values.
 fn mean_product(errors: &[Vec<f64>]) -> Option<f64> {
     let count = errors.len();
     if count < 2 {

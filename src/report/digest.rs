@@ -1,4 +1,4 @@
-//! What a measurement belongs to, as a short name.
+//! Digests that name measurements: equal only for the same picture by the same renderer.
 
 use std::sync::atomic::AtomicBool;
 
@@ -10,9 +10,9 @@ use crate::path::World;
 use crate::render::{Sampling, Session};
 use crate::scene::Camera;
 
-/// What a picture converges to: scene, map, camera, size, bounces, and the renderer itself, by a tiny
-/// picture that any change of it is likely to change. So a reference of an older renderer is not
-/// taken for one of this.
+/// Digest of all that a picture converges to: scene, map, camera, size and bounces. A tiny rendered picture
+/// is part of it, which nearly any change of the renderer changes: references of an older renderer are
+/// therefore not reused.
 pub(super) fn of_picture(
     world: &World,
     environment: &Environment,

@@ -1,4 +1,4 @@
-//! Where measurements were made.
+//! The machine and the devices that measurements are made on.
 
 use std::fs;
 
@@ -39,7 +39,7 @@ impl Machine {
         }
     }
 
-    /// Digest of what timings depend on: this machine and this very executable.
+    /// Digest of all that timings depend on: this machine and this executable's bytes.
     pub(super) fn digest(&self) -> Digest {
         let executable = std::env::current_exe().and_then(fs::read).unwrap_or_default();
         Digest::new()
@@ -81,7 +81,7 @@ impl OpenDevice {
         Ok(Self { device, gpu: Some(gpu), name })
     }
 
-    /// Whether it is likely to be the fastest: a real GPU.
+    /// Whether it is a GPU that is not emulated in software.
     pub(super) fn is_real_gpu(&self) -> bool {
         self.gpu.as_ref().is_some_and(|gpu| !gpu.facts().is_software())
     }

@@ -15,7 +15,7 @@ use crate::path::World;
 use crate::render::{Figures, Phase, Session, StopRule, gpu};
 use crate::scene::Camera;
 
-/// Where runs take place.
+/// The scene, map and device of a run.
 #[derive(Clone, Copy)]
 pub(super) struct Place<'a> {
     pub(super) world: &'a World,
@@ -75,11 +75,11 @@ pub struct Point {
     pub samples: u32,
     /// Rays of rendering, shadow rays included.
     pub rays: u64,
-    /// Its errors, once there is a reference.
+    /// Errors against the reference; `None` before there is one.
     pub errors: Option<Comparison>,
 }
 
-/// Bytes of what a run holds.
+/// Memory that a run holds, in bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Memory {
     /// The map's importance table.
@@ -103,11 +103,11 @@ pub struct Run {
     pub seed: u32,
     /// Seconds of building the map's importance table.
     pub table_seconds: f64,
-    /// What the session says.
+    /// The session's own figures.
     pub figures: Figures,
-    /// What it held.
+    /// Memory that it held.
     pub memory: Memory,
-    /// Nanoseconds of a thread per ray, measured beside the run.
+    /// Nanoseconds per ray and thread, measured after the run.
     pub nanoseconds_per_ray: Option<f64>,
     /// In order of time; the last one is at or after the end.
     pub points: Vec<Point>,
@@ -117,23 +117,23 @@ pub struct Run {
     pub reference_pictures: Option<u32>,
 }
 
-/// A finished run with its pictures, one a point.
+/// A finished run with its pictures, one for each point.
 pub(super) struct Finished {
     pub(super) run: Run,
     pub(super) films: Vec<Image>,
-    /// The last one without noise.
+    /// The last one, denoised.
     pub(super) denoised: Image,
-    /// What was learned, for measurements beside the run.
+    /// The learned grid, for measurements after the run.
     pub(super) grid: Option<LightGrid>,
 }
 
-/// Points are this factor in time apart.
+/// Ratio of the times of successive points.
 const STEP: f64 = std::f64::consts::SQRT_2;
 
-/// The first point is at most this share of the end: earlier errors interest nobody.
+/// The first point is at most at this share of the run's time.
 const FIRST_SHARE: f64 = 1.0 / 256.0;
 
-/// Runs a method for `seconds`; `None` if it was cancelled. Taking pictures aside is not timed.
+/// Runs a method for `seconds`; `None` if it was cancelled. The time of copying pictures does not count.
 pub(super) fn measure(
     place: &Place<'_>,
     method: (&str, &Settings),
@@ -205,11 +205,11 @@ fn memory(place: &Place<'_>, session: &Session<'_>) -> Memory {
 }
 
 impl Run {
-    /// Takes the errors of its pictures, one a point, and of the last one without noise.
+    /// Computes the errors of its pictures, one for each point, and of the denoised last one.
     ///
     /// # Errors
     /// If the reference is black or a picture is not finite.
-    pub(super) fn judge(
+    pub(super) fn evaluate(
         &mut self,
         films: &[Image],
         denoised: &Image,

@@ -1,4 +1,4 @@
-//! What is to be measured: rows of scene and map, methods, devices, and how long.
+//! Plans of measurements: rows of scene and map, methods, devices, and durations.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use crate::render::{Gi, Sampling, Sharing, View};
 use crate::sampler::Points;
 use crate::scene::Camera;
 
-/// Fewest pictures: their spread must be worth something.
+/// Minimum number of pictures of a reference, whose spread estimates its noise.
 pub(super) const MIN_PICTURES: u32 = 8;
 
 /// A device to measure on.
@@ -21,7 +21,7 @@ pub(super) const MIN_PICTURES: u32 = 8;
 pub enum Device {
     /// All threads.
     Cpu,
-    /// The best adapter, be it a software one.
+    /// The best adapter, which may be a software one.
     Gpu,
 }
 
@@ -35,7 +35,7 @@ impl Device {
     }
 }
 
-/// All that a way of rendering may differ in without changing what the picture converges to.
+/// Settings that change how fast a picture converges, but not its limit (except a cache's bias).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Settings {
     /// How the map is sampled.
@@ -50,18 +50,18 @@ pub struct Settings {
     pub grid_columns: u32,
     /// Whether pixels share their second vertices.
     pub sharing: Sharing,
-    /// How light that has met several surfaces is found.
+    /// How indirect light is found.
     pub gi: Gi,
-    /// Camera paths to learn from; `None` for as many as suit the picture.
+    /// Camera paths to learn from; `None` for the default of the picture's size.
     pub learning_paths: Option<u64>,
-    /// Points samples are taken at.
+    /// Point set of the samples.
     pub points: Points,
-    /// Whether dim paths are ended at random.
+    /// Whether Russian roulette ends dim paths.
     pub russian_roulette: bool,
 }
 
 impl Settings {
-    /// What `lightgrid render --sampling` does.
+    /// The settings of `lightgrid render --sampling`.
     pub fn of(sampling: Sampling) -> Self {
         let environment = EnvironmentOptions::default();
         Self {
@@ -78,7 +78,7 @@ impl Settings {
         }
     }
 
-    /// How the map is turned into a light.
+    /// Options of the map's importance table.
     pub(super) fn environment(&self) -> EnvironmentOptions {
         EnvironmentOptions {
             table: self.table,
@@ -104,31 +104,31 @@ impl Settings {
                 View::suitable_learning_paths(self.sampling, [width, height], None)
             }),
             distributions: self.distributions,
-            // For the denoiser.
+            // The denoiser reads them.
             layers: true,
             ..View::new(camera.clone(), [width, height])
         }
     }
 }
 
-/// A named way of rendering.
+/// A named method of rendering.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Method {
     /// Short, unique within its row.
     pub name: String,
-    /// What it belongs to in a table of ablations.
+    /// Its group in a table of ablations.
     pub group: Option<&'static str>,
     /// The settings.
     pub settings: Settings,
 }
 
 impl Method {
-    /// One of the sampling modes, called as on the command line.
+    /// A sampling mode with its name on the command line.
     pub fn of(sampling: Sampling) -> Self {
         Self { name: sampling.name().to_owned(), group: None, settings: Settings::of(sampling) }
     }
 
-    /// The same with indirect light found like this.
+    /// The same method with this way of finding indirect light.
     pub fn with_gi(self, gi: Gi) -> Self {
         let name = match gi {
             Gi::Exact => self.name,
@@ -138,19 +138,19 @@ impl Method {
     }
 }
 
-/// The picture, which is the same for all.
+/// The picture's size and bounces, the same for all methods.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Frame {
     /// Pixels per row, and rows.
     pub size: (u32, u32),
-    /// Most vertices, on surfaces or in a medium, that scatter light; 1 is direct light only.
+    /// Maximum number of vertices, on surfaces or in a medium, that scatter light; 1 is direct light only.
     pub bounces: u32,
 }
 
 /// A scene under a map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// What to call it.
+    /// Its title.
     pub title: String,
     /// A file or a built-in.
     pub scene: String,
@@ -158,12 +158,12 @@ pub struct Row {
     pub map: String,
     /// Speed-up in the talk on CPU and GPU.
     pub published: Option<[f64; 2]>,
-    /// Speed-up of `adaptive` over `plain` that is asked for.
+    /// Target for the speed-up of `adaptive` over `plain`.
     pub target: Option<f64>,
 }
 
 impl Row {
-    /// A row without anything to compare it with.
+    /// A row without published figures or a target.
     pub fn new(scene: &str, map: &str) -> Self {
         Self {
             title: format!("{scene} / {map}"),
@@ -187,15 +187,15 @@ impl Row {
 /// How much work goes into a plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Effort {
-    /// Where.
+    /// The devices.
     pub devices: Vec<Device>,
-    /// The picture.
+    /// The picture's size and bounces.
     pub frame: Frame,
     /// Seconds of tables, learning and rendering of one run.
     pub seconds: f64,
     /// Independent runs of every combination.
     pub seeds: u32,
-    /// The reference's noise may be this share of the smallest error.
+    /// Maximum noise of the reference, as a share of the smallest error.
     pub reference_noise: f64,
 }
 
@@ -211,31 +211,31 @@ impl Effort {
 pub struct Plan {
     /// Title of the page.
     pub title: String,
-    /// What it is about, paragraph by paragraph.
+    /// Introduction of the page, by paragraph.
     pub introduction: Vec<String>,
-    /// What must be known to read the published figures beside ours.
+    /// Differences between the published measurements and ours.
     pub differences: Vec<String>,
     /// Scenes and maps.
     pub rows: Vec<Row>,
-    /// What is compared, on every row; the first is the baseline.
+    /// The methods that are compared on every row.
     pub methods: Vec<Method>,
-    /// Methods (by index) that the others are held against, each in a column of its own.
+    /// Indices of the methods that the others are compared with, each in a column of its own.
     pub baselines: Vec<usize>,
-    /// Where, how long, how often.
+    /// Devices, durations and numbers of runs.
     pub effort: Effort,
     /// A picture to be taken as the reference of the only row.
     pub reference: Option<PathBuf>,
-    /// How the command is repeated.
+    /// The command line that makes this report.
     pub command: String,
 }
 
 impl Plan {
-    /// Seconds that all of it takes, about: runs, references, where error is left, overhead.
+    /// Expected seconds of the whole plan: runs, references, sources of error, overhead.
     pub fn expected_seconds(&self) -> f64 {
         self.rows.len() as f64 * self.expected_row_seconds()
     }
 
-    /// The same for one row.
+    /// Expected seconds of a row.
     pub(super) fn expected_row_seconds(&self) -> f64 {
         let runs = self.methods.len() * self.effort.devices.len() * self.effort.seeds as usize;
         let pictures = (1.0 / self.effort.reference_noise).max(f64::from(MIN_PICTURES));
@@ -244,15 +244,16 @@ impl Plan {
         (runs as f64 + reference + shares) * self.effort.seconds * OVERHEAD
     }
 
-    /// Methods whose error is taken apart: the sampling modes as they are.
+    /// Methods whose error is split by its sources: the sampling modes with default settings.
     pub(super) fn compared(&self) -> Vec<&Method> {
         let is_mode = |m: &&Method| m.settings == Settings::of(m.settings.sampling);
         self.methods.iter().filter(is_mode).collect()
     }
 }
 
-/// Runs' worth of time that taking one method's error apart costs.
+/// Duration of splitting one method's error by its sources, in durations of a run.
 pub(super) const SHARE_RUNS: f64 = 1.5;
 
-/// Loading, building, comparing, writing, and passes that end a little late. *Measured* on two cores.
+/// Ratio of the total time to that of runs: loading, building, comparing, writing, and passes that end late.
+/// *Measured* on two cores.
 const OVERHEAD: f64 = 1.1;

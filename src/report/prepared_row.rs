@@ -1,4 +1,4 @@
-//! A row made ready: the scene's tree, the camera, the map as every method wants it.
+//! A loaded row: the scene's tree, the camera, and the map with the tables that the methods need.
 
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -23,11 +23,11 @@ pub(super) struct PreparedRow {
     lights: Vec<Light>,
     pub(super) map_size: (u32, u32),
     pub(super) notices: Notices,
-    /// Of what its picture converges to.
+    /// Digest of the picture's limit.
     pub(super) digest: Digest,
 }
 
-/// A map with one kind of table, and how long that took.
+/// A map with one kind of table, and the seconds of building it.
 struct Light {
     options: EnvironmentOptions,
     environment: Environment,
@@ -87,7 +87,7 @@ impl PreparedRow {
         Ok(())
     }
 
-    /// Where runs with these settings take place.
+    /// The place of runs with these settings.
     pub(super) fn place<'a>(
         &'a self,
         plan: &'a Plan,
@@ -107,8 +107,8 @@ impl PreparedRow {
         }
     }
 
-    /// Mean nanoseconds of a thread that a ray takes when a picture is rendered with a learned grid,
-    /// taken over at least this long.
+    /// Mean nanoseconds per ray and thread while a picture is rendered with a learned grid, over at least
+    /// `seconds`.
     pub(super) fn time_rays(
         &mut self,
         plan: &Plan,

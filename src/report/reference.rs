@@ -1,7 +1,7 @@
-//! The reference: the mean of independent pictures, whose spread says how noisy it still is.
+//! The reference: the mean of independent pictures, whose spread estimates its remaining noise.
 //!
-//! It grows picture by picture, on disk after each, under a name that is a digest of all that it
-//! depends on; so it can be gone on with, and is never taken for another one.
+//! It grows picture by picture and is written after each. Its file's name is a digest of all that it depends
+//! on, so a report can be resumed and never uses a reference of something else.
 
 use std::fs;
 use std::io::Write as _;
@@ -32,7 +32,7 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Of a picture whose pixels have these variances, per channel.
+    /// The noise of a picture from the variances of its pixels, per channel.
     pub(super) fn of(variances: &[[f64; 3]], reference: &Image) -> Self {
         let count = variances.len() as f64;
         let mean = crate::metrics::mean(reference);
@@ -55,7 +55,7 @@ pub(super) fn relative(variances: &[f64; 3], pixel: &[f32; 3], mean: f64) -> f64
     variances.iter().zip(pixel).map(of_channel).sum()
 }
 
-/// Variances of the mean of `count` pictures, by the sums of their values and of their squares.
+/// Variances of the mean of `count` pictures, from the sums of their values and of their squares.
 pub(super) fn variances_of_mean(sums: &[f64; 3], squares: &[f64; 3], count: f64) -> [f64; 3] {
     [0, 1, 2].map(|i| {
         let mean = sums[i] / count;
@@ -63,10 +63,10 @@ pub(super) fn variances_of_mean(sums: &[f64; 3], squares: &[f64; 3], count: f64)
     })
 }
 
-/// Facts about a reference, as its file begins.
+/// Facts about a reference: the first line of its file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceFacts {
-    /// Digest of what it is a picture of.
+    /// Digest of the picture's limit.
     pub digest: String,
     /// Pixels per row, and rows.
     pub size: (u32, u32),
@@ -76,7 +76,7 @@ pub struct ReferenceFacts {
     pub samples_per_picture: u32,
     /// Seconds that all of them took.
     pub seconds: f64,
-    /// What rendered the last of them.
+    /// The device that rendered the last of them.
     pub device: String,
 }
 
@@ -89,11 +89,11 @@ pub(super) struct Reference {
     path: PathBuf,
 }
 
-/// Seeds of its pictures begin here, far from those of runs.
+/// First seed of its pictures, far from those of runs.
 const FIRST_SEED: u32 = 0x5265_6600;
 
 impl Reference {
-    /// The one kept in `folder`, or an empty one that will be.
+    /// The reference stored in `folder`, or an empty one to be stored there.
     pub(super) fn open(folder: &Path, digest: Digest, size: (u32, u32)) -> Self {
         let path = folder.join(format!("{digest}.ref"));
         let pixels = size.0 as usize * size.1 as usize;
@@ -112,7 +112,7 @@ impl Reference {
         })
     }
 
-    /// `None` if there is no such file, or it is not whole.
+    /// `None` if the file is missing or incomplete.
     fn read(path: &Path, digest: &str, size: (u32, u32)) -> Option<Self> {
         let bytes = fs::read(path).ok()?;
         let line = bytes.iter().position(|b| *b == b'\n')?;
@@ -137,8 +137,8 @@ impl Reference {
         })
     }
 
-    /// Renders one more picture with the default sampling and keeps it; the first one renders for `seconds`
-    /// (and at least as long as it learned), the others as many samples. `false` if it was cancelled.
+    /// Renders one more picture with the default sampling and stores it. The first one renders for `seconds`, and
+    /// at least as long as it learned; the others take as many samples as the first. `false` if it was cancelled.
     ///
     /// # Errors
     /// If the device fails or the file cannot be written.
@@ -198,7 +198,7 @@ impl Reference {
         Image { width, height, pixels }
     }
 
-    /// Whether all its pictures are black, with which nothing can be compared.
+    /// Whether all its pictures are black: relative errors are undefined then.
     pub(super) fn is_black(&self) -> bool {
         self.facts.pictures > 0 && self.sums.as_flattened().iter().all(|sum| *sum <= 0.0)
     }
@@ -219,7 +219,7 @@ impl Reference {
         Noise::of(&variances, &self.image())
     }
 
-    /// Pictures that are missing until the noise is `share` of `error`, about.
+    /// Estimated number of pictures that are missing until the noise is `share` of `error`.
     pub(super) fn pictures_missing(&self, share: f64, error: f64) -> u32 {
         let (pictures, noise) = (self.facts.pictures, self.noise().trimmed_rel_mse);
         let enough = if noise.is_finite() && error > 0.0 {
@@ -231,7 +231,7 @@ impl Reference {
     }
 }
 
-/// A picture that somebody else made, of the size of the runs.
+/// Reads a given picture as the reference; it must have the size of the runs.
 ///
 /// # Errors
 /// If it cannot be read, is not linear, has another size, or is black.

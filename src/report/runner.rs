@@ -1,16 +1,16 @@
-//! Going through a plan: what is on disk is taken, what is missing is measured, pages are kept up to
+//! Makes a report: goes through a plan, reuses runs on disk, measures the missing ones, and keeps the pages up to
 //! date.
 
-mod evaluate;
-
-use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use super::context::{Context, Options, RowState, denoised};
+use super::evaluate::{
+    find_biases, find_shares, grow_reference, reference_report, refine_reference,
+};
 use super::machine::{Machine, OpenDevice};
 use super::measure::{Run, measure};
-use super::pages::{duration, row_sentence};
-use super::plan::{MIN_PICTURES, Method, Plan, Row};
+use super::pages::row_sentence;
+use super::plan::{MIN_PICTURES, Plan, Row, SHARE_RUNS};
 use super::prepared_row::PreparedRow;
 use super::reference::{Reference, read_reference};
 use super::store::Store;
@@ -19,32 +19,20 @@ use crate::digest::Digest;
 use crate::error::{Error, Result};
 use crate::image::Image;
 
-/// How a report is made, beside what it is about.
-pub struct Options<'a> {
-    /// The report's folder.
-    pub folder: &'a Path,
-    /// Folder of references, if it is another one.
-    pub references: Option<&'a Path>,
-    /// The GPU whose name contains this.
-    pub adapter: Option<&'a str>,
-    /// Becomes true when it is to stop.
-    pub cancel: &'a AtomicBool,
-    /// Is told what is being done.
-    pub progress: &'a dyn Fn(String),
-    /// Is told what is done.
-    pub tell: &'a dyn Fn(String),
-}
-
-/// Measures what is missing and writes `report.html`, `report.csv`, `report.json` and `plots/`, as far
-/// as it comes before it is told to stop.
+/// Measures the missing runs and writes `report.html`, `report.csv`, `report.json` and `plots/`; returns an
+/// unfinished report if it is cancelled.
 ///
 /// # Errors
-/// If a scene or map cannot be used, a device fails, or something cannot be written; what was measured
-/// is on disk and will be taken when the same plan is made again.
+/// If a scene or map cannot be used, a device fails, or a file cannot be written. Finished runs are on disk and
+/// are reused when the same plan is made again.
 pub fn make(plan: &Plan, options: &Options<'_>) -> Result<Report> {
     let size = plan.effort.frame.size;
     let file_reference =
         plan.reference.as_deref().map(|path| read_reference(path, size)).transpose()?;
+    let file_reference = file_reference.map(|image| {
+        let digest = digest_of(&image);
+        (image, digest)
+    });
     let store = Store::open(options.folder, options.references)?;
     let machine = Machine::here();
     let devices = plan
@@ -53,15 +41,10 @@ pub fn make(plan: &Plan, options: &Options<'_>) -> Result<Report> {
         .iter()
         .map(|device| OpenDevice::open(*device, options.adapter, &machine))
         .collect::<Result<Vec<_>>>()?;
+    let machine_digest = machine.digest();
     let mut runner = Runner {
-        machine_digest: machine.digest(),
+        context: Context { plan, options, store, devices, machine_digest, file_reference },
         report: Report { plan: plan.clone(), machine, rows: Vec::new(), is_finished: false },
-        plan,
-        store,
-        devices,
-        file_digest: file_reference.as_ref().map(digest_of),
-        file_reference,
-        options,
         pages_written: None,
     };
     for row in &plan.rows {
@@ -70,7 +53,7 @@ pub fn make(plan: &Plan, options: &Options<'_>) -> Result<Report> {
             (options.tell)(row_sentence(&runner.report, row));
         }
         runner.write_pages()?;
-        if runner.is_cancelled() {
+        if runner.context.is_cancelled() {
             return Ok(runner.report);
         }
     }
@@ -80,13 +63,7 @@ pub fn make(plan: &Plan, options: &Options<'_>) -> Result<Report> {
 }
 
 struct Runner<'a> {
-    plan: &'a Plan,
-    options: &'a Options<'a>,
-    store: Store,
-    devices: Vec<OpenDevice>,
-    machine_digest: Digest,
-    file_reference: Option<Image>,
-    file_digest: Option<Digest>,
+    context: Context<'a>,
     report: Report,
     pages_written: Option<Instant>,
 }
@@ -94,24 +71,12 @@ struct Runner<'a> {
 /// Pages are written anew at most this often while runs go on.
 const PAGES_EVERY: Duration = Duration::from_secs(30);
 
-/// What is known of a row while it is measured.
-struct Work {
-    prepared: PreparedRow,
-    reference: Option<Reference>,
-    /// Runs by device and method, with the names they are kept under.
-    runs: Vec<Vec<Vec<(String, Run)>>>,
-    /// Why a device cannot do this row.
-    refusals: Vec<Option<String>>,
-}
-
 impl Runner<'_> {
-    fn is_cancelled(&self) -> bool {
-        self.options.cancel.load(Ordering::Relaxed)
-    }
-
+    /// Measures a row and adds it to the report.
     fn row(&mut self, row: &Row) -> Result<()> {
-        self.say(&format!("{}: loading", row.title), 0.0);
-        let prepared = PreparedRow::load(row, self.plan)?;
+        let rows_after = self.context.plan.rows.len() - self.report.rows.len() - 1;
+        self.context.say(&format!("{}: loading", row.title), 0.0, rows_after);
+        let prepared = PreparedRow::load(row, self.context.plan)?;
         let report = RowReport {
             row: row.clone(),
             notices: prepared.notices.iter().map(str::to_owned).collect(),
@@ -124,47 +89,56 @@ impl Runner<'_> {
             pictures: Pictures::default(),
         };
         self.report.rows.push(report);
-        let reference = self.file_reference.is_none().then(|| {
-            Reference::open(self.store.references(), prepared.digest, self.plan.effort.frame.size)
+        let reference = self.context.file_reference.is_none().then(|| {
+            Reference::open(
+                self.context.store.references(),
+                prepared.digest,
+                self.context.plan.effort.frame.size,
+            )
         });
-        let mut work = Work {
-            runs: vec![vec![Vec::new(); self.plan.methods.len()]; self.devices.len()],
-            refusals: vec![None; self.devices.len()],
+        let mut state = RowState {
+            runs: vec![
+                vec![Vec::new(); self.context.plan.methods.len()];
+                self.context.devices.len()
+            ],
+            refusals: vec![None; self.context.devices.len()],
             prepared,
             reference,
+            rows_after,
         };
-        for device in 0..self.devices.len() {
-            let uploaded = work.prepared.upload(&self.devices[device]);
-            self.can(&mut work, device, &uploaded);
+        for device in 0..self.context.devices.len() {
+            let uploaded = state.prepared.upload(&self.context.devices[device]);
+            self.accept(&mut state, device, &uploaded);
         }
-        if work.refusals.iter().all(Option::is_some) {
-            return self.update(&mut work);
+        if state.refusals.iter().all(Option::is_some) {
+            return self.update(&mut state);
         }
-        let mut is_whole = self.grow_reference(&mut work, MIN_PICTURES)?;
+        let mut is_whole = grow_reference(&self.context, &mut state, MIN_PICTURES)?;
         while is_whole {
-            is_whole = self.all_runs(&mut work)? && self.judge_well(&mut work)?;
-            if !is_whole || !self.forget_outdated(&mut work) {
+            is_whole = self.all_runs(&mut state)? && refine_reference(&self.context, &mut state)?;
+            if !is_whole || !self.remove_outdated(&mut state) {
                 break;
             }
         }
-        self.update(&mut work)?;
-        if is_whole && self.take_apart(&work)? {
-            self.find_biases(&work)?;
-            self.forget_pictures(&work);
+        self.update(&mut state)?;
+        let Some(report) = self.report.rows.last_mut().filter(|_| is_whole) else { return Ok(()) };
+        if find_shares(&self.context, &state, report)? {
+            find_biases(&self.context, &state, report)?;
+            self.remove_pictures(&state);
         }
         Ok(())
     }
 
-    /// Every run that is missing, seed by seed, so that what disturbs the machine for a while disturbs
-    /// all methods alike.
-    fn all_runs(&mut self, work: &mut Work) -> Result<bool> {
-        for seed in 0..self.plan.effort.seeds {
-            for device in 0..self.devices.len() {
-                for method in 0..self.plan.methods.len() {
-                    if work.refusals[device].is_some() {
+    /// Measures the missing runs, seed by seed, so that a disturbance of the machine affects all methods alike;
+    /// `false` if it was cancelled.
+    fn all_runs(&mut self, state: &mut RowState) -> Result<bool> {
+        for seed in 0..self.context.plan.effort.seeds {
+            for device in 0..self.context.devices.len() {
+                for method in 0..self.context.plan.methods.len() {
+                    if state.refusals[device].is_some() {
                         continue;
                     }
-                    if !self.run(work, device, method, seed)? {
+                    if !self.run(state, device, method, seed)? {
                         return Ok(false);
                     }
                 }
@@ -174,140 +148,139 @@ impl Runner<'_> {
     }
 
     /// One run, from disk or measured; `false` if it was cancelled.
-    fn run(&mut self, work: &mut Work, device: usize, method: usize, seed: u32) -> Result<bool> {
-        let plan = self.plan;
-        let key = self.key(work, device, &plan.methods[method], seed);
-        if let Some(run) = self.store.read::<Run>(&key) {
+    fn run(
+        &mut self,
+        state: &mut RowState,
+        device: usize,
+        method: usize,
+        seed: u32,
+    ) -> Result<bool> {
+        let plan = self.context.plan;
+        let key = self.context.key(state, device, &plan.methods[method], seed);
+        if let Some(run) = self.context.store.read::<Run>(&key) {
             let has_errors = run.points.iter().all(|p| p.errors.is_some());
-            if has_errors || self.pictures(&key, &run).is_some() {
-                work.runs[device][method].push((key, run));
+            if has_errors || self.context.pictures(&key, &run).is_some() {
+                state.runs[device][method].push((key, run));
                 return Ok(true);
             }
         }
-        self.say_run(work, device, method, seed);
+        self.say_run(state, device, method, seed);
         let name = &plan.methods[method].name;
         let settings = &plan.methods[method].settings;
-        if !self.make_ready(work, device, method) {
+        if !self.make_ready(state, device, method) {
             return Ok(true);
         }
-        let place = work.prepared.place(plan, &self.devices[device], settings);
+        let place = state.prepared.place(plan, &self.context.devices[device], settings);
         let seconds = plan.effort.seconds;
-        let cancel = self.options.cancel;
+        let cancel = self.context.options.cancel;
         let Some(mut done) = measure(&place, (name, settings), seed, seconds, cancel)? else {
             return Ok(false);
         };
-        if seed == 0 && self.devices[device].gpu.is_none() {
+        if seed == 0 && self.context.devices[device].gpu.is_none() {
             let grid = done.grid.take();
-            done.run.nanoseconds_per_ray = work.prepared.time_rays(
+            done.run.nanoseconds_per_ray = state.prepared.time_rays(
                 plan,
-                &self.devices[device],
+                &self.context.devices[device],
                 settings,
                 grid,
                 seconds.min(1.0),
             )?;
         }
-        if let Some((reference, pictures)) = self.reference(work) {
-            done.run.judge(&done.films, &done.denoised, &reference)?;
+        if let Some((reference, pictures)) = self.context.reference(state) {
+            done.run.evaluate(&done.films, &done.denoised, &reference)?;
             done.run.reference_pictures = pictures;
         }
         // Pictures first: a run without them is measured again.
-        self.store.write_pictures(&key, &done.films)?;
-        self.store.write_pictures(&denoised(&key), &[done.denoised])?;
-        self.store.write(&key, &done.run)?;
-        work.runs[device][method].push((key, done.run));
+        self.context.store.write_pictures(&key, &done.films)?;
+        self.context.store.write_pictures(&denoised(&key), &[done.denoised])?;
+        self.context.store.write(&key, &done.run)?;
+        state.runs[device][method].push((key, done.run));
         if self.pages_written.is_none_or(|at| at.elapsed() > PAGES_EVERY) {
-            self.update(work)?;
+            self.update(state)?;
             self.write_pages()?;
         }
-        Ok(!self.is_cancelled())
+        Ok(!self.context.is_cancelled())
     }
 
-    /// Builds what a GPU needs for a method, if it did not keep it from the last run; `false` if it cannot do it.
-    fn make_ready(&self, work: &mut Work, device: usize, method: usize) -> bool {
-        if self.devices[device].gpu.is_none() {
+    /// Compiles a GPU's kernels for a method, unless they are cached; `false` if the GPU does not support it.
+    fn make_ready(&self, state: &mut RowState, device: usize, method: usize) -> bool {
+        if self.context.devices[device].gpu.is_none() {
             return true;
         }
-        let settings = &self.plan.methods[method].settings;
-        let place = work.prepared.place(self.plan, &self.devices[device], settings);
+        let settings = &self.context.plan.methods[method].settings;
+        let place =
+            state.prepared.place(self.context.plan, &self.context.devices[device], settings);
         let ready = place.warm_up(settings);
-        self.can(work, device, &ready)
+        self.accept(state, device, &ready)
     }
 
-    /// Notes why a device cannot do a row, if it cannot; whether it can.
-    fn can(&self, work: &mut Work, device: usize, outcome: &Result<()>) -> bool {
+    /// Whether `outcome` is a success; else stores the reason why the device cannot render the row.
+    fn accept(&self, state: &mut RowState, device: usize, outcome: &Result<()>) -> bool {
         if let Err(reason) = outcome {
-            (self.options.tell)(format!("{}: {reason}", work.prepared.title));
-            work.refusals[device] = Some(format!("not measured: {reason}"));
+            (self.context.options.tell)(format!("{}: {reason}", state.prepared.title));
+            state.refusals[device] = Some(format!("not measured: {reason}"));
         }
         outcome.is_ok()
     }
 
-    /// All pictures of a run, one a point, and the last one without noise, if they are still there.
-    fn pictures(&self, key: &str, run: &Run) -> Option<(Vec<Image>, Image)> {
-        let size = self.plan.effort.frame.size;
-        let films = self.store.read_pictures(key, size)?;
-        let denoised = self.last_picture(&denoised(key))?;
-        (films.len() == run.points.len()).then_some((films, denoised))
-    }
-
-    /// The last of the pictures kept under a name.
-    fn last_picture(&self, key: &str) -> Option<Image> {
-        self.store.read_pictures(key, self.plan.effort.frame.size)?.pop()
-    }
-
-    /// Forgets all runs, and for ever those that were judged by an older reference and have no pictures to be
-    /// judged by again; whether there was one.
-    fn forget_outdated(&self, work: &mut Work) -> bool {
-        let pictures = self.reference(work).and_then(|(_, pictures)| pictures);
+    /// Removes runs with errors against an older reference whose pictures are gone, and then clears all runs to be
+    /// read again; whether there was such a run.
+    fn remove_outdated(&self, state: &mut RowState) -> bool {
+        let pictures = self.context.reference(state).and_then(|(_, pictures)| pictures);
         let is_outdated = |(_, run): &&(String, Run)| run.reference_pictures != pictures;
-        let outdated: Vec<_> = work.runs.iter().flatten().flatten().filter(is_outdated).collect();
-        outdated.iter().for_each(|(key, _)| self.store.remove(key));
+        let outdated: Vec<_> = state.runs.iter().flatten().flatten().filter(is_outdated).collect();
+        outdated.iter().for_each(|(key, _)| self.context.store.remove(key));
         let is_one = !outdated.is_empty();
         if is_one {
-            work.runs.iter_mut().flatten().for_each(Vec::clear);
+            state.runs.iter_mut().flatten().for_each(Vec::clear);
         }
         is_one
     }
 
-    /// Keeps the last picture of each run, and what it is without noise of the first ones (of all for a given
-    /// reference, whose noise is judged by them).
-    fn forget_pictures(&self, work: &Work) {
-        for (key, run) in work.runs.iter().flatten().flatten() {
-            if run.seed > 0 && self.file_reference.is_none() {
-                self.store.remove_pictures(&denoised(key));
+    /// Removes all pictures but the last of each run. Denoised pictures are kept for the first runs, and for all
+    /// runs if the reference is given, whose noise they estimate.
+    fn remove_pictures(&self, state: &RowState) {
+        for (key, run) in state.runs.iter().flatten().flatten() {
+            if run.seed > 0 && self.context.file_reference.is_none() {
+                self.context.store.remove_pictures(&denoised(key));
             }
-            let films =
-                self.store.read_pictures(key, self.plan.effort.frame.size).unwrap_or_default();
+            let films = self
+                .context
+                .store
+                .read_pictures(key, self.context.plan.effort.frame.size)
+                .unwrap_or_default();
             if let [_, .., last] = films.as_slice() {
-                // A run with all its pictures is as good as one with the last of them.
-                let _ = self.store.write_pictures(key, std::slice::from_ref(last));
+                // A failure only leaves more pictures on the disk.
+                let _ = self.context.store.write_pictures(key, std::slice::from_ref(last));
             }
         }
     }
 
-    /// Brings the row's report up to date.
-    fn update(&mut self, work: &mut Work) -> Result<()> {
-        let plan = self.plan;
-        let reference = self.reference(work);
+    /// Updates the row's report.
+    fn update(&mut self, state: &mut RowState) -> Result<()> {
+        let plan = self.context.plan;
+        let reference = self.context.reference(state);
         let threads = self.report.machine.threads;
-        let reference_report = self.reference_report(work)?;
+        let reference_report = reference_report(&self.context, state)?;
         let mut pictures =
             Pictures { reference: reference.map(|(image, _)| image), runs: Vec::new() };
         let mut devices = Vec::new();
-        for (index, device) in self.devices.iter().enumerate() {
-            for (method, runs) in plan.methods.iter().zip(&work.runs[index]) {
-                if let Some(picture) = runs.first().and_then(|(key, _)| self.last_picture(key)) {
+        for (index, device) in self.context.devices.iter().enumerate() {
+            for (method, runs) in plan.methods.iter().zip(&state.runs[index]) {
+                if let Some(picture) =
+                    runs.first().and_then(|(key, _)| self.context.last_picture(key))
+                {
                     pictures.runs.push((device.device, method.name.clone(), picture));
                 }
             }
-            let runs = work.runs[index]
+            let runs = state.runs[index]
                 .iter()
                 .map(|runs| runs.iter().map(|(_, run)| run.clone()).collect())
                 .collect();
             devices.push(DeviceReport {
                 device: device.device,
                 name: device.name.clone(),
-                not_measured: work.refusals[index].clone(),
+                not_measured: state.refusals[index].clone(),
                 methods: summarise(plan, threads, runs),
             });
         }
@@ -320,61 +293,36 @@ impl Runner<'_> {
     }
 
     fn write_pages(&mut self) -> Result<()> {
-        super::pages::write(&self.report, self.store.root())?;
+        super::pages::write(&self.report, self.context.store.root())?;
         self.pages_written = Some(Instant::now());
         Ok(())
     }
 
-    /// Name of a run: readable, and a digest of all that it depends on.
-    fn key(&self, work: &Work, device: usize, method: &Method, seed: u32) -> String {
-        let device = &self.devices[device];
-        let digest = self.machine_digest.debug(&work.prepared.digest).debug(&(
-            &method.settings,
-            &device.name,
-            self.plan.effort.seconds,
-            seed,
-            self.file_digest,
-        ));
-        let readable = format!("{}-{}-{}", work.prepared.title, device.device.title(), method.name);
-        let readable: String = readable
-            .chars()
-            .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' })
-            .collect();
-        let tail = readable.len().saturating_sub(80);
-        format!("{}_{seed}_{digest}", &readable[tail..])
-    }
-
-    fn say_run(&self, work: &Work, device: usize, method: usize, seed: u32) {
-        let plan = self.plan;
-        let done: usize = work.runs.iter().flatten().map(Vec::len).sum();
+    fn say_run(&self, state: &RowState, device: usize, method: usize, seed: u32) {
+        let plan = self.context.plan;
+        let done: usize = state.runs.iter().flatten().map(Vec::len).sum();
         let all = plan.methods.len() * plan.effort.devices.len() * plan.effort.seeds as usize;
-        let reference = work
+        let reference = state
             .reference
             .as_ref()
             .map_or(0, |reference| reference.pictures_missing(plan.effort.reference_noise, 0.0));
-        let left = (all - done) as f64 + f64::from(reference) + super::plan::SHARE_RUNS;
-        self.say(
+        let left = (all - done) as f64 + f64::from(reference) + SHARE_RUNS;
+        self.context.say(
             &format!(
                 "{}: {} on {}, run {} of {}",
-                work.prepared.title,
+                state.prepared.title,
                 plan.methods[method].name,
-                self.devices[device].device.title(),
+                self.context.devices[device].device.title(),
                 seed + 1,
                 plan.effort.seeds
             ),
             left * plan.effort.seconds,
+            state.rows_after,
         );
-    }
-
-    /// Says what is done, with the time left: for this row as given, for later ones as expected.
-    fn say(&self, what: &str, row_seconds: f64) {
-        let later = self.plan.rows.len().saturating_sub(self.report.rows.len().max(1));
-        let left = row_seconds + later as f64 * self.plan.expected_row_seconds();
-        (self.options.progress)(format!("{what}, {} left", duration(left)));
     }
 }
 
-/// Refuses what can be seen to be wrong before hours of work.
+/// Refuses a plan whose errors are known before anything is measured.
 ///
 /// # Errors
 /// If a scene or map is neither built in nor a file, or a reference is given for several rows.
@@ -391,12 +339,7 @@ pub fn check(plan: &Plan) -> Result<()> {
     Ok(())
 }
 
-/// What runs that are judged by a given picture depend on.
+/// Digest of a given reference.
 fn digest_of(picture: &Image) -> Digest {
     Digest::new().bytes(bytemuck::cast_slice(picture.pixels.as_flattened()))
-}
-
-/// Under which name a run's last picture without noise is kept.
-fn denoised(key: &str) -> String {
-    format!("{key}_denoised")
 }

@@ -1,4 +1,4 @@
-//! Results on disk: one file a run, written beside and renamed, so that a report can be gone on with.
+//! Results on disk: a file for each run, written beside and renamed, so that a report can be resumed.
 
 use std::fs;
 use std::io::Write as _;
@@ -46,17 +46,17 @@ impl Store {
         self.root.join("runs").join(format!("{key}.{extension}"))
     }
 
-    /// What was kept under a name; `None` if there is nothing, or it is not whole.
+    /// The value stored under a name; `None` if it is missing or incomplete.
     pub(super) fn read<T: DeserializeOwned>(&self, key: &str) -> Option<T> {
         serde_json::from_slice(&fs::read(self.path(key, "json")).ok()?).ok()
     }
 
-    /// Keeps a value under a name.
+    /// Stores a value under a name.
     pub(super) fn write(&self, key: &str, value: &impl Serialize) -> Result<()> {
         write_json(&self.path(key, "json"), &to_value(value)?)
     }
 
-    /// The pictures kept under a name, all of one size.
+    /// The pictures stored under a name, all of one size.
     pub(super) fn read_pictures(&self, key: &str, size: (u32, u32)) -> Option<Vec<Image>> {
         let bytes = fs::read(self.path(key, "f32")).ok()?;
         let floats: Vec<f32> = bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
@@ -69,7 +69,7 @@ impl Store {
         Some(triples.chunks(pixels).map(picture).collect())
     }
 
-    /// Keeps pictures of one size under a name, as bare little-endian floats.
+    /// Stores pictures of one size under a name, as little-endian floats without a header.
     pub(super) fn write_pictures(&self, key: &str, pictures: &[Image]) -> Result<()> {
         write_beside_and_rename(&self.path(key, "f32"), |file| {
             pictures
@@ -79,15 +79,15 @@ impl Store {
         })
     }
 
-    /// Forgets what is kept under a name.
+    /// Removes the value and the pictures of a name.
     pub(super) fn remove(&self, key: &str) {
-        // What is still there is measured again all the same, and written over.
+        // A file that cannot be removed is overwritten by the next measurement.
         let _ = fs::remove_file(self.path(key, "json"));
     }
 
-    /// Forgets the pictures kept under a name.
+    /// Removes the pictures of a name.
     pub(super) fn remove_pictures(&self, key: &str) {
-        // Nothing depends on it: it only frees the disk.
+        // A failure only leaves a file on the disk.
         let _ = fs::remove_file(self.path(key, "f32"));
     }
 }

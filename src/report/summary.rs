@@ -1,4 +1,4 @@
-//! What all runs of a row say together.
+//! Summaries of all runs of a row: the report's data.
 
 use serde::Serialize;
 
@@ -15,7 +15,7 @@ use crate::metrics::Comparison;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Measure {
-    /// The one that speed-ups are told by.
+    /// Relative MSE without the worst 0.1 % of the pixels: speed-ups are computed from it.
     TrimmedRelMse,
     /// Relative mean squared error.
     RelMse,
@@ -28,11 +28,11 @@ pub enum Measure {
 }
 
 impl Measure {
-    /// All of them, the most telling first.
+    /// All of them, the one of speed-ups first.
     pub const ALL: [Self; 5] =
         [Self::TrimmedRelMse, Self::RelMse, Self::Mse, Self::Blocks, Self::Flip];
 
-    /// In words.
+    /// Its name on the page.
     pub fn title(self) -> &'static str {
         match self {
             Self::TrimmedRelMse => "trimmed relMSE",
@@ -43,7 +43,7 @@ impl Measure {
         }
     }
 
-    /// The value.
+    /// Its value in a comparison.
     pub fn of(self, errors: &Comparison) -> f64 {
         match self {
             Self::TrimmedRelMse => errors.trimmed_rel_mse,
@@ -59,9 +59,9 @@ impl Measure {
 /// A whole report so far.
 #[derive(Debug, Serialize)]
 pub struct Report {
-    /// What was asked for.
+    /// The plan.
     pub plan: Plan,
-    /// Where.
+    /// The machine.
     pub machine: super::machine::Machine,
     /// Rows in order, as far as they are begun.
     pub rows: Vec<RowReport>,
@@ -72,21 +72,21 @@ pub struct Report {
 /// One scene under one map.
 #[derive(Debug, Serialize)]
 pub struct RowReport {
-    /// What it is.
+    /// Scene and map.
     pub row: Row,
-    /// What was said while loading.
+    /// Notices of loading.
     pub notices: Vec<String>,
     /// Triangles of the scene.
     pub triangles: usize,
     /// Columns and rows of the map.
     pub map_size: (u32, u32),
-    /// What errors were taken against.
+    /// The reference that errors were computed against.
     pub reference: Option<ReferenceReport>,
-    /// One entry a device.
+    /// An entry for each device.
     pub devices: Vec<DeviceReport>,
-    /// Where the error is left.
+    /// Sources of the remaining error, by method.
     pub shares: Vec<Shares>,
-    /// How far what methods converge to is from the reference.
+    /// Biases of the methods.
     pub biases: Vec<Bias>,
     /// The reference and, by device and method, pictures of the first seed at the end.
     #[serde(skip)]
@@ -113,27 +113,27 @@ pub struct ReferenceReport {
     pub noise: Option<Noise>,
     /// That noise over the smallest mean error, both as trimmed relMSE.
     pub share: Option<f64>,
-    /// Whether that is as little as was asked for.
+    /// Whether that is at most the share that was asked for.
     pub is_good: bool,
 }
 
 /// A row on one device.
 #[derive(Debug, Serialize)]
 pub struct DeviceReport {
-    /// Which.
+    /// The device.
     pub device: Device,
     /// Processor or adapter.
     pub name: String,
     /// Why there are no figures.
     pub not_measured: Option<String>,
-    /// One entry a method.
+    /// An entry for each method.
     pub methods: Vec<MethodReport>,
 }
 
 /// A method on a row and device.
 #[derive(Debug, Serialize)]
 pub struct MethodReport {
-    /// What it is.
+    /// The method.
     pub method: Method,
     /// At the end, mean over runs with its standard error, by measure.
     pub errors: Vec<(Measure, Estimate)>,
@@ -145,11 +145,11 @@ pub struct MethodReport {
     pub slopes: Vec<(Measure, Estimate)>,
     /// Against each baseline of the plan, by measure.
     pub speed_ups: Vec<(String, Measure, SpeedUp)>,
-    /// Ratio of error times rendering time against the first baseline: learning and tables for free.
+    /// Ratio of error times rendering time over the first baseline, without the time of learning and tables.
     pub without_learning: Option<f64>,
-    /// Where the time went.
+    /// Durations and counts.
     pub costs: Costs,
-    /// What it held, at most.
+    /// Maximum memory over the runs.
     pub memory: Memory,
     /// Every run.
     pub runs: Vec<Run>,
@@ -162,7 +162,7 @@ pub struct Costs {
     pub learn_seconds: f64,
     /// Seconds of building the map's table and the distributions.
     pub table_seconds: f64,
-    /// Seconds of rendering that went into rays; unknown on a GPU.
+    /// Seconds of rendering spent on ray casts; unknown on a GPU.
     pub ray_seconds: Option<f64>,
     /// Seconds of rendering.
     pub render_seconds: f64,
@@ -291,7 +291,7 @@ impl DeviceReport {
     }
 }
 
-/// Curves of error against time, of the runs that have been judged.
+/// Curves of error against time, of the runs whose errors are known.
 pub(super) fn curves(runs: &[Run], measure: Measure) -> Vec<Curve> {
     let error = |run: &Run| {
         let point = |p: &Point| Some((p.seconds, measure.of(&p.errors?)));
@@ -341,7 +341,7 @@ pub(super) fn summarise(plan: &Plan, threads: usize, runs: Vec<Vec<Run>>) -> Vec
             speed_ups,
             without_learning: efficiencies[plan.baselines[0]].zip(efficiency).map(|(b, a)| b / a),
             costs: costs(&runs, threads),
-            memory: most_memory(&runs),
+            memory: max_memory(&runs),
             runs,
         })
         .collect()
@@ -352,8 +352,8 @@ fn estimate(runs: &[Run], value: impl Fn(&Run) -> Option<f64>) -> Option<Estimat
     (!values.is_empty()).then(|| Estimate::of(&values)).flatten()
 }
 
-/// Points before the error has settled into a power law do not count: from this share of the
-/// rendering time on, and this many samples.
+/// A slope is fitted to the points from this share of the rendering time and this many samples on, where the
+/// error follows a power law.
 const SLOPE_FROM: (f64, u32) = (1.0 / 16.0, 4);
 
 fn slope(run: &Run, measure: Measure) -> Option<f64> {
@@ -394,7 +394,7 @@ fn costs(runs: &[Run], threads: usize) -> Costs {
     }
 }
 
-fn most_memory(runs: &[Run]) -> Memory {
+fn max_memory(runs: &[Run]) -> Memory {
     runs.iter().fold(Memory::default(), |most, run| Memory {
         table_bytes: most.table_bytes.max(run.memory.table_bytes),
         bvh_bytes: most.bvh_bytes.max(run.memory.bvh_bytes),

@@ -1,9 +1,9 @@
-//! The talk's table of speed-ups, and two rows beside it.
+//! The plan of the talk's table of speed-ups, with two more rows.
 
 use super::plan::{Effort, Method, Plan, Row, Settings};
 use crate::render::{Gi, Sampling, Sharing};
 
-/// Title, scene, map, the talk's speed-up on CPU and GPU, and the one `adaptive` is to reach.
+/// Title, scene, map, the talk's speed-up on CPU and GPU, and the target for `adaptive`.
 type Entry = (&'static str, &'static str, &'static str, Option<[f64; 2]>, Option<f64>);
 
 const ROWS: [Entry; 9] = [
@@ -32,7 +32,7 @@ pub fn plan(effort: Effort, command: String) -> Plan {
     let modes = || [Sampling::Plain, Sampling::Talk, Sampling::Adaptive].map(Method::of);
     let mut methods = modes().to_vec();
     let mut baselines = vec![0];
-    // Where light meets one surface only, there is nothing to share nor to remember.
+    // With a single bounce there are no second vertices to share or to cache.
     if effort.frame.bounces > 1 {
         let settings = Settings { sharing: Sharing::Off, ..Settings::of(Sampling::Adaptive) };
         methods.push(Method { name: "own paths".to_owned(), group: None, settings });
