@@ -43,8 +43,8 @@ fn count_weight(counter: u32, weight: f32) {
 }
 
 //#if RECORD_RATIO
-// What a try counts whose light is not held up: a power of what the surface or the phase function
-// makes of its direction.
+// What a try counts whose light is not held up: one, or what the surface or the phase function makes of
+// its direction.
 fn visibility_share(vertex: Vertex, direction: vec3f, own_pdf: f32) -> f32 {
     var share = abs(dot(vertex.point.shading_frame.z, direction));
 //#if MEDIUM
@@ -55,11 +55,7 @@ fn visibility_share(vertex: Vertex, direction: vec3f, own_pdf: f32) -> f32 {
 //#if RECORD_COSINE
     return share;
 //#else
-//#if RECORD_SQUARED_COSINE
-    return share * share;
-//#else
     return 1.0;
-//#end
 //#end
 }
 

@@ -161,25 +161,16 @@ fn inverse_energy(tile: u32) -> f32 {
     return tables(ROWS_AT + patch_grid().y + tile).x;
 }
 
-// Density of `sample_in_tile`, given the tile, where a patch with these corners shows this radiance.
-fn tile_density(tile: u32, at: vec2u, corners: Corners, radiance: vec3f) -> f32 {
-    let here = map_importance(radiance);
-//#if SUMMED_AREA
-    let sum = map_importance(corners.upper_left) + map_importance(corners.upper_right)
-        + map_importance(corners.lower_left) + map_importance(corners.lower_right);
-    let energy = patch_energy(sum, at.y);
-    return select(0.0, patch_probability(tile, at) * (here / energy), energy > 0.0);
-//#else
-    return here * inverse_energy(tile);
-//#end
+// Density of `sample_in_tile`, given the tile, where it shows this radiance.
+fn tile_density(tile: u32, radiance: vec3f) -> f32 {
+    return map_importance(radiance) * inverse_energy(tile);
 }
 
 fn radiance_and_tile_pdf(direction: vec3f) -> RadianceAndTilePdf {
     let point = map_point(direction);
     let tile = tile_of_patch(point.at);
-    let corners = corners_of(point.at);
-    let radiance = interpolated(corners, point.within);
-    let pdf = tile_density(tile, point.at, corners, radiance);
+    let radiance = interpolated(corners_of(point.at), point.within);
+    let pdf = tile_density(tile, radiance);
     return RadianceAndTilePdf(scaled_radiance(radiance), tile, pdf);
 }
 
@@ -212,14 +203,10 @@ fn sample_in_tile(tile: u32, u: vec2u) -> EnvironmentSample {
     let across = sample_linear(a + down * (c - a), b + down * (d - b), chosen.within.x);
     let radiance = interpolated(corners, vec2f(across, down));
     result.radiance = scaled_radiance(radiance);
-    result.pdf_solid_angle = tile_density(tile, chosen.at, corners, radiance);
+    result.pdf_solid_angle = tile_density(tile, radiance);
     let row = patch_row(chosen.at.y);
-//#if SUMMED_AREA
-    result.weight = 1.0;
-//#else
     let energy = patch_energy(a + b + c + d, chosen.at.y);
     result.weight = energy * inverse_energy(tile) / chosen.probability;
-//#end
 
     let x = f32(chosen.at.x) + across - MAP_SHIFT;
     let world_turns = x / f32(globals.map_width) + globals.rotation_turns - 0.5;

@@ -8,23 +8,14 @@ struct Sampler {
 
 fn sampler_new(seed: u32, pixel: u32, index: u32) -> Sampler {
     let pixel_seed = hash(hash(pixel) + hash(seed));
-//#if INDEPENDENT_POINTS
-    return Sampler(0u, hash(pixel_seed ^ index), 0u);
-//#else
     return Sampler(reverseBits(index), pixel_seed, 0u);
-//#end
 }
 
 // The stream of one of `count` estimates that the sample makes of the same thing.
 fn sampler_of_estimate(sampler: Sampler, count: u32, estimate: u32) -> Sampler {
     let pair = sampler.pair + (count - 1u) * PAIRS_OF_ESTIMATES;
-//#if INDEPENDENT_POINTS
-    let seed = select(sampler.pixel_seed, hash(sampler.pixel_seed ^ estimate), count > 1u);
-    return Sampler(0u, seed, pair);
-//#else
     let index = reverseBits(sampler.reversed_index) * count + estimate;
     return Sampler(reverseBits(index), sampler.pixel_seed, pair);
-//#end
 }
 
 fn next_pair_bits(sampler: ptr<function, Sampler>) -> vec2u {

@@ -21,7 +21,6 @@ mod tile_local;
 mod tiles;
 mod weights;
 
-use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
@@ -324,9 +323,9 @@ impl Environment {
         &self.map
     }
 
-    /// The table's words, part after part, for a GPU; summed-area tables have one part.
-    pub(crate) fn table_words(&self) -> Vec<Cow<'_, [u32]>> {
-        self.table.words()
+    /// The table's sums along the rows of tiles, and down the tiles; `None` of a summed-area table.
+    pub(crate) fn tile_sums(&self) -> Option<[&[u32]; 2]> {
+        self.table.tile_sums()
     }
 
     /// Which table.

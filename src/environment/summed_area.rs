@@ -146,24 +146,6 @@ impl SummedArea {
         }
     }
 
-    /// The corners as 32-bit words; f64 ones as shares of the last one, each of two f32 that add up to it to 48
-    /// bits, the larger one first.
-    pub(crate) fn words(&self) -> Vec<u32> {
-        match &self.corners {
-            Corners::U32(corners) => corners.clone(),
-            Corners::F32(corners) => corners.iter().map(|corner| corner.to_bits()).collect(),
-            Corners::F64(corners) => {
-                let total = corners.last().copied().unwrap_or_default();
-                let halves = |corner: &f64| {
-                    let share = if total > 0.0 { corner / total } else { 0.0 };
-                    let high = share as f32;
-                    [high.to_bits(), ((share - f64::from(high)) as f32).to_bits()]
-                };
-                corners.iter().flat_map(halves).collect()
-            }
-        }
-    }
-
     /// Bytes of the table.
     pub(crate) fn memory_bytes(&self) -> usize {
         match &self.corners {

@@ -1,6 +1,5 @@
 //! The choice of importance table behind one face.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::DVec2;
@@ -66,7 +65,7 @@ impl Table {
         match (self, search) {
             (Self::TileLocal(table), Search::TileLocal(search)) => Some(table.finish(search)),
             (Self::SummedArea(table), Search::SummedArea(u)) => {
-                // As many bits as a GPU has for it.
+                // 48 bits of each.
                 let [x, y] = u.map(|u| (u >> 16) as f64 * (1.0 / (1_u64 << 48) as f64));
                 table.sample(grid.patches(tile), DVec2::new(x, y))
             }
@@ -90,11 +89,11 @@ impl Table {
         }
     }
 
-    /// The sums as 32-bit words, part after part.
-    pub(crate) fn words(&self) -> Vec<Cow<'_, [u32]>> {
+    /// Sums along the rows of tiles, and down the tiles; `None` of a summed-area table.
+    pub(crate) fn tile_sums(&self) -> Option<[&[u32]; 2]> {
         match self {
-            Self::TileLocal(table) => table.sums().map(Cow::Borrowed).into(),
-            Self::SummedArea(table) => vec![Cow::Owned(table.words())],
+            Self::TileLocal(table) => Some(table.sums()),
+            Self::SummedArea(_) => None,
         }
     }
 

@@ -1,6 +1,6 @@
 //! Every default of the code beside the alternatives that it was chosen over.
 
-use super::plan::{Effort, Method, Plan, Row, Settings};
+use super::plan::{Device, Effort, Method, Plan, Row, Settings};
 use crate::environment::TableKind;
 use crate::light_grid::{DistributionOptions, Recording, RenderedPaths};
 use crate::render::{Gi, Sampling, Sharing};
@@ -16,7 +16,7 @@ const ROWS: [(&str, &str); 5] = [
 ];
 
 /// The plan, for these scenes and maps, of the methods whose group or name contains one of `only`;
-/// `plain` and `adaptive` are always there.
+/// `plain` and `adaptive` are always there. What only the CPU can do is left out where a GPU is measured, too.
 pub fn plan(rows: Vec<Row>, only: &[String], effort: Effort, command: String) -> Plan {
     let rows =
         if rows.is_empty() { ROWS.map(|(scene, map)| Row::new(scene, map)).to_vec() } else { rows };
@@ -24,7 +24,9 @@ pub fn plan(rows: Vec<Row>, only: &[String], effort: Effort, command: String) ->
         let group = method.group.unwrap_or_default();
         let is_in =
             |word: &String| group.contains(word.as_str()) || method.name.contains(word.as_str());
-        only.is_empty() || only.iter().any(is_in)
+        let can_be_measured =
+            is_on_gpus(&method.settings) || !effort.devices.contains(&Device::Gpu);
+        can_be_measured && (only.is_empty() || only.iter().any(is_in))
     };
     let mut methods = [Sampling::Plain, Sampling::Adaptive].map(Method::of).to_vec();
     methods.extend(variants().into_iter().filter(is_asked));
@@ -44,6 +46,13 @@ pub fn plan(rows: Vec<Row>, only: &[String], effort: Effort, command: String) ->
         reference: None,
         command,
     }
+}
+
+/// Whether GPUs have it: what is only measured is left to the CPU.
+fn is_on_gpus(settings: &Settings) -> bool {
+    settings.table == TableKind::TileLocal
+        && settings.points == Points::Sobol
+        && settings.distributions.recording != Recording::VisibleCosineSquared
 }
 
 /// Groups of the variants, in order.

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 use lightgrid::environment::{Environment, EnvironmentOptions, TableKind, sky};
+use lightgrid::light_grid::Recording;
 use lightgrid::path::{Background, PathLimits, World, WorldBuilder, framing};
 use lightgrid::render::film::{Film, Pixel};
 use lightgrid::render::filter::PixelFilter;
@@ -131,19 +132,25 @@ fn every_built_in_scene_looks_the_same_in_every_mode() {
 }
 
 #[test]
-fn every_table_draws_the_same_picture() {
+fn what_is_only_measured_is_for_the_cpu_alone() {
     let Some(gpu) = gpu() else { return };
     let world = World::new(builtin::build("crack").expect("built in"));
-    for table in [TableKind::U32, TableKind::F32, TableKind::F64] {
-        let options = EnvironmentOptions {
-            table,
-            rotation_radians: 0.7,
-            intensity: 2.0,
-            ..Default::default()
-        };
-        let map = sky::build("sunset", 128, 64).expect("a sky");
-        let environment = Environment::new(map, &options).expect("a sound map");
-        compare(&gpu, &table.to_string(), &world, &environment, Sampling::Plain);
+    let map = sky::build("sunset", 128, 64).expect("a sky");
+    let options = EnvironmentOptions { table: TableKind::F32, ..Default::default() };
+    let summed = Environment::new(map, &options).expect("a sound map");
+    let refused = UploadedScene::new(&gpu, &world, &summed).err().expect("it is refused");
+    assert_eq!(refused.to_string(), "a summed-area table (f32) is for the CPU alone");
+    let environment = sky_map("sunset");
+    let uploaded = UploadedScene::new(&gpu, &world, &environment).expect("it fits");
+    let view = View::new(world.scene.cameras[0].clone(), [16, 9]);
+    let mut squared = view.clone();
+    squared.distributions.recording = Recording::VisibleCosineSquared;
+    for (view, sentence) in [
+        (View { points: Points::Independent, ..view }, "independent points are for the CPU alone"),
+        (squared, "learning by the squared cosine is for the CPU alone"),
+    ] {
+        let refused = Session::on_gpu(&world, &environment, view, &uploaded).err();
+        assert_eq!(refused.expect("it is refused").to_string(), sentence);
     }
 }
 
@@ -382,20 +389,6 @@ fn instances_look_the_same() {
         assert!(share < 0.1, "{sharing:?}, {gi:?}: {share}");
         expect_same_mean(&gpu, &format!("{sharing:?}, {gi:?}"), &gpu_film, &same);
     }
-}
-
-#[test]
-fn independent_points_are_the_same() {
-    let Some(gpu) = gpu() else { return };
-    let world = World::new(builtin::build("open").expect("built in"));
-    let environment = sky_map("overcast");
-    let points = Points::Independent;
-    let view = View { points, ..picture(&world, Sampling::Plain) };
-    let gpu_film = finish(on_gpu(&world, &environment, view.clone(), &gpu), 8);
-    let cpu_film = render(&world, &environment, view.clone(), 8);
-    assert!(differing(&cpu_film, &gpu_film) < 0.05);
-    let even = render(&world, &environment, View { points: Points::Sobol, ..view }, 8);
-    assert!(differing(&even, &gpu_film) > 0.5, "they are other points");
 }
 
 #[test]

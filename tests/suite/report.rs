@@ -37,9 +37,17 @@ fn every_ablation_is_a_change_with_a_name_of_its_own() {
             assert_ne!(method.settings, other.settings, "{} and {}", method.name, other.name);
         }
     }
-    let some = ablations::plan(Vec::new(), &["tiles".to_owned()], effort(), String::new());
-    let names: Vec<&str> = some.methods.iter().map(|m| m.name.as_str()).collect();
-    assert_eq!(names, ["plain", "adaptive", "8x4 tiles", "32x16 tiles", "64x32 tiles"]);
+    let names = |word: &str, devices: &[Device]| -> Vec<String> {
+        let effort = Effort { devices: devices.to_vec(), ..effort() };
+        let some = ablations::plan(Vec::new(), &[word.to_owned()], effort, String::new());
+        some.methods.into_iter().map(|m| m.name).collect()
+    };
+    let both = [Device::Cpu, Device::Gpu];
+    let tiles = ["plain", "adaptive", "8x4 tiles", "32x16 tiles", "64x32 tiles"];
+    assert_eq!(names("tiles", &both), tiles);
+    let tables = ["plain", "adaptive", "table u32", "table f32", "table f64"];
+    assert_eq!(names("table", &both[..1]), tables);
+    assert_eq!(names("table", &both), tables[..2], "a GPU has no others");
 }
 
 #[test]

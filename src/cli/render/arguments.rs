@@ -136,7 +136,7 @@ pub(in crate::cli) struct RenderArguments {
         help_heading = "Light"
     )]
     pub(super) gi: Gi,
-    /// Importance table of the map.
+    /// Importance table of the map; all but tile-local are for the CPU alone.
     #[arg(
         long,
         default_value = "tile-local",

@@ -5,7 +5,8 @@ use super::super::filter::PixelFilter;
 use super::super::{Gi, Sampling, View};
 use super::kernel::Kernel;
 use super::shader::Constants;
-use crate::environment::{Environment, TableKind};
+use crate::environment::Environment;
+use crate::error::{Error, Result};
 use crate::light_grid::Recording;
 use crate::path::{Background, World};
 use crate::sampler::Points;
@@ -19,42 +20,32 @@ bitflags::bitflags! {
         const BACKGROUND_BLUR = 1 << 0;
         /// The camera sees a colour in place of the map.
         const BACKGROUND_COLOR = 1 << 1;
-        /// Random points in place of Sobol's.
-        const INDEPENDENT_POINTS = 1 << 2;
         /// Albedo, normal and depth are kept.
-        const LAYERS = 1 << 3;
+        const LAYERS = 1 << 2;
         /// A lens that is no pinhole.
-        const LENS = 1 << 4;
+        const LENS = 1 << 3;
         /// Something scatters between surfaces or in solids.
-        const MEDIUM = 1 << 5;
+        const MEDIUM = 1 << 4;
         /// Paths end in the radiance cache, or train it.
-        const RADIANCE_CACHE = 1 << 6;
+        const RADIANCE_CACHE = 1 << 5;
         /// A pixel filter wider than a box.
-        const WIDE_FILTER = 1 << 7;
+        const WIDE_FILTER = 1 << 6;
         /// Lights to be sampled that are not the map.
-        const LOCAL_LIGHTS = 1 << 8;
+        const LOCAL_LIGHTS = 1 << 7;
         /// A map that is not black.
-        const MAP = 1 << 9;
+        const MAP = 1 << 8;
         /// The map is sampled.
-        const MAP_SAMPLING = 1 << 10;
-        /// A summed-area table of `f32`.
-        const TABLE_F32 = 1 << 11;
-        /// One of `f64`.
-        const TABLE_F64 = 1 << 12;
-        /// One of rounded `u32`.
-        const TABLE_U32 = 1 << 13;
+        const MAP_SAMPLING = 1 << 9;
         /// Tiles are chosen by the cell.
-        const LIGHT_GRID = 1 << 14;
+        const LIGHT_GRID = 1 << 10;
         /// Cells tell which way a surface faces.
-        const FACES = 1 << 15;
+        const FACES = 1 << 11;
         /// It is counted what samples of the map see.
-        const COUNTING = 1 << 16;
+        const COUNTING = 1 << 12;
         /// Counters hold a share of what was tried.
-        const RECORD_RATIO = 1 << 17;
+        const RECORD_RATIO = 1 << 13;
         /// The share is weighted by the cosine.
-        const RECORD_COSINE = 1 << 18;
-        /// By its square.
-        const RECORD_SQUARED_COSINE = 1 << 19;
+        const RECORD_COSINE = 1 << 14;
     }
 }
 
@@ -91,8 +82,24 @@ pub(crate) struct Features {
 const NOT_ASKED_FOR: [&str; 5] =
     ["ABSORPTION", "ALPHA_BLEND", "FOG", "SCATTERING_SOLIDS", "THIN_TRANSMISSION"];
 
+/// Refuses what is only measured, and has no kernels.
+///
+/// # Errors
+/// If the view asks for it.
+pub(super) fn check(view: &View) -> Result<()> {
+    let recording = view.distribution_options().map(|options| options.recording);
+    let what = match (view.points, recording) {
+        (Points::Independent, _) => "independent points are",
+        (_, Some(Recording::VisibleCosineSquared)) => "learning by the squared cosine is",
+        _ => return Ok(()),
+    };
+    Err(Error::new(format!("{what} for the CPU alone")))
+}
+
+type Condition = fn(&Features) -> bool;
+
 /// What follows from the others, by name.
-const DERIVED: [(&str, fn(&Features) -> bool); 12] = {
+const DERIVED: [(&str, Condition); 11] = {
     use {SceneFeatures as S, ViewFeatures as V};
     [
         // Some hits of closest-hit rays do not count.
@@ -106,7 +113,6 @@ const DERIVED: [(&str, fn(&Features) -> bool); 12] = {
         ("SHADOW_MEDIA", |f| f.view.contains(V::MEDIUM) || f.scene.contains(S::SOLID_TRANSMISSION)),
         ("SHADOW_RAYS", Features::shadow_rays),
         ("SOFTWARE_WALK", Features::software_walk),
-        ("SUMMED_AREA", Features::summed_area),
         ("TANGENTS", Features::tangents),
         ("TRANSMISSION", Features::transmission),
         // Textures that few materials have.
@@ -117,10 +123,6 @@ const DERIVED: [(&str, fn(&Features) -> bool); 12] = {
 };
 
 impl Features {
-    /// Tables that are not the default.
-    pub(super) const TABLES: ViewFeatures =
-        ViewFeatures::TABLE_F32.union(ViewFeatures::TABLE_F64).union(ViewFeatures::TABLE_U32);
-
     /// What a scene needs: its materials and lights.
     pub(crate) fn of_world(world: &World) -> Self {
         let mut scene = world.needs.features;
@@ -137,8 +139,6 @@ impl Features {
         let samples_map = view.sampling != Sampling::Bsdf && !environment.is_black();
         let options = view.distribution_options();
         let recording = options.map(|options| options.recording);
-        let cosine_power = recording.map_or(0, Recording::cosine_power);
-        let table = environment.table_kind();
         let has_scattering_solids = world.needs.has(SceneFeatures::SCATTERING_SOLIDS);
         let mut features = Self::of_world(world);
         for (feature, is_needed) in [
@@ -146,7 +146,6 @@ impl Features {
             (ViewFeatures::BACKGROUND_COLOR, matches!(view.background, Background::Color(_))),
             (ViewFeatures::COUNTING, samples_map && options.is_some_and(|o| o.goes_on())),
             (ViewFeatures::FACES, options.is_some_and(|options| options.faces)),
-            (ViewFeatures::INDEPENDENT_POINTS, view.points == Points::Independent),
             (ViewFeatures::LAYERS, view.layers),
             (ViewFeatures::LENS, view.camera.lens_radius > 0.0),
             (ViewFeatures::LIGHT_GRID, samples_map && recording.is_some()),
@@ -154,12 +153,11 @@ impl Features {
             (ViewFeatures::MAP_SAMPLING, samples_map),
             (ViewFeatures::MEDIUM, has_scattering_solids || view.fog(world).is_some()),
             (ViewFeatures::RADIANCE_CACHE, view.gi == Gi::Cached),
-            (ViewFeatures::RECORD_COSINE, cosine_power == 1),
+            (
+                ViewFeatures::RECORD_COSINE,
+                recording.is_some_and(|recording| recording.cosine_power() == 1),
+            ),
             (ViewFeatures::RECORD_RATIO, recording.is_some_and(Recording::is_ratio)),
-            (ViewFeatures::RECORD_SQUARED_COSINE, cosine_power == 2),
-            (ViewFeatures::TABLE_F32, table == TableKind::F32),
-            (ViewFeatures::TABLE_F64, table == TableKind::F64),
-            (ViewFeatures::TABLE_U32, table == TableKind::U32),
             (ViewFeatures::WIDE_FILTER, view.filter != PixelFilter::Box),
         ] {
             features.view.set(feature, is_needed);
@@ -183,10 +181,9 @@ impl Features {
         features
     }
 
-    /// Everything that a kernel asks for at once, with the table that is used by default. How deep the
-    /// tree is, its stack's size says.
+    /// Everything that a kernel asks for at once. How deep the tree is, its stack's size says.
     pub(crate) fn most() -> Self {
-        let view = ViewFeatures::all() - Self::TABLES - ViewFeatures::RADIANCE_CACHE;
+        let view = ViewFeatures::all() - ViewFeatures::RADIANCE_CACHE;
         Self { scene: SceneFeatures::all(), view, kernel: KernelFeatures::empty() }
     }
 
@@ -211,7 +208,7 @@ impl Features {
             self.kernel.set(feature, is_needed);
         }
         if kernel.begins_anywhere() {
-            self.view -= ViewFeatures::LAYERS | ViewFeatures::INDEPENDENT_POINTS;
+            self.view -= ViewFeatures::LAYERS;
             self.view.set(ViewFeatures::COUNTING, kernel == Kernel::Learn);
         } else if kernel.casts() {
             self.view -= ViewFeatures::COUNTING | ViewFeatures::LAYERS;
@@ -257,11 +254,6 @@ impl Features {
     /// A kernel walks the tree.
     pub(super) fn software_walk(&self) -> bool {
         !self.kernel.contains(KernelFeatures::HARDWARE_RAYS)
-    }
-
-    /// A summed-area table, whatever its numbers.
-    pub(super) fn summed_area(&self) -> bool {
-        self.view.intersects(Self::TABLES)
     }
 
     /// Tangents of vertices.

@@ -101,7 +101,7 @@ impl Renderer {
 pub(super) mod tests {
     use super::*;
     use crate::light_grid::cells::SphericalGrid;
-    use crate::light_grid::{DistributionOptions, LightGrid, Recording};
+    use crate::light_grid::{DistributionOptions, LightGrid};
     use crate::path::PathTracer;
     use crate::path::camera::CameraRays;
     use crate::radiance_cache::RadianceCache;
@@ -185,12 +185,7 @@ pub(super) mod tests {
     #[test]
     fn both_devices_learn_the_same_counters() {
         let Some(gpu) = Gpu::for_test() else { return };
-        let squared = DistributionOptions {
-            faces: false,
-            recording: Recording::VisibleCosineSquared,
-            ..DistributionOptions::ADAPTIVE
-        };
-        for recording in [DistributionOptions::ADAPTIVE, DistributionOptions::TALK, squared] {
+        for recording in [DistributionOptions::ADAPTIVE, DistributionOptions::TALK] {
             let (cpu_visits, cpu_blocks, cpu_rays) = learn(None, recording);
             let (gpu_visits, gpu_blocks, gpu_rays) = learn(Some(&gpu), recording);
             assert_eq!(cpu_blocks.len(), gpu_blocks.len(), "the same cells have counters");

@@ -225,6 +225,7 @@ impl Renderer {
         rays: &CameraRays,
         film: Option<&Film>,
     ) -> Result<Self> {
+        features::check(view)?;
         let mut features = Features::of(world, environment, view);
         if uploaded.gpu.has_hardware_rays() {
             features = features.with_hardware_rays();

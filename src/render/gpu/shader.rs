@@ -338,7 +338,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 65] {
+fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 64] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -376,8 +376,7 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 65] {
         (wgsl!("bsdf"), true),
         (wgsl!("light_grid"), true),
         (wgsl!("environment"), true),
-        (wgsl!("tile_local"), samples_map && !features.summed_area()),
-        (wgsl!("summed_area"), samples_map && features.summed_area()),
+        (wgsl!("tile_local"), samples_map),
         (wgsl!("draw"), features.scene_lights()),
         (wgsl!("light_tree"), features.scene_lights()),
         (wgsl!("lights"), features.scene_lights()),
@@ -556,17 +555,14 @@ mod tests {
         let mut found = BTreeSet::new();
         let all = [Kernel::Render, Kernel::Learn, Kernel::Train, Kernel::Trace].into_iter();
         for kernel in all.chain(Kernel::OF_SHARING) {
-            for table in [ViewFeatures::empty(), ViewFeatures::TABLE_U32] {
-                let features = reachable(|_| true, table);
-                let constants =
-                    Constants { stack_size: 20, shared_stack_size: 10, ..Constants::default() };
-                let source =
-                    Program::new(kernel, features, &constants, &ArrayPlaces::default()).source;
-                let module = naga::front::wgsl::parse_str(&source).expect("it is valid");
-                let entries = module.entry_points.iter().map(|entry| &entry.function);
-                for function in module.functions.iter().map(|(_, f)| f).chain(entries) {
-                    found.extend(integer_divisions(&module, function, &source));
-                }
+            let features = reachable(|_| true);
+            let constants =
+                Constants { stack_size: 20, shared_stack_size: 10, ..Constants::default() };
+            let source = Program::new(kernel, features, &constants, &ArrayPlaces::default()).source;
+            let module = naga::front::wgsl::parse_str(&source).expect("it is valid");
+            let entries = module.entry_points.iter().map(|entry| &entry.function);
+            for function in module.functions.iter().map(|(_, f)| f).chain(entries) {
+                found.extend(integer_divisions(&module, function, &source));
             }
         }
         assert_eq!(found.iter().map(String::as_str).collect::<Vec<_>>(), DIVISIONS);
@@ -614,13 +610,13 @@ mod tests {
     fn independent() -> Vec<Features> {
         let none = Features::default();
         let scene = SceneFeatures::all().iter().map(|scene| Features { scene, ..none });
-        let view = (ViewFeatures::all() - Features::TABLES).iter();
-        scene.chain(view.map(|view| Features { view, ..none })).collect()
+        let view = ViewFeatures::all().iter().map(|view| Features { view, ..none });
+        scene.chain(view).collect()
     }
 
     /// What reachable pictures have: no map to sample without a map, no grid without sampling it.
-    fn reachable(on: impl Fn(usize) -> bool, table: ViewFeatures) -> Features {
-        let (mut scene, mut view) = (SceneFeatures::empty(), table);
+    fn reachable(on: impl Fn(usize) -> bool) -> Features {
+        let (mut scene, mut view) = (SceneFeatures::empty(), ViewFeatures::empty());
         for (_, feature) in independent().into_iter().enumerate().filter(|(i, _)| on(*i)) {
             scene |= feature.scene;
             view |= feature.view;
@@ -654,18 +650,15 @@ mod tests {
     #[test]
     fn every_variant_validates() {
         let count = independent().len();
-        let none = ViewFeatures::empty();
-        let tables =
-            [none, ViewFeatures::TABLE_U32, ViewFeatures::TABLE_F32, ViewFeatures::TABLE_F64];
-        let mut sets = vec![reachable(|_| false, none), reachable(|_| true, none)];
+        let mut sets = vec![reachable(|_| false), reachable(|_| true)];
         for one in 0..count {
-            sets.push(reachable(|i| i == one, none));
-            sets.push(reachable(|i| i != one, none));
+            sets.push(reachable(|i| i == one));
+            sets.push(reachable(|i| i != one));
         }
         for seed in 0..60_u32 {
             let half = |at| u64::from(crate::sampler::hash(2 * seed + at));
             let bits = half(1) << 32 | half(2);
-            sets.push(reachable(|i| bits >> i & 1 == 1, tables[seed as usize % 4]));
+            sets.push(reachable(|i| bits >> i & 1 == 1));
         }
         let in_textures = ArrayPlaces { width_log2: 12, ..ArrayPlaces::default() };
         let in_buffers = ARRAYS.map(|array| array.name).into();

@@ -40,8 +40,8 @@ impl UploadedScene {
     pub fn new(gpu: &Gpu, world: &World, environment: &Environment) -> Result<Self> {
         let mut buffers = Buffers::new(gpu);
         let mut globals = Globals::default();
-        let constants = upload_world(gpu, &mut buffers, &mut globals, world)?;
         upload_map(&mut buffers, &mut globals, environment)?;
+        let constants = upload_world(gpu, &mut buffers, &mut globals, world)?;
         let environment = environment.clone();
         Ok(Self { gpu: gpu.clone(), buffers, globals, constants, environment })
     }
@@ -200,9 +200,12 @@ fn upload_map(
         Cow::Owned(bytemuck::pod_collect_to_vec(&words))
     });
     buffers.put_array("map_texels", "the map", map.pixels.len() as u64, rows)?;
-    let parts = environment.table_words();
+    let parts = environment.tile_sums().ok_or_else(|| {
+        let kind = environment.table_kind();
+        Error::new(format!("a summed-area table ({kind}) is for the CPU alone"))
+    })?;
     globals.tile_sums_at = parts[0].len() as u32;
     let words = parts.iter().map(|part| part.len() as u64).sum();
-    let bytes = parts.iter().map(|part| Cow::Borrowed(bytemuck::cast_slice(part)));
+    let bytes = parts.into_iter().map(|part| Cow::Borrowed(bytemuck::cast_slice(part)));
     buffers.put_array("sums", "the map's importance table", words, bytes)
 }

@@ -1,4 +1,4 @@
-//! What probes run on: a scene with one of everything, and maps with each table.
+//! What probes run on: scenes with one of everything, and maps of several sizes.
 
 use std::f32::consts::PI;
 
@@ -6,7 +6,7 @@ use glam::{Affine2, DAffine3, DMat3, DQuat, DVec3, Quat, UVec2, Vec2, Vec3, Vec4
 
 use super::cases::Random;
 use crate::bvh::Ray;
-use crate::environment::{Environment, EnvironmentOptions, TableKind};
+use crate::environment::{Environment, EnvironmentOptions};
 use crate::image::{Image, Texels};
 use crate::light_grid::LightGrid;
 use crate::light_grid::cells::SphericalGrid;
@@ -42,12 +42,11 @@ pub(in super::super) fn instanced_one() -> Fixture {
     fixture
 }
 
-/// First the one with everything, whose map has tile-local sums; then one for each other table, with
-/// other cameras, filters and cells; then the widest and the tallest map; then the first one with instances.
+/// First the one with everything; then three with other cameras, filters and cells; then the widest and the
+/// tallest map; then the first one with instances.
 pub(super) fn all() -> [Fixture; 7] {
     use PixelFilter::{BlackmanHarris, Box, Gauss};
     use Sampling::{Adaptive, Plain, Talk};
-    use TableKind::{F32, F64, TileLocal, U32};
     let thin_lens = Camera { lens_radius: 0.1, focus_distance: 5.0, ..camera() };
     let parallel = Projection::Orthographic { half_height: 3.0 };
     let fixture = |scene: Scene, environment: Environment, camera, filter, sampling| {
@@ -71,16 +70,15 @@ pub(super) fn all() -> [Fixture; 7] {
         let grid = grid.expect("the map is not black");
         Fixture { world, environment, view, rays, grid }
     };
-    let map = |table| environment((61, 37), table);
-    let large = |size| environment(size, TileLocal);
+    let map = || environment((61, 37));
     [
-        fixture(foggy(scene(300)), map(TileLocal), thin_lens, BlackmanHarris, Adaptive),
-        fixture(scene(1), map(U32), camera(), Box, Talk),
-        fixture(scene(1), map(F32), Camera { projection: parallel, ..camera() }, Gauss, Adaptive),
-        fixture(scene(1), map(F64), camera(), Gauss, Plain),
-        fixture(scene(1), large((16384, 8)), camera(), Box, Plain),
-        fixture(scene(1), large((8, 8192)), camera(), Box, Plain),
-        fixture(foggy(instanced(scene(300))), map(TileLocal), camera(), BlackmanHarris, Adaptive),
+        fixture(foggy(scene(300)), map(), thin_lens, BlackmanHarris, Adaptive),
+        fixture(scene(1), map(), camera(), Box, Talk),
+        fixture(scene(1), map(), Camera { projection: parallel, ..camera() }, Gauss, Adaptive),
+        fixture(scene(1), map(), camera(), Gauss, Plain),
+        fixture(scene(1), environment((16384, 8)), camera(), Box, Plain),
+        fixture(scene(1), environment((8, 8192)), camera(), Box, Plain),
+        fixture(foggy(instanced(scene(300))), map(), camera(), BlackmanHarris, Adaptive),
     ]
 }
 
@@ -152,7 +150,7 @@ pub(in super::super) fn view_of(world: &World, sampling: Sampling) -> View {
 
 /// Tiles of unequal size, one of them black, dim ones beside a sun. Radiance is what the device can
 /// hold, so that packing (which has a test of its own) is no part of what is compared.
-fn environment((width, height): (u32, u32), table: TableKind) -> Environment {
+fn environment((width, height): (u32, u32)) -> Environment {
     let mut random = Random::default();
     let map = Image::from_fn(width, height, |x, y| {
         let radiance = match (x, y) {
@@ -163,12 +161,11 @@ fn environment((width, height): (u32, u32), table: TableKind) -> Environment {
         unpack_radiance(pack_radiance(radiance.to_array()))
     });
     let options = EnvironmentOptions {
-        table,
         tile_columns: 7,
         tile_rows: 5,
         rotation_radians: 2.0,
         intensity: 1.7,
-        sun: 1.0,
+        ..EnvironmentOptions::default()
     };
     Environment::new(map, &options).expect("a sound map")
 }

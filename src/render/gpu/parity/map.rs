@@ -7,16 +7,22 @@ use super::cases::{case, cases, edge_directions, edge_words};
 use super::fixture::Fixture;
 use super::functions::camera;
 use super::twin::{Bound, EXACT, Twin, ulps};
-use crate::environment::{Environment, TableKind};
+use crate::environment::Environment;
 use crate::light_grid::WHOLE_MAP;
 use crate::light_grid::cells::dominant_face;
 use crate::render::gpu::layout::unpack_radiance;
 
-/// The probes that depend on the table, the cells or the camera.
+/// All probes of a map, and [`of_view`].
 pub(super) fn probes(fixture: &Fixture) -> Vec<Probe<'_>> {
     let mut probes = look_ups(&fixture.environment);
     probes.extend(samples(&fixture.environment));
-    probes.extend(cells(fixture));
+    probes.extend(of_view(fixture));
+    probes
+}
+
+/// The probes that depend on the cells or the camera.
+pub(super) fn of_view(fixture: &Fixture) -> Vec<Probe<'_>> {
+    let mut probes = cells(fixture);
     probes.extend(distributions(fixture));
     probes.extend(camera(fixture));
     probes
@@ -38,20 +44,11 @@ fn contrast(environment: &Environment, direction: Vec3) -> f32 {
     largest * map.width.max(map.height) as f32 * environment.rotation_and_intensity().1
 }
 
-/// A few units in the last place of a density, which is as well known as the radiance it follows. The
-/// f64 table is kept to 2^-48 of its total, which may be much of a dim tile, and be some density where
-/// there is none.
+/// A few units in the last place of a density, which is as well known as the radiance it follows.
 fn density_bound(environment: &Environment, direction: Vec3, tile: u32) -> Bound {
     let energies = environment.tile_energies();
-    let (_, row) = environment.patch_of(direction);
     let (_, intensity) = environment.rotation_and_intensity();
-    let brightest = contrast(environment, direction) / intensity / energies[tile as usize] as f32;
-    if environment.table_kind() != TableKind::F64 {
-        return ulps(8.0).of(brightest);
-    }
-    let share = energies[tile as usize] / energies.iter().sum::<f64>();
-    let most = 1.0 / (f64::from(environment.patch_solid_angle(row)) * share);
-    ulps(8.0).of(brightest + (most * f64::from(f32::EPSILON)) as f32)
+    ulps(8.0).of(contrast(environment, direction) / intensity / energies[tile as usize] as f32)
 }
 
 /// How much the last place of a random number within a row turns a sample, in such places: near a
@@ -177,9 +174,7 @@ pub(super) fn samples(environment: &Environment) -> Vec<Probe<'_>> {
             }
         },
     );
-    // Places at the edges of a dim tile are known to 2^-48 of all energy.
-    let flips = if environment.table_kind() == TableKind::F64 { 300 } else { 500 };
-    vec![sample.flips(flips), density.flips(500)]
+    vec![sample.flips(500), density.flips(500)]
 }
 
 fn cells(fixture: &Fixture) -> Vec<Probe<'_>> {

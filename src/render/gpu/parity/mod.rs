@@ -215,7 +215,7 @@ fn ask(renderer: &mut Renderer, index: usize, probe: &Probe<'_>) -> Vec<u32> {
 /// A fixture, what its probes' WGSL shares, and the probes.
 type Group<'a> = (&'a Fixture, &'static [&'static str], Vec<Probe<'a>>);
 
-/// All probes: most on a scene with everything, those of the map with each table.
+/// All probes: most on a scene with everything, some with other maps, cells and cameras.
 fn groups(fixtures: &[Fixture]) -> Vec<Group<'_>> {
     let mut groups: Vec<Group<'_>> = vec![
         (&fixtures[0], &[], functions::probes(&fixtures[0])),
@@ -223,8 +223,9 @@ fn groups(fixtures: &[Fixture]) -> Vec<Group<'_>> {
         (&fixtures[0], &[scattering::PRELUDE], surfaces::probes(&fixtures[0])),
         (&fixtures[0], &[], surfaces::path_probes(&fixtures[0])),
         (&fixtures[0], &[], media::probes(&fixtures[0])),
+        (&fixtures[0], &[], map::probes(&fixtures[0])),
     ];
-    groups.extend(fixtures[..4].iter().map(|fixture| (fixture, &[][..], map::probes(fixture))));
+    groups.extend(fixtures[1..4].iter().map(|fixture| (fixture, &[][..], map::of_view(fixture))));
     let large = fixtures[4..6].iter();
     groups.extend(large.map(|fixture| (fixture, &[][..], map::samples(&fixture.environment))));
     let prelude = &[scattering::PRELUDE];
@@ -250,10 +251,10 @@ run_group! {
     surfaces_lights_and_hits: 2, Usual;
     whole_paths: 3, Usual;
     media_between_surfaces: 4, Usual;
-    map_with_a_tile_local_table: 5, Usual;
-    map_with_a_table_in_u32: 6, Usual;
-    map_with_a_table_in_f32: 7, Usual;
-    map_with_a_table_in_f64: 8, Usual;
+    map_cells_and_distributions: 5, Usual;
+    cells_of_the_talk: 6, Usual;
+    cells_and_a_parallel_camera: 7, Usual;
+    no_cells: 8, Usual;
     widest_map: 9, Usual;
     tallest_map: 10, Usual;
     // These two read all arrays.
