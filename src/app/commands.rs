@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use egui::{Key, KeyboardShortcut, Modifiers};
+use egui::{Event, Key, KeyboardShortcut, Modifiers};
 
 use super::document::Viewpoint;
 use super::interface::Purpose;
@@ -113,7 +113,7 @@ pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 21] = [
     (control(Key::Q), "Quit", Command::Quit),
 ];
 
-/// Another key for [`Command::Redo`].
+/// Another key for [`Command::Redo`], as macOS and Blender have it.
 const REDO_TOO: KeyboardShortcut =
     KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
 
@@ -142,68 +142,95 @@ const fn control(key: Key) -> KeyboardShortcut {
     KeyboardShortcut::new(Modifiers::COMMAND, key)
 }
 
-/// Takes the shortcuts pressed in this frame; while somebody types or answers a question, it is only the
-/// one that leaves.
+/// Takes the shortcuts pressed in this frame: a command for each press, in their order. While somebody types or
+/// answers a question, the only one is [`Command::Quit`].
 pub(crate) fn pressed(context: &egui::Context, is_modal: bool) -> Vec<Command> {
-    if is_modal || context.text_edit_focused() {
-        let leaves = context.input_mut(|input| input.consume_shortcut(&control(Key::Q)));
-        return if leaves { vec![Command::Quit] } else { Vec::new() };
+    let is_typing = is_modal || context.text_edit_focused();
+    let mut commands = Vec::new();
+    let mut take = |event: &Event| {
+        let command = requested(event).filter(|it| !is_typing || *it == Command::Quit);
+        let Some(command) = command else { return false };
+        // A key that is held asks once; only steps back and forth are repeated.
+        let is_repeat = matches!(event, Event::Key { repeat: true, .. });
+        if !is_repeat || matches!(command, Command::Undo | Command::Redo) {
+            commands.push(command);
+        }
+        // Escape ends drags, too, and copying is meant for selected text as well.
+        matches!(event, Event::Key { key, .. } if *key != Key::Escape)
+    };
+    context.input_mut(|input| input.events.retain(|event| !take(event)));
+    commands
+}
+
+/// The command that an event asks for.
+fn requested(event: &Event) -> Option<Command> {
+    match event {
+        Event::Copy => Some(Command::Copy),
+        Event::Text(text) if text == "?" => Some(Command::ToggleShortcuts),
+        Event::Key { key, modifiers, pressed: true, .. } => {
+            let is_pressed = |shortcut: &KeyboardShortcut| {
+                shortcut.logical_key == *key && modifiers.matches_logically(shortcut.modifiers)
+            };
+            match key {
+                Key::Escape => Some(Command::CloseSheets),
+                Key::F1 if modifiers.is_none() => Some(Command::ToggleShortcuts),
+                _ if is_pressed(&REDO_TOO) => Some(Command::Redo),
+                // A shortcut without Shift lets Shift pass: one with it follows it in the list.
+                _ => {
+                    let found = SHORTCUTS.iter().rfind(|(shortcut, _, _)| is_pressed(shortcut));
+                    found.map(|(_, _, command)| command.clone())
+                }
+            }
+        }
+        _ => None,
     }
-    context.input_mut(|input| {
-        // A key that is held asks once; only steps back and forth are taken one after the other.
-        let asks_again = |key: &Key, modifiers: &Modifiers| {
-            let steps = [Command::Undo, Command::Redo];
-            SHORTCUTS.iter().any(|(shortcut, _, command)| {
-                shortcut.logical_key == *key
-                    && modifiers.matches_logically(shortcut.modifiers)
-                    && !steps.contains(command)
-            })
-        };
-        input.events.retain(
-            |event| !matches!(event, egui::Event::Key { key, repeat: true, modifiers, .. } if asks_again(key, modifiers)),
-        );
-        // As macOS and Blender have it; it comes before Undo, whose key lets Shift pass.
-        let redoes = input.consume_shortcut(&REDO_TOO).then_some(Command::Redo);
-        let pressed = SHORTCUTS
-            .iter()
-            .rev()
-            .filter(|(shortcut, _, _)| input.consume_shortcut(shortcut))
-            .map(|(_, _, command)| command.clone());
-        let mut commands: Vec<Command> = redoes.into_iter().chain(pressed).collect();
-        let asks = input.events.iter().any(|e| matches!(e, egui::Event::Text(t) if t == "?"));
-        if asks || input.consume_key(Modifiers::NONE, Key::F1) {
-            commands.push(Command::ToggleShortcuts);
-        }
-        // After what opens a sheet: both may come in one frame.
-        if input.key_pressed(Key::Escape) {
-            commands.push(Command::CloseSheets);
-        }
-        let copies = input.events.iter().any(|e| matches!(e, egui::Event::Copy));
-        if copies {
-            commands.push(Command::Copy);
-        }
-        commands
-    })
+}
+
+/// Whether an event asks for a question that has to be answered by typing.
+pub(super) fn asks_for_path(event: &Event) -> bool {
+    let questions = [Command::ChooseScene, Command::ChooseMap, Command::ChooseSave];
+    requested(event).is_some_and(|command| questions.contains(&command))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn key(key: Key, modifiers: Modifiers, repeat: bool) -> Event {
+        Event::Key { key, physical_key: None, pressed: true, repeat, modifiers }
+    }
+
+    /// What these events of one frame ask for.
+    fn commands_of(events: &[Event]) -> Vec<Command> {
+        let context = egui::Context::default();
+        let input = egui::RawInput { events: events.to_vec(), ..Default::default() };
+        let mut commands = Vec::new();
+        let _ = context.run_ui(input, |ui| commands = pressed(ui.ctx(), false));
+        commands
+    }
+
     #[test]
     fn a_key_that_is_held_asks_once_but_for_steps_back() {
-        let context = egui::Context::default();
-        let held = |key, modifiers: Modifiers, repeat| {
-            let event =
-                egui::Event::Key { key, physical_key: None, pressed: true, repeat, modifiers };
-            let input = egui::RawInput { events: vec![event], ..Default::default() };
-            let mut commands = Vec::new();
-            let _ = context.run_ui(input, |ui| commands = pressed(ui.ctx(), false));
-            commands
-        };
+        let held = |code, modifiers, repeat| commands_of(&[key(code, modifiers, repeat)]);
         assert_eq!(held(Key::K, Modifiers::NONE, false), [Command::KeepPicture]);
         assert_eq!(held(Key::K, Modifiers::NONE, true), []);
         assert_eq!(held(Key::Z, Modifiers::COMMAND, true), [Command::Undo]);
         assert_eq!(held(Key::Z, Modifiers::COMMAND | Modifiers::SHIFT, true), [Command::Redo]);
+    }
+
+    #[test]
+    fn keys_of_one_frame_keep_their_order_and_number() {
+        let plain = |code| key(code, Modifiers::NONE, false);
+        let undo = key(Key::Z, Modifiers::COMMAND, false);
+        assert_eq!(commands_of(&[undo.clone(), undo.clone()]), [Command::Undo, Command::Undo]);
+        let redo = key(Key::Z, Modifiers::COMMAND | Modifiers::SHIFT, false);
+        assert_eq!(commands_of(&[undo, redo]), [Command::Undo, Command::Redo]);
+        let paused = [plain(Key::Space), plain(Key::R)];
+        assert_eq!(commands_of(&paused), [Command::TogglePause, Command::Restart]);
+        let twice = [plain(Key::X), plain(Key::X)];
+        assert_eq!(commands_of(&twice), [Command::ToggleRegion, Command::ToggleRegion]);
+        let closed = [plain(Key::Escape), plain(Key::X), key(Key::F, Modifiers::SHIFT, false)];
+        let expected = [Command::CloseSheets, Command::ToggleRegion, Command::FrameSelected];
+        assert_eq!(commands_of(&closed), expected);
     }
 }

@@ -6,9 +6,12 @@ use std::mem::discriminant;
 
 use egui::{Event, Key};
 
+use super::commands;
+
 /// Leaves in `events` what may be taken in one frame: presses of keys or of buttons, not both, no button let go
 /// that was pressed in it, Tab, which completes what is typed, without anything typed before or after it, and nothing
-/// typed after Enter, which ends that. The rest is returned; it is meant for the next frame.
+/// typed after Enter, which ends that, or after a shortcut that asks for a path, which begins it. The rest is returned;
+/// it is meant for the next frame.
 pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
     let is_press = |event: &&Event| {
         matches!(
@@ -18,7 +21,7 @@ pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
     };
     let first = events.iter().find(is_press).map(discriminant);
     let is_other = |event: &Event| is_press(&event) && first != Some(discriminant(event));
-    let (mut is_down, mut typed, mut is_entered) = (false, None, false);
+    let (mut is_down, mut typed, mut is_over) = (false, None, false);
     let ends = |event: &Event| {
         let is_button =
             |down| matches!(event, Event::PointerButton { pressed, .. } if *pressed == down);
@@ -28,11 +31,12 @@ pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
             event,
             Event::Text(_) | Event::Paste(_) | Event::Ime(_) | Event::Key { pressed: true, .. }
         );
-        let is_after_enter = is_typing && is_entered;
-        is_entered |= matches!(event, Event::Key { key: Key::Enter, pressed: true, .. });
+        let is_of_another = is_typing && is_over;
+        let is_enter = matches!(event, Event::Key { key: Key::Enter, pressed: true, .. });
+        is_over |= is_enter || commands::asks_for_path(event);
         let is_beside_tab = is_typing && typed.is_some_and(|was_tab| was_tab || is_tab);
         typed = if is_typing { Some(is_tab) } else { typed };
-        is_other(event) || (is_down && is_button(false)) || is_beside_tab || is_after_enter
+        is_other(event) || (is_down && is_button(false)) || is_beside_tab || is_of_another
     };
     let end = events.iter().position(ends).unwrap_or(events.len());
     events.split_off(end)
@@ -72,6 +76,17 @@ mod tests {
             vec![key(Key::D), text("d"), key(Key::Enter)],
         ];
         check(&turns);
+    }
+
+    #[test]
+    fn what_is_typed_after_a_question_is_no_shortcut() {
+        let modifiers = Modifiers::COMMAND;
+        let asks = |key| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
+        let typed = vec![key_event(Key::N, true), Event::Text("n".to_owned())];
+        for key in [Key::O, Key::M, Key::S] {
+            check(&[vec![key_event(Key::Space, true), asks(key)], typed.clone()]);
+        }
+        check(&[[vec![asks(Key::Z)], typed].concat()]);
     }
 
     #[test]

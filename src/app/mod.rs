@@ -245,6 +245,8 @@ impl App {
         self.panels(ui, &mut commands);
         for command in commands {
             self.execute(command, &context);
+            // Each is a step of its own.
+            self.settle(&context);
         }
         self.settle(&context);
         self.send_down(&context);
