@@ -190,12 +190,14 @@ impl App {
 
     fn read_scene_again(&mut self) {
         if !sources::is_built_in_scene(&self.document.scene) {
+            self.interface.paused = false;
             self.loader.load_scene(&self.document.scene);
         }
     }
 
     fn read_map_again(&mut self) {
         if !sources::is_built_in_map(&self.document.map) {
+            self.interface.paused = false;
             self.loader.load_map(&self.document.map, self.document.sun);
         }
     }

@@ -81,7 +81,8 @@ mod tests {
     #[test]
     fn what_is_typed_after_a_question_is_no_shortcut() {
         let modifiers = Modifiers::COMMAND;
-        let asks = |key| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
+        let asks =
+            |key| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers };
         let typed = vec![key_event(Key::N, true), Event::Text("n".to_owned())];
         for key in [Key::O, Key::M, Key::S] {
             check(&[vec![key_event(Key::Space, true), asks(key)], typed.clone()]);

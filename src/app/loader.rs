@@ -7,10 +7,11 @@ use std::time::Instant;
 
 use super::document::Document;
 use super::threads::{Wake, lock};
-use crate::environment::sun::{Sun, equal_energy_tiles};
+use crate::environment::sun::{Sun, SunTexels, equal_energy_tiles};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{Error, Notices, Result};
 use crate::image::{Image, catch_panic};
+use crate::memory;
 use crate::path::World;
 use crate::render::gpu::KernelFacts;
 use crate::scene::{Material, MaterialEdit, SceneOptions};
@@ -69,6 +70,61 @@ pub struct LoadedMap {
     pub notices: Notices,
     /// Seconds of reading and of building the table.
     pub seconds: [f64; 2],
+    /// Its sun at factor 1.
+    sun_texels: Arc<SunTexels>,
+}
+
+impl LoadedMap {
+    /// Reads a map.
+    fn read(name: &str, sun_factor: f32) -> Result<Self> {
+        let start = Instant::now();
+        let (map, notices) = sources::map(name)?;
+        let seconds = start.elapsed().as_secs_f64();
+        let sun_texels = Arc::new(SunTexels::of(&map));
+        Self::new(name, map, sun_texels, sun_factor, notices, seconds)
+    }
+
+    /// The same with another factor on its sun.
+    fn with_sun(&self, sun_factor: f32) -> Result<Self> {
+        let map = self.environment.map();
+        // The table takes as much again.
+        let bytes = 2 * map.pixels.len() * size_of::<[f32; 3]>();
+        memory::check(bytes as u64)
+            .map_err(|cause| Error::at(&self.name, format!("to change its sun {cause}")))?;
+        let mut map = map.clone();
+        self.sun_texels.put_back(&mut map);
+        let (texels, notices) = (Arc::clone(&self.sun_texels), self.notices.clone());
+        Self::new(&self.name, map, texels, sun_factor, notices, self.seconds[0])
+    }
+
+    /// Of a map with its sun at factor 1.
+    fn new(
+        name: &str,
+        map: Image,
+        sun_texels: Arc<SunTexels>,
+        sun_factor: f32,
+        notices: Notices,
+        seconds_of_reading: f64,
+    ) -> Result<Self> {
+        let start = Instant::now();
+        let options = EnvironmentOptions { sun: sun_factor, ..EnvironmentOptions::default() };
+        let environment =
+            Environment::new(map, &options).map_err(|cause| Error::at(name, cause))?;
+        let seconds = [seconds_of_reading, start.elapsed().as_secs_f64()];
+        let preview = environment.map().shrunk(256);
+        let count = environment.tile_count() as usize;
+        Ok(Self {
+            name: name.to_owned(),
+            sun_factor,
+            sun: Sun::of(environment.map()),
+            equal_energy: equal_energy_tiles(&preview, count).into(),
+            preview: Arc::new(preview),
+            environment: Arc::new(environment),
+            notices,
+            seconds,
+            sun_texels,
+        })
+    }
 }
 
 /// What is loaded.
@@ -91,7 +147,7 @@ pub enum Loaded {
 /// What is under way.
 struct InFlight {
     name: String,
-    /// Whether the scene is there and only its materials change.
+    /// Whether the scene is there and only its materials change, or the map and only its sun.
     is_edit: bool,
     number: u64,
 }
@@ -140,10 +196,19 @@ impl Loader {
         });
     }
 
-    /// Starts to load a map unless it is being loaded.
+    /// Starts to load a map unless it is being loaded; a change to its sun is given up.
     pub fn load_map(&mut self, name: &str, sun_factor: f32) {
         self.spawn(Kind::Map, name, false, move |name| {
-            Loaded::Map(name.to_owned(), load_map(name, sun_factor))
+            Loaded::Map(name.to_owned(), LoadedMap::read(name, sun_factor))
+        });
+    }
+
+    /// Starts to change the sun of a map that is there, unless something is being done to it.
+    pub fn edit_map(&mut self, map: &LoadedMap, sun_factor: f32) {
+        let map = map.clone();
+        let name = map.name.clone();
+        self.spawn(Kind::Map, &name, true, move |name| {
+            Loaded::Map(name.to_owned(), map.with_sun(sun_factor))
         });
     }
 
@@ -209,20 +274,4 @@ fn load_scene(name: &str, options: &SceneOptions) -> Result<LoadedScene> {
     let materials = world.scene.materials.clone().into();
     let edits = BTreeMap::new();
     Ok(LoadedScene { name: name.to_owned(), world, edits, materials, kernel, seconds })
-}
-
-fn load_map(name: &str, sun_factor: f32) -> Result<LoadedMap> {
-    let start = Instant::now();
-    let (map, notices) = sources::map(name)?;
-    let read = start.elapsed().as_secs_f64();
-    let options = EnvironmentOptions { sun: sun_factor, ..EnvironmentOptions::default() };
-    let environment = Environment::new(map, &options).map_err(|cause| Error::at(name, cause))?;
-    let seconds = [read, start.elapsed().as_secs_f64() - read];
-    let environment = Arc::new(environment);
-    let preview = Arc::new(environment.map().shrunk(256));
-    let sun = Sun::of(environment.map());
-    let count = environment.tile_count() as usize;
-    let equal_energy = equal_energy_tiles(&preview, count).into();
-    let name = name.to_owned();
-    Ok(LoadedMap { name, sun_factor, environment, preview, sun, equal_energy, notices, seconds })
 }

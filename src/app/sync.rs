@@ -287,8 +287,11 @@ impl App {
             }
             Some(_) => {}
         }
-        if self.map_of_document().is_none_or(|map| map.sun_factor != self.document.sun) {
-            self.loader.load_map(&self.document.map, self.document.sun);
+        let sun = self.document.sun;
+        match self.map.as_ref().filter(|map| map.name == self.document.map) {
+            None => self.loader.load_map(&self.document.map, sun),
+            Some(map) if map.sun_factor != sun => self.loader.edit_map(map, sun),
+            Some(_) => {}
         }
         if let Some(request) = self.request(context.time()) {
             if request.moving {

@@ -12,6 +12,7 @@ use super::interface::{Dock, Interface, Tab};
 use super::overlays::Overlay;
 use super::screenshot::{Shot, Studio};
 use super::{Start, sync};
+use crate::environment::{Environment, EnvironmentOptions};
 use crate::image::{ExrPicture, Image, read_picture, write_exr};
 use crate::memory;
 use crate::path::Background;
@@ -40,6 +41,11 @@ fn studio_of(scene: &str, size: (u32, u32)) -> Option<Studio> {
     let studio = Studio::open(shot);
     let studio = studio.inspect_err(|error| crate::terminal::notice(format!("SKIPPED: {error}")));
     studio.ok()
+}
+
+fn write_picture(path: &Path, image: &Image) {
+    let picture = ExrPicture { image, layers: Vec::new(), metadata: &[], preview: None };
+    write_exr(path, picture).expect("written");
 }
 
 impl Studio {
@@ -116,10 +122,7 @@ fn a_map_that_has_gone_is_no_step_to_go_back_to() {
     let maps = ["one.exr", "two.exr"].map(|name| folder.path().join(name).display().to_string());
     studio.settle().expect("rendered");
     for map in &maps {
-        let white = Image::filled(4, 2, [1.0; 3]);
-        let picture =
-            ExrPicture { image: &white, layers: Vec::new(), metadata: &[], preview: None };
-        write_exr(Path::new(map), picture).expect("written");
+        write_picture(Path::new(map), &Image::filled(4, 2, [1.0; 3]));
         studio.asks(Command::OpenMap(map.clone()));
         studio.settle().expect("rendered");
     }
@@ -132,6 +135,58 @@ fn a_map_that_has_gone_is_no_step_to_go_back_to() {
     studio.frame().expect("drawn");
     studio.asks(Command::Undo);
     assert_eq!(studio.app.document.map, "sky:day@64x32");
+}
+
+#[test]
+fn the_sun_is_changed_without_the_file_of_its_map() {
+    let Some(mut studio) = studio("open") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("map.exr");
+    let name = file.display().to_string();
+    let mut pixels = vec![[0.25, 0.5, 1.0]; 64 * 32];
+    pixels[8 * 64 + 20] = [900.0, 800.0, 700.0];
+    let map = Image { width: 64, height: 32, pixels };
+    write_picture(&file, &map);
+    studio.app.document.sun = 0.0;
+    studio.asks(Command::OpenMap(name.clone()));
+    studio.settle().expect("rendered");
+    std::fs::remove_file(&file).expect("removed");
+    for factor in [3.0, 0.5, 1.0] {
+        studio.app.document.sun = factor;
+        studio.settle().expect("rendered");
+        assert_eq!(studio.app.failure(), None);
+        let loaded = studio.app.map.as_ref().expect("it is there");
+        let options = EnvironmentOptions { sun: factor, ..EnvironmentOptions::default() };
+        let expected = Environment::new(map.clone(), &options).expect("sound");
+        assert_eq!((loaded.sun_factor, loaded.environment.map()), (factor, expected.map()));
+    }
+    // Read again it has gone.
+    studio.asks(Command::ReadAgain);
+    while studio.app.failure().is_none() {
+        studio.frame().expect("drawn");
+    }
+    assert_eq!((&studio.app.document.map, studio.app.document.sun), (&name, 1.0));
+}
+
+#[test]
+fn a_paused_picture_goes_on_with_a_map_that_is_read_again() {
+    let Some(mut studio) = studio("open") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("map.exr");
+    let name = file.display().to_string();
+    write_picture(&file, &Image::filled(4, 2, [1.0; 3]));
+    studio.asks(Command::OpenMap(name.clone()));
+    studio.settle().expect("rendered");
+    for (asked, light) in [(Command::ReadAgain, 2.0), (Command::OpenMap(name), 4.0)] {
+        studio.asks(Command::TogglePause);
+        studio.frame().expect("drawn");
+        write_picture(&file, &Image::filled(4, 2, [light; 3]));
+        studio.asks(asked);
+        studio.settle().expect("rendered");
+        let snapshot = studio.app.snapshot.as_ref().expect("it is there");
+        assert_eq!(snapshot.request.environment.map().pixels[0], [light; 3]);
+        assert!(snapshot.main.film.min_samples() > 0);
+    }
 }
 
 #[test]
@@ -222,9 +277,7 @@ fn errors_are_measured_against_a_reference_where_it_shows_the_same() {
     let Some(mut studio) = studio("open") else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("reference.exr");
-    let grey = Image::filled(48, 32, [0.5; 3]);
-    let picture = ExrPicture { image: &grey, layers: Vec::new(), metadata: &[], preview: None };
-    write_exr(&file, picture).expect("written");
+    write_picture(&file, &Image::filled(48, 32, [0.5; 3]));
     studio.asks(Command::OpenReference(file.display().to_string()));
     while studio.app.reference.is_none() {
         studio.frame().expect("drawn");

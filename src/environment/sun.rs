@@ -100,6 +100,33 @@ pub(crate) fn with_sun(mut map: Image, factor: f32) -> Image {
     map
 }
 
+/// What [`with_sun`] may change of a map, as it was before: by it a factor is exchanged for another without
+/// the map's file.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SunTexels {
+    /// Places in the list of pixels, and radiances.
+    texels: Vec<(usize, [f32; 3])>,
+}
+
+impl SunTexels {
+    /// Of a map to which no factor was applied; none on a black map.
+    pub(crate) fn of(map: &Image) -> Self {
+        let Some(sun) = Sun::of(map) else { return Self::default() };
+        let cone = Cone::new(map, sun.texel);
+        let place = |x, y| (y * map.width + x) as usize;
+        let row = |y| cone.row(y, SUN_RADIUS_DEGREES).map(move |x| place(x, y));
+        let texels = (0..map.height).flat_map(row).map(|i| (i, map.pixels[i])).collect();
+        Self { texels }
+    }
+
+    /// Makes the map what it was before any factor.
+    pub(crate) fn put_back(&self, map: &mut Image) {
+        for (place, radiance) in &self.texels {
+            map.pixels[*place] = *radiance;
+        }
+    }
+}
+
 /// Texels around one of a map.
 struct Cone {
     width: u32,
@@ -243,6 +270,11 @@ mod tests {
         let none = with_sun(map.clone(), 0.0);
         assert!(none.pixels.iter().all(|pixel| pixel[0] < 4.0), "only the sky is left");
         assert_eq!(with_sun(map.clone(), 1.0).pixels, map.pixels);
+        let texels = SunTexels::of(&map);
+        for mut changed in [half, none, with_sun(map.clone(), 7.0)] {
+            texels.put_back(&mut changed);
+            assert_eq!(changed, map);
+        }
         assert_eq!(with_sun(Image::filled(8, 4, [0.0; 3]), 3.0), Image::filled(8, 4, [0.0; 3]));
     }
 

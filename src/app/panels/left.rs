@@ -270,7 +270,7 @@ fn environment(
     }
 }
 
-/// The sun's light is taken up when the slider is let go: the map is read again.
+/// The sun's light is taken up when the slider is let go: the map's tables are built anew.
 fn sun(ui: &mut Ui, sun: &mut f32) {
     let hint = "Multiplies the light of the map's sun, and not that of its sky. The picture begins anew: apart, both would \
                 take twice the memory and time";
