@@ -119,20 +119,45 @@ struct Runner {
 
 /// Lets Ctrl-C, requests to end and closed terminals close the window as a person would; a second one leaves at once.
 fn close_on_signals(asked: &Arc<AtomicBool>, proxy: EventLoopProxy<Call>) {
-    for signal in [SIGINT, SIGTERM] {
-        // Where signals cannot be caught they end the process, as ever.
+    let ends = [SIGINT, SIGTERM];
+    for signal in ends {
+        // Where signals cannot be caught they end the process.
         let _ = flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(asked));
-        let _ = flag::register(signal, Arc::clone(asked));
     }
     // The terminal that it was started from may be closed; its shell may say so twice.
-    let _ = crate::terminal::hang_up().map(|signal| flag::register(signal, Arc::clone(asked)));
-    let asked = Arc::clone(asked);
+    let signals: Vec<i32> = ends.into_iter().chain(crate::terminal::hang_up()).collect();
+    for signal in &signals {
+        let _ = flag::register(*signal, Arc::clone(asked));
+    }
+    let wait = waiting_for(&signals, Arc::clone(asked));
     let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+        wait();
+        let _ = proxy.send_event(Call::Repaint(Instant::now()));
+    });
+}
+
+/// What blocks until one of these signals has set `asked`.
+#[cfg(unix)]
+fn waiting_for(signals: &[i32], asked: Arc<AtomicBool>) -> impl FnOnce() + Send + use<> {
+    let caught = signal_hook::iterator::Signals::new(signals);
+    move || {
+        // One may have come before they were caught here.
+        if let Ok(mut caught) = caught
+            && !asked.load(Ordering::Relaxed)
+        {
+            caught.forever().next();
+        }
+    }
+}
+
+/// The same where nothing wakes a thread at a signal: it looks every 50 ms.
+#[cfg(not(unix))]
+fn waiting_for(_: &[i32], asked: Arc<AtomicBool>) -> impl FnOnce() + Send + use<> {
+    move || {
         while !asked.load(Ordering::Relaxed) {
             std::thread::sleep(Duration::from_millis(50));
         }
-        let _ = proxy.send_event(Call::Repaint(Instant::now()));
-    });
+    }
 }
 
 /// What there is once a window is open.
