@@ -12,8 +12,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use egui::{Color32, ColorImage};
 
 use super::document::Document;
-use super::history::{MAX_PICTURES, SMALL_WIDTH};
-use super::kept_picture::{KeptPicture, Pixels};
+use super::kept_picture::{KeptPicture, MAX_PICTURES, Pixels, SMALL_WIDTH};
 use super::screen::color_image;
 use super::settings_file;
 use crate::error::{Error, Result};

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use egui::{Event, Key, KeyboardShortcut, Modifiers};
 
 use super::document::Viewpoint;
-use super::interface::Purpose;
 
 /// Something asked for by a panel, a key or a dropped file; the application carries it out.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,8 +21,6 @@ pub enum Command {
     ChooseMap,
     /// Ask where to write the picture.
     ChooseSave,
-    /// Open the system's file dialogue.
-    Browse(Purpose),
     /// Show where the method was published.
     ShowMethod,
     /// Write the picture.

@@ -84,6 +84,13 @@ pub struct Look {
     pub denoiser: Denoiser,
 }
 
+impl Look {
+    /// Stops in all where so many would be automatic.
+    pub(super) fn total_ev(&self, automatic_ev: f32) -> f32 {
+        self.exposure_ev + if self.auto_exposure { automatic_ev } else { 0.0 }
+    }
+}
+
 /// Size of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PictureSize {

@@ -2,6 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use super::commands::Command;
+use super::interface::Interface;
+use super::messages::Messages;
+use super::theme;
 use crate::image::extension;
 use crate::sources;
 
@@ -30,6 +34,29 @@ impl Dropped {
         let (scene, map) = (scenes.next(), maps.next());
         Self { scene, map, left: scenes.chain(maps).collect() }
     }
+}
+
+/// Files dropped onto the window: one scene and one map of them are opened. With a scene come files that belong
+/// to it, pictures among them, of which none but those in linear radiance are taken for maps.
+pub(super) fn dropped_files(
+    context: &egui::Context,
+    interface: &mut Interface,
+    messages: &mut Messages,
+) -> Vec<Command> {
+    let paths: Vec<PathBuf> = context
+        .input(|input| input.raw.dropped_files.iter().map(|f| f.path().to_path_buf()).collect());
+    if paths.is_empty() {
+        return Vec::new();
+    }
+    // Or they would be opened behind it.
+    interface.prompt = None;
+    let chosen = Dropped::of(&paths);
+    let left = chosen.left.iter().map(|name| theme::file_name(name)).collect::<Vec<_>>();
+    if !left.is_empty() {
+        messages.notice(format!("Not opened: {}", left.join(", ")));
+    }
+    let scene = chosen.scene.map(Command::OpenScene);
+    scene.into_iter().chain(chosen.map.map(Command::OpenMap)).collect()
 }
 
 #[cfg(test)]

@@ -5,17 +5,11 @@ use std::sync::Arc;
 
 use super::album::Album;
 use super::document::Document;
-use super::kept_picture::{KeptPicture, Pixels};
+use super::kept_picture::{KeptPicture, MAX_PICTURES, Pixels};
 use super::screen::color_image;
 use crate::error::Result;
 use crate::image::{Image, Rgb8};
 use crate::scene::SceneOptions;
-
-/// Most pictures kept.
-pub(super) const MAX_PICTURES: usize = 12;
-
-/// Width in pixels at which they are shown in the list.
-pub(crate) const SMALL_WIDTH: u32 = 128;
 
 /// Kept pictures, oldest first.
 #[derive(Default)]

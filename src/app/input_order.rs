@@ -9,9 +9,8 @@ use egui::{Event, Key};
 use super::commands;
 
 /// Leaves in `events` what may be taken in one frame: presses of keys or of buttons, not both, no button let go
-/// that was pressed in it, Tab, which completes what is typed, without anything typed before or after it, and nothing
-/// typed after Enter, which ends that, or after a shortcut that asks for a path, which begins it. The rest is returned;
-/// it is meant for the next frame.
+/// that was pressed in it, and nothing typed after Enter, which ends what is typed, or after a shortcut that asks for a
+/// path, which begins it. The rest is returned; it is meant for the next frame.
 pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
     let is_press = |event: &&Event| {
         matches!(
@@ -21,12 +20,11 @@ pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
     };
     let first = events.iter().find(is_press).map(discriminant);
     let is_other = |event: &Event| is_press(&event) && first != Some(discriminant(event));
-    let (mut is_down, mut typed, mut is_over) = (false, None, false);
+    let (mut is_down, mut is_over) = (false, false);
     let ends = |event: &Event| {
         let is_button =
             |down| matches!(event, Event::PointerButton { pressed, .. } if *pressed == down);
         is_down |= is_button(true);
-        let is_tab = matches!(event, Event::Key { key: Key::Tab, pressed: true, .. });
         let is_typing = matches!(
             event,
             Event::Text(_) | Event::Paste(_) | Event::Ime(_) | Event::Key { pressed: true, .. }
@@ -34,9 +32,7 @@ pub(super) fn first_turn(events: &mut Vec<Event>) -> Vec<Event> {
         let is_of_another = is_typing && is_over;
         let is_enter = matches!(event, Event::Key { key: Key::Enter, pressed: true, .. });
         is_over |= is_enter || commands::asks_for_path(event);
-        let is_beside_tab = is_typing && typed.is_some_and(|was_tab| was_tab || is_tab);
-        typed = if is_typing { Some(is_tab) } else { typed };
-        is_other(event) || (is_down && is_button(false)) || is_beside_tab || is_of_another
+        is_other(event) || (is_down && is_button(false)) || is_of_another
     };
     let end = events.iter().position(ends).unwrap_or(events.len());
     events.split_off(end)
@@ -65,13 +61,10 @@ mod tests {
     }
 
     #[test]
-    fn tab_completes_what_is_typed_before_it() {
+    fn enter_ends_what_is_typed() {
         let key = |key| key_event(key, true);
         let text = |letter: &str| Event::Text(letter.to_owned());
         let turns = [
-            vec![key(Key::A), text("a"), key(Key::B), text("b")],
-            vec![key(Key::Tab)],
-            vec![key(Key::Tab)],
             vec![key(Key::C), text("c"), key(Key::Enter)],
             vec![key(Key::D), text("d"), key(Key::Enter)],
         ];

@@ -1,13 +1,11 @@
 //! What the grid knows at one point, and what is true there.
 
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, channel};
 
 use glam::{Vec2, Vec3};
 
 use super::interface::Interface;
 use super::surface_map::{Spot, look_at_place};
-use super::threads::Wake;
 use super::worker::Snapshot;
 use crate::bvh::{Ray, offset_origin};
 use crate::color::importance;
@@ -53,6 +51,7 @@ pub(super) struct Truth {
 }
 
 /// Follows the pointer.
+#[derive(Default)]
 pub(super) struct Inspector {
     inspected: Option<Inspected>,
     truth: Option<Truth>,
@@ -60,29 +59,10 @@ pub(super) struct Inspector {
     environment: Option<Arc<Environment>>,
     learned: Option<(Arc<LightGrid>, Vec<f32>)>,
     source: Option<(Vec2, u64)>,
-    sender: Sender<Truth>,
-    receiver: Receiver<Truth>,
     busy: bool,
-    wake: Wake,
 }
 
 impl Inspector {
-    /// `wake` is called when a truth is known.
-    pub(super) fn new(wake: Wake) -> Self {
-        let (sender, receiver) = channel();
-        Self {
-            inspected: None,
-            truth: None,
-            environment: None,
-            learned: None,
-            source: None,
-            sender,
-            receiver,
-            busy: false,
-            wake,
-        }
-    }
-
     /// What is inspected.
     pub(super) fn inspected(&self) -> Option<&Inspected> {
         self.inspected.as_ref()
@@ -114,11 +94,8 @@ impl Inspector {
     }
 
     /// Takes a truth that is ready.
-    pub(super) fn collect(&mut self) {
-        while let Ok(truth) = self.receiver.try_recv() {
-            self.truth = Some(truth);
-            self.busy = false;
-        }
+    pub(super) fn take(&mut self, truth: Truth) {
+        (self.truth, self.busy) = (Some(truth), false);
     }
 
     /// Looks again if the pointer or the grid has changed.
@@ -159,19 +136,19 @@ impl Inspector {
         self.learned = Some((Arc::clone(grid), sums));
     }
 
-    /// Measures the truth at the inspected point by brute force, beside the window.
-    pub(super) fn measure(&mut self, snapshot: &Arc<Snapshot>) {
-        let Some(inspected) = self.inspected.as_ref().filter(|_| !self.busy) else { return };
+    /// Measures the truth at the inspected point by brute force, unless one is being measured.
+    pub(super) fn measure(
+        &mut self,
+        snapshot: &Arc<Snapshot>,
+    ) -> Option<impl FnOnce() -> Truth + Send + use<>> {
+        let inspected = self.inspected.as_ref().filter(|_| !self.busy)?;
         let (spot, snapshot) = (inspected.spot, Arc::clone(snapshot));
-        let (sender, wake) = (self.sender.clone(), self.wake.clone());
-        let thread = std::thread::Builder::new().name("truth".to_owned()).spawn(move || {
+        self.busy = true;
+        Some(move || {
             let environment = Arc::clone(&snapshot.request.environment);
             let shares = true_shares(&snapshot.request.world, &environment, &spot);
-            // The window may have gone meanwhile.
-            let _ = sender.send(Truth { position: spot.position, environment, shares });
-            wake();
-        });
-        self.busy = thread.is_ok();
+            Truth { position: spot.position, environment, shares }
+        })
     }
 }
 

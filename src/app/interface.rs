@@ -3,7 +3,7 @@
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
 
-use super::document::PictureSize;
+use super::document::{PictureSize, in_other_shape};
 use super::drag::Drag;
 use super::overlays::Overlay;
 use super::zoom::Zoom;
@@ -140,34 +140,21 @@ pub struct Prompt {
     pub purpose: Purpose,
     /// What has been typed.
     pub path: String,
-    /// Where the field is to get its cursor, and the keyboard with it.
-    pub cursor: Option<Cursor>,
-    /// What is to be known of a path before it is taken, and of which.
-    pub objection: Option<(String, Objection)>,
-    /// What the path may go on to, for those who asked.
-    pub offers: Vec<String>,
+    /// Whether it was just opened: its field is to get the keyboard, and typing to replace the path.
+    pub is_new: bool,
+    /// The path that was not taken last.
+    pub refusal: Option<Refusal>,
 }
 
-/// A place in a field.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cursor {
-    /// What is typed next takes the place of all.
-    OverAll,
-    /// What is typed next follows.
-    AtEnd,
-}
-
-/// What is to be known of a path before it is taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Objection {
-    /// Nothing can be opened there.
-    Missing,
-    /// Nothing can be written there.
-    NoFolder,
-    /// Its name does not say of what kind it is to be.
-    Unknown,
-    /// A file would be written over.
-    Replaces,
+/// A path that was not taken.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// The path as it was typed.
+    pub path: String,
+    /// Why it was not taken.
+    pub sentence: String,
+    /// Whether a file would be replaced: entered again, the path is taken.
+    pub replaces: bool,
 }
 
 /// What a path is asked for.
@@ -310,9 +297,7 @@ impl Interface {
 
     /// Asks for a path.
     pub(super) fn ask(&mut self, purpose: Purpose, path: String) {
-        let cursor = Some(Cursor::OverAll);
-        let offers = Vec::new();
-        self.prompt = Some(Prompt { purpose, path, cursor, objection: None, offers });
+        self.prompt = Some(Prompt { purpose, path, is_new: true, refusal: None });
     }
 
     /// Opens what developers look at, or closes it.
@@ -330,6 +315,14 @@ impl Interface {
     /// Width over height of the room.
     pub(super) fn aspect(&self) -> f32 {
         self.viewport_pixels.map_or(16.0 / 9.0, |[w, h]| w as f32 / h.max(1) as f32)
+    }
+
+    /// Keeps the inspected place on the same part of the scene where the aspect was so many times what it is now.
+    pub(super) fn follow_shape(&mut self, factor: f32) {
+        if let Some(place) = self.pinned {
+            let place = Vec2::new(in_other_shape(place.x, factor), place.y);
+            self.pinned = Some(place).filter(|place| (0.0..=1.0).contains(&place.x));
+        }
     }
 
     /// The place that is inspected.

@@ -11,6 +11,12 @@ use crate::error::Decoded;
 use crate::image::{Image, read_picture};
 use crate::scene::SceneOptions;
 
+/// Most pictures kept.
+pub(super) const MAX_PICTURES: usize = 12;
+
+/// Width in pixels at which they are shown in the list.
+pub(super) const SMALL_WIDTH: u32 = 128;
+
 /// A kept picture.
 pub(crate) struct KeptPicture {
     /// What to call it.

@@ -48,6 +48,11 @@ impl Messages {
         self.add(sentence.into(), true, None);
     }
 
+    /// Several things that failed.
+    pub(crate) fn errors(&mut self, sentences: Vec<String>) {
+        sentences.into_iter().for_each(|sentence| self.error(sentence));
+    }
+
     /// A file could not be opened in place of another.
     pub(crate) fn not_opened(&mut self, kind: Kind, sentence: impl Into<String>) {
         self.add(sentence.into(), true, Some(kind));

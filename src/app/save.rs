@@ -1,11 +1,13 @@
 //! Writing pictures, on a thread of its own.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde_json::json;
 
 use super::document::Document;
 use super::loader::{LoadedMap, LoadedScene};
+use super::tasks::{TaskResult, Tasks};
 use super::worker::Snapshot;
 use crate::error::{Notices, Result};
 use crate::image::check_writable;
@@ -15,7 +17,7 @@ use crate::output::{Exposure, LayerName, PictureOptions, write_picture};
 /// What a picture is written from.
 pub(super) struct Picture {
     /// The film and what was done for it.
-    pub(super) snapshot: std::sync::Arc<Snapshot>,
+    pub(super) snapshot: Arc<Snapshot>,
     /// Stops, automatic ones included.
     pub(super) exposure_ev: f32,
     /// The settings.
@@ -26,8 +28,49 @@ pub(super) struct Picture {
     pub(super) map: LoadedMap,
 }
 
+/// Where the picture is to be written once it has its full size.
+#[derive(Default)]
+pub(super) struct Saves {
+    waiting: Vec<PathBuf>,
+}
+
+impl Saves {
+    /// Has the picture written to a path.
+    pub(super) fn add(&mut self, path: PathBuf) {
+        self.waiting.push(path);
+    }
+
+    /// Whether no path waits.
+    pub(super) fn is_empty(&self) -> bool {
+        self.waiting.is_empty()
+    }
+
+    /// Writes a picture to all paths that wait.
+    pub(super) fn write(&mut self, picture: Picture, tasks: &mut Tasks) {
+        let picture = Arc::new(picture);
+        for path in self.waiting.drain(..) {
+            let picture = Arc::clone(&picture);
+            tasks.write("save", move || {
+                write(&path, &picture)?;
+                let film = &picture.snapshot.main.film;
+                let (path, width, height) = (path.display(), film.width, film.height);
+                let saved = format!("Saved {path}, {width} x {height} pixels");
+                let remarks = remarks(&picture);
+                let sentence = remarks.iter().fold(saved, |all, remark| format!("{all}; {remark}"));
+                Ok(TaskResult::Done(sentence))
+            });
+        }
+    }
+
+    /// Gives up what waits: a sentence each, with the cause.
+    pub(super) fn give_up(&mut self, why: &str) -> Vec<String> {
+        let sentence = |path: PathBuf| format!("{}: not saved: {why}", path.display());
+        self.waiting.drain(..).map(sentence).collect()
+    }
+}
+
 /// Writes what is shown as `.png`, or the film with all layers as `.exr`.
-pub(super) fn picture(path: &Path, picture: &Picture) -> Result<()> {
+fn write(path: &Path, picture: &Picture) -> Result<()> {
     check_writable(path)?;
     let snapshot = &picture.snapshot;
     let document = &picture.document;
@@ -84,7 +127,7 @@ fn settings(picture: &Picture) -> Vec<(&'static str, serde_json::Value)> {
 }
 
 /// What is remarkable about a picture that was written, for the message.
-pub(super) fn remarks(picture: &Picture) -> Notices {
+fn remarks(picture: &Picture) -> Notices {
     let mut notices = Notices::default();
     let snapshot = &picture.snapshot;
     for sentence in crate::output::remarks(&snapshot.main.film, &snapshot.request.environment) {

@@ -8,11 +8,12 @@ use std::time::{Duration, Instant};
 use egui_wgpu::{Renderer, ScreenDescriptor};
 use wgpu::{Extent3d, TextureFormat, TextureUsages};
 
+use super::application::{App, Start};
 use super::interface::Interface;
 use super::loader::Loader;
 use super::screen::{Screen, TextureCopies, renderer_options};
+use super::theme;
 use super::threads::{Wake, Wakes};
-use super::{App, Start, theme};
 use crate::error::{Error, Result};
 use crate::image::Rgb8;
 use crate::render::gpu::{DeviceChoice, Gpu};
@@ -92,7 +93,7 @@ impl Studio {
 
     /// Pixels of the picture across and down, once there is one.
     pub fn picture_size(&self) -> Option<[u32; 2]> {
-        self.app.snapshot.as_ref().map(|snapshot| snapshot.request.view.whole_size())
+        self.app.rendering.snapshot.as_ref().map(|snapshot| snapshot.request.view.whole_size())
     }
 
     /// Opens and chooses what `interface` says; the picture is not rendered again.
@@ -114,12 +115,12 @@ impl Studio {
     /// If the scene cannot be read or has no such material.
     pub fn choose_material(&mut self, name: &str) -> Result<()> {
         self.settle()?;
-        let scene = self.app.scene.iter();
+        let scene = self.app.assets.scene.iter();
         let number = scene.flat_map(|scene| scene.materials.iter()).position(|m| m.name == name);
         let number = number.ok_or_else(|| {
-            let scene = self.app.scene.as_ref().map(|scene| &scene.world.scene);
+            let scene = self.app.assets.scene.as_ref().map(|scene| &scene.world.scene);
             let cause = scene.map(|scene| scene.without_material(name)).unwrap_or_default();
-            Error::at(&self.app.document.scene, cause)
+            Error::at(&self.app.edited.document.scene, cause)
         })?;
         self.app.interface.choose_material(Some(number as u32));
         Ok(())
@@ -131,12 +132,12 @@ impl Studio {
     /// If the map cannot be read or has fewer tiles.
     pub fn check_tile(&mut self, tile: u32) -> Result<()> {
         self.settle()?;
-        let count = self.app.lit.as_ref().map_or(0, |lit| lit.environment.tile_count());
+        let count = self.app.assets.map.as_ref().map_or(0, |map| map.environment.tile_count());
         if tile < count {
             return Ok(());
         }
         let cause = format!("there is no tile {tile}: it has {count}, counted from 0");
-        Err(Error::at(&self.app.document.map, cause))
+        Err(Error::at(&self.app.edited.document.map, cause))
     }
 
     /// Renders until the stop rule is met, draws, reads back.
@@ -155,7 +156,7 @@ impl Studio {
 
     /// Whether the CPU is to render.
     pub fn is_on_cpu(&self) -> bool {
-        self.app.document.light.device == DeviceChoice::Cpu
+        self.app.edited.document.light.device == DeviceChoice::Cpu
     }
 
     /// Loses the device, as a driver reset would; for tests of what happens then.
@@ -183,7 +184,7 @@ impl Studio {
         self.frame()?;
         self.frame()?;
         loop {
-            if let Some(failure) = self.app.failure() {
+            if let Some(failure) = self.app.messages.first_error() {
                 return Err(Error::new(failure));
             }
             if self.app.is_settled() {

@@ -41,8 +41,6 @@ pub struct Settings {
     pub viewpoints: Vec<SceneViewpoints>,
     /// Where pictures were written last.
     pub save_folder: Option<PathBuf>,
-    /// Whether whoever asks for a file gets the system's dialogue at once, where there is one.
-    pub browses_at_once: bool,
     /// Size of the window in points.
     pub window_size: [f32; 2],
     /// How the picture is developed.
@@ -67,7 +65,6 @@ impl Default for Settings {
             recent_maps: Vec::new(),
             viewpoints: Vec::new(),
             save_folder: None,
-            browses_at_once: true,
             window_size: [1440.0, 900.0],
             look: document.look,
             light: document.light,
@@ -245,9 +242,6 @@ impl Settings {
         }
         if after.save_folder != before.save_folder {
             self.save_folder.clone_from(&after.save_folder);
-        }
-        if after.browses_at_once != before.browses_at_once {
-            self.browses_at_once = after.browses_at_once;
         }
         for of in after.viewpoints.iter().rev().chain(&before.viewpoints) {
             let (then, now) = (before.viewpoints_of(&of.scene), after.viewpoints_of(&of.scene));

@@ -9,7 +9,6 @@ use egui::{Context, TextureHandle, TextureOptions};
 
 use super::screen::color_image;
 use super::settings_file::lasting_map;
-use super::{App, Later};
 use crate::digest::Digest;
 use crate::environment::sky;
 use crate::image::ldr::decode_ldr;
@@ -25,58 +24,66 @@ const MAX_FILES: usize = 64;
 pub(super) type SmallMap = (String, Rgb8);
 
 /// Small pictures of maps on the device, by their lasting names.
-#[derive(Default)]
 pub(super) struct SmallMaps {
     folder: Option<PathBuf>,
     textures: BTreeMap<String, TextureHandle>,
 }
 
 impl SmallMaps {
+    /// None yet; `folder` is where they are kept, if anywhere.
+    pub(super) fn new(folder: Option<PathBuf>) -> Self {
+        Self { folder, textures: BTreeMap::new() }
+    }
+
+    /// Reads the pictures of maps that were opened lately, and makes those of built-in skies.
+    pub(super) fn read(&self, recent: Vec<String>) -> impl FnOnce() -> Vec<SmallMap> + use<> {
+        let folder = self.folder.clone();
+        move || {
+            let skies = sky::names().iter().filter_map(|name| {
+                let map = sky::build(name, WIDTH, WIDTH / 2).ok()?;
+                Some((format!("sky:{name}"), in_small(&map)))
+            });
+            let read = |folder: PathBuf| -> Vec<SmallMap> {
+                tidy(&folder);
+                let small = |name: String| Some((name.clone(), read_small(&folder, &name)?));
+                recent.into_iter().filter_map(small).collect()
+            };
+            let known = folder.map(read).unwrap_or_default();
+            known.into_iter().chain(skies).collect()
+        }
+    }
+
     /// The picture of a map, if there is one.
     pub(super) fn of(&self, name: &str) -> Option<&TextureHandle> {
         self.textures.get(name)
     }
 
+    /// Takes a picture that is ready.
     pub(super) fn take(&mut self, (name, small): SmallMap, context: &Context) {
         let image = color_image(&small);
         let texture = context.load_texture(&name, image, TextureOptions::LINEAR);
         self.textures.insert(name, texture);
     }
-}
 
-impl App {
-    /// Reads the pictures of maps that were opened lately, and makes those of built-in skies.
-    pub(super) fn begin_small_maps(&mut self, folder: Option<PathBuf>) {
-        let recent = self.settings.recent_maps.clone();
-        self.small_maps.folder.clone_from(&folder);
-        self.do_later("small maps", move || {
-            let skies = sky::names().iter().filter_map(|name| {
-                let map = sky::build(name, WIDTH, WIDTH / 2).ok()?;
-                Some((format!("sky:{name}"), in_small(&map)))
-            });
-            let read = |folder: &PathBuf| {
-                tidy(folder);
-                let small = |name: &String| Some((name.clone(), read_small(folder, name)?));
-                recent.iter().filter_map(small).collect()
-            };
-            let known: Vec<SmallMap> = folder.as_ref().map(read).unwrap_or_default();
-            Ok(Later::SmallMaps(known.into_iter().chain(skies).collect()))
-        });
-    }
-
-    /// Keeps the picture of a map that was opened, of which `preview` is a smaller one.
-    pub(super) fn keep_small_map(&mut self, name: &str, preview: Arc<Image>) {
-        let (name, folder) = (lasting_map(name), self.small_maps.folder.clone());
-        let is_of_file = self.settings.recent_maps.contains(&name);
-        self.write_later("small map", move || {
+    /// Makes the picture of a map that was opened, of which `preview` is a smaller one, and writes it if that is a
+    /// recent file.
+    pub(super) fn make(
+        &self,
+        name: &str,
+        recent: &[String],
+        preview: Arc<Image>,
+    ) -> impl FnOnce() -> SmallMap + use<> {
+        let name = lasting_map(name);
+        let folder = self.folder.clone().filter(|_| recent.contains(&name));
+        move || {
             let small = in_small(&preview);
-            if let Some(folder) = folder.filter(|_| is_of_file) {
+            if let Some(folder) = folder {
                 // Without it the list has no picture, and no more is lost.
                 let _ = std::fs::create_dir_all(&folder);
                 let _ = write_png(&file_of(&folder, &name), &small, &[]);
             }
-            Ok(Later::SmallMaps(vec![(name, small)]))
-        });
+            (name, small)
+        }
     }
 }
 

@@ -1,231 +1,195 @@
 //! What comes up from the threads, and what is sent down to them.
 
 use std::sync::Arc;
+use std::time::Duration;
 
-use glam::{Vec2, Vec3};
-
+use super::application::App;
+use super::assets::{Assets, first_viewpoint};
 use super::comparison::Comparison;
-use super::document::{Document, PictureSize, Viewpoint, in_other_shape, number_now};
+use super::document::{Document, number_now};
+use super::edited::Edited;
 use super::interface::Chosen;
+use super::library::Library;
 use super::loader::{Kind, Loaded, LoadedMap, LoadedScene};
-use super::presenter::{Order, Shown};
-use super::speed_up::SpeedUp;
-use super::threads::lock;
+use super::tasks::TaskResult;
 use super::worker::{Request, Snapshot};
-use super::{App, Later, surface_map};
 use crate::denoise::Denoiser;
-use crate::environment::Environment;
-use crate::memory;
-use crate::path::framing;
+use crate::error::Error;
 use crate::render::gpu::DeviceChoice;
 use crate::sources;
-
-/// What a pixel of the picture takes: films of its exact and of its cached light, copies of both that are shown
-/// and that will be, and what takes noise out (measured: 630).
-pub(super) const BYTES_PER_PIXEL: u64 = 640;
-
-/// An environment and what it was made from.
-pub(super) struct TransformedMap {
-    map: Arc<Environment>,
-    rotation_degrees: f32,
-    intensity: f32,
-    pub(super) environment: Arc<Environment>,
-}
 
 impl App {
     /// Takes what the threads have ready.
     pub(super) fn collect(&mut self, context: &egui::Context) {
-        for loaded in self.loader.take() {
+        for loaded in self.assets.take(&self.edited.document) {
             match loaded {
-                // Somebody has gone back meanwhile.
-                Loaded::Scene(name, _) if name != self.document.scene => {}
-                Loaded::Map(name, _) if name != self.document.map => {}
                 Loaded::Scene(_, Ok(scene)) => self.take_scene(scene),
+                Loaded::Scene(_, Err(error)) => self.refuse_scene(&error),
                 Loaded::Edited(_, Ok(scene)) => {
-                    self.scene = Some(scene);
-                    self.inspector.forget();
+                    self.assets.scene = Some(scene);
+                    self.rendering.inspector.forget();
                 }
                 Loaded::Edited(_, Err(error)) => {
                     self.messages.error(error.to_string());
-                    let edits = self.scene.as_ref().map(|scene| scene.edits.clone());
-                    self.put_back(|document| document.materials = edits.unwrap_or_default());
+                    let edits = self.assets.scene.as_ref().map(|scene| scene.edits.clone());
+                    let edits = edits.unwrap_or_default();
+                    self.edited.put_back(|document| document.materials = edits);
                 }
-                Loaded::Map(_, Ok(map)) => {
-                    if self.map.as_ref().is_none_or(|old| old.name != map.name) {
-                        self.messages.notices(&map.notices);
-                    }
-                    self.messages.opened(Kind::Map);
-                    self.settings.recent_map(&map.name);
-                    self.has_news |= self.settings.recent_maps != self.settings_before.recent_maps;
-                    // Not as it is with another sun.
-                    if map.sun_factor == 1.0 {
-                        self.keep_small_map(&map.name, Arc::clone(&map.preview));
-                    }
-                    self.map = Some(map);
-                    self.inspector.forget();
-                }
-                // What is shown stays, and the document says so again.
-                Loaded::Scene(_, Err(error)) => {
-                    match &self.scene {
-                        Some(_) => self.messages.not_opened(Kind::Scene, error.to_string()),
-                        None => self.messages.error(error.to_string()),
-                    }
-                    // One that is read again is still shown.
-                    if self.scene_of_document().is_none() {
-                        self.give_up_saving("its scene cannot be read");
-                    }
-                    self.stay_in_scene();
-                }
-                Loaded::Map(_, Err(error)) => {
-                    let (map, sun) = match &self.map {
-                        Some(map) => {
-                            self.messages.not_opened(Kind::Map, error.to_string());
-                            (map.name.clone(), map.sun_factor)
-                        }
-                        // At the start there is none: the built-in one is always there.
-                        None => {
-                            self.messages.error(error.to_string());
-                            let Document { map, sun, .. } = Document::default();
-                            (map, sun)
-                        }
-                    };
-                    if self.snapshot.is_none() {
-                        self.give_up_saving("there is no picture");
-                    }
-                    self.put_back(|document| (document.map, document.sun) = (map, sun));
-                }
+                Loaded::Map(_, Ok(map)) => self.take_map(map),
+                Loaded::Map(_, Err(error)) => self.refuse_map(&error),
             }
         }
-        while let Ok(later) = self.later.1.try_recv() {
-            match later {
-                Later::Chosen(number, path) => {
-                    self.take_chosen(number, path.as_deref(), context);
-                }
-                Later::SmallMaps(maps) => {
-                    maps.into_iter().for_each(|map| self.small_maps.take(map, context));
-                }
-                Later::Done(sentence) => self.messages.notice(sentence),
-                Later::Failed(sentence) => self.messages.error(sentence),
-                Later::KeptPictures(earlier) => {
-                    let count = self.history.take_over(earlier);
-                    self.interface.compared.shift(count);
-                }
-            }
+        while let Some(result) = self.tasks.next_result() {
+            self.take_result(result, context);
         }
-        let arrived = lock(&self.arriving).take();
-        if arrived.is_some() {
-            (self.reference, self.reference_of) = (arrived, None);
+        self.take_render_failures();
+        self.rendering.collect();
+        self.display.collect();
+        if let Some(factor) = self.display.change_of_aspect() {
+            self.interface.follow_shape(factor);
         }
-        if let Some(sentence) = self.worker.take_panic() {
-            self.messages.error(sentence);
-            // It would end so again.
-            self.interface.paused = true;
-        }
-        for sentence in self.worker.take_failures() {
-            self.messages.error(sentence);
-            // Asked for again, it is tried again. The worker does without by itself where none was asked for.
-            if self.document.light.device == DeviceChoice::Gpu {
-                self.document.light.device = DeviceChoice::Cpu;
-                self.undo.amend(&self.document);
-            }
-        }
-        self.inspector.collect();
-        let snapshot = self.worker.snapshot();
-        if let Some(snapshot) = snapshot
-            && self.snapshot.as_ref().is_none_or(|old| old.number != snapshot.number)
-        {
-            self.convergence.add(snapshot.main.sampling, &snapshot.curves);
-            let plain = snapshot.plain.as_ref();
-            self.speed_up = plain.and_then(|plain| SpeedUp::of(&snapshot.main, plain));
-            self.snapshot = Some(snapshot);
-        }
-        // What is on a device that was lost cannot be drawn.
-        let is_here =
-            |shown: &Arc<Shown>| Arc::ptr_eq(&shown.order.developer, &self.screen.developer);
-        self.shown = self.presenter.shown().filter(is_here);
-        self.follow_shape();
         self.inspect();
-        let shown = self.shown.as_deref();
-        if let Some(failure) = shown.and_then(|shown| shown.failure.clone()) {
-            self.messages.error(failure);
-            self.document.look.denoiser = Denoiser::default();
-            self.undo.amend(&self.document);
-        }
-        // Said once: what cannot be compared is compared no longer.
-        let compared = Comparison::new(self.interface.compared, &self.history);
-        let shown = shown.filter(|shown| compared.is_some() && shown.order.compared == compared);
-        if let Some(failure) = shown.and_then(|shown| shown.uncompared.clone()) {
-            self.messages.error(failure);
-            self.interface.compared = Chosen::default();
-        }
+        self.take_display_failures();
     }
 
     fn take_scene(&mut self, scene: LoadedScene) {
         self.messages.opened(Kind::Scene);
         self.messages.notices(&scene.world.scene.notices);
-        self.settings.recent_scene(&scene.name);
-        self.has_news |= self.settings.recent_scenes != self.settings_before.recent_scenes;
-        let is_first = self.scene.is_none();
-        if let Some(before) = self.scene.take().filter(|before| before.name == scene.name) {
+        self.library.note_scene(&scene.name);
+        let is_first = self.assets.scene.is_none();
+        let before = self.assets.scene.take().filter(|before| before.name == scene.name);
+        if let Some(before) = before {
             self.renumber(&before, &scene);
         }
-        self.scene = Some(scene);
-        self.fill_in_viewpoint();
+        self.assets.scene = Some(scene);
+        fill_in_viewpoint(&mut self.edited, &self.assets);
         if is_first {
             // An empty window is nothing to go back to.
-            self.undo.amend(&self.document);
+            self.edited.amend(|_| ());
         }
-        self.inspector.forget();
+        self.rendering.inspector.forget();
     }
 
-    /// Keeps what was changed with the materials that have its name, where a scene was read again: another program
-    /// may have put them in another order.
+    /// Keeps to the same materials by their names, where a scene was read again.
     fn renumber(&mut self, before: &LoadedScene, now: &LoadedScene) {
-        let (before, now, name) = (&before.materials, &now.materials, &now.name);
-        for material in self.document.renumber(before, now) {
+        for material in self.edited.renumber(before, now) {
+            let name = &now.name;
             let sentence = format!("{name}: {material}, which was changed, is no longer there");
             self.messages.notice(sentence);
         }
-        self.undo.change_all(|document| {
-            if document.scene == *name {
-                document.renumber(before, now);
-            }
-        });
-        if let Some(of) = self.reference_of.as_mut().filter(|of| of.scene == *name) {
-            of.renumber(before, now);
-        }
+        let (before, after) = (&before.materials, &now.materials);
+        self.assets.renumber_reference(&now.name, before, after);
         let material = self.interface.material;
-        self.interface.material = material.and_then(|number| number_now(number, before, now));
+        self.interface.material = material.and_then(|number| number_now(number, before, after));
     }
 
-    /// Gives the document what belongs to the scene that is shown, after another could not be read.
-    pub(super) fn stay_in_scene(&mut self) {
-        let Some(scene) = &self.scene else {
-            // At the start there is none: the built-in one is always there.
-            self.document.scene = Document::default().scene;
-            self.document.viewpoint = None;
-            self.document.bookmarks = self.settings.viewpoints_of(&self.document.scene);
-            return;
-        };
-        let before = self.undo.present();
-        let brought_its_sky = sources::is_built_in_scene(&self.document.scene);
-        if before.scene == scene.name {
-            self.document.scene.clone_from(&before.scene);
-            self.document.viewpoint.clone_from(&before.viewpoint);
-            self.document.bookmarks.clone_from(&before.bookmarks);
-            (self.document.region, self.document.fog) = (before.region, before.fog);
-            self.document.materials.clone_from(&before.materials);
-            // The sky that came with the other one goes with it; a map that somebody chose stays.
-            if brought_its_sky {
-                self.document.map.clone_from(&before.map);
+    /// What is shown stays, and the document says so again.
+    fn refuse_scene(&mut self, error: &Error) {
+        match &self.assets.scene {
+            Some(_) => self.messages.not_opened(Kind::Scene, error.to_string()),
+            None => self.messages.error(error.to_string()),
+        }
+        // One that is read again is still shown.
+        if self.assets.scene_of(&self.edited.document).is_none() {
+            self.messages.errors(self.saves.give_up("its scene cannot be read"));
+        }
+        stay_in_scene(&mut self.edited, &self.assets, &self.library);
+    }
+
+    fn take_map(&mut self, map: LoadedMap) {
+        if self.assets.map.as_ref().is_none_or(|old| old.name != map.name) {
+            self.messages.notices(&map.notices);
+        }
+        self.messages.opened(Kind::Map);
+        self.library.note_map(&map.name);
+        // Not as it is with another sun.
+        if map.sun_factor == 1.0 {
+            let Library { settings, small_maps, .. } = &self.library;
+            let preview = Arc::clone(&map.preview);
+            let make = small_maps.make(&map.name, &settings.recent_maps, preview);
+            self.tasks.write("small map", || Ok(TaskResult::SmallMaps(vec![make()])));
+        }
+        self.assets.map = Some(map);
+        self.rendering.inspector.forget();
+    }
+
+    /// What is shown stays, and the document says so again.
+    fn refuse_map(&mut self, error: &Error) {
+        let (map, sun) = match &self.assets.map {
+            Some(map) => {
+                self.messages.not_opened(Kind::Map, error.to_string());
+                (map.name.clone(), map.sun_factor)
             }
-        } else {
-            // Somebody went back to a file that is no longer there.
-            self.document.scene.clone_from(&scene.name);
-            self.document.viewpoint = Some(first_viewpoint(scene));
-            self.document.bookmarks = self.settings.viewpoints_of(&scene.name);
-            self.document.materials.clone_from(&scene.edits);
-            self.undo.amend(&self.document);
+            // At the start there is none: the built-in one is always there.
+            None => {
+                self.messages.error(error.to_string());
+                let Document { map, sun, .. } = Document::default();
+                (map, sun)
+            }
+        };
+        if self.rendering.snapshot.is_none() {
+            self.messages.errors(self.saves.give_up("there is no picture"));
+        }
+        self.edited.put_back(|document| (document.map, document.sun) = (map, sun));
+    }
+
+    fn take_result(&mut self, result: TaskResult, context: &egui::Context) {
+        match result {
+            TaskResult::Chosen(number, path) => {
+                let command = self.desktop.answer(number, path.as_deref(), &mut self.interface);
+                if let Some(command) = command {
+                    self.execute(command, context);
+                }
+            }
+            TaskResult::SmallMaps(maps) => {
+                let small_maps = &mut self.library.small_maps;
+                maps.into_iter().for_each(|map| small_maps.take(map, context));
+            }
+            TaskResult::Truth(truth) => self.rendering.inspector.take(truth),
+            TaskResult::Done(sentence) => self.messages.notice(sentence),
+            TaskResult::Failed(sentence) => self.messages.error(sentence),
+            TaskResult::KeptPictures(earlier) => {
+                let count = self.library.history.take_over(earlier);
+                self.interface.compared.shift(count);
+            }
+            TaskResult::Reference(reference) => {
+                let (name, image) = (&reference.name, &reference.image);
+                self.messages.notice(format!(
+                    "Errors are measured against {name}; the picture must be {} x {} pixels for that",
+                    image.width, image.height
+                ));
+                self.assets.set_reference(Some(reference));
+            }
+        }
+    }
+
+    fn take_render_failures(&mut self) {
+        if let Some(sentence) = self.rendering.worker.take_panic() {
+            self.messages.error(sentence);
+            // It would end so again.
+            self.interface.paused = true;
+        }
+        for sentence in self.rendering.worker.take_failures() {
+            self.messages.error(sentence);
+            // Asked for again, it is tried again. The worker does without by itself where none was asked for.
+            if self.edited.document.light.device == DeviceChoice::Gpu {
+                self.edited.amend(|document| document.light.device = DeviceChoice::Cpu);
+            }
+        }
+    }
+
+    fn take_display_failures(&mut self) {
+        let Some(shown) = self.display.shown.as_deref() else { return };
+        if let Some(failure) = shown.failure.clone() {
+            self.messages.error(failure);
+            self.edited.amend(|document| document.look.denoiser = Denoiser::default());
+        }
+        // Said once: what cannot be compared is compared no longer.
+        let compared = Comparison::new(self.interface.compared, &self.library.history);
+        let is_it = compared.is_some() && shown.order.compared == compared;
+        if let Some(failure) = shown.uncompared.clone().filter(|_| is_it) {
+            self.messages.error(failure);
+            self.interface.compared = Chosen::default();
         }
     }
 
@@ -233,237 +197,121 @@ impl App {
     pub(super) fn settle(&mut self, context: &egui::Context) {
         let busy = context.input(|i| i.pointer.any_down()) || context.text_edit_focused();
         // A file that is being read may turn out to be damaged: nothing has changed then.
-        let is_there = self.scene_of_document().is_some() && self.map_of_document().is_some();
+        let is_there = self.assets.are_named_by(&self.edited.document);
         if !busy && is_there && !self.interface.is_moving(context.time()) {
-            self.undo.settle(&self.document);
+            self.edited.settle();
         }
-    }
-
-    /// The scene that the document names, if it is there.
-    pub(super) fn scene_of_document(&self) -> Option<&LoadedScene> {
-        self.scene.as_ref().filter(|scene| scene.name == self.document.scene)
-    }
-
-    /// The map that the document names, if it is there.
-    fn map_of_document(&self) -> Option<&LoadedMap> {
-        self.map.as_ref().filter(|map| map.name == self.document.map)
-    }
-
-    /// Whether scene and map are there as the document wants them.
-    pub(super) fn has_sources(&self) -> bool {
-        self.scene_of_document().is_some_and(|scene| scene.edits == self.document.materials)
-            && self.map_of_document().is_some_and(|map| map.sun_factor == self.document.sun)
     }
 
     /// Whether a picture, which may be small, is of what the document says now.
     pub(super) fn is_of_document(&self, snapshot: &Snapshot) -> bool {
-        self.has_sources() && self.worker.is_of_latest(snapshot)
-    }
-
-    /// Takes back what cannot be had; it was no step.
-    fn put_back(&mut self, change: impl FnOnce(&mut Document)) {
-        let refused = self.document.clone();
-        change(&mut self.document);
-        self.undo.correct(&refused, &self.document);
-    }
-
-    /// Looks from somewhere, where the document does not say from where.
-    fn fill_in_viewpoint(&mut self) {
-        if self.document.viewpoint.is_none()
-            && let Some(viewpoint) = self.scene_of_document().map(first_viewpoint)
-        {
-            self.put_back(|document| document.viewpoint = Some(viewpoint));
-        }
+        self.assets.are_as_in(&self.edited.document) && self.rendering.worker.is_of_latest(snapshot)
     }
 
     /// Tells the loader, the worker and the presenter what is wanted now.
     pub(super) fn send_down(&mut self, context: &egui::Context) {
-        self.fill_in_viewpoint();
-        self.follow_room();
-        match self.scene.as_ref().filter(|scene| scene.name == self.document.scene) {
-            None => self.loader.load_scene(&self.document.scene),
-            Some(scene) if scene.edits != self.document.materials => {
-                self.loader.edit_scene(scene, &self.document.materials);
-            }
-            Some(_) => {}
-        }
-        let sun = self.document.sun;
-        match self.map.as_ref().filter(|map| map.name == self.document.map) {
-            None => self.loader.load_map(&self.document.map, sun),
-            Some(map) if map.sun_factor != sun => self.loader.edit_map(map, sun),
-            Some(_) => {}
-        }
+        fill_in_viewpoint(&mut self.edited, &self.assets);
+        self.edited.follow_room(self.interface.viewport_pixels);
+        self.assets.load(&self.edited.document);
         if let Some(request) = self.request(context.time()) {
             if request.moving {
-                context.request_repaint_after(std::time::Duration::from_millis(60));
+                context.request_repaint_after(Duration::from_millis(60));
             }
             self.inspect();
-            self.worker.submit(request);
+            self.rendering.worker.submit(request);
         }
-        self.save_when_whole();
-        if let Some(snapshot) = self.snapshot.as_ref().filter(|s| s.has_picture()) {
+        if !self.saves.is_empty()
+            && let Some(picture) = self.picture()
+        {
+            self.saves.write(picture, &mut self.tasks);
+        }
+        if let Some(snapshot) = self.rendering.snapshot.as_ref().filter(|s| s.has_picture()) {
+            let document = &self.edited.document;
             // Kept pictures are whole ones.
-            let is_whole = self.document.region.is_none() && snapshot.request.view.crop.is_none();
-            let compared = Comparison::new(self.interface.compared, &self.history);
-            let look = &self.document.look;
-            self.presenter.order(Order {
-                developer: Arc::clone(&self.screen.developer),
-                snapshot: Arc::clone(snapshot),
-                denoiser: look.denoise.then_some(look.denoiser),
-                metered: look.auto_exposure.then_some(look.white_balance),
-                overlay: self.interface.overlay,
-                look: self.interface.overlay.filter(|o| o.is_developed()).map(|_| *look),
-                tile: self.interface.tile,
-                compared: compared.filter(|_| is_whole),
-            });
+            let is_whole = document.region.is_none() && snapshot.request.view.crop.is_none();
+            let compared = Comparison::new(self.interface.compared, &self.library.history);
+            let compared = compared.filter(|_| is_whole);
+            self.display.order(snapshot, document, &self.interface, compared);
         }
-    }
-
-    /// Keeps the region on the same part of the scene where the room for the picture has got another shape: the field
-    /// of view is vertical.
-    fn follow_room(&mut self) {
-        let Some(room) = self.interface.viewport_pixels else { return };
-        let before = self.room.replace(room).filter(|before| *before != room);
-        let Some(before) = before else { return };
-        let aspect = |[width, height]: [u32; 2]| width as f32 / height as f32;
-        let factor = aspect(before) / aspect(room);
-        self.document.follow_room(factor);
-        self.undo.change_all(|document| document.follow_room(factor));
-    }
-
-    /// Keeps the inspected place there, too, where another picture is shown.
-    fn follow_shape(&mut self) {
-        let Some(shown) = &self.shown else { return };
-        let view = shown.order.snapshot.view();
-        if view.crop.is_some() {
-            return;
-        }
-        let aspect = view.width as f32 / view.height.max(1) as f32;
-        let before = self.shown_aspect.replace(aspect).filter(|before| *before != aspect);
-        if let Some((before, place)) = before.zip(self.interface.pinned) {
-            let place = Vec2::new(in_other_shape(place.x, before / aspect), place.y);
-            self.interface.pinned = Some(place).filter(|place| (0.0..=1.0).contains(&place.x));
-        }
-    }
-
-    /// Takes back a size, or the whole in place of a region, for which there is no memory: the system would end
-    /// the window.
-    fn check_size(&mut self) {
-        let asked = (self.document.size, self.document.region);
-        if asked == self.affordable {
-            return;
-        }
-        if let PictureSize::Fixed(width, height) = asked.0 {
-            // A region of how many pixels is known once there is a camera.
-            let Some(view) = self.document.view(width, height) else { return };
-            let bytes = view.pixels() * BYTES_PER_PIXEL;
-            if let Err(cause) = memory::check(bytes) {
-                self.messages.error(format!("a picture of {width} x {height} pixels {cause}"));
-                let (size, region) = self.affordable;
-                self.put_back(|document| (document.size, document.region) = (size, region));
-            }
-        }
-        self.affordable = (self.document.size, self.document.region);
     }
 
     fn request(&mut self, now: f64) -> Option<Request> {
-        self.check_size();
-        if self.reference.is_some() && self.reference_of.is_none() && self.has_sources() {
-            self.reference_of = Some(self.document.clone());
+        if let Err(sentence) = self.edited.check_size() {
+            self.messages.error(sentence);
         }
+        let (document, interface) = (&self.edited.document, &self.interface);
+        let reference = self.assets.reference_for(document);
         // Another scene would be seen from this one's viewpoint.
-        let world = Arc::clone(&self.scene_of_document()?.world);
-        let environment = self.environment()?;
-        let [width, height] = self.document.size.pixels(self.interface.viewport_pixels)?;
+        let world = Arc::clone(&self.assets.scene_of(document)?.world);
+        let environment = self.assets.environment(document)?;
+        let [width, height] = document.size.pixels(interface.viewport_pixels)?;
         Some(Request {
             world,
             environment,
-            view: self.document.view(width, height)?,
-            split: self.document.light.split,
-            moving: self.interface.is_moving(now) && !self.is_repeatable,
+            view: document.view(width, height)?,
+            split: document.light.split,
+            moving: interface.is_moving(now) && !self.is_repeatable,
             previews: !self.is_repeatable,
-            device: self.document.light.device,
-            wants_cached: self.document.look.denoise,
-            inspects_cache: self.interface.inspects_cache(),
-            rule: self.document.stop,
-            is_frozen: self.interface.is_frozen,
-            reference: self
-                .reference
-                .clone()
-                .filter(|_| self.has_sources() && self.is_like_reference()),
-            paused: self.interface.paused,
-            run: self.interface.run,
+            device: document.light.device,
+            wants_cached: document.look.denoise,
+            inspects_cache: interface.inspects_cache(),
+            rule: document.stop,
+            is_frozen: interface.is_frozen,
+            reference,
+            paused: interface.paused,
+            run: interface.run,
         })
     }
 
-    /// What the picture on the screen is of or, before there is one, the newest.
+    /// The picture on the screen or, before there is one, the newest.
     pub(super) fn seen(&self) -> Option<&Arc<Snapshot>> {
-        let shown = self.shown.as_ref().map(|shown| &shown.order.snapshot);
-        shown.or(self.snapshot.as_ref())
+        let shown = self.display.shown.as_ref().map(|shown| &shown.order.snapshot);
+        shown.or(self.rendering.snapshot.as_ref())
     }
 
     fn inspect(&mut self) {
         let seen = self.seen().cloned();
-        self.inspector.update(&self.interface, seen.as_ref());
-    }
-
-    /// Whether the document shows what it did when the reference came: that is of nothing else.
-    pub(super) fn is_like_reference(&self) -> bool {
-        self.reference_of.as_ref().is_some_and(|of| of.shows_like(&self.document))
-    }
-
-    /// The map as the document turns and scales it; made anew only when that changes.
-    fn environment(&mut self) -> Option<Arc<Environment>> {
-        let map = &self.map.as_ref()?.environment;
-        let (rotation_degrees, intensity) =
-            (self.document.rotation_degrees, self.document.intensity);
-        let is_current = self.lit.as_ref().is_some_and(|lit| {
-            Arc::ptr_eq(&lit.map, map)
-                && lit.rotation_degrees == rotation_degrees
-                && lit.intensity == intensity
-        });
-        if !is_current {
-            let mut environment = (**map).clone();
-            environment.set_rotation(rotation_degrees.to_radians());
-            environment.set_intensity(intensity);
-            let environment = Arc::new(environment);
-            self.lit = Some(TransformedMap {
-                map: Arc::clone(map),
-                rotation_degrees,
-                intensity,
-                environment,
-            });
-        }
-        self.lit.as_ref().map(|lit| Arc::clone(&lit.environment))
+        self.rendering.inspector.update(&self.interface, seen.as_ref());
     }
 }
 
-/// Through the scene's first camera, or of all of it where there is none.
-fn first_viewpoint(scene: &LoadedScene) -> Viewpoint {
-    let own = scene.world.scene.cameras.first().cloned();
-    let is_framed = own.is_none();
-    let camera = own.unwrap_or_else(|| framing::frame(&scene.world, 16.0 / 9.0));
-    let (low, high) = scene.world.bvh.bounds();
-    let eye = Vec3::from(camera.world_from_camera.translation);
-    let is_outside = !(eye.cmpge(low) & eye.cmple(high)).all();
-    // What is framed from outside is turned about its middle, not about what is seen first or behind it.
-    let distance = match is_framed && is_outside {
-        true => camera.focus_distance,
-        false => pivot_distance(scene, &camera),
+/// Looks from somewhere, where the document does not say from where.
+fn fill_in_viewpoint(edited: &mut Edited, assets: &Assets) {
+    if edited.document.viewpoint.is_none()
+        && let Some(viewpoint) = assets.scene_of(&edited.document).map(first_viewpoint)
+    {
+        edited.put_back(|document| document.viewpoint = Some(viewpoint));
+    }
+}
+
+/// Gives the document what belongs to the scene that is shown, after another could not be read.
+pub(super) fn stay_in_scene(edited: &mut Edited, assets: &Assets, library: &Library) {
+    let before = edited.undo.present().clone();
+    let document = &mut edited.document;
+    let Some(scene) = &assets.scene else {
+        // At the start there is none: the built-in one is always there.
+        document.scene = Document::default().scene;
+        document.viewpoint = None;
+        document.bookmarks = library.settings.viewpoints_of(&document.scene);
+        return;
     };
-    let mut viewpoint = Viewpoint::of(&camera, distance);
-    if !(viewpoint.focus_distance.is_finite() && viewpoint.focus_distance > 0.0) {
-        viewpoint.focus_distance = distance;
+    if before.scene == scene.name {
+        // The sky that came with the other one goes with it; a map that somebody chose stays.
+        if sources::is_built_in_scene(&document.scene) {
+            document.map = before.map;
+        }
+        document.scene = before.scene;
+        document.viewpoint = before.viewpoint;
+        document.bookmarks = before.bookmarks;
+        (document.region, document.fog) = (before.region, before.fog);
+        document.materials = before.materials;
+    } else {
+        // Somebody went back to a file that is no longer there.
+        edited.amend(|document| {
+            document.scene.clone_from(&scene.name);
+            document.viewpoint = Some(first_viewpoint(scene));
+            document.bookmarks = library.settings.viewpoints_of(&scene.name);
+            document.materials.clone_from(&scene.edits);
+        });
     }
-    viewpoint
-}
-
-/// Metres to what is in the middle of a camera's picture.
-fn pivot_distance(scene: &LoadedScene, camera: &crate::scene::Camera) -> f32 {
-    let rays = crate::path::camera::CameraRays::new(camera, 16, 9);
-    let ray = rays.ray(Vec2::new(8.0, 4.5), Vec2::splat(0.5));
-    let (low, high) = scene.world.bvh.bounds();
-    surface_map::look(&scene.world, ray)
-        .map_or(0.5 * (high - low).length(), |spot| spot.position.distance(ray.origin))
-        .max(0.05)
 }

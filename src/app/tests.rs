@@ -11,7 +11,7 @@ use super::document::{Document, Light, Look, PictureSize};
 use super::interface::{Dock, Interface, Tab};
 use super::overlays::Overlay;
 use super::screenshot::{Shot, Studio};
-use super::{Start, sync};
+use super::{Start, edited};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::image::{ExrPicture, Image, read_picture, write_exr};
 use crate::memory;
@@ -64,12 +64,12 @@ fn what_is_saved_is_what_was_asked_for_and_not_what_was_there_before() {
     studio.asks(Command::Save(early.clone()));
     studio.asks(Command::Save(folder.path().join("another.png")));
     studio.asks(Command::KeepPicture);
-    assert!(studio.app.history.list_mut().is_empty(), "it is none of the document");
+    assert!(studio.app.library.history.list_mut().is_empty(), "it is none of the document");
     studio.settle().expect("rendered");
     studio.frame().expect("drawn");
     studio.asks(Command::Save(late.clone()));
     studio.asks(Command::KeepPicture);
-    assert_eq!(studio.app.history.list_mut().len(), 1);
+    assert_eq!(studio.app.library.history.list_mut().len(), 1);
     studio.frame().expect("drawn");
     assert!(studio.app.finish().is_empty());
     let pixels = |path: &Path| read_picture(path).expect("written").pixels;
@@ -85,34 +85,34 @@ fn what_is_saved_is_what_was_asked_for_and_not_what_was_there_before() {
 #[test]
 fn a_size_without_memory_is_refused_and_undo_goes_on() {
     const HUGE: PictureSize = PictureSize::Fixed(16_384, 8_192);
-    if memory::check((16_384 * 8_192) * sync::BYTES_PER_PIXEL).is_ok() {
+    if memory::check((16_384 * 8_192) * edited::BYTES_PER_PIXEL).is_ok() {
         crate::terminal::notice("SKIPPED: there is memory for everything");
         return;
     }
     let Some(mut studio) = studio("open") else { return };
     studio.settle().expect("rendered");
-    let small = studio.app.document.size;
-    studio.app.document.rotation_degrees = 30.0;
+    let small = studio.app.edited.document.size;
+    studio.app.edited.document.rotation_degrees = 30.0;
     studio.settle().expect("rendered");
     let frames = |studio: &mut Studio| (0..3).for_each(|_| studio.frame().expect("drawn"));
-    studio.app.document.size = HUGE;
+    studio.app.edited.document.size = HUGE;
     frames(&mut studio);
-    assert_eq!(studio.app.document.size, small);
-    assert!(studio.app.failure().is_some_and(|said| said.contains("16384 x 8192")));
+    assert_eq!(studio.app.edited.document.size, small);
+    assert!(studio.app.messages.first_error().is_some_and(|said| said.contains("16384 x 8192")));
     // Of a part there may be as much as one likes, of the whole not.
-    studio.app.document.region = Some([0.0, 0.0, 0.002, 0.002]);
-    studio.app.document.size = HUGE;
+    studio.app.edited.document.region = Some([0.0, 0.0, 0.002, 0.002]);
+    studio.app.edited.document.size = HUGE;
     frames(&mut studio);
-    assert_eq!(studio.app.document.size, HUGE);
+    assert_eq!(studio.app.edited.document.size, HUGE);
     studio.asks(Command::ToggleRegion);
     frames(&mut studio);
-    assert!(studio.app.document.size == HUGE && studio.app.document.region.is_some());
+    assert!(studio.app.edited.document.size == HUGE && studio.app.edited.document.region.is_some());
     studio.asks(Command::Undo);
     frames(&mut studio);
-    assert_eq!((studio.app.document.size, studio.app.document.region), (small, None));
-    assert_eq!(studio.app.document.rotation_degrees, 30.0);
+    assert_eq!((studio.app.edited.document.size, studio.app.edited.document.region), (small, None));
+    assert_eq!(studio.app.edited.document.rotation_degrees, 30.0);
     studio.asks(Command::Undo);
-    assert_eq!(studio.app.document.rotation_degrees, 0.0);
+    assert_eq!(studio.app.edited.document.rotation_degrees, 0.0);
 }
 
 #[test]
@@ -128,13 +128,13 @@ fn a_map_that_has_gone_is_no_step_to_go_back_to() {
     }
     std::fs::remove_file(&maps[0]).expect("removed");
     studio.asks(Command::Undo);
-    while studio.app.failure().is_none() {
+    while studio.app.messages.first_error().is_none() {
         studio.frame().expect("drawn");
     }
-    assert_eq!(studio.app.document.map, maps[1]);
+    assert_eq!(studio.app.edited.document.map, maps[1]);
     studio.frame().expect("drawn");
     studio.asks(Command::Undo);
-    assert_eq!(studio.app.document.map, "sky:day@64x32");
+    assert_eq!(studio.app.edited.document.map, "sky:day@64x32");
 }
 
 #[test]
@@ -147,25 +147,25 @@ fn the_sun_is_changed_without_the_file_of_its_map() {
     pixels[8 * 64 + 20] = [900.0, 800.0, 700.0];
     let map = Image { width: 64, height: 32, pixels };
     write_picture(&file, &map);
-    studio.app.document.sun = 0.0;
+    studio.app.edited.document.sun = 0.0;
     studio.asks(Command::OpenMap(name.clone()));
     studio.settle().expect("rendered");
     std::fs::remove_file(&file).expect("removed");
     for factor in [3.0, 0.5, 1.0] {
-        studio.app.document.sun = factor;
+        studio.app.edited.document.sun = factor;
         studio.settle().expect("rendered");
-        assert_eq!(studio.app.failure(), None);
-        let loaded = studio.app.map.as_ref().expect("it is there");
+        assert_eq!(studio.app.messages.first_error(), None);
+        let loaded = studio.app.assets.map.as_ref().expect("it is there");
         let options = EnvironmentOptions { sun: factor, ..EnvironmentOptions::default() };
         let expected = Environment::new(map.clone(), &options).expect("sound");
         assert_eq!((loaded.sun_factor, loaded.environment.map()), (factor, expected.map()));
     }
     // Read again it has gone.
     studio.asks(Command::ReadAgain);
-    while studio.app.failure().is_none() {
+    while studio.app.messages.first_error().is_none() {
         studio.frame().expect("drawn");
     }
-    assert_eq!((&studio.app.document.map, studio.app.document.sun), (&name, 1.0));
+    assert_eq!((&studio.app.edited.document.map, studio.app.edited.document.sun), (&name, 1.0));
 }
 
 #[test]
@@ -183,7 +183,7 @@ fn a_paused_picture_goes_on_with_a_map_that_is_read_again() {
         write_picture(&file, &Image::filled(4, 2, [light; 3]));
         studio.asks(asked);
         studio.settle().expect("rendered");
-        let snapshot = studio.app.snapshot.as_ref().expect("it is there");
+        let snapshot = studio.app.rendering.snapshot.as_ref().expect("it is there");
         assert_eq!(snapshot.request.environment.map().pixels[0], [light; 3]);
         assert!(snapshot.main.film.min_samples() > 0);
     }
@@ -197,14 +197,14 @@ fn a_scene_is_looked_at_from_somewhere_and_known_by_any_of_its_paths() {
     let name = file.display().to_string();
     let Some(mut studio) = studio(&name) else { return };
     studio.settle().expect("rendered");
-    studio.app.document.viewpoint = None;
+    studio.app.edited.document.viewpoint = None;
     studio.settle().expect("rendered");
-    assert!(studio.app.document.viewpoint.is_some());
+    assert!(studio.app.edited.document.viewpoint.is_some());
     studio.asks(Command::Bookmark);
-    studio.app.document.rotation_degrees = 30.0;
-    let before = studio.app.document.clone();
+    studio.app.edited.document.rotation_degrees = 30.0;
+    let before = studio.app.edited.document.clone();
     studio.asks(Command::OpenScene(folder.path().join("./triangle.gltf").display().to_string()));
-    assert_eq!(studio.app.document, before, "it is read again");
+    assert_eq!(studio.app.edited.document, before, "it is read again");
     // Paused, it would never be seen.
     studio.asks(Command::TogglePause);
     studio.asks(Command::OpenScene("open".to_owned()));
@@ -221,11 +221,11 @@ fn a_scene_is_read_again_while_a_material_of_it_changes() {
     let larger = TRIANGLE.replace(r#"{"mesh": 0}"#, r#"{"mesh": 0, "scale": [2, 2, 2]}"#);
     std::fs::write(&file, larger).expect("written");
     let edit = MaterialEdit { roughness: Some(0.25), ..MaterialEdit::default() };
-    studio.app.document.materials.insert(0, edit);
+    studio.app.edited.document.materials.insert(0, edit);
     studio.frame().expect("drawn");
     studio.asks(Command::ReadAgain);
     studio.settle().expect("rendered");
-    let scene = &studio.app.scene.as_ref().expect("it is there").world.scene;
+    let scene = &studio.app.assets.scene.as_ref().expect("it is there").world.scene;
     assert!(scene.positions.iter().any(|position| position.max_element() == 2.0));
     assert_eq!(scene.materials[0].roughness, 0.25);
 }
@@ -246,7 +246,7 @@ fn a_tile_that_a_smaller_map_does_not_have_is_shown_nowhere() {
 fn what_is_only_looked_at_stays_as_it_is() {
     let Some(mut studio) = studio("office") else { return };
     studio.settle().expect("rendered");
-    let document = &mut studio.app.document;
+    let document = &mut studio.app.edited.document;
     let viewpoint = document.viewpoint.as_mut().expect("there is a camera");
     viewpoint.fov_y_degrees = Some(22.945);
     (viewpoint.lens_radius, viewpoint.focus_distance) = (0.000_437, 0.003);
@@ -264,12 +264,12 @@ fn what_is_only_looked_at_stays_as_it_is() {
     for tab in [Tab::Picture, Tab::Inspect, Tab::Scene] {
         studio.arrange(Interface { tab, material: Some(0), ..Interface::default() });
         (0..4).for_each(|_| studio.frame().expect("drawn"));
-        assert_eq!(studio.app.document, before, "{tab:?}");
+        assert_eq!(studio.app.edited.document, before, "{tab:?}");
     }
     // One that has not been changed is not changed by being chosen, either.
     studio.arrange(Interface { material: Some(1), ..Interface::default() });
     (0..4).for_each(|_| studio.frame().expect("drawn"));
-    assert_eq!(studio.app.document, before);
+    assert_eq!(studio.app.edited.document, before);
 }
 
 #[test]
@@ -279,15 +279,15 @@ fn errors_are_measured_against_a_reference_where_it_shows_the_same() {
     let file = folder.path().join("reference.exr");
     write_picture(&file, &Image::filled(48, 32, [0.5; 3]));
     studio.asks(Command::OpenReference(file.display().to_string()));
-    while studio.app.reference.is_none() {
+    while studio.app.assets.reference.is_none() {
         studio.frame().expect("drawn");
-        assert_eq!(studio.app.failure(), None);
+        assert_eq!(studio.app.messages.first_error(), None);
     }
     // The light comes from elsewhere meanwhile.
     for (degrees, is_measured) in [(0.0, true), (30.0, false), (0.0, true)] {
-        studio.app.document.rotation_degrees = degrees;
+        studio.app.edited.document.rotation_degrees = degrees;
         studio.settle().expect("rendered");
-        let request = &studio.app.snapshot.as_ref().expect("it is there").request;
+        let request = &studio.app.rendering.snapshot.as_ref().expect("it is there").request;
         assert_eq!(request.reference.is_some(), is_measured, "{degrees}");
     }
 }
@@ -300,7 +300,7 @@ fn the_truth_of_another_map_is_never_shown() {
     let measured = |studio: &mut Studio| {
         studio.measure_truth().expect("rendered");
         studio.settle().expect("measured");
-        studio.app.inspector.truth().expect("there").shares.clone()
+        studio.app.rendering.inspector.truth().expect("there").shares.clone()
     };
     let day = measured(&mut studio);
     // One that is still being measured when the map changes, too.
@@ -308,8 +308,8 @@ fn the_truth_of_another_map_is_never_shown() {
     studio.asks(Command::OpenMap("sky:overcast@64x32".to_owned()));
     studio.settle().expect("rendered");
     studio.frame().expect("drawn");
-    assert!(studio.app.inspector.inspected().is_some());
-    assert!(studio.app.inspector.truth().is_none(), "it is the old map's");
+    assert!(studio.app.rendering.inspector.inspected().is_some());
+    assert!(studio.app.rendering.inspector.truth().is_none(), "it is the old map's");
     assert_ne!(measured(&mut studio), day);
 }
 

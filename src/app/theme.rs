@@ -103,6 +103,13 @@ pub(super) fn heading(ui: &mut Ui, text: &str) {
     ui.add_space(-2.0);
 }
 
+/// A line below what is above, and the heading of the next group.
+pub(super) fn section(ui: &mut Ui, text: &str) {
+    ui.add_space(4.0);
+    ui.separator();
+    heading(ui, text);
+}
+
 /// One setting: its name on the left, what sets it on the right.
 pub(super) fn row<R>(ui: &mut Ui, name: &str, hint: &str, add: impl FnOnce(&mut Ui) -> R) -> R {
     ui.horizontal(|ui| {

@@ -22,11 +22,12 @@ use winit::event_loop::{
 use winit::platform::wayland::WindowAttributesExtWayland as _;
 use winit::window::{Fullscreen, Window, WindowId};
 
+use super::application::{App, Start};
 use super::loader::Loader;
 use super::screen::{Screen, TextureCopies, renderer_options};
 use super::settings_file::Settings;
 use super::threads::{Wake, Wakes};
-use super::{App, Start, input_order, theme};
+use super::{input_order, theme};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::render::gpu::Gpu;
@@ -277,8 +278,8 @@ impl Runner {
             Some(screen.gpu().limits.max_texture_dimension_2d as usize),
         );
         let mut app = App::new(start, loader, screen, &context, wakes)?;
-        app.lie_in(Arc::clone(&window));
-        self.notices.drain(..).for_each(|sentence| app.say(sentence));
+        app.desktop.lie_in(Arc::clone(&window));
+        self.notices.drain(..).for_each(|sentence| app.messages.notice(sentence));
         Ok(Running {
             window,
             context,
@@ -357,7 +358,7 @@ impl Running {
             return Ok(());
         };
         let start = Instant::now();
-        if let Err(loss) = self.app.screen().gpu().check() {
+        if let Err(loss) = self.app.display.screen.gpu().check() {
             self.replace_device(&loss)?;
         }
         let mut input = self.input.take_egui_input(&self.window);
@@ -366,9 +367,9 @@ impl Running {
             self.input.egui_input_mut().events = later;
             self.context.request_repaint();
         }
-        let was_modal = self.app.is_modal();
+        let was_modal = self.app.interface.is_modal();
         let mut output = self.context.run_ui(input, |ui| self.app.show(ui));
-        if self.app.is_modal() && !was_modal {
+        if self.app.interface.is_modal() && !was_modal {
             // Or a tooltip from before lies over the question until the pointer moves.
             self.input.egui_input_mut().events.push(egui::Event::PointerGone);
         }
@@ -376,7 +377,7 @@ impl Running {
         let points = output.pixels_per_point;
         let primitives = self.context.tessellate(output.shapes, points);
         self.copies.follow(&output.textures_delta);
-        let gpu = self.app.screen().gpu().clone();
+        let gpu = self.app.display.screen.gpu().clone();
         let is_stale = self.is_stale.swap(false, Ordering::Relaxed);
         let mut paint = || {
             let Some(painter) = &mut self.painter else { return };
@@ -402,23 +403,23 @@ impl Running {
         if self.is_stale.load(Ordering::Relaxed) {
             self.context.request_repaint();
         }
-        if self.app.screen().gpu().check().is_err() {
+        if self.app.display.screen.gpu().check().is_err() {
             self.context.request_repaint();
         } else if let Err(panic) = drawn {
             resume_unwind(panic);
         }
-        if self.app.toggles_full_screen() {
+        if std::mem::take(&mut self.app.toggles_full_screen) {
             let fills = self.window.fullscreen().is_some();
             self.window.set_fullscreen((!fills).then_some(Fullscreen::Borderless(None)));
         }
-        let title = self.app.title();
+        let title = format!("{} - lightgrid", self.app.edited.document.scene);
         if title != self.title {
             self.window.set_title(&title);
             self.title = title;
         }
         self.drawn_at = Instant::now();
         self.rest = Duration::ZERO;
-        if self.app.screen().gpu().facts().is_software() {
+        if self.app.display.screen.gpu().facts().is_software() {
             self.rest = (REST * start.elapsed()).min(MAX_REST);
         }
         Ok(())
@@ -426,7 +427,7 @@ impl Running {
 
     /// When the next frame of what is new can be afforded.
     fn rested_at(&self) -> Instant {
-        let longest = MAX_REST.as_secs_f64().min(REST_OF_A_SECOND * self.app.seconds());
+        let longest = MAX_REST.as_secs_f64().min(REST_OF_A_SECOND * self.app.rendering.seconds());
         self.least_rested_at().max(self.drawn_at + self.rest.min(Duration::from_secs_f64(longest)))
     }
 
@@ -504,12 +505,12 @@ impl ApplicationHandler<Call> for Runner {
             }
             WindowEvent::RedrawRequested => {
                 let drawn = running.draw();
-                if running.app.has_news_to_keep()
+                if running.app.library.take_news()
                     && let Err(error) = running.keep_settings(self.settings_path.as_deref(), false)
                 {
-                    running.app.say(error.to_string());
+                    running.app.messages.notice(error.to_string());
                 }
-                if drawn.is_err() || running.app.is_closing() {
+                if drawn.is_err() || running.app.is_closing {
                     self.loss = drawn.err();
                     self.close(event_loop);
                 }
@@ -521,11 +522,11 @@ impl ApplicationHandler<Call> for Runner {
                 if let Some((width, height)) = size
                     && let Some(painter) = &mut running.painter
                 {
-                    let gpu = running.app.screen().gpu();
+                    let gpu = running.app.display.screen.gpu();
                     gpu.alone(|| painter.on_window_resized(ViewportId::ROOT, width, height));
                 }
             }
-            WindowEvent::Focused(false) => running.app.lose_focus(),
+            WindowEvent::Focused(false) => running.app.desktop.lose_focus(),
             WindowEvent::KeyboardInput { .. }
             | WindowEvent::MouseInput { .. }
             | WindowEvent::MouseWheel { .. }

@@ -42,9 +42,8 @@ pub(super) fn paint(
 
 /// As the picture is developed: white balance, exposure, tone curve.
 fn develop(radiance: Vec3, (look, automatic_ev): (Look, f32)) -> [u8; 3] {
-    let stops = look.exposure_ev + if look.auto_exposure { automatic_ev } else { 0.0 };
     let balanced = (look.white_balance.matrix() * radiance).max(Vec3::ZERO);
-    let display = look.curve.apply(balanced * stops.exp2());
+    let display = look.curve.apply(balanced * look.total_ev(automatic_ev).exp2());
     display.to_array().map(|v| (255.0 * srgb_from_linear(v)).round() as u8)
 }
 

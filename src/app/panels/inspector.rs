@@ -28,9 +28,7 @@ pub(in crate::app) fn show(
 ) {
     let Some(map) = map else { return };
     let size = map.environment.tile_grid();
-    ui.add_space(4.0);
-    ui.separator();
-    theme::heading(ui, "TILES OF THE MAP");
+    theme::section(ui, "TILES OF THE MAP");
     tile_views(ui, interface);
     let energies: Vec<f32> =
         map.environment.tile_energies().iter().map(|energy| *energy as f32).collect();
@@ -56,9 +54,7 @@ pub(in crate::app) fn show(
         "Go on with the distributions there are, around their old centre, when the camera or a setting \
          changes",
     );
-    ui.add_space(4.0);
-    ui.separator();
-    theme::heading(ui, "CELL UNDER THE POINTER");
+    theme::section(ui, "CELL UNDER THE POINTER");
     match inspector.inspected() {
         Some(inspected) => {
             facts(ui, inspected);

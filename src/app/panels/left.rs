@@ -66,16 +66,12 @@ pub(in crate::app) fn sections(
     scene(ui, document, sources, commands);
     theme::heading(ui, "CAMERA");
     cameras(ui, document, sources.scene, commands);
-    ui.add_space(4.0);
-    ui.separator();
-    theme::heading(ui, "ENVIRONMENT");
+    theme::section(ui, "ENVIRONMENT");
     environment(ui, document, interface, sources, commands);
-    ui.add_space(4.0);
-    ui.separator();
     if let Some(scene) = sources.scene {
+        theme::section(ui, "FOG");
         fog(ui, &mut document.fog, scene.world.scene.medium);
-        ui.add_space(4.0);
-        ui.separator();
+        theme::section(ui, "MATERIAL");
         material::show(ui, document, interface, scene);
     }
 }
@@ -345,7 +341,6 @@ fn fog(ui: &mut Ui, fog: &mut Option<Medium>, own: Option<Medium>) {
     let mut is_on =
         is_held || now.scattering != clear.scattering || now.absorption != clear.absorption;
     let mut holds = false;
-    theme::heading(ui, "FOG");
     ui.horizontal(|ui| {
         let hint = "A medium that scatters and swallows light";
         if ui.checkbox(&mut is_on, "Fill the air").on_hover_text(hint).changed() {

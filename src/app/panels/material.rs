@@ -16,7 +16,6 @@ pub(super) fn show(
     interface: &mut Interface,
     scene: &LoadedScene,
 ) {
-    theme::heading(ui, "MATERIAL");
     let title = |number: u32| {
         let name = called(number, &scene.materials);
         match document.materials.get(&number) {

@@ -20,27 +20,19 @@ pub(in crate::app) fn show(
     curve(ui, document);
     white_balance(ui, &mut document.look.white_balance);
     denoiser(ui, document);
-    ui.add_space(4.0);
-    ui.separator();
-    theme::heading(ui, "LIGHT");
+    theme::section(ui, "LIGHT");
     theme::row(ui, "Bounces", "How often light turns on its way; 1 is direct light", |ui| {
         ui.add(theme::slider(&mut document.light.bounces, 0..=32));
     });
     theme::row(ui, "Seed", "The same seed gives the same picture", |ui| {
         ui.add(theme::number(&mut document.light.seed, 0..=u32::MAX));
     });
-    ui.add_space(4.0);
-    ui.separator();
-    theme::heading(ui, "SIZE");
+    theme::section(ui, "SIZE");
     size(ui, &mut document.size);
     region(ui, document.region.is_some(), commands);
-    ui.add_space(4.0);
-    ui.separator();
-    theme::heading(ui, "STOP AT");
+    theme::section(ui, "STOP AT");
     stop(ui, document);
-    ui.add_space(4.0);
-    ui.separator();
-    theme::heading(ui, "COMPARE");
+    theme::section(ui, "COMPARE");
     if ui
         .button("Keep this picture")
         .on_hover_text("For comparing it with others and with what is rendered next (K)")

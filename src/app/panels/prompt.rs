@@ -1,72 +1,51 @@
-//! Asking for a path: typed, pasted, recent, or from the system's dialogue.
+//! Asking for a path to type or paste; the system's dialogue lies before it where there is one.
 
-use std::path::{MAIN_SEPARATOR, Path, is_separator};
+use std::path::{Path, is_separator};
 
 use egui::text::{CCursor, CCursorRange};
-use egui::{Align, Context, Id, Key, Layout, Modal, Modifiers, Response, RichText, TextEdit, Ui};
+use egui::{Context, Id, Key, Modal, RichText, TextEdit};
 
-use super::map_view;
 use crate::app::commands::Command;
-use crate::app::completion::{Completion, complete, in_home};
-use crate::app::interface::{Cursor, Interface, Objection, Prompt, Purpose};
-use crate::app::settings_file::Settings;
-use crate::app::small_maps::SmallMaps;
+use crate::app::interface::{Interface, Purpose, Refusal};
 use crate::app::theme;
 use crate::image::extension;
 use crate::sources;
 
-/// What is to be known of a path before it is taken.
-fn objection(purpose: Purpose, path: &str) -> Option<Objection> {
-    let is_there = Path::new(path).exists();
-    if purpose.is_output() {
-        let (_, extensions) = purpose.files();
-        if !extension(Path::new(path)).is_some_and(|extension| extensions.contains(&&*extension)) {
-            return Some(Objection::Unknown);
-        }
-        let folder = Path::new(path).parent().filter(|folder| !folder.as_os_str().is_empty());
-        if folder.is_some_and(|folder| !folder.is_dir()) {
-            return Some(Objection::NoFolder);
-        }
-        return is_there.then_some(Objection::Replaces);
-    }
-    (!is_there && !is_built_in(purpose, path)).then_some(Objection::Missing)
-}
-
-fn is_built_in(purpose: Purpose, name: &str) -> bool {
-    match purpose {
-        Purpose::Scene => sources::is_built_in_scene(name),
-        Purpose::Map => sources::is_built_in_map(name),
+/// Why a path is not taken, unless it is; `typed` is the path as it was typed.
+fn refusal(purpose: Purpose, typed: &str, path: &Path) -> Option<Refusal> {
+    let refused = |sentence: &str| {
+        Some(Refusal { path: typed.to_owned(), sentence: sentence.to_owned(), replaces: false })
+    };
+    let (_, extensions) = purpose.files();
+    let is_known = || extension(path).is_some_and(|extension| extensions.contains(&&*extension));
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let is_built_in = match purpose {
+        Purpose::Scene => sources::is_built_in_scene(typed),
+        Purpose::Map => sources::is_built_in_map(typed),
         _ => false,
-    }
-}
-
-fn sentence(objection: Objection, purpose: Purpose) -> String {
-    match objection {
-        Objection::Missing => "There is no such file.".to_owned(),
-        Objection::NoFolder => "There is no such folder.".to_owned(),
-        Objection::Unknown => {
-            format!("It must end in .{}.", purpose.files().1.join(" or ."))
+    };
+    match path {
+        _ if is_built_in => None,
+        _ if path.is_dir() => refused("This is a folder."),
+        _ if !purpose.is_output() && !path.exists() => refused("There is no such file."),
+        _ if !purpose.is_output() => None,
+        _ if !is_known() => refused(&format!("It must end in .{}.", extensions.join(" or ."))),
+        _ if folder.is_some_and(|folder| !folder.is_dir()) => refused("There is no such folder."),
+        _ if path.exists() => {
+            let refusal = refused("This file is there already: Enter again replaces it.");
+            refusal.map(|refusal| Refusal { replaces: true, ..refusal })
         }
-        Objection::Replaces => "This file is there already: Enter again replaces it.".to_owned(),
+        _ => None,
     }
 }
 
-/// Ways to go on that are shown.
-const MAX_OFFERS: usize = 12;
-
-impl Prompt {
-    /// Goes on with what is typed as far as there is one way, and offers the ways where there are several.
-    fn complete(&mut self) {
-        let (_, extensions) = self.purpose.files();
-        let Completion { path, offers } = complete(&self.path, extensions);
-        (self.path, self.offers) = (path, offers);
-        self.cursor = Some(Cursor::AtEnd);
-    }
-
-    /// Goes on from here.
-    fn go_on(&mut self, path: String) {
-        self.path = path;
-        self.complete();
+/// A path in which `~` at the beginning is the user's own folder.
+fn in_home(path: &str) -> String {
+    let rest =
+        path.strip_prefix('~').filter(|rest| rest.is_empty() || rest.starts_with(is_separator));
+    match rest.zip(std::env::home_dir()) {
+        Some((rest, home)) => format!("{}{rest}", home.display()),
+        None => path.to_owned(),
     }
 }
 
@@ -74,114 +53,59 @@ impl Prompt {
 pub(in crate::app) fn show(
     context: &Context,
     interface: &mut Interface,
-    settings: &mut Settings,
-    small_maps: &SmallMaps,
     commands: &mut Vec<Command>,
 ) {
     let Some(prompt) = &mut interface.prompt else { return };
-    let (hint, accept, recent): (_, _, &[String]) = match prompt.purpose {
-        Purpose::Scene => ("Path of a .gltf or .glb file", "Open", &settings.recent_scenes),
-        Purpose::Map => ("Path of an .exr, .hdr or 8-bit picture", "Open", &settings.recent_maps),
-        Purpose::Picture => ("Path of a .png (as shown) or .exr (linear, all layers)", "Save", &[]),
+    let (hint, accept) = match prompt.purpose {
+        Purpose::Scene => ("Path of a .gltf or .glb file", "Open"),
+        Purpose::Map => ("Path of an .exr, .hdr or 8-bit picture", "Open"),
+        Purpose::Picture => ("Path of a .png (as shown) or .exr (linear, all layers)", "Save"),
         Purpose::Reference => {
-            ("Path of a linear .exr or .hdr picture of the same view without noise", "Open", &[])
+            ("Path of a linear .exr or .hdr picture of the same view without noise", "Open")
         }
-        Purpose::Distributions => ("Path of a .csv, .json or .exr file", "Export", &[]),
+        Purpose::Distributions => ("Path of a .csv, .json or .exr file", "Export"),
     };
     let (mut is_done, mut is_closed) = (false, false);
     let response = Modal::new(Id::unique("prompt")).show(context, |ui| {
         ui.set_width(520.0);
         ui.label(RichText::new(prompt.purpose.title()).heading());
         ui.add_space(4.0);
-        if ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab)) {
-            prompt.complete();
-        }
-        let field = TextEdit::singleline(&mut prompt.path).hint_text(hint).lock_focus(true);
+        let field = TextEdit::singleline(&mut prompt.path).hint_text(hint);
         let mut field = field.desired_width(f32::INFINITY).show(ui);
-        if let Some(cursor) = prompt.cursor.take() {
-            // Asked for again, it would not keep Tab for itself in the next frame.
-            if !field.response.has_focus() {
-                field.response.request_focus();
-            }
+        if std::mem::take(&mut prompt.is_new) {
+            field.response.request_focus();
             let end = CCursor::new(prompt.path.chars().count());
-            let begin = if cursor == Cursor::OverAll { CCursor::new(0) } else { end };
-            field.state.cursor.set_char_range(Some(CCursorRange::two(begin, end)));
+            let all = CCursorRange::two(CCursor::new(0), end);
+            field.state.cursor.set_char_range(Some(all));
             field.state.store(ui.ctx(), field.response.id);
             ui.ctx().request_repaint();
         }
         let field = field.response;
-        if field.changed() {
-            prompt.offers.clear();
-        }
         if field.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
             is_done = true;
             // Enter takes the keyboard away; without a path there is nothing to be done yet.
             field.request_focus();
         }
-        let objection = prompt.objection.as_ref().filter(|(of, _)| of == prompt.path.trim());
-        let objection = objection.map(|(_, objection)| *objection);
-        if let Some(objection) = objection {
-            ui.label(RichText::new(sentence(objection, prompt.purpose)).color(theme::ALERT));
-        }
-        let mut taken = None;
-        for offer in prompt.offers.iter().take(MAX_OFFERS) {
-            if path_link(ui, offer).clicked() {
-                taken = Some(offer.clone());
-            }
-        }
-        if let Some(offer) = taken {
-            prompt.go_on(offer);
-            ui.ctx().request_repaint();
-        }
-        let hidden = prompt.offers.len().saturating_sub(MAX_OFFERS);
-        if hidden > 0 {
-            ui.label(theme::quiet(format!("and {hidden} more")));
-        }
-        let recent = if prompt.offers.is_empty() { recent } else { &[] };
-        for name in recent {
-            ui.horizontal(|ui| {
-                let is_map = prompt.purpose == Purpose::Map;
-                if let Some(small) = small_maps.of(name).filter(|_| is_map) {
-                    ui.add(map_view::small(small));
-                }
-                if path_link(ui, name).clicked() {
-                    prompt.path.clone_from(name);
-                    is_done = true;
-                }
-            });
+        prompt.refusal.take_if(|refusal| refusal.path != prompt.path.trim());
+        if let Some(refusal) = &prompt.refusal {
+            ui.label(RichText::new(&refusal.sentence).color(theme::ALERT));
         }
         ui.add_space(6.0);
         ui.horizontal(|ui| {
-            let replaces = objection == Some(Objection::Replaces);
+            let replaces = prompt.refusal.as_ref().is_some_and(|refusal| refusal.replaces);
             let accept = if replaces { "Replace" } else { accept };
             is_done |= ui.button(RichText::new(accept).color(theme::ACCENT)).clicked();
-            if ui.button("Browse…").on_hover_text("The system's file dialogue").clicked() {
-                commands.push(Command::Browse(prompt.purpose));
-            }
             is_closed |= ui.button("Cancel").clicked();
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                let is_at_once = &mut settings.browses_at_once;
-                ui.checkbox(is_at_once, theme::quiet("Browse at once"))
-                    .on_hover_text("Open the system's file dialogue together with this question");
-            });
         });
     });
     let typed = prompt.path.trim();
-    let path = &in_home(typed);
-    if is_done && !is_built_in(prompt.purpose, path) && Path::new(path).is_dir() {
-        let is_ended = typed.ends_with(is_separator);
-        prompt.go_on(if is_ended { typed.to_owned() } else { format!("{typed}{MAIN_SEPARATOR}") });
-        context.request_repaint();
-    } else if is_done && !typed.is_empty() {
-        let is_known = prompt.objection.as_ref().is_some_and(|(of, _)| of == typed);
-        match objection(prompt.purpose, path) {
-            Some(objection) if objection != Objection::Replaces || !is_known => {
-                prompt.objection = Some((typed.to_owned(), objection));
-            }
-            _ => {
-                commands.push(prompt.purpose.command(path));
-                is_closed = true;
-            }
+    if is_done && !typed.is_empty() {
+        let path = in_home(typed);
+        let again = prompt.refusal.as_ref().is_some_and(|refusal| refusal.replaces);
+        prompt.refusal = refusal(prompt.purpose, typed, Path::new(&path));
+        if prompt.refusal.as_ref().is_none_or(|refusal| refusal.replaces && again) {
+            commands.push(prompt.purpose.command(&path));
+            is_closed = true;
         }
     }
     if is_closed || response.should_close() {
@@ -189,47 +113,47 @@ pub(in crate::app) fn show(
     }
 }
 
-/// A path on one line, which gives its end where there is little room.
-fn path_link(ui: &mut Ui, path: &str) -> Response {
-    const MAX_CHARACTERS: usize = 74;
-    let hidden = path.chars().count().saturating_sub(MAX_CHARACTERS);
-    let end: String = path.chars().skip(hidden).collect();
-    let text = if hidden > 0 { format!("…{end}") } else { end };
-    let link = ui.link(RichText::new(text).size(12.5));
-    if hidden > 0 { link.on_hover_text(path) } else { link }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::path::MAIN_SEPARATOR;
+
     use super::*;
 
     #[test]
     fn nothing_is_opened_that_is_not_there_and_nothing_replaced_unasked() {
         let folder = tempfile::tempdir().expect("a folder");
-        let [there, gone] = ["a.png", "b.png"].map(|name| folder.path().join(name));
-        std::fs::write(&there, "").expect("written");
-        let asked = |purpose, path: &Path| objection(purpose, path.to_str().expect("text"));
+        let asked = |purpose, name: &str| {
+            let path = folder.path().join(name);
+            let refusal = refusal(purpose, path.to_str().expect("text"), &path)?;
+            Some((refusal.sentence.trim_end_matches('.').to_owned(), refusal.replaces))
+        };
+        let because = |sentence: &str| Some((sentence.to_owned(), false));
+        std::fs::write(folder.path().join("a.png"), "").expect("written");
+        std::fs::write(folder.path().join("a.csv"), "").expect("written");
         for purpose in [Purpose::Scene, Purpose::Map, Purpose::Reference] {
-            assert_eq!(
-                (asked(purpose, &there), asked(purpose, &gone)),
-                (None, Some(Objection::Missing))
-            );
+            assert_eq!(asked(purpose, "a.png"), None);
+            assert_eq!(asked(purpose, "b.png"), because("There is no such file"));
+            assert_eq!(asked(purpose, ""), because("This is a folder"));
         }
-        assert_eq!(
-            (asked(Purpose::Picture, &there), asked(Purpose::Picture, &gone)),
-            (Some(Objection::Replaces), None)
-        );
-        let [there, gone] = ["a.csv", "b.csv"].map(|name| folder.path().join(name));
-        std::fs::write(&there, "").expect("written");
-        assert_eq!(
-            (asked(Purpose::Distributions, &there), asked(Purpose::Distributions, &gone)),
-            (Some(Objection::Replaces), None)
-        );
-        let nowhere = folder.path().join("gone").join("b.png");
-        assert_eq!(asked(Purpose::Picture, &nowhere), Some(Objection::NoFolder));
-        let nameless = folder.path().join("b");
-        assert_eq!(asked(Purpose::Picture, &nameless), Some(Objection::Unknown));
-        assert_eq!(objection(Purpose::Scene, "office"), None);
-        assert_eq!(objection(Purpose::Map, "sky:day@64x32"), None);
+        for (purpose, there, gone) in
+            [(Purpose::Picture, "a.png", "b.png"), (Purpose::Distributions, "a.csv", "b.csv")]
+        {
+            assert!(asked(purpose, there).is_some_and(|(_, replaces)| replaces));
+            assert_eq!(asked(purpose, gone), None);
+        }
+        let nowhere = format!("gone{MAIN_SEPARATOR}b.png");
+        assert_eq!(asked(Purpose::Picture, &nowhere), because("There is no such folder"));
+        assert_eq!(asked(Purpose::Picture, "b"), because("It must end in .png or .exr"));
+        assert_eq!(refusal(Purpose::Scene, "office", Path::new("office")), None);
+        let sky = "sky:day@64x32";
+        assert_eq!(refusal(Purpose::Map, sky, Path::new(sky)), None);
+    }
+
+    #[test]
+    fn a_tilde_is_the_users_folder() {
+        let home = std::env::home_dir().expect("a folder").display().to_string();
+        assert_eq!(in_home("~"), home);
+        assert_eq!(in_home(&format!("~{MAIN_SEPARATOR}a")), format!("{home}{MAIN_SEPARATOR}a"));
+        assert_eq!((in_home("~a").as_str(), in_home("b/~").as_str()), ("~a", "b/~"));
     }
 }

@@ -1,0 +1,273 @@
+//! The application: its parts, its frames and its panels.
+
+use std::path::PathBuf;
+
+use super::assets::Assets;
+use super::commands::{self, Command};
+use super::desktop::Desktop;
+use super::display::Display;
+use super::document::Document;
+use super::dropped::dropped_files;
+use super::edited::Edited;
+use super::history::History;
+use super::interface::{Dock, Interface, Tab};
+use super::library::Library;
+use super::loader::Loader;
+use super::messages::Messages;
+use super::rendering::Rendering;
+use super::save::Saves;
+use super::screen::Screen;
+use super::settings_file::Settings;
+use super::small_maps::SmallMaps;
+use super::tasks::{TaskResult, Tasks};
+use super::threads::Wakes;
+use super::{panels, theme};
+use crate::error::{Error, Result};
+use crate::render::gpu::RayChoice;
+
+/// What is shown at the start.
+#[derive(Debug, Clone, Default)]
+pub struct Start {
+    /// The picture.
+    pub document: Document,
+    /// What is open.
+    pub interface: Interface,
+    /// What earlier windows left.
+    pub settings: Settings,
+    /// What is asked of the scenes' files.
+    pub of_scene: crate::scene::SceneOptions,
+    /// The GPU to take where one is wanted: part of its name or backend.
+    pub adapter: Option<String>,
+    /// What finds the surfaces that rays hit on it.
+    pub rays: RayChoice,
+    /// Where kept pictures are for the next window, if they are to be.
+    pub pictures: Option<PathBuf>,
+    /// Where small pictures of maps are kept.
+    pub small_maps: Option<PathBuf>,
+    /// For screenshots: no previews on the way, and no figures that depend on the clock.
+    pub is_repeatable: bool,
+}
+
+/// The application. Its parts know nothing of each other.
+pub struct App {
+    /// What the picture is to be.
+    pub(super) edited: Edited,
+    /// What is open and pointed at.
+    pub(super) interface: Interface,
+    /// What outlasts the window.
+    pub(super) library: Library,
+    /// What is to be said.
+    pub(super) messages: Messages,
+    /// Scene, map and reference.
+    pub(super) assets: Assets,
+    /// The worker and its pictures.
+    pub(super) rendering: Rendering,
+    /// What is on the screen.
+    pub(super) display: Display,
+    /// Files being read and written.
+    pub(super) tasks: Tasks,
+    /// Where the picture is to be written once it has its full size.
+    pub(super) saves: Saves,
+    /// The desktop's dialogues.
+    pub(super) desktop: Desktop,
+    /// See [`Start::is_repeatable`].
+    pub(super) is_repeatable: bool,
+    /// Whether the window is to fill the screen, or no longer.
+    pub(super) toggles_full_screen: bool,
+    /// Whether the window is to be closed.
+    pub(super) is_closing: bool,
+}
+
+impl App {
+    /// Starts the threads, which call `wakes`, but for the loader's, which is at work.
+    ///
+    /// # Errors
+    /// If the system gives no threads.
+    pub fn new(
+        start: Start,
+        loader: Loader,
+        screen: Screen,
+        context: &egui::Context,
+        wakes: Wakes,
+    ) -> Result<Self> {
+        theme::apply(context);
+        let tasks = Tasks::new(wakes.draw.clone());
+        let mut history = History::new(start.of_scene);
+        if let Some(folder) = start.pictures {
+            let report = tasks.reporter();
+            history = history.of_folder(folder, move |found| {
+                let failed = |error: Error| TaskResult::Failed(error.to_string());
+                report(found.map_or_else(failed, TaskResult::KeptPictures));
+            })?;
+        }
+        let small_maps = SmallMaps::new(start.small_maps);
+        let read = small_maps.read(start.settings.recent_maps.clone());
+        tasks.run("small maps", || Ok(TaskResult::SmallMaps(read())));
+        let gpu = (start.adapter, start.rays);
+        Ok(Self {
+            edited: Edited::new(start.document),
+            interface: start.interface,
+            library: Library::new(start.settings, history, small_maps),
+            messages: Messages::default(),
+            assets: Assets::new(loader),
+            rendering: Rendering::start(wakes.relay, gpu, screen.gpu().clone())?,
+            display: Display::start(screen, wakes.draw)?,
+            tasks,
+            saves: Saves::default(),
+            desktop: Desktop::default(),
+            is_repeatable: start.is_repeatable,
+            toggles_full_screen: false,
+            is_closing: false,
+        })
+    }
+
+    /// One frame: collects, draws, carries out, sends down.
+    pub fn show(&mut self, ui: &mut egui::Ui) {
+        let context = ui.ctx().clone();
+        self.collect(&context);
+        let mut commands = commands::pressed(&context, self.interface.is_modal());
+        commands.extend(dropped_files(&context, &mut self.interface, &mut self.messages));
+        self.panels(ui, &mut commands);
+        for command in commands {
+            self.execute(command, &context);
+            // Each is a step of its own.
+            self.settle(&context);
+        }
+        self.settle(&context);
+        self.send_down(&context);
+    }
+
+    /// Passes what the worker has on to the presenter, without a frame; whether one is to be drawn all
+    /// the same, for there is nothing to present.
+    pub fn relay(&mut self, context: &egui::Context) -> bool {
+        self.collect(context);
+        self.send_down(context);
+        self.display.is_settled()
+    }
+
+    /// Goes on with another screen: the device of the one before was lost, and `why` says how.
+    pub fn move_to(&mut self, screen: Screen, why: &Error) {
+        let name = screen.gpu().facts().short_name();
+        self.messages.notice(format!("{why}; the window goes on with {name}"));
+        self.rendering.worker.move_to(screen.gpu().clone());
+        self.display.move_to(screen);
+    }
+
+    /// Whether the picture asked for is done and on the screen.
+    pub fn is_settled(&self) -> bool {
+        self.assets.are_as_in(&self.edited.document)
+            && self.rendering.is_done()
+            && self.display.shown.is_some()
+            && self.display.is_settled()
+    }
+
+    /// Waits until all files are written; what has failed of that and was not yet told.
+    pub fn finish(&mut self) -> Vec<String> {
+        self.library.history.finish();
+        let mut failures = self.tasks.finish();
+        let why = "the window was closed before its picture was there";
+        failures.extend(self.saves.give_up(why));
+        failures
+    }
+
+    /// What is to be kept for the next window, on top of what the file holds by now, if that is understood: lists of
+    /// files and viewpoints, and at the end what was set.
+    pub fn settings(&mut self, found: Option<Settings>, is_end: bool) -> Settings {
+        let Edited { document, start, .. } = &self.edited;
+        let mut settings = self.library.take_settings(found, document);
+        if is_end {
+            settings.remember(document, start, &self.interface);
+        }
+        settings
+    }
+
+    fn panels(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
+        if self.interface.panels {
+            let Edited { document, undo, .. } = &mut self.edited;
+            let is_on_gpu = self.rendering.is_on_gpu(document.light.device);
+            panels::top::show(ui, document, &self.interface, undo, is_on_gpu, commands);
+            let shown = self.display.shown.as_ref();
+            let status = panels::status::Status {
+                snapshot: self.rendering.snapshot.as_deref(),
+                shown: shown.map(|shown| &*shown.order.snapshot),
+                loading: self.assets.loading().collect(),
+                threads: self.rendering.worker.threads(),
+                is_preparing: self.rendering.worker.is_preparing(),
+                overlay: self.interface.overlay,
+                magnification: self.interface.magnification(document.size),
+                pointed: self.interface.pointed.filter(|_| !self.is_repeatable),
+                hides_clock: self.is_repeatable,
+            };
+            panels::status::show(ui, &status);
+            self.sides(ui, commands);
+            self.dock(ui, commands);
+        }
+        let area = self.viewport(ui, commands);
+        panels::prompt::show(ui.ctx(), &mut self.interface, commands);
+        panels::shortcuts::show(ui.ctx(), &mut self.interface);
+        panels::messages::show(ui.ctx(), area, &mut self.messages);
+    }
+
+    /// The panels beside the picture.
+    fn sides(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
+        let document = &mut self.edited.document;
+        let map = self.assets.map.as_ref();
+        let sources = panels::left::Sources {
+            // While another one is read, nothing is to be chosen in the one that is shown.
+            scene: self.assets.scene_of(document),
+            map,
+            settings: &self.library.settings,
+            small_maps: &self.library.small_maps,
+        };
+        if !theme::is_small(ui) {
+            panels::left::show(ui, document, &mut self.interface, sources, commands);
+        }
+        let exposure_ev = self.display.exposure_ev(document);
+        let history = &mut self.library.history;
+        panels::right::show(ui, &mut self.interface, |ui, interface| match interface.tab {
+            Tab::Scene => panels::left::sections(ui, document, interface, sources, commands),
+            Tab::Picture => {
+                panels::picture::show(ui, document, exposure_ev, commands);
+                panels::history::show(ui, history, &mut interface.compared, commands);
+            }
+            Tab::Inspect => {
+                let Rendering { inspector, snapshot, .. } = &self.rendering;
+                panels::method::show(ui, &mut document.light, commands);
+                panels::overlay::show(ui, interface, self.display.shown.as_deref());
+                let snapshot = snapshot.as_deref();
+                panels::inspector::show(ui, interface, inspector, map, snapshot, commands);
+            }
+        });
+    }
+
+    fn dock(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) {
+        let (assets, convergence) = (&self.assets, &mut self.rendering.convergence);
+        panels::dock::show(ui, &mut self.interface, |ui, dock| match dock {
+            Dock::Convergence => {
+                let reference = assets.reference(&self.edited.document);
+                let hides_clock = self.is_repeatable;
+                panels::convergence::show(ui, convergence, hides_clock, reference, commands);
+            }
+            Dock::Needs => panels::needs::show(ui, assets.scene.as_ref(), assets.map.as_ref()),
+        });
+    }
+
+    fn viewport(&mut self, ui: &mut egui::Ui, commands: &mut Vec<Command>) -> egui::Rect {
+        let document = &mut self.edited.document;
+        let settings = self.display.settings(document, &self.interface);
+        let mut scope = panels::scope::Scope {
+            scene: self.assets.scene_of(document),
+            document,
+            interface: &mut self.interface,
+            textures: &mut self.display.textures,
+            screen: &self.display.screen,
+            shown: self.display.shown.as_deref(),
+            settings,
+            snapshot: self.rendering.snapshot.as_deref(),
+            speed_up: self.rendering.speed_up,
+            loading: self.assets.loading().next().is_some(),
+            commands,
+        };
+        panels::viewport::show(ui, &mut scope)
+    }
+}

@@ -1,0 +1,205 @@
+//! Scene, map and reference: what is loaded, against what the document wants.
+
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+
+use super::document::{Document, Viewpoint};
+use super::loader::{Loaded, LoadedMap, LoadedScene, Loader};
+use super::surface_map;
+use super::worker::Reference;
+use crate::environment::Environment;
+use crate::path::framing;
+use crate::scene::Material;
+use crate::sources;
+
+/// A map turned and scaled.
+struct TransformedMap {
+    /// What it was made from.
+    map: Arc<Environment>,
+    rotation_degrees: f32,
+    intensity: f32,
+    environment: Arc<Environment>,
+}
+
+/// What is loaded.
+pub(super) struct Assets {
+    loader: Loader,
+    /// The scene that is shown.
+    pub(super) scene: Option<LoadedScene>,
+    /// The map in use.
+    pub(super) map: Option<LoadedMap>,
+    /// It, turned and scaled as the document says.
+    transformed: Option<TransformedMap>,
+    /// What errors are measured against.
+    pub(super) reference: Option<Arc<Reference>>,
+    /// What was shown when it came.
+    reference_of: Option<Document>,
+}
+
+impl Assets {
+    /// Of a loader that is at work.
+    pub(super) fn new(loader: Loader) -> Self {
+        let (scene, map, transformed) = (None, None, None);
+        Self { loader, scene, map, transformed, reference: None, reference_of: None }
+    }
+
+    /// The scene that the document names, if it is there.
+    pub(super) fn scene_of(&self, document: &Document) -> Option<&LoadedScene> {
+        self.scene.as_ref().filter(|scene| scene.name == document.scene)
+    }
+
+    /// The map that the document names, if it is there.
+    fn map_of(&self, document: &Document) -> Option<&LoadedMap> {
+        self.map.as_ref().filter(|map| map.name == document.map)
+    }
+
+    /// Whether the scene and the map that the document names are there.
+    pub(super) fn are_named_by(&self, document: &Document) -> bool {
+        self.scene_of(document).is_some() && self.map_of(document).is_some()
+    }
+
+    /// Whether scene and map are there as the document wants them.
+    pub(super) fn are_as_in(&self, document: &Document) -> bool {
+        self.scene_of(document).is_some_and(|scene| scene.edits == document.materials)
+            && self.map_of(document).is_some_and(|map| map.sun_factor == document.sun)
+    }
+
+    /// What is being loaded.
+    pub(super) fn loading(&self) -> impl Iterator<Item = &str> {
+        self.loader.busy_with()
+    }
+
+    /// What has been loaded since this was asked last and is still wanted.
+    pub(super) fn take(&mut self, document: &Document) -> Vec<Loaded> {
+        let mut loaded = self.loader.take();
+        loaded.retain(|loaded| match loaded {
+            Loaded::Scene(name, _) => *name == document.scene,
+            Loaded::Map(name, _) => *name == document.map,
+            Loaded::Edited(..) => true,
+        });
+        loaded
+    }
+
+    /// Begins to load what the document wants and is not there.
+    pub(super) fn load(&mut self, document: &Document) {
+        match self.scene.as_ref().filter(|scene| scene.name == document.scene) {
+            None => self.loader.load_scene(&document.scene),
+            Some(scene) if scene.edits != document.materials => {
+                self.loader.edit_scene(scene, &document.materials);
+            }
+            Some(_) => {}
+        }
+        let sun = document.sun;
+        match self.map.as_ref().filter(|map| map.name == document.map) {
+            None => self.loader.load_map(&document.map, sun),
+            Some(map) if map.sun_factor != sun => self.loader.edit_map(map, sun),
+            Some(_) => {}
+        }
+    }
+
+    /// Begins to read the scene's file again; whether there is one.
+    pub(super) fn read_scene_again(&mut self, document: &Document) -> bool {
+        let is_file = !sources::is_built_in_scene(&document.scene);
+        if is_file {
+            self.loader.load_scene(&document.scene);
+        }
+        is_file
+    }
+
+    /// Begins to read the map's file again; whether there is one.
+    pub(super) fn read_map_again(&mut self, document: &Document) -> bool {
+        let is_file = !sources::is_built_in_map(&document.map);
+        if is_file {
+            self.loader.load_map(&document.map, document.sun);
+        }
+        is_file
+    }
+
+    /// The map as the document turns and scales it; made anew only when that changes.
+    pub(super) fn environment(&mut self, document: &Document) -> Option<Arc<Environment>> {
+        let map = &self.map.as_ref()?.environment;
+        let (rotation_degrees, intensity) = (document.rotation_degrees, document.intensity);
+        let is_current = self.transformed.as_ref().is_some_and(|transformed| {
+            Arc::ptr_eq(&transformed.map, map)
+                && transformed.rotation_degrees == rotation_degrees
+                && transformed.intensity == intensity
+        });
+        if !is_current {
+            let mut environment = (**map).clone();
+            environment.set_rotation(rotation_degrees.to_radians());
+            environment.set_intensity(intensity);
+            let (map, environment) = (Arc::clone(map), Arc::new(environment));
+            self.transformed =
+                Some(TransformedMap { map, rotation_degrees, intensity, environment });
+        }
+        self.transformed.as_ref().map(|transformed| Arc::clone(&transformed.environment))
+    }
+
+    /// Measures errors against a picture from now on, or against none.
+    pub(super) fn set_reference(&mut self, reference: Option<Arc<Reference>>) {
+        (self.reference, self.reference_of) = (reference, None);
+    }
+
+    /// Keeps the reference with materials that were given other numbers.
+    pub(super) fn renumber_reference(
+        &mut self,
+        scene: &str,
+        before: &[Material],
+        now: &[Material],
+    ) {
+        if let Some(of) = self.reference_of.as_mut().filter(|of| of.scene == scene) {
+            of.renumber(before, now);
+        }
+    }
+
+    /// The reference, if it shows what the document does. One that has just come shows the document of now.
+    pub(super) fn reference_for(&mut self, document: &Document) -> Option<Arc<Reference>> {
+        let is_there = self.are_as_in(document);
+        if self.reference.is_some() && self.reference_of.is_none() && is_there {
+            self.reference_of = Some(document.clone());
+        }
+        self.reference.clone().filter(|_| is_there && self.is_like_reference(document))
+    }
+
+    /// The reference, and whether it shows what the document does, as far as is known.
+    pub(super) fn reference(&self, document: &Document) -> Option<(&Reference, bool)> {
+        let is_of_view = self.reference_of.is_none() || self.is_like_reference(document);
+        self.reference.as_deref().map(|reference| (reference, is_of_view))
+    }
+
+    /// Whether the document shows what it did when the reference came.
+    fn is_like_reference(&self, document: &Document) -> bool {
+        self.reference_of.as_ref().is_some_and(|of| of.shows_like(document))
+    }
+}
+
+/// Through the scene's first camera, or of all of it where there is none.
+pub(super) fn first_viewpoint(scene: &LoadedScene) -> Viewpoint {
+    let own = scene.world.scene.cameras.first().cloned();
+    let is_framed = own.is_none();
+    let camera = own.unwrap_or_else(|| framing::frame(&scene.world, 16.0 / 9.0));
+    let (low, high) = scene.world.bvh.bounds();
+    let eye = Vec3::from(camera.world_from_camera.translation);
+    let is_outside = !(eye.cmpge(low) & eye.cmple(high)).all();
+    // What is framed from outside is turned about its middle, not about what is seen first or behind it.
+    let distance = match is_framed && is_outside {
+        true => camera.focus_distance,
+        false => pivot_distance(scene, &camera),
+    };
+    let mut viewpoint = Viewpoint::of(&camera, distance);
+    if !(viewpoint.focus_distance.is_finite() && viewpoint.focus_distance > 0.0) {
+        viewpoint.focus_distance = distance;
+    }
+    viewpoint
+}
+
+/// Metres to what is in the middle of a camera's picture.
+fn pivot_distance(scene: &LoadedScene, camera: &crate::scene::Camera) -> f32 {
+    let rays = crate::path::camera::CameraRays::new(camera, 16, 9);
+    let ray = rays.ray(Vec2::new(8.0, 4.5), Vec2::splat(0.5));
+    let (low, high) = scene.world.bvh.bounds();
+    surface_map::look(&scene.world, ray)
+        .map_or(0.5 * (high - low).length(), |spot| spot.position.distance(ray.origin))
+        .max(0.05)
+}

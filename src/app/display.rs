@@ -1,0 +1,121 @@
+//! What is on the screen, and what makes it ready.
+
+use std::sync::Arc;
+
+use super::comparison::Comparison;
+use super::document::Document;
+use super::interface::Interface;
+use super::overlays::Overlay;
+use super::panels::scope::Textures;
+use super::presenter::{Order, Presenter, Shown};
+use super::screen::Screen;
+use super::threads::Wake;
+use super::worker::Snapshot;
+use crate::develop::DevelopSettings;
+use crate::error::Result;
+use crate::image::Rgb8;
+
+/// The presenting thread and its results, on a device.
+pub(super) struct Display {
+    presenter: Presenter,
+    /// What is ready to be developed.
+    pub(super) shown: Option<Arc<Shown>>,
+    /// Developed pictures.
+    pub(super) textures: Textures,
+    /// The device.
+    pub(super) screen: Screen,
+    /// Width over height of the whole picture that was shown last.
+    aspect: Option<f32>,
+}
+
+impl Display {
+    /// Starts the thread, which calls `wake` when there is something new to show.
+    ///
+    /// # Errors
+    /// If the system gives no thread.
+    pub(super) fn start(screen: Screen, wake: Wake) -> Result<Self> {
+        let (presenter, textures) = (Presenter::start(wake)?, Textures::default());
+        Ok(Self { presenter, shown: None, textures, screen, aspect: None })
+    }
+
+    /// Takes what is ready.
+    pub(super) fn collect(&mut self) {
+        // What is on a device that was lost cannot be drawn.
+        let is_here =
+            |shown: &Arc<Shown>| Arc::ptr_eq(&shown.order.developer, &self.screen.developer);
+        self.shown = self.presenter.shown().filter(is_here);
+    }
+
+    /// The aspect before over the one of now, if another whole picture is shown since this was asked last.
+    pub(super) fn change_of_aspect(&mut self) -> Option<f32> {
+        let view = self.shown.as_ref()?.order.snapshot.view();
+        if view.crop.is_some() {
+            return None;
+        }
+        let aspect = view.width as f32 / view.height.max(1) as f32;
+        let before = self.aspect.replace(aspect).filter(|before| *before != aspect);
+        before.map(|before| before / aspect)
+    }
+
+    /// Has a picture made ready.
+    pub(super) fn order(
+        &mut self,
+        snapshot: &Arc<Snapshot>,
+        document: &Document,
+        interface: &Interface,
+        compared: Option<Comparison>,
+    ) {
+        let look = &document.look;
+        self.presenter.order(Order {
+            developer: Arc::clone(&self.screen.developer),
+            snapshot: Arc::clone(snapshot),
+            denoiser: look.denoise.then_some(look.denoiser),
+            metered: look.auto_exposure.then_some(look.white_balance),
+            overlay: interface.overlay,
+            look: interface.overlay.filter(|o| o.is_developed()).map(|_| *look),
+            tile: interface.tile,
+            compared,
+        });
+    }
+
+    /// Whether what was ordered last is shown.
+    pub(super) fn is_settled(&self) -> bool {
+        self.presenter.is_settled()
+    }
+
+    /// Stops in all, once the automatic ones are known.
+    pub(super) fn exposure_ev(&self, document: &Document) -> Option<f32> {
+        Some(document.look.total_ev(self.shown.as_ref()?.automatic_ev))
+    }
+
+    /// How the picture is developed, once the exposure is known.
+    pub(super) fn settings(
+        &self,
+        document: &Document,
+        interface: &Interface,
+    ) -> Option<DevelopSettings> {
+        let look = &document.look;
+        let is_opaque = interface.overlay.is_some_and(Overlay::is_opaque);
+        let opacity = if is_opaque { 1.0 } else { interface.overlay_opacity };
+        Some(DevelopSettings {
+            white_balance: look.white_balance,
+            exposure_ev: self.exposure_ev(document)?,
+            curve: look.curve,
+            // What the overlay does not speak of steps back.
+            opacity: [opacity, 0.6 * opacity],
+        })
+    }
+
+    /// The picture as it is on the screen, overlay included, if there is one.
+    pub(super) fn read(&self) -> Option<Result<Rgb8>> {
+        let developed = self.textures.picture(self.shown.as_deref())?;
+        Some(self.screen.developer.read(&developed.display))
+    }
+
+    /// Goes on with another device.
+    pub(super) fn move_to(&mut self, screen: Screen) {
+        // Both are on the device that was lost.
+        (self.shown, self.textures) = (None, Textures::default());
+        self.screen = screen;
+    }
+}

@@ -1,0 +1,71 @@
+//! What is rendered: the worker, its latest picture, and what is measured of that.
+
+use std::sync::Arc;
+
+use super::convergence::Convergence;
+use super::inspect::Inspector;
+use super::speed_up::SpeedUp;
+use super::threads::Wake;
+use super::worker::{Activity, Snapshot, Worker};
+use crate::error::Result;
+use crate::render::gpu::{DeviceChoice, Gpu, RayChoice};
+
+/// The render thread and its results.
+pub(super) struct Rendering {
+    /// The curves of the error.
+    pub(super) convergence: Convergence,
+    /// The place that is looked at.
+    pub(super) inspector: Inspector,
+    /// The render thread.
+    pub(super) worker: Worker,
+    /// Its latest picture.
+    pub(super) snapshot: Option<Arc<Snapshot>>,
+    /// How much faster than the plain method that was made, where both are rendered.
+    pub(super) speed_up: Option<SpeedUp>,
+}
+
+impl Rendering {
+    /// Starts the thread, which calls `wake` at every new picture. `gpu` names the GPU to take where one is wanted and what finds surfaces there; `screen` is
+    /// the one the window is drawn on.
+    ///
+    /// # Errors
+    /// If the system gives no thread.
+    pub(super) fn start(wake: Wake, gpu: (Option<String>, RayChoice), screen: Gpu) -> Result<Self> {
+        Ok(Self {
+            convergence: Convergence::default(),
+            inspector: Inspector::default(),
+            worker: Worker::start(wake, gpu, screen)?,
+            snapshot: None,
+            speed_up: None,
+        })
+    }
+
+    /// Takes what is ready.
+    pub(super) fn collect(&mut self) {
+        let Some(snapshot) = self.worker.snapshot() else { return };
+        if self.snapshot.as_ref().is_none_or(|old| old.number != snapshot.number) {
+            self.convergence.add(snapshot.main.sampling, &snapshot.curves);
+            let plain = snapshot.plain.as_ref();
+            self.speed_up = plain.and_then(|plain| SpeedUp::of(&snapshot.main, plain));
+            self.snapshot = Some(snapshot);
+        }
+    }
+
+    /// Whether the picture that was asked for last is done.
+    pub(super) fn is_done(&self) -> bool {
+        let is_answer =
+            |s: &Arc<Snapshot>| s.activity == Activity::Done && self.worker.has_answered(s);
+        self.snapshot.as_ref().is_some_and(is_answer) && !self.inspector.is_busy()
+    }
+
+    /// Whether a GPU renders or is being made ready for it, where this device was chosen.
+    pub(super) fn is_on_gpu(&self, choice: DeviceChoice) -> bool {
+        let is_preparing = choice != DeviceChoice::Cpu && self.worker.is_preparing();
+        is_preparing || self.snapshot.as_ref().is_some_and(|s| s.main.gpu.is_some())
+    }
+
+    /// Seconds of work on the picture.
+    pub(super) fn seconds(&self) -> f64 {
+        self.snapshot.as_ref().map_or(0.0, |snapshot| snapshot.seconds())
+    }
+}

@@ -1,0 +1,98 @@
+//! What runs beside the window: reading and writing files, and asking the desktop.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+
+use super::inspect::Truth;
+use super::kept_picture::KeptPicture;
+use super::small_maps::SmallMap;
+use super::threads::{Wake, spawn};
+use super::worker::Reference;
+use crate::error::Result;
+
+/// What comes back from a task.
+pub(super) enum TaskResult {
+    /// A file was chosen in the dialogue of this number, or none.
+    Chosen(u32, Option<String>),
+    /// A file was written.
+    Done(String),
+    /// Something failed.
+    Failed(String),
+    /// What errors are to be measured against.
+    Reference(Arc<Reference>),
+    /// What is true at the inspected point.
+    Truth(Truth),
+    /// Pictures that earlier windows kept.
+    KeptPictures(Vec<KeptPicture>),
+    /// Maps in small.
+    SmallMaps(Vec<SmallMap>),
+}
+
+/// Threads for one task each, and their results.
+pub(super) struct Tasks {
+    sender: Sender<TaskResult>,
+    receiver: Receiver<TaskResult>,
+    wake: Wake,
+    /// Threads that write files.
+    writing: Vec<JoinHandle<()>>,
+}
+
+impl Tasks {
+    /// `wake` is called at every result.
+    pub(super) fn new(wake: Wake) -> Self {
+        let (sender, receiver) = channel();
+        Self { sender, receiver, wake, writing: Vec::new() }
+    }
+
+    /// A function that other threads report a result by.
+    pub(super) fn reporter(&self) -> impl Fn(TaskResult) + Send + 'static + use<> {
+        let (sender, wake) = (self.sender.clone(), self.wake.clone());
+        move |result| {
+            // The window may have gone meanwhile.
+            let _ = sender.send(result);
+            wake();
+        }
+    }
+
+    /// Runs something slow on a thread, unless the system gives none. A failure is a result, too.
+    pub(super) fn run(
+        &self,
+        name: &str,
+        work: impl FnOnce() -> Result<TaskResult> + Send + 'static,
+    ) -> Option<JoinHandle<()>> {
+        let [report, refuse] = [(); 2].map(|()| self.reporter());
+        let failed = |error: crate::error::Error| TaskResult::Failed(error.to_string());
+        let thread = spawn(name, move || report(work().unwrap_or_else(failed)));
+        thread.map_err(|error| refuse(failed(error))).ok()
+    }
+
+    /// The same for a file that is written: the end of the window waits for it.
+    pub(super) fn write(
+        &mut self,
+        name: &str,
+        work: impl FnOnce() -> Result<TaskResult> + Send + 'static,
+    ) {
+        self.writing.retain(|thread| !thread.is_finished());
+        let thread = self.run(name, work);
+        self.writing.extend(thread);
+    }
+
+    /// The next result, if one has come.
+    pub(super) fn next_result(&self) -> Option<TaskResult> {
+        self.receiver.try_recv().ok()
+    }
+
+    /// Waits until all files are written; the failures that have not been reported yet.
+    pub(super) fn finish(&mut self) -> Vec<String> {
+        for thread in self.writing.drain(..) {
+            // What panics has said so.
+            let _ = thread.join();
+        }
+        let failed = |result| match result {
+            TaskResult::Failed(sentence) => Some(sentence),
+            _ => None,
+        };
+        self.receiver.try_iter().filter_map(failed).collect()
+    }
+}
