@@ -88,7 +88,11 @@ impl Library {
 
     /// The settings to be written over what the file holds by now, if that is understood: lists of files and
     /// viewpoints.
-    pub(super) fn take_settings(&mut self, found: Option<Settings>, document: &Document) -> Settings {
+    pub(super) fn take_settings(
+        &mut self,
+        found: Option<Settings>,
+        document: &Document,
+    ) -> Settings {
         let mut found = found.unwrap_or_else(|| self.written.clone());
         let mut settings = self.settings.clone();
         settings.keep_viewpoints(document);

@@ -196,29 +196,15 @@ impl Settings {
     /// Takes over what was changed in a window since it was opened with `start`: what the command line
     /// said was for that window alone.
     pub fn remember(&mut self, document: &Document, start: &Document, interface: &Interface) {
-        fn take<T: PartialEq + Copy>(kept: &mut T, now: T, before: &T) {
-            if now != *before {
-                *kept = now;
-            }
+        let shared = |of: &Document| {
+            let Document { look, light, size, stop, .. } = *of;
+            serde_json::to_value(Self { look, light, size, stop, ..Self::default() })
+        };
+        let values = shared(start).and_then(|before| Ok((before, shared(document)?)));
+        if let (Ok((before, now)), Ok(mut kept)) = (values, serde_json::to_value(&*self)) {
+            take_changes(&mut kept, &before, &now);
+            *self = Self::deserialize(kept).unwrap_or_else(|_| self.clone());
         }
-        let (light, now, before) = (&mut self.light, document.light, start.light);
-        take(&mut light.device, now.device, &before.device);
-        take(&mut light.sampling, now.sampling, &before.sampling);
-        take(&mut light.split, now.split, &before.split);
-        take(&mut light.bounces, now.bounces, &before.bounces);
-        take(&mut light.seed, now.seed, &before.seed);
-        let (look, now, before) = (&mut self.look, document.look, start.look);
-        take(&mut look.denoise, now.denoise, &before.denoise);
-        take(&mut look.denoiser, now.denoiser, &before.denoiser);
-        take(&mut look.exposure_ev, now.exposure_ev, &before.exposure_ev);
-        take(&mut look.auto_exposure, now.auto_exposure, &before.auto_exposure);
-        take(&mut look.curve, now.curve, &before.curve);
-        take(&mut look.white_balance, now.white_balance, &before.white_balance);
-        take(&mut self.size, document.size, &start.size);
-        let (stop, now, before) = (&mut self.stop, document.stop, start.stop);
-        take(&mut stop.samples, now.samples, &before.samples);
-        take(&mut stop.seconds, now.seconds, &before.seconds);
-        take(&mut stop.noise, now.noise, &before.noise);
         self.tab = interface.tab;
         self.dock = interface.dock;
     }
@@ -342,6 +328,22 @@ pub(super) fn is_within_bounds(document: &Document) -> bool {
     settings == settings.clone().within_bounds()
 }
 
+/// Sets what differs between two values of one kind, field by field.
+fn take_changes(kept: &mut Value, before: &Value, now: &Value) {
+    match (&mut *kept, before, now) {
+        _ if before == now => {}
+        // Of a choice with fields, another one is taken whole.
+        (Value::Object(kept), Value::Object(before), Value::Object(now))
+            if before.keys().eq(now.keys()) && kept.keys().eq(now.keys()) =>
+        {
+            for (key, field) in kept {
+                take_changes(field, &before[key], &now[key]);
+            }
+        }
+        _ => kept.clone_from(now),
+    }
+}
+
 /// Sets what of `found` fits into the settings below a place in them, field by field.
 fn take_over(whole: &mut Value, place: &str, found: &Value) {
     for (key, value) in found.as_object().into_iter().flatten() {
@@ -376,10 +378,11 @@ mod tests {
         let start = document.clone();
         document.light.bounces = 3;
         (document.look.exposure_ev, document.stop.noise) = (1.0, Some(0.1));
+        document.size = PictureSize::Fixed(64, 32);
         settings.remember(&document, &start, &Interface::default());
         let mut expected = Settings::default();
         (expected.light.bounces, expected.look.exposure_ev) = (3, 1.0);
-        expected.stop.noise = Some(0.1);
+        (expected.stop.noise, expected.size) = (Some(0.1), PictureSize::Fixed(64, 32));
         assert_eq!(settings, expected);
     }
 
