@@ -222,7 +222,8 @@ impl App {
     fn keep(&mut self) {
         let Some(image) = self.image_to_keep() else {
             if self.display.shown.is_some() {
-                self.messages.notice("A picture can be kept once it has its full size");
+                self.messages
+                    .notice("A picture can be kept once it is rendered at full resolution");
             }
             return;
         };
@@ -279,10 +280,11 @@ impl App {
         self.library.note_save(&path);
         self.saves.add(path);
         if self.picture().is_none() {
-            let paused =
-                if self.interface.paused { ", for which it must go on (Space)" } else { "" };
-            let sentence = format!("The picture will be saved once it has its full size{paused}");
-            self.messages.notice(sentence);
+            let paused = match self.interface.paused {
+                true => "; rendering is paused, press Space to resume",
+                false => "",
+            };
+            self.messages.notice(format!("Will be saved at full resolution{paused}"));
         }
     }
 
@@ -306,9 +308,7 @@ impl App {
     fn export(&mut self, path: PathBuf) {
         let grid = self.rendering.snapshot.as_ref().and_then(|s| s.main.grid.clone());
         let Some(grid) = grid else {
-            self.messages.error(
-                "there are no distributions to export: the map is sampled by the BSDF alone",
-            );
+            self.messages.error("there are no distributions to export: BSDF sampling learns none");
             return;
         };
         self.tasks.write("export", move || {

@@ -39,7 +39,7 @@ impl Messages {
         let told = if count < MAX_MESSAGES { count } else { MAX_MESSAGES - 2 };
         sentences.iter().take(told).for_each(|sentence| self.notice(sentence));
         if told < count {
-            self.notice(format!("{} more remarks: lightgrid info tells them", count - told));
+            self.notice(format!("{} more notices: run `lightgrid info`", count - told));
         }
     }
 
@@ -113,9 +113,6 @@ mod tests {
         assert_eq!(said(&mut messages), ["0", "1", "2"]);
         notices.add("3");
         messages.notices(&notices);
-        assert_eq!(
-            said(&mut messages)[1..],
-            ["0", "1", "2 more remarks: lightgrid info tells them"]
-        );
+        assert_eq!(said(&mut messages)[1..], ["0", "1", "2 more notices: run `lightgrid info`"]);
     }
 }

@@ -155,7 +155,7 @@ impl App {
             TaskResult::Reference(reference) => {
                 let (name, image) = (&reference.name, &reference.image);
                 self.messages.notice(format!(
-                    "Errors are measured against {name}; the picture must be {} x {} pixels for that",
+                    "Errors are measured against {name} in pictures of {} x {} pixels",
                     image.width, image.height
                 ));
                 self.assets.set_reference(Some(reference));

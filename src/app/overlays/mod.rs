@@ -112,9 +112,9 @@ impl Overlay {
             }
             Self::Faces => "Cells are split by the axis that a surface's normal is nearest to.",
             Self::Learned => {
-                "Where a cell has its own distribution; elsewhere the whole map is sampled."
+                "Cells with a distribution of their own; elsewhere the whole map is sampled."
             }
-            Self::Visits => "How often learning paths tried the map from each cell.",
+            Self::Visits => "Shadow rays that learning traced towards the map from each cell.",
             Self::Sky => {
                 "Mean visibility times cosine over all tiles of the map, as learning found it."
             }
@@ -127,16 +127,13 @@ impl Overlay {
             }
             Self::Tile => "Probability with which each cell samples the tile chosen on the map.",
             Self::CacheCells => {
-                "Cells of the radiance cache, which cached light is taken from; hue is how often a cell's edge \
-                 was doubled, dark is what nothing has trained, glossy surfaces among it."
+                "Cells of the radiance cache; hue is the level, each of twice the size; untrained cells, as on glossy surfaces, are dark."
             }
             Self::CacheRadiance => {
-                "What each cell of the cache sends back, at the mean albedo of what is in it, developed as \
-                 the picture is."
+                "Reflected radiance of each cell of the cache at its mean albedo, developed as the picture is."
             }
             Self::CacheSamples => {
-                "Estimates that have trained each cell of the cache; dark where a cell four times as large \
-                 or the mean of all speaks for it."
+                "Samples that have trained each cell of the cache; dark where a larger cell or the global mean is used."
             }
             Self::Samples => "Samples each pixel has.",
             Self::Error => "Standard error of a pixel's luminance over its luminance.",

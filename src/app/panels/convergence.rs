@@ -26,24 +26,23 @@ pub(in crate::app) fn show(
             ui.selectable_value(&mut convergence.by_samples, true, "Samples");
         }
         ui.label(theme::quiet("Earlier runs are dim"));
-        let hint = "A picture of this view without noise: the true error is drawn too";
+        let hint = "A picture of this view without noise; the true error is plotted, too";
         if ui.button("Reference…").on_hover_text(hint).clicked() {
             commands.push(Command::ChooseReference);
         }
         if let Some((reference, is_of_view)) = reference {
-            if ui.button("Forget it").on_hover_text(&reference.name).clicked() {
+            if ui.button("Remove").on_hover_text(&reference.name).clicked() {
                 commands.push(Command::ForgetReference);
             }
             if !is_of_view {
-                let hint =
-                    "Nothing is measured against it until scene, light and view are as they were";
-                ui.label(theme::quiet("It shows something else")).on_hover_text(hint);
+                let hint = "Errors are measured again once scene, light and view match it";
+                ui.label(theme::quiet("It shows another view")).on_hover_text(hint);
             }
         }
     });
     let lines = lines(convergence, by_samples);
     if lines.is_empty() {
-        ui.label(theme::quiet("The first two samples of every pixel give the first point."));
+        ui.label(theme::quiet("The plot begins at two samples per pixel."));
         return;
     }
     Plot::new("convergence")

@@ -26,8 +26,8 @@ pub(in crate::app) fn show(
                 ui.selectable_value(&mut chosen.is_difference, is_difference, name)
                     .on_hover_text(hint);
             };
-            way(false, "Wipe", "One beside the other, with a line that can be dragged");
-            way(true, "Difference", "How far apart they are, four times as bright");
+            way(false, "Wipe", "Side by side, with a line that can be dragged");
+            way(true, "Difference", "Their difference, four times as bright");
         });
     }
     let mut removed = None;
@@ -46,8 +46,8 @@ pub(in crate::app) fn show(
                     side(ui, &mut chosen.left, i, "Left");
                     let has_left = chosen.left.is_some();
                     ui.add_enabled_ui(has_left, |ui| side(ui, &mut chosen.right, i, "Right"));
-                    let hint = "Set scene, map, camera and everything else as they were for it";
-                    if ui.small_button("As then").on_hover_text(hint).clicked() {
+                    let hint = "Restores scene, map, camera and all settings of this picture";
+                    if ui.small_button("Restore").on_hover_text(hint).clicked() {
                         commands.push(Command::SetAsKept(i));
                     }
                     if forget(ui, kept) {
@@ -85,7 +85,7 @@ fn forget(ui: &mut Ui, kept: &KeptPicture) -> bool {
 /// Chooses a picture for one side, or gives that back.
 fn side(ui: &mut Ui, chosen: &mut Option<usize>, index: usize, name: &str) {
     let is_chosen = *chosen == Some(index);
-    let hint = format!("Compare it, at the {}", name.to_lowercase());
+    let hint = format!("Compare it on the {}", name.to_lowercase());
     if ui.add(egui::Button::selectable(is_chosen, name).small()).on_hover_text(hint).clicked() {
         *chosen = (!is_chosen).then_some(index);
     }
@@ -97,5 +97,5 @@ fn small(ui: &mut Ui, kept: &mut KeptPicture) -> egui::Response {
     });
     let size = Vec2::new(HEIGHT * texture.aspect_ratio(), HEIGHT).min(Vec2::new(96.0, HEIGHT));
     let image = Image::new((texture.id(), size)).sense(Sense::click());
-    ui.add(image).on_hover_text("Compare it with what is rendered, or no longer")
+    ui.add(image).on_hover_text("Compares it with what is rendered; again to stop")
 }

@@ -51,8 +51,7 @@ pub(in crate::app) fn show(
         ui.label(theme::quiet("Click a tile to see which cells sample it."));
     }
     ui.checkbox(&mut interface.is_frozen, "Freeze learning").on_hover_text(
-        "Go on with the distributions there are, around their old centre, when the camera or a setting \
-         changes",
+        "Keeps the learned distributions, around their old centre, when the camera or a setting changes",
     );
     theme::section(ui, "CELL UNDER THE POINTER");
     match inspector.inspected() {
@@ -65,7 +64,7 @@ pub(in crate::app) fn show(
             ui.label(theme::quiet("There is no surface here, only the map; click elsewhere."));
         }
         None => {
-            ui.label(theme::quiet("Point at a surface; click to stay there."));
+            ui.label(theme::quiet("Point at a surface; click to pin it."));
         }
     }
     if snapshot.is_some_and(|s| s.main.grid.is_some()) {
@@ -81,12 +80,11 @@ pub(in crate::app) fn show(
 fn tile_views(ui: &mut Ui, interface: &mut Interface) {
     const VIEWS: [(TileView, &str, &str); 3] = [
         (TileView::Energy, "Energy", "Share of the map's energy in each tile"),
-        (TileView::Learned, "Learned", "What all cells together have learned to sample"),
+        (TileView::Learned, "Learned", "Learned probability of each tile, summed over all cells"),
         (
             TileView::EqualEnergy,
             "Equal energy",
-            "As many tiles of equal energy. They are not used: they crowd around the sun, and large \
-             ones say little about which part of the sky is seen",
+            "Tiles of equal energy, for comparison only: they crowd around the sun, and large ones cannot tell which part of the sky is seen",
         ),
     ];
     ui.horizontal(|ui| {
@@ -236,10 +234,10 @@ fn cell(
         let pairs = truth.shares.iter().zip(&inspected.probabilities);
         let distance: f32 = pairs.map(|(a, b)| 0.5 * (a - b).abs()).sum();
         ui.label(theme::quiet(if truth.shares.iter().all(|share| *share == 0.0) {
-            "Brute force finds that nothing of the map is seen from this very point".to_owned()
+            "Ground truth: no part of the map is visible from this point".to_owned()
         } else {
             format!(
-                "Visible energy times cosine here, by brute force: {:.0} % of what was learned lies elsewhere",
+                "Ground truth (visible energy times cosine): {:.0} % of the learned probability lies elsewhere",
                 100.0 * distance
             )
         }));
@@ -247,14 +245,14 @@ fn cell(
     ui.horizontal(|ui| {
         let label = if inspector.is_busy() { "Measuring…" } else { "Measure the truth" };
         let button = ui.add_enabled(!inspector.is_busy(), egui::Button::new(label));
-        let hint = "256 shadow rays for every tile from this very point";
+        let hint = "Ground truth by 256 shadow rays to every tile from this point";
         if button.on_hover_text(hint).clicked() {
             if interface.pinned.is_none() {
                 interface.pinned = interface.pointed;
             }
             commands.push(Command::MeasureTruth);
         }
-        if interface.pinned.is_some() && ui.button("Let go").clicked() {
+        if interface.pinned.is_some() && ui.button("Unpin").clicked() {
             interface.pinned = None;
         }
     });
@@ -268,7 +266,7 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
             let face = FACES.get(face as usize).copied().unwrap_or("all");
             format!("{cell}: row {row}, column {column}, face {face}")
         }
-        None => "no grid: the whole map everywhere".to_owned(),
+        None => "no grid: the whole map is sampled everywhere".to_owned(),
     };
     let distribution = match inspected.distribution {
         crate::light_grid::WHOLE_MAP => "the whole map's".to_owned(),
@@ -282,29 +280,28 @@ fn facts(ui: &mut Ui, inspected: &Inspected) {
         line(
             "Cell",
             cell,
-            "Cells of the Light Grid lie around the camera: rows from above to below, columns all around, and one of \
-             each for every axis that surfaces may face",
+            "Cells of the Light Grid surround the camera: rows by elevation, columns by azimuth, one for each axis that a surface may face",
         );
         line(
             "Distribution",
             distribution,
-            "What the map is sampled by from here: the cell's own, once it has learned enough",
+            "What the map is sampled by from here; a cell has its own once it has learned enough",
         );
-        line("Position", format!("{:.2}, {:.2}, {:.2} m", p.x, p.y, p.z), "In the scene; y is up");
-        line("Material", inspected.material.clone(), "As the file calls it");
+        line("Position", format!("{:.2}, {:.2}, {:.2} m", p.x, p.y, p.z), "World position; y is up");
+        line("Material", inspected.material.clone(), "Its name in the file");
         if !inspected.probabilities.is_empty() {
             let p = &inspected.probabilities;
             let entropy: f32 = p.iter().map(|p| if *p > 0.0 { -p * p.log2() } else { 0.0 }).sum();
             let support = p.iter().filter(|p| **p > 0.0).count();
-            let hint = "How widely it spreads: 0 is one tile alone, and each bit is twice as many";
+            let hint = "Spread of the distribution: 0 bits is one tile, each bit doubles their number";
             line("Entropy", format!("{entropy:.2} bits over {support} tiles"), hint);
         }
         if tries > 0.0 {
-            let hint = "Shadow rays towards the map that learning has traced from the cell";
-            line("Learned from", format!("{} tries", theme::count(tries as u64)), hint);
+            let hint = "Rays towards the map that learning has traced from this cell";
+            line("Learned from", format!("{} shadow rays", theme::count(tries as u64)), hint);
         }
         if let Some(bytes) = inspected.memory_bytes {
-            line("Memory", theme::bytes(bytes), "What this distribution alone takes");
+            line("Memory", theme::bytes(bytes), "Memory of this distribution");
         }
     });
 }
@@ -329,13 +326,13 @@ fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
     };
     let face = FACES.get(cell.face as usize).copied().unwrap_or("all");
     let radiance = match (cell.samples, cell.samples_around) {
-        // Nobody has told the albedo, either.
+        // The albedo is not known, either.
         (0, 0) => "unknown".to_owned(),
         _ => cell.radiance.to_array().map(|light| theme::figure(f64::from(light))).join("  "),
     };
     let trained = match (cell.samples, cell.samples_around) {
-        (0, 0) => "nothing: the mean of all speaks for it".to_owned(),
-        (0, around) => format!("nothing: {} around speak for it", theme::count(around)),
+        (0, 0) => "untrained: the global mean is used".to_owned(),
+        (0, around) => format!("untrained: {} samples around it are used", theme::count(around)),
         (own, around) => format!("{} samples, {} around", theme::count(own), theme::count(around)),
     };
     Grid::new("cached").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {

@@ -152,7 +152,7 @@ fn cameras(
         }
         for (i, viewpoint) in document.bookmarks.iter().enumerate() {
             let button = ui.button(viewpoint.name.clone());
-            let button = button.on_hover_text("Click: look from here. Right click: forget it");
+            let button = button.on_hover_text("Click: go to this view. Right click: delete it");
             if button.clicked() {
                 commands.push(Command::LookFrom(viewpoint.clone()));
             }
@@ -169,23 +169,33 @@ fn cameras(
     });
     let Some(viewpoint) = &mut document.viewpoint else { return };
     if let Some(degrees) = &mut viewpoint.fov_y_degrees {
-        theme::row(ui, "Field of view", "Vertical", |ui| {
+        theme::row(ui, "Field of view", "Vertical angle", |ui| {
             ui.add(theme::slider(degrees, 1.0..=170.0).suffix("°").max_decimals(1));
         });
     }
-    theme::row(ui, "Lens radius", "0 keeps everything sharp", |ui| {
-        let mut millimetres = viewpoint.lens_radius * 1000.0;
-        let slider = theme::slider(&mut millimetres, 0.0..=100.0).logarithmic(true);
-        let slider = slider.smallest_positive(0.1).suffix(" mm").max_decimals(1);
-        if ui.add(slider).changed() {
-            viewpoint.lens_radius = millimetres / 1000.0;
-        }
-    });
+    theme::row(
+        ui,
+        "Lens radius",
+        "Radius of the aperture: more blurs what is out of focus; 0 keeps everything sharp",
+        |ui| {
+            let mut millimetres = viewpoint.lens_radius * 1000.0;
+            let slider = theme::slider(&mut millimetres, 0.0..=100.0).logarithmic(true);
+            let slider = slider.smallest_positive(0.1).suffix(" mm").max_decimals(1);
+            if ui.add(slider).changed() {
+                viewpoint.lens_radius = millimetres / 1000.0;
+            }
+        },
+    );
     if viewpoint.lens_radius > 0.0 {
-        theme::row(ui, "Focus at", "Ctrl click on the picture sets it", |ui| {
-            let slider = theme::slider(&mut viewpoint.focus_distance, 0.01..=1000.0);
-            ui.add(slider.logarithmic(true).suffix(" m"));
-        });
+        theme::row(
+            ui,
+            "Focus at",
+            "Distance of what is sharp; Ctrl click in the picture sets it",
+            |ui| {
+                let slider = theme::slider(&mut viewpoint.focus_distance, 0.01..=1000.0);
+                ui.add(slider.logarithmic(true).suffix(" m"));
+            },
+        );
     }
 }
 
@@ -237,7 +247,7 @@ fn environment(
             theme::bytes(map.environment.memory_bytes().table)
         ));
     }
-    theme::row(ui, "Rotation", "Turns the map about the vertical", |ui| {
+    theme::row(ui, "Rotation", "Rotates the map about the vertical axis", |ui| {
         let degrees = &mut document.rotation_degrees;
         let slider = theme::slider(degrees, 0.0..=360.0).suffix("°").max_decimals(1);
         let response = ui.add(slider.clamping(SliderClamping::Never));
@@ -249,7 +259,7 @@ fn environment(
             interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
         }
     });
-    theme::row(ui, "Intensity", "Multiplies the map's light", |ui| {
+    theme::row(ui, "Intensity", "Brightness of the map", |ui| {
         let slider = theme::slider(&mut document.intensity, 0.0..=10.0).logarithmic(true);
         let slider = slider.smallest_positive(0.01).fixed_decimals(2).prefix("× ");
         if ui.add(slider).dragged() {
@@ -268,8 +278,8 @@ fn environment(
 
 /// The sun's light is taken up when the slider is let go: the map's tables are built anew.
 fn sun(ui: &mut Ui, sun: &mut f32) {
-    let hint = "Multiplies the light of the map's sun, and not that of its sky. The picture begins anew: apart, both would \
-                take twice the memory and time";
+    let hint =
+        "Brightness of the map's sun alone; its sky stays as it is. The picture starts again";
     theme::row(ui, "Sun", hint, |ui| {
         let id = ui.scope_id().with("sun");
         let mut value = ui.data(|data| data.get_temp(id)).unwrap_or(*sun);
@@ -298,7 +308,7 @@ fn background(ui: &mut Ui, background: &mut Background) {
     theme::row(
         ui,
         "Background",
-        "What the camera sees of the map, straight or through panes",
+        "What the camera sees behind the scene, also through panes",
         |ui| {
             theme::choice(ui, "background").selected_text(name).show_ui(ui, |ui| {
                 for (kind, name) in kinds {
@@ -314,7 +324,7 @@ fn background(ui: &mut Ui, background: &mut Background) {
     match background {
         Background::Map => {}
         Background::Blurred(radians) => {
-            theme::row(ui, "Blur", "How far the map is out of focus", |ui| {
+            theme::row(ui, "Blur", "Blur of the background", |ui| {
                 let mut degrees = radians.to_degrees();
                 let slider = theme::slider(&mut degrees, 0.1..=90.0).logarithmic(true).suffix("°");
                 if ui.add(slider.fixed_decimals(1)).changed() {
@@ -323,7 +333,7 @@ fn background(ui: &mut Ui, background: &mut Background) {
             });
         }
         Background::Color(rgb) => {
-            theme::row(ui, "Colour", "Linear radiance", |ui| {
+            theme::row(ui, "Colour", "Background colour, linear", |ui| {
                 theme::color(ui, rgb);
             });
         }
@@ -342,7 +352,7 @@ fn fog(ui: &mut Ui, fog: &mut Option<Medium>, own: Option<Medium>) {
         is_held || now.scattering != clear.scattering || now.absorption != clear.absorption;
     let mut holds = false;
     ui.horizontal(|ui| {
-        let hint = "A medium that scatters and swallows light";
+        let hint = "Participating medium (scatters and absorbs light)";
         if ui.checkbox(&mut is_on, "Fill the air").on_hover_text(hint).changed() {
             let thick = Medium { scattering: Vec3::splat(FIRST_FOG), ..clear };
             edited = match (is_on, own) {
@@ -365,11 +375,11 @@ fn fog(ui: &mut Ui, fog: &mut Option<Medium>, own: Option<Medium>) {
                 *value = if old > 0.0 { *value * (mean / old) } else { Vec3::splat(mean) };
             }
         };
-        let hint = "One over the mean way of light between two scatterings";
+        let hint = "Scattering coefficient, 1/m (1 / mean free path)";
         theme::row(ui, "Scattering", hint, |ui| coefficient(ui, &mut edited.scattering));
-        let hint = "Share of the light that is swallowed per metre";
+        let hint = "Absorption coefficient, 1/m";
         theme::row(ui, "Absorption", hint, |ui| coefficient(ui, &mut edited.absorption));
-        let hint = "-1 scatters back, 0 to all sides alike, 1 straight on";
+        let hint = "Henyey-Greenstein g: -1 backward, 0 isotropic, 1 forward";
         theme::row(ui, "Anisotropy", hint, |ui| {
             ui.add(theme::slider(&mut edited.anisotropy, -0.95..=0.95).fixed_decimals(2));
         });

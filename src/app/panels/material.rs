@@ -55,7 +55,7 @@ pub(super) fn show(
 }
 
 fn change(ui: &mut Ui, edit: &mut MaterialEdit, material: &Material) {
-    let has = |texture: bool| if texture { "Its texture is multiplied by this" } else { "" };
+    let has = |texture: bool| if texture { "Multiplies the texture" } else { "" };
     theme::row(ui, "Colour", has(material.texture(TextureSlot::BaseColor).is_some()), |ui| {
         let mut rgb = edit.color.unwrap_or(material.base_color.truncate()).to_array();
         if theme::color(ui, &mut rgb) {
@@ -76,9 +76,8 @@ fn change(ui: &mut Ui, edit: &mut MaterialEdit, material: &Material) {
         share(ui, &mut edit.metalness, material.metallic);
     });
     ui.horizontal(|ui| {
-        ui.checkbox(&mut edit.hidden, "Hide")
-            .on_hover_text("Neither light nor the camera meets it");
-        let text = RichText::new("As it was").size(12.0);
+        ui.checkbox(&mut edit.hidden, "Hide").on_hover_text("Invisible to the camera and to light");
+        let text = RichText::new("Reset").size(12.0);
         if *edit != MaterialEdit::default() && ui.button(text).clicked() {
             *edit = MaterialEdit::default();
         }

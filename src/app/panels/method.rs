@@ -13,11 +13,11 @@ use crate::render::Sampling;
 const WAYS: [(Sampling, &str); 4] = [
     (
         Sampling::Adaptive,
-        "What each part of the scene sees of the map is learned, and only that sampled",
+        "Learns which tiles of the map each part of the scene sees, and samples those",
     ),
-    (Sampling::Talk, "The same as the SIGGRAPH talk of 2018 describes it, for comparison"),
-    (Sampling::Plain, "The whole map by its brightness, whether it is seen or not"),
-    (Sampling::Bsdf, "Directions of the surfaces alone, without regard to the map"),
+    (Sampling::Talk, "As described in the SIGGRAPH talk of 2018, for comparison"),
+    (Sampling::Plain, "Samples the whole map by brightness, visible or not"),
+    (Sampling::Bsdf, "BSDF sampling only"),
 ];
 
 /// What was published of it.
@@ -26,7 +26,7 @@ const TITLE: &str =
 
 /// Draws the choice.
 pub(in crate::app) fn show(ui: &mut Ui, light: &mut Light, commands: &mut Vec<Command>) {
-    theme::row(ui, "Sampling", "How light from the map is found; the picture is the same", |ui| {
+    theme::row(ui, "Sampling", "How the map is sampled; only noise and speed differ", |ui| {
         ComboBox::from_id_salt("sampling").selected_text(capital(light.sampling)).show_ui(
             ui,
             |ui| {
@@ -37,8 +37,9 @@ pub(in crate::app) fn show(ui: &mut Ui, light: &mut Light, commands: &mut Vec<Co
             },
         );
     });
-    ui.checkbox(&mut light.split, "Split view")
-        .on_hover_text("Plain on the left, the chosen sampling on the right, at equal time (V)");
+    ui.checkbox(&mut light.split, "Split view").on_hover_text(
+        "Plain sampling on the left, the chosen one on the right, for equal time (V)",
+    );
     let link = ui.link(RichText::new("About the method").size(12.0));
     if link.on_hover_text(format!("{TITLE}\n{METHOD}")).clicked() {
         commands.push(Command::ShowMethod);

@@ -42,7 +42,7 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
             ui.label(theme::quiet("Kept pictures have no overlays."));
         }
         None => {
-            ui.label(theme::quiet("Waiting for a grid with cells."));
+            ui.label(theme::quiet("The Light Grid has no cells yet."));
         }
     }
     if let Some(Ok(cache)) = cache {
@@ -50,20 +50,14 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
     }
 }
 
-/// Why there is nothing to be said of a radiance cache.
+/// Why there is no radiance cache.
 pub(in crate::app) fn no_cache(missing: NoCache) -> &'static str {
     match missing {
-        NoCache::NotDenoised => {
-            "There is no radiance cache: it is trained for cached light, with Denoise."
-        }
-        NoCache::Split => "There is no radiance cache: a split view shows no cached light.",
-        NoCache::QuickDevice => {
-            "There is no radiance cache: this GPU is quick enough without cached light."
-        }
-        NoCache::OneBounce => {
-            "There is no radiance cache: light that has met one surface needs none."
-        }
-        NoCache::Unasked | NoCache::Untrained => "Nothing has trained the radiance cache yet.",
+        NoCache::NotDenoised => "No radiance cache: it is trained only while Denoise is on.",
+        NoCache::Split => "No radiance cache: the split view does not use it.",
+        NoCache::QuickDevice => "No radiance cache: this GPU is fast enough without it.",
+        NoCache::OneBounce => "No radiance cache: direct light does not use it.",
+        NoCache::Unasked | NoCache::Untrained => "The radiance cache is not trained yet.",
     }
 }
 

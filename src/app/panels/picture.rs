@@ -21,12 +21,17 @@ pub(in crate::app) fn show(
     white_balance(ui, &mut document.look.white_balance);
     denoiser(ui, document);
     theme::section(ui, "LIGHT");
-    theme::row(ui, "Bounces", "How often light turns on its way; 1 is direct light", |ui| {
+    theme::row(ui, "Bounces", "Maximum number of bounces; 1 is direct light", |ui| {
         ui.add(theme::slider(&mut document.light.bounces, 0..=32));
     });
-    theme::row(ui, "Seed", "The same seed gives the same picture", |ui| {
-        ui.add(theme::number(&mut document.light.seed, 0..=u32::MAX));
-    });
+    theme::row(
+        ui,
+        "Seed",
+        "Seed of the random numbers; the same one gives the same picture",
+        |ui| {
+            ui.add(theme::number(&mut document.light.seed, 0..=u32::MAX));
+        },
+    );
     theme::section(ui, "SIZE");
     size(ui, &mut document.size);
     region(ui, document.region.is_some(), commands);
@@ -35,7 +40,7 @@ pub(in crate::app) fn show(
     theme::section(ui, "COMPARE");
     if ui
         .button("Keep this picture")
-        .on_hover_text("For comparing it with others and with what is rendered next (K)")
+        .on_hover_text("Keeps it for comparison with other pictures and later renders (K)")
         .clicked()
     {
         commands.push(Command::KeepPicture);
@@ -45,26 +50,26 @@ pub(in crate::app) fn show(
 fn denoiser(ui: &mut Ui, document: &mut Document) {
     ui.horizontal(|ui| {
         ui.checkbox(&mut document.look.denoise, "Denoise")
-            .on_hover_text("Noise is averaged over pixels of like surfaces and light; without it every sample is shown as it is. For display and .png: .exr files keep what was rendered (N)");
+            .on_hover_text("Removes noise on the screen and in .png files; .exr files keep what was rendered (N)");
         if !document.look.denoise {
             return;
         }
         // The library is looked for once.
         if let Err(missing) = Denoiser::Oidn.check() {
-            ui.weak("built-in filter").on_hover_text(format!("Intel's trained filter is smoother. {missing}. Start again, and it can be chosen here"));
+            ui.weak("built-in filter").on_hover_text(format!("Intel's Open Image Denoise gives smoother pictures. {missing}. Restart lightgrid to choose it here"));
             return;
         }
         let chosen = &mut document.look.denoiser;
         ui.selectable_value(chosen, Denoiser::ATrous, "À-trous")
-            .on_hover_text("Edge-avoiding filter over albedo, normals and depth: fast");
+            .on_hover_text("Built-in edge-avoiding filter: fast");
         ui.selectable_value(chosen, Denoiser::Oidn, "Open Image Denoise")
-            .on_hover_text("Intel's trained filter, found on this machine: slower, smoother");
+            .on_hover_text("Intel's neural denoiser, found on this machine: slower, smoother");
     });
 }
 
 fn exposure(ui: &mut Ui, document: &mut Document, exposure_ev: Option<f32>) {
     let look = &mut document.look;
-    theme::row(ui, "Exposure", "Stops; double the light is one more", |ui| {
+    theme::row(ui, "Exposure", "Stops (EV): +1 doubles the brightness", |ui| {
         ui.add(
             theme::slider(&mut look.exposure_ev, -8.0..=8.0)
                 .suffix(" EV")
@@ -74,15 +79,15 @@ fn exposure(ui: &mut Ui, document: &mut Document, exposure_ev: Option<f32>) {
     });
     theme::row(ui, "", "", |ui| {
         ui.checkbox(&mut look.auto_exposure, "Automatic")
-            .on_hover_text("Bring the picture to middle grey, then add the stops above");
+            .on_hover_text("Exposes for middle grey, then adds the stops above");
         if let Some(exposure_ev) = exposure_ev.filter(|_| look.auto_exposure) {
-            ui.label(theme::quiet(format!("{exposure_ev:+.1} EV in all")));
+            ui.label(theme::quiet(format!("{exposure_ev:+.1} EV in total")));
         }
     });
 }
 
 fn curve(ui: &mut Ui, document: &mut Document) {
-    theme::row(ui, "Tone curve", "How bright light fades into white", |ui| {
+    theme::row(ui, "Tone curve", "How highlights are compressed for the screen", |ui| {
         let name = curve_name(document.look.curve);
         theme::choice(ui, "curve").selected_text(name).show_ui(ui, |ui| {
             for curve in ToneCurve::ALL {
@@ -103,7 +108,7 @@ fn curve_name(curve: ToneCurve) -> &'static str {
 }
 
 fn white_balance(ui: &mut Ui, balance: &mut WhiteBalance) {
-    theme::row(ui, "White", "Colour temperature of the light that looks white", |ui| {
+    theme::row(ui, "White", "White balance: the colour temperature that looks white", |ui| {
         let slider = theme::slider(&mut balance.kelvin, KELVIN).suffix(" K");
         ui.add(slider.fixed_decimals(0).logarithmic(true));
     });
@@ -123,7 +128,7 @@ fn size(ui: &mut Ui, size: &mut PictureSize) {
         PictureSize::Viewport(divisor) => format!("Viewport / {divisor}"),
         PictureSize::Fixed(width, height) => format!("{width} x {height}"),
     };
-    theme::row(ui, "Pixels", "Size of the picture", |ui| {
+    theme::row(ui, "Pixels", "Resolution of the picture", |ui| {
         theme::choice(ui, "size").selected_text(name(*size)).show_ui(ui, |ui| {
             let viewport = [1, 2, 4].map(PictureSize::Viewport);
             let fixed = FIXED.map(|(w, h)| PictureSize::Fixed(w, h));
@@ -143,9 +148,9 @@ fn size(ui: &mut Ui, size: &mut PictureSize) {
 
 fn region(ui: &mut Ui, has_region: bool, commands: &mut Vec<Command>) {
     let (text, hint) = if has_region {
-        ("Render the whole again", "The region is given up (X)")
+        ("Render the whole again", "Removes the region (X)")
     } else {
-        ("Render a region…", "Then drag over the part that is to be rendered (X)")
+        ("Render a region…", "Then drag a rectangle over the picture (X)")
     };
     if ui.button(text).on_hover_text(hint).clicked() {
         commands.push(Command::ToggleRegion);
@@ -164,7 +169,7 @@ fn stop(ui: &mut Ui, document: &mut Document) {
     });
     stop.noise = percent.map(|percent| percent / 100.0);
     if stop.samples.is_none() && stop.seconds.is_none() && stop.noise.is_none() {
-        ui.label(theme::quiet("Nothing chosen: it never stops by itself"));
+        ui.label(theme::quiet("No limit: it goes on until it is paused"));
     }
 }
 

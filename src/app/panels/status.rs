@@ -70,8 +70,7 @@ fn phase(ui: &mut Ui, status: &Status<'_>) {
     }
     if status.is_preparing {
         ui.label(RichText::new("Preparing the GPU…").color(theme::ACCENT)).on_hover_text(
-            "The scene is uploaded and kernels are compiled, which takes some seconds; the CPU goes on \
-             meanwhile",
+            "Uploading the scene and compiling kernels takes some seconds; the CPU renders meanwhile",
         );
     }
     let Some(snapshot) = status.snapshot else {
@@ -79,7 +78,9 @@ fn phase(ui: &mut Ui, status: &Status<'_>) {
         return;
     };
     match snapshot.activity {
-        Activity::Moving => word(ui, "Moving", theme::SECOND, "A small picture while it moves"),
+        Activity::Moving => {
+            word(ui, "Moving", theme::SECOND, "A smaller picture while the view or light changes");
+        }
         Activity::Learning(share) => {
             let learning = &snapshot.now;
             let all = snapshot.request.view.learning_paths;
@@ -95,11 +96,13 @@ fn phase(ui: &mut Ui, status: &Status<'_>) {
                     .fill(Color32::from_rgb(122, 86, 34))
                     .text(RichText::new(text).size(11.5).color(theme::TEXT)),
             )
-            .on_hover_text("Finding out which tiles of the map each part of the picture can see");
+            .on_hover_text("Learning which tiles of the map each part of the picture can see");
         }
         Activity::Rendering => word(ui, "Rendering", theme::ACCENT, "Adding samples"),
-        Activity::Paused => word(ui, "Paused", theme::SECOND, "Space goes on"),
-        Activity::Done => word(ui, "Done", Color32::from_rgb(120, 200, 130), "A stop rule was met"),
+        Activity::Paused => word(ui, "Paused", theme::SECOND, "Space resumes"),
+        Activity::Done => {
+            word(ui, "Done", Color32::from_rgb(120, 200, 130), "A limit under STOP AT was reached");
+        }
     }
 }
 
@@ -115,11 +118,11 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
             ui,
             &theme::clock(snapshot.seconds()),
             "",
-            "Learning and rendering, cached light included",
+            "Time spent on learning and rendering, cached light included",
         );
         let rate = snapshot.now.rays as f64 / snapshot.now.render_seconds.max(1e-9);
         if !theme::is_small(ui) {
-            let hint = "Rays, shadow rays included, while rendering";
+            let hint = "Rays per second of rendering, shadow rays included";
             number(ui, &theme::figure(rate), "rays/s", hint);
         }
     }
@@ -128,13 +131,11 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
         let told = match backdrop.origin {
             Origin::Cache => Some((
                 "cached light",
-                "So much of what is shown is light remembered by place: calm at once, a few percent off, \
-                 gone when there are enough samples, and never in what is saved",
+                "Share of cached light in the picture: free of noise at once, a few percent off, replaced as samples arrive, never saved",
             )),
             Origin::Resized => Some((
                 "resized",
-                "So much of what is shown is the picture from before its size changed; it goes when there are \
-                 enough samples, and is never in what is saved",
+                "Share of the picture from before the resize: replaced as samples arrive, never saved",
             )),
             Origin::Before => None,
         };
@@ -146,11 +147,9 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
         let (is_more, hint) = match session.samples < FEW {
             true => (
                 "> ",
-                "Least relative RMS error of the pixels: so few samples may not have met what is bright",
+                "Lower bound of the relative RMS error (few samples may have missed bright light)",
             ),
-            false => {
-                ("", "Estimated relative RMS error of the pixels, from the samples' own spread")
-            }
+            false => ("", "Estimated relative RMS error of the pixels, before denoising"),
         };
         let percent = format!("{is_more}{:.1} %", 100.0 * session.noise);
         number(ui, &percent, "noise", hint);
@@ -158,9 +157,8 @@ fn figures(ui: &mut Ui, snapshot: &Snapshot, hides_clock: bool) {
     let invalid = session.invalid_samples;
     if invalid > 0 {
         let text = RichText::new(format!("{} not finite", theme::count(invalid)));
-        ui.label(text.color(theme::ALERT)).on_hover_text(
-            "Samples that were NaN or infinite: they are left out of the picture and counted as black",
-        );
+        ui.label(text.color(theme::ALERT))
+            .on_hover_text("Samples that were NaN or infinite; they count as black");
     }
     // There is no room for what says least.
     if theme::is_small(ui) {
@@ -188,7 +186,7 @@ fn pixel(ui: &mut Ui, snapshot: &Snapshot, place: glam::Vec2, overlay: Option<Ov
     let told = overlay.and_then(|overlay| value_text(overlay, film, index));
     let told = told.map(|told| format!("  ·  {told}")).unwrap_or_default();
     let text = format!("{x}, {y}:  {r}  {g}  {b}  ·  {samples}{told}");
-    ui.label(theme::quiet(text)).on_hover_text("Linear radiance of the pixel, unfiltered");
+    ui.label(theme::quiet(text)).on_hover_text("Linear radiance of the pixel, before denoising");
 }
 
 fn number(ui: &mut Ui, value: &str, unit: &str, hint: &str) {
@@ -235,7 +233,7 @@ fn device(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
             let word = if threads == 1 { "thread" } else { "threads" };
             (
                 format!("CPU, {threads} {word}"),
-                "Size of the picture in pixels, and who renders it".to_owned(),
+                "Size of the picture in pixels, and the rendering device".to_owned(),
             )
         }
     };

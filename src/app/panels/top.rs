@@ -80,17 +80,17 @@ fn button(ui: &mut Ui, (text, hint): (&str, &str), commands: &mut Vec<Command>, 
 fn files(ui: &mut Ui, commands: &mut Vec<Command>) {
     let is_narrow = theme::is_narrow(ui);
     let scene = if is_narrow { "Scene…" } else { "Open scene…" };
-    let hint = "A glTF file (Ctrl O); it can be dropped onto the window too";
+    let hint = "A glTF file (Ctrl O); files can be dropped onto the window, too";
     button(ui, (scene, hint), commands, Command::ChooseScene);
     let map = if is_narrow { "Map…" } else { "Open map…" };
-    let hint = "A lat-long HDR map (Ctrl M); it can be dropped onto the window too";
+    let hint = "A lat-long HDR map (Ctrl M); files can be dropped onto the window, too";
     button(ui, (map, hint), commands, Command::ChooseMap);
-    let hint = "The picture as .png or .exr (Ctrl S)";
+    let hint = "Save the picture as .png or .exr (Ctrl S)";
     button(ui, ("Save…", hint), commands, Command::ChooseSave);
 }
 
 fn copy(ui: &mut Ui, commands: &mut Vec<Command>) {
-    let hint = "The picture to the clipboard (Ctrl C)";
+    let hint = "Copy the picture to the clipboard (Ctrl C)";
     button(ui, ("Copy", hint), commands, Command::Copy);
 }
 
@@ -99,8 +99,11 @@ fn restart(ui: &mut Ui, commands: &mut Vec<Command>) {
 }
 
 fn pause(ui: &mut Ui, interface: &Interface, commands: &mut Vec<Command>) {
-    let words =
-        if interface.paused { ("Resume", "Go on (Space)") } else { ("Pause", "Pause (Space)") };
+    let words = if interface.paused {
+        ("Resume", "Resume rendering (Space)")
+    } else {
+        ("Pause", "Pause rendering (Space)")
+    };
     button(ui, words, commands, Command::TogglePause);
 }
 
@@ -122,8 +125,8 @@ fn device(ui: &mut Ui, document: &mut Document, is_on_gpu: bool) {
             document.light.device = choice;
         }
     };
-    choose("CPU", "Render on the processor (G changes)", !is_on_gpu, DeviceChoice::Cpu);
-    choose("GPU", "Render on the graphics card (G changes)", is_on_gpu, DeviceChoice::Gpu);
+    choose("CPU", "Render on the CPU (G switches)", !is_on_gpu, DeviceChoice::Cpu);
+    choose("GPU", "Render on the GPU (G switches)", is_on_gpu, DeviceChoice::Gpu);
 }
 
 fn shortcuts(ui: &mut Ui, text: &str, commands: &mut Vec<Command>) {
@@ -139,9 +142,8 @@ fn developer(ui: &mut Ui, interface: &Interface, commands: &mut Vec<Command>) {
 }
 
 fn denoise(ui: &mut Ui, document: &mut Document) {
-    ui.toggle_value(&mut document.look.denoise, "Denoise").on_hover_text(
-        "Filter what noise is left, for display and .png; off and on shows the difference (N)",
-    );
+    ui.toggle_value(&mut document.look.denoise, "Denoise")
+        .on_hover_text("Removes noise on the screen and in .png files (N)");
 }
 
 #[cfg(test)]
