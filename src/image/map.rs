@@ -1,7 +1,7 @@
 //! Environment maps and pictures from files of any format we read.
 
 use std::fs::File;
-use std::io::{self, Cursor, Read};
+use std::io::{Cursor, Read};
 use std::path::Path;
 
 use image::ImageDecoder as _;
@@ -106,9 +106,7 @@ pub(crate) fn is_film(path: &Path) -> bool {
 
 /// Whether these are the first bytes of a picture.
 pub(crate) fn looks_like_picture(bytes: &[u8]) -> bool {
-    let starts: [&[u8]; 7] =
-        [b"\x76\x2f\x31\x01", b"#?", b"\x89PNG", b"\xff\xd8\xff", b"RIFF", b"II*\0", b"MM\0*"];
-    starts.into_iter().any(|start| bytes.starts_with(start))
+    bytes.starts_with(b"#?") || image::guess_format(bytes).is_ok()
 }
 
 /// Above it, what other programs write becomes infinite.
@@ -183,6 +181,9 @@ impl Defects {
     }
 }
 
+/// Formats that are read.
+const KNOWN: &str = "EXR, HDR, PNG, JPEG, WebP, TIFF, BMP, TGA";
+
 /// Who decodes a file.
 enum Format {
     Exr,
@@ -192,26 +193,29 @@ enum Format {
 
 /// Tells the format by the first bytes, else by the extension.
 fn format_of(path: &Path) -> Result<Format> {
-    let mut magic = [0u8; 4];
-    let (mut file, _) = open_file(path).map_err(|cause| Error::at(path, cause))?;
-    let known = match file.read_exact(&mut magic) {
-        Ok(()) => true,
-        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => false,
-        Err(e) => return Err(Error::at(path, read_cause(&e))),
-    };
-    if known && is_film(path) {
+    /// No format takes more bytes to be told.
+    const START: u64 = 16;
+    let (file, _) = open_file(path).map_err(|cause| Error::at(path, cause))?;
+    let mut start = Vec::new();
+    file.take(START).read_to_end(&mut start).map_err(|e| Error::at(path, read_cause(&e)))?;
+    if is_film(path) {
         return Err(Error::at(path, IS_A_FILM));
     }
-    if known && looks_like_scene(&magic) {
+    if looks_like_scene(&start) {
         return Err(Error::at(path, "is a glTF scene, where a map or a picture is expected"));
     }
-    let extension = extension(path);
-    Ok(match (&magic, extension.as_deref()) {
-        (b"\x76\x2f\x31\x01", _) if known => Format::Exr,
-        ([b'#', b'?', ..], _) if known => Format::Hdr,
-        (_, Some("exr")) => Format::Exr,
-        (_, Some("hdr" | "rgbe" | "pic" | "xyze")) => Format::Hdr,
-        _ => Format::Other,
+    let told = image::guess_format(&start).ok();
+    Ok(match (told, extension(path).as_deref()) {
+        (Some(image::ImageFormat::OpenExr), _) => Format::Exr,
+        _ if start.starts_with(b"#?") => Format::Hdr,
+        (Some(other), _) if !other.reading_enabled() => {
+            let name = format!("{other:?}").to_uppercase();
+            return Err(Error::at(path, format!("is of the format {name}, not one of {KNOWN}")));
+        }
+        (Some(_), _) => Format::Other,
+        (None, Some("exr")) => Format::Exr,
+        (None, Some("hdr" | "rgbe" | "pic" | "xyze")) => Format::Hdr,
+        (None, _) => Format::Other,
     })
 }
 
@@ -264,9 +268,7 @@ fn decode_ldr_file(path: &Path) -> Decoded<image::DynamicImage> {
     };
     let mut reader_of_pixels = reader()?;
     if reader_of_pixels.format().is_none() {
-        return Err("is not a picture of a known format (EXR, HDR, PNG, JPEG, WebP, TIFF, BMP, \
-                    TGA)"
-            .into());
+        return Err(format!("is not a picture of a known format ({KNOWN})"));
     }
     tiff::check(&bytes)?;
     let cause = |e| format!("cannot be decoded: {}", decoder_cause(&e, file_bytes));

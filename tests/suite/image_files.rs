@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use lightgrid::color::luminance;
 use lightgrid::image::{
-    ExrPicture, Image, Layer, LoadedMap, Rgb8, read_exr_metadata, read_map, read_picture, sanitise,
-    write_beside_and_rename, write_exr, write_png,
+    ExrPicture, Image, Layer, LoadedMap, Rgb8, encode_png, read_exr_metadata, read_map,
+    read_picture, sanitise, write_beside_and_rename, write_exr, write_png,
 };
 use lightgrid::tone::{ToneCurve, auto_exposure_ev, display_rgb8};
 
@@ -247,7 +247,7 @@ fn hdr_run_lengths_xyz_and_truncation() {
     assert!(error.contains("only 1 of 2 rows can be read"), "{error}");
     let bomb = read_hdr_bytes(b"#?RADIANCE\n\n-Y 16384 +X 16384\n\x02\x02").unwrap_err();
     assert!(bomb.contains("2 bytes cannot hold 16384 x 16384 pixels"), "{bomb}");
-    let none = read_hdr_bytes(b"P6 no radiance here").unwrap_err();
+    let none = read_hdr_bytes(b"no radiance here").unwrap_err();
     assert!(none.contains("does not begin with #?"), "{none}");
 }
 
@@ -262,7 +262,15 @@ fn ldr_maps_are_told_by_content_or_extension() {
     bmp.extend([0; 16]);
     bmp.extend([&pixels_bgr[..], &[0, 0]].concat());
     let grey = lightgrid::color::linear_from_srgb(128.0 / 255.0);
-    for (name, bytes) in [("map.tga", &tga), ("map.bmp", &bmp), ("map.unknown", &bmp)] {
+    let png = encode_png(&Rgb8 { width: 2, height: 1, pixels: vec![[255, 0, 0], [128; 3]] });
+    let png = png.unwrap();
+    for (name, bytes) in [
+        ("map.tga", &tga),
+        ("map.bmp", &bmp),
+        ("map.unknown", &bmp),
+        ("map.hdr", &png),
+        ("map.exr", &bmp),
+    ] {
         let (_folder, path) = temporary(name);
         fs::write(&path, bytes).unwrap();
         let map = read_map(&path).unwrap();
@@ -275,6 +283,8 @@ fn ldr_maps_are_told_by_content_or_extension() {
         ("empty.exr", b"", "is cut short"),
         ("empty.hdr", b"", "is not a Radiance picture"),
         ("text.exr", b"no picture at all", "is not an OpenEXR file"),
+        ("gif.hdr", b"GIF89a and more than that", "is of the format GIF, not one of EXR"),
+        ("floats.exr", b"P6 2 1 255 and pixels", "is of the format PNM, not one of EXR"),
         ("half.png", b"\x89PNG\r\n\x1a\n\0\0", "cannot be decoded"),
     ] {
         let (_folder, path) = temporary(name);
