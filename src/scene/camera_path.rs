@@ -55,8 +55,18 @@ impl CameraPath {
 
     /// World from camera at a time in seconds; before the first key and after the last as there.
     pub fn at(&self, seconds: f64) -> DAffine3 {
-        self.links.iter().fold(DAffine3::IDENTITY, |world, link| world * link.at(seconds))
+        unmirrored(self.links.iter().fold(DAffine3::IDENTITY, |world, link| world * link.at(seconds)))
     }
+}
+
+/// World from camera for a picture that is not mirrored, whatever is mirrored above: scale is ignored for cameras
+/// (glTF 2.0, section 3.10.2). The camera looks the same way, its top stays at the top.
+pub(crate) fn unmirrored(mut world_from_camera: DAffine3) -> DAffine3 {
+    let axes = &mut world_from_camera.matrix3;
+    if axes.determinant() < 0.0 {
+        axes.x_axis = -axes.x_axis;
+    }
+    world_from_camera
 }
 
 impl Link {

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use glam::DAffine3;
 use gltf::json;
 use json::Index;
 use json::accessor::Type;
@@ -14,7 +13,7 @@ use serde_json::Value;
 use super::Fallible;
 use super::accessor::Elements;
 use super::buffers::File;
-use super::pose::{Nodes, local_transform};
+use super::pose::{Nodes, local_transform, own_mirror};
 use crate::scene::camera_path::{CameraPath, Interpolation, Link, Track};
 
 /// Members of an animation. Channels are read one by one, for some are of no node: those of
@@ -68,7 +67,7 @@ impl<'a> Channels<'a> {
     ) -> Fallible<Option<CameraPath>> {
         let mut links = Vec::new();
         // Nodes at rest below the last one that moves.
-        let mut fixed = DAffine3::IDENTITY;
+        let mut fixed = own_mirror(&self.file.document.nodes.get(node)?);
         let mut next = Some(node);
         while let Some(node) = next {
             let at_rest = self.file.document.nodes.get(node)?;

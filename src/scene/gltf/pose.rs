@@ -274,6 +274,12 @@ pub(super) fn local_transform(node: &json::Node) -> DAffine3 {
     )
 }
 
+/// The mirroring by a node's own scale.
+pub(super) fn own_mirror(node: &json::Node) -> DAffine3 {
+    let scale = node.scale.filter(|_| node.matrix.is_none()).unwrap_or([1.0; 3]);
+    DAffine3::from_scale(Vec3::from(scale).signum().as_dvec3())
+}
+
 /// Affine part of a column-major 4x4 matrix; its last row is (0, 0, 0, 1) by the specification.
 fn affine_from_columns(m: &[f64; 16]) -> DAffine3 {
     let column = |c: usize| DVec3::new(m[4 * c], m[4 * c + 1], m[4 * c + 2]);

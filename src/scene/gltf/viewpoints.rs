@@ -12,9 +12,9 @@ use super::animation::Channels;
 use super::buffers::File;
 use super::document::Document;
 use super::materials::BRIGHTEST;
-use super::pose::{CAMERA, LIGHT, Nodes};
+use super::pose::{CAMERA, LIGHT, Nodes, own_mirror};
 use crate::error::Notices;
-use crate::scene::camera_path::CameraPath;
+use crate::scene::camera_path::{CameraPath, unmirrored};
 use crate::scene::{Camera, Projection, PunctualKind, PunctualLight};
 
 /// Field of view where the file's is unusable.
@@ -46,7 +46,8 @@ pub(super) fn cameras(
             notices.add(format!("the movement of camera {name} is left out: {cause}"));
             None
         });
-        cameras.push((index.value(), camera(&source, name, nodes.world(number), notices), path));
+        let world_from_camera = unmirrored(nodes.world(number) * own_mirror(&node));
+        cameras.push((index.value(), camera(&source, name, world_from_camera, notices), path));
     }
     cameras.sort_by_key(|&(index, ..)| index);
     Ok(cameras.into_iter().map(|(_, camera, path)| (camera, path)).unzip())

@@ -459,6 +459,33 @@ fn cameras_and_lights() {
     assert_eq!(lamp.position, Vec3::new(1.0, 2.0, 3.0));
 }
 
+/// The scale of a camera's own node is ignored; below a mirroring node it sees what it would see there, not mirrored.
+#[test]
+fn cameras_are_not_mirrored() {
+    let axes = |camera: &str, parent: &str| {
+        let scene = square().load(&format!(
+            r#"{},{{"camera":0,"translation":[0.5,0,4]{camera}}},{{"children":[1]{parent}}}],"scenes":[{{"nodes":[0,2]}}],
+            "cameras":[{{"type":"perspective","perspective":{{"yfov":0.5,"znear":0.1}}}}]"#,
+            ONE_MESH.trim_end_matches(']')
+        ));
+        let placed = scene.cameras[0].world_from_camera;
+        let [x, y, z] = [placed.matrix3.x_axis, placed.matrix3.y_axis, placed.matrix3.z_axis]
+            .map(|axis| Vec3::from(axis.normalize()));
+        (Vec3::from(placed.translation), [x, y, z])
+    };
+    let plain = axes("", "");
+    assert_eq!(plain, (Vec3::new(0.5, 0.0, 4.0), [Vec3::X, Vec3::Y, Vec3::Z]));
+    for scale in ["-1,1,1", "1,-1,1", "1,1,-1", "-2,-3,-4", "9,9,9"] {
+        assert_eq!(axes(&format!(r#","scale":[{scale}]"#), ""), plain, "{scale}");
+    }
+    let [x, y, z] = plain.1;
+    let below = axes("", r#","scale":[1,1,-1]"#);
+    assert_eq!(below, (Vec3::new(0.5, 0.0, -4.0), [-x, y, -z]));
+    let matrix = r#","matrix":[-1,0,0,0,0,1,0,0,0,0,1,0,0.5,0,4,1]"#;
+    let by_matrix = axes(matrix, "");
+    assert_eq!(by_matrix, plain);
+}
+
 #[test]
 fn lights_outside_their_range_are_brought_into_it_and_it_is_said() {
     let scene = square().load(
