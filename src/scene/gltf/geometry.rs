@@ -5,7 +5,7 @@ use gltf::json;
 
 use super::buffers::File;
 use super::part::{Part, Tally};
-use super::primitive::Source;
+use super::primitive::{Source, Target};
 use super::{Fallible, tangents};
 use crate::scene::{Material, TextureRef, TextureSlot};
 
@@ -40,7 +40,7 @@ impl Needs {
 pub(super) fn read_part(
     file: &File<'_>,
     primitive: &json::mesh::Primitive,
-    weights: &[f32],
+    (targets, weights): (&[Target], &[f32]),
     material: u32,
     needs: &Needs,
     tally: &mut Tally,
@@ -61,7 +61,7 @@ pub(super) fn read_part(
     part.colors = source.colors(&vertices, tally)?;
     source.influences(&vertices, &mut part)?;
     source.tangents(&vertices, &mut part)?;
-    source.morph(&vertices, weights, &mut part)?;
+    source.morph(&vertices, targets, weights, &mut part, tally)?;
     // Non-finite corners would spread through the tangents of a whole part.
     let before = part.triangles.len();
     let positions = &part.positions;

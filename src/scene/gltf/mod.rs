@@ -354,8 +354,12 @@ impl Reading<'_> {
             let primitive = primitive?;
             let material = self.materials.places[&self.look.material(&primitive)];
             let needs = Needs::of(&self.materials.materials[material as usize]);
-            let part = geometry::read_part(self.file, &primitive, weights, material, &needs, tally)
-                .map_err(|cause| format!("primitive {number}: {cause}"))?;
+            let targets = if weights.is_empty() { Vec::new() } else { mesh.targets(number)? };
+            let read = |tally| {
+                let morph = (&targets[..], weights);
+                geometry::read_part(self.file, &primitive, morph, material, &needs, tally)
+            };
+            let part = read(tally).map_err(|cause| format!("primitive {number}: {cause}"))?;
             let Some(part) = part else { continue };
             // Many may share the same long list of corners.
             triangles += part.triangles.len() as u64;

@@ -1,5 +1,7 @@
 //! Primitives: what their accessors say, vertex by vertex.
 
+use std::ops::{AddAssign, Mul};
+
 use glam::{Vec2, Vec3, Vec4};
 use gltf::json;
 use json::accessor::Type;
@@ -31,6 +33,31 @@ impl Mesh {
             read(text.get()).map_err(|cause| not_gltf(&format!("primitive {number}: {cause}")))
         })
     }
+
+    /// Morph targets of a primitive.
+    pub(super) fn targets(&self, primitive: usize) -> Fallible<Vec<Target>> {
+        let targets: Targets = read(self.primitives[primitive].get())
+            .map_err(|cause| not_gltf(&format!("primitive {primitive}: {cause}")))?;
+        Ok(targets.targets.unwrap_or_default())
+    }
+}
+
+#[derive(Deserialize)]
+struct Targets {
+    targets: Option<Vec<Target>>,
+}
+
+/// A morph target: accessors of what is added to each vertex. (The types of the crate `gltf` lack colours and
+/// texture coordinates.)
+#[derive(Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+pub(super) struct Target {
+    position: Option<json::Index<json::Accessor>>,
+    normal: Option<json::Index<json::Accessor>>,
+    tangent: Option<json::Index<json::Accessor>>,
+    texcoord_0: Option<json::Index<json::Accessor>>,
+    texcoord_1: Option<json::Index<json::Accessor>>,
+    color_0: Option<json::Index<json::Accessor>>,
 }
 
 /// A triangle primitive whose accessors are checked as they are read.
@@ -160,9 +187,7 @@ impl<'a> Source<'a> {
             return Ok(Vec::new());
         };
         let read = |&vertex: &u32| {
-            let uv = Vec2::from_array(elements.floats(vertex as usize));
-            tally.bad_values += usize::from(!uv.is_finite());
-            if uv.is_finite() { uv } else { Vec2::ZERO }
+            usable_uv(Vec2::from_array(elements.floats(vertex as usize)), tally)
         };
         Ok(vertices.iter().map(read).collect())
     }
@@ -179,8 +204,7 @@ impl<'a> Source<'a> {
             if elements.components == 3 {
                 color.w = 1.0;
             }
-            tally.bad_values += usize::from(!color.is_finite());
-            if color.is_finite() { color.max(Vec4::ZERO) } else { Vec4::ONE }
+            usable_color(color, tally)
         };
         Ok(vertices.iter().map(read).collect())
     }
@@ -228,25 +252,30 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    /// Adds morph targets to positions, normals and tangents.
-    pub(super) fn morph(&self, vertices: &[u32], weights: &[f32], part: &mut Part) -> Fallible<()> {
-        for (target, &weight) in self.primitive.targets.iter().flatten().zip(weights) {
-            if weight == 0.0 {
-                continue;
-            }
-            let shift = |accessor: Option<json::Index<json::Accessor>>, values: &mut [Vec3]| {
-                let Some(accessor) = accessor else { return Ok(()) };
-                let elements = Elements::open(self.file, accessor, &[Type::Vec3])?;
-                let elements = self.per_vertex(accessor, elements)?;
-                for (value, &vertex) in values.iter_mut().zip(vertices) {
-                    *value += weight * Vec3::from_array(elements.floats(vertex as usize));
-                }
-                Fallible::Ok(())
-            };
-            shift(target.positions, &mut part.positions)?;
-            shift(target.normals, &mut part.normals)?;
+    /// Adds morph targets to what there is of each vertex (section 3.7.2.2).
+    pub(super) fn morph(
+        &self,
+        vertices: &[u32],
+        targets: &[Target],
+        weights: &[f32],
+        part: &mut Part,
+        tally: &mut Tally,
+    ) -> Fallible<()> {
+        const VEC2: &[Type] = &[Type::Vec2];
+        const VEC3: &[Type] = &[Type::Vec3];
+        const COLOR: &[Type] = &[Type::Vec3, Type::Vec4];
+        let mut is_morphed = false;
+        for (target, &weight) in targets.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
+            is_morphed = true;
+            let shift = Shift { source: self, vertices, weight };
+            shift.add(target.position, VEC3, &mut part.positions)?;
+            shift.add(target.normal, VEC3, &mut part.normals)?;
+            let [first, second] = &mut part.uvs;
+            shift.add(target.texcoord_0, VEC2, first)?;
+            shift.add(target.texcoord_1, VEC2, second)?;
+            shift.add(target.color_0, COLOR, &mut part.colors)?;
             let mut directions: Vec<Vec3> = part.tangents.iter().map(|t| t.truncate()).collect();
-            shift(target.tangents, &mut directions)?;
+            shift.add(target.tangent, VEC3, &mut directions)?;
             for (tangent, direction) in part.tangents.iter_mut().zip(directions) {
                 *tangent = direction.extend(tangent.w);
             }
@@ -254,8 +283,52 @@ impl<'a> Source<'a> {
         for normal in &mut part.normals {
             *normal = unit(*normal);
         }
+        if is_morphed {
+            part.uvs.iter_mut().flatten().for_each(|uv| *uv = usable_uv(*uv, tally));
+            let colors = part.colors.iter_mut();
+            colors.for_each(|color| *color = usable_color(*color, tally).min(Vec4::ONE));
+        }
         Ok(())
     }
+}
+
+/// What a morph target adds to some vertices.
+struct Shift<'a> {
+    source: &'a Source<'a>,
+    vertices: &'a [u32],
+    weight: f32,
+}
+
+impl Shift<'_> {
+    fn add<const N: usize, V>(
+        &self,
+        accessor: Option<json::Index<json::Accessor>>,
+        types: &[Type],
+        values: &mut [V],
+    ) -> Fallible<()>
+    where
+        V: From<[f32; N]> + AddAssign + Mul<f32, Output = V>,
+    {
+        let Some(accessor) = accessor else { return Ok(()) };
+        let elements = Elements::open(self.source.file, accessor, types)?;
+        let elements = self.source.per_vertex(accessor, elements)?;
+        for (value, &vertex) in values.iter_mut().zip(self.vertices) {
+            *value += V::from(elements.floats(vertex as usize)) * self.weight;
+        }
+        Ok(())
+    }
+}
+
+/// Texture coordinates, the origin (counted) where they are not finite.
+fn usable_uv(uv: Vec2, tally: &mut Tally) -> Vec2 {
+    tally.bad_values += usize::from(!uv.is_finite());
+    if uv.is_finite() { uv } else { Vec2::ZERO }
+}
+
+/// A colour without negative channels, white (counted) where it is not finite.
+fn usable_color(color: Vec4, tally: &mut Tally) -> Vec4 {
+    tally.bad_values += usize::from(!color.is_finite());
+    if color.is_finite() { color.max(Vec4::ZERO) } else { Vec4::ONE }
 }
 
 /// The values of an attribute, packed or plain.

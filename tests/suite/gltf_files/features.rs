@@ -255,6 +255,37 @@ fn morph_weights_of_the_node_go_before_those_of_the_mesh() {
     assert_eq!(builder.load(&rest(r#","weights":[2]"#)).positions[0].z, 2.0);
 }
 
+/// Texture coordinates and colours are morphed like positions; colours stay within 0 to 1.
+#[test]
+fn morph_targets_move_texture_coordinates_and_colours() {
+    let mut builder = square();
+    let uvs = builder.floats("VEC2", &[0., 0., 1., 0., 1., 1., 0., 1.]);
+    let uv_shift = builder.floats("VEC2", &[0.5; 8]);
+    let colors = builder.floats("VEC4", &[0.5, 0.5, 0.5, 1.0].repeat(4));
+    let color_shift = builder.floats("VEC3", &[0.25, 1.0, -0.5].repeat(4));
+    let infinite = builder.floats("VEC2", &[f32::INFINITY; 8]);
+    let scene = |shift: usize, weights: &str| {
+        let material = textured_material(
+            r#""pbrMetallicRoughness":{"baseColorTexture":{"index":0,"texCoord":1}}"#,
+            "{}",
+        );
+        builder.load(&format!(
+            r#""meshes":[{{"weights":{weights},"primitives":[{{"attributes":{{"POSITION":0,"TEXCOORD_1":{uvs},
+            "COLOR_0":{colors}}},"indices":1,"material":0,"targets":[{{"TEXCOORD_1":{shift}}},
+            {{"COLOR_0":{color_shift},"POSITION":0}}]}}]}}],"nodes":[{{"mesh":0}}],{material}"#
+        ))
+    };
+    let still = scene(uv_shift, "[0,0]");
+    assert_eq!((still.uvs[1][1], still.colors[0]), (Vec2::X, Vec4::new(0.5, 0.5, 0.5, 1.0)));
+    let moved = scene(uv_shift, "[0.5,1]");
+    assert_eq!(moved.uvs[1][1], Vec2::new(1.25, 0.25));
+    assert_eq!(moved.colors[0], Vec4::new(0.75, 1.0, 0.0, 1.0));
+    assert_eq!(moved.positions[1], 2.0 * Vec3::X);
+    let bad = scene(infinite, "[1,0]");
+    assert_eq!(bad.uvs[1], [Vec2::ZERO; 4]);
+    assert!(bad.notices.iter().any(|it| it.starts_with("4 texture coordinates or colours")));
+}
+
 #[test]
 fn extensions_required_used_and_honoured() {
     let error = square().error(&format!(
