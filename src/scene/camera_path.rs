@@ -55,7 +55,9 @@ impl CameraPath {
 
     /// World from camera at a time in seconds; before the first key and after the last as there.
     pub fn at(&self, seconds: f64) -> DAffine3 {
-        unmirrored(self.links.iter().fold(DAffine3::IDENTITY, |world, link| world * link.at(seconds)))
+        unmirrored(
+            self.links.iter().fold(DAffine3::IDENTITY, |world, link| world * link.at(seconds)),
+        )
     }
 }
 

@@ -321,6 +321,11 @@ impl Material {
         }
     }
 
+    /// Whether what is of it is a body with an inside that light gets into.
+    pub(crate) fn has_inside(&self) -> bool {
+        (self.transmission > 0.0 || self.diffuse_transmission > 0.0) && self.thickness > 0.0
+    }
+
     /// Whether as much light goes straight through as through another one with the same textures, and as much
     /// is emitted: the colour of glass counts, that of a wall does not.
     pub(crate) fn lets_pass_like(&self, other: &Self) -> bool {

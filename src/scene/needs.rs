@@ -163,8 +163,7 @@ impl SceneNeeds {
         for (slot, _) in m.textures.iter().enumerate().filter(|(_, texture)| texture.is_some()) {
             *texture_slots |= 1 << slot;
         }
-        let has_inside =
-            (m.transmission > 0.0 || m.diffuse_transmission > 0.0) && m.thickness > 0.0;
+        let has_inside = m.has_inside();
         for (feature, is_needed) in [
             (S::TEXTURES, m.textures.iter().any(Option::is_some)),
             (S::SECOND_UV_SET, m.textures.iter().flatten().any(|texture| texture.uv_set == 1)),

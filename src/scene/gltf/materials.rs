@@ -12,8 +12,9 @@ use super::Fallible;
 use super::buffers::File;
 use super::document::Document;
 use super::medium;
-use super::textures::Wanted;
+use super::textures::{Decoded, Wanted};
 use crate::error::Notices;
+use crate::scene::surface::absorption;
 use crate::scene::{AlphaMode, Material, Texture, TextureImage, TextureRef, TextureSlot as Slot};
 
 /// Largest radiance a surface may emit: its square is far from overflow.
@@ -26,6 +27,8 @@ pub(super) struct Materials {
     pub(super) images: Vec<TextureImage>,
     /// Place in `materials` by number in the file (`None`: the default material).
     pub(super) places: BTreeMap<Option<u32>, u32>,
+    /// Places of what is made for sheets, by those of the bodies' materials and the bits of the thickness.
+    sheets: BTreeMap<(u32, u32), u32>,
 }
 
 impl Materials {
@@ -64,7 +67,35 @@ impl Materials {
         for (place, factor) in glossy {
             decoded.make_rough(&mut materials[place], factor);
         }
-        Ok(Self { materials, textures: decoded.textures, images: decoded.images, places })
+        let Decoded { textures, images, .. } = decoded;
+        Ok(Self { materials, textures, images, places, sheets: BTreeMap::new() })
+    }
+
+    /// Place of the material of a sheet, so thick in metres, given that of a body: a thin wall of the colour that
+    /// the body's inside has at that thickness.
+    pub(super) fn sheet(&mut self, body: u32, thickness: f32) -> u32 {
+        *self.sheets.entry((body, thickness.to_bits())).or_insert_with(|| {
+            let mut sheet = self.materials[body as usize].clone();
+            let tint = (-absorption(&sheet) * thickness).exp();
+            if sheet.transmission > 0.0 {
+                sheet.base_color *= tint.extend(1.0);
+            }
+            sheet.diffuse_transmission_color *= tint;
+            sheet.thickness = 0.0;
+            self.materials.push(sheet);
+            self.materials.len() as u32 - 1
+        })
+    }
+
+    /// Names the materials of bodies that are on sheets.
+    pub(super) fn tell_of_sheets(&self, notices: &mut Notices) {
+        let bodies: BTreeSet<u32> = self.sheets.keys().map(|&(body, _)| body).collect();
+        for body in bodies {
+            notices.add(format!(
+                "material {} has a volume on surfaces that are not closed; there it is a sheet of its thickness",
+                self.materials[body as usize].name
+            ));
+        }
     }
 }
 

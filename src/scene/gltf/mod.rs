@@ -9,6 +9,7 @@
 //! unpack them, `pose` places nodes
 //! and joints, `animation` moves cameras, `materials`, `variants`, `textures` and `medium` read the look, `primitive`, `geometry` and `tangents` read
 //! triangles,
+//! `sheets` finds surfaces of bodies that enclose nothing,
 //! `share` says which are held once for all their instances, `bake` puts the others into the world.
 
 mod accessor;
@@ -29,6 +30,7 @@ mod part;
 mod pose;
 mod primitive;
 mod share;
+mod sheets;
 mod tangents;
 mod textures;
 mod uri;
@@ -152,7 +154,7 @@ fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallib
         is_emitter(&materials.materials[material as usize])
     };
     let mut sharing = Sharing::choose(document, &placements, is_lamp)?;
-    let reading = Reading { file: &file, nodes: &nodes, look: &look, materials: &materials };
+    let mut reading = Reading { file: &file, nodes: &nodes, look: &look, materials };
     for (&number, placements) in &placements {
         let mesh: Mesh = document.meshes.get_as(json::Index::new(number))?;
         reading
@@ -163,6 +165,8 @@ fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallib
             })?;
     }
     sharing.finish(&mut scene)?;
+    let materials = reading.materials;
+    materials.tell_of_sheets(&mut notices);
     if scene.triangles.is_empty() {
         let reasons = repairs(&tally).join(", ");
         let reasons = if reasons.is_empty() { reasons } else { format!(" ({reasons})") };
@@ -286,13 +290,13 @@ struct Reading<'a> {
     file: &'a File<'a>,
     nodes: &'a Nodes,
     look: &'a Look,
-    materials: &'a Materials,
+    materials: Materials,
 }
 
 impl Reading<'_> {
     /// Appends all placements of one mesh, reading it again only where morph weights differ.
     fn append_mesh(
-        &self,
+        &mut self,
         number: u32,
         mesh: &Mesh,
         placements: &[Placement],
@@ -307,7 +311,11 @@ impl Reading<'_> {
             let weights = weights.unwrap_or_default();
             let parts = match read.take() {
                 Some((known, parts)) if known == weights => parts,
-                _ => self.read_parts(mesh, weights, tally)?,
+                _ => {
+                    let mut parts = self.read_parts(mesh, weights, tally)?;
+                    self.open_sheets(&mut parts, placement.instances.first())?;
+                    parts
+                }
             };
             let joints = match placement.skin {
                 Some(skin) => {
@@ -369,6 +377,23 @@ impl Reading<'_> {
             parts.push(part);
         }
         Ok(parts)
+    }
+
+    /// Gives bodies that are not closed the materials of sheets, as thick as the first instance is placed.
+    fn open_sheets(&mut self, parts: &mut [Part], place: Option<&DAffine3>) -> Fallible<()> {
+        let material = |part: &Part| &self.materials.materials[part.material as usize];
+        if !parts.iter().any(|part| material(part).has_inside()) {
+            return Ok(());
+        }
+        let scale = place.map_or(1.0, |place| place.matrix3.determinant().abs().cbrt()) as f32;
+        let are_sheets = sheets::sheets(parts)?;
+        for (part, is_sheet) in parts.iter_mut().zip(are_sheets) {
+            let material = &self.materials.materials[part.material as usize];
+            if is_sheet && material.has_inside() {
+                part.material = self.materials.sheet(part.material, scale * material.thickness);
+            }
+        }
+        Ok(())
     }
 }
 

@@ -186,9 +186,8 @@ impl<'a> Source<'a> {
         let Some(elements) = self.attribute(&Semantic::TexCoords(set), &[Type::Vec2])? else {
             return Ok(Vec::new());
         };
-        let read = |&vertex: &u32| {
-            usable_uv(Vec2::from_array(elements.floats(vertex as usize)), tally)
-        };
+        let read =
+            |&vertex: &u32| usable_uv(Vec2::from_array(elements.floats(vertex as usize)), tally);
         Ok(vertices.iter().map(read).collect())
     }
 

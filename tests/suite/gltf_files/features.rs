@@ -286,6 +286,41 @@ fn morph_targets_move_texture_coordinates_and_colours() {
     assert!(bad.notices.iter().any(|it| it.starts_with("4 texture coordinates or colours")));
 }
 
+/// A body's inside absorbs over the way through it, a sheet's over its thickness as it is placed.
+#[test]
+fn a_volume_on_a_sheet_is_a_thin_tinted_wall() {
+    let mut builder = square();
+    let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]].as_flattened().to_vec();
+    let solid = builder.floats("VEC3", &corners);
+    let faces = builder.indices(&[0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]);
+    let scene = |nodes: &str, transmission: &str| {
+        builder.load(&format!(
+            r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,"material":0}}]}},
+            {{"primitives":[{{"attributes":{{"POSITION":{solid}}},"indices":{faces},"material":0}}]}}],
+            "nodes":[{nodes}],"materials":[{{"name":"Syrup","pbrMetallicRoughness":{{"metallicFactor":0}},
+            "extensions":{{{transmission},"KHR_materials_volume":{{"thicknessFactor":0.1,
+            "attenuationDistance":0.4,"attenuationColor":[0.25,1,0.0625]}}}}}}]"#
+        ))
+    };
+    let glass = r#""KHR_materials_transmission":{"transmissionFactor":1}"#;
+    let both = scene(r#"{"mesh":0,"scale":[2,2,2]},{"mesh":1}"#, glass);
+    let of = |triangle: usize| &both.materials[both.triangle_materials[triangle] as usize];
+    let (sheet, body) = (of(0), of(5));
+    assert_eq!((sheet.thickness, body.thickness), (0.0, 0.1));
+    assert!(sheet.base_color.abs_diff_eq(Vec4::new(0.5, 1.0, 0.25, 1.0), 1e-6));
+    assert_eq!((body.base_color, body.name.as_str()), (Vec4::ONE, "Syrup"));
+    let said = "material Syrup has a volume on surfaces that are not closed";
+    assert!(both.notices.iter().any(|it| it.starts_with(said)));
+    let body = scene(r#"{"mesh":1}"#, glass);
+    assert_eq!((body.materials.len(), body.notices.is_empty()), (1, true));
+    let leaf = r#""KHR_materials_diffuse_transmission":{"diffuseTransmissionFactor":1}"#;
+    let leaf = scene(r#"{"mesh":0}"#, leaf);
+    let leaf = &leaf.materials[leaf.triangle_materials[0] as usize];
+    let color = Vec3::new(0.5_f32.sqrt(), 1.0, 0.5);
+    assert!(leaf.diffuse_transmission_color.abs_diff_eq(color, 1e-6));
+    assert_eq!(leaf.base_color, Vec4::ONE);
+}
+
 #[test]
 fn extensions_required_used_and_honoured() {
     let error = square().error(&format!(
