@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, Weak};
 
-use super::Request;
+use super::request::Request;
 use crate::app::threads::lock;
 use crate::environment::Environment;
 use crate::error::{Error, Result};

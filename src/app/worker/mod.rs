@@ -7,44 +7,38 @@
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
+mod cached;
 mod device;
-mod job;
-mod kept;
+mod earlier;
+mod inspection;
 mod preparation;
+mod preview;
 mod request;
+mod session_cache;
+mod sessions;
+mod shared;
 mod snapshot;
+mod task;
 #[cfg(test)]
 pub(super) mod tests;
+mod watch;
 
-use job::PictureTask;
-use kept::SessionCache;
+use preview::Preview;
 pub(crate) use request::{Reference, Request};
-use snapshot::PublishThrottle;
+use session_cache::SessionCache;
+use sessions::Sessions;
+use shared::Shared;
 pub(crate) use snapshot::{Activity, Backdrop, NoCache, Origin, Point, SessionSnapshot, Snapshot};
+use task::PictureTask;
+use watch::RequestWatch;
 
-use super::threads::{Latest, LatestThread, Wake, lock};
+use super::threads::{LatestThread, Wake, lock};
 use crate::alarm::Alarm;
 use crate::error::{Error, Result};
 use crate::render::gpu::{Gpu, RayChoice};
-
-struct Shared {
-    /// What is asked for; it stays there while it is worked on.
-    orders: Arc<Latest<Arc<Request>>>,
-    /// How many [`preparation::Preparation`]s are under way.
-    preparations: AtomicUsize,
-    wake: Wake,
-    cancel: Arc<AtomicBool>,
-    snapshot: Mutex<Option<Arc<Snapshot>>>,
-    rest: Arc<PublishThrottle>,
-    failures: Mutex<Vec<String>>,
-    /// What is said of a panic.
-    panic: Mutex<Option<String>>,
-    /// The device the window is drawn on.
-    screen: Arc<Mutex<Gpu>>,
-}
 
 /// The handle of the render thread; it ends when dropped.
 pub(crate) struct Worker {
@@ -66,17 +60,7 @@ impl Worker {
             .build()
             .map_err(|e| Error::new(format!("the render threads cannot be started: {e}")))?;
         let pool = Arc::new(pool);
-        let shared = Arc::new(Shared {
-            orders: Arc::default(),
-            preparations: AtomicUsize::default(),
-            wake,
-            cancel: Arc::default(),
-            snapshot: Mutex::default(),
-            rest: Arc::new(PublishThrottle::new()),
-            failures: Mutex::default(),
-            panic: Mutex::default(),
-            screen: Arc::new(Mutex::new(screen)),
-        });
+        let shared = Arc::new(Shared::new(wake, screen));
         let (inside, render_pool) = (Arc::clone(&shared), Arc::clone(&pool));
         let work = move |_: &_| run(&inside, &render_pool, &gpu);
         let thread = LatestThread::start("worker", Arc::clone(&shared.orders), work)?;
@@ -165,8 +149,8 @@ fn lower_priority() {
 }
 
 fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, RayChoice)) {
-    let fresh = || SessionCache::new(gpu.clone(), Arc::clone(&shared.screen));
-    let mut kept = fresh();
+    let fresh = || (SessionCache::new(gpu.clone(), Arc::clone(&shared.screen)), Preview::default());
+    let (mut kept, mut preview) = fresh();
     let alarm = Alarm::start(Arc::clone(&shared.cancel));
     let mut done: Option<Arc<Request>> = None;
     let next = |done: Option<&Request>| {
@@ -181,28 +165,20 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
         })
     };
     while let Some(request) = next(done.as_deref()) {
-        let world = Arc::clone(&request.world);
-        let environment = Arc::clone(&request.environment);
         kept.leave_other_worlds(&request);
-        let asked = Arc::clone(&request);
         let worked = catch_unwind(AssertUnwindSafe(|| {
-            let mut job = PictureTask::new(shared, &alarm, &mut kept, request);
-            pool.install(|| {
-                if job.is_moving() {
-                    job.follow(&world, &environment);
-                } else {
-                    job.render(&world, &environment);
-                }
-            });
-            job.into_request()
+            let (world, environment) = (&*request.world, &*request.environment);
+            let watch = RequestWatch { shared, request: Arc::clone(&request) };
+            let sessions = Sessions::new(watch, &mut kept, &alarm);
+            let task = PictureTask::new(sessions, &mut preview);
+            pool.install(|| task.work(world, environment))
         }));
         done = Some(worked.unwrap_or_else(|_| {
             // The panic is on the terminal. Nothing of what it left is trusted.
-            kept = fresh();
+            (kept, preview) = fresh();
             alarm.set(None);
-            *lock(&shared.panic) = Some("rendering has failed; R begins again".to_owned());
-            (shared.wake)();
-            asked
+            shared.report_panic();
+            request
         }));
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::Shared;
+use super::shared::Shared;
 
 /// Some of it that is under way. It ends when dropped, be it by a panic.
 pub(super) struct Preparation(Arc<Shared>);

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::snapshot::PublishThrottle;
 use super::*;
 use crate::environment::{Environment, EnvironmentOptions, sky};
 use crate::path::World;

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::app::worker::kept::SuspendedCache;
+use super::session_cache::SuspendedCache;
 use crate::environment::Environment;
 use crate::path::World;
 use crate::render::Session;
@@ -22,8 +22,8 @@ pub(super) enum CachedPicture<'s> {
     /// There is none.
     #[default]
     Absent,
-    /// It is rendered; the film published last, of so many samples in all.
-    UnderWay(Box<Session<'s>>, Option<(u64, Arc<Film>)>),
+    /// It is rendered.
+    UnderWay(Box<Session<'s>>),
     /// All of it, of so many samples in all.
     Complete(u64, Arc<Film>),
 }
@@ -38,7 +38,7 @@ impl<'s> CachedPicture<'s> {
         match suspended {
             SuspendedCache::Absent => Self::Absent,
             SuspendedCache::UnderWay(state) => {
-                Self::UnderWay(Box::new(Session::resume(world, environment, *state)), None)
+                Self::UnderWay(Box::new(Session::resume(world, environment, *state)))
             }
             SuspendedCache::Complete((samples, film)) => Self::Complete(samples, film),
         }
@@ -48,7 +48,7 @@ impl<'s> CachedPicture<'s> {
     pub(super) fn suspend(self) -> SuspendedCache {
         match self {
             Self::Absent => SuspendedCache::Absent,
-            Self::UnderWay(session, _) => SuspendedCache::UnderWay(Box::new(session.suspend())),
+            Self::UnderWay(session) => SuspendedCache::UnderWay(Box::new(session.suspend())),
             Self::Complete(samples, film) => SuspendedCache::Complete((samples, film)),
         }
     }
@@ -66,7 +66,7 @@ impl<'s> CachedPicture<'s> {
     /// Its film, once all of its pixels have a sample.
     pub(super) fn film_so_far(&self) -> Option<&Film> {
         match self {
-            Self::UnderWay(session, _) if session.samples() > 0 => Some(session.film()),
+            Self::UnderWay(session) if session.samples() > 0 => Some(session.film()),
             Self::Complete(_, film) => Some(film),
             _ => None,
         }
@@ -75,7 +75,7 @@ impl<'s> CachedPicture<'s> {
     /// What renders it.
     pub(super) fn session(&self) -> Option<&Session<'s>> {
         match self {
-            Self::UnderWay(session, _) => Some(session),
+            Self::UnderWay(session) => Some(session),
             _ => None,
         }
     }
@@ -83,7 +83,7 @@ impl<'s> CachedPicture<'s> {
     /// The same, to be changed.
     pub(super) fn session_mut(&mut self) -> Option<&mut Session<'s>> {
         match self {
-            Self::UnderWay(session, _) => Some(session),
+            Self::UnderWay(session) => Some(session),
             _ => None,
         }
     }
@@ -92,7 +92,7 @@ impl<'s> CachedPicture<'s> {
     /// has one the exact one has every third turn, for what is shown must not stand still while the cache is
     /// trained.
     pub(super) fn next(&mut self, main: &Session<'_>, turns: u32) -> Option<&mut Session<'s>> {
-        let Self::UnderWay(session, _) = self else { return None };
+        let Self::UnderWay(session) = self else { return None };
         let is_shown = session.samples() > 0;
         let is_next =
             session.samples() < SAMPLES.min(2 + 4 * main.samples()) && (is_shown || turns < 2);
@@ -111,27 +111,9 @@ impl<'s> CachedPicture<'s> {
 
     /// Drops it. `keep` gets what rendered it, which is returned.
     pub(super) fn end(&mut self, keep: impl FnOnce(&mut Session<'s>)) -> Option<Box<Session<'s>>> {
-        // The copy goes first: both together are large.
-        let Self::UnderWay(mut session, _) = std::mem::take(self) else { return None };
+        let Self::UnderWay(mut session) = std::mem::take(self) else { return None };
         keep(&mut session);
         Some(session)
-    }
-
-    /// Its film and how many samples that has, if these are more than so many and all over the picture. A copy is
-    /// made unless there is a new one already or, if it `rests`, any: it is megabytes and is soon complete.
-    pub(super) fn film(&mut self, least: u64, rests: bool) -> Option<(u64, Arc<Film>)> {
-        match self {
-            Self::UnderWay(session, copy)
-                if session.figures().samples > least && session.is_begun() =>
-            {
-                let samples = session.figures().samples;
-                let kept = copy.take().filter(|(of, _)| rests || *of == samples);
-                let kept = kept.unwrap_or_else(|| (samples, Arc::new(session.film().clone())));
-                Some(copy.insert(kept).clone())
-            }
-            Self::Complete(samples, film) if *samples > least => Some((*samples, Arc::clone(film))),
-            _ => None,
-        }
     }
 }
 

@@ -1,15 +1,15 @@
-//! Sessions of a job: with what is known, where they run, and how far they go at a time.
+//! Sessions for a request: with what is known, on which device, and how far they go at a time.
 
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use super::cached::CachedPicture;
-use super::{MAIN, PictureTask, Rested};
-use crate::app::threads::lock;
-use crate::app::worker::preparation::Preparation;
+use super::preparation::Preparation;
+use super::session_cache::SessionCache;
+use super::watch::{RequestWatch, Rested};
+use crate::alarm::Alarm;
 use crate::environment::Environment;
 use crate::error::Result;
+use crate::light_grid::LearningGrid;
 use crate::path::World;
 use crate::render::gpu::CompileGuard;
 use crate::render::{Gi, Phase, Session, StopRule, View};
@@ -29,65 +29,60 @@ pub(super) enum Placed {
     TooLate,
 }
 
-impl PictureTask<'_> {
+/// Makes sessions for a request, places them on a device and lets them go on.
+pub(super) struct Sessions<'a> {
+    pub(super) watch: RequestWatch<'a>,
+    pub(super) kept: &'a mut SessionCache,
+    alarm: &'a Alarm,
+}
+
+impl<'a> Sessions<'a> {
+    pub(super) fn new(
+        watch: RequestWatch<'a>,
+        kept: &'a mut SessionCache,
+        alarm: &'a Alarm,
+    ) -> Self {
+        Self { watch, kept, alarm }
+    }
+
     /// A session for a picture so small that a pass takes a moment on a GPU that [is quick], else on the CPU, with
     /// what was learned before.
     ///
-    /// [is quick]: crate::app::worker::device::Device::is_quick
+    /// [is quick]: super::device::Device::is_quick
     pub(super) fn small_session<'b>(
         &mut self,
         world: &'b World,
         environment: &'b Environment,
         is_quick: bool,
     ) -> Session<'b> {
-        let request = Arc::clone(&self.request);
+        let request = Arc::clone(&self.watch.request);
         let shrink = self.shrink(&request.view, is_quick);
         let mut view =
             request.view.of_size(request.view.width / shrink, request.view.height / shrink);
         // Learning would take longer than the picture. Where cached light is not wanted, there are no kernels for it.
-        if self.request.wants_cached && !is_quick && self.kept.has_training_for(&self.request) {
+        if request.wants_cached && !is_quick && self.kept.has_training_for(&request) {
             view.gi = Gi::Cached;
         }
         self.experienced_session(world, environment, view)
     }
 
-    /// The session of this very picture that was left for another one, if it was not long ago, and the cached
-    /// picture beside it.
-    pub(super) fn picture_of_before<'b>(
-        &mut self,
-        world: &'b World,
-        environment: &'b Environment,
-    ) -> (Option<Session<'b>>, CachedPicture<'b>) {
-        let Some(left) = self.kept.come_back(&self.request) else {
-            return (None, CachedPicture::default());
-        };
-        (self.counters, self.cached_seconds) = (left.counters, left.cached_seconds);
-        self.curves[MAIN] = left.curve;
-        // What was kept of it to be seen meanwhile has the same samples.
-        self.kept.backdrop.take_if(|seen| seen.request.is_resumed_by(&self.request));
-        let mut cached = CachedPicture::resume(world, environment, left.cached);
-        if let Some(session) = cached.session_mut() {
-            self.take_up_training(session);
-        }
-        (Some(Session::resume(world, environment, left.session)), cached)
-    }
-
-    /// A session that learns, from what is known of the scene if the camera has not gone far.
+    /// A session that learns, and the counters it goes on from: those of this scene, if the camera has not gone far.
     pub(super) fn learning_session<'b>(
         &mut self,
         world: &'b World,
         environment: &'b Environment,
         view: View,
-    ) -> Session<'b> {
+    ) -> (Session<'b>, Option<Arc<LearningGrid>>) {
         let mut session = Session::new(world, environment, view);
-        if let Some(counted) = self.kept.counted_for(&self.request) {
-            match session.continue_learning(&counted) {
-                Ok(true) => self.counters = Some(counted),
-                Ok(false) => {}
-                Err(error) => self.go_on(&mut session, Err(error)),
+        let counted = self.kept.counted_for(&self.watch.request);
+        let counted = counted.filter(|counted| match session.continue_learning(counted) {
+            Ok(is_gone_on_from) => is_gone_on_from,
+            Err(failure) => {
+                self.go_on(&mut session, Err(failure));
+                false
             }
-        }
-        session
+        });
+        (session, counted)
     }
 
     /// A session that does not learn but uses what was learned before.
@@ -101,7 +96,7 @@ impl PictureTask<'_> {
         session.finish_learning();
         let is_learning_mode = session.view().distribution_options().is_some();
         if let Some(distributions) =
-            self.kept.distributions_for(&self.request).filter(|_| is_learning_mode)
+            self.kept.distributions_for(&self.watch.request).filter(|_| is_learning_mode)
         {
             let given = session.set_grid((*distributions).clone());
             self.go_on(&mut session, given);
@@ -113,8 +108,8 @@ impl PictureTask<'_> {
     }
 
     /// Gives a session the radiance cache that was trained for others, if it suits.
-    fn take_up_training(&mut self, session: &mut Session<'_>) {
-        if self.kept.has_training_for(&self.request)
+    pub(super) fn take_up_training(&mut self, session: &mut Session<'_>) {
+        if self.kept.has_training_for(&self.watch.request)
             && let Some((training, _)) = self.kept.training.take()
         {
             let given = session.set_training(training);
@@ -131,6 +126,22 @@ impl PictureTask<'_> {
         let is_right = |last: &u32| (0.6..=1.8).contains(&(f64::from(*last) / shrink));
         let last = self.kept.shrink.filter(is_right);
         *self.kept.shrink.insert(last.unwrap_or((shrink.ceil() as u32).clamp(1, 16)))
+    }
+
+    /// One learning pass on the device that the session is on.
+    pub(super) fn learn_in_place(&mut self, session: &mut Session<'_>) {
+        let learned = session.advance(1, &self.watch.shared.cancel);
+        self.go_on(session, learned);
+    }
+
+    /// Keeps the radiance cache of a session for the next one.
+    pub(super) fn keep_training(&mut self, session: &mut Session<'_>) {
+        self.kept.keep_training(session, &self.watch.request);
+    }
+
+    /// Waits until something else is asked for, or kernels are compiled.
+    pub(super) fn rest(&self) -> Rested {
+        self.watch.rest(&self.kept.device)
     }
 
     /// One pass on the device that is asked for, cut short after a slice if asked for.
@@ -150,26 +161,23 @@ impl PictureTask<'_> {
         self.alarm.set(cut.then(|| Instant::now() + SLICE));
         let advanced = match self.beginning(session) {
             Some(every) => {
-                session.begin(every, &self.shared.cancel);
+                session.begin(every, &self.watch.shared.cancel);
                 Ok(())
             }
             None => {
                 let samples = session.next_pass(&rule.unwrap_or_default());
-                session.advance(samples, &self.shared.cancel)
+                session.advance(samples, &self.watch.shared.cancel)
             }
         };
         self.alarm.set(None);
         self.go_on(session, advanced);
-        let slot = self.shared.orders.slot();
-        if !slot.is_closed && slot.value.as_ref().is_none_or(|new| !self.request.restarts(new)) {
-            self.shared.cancel.store(false, Ordering::Relaxed);
-        }
+        self.watch.go_on();
     }
 
     /// How far apart the pixels are that the film is to begin with now; `None` once it has begun, and
     /// for moving pictures, which are small.
     pub(super) fn beginning(&self, session: &Session<'_>) -> Option<u32> {
-        let begins = self.request.previews && !self.request.moving;
+        let begins = self.watch.request.previews && !self.watch.request.moving;
         if begins { session.next_beginning() } else { None }
     }
 
@@ -180,16 +188,16 @@ impl PictureTask<'_> {
         // none is quicker.
         let is_fresh = session.samples() == 0 && !session.is_on_gpu();
         let is_learning = session.phase() == Phase::Learning;
-        let begins =
-            self.request.moving || is_fresh && (is_learning || self.beginning(session).is_some());
-        let waits = begins && !self.kept.device.is_quick(&self.request);
-        if self.request.previews && (waits || session.view().gi == Gi::Cached) {
+        let begins = self.watch.request.moving
+            || is_fresh && (is_learning || self.beginning(session).is_some());
+        let waits = begins && !self.kept.device.is_quick(&self.watch.request);
+        if self.watch.request.previews && (waits || session.view().gi == Gi::Cached) {
             session.continue_on_cpu();
             return Placed::InTime;
         }
-        self.kept.device.choose_for(&self.request);
-        let needs_upload = self.kept.device.needs_upload(&self.request);
-        let uploading = needs_upload.then(|| Preparation::begin(self.shared));
+        self.kept.device.choose_for(&self.watch.request);
+        let needs_upload = self.kept.device.needs_upload(&self.watch.request);
+        let uploading = needs_upload.then(|| Preparation::begin(self.watch.shared));
         if needs_upload {
             // With another one or another scene it was different.
             self.kept.seconds_per_path[1] = None;
@@ -197,7 +205,8 @@ impl PictureTask<'_> {
         self.place_if_compiled(session);
         drop(uploading);
         // Pictures that are compared, or are to be repeatable, come from one device.
-        let is_patient = self.request.split && !self.request.moving || !self.request.previews;
+        let is_patient =
+            self.watch.request.split && !self.watch.request.moving || !self.watch.request.previews;
         while is_patient && !session.is_on_gpu() && self.kept.device.was_compiling() {
             if self.rest() == Rested::ForRequest {
                 return Placed::TooLate;
@@ -209,28 +218,28 @@ impl PictureTask<'_> {
     }
 
     fn place_if_compiled(&mut self, session: &mut Session<'_>) {
-        let shared = self.shared;
+        let shared = self.watch.shared;
         let preparation = || Arc::new(Preparation::begin(shared)) as Arc<CompileGuard>;
-        self.kept.device.place(session, &self.request, preparation);
-        self.tell_failure();
+        self.kept.device.place(session, &self.watch.request, preparation);
+        self.report_failure();
     }
 
     /// Goes on where it can if a GPU has failed.
     pub(super) fn go_on(&mut self, session: &mut Session<'_>, outcome: Result<()>) {
         if let Err(failure) = outcome {
             session.continue_on_cpu();
-            self.kept.device.give_up(&failure, &self.request);
-            self.tell_failure();
+            self.kept.device.give_up(&failure, &self.watch.request);
+            self.report_failure();
         }
     }
 
-    fn tell_failure(&mut self) {
+    fn report_failure(&mut self) {
         if let Some(sentence) = self.kept.device.take_failure() {
-            lock(&self.shared.failures).push(sentence);
-            (self.shared.wake)();
+            self.watch.shared.report_failure(sentence);
         }
     }
 
+    /// Notes how fast the device is that a session is on.
     pub(super) fn measure(&mut self, session: &Session<'_>) {
         if let Some(seconds) = session.seconds_per_sample() {
             self.kept.seconds_per_path[usize::from(session.is_on_gpu())] = Some(seconds);

@@ -3,12 +3,11 @@
 use std::sync::{Arc, Mutex};
 
 use super::device::Device;
-use super::snapshot::CompletePicture;
-use super::{Point, Request};
+use super::request::Request;
+use super::snapshot::{CompletePicture, Point};
 use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
-use crate::render::film::Film;
 use crate::render::gpu::{Gpu, RayChoice};
 use crate::render::{CacheTraining, Session, SessionState};
 
@@ -23,21 +22,10 @@ pub(super) struct SessionCache {
     /// By what the last moving picture's sides were divided.
     pub(super) shrink: Option<u32>,
     pub(super) snapshots: u64,
-    /// A film of what was seen last, and what it was rendered for.
-    pub(super) backdrop: Option<PreviousFilm>,
     /// What paths have trained the radiance cache, and where.
     pub(super) training: Option<(CacheTraining, Arc<Request>)>,
     /// Pictures that were left for others, oldest first.
     left: Vec<SuspendedPicture>,
-}
-
-/// A film of what was seen.
-pub(super) struct PreviousFilm {
-    /// What it was rendered for.
-    pub(super) request: Arc<Request>,
-    pub(super) film: Arc<Film>,
-    /// What one of its samples counts beside an exact one: more where there is cached light in it.
-    pub(super) worth: f32,
 }
 
 /// A picture that was left for another one: whoever comes back to it finds it as it was.
@@ -119,7 +107,6 @@ impl SessionCache {
             seconds_per_path: [None, None],
             shrink: None,
             snapshots: 0,
-            backdrop: None,
             training: None,
             left: Vec::new(),
         }
@@ -142,7 +129,6 @@ impl SessionCache {
     pub(super) fn leave_other_worlds(&mut self, request: &Request) {
         let world = &request.world;
         let is_other = |of: &Request| !Arc::ptr_eq(&of.world, world);
-        self.backdrop.take_if(|seen| is_other(&seen.request));
         self.training.take_if(|(_, of)| is_other(of));
         self.left.retain(|left| !is_other(&left.request));
         let map = &request.environment;

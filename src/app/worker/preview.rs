@@ -1,0 +1,263 @@
+//! What is shown between samples and screen: copies of films in the making, and a film of the view from before.
+
+use std::borrow::Cow;
+use std::sync::{Arc, Weak};
+use std::time::{Duration, Instant};
+
+use super::cached::{self, CachedPicture};
+use super::earlier::EarlierFilm;
+use super::request::Request;
+use super::sessions::SLICE;
+use super::snapshot::{Activity, Backdrop, CompletePicture, Origin, SessionSnapshot};
+use crate::render::film::Film;
+use crate::render::gpu::{DeviceFilm, Gpu};
+use crate::render::{Session, View};
+
+/// A film that is shown in place is read back this seldom.
+const READING_GAP: Duration = Duration::from_millis(250);
+/// A film that is copied for being shown is replaced when it is so old, whoever still has others.
+const MAX_COPY_AGE: Duration = Duration::from_secs(2);
+/// Publishing may take at most about one part in this of the time.
+const PUBLISH_SHARE: u32 = 40;
+/// But a picture that changes is shown at least so often.
+pub(super) const MAX_GAP: Duration = Duration::from_millis(800);
+
+/// Films by the session they are of.
+pub(super) const MAIN: usize = 0;
+pub(super) const PLAIN: usize = 1;
+
+/// Decides when films are copied for the window, and which films it is shown together.
+#[derive(Default)]
+pub(super) struct Preview {
+    /// A film of what was seen last.
+    earlier: Option<EarlierFilm>,
+    /// The main and the plain picture, as they were copied last.
+    copies: [Option<FilmCopy>; 2],
+    /// The cached picture, as it was copied last, of so many samples.
+    cached_copy: Option<CompletePicture>,
+    /// Copies that somebody still has.
+    lent: Vec<Weak<Film>>,
+    /// Whether the window wants no new copy for now.
+    rests: bool,
+}
+
+/// A session's picture as it was when its film was copied or, where it is shown in place, read back.
+struct FilmCopy {
+    session: SessionSnapshot,
+    /// Where the film is shown in place meanwhile.
+    of: Option<(Gpu, DeviceFilm)>,
+    at: Instant,
+    /// Age at which it is too old, where it is shown in place.
+    gap: Duration,
+}
+
+impl Preview {
+    /// Begins with another request: of all films, one from before serves on that looks like it.
+    pub(super) fn begin(&mut self, request: &Request) {
+        let earlier = self.earlier.take().and_then(|earlier| earlier.begin(request));
+        *self = Self { earlier, ..Self::default() };
+    }
+
+    /// Resizes the film from before to the size of the picture.
+    pub(super) fn resize_earlier(&mut self, view: &View) {
+        if let Some(earlier) = &mut self.earlier {
+            earlier.resize(view);
+        }
+    }
+
+    /// Whether the film from before says so much that no cached light is needed beside it.
+    pub(super) fn is_rich(&self) -> bool {
+        let enough = 2.0 / 3.0 * cached::SAMPLES as f32;
+        self.earlier.as_ref().is_some_and(|earlier| earlier.is_resized_worth(enough))
+    }
+
+    /// Goes on with the very picture that was left: what was kept of it to be seen meanwhile has the same samples.
+    pub(super) fn resume(&mut self, request: &Request) {
+        self.earlier.take_if(|earlier| earlier.is_of_same(request));
+    }
+
+    /// Lets go of the copy of the plain picture.
+    pub(super) fn end_plain(&mut self) {
+        self.copies[PLAIN] = None;
+    }
+
+    /// Keeps a film for the next picture's first moments, unless there is a better one of the same view.
+    pub(super) fn keep(&mut self, request: &Arc<Request>, film: Cow<'_, Film>, worth: f32) {
+        let known = self.earlier.as_ref().map_or(0.0, |earlier| earlier.weight(&request.view));
+        if film.min_samples() > 0 && worth * film.total_samples() as f32 > known {
+            let film = Arc::new(film.into_owned());
+            self.earlier = Some(EarlierFilm::new(Arc::clone(request), film, worth));
+        }
+    }
+
+    /// Prepares for publishing a picture of so many samples: the earlier film goes once it counts no more, and it is
+    /// decided whether new copies are wanted, which are not where `is_throttled`. A picture that `is_final` is always
+    /// copied.
+    pub(super) fn prepare(&mut self, samples: u32, is_final: bool, is_throttled: bool) {
+        self.earlier.take_if(|earlier| earlier.has_faded(samples));
+        self.rests = !is_final && (is_throttled || self.is_ahead());
+    }
+
+    /// Whether the window rests, and gets no new copies.
+    pub(super) fn rests(&self) -> bool {
+        self.rests
+    }
+
+    /// Whether those who show films have one that they have not come to yet: a third would only take memory.
+    fn is_ahead(&mut self) -> bool {
+        self.lent.retain(|film| film.strong_count() > 0);
+        let copies = || self.copies.iter().flatten();
+        let is_fresh = |copy: &FilmCopy| copy.at.elapsed() < MAX_COPY_AGE;
+        self.lent.len() > copies().count().max(1) && copies().any(is_fresh)
+    }
+
+    /// Whether the last copy of a session's film does not serve on, by its age where it is shown `in_place`.
+    fn is_stale(&self, role: usize, in_place: Option<&(Gpu, DeviceFilm)>, rests: bool) -> bool {
+        let serves = |copy: &FilmCopy| match (&copy.of, in_place) {
+            (Some(read), Some(of)) => is_same(read, of) && copy.at.elapsed() < copy.gap,
+            // Before the first sample it was another picture, and none before pixels everywhere have one.
+            (None, None) => {
+                rests && copy.session.figures.samples > 0 && copy.session.film.is_begun()
+            }
+            _ => false,
+        };
+        !self.copies[role].as_ref().is_some_and(serves)
+    }
+
+    /// Whether figures that need the main film are to be taken anew.
+    pub(super) fn is_reading_due(
+        &self,
+        session: &Session<'_>,
+        in_place: Option<&(Gpu, DeviceFilm)>,
+    ) -> bool {
+        session.samples() > 0 && self.is_stale(MAIN, in_place, false)
+    }
+
+    /// Whether a session's film is to be copied now.
+    fn is_copy_due(
+        &self,
+        role: usize,
+        session: &Session<'_>,
+        in_place: Option<&(Gpu, DeviceFilm)>,
+        is_final: bool,
+    ) -> bool {
+        let Some(copy) = &self.copies[role] else { return true };
+        // The last picture, and the first one with a sample in every pixel, are shown at once.
+        if is_final || session.samples() > 0 && copy.session.samples == 0 {
+            return true;
+        }
+        // Nobody looks at one whose first pixels are not everywhere.
+        let is_unseen = in_place.is_none() && !session.is_begun();
+        !is_unseen && self.is_stale(role, in_place, self.rests)
+    }
+
+    /// A session's picture, and what reading a film that is shown `in_place` took of the time. The main one's is the
+    /// film from before until it has a sample.
+    pub(super) fn session_snapshot(
+        &mut self,
+        role: usize,
+        session: &Session<'_>,
+        in_place: Option<(Gpu, DeviceFilm)>,
+        is_final: bool,
+    ) -> (SessionSnapshot, Duration) {
+        let (is_in_place, mut cost) = (in_place.is_some(), Duration::ZERO);
+        let is_due = self.is_copy_due(role, session, in_place.as_ref(), is_final);
+        let copy = match self.copies[role].take().filter(|_| !is_due) {
+            Some(copy) => copy,
+            None => {
+                let start = Instant::now();
+                let is_empty = role == MAIN && session.figures().samples == 0;
+                let earlier = self.earlier.as_ref().filter(|_| is_empty);
+                let film = earlier.and_then(|earlier| earlier.film_for(session.view()));
+                let film = film.unwrap_or_else(|| Arc::new(session.film().clone()));
+                if session.figures().samples > 0 {
+                    self.lent.push(Arc::downgrade(&film));
+                }
+                let session = SessionSnapshot {
+                    sampling: session.view().sampling,
+                    samples: session.samples(),
+                    noise: session.noise(),
+                    figures: session.figures(),
+                    comparable_seconds: session.comparable_seconds(),
+                    invalid_samples: film.invalid_samples(),
+                    film,
+                    grid: None,
+                    gpu: None,
+                    on_device: None,
+                };
+                if is_in_place {
+                    cost = start.elapsed();
+                }
+                let gap = gap_after(cost).max(READING_GAP);
+                FilmCopy { session, of: in_place, at: Instant::now(), gap }
+            }
+        };
+        let mut snapshot = self.copies[role].insert(copy).session.clone();
+        if is_in_place {
+            // That is what is shown.
+            snapshot.samples = session.samples();
+        }
+        snapshot.gpu = session.gpu_figures().map(Arc::new);
+        snapshot.on_device = session.film_on_device();
+        (snapshot, cost)
+    }
+
+    /// The film that is shown together with the main picture's own of so many samples a pixel: the cached one once it
+    /// has clearly more to say than the one from before, as chance and gaps between its first pixels count against it.
+    pub(super) fn backdrop(
+        &mut self,
+        request: &Arc<Request>,
+        activity: Activity,
+        samples: u32,
+        cached: &CachedPicture<'_>,
+    ) -> Option<Backdrop> {
+        // A film that was kept of this request has the same samples.
+        let earlier = self.earlier.as_ref().filter(|earlier| !earlier.is_of(request));
+        let earlier = earlier.and_then(|earlier| earlier.backdrop(&request.view, samples));
+        let seen = earlier.as_ref().map_or(0, |earlier| earlier.samples);
+        let cached = self.cached_film(cached, 3 * seen / 2).filter(|_| request.wants_cached);
+        let shown = match cached {
+            Some((of, film)) => {
+                let worth = cached::worth(samples);
+                Some(Backdrop { film, samples: of, worth, origin: Origin::Cache })
+            }
+            None => earlier,
+        };
+        // What is compared, and what is done, is what will be saved.
+        let is_plain = request.split || activity == Activity::Done;
+        let is_wanted = |backdrop: &Backdrop| {
+            backdrop.worth > 0.0 && !(is_plain && backdrop.origin == Origin::Resized)
+        };
+        shown.filter(is_wanted)
+    }
+
+    /// The cached picture's film and how many samples that has, if these are more than `least` and all over the
+    /// picture. A copy is made unless there is a new one already or, while the window rests, any: it is megabytes and
+    /// is soon complete.
+    fn cached_film(&mut self, cached: &CachedPicture<'_>, least: u64) -> Option<CompletePicture> {
+        let copy = self.cached_copy.take();
+        match cached {
+            CachedPicture::UnderWay(session)
+                if session.figures().samples > least && session.is_begun() =>
+            {
+                let samples = session.figures().samples;
+                let copy = copy.filter(|(of, _)| self.rests || *of == samples);
+                let copy = copy.unwrap_or_else(|| (samples, Arc::new(session.film().clone())));
+                Some(self.cached_copy.insert(copy).clone())
+            }
+            CachedPicture::Complete(samples, film) if *samples > least => {
+                Some((*samples, Arc::clone(film)))
+            }
+            _ => None,
+        }
+    }
+}
+
+fn is_same((gpu, film): &(Gpu, DeviceFilm), other: &(Gpu, DeviceFilm)) -> bool {
+    gpu.is_same(&other.0) && *film == other.1
+}
+
+/// Time until something that took `cost` may be done again.
+pub(super) fn gap_after(cost: Duration) -> Duration {
+    (cost * PUBLISH_SHARE).clamp(SLICE, MAX_GAP)
+}

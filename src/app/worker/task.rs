@@ -1,0 +1,492 @@
+//! One request being worked on.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::cached::{CachedPicture, worth};
+use super::inspection::Inspection;
+use super::preview::{MAIN, MAX_GAP, PLAIN, Preview, gap_after};
+use super::request::Request;
+use super::session_cache::{Learned, SuspendedPicture};
+use super::sessions::{Placed, Sessions};
+use super::snapshot::{Activity, SessionSnapshot, Snapshot};
+use crate::app::threads::lock;
+use crate::environment::Environment;
+use crate::light_grid::LearningGrid;
+use crate::path::World;
+use crate::render::film::Film;
+use crate::render::gpu::{DeviceFilm, Gpu};
+use crate::render::{Gi, Phase, Sampling, Session, StopRule, View};
+
+/// While there is much to learn the picture goes on a little this often.
+const STANDSTILL: Duration = Duration::from_millis(400);
+
+/// Works on one request until something else is asked for.
+pub(super) struct PictureTask<'a> {
+    sessions: Sessions<'a>,
+    preview: &'a mut Preview,
+    inspection: Inspection,
+    /// What learning has counted, once it has ended.
+    counters: Option<Arc<LearningGrid>>,
+    /// Seconds spent on the cached picture.
+    cached_seconds: f64,
+    /// When what was published last, and when there may be something new.
+    published: Instant,
+    last: Option<(Activity, u64)>,
+    publish_gap: Duration,
+}
+
+/// The pictures of one request.
+struct Pictures<'s> {
+    main: Session<'s>,
+    /// The plain picture of a split view.
+    plain: Option<Session<'s>>,
+    cached: CachedPicture<'s>,
+    /// Turns of the cached one in a row.
+    turns: u32,
+}
+
+impl<'s> Pictures<'s> {
+    fn new(main: Session<'s>, cached: CachedPicture<'s>) -> Self {
+        Self { main, plain: None, cached, turns: 0 }
+    }
+
+    /// Grows with whatever is done for them.
+    fn progress(&self) -> u64 {
+        let progress = |session: &Session<'_>| {
+            let figures = session.figures();
+            // A radiance cache is trained out of sight, but that learning is over is to be seen.
+            figures.learning_paths + figures.samples + u64::from(figures.training_paths > 0)
+        };
+        let sessions = [Some(&self.main), self.plain.as_ref(), self.cached.session()];
+        sessions.into_iter().flatten().map(progress).sum()
+    }
+
+    /// Whether the plain picture of a split view has had the time of the main one, learning included. What that is
+    /// must be known of both: whichever has moved to another device has the next turn.
+    fn are_level(&self, rule: &StopRule) -> bool {
+        let (Some(plain), main) = (&self.plain, &self.main) else { return false };
+        match (plain.comparable_seconds(), main.comparable_seconds()) {
+            (None, _) => false,
+            (Some(plain), Some(main)) => plain >= main,
+            (Some(_), None) => !main.is_done(rule) || plain.samples() >= main.samples(),
+        }
+    }
+}
+
+impl<'a> PictureTask<'a> {
+    pub(super) fn new(sessions: Sessions<'a>, preview: &'a mut Preview) -> Self {
+        preview.begin(&sessions.watch.request);
+        Self {
+            sessions,
+            preview,
+            inspection: Inspection::default(),
+            counters: None,
+            cached_seconds: 0.0,
+            published: Instant::now(),
+            last: None,
+            publish_gap: Duration::ZERO,
+        }
+    }
+
+    fn request(&self) -> &Arc<Request> {
+        &self.sessions.watch.request
+    }
+
+    /// Works until something else is asked for; the request that was worked on last.
+    pub(super) fn work(mut self, world: &World, environment: &Environment) -> Arc<Request> {
+        if self.request().moving {
+            self.follow(world, environment);
+        } else {
+            self.render(world, environment);
+        }
+        self.sessions.watch.request
+    }
+
+    /// Small pictures for as long as the camera rests at this very place.
+    fn follow(&mut self, world: &World, environment: &Environment) {
+        let was_quick = self.sessions.kept.device.is_quick(self.request());
+        let mut session = self.sessions.small_session(world, environment, was_quick);
+        self.sessions.place(&mut session);
+        if was_quick && !session.is_on_gpu() {
+            // The CPU affords less until there are kernels for it.
+            session = self.sessions.small_session(world, environment, false);
+        }
+        let mut pictures = Pictures::new(session, CachedPicture::Absent);
+        while !self.sessions.watch.is_superseded() {
+            // The first pass is never cut short: some picture is better than none.
+            let cut = pictures.main.samples() > 0;
+            self.sessions.advance(&mut pictures.main, None, cut);
+            if pictures.main.samples() == 0 || self.sessions.watch.is_elsewhere() {
+                break;
+            }
+            self.sessions.measure(&pictures.main);
+            self.keep_earlier(Cow::Borrowed(pictures.main.film()), 1.0);
+            self.publish(Activity::Moving, &pictures);
+            if pictures.main.samples() >= 64 {
+                self.sessions.rest();
+            }
+        }
+        self.sessions.keep_training(&mut pictures.main);
+    }
+
+    /// The full picture: learning first, then samples until a rule is met.
+    fn render(&mut self, world: &World, environment: &Environment) {
+        let mut pictures = self.begin_pictures(world, environment);
+        let is_rich = self.preview.is_rich();
+        // When the picture went on last.
+        let mut went_on = Instant::now();
+        while let Some(activity) = self.next_activity(&pictures) {
+            self.begin_and_end_others(world, environment, &mut pictures, is_rich);
+            match activity {
+                Activity::Paused | Activity::Done => {
+                    self.stand_still(activity, &mut pictures);
+                    continue;
+                }
+                // A picture first, and one that goes on.
+                Activity::Learning(_)
+                    if self.sessions.beginning(&pictures.main).is_some()
+                        && (!pictures.main.is_begun() || went_on.elapsed() >= STANDSTILL) =>
+                {
+                    self.sessions.advance(&mut pictures.main, None, true);
+                    self.sessions.measure(&pictures.main);
+                    went_on = Instant::now();
+                }
+                Activity::Learning(_) => self.learn(&mut pictures.main),
+                Activity::Rendering | Activity::Moving => self.take_turn(&mut pictures),
+            }
+            pictures.cached.complete(|session| self.sessions.keep_training(session));
+            self.publish_if_due(activity, &pictures);
+        }
+        if self.request().previews {
+            self.leave(pictures);
+        } else {
+            pictures.cached.end(|session| self.sessions.keep_training(session));
+        }
+    }
+
+    /// The picture that was left, if it was this very one and not long ago, or a new one.
+    fn begin_pictures<'s>(
+        &mut self,
+        world: &'s World,
+        environment: &'s Environment,
+    ) -> Pictures<'s> {
+        let request = Arc::clone(self.request());
+        if let Some(left) = self.sessions.kept.come_back(&request) {
+            self.preview.resume(&request);
+            (self.counters, self.cached_seconds) = (left.counters, left.cached_seconds);
+            self.inspection.curves[MAIN] = left.curve;
+            let mut cached = CachedPicture::resume(world, environment, left.cached);
+            if let Some(session) = cached.session_mut() {
+                self.sessions.take_up_training(session);
+            }
+            let main = Session::resume(world, environment, left.session);
+            let pictures = Pictures::new(main, cached);
+            // Before it goes on.
+            self.publish(Activity::Rendering, &pictures);
+            return pictures;
+        }
+        if request.previews && !self.sessions.kept.device.is_quick(&request) {
+            self.preview.resize_earlier(&request.view);
+        }
+        let view = request.view.clone();
+        let main = if request.is_frozen && self.sessions.kept.distributions_for(&request).is_some()
+        {
+            self.sessions.experienced_session(world, environment, view)
+        } else {
+            let (session, counted) = self.sessions.learning_session(world, environment, view);
+            self.counters = counted;
+            session
+        };
+        Pictures::new(main, CachedPicture::Absent)
+    }
+
+    /// Begins the cached and the plain picture where they are wanted, and ends them where they are not.
+    fn begin_and_end_others<'s>(
+        &mut self,
+        world: &'s World,
+        environment: &'s Environment,
+        pictures: &mut Pictures<'s>,
+        is_rich: bool,
+    ) {
+        let Pictures { main, plain, cached, .. } = pictures;
+        let request = Arc::clone(self.request());
+        let may_want_cached = self.may_want_cached(main);
+        if !(request.wants_cached && may_want_cached) {
+            // One that is complete may be wanted again with the next key.
+            if !(cached.is_complete() && may_want_cached) {
+                cached.end(|session| self.sessions.keep_training(session));
+            }
+        } else if cached.is_absent() && !is_rich && self.is_time_for_cached(main) {
+            let view = View { gi: Gi::Cached, ..request.view.clone() };
+            let session = self.sessions.experienced_session(world, environment, view);
+            *cached = CachedPicture::UnderWay(Box::new(session));
+        }
+        if !request.split {
+            *plain = None;
+            self.preview.end_plain();
+            self.inspection.curves[PLAIN].clear();
+        } else if plain.is_none() {
+            let view = View { sampling: Sampling::Plain, ..request.view.clone() };
+            *plain = Some(Session::new(world, environment, view));
+        }
+    }
+
+    /// Publishes a picture that is paused or done, and waits until something else is asked for or possible.
+    fn stand_still(&mut self, activity: Activity, pictures: &mut Pictures<'_>) {
+        if activity == Activity::Done {
+            let settled = pictures.main.settle();
+            let has_failed = settled.is_err();
+            self.sessions.go_on(&mut pictures.main, settled);
+            if has_failed {
+                return;
+            }
+        }
+        // With an error, if something to measure it by has come.
+        self.note(pictures);
+        self.publish(activity, pictures);
+        // A GPU may be ready now, or asked for. What is compared stays comparable.
+        let was_on_gpu = pictures.main.is_on_gpu();
+        if self.request().split {
+            self.sessions.kept.device.note_compiled();
+        } else {
+            self.sessions.place(&mut pictures.main);
+        }
+        if pictures.main.is_on_gpu() == was_on_gpu {
+            self.sessions.rest();
+        }
+    }
+
+    /// Puts the picture aside for another one.
+    fn leave(&mut self, pictures: Pictures<'_>) {
+        let Pictures { main, mut cached, .. } = pictures;
+        if self.sessions.watch.is_left_for_same_light()
+            && let Some(session) = cached.session_mut()
+        {
+            self.sessions.keep_training(session);
+        }
+        // What is seen of it is better than the film alone.
+        let times = worth(main.samples());
+        let shown = cached.film_so_far().filter(|_| times >= 1.0 && main.samples() > 0);
+        let shown = shown.map(|cached| cached.together(main.film(), times));
+        let mut left = SuspendedPicture {
+            request: Arc::clone(self.request()),
+            session: main.suspend(),
+            cached: cached.suspend(),
+            counters: self.counters.take(),
+            curve: std::mem::take(&mut self.inspection.curves[MAIN]),
+            cached_seconds: self.cached_seconds,
+        };
+        let is_worth_it = left.is_worth_it();
+        match shown {
+            Some(shown) => self.keep_earlier(Cow::Owned(shown), times),
+            None if !is_worth_it => {
+                return self.keep_earlier(Cow::Owned(left.session.into_film()), 1.0);
+            }
+            None => {
+                if let Some(film) = left.session.film() {
+                    self.keep_earlier(Cow::Borrowed(film), 1.0);
+                }
+            }
+        }
+        if is_worth_it {
+            self.sessions.kept.leave(left);
+        }
+    }
+
+    fn keep_earlier(&mut self, film: Cow<'_, Film>, worth: f32) {
+        self.preview.keep(&self.sessions.watch.request, film, worth);
+    }
+
+    /// Some samples of the picture that is next: the plain one at equal time, learning included, the cached
+    /// one a few turns in a row, or the main one.
+    fn take_turn(&mut self, pictures: &mut Pictures<'_>) {
+        let rule = self.rule();
+        // What they take is compared on the same device.
+        if let Some(plain) = &mut pictures.plain
+            && [&mut pictures.main, plain]
+                .into_iter()
+                .any(|session| self.sessions.place(session) == Placed::TooLate)
+        {
+            return;
+        }
+        let is_plain_next = pictures.plain.is_some() && !pictures.are_level(&rule);
+        let Pictures { main, plain, cached, turns } = pictures;
+        if let Some(plain) = plain.as_mut().filter(|_| is_plain_next) {
+            self.sessions.advance_in_place(plain, None, true);
+        } else if let Some(cached) = cached.next(main, *turns) {
+            let start = Instant::now();
+            // Where it is shown no GPU is quicker, and one that is being made ready will show none.
+            let cut = self.request().previews;
+            self.sessions.advance_in_place(cached, None, cut);
+            self.cached_seconds += start.elapsed().as_secs_f64();
+            *turns += 1;
+        } else {
+            *turns = 0;
+            let distribution_paths = main.figures().distribution_paths;
+            let cut = self.request().previews;
+            self.sessions.advance(main, Some(rule), cut);
+            self.sessions.measure(main);
+            if main.figures().distribution_paths > distribution_paths {
+                self.keep_distributions(main, true);
+            }
+        }
+    }
+
+    /// Whether light from a radiance cache can be shown beside what there is, if it is asked for: not where a real
+    /// GPU has many samples in a moment, nor where pictures are compared.
+    fn may_want_cached(&self, main: &Session<'_>) -> bool {
+        !self.request().split
+            && !self.sessions.kept.device.is_quick(self.request())
+            && worth(main.samples()) > 0.0
+    }
+
+    /// Where the cache is to be trained first, every pixel has its first exact sample before.
+    fn is_time_for_cached(&self, main: &Session<'_>) -> bool {
+        main.phase() == Phase::Rendering
+            && (main.samples() > 0 || self.sessions.kept.has_training_for(self.request()))
+    }
+
+    /// When the main picture is done: what the cached one took counts.
+    fn rule(&self) -> StopRule {
+        let rule = self.request().rule;
+        let seconds = rule.seconds.map(|seconds| seconds - self.cached_seconds);
+        StopRule { seconds, ..rule }
+    }
+
+    /// What is to be done next; `None` when something else is asked for.
+    fn next_activity(&mut self, pictures: &Pictures<'_>) -> Option<Activity> {
+        if !self.sessions.watch.takes_up_latest() {
+            return None;
+        }
+        let (request, rule, main) = (self.request(), self.rule(), &pictures.main);
+        // Begun later, it has the same time to come.
+        let is_compared = !request.split || pictures.are_level(&rule);
+        Some(if request.paused {
+            Activity::Paused
+        } else if main.phase() == Phase::Learning {
+            let (done, all) = (main.figures().learning_paths, main.view().learning_paths);
+            Activity::Learning(done as f32 / all.max(1) as f32)
+        } else if main.samples() > 0 && main.is_done(&rule) && is_compared {
+            Activity::Done
+        } else {
+            Activity::Rendering
+        })
+    }
+
+    /// One learning pass.
+    fn learn(&mut self, main: &mut Session<'_>) {
+        if self.sessions.place(main) == Placed::TooLate {
+            return;
+        }
+        self.sessions.learn_in_place(main);
+        let is_done = main.phase() == Phase::Rendering;
+        // A little learned is better than nothing, but what was learned to the end is better still.
+        let has_some = main.figures().learned_cells > 0;
+        if is_done || has_some && !self.sessions.kept.has_learned_in(self.request()) {
+            self.keep_distributions(main, is_done);
+        }
+    }
+
+    /// Keeps what was learned, for inspection and for the next request.
+    fn keep_distributions(&mut self, main: &Session<'_>, is_complete: bool) {
+        let request = Arc::clone(self.request());
+        if is_complete {
+            self.counters = main.counters().map(|counters| Arc::new(counters.snapshot()));
+            let counted = self.counters.clone();
+            self.sessions.kept.counted = counted.map(|counted| (counted, Arc::clone(&request)));
+        }
+        if let Some(grid) = self.inspection.distributions_of(main) {
+            let (environment, world) = (&request.environment, &request.world);
+            let (environment, world) = (Arc::clone(environment), Arc::clone(world));
+            self.sessions.kept.learned = Some(Learned { grid, environment, world, is_complete });
+        }
+    }
+
+    /// Brings the curves up to date.
+    fn note(&mut self, pictures: &Pictures<'_>) {
+        let request = &self.sessions.watch.request;
+        self.inspection.note(MAIN, &pictures.main, request);
+        if let Some(plain) = &pictures.plain {
+            self.inspection.note(PLAIN, plain, request);
+        }
+    }
+
+    /// Publishes what has changed, if it is time for that.
+    fn publish_if_due(&mut self, activity: Activity, pictures: &Pictures<'_>) {
+        let is_due = self.published.elapsed() >= self.publish_gap;
+        let in_place = self.in_place(&pictures.main);
+        let is_reading_due =
+            is_due && self.preview.is_reading_due(&pictures.main, in_place.as_ref());
+        let previews = self.request().previews;
+        if is_due && previews && !self.sessions.watch.is_superseded() {
+            let now = Some((activity, pictures.progress()));
+            if self.last != now {
+                self.publish(activity, pictures);
+                self.last = now;
+            }
+        }
+        // After publishing, which has read the film.
+        if is_reading_due || !previews {
+            self.note(pictures);
+        }
+    }
+
+    fn publish(&mut self, activity: Activity, pictures: &Pictures<'_>) {
+        let start = Instant::now();
+        let (shared, request) = (self.sessions.watch.shared, Arc::clone(self.request()));
+        let is_final = matches!(activity, Activity::Paused | Activity::Done);
+        let Pictures { main, plain, cached, .. } = pictures;
+        self.preview.prepare(main.samples(), is_final, shared.throttle.lasts(MAX_GAP));
+        let (main_snapshot, mut reading) = self.session_snapshot(MAIN, main, is_final);
+        let plain = plain.as_ref().map(|plain| {
+            let (snapshot, cost) = self.session_snapshot(PLAIN, plain, is_final);
+            reading += cost;
+            snapshot
+        });
+        let kept = &mut *self.sessions.kept;
+        kept.snapshots += 1;
+        shared.publish(Snapshot {
+            number: kept.snapshots,
+            activity,
+            main: main_snapshot,
+            now: main.figures(),
+            plain,
+            counters: self.counters.clone(),
+            backdrop: self.preview.backdrop(&request, activity, main.samples(), cached),
+            cached_seconds: self.cached_seconds,
+            cache: self.inspection.cache_facts(cached.session().unwrap_or(main), &request, kept),
+            curves: self.inspection.curves.clone(),
+            rest: Arc::clone(&shared.throttle),
+            request,
+        });
+        self.published = Instant::now();
+        if !self.preview.rests() {
+            let cost = (self.published - start).saturating_sub(reading);
+            self.publish_gap = gap_after(cost);
+        }
+    }
+
+    fn session_snapshot(
+        &mut self,
+        role: usize,
+        session: &Session<'_>,
+        is_final: bool,
+    ) -> (SessionSnapshot, Duration) {
+        let in_place = self.in_place(session);
+        let (mut snapshot, cost) = self.preview.session_snapshot(role, session, in_place, is_final);
+        snapshot.grid = self.inspection.distributions_of(session);
+        (snapshot, cost)
+    }
+
+    /// The session's film if the window shows it in every frame without its being read. Small ones are
+    /// filtered on the CPU, and software does not draw so often.
+    fn in_place(&self, session: &Session<'_>) -> Option<(Gpu, DeviceFilm)> {
+        let (gpu, film) = session.film_on_device()?;
+        let is_small = film.width < self.request().view.width;
+        let screen = &self.sessions.watch.shared.screen;
+        let is_live = !gpu.facts().is_software() && gpu.is_same(&lock(screen));
+        (is_live && !is_small).then_some((gpu, film))
+    }
+}
