@@ -7,7 +7,7 @@
 //! - A *mention* is inline code that begins with `lightgrid` and is no whole command: its options must exist.
 //! - Commands that are shown run as they stand, but small and on files made for them: see [`shrunk`].
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
@@ -375,6 +375,46 @@ fn what_pages_link_to_is_there() {
         }
     }
     assert!(count > 40, "{count} links are found");
+}
+
+/// Text of all files below a folder of the project.
+fn text_below(folder: PathBuf) -> String {
+    let entries = fs::read_dir(folder).expect("a folder");
+    let paths = entries.map(|entry| entry.expect("readable").path());
+    let text = |path: PathBuf| match path.is_dir() {
+        true => text_below(path),
+        false => fs::read_to_string(path).expect("readable"),
+    };
+    paths.map(text).collect()
+}
+
+/// Files and folders that pages name exist, and so do the types and constants of method.md and architecture.md.
+#[test]
+fn code_that_pages_name_exists() {
+    let sources = text_below(root().join("src"));
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let words: BTreeSet<&str> = sources.split(|c| !is_word(c)).collect();
+    let folders = ["src", "shaders", "tests", "benches", "examples", "docs", "assets", ".ci"];
+    let (mut paths, mut names) = (0, 0);
+    for page in pages() {
+        let explains = ["docs/method.md", "docs/architecture.md"].contains(&page.name.as_str());
+        for code in inline(&split(&page).1) {
+            let is_path = code.chars().all(|c| is_word(c) || "./-".contains(c));
+            let is_in = |folder: &&str| code.starts_with(&format!("{folder}/"));
+            if is_path && folders.iter().any(is_in) {
+                paths += 1;
+                assert!(root().join(&code).exists(), "{}: {code} does not exist", page.name);
+            }
+            let is_name = code.starts_with(char::is_uppercase)
+                && code.split("::").all(|part| part.chars().all(is_word));
+            if is_name && explains {
+                names += 1;
+                let name = code.rsplit("::").next().unwrap_or(&code);
+                assert!(words.contains(name), "{}: src has no {code}", page.name);
+            }
+        }
+    }
+    assert!(paths > 60 && names > 50, "{paths} paths and {names} names are found");
 }
 
 #[test]
