@@ -17,6 +17,7 @@ use super::progress::Progress;
 use crate::alarm::Alarm;
 use crate::environment::Environment;
 use crate::error::{Error, Notices, Result};
+use crate::image::exr_encoder_bytes;
 use crate::light_grid::LearningGrid;
 use crate::memory;
 use crate::output::record::{Phases, Record};
@@ -38,8 +39,11 @@ const BYTES_WITH_LAYERS: [u64; 2] = [120, 72];
 /// What takes noise out of a film with layers, or makes a part of it, takes.
 const BYTES_OF_COPY: u64 = 136;
 
-/// Bytes that encoders take for themselves.
-const BYTES_OF_ENCODERS: u64 = 8 << 20;
+/// Most channels of a picture, and of one with layers.
+const CHANNELS: [u64; 2] = [5, 12];
+
+/// Bytes that the encoder of `.png` and the buffers of files take, and what is too small to be counted.
+const BYTES_OF_ENCODERS: u64 = 16 << 20;
 
 /// Loads, learns, renders, writes.
 pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
@@ -86,7 +90,7 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<()> {
     }
 }
 
-/// What the film takes, and what writing it does: pixels, encoders and the stacks of their threads.
+/// What the film takes, and what writing it does: pixels and encoders.
 fn needed_bytes(arguments: &RenderArguments) -> [u64; 2] {
     let [width, height] = arguments.size();
     let has_layers = arguments.wants_surfaces();
@@ -96,8 +100,13 @@ fn needed_bytes(arguments: &RenderArguments) -> [u64; 2] {
     {
         writing = BYTES_OF_COPY;
     }
+    if arguments.seconds.is_some() {
+        // Where pixels have no sample, a copy of the film has that of one beside them.
+        writing += film;
+    }
     let [film, writing] = [film, writing].map(|bytes| u64::from(width) * u64::from(height) * bytes);
-    [film, writing + BYTES_OF_ENCODERS + rayon::current_num_threads() as u64 * STACK_BYTES]
+    let encoders = exr_encoder_bytes(width, CHANNELS[usize::from(has_layers)]) + BYTES_OF_ENCODERS;
+    [film, writing + encoders]
 }
 
 fn too_large(cause: &str) -> Error {

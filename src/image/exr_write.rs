@@ -1,14 +1,18 @@
 //! OpenEXR pictures with feature layers and metadata.
 
-use std::io::{self, Read as _, Seek as _, Write as _};
+use std::io::{self, Read as _, Seek, Write};
 use std::path::Path;
 
+use exr::block::UncompressedBlock;
+use exr::block::chunk::Chunk;
+use exr::block::writer::ChunksWriter as _;
+use exr::image::write::layers::{LayersWriter as _, WritableLayers as _};
 use exr::meta::attribute::Preview;
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples,
     Image as ExrImage, Layer as ExrLayer, LayerAttributes, LineOrder, SmallVec, Text, Vec2,
-    WritableImage,
 };
+use rayon::prelude::*;
 
 use super::exr_patch::sort_attributes;
 use super::{Image, Rgb8, write_beside_and_rename};
@@ -89,7 +93,7 @@ pub fn write_exr(path: &Path, picture: ExrPicture<'_>) -> Result<()> {
     let layer = ExrLayer::new(size, attributes, encoding, AnyChannels::sort(channels));
     let file_content = ExrImage::from_layer(layer);
     write_beside_and_rename(path, |file| {
-        file_content.write().to_buffered(&mut *file).map_err(|error| match error {
+        write_blocks(&mut *file, &file_content).map_err(|error| match error {
             exr::error::Error::Io(error) => error,
             other => io::Error::other(other.to_string()),
         })?;
@@ -99,6 +103,53 @@ pub fn write_exr(path: &Path, picture: ExrPicture<'_>) -> Result<()> {
         if sort_attributes(&mut start).is_some() {
             file.rewind()?;
             file.write_all(&start)?;
+        }
+        Ok(())
+    })
+}
+
+/// Lines of a block in files of [`Compression::ZIP16`].
+const LINES_OF_BLOCK: u64 = 16;
+
+/// Bytes of pixels that are compressed at once, on a machine of many cores.
+const MAX_BATCH_BYTES: u64 = 256 << 20;
+
+/// Copies of a block that exist while it is compressed, with room to spare: raw, reordered twice, and the
+/// compressed bytes, whose list grows by doubling. A debug build of the library also unpacks them again.
+const COPIES_OF_BLOCK: u64 = 8;
+
+/// Blocks that are compressed at once, and the bytes of one.
+fn batch(width: u64, channels: u64) -> (u64, u64) {
+    let bytes = LINES_OF_BLOCK * width * channels * size_of::<f32>() as u64;
+    let threads = rayon::current_num_threads() as u64;
+    ((MAX_BATCH_BYTES / bytes.max(1)).clamp(1, threads), bytes)
+}
+
+/// Bytes that [`write_exr`] takes at most besides the channels' values.
+pub(crate) fn exr_encoder_bytes(width: u32, channels: u64) -> u64 {
+    let (blocks, bytes) = batch(width.into(), channels);
+    blocks * bytes * COPIES_OF_BLOCK
+}
+
+/// Writes all blocks in order, compressed by the threads that there are. The library would start threads of
+/// its own, whose stacks and heaps may not fit where memory is short.
+fn write_blocks(file: impl Write + Seek, picture: &ExrImage<ExrLayer<AnyChannels<FlatSamples>>>) -> exr::error::UnitResult {
+    let layers = &picture.layer_data;
+    let headers = layers.infer_headers(&picture.attributes);
+    let pixels = layers.create_writer(&headers);
+    exr::block::write(file, headers, true, |meta, writer| {
+        let blocks: Vec<_> = meta.enumerate_ordered_header_block_indices().collect();
+        let header = &meta.headers[0];
+        let (count, _) = batch(header.layer_size.width() as u64, header.channels.list.len() as u64);
+        for batch in blocks.chunks(count as usize) {
+            let compress = |&(_, index): &(usize, _)| {
+                let data = pixels.extract_uncompressed_block(&meta.headers, index);
+                UncompressedBlock { index, data }.compress_to_chunk(&meta.headers)
+            };
+            let chunks: Vec<exr::error::Result<Chunk>> = batch.par_iter().map(compress).collect();
+            for ((at, _), chunk) in batch.iter().zip(chunks) {
+                writer.write_chunk(*at, chunk?)?;
+            }
         }
         Ok(())
     })

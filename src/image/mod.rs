@@ -19,6 +19,7 @@ mod texels;
 mod tiff;
 
 pub use exr_read::{read_exr_metadata, read_exr_preview};
+pub(crate) use exr_write::exr_encoder_bytes;
 pub use exr_write::{ExrPicture, Layer, write_exr};
 pub use file::{check_writable, is_same_file, write_beside_and_rename};
 pub(crate) use file::{

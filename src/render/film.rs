@@ -339,7 +339,12 @@ impl Film {
         if self.surfaces.is_empty() {
             return None;
         }
-        let mut layers = SurfaceLayers::default();
+        let count = self.surfaces.len();
+        let mut layers = SurfaceLayers {
+            albedo: Vec::with_capacity(count),
+            normal: Vec::with_capacity(count),
+            depth: Vec::with_capacity(count),
+        };
         for (surface, pixel) in self.surfaces.iter().zip(&self.pixels) {
             let (albedo, normal, depth) = surface.mean(pixel.samples);
             layers.albedo.push(albedo);
