@@ -10,8 +10,6 @@ use std::time::{Duration, Instant};
 use egui::ViewportId;
 use egui_wgpu::winit::Painter;
 use egui_wgpu::{SurfaceErrorAction, WgpuConfiguration, WgpuSetup, WgpuSetupExisting};
-use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::flag;
 use winit::application::ApplicationHandler;
 use winit::dpi::{LogicalSize, PhysicalSize};
 use winit::event::WindowEvent;
@@ -31,6 +29,7 @@ use super::{input_order, theme};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::render::gpu::Gpu;
+use crate::terminal::{hang_up, on_request_to_end};
 
 /// What other threads ask the event loop for.
 #[derive(Debug, Clone, Copy)]
@@ -120,45 +119,15 @@ struct Runner {
 
 /// Lets Ctrl-C, requests to end and closed terminals close the window as a person would; a second one leaves at once.
 fn close_on_signals(asked: &Arc<AtomicBool>, proxy: EventLoopProxy<Call>) {
-    let ends = [SIGINT, SIGTERM];
-    for signal in ends {
-        // Where signals cannot be caught they end the process.
-        let _ = flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(asked));
-    }
-    // The terminal that it was started from may be closed; its shell may say so twice.
-    let signals: Vec<i32> = ends.into_iter().chain(crate::terminal::hang_up()).collect();
-    for signal in &signals {
-        let _ = flag::register(*signal, Arc::clone(asked));
-    }
-    let wait = waiting_for(&signals, Arc::clone(asked));
-    let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
-        wait();
+    let asked = Arc::clone(asked);
+    // Where signals cannot be caught they end the process.
+    let _ = on_request_to_end(move |signal| {
+        // The shell of a terminal that is closed may say so twice.
+        if asked.swap(true, Ordering::Relaxed) && hang_up() != Some(signal) {
+            signal_hook::low_level::exit(128 + signal);
+        }
         let _ = proxy.send_event(Call::Repaint(Instant::now()));
     });
-}
-
-/// What blocks until one of these signals has set `asked`.
-#[cfg(unix)]
-fn waiting_for(signals: &[i32], asked: Arc<AtomicBool>) -> impl FnOnce() + Send + use<> {
-    let caught = signal_hook::iterator::Signals::new(signals);
-    move || {
-        // One may have come before they were caught here.
-        if let Ok(mut caught) = caught
-            && !asked.load(Ordering::Relaxed)
-        {
-            caught.forever().next();
-        }
-    }
-}
-
-/// The same where nothing wakes a thread at a signal: it looks every 50 ms.
-#[cfg(not(unix))]
-fn waiting_for(_: &[i32], asked: Arc<AtomicBool>) -> impl FnOnce() + Send + use<> {
-    move || {
-        while !asked.load(Ordering::Relaxed) {
-            std::thread::sleep(Duration::from_millis(50));
-        }
-    }
 }
 
 /// What there is once a window is open.

@@ -2,18 +2,11 @@
 //! keep what is done, twice to leave at once. A closed terminal is no hurry: its shell may say so again.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
-
-use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::flag::register_usize;
 
 use crate::image::remove_unfinished;
-use crate::terminal::{hang_up, leave_line, notice, tell};
-
-/// How often signals are looked for: sooner than anybody notices.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+use crate::terminal::{hang_up, leave_line, notice, on_request_to_end, tell};
 
 /// What signals set.
 pub(super) struct Interrupt {
@@ -29,47 +22,35 @@ impl Interrupt {
     /// Watches from now on. `what` says what will be done when there is something to keep.
     pub(super) fn watch(what: &'static str) -> Self {
         let [asked, signalled, has_work] = [(); 3].map(|()| Arc::<AtomicBool>::default());
-        let caught = Arc::new(AtomicUsize::new(0));
-        let register = |signal| register_usize(signal, Arc::clone(&caught), signal as usize);
         let flags = [&asked, &signalled, &has_work].map(Arc::clone);
         let frames = Arc::<Mutex<Option<PathBuf>>>::default();
-        let inside = (flags, Arc::clone(&caught), Arc::clone(&frames));
-        let hang_up = hang_up();
-        let mut signals = [SIGINT, SIGTERM].into_iter().chain(hang_up);
-        let watching = signals.try_for_each(|s| register(s).map(|_| ()));
-        let watching = watching.and_then(|()| {
-            std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
-                let ([asked, signalled, has_work], caught, frames) = inside;
-                let mut was_asked = false;
-                loop {
-                    std::thread::sleep(LOOK_EVERY);
-                    let signal = caught.swap(0, Ordering::Relaxed);
-                    if signal == 0 || (was_asked && hang_up == Some(signal as i32)) {
-                        continue;
-                    }
-                    if was_asked || !has_work.load(Ordering::Relaxed) {
-                        if !was_asked {
-                            leave_line();
-                            tell("lightgrid: interrupted before there was anything to keep");
-                        }
-                        remove_unfinished();
-                        let frames = frames.lock().unwrap_or_else(PoisonError::into_inner).take();
-                        match frames.filter(|folder| folder.exists()) {
-                            Some(folder) if was_asked => {
-                                tell(format_args!("the frames are kept in {}", folder.display()));
-                            }
-                            Some(folder) => drop(std::fs::remove_dir_all(folder)),
-                            None => {}
-                        }
-                        std::process::exit(128 + signal as i32);
-                    }
-                    was_asked = true;
-                    signalled.store(true, Ordering::SeqCst);
-                    asked.store(true, Ordering::SeqCst);
+        let of_video = Arc::clone(&frames);
+        let watching = on_request_to_end(move |signal| {
+            let [asked, signalled, has_work] = &flags;
+            let was_asked = signalled.load(Ordering::SeqCst);
+            if was_asked && hang_up() == Some(signal) {
+                return;
+            }
+            if was_asked || !has_work.load(Ordering::Relaxed) {
+                if !was_asked {
                     leave_line();
-                    tell(format_args!("lightgrid: {what} (again: leave now)"));
+                    tell("lightgrid: interrupted before there was anything to keep");
                 }
-            })
+                remove_unfinished();
+                let frames = of_video.lock().unwrap_or_else(PoisonError::into_inner).take();
+                match frames.filter(|folder| folder.exists()) {
+                    Some(folder) if was_asked => {
+                        tell(format_args!("the frames are kept in {}", folder.display()));
+                    }
+                    Some(folder) => drop(std::fs::remove_dir_all(folder)),
+                    None => {}
+                }
+                std::process::exit(128 + signal);
+            }
+            signalled.store(true, Ordering::SeqCst);
+            asked.store(true, Ordering::SeqCst);
+            leave_line();
+            tell(format_args!("lightgrid: {what} (again: leave now)"));
         });
         if watching.is_err() {
             notice("Ctrl-C cannot be caught here and will end the process at once");

@@ -133,7 +133,10 @@ pub(crate) fn exr_encoder_bytes(width: u32, channels: u64) -> u64 {
 
 /// Writes all blocks in order, compressed by the threads that there are. The library would start threads of
 /// its own, whose stacks and heaps may not fit where memory is short.
-fn write_blocks(file: impl Write + Seek, picture: &ExrImage<ExrLayer<AnyChannels<FlatSamples>>>) -> exr::error::UnitResult {
+fn write_blocks(
+    file: impl Write + Seek,
+    picture: &ExrImage<ExrLayer<AnyChannels<FlatSamples>>>,
+) -> exr::error::UnitResult {
     let layers = &picture.layer_data;
     let headers = layers.infer_headers(&picture.attributes);
     let pixels = layers.create_writer(&headers);

@@ -50,7 +50,7 @@ const CRATES: [(&str, &[&str]); 30] = [
     ("pulp", &["denoise"]),
     ("rfd", &["app/desktop"]),
     ("ruzstd", &["image/ktx2"]),
-    ("signal_hook", &["app/window", "cli/interrupt"]),
+    ("signal_hook", &["app/window", "terminal"]),
     ("statrs", &["metrics"]),
     ("wgpu", &["app", "develop", "render/gpu"]),
     ("winit", &["app/desktop", "app/window"]),
