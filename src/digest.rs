@@ -67,6 +67,40 @@ impl Digest {
         self.bytes(bytemuck::cast_slice(map.pixels.as_flattened()))
     }
 
+    /// Takes in a built-in scene, as far as code decides it: its numbers as they are, and values of the last bits
+    /// of which another processor's sines may differ as [`Self::rounded`].
+    pub(crate) fn built_in_scene(self, scene: &Scene) -> Self {
+        let Scene { materials, lights, medium, .. } = scene;
+        let meshes = scene.instances.meshes();
+        let places = scene.instances.iter().map(|instance| instance.placing.affine());
+        let texels = scene.images.iter().flat_map(|image| image.texels.bytes());
+        self.bytes(bytemuck::cast_slice(scene.triangles.as_flattened()))
+            .bytes(bytemuck::cast_slice(&scene.triangle_materials))
+            .debug(&(&scene.textures, meshes))
+            .bytes(format!("{materials:.3?} {lights:.3?} {medium:.3?}").as_bytes())
+            .rounded(scene.positions.iter().flat_map(|position| position.to_array()))
+            .rounded(scene.normals.iter().flat_map(|normal| normal.to_array()))
+            .rounded(scene.uvs.iter().flatten().flat_map(|uv| uv.to_array()))
+            .rounded(places.flat_map(|place| place.to_cols_array()))
+            .rounded(texels.map(|byte| f32::from(*byte)))
+    }
+
+    /// Takes in a built-in sky as [`Self::built_in_scene`] does a scene.
+    pub(crate) fn built_in_map(self, map: &Image) -> Self {
+        self.debug(&(map.width, map.height)).rounded(map.pixels.iter().flatten().copied())
+    }
+
+    /// Takes in how many values there are, and two sums of them to five digits, one with weights: which is where.
+    fn rounded(self, values: impl Iterator<Item = f32>) -> Self {
+        let (mut count, mut sum, mut weighted) = (0_u32, 0.0, 0.0);
+        for value in values.map(f64::from) {
+            sum += value.abs();
+            weighted += value * f64::from(count % 31);
+            count += 1;
+        }
+        self.bytes(format!("{count} {sum:.4e} {:.4}", weighted / sum).as_bytes())
+    }
+
     /// The digest as a number.
     pub(crate) fn value(self) -> u64 {
         self.0

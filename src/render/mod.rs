@@ -27,3 +27,7 @@ pub(crate) use session::SessionState;
 pub use session::{Doubling, Session};
 pub use sharing::Sharing;
 pub use view::{Crop, Sampling, View};
+
+/// Version of what samples are made of: raised when a picture of the same options and seed is another than before.
+/// Parts and checkpoints of other versions are refused.
+pub const SAMPLES_VERSION: u32 = 1;

@@ -20,7 +20,7 @@ use crate::output::film_file::{FilmFacts, Part, read_film, write_film};
 use crate::output::record::Record;
 use crate::path::{PathLimits, World};
 use crate::render::film::Film;
-use crate::render::{Doubling, Figures, Gi, Phase, Session, StopRule, View};
+use crate::render::{Doubling, Figures, Gi, Phase, SAMPLES_VERSION, Session, StopRule, View};
 use crate::sources;
 
 /// A first sample that pixels share is begun where so many times as long is left as all would take of their
@@ -383,28 +383,28 @@ impl RenderJob {
     }
 }
 
-/// What a picture's samples depend on, by names for sentences. Built-in scenes and skies are known by
-/// their names: another processor's sines may differ in the last bit.
+/// What a picture's samples depend on, by names for sentences.
 fn identity(
     arguments: &RenderArguments,
     world: &World,
     environment: &Environment,
     view: &View,
 ) -> Vec<(String, String)> {
-    let scene = match sources::is_built_in_scene(&arguments.scene) {
+    let (scene, map) = (&arguments.scene, arguments.map());
+    let scene = match sources::is_built_in_scene(scene) {
         true => {
             let changes = (arguments.of_scene.options().hide, arguments.of_scene.edits());
-            format!("{} {}", arguments.scene, Digest::new().debug(&changes))
+            format!("{scene} {}", Digest::new().debug(&changes).built_in_scene(&world.scene))
         }
         false => Digest::new().scene(&world.scene).to_string(),
     };
-    let map = match sources::is_built_in_map(arguments.map()) {
-        true => arguments.map().to_owned(),
+    let map = match sources::is_built_in_map(map) {
+        true => format!("{map} {}", Digest::new().built_in_map(environment.map())),
         false => Digest::new().map(environment.map()).to_string(),
     };
     let PathLimits { bounces, russian_roulette } = view.limits;
     let pairs = [
-        ("version", env!("CARGO_PKG_VERSION").to_owned()),
+        ("version", format!("{}, samples {SAMPLES_VERSION}", env!("CARGO_PKG_VERSION"))),
         ("scene", scene),
         ("map", map),
         ("camera", Digest::new().debug(&view.camera).to_string()),

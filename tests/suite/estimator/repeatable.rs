@@ -9,13 +9,13 @@ use lightgrid::light_grid::{DistributionOptions, LearningGrid, LightGrid, MEMORY
 use lightgrid::path::camera::CameraRays;
 use lightgrid::path::{Background, PathLimits, PathTracer, World};
 use lightgrid::render::film::Film;
-use lightgrid::render::{Phase, Sampling, Session, View};
+use lightgrid::render::{Phase, SAMPLES_VERSION, Sampling, Session, Sharing, View};
 use lightgrid::sampler::Sampler;
-use lightgrid::scene::Camera;
+use lightgrid::scene::{Camera, builtin};
 use rayon::prelude::*;
 
 use super::scenes::{pane, room};
-use super::{environment, learned, view};
+use super::{environment, learned, render, view};
 
 struct Setting {
     world: World,
@@ -226,4 +226,58 @@ fn another_seed_gives_another_picture() {
     assert!(a.0 != b.0 && a.1 != b.1);
     let same = a.0.pixels().iter().zip(b.0.pixels()).filter(|(a, b)| a == b).count();
     assert!(same < a.0.pixels().len() / 10, "{same} pixels are the same");
+}
+
+/// The version that [`PICTURES`] are of.
+const VERSION: u32 = 1;
+
+/// Scene, sampling and sharing of small pictures, and what they come to: their mean, and how they are spread.
+const PICTURES: [(&str, Sampling, Sharing, &str); 8] = [
+    ("open", Sampling::Bsdf, Sharing::Off, ""),
+    ("open", Sampling::Plain, Sharing::Off, ""),
+    ("office", Sampling::Talk, Sharing::Off, ""),
+    ("office", Sampling::Adaptive, Sharing::Off, ""),
+    ("office", Sampling::Adaptive, Sharing::Large, ""),
+    ("evening", Sampling::Adaptive, Sharing::Off, ""),
+    ("fog", Sampling::Adaptive, Sharing::Small, ""),
+    ("materials", Sampling::Adaptive, Sharing::Off, ""),
+];
+
+/// Digits that the sines of another machine leave as they are; other samples change the third.
+fn figures(film: &Film) -> String {
+    let image = film.image();
+    let values = || image.pixels.iter().flatten().map(|value| f64::from(*value));
+    let sum: f64 = values().sum();
+    let weighted = values().zip((0..31).cycle()).map(|(value, weight)| value * f64::from(weight));
+    format!("{:.3e} {:.3}", sum / values().count() as f64, weighted.sum::<f64>() / sum)
+}
+
+/// Parts and checkpoints of two builds are joined where they say the same version of samples.
+#[test]
+fn other_samples_are_another_version() {
+    let mut table = String::new();
+    let mut is_changed = false;
+    for (scene, sampling, sharing, expected) in PICTURES {
+        let world = World::new(builtin::build(scene).expect("built in"));
+        let name = builtin::sky(scene).trim_start_matches("sky:");
+        let environment = environment(sky::build(name, 128, 64).expect("a sky"));
+        let view = View {
+            sampling,
+            sharing,
+            seed: 1,
+            learning_paths: 1 << 10,
+            ..View::new(world.scene.cameras[0].clone(), [32, 18])
+        };
+        let found = figures(&render(&world, &environment, view, 4));
+        table +=
+            &format!("    ({scene:?}, Sampling::{sampling:?}, Sharing::{sharing:?}, {found:?}),\n");
+        is_changed |= found != expected;
+    }
+    assert!(
+        !is_changed,
+        "samples are others than those of version {VERSION}: raise SAMPLES_VERSION in src/render/mod.rs and \
+         VERSION here to {}, and take these as PICTURES:\n{table}",
+        VERSION + 1
+    );
+    assert_eq!(SAMPLES_VERSION, VERSION, "the pictures are those of version {VERSION}");
 }
