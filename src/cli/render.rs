@@ -25,7 +25,7 @@ use crate::output::{self, Exposure};
 use crate::path::World;
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceChoice, UploadedScene};
-use crate::render::{Figures, Session};
+use crate::render::{Driver, Figures, Session};
 use crate::scene::Camera;
 use crate::terminal::notice;
 pub(super) use arguments::RenderArguments;
@@ -151,26 +151,26 @@ impl Job<'_> {
         let mut assignment = RenderJob::open(arguments, rule, (world, environment), &view)?;
         assignment.say(&mut notices);
         let uploaded = self.uploaded.as_ref();
-        let mut session =
+        let session =
             device::start(arguments.device, uploaded, (world, environment), view, &mut notices)?;
+        let mut driver = assignment.driver(session);
         let (nothing, not_yet) = (Film::new(0, 0, false), Figures::default());
-        let record = self.record(arguments, &session, (&nothing, &not_yet), &notices);
+        let record = self.record(arguments, &driver.session, (&nothing, &not_yet), &notices);
         assignment.set_metadata(record.metadata());
         let mut cpu = TakeOver { device: arguments.device, notices: &mut notices };
         let counted = known.as_ref().and_then(|known| known.counted.as_ref());
         let begun = counted.map_or(Ok(()), |counted| {
-            let taken_up = session.continue_learning(counted);
-            cpu.goes_on(&mut session, taken_up).map(|_| ())
+            let taken_up = driver.session.continue_learning(counted);
+            cpu.goes_on(&mut driver.session, taken_up).map(|_| ())
         });
-        let outcome = begun.and_then(|()| {
-            work(&mut session, &mut assignment, &self.interrupt, progress, &mut cpu)
-        });
+        let outcome = begun
+            .and_then(|()| work(&mut driver, &mut assignment, &self.interrupt, progress, &mut cpu));
         progress.finish();
-        if !assignment.has_samples(&session) {
+        if !driver.has_samples() {
             return outcome.map(|()| Vec::new());
         }
         drop(spare);
-        let film = assignment.film(&session);
+        let film = driver.film();
         let remarks = output::remarks(&film, environment);
         remarks.iter().for_each(|sentence| notices.add(sentence));
 
@@ -179,12 +179,12 @@ impl Job<'_> {
             // What the first frame has is what all have.
             arguments.to_mut().picture.take_exposure(&film, asked.pictures());
         }
-        let figures = session.figures();
-        let record = self.record(&arguments, &session, (&film, &figures), &notices);
-        let mut failures = outputs::write(&arguments, &assignment, &record, session.grid());
+        let figures = driver.session.figures();
+        let record = self.record(&arguments, &driver.session, (&film, &figures), &notices);
+        let mut failures = outputs::write(&arguments, &assignment, &driver, &record);
         // Another device may have taken over.
         assignment.set_metadata(record.metadata());
-        failures.extend(assignment.keep(&session).err());
+        failures.extend(assignment.keep(&driver).err());
         remarks.iter().for_each(notice);
         if let Err(failure) = outcome {
             failures.push(failure);
@@ -192,7 +192,7 @@ impl Job<'_> {
         }
         if let Some(known) = known {
             known.exposure = Some(arguments.picture.exposure());
-            known.counted = session.counters().map(LearningGrid::snapshot);
+            known.counted = driver.session.counters().map(LearningGrid::snapshot);
         }
         Ok(failures)
     }
@@ -345,7 +345,7 @@ impl TakeOver<'_> {
 /// Runs the session until a rule or the user says stop. When the seconds are over, the pass under way ends
 /// with what it has.
 fn work(
-    session: &mut Session<'_>,
+    driver: &mut Driver<'_>,
     assignment: &mut RenderJob,
     interrupt: &Interrupt,
     progress: &Progress,
@@ -353,9 +353,9 @@ fn work(
 ) -> Result<()> {
     let alarm = Alarm::start(Arc::clone(interrupt.asked()));
     loop {
-        progress.show(session, assignment.rule());
-        let step = assignment.step(session, interrupt, &alarm, cpu.notices);
-        if cpu.goes_on(session, step)? == Some(true) {
+        progress.show(&driver.session, &driver.rule);
+        let step = assignment.step(driver, interrupt, &alarm, cpu.notices);
+        if cpu.goes_on(&mut driver.session, step)? == Some(true) {
             return Ok(());
         }
     }

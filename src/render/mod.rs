@@ -2,6 +2,7 @@
 
 mod cpu;
 mod devices;
+mod driver;
 pub mod film;
 pub mod filter;
 mod gaps;
@@ -18,6 +19,8 @@ mod sharing;
 mod view;
 mod view_probe;
 
+pub(crate) use driver::Awaited;
+pub use driver::{Beginning, Driver};
 pub(crate) use gi::CacheTraining;
 pub use gi::Gi;
 use pass::Pass;

@@ -7,11 +7,10 @@ use super::{RenderArguments, frames};
 use crate::cli::picture::{check_kept, say_written};
 use crate::error::{Error, Result};
 use crate::image::{check_writable, is_same_file};
-use crate::light_grid::LightGrid;
 use crate::output::distributions::{check_distributions_extension, write_distributions};
 use crate::output::record::{self, Record};
 use crate::path::World;
-use crate::render::{Sampling, View};
+use crate::render::{Driver, Sampling, View};
 
 /// Refuses outputs before the work rather than after it.
 pub(super) fn check(arguments: &RenderArguments) -> Result<()> {
@@ -89,12 +88,12 @@ pub(super) fn without_distributions(path: &Path) -> Error {
 pub(super) fn write(
     arguments: &RenderArguments,
     assignment: &RenderJob,
+    driver: &Driver<'_>,
     record: &Record<'_>,
-    grid: Option<&LightGrid>,
 ) -> Vec<Error> {
     let metadata = record.metadata();
     let write = |path: &PathBuf| match arguments.part {
-        Some(_) => assignment.write_part(path, record),
+        Some(_) => assignment.write_part(path, driver, record),
         None => arguments.picture.write(path, record.film, &metadata),
     };
     let write_and_say = |path: &PathBuf| write(path).map(|()| say_written(path)).err();
@@ -106,7 +105,8 @@ pub(super) fn write(
     }
     if let Some(path) = &arguments.distributions {
         let none = || without_distributions(path);
-        let written = grid.ok_or_else(none).and_then(|grid| write_distributions(path, grid));
+        let written =
+            driver.session.grid().ok_or_else(none).and_then(|grid| write_distributions(path, grid));
         failures.extend(written.map(|()| say_written(path)).err());
     }
     failures
