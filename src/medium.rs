@@ -1,10 +1,9 @@
-//! What lies between surfaces: homogeneous media that absorb and scatter light.
+//! Homogeneous participating media: absorption and scattering between surfaces.
 //!
-//! A ray crosses a medium on a stretch `from..to`. Free flight is sampled for one colour channel,
-//! chosen in proportion to what the path carries, and weighed by the density of all three (one-sample
-//! MIS), so that a medium that takes blue from a ray takes no variance from red. All is finite for
-//! optical depths from 1e-6, where random numbers still resolve the way, to 1e4, where next to
-//! nothing comes through.
+//! A ray crosses a medium on the interval `from..to`. Free flight is sampled for one colour channel, chosen in
+//! proportion to the path's throughput, and weighted by the density of all three (one-sample MIS): absorption of
+//! blue then adds no variance to red. All values are finite for optical depths from 1e-6, where random numbers
+//! still resolve distances, to 1e4, where transmittance vanishes.
 
 use std::f32::consts::PI;
 
@@ -14,28 +13,28 @@ use crate::math::{Frame, sin_cos_turns};
 use crate::sampler::unit_from_bits;
 use crate::scene::{Material, Medium};
 
-/// Media without a box of their own fill the scene's, grown by this share of its diagonal.
+/// Media without a box of their own fill the scene's box, enlarged by this share of its diagonal.
 const MARGIN: f32 = 0.02;
 
-/// A direction's components are taken for at least this large.
+/// Minimum magnitude of a direction's components.
 pub(crate) const MIN_COMPONENT: f32 = 1e-18;
 
-/// Largest mean cosine of scattering, either way.
+/// Maximum magnitude of the mean cosine of scattering.
 pub const MAX_ANISOTROPY: f32 = 0.99;
 
-/// What a medium does to light, wherever it is.
+/// Optical properties of a medium.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Interior {
     /// Scattering coefficient per metre, linear RGB.
     pub scattering: Vec3,
-    /// Coefficient per metre of what scattering and absorption take, linear RGB.
+    /// Extinction coefficient (scattering plus absorption) per metre, linear RGB.
     pub extinction: Vec3,
-    /// How scattered light is spread.
+    /// Phase function.
     pub phase: Phase,
 }
 
 impl Interior {
-    /// Of a solid body, given its absorption coefficient.
+    /// The interior of a solid body, from its absorption coefficient.
     pub fn of_body(material: &Material, absorption: Vec3) -> Self {
         Self {
             scattering: material.scattering,
@@ -44,17 +43,17 @@ impl Interior {
         }
     }
 
-    /// Whether light goes through as if nothing were there.
+    /// Whether it neither scatters nor absorbs.
     pub fn is_clear(&self) -> bool {
         self.extinction == Vec3::ZERO
     }
 
-    /// Whether light changes its direction.
+    /// Whether it scatters.
     pub fn scatters(&self) -> bool {
         self.scattering != Vec3::ZERO
     }
 
-    /// Share of light left after `distance` metres.
+    /// Transmittance over `distance` metres.
     pub fn transmittance(&self, distance: f32) -> Vec3 {
         (-self.extinction * distance).exp()
     }
@@ -64,7 +63,7 @@ impl Interior {
     pub fn fly(&self, throughput: Vec3, length: f32, bits: [u32; 2]) -> Flight {
         let pair = throughput.x + throughput.y;
         let sum = pair + throughput.z;
-        // Not normalised first: a channel that carries nothing is then never chosen.
+        // Not normalised first, so that a channel without throughput is never chosen.
         let target = unit_from_bits(bits[1]) * sum;
         let channel = usize::from(target >= throughput.x) + usize::from(target >= pair);
         let choice = throughput / sum;
@@ -80,9 +79,8 @@ impl Interior {
         Flight { scattered_at: scatters.then_some(distance), weight }
     }
 
-    /// The first `distance` metres of the way of a ray that carries `throughput`, which may not be black: to
-    /// where it is scattered, or else to where the medium ends. In a medium that scatters nothing all rays
-    /// come through.
+    /// Weight and density of the first `distance` metres of a ray with this throughput, which may not be black:
+    /// up to the place where it is scattered, or else to the end of the medium. Without scattering all rays pass.
     pub fn crossing(&self, throughput: Vec3, distance: f32, is_scattered: bool) -> Crossing {
         let left = self.transmittance(distance);
         let choice = throughput / throughput.element_sum();
@@ -94,27 +92,26 @@ impl Interior {
     }
 }
 
-/// A straight way, as one of those that [`Interior::fly`] chooses from.
+/// A segment of a path, as [`Interior::fly`] samples it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
-    /// Share of light that is left at its end, linear RGB; if that lies in the medium, times what is scattered
-    /// there, per metre.
+    /// Transmittance to its end, linear RGB; if the end lies in the medium, times the scattering coefficient there.
     pub weight: Vec3,
-    /// Probability that light comes to its end or, per metre, is scattered there.
+    /// Probability of passing to its end or, per metre, of scattering there.
     pub density: f32,
 }
 
 impl Crossing {
-    /// Through clear air.
+    /// A segment without a medium.
     pub const CLEAR: Self = Self { weight: Vec3::ONE, density: 1.0 };
 }
 
-/// What happened to light on its way through a medium.
+/// A sampled free flight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flight {
-    /// Metres to where it was scattered; `None` if it came through.
+    /// Distance to the scattering event in metres; `None` if it passed through.
     pub scattered_at: Option<f32>,
-    /// What the throughput is to be multiplied with, linear RGB.
+    /// Factor on the throughput, linear RGB.
     pub weight: Vec3,
 }
 
@@ -132,12 +129,12 @@ pub(crate) fn optical_depth(bits: u32) -> f32 {
 /// Henyey and Greenstein's phase function (*Diffuse radiation in the galaxy*, 1941).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Phase {
-    /// Mean cosine between the directions of travel before and after; 0 is the same to all sides.
+    /// Mean cosine between the directions of travel before and after; 0 is isotropic.
     mean_cosine: f32,
 }
 
 impl Phase {
-    /// With this mean cosine, clamped to what can be sampled.
+    /// The phase function of this mean cosine, clamped to the range that can be sampled.
     pub fn new(mean_cosine: f32) -> Self {
         Self { mean_cosine: mean_cosine.clamp(-MAX_ANISOTROPY, MAX_ANISOTROPY) }
     }
@@ -173,7 +170,7 @@ impl Phase {
 /// A medium in its box, ready for rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fog {
-    /// What fills the box.
+    /// The medium in the box.
     pub interior: Interior,
     /// Lower and upper corner in metres.
     pub bounds: [Vec3; 2],
@@ -194,7 +191,7 @@ impl Fog {
         (!interior.is_clear() && fills).then_some(Self { interior, bounds })
     }
 
-    /// The stretch of a ray inside of the box, up to `distance` metres.
+    /// The interval of a ray inside the box, up to `distance` metres.
     pub fn stretch(&self, origin: Vec3, direction: Vec3, distance: f32) -> Option<(f32, f32)> {
         // No division by zero: on a face it would be NaN.
         let direction = direction.map(|d| d.abs().max(MIN_COMPONENT).copysign(d));
@@ -253,7 +250,7 @@ mod tests {
             let weight = crossing.weight / crossing.density;
             assert!((weight - flight.weight).abs().max_element() < 1e-5, "{flight:?} {crossing:?}");
         }
-        // Light is scattered somewhere or comes through.
+        // Light is scattered somewhere or passes through.
         const STEPS: u32 = 10_000;
         let density = |i: u32| {
             interior.crossing(throughput, (i as f32 + 0.5) * 2.0 / STEPS as f32, true).density

@@ -11,7 +11,7 @@ use crate::image::{Image, Rgb8};
 
 pub use white_balance::{DAYLIGHT_KELVIN, KELVIN, TINT, WhiteBalance};
 
-/// How radiance of any size becomes display light in `[0,1]`.
+/// Curve from exposed radiance to display light in `[0,1]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ToneCurve {
@@ -32,7 +32,7 @@ impl ToneCurve {
     /// All curves.
     pub const ALL: [Self; 5] = [Self::Agx, Self::Aces, Self::Neutral, Self::Reinhard, Self::None];
 
-    /// What the command line and files call it.
+    /// Its name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Agx => "agx",
@@ -58,7 +58,7 @@ impl ToneCurve {
     }
 }
 
-/// Beyond what any curve tells from white, and small enough that its square is finite.
+/// Maximum of a channel: white in every curve, and its square is finite.
 const BRIGHTEST: f32 = 1e6;
 
 /// The 8-bit sRGB picture of `image * 2^exposure_ev` under a tone curve.
@@ -85,7 +85,7 @@ pub fn display_rgb8(image: &Image, exposure_ev: f32, curve: ToneCurve) -> Rgb8 {
 fn quantise(value: f32, dither: f32) -> u8 {
     let level = value * 255.0;
     let nearest = level.round();
-    // Rounding errors of the curve are not worth a dither.
+    // Rounding errors of the curve are not dithered.
     if (level - nearest).abs() < 1e-3 { nearest as u8 } else { (level + dither) as u8 }
 }
 

@@ -1,11 +1,10 @@
 //! The environment map as a light: radiance, equal-size tiles, importance sampling in a tile.
 //!
 //! An [`Environment`] owns the map's pixels and an importance table over its patches, the areas
-//! between texel centres (`patches`). Directions are drawn with the density that is read there: the
-//! importance of the interpolated radiance over the tile's energy. The map is cut into
-//! equal-size tiles that are fixed to the map; which tile to sample is somebody else's choice (the
-//! light grid learns it, [`Environment::tile_energies`] is the choice without knowledge), so every
-//! density here is conditional on the tile.
+//! between texel centres (`patches`). The density of a direction is the importance of the interpolated
+//! radiance over the tile's energy. The map is cut into equal-size tiles that are fixed to the map. The
+//! caller chooses the tile (the light grid learns which; without learning, tiles are chosen by
+//! [`Environment::tile_energies`]), so every density here is conditional on the tile.
 //!
 //! Rotation turns the map about +Y as [`crate::math::rotate_y`] turns directions: what the map
 //! shows at `u` is seen at lat-long `u + rotation / 2pi`. Tiles turn with the map.
@@ -52,10 +51,10 @@ pub struct Environment {
     patches: PatchRows,
     /// Factor on importance that brings the brightest pixel near 1: a power of two.
     importance_scale: f32,
-    /// The pixels' importance, so scaled. Most samples are hidden: these are enough to place them, and a
-    /// third as large.
+    /// The pixels' importance, scaled by `importance_scale`. Placing a sample needs only these, a third of the
+    /// pixels' size; most samples are occluded and need no radiance.
     importances: Arc<Vec<f32>>,
-    /// One over each tile's energy, so scaled; 0 where f32 cannot hold it.
+    /// One over each tile's energy in the same scale; 0 where f32 overflows.
     inverse_energies: Vec<f32>,
     /// Solid-angle mean of the map, without intensity.
     map_mean: Vec3,
@@ -66,16 +65,15 @@ pub struct Environment {
     intensity: f32,
 }
 
-/// A direction drawn from one tile of the map; [`Environment::sampled_radiance`] is what comes from there.
+/// A direction drawn from one tile of the map; [`Environment::sampled_radiance`] gives its radiance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnvironmentSample {
     /// Unit world direction towards the map.
     pub direction: Vec3,
     /// Density in 1/steradian, given the tile: the importance of the radiance over the tile's energy.
     pub pdf_solid_angle: f32,
-    /// That density over the one with which the integers of the table drew the direction. An estimate
-    /// is multiplied by it, and then exact: it is 1 but for the rounding of patches to 2^-32 of a
-    /// tile.
+    /// That density over the actual one of the table's integers, a factor of the estimate that keeps it exact.
+    /// It differs from 1 by the rounding of patches to 2^-32 of a tile.
     pub weight: f32,
     point: MapPoint,
 }
@@ -89,7 +87,7 @@ pub struct EnvironmentMemory {
     pub table: usize,
 }
 
-/// A place on the map: a patch and where in it, in `[0,1]` of its extent.
+/// A place on the map: a patch and the position in it, in `[0,1]` of its extent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct MapPoint {
     pub(crate) column: u32,
@@ -98,10 +96,10 @@ pub(crate) struct MapPoint {
     pub(crate) down: f32,
 }
 
-/// What there is at the corners of a patch: left to right, then down.
+/// Values at the corners of a patch: left to right, then down.
 type Corners<T> = [T; 4];
 
-/// A direction that is being drawn from a tile.
+/// A direction whose patch is not yet chosen completely.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TileSearch {
     tile: u32,
@@ -170,12 +168,12 @@ impl Environment {
         self.radiance_at(&self.map_point(direction))
     }
 
-    /// Radiance from where a sample was drawn.
+    /// Radiance of a sample.
     pub fn sampled_radiance(&self, sample: &EnvironmentSample) -> Vec3 {
         self.radiance_at(&sample.point)
     }
 
-    /// Has what [`Self::sampled_radiance`] reads fetched.
+    /// Prefetches the pixels that [`Self::sampled_radiance`] reads.
     pub(crate) fn prefetch_radiance(&self, sample: &EnvironmentSample) {
         let [_, above, _, below] = self.corner_pixels(sample.point.column, sample.point.row);
         [above, below].iter().for_each(|pixel| prefetch(&self.map.pixels[*pixel]));
@@ -198,7 +196,7 @@ impl Environment {
         direction_from_uv(DVec2::new(at(u, within.x), at(v, within.y)).as_vec2())
     }
 
-    /// What a tile spans of lat-long u, which may pass 1, and v of world directions.
+    /// The ranges of lat-long u, which may pass 1, and v of world directions in a tile.
     pub(crate) fn extent_of_tile(&self, tile: u32) -> [Range<f64>; 2] {
         let patches = self.grid.patches(tile);
         let shift = f64::from(patches::SHIFT);
@@ -215,8 +213,8 @@ impl Environment {
         self.grid.tile_of_patch(point.column, point.row)
     }
 
-    /// Per tile the integral of importance over its solid angle, at intensity 1, as the table has
-    /// it. Tiles of energy 0 cannot be sampled.
+    /// Per tile, the table's integral of importance over the tile's solid angle, at intensity 1. Tiles of energy
+    /// 0 cannot be sampled.
     pub fn tile_energies(&self) -> &[f64] {
         &self.tile_energies
     }
@@ -228,8 +226,8 @@ impl Environment {
         self.finish_sample(&self.search_tile(tile, u)?)
     }
 
-    /// Begins [`Self::sample_in_tile`]. Maps are large and memory is far: what the rest will read is
-    /// fetched while something else is done.
+    /// Begins [`Self::sample_in_tile`] and prefetches the data that [`Self::finish_sample`] reads, so that the caller
+    /// can work while memory is read.
     pub(crate) fn search_tile(&self, tile: u32, u: [u32; 2]) -> Option<TileSearch> {
         let search = self.table.search(tile, refine(u))?;
         if let Search::TileLocal(search) = &search {
@@ -239,7 +237,7 @@ impl Environment {
         Some(TileSearch { tile, search })
     }
 
-    /// Draws the direction that was searched for.
+    /// Completes the direction that [`Self::search_tile`] began.
     pub(crate) fn finish_sample(&self, search: &TileSearch) -> Option<EnvironmentSample> {
         let tile = search.tile;
         let patch = self.table.finish(&self.grid, tile, &search.search)?;
@@ -303,7 +301,7 @@ impl Environment {
         (self.scaled(radiance), tile, pdf)
     }
 
-    /// Whether no light comes from anywhere.
+    /// Whether the map is black.
     pub fn is_black(&self) -> bool {
         self.intensity <= 0.0 || self.map_is_black
     }
@@ -318,7 +316,7 @@ impl Environment {
         (self.map_mean * self.intensity).min(Vec3::MAX)
     }
 
-    /// The map as it was given but for its sun: not turned, at intensity 1.
+    /// The map with its sun factor applied, not rotated, at intensity 1.
     pub fn map(&self) -> &Image {
         &self.map
     }
@@ -348,7 +346,7 @@ impl Environment {
         (self.importance_scale, &self.inverse_energies)
     }
 
-    /// What the pixels and the table take.
+    /// Memory of the pixels and of the table.
     pub fn memory_bytes(&self) -> EnvironmentMemory {
         let rows = self.patches.memory_bytes()
             + size_of_val(&self.importances[..])
@@ -361,7 +359,7 @@ impl Environment {
     }
 
     /// Density of [`Self::sample_in_tile`], given the tile, at a point of this scaled importance. Only
-    /// summed-area tables ask for those at the patch's corners.
+    /// summed-area tables need the importances at the patch's corners.
     fn density(
         &self,
         tile: u32,
@@ -390,7 +388,7 @@ impl Environment {
         Arc::ptr_eq(&self.map, &other.map) && Arc::ptr_eq(&self.table, &other.table)
     }
 
-    /// Where the map shows a unit world direction.
+    /// The place on the map of a unit world direction.
     pub(crate) fn map_point(&self, direction: Vec3) -> MapPoint {
         let uv = uv_from_direction(direction);
         let turned = uv.x - self.rotation_turns;

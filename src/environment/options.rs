@@ -1,4 +1,4 @@
-//! How a map is turned into a light.
+//! Options of a map as a light: importance table, tiles, rotation, intensity, sun.
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ pub enum TableKind {
     /// Exact integer sums tile by tile, 4 bytes per texel.
     #[default]
     TileLocal,
-    /// The talk's: a summed-area table in f64, rounded to u32.
+    /// The talk's table: a summed-area table in f64, rounded to u32.
     U32,
     /// A summed-area table computed in f32.
     F32,
@@ -37,7 +37,7 @@ impl fmt::Display for TableKind {
     }
 }
 
-/// What an [`super::Environment`] is built with.
+/// Options of an [`super::Environment`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EnvironmentOptions {
     /// Importance table.
@@ -46,7 +46,7 @@ pub struct EnvironmentOptions {
     pub tile_columns: u32,
     /// Tiles along v, at least 1; no more are made than the map has rows.
     pub tile_rows: u32,
-    /// Turns the map about +Y so that lat-long `u` of what is seen grows.
+    /// Rotation about +Y in radians; it increases the lat-long `u` at which each texel is seen.
     pub rotation_radians: f32,
     /// Factor on all radiance, at least 0.
     pub intensity: f32,

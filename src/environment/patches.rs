@@ -3,15 +3,15 @@
 //! Radiance is interpolated between texel centres: a patch is the rectangle between four of them; rows of
 //! half height close the sphere at the poles. Down a patch, radiance is linear in the cosine of the polar
 //! angle, that is in solid angle: so a patch's integral is its solid angle times the mean of its corners,
-//! and directions are drawn with a density proportional to what is then read there. (Linear in the angle
-//! itself, as others have it, differs by the share `pi / (8 height tan(theta))` of two texels' difference:
-//! 0.08 % at 512 rows, halfway to the pole.)
+//! and directions are drawn with a density proportional to the interpolated importance. (Interpolation linear
+//! in the angle, as other renderers use, differs by the share `pi / (8 height tan(theta))` of two texels'
+//! difference: 0.08 % at 512 rows, halfway to the pole.)
 
 use glam::Vec2;
 
 use std::f64::consts::{PI, TAU};
 
-/// How far patch edges lie before texel edges, in texels.
+/// Offset of patch edges from texel edges, in texels.
 pub(crate) const SHIFT: f32 = 0.5;
 
 /// A row of patches.
@@ -26,7 +26,7 @@ pub(crate) struct PatchRow {
     pub(crate) solid_angle: f32,
 }
 
-/// Which patches a map has.
+/// The patches of a map.
 #[derive(Debug, Clone)]
 pub(crate) struct PatchRows {
     rows: Vec<PatchRow>,
@@ -63,8 +63,8 @@ impl PatchRows {
         (sine, if from_upper { 1.0 - distance } else { distance - 1.0 })
     }
 
-    /// How far down a row, in `[0,1]`, a polar angle lies whose squared sine and whose cosine these
-    /// are.
+    /// Position in a row, in `[0,1]` from its upper edge, of a polar angle given by its squared sine and its
+    /// cosine.
     pub(crate) fn down(&self, row: u32, squared_sine: f32, cosine: f32) -> f32 {
         let PatchRow { top, extent, .. } = self.rows[row as usize];
         let near = squared_sine / (1.0 + cosine.abs());
@@ -91,7 +91,7 @@ pub(crate) fn solid_angle(width: u32, height: u32, row: u32) -> f64 {
     TAU / f64::from(width) * (distance(row + 1) - distance(row)).abs()
 }
 
-/// Whether a row's cosines are told from the upper pole.
+/// Whether a row's cosines are stored as distances from the upper pole's.
 fn is_upper(row: u32, count: u32) -> bool {
     2 * row < count
 }
@@ -126,7 +126,7 @@ pub(crate) struct PatchSample {
     pub(crate) x: u32,
     /// Row.
     pub(crate) y: u32,
-    /// What the random numbers have left, uniform in `[0,1]`^2.
+    /// The remainder of the random numbers, uniform in `[0,1]`^2.
     pub(crate) within: Vec2,
     /// Probability of the patch given the tile.
     pub(crate) probability: f32,

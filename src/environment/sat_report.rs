@@ -1,9 +1,9 @@
-//! The talk's claim about summed-area tables, measured: which table samples a map how truly.
+//! Measures the talk's claim about summed-area tables: the sampling error of each importance table.
 //!
 //! The talk reports the mean squared error of a density reconstructed from samples, u32 against
 //! f32, without its unit. Here it is in units of the mean texel density, and it is the limit of
 //! infinitely many samples: every table's search is followed for all random numbers at once, so
-//! the noise of a histogram does not hide what a table does.
+//! that no histogram noise is added.
 
 use std::fmt;
 use std::hint::black_box;
@@ -24,8 +24,8 @@ use crate::image::Image;
 /// Samples drawn to time a table.
 pub const TIMED_SAMPLES: u32 = 1 << 20;
 
-/// The talk's maps, which our skies of these names stand for: columns and rows, and the mean squared error
-/// published, in its unit, of u32 and f32.
+/// The talk's maps, which built-in skies of the same names replace: columns, rows, and the published mean squared
+/// errors of u32 and f32, in the talk's unit.
 pub const TALKS_MAPS: [(&str, (u32, u32), [f64; 2]); 4] = [
     ("Hallway", (10_000, 5000), [1.0e-5, 3.8e-1]),
     ("Day", (15_000, 7500), [4.9e-7, 8.6e-3]),
@@ -115,7 +115,7 @@ pub fn sat_report(map: &Image, timed_samples: u32) -> Result<SatReport> {
     })
 }
 
-/// How far a table is from the truth: sums over patches.
+/// Errors of a table: sums over patches.
 #[derive(Default)]
 struct Deviation {
     squares: f64,
@@ -164,7 +164,7 @@ impl Deviation {
     }
 }
 
-/// How a table samples the whole map, row by row.
+/// The probabilities with which a table samples the whole map, row by row.
 enum Distribution<'a> {
     TileLocal { table: &'a TileLocal, grid: &'a TileGrid, tile_probabilities: Vec<f64> },
     SummedArea { table: &'a SummedArea, whole: TilePatches, row_probabilities: Vec<f64> },
@@ -190,7 +190,7 @@ impl<'a> Distribution<'a> {
     /// Probabilities with which the patches of row `y` are sampled.
     fn sampled(&self, y: u32) -> Vec<f64> {
         match self {
-            // Exact sums: each entry is met as often as reported.
+            // Exact sums: each entry is sampled with its reported probability.
             Self::TileLocal { .. } => self.reported(y),
             Self::SummedArea { table, whole, row_probabilities } => {
                 let columns = table.column_distribution(whole, y);

@@ -1,11 +1,10 @@
-//! Summed-area tables over the whole map: the talk's u32 form and the f32 and f64 ones it is
-//! measured against. Any rectangle of patches can be sampled by two binary searches.
+//! Summed-area tables over the whole map: the talk's u32 form and, to compare with it, f32 and f64 forms. Any rectangle of patches can be sampled by two binary searches.
 //!
 //! They are kept for comparison. The u32 form is an f64 table rounded corner by corner, as in the
 //! talk (Atanasov et al., SIGGRAPH 2018 Talks): the error of every corner is the same half unit,
 //! but a patch is the difference of four corners, so a dim patch can get no mass (it is then never
-//! sampled) or a negative one. The searched sums then fall here and there, and the choice follows
-//! the reported probability only nearly. Negative masses count as zero; nothing panics or loops.
+//! sampled) or a negative one. The searched sums then decrease in places, and the choice only approximately
+//! follows the reported probability. Negative masses count as zero; nothing panics or loops.
 
 use std::ops::Range;
 
@@ -16,7 +15,7 @@ use super::patches::PatchSample;
 use super::tiles::TilePatches;
 use super::weights::Weights;
 
-/// Sums at the corners of patches, as they are kept; all convert to f64 exactly.
+/// Sums at the corners of patches in their stored format; all convert to f64 exactly.
 #[derive(Debug)]
 enum Corners {
     U32(Vec<u32>),
@@ -104,27 +103,27 @@ impl SummedArea {
         })
     }
 
-    /// Probability of [`Self::sample`] to choose this patch of the rectangle, exact as far as the
-    /// table's sums never fall.
+    /// Probability of [`Self::sample`] to choose this patch of the rectangle; exact if the table's sums never
+    /// decrease.
     pub(crate) fn sample_probability(&self, patches: &TilePatches, x: u32, y: u32) -> f64 {
         let total = self.mass(&patches.x, &patches.y);
         let mass = self.mass(&(x..x + 1), &(y..y + 1));
         if total > 0.0 && mass > 0.0 { mass / total } else { 0.0 }
     }
 
-    /// With what probability [`Self::sample`] really ends in each row of the rectangle.
+    /// Actual probability of [`Self::sample`] to end in each row of the rectangle.
     pub(crate) fn row_distribution(&self, patches: &TilePatches) -> Vec<f64> {
         let sum = |y| self.mass(&patches.x, &(patches.y.start..y + 1));
         search_distribution(&patches.y.clone().map(sum).collect::<Vec<_>>())
     }
 
-    /// With what probability [`Self::sample`], once in row `y`, really ends in each column.
+    /// Actual probability of [`Self::sample`] to end in each column, given row `y`.
     pub(crate) fn column_distribution(&self, patches: &TilePatches, y: u32) -> Vec<f64> {
         let sum = |x| self.mass(&(patches.x.start..x + 1), &(y..y + 1));
         search_distribution(&patches.x.clone().map(sum).collect::<Vec<_>>())
     }
 
-    /// Mass of a rectangle, as the table has it: may be negative through rounding.
+    /// Mass of a rectangle in the table; rounding may make it negative.
     pub(crate) fn mass(&self, x: &Range<u32>, y: &Range<u32>) -> f64 {
         let at = |x: u32, y: u32| {
             let index = y as usize * self.stride + x as usize;
@@ -167,7 +166,7 @@ fn zero<T: Clone + Default>(weights: &Weights<'_>) -> Vec<T> {
 
 struct Choice {
     index: u32,
-    /// How far into the entry, in `[0,1]`.
+    /// Position within the entry, in `[0,1]`.
     fraction: f64,
 }
 
@@ -190,8 +189,8 @@ fn search(range: &Range<u32>, u: f64, sum_to: impl Fn(u32) -> f64) -> Option<Cho
     (mass > 0.0).then_some(Choice { index: first, fraction })
 }
 
-/// With what probability [`search`] ends at each entry of these inclusive sums. Each comparison
-/// cuts the interval of `u` that leads on, so this is exact even where the sums fall.
+/// Actual probability of [`search`] to end at each entry of these inclusive sums. Each comparison cuts the
+/// interval of `u` that leads to an entry, so this is exact even where the sums decrease.
 fn search_distribution(sums: &[f64]) -> Vec<f64> {
     fn descend(
         sums: &[f64],

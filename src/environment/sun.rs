@@ -1,4 +1,4 @@
-//! What stands out on a map: where it is brightest, and how tiles of equal energy would lie.
+//! The sun of a map: its brightest place, its scaling, and rectangles of equal energy.
 
 use glam::{DVec3, Vec3};
 
@@ -6,7 +6,7 @@ use crate::color::luminance;
 use crate::image::Image;
 use crate::math::texel_solid_angle;
 
-/// Radius in degrees of what counts as the sun around the brightest texel.
+/// Radius in degrees of the sun's disc around the brightest texel.
 const SUN_RADIUS_DEGREES: f64 = 2.5;
 
 /// The brightest place of a map.
@@ -69,8 +69,8 @@ impl Sun {
     }
 }
 
-/// The map with `factor` times the light of its sun: what within 2.5 degrees of its brightest texel is
-/// brighter than the sky around, whose mean is taken up to twice as far. Black maps stay as they are.
+/// The map with `factor` times the light of its sun: the radiance within 2.5 degrees of the brightest texel
+/// above the mean of the surrounding ring of 2.5 to 5 degrees. Black maps are unchanged.
 pub(crate) fn with_sun(mut map: Image, factor: f32) -> Image {
     let Some(sun) = Sun::of(&map) else { return map };
     let cone = Cone::new(&map, sun.texel);
@@ -150,7 +150,7 @@ impl Cone {
         90.0 - (f64::from(y) + 0.5) / f64::from(self.height) * 180.0
     }
 
-    /// Columns of a row within so many degrees of the axis.
+    /// Columns of a row within `degrees` of the axis.
     fn row(&self, y: u32, degrees: f64) -> impl Iterator<Item = u32> {
         let [azimuth, elevation] = self.axis_degrees;
         let (sin, cos) = elevation.to_radians().sin_cos();
@@ -165,9 +165,9 @@ impl Cone {
     }
 }
 
-/// `count` rectangles of texels, `[left, top, right, bottom)`, of as equal an energy as halving can
-/// make them: what the method does not use, since the smallest lie where the sun is and say nothing
-/// about which part of the sky is seen. Fewer if the map has too few lit texels.
+/// `count` rectangles of texels, `[left, top, right, bottom)`, of nearly equal energy by repeated halving;
+/// fewer if the map has too few lit texels. For display only: the method uses tiles of equal size, since the
+/// smallest of these rectangles lie at the sun and do not separate parts of the sky.
 pub fn equal_energy_tiles(map: &Image, count: usize) -> Vec<[u32; 4]> {
     let energies: Vec<f64> = map
         .pixels

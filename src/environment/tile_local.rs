@@ -1,8 +1,8 @@
 //! The default importance table: one exact integer table per tile.
 //!
 //! A tile's patches get integers that add up to just under 2^32, and their prefix sums are exact.
-//! So the sums never fall, no lit patch is lost, and the probability of a patch is a quotient of
-//! the very integers that are searched. It takes the same 4 bytes per patch as a 32-bit
+//! So the sums never decrease, no lit patch is lost, and the probability of a patch is a quotient of
+//! the integers that are searched. It takes the same 4 bytes per patch as a 32-bit
 //! summed-area table, and a map with a sun beside dim sky is as safe as an even one, because the
 //! tiles do not share the 32 bits. The idea to quantise before adding up is our answer to the
 //! rounded summed-area table of the talk, see [`super::summed_area`].
@@ -18,35 +18,35 @@ use super::weights::Weights;
 use crate::huge_pages::zeros_on_huge_pages;
 use crate::prefetch::prefetch;
 
-/// Sums of a row that a search ends with: a cache line of them.
+/// Entries in a group of sums: a cache line. A search ends in one group.
 const GROUP: usize = 16;
 
 /// Exact integer prefix sums, tile by tile.
 #[derive(Debug, Clone)]
 pub(crate) struct TileLocal {
-    /// Where each tile's sums are: all that a search asks for, in a cache line.
+    /// The place of each tile's sums: all data that a search needs about a tile, in a cache line.
     places: Vec<Place>,
     /// Tile after tile (see [`TileGrid::first_patch`]), row after row in a tile: sums along the
     /// row, this patch included. Wrapping cannot happen: a tile's total is below 2^32.
     row_sums: Vec<u32>,
-    /// Their groups, row after row of tiles in the same order: few enough to stay near the processor, so
-    /// that a search waits for far memory once.
+    /// Coarse index of `tile_sums`, by row of tiles in the same order. It is small enough to stay in the
+    /// processor's cache, so that a search waits for main memory once.
     row_groups: Groups,
     /// Per tile: sums over whole rows, this row included.
     tile_sums: Vec<u32>,
-    /// Their groups, tile after tile.
+    /// Coarse index of `row_sums`, tile after tile.
     tile_groups: Groups,
 }
 
-/// The last of every [`GROUP`] of sums, so many for each run of sums that is searched; after a run's last
-/// group, its total.
+/// Coarse index: the last sum of every [`GROUP`] entries of each searched run, the same number for each run;
+/// after a run's last group, its total.
 #[derive(Debug, Clone)]
 struct Groups {
     lasts: Vec<u32>,
     per_run: usize,
 }
 
-/// Where a tile's patches and its sums are.
+/// The place of a tile's patches and of its sums.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     /// Its first patch's column and row.
@@ -99,9 +99,9 @@ impl TileLocal {
         (Self { places, row_sums, row_groups, tile_sums, tile_groups }, energies)
     }
 
-    /// Begins to choose a patch of the tile: a row by the second number and, by the first, some columns,
-    /// among which [`Self::finish`] chooses; both are 64-bit fractions of one. Monotone in both. What the
-    /// rest will read is fetched meanwhile. `None` if the tile is black.
+    /// Begins to choose a patch of the tile: a row by the second number and a group of columns by the first, in
+    /// which [`Self::finish`] chooses one. Both numbers are 64-bit fractions of one; the choice is monotone in
+    /// both. Prefetches the sums that `finish` reads. `None` if the tile is black.
     #[inline]
     pub(crate) fn search(&self, tile: u32, u: [u64; 2]) -> Option<Search> {
         let place = &self.places[tile as usize];
@@ -133,7 +133,7 @@ impl TileLocal {
         })
     }
 
-    /// Chooses the patch that was searched for.
+    /// Completes the choice that [`Self::search`] began.
     #[inline]
     pub(crate) fn finish(&self, search: &Search) -> PatchSample {
         let sums = &self.row_sums[search.sums..][..search.length as usize];
@@ -181,7 +181,7 @@ impl Place {
 }
 
 impl Groups {
-    /// Of runs of sums, of which the longest has so many.
+    /// The index of runs of sums; `longest` is the longest run's number of entries.
     fn of<'a>(runs: impl ParallelIterator<Item = &'a [u32]>, longest: Option<u32>) -> Self {
         let per_run = longest.unwrap_or(0).div_ceil(GROUP as u32) as usize;
         let ends = (1..=per_run).map(|end| GROUP * end);
@@ -189,7 +189,7 @@ impl Groups {
         Self { lasts: runs.flat_map_iter(lasts_of).collect(), per_run }
     }
 
-    /// Where in a run the group begins that holds the target, and the sum before it.
+    /// The first entry of the group that holds the target, within its run, and the sum before that entry.
     #[inline]
     fn find(&self, run: usize, target: Target) -> (usize, u32) {
         let lasts = &self.lasts[run * self.per_run..][..self.per_run];
@@ -217,14 +217,14 @@ fn places(tile_sums: &[u32], grid: &TileGrid) -> Vec<Place> {
     (0..grid.count()).map(place).collect()
 }
 
-/// A patch that is being chosen.
+/// A patch whose row and group of columns are chosen.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Search {
     row: u32,
-    /// First of some columns, one of which it will be, and how many they are.
+    /// First column of the group, and the number of its columns.
     column: u32,
     length: u32,
-    /// Where their sums begin.
+    /// Index of their first sum.
     sums: usize,
     /// The sum before them.
     before: u32,
@@ -234,24 +234,24 @@ pub(crate) struct Search {
 }
 
 impl Search {
-    /// Row and columns among which the patch will be.
+    /// Row and columns of the group.
     pub(crate) fn among(&self) -> (u32, Range<u32>) {
         (self.row, self.column..self.column + self.length)
     }
 }
 
-/// What is searched: a 64-bit fraction of a positive total.
+/// The target of a search: a 64-bit fraction of a positive total.
 #[derive(Debug, Clone, Copy, Default)]
 struct Target {
     whole: u32,
     part: u32,
 }
 
-/// Where a search ended.
+/// The entry in which a search ended.
 struct Choice {
     index: usize,
     mass: u32,
-    /// How far into the entry, in `[0,1]`.
+    /// Position within the entry, in `[0,1]`.
     fraction: f32,
 }
 
@@ -290,7 +290,7 @@ fn fill_weights(
     }
 }
 
-/// Turns weights into integers, at least 1 where there is any, and adds them up.
+/// Rounds weights to integers, positive ones to at least 1, and computes their prefix sums.
 fn quantise(weights: &[f64], energy: f64, width: u32, row_sums: &mut [u32], tile_sums: &mut [u32]) {
     if energy <= 0.0 {
         return; // Black: the sums are zero already.

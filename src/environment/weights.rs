@@ -1,4 +1,4 @@
-//! What a patch is worth to a sampler: the integral of importance over its solid angle, in f64.
+//! Weights of patches: the integral of importance over a patch's solid angle, in f64.
 
 use glam::Vec3;
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! Which cell a point belongs to.
+//! Cells of the Light Grid: from a point to its cell.
 
 use glam::Vec3;
 
@@ -9,11 +9,11 @@ pub const MEDIUM_FACE: u32 = 6;
 
 /// A uniform spherical grid around the camera, optionally split by the direction a surface faces.
 ///
-/// The talk's grid has no faces. *Measured* (design study): six faces and a cosine weight are nearly
-/// the whole gain over it in direct light, because a floor and the wall behind it see other tiles.
+/// The talk's grid has no faces. *Measured* (design study): six faces and a cosine weight give nearly the whole
+/// gain over it in direct light, because a floor and a wall in one cell see different tiles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SphericalGrid {
-    /// World position in metres that all cells are seen from; the camera when learning started.
+    /// World position of the grid's centre in metres; the camera when learning started.
     pub center: Vec3,
     /// Cells around the horizon.
     pub columns: u32,
@@ -49,7 +49,7 @@ impl SphericalGrid {
     }
 
     fn cell_on_face(&self, position: Vec3, face: u32) -> u32 {
-        // Of any length: only angles are asked for.
+        // Not normalised: only its angles are used.
         let uv = uv_from_direction(position - self.center);
         // `as` saturates, so that rounding (or a NaN position) can never leave the grid.
         let column = ((uv.x * self.columns as f32) as u32).min(self.columns - 1);

@@ -1,4 +1,4 @@
-//! What learning counts: integers only, so that the result depends on no order.
+//! Counters of learning: integers only, so that results do not depend on the order of paths.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
@@ -10,14 +10,14 @@ use crate::prefetch::prefetch;
 /// even if all fell into one counter it grows by less than 2^31 between two calls of
 /// [`Counters::end_pass`], which halves a cell whose counters passed 2^31: no wrap, ever.
 pub const WEIGHT_ONE: f32 = 256.0;
-/// Largest weight that is recorded as it is; more is clamped.
+/// Maximum recorded weight; larger ones are clamped.
 pub const MAX_WEIGHT: f32 = 4.0;
 /// Bound on records between two calls of [`Counters::end_pass`].
 pub const MAX_RECORDS_PER_PASS: u64 = (1 << 31) / (WEIGHT_ONE as u64 * MAX_WEIGHT as u64) - 1;
 
 const NO_SLOT: u32 = u32::MAX;
 
-/// What is known of one tile seen from one cell.
+/// Counts of one tile seen from one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Tally {
     /// Samples that fell into the tile.
@@ -76,8 +76,8 @@ impl Counters {
         self.blocks[slot as usize][tile as usize].fetch_add(pair(1, fixed), Ordering::Relaxed);
     }
 
-    /// Says that [`Self::record`] will be called for this cell and tile after some other work: counters
-    /// are megabytes, and what is far in memory takes as long as a short ray.
+    /// Prefetches the counters of this cell and tile for a later [`Self::record`]: a cache miss takes as long as a
+    /// short ray.
     pub fn prefetch(&self, cell: u32, tile: u32) {
         let slot = self.slot_of_cell[cell as usize];
         if slot != NO_SLOT {
@@ -86,19 +86,19 @@ impl Counters {
     }
 
     /// Visits of each cell, the slot of each cell (`u32::MAX` without one) and the words of each
-    /// slot: what a GPU needs to count on.
+    /// slot: the state from which a GPU continues to count.
     pub(crate) fn words(&self) -> (Vec<u32>, &[u32], Vec<u32>) {
         let visits = self.visits.iter().map(|word| word.load(Ordering::Relaxed)).collect();
         let pairs = self.blocks.iter().flat_map(|block| block.iter());
         (visits, &self.slot_of_cell, pairs.flat_map(|p| parts(p.load(Ordering::Relaxed))).collect())
     }
 
-    /// How many words of visits and of blocks [`Self::words`] gives.
+    /// Numbers of words of visits and of blocks in [`Self::words`].
     pub(crate) fn word_counts(&self) -> (usize, usize) {
         (self.visits.len(), self.blocks.len() * 2 * self.tile_count as usize)
     }
 
-    /// Takes back what [`Self::words`] gave, counted on.
+    /// Replaces the state by continued counts of [`Self::words`].
     pub(crate) fn set_words(&self, visits: &[u32], blocks: &[u32]) {
         for (word, value) in self.visits.iter().zip(visits) {
             word.store(*value, Ordering::Relaxed);

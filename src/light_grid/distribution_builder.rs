@@ -15,13 +15,13 @@ use crate::environment::Environment;
 /// Cells per side of the blocks that visibility is pooled over.
 const POOL: u32 = 4;
 
-/// Distributions are made of so many bytes at a time before they are appended to the others.
+/// Bytes of distributions that are built at a time before they are appended to the others.
 const BYTES_AT_ONCE: usize = 1 << 19;
 
-/// Distribution entries left over by MIS compensation must carry at least this much of the distribution.
+/// Minimum share of a distribution that must remain after MIS compensation.
 const MIN_COMPENSATED: f64 = 0.05;
 
-/// How a slot's counters, those around it and the map become weights of tiles.
+/// Computes tile weights from a slot's counters, from those of its neighbours and from the map.
 pub(super) struct DistributionBuilder<'a> {
     grid: SphericalGrid,
     counters: &'a Counters,
@@ -71,9 +71,8 @@ impl<'a> DistributionBuilder<'a> {
         builder
     }
 
-    /// Appends the distributions of the most visited cells, as many as fit into `room` bytes beside what making
-    /// them takes, and notes which distribution each of these cells uses. Which distribution is which does not
-    /// depend on the threads.
+    /// Appends the distributions of the most visited cells and stores each cell's distribution index. Their number
+    /// is limited by `room` bytes, which include the memory of building them. Indices do not depend on threads.
     pub(super) fn build(
         &self,
         room: usize,
@@ -124,10 +123,10 @@ impl<'a> DistributionBuilder<'a> {
         }
     }
 
-    /// Bytes held beside the counters and what is made of them.
+    /// Bytes held beside the counters and the distributions.
     fn memory_bytes(&self) -> usize {
         let tile_count = self.map_distribution.len();
-        // As for eight threads, however many there are: distributions must not depend on it.
+        // Computed for eight threads whatever their number, on which distributions must not depend.
         let threads = 8;
         let tallies = (self.faces.len() + threads) * tile_count * size_of::<Tally>();
         let doubles = (self.diffuse.len() + 1 + threads) * tile_count * size_of::<f64>();
@@ -165,8 +164,8 @@ impl<'a> DistributionBuilder<'a> {
         }
     }
 
-    /// Energy of each tile times a power of its visibility ratio, which is drawn towards the block's,
-    /// and that towards the face's, where the tile was tried too seldom.
+    /// Energy of each tile times a power of its visibility ratio. Where the tile has few tries, its ratio is pooled
+    /// with the block's, and that with the face's.
     fn visible_energies(
         &self,
         slot: usize,
@@ -184,7 +183,7 @@ impl<'a> DistributionBuilder<'a> {
         weights.extend(own.zip(block).zip(face).zip(&self.map_distribution).map(
             |(((own, block), face), map)| {
                 let ratio = shrink(&own, shrink(block, shrink(face, 0.0)));
-                // Most tiles of an interior are never seen, and a power takes long.
+                // Most tiles of an interior are never seen: skip their power.
                 if ratio > 0.0 { map * power(ratio, exponent) } else { 0.0 }
             },
         ));
@@ -202,12 +201,12 @@ impl<'a> DistributionBuilder<'a> {
     }
 }
 
-/// `base` to the power of `exponent`, by roots where they do.
+/// `base` to the power of `exponent`, computed by square roots for an exponent of 3/4.
 fn power(base: f64, exponent: f64) -> f64 {
     if exponent == 0.75 { (base * base.sqrt()).sqrt() } else { base.powf(exponent) }
 }
 
-/// How many of the first distributions fit into `room` bytes (and into 16-bit distribution indices).
+/// Number of the first distributions that fit into `room` bytes (and into 16-bit distribution indices).
 fn fitting(supports: &[usize], room: usize, tile_count: u32) -> usize {
     let mut used = 0;
     supports
@@ -220,16 +219,16 @@ fn fitting(supports: &[usize], room: usize, tile_count: u32) -> usize {
         .count()
 }
 
-/// For each face axis, the share of a Lambertian's density that falls into each tile, and at last that
-/// of even scattering in a medium.
+/// For each face axis, the share of a Lambertian's density that falls into each tile; last, the shares of
+/// isotropic scattering in a medium.
 fn diffuse_shares(environment: &Environment) -> Vec<Vec<f64>> {
     let tiles = 0..environment.tile_count();
     let share = |face| tiles.clone().map(move |tile| diffuse_share(environment, face, tile));
     (0..=MEDIUM_FACE).map(|face| share(face).collect()).collect()
 }
 
-/// Integral over a tile of the cosine with a face's axis over pi, or of an even density: of rectangles in
-/// longitude and polar angle there are closed forms.
+/// Integral over a tile of the cosine with a face's axis over pi, or of the isotropic density, in closed form for
+/// rectangles of longitude and polar angle.
 fn diffuse_share(environment: &Environment, face: u32, tile: u32) -> f64 {
     let [u, v] = environment.extent_of_tile(tile);
     let azimuths = (u.start - 0.5) * TAU..(u.end - 0.5) * TAU;
@@ -252,7 +251,7 @@ fn diffuse_share(environment: &Environment, face: u32, tile: u32) -> f64 {
             };
     }
     let toward = f64::from(axis.z).atan2(f64::from(axis.x));
-    // The integral of the cosine where it is positive, from where it begins to be.
+    // The integral of the positive part of the cosine.
     let lit = |azimuth: f64| {
         let from_edge = azimuth - toward + FRAC_PI_2;
         let rest = from_edge.rem_euclid(TAU);

@@ -10,12 +10,12 @@ use crate::environment::Environment;
 /// A grid with its learning counters: records while paths are traced, then becomes a [`LightGrid`].
 #[derive(Debug)]
 pub struct LearningGrid {
-    /// Where the cells lie.
+    /// The cells.
     pub grid: SphericalGrid,
-    /// What was counted.
+    /// The counters of its cells.
     pub counters: Counters,
     options: DistributionOptions,
-    /// How many times distributions were made.
+    /// Number of times that distributions were built.
     generation: u32,
 }
 
@@ -34,7 +34,7 @@ impl LearningGrid {
         }
     }
 
-    /// What a record must hold.
+    /// The kind of weight that a record must have.
     pub fn recording(&self) -> Recording {
         self.options.recording
     }
@@ -44,7 +44,7 @@ impl LearningGrid {
         self.options.tries_per_vertex
     }
 
-    /// Whether what was counted is of the same kind, be it around another centre.
+    /// Whether both grids count the same kind of weight in grids of the same shape; centres may differ.
     pub(crate) fn is_like(&self, other: &Self) -> bool {
         let around_other = SphericalGrid { center: other.grid.center, ..self.grid };
         (around_other, self.options) == (other.grid, other.options)
@@ -55,7 +55,7 @@ impl LearningGrid {
         Self { counters: self.counters.snapshot(), ..*self }
     }
 
-    /// The distributions that follow from what was counted so far: the next generation. `None` for a black map.
+    /// Builds the next generation of distributions from the counters. `None` for a black map.
     pub fn distributions(&mut self, environment: &Environment) -> Option<LightGrid> {
         self.generation += 1;
         let mut result = LightGrid::whole_map(environment.tile_energies())?;

@@ -1,8 +1,8 @@
 //! The Light Grid: which tiles of the environment map each part of the picture can see.
 //!
 //! Atanasov et al., *Adaptive Environment Sampling on CPU and GPU*, ACM SIGGRAPH 2018 Talks. A
-//! [`cells::SphericalGrid`] around the camera maps a point to a cell, [`counters::Counters`] collect
-//! what camera paths saw, and [`LightGrid`] holds the resulting [`tile_distributions::TileDistributions`].
+//! [`cells::SphericalGrid`] around the camera maps a point to a cell, [`counters::Counters`] count the map
+//! samples of camera paths, and [`LightGrid`] holds the resulting [`tile_distributions::TileDistributions`].
 //! Whatever was learned, the estimate stays unbiased: the distribution that chose a sample also gives its pdf,
 //! and BSDF sampling covers what a distribution cannot choose.
 
@@ -25,7 +25,7 @@ pub use options::{DistributionOptions, Recording, RenderedPaths};
 /// Index of the distribution proportional to the whole map's tile energies.
 pub const WHOLE_MAP: u32 = 0;
 
-/// Most bytes the grid may hold, learning and rendering alike (the talk's 10 MB).
+/// Maximum bytes of the grid, in learning and in rendering (the talk's 10 MB).
 pub const MEMORY_BUDGET_BYTES: usize = 10 << 20;
 
 /// The tile distributions and which of them a point uses.
@@ -33,9 +33,9 @@ pub const MEMORY_BUDGET_BYTES: usize = 10 << 20;
 pub struct LightGrid {
     distributions: TileDistributions,
     cells: Option<Cells>,
-    /// Of 256 samples so many follow the whole map's distribution whatever was learned.
+    /// Share of samples, in 256ths, that follow the whole map's distribution.
     whole_map_share: u32,
-    /// How many times distributions were made of what was counted; see [`Self::generation`].
+    /// Number of times that distributions were built from counters; see [`Self::generation`].
     generation: u32,
 }
 
@@ -106,14 +106,14 @@ impl LightGrid {
         &self.distributions
     }
 
-    /// 0 where nothing was learned; later distributions of one learning have a higher one. The samples that
-    /// distributions were made of followed distributions of lower generations: see
+    /// Generation of the distributions: 0 without learning, and increasing by one each time they are rebuilt. The
+    /// samples that they were built from followed distributions of lower generations: see
     /// [`crate::sampler::Sequence`].
     pub(crate) fn generation(&self) -> u32 {
         self.generation
     }
 
-    /// Of 256 samples so many follow the whole map's distribution whatever was learned.
+    /// Share of samples, in 256ths, that follow the whole map's distribution.
     pub(crate) fn whole_map_share(&self) -> u32 {
         self.whole_map_share
     }
@@ -130,7 +130,7 @@ impl LightGrid {
             .map_or(WHOLE_MAP, |cells| u32::from(cells.distribution_of_cell[cell as usize]))
     }
 
-    /// Where the cells lie and which distribution each uses; `None` if every point uses the whole map.
+    /// The cells and each cell's distribution; `None` if every point uses the whole map.
     pub(crate) fn cells(&self) -> Option<(&SphericalGrid, &[u16])> {
         self.cells.as_ref().map(|cells| (&cells.grid, cells.distribution_of_cell.as_slice()))
     }
@@ -168,8 +168,8 @@ impl LightGrid {
     }
 }
 
-/// Splits a uniform number at a share in 256ths: whether it lies below, and where in its part it lies,
-/// as a uniform number. Both parts keep the order, hence the stratification; `finer` is its bits below.
+/// Splits a uniform number at a share in 256ths: whether it lies below, and its position in its part as a uniform
+/// number. Both parts keep the order, hence the stratification; `finer` are the bits below it.
 fn split(bits: u32, finer: u32, share: u32) -> (bool, u32) {
     let edge = u64::from(share) << 24;
     let is_below = u64::from(bits) < edge;

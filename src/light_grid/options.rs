@@ -1,8 +1,8 @@
-//! How counters become distributions.
+//! Options of distributions: how they are computed from counters.
 
 use serde::{Deserialize, Serialize};
 
-/// What one learning record holds. All but the last, divided by the tries, are visibility ratios
+/// The weight of one learning record. All but the last, divided by the tries, are visibility ratios
 /// that do not depend on the map's radiance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -34,41 +34,40 @@ impl Recording {
     }
 }
 
-/// How counters become distributions. The defaults are *measured*: `lightgrid report ablations`.
+/// Options of distributions. The defaults are *measured*: `lightgrid report ablations`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DistributionOptions {
     /// Whether cells are split six-fold by the direction a surface faces.
     pub faces: bool,
-    /// What the counters hold.
+    /// The weight that the counters sum.
     pub recording: Recording,
-    /// Tries per tile that the pooled ratio of the 4x4 cells around is worth.
+    /// Number of tries per tile that the pooled ratio of the block of 4x4 cells counts as.
     pub pooling_tries: f64,
-    /// Power of the visibility ratio: 1 weighs a tile by its mean visible energy, 1/2 by its root
-    /// mean square, which is best where each point of a cell sees either all or nothing of it
-    /// (Rath et al. 2020).
+    /// Power of the visibility ratio: 1 weights a tile by its mean visible energy, 1/2 by its root mean square.
+    /// The latter is optimal if each point of a cell sees either all or nothing of the tile (Rath et al. 2020).
     pub ratio_exponent: f64,
     /// Share of samples, in 256ths, that follow the whole map's distribution whatever was learned; see
     /// [`super::LightGrid::sample`].
     pub whole_map_share: u32,
-    /// How much of the diffuse BSDF's own density is subtracted from a distribution (MIS compensation,
-    /// Karlik et al. 2019, on tiles).
+    /// Share of the diffuse BSDF's density that is subtracted from a distribution (MIS compensation, Karlik et
+    /// al. 2019, on tiles).
     pub compensation: f64,
-    /// Samples of the map that each vertex of a learning path tries: another shadow ray is cheaper
-    /// than another path. A rendered path tries one, or three where pixels share what is behind.
+    /// Samples of the map at each vertex of a learning path: another shadow ray is cheaper than another path. A
+    /// rendered path takes one, or three where pixels share second vertices.
     pub tries_per_vertex: u32,
-    /// Where rendered paths count too, until the distributions hardly get better.
+    /// Scenes in which rendered paths are counted too, until the distributions converge.
     pub rendered_paths: RenderedPaths,
 }
 
-/// Where rendered paths count as learning paths do.
+/// Scenes in which rendered paths are counted like learning paths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RenderedPaths {
-    /// Nowhere: distributions are those of learning paths.
+    /// In none: distributions come from learning paths only.
     Nowhere,
-    /// Where what the camera sees is enclosed. Outside little is left to learn, and what better distributions
-    /// gain is less than a new sequence of points costs: counting for four samples makes 1.09 times the
-    /// error there (0.89 to 1.27), 0.96 times in rooms (0.79 to 1.07).
+    /// In scenes whose visible part is enclosed. Outdoors, better distributions gain less than a new sequence of
+    /// points costs: counting four samples multiplies the error by 1.09 there (0.89 to 1.27), and by 0.96 in
+    /// rooms (0.79 to 1.07).
     InRooms,
     /// In every scene.
     Everywhere,
@@ -99,8 +98,8 @@ impl DistributionOptions {
         rendered_paths: RenderedPaths::Nowhere,
     };
 
-    /// Whether rendered paths may count too. Their samples of the map follow the distributions, so only
-    /// ratios can be counted.
+    /// Whether rendered paths may be counted too: only with ratios, since their samples of the map follow the
+    /// distributions.
     pub fn goes_on(&self) -> bool {
         self.rendered_paths != RenderedPaths::Nowhere && self.recording.is_ratio()
     }

@@ -3,15 +3,14 @@
 use crate::prefetch::prefetch_all;
 use crate::sampler::unit_from_bits;
 
-/// The chosen tile, its probability, and what is left of the random number.
+/// The chosen tile, its probability, and the remainder of the random number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TileChoice {
     /// Tile index.
     pub tile: u32,
-    /// Probability of having chosen it, the very ratio of integers that was sampled.
+    /// Probability of the choice: the ratio of the integers that were searched.
     pub probability: f32,
-    /// Where in the tile's share the random number fell: a fresh uniform number, as a 32-bit fraction
-    /// of one.
+    /// Position of the random number in the tile's share: a new uniform number, as a 32-bit fraction of one.
     pub remainder: u32,
 }
 
@@ -26,7 +25,7 @@ pub struct TileDistributions {
     words_per_distribution: u32,
     /// First entry of each distribution, and one more.
     starts: Vec<u32>,
-    /// `words_per_distribution` words a distribution: which tiles it can choose.
+    /// Bit masks of the tiles that each distribution can choose, `words_per_distribution` words each.
     masks: Vec<u64>,
     /// Entries before each word of the mask.
     ranks: Vec<u16>,
@@ -108,7 +107,7 @@ impl TileDistributions {
         4 + tile_count.div_ceil(64) as usize * 10 + support as usize * 6
     }
 
-    /// Makes room for exactly this much, so that growing never holds twice the memory.
+    /// Reserves exactly this much, so that growing never holds twice the memory.
     pub fn reserve_exact(&mut self, distributions: usize, entries: usize) {
         self.starts.reserve_exact(distributions);
         self.masks.reserve_exact(distributions * self.words_per_distribution as usize);
@@ -169,7 +168,7 @@ impl TileDistributions {
         first
     }
 
-    /// Has what [`Self::sample`] searches fetched.
+    /// Prefetches the sums that [`Self::sample`] searches.
     pub(crate) fn prefetch(&self, distribution: u32) {
         let (start, end) = self.range(distribution);
         prefetch_all(&self.last[start..end]);

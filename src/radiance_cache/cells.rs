@@ -1,4 +1,4 @@
-//! Which cell of the cache a point of a surface belongs to: twin of `shaders/radiance_cache.wgsl`.
+//! Cells of the cache: from a surface point to its cell; twin of `shaders/radiance_cache.wgsl`.
 
 use glam::Vec3;
 
@@ -6,22 +6,22 @@ use super::{MAX_PROBES, SLOTS};
 use crate::light_grid::cells::dominant_face;
 use crate::sampler::hash;
 
-/// Most doublings of cells.
+/// Maximum number of doublings of a cell's edge.
 const MAX_LEVELS: u32 = 31;
-/// Marks the cells four times as large that others lean on.
+/// Flag of parents: cells four times as large, which cells with few paths are blended with.
 pub(crate) const PARENT: u32 = 1 << 8;
-/// Keeps check words apart from places in the table.
+/// Seed that makes check words independent of table places.
 pub(crate) const CHECK_SEED: u32 = 0x6365_6c6c;
 
-/// How surfaces are cut into cells.
+/// The division of surfaces into cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CacheCells {
-    /// World position from which cells grow: the camera when learning began.
+    /// World position around which cells are smallest: the camera when learning began.
     pub center: Vec3,
-    /// Metres along an edge of the smallest.
+    /// Edge of the smallest cells in metres.
     pub edge: f32,
-    /// Metres to the centre within which cells are all of the same size, and beyond which they double
-    /// with every doubling of the distance.
+    /// Radius in metres within which all cells have the smallest size; beyond it they double with every doubling
+    /// of the distance.
     pub least_distance: f32,
 }
 
@@ -29,27 +29,27 @@ pub struct CacheCells {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Cell {
     coordinates: [i32; 3],
-    /// Face, level, and whether it is a parent.
+    /// Face, level, and the flag of parents.
     kind: u32,
 }
 
-/// Where a cell is looked for in the table.
+/// The place of a cell in the table.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Key {
     place: u32,
-    /// Tells cells apart that are looked for in the same place; not 0.
+    /// Check word that separates cells of the same place; not 0.
     pub(super) check: u32,
 }
 
 impl CacheCells {
-    /// Metres along an edge of the cell at `position`.
+    /// Edge in metres of the cell at `position`.
     pub fn edge_at(&self, position: Vec3) -> f32 {
         self.edge_of_level(self.level_at(position))
     }
 
     fn level_at(&self, position: Vec3) -> u32 {
         let times = (position - self.center).length() / self.least_distance;
-        // The exponent: not a logarithm, which devices round each in their own way.
+        // The exponent of the float: devices round logarithms differently.
         (times.max(1.0).to_bits() >> 23).saturating_sub(127).min(MAX_LEVELS)
     }
 
@@ -59,7 +59,7 @@ impl CacheCells {
 
     pub(super) fn cell_at(&self, position: Vec3, normal: Vec3) -> Cell {
         let level = self.level_at(position);
-        // Surfaces along the sides of cells are well inside.
+        // Shifted so that surfaces on cell borders lie well inside cells.
         let place = (position - self.center) / self.edge_of_level(level) + 0.25 * normal;
         let coordinates = place.floor().to_array().map(|at| at as i32);
         Cell { coordinates, kind: dominant_face(normal) | level << 3 }
@@ -67,17 +67,17 @@ impl CacheCells {
 }
 
 impl Cell {
-    /// The cell four times as large that it is a part of.
+    /// Its parent: the cell four times as large that contains it.
     pub(super) fn parent(self) -> Self {
         Self { coordinates: self.coordinates.map(|at| at >> 2), kind: self.kind | PARENT }
     }
 
-    /// How often its edge was doubled.
+    /// Number of doublings of its edge.
     pub(super) fn level(self) -> u32 {
         (self.kind & (PARENT - 1)) >> 3
     }
 
-    /// The axis that its surfaces face.
+    /// The axis of its surfaces' normals.
     pub(super) fn face(self) -> u32 {
         self.kind & 7
     }
@@ -91,7 +91,7 @@ impl Cell {
 }
 
 impl Key {
-    /// The slots that it may be in.
+    /// The slots in which it may be stored.
     pub(super) fn probes(self) -> impl Iterator<Item = usize> {
         (0..MAX_PROBES).map(move |probe| (self.place as usize + probe) % SLOTS)
     }

@@ -1,44 +1,44 @@
-//! What is known of each cell of the cache, for whoever wants to see it.
+//! Facts about cells of the cache, for display.
 
 use glam::Vec3;
 
 use super::cells::{CacheCells, Cell};
 use super::{RadianceCache, SLOTS, WORDS};
 
-/// The cache as it is read, and how sure its cells are.
+/// The cache, and the training of its cells.
 #[derive(Debug, Clone)]
 pub struct CacheFacts {
     pub(super) cache: RadianceCache,
-    /// Of each slot what has trained it; a parent's is that of all its cells.
+    /// Training of each slot; a parent's is that of all its cells.
     pub(super) training: Vec<Training>,
     pub(super) cell_count: usize,
     pub(super) paths: u64,
 }
 
-/// What has trained a cell.
+/// Training of a cell.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Training {
     pub(super) paths: u64,
-    /// Mean albedo of the surfaces they met.
+    /// Mean albedo of the surfaces that the estimates belong to.
     pub(super) albedo: Vec3,
 }
 
 /// A cell of the cache.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KnownCell {
-    /// Tells it from others, but for a few in a billion.
+    /// Identifier: equal for two cells with a probability of a few in a billion.
     pub number: u32,
-    /// How often its edge was doubled.
+    /// Number of doublings of its edge.
     pub level: u32,
-    /// Axis that surfaces in it face: +X, -X, +Y, -Y, +Z, -Z.
+    /// Axis of its surfaces' normals: +X, -X, +Y, -Y, +Z, -Z.
     pub face: u32,
     /// Metres along an edge.
     pub edge: f32,
-    /// Estimates that have trained it.
+    /// Number of estimates that have trained it.
     pub samples: u64,
-    /// The same of the cell four times as large that it leans on, its own included.
+    /// Number of estimates of its parent, the cell four times as large, its own included.
     pub samples_around: u64,
-    /// Radiance that its surfaces send back, at their mean albedo; linear RGB.
+    /// Reflected radiance of its surfaces at their mean albedo; linear RGB.
     pub radiance: Vec3,
 }
 
@@ -60,22 +60,22 @@ impl CacheFacts {
         }
     }
 
-    /// How surfaces are cut into cells.
+    /// The division of surfaces into cells.
     pub fn cells(&self) -> &CacheCells {
         self.cache.cells()
     }
 
-    /// Number of cells that anything has trained.
+    /// Number of trained cells.
     pub fn cell_count(&self) -> usize {
         self.cell_count
     }
 
-    /// Estimates that have trained all of them.
+    /// Number of estimates over all cells.
     pub fn samples(&self) -> u64 {
         self.paths
     }
 
-    /// Bytes that the cache and its training hold, whatever there is to be known.
+    /// Bytes of the cache and its training, without these facts.
     pub fn memory_bytes() -> usize {
         SLOTS * (WORDS * size_of::<u32>() + size_of::<[u32; 4]>())
     }
@@ -108,7 +108,7 @@ mod tests {
         assert_eq!((cell.samples, cell.samples_around), (1000, 1000));
         assert!(cell.radiance.abs_diff_eq(radiance, 2e-3), "{cell:?}");
 
-        // In the same larger cell, which speaks for it.
+        // A point of the same parent cell, whose radiance it takes.
         let neighbour = facts.cell_at(beside, Vec3::Y);
         assert_ne!(neighbour.number, cell.number);
         assert_eq!((neighbour.samples, neighbour.samples_around), (0, 1000));

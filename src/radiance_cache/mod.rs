@@ -1,13 +1,13 @@
 //! A world-space cache of reflected radiance, learned from whole paths.
 //!
-//! Surfaces are cut into cubic cells by where they are and which way they face, hashed into a table of
+//! Surfaces are divided into cubic cells by position and dominant axis of the normal, hashed into a table of
 //! fixed size (Binder, Fricke, Keller, *Massively Parallel Path Space Filtering*, 2019). Cells grow with
-//! the distance from the camera, so that their number is bounded. Each holds the mean radiance that
-//! paths have brought back to it, over the mean albedo: textures are put back where it is read. What
-//! few paths have trained leans on a cell four times as large.
+//! the distance from the camera, so that their number is bounded. Each holds the mean reflected radiance of
+//! paths over the mean albedo; readers multiply by the albedo of their point, which restores textures. Cells
+//! with few paths are blended with a parent cell four times as large.
 //!
-//! Sums are integers: they do not depend on the order of the paths. A [`RadianceCache`] is read while
-//! the [`RadianceSums`] that it was made of go on.
+//! Sums are integers: they do not depend on the order of the paths. A [`RadianceCache`] is read while training
+//! continues in [`RadianceSums`].
 
 mod cells;
 mod facts;
@@ -24,41 +24,40 @@ pub(crate) use sums::{ALBEDO_ONE, MAX_PATHS, WORDS};
 
 /// Slots of the table: a power of two.
 pub(crate) const SLOTS: usize = 1 << 16;
-/// Slots in a row that are looked through for a cell: more than any cell needs before the table counts as full, for
-/// which of them find a slot must not depend on who comes first.
+/// Maximum number of successive slots that are probed for a cell. No cell needs more before the table counts as
+/// full, so that the order of insertion does not decide which cells find a slot.
 pub(crate) const MAX_PROBES: usize = 512;
-/// What a parent says counts in a cell as much as so many paths of its own.
+/// Weight of the parent's mean in a cell, in paths.
 const PARENTS_PATHS: f64 = 8.0;
-/// The same of the mean of all cells in a parent: what few paths see is often brighter or darker.
+/// Weight of the mean of all cells in a parent, in paths: few paths are often much brighter or darker.
 const PATHS_OF_ALL: f64 = 1.0;
-/// Least albedo that radiance is divided by.
+/// Minimum albedo that radiance is divided by.
 const MIN_ALBEDO: f64 = 1.0 / 256.0;
 
-/// What has been learned, to be read by any number of threads.
+/// The trained cache, readable from any number of threads.
 #[derive(Debug, Clone)]
 pub struct RadianceCache {
     cells: CacheCells,
-    /// Of each slot the check word of its cell (0 if it is empty) and the bits of its radiance over
-    /// albedo, linear RGB.
+    /// For each slot the check word of its cell (0 if empty) and the bits of its radiance over albedo, linear RGB.
     slots: Vec<[u32; 4]>,
     mean: Vec3,
 }
 
 impl RadianceCache {
-    /// Where its cells lie.
+    /// Its cells.
     pub fn cells(&self) -> &CacheCells {
         &self.cells
     }
 
-    /// Radiance that a surface at `position`, with this unit normal on the side it is seen from, sends
-    /// back for each part of its albedo; linear RGB.
+    /// Reflected radiance over albedo of a surface at `position` with this unit normal on the visible side; linear
+    /// RGB.
     pub fn radiance_over_albedo(&self, position: Vec3, normal: Vec3) -> Vec3 {
         let cell = self.cells.cell_at(position, normal);
         let known = |key| self.find(key);
         known(cell.key()).or_else(|| known(cell.parent().key())).unwrap_or(self.mean)
     }
 
-    /// The table as a GPU reads it, and the mean radiance over albedo, which is that of unknown cells.
+    /// The table in the GPU's layout, and the mean radiance over albedo, which unknown cells have.
     pub(crate) fn slots_and_mean(&self) -> (&[[u32; 4]], Vec3) {
         (&self.slots, self.mean)
     }

@@ -1,4 +1,4 @@
-//! What paths bring back to the cells of the cache.
+//! Training of the cache: sums over paths, cell by cell.
 
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
@@ -16,28 +16,28 @@ const PARENT_AT: usize = 1;
 const COUNT_AT: usize = 2;
 const ALBEDO_AT: usize = 3;
 const RADIANCE_AT: usize = 6;
-/// An albedo of 1: 2^24 paths do not overflow a word.
+/// Units of an albedo of 1: 2^24 paths do not overflow a word.
 pub(crate) const ALBEDO_ONE: f32 = 255.0;
-/// Units of the brightest radiance there is in the scene, and most of one estimate: so many times 2^24
-/// do not overflow two words.
+/// Units of the brightest radiance in the scene, and the maximum of one estimate: 2^24 of them do not overflow two
+/// words.
 const BRIGHTEST: f32 = (1_u64 << 36) as f32;
 const MAX_SUM: f32 = (1_u64 << 40) as f32;
-/// Share of slots in use beyond which cells no longer find one for sure.
+/// Share of used slots above which a cell may find no slot.
 const FULL: f64 = 0.75;
-/// Most paths that may train it in all.
+/// Maximum number of paths that train the cache.
 pub(crate) const MAX_PATHS: u64 = 1 << 22;
 
-/// Sums of what paths have brought back, cell by cell.
+/// Sums of the paths' estimates of reflected radiance, cell by cell.
 pub struct RadianceSums {
     cells: CacheCells,
-    /// Units a radiance of 1 counts.
+    /// Units of a radiance of 1.
     scale: f32,
     words: Box<[AtomicU32]>,
-    /// Slots in use, which somebody asks for after every few paths.
+    /// Number of used slots, which is read after every few paths.
     used: AtomicUsize,
 }
 
-/// What a slot holds.
+/// Content of a slot.
 #[derive(Clone, Copy, Default)]
 struct Tally {
     check: u32,
@@ -48,24 +48,24 @@ struct Tally {
 }
 
 impl RadianceSums {
-    /// Empty. `brightest` is about the largest radiance that anything emits.
+    /// Empty sums. `brightest` is the approximate maximum of emitted radiance.
     pub fn new(cells: CacheCells, brightest: f32) -> Self {
         let scale = BRIGHTEST / brightest.clamp(f32::MIN_POSITIVE * BRIGHTEST, f32::MAX);
         let words = (0..SLOTS * WORDS).map(|_| AtomicU32::new(0)).collect();
         Self { cells, scale, words, used: AtomicUsize::new(0) }
     }
 
-    /// Where its cells lie.
+    /// Its cells.
     pub fn cells(&self) -> &CacheCells {
         &self.cells
     }
 
-    /// All words and how many units a radiance of 1 counts: what a GPU needs to count on.
+    /// All words and the units of a radiance of 1: the state from which a GPU continues.
     pub(crate) fn words_and_scale(&self) -> (Vec<u32>, f32) {
         (self.words.iter().map(|word| word.load(Ordering::Relaxed)).collect(), self.scale)
     }
 
-    /// Takes the words back, counted on.
+    /// Replaces the state by continued counts of the words.
     pub(crate) fn set_words(&self, words: &[u32]) {
         self.words
             .iter()
@@ -103,7 +103,7 @@ impl RadianceSums {
         }
     }
 
-    /// How often something was added, and mean radiance of all that was.
+    /// Number of added estimates, and their mean radiance.
     #[cfg(test)]
     pub(crate) fn totals(&self) -> (u64, DVec3) {
         let mut all = Tally::default();
@@ -112,7 +112,7 @@ impl RadianceSums {
         (all.count, DVec3::from_array(radiance) / all.count as f64)
     }
 
-    /// The slot of a cell, a new one if it has none; `None` if there is no more room for it.
+    /// The slot of a cell, a new one if it has none; `None` if all slots of its place are used.
     fn slot_of(&self, key: Key) -> Option<usize> {
         key.probes().find(|slot| {
             let check = &self.words[slot * WORDS];
@@ -126,13 +126,13 @@ impl RadianceSums {
         })
     }
 
-    /// What has been learned so far; `None` if there are more cells than the table has room for: then
-    /// which of them have found a slot is a matter of chance.
+    /// The cache trained so far; `None` if there are more cells than the table holds, for then the order of
+    /// insertion decides which cells are in it.
     pub fn cache(&self) -> Option<RadianceCache> {
         self.tallies().map(|(tallies, all)| self.cache_of(&tallies, &all))
     }
 
-    /// The same with how sure its cells are; `None` before the first path, too.
+    /// The same with the training of its cells; `None` before the first path, too.
     pub fn facts(&self) -> Option<CacheFacts> {
         let (tallies, all) = self.tallies().filter(|(_, all)| all.count > 0)?;
         let training = tallies.iter().map(|tally| {
@@ -148,12 +148,12 @@ impl RadianceSums {
         })
     }
 
-    /// Whether cells no longer find a slot for sure.
+    /// Whether a cell may find no slot.
     pub(crate) fn is_full(&self) -> bool {
         self.used.load(Ordering::Relaxed) as f64 > FULL * SLOTS as f64
     }
 
-    /// What each slot holds, parents what all their cells do, and all together.
+    /// The content of each slot, with the sums of all their cells in parents, and the total.
     fn tallies(&self) -> Option<(Vec<Tally>, Tally)> {
         let mut tallies: Vec<Tally> = self.words.chunks_exact(WORDS).map(Tally::new).collect();
         if self.is_full() {
@@ -211,7 +211,7 @@ impl Tally {
         }
     }
 
-    /// `None` if no path has come here.
+    /// `None` without paths.
     fn radiance_over_albedo(&self, scale: f64) -> Option<DVec3> {
         let paths = (self.count > 0).then_some(self.count as f64)?;
         Some(DVec3::from_array([0, 1, 2].map(|channel| {
@@ -220,7 +220,7 @@ impl Tally {
         })))
     }
 
-    /// The same where what is expected counts as much as `weight` paths.
+    /// The same blended with an expected value that counts as `weight` paths.
     fn leaning(&self, expected: DVec3, weight: f64, scale: f64) -> DVec3 {
         let paths = self.count as f64;
         self.radiance_over_albedo(scale)
@@ -228,13 +228,13 @@ impl Tally {
     }
 }
 
-/// Bits that differ from place to place, for what may be the same everywhere.
+/// Random bits from a position, to round values that may be equal everywhere.
 fn dice(position: Vec3) -> u32 {
     let [x, y, z] = position.to_array().map(f32::to_bits);
     hash(x ^ hash(y ^ hash(z)))
 }
 
-/// A whole number near `value`, of which no two are alike, as often above as makes the mean right.
+/// Rounds `value` up or down by a hash of its bits, so that the expected result is `value`.
 fn dithered(value: f32) -> u64 {
     let value = value.clamp(0.0, MAX_SUM);
     (value + unit_from_bits(hash(value.to_bits()))) as u64

@@ -20,18 +20,17 @@ pub struct Sampler {
     points: Points,
 }
 
-/// Pairs of numbers between those of samples and those of estimates of which a sample makes several: more
-/// than any takes.
+/// Offset, in pairs, of the streams of repeated estimates from the stream of their sample; no stream has as many
+/// pairs.
 pub(crate) const PAIRS_OF_ESTIMATES: u32 = 1 << 24;
 
-/// The random numbers of a picture from one sample on: a scramble of their own for each generation of
-/// tile distributions.
+/// The random numbers of a picture from one sample on: each generation of tile distributions has a scramble of
+/// its own.
 ///
-/// Distributions are made of what a pixel's own samples have seen, too, and the points of one scrambled
-/// sequence avoid each other: a sample whose distribution knows its predecessors is not uniform given that
-/// distribution. Distributions of generation `g` are made of samples of earlier generations alone, so with a
-/// fresh scramble for each generation an estimate is independent of the distribution it is made by, hence
-/// unbiased.
+/// Distributions depend on earlier samples of the same pixel, and points of one scrambled sequence avoid each
+/// other: given such a distribution, the next point of the same sequence would not be uniform. Distributions of
+/// generation `g` depend on samples of earlier generations only. With a new scramble for each generation, an
+/// estimate is independent of the distribution it is drawn from, and hence unbiased.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Sequence {
     /// Generation of the distributions in use; 0 without any.
@@ -52,14 +51,14 @@ impl Sequence {
     }
 }
 
-/// Which points the samples of a pixel are.
+/// Point set of a pixel's samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Points {
-    /// Owen-scrambled Sobol points: those of all samples together fill the unit square evenly.
+    /// Owen-scrambled Sobol points: those of all samples together are stratified in the unit square.
     #[default]
     Sobol,
-    /// Independent random points, to measure what the even ones gain.
+    /// Independent random points, for comparison.
     Independent,
 }
 
@@ -69,7 +68,7 @@ impl Points {
         let even = Sampler::new(seed, pixel, index);
         match self {
             Self::Sobol => even,
-            // The first point of a scrambled sequence of its own is anywhere with equal chance.
+            // The first point of a newly scrambled sequence is uniform.
             Self::Independent => Sampler { points: self, ..even.independent(index) },
         }
     }
@@ -78,15 +77,15 @@ impl Points {
 impl Sampler {
     /// The stream of sample `index` of pixel `pixel`; the same three numbers give the same stream.
     pub fn new(seed: u32, pixel: u32, index: u32) -> Self {
-        // Were it a bitwise sum, another seed would give all pixels each other's numbers.
+        // With a bitwise sum, another seed would only exchange the numbers of pixels.
         let pixel_seed = hash(hash(pixel).wrapping_add(hash(seed)));
         let points = Points::Sobol;
         Self { reversed_index: index.reverse_bits(), pixel_seed, pair: 0, points }
     }
 
-    /// The stream of one of `count` estimates that the sample makes of the same thing: the numbers of all
-    /// estimates of all samples are the points of one sequence, so that those of one sample are even, too.
-    /// Of a single one it is the sample's own.
+    /// The stream of one of `count` estimates of the same integral within a sample. The numbers of all estimates of
+    /// all samples are points of one sequence, so that those of one sample are stratified, too. A single estimate
+    /// takes the sample's own stream.
     pub(crate) fn of_estimate(&self, count: u32, estimate: u32) -> Self {
         if count == 1 {
             return self.clone();
@@ -116,12 +115,12 @@ impl Sampler {
         let [x, y] = sobol_reversed(shuffled);
         let x = owen_scramble_reversed(x, hash(seed ^ 0x5851_f42d));
         let y = owen_scramble_reversed(y, hash(seed ^ 0x1405_7b7e));
-        // Both turned round at once.
+        // Reverses the bits of both at once.
         let both = (u64::from(y) << 32 | u64::from(x)).reverse_bits();
         [(both >> 32) as u32, both as u32]
     }
 
-    /// Leaves out so many pairs.
+    /// Skips `pairs` pairs.
     pub(crate) fn skip(&mut self, pairs: u32) {
         self.pair = self.pair.wrapping_add(pairs);
     }

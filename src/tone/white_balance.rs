@@ -1,4 +1,4 @@
-//! White balance: the light that shall look white.
+//! White balance: the colour of light that is shown as white.
 
 use std::ops::RangeInclusive;
 
@@ -12,22 +12,22 @@ use crate::image::Image;
 /// Colour temperature of Rec.709's white, D65, in kelvin.
 pub const DAYLIGHT_KELVIN: f32 = 6504.0;
 
-/// Colour temperatures that can be white, in kelvin.
+/// Range of colour temperatures, in kelvin.
 pub const KELVIN: RangeInclusive<f32> = 2000.0..=12000.0;
-/// Tints that it can have.
+/// Range of tints.
 pub const TINT: RangeInclusive<f32> = -1.0..=1.0;
 
-/// Which light looks white: the daylight or black body of a correlated colour temperature.
+/// The light that is shown as white: daylight or a black body of a correlated colour temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WhiteBalance {
-    /// Within [`KELVIN`]; lower values make a picture cooler, for they call warm light white.
+    /// Within [`KELVIN`]; lower values make a picture cooler, since warm light becomes white.
     pub kelvin: f32,
     /// Along green (negative) to magenta (positive), within [`TINT`].
     pub tint: f32,
 }
 
 impl Default for WhiteBalance {
-    /// Leaves colours as they are.
+    /// No change of colours.
     fn default() -> Self {
         Self { kelvin: DAYLIGHT_KELVIN, tint: 0.0 }
     }
@@ -61,7 +61,7 @@ impl WhiteBalance {
     }
 }
 
-/// Sums of so large values are finite.
+/// Maximum of a channel; sums of such values are finite.
 const MAX_COMPONENT: f32 = 1e30;
 
 /// Cone responses from XYZ (Lam 1985, the Bradford transform).

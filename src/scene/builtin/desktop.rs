@@ -1,4 +1,4 @@
-//! What lies on a desk: origins are below the middle, fronts along +Z.
+//! Objects on a desk: origins are below the middle, fronts along +Z.
 
 use glam::Vec3;
 

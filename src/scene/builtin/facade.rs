@@ -19,7 +19,7 @@ pub(super) struct HouseMats {
     pub(super) trim: Mat,
     /// Window frames.
     pub(super) frame: Mat,
-    /// What is seen behind windows.
+    /// Surfaces behind windows.
     pub(super) pane: Mat,
     /// Roof.
     pub(super) roof: Mat,

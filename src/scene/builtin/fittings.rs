@@ -1,4 +1,4 @@
-//! What is fitted to walls, in a wall's frame: window frames, mouldings, doors, curtains.
+//! Fittings of walls, in a wall's frame: window frames, mouldings, doors, curtains.
 
 use std::f32::consts::{PI, TAU};
 

@@ -1,4 +1,5 @@
-//! Lamps, lit if their bulbs and shades are made of what shines: their origin is below their middle, or at the ceiling.
+//! Lamps, lit if the materials of their bulbs and shades emit; their origin is below their middle, or at the
+//! ceiling.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 

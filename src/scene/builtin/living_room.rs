@@ -9,7 +9,7 @@ use super::mesh::placed;
 use super::mesh::{Builder, LIFT, Mat};
 use super::objects;
 use super::plants;
-use super::reliefs as relief;
+use super::reliefs;
 use super::room::{self, Hole, Shell};
 use super::textures;
 use super::{fittings, lamps, seating};
@@ -57,21 +57,21 @@ impl Palette {
     fn new(b: &mut Builder, lamps: [f32; 3]) -> Self {
         let size = Vec2::splat(1.9);
         let parquet = b.texture(textures::herringbone([0.46, 0.29, 0.16]), size);
-        let blocks = b.data(relief::herringbone(size), size);
+        let blocks = b.data(reliefs::herringbone(size), size);
         let size = Vec2::new(1.4, 0.7);
         let oak = b.texture(textures::timber([0.50, 0.34, 0.19]), size);
         let walnut = b.texture(textures::timber([0.23, 0.13, 0.075]), size);
-        let grain = b.data(relief::timber(size), size);
+        let grain = b.data(reliefs::timber(size), size);
         let size = Vec2::splat(2.5);
         let plaster = b.texture(textures::plaster([0.78, 0.75, 0.69], 0.10), size);
         let accent = b.texture(textures::plaster([0.24, 0.33, 0.30], 0.16), size);
-        let trowel = b.data(relief::plaster(size), size);
+        let trowel = b.data(reliefs::plaster(size), size);
         let size = Vec2::splat(0.20);
         let velvet = b.texture(textures::weave([0.52, 0.20, 0.085], 64), size);
-        let pile = b.data(relief::weave(size, 64), size);
+        let pile = b.data(reliefs::weave(size, 64), size);
         let size = Vec2::splat(0.16);
         let boucle = b.texture(textures::weave([0.74, 0.69, 0.60], 32), size);
-        let loops = b.data(relief::weave(size, 32), size);
+        let loops = b.data(reliefs::weave(size, 32), size);
         let linen = b.texture(textures::weave([0.72, 0.66, 0.56], 128), Vec2::splat(0.30));
         let ochre = b.texture(textures::weave([0.58, 0.45, 0.27], 128), Vec2::splat(0.30));
         let rug = b.texture(
@@ -135,8 +135,8 @@ pub(super) fn build() -> Scene {
     furnished("living-room", [0.0; 3])
 }
 
-/// Builds the scene `evening`: radiance of the shades and bulbs beside that of `sky:night`, of which a
-/// wall by the window gets less than a thousandth.
+/// Builds the scene `evening`, lit by its shades and bulbs; `sky:night` adds less than a thousandth of the light
+/// of a wall by the window.
 pub(super) fn evening() -> Scene {
     furnished("evening", [0.6, 25.0, 40.0])
 }

@@ -45,7 +45,7 @@ pub fn names() -> &'static [&'static str] {
     &["living-room", "evening", "office", "exterior", "fog", "open", "materials", "crack"]
 }
 
-/// The built-in sky that suits a scene, be it built in or not.
+/// The default built-in sky of a scene, built in or not.
 pub fn sky(name: &str) -> &'static str {
     match name {
         "evening" => "sky:night",

@@ -9,7 +9,7 @@ use super::mesh::placed;
 use super::mesh::{Builder, Mat};
 use super::objects;
 use super::plants;
-use super::reliefs as relief;
+use super::reliefs;
 use super::room::{self, Hole, Shell};
 use super::textures;
 use super::{desktop, fittings, lamps, seating};
@@ -51,18 +51,18 @@ impl Palette {
     fn new(b: &mut Builder) -> Self {
         let size = Vec2::new(2.6, 1.6);
         let boards = b.texture(textures::planks([0.40, 0.27, 0.16], 10, 2), size);
-        let joints = b.data(relief::planks(size, 10, 2), size);
+        let joints = b.data(reliefs::planks(size, 10, 2), size);
         let size = Vec2::new(1.4, 0.7);
         let oak = b.texture(textures::timber([0.52, 0.36, 0.21]), size);
-        let grain = b.data(relief::timber(size), size);
+        let grain = b.data(reliefs::timber(size), size);
         let size = Vec2::splat(2.5);
         let plaster = b.texture(textures::plaster([0.76, 0.74, 0.70], 0.10), size);
         let feature = b.texture(textures::plaster([0.60, 0.41, 0.31], 0.14), size);
-        let trowel = b.data(relief::plaster(size), size);
+        let trowel = b.data(reliefs::plaster(size), size);
         let size = Vec2::splat(0.19);
         let blue = b.texture(textures::weave([0.16, 0.24, 0.36], 64), size);
         let grey = b.texture(textures::weave([0.44, 0.43, 0.41], 64), size);
-        let threads = b.data(relief::weave(size, 64), size);
+        let threads = b.data(reliefs::weave(size, 64), size);
         let linen = b.texture(textures::weave([0.62, 0.55, 0.44], 128), Vec2::splat(0.3));
         let rug = b.texture(
             textures::rug([0.55, 0.52, 0.47], [0.14, 0.20, 0.28], [0.62, 0.42, 0.16]),

@@ -6,7 +6,7 @@ use glam::{Affine3A, Mat3, Vec2, Vec3};
 
 use super::mesh::{Builder, Mat};
 
-/// How far parts that meet reach into each other, so that no faces are coplanar and nothing leaks.
+/// Overlap of adjacent parts in metres, so that no faces are coplanar and no light leaks.
 const OVERLAP: f32 = 0.02;
 
 /// A hole through a wall, in metres along and up from the wall's inner lower corner.

@@ -9,9 +9,9 @@ use super::materials::{self, embossed, glass, matte, metal, textured, two_sided,
 use super::mesh::{Builder, placed};
 use super::objects;
 use super::plants;
-use super::reliefs as relief;
+use super::reliefs;
 use super::seating;
-use super::tableware as ware;
+use super::tableware;
 use super::textures;
 use crate::scene::{AlphaMode, Material, Scene};
 
@@ -45,11 +45,11 @@ pub(super) fn build() -> Scene {
 fn room(b: &mut Builder) {
     let size = Vec2::new(1.4, 0.7);
     let oak = b.texture(textures::timber([0.42, 0.27, 0.145]), size);
-    let grain = b.data(relief::timber(size), size);
+    let grain = b.data(reliefs::timber(size), size);
     let oak = b.material(embossed(varnished(textured("oak", oak, 0.55), 0.3, 0.25), grain));
     let size = Vec2::splat(1.6);
     let plaster = b.texture(textures::plaster([0.20, 0.29, 0.30], 0.22), size);
-    let trowel = b.data(relief::plaster(size), size);
+    let trowel = b.data(reliefs::plaster(size), size);
     let wall = b.material(embossed(textured("plaster", plaster, 0.8), trowel));
     let floor = b.material(matte("floor", [0.30, 0.21, 0.13], 0.5));
     let brass = b.material(materials::brass());
@@ -95,10 +95,12 @@ fn tea(b: &mut Builder) {
     let glaze = b.material(matte("blue glaze", [0.035, 0.13, 0.30], 0.12));
     let tea = b.material(matte("tea", [0.10, 0.045, 0.008], 0.02));
     b.standing(Vec3::new(-0.24, 0.0, 0.0), 0.0, |b| {
-        ware::runner(b, organza, 0.56, [-0.20, 0.262], 0.30);
+        tableware::runner(b, organza, 0.56, [-0.20, 0.262], 0.30);
     });
     let on_cloth = 0.003;
-    b.scaled(Vec3::new(-0.30, on_cloth, 0.03), -24.0, 1.35, |b| ware::teapot(b, lacquer, black));
+    b.scaled(Vec3::new(-0.30, on_cloth, 0.03), -24.0, 1.35, |b| {
+        tableware::teapot(b, lacquer, black)
+    });
     for (x, z) in [(-0.06, 0.08), (-0.04, 0.195)] {
         b.scaled(Vec3::new(x, on_cloth, z), 0.0, 1.2, |b| {
             objects::bowl(b, glaze, 0.045, 0.048);
@@ -159,7 +161,7 @@ fn glasses(b: &mut Builder) {
         ..solid("sea glass", 0.3)
     });
     let flint = b.material(Material { ior: 1.8, dispersion: 4.0, ..solid("flint glass", 0.0) });
-    b.standing(Vec3::new(0.10, 0.0, -0.11), 0.0, |b| ware::carafe(b, clear, drink, 0.32));
+    b.standing(Vec3::new(0.10, 0.0, -0.11), 0.0, |b| tableware::carafe(b, clear, drink, 0.32));
     b.standing(Vec3::new(-0.60, 0.0, -0.10), 0.0, |b| {
         let shape = [
             (0.0, 0.001),
@@ -170,7 +172,7 @@ fn glasses(b: &mut Builder) {
             (0.016, 0.33),
             (0.021, 0.345),
         ];
-        b.lathe(frosted, 64, &ware::smooth(&shape, 6));
+        b.lathe(frosted, 64, &tableware::smooth(&shape, 6));
     });
     b.scaled(Vec3::new(-0.67, 0.0, 0.10), 0.0, 1.2, |b| {
         let shape = [
@@ -182,11 +184,11 @@ fn glasses(b: &mut Builder) {
             (0.034, 0.125),
             (0.044, 0.145),
         ];
-        b.lathe(bubble, 64, &ware::smooth(&shape, 8));
+        b.lathe(bubble, 64, &tableware::smooth(&shape, 8));
     });
     let radius = 0.08;
     b.part(placed([0.13, 0.609 * radius + 4e-4, 0.13], [0.0, 65.0, -35.75]), |b| {
-        ware::brilliant(b, flint, radius);
+        tableware::brilliant(b, flint, radius);
     });
     for (x, z, turn, half) in [
         (0.25, 0.205, 20.0, [0.036, 0.018, 0.025]),
@@ -203,7 +205,7 @@ fn glasses(b: &mut Builder) {
 fn cloths(b: &mut Builder) {
     let size = Vec2::splat(0.10);
     let weave = b.texture(textures::weave([0.30, 0.035, 0.10], 40), size);
-    let threads = b.data(relief::weave(size, 40), size);
+    let threads = b.data(reliefs::weave(size, 40), size);
     let velvet = b.material(Material {
         sheen_color: Vec3::new(0.75, 0.45, 0.55),
         sheen_roughness: 0.35,
@@ -219,7 +221,7 @@ fn cloths(b: &mut Builder) {
         seating::pillow(b, velvet, 0.16);
     });
     b.part(placed([0.835, 0.209, 0.05], [-28.0, -20.0, 15.0]), |b| {
-        ware::nautilus(b, nacre, 0.12);
+        tableware::nautilus(b, nacre, 0.12);
     });
 }
 
@@ -253,8 +255,8 @@ fn translucent(b: &mut Builder) {
     for (x, z, radius, height) in
         [(0.56, -0.16, 0.040, 0.22), (0.64, -0.14, 0.036, 0.14), (0.585, -0.07, 0.035, 0.085)]
     {
-        b.standing(Vec3::new(x, 0.0, z), 0.0, |b| ware::candle(b, wax, black, radius, height));
+        b.standing(Vec3::new(x, 0.0, z), 0.0, |b| tableware::candle(b, wax, black, radius, height));
     }
-    b.standing(Vec3::new(0.80, 0.40, -0.08), 0.0, |b| ware::lantern(b, paper, 0.17));
+    b.standing(Vec3::new(0.80, 0.40, -0.08), 0.0, |b| tableware::lantern(b, paper, 0.17));
     b.rod(black, Vec3::new(0.80, 0.66, -0.08), Vec3::new(0.80, 1.6, -0.08), 0.002);
 }

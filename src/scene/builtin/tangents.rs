@@ -15,8 +15,8 @@ struct Around {
 }
 
 impl Builder {
-    /// Gives each vertex a tangent: the mean direction in which u grows over its triangles. No shape has
-    /// mirrored halves of a texture meet in a vertex, so that none has to be split.
+    /// Gives each vertex a tangent: the mean direction in which u grows over its triangles. No vertex is split,
+    /// since in no shape do mirrored halves of a texture share a vertex.
     pub(super) fn add_tangents(&mut self) {
         let scene = &mut self.scene;
         let mut around = vec![Around::default(); scene.positions.len()];

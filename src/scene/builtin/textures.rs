@@ -31,10 +31,10 @@ fn paint(width: u32, height: u32, f: impl Fn(Vec2) -> Vec3 + Sync) -> TextureIma
     TextureImage { width, height, texels: texels.into() }
 }
 
-/// Tells the wood of `timber` apart.
+/// Seed of the wood of `timber`.
 pub(super) const TIMBER: u32 = 11;
 
-/// Fibres of wood along u, and how much of a pore there is, both in `[0,1]`.
+/// Strength of the fibres of wood along u, and of its pores, both in `[0,1]`.
 pub(super) fn fibres(uv: Vec2, seed: u32) -> (f32, f32) {
     let shift = unit(seed) * 8.0;
     let fibre = tiling(uv * Vec2::new(20.0, 300.0) + shift, IVec2::new(20, 300), seed ^ 5);
@@ -43,7 +43,7 @@ pub(super) fn fibres(uv: Vec2, seed: u32) -> (f32, f32) {
     (fibre, pores)
 }
 
-/// Wood of base colour `tone` with its grain along u; `seed` tells planks apart.
+/// Wood of base colour `tone` with its grain along u; each plank has a `seed` of its own.
 fn grain(uv: Vec2, tone: Vec3, seed: u32) -> Vec3 {
     let shift = unit(seed) * 8.0;
     let warp = tiling_fbm(uv * Vec2::new(4.0, 8.0) + shift, IVec2::new(4, 8), 2, seed);
@@ -63,7 +63,7 @@ pub(super) fn timber(tone: [f32; 3]) -> TextureImage {
 
 /// A piece of a wooden floor at a place of it.
 pub(super) struct Board {
-    /// Tells its grain apart.
+    /// Seed of its grain.
     pub(super) seed: u32,
     /// Place in the wood that it is cut from.
     pub(super) wood: Vec2,
@@ -116,7 +116,7 @@ impl Board {
         }
     }
 
-    /// Its colour, its joints in this much of it.
+    /// Its colour; joints are darker by this factor.
     fn color(&self, tone: Vec3, joint: f32) -> Vec3 {
         grain(self.wood, tone * self.shade, self.seed) * joint.lerp(1.0, self.top)
     }
@@ -154,7 +154,7 @@ pub(super) struct Thread {
 }
 
 impl Thread {
-    /// That of `threads` across the texture each way.
+    /// The top thread of a weave with `threads` across the texture each way.
     pub(super) fn at(uv: Vec2, threads: i32) -> Self {
         let p = uv * threads as f32;
         let (x, y) = (p.x.fract(), p.y.fract());
