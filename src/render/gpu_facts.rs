@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::gpu::KernelFacts;
-
 /// What finds the surfaces that rays hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -98,6 +96,23 @@ pub struct FlightFigures {
     pub device_seconds: f64,
     /// Whether these are the device's timestamps.
     pub has_timestamps: bool,
+}
+
+/// What the render kernel of a picture holds and what was left out of it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct KernelFacts {
+    /// Features it was built with.
+    pub features: Vec<String>,
+    /// Features it does without.
+    pub left_out: Vec<String>,
+    /// Bytes of its source.
+    pub source_bytes: usize,
+    /// Bytes of the source with every feature.
+    pub full_source_bytes: usize,
+    /// Bytes of a vertex on the device.
+    pub vertex_bytes: u32,
+    /// Bytes of a vertex with everything a scene can have.
+    pub full_vertex_bytes: u32,
 }
 
 /// What was left out of the kernels and what they take.

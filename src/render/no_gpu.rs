@@ -4,8 +4,6 @@
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use serde::Serialize;
-
 use super::film::Film;
 use super::{Pass, View};
 use crate::bvh::Ray;
@@ -18,7 +16,9 @@ use crate::radiance_cache::{RadianceCache, RadianceSums};
 
 pub use super::devices::DeviceChoice;
 pub(crate) use super::gpu_facts::Question;
-pub use super::gpu_facts::{AdapterFacts, FlightFigures, GpuFigures, RayChoice, Schedule};
+pub use super::gpu_facts::{
+    AdapterFacts, FlightFigures, GpuFigures, KernelFacts, RayChoice, Schedule,
+};
 
 /// What is said where a GPU is asked for.
 pub(crate) const NO_GPU: &str = "this lightgrid was built without GPU rendering (feature `gpu`)";
@@ -103,14 +103,10 @@ impl UploadedScene {
     }
 }
 
-/// What there is to say of kernels: nothing.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct KernelFacts;
-
 impl KernelFacts {
-    /// Of the kernel for a scene.
-    pub fn of_scene(_: &World) -> Self {
-        Self
+    /// Of the kernel for a scene: none.
+    pub fn of_scene(_: &World) -> Option<Self> {
+        None
     }
 }
 

@@ -1,33 +1,12 @@
 //! Kernels that are compiled while nobody waits for them.
 
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Weak};
 
 use super::device::Gpu;
-use super::pipeline::{Pipeline, Programs, no_thread};
+use super::kernel_cache::{CompileGuard, Pipeline};
+use super::pipeline::{Programs, no_thread};
 use crate::error::{Error, Result};
-
-/// What is held for as long as a thread compiles.
-pub(crate) type CompileGuard = dyn Any + Send + Sync;
-
-/// Kernels that are to be compiled ahead.
-#[derive(Default)]
-pub(super) struct Ahead {
-    /// The sources that threads compile, and what those hold.
-    under_way: Vec<(Vec<String>, Weak<CompileGuard>)>,
-    /// Sources that were refused last, and why.
-    refused: Option<(Vec<String>, Error)>,
-}
-
-impl Ahead {
-    /// What the thread holds that compiles these, if there is one.
-    fn holder_of(&mut self, sources: &[String]) -> Option<Weak<CompileGuard>> {
-        self.under_way.retain(|(_, held)| held.strong_count() > 0);
-        let found = self.under_way.iter().find(|(others, _)| others == sources);
-        found.map(|(_, held)| Weak::clone(held))
-    }
-}
 
 /// Kernels, or what is held by the thread that compiles them.
 pub(crate) enum MaybeReady<T> {
@@ -47,7 +26,7 @@ impl Gpu {
         until_then: impl FnOnce() -> Arc<CompileGuard>,
     ) -> Result<MaybeReady<Vec<Arc<Pipeline>>>> {
         let sources: Vec<_> = programs.iter().map(|(_, program)| program.source.clone()).collect();
-        let mut known = self.known_pipelines();
+        let mut known = self.kernel_cache();
         if let Some((_, error)) = known.ahead.refused.take_if(|(of, _)| *of == sources) {
             return Err(error);
         }
@@ -67,7 +46,7 @@ impl Gpu {
             let failed = |_| Err(Error::new("a kernel cannot be compiled"));
             let compiled = catch_unwind(AssertUnwindSafe(|| gpu.pipelines(programs)));
             if let Err(error) = compiled.unwrap_or_else(failed) {
-                gpu.known_pipelines().ahead.refused = Some((sources, error));
+                gpu.kernel_cache().ahead.refused = Some((sources, error));
             }
             // Nobody is told before it can be found, nor when the device may have gone with the process.
             drop(gpu);

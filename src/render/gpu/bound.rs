@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::buffers::Buffers;
 use super::device::Gpu;
-use super::pipeline::Pipeline;
+use super::kernel_cache::Pipeline;
 use super::shader::Binding;
 use crate::error::{Error, Result};
 

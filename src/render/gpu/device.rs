@@ -6,7 +6,7 @@ use wgpu::wgt::WgpuHasDisplayHandle;
 use wgpu::{Adapter, Backends, DeviceType, ErrorFilter, Features, Instance, InstanceDescriptor};
 use wgpu::{Limits, PollType, SubmissionIndex, Surface};
 
-use super::pipeline::Pipelines;
+use super::kernel_cache::KernelCache;
 use crate::error::{Error, Result};
 use crate::render::gpu_facts::{AdapterFacts, RayChoice, Schedule};
 
@@ -99,7 +99,7 @@ pub struct Gpu {
     /// Whether frames of a window are drawn on it too.
     pub(super) has_window: bool,
     hardware_rays: bool,
-    pub(super) pipelines: Arc<Mutex<Pipelines>>,
+    pub(super) kernels: Arc<Mutex<KernelCache>>,
     /// Whether read-only arrays lie in storage buffers.
     prefers_buffers: bool,
     /// How kernels share the work, whatever suits it.
@@ -236,7 +236,7 @@ impl Gpu {
             submitting: Arc::default(),
             has_window: false,
             hardware_rays: false,
-            pipelines: Arc::default(),
+            kernels: Arc::default(),
             prefers_buffers,
             schedule: None,
         };

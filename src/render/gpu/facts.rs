@@ -1,28 +1,11 @@
-//! What is told of a picture's kernel.
-
-use serde::Serialize;
+//! Facts of a render kernel: what it holds and what was left out of it.
 
 use super::features::Features;
 use super::kernel::Kernel;
-use super::shader::{ArrayPlaces, Constants, Program, VertexTexels};
+use super::shader::{ArrayPlaces, Constants, Program};
+use super::texels::VertexTexels;
 use crate::path::World;
-
-/// What the render kernel of a picture holds and what was left out of it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct KernelFacts {
-    /// Features it was built with.
-    pub features: Vec<String>,
-    /// Features it does without.
-    pub left_out: Vec<String>,
-    /// Bytes of its source.
-    pub source_bytes: usize,
-    /// Bytes of the source with every feature.
-    pub full_source_bytes: usize,
-    /// Bytes of a vertex on the device.
-    pub vertex_bytes: u32,
-    /// Bytes of a vertex with everything a scene can have.
-    pub full_vertex_bytes: u32,
-}
+use crate::render::gpu_facts::KernelFacts;
 
 impl KernelFacts {
     /// Of the kernel for these features.

@@ -4,7 +4,6 @@
 use super::super::filter::PixelFilter;
 use super::super::{Gi, Sampling, View};
 use super::kernel::Kernel;
-use super::shader::Constants;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::light_grid::Recording;
@@ -193,9 +192,8 @@ impl Features {
         self
     }
 
-    /// The same for a kernel with these constants.
-    pub(super) fn in_kernel(mut self, kernel: Kernel, constants: &Constants) -> Self {
-        let is_deep = constants.stack_size > constants.shared_stack_size;
+    /// The same for a kernel, whose walks' stacks may not fit into workgroup memory.
+    pub(super) fn in_kernel(mut self, kernel: Kernel, is_deep: bool) -> Self {
         let is_cached = self.view.contains(ViewFeatures::RADIANCE_CACHE);
         for (feature, is_needed) in [
             (KernelFeatures::CACHED, kernel == Kernel::Render && is_cached),

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3, Vec4};
 
 use super::super::View;
-use super::shader::VertexTexels;
+use super::texels::VertexTexels;
 use crate::color::importance;
 use crate::environment::Environment;
 use crate::light_grid::LightGrid;

@@ -17,6 +17,7 @@ mod features;
 mod film;
 mod flight;
 pub(crate) mod kernel;
+mod kernel_cache;
 mod layout;
 mod learning;
 mod pacer;
@@ -29,6 +30,7 @@ mod read;
 mod registers;
 pub(crate) mod shader;
 mod sharing;
+mod texels;
 mod uploaded_scene;
 
 use std::collections::BTreeMap;
@@ -49,15 +51,18 @@ use crate::path::camera::CameraRays;
 use crate::radiance_cache::RadianceCache;
 use crate::scene::needs::SceneFeatures;
 #[cfg(feature = "window")]
-pub(crate) use background_compile::{CompileGuard, MaybeReady};
+pub(crate) use background_compile::MaybeReady;
 use bound::Bound;
 use buffers::Buffers;
 use features::{Features, ViewFeatures};
 use film::Sums;
 use flight::{Flights, Job};
 use kernel::Kernel;
+#[cfg(feature = "window")]
+pub(crate) use kernel_cache::CompileGuard;
+use kernel_cache::Pipeline;
 use layout::{Globals, Work};
-use pipeline::{Pipeline, Programs};
+use pipeline::Programs;
 use queue::Queue;
 use shader::{Constants, Program};
 use sharing::Sharing;
@@ -65,10 +70,11 @@ use uploaded_scene::put_array;
 
 pub use super::devices::DeviceChoice;
 pub(crate) use super::gpu_facts::Question;
-pub use super::gpu_facts::{AdapterFacts, FlightFigures, GpuFigures, RayChoice, Schedule};
+pub use super::gpu_facts::{
+    AdapterFacts, FlightFigures, GpuFigures, KernelFacts, RayChoice, Schedule,
+};
 pub(crate) use device::NO_GPU;
 pub use device::{Gpu, adapters};
-pub use facts::KernelFacts;
 pub(crate) use film::DeviceFilm;
 pub use uploaded_scene::UploadedScene;
 

@@ -1,4 +1,4 @@
-//! Kernels ready to run.
+//! Compiling kernels.
 
 use std::borrow::Cow;
 use std::sync::{Arc, MutexGuard, PoisonError};
@@ -6,6 +6,7 @@ use std::thread::ScopedJoinHandle;
 
 use super::device::Gpu;
 use super::kernel::Kernel;
+use super::kernel_cache::{KernelCache, Pipeline};
 use super::shader::{Binding, Program};
 use crate::error::{Error, Result};
 
@@ -18,13 +19,6 @@ const RUNTIME_CHECKS: wgpu::ShaderRuntimeChecks = wgpu::ShaderRuntimeChecks {
     int_div_checks: false,
     ..wgpu::ShaderRuntimeChecks::checked()
 };
-
-/// A kernel ready to run.
-pub(super) struct Pipeline {
-    pub(super) pipeline: wgpu::ComputePipeline,
-    pub(super) layout: wgpu::BindGroupLayout,
-    pub(super) program: Program,
-}
 
 impl Pipeline {
     /// Compiles a program; this can take seconds.
@@ -79,57 +73,22 @@ impl Pipeline {
     }
 }
 
-/// Most kernels that are kept for those who may want them again: those of some four scenes. Each is a megabyte
-/// or so where software runs it.
-const MAX_KEPT_KERNELS: usize = 32;
-
-/// Kernels that were compiled.
-#[derive(Default)]
-pub(super) struct Pipelines {
-    /// The last one used at the end.
-    kept: Vec<Arc<Pipeline>>,
-    #[cfg(feature = "window")]
-    pub(super) ahead: super::background_compile::Ahead,
-}
-
-impl Pipelines {
-    /// The kernel of this source, if there is one.
-    pub(super) fn find(&mut self, source: &str) -> Option<Arc<Pipeline>> {
-        let at = self.kept.iter().position(|pipeline| pipeline.program.source == source)?;
-        let found = self.kept.remove(at);
-        self.kept.push(Arc::clone(&found));
-        Some(found)
-    }
-
-    /// Keeps another one in the place of that which nobody has asked for the longest.
-    fn keep(&mut self, pipeline: Arc<Pipeline>) {
-        // Two may have compiled it at the same time.
-        if self.find(&pipeline.program.source).is_some() {
-            return;
-        }
-        if self.kept.len() == MAX_KEPT_KERNELS {
-            self.kept.remove(0);
-        }
-        self.kept.push(pipeline);
-    }
-}
-
 /// Kernels to be compiled.
 pub(super) type Programs = Vec<(Kernel, Program)>;
 
 impl Gpu {
-    pub(super) fn known_pipelines(&self) -> MutexGuard<'_, Pipelines> {
-        self.pipelines.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(super) fn kernel_cache(&self) -> MutexGuard<'_, KernelCache> {
+        self.kernels.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// A kernel, compiled unless this device ran it lately.
     fn pipeline(&self, kernel: Kernel, program: Program) -> Result<Arc<Pipeline>> {
-        let known = self.known_pipelines().find(&program.source);
+        let known = self.kernel_cache().find(&program.source);
         if let Some(pipeline) = known {
             return Ok(pipeline);
         }
         let pipeline = Pipeline::new(self, kernel.name(), program)?;
-        self.known_pipelines().keep(Arc::clone(&pipeline));
+        self.kernel_cache().keep(Arc::clone(&pipeline));
         Ok(pipeline)
     }
 
@@ -180,6 +139,7 @@ fn binding_type(binding: &Binding) -> wgpu::BindingType {
 
 #[cfg(test)]
 mod tests {
+    use super::super::kernel_cache::MAX_KEPT_KERNELS;
     use super::*;
 
     #[test]

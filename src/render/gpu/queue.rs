@@ -11,7 +11,7 @@ use super::features::Features;
 use super::flight::{Job, REPORT_BYTES};
 use super::kernel::Kernel;
 use super::layout::Work;
-use super::shader::SlotTexels;
+use super::texels::SlotTexels;
 use super::{GROUP, Progress, Renderer};
 use crate::error::Result;
 use crate::render::gpu_facts::Schedule;

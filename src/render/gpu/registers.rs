@@ -14,9 +14,8 @@ use ash::vk;
 
 use super::features::{Features, ViewFeatures};
 use super::kernel::Kernel;
-use super::shader::{
-    ARRAYS, ArrayPlaces, Binding, Constants, Program, SHARED_STACK_SIZE, VertexTexels,
-};
+use super::shader::{ARRAYS, ArrayPlaces, Binding, Constants, Program, SHARED_STACK_SIZE};
+use super::texels::VertexTexels;
 use crate::path::World;
 use crate::scene::builtin;
 

@@ -8,7 +8,8 @@ use super::super::cast::CastRay;
 use super::super::features::Features;
 use super::super::kernel::Kernel;
 use super::super::layout::{Globals, Material, TextureRef, Work};
-use super::super::shader::{ArrayPlaces, Constants, Program, VertexTexels};
+use super::super::shader::{ArrayPlaces, Constants, Program};
+use super::super::texels::VertexTexels;
 
 /// A struct's fields in bytes: name, offset, size.
 type Fields = Vec<(&'static str, usize, usize)>;

@@ -26,8 +26,9 @@ use std::collections::BTreeSet;
 
 use super::features::Features;
 use super::kernel::Kernel;
-use super::pipeline::Pipeline;
-use super::shader::{ArrayPlaces, Binding, Constants, Program, VertexTexels};
+use super::kernel_cache::Pipeline;
+use super::shader::{ArrayPlaces, Binding, Constants, Program};
+use super::texels::VertexTexels;
 use super::{Gpu, Renderer, UploadedScene, Work};
 use fixture::Fixture;
 use twin::Twin;
