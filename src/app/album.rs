@@ -37,10 +37,8 @@ pub(super) struct Album {
     written: u32,
 }
 
-enum Job {
-    Write { file: PathBuf, pixels: Arc<Pixels>, texts: Vec<(String, String)>, small: Rgb8 },
-    Remove(PathBuf),
-}
+/// What is done to a file.
+type Job = Box<dyn FnOnce() -> Result<()> + Send>;
 
 impl Album {
     /// Begins to read a folder, which need not be there. `report` is told the newest that are in it, and
@@ -49,7 +47,7 @@ impl Album {
         folder: PathBuf,
         report: impl Fn(Result<Vec<KeptPicture>>) + Send + 'static,
     ) -> Result<Self> {
-        let (jobs, orders) = channel();
+        let (jobs, orders) = channel::<Job>();
         let place = folder.clone();
         let thread = std::thread::Builder::new()
             .name("kept pictures".to_owned())
@@ -60,7 +58,7 @@ impl Album {
                     report(Err(sentence));
                 }
                 for job in orders {
-                    if let Err(error) = carry_out(job) {
+                    if let Err(error) = job() {
                         report(Err(error));
                     }
                 }
@@ -90,19 +88,32 @@ impl Album {
         ];
         let texts = texts.map(|(key, text)| (key.to_owned(), text));
         let (pixels, small) = (Arc::clone(&kept.pixels), small.clone());
-        self.send(Job::Write { file: file.clone(), pixels, texts: texts.into(), small });
-        Ok(file)
+        let place = file.clone();
+        self.send(move || {
+            if let Some(folder) = file.parent() {
+                std::fs::create_dir_all(folder).map_err(|e| Error::at(folder, e))?;
+            }
+            let image = pixels.get().map_err(Error::new)?;
+            let (layers, preview) = (Vec::new(), Some(&small));
+            write_exr(&file, ExrPicture { image: &image, layers, metadata: &texts, preview })?;
+            pixels.leave_to(file);
+            Ok(())
+        });
+        Ok(place)
     }
 
     /// Removes a picture's file.
     pub(super) fn remove(&self, file: PathBuf) {
-        self.send(Job::Remove(file));
+        self.send(move || match std::fs::remove_file(&file) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::at(&file, e)),
+            _ => Ok(()),
+        });
     }
 
-    fn send(&self, job: Job) {
+    fn send(&self, job: impl FnOnce() -> Result<()> + Send + 'static) {
         if let Some(jobs) = &self.jobs {
             // The thread ends after this does.
-            let _ = jobs.send(job);
+            let _ = jobs.send(Box::new(job));
         }
     }
 }
@@ -115,30 +126,6 @@ impl Drop for Album {
             // A panic there was reported there.
             let _ = thread.join();
         }
-    }
-}
-
-fn carry_out(job: Job) -> Result<()> {
-    match job {
-        Job::Write { file, pixels, texts, small } => {
-            if let Some(folder) = file.parent() {
-                std::fs::create_dir_all(folder).map_err(|e| Error::at(folder, e))?;
-            }
-            let image = pixels.get().map_err(Error::new)?;
-            let picture = ExrPicture {
-                image: &image,
-                layers: Vec::new(),
-                metadata: &texts,
-                preview: Some(&small),
-            };
-            write_exr(&file, picture)?;
-            pixels.leave_to(file);
-            Ok(())
-        }
-        Job::Remove(file) => match std::fs::remove_file(&file) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::at(&file, e)),
-            _ => Ok(()),
-        },
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::document::{Document, Viewpoint};
-use super::loader::{Loaded, LoadedMap, LoadedScene, Loader};
+use super::loader::{Kind, Loaded, LoadedMap, LoadedScene, Loader};
 use super::surface_map;
 use super::worker::Reference;
 use crate::environment::Environment;
@@ -98,22 +98,15 @@ impl Assets {
         }
     }
 
-    /// Begins to read the scene's file again; whether there is one.
-    pub(super) fn read_scene_again(&mut self, document: &Document) -> bool {
-        let is_file = !sources::is_built_in_scene(&document.scene);
-        if is_file {
-            self.loader.load_scene(&document.scene);
+    /// Begins to read a file of the document again; whether there is one.
+    pub(super) fn read_again(&mut self, kind: Kind, document: &Document) -> bool {
+        let Document { scene, map, sun, .. } = document;
+        match kind {
+            Kind::Scene if !sources::is_built_in_scene(scene) => self.loader.load_scene(scene),
+            Kind::Map if !sources::is_built_in_map(map) => self.loader.load_map(map, *sun),
+            _ => return false,
         }
-        is_file
-    }
-
-    /// Begins to read the map's file again; whether there is one.
-    pub(super) fn read_map_again(&mut self, document: &Document) -> bool {
-        let is_file = !sources::is_built_in_map(&document.map);
-        if is_file {
-            self.loader.load_map(&document.map, document.sun);
-        }
-        is_file
+        true
     }
 
     /// The map as the document turns and scales it; made anew only when that changes.

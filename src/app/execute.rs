@@ -11,6 +11,7 @@ use super::commands::Command;
 use super::document::{Document, Viewpoint};
 use super::interface::{Chosen, Purpose, Tab};
 use super::kept_picture::SMALL_WIDTH;
+use super::loader::Kind;
 use super::screen::color_image;
 use super::settings_file::lasting_scene;
 use super::sync::stay_in_scene;
@@ -31,7 +32,7 @@ impl App {
         match command {
             Command::OpenScene(name) => self.open_scene(name),
             Command::OpenMap(name) if document.map == name => {
-                interface.paused &= !self.assets.read_map_again(document);
+                interface.paused &= !self.assets.read_again(Kind::Map, document);
             }
             Command::OpenMap(name) => {
                 // The old one is not to be looked at for ever.
@@ -39,9 +40,8 @@ impl App {
                 document.map = name;
             }
             Command::ReadAgain => {
-                let assets = &mut self.assets;
-                let is_read = [assets.read_scene_again(document), assets.read_map_again(document)];
-                interface.paused &= is_read == [false; 2];
+                let mut read = |kind| self.assets.read_again(kind, document);
+                interface.paused &= [read(Kind::Scene), read(Kind::Map)] == [false; 2];
             }
             Command::ChooseScene => self.ask(Purpose::Scene, String::new()),
             Command::ChooseMap => self.ask(Purpose::Map, String::new()),
@@ -176,7 +176,7 @@ impl App {
         if let Some(name) = shown {
             self.interface.paused = false;
             if document.scene == name {
-                self.assets.read_scene_again(document);
+                self.assets.read_again(Kind::Scene, document);
             } else {
                 // Another one was asked for, and is still being read.
                 stay_in_scene(&mut self.edited, &self.assets, &self.library);

@@ -250,8 +250,9 @@ impl Interface {
     /// Tells that something moves: for a moment small pictures are better than good ones.
     ///
     /// It lasts for some frames, so that it does not flicker where frames take long.
-    pub fn keep_moving(&mut self, now: f64, frame_seconds: f32) {
-        self.moving_until = now + f64::from((3.0 * frame_seconds).clamp(0.18, 1.0));
+    pub fn keep_moving(&mut self, context: &egui::Context) {
+        let frame_seconds = context.input(|input| input.unstable_dt);
+        self.moving_until = context.time() + f64::from((3.0 * frame_seconds).clamp(0.18, 1.0));
     }
 
     /// Looks at a material, whose settings come into sight, or at none.

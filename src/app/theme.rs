@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 
 use egui::emath::Numeric;
 use egui::{
-    Align2, Color32, CornerRadius, DragValue, FontId, Margin, Pos2, Rect, RichText, Shape, Slider,
-    SliderClamping, Stroke, SurrenderFocusOn, TextStyle, Ui, Vec2, Visuals,
+    Align2, Color32, CornerRadius, DragValue, FontId, Margin, Pos2, Rect, Response, RichText,
+    Shape, Slider, SliderClamping, Stroke, SurrenderFocusOn, TextStyle, Ui, Vec2, Visuals, Widget,
 };
 use glam::Vec3;
 
@@ -129,6 +129,11 @@ pub(super) fn row<R>(ui: &mut Ui, name: &str, hint: &str, add: impl FnOnce(&mut 
         add(ui)
     })
     .inner
+}
+
+/// One setting that a single widget sets.
+pub(super) fn set(ui: &mut Ui, name: &str, hint: &str, widget: impl Widget) -> Response {
+    row(ui, name, hint, |ui| ui.add(widget))
 }
 
 /// A slider from end to end of a range. What lies beyond or between its decimals stays until it is moved: a

@@ -138,7 +138,7 @@ fn travel(ui: &Ui, whole: Rect, response: &Response, steps: &[Step], scope: &mut
         context.request_repaint();
     }
     if moved {
-        scope.interface.keep_moving(context.time(), context.input(|i| i.unstable_dt));
+        scope.interface.keep_moving(context);
     }
 }
 

@@ -2,7 +2,8 @@
 //! shows the same.
 
 use egui::{
-    Button, Margin, Panel, Response, RichText, ScrollArea, SliderClamping, TextureHandle, Ui,
+    Button, Margin, Panel, Response, RichText, ScrollArea, Slider, SliderClamping, TextureHandle,
+    Ui,
 };
 
 use glam::Vec3;
@@ -169,33 +170,20 @@ fn cameras(
     });
     let Some(viewpoint) = &mut document.viewpoint else { return };
     if let Some(degrees) = &mut viewpoint.fov_y_degrees {
-        theme::row(ui, "Field of view", "Vertical angle", |ui| {
-            ui.add(theme::slider(degrees, 1.0..=170.0).suffix("°").max_decimals(1));
-        });
+        let slider = theme::slider(degrees, 1.0..=170.0).suffix("°").max_decimals(1);
+        theme::set(ui, "Field of view", "Vertical angle", slider);
     }
-    theme::row(
-        ui,
-        "Lens radius",
-        "Radius of the aperture: more blurs what is out of focus; 0 keeps everything sharp",
-        |ui| {
-            let mut millimetres = viewpoint.lens_radius * 1000.0;
-            let slider = theme::slider(&mut millimetres, 0.0..=100.0).logarithmic(true);
-            let slider = slider.smallest_positive(0.1).suffix(" mm").max_decimals(1);
-            if ui.add(slider).changed() {
-                viewpoint.lens_radius = millimetres / 1000.0;
-            }
-        },
-    );
+    let mut millimetres = viewpoint.lens_radius * 1000.0;
+    let slider = theme::slider(&mut millimetres, 0.0..=100.0).logarithmic(true);
+    let slider = slider.smallest_positive(0.1).suffix(" mm").max_decimals(1);
+    let hint = "More blurs what is out of focus; 0 keeps everything sharp";
+    if theme::set(ui, "Lens radius", hint, slider).changed() {
+        viewpoint.lens_radius = millimetres / 1000.0;
+    }
     if viewpoint.lens_radius > 0.0 {
-        theme::row(
-            ui,
-            "Focus at",
-            "Distance of what is sharp; Ctrl click in the picture sets it",
-            |ui| {
-                let slider = theme::slider(&mut viewpoint.focus_distance, 0.01..=1000.0);
-                ui.add(slider.logarithmic(true).suffix(" m"));
-            },
-        );
+        let slider = theme::slider(&mut viewpoint.focus_distance, 0.01..=1000.0);
+        let hint = "Distance of what is sharp; Ctrl click in the picture sets it";
+        theme::set(ui, "Focus at", hint, slider.logarithmic(true).suffix(" m"));
     }
 }
 
@@ -218,7 +206,7 @@ fn environment(
             let way: f32 = steps.iter().map(Step::right).sum();
             let degrees = way / response.rect.width() * 360.0;
             document.rotation_degrees = (document.rotation_degrees + degrees).rem_euclid(360.0);
-            interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
+            interface.keep_moving(ui.ctx());
         }
         response.on_hover_text(
             "Drag to turn the map. The middle of the picture is seen along +X, the left quarter \
@@ -247,25 +235,19 @@ fn environment(
             theme::bytes(map.environment.memory_bytes().table)
         ));
     }
-    theme::row(ui, "Rotation", "Rotates the map about the vertical axis", |ui| {
-        let degrees = &mut document.rotation_degrees;
-        let slider = theme::slider(degrees, 0.0..=360.0).suffix("°").max_decimals(1);
-        let response = ui.add(slider.clamping(SliderClamping::Never));
-        // Somebody may type -90.
-        if !(0.0..=360.0).contains(degrees) {
-            *degrees = degrees.rem_euclid(360.0);
-        }
-        if response.dragged() {
-            interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
-        }
-    });
-    theme::row(ui, "Intensity", "Brightness of the map", |ui| {
-        let slider = theme::slider(&mut document.intensity, 0.0..=10.0).logarithmic(true);
-        let slider = slider.smallest_positive(0.01).fixed_decimals(2).prefix("× ");
-        if ui.add(slider).dragged() {
-            interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
-        }
-    });
+    let degrees = &mut document.rotation_degrees;
+    let slider = theme::slider(degrees, 0.0..=360.0).suffix("°").max_decimals(1);
+    let slider = slider.clamping(SliderClamping::Never);
+    let hint = "Rotates the map about the vertical axis";
+    let is_turned = theme::set(ui, "Rotation", hint, slider).dragged();
+    // Somebody may type -90.
+    if !(0.0..=360.0).contains(degrees) {
+        *degrees = degrees.rem_euclid(360.0);
+    }
+    let slider = factor(&mut document.intensity);
+    if theme::set(ui, "Intensity", "Brightness of the map", slider).dragged() || is_turned {
+        interface.keep_moving(ui.ctx());
+    }
     sun(ui, &mut document.sun);
     background(ui, &mut document.background);
     if (document.rotation_degrees, document.intensity, document.sun) != (0.0, 1.0, 1.0) {
@@ -283,9 +265,7 @@ fn sun(ui: &mut Ui, sun: &mut f32) {
     theme::row(ui, "Sun", hint, |ui| {
         let id = ui.scope_id().with("sun");
         let mut value = ui.data(|data| data.get_temp(id)).unwrap_or(*sun);
-        let slider = theme::slider(&mut value, 0.0..=10.0).logarithmic(true);
-        let slider = slider.smallest_positive(0.01).fixed_decimals(2).prefix("× ");
-        let response = ui.add(slider);
+        let response = ui.add(factor(&mut value));
         if response.dragged() || response.has_focus() {
             ui.data_mut(|data| data.insert_temp(id, value));
         } else {
@@ -293,6 +273,12 @@ fn sun(ui: &mut Ui, sun: &mut f32) {
             *sun = value;
         }
     });
+}
+
+/// A slider for a factor on light.
+fn factor(value: &mut f32) -> Slider<'_> {
+    let slider = theme::slider(value, 0.0..=10.0).logarithmic(true);
+    slider.smallest_positive(0.01).fixed_decimals(2).prefix("× ")
 }
 
 /// What the camera sees of the map; surfaces are lit by it in any case.
@@ -305,32 +291,26 @@ fn background(ui: &mut Ui, background: &mut Background) {
     let is_same =
         |a: &Background, b: &Background| std::mem::discriminant(a) == std::mem::discriminant(b);
     let name = kinds.iter().find(|(kind, _)| is_same(kind, background)).map_or("", |(_, n)| n);
-    theme::row(
-        ui,
-        "Background",
-        "What the camera sees behind the scene, also through panes",
-        |ui| {
-            theme::choice(ui, "background").selected_text(name).show_ui(ui, |ui| {
-                for (kind, name) in kinds {
-                    if ui.selectable_label(is_same(&kind, background), name).clicked()
-                        && !is_same(&kind, background)
-                    {
-                        *background = kind;
-                    }
+    let hint = "What the camera sees behind the scene, also through panes";
+    theme::row(ui, "Background", hint, |ui| {
+        theme::choice(ui, "background").selected_text(name).show_ui(ui, |ui| {
+            for (kind, name) in kinds {
+                let is_chosen = is_same(&kind, background);
+                if ui.selectable_label(is_chosen, name).clicked() && !is_chosen {
+                    *background = kind;
                 }
-            });
-        },
-    );
+            }
+        });
+    });
     match background {
         Background::Map => {}
         Background::Blurred(radians) => {
-            theme::row(ui, "Blur", "Blur of the background", |ui| {
-                let mut degrees = radians.to_degrees();
-                let slider = theme::slider(&mut degrees, 0.1..=90.0).logarithmic(true).suffix("°");
-                if ui.add(slider.fixed_decimals(1)).changed() {
-                    *radians = degrees.to_radians();
-                }
-            });
+            let mut degrees = radians.to_degrees();
+            let slider = theme::slider(&mut degrees, 0.1..=90.0).logarithmic(true);
+            let slider = slider.suffix("°").fixed_decimals(1);
+            if theme::set(ui, "Blur", "Blur of the background", slider).changed() {
+                *radians = degrees.to_radians();
+            }
         }
         Background::Color(rgb) => {
             theme::row(ui, "Colour", "Background colour, linear", |ui| {
@@ -380,9 +360,8 @@ fn fog(ui: &mut Ui, fog: &mut Option<Medium>, own: Option<Medium>) {
         let hint = "Absorption coefficient, 1/m";
         theme::row(ui, "Absorption", hint, |ui| coefficient(ui, &mut edited.absorption));
         let hint = "Henyey-Greenstein g: -1 backward, 0 isotropic, 1 forward";
-        theme::row(ui, "Anisotropy", hint, |ui| {
-            ui.add(theme::slider(&mut edited.anisotropy, -0.95..=0.95).fixed_decimals(2));
-        });
+        let slider = theme::slider(&mut edited.anisotropy, -0.95..=0.95).fixed_decimals(2);
+        theme::set(ui, "Anisotropy", hint, slider);
     }
     ui.data_mut(|data| data.insert_temp(id, holds));
     if edited != now {

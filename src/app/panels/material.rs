@@ -50,7 +50,7 @@ pub(super) fn show(
         document.materials.insert(number, edit);
     }
     if edit != before {
-        interface.keep_moving(ui.ctx().time(), ui.input(|i| i.unstable_dt));
+        interface.keep_moving(ui.ctx());
     }
 }
 
@@ -63,18 +63,15 @@ fn change(ui: &mut Ui, edit: &mut MaterialEdit, material: &Material) {
         }
     });
     let of_texture = has(material.texture(TextureSlot::MetallicRoughness).is_some());
-    let share = |ui: &mut Ui, value: &mut Option<f32>, own: f32| {
+    let mut share = |name: &str, value: &mut Option<f32>, own: f32| {
         let mut now = value.unwrap_or(own);
-        if ui.add(theme::slider(&mut now, 0.0..=1.0).fixed_decimals(2)).changed() {
+        let slider = theme::slider(&mut now, 0.0..=1.0).fixed_decimals(2);
+        if theme::set(ui, name, of_texture, slider).changed() {
             *value = Some(now);
         }
     };
-    theme::row(ui, "Roughness", of_texture, |ui| {
-        share(ui, &mut edit.roughness, material.roughness);
-    });
-    theme::row(ui, "Metalness", of_texture, |ui| {
-        share(ui, &mut edit.metalness, material.metallic);
-    });
+    share("Roughness", &mut edit.roughness, material.roughness);
+    share("Metalness", &mut edit.metalness, material.metallic);
     ui.horizontal(|ui| {
         ui.checkbox(&mut edit.hidden, "Hide").on_hover_text("Invisible to the camera and to light");
         let text = RichText::new("Reset").size(12.0);

@@ -24,9 +24,8 @@ pub(in crate::app) fn show(ui: &mut Ui, interface: &mut Interface, shown: Option
     let Some(overlay) = interface.overlay else { return };
     ui.label(theme::quiet(overlay.description()));
     if !overlay.is_opaque() {
-        theme::row(ui, "Opacity", "", |ui| {
-            ui.add(theme::slider(&mut interface.overlay_opacity, 0.0..=1.0).fixed_decimals(2));
-        });
+        let slider = theme::slider(&mut interface.overlay_opacity, 0.0..=1.0).fixed_decimals(2);
+        theme::set(ui, "Opacity", "", slider);
     }
     let shown = shown.filter(|s| s.order.overlay == Some(overlay));
     let cache = shown.filter(|_| overlay.is_of_cache()).map(|s| &s.order.snapshot.cache);

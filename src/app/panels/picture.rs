@@ -21,17 +21,10 @@ pub(in crate::app) fn show(
     white_balance(ui, &mut document.look.white_balance);
     denoiser(ui, document);
     theme::section(ui, "LIGHT");
-    theme::row(ui, "Bounces", "Maximum number of bounces; 1 is direct light", |ui| {
-        ui.add(theme::slider(&mut document.light.bounces, 0..=32));
-    });
-    theme::row(
-        ui,
-        "Seed",
-        "Seed of the random numbers; the same one gives the same picture",
-        |ui| {
-            ui.add(theme::number(&mut document.light.seed, 0..=u32::MAX));
-        },
-    );
+    let bounces = theme::slider(&mut document.light.bounces, 0..=32);
+    theme::set(ui, "Bounces", "Maximum number of bounces; 1 is direct light", bounces);
+    let seed = theme::number(&mut document.light.seed, 0..=u32::MAX);
+    theme::set(ui, "Seed", "Of the random numbers; the same one gives the same picture", seed);
     theme::section(ui, "SIZE");
     size(ui, &mut document.size);
     region(ui, document.region.is_some(), commands);
@@ -69,14 +62,9 @@ fn denoiser(ui: &mut Ui, document: &mut Document) {
 
 fn exposure(ui: &mut Ui, document: &mut Document, exposure_ev: Option<f32>) {
     let look = &mut document.look;
-    theme::row(ui, "Exposure", "Stops (EV): +1 doubles the brightness", |ui| {
-        ui.add(
-            theme::slider(&mut look.exposure_ev, -8.0..=8.0)
-                .suffix(" EV")
-                .min_decimals(1)
-                .max_decimals(2),
-        );
-    });
+    let slider = theme::slider(&mut look.exposure_ev, -8.0..=8.0).suffix(" EV");
+    let slider = slider.min_decimals(1).max_decimals(2);
+    theme::set(ui, "Exposure", "Stops (EV): +1 doubles the brightness", slider);
     theme::row(ui, "", "", |ui| {
         ui.checkbox(&mut look.auto_exposure, "Automatic")
             .on_hover_text("Exposes for middle grey, then adds the stops above");
@@ -108,13 +96,11 @@ fn curve_name(curve: ToneCurve) -> &'static str {
 }
 
 fn white_balance(ui: &mut Ui, balance: &mut WhiteBalance) {
-    theme::row(ui, "White", "White balance: the colour temperature that looks white", |ui| {
-        let slider = theme::slider(&mut balance.kelvin, KELVIN).suffix(" K");
-        ui.add(slider.fixed_decimals(0).logarithmic(true));
-    });
-    theme::row(ui, "Tint", "Green to magenta", |ui| {
-        ui.add(theme::slider(&mut balance.tint, TINT).fixed_decimals(2));
-    });
+    let slider = theme::slider(&mut balance.kelvin, KELVIN).suffix(" K");
+    let slider = slider.fixed_decimals(0).logarithmic(true);
+    theme::set(ui, "White", "White balance: the colour temperature that looks white", slider);
+    let slider = theme::slider(&mut balance.tint, TINT).fixed_decimals(2);
+    theme::set(ui, "Tint", "Green to magenta", slider);
     let is_changed = *balance != WhiteBalance::default();
     if is_changed && ui.button(format!("Daylight, {DAYLIGHT_KELVIN:.0} K")).clicked() {
         *balance = WhiteBalance::default();
