@@ -188,11 +188,9 @@ impl App {
             panels::top::show(ui, document, &self.interface, undo, is_on_gpu, commands);
             let shown = self.display.shown.as_ref();
             let status = panels::status::Status {
-                snapshot: self.rendering.snapshot.as_deref(),
+                rendering: &self.rendering,
                 shown: shown.map(|shown| &*shown.order.snapshot),
                 loading: self.assets.loading().collect(),
-                threads: self.rendering.worker.threads(),
-                is_preparing: self.rendering.worker.is_preparing(),
                 overlay: self.interface.overlay,
                 magnification: self.interface.magnification(document.size),
                 pointed: self.interface.pointed.filter(|_| !self.is_repeatable),

@@ -72,13 +72,9 @@ impl Assets {
 
     /// What has been loaded since this was asked last and is still wanted.
     pub(super) fn take(&mut self, document: &Document) -> Vec<Loaded> {
-        let mut loaded = self.loader.take();
-        loaded.retain(|loaded| match loaded {
-            Loaded::Scene(name, _) => *name == document.scene,
-            Loaded::Map(name, _) => *name == document.map,
-            Loaded::Edited(..) => true,
-        });
-        loaded
+        let wanted = [&document.scene, &document.map];
+        let loaded = self.loader.take().into_iter().filter(|(name, _)| wanted.contains(&name));
+        loaded.map(|(_, loaded)| loaded).collect()
     }
 
     /// Begins to load what the document wants and is not there.

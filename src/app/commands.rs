@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use egui::{Event, Key, KeyboardShortcut, Modifiers};
 
 use super::document::Viewpoint;
+use super::interface::Purpose;
 
 /// Something asked for by a panel, a key or a dropped file; the application carries it out.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,12 +16,8 @@ pub enum Command {
     OpenMap(String),
     /// Read the files of scene and map again: another program may have written them.
     ReadAgain,
-    /// Ask for a scene file.
-    ChooseScene,
-    /// Ask for a map file.
-    ChooseMap,
-    /// Ask where to write the picture.
-    ChooseSave,
+    /// Ask for a path.
+    Ask(Purpose),
     /// Show where the method was published.
     ShowMethod,
     /// Write the picture.
@@ -71,12 +68,8 @@ pub enum Command {
     SetAsKept(usize),
     /// Compute the true visible energy at the inspected point.
     MeasureTruth,
-    /// Ask where to write the inspected cell's distribution.
-    ChooseExport,
     /// Write all distributions.
     Export(PathBuf),
-    /// Ask for a picture without noise.
-    ChooseReference,
     /// Measure errors against this picture.
     OpenReference(String),
     /// Measure no errors any more.
@@ -101,9 +94,9 @@ pub(crate) const SHORTCUTS: [(KeyboardShortcut, &str, Command); 21] = [
     (plain(Key::H), "Hide or show the panels", Command::TogglePanels),
     (plain(Key::F11), "Full screen on or off", Command::ToggleFullScreen),
     (plain(Key::F12), "Hide or show the developer's panel", Command::ToggleDeveloper),
-    (control(Key::S), "Save the picture", Command::ChooseSave),
-    (control(Key::O), "Open a scene", Command::ChooseScene),
-    (control(Key::M), "Open a map", Command::ChooseMap),
+    (control(Key::S), "Save the picture", Command::Ask(Purpose::Picture)),
+    (control(Key::O), "Open a scene", Command::Ask(Purpose::Scene)),
+    (control(Key::M), "Open a map", Command::Ask(Purpose::Map)),
     (plain(Key::F5), "Reload scene and map", Command::ReadAgain),
     (control(Key::Z), "Undo", Command::Undo),
     (control(Key::Y), "Redo", Command::Redo),
@@ -183,10 +176,9 @@ fn requested(event: &Event) -> Option<Command> {
     }
 }
 
-/// Whether an event asks for a question that has to be answered by typing.
+/// Whether an event opens a question that is answered by typing.
 pub(super) fn asks_for_path(event: &Event) -> bool {
-    let questions = [Command::ChooseScene, Command::ChooseMap, Command::ChooseSave];
-    requested(event).is_some_and(|command| questions.contains(&command))
+    matches!(requested(event), Some(Command::Ask(_)))
 }
 
 #[cfg(test)]

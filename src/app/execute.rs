@@ -43,16 +43,7 @@ impl App {
                 let mut read = |kind| self.assets.read_again(kind, document);
                 interface.paused &= [read(Kind::Scene), read(Kind::Map)] == [false; 2];
             }
-            Command::ChooseScene => self.ask(Purpose::Scene, String::new()),
-            Command::ChooseMap => self.ask(Purpose::Map, String::new()),
-            Command::ChooseSave => {
-                let file = self.library.suggested_file(&document.scene);
-                self.ask(Purpose::Picture, file);
-            }
-            Command::ChooseExport => {
-                self.ask(Purpose::Distributions, "distributions.csv".to_owned());
-            }
-            Command::ChooseReference => self.ask(Purpose::Reference, String::new()),
+            Command::Ask(purpose) => self.ask(purpose),
             Command::OpenReference(name) => {
                 self.tasks.run("reference", move || {
                     let image = read_picture(Path::new(&name))?;
@@ -132,7 +123,12 @@ impl App {
     }
 
     /// Asks for a path: by a prompt, and by the system's dialogue before it where there is one.
-    fn ask(&mut self, purpose: Purpose, path: String) {
+    fn ask(&mut self, purpose: Purpose) {
+        let path = match purpose {
+            Purpose::Picture => self.library.suggested_file(&self.edited.document.scene),
+            Purpose::Distributions => "distributions.csv".to_owned(),
+            _ => String::new(),
+        };
         self.interface.ask(purpose, path.clone());
         if !self.is_repeatable {
             self.desktop.ask(purpose, path, &self.library.settings, &self.tasks);

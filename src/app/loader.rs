@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use super::document::Document;
-use super::threads::{Wake, lock};
+use super::threads::{Wake, lock, spawn};
 use crate::environment::sun::{Sun, SunTexels, equal_energy_tiles};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::error::{Error, Notices, Result};
@@ -137,11 +137,11 @@ pub(crate) enum Kind {
 /// What loading came to.
 pub enum Loaded {
     /// A scene, or why not.
-    Scene(String, Result<LoadedScene>),
+    Scene(Result<LoadedScene>),
     /// The scene that is there with other materials, or why not.
-    Edited(String, Result<LoadedScene>),
+    Edited(Result<LoadedScene>),
     /// A map, or why not.
-    Map(String, Result<LoadedMap>),
+    Map(Result<LoadedMap>),
 }
 
 /// What is under way.
@@ -181,35 +181,26 @@ impl Loader {
 
     /// Starts to load a scene unless it is being loaded; a change to its materials is given up.
     pub fn load_scene(&mut self, name: &str) {
-        let options = self.options.clone();
-        self.spawn(Kind::Scene, name, false, move |name| {
-            Loaded::Scene(name.to_owned(), load_scene(name, &options))
-        });
+        let (own, options) = (name.to_owned(), self.options.clone());
+        self.spawn(Kind::Scene, name, false, move || Loaded::Scene(load_scene(&own, &options)));
     }
 
     /// Starts to change the materials of a scene that is there, unless something is being done to it.
     pub fn edit_scene(&mut self, scene: &LoadedScene, edits: &BTreeMap<u32, MaterialEdit>) {
-        let (scene, edits) = (scene.clone(), edits.clone());
-        let name = scene.name.clone();
-        self.spawn(Kind::Scene, &name, true, move |name| {
-            Loaded::Edited(name.to_owned(), scene.edited(edits))
-        });
+        let (own, edits) = (scene.clone(), edits.clone());
+        self.spawn(Kind::Scene, &scene.name, true, move || Loaded::Edited(own.edited(edits)));
     }
 
     /// Starts to load a map unless it is being loaded; a change to its sun is given up.
     pub fn load_map(&mut self, name: &str, sun_factor: f32) {
-        self.spawn(Kind::Map, name, false, move |name| {
-            Loaded::Map(name.to_owned(), LoadedMap::read(name, sun_factor))
-        });
+        let own = name.to_owned();
+        self.spawn(Kind::Map, name, false, move || Loaded::Map(LoadedMap::read(&own, sun_factor)));
     }
 
     /// Starts to change the sun of a map that is there, unless something is being done to it.
     pub fn edit_map(&mut self, map: &LoadedMap, sun_factor: f32) {
-        let map = map.clone();
-        let name = map.name.clone();
-        self.spawn(Kind::Map, &name, true, move |name| {
-            Loaded::Map(name.to_owned(), map.with_sun(sun_factor))
-        });
+        let own = map.clone();
+        self.spawn(Kind::Map, &map.name, true, move || Loaded::Map(own.with_sun(sun_factor)));
     }
 
     /// What is being loaded.
@@ -217,14 +208,13 @@ impl Loader {
         self.in_flight.iter().flatten().map(|in_flight| in_flight.name.as_str())
     }
 
-    /// What has been loaded since the last call; results nobody waits for any more are dropped.
-    pub fn take(&mut self) -> Vec<Loaded> {
+    /// What has been loaded since the last call, by name; results nobody waits for any more are dropped.
+    pub fn take(&mut self) -> Vec<(String, Loaded)> {
         let mut results = Vec::new();
         for (number, loaded) in self.receiver.try_iter() {
             let is_this = |in_flight: &mut InFlight| in_flight.number == number;
-            if self.in_flight.iter_mut().any(|slot| slot.take_if(is_this).is_some()) {
-                results.push(loaded);
-            }
+            let found = self.in_flight.iter_mut().find_map(|slot| slot.take_if(is_this));
+            results.extend(found.map(|in_flight| (in_flight.name, loaded)));
         }
         results
     }
@@ -234,7 +224,7 @@ impl Loader {
         kind: Kind,
         name: &str,
         is_edit: bool,
-        load: impl FnOnce(&str) -> Loaded + Send + 'static,
+        load: impl FnOnce() -> Loaded + Send + 'static,
     ) {
         let in_flight = &mut self.in_flight[kind as usize];
         if in_flight.as_ref().is_some_and(|it| it.name == name && (is_edit || !it.is_edit)) {
@@ -246,13 +236,13 @@ impl Loader {
         let (sender, wake) = (self.sender.clone(), self.wake.clone());
         let turn = Arc::clone(&self.turns[kind as usize]);
         let name = name.to_owned();
-        let thread = std::thread::Builder::new().name("load".to_owned()).spawn(move || {
+        let thread = spawn("load", move || {
             let _turn = lock(&turn);
             // A panic must not leave the window waiting for ever.
             let failed = || Error::at(&name, "cannot be read: the program failed at it");
-            let loaded = catch_panic(|| load(&name)).unwrap_or_else(|| match kind {
-                Kind::Scene => Loaded::Scene(name.clone(), Err(failed())),
-                Kind::Map => Loaded::Map(name.clone(), Err(failed())),
+            let loaded = catch_panic(load).unwrap_or_else(|| match kind {
+                Kind::Scene => Loaded::Scene(Err(failed())),
+                Kind::Map => Loaded::Map(Err(failed())),
             });
             // The window may have gone meanwhile.
             let _ = sender.send((number, loaded));

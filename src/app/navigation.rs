@@ -42,7 +42,7 @@ impl Viewpoint {
     /// Turns about the pivot: `drag` in points, right and down.
     pub(super) fn orbit(&mut self, drag: Vec2) {
         let pivot = self.pivot();
-        self.turn(drag);
+        self.look_around(drag);
         self.eye = (pivot - self.forward() * self.pivot_distance).to_array();
     }
 
@@ -67,10 +67,6 @@ impl Viewpoint {
 
     /// Turns about the eye: `drag` in points, right and down.
     pub(super) fn look_around(&mut self, drag: Vec2) {
-        self.turn(drag);
-    }
-
-    fn turn(&mut self, drag: Vec2) {
         let rotation = self.rotation();
         let yaw = Quat::from_rotation_y(-drag.x * RADIANS_PER_POINT);
         let right = rotation * Vec3::X;

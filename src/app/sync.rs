@@ -23,20 +23,20 @@ impl App {
     pub(super) fn collect(&mut self, context: &egui::Context) {
         for loaded in self.assets.take(&self.edited.document) {
             match loaded {
-                Loaded::Scene(_, Ok(scene)) => self.take_scene(scene),
-                Loaded::Scene(_, Err(error)) => self.refuse_scene(&error),
-                Loaded::Edited(_, Ok(scene)) => {
+                Loaded::Scene(Ok(scene)) => self.take_scene(scene),
+                Loaded::Scene(Err(error)) => self.refuse_scene(&error),
+                Loaded::Edited(Ok(scene)) => {
                     self.assets.scene = Some(scene);
                     self.rendering.inspector.forget();
                 }
-                Loaded::Edited(_, Err(error)) => {
+                Loaded::Edited(Err(error)) => {
                     self.messages.error(error.to_string());
                     let edits = self.assets.scene.as_ref().map(|scene| scene.edits.clone());
                     let edits = edits.unwrap_or_default();
                     self.edited.put_back(|document| document.materials = edits);
                 }
-                Loaded::Map(_, Ok(map)) => self.take_map(map),
-                Loaded::Map(_, Err(error)) => self.refuse_map(&error),
+                Loaded::Map(Ok(map)) => self.take_map(map),
+                Loaded::Map(Err(error)) => self.refuse_map(&error),
             }
         }
         while let Some(result) = self.tasks.next_result() {

@@ -7,6 +7,7 @@ use egui_plot::{Corner, GridMark, Legend, Line, LineStyle, Plot, PlotPoints};
 
 use crate::app::commands::Command;
 use crate::app::convergence::{Convergence, Run};
+use crate::app::interface::Purpose;
 use crate::app::theme;
 use crate::app::worker::{Point, Reference};
 
@@ -28,7 +29,7 @@ pub(in crate::app) fn show(
         ui.label(theme::quiet("Earlier runs are dim"));
         let hint = "A picture of this view without noise; the true error is plotted, too";
         if ui.button("Reference…").on_hover_text(hint).clicked() {
-            commands.push(Command::ChooseReference);
+            commands.push(Command::Ask(Purpose::Reference));
         }
         if let Some((reference, is_of_view)) = reference {
             if ui.button("Remove").on_hover_text(&reference.name).clicked() {

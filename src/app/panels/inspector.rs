@@ -5,7 +5,7 @@ use egui::{Color32, Grid, Rect, Response, RichText, Stroke, StrokeKind, Ui, Vec2
 use super::{color_bar, map_view, overlay};
 use crate::app::commands::Command;
 use crate::app::inspect::{Inspected, Inspector};
-use crate::app::interface::{Interface, TileView};
+use crate::app::interface::{Interface, Purpose, TileView};
 use crate::app::loader::LoadedMap;
 use crate::app::overlays::{length, palette};
 use crate::app::theme;
@@ -72,7 +72,7 @@ pub(in crate::app) fn show(
         let hint =
             "All distributions as .csv, .json or .exr (one row a distribution, one column a tile)";
         if ui.button("Export distributions…").on_hover_text(hint).clicked() {
-            commands.push(Command::ChooseExport);
+            commands.push(Command::Ask(Purpose::Distributions));
         }
     }
 }

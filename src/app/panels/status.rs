@@ -3,27 +3,24 @@
 use egui::{Align, Color32, Layout, Margin, Panel, RichText, Ui};
 
 use crate::app::overlays::{Overlay, value_text};
+use crate::app::rendering::Rendering;
 use crate::app::theme;
 use crate::app::worker::{Activity, Origin, Snapshot};
 
 /// What the line is drawn from.
 pub(in crate::app) struct Status<'a> {
-    /// The latest picture.
-    pub(in crate::app) snapshot: Option<&'a Snapshot>,
+    /// The worker and its latest picture.
+    pub(in crate::app) rendering: &'a Rendering,
     /// That of the picture on the screen.
     pub(in crate::app) shown: Option<&'a Snapshot>,
     /// Files being loaded.
     pub(in crate::app) loading: Vec<&'a str>,
-    /// Whether a GPU is being made ready.
-    pub(in crate::app) is_preparing: bool,
     /// What is drawn over it.
     pub(in crate::app) overlay: Option<Overlay>,
     /// Pixels of the screen for one of the picture, where it is magnified.
     pub(in crate::app) magnification: Option<f32>,
     /// Place of the picture under the pointer, both coordinates in `[0,1]`.
     pub(in crate::app) pointed: Option<glam::Vec2>,
-    /// Render threads.
-    pub(in crate::app) threads: usize,
     /// Figures that depend on the clock are left out.
     pub(in crate::app) hides_clock: bool,
 }
@@ -40,7 +37,7 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
             ui.spacing_mut().item_spacing.x = 18.0;
             // What is at the right comes first, and what then has no room ends there.
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                if let Some(snapshot) = status.snapshot {
+                if let Some(snapshot) = &status.rendering.snapshot {
                     let pointed = status.pointed.zip(status.shown);
                     // Where there is room for one, what is pointed at comes first.
                     if pointed.is_none() || !theme::is_narrow(ui) {
@@ -53,7 +50,7 @@ pub(in crate::app) fn show(ui: &mut Ui, status: &Status<'_>) {
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     ui.shrink_clip_rect(ui.max_rect());
                     phase(ui, status);
-                    if let Some(snapshot) = status.snapshot {
+                    if let Some(snapshot) = &status.rendering.snapshot {
                         figures(ui, snapshot, status.hides_clock);
                     }
                 });
@@ -68,12 +65,12 @@ fn phase(ui: &mut Ui, status: &Status<'_>) {
         ui.label(RichText::new(text).color(theme::ACCENT)).on_hover_text(*name);
         return;
     }
-    if status.is_preparing {
+    if status.rendering.worker.is_preparing() {
         ui.label(RichText::new("Preparing the GPU…").color(theme::ACCENT)).on_hover_text(
             "Uploading the scene and compiling kernels takes some seconds; the CPU renders meanwhile",
         );
     }
-    let Some(snapshot) = status.snapshot else {
+    let Some(snapshot) = &status.rendering.snapshot else {
         ui.label(RichText::new("Starting").color(theme::ACCENT));
         return;
     };
@@ -209,7 +206,7 @@ fn size(snapshot: &Snapshot) -> [u32; 2] {
 }
 
 fn device(ui: &mut Ui, snapshot: &Snapshot, status: &Status<'_>) {
-    let threads = status.threads;
+    let threads = status.rendering.worker.threads();
     let [width, height] = size(snapshot);
     let (name, hint) = match &snapshot.main.gpu {
         Some(gpu) => {

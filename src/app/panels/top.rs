@@ -4,7 +4,7 @@ use egui::{Align, Layout, Margin, Panel, Ui};
 
 use crate::app::commands::Command;
 use crate::app::document::Document;
-use crate::app::interface::{Interface, Tab};
+use crate::app::interface::{Interface, Purpose, Tab};
 use crate::app::theme;
 use crate::app::undo::Undo;
 use crate::render::gpu::DeviceChoice;
@@ -81,12 +81,12 @@ fn files(ui: &mut Ui, commands: &mut Vec<Command>) {
     let is_narrow = theme::is_narrow(ui);
     let scene = if is_narrow { "Scene…" } else { "Open scene…" };
     let hint = "A glTF file (Ctrl O); files can be dropped onto the window, too";
-    button(ui, (scene, hint), commands, Command::ChooseScene);
+    button(ui, (scene, hint), commands, Command::Ask(Purpose::Scene));
     let map = if is_narrow { "Map…" } else { "Open map…" };
     let hint = "A lat-long HDR map (Ctrl M); files can be dropped onto the window, too";
-    button(ui, (map, hint), commands, Command::ChooseMap);
+    button(ui, (map, hint), commands, Command::Ask(Purpose::Map));
     let hint = "Save the picture as .png or .exr (Ctrl S)";
-    button(ui, ("Save…", hint), commands, Command::ChooseSave);
+    button(ui, ("Save…", hint), commands, Command::Ask(Purpose::Picture));
 }
 
 fn copy(ui: &mut Ui, commands: &mut Vec<Command>) {
