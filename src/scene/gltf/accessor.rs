@@ -6,8 +6,8 @@ use gltf::json;
 use json::accessor::{ComponentType, Type};
 use json::validation::{Checked, USize64};
 
-use super::Fallible;
 use super::buffers::File;
+use super::limits::Fallible;
 
 /// The elements of one accessor. All reads are in bounds once this is built, and nothing is
 /// allocated but the indices of sparse accessors.

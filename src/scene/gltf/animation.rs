@@ -10,9 +10,9 @@ use json::validation::Checked;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::Fallible;
 use super::accessor::Elements;
 use super::buffers::File;
+use super::limits::Fallible;
 use super::pose::{Nodes, local_transform, own_mirror};
 use crate::scene::camera_path::{CameraPath, Interpolation, Link, Track};
 

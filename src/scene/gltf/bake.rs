@@ -2,9 +2,9 @@
 
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 
+use super::limits::{Fallible, MAX_TRIANGLES, check_count, check_growth};
 use super::part::{Part, Tally};
 use super::tangents::NO_TANGENT;
-use super::{Fallible, MAX_TRIANGLES, check_count, check_growth};
 use crate::scene::{Placing, Scene};
 
 /// Appends a part once for each instance. Memory is reserved only after the limits are checked.

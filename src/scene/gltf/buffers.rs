@@ -10,8 +10,8 @@ use gltf::json::{self, Index};
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
-use super::Fallible;
 use super::document::Document;
+use super::limits::Fallible;
 use super::meshopt::Packed;
 use super::objects::not_gltf;
 use super::uri::{self, Folder, Place};

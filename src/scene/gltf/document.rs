@@ -4,9 +4,9 @@ use gltf::json;
 use json::extensions::scene::khr_lights_punctual::Light;
 use serde::Deserialize;
 
+use super::limits::Fallible;
 use super::objects::{Objects, members, not_gltf, read};
-use super::variants::{self, Variant};
-use super::{Fallible, extensions, lenient};
+use super::{extensions, lenient};
 use crate::error::Notices;
 use crate::memory;
 
@@ -57,7 +57,8 @@ pub(super) struct Document<'a> {
     pub(super) scenes: Objects<'a, json::Scene>,
     pub(super) skins: Objects<'a, json::Skin>,
     pub(super) textures: Objects<'a, json::Texture>,
-    pub(super) variants: Objects<'a, Variant>,
+    /// The text of the extensions of the whole file.
+    pub(super) extensions: &'a str,
 }
 
 #[derive(Deserialize)]
@@ -73,19 +74,16 @@ impl<'a> Document<'a> {
         if text.len() > u32::MAX as usize {
             return Err("its JSON has more than 4 GiB".into());
         }
-        let values = lenient::check_indices(text)?;
+        let values = lenient::check_indices(text, extensions::SUPPORTED)?;
         memory::check(values.saturating_mul(BYTES_OF_OBJECT))?;
         let found = members(text, MEMBERS)?;
         let of = |name: &str| MEMBERS.iter().position(|it| *it == name).and_then(|at| found[at]);
         check_version(of("asset"))?;
         let names = |list| Objects::new(of(list), "extension");
         extensions::check(&names("extensionsUsed")?, &names("extensionsRequired")?, notices)?;
-        let [lights, variants] = members(
-            of("extensions").unwrap_or("{}"),
-            ["KHR_lights_punctual", variants::EXTENSION],
-        )?;
+        let extensions = of("extensions").unwrap_or("{}");
+        let [lights] = members(extensions, ["KHR_lights_punctual"])?;
         let [lights] = members(lights.unwrap_or("{}"), ["lights"])?;
-        let [variants] = members(variants.unwrap_or("{}"), ["variants"])?;
         if of("animations").is_some() {
             notices.add("the file has animations: cameras alone follow theirs, in --frames; all else is at rest");
         }
@@ -106,7 +104,7 @@ impl<'a> Document<'a> {
             scenes: Objects::new(of("scenes"), "scene")?,
             skins: Objects::new(of("skins"), "skin")?,
             textures: Objects::new(of("textures"), "texture")?,
-            variants: Objects::new(variants, "variant")?,
+            extensions,
         })
     }
 }

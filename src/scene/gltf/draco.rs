@@ -13,7 +13,7 @@ use serde::Deserialize;
 
 use super::accessor::Elements;
 use super::buffers::File;
-use super::{Fallible, MAX_TRIANGLES, check_count};
+use super::limits::{Fallible, MAX_TRIANGLES, check_count};
 use crate::image::catch_panic;
 use crate::memory;
 

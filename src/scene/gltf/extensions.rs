@@ -1,6 +1,6 @@
 //! Which extensions are honoured, and what is said about the others.
 
-use super::Fallible;
+use super::limits::Fallible;
 use super::objects::Objects;
 use crate::error::Notices;
 

@@ -4,9 +4,10 @@ use glam::Affine2;
 use gltf::json;
 
 use super::buffers::File;
+use super::limits::Fallible;
 use super::part::{Part, Tally};
 use super::primitive::{Source, Target};
-use super::{Fallible, tangents};
+use super::tangents;
 use crate::scene::{Material, TextureRef, TextureSlot};
 
 /// What a material reads of its vertices.

@@ -7,8 +7,7 @@ use std::fmt;
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::Value;
 
-use super::Fallible;
-use super::extensions::SUPPORTED;
+use super::limits::Fallible;
 
 /// Keys whose whole numbers say which object of the file is meant.
 const INDICES: &[&str] = &[
@@ -37,11 +36,11 @@ const INDICES: &[&str] = &[
 ];
 
 /// Refuses text that is no JSON, and indices of more than 32 bits: the types would cut them to others.
-/// Nothing is kept of the text; returns how many values are in it.
-pub(super) fn check_indices(text: &str) -> Fallible<u64> {
+/// Of extensions only those that are `read` count. Nothing is kept of the text; returns how many values are in it.
+pub(super) fn check_indices(text: &str, read: &[&str]) -> Fallible<u64> {
     let mut reader = serde_json::Deserializer::from_str(text);
     let values = Cell::new(0);
-    Check { is_index: false, of_objects: false, of_extensions: false, values: &values }
+    Check { is_index: false, of_objects: false, of_extensions: false, read, values: &values }
         .deserialize(&mut reader)
         .and_then(|()| reader.end())
         .map(|()| values.get())
@@ -59,6 +58,8 @@ struct Check<'c> {
     of_objects: bool,
     /// Whether it has extensions, of which those that are not read may hold anything.
     of_extensions: bool,
+    /// Names of those that are read.
+    read: &'c [&'c str],
     /// Counts them.
     values: &'c Cell<u64>,
 }
@@ -116,7 +117,7 @@ impl<'de> Visitor<'de> for Check<'_> {
 
     fn visit_map<A: MapAccess<'de>>(self, mut object: A) -> Result<(), A::Error> {
         while let Some(key) = object.next_key::<Cow<'de, str>>()? {
-            if key == "extras" || (self.of_extensions && !SUPPORTED.contains(&&*key)) {
+            if key == "extras" || (self.of_extensions && !self.read.contains(&&*key)) {
                 object.next_value::<IgnoredAny>()?;
             } else {
                 let is_index = self.of_objects || INDICES.contains(&&*key);
@@ -156,7 +157,8 @@ mod tests {
 
     #[test]
     fn indices_have_32_bits_and_other_numbers_what_they_want() {
-        let check = |value: Value| check_indices(&value.to_string()).map(|_| ());
+        let check =
+            |value: Value| check_indices(&value.to_string(), &["KHR_lights_punctual"]).map(|_| ());
         let large = 1_u64 << 32;
         assert_eq!(
             check(json!({"nodes": [{"translation": [large, 0, 0], "children": [1]}]})),
@@ -173,8 +175,8 @@ mod tests {
         ] {
             assert!(check(wrong.clone()).unwrap_err().contains("more than 32 bits"), "{wrong}");
         }
-        assert_eq!(check_indices(r#"{"a": [1, {"b": "c"}], "extras": [1, 2]}"#), Ok(5));
-        assert!(check_indices("{} {}").unwrap_err().contains("valid glTF JSON"));
+        assert_eq!(check_indices(r#"{"a": [1, {"b": "c"}], "extras": [1, 2]}"#, &[]), Ok(5));
+        assert!(check_indices("{} {}", &[]).unwrap_err().contains("valid glTF JSON"));
     }
 
     #[test]

@@ -8,9 +8,9 @@ use json::extensions::texture::TextureTransform;
 use json::validation::Checked;
 use serde_json::{Map, Value};
 
-use super::Fallible;
 use super::buffers::File;
 use super::document::Document;
+use super::limits::Fallible;
 use super::medium;
 use super::textures::{Decoded, Wanted};
 use crate::error::Notices;

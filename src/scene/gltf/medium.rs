@@ -14,8 +14,8 @@ use glam::{DVec3, Vec3};
 use gltf::json;
 use serde_json::{Map, Value};
 
-use super::Fallible;
 use super::document::Document;
+use super::limits::Fallible;
 use super::pose::{EXTRAS, Nodes, Tops};
 use crate::error::Notices;
 use crate::scene::Medium;

@@ -2,49 +2,16 @@
 
 #[cfg_attr(not(feature = "meshopt"), path = "meshopt/absent.rs")]
 mod codec;
+mod packed;
 
 use gltf::json;
-use serde::Deserialize;
+use serde::Deserialize as _;
 use serde_json::Value;
 
-use super::Fallible;
+use super::limits::Fallible;
 use crate::memory;
-
-/// What the extension says of a buffer view.
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub(super) struct Packed {
-    /// Where the packed bytes are.
-    pub(super) buffer: usize,
-    #[serde(default)]
-    pub(super) byte_offset: u64,
-    pub(super) byte_length: u64,
-    byte_stride: usize,
-    count: u64,
-    mode: Mode,
-    #[serde(default)]
-    filter: Filter,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "UPPERCASE")]
-enum Mode {
-    Attributes,
-    Triangles,
-    Indices,
-}
-
-/// What is to be done with attributes afterwards.
-#[derive(Clone, Copy, Default, Deserialize, PartialEq)]
-#[serde(rename_all = "UPPERCASE")]
-enum Filter {
-    #[default]
-    None,
-    Octahedral,
-    Quaternion,
-    Exponential,
-    Color,
-}
+pub(super) use packed::Packed;
+use packed::{Filter, Mode};
 
 /// More bytes than the codec makes of one: a block of 256 bytes can take a quarter of one.
 const MAX_BYTE_VALUES: u64 = 1100;

@@ -5,9 +5,9 @@
 //! backed by data. What cannot be rendered is left out with a notice; what makes the geometry
 //! meaningless is an error.
 //!
-//! `document`, `objects` and `lenient` parse, `buffers`, `uri` and `accessor` give access to the data, `meshopt` and `draco`
-//! unpack them, `pose` places nodes
-//! and joints, `animation` moves cameras, `materials`, `variants`, `textures` and `medium` read the look, `primitive`, `geometry` and `tangents` read
+//! `document`, `objects` and `lenient` parse, `limits` says what is too much, `buffers`, `uri` and `accessor` give access to the data, `meshopt` and `draco`
+//! unpack them, `pose` and `placement` place nodes,
+//! joints and meshes, `animation` moves cameras, `materials`, `variants`, `textures` and `medium` read the look, `primitive`, `geometry` and `tangents` read
 //! triangles,
 //! `sheets` finds surfaces of bodies that enclose nothing,
 //! `share` says which are held once for all their instances, `bake` puts the others into the world.
@@ -21,12 +21,14 @@ mod draco;
 mod extensions;
 mod geometry;
 mod lenient;
+mod limits;
 mod materials;
 mod medium;
 mod meshopt;
 mod newer;
 mod objects;
 mod part;
+mod placement;
 mod pose;
 mod primitive;
 mod share;
@@ -45,46 +47,21 @@ use gltf::json;
 
 use crate::error::{Error, Notices, Result};
 use crate::image::{IS_A_FILM, looks_like_film, looks_like_picture, read_file};
-use crate::memory;
-use crate::scene::copies::{copies, hash_of};
 use crate::scene::needs::is_emitter;
 use crate::scene::{Outlines, Scene, SceneOptions};
 
 use buffers::File;
 use document::Document;
 use geometry::Needs;
+use limits::{Fallible, MAX_TRIANGLES, check_count, check_growth};
 use materials::Materials;
 use part::{Part, Tally};
-use pose::{MESH, Nodes};
+use placement::{Placement, drop_copies, placements};
+use pose::Nodes;
 use primitive::Mesh;
 use share::Sharing;
 use uri::Folder;
 use variants::Look;
-
-/// Most triangles a scene may hold, baked instances counted one by one.
-const MAX_TRIANGLES: u64 = 200_000_000;
-
-/// Refuses more than so many of something.
-fn check_count(count: u64, most: u64, there_are: &str, what: &str) -> Fallible<()> {
-    match count > most {
-        true => Err(format!("{there_are} more than {} million {what}", most / 1_000_000)),
-        false => Ok(()),
-    }
-}
-
-/// Memory is asked for so much at once: in steps, so that many small things do not each ask for it.
-const STEP: u64 = 1 << 26;
-
-/// Whether there is memory for so many more bytes of what grows bit by bit.
-fn check_growth(present: u64, added: u64) -> Fallible<()> {
-    match present / STEP == present.saturating_add(added) / STEP {
-        true => Ok(()),
-        false => memory::check(added.max(STEP)),
-    }
-}
-
-/// A result whose error is the cause alone; the file's name is put before it in one place.
-type Fallible<T> = std::result::Result<T, String>;
 
 /// Loads a `.gltf` or `.glb` file; relative URIs in it are files beside it.
 ///
@@ -201,72 +178,6 @@ fn leave_out(scene: &mut Scene, options: &SceneOptions, notices: &mut Notices) -
     }
     scene.remove_triangles_of(&hulls);
     scene.check_shown()
-}
-
-/// A node that shows a mesh.
-struct Placement {
-    skin: Option<json::Index<json::Skin>>,
-    /// Of morph targets, if the mesh's own do not hold.
-    weights: Option<Vec<f32>>,
-    /// World from mesh, one for each instance.
-    instances: Vec<DAffine3>,
-}
-
-/// The shown nodes with meshes, by mesh, so that each mesh is read once.
-fn placements(file: &File<'_>, nodes: &Nodes) -> Fallible<BTreeMap<u32, Vec<Placement>>> {
-    let mut placements: BTreeMap<u32, Vec<Placement>> = BTreeMap::new();
-    let mut shown = 0;
-    for number in nodes.showing(MESH) {
-        let node = file.document.nodes.get(number)?;
-        let Some(mesh) = node.mesh else { continue };
-        file.document.meshes.text(mesh)?;
-        let world = nodes.world(number);
-        let instances = pose::instances(file, &node)
-            .map_err(|cause| format!("node {number}: {cause}"))?
-            .map_or_else(|| vec![world], |all| all.iter().map(|&one| world * one).collect());
-        shown += instances.len() as u64;
-        check_count(shown, MAX_TRIANGLES, "there are", "instances")?;
-        let placement = Placement { skin: node.skin, weights: node.weights, instances };
-        placements.entry(mesh.value() as u32).or_default().push(placement);
-    }
-    Ok(placements)
-}
-
-/// Leaves out instances of a mesh in the place of another one, as after a doubled import; how many there were.
-fn drop_copies(placements: &mut BTreeMap<u32, Vec<Placement>>) -> usize {
-    let mut dropped = 0;
-    for placements in placements.values_mut() {
-        let numbers = |(number, placement): (usize, &Placement)| {
-            (0..placement.instances.len()).map(move |instance| (number, instance))
-        };
-        let all: Vec<_> = placements.iter().enumerate().flat_map(numbers).collect();
-        let place = |at: usize| {
-            let (placement, instance) = all[at];
-            let cells = placements[placement].instances[instance].to_cols_array();
-            cells.map(|cell| (cell + 0.0).to_bits())
-        };
-        // What has a skin has a shape of its own.
-        let is_copy = |first: usize, second: usize| {
-            let [first_of, second_of] = [first, second].map(|at| &placements[all[at].0]);
-            place(first) == place(second)
-                && first_of.skin.is_none()
-                && second_of.skin.is_none()
-                && first_of.weights == second_of.weights
-        };
-        let copies = copies(all.len(), |at| hash_of(place(at)), is_copy);
-        if copies.is_empty() {
-            continue;
-        }
-        dropped += copies.len();
-        let mut keep = vec![true; all.len()];
-        copies.into_iter().for_each(|copy| keep[copy] = false);
-        let mut keep = keep.into_iter();
-        for placement in placements.iter_mut() {
-            placement.instances.retain(|_| keep.next().unwrap_or(true));
-        }
-        placements.retain(|placement| !placement.instances.is_empty());
-    }
-    dropped
 }
 
 /// Numbers of the materials that are shown; `None` is the default one.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde_json::{Map, Value};
 
-use super::Fallible;
+use super::limits::Fallible;
 use super::materials::{Reader, number, texture};
 use crate::scene::{Material, TextureSlot as Slot};
 

@@ -13,7 +13,8 @@ use serde::de::{DeserializeOwned, Deserializer, IgnoredAny, MapAccess, SeqAccess
 use serde_json::Value;
 use serde_json::value::RawValue;
 
-use super::{Fallible, lenient};
+use super::lenient;
+use super::limits::Fallible;
 
 /// The objects of one kind.
 pub(super) struct Objects<'a, T> {

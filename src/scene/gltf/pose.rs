@@ -9,10 +9,10 @@ use json::accessor::Type;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::Fallible;
 use super::accessor::Elements;
 use super::buffers::File;
 use super::document::Document;
+use super::limits::Fallible;
 use super::objects::Objects;
 use crate::error::Notices;
 use crate::memory;

@@ -13,9 +13,9 @@ use serde_json::value::RawValue;
 use super::accessor::Elements;
 use super::buffers::File;
 use super::draco::Unpacked;
+use super::limits::{Fallible, MAX_TRIANGLES, check_count};
 use super::objects::{not_gltf, read};
 use super::part::{Part, Tally};
-use super::{Fallible, MAX_TRIANGLES, check_count};
 use crate::memory;
 use crate::scene::placing::unit;
 

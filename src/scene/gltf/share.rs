@@ -12,10 +12,12 @@ use gltf::json;
 use json::mesh::Mode;
 use json::validation::Checked;
 
+use super::bake;
 use super::document::Document;
+use super::limits::Fallible;
 use super::part::{Part, Tally};
+use super::placement::Placement;
 use super::primitive::Mesh;
-use super::{Fallible, Placement, bake};
 use crate::bvh;
 use crate::memory;
 use crate::scene::{Instance, Instances, MAX_SHOWN, Placing, Scene};

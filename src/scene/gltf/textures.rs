@@ -9,9 +9,9 @@ use json::validation::Checked;
 use rayon::prelude::*;
 use serde::Deserialize;
 
-use super::Fallible;
 use super::buffers::{File, uri_of};
 use super::document::Document;
+use super::limits::Fallible;
 use super::uri::{self, Place};
 use crate::error::Notices;
 use crate::image::ldr::{LdrHeader, LdrImage, decode_ldr};

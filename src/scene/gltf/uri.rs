@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use super::Fallible;
+use super::limits::Fallible;
 use crate::image::{read_cause, read_file};
 
 /// How a URI begins that is data itself.

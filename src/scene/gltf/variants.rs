@@ -4,18 +4,19 @@ use gltf::json;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::Fallible;
 use super::document::Document;
+use super::limits::Fallible;
+use super::objects::{Objects, members};
 use crate::error::Notices;
 
-pub(super) const EXTENSION: &str = "KHR_materials_variants";
+const EXTENSION: &str = "KHR_materials_variants";
 
 /// So many looks are named.
 const MAX_NAMED: usize = 50;
 
 /// A look of a model.
 #[derive(Deserialize)]
-pub(super) struct Variant {
+struct Variant {
     #[serde(default)]
     name: String,
 }
@@ -33,7 +34,9 @@ impl Look {
         name: Option<&str>,
         notices: &mut Notices,
     ) -> Fallible<Self> {
-        let variants = &document.variants;
+        let [list] = members(document.extensions, [EXTENSION])?;
+        let [list] = members(list.unwrap_or("{}"), ["variants"])?;
+        let variants: Objects<'_, Variant> = Objects::new(list, "variant")?;
         let names = || variants.indices().map(|index| variants.get(index).map(|it| it.name));
         let list = || {
             let first = names().take(MAX_NAMED).collect::<Fallible<Vec<String>>>()?.join(", ");

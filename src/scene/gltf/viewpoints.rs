@@ -7,10 +7,10 @@ use gltf::json;
 use json::extensions::scene::khr_lights_punctual::{Light, Type};
 use json::validation::Checked;
 
-use super::Fallible;
 use super::animation::Channels;
 use super::buffers::File;
 use super::document::Document;
+use super::limits::Fallible;
 use super::materials::BRIGHTEST;
 use super::pose::{CAMERA, LIGHT, Nodes, own_mirror};
 use crate::error::Notices;

@@ -2,8 +2,8 @@
 
 use meshopt::ffi;
 
-use super::{Filter, Mode, Packed};
-use crate::scene::gltf::Fallible;
+use super::packed::{Filter, Mode, Packed};
+use crate::scene::gltf::limits::Fallible;
 
 /// Unpacks `bytes`; `unpacked` has room for as many elements of as many bytes as `packed` says, which are
 /// such as the mode and the filter allow.
