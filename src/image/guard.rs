@@ -1,8 +1,14 @@
-//! Decoders of other people panic on some damaged files; here such a panic becomes a value.
+//! Decoders of other people take much memory for some files, or panic; here such a panic becomes a value.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Once;
+
+/// Most bytes that decoding a picture file of `file_bytes` may take: what deflate, the densest of the
+/// codecs in use on real pictures, could make of it (1032 to 1), and some room for tables.
+pub(crate) fn decoder_bytes(file_bytes: u64) -> u64 {
+    (16 << 20) + file_bytes.saturating_mul(1100)
+}
 
 thread_local! {
     static QUIET: Cell<bool> = const { Cell::new(false) };

@@ -9,8 +9,7 @@ use basisu::basislz::etc1s::Etc1sTranscoder;
 use basisu::uastc::unpack::unpack_uastc;
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
 
-use super::guard::catch_panic;
-use super::ldr::decoder_bytes;
+use super::guard::{catch_panic, decoder_bytes};
 use crate::error::Decoded;
 use crate::memory;
 

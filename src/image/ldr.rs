@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use image::ImageDecoder;
 
-use super::guard::catch_panic;
+use super::guard::{catch_panic, decoder_bytes};
 use super::{Texels, ktx2, tiff};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -17,12 +17,6 @@ const MAX_PIXELS: u64 = 1 << 28;
 
 /// Most bytes one picture may take while it is decoded: 16384 x 16384 RGBA.
 const MAX_BYTES: u64 = 1 << 30;
-
-/// Most bytes that decoding a picture file of `file_bytes` may take: what deflate, the densest of the
-/// codecs in use on real pictures, could make of it (1032 to 1), and some room for tables.
-pub(crate) fn decoder_bytes(file_bytes: u64) -> u64 {
-    (16 << 20) + file_bytes.saturating_mul(1100)
-}
 
 /// A decoder's complaint.
 pub(crate) fn decoder_cause(cause: &image::ImageError, file_bytes: u64) -> String {

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::exr_read::{Exr, read_exr};
 use super::file::{extension, open_file, read_cause, read_file};
-use super::guard::catch_panic;
+use super::guard::{catch_panic, decoder_bytes};
 use super::hdr::decode_hdr;
-use super::ldr::{decoder_bytes, decoder_cause};
+use super::ldr::decoder_cause;
 use super::{Image, MAX_PIXELS, MAX_SIDE, check_size, tiff};
 use crate::color::linear_from_srgb;
 use crate::error::{Decoded, Error, Notices, Result};
