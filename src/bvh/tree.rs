@@ -1,0 +1,166 @@
+//! The tree and how it is walked.
+
+use std::mem::size_of_val;
+
+use glam::Vec3;
+
+#[cfg(target_arch = "x86_64")]
+use super::avx2;
+use super::build;
+use super::instance::{InstanceWords, Placed, Shared};
+use super::lanes::Portable;
+use super::ray::{Hit, Ray};
+use super::traverse::{self, TreeRef};
+use super::wide::{Block, Node, Reference};
+use crate::huge_pages::on_huge_pages;
+
+/// Which instructions the walk uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Simd {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+}
+
+impl Simd {
+    fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if avx2::is_available() {
+            return Self::Avx2;
+        }
+        Self::Portable
+    }
+}
+
+/// Bounding volume hierarchy over the triangles of a scene.
+#[derive(Debug, Clone)]
+pub struct Bvh {
+    nodes: Vec<Node>,
+    blocks: Vec<Block>,
+    /// Its instances.
+    pub(super) placed: Vec<Placed>,
+    root: Reference,
+    bounds: (Vec3, Vec3),
+    extent: f32,
+    simd: Simd,
+}
+
+impl Bvh {
+    /// Builds on all threads of the current rayon pool.
+    ///
+    /// Triangles with indices out of range, coordinates that are not finite or no area (their edges'
+    /// cross product is zero in f32) are left out: no ray hits them.
+    pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        Self::with_instances(positions, triangles, Shared::default())
+    }
+
+    /// The same with meshes among the triangles that are met where their instances are, and a tree for
+    /// each of them. Two levels are walked more slowly than one over copies of the triangles.
+    pub fn with_instances(positions: &[Vec3], triangles: &[[u32; 3]], shared: Shared<'_>) -> Self {
+        let build::Tree { nodes, blocks, placed, root, bounds } =
+            build::build(positions, triangles, shared);
+        let extent = bounds.0.abs().max(bounds.1.abs()).max_element();
+        Self {
+            nodes: on_huge_pages(nodes),
+            blocks: on_huge_pages(blocks),
+            placed,
+            root,
+            bounds,
+            extent,
+            simd: Simd::detect(),
+        }
+    }
+
+    /// This tree, walked without special instructions; for comparison.
+    pub fn into_portable(mut self) -> Self {
+        self.simd = Simd::Portable;
+        self
+    }
+
+    /// The nearest hit that `accept` takes; of equally near ones that with the lowest triangle index.
+    ///
+    /// `accept` is asked about any hit nearer than the nearest so far, in no particular order.
+    /// Triangles have no back side: culling, like alpha masks, is up to `accept`.
+    #[inline]
+    pub fn closest_hit(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
+        if self.placed.is_empty() {
+            self.closest_of::<1>(ray, accept)
+        } else {
+            self.closest_of::<2>(ray, accept)
+        }
+    }
+
+    /// Whether some hit blocks the ray.
+    ///
+    /// Every hit is offered to `blocks` exactly once, in no particular order, until it returns true.
+    #[inline]
+    pub fn any_hit(&self, ray: &Ray, blocks: impl FnMut(&Hit) -> bool) -> bool {
+        if self.placed.is_empty() {
+            self.any_of::<1>(ray, blocks)
+        } else {
+            self.any_of::<2>(ray, blocks)
+        }
+    }
+
+    #[inline(always)]
+    fn closest_of<const LEVELS: usize>(
+        &self,
+        ray: &Ray,
+        accept: impl Fn(&Hit) -> bool,
+    ) -> Option<Hit> {
+        match self.simd {
+            Simd::Portable => traverse::closest_hit::<Portable, LEVELS>(self.tree(), ray, accept),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
+            Simd::Avx2 => unsafe { avx2::closest_hit::<LEVELS>(self.tree(), ray, accept) },
+        }
+    }
+
+    #[inline(always)]
+    fn any_of<const LEVELS: usize>(&self, ray: &Ray, blocks: impl FnMut(&Hit) -> bool) -> bool {
+        match self.simd {
+            Simd::Portable => traverse::any_hit::<Portable, LEVELS>(self.tree(), ray, blocks),
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` is set only where `avx2::is_available`.
+            Simd::Avx2 => unsafe { avx2::any_hit::<LEVELS>(self.tree(), ray, blocks) },
+        }
+    }
+
+    /// Lower and upper corner of the box around all triangles (for instances, around boxes of parts
+    /// of them); both zero if there are none.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        self.bounds
+    }
+
+    /// Bytes of the tree and its copy of the triangles.
+    pub fn memory_bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice())
+            + size_of_val(self.blocks.as_slice())
+            + size_of_val(self.placed.as_slice())
+    }
+
+    /// Its instances as a GPU reads them; `root_of` tells where the root of a mesh's tree is there.
+    pub(crate) fn instance_words(&self, root_of: impl Fn(u32) -> u32) -> Vec<InstanceWords> {
+        self.placed.iter().map(|placed| placed.words(root_of(placed.mesh))).collect()
+    }
+
+    /// Name of the instructions in use, for logs.
+    pub fn simd_name(&self) -> &'static str {
+        match self.simd {
+            Simd::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Simd::Avx2 => "AVX2+FMA",
+        }
+    }
+
+    #[inline(always)]
+    fn tree(&self) -> TreeRef<'_> {
+        TreeRef {
+            nodes: &self.nodes,
+            blocks: &self.blocks,
+            placed: &self.placed,
+            root: self.root,
+            extent: self.extent,
+        }
+    }
+}
