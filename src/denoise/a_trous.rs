@@ -12,21 +12,14 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use super::edges;
-use super::guides::{Guides, falling, pairs, rows};
+use super::guides::Guides;
+use super::light::{Light, MAX_VARIANCE, Row, compared_luminance};
 use super::samples::Samples;
-use crate::color::luminance;
 use crate::image::Image;
 
 /// Pixels between two taps of each pass. Where guides or light stop what the first passes should spread, later
 /// ones put it at their taps alone, a lattice: the last two fill it.
 pub(crate) const STEPS: [u32; 7] = [1, 2, 4, 8, 16, 3, 1];
-/// Luminances have nothing in common that are so many of their standard errors apart.
-pub(crate) const ERRORS_TOLERATED: f32 = 4.0;
-/// The same of no variance: not zero.
-pub(crate) const MIN_VARIANCE: f32 = 1e-12;
-/// No variance and no luminance that is compared is larger, so that sums of them are finite.
-pub(crate) const MAX_VARIANCE: f32 = 1e30;
-pub(crate) const MAX_LUMINANCE: f32 = 1e15;
 /// Columns and rows around a pixel that share its error.
 const REACH: isize = 2;
 /// What a pixel on another surface counts there, so that somebody always does: one that has met no light and has
@@ -34,8 +27,6 @@ const REACH: isize = 2;
 pub(crate) const MIN_LIKENESS: f32 = 0.05;
 /// Squared light of which a single sample's variance is so much at least.
 pub(crate) const MIN_SPREAD: f32 = 0.1;
-/// The variance of a single sample.
-const UNKNOWN: f32 = -1.0;
 /// By how much more a variance is tolerated that is known of one sample only by those around it.
 pub(crate) const SINGLE: f32 = 3.0;
 /// How much less likely one sample more makes it that all of a pixel's are off its surroundings by chance: two
@@ -43,20 +34,6 @@ pub(crate) const SINGLE: f32 = 3.0;
 pub(crate) const FEWER: f32 = 0.2;
 /// Weights of a B3 spline.
 const KERNEL: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
-
-/// Light on all pixels, albedo taken out, and the variance of its luminance; negative where it is not known.
-pub(super) struct Light {
-    pub(super) rgb: [Vec<f32>; 3],
-    pub(super) luminance: Vec<f32>,
-    pub(super) variance: Vec<f32>,
-}
-
-/// A row of [`Light`], to be written.
-struct Row<'a> {
-    rgb: [&'a mut [f32]; 3],
-    luminance: &'a mut [f32],
-    variance: &'a mut [f32],
-}
 
 /// The picture of films with layers, filtered.
 pub(super) fn denoise(samples: &Samples<'_>) -> Image {
@@ -67,41 +44,6 @@ pub(super) fn denoise(samples: &Samples<'_>) -> Image {
         light = filtered(&light, &guides, step as isize);
     }
     edges::mended(samples, &guides, &light, &support)
-}
-
-impl Light {
-    fn of(samples: &Samples<'_>, guides: &Guides) -> Self {
-        let undressed = |index: usize| {
-            let (albedo, mean) = (guides.at(index).albedo, samples.mean(index));
-            let scale = 1.0 / luminance(albedo);
-            let variance = mean.variance.map_or(UNKNOWN, |variance| variance * scale * scale);
-            (mean.rgb / albedo, variance.min(MAX_VARIANCE))
-        };
-        let pixels: Vec<(Vec3, f32)> =
-            (0..guides.width * guides.height).into_par_iter().map(undressed).collect();
-        Self {
-            rgb: [0, 1, 2].map(|c| pixels.iter().map(|(rgb, _)| rgb[c]).collect()),
-            luminance: pixels.iter().map(|(rgb, _)| compared_luminance(*rgb)).collect(),
-            variance: pixels.iter().map(|(_, variance)| *variance).collect(),
-        }
-    }
-
-    fn black(pixels: usize) -> Self {
-        let plane = || vec![0.0; pixels];
-        Self { rgb: [plane(), plane(), plane()], luminance: plane(), variance: plane() }
-    }
-
-    fn rows(&mut self, width: usize) -> Vec<Row<'_>> {
-        let [r, g, b] = self.rgb.each_mut();
-        let all = rows([r, g, b, &mut self.luminance, &mut self.variance], width).into_iter();
-        all.map(|[r, g, b, luminance, variance]| Row { rgb: [r, g, b], luminance, variance })
-            .collect()
-    }
-}
-
-/// Luminance for comparisons.
-pub(super) fn compared_luminance(rgb: Vec3) -> f32 {
-    luminance(rgb).min(MAX_LUMINANCE)
 }
 
 /// What the pixels around one know, each in proportion to its likeness.
@@ -231,24 +173,6 @@ fn filter_row(light: &Light, guides: &Guides, (y, mut row): (usize, Row<'_>), st
         });
         row.variance[x] *= scale * scale;
         row.luminance[x] = compared_luminance(Vec3::from(rgb));
-    }
-}
-
-impl Light {
-    /// Multiplies each weight by how well the light fits that of the pixels from `there` on. It is the same for both
-    /// of two pixels: what one gives the other gets.
-    #[inline(always)]
-    fn compare(&self, [here, there]: [usize; 2], weights: &mut [f32]) {
-        let at = ([here, there], weights.len());
-        let planes = [&self.luminance, &self.variance];
-        let [luminance, variance] = planes.map(|plane| pairs(plane, at));
-        for (i, weight) in weights.iter_mut().enumerate() {
-            let difference = luminance.0[i] - luminance.1[i];
-            let variance = variance.0[i] + variance.1[i] + MIN_VARIANCE;
-            *weight *= falling(
-                difference * difference * (1.0 / (ERRORS_TOLERATED * ERRORS_TOLERATED)) / variance,
-            );
-        }
     }
 }
 

@@ -8,8 +8,8 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::a_trous::{Light, compared_luminance};
 use super::guides::{Guide, Guides, around};
+use super::light::{Light, compared_luminance};
 use super::samples::Samples;
 use crate::color::luminance;
 use crate::image::Image;

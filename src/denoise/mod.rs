@@ -4,6 +4,7 @@ pub(crate) mod a_trous;
 mod cell;
 pub(crate) mod edges;
 pub(crate) mod guides;
+pub(crate) mod light;
 mod oidn;
 mod samples;
 mod scales;

@@ -2,7 +2,7 @@
 
 use super::{dispatch, entry, filled, pipeline};
 use crate::denoise::a_trous::STEPS;
-use crate::denoise::{a_trous, edges, guides};
+use crate::denoise::{a_trous, edges, guides, light};
 use crate::render::gpu::{DeviceFilm, Gpu, constants};
 
 constants::constants! {
@@ -12,16 +12,16 @@ constants::constants! {
     DEPTH_GROWTH: guides::DEPTH_GROWTH,
     DEPTH_SCALE: edges::DEPTH_SCALE,
     DEPTH_TOLERANCE: guides::DEPTH_TOLERANCE,
-    ERRORS_TOLERATED: a_trous::ERRORS_TOLERATED,
+    ERRORS_TOLERATED: light::ERRORS_TOLERATED,
     FEWER: a_trous::FEWER,
-    MAX_LUMINANCE: a_trous::MAX_LUMINANCE,
-    MAX_VARIANCE: a_trous::MAX_VARIANCE,
+    MAX_LUMINANCE: light::MAX_LUMINANCE,
+    MAX_VARIANCE: light::MAX_VARIANCE,
     MIN_ALBEDO: guides::MIN_ALBEDO,
     MIN_ALIKE: edges::MIN_ALIKE,
     MIN_LIKENESS: a_trous::MIN_LIKENESS,
     MIN_NEARNESS: guides::MIN_NEARNESS,
     MIN_SPREAD: a_trous::MIN_SPREAD,
-    MIN_VARIANCE: a_trous::MIN_VARIANCE,
+    MIN_VARIANCE: light::MIN_VARIANCE,
     NORMAL_TOLERANCE: guides::NORMAL_TOLERANCE,
     NORMAL_VARIANCES: guides::NORMAL_VARIANCES,
     RELATIVE_ERROR: edges::RELATIVE_ERROR,
