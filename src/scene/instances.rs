@@ -1,14 +1,11 @@
 //! Meshes that a scene shows several times but holds once.
 //!
-//! Triangles have numbers. Those in the world have their place in [`Scene::triangles`]; those of
+//! Triangles have numbers. Those in the world have their place in [`super::Scene::triangles`]; those of
 //! instances have the numbers after them, in the order of instances, with gaps: numbers are given away
 //! in slots of equal size, so that a number tells the instance without a search.
 
 use std::ops::Range;
 
-use glam::Vec3;
-
-use super::Scene;
 use super::placing::Placing;
 use crate::bvh;
 
@@ -27,7 +24,7 @@ pub struct Instance {
     pub placing: Placing,
 }
 
-/// A triangle's place in [`Scene::triangles`], and that of the instance it is of, if it is.
+/// A triangle's place in [`super::Scene::triangles`], and that of the instance it is of, if it is.
 pub(super) type Surface<'a> = (usize, Option<&'a Placing>);
 
 /// All shared meshes of a scene and where they are shown.
@@ -36,7 +33,7 @@ pub struct Instances {
     meshes: Vec<Range<u32>>,
     all: Vec<Instance>,
     /// Number of the first triangle of instances; beyond all without meshes.
-    first: u32,
+    pub(super) first: u32,
     /// A slot has two to the power of so many numbers.
     slot_log2: u32,
     /// Which instance each slot is of.
@@ -52,7 +49,7 @@ impl Default for Instances {
 }
 
 impl Instances {
-    /// Numbers the triangles of instances. `meshes` are ranges of [`Scene::triangles`], in its space
+    /// Numbers the triangles of instances. `meshes` are ranges of [`super::Scene::triangles`], in its space
     /// each: its last triangles, in order.
     ///
     /// At most [`MAX_SHOWN`] triangles are shown.
@@ -85,7 +82,7 @@ impl Instances {
         self.all.len()
     }
 
-    /// Triangles of each mesh: ranges of [`Scene::triangles`].
+    /// Triangles of each mesh: ranges of [`super::Scene::triangles`].
     pub fn meshes(&self) -> &[Range<u32>] {
         &self.meshes
     }
@@ -139,81 +136,5 @@ impl Instances {
             start..next
         });
         Self::new(meshes.collect(), self.all)
-    }
-}
-
-impl Scene {
-    /// Triangles that are not of meshes but lie in the world: places in [`Self::triangles`].
-    pub fn own_triangles(&self) -> Range<u32> {
-        0..self.instances.first.min(self.triangles.len() as u32)
-    }
-
-    /// How many triangles are shown, those of instances counted one by one.
-    pub fn shown_triangles(&self) -> u64 {
-        let instances = &self.instances;
-        let of_mesh = |mesh: u32| instances.meshes[mesh as usize].len() as u64;
-        let shared: u64 = instances.meshes.iter().map(|mesh| mesh.len() as u64).sum();
-        let shown: u64 = instances.iter().map(|instance| of_mesh(instance.mesh)).sum();
-        self.triangles.len() as u64 - shared + shown
-    }
-
-    /// World positions of the corners of a triangle, given its number.
-    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
-        self.corners_at(self.instances.find(triangle))
-    }
-
-    pub(super) fn corners_at(&self, (place, placing): Surface<'_>) -> [Vec3; 3] {
-        let corners = self.triangles[place].map(|vertex| self.positions[vertex as usize]);
-        placing.map_or(corners, |placing| placing.turned(corners.map(|p| placing.position(p))))
-    }
-
-    /// Index of the material of a triangle, given its number.
-    #[inline]
-    pub fn material_of(&self, triangle: u32) -> u32 {
-        self.triangle_materials[self.instances.find(triangle).0]
-    }
-
-    /// The triangles in the world, and those of each mesh once, where its first instance is.
-    pub(super) fn each_once(&self) -> impl Iterator<Item = Surface<'_>> {
-        let mut placings = vec![None; self.instances.meshes.len()];
-        for instance in self.instances.iter().rev() {
-            placings[instance.mesh as usize] = Some(&instance.placing);
-        }
-        let shown = self.instances.meshes.iter().cloned().zip(placings);
-        let shown = shown.filter(|(_, placing)| placing.is_some());
-        let of_meshes =
-            shown.flat_map(|(mesh, placing)| mesh.map(move |at| (at as usize, placing)));
-        self.own_triangles().map(|place| (place as usize, None)).chain(of_meshes)
-    }
-
-    /// World points whose hull holds all triangles of some materials: their corners, and those of boxes
-    /// around instances.
-    pub fn hull_points(&self, is_wanted: impl Fn(u32) -> bool) -> impl Iterator<Item = Vec3> {
-        let corners = |place: usize| self.triangles[place].map(|v| self.positions[v as usize]);
-        let is_wanted = move |place: &usize| is_wanted(self.triangle_materials[*place]);
-        let boxes: Vec<_> = self
-            .instances
-            .meshes
-            .iter()
-            .map(|mesh| {
-                let mesh = (mesh.start as usize..mesh.end as usize).filter(&is_wanted);
-                let points = mesh.flat_map(corners);
-                points.fold(None, |found: Option<(Vec3, Vec3)>, point| {
-                    let (low, high) = found.unwrap_or((point, point));
-                    Some((low.min(point), high.max(point)))
-                })
-            })
-            .collect();
-        let of_instances = self.instances.iter().flat_map(move |instance| {
-            let around = boxes[instance.mesh as usize].into_iter();
-            around.flat_map(move |(low, high)| {
-                (0..8).map(move |corner| {
-                    let at = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
-                    instance.placing.position(Vec3::new(at(0), at(1), at(2)))
-                })
-            })
-        });
-        let own = self.own_triangles().map(|place| place as usize);
-        own.filter(is_wanted).flat_map(corners).chain(of_instances)
     }
 }
