@@ -3,9 +3,6 @@
 
 use std::sync::Arc;
 
-use super::session_cache::SuspendedCache;
-use crate::environment::Environment;
-use crate::path::World;
 use crate::render::Session;
 use crate::render::film::Film;
 
@@ -16,74 +13,40 @@ pub(super) const SAMPLES: u32 = 16;
 /// falls no further.)
 const WORTH: f32 = 4.0;
 
-/// How far it is.
+/// How far it is; `S` renders it, or will when it is gone on with.
 #[derive(Default)]
-pub(super) enum CachedPicture<'s> {
+pub(super) enum CachedPicture<S> {
     /// There is none.
     #[default]
     Absent,
     /// It is rendered.
-    UnderWay(Box<Session<'s>>),
+    UnderWay(Box<S>),
     /// All of it, of so many samples in all.
     Complete(u64, Arc<Film>),
 }
 
-impl<'s> CachedPicture<'s> {
-    /// Goes on with what was put aside.
-    pub(super) fn resume(
-        world: &'s World,
-        environment: &'s Environment,
-        suspended: SuspendedCache,
-    ) -> Self {
-        match suspended {
-            SuspendedCache::Absent => Self::Absent,
-            SuspendedCache::UnderWay(state) => {
-                Self::UnderWay(Box::new(Session::resume(world, environment, *state)))
-            }
-            SuspendedCache::Complete((samples, film)) => Self::Complete(samples, film),
-        }
-    }
-
-    /// Puts it aside.
-    pub(super) fn suspend(self) -> SuspendedCache {
+impl<S> CachedPicture<S> {
+    /// It with something else to render it.
+    pub(super) fn map<T>(self, change: impl FnOnce(S) -> T) -> CachedPicture<T> {
         match self {
-            Self::Absent => SuspendedCache::Absent,
-            Self::UnderWay(session) => SuspendedCache::UnderWay(Box::new(session.suspend())),
-            Self::Complete(samples, film) => SuspendedCache::Complete((samples, film)),
+            Self::Absent => CachedPicture::Absent,
+            Self::UnderWay(session) => CachedPicture::UnderWay(Box::new(change(*session))),
+            Self::Complete(samples, film) => CachedPicture::Complete(samples, film),
         }
     }
 
-    /// Whether it has not been begun.
-    pub(super) fn is_absent(&self) -> bool {
-        matches!(self, Self::Absent)
+    /// What renders it.
+    pub(super) fn session(&self) -> Option<&S> {
+        if let Self::UnderWay(session) = self { Some(session) } else { None }
     }
+}
 
-    /// Whether it has all its samples.
-    pub(super) fn is_complete(&self) -> bool {
-        matches!(self, Self::Complete(..))
-    }
-
+impl<'s> CachedPicture<Session<'s>> {
     /// Its film, once all of its pixels have a sample.
     pub(super) fn film_so_far(&self) -> Option<&Film> {
         match self {
             Self::UnderWay(session) if session.samples() > 0 => Some(session.film()),
             Self::Complete(_, film) => Some(film),
-            _ => None,
-        }
-    }
-
-    /// What renders it.
-    pub(super) fn session(&self) -> Option<&Session<'s>> {
-        match self {
-            Self::UnderWay(session) => Some(session),
-            _ => None,
-        }
-    }
-
-    /// The same, to be changed.
-    pub(super) fn session_mut(&mut self) -> Option<&mut Session<'s>> {
-        match self {
-            Self::UnderWay(session) => Some(session),
             _ => None,
         }
     }

@@ -39,12 +39,14 @@ impl Inspection {
         })
     }
 
-    /// What is in the radiance cache that `session` trains or, if it trains none, that was trained before.
+    /// What is in the radiance cache that `session` trains or, if it trains none, that was trained before. None is used
+    /// where a device `is_quick`.
     pub(super) fn cache_facts(
         &mut self,
         session: &Session<'_>,
         request: &Request,
         kept: &SessionCache,
+        is_quick: bool,
     ) -> Result<Arc<CacheFacts>, NoCache> {
         if !request.inspects_cache {
             return Err(NoCache::Unasked);
@@ -56,7 +58,7 @@ impl Inspection {
             NoCache::NotDenoised
         } else if request.split {
             NoCache::Split
-        } else if kept.device.is_quick(request) {
+        } else if is_quick {
             NoCache::QuickDevice
         } else {
             NoCache::Untrained

@@ -26,6 +26,7 @@ mod task;
 pub(super) mod tests;
 mod watch;
 
+use device::Device;
 use preview::Preview;
 pub(crate) use request::{Reference, Request};
 use session_cache::SessionCache;
@@ -149,8 +150,9 @@ fn lower_priority() {
 }
 
 fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, RayChoice)) {
-    let fresh = || (SessionCache::new(gpu.clone(), Arc::clone(&shared.screen)), Preview::default());
-    let (mut kept, mut preview) = fresh();
+    let device = || Device::new(gpu.clone(), Arc::clone(&shared.screen));
+    let fresh = || (device(), SessionCache::default(), Preview::default());
+    let (mut device, mut kept, mut preview) = fresh();
     let alarm = Alarm::start(Arc::clone(&shared.cancel));
     let mut done: Option<Arc<Request>> = None;
     let next = |done: Option<&Request>| {
@@ -167,15 +169,20 @@ fn run(shared: &Arc<Shared>, pool: &rayon::ThreadPool, gpu: &(Option<String>, Ra
     while let Some(request) = next(done.as_deref()) {
         kept.leave_other_worlds(&request);
         let worked = catch_unwind(AssertUnwindSafe(|| {
-            let (world, environment) = (&*request.world, &*request.environment);
-            let watch = RequestWatch { shared, request: Arc::clone(&request) };
-            let sessions = Sessions::new(watch, &mut kept, &alarm);
+            let sessions = Sessions {
+                world: &request.world,
+                environment: &request.environment,
+                watch: RequestWatch { shared, request: Arc::clone(&request) },
+                device: &mut device,
+                kept: &mut kept,
+                alarm: &alarm,
+            };
             let task = PictureTask::new(sessions, &mut preview);
-            pool.install(|| task.work(world, environment))
+            pool.install(|| task.work())
         }));
         done = Some(worked.unwrap_or_else(|_| {
             // The panic is on the terminal. Nothing of what it left is trusted.
-            (kept, preview) = fresh();
+            (device, kept, preview) = fresh();
             alarm.set(None);
             shared.report_panic();
             request

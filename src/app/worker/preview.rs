@@ -8,7 +8,7 @@ use super::cached::{self, CachedPicture};
 use super::earlier::EarlierFilm;
 use super::request::Request;
 use super::sessions::SLICE;
-use super::snapshot::{Activity, Backdrop, CompletePicture, Origin, SessionSnapshot};
+use super::snapshot::{Activity, Backdrop, Origin, SessionSnapshot};
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::render::{Session, View};
@@ -34,7 +34,7 @@ pub(super) struct Preview {
     /// The main and the plain picture, as they were copied last.
     copies: [Option<FilmCopy>; 2],
     /// The cached picture, as it was copied last, of so many samples.
-    cached_copy: Option<CompletePicture>,
+    cached_copy: Option<(u64, Arc<Film>)>,
     /// Copies that somebody still has.
     lent: Vec<Weak<Film>>,
     /// Whether the window wants no new copy for now.
@@ -209,7 +209,7 @@ impl Preview {
         request: &Arc<Request>,
         activity: Activity,
         samples: u32,
-        cached: &CachedPicture<'_>,
+        cached: &CachedPicture<Session<'_>>,
     ) -> Option<Backdrop> {
         // A film that was kept of this request has the same samples.
         let earlier = self.earlier.as_ref().filter(|earlier| !earlier.is_of(request));
@@ -234,7 +234,11 @@ impl Preview {
     /// The cached picture's film and how many samples that has, if these are more than `least` and all over the
     /// picture. A copy is made unless there is a new one already or, while the window rests, any: it is megabytes and
     /// is soon complete.
-    fn cached_film(&mut self, cached: &CachedPicture<'_>, least: u64) -> Option<CompletePicture> {
+    fn cached_film(
+        &mut self,
+        cached: &CachedPicture<Session<'_>>,
+        least: u64,
+    ) -> Option<(u64, Arc<Film>)> {
         let copy = self.cached_copy.take();
         match cached {
             CachedPicture::UnderWay(session)

@@ -1,19 +1,18 @@
 //! What one job leaves for the next.
 
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
-use super::device::Device;
+use super::cached::CachedPicture;
 use super::request::Request;
-use super::snapshot::{CompletePicture, Point};
+use super::snapshot::Point;
 use crate::environment::Environment;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
-use crate::render::gpu::{Gpu, RayChoice};
 use crate::render::{CacheTraining, Session, SessionState};
 
 /// What one job leaves for the next.
+#[derive(Default)]
 pub(super) struct SessionCache {
-    pub(super) device: Device,
     pub(super) learned: Option<Learned>,
     /// What was counted, if it came to its end, and what for.
     pub(super) counted: Option<(Arc<LearningGrid>, Arc<Request>)>,
@@ -32,7 +31,8 @@ pub(super) struct SessionCache {
 pub(super) struct SuspendedPicture {
     pub(super) request: Arc<Request>,
     pub(super) session: SessionState,
-    pub(super) cached: SuspendedCache,
+    /// The picture by cached light beside it.
+    pub(super) cached: CachedPicture<SessionState>,
     /// What learning had counted, for inspection.
     pub(super) counters: Option<Arc<LearningGrid>>,
     /// How its error fell.
@@ -41,35 +41,23 @@ pub(super) struct SuspendedPicture {
     pub(super) cached_seconds: f64,
 }
 
-/// The picture by cached light beside a picture that was left.
-pub(super) enum SuspendedCache {
-    Absent,
-    UnderWay(Box<SessionState>),
-    Complete(CompletePicture),
-}
-
-impl SuspendedCache {
-    fn memory_bytes(&self) -> usize {
-        match self {
-            Self::Absent => 0,
-            Self::UnderWay(session) => session.memory_bytes(),
-            Self::Complete((_, film)) => film.memory_bytes(),
-        }
-    }
-}
-
 impl SuspendedPicture {
     /// Whether it has taken long, and there is room for it; if need be without the picture by cached light.
     pub(super) fn is_worth_it(&mut self) -> bool {
         if self.memory_bytes() > MAX_LEFT_BYTES {
-            self.cached = SuspendedCache::Absent;
+            self.cached = CachedPicture::Absent;
         }
         let seconds = self.session.elapsed_seconds() + self.cached_seconds;
         seconds >= MIN_LEFT_SECONDS && self.memory_bytes() <= MAX_LEFT_BYTES
     }
 
     fn memory_bytes(&self) -> usize {
-        self.session.memory_bytes() + self.cached.memory_bytes()
+        let cached = match &self.cached {
+            CachedPicture::Absent => 0,
+            CachedPicture::UnderWay(session) => session.memory_bytes(),
+            CachedPicture::Complete(_, film) => film.memory_bytes(),
+        };
+        self.session.memory_bytes() + cached
     }
 
     /// Bytes of its map, unless that is the one in use.
@@ -98,20 +86,6 @@ pub(super) struct Learned {
 }
 
 impl SessionCache {
-    /// Of a worker that has done nothing yet.
-    pub(super) fn new(gpu: (Option<String>, RayChoice), screen: Arc<Mutex<Gpu>>) -> Self {
-        Self {
-            device: Device::new(gpu, screen),
-            learned: None,
-            counted: None,
-            seconds_per_path: [None, None],
-            shrink: None,
-            snapshots: 0,
-            training: None,
-            left: Vec::new(),
-        }
-    }
-
     /// Keeps a picture that is left for another.
     pub(super) fn leave(&mut self, left: SuspendedPicture) {
         self.left.push(left);
@@ -209,12 +183,11 @@ mod tests {
 
     #[test]
     fn the_radiance_cache_is_kept_for_the_same_light_on_the_same_scene_near_by() {
-        let Some(gpu) = Gpu::for_test() else { return };
         let world = Arc::new(World::new(builtin::build("office").expect("built in")));
         let request = request(Arc::clone(&world), lit("overcast"), [16, 9]);
         let view = View { gi: Gi::Cached, ..request.view.clone() };
         let request = Request { view, wants_cached: true, ..request };
-        let mut kept = SessionCache::new((None, RayChoice::default()), Arc::new(Mutex::new(gpu)));
+        let mut kept = SessionCache::default();
         let mut session = Session::new(&world, &request.environment, request.view.clone());
         kept.keep_training(&mut session, &Arc::new(request.clone()));
         let serves = |change: &dyn Fn(&mut Request)| {

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::device::Device;
 use super::preparation::Preparation;
 use super::session_cache::SessionCache;
-use super::watch::{RequestWatch, Rested};
+use super::watch::RequestWatch;
 use crate::alarm::Alarm;
 use crate::environment::Environment;
 use crate::error::Result;
@@ -21,40 +22,27 @@ const MOVING_SECONDS: f64 = 0.07;
 /// What a camera path takes, until it has been measured.
 const LIKELY_SECONDS_PER_PATH: f64 = 1e-5;
 
-/// Whether a session is where it is to be.
-#[derive(PartialEq, Eq)]
-pub(super) enum Placed {
-    InTime,
-    /// Something else was asked for before it could be there.
-    TooLate,
-}
-
 /// Makes sessions for a request, places them on a device and lets them go on.
 pub(super) struct Sessions<'a> {
+    pub(super) world: &'a World,
+    pub(super) environment: &'a Environment,
     pub(super) watch: RequestWatch<'a>,
+    pub(super) device: &'a mut Device,
     pub(super) kept: &'a mut SessionCache,
-    alarm: &'a Alarm,
+    pub(super) alarm: &'a Alarm,
 }
 
 impl<'a> Sessions<'a> {
-    pub(super) fn new(
-        watch: RequestWatch<'a>,
-        kept: &'a mut SessionCache,
-        alarm: &'a Alarm,
-    ) -> Self {
-        Self { watch, kept, alarm }
+    /// A session for this view, of which nothing is known.
+    pub(super) fn new_session(&self, view: View) -> Session<'a> {
+        Session::new(self.world, self.environment, view)
     }
 
     /// A session for a picture so small that a pass takes a moment on a GPU that [is quick], else on the CPU, with
     /// what was learned before.
     ///
     /// [is quick]: super::device::Device::is_quick
-    pub(super) fn small_session<'b>(
-        &mut self,
-        world: &'b World,
-        environment: &'b Environment,
-        is_quick: bool,
-    ) -> Session<'b> {
+    pub(super) fn small_session(&mut self, is_quick: bool) -> Session<'a> {
         let request = Arc::clone(&self.watch.request);
         let shrink = self.shrink(&request.view, is_quick);
         let mut view =
@@ -63,17 +51,15 @@ impl<'a> Sessions<'a> {
         if request.wants_cached && !is_quick && self.kept.has_training_for(&request) {
             view.gi = Gi::Cached;
         }
-        self.experienced_session(world, environment, view)
+        self.experienced_session(view)
     }
 
     /// A session that learns, and the counters it goes on from: those of this scene, if the camera has not gone far.
-    pub(super) fn learning_session<'b>(
+    pub(super) fn learning_session(
         &mut self,
-        world: &'b World,
-        environment: &'b Environment,
         view: View,
-    ) -> (Session<'b>, Option<Arc<LearningGrid>>) {
-        let mut session = Session::new(world, environment, view);
+    ) -> (Session<'a>, Option<Arc<LearningGrid>>) {
+        let mut session = self.new_session(view);
         let counted = self.kept.counted_for(&self.watch.request);
         let counted = counted.filter(|counted| match session.continue_learning(counted) {
             Ok(is_gone_on_from) => is_gone_on_from,
@@ -86,13 +72,8 @@ impl<'a> Sessions<'a> {
     }
 
     /// A session that does not learn but uses what was learned before.
-    pub(super) fn experienced_session<'b>(
-        &mut self,
-        world: &'b World,
-        environment: &'b Environment,
-        view: View,
-    ) -> Session<'b> {
-        let mut session = Session::new(world, environment, view);
+    pub(super) fn experienced_session(&mut self, view: View) -> Session<'a> {
+        let mut session = self.new_session(view);
         session.finish_learning();
         let is_learning_mode = session.view().distribution_options().is_some();
         if let Some(distributions) =
@@ -139,14 +120,14 @@ impl<'a> Sessions<'a> {
         self.kept.keep_training(session, &self.watch.request);
     }
 
-    /// Waits until something else is asked for, or kernels are compiled.
-    pub(super) fn rest(&self) -> Rested {
-        self.watch.rest(&self.kept.device)
+    /// Waits until something else is asked for, or kernels are compiled; whether that is it.
+    pub(super) fn rest(&self) -> bool {
+        self.watch.rest(self.device)
     }
 
     /// One pass on the device that is asked for, cut short after a slice if asked for.
     pub(super) fn advance(&mut self, session: &mut Session<'_>, rule: Option<StopRule>, cut: bool) {
-        if self.place(session) == Placed::InTime {
+        if self.place(session) {
             self.advance_in_place(session, rule, cut);
         }
     }
@@ -181,22 +162,22 @@ impl<'a> Sessions<'a> {
         if begins { session.next_beginning() } else { None }
     }
 
-    /// Lets the session run on the device that is asked for now.
-    pub(super) fn place(&mut self, session: &mut Session<'_>) -> Placed {
-        self.kept.device.note_compiled();
+    /// Lets the session run on the device that is asked for now; whether it does before something else is asked for.
+    pub(super) fn place(&mut self, session: &mut Session<'_>) -> bool {
+        self.device.note_compiled();
         // A GPU that is not ready, or is none, comes when there is something to be seen. Cached light is shown where
         // none is quicker.
         let is_fresh = session.samples() == 0 && !session.is_on_gpu();
         let is_learning = session.phase() == Phase::Learning;
         let begins = self.watch.request.moving
             || is_fresh && (is_learning || self.beginning(session).is_some());
-        let waits = begins && !self.kept.device.is_quick(&self.watch.request);
+        let waits = begins && !self.device.is_quick(&self.watch.request);
         if self.watch.request.previews && (waits || session.view().gi == Gi::Cached) {
             session.continue_on_cpu();
-            return Placed::InTime;
+            return true;
         }
-        self.kept.device.choose_for(&self.watch.request);
-        let needs_upload = self.kept.device.needs_upload(&self.watch.request);
+        self.device.choose_for(&self.watch.request);
+        let needs_upload = self.device.needs_upload(&self.watch.request);
         let uploading = needs_upload.then(|| Preparation::begin(self.watch.shared));
         if needs_upload {
             // With another one or another scene it was different.
@@ -207,20 +188,20 @@ impl<'a> Sessions<'a> {
         // Pictures that are compared, or are to be repeatable, come from one device.
         let is_patient =
             self.watch.request.split && !self.watch.request.moving || !self.watch.request.previews;
-        while is_patient && !session.is_on_gpu() && self.kept.device.was_compiling() {
-            if self.rest() == Rested::ForRequest {
-                return Placed::TooLate;
+        while is_patient && !session.is_on_gpu() && self.device.was_compiling() {
+            if !self.rest() {
+                return false;
             }
-            self.kept.device.note_compiled();
+            self.device.note_compiled();
             self.place_if_compiled(session);
         }
-        Placed::InTime
+        true
     }
 
     fn place_if_compiled(&mut self, session: &mut Session<'_>) {
         let shared = self.watch.shared;
         let preparation = || Arc::new(Preparation::begin(shared)) as Arc<CompileGuard>;
-        self.kept.device.place(session, &self.watch.request, preparation);
+        self.device.place(session, &self.watch.request, preparation);
         self.report_failure();
     }
 
@@ -228,13 +209,13 @@ impl<'a> Sessions<'a> {
     pub(super) fn go_on(&mut self, session: &mut Session<'_>, outcome: Result<()>) {
         if let Err(failure) = outcome {
             session.continue_on_cpu();
-            self.kept.device.give_up(&failure, &self.watch.request);
+            self.device.give_up(&failure, &self.watch.request);
             self.report_failure();
         }
     }
 
     fn report_failure(&mut self) {
-        if let Some(sentence) = self.kept.device.take_failure() {
+        if let Some(sentence) = self.device.take_failure() {
             self.watch.shared.report_failure(sentence);
         }
     }

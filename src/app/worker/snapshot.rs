@@ -143,9 +143,6 @@ impl PublishThrottle {
     }
 }
 
-/// A cached picture that has all its samples: their number, and the film.
-pub(super) type CompletePicture = (u64, Arc<Film>);
-
 /// A film that is shown together with the picture's own, and never saved.
 #[derive(Clone)]
 pub(crate) struct Backdrop {

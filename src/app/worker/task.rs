@@ -9,12 +9,10 @@ use super::inspection::Inspection;
 use super::preview::{MAIN, MAX_GAP, PLAIN, Preview, gap_after};
 use super::request::Request;
 use super::session_cache::{Learned, SuspendedPicture};
-use super::sessions::{Placed, Sessions};
+use super::sessions::Sessions;
 use super::snapshot::{Activity, SessionSnapshot, Snapshot};
 use crate::app::threads::lock;
-use crate::environment::Environment;
 use crate::light_grid::LearningGrid;
-use crate::path::World;
 use crate::render::film::Film;
 use crate::render::gpu::{DeviceFilm, Gpu};
 use crate::render::{Gi, Phase, Sampling, Session, StopRule, View};
@@ -42,13 +40,13 @@ struct Pictures<'s> {
     main: Session<'s>,
     /// The plain picture of a split view.
     plain: Option<Session<'s>>,
-    cached: CachedPicture<'s>,
+    cached: CachedPicture<Session<'s>>,
     /// Turns of the cached one in a row.
     turns: u32,
 }
 
 impl<'s> Pictures<'s> {
-    fn new(main: Session<'s>, cached: CachedPicture<'s>) -> Self {
+    fn new(main: Session<'s>, cached: CachedPicture<Session<'s>>) -> Self {
         Self { main, plain: None, cached, turns: 0 }
     }
 
@@ -95,23 +93,23 @@ impl<'a> PictureTask<'a> {
     }
 
     /// Works until something else is asked for; the request that was worked on last.
-    pub(super) fn work(mut self, world: &World, environment: &Environment) -> Arc<Request> {
+    pub(super) fn work(mut self) -> Arc<Request> {
         if self.request().moving {
-            self.follow(world, environment);
+            self.follow();
         } else {
-            self.render(world, environment);
+            self.render();
         }
         self.sessions.watch.request
     }
 
     /// Small pictures for as long as the camera rests at this very place.
-    fn follow(&mut self, world: &World, environment: &Environment) {
-        let was_quick = self.sessions.kept.device.is_quick(self.request());
-        let mut session = self.sessions.small_session(world, environment, was_quick);
+    fn follow(&mut self) {
+        let was_quick = self.sessions.device.is_quick(self.request());
+        let mut session = self.sessions.small_session(was_quick);
         self.sessions.place(&mut session);
         if was_quick && !session.is_on_gpu() {
             // The CPU affords less until there are kernels for it.
-            session = self.sessions.small_session(world, environment, false);
+            session = self.sessions.small_session(false);
         }
         let mut pictures = Pictures::new(session, CachedPicture::Absent);
         while !self.sessions.watch.is_superseded() {
@@ -132,13 +130,13 @@ impl<'a> PictureTask<'a> {
     }
 
     /// The full picture: learning first, then samples until a rule is met.
-    fn render(&mut self, world: &World, environment: &Environment) {
-        let mut pictures = self.begin_pictures(world, environment);
+    fn render(&mut self) {
+        let mut pictures = self.begin_pictures();
         let is_rich = self.preview.is_rich();
         // When the picture went on last.
         let mut went_on = Instant::now();
         while let Some(activity) = self.next_activity(&pictures) {
-            self.begin_and_end_others(world, environment, &mut pictures, is_rich);
+            self.begin_and_end_others(&mut pictures, is_rich);
             match activity {
                 Activity::Paused | Activity::Done => {
                     self.stand_still(activity, &mut pictures);
@@ -167,35 +165,33 @@ impl<'a> PictureTask<'a> {
     }
 
     /// The picture that was left, if it was this very one and not long ago, or a new one.
-    fn begin_pictures<'s>(
-        &mut self,
-        world: &'s World,
-        environment: &'s Environment,
-    ) -> Pictures<'s> {
+    fn begin_pictures(&mut self) -> Pictures<'a> {
         let request = Arc::clone(self.request());
         if let Some(left) = self.sessions.kept.come_back(&request) {
             self.preview.resume(&request);
             (self.counters, self.cached_seconds) = (left.counters, left.cached_seconds);
             self.inspection.curves[MAIN] = left.curve;
-            let mut cached = CachedPicture::resume(world, environment, left.cached);
-            if let Some(session) = cached.session_mut() {
-                self.sessions.take_up_training(session);
-            }
-            let main = Session::resume(world, environment, left.session);
-            let pictures = Pictures::new(main, cached);
+            let (world, environment) = (self.sessions.world, self.sessions.environment);
+            let resume = |state| Session::resume(world, environment, state);
+            let cached = left.cached.map(|state| {
+                let mut session = resume(state);
+                self.sessions.take_up_training(&mut session);
+                session
+            });
+            let pictures = Pictures::new(resume(left.session), cached);
             // Before it goes on.
             self.publish(Activity::Rendering, &pictures);
             return pictures;
         }
-        if request.previews && !self.sessions.kept.device.is_quick(&request) {
+        if request.previews && !self.sessions.device.is_quick(&request) {
             self.preview.resize_earlier(&request.view);
         }
         let view = request.view.clone();
         let main = if request.is_frozen && self.sessions.kept.distributions_for(&request).is_some()
         {
-            self.sessions.experienced_session(world, environment, view)
+            self.sessions.experienced_session(view)
         } else {
-            let (session, counted) = self.sessions.learning_session(world, environment, view);
+            let (session, counted) = self.sessions.learning_session(view);
             self.counters = counted;
             session
         };
@@ -203,24 +199,22 @@ impl<'a> PictureTask<'a> {
     }
 
     /// Begins the cached and the plain picture where they are wanted, and ends them where they are not.
-    fn begin_and_end_others<'s>(
-        &mut self,
-        world: &'s World,
-        environment: &'s Environment,
-        pictures: &mut Pictures<'s>,
-        is_rich: bool,
-    ) {
+    fn begin_and_end_others(&mut self, pictures: &mut Pictures<'a>, is_rich: bool) {
         let Pictures { main, plain, cached, .. } = pictures;
         let request = Arc::clone(self.request());
         let may_want_cached = self.may_want_cached(main);
         if !(request.wants_cached && may_want_cached) {
             // One that is complete may be wanted again with the next key.
-            if !(cached.is_complete() && may_want_cached) {
+            let is_complete = matches!(cached, CachedPicture::Complete(..));
+            if !(is_complete && may_want_cached) {
                 cached.end(|session| self.sessions.keep_training(session));
             }
-        } else if cached.is_absent() && !is_rich && self.is_time_for_cached(main) {
+        } else if matches!(cached, CachedPicture::Absent)
+            && !is_rich
+            && self.is_time_for_cached(main)
+        {
             let view = View { gi: Gi::Cached, ..request.view.clone() };
-            let session = self.sessions.experienced_session(world, environment, view);
+            let session = self.sessions.experienced_session(view);
             *cached = CachedPicture::UnderWay(Box::new(session));
         }
         if !request.split {
@@ -229,7 +223,7 @@ impl<'a> PictureTask<'a> {
             self.inspection.curves[PLAIN].clear();
         } else if plain.is_none() {
             let view = View { sampling: Sampling::Plain, ..request.view.clone() };
-            *plain = Some(Session::new(world, environment, view));
+            *plain = Some(self.sessions.new_session(view));
         }
     }
 
@@ -249,7 +243,7 @@ impl<'a> PictureTask<'a> {
         // A GPU may be ready now, or asked for. What is compared stays comparable.
         let was_on_gpu = pictures.main.is_on_gpu();
         if self.request().split {
-            self.sessions.kept.device.note_compiled();
+            self.sessions.device.note_compiled();
         } else {
             self.sessions.place(&mut pictures.main);
         }
@@ -261,8 +255,8 @@ impl<'a> PictureTask<'a> {
     /// Puts the picture aside for another one.
     fn leave(&mut self, pictures: Pictures<'_>) {
         let Pictures { main, mut cached, .. } = pictures;
-        if self.sessions.watch.is_left_for_same_light()
-            && let Some(session) = cached.session_mut()
+        if let CachedPicture::UnderWay(session) = &mut cached
+            && self.sessions.watch.is_left_for_same_light()
         {
             self.sessions.keep_training(session);
         }
@@ -273,7 +267,7 @@ impl<'a> PictureTask<'a> {
         let mut left = SuspendedPicture {
             request: Arc::clone(self.request()),
             session: main.suspend(),
-            cached: cached.suspend(),
+            cached: cached.map(Session::suspend),
             counters: self.counters.take(),
             curve: std::mem::take(&mut self.inspection.curves[MAIN]),
             cached_seconds: self.cached_seconds,
@@ -305,9 +299,7 @@ impl<'a> PictureTask<'a> {
         let rule = self.rule();
         // What they take is compared on the same device.
         if let Some(plain) = &mut pictures.plain
-            && [&mut pictures.main, plain]
-                .into_iter()
-                .any(|session| self.sessions.place(session) == Placed::TooLate)
+            && [&mut pictures.main, plain].into_iter().any(|session| !self.sessions.place(session))
         {
             return;
         }
@@ -338,7 +330,7 @@ impl<'a> PictureTask<'a> {
     /// GPU has many samples in a moment, nor where pictures are compared.
     fn may_want_cached(&self, main: &Session<'_>) -> bool {
         !self.request().split
-            && !self.sessions.kept.device.is_quick(self.request())
+            && !self.sessions.device.is_quick(self.request())
             && worth(main.samples()) > 0.0
     }
 
@@ -377,7 +369,7 @@ impl<'a> PictureTask<'a> {
 
     /// One learning pass.
     fn learn(&mut self, main: &mut Session<'_>) {
-        if self.sessions.place(main) == Placed::TooLate {
+        if !self.sessions.place(main) {
             return;
         }
         self.sessions.learn_in_place(main);
@@ -445,6 +437,7 @@ impl<'a> PictureTask<'a> {
             reading += cost;
             snapshot
         });
+        let is_quick = self.sessions.device.is_quick(&request);
         let kept = &mut *self.sessions.kept;
         kept.snapshots += 1;
         shared.publish(Snapshot {
@@ -456,7 +449,12 @@ impl<'a> PictureTask<'a> {
             counters: self.counters.clone(),
             backdrop: self.preview.backdrop(&request, activity, main.samples(), cached),
             cached_seconds: self.cached_seconds,
-            cache: self.inspection.cache_facts(cached.session().unwrap_or(main), &request, kept),
+            cache: self.inspection.cache_facts(
+                cached.session().unwrap_or(main),
+                &request,
+                kept,
+                is_quick,
+            ),
             curves: self.inspection.curves.clone(),
             rest: Arc::clone(&shared.throttle),
             request,

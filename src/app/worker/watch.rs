@@ -14,15 +14,6 @@ pub(super) struct RequestWatch<'a> {
     pub(super) request: Arc<Request>,
 }
 
-/// The reason why a wait has ended.
-#[derive(PartialEq, Eq)]
-pub(super) enum Rested {
-    /// Something else is asked for.
-    ForRequest,
-    /// Kernels that sessions can be placed with are compiled.
-    ForKernels,
-}
-
 impl RequestWatch<'_> {
     /// Takes up the latest request, if work goes on for it; whether it does.
     pub(super) fn takes_up_latest(&mut self) -> bool {
@@ -68,14 +59,14 @@ impl RequestWatch<'_> {
         self.shared.orders.slot().value.as_ref().is_some_and(is_lit_alike)
     }
 
-    /// Waits until something else is asked for, or kernels are compiled that were not.
-    pub(super) fn rest(&self, device: &Device) -> Rested {
+    /// Waits until something else is asked for, or kernels are compiled that were not; whether they are.
+    pub(super) fn rest(&self, device: &Device) -> bool {
         self.shared.orders.wait(|slot| {
             let is_other = slot.value.as_ref().is_none_or(|new| !self.request.is_same(new));
             if slot.is_closed || is_other {
-                ControlFlow::Break(Rested::ForRequest)
+                ControlFlow::Break(false)
             } else if device.was_compiling() && !device.is_compiling() {
-                ControlFlow::Break(Rested::ForKernels)
+                ControlFlow::Break(true)
             } else {
                 ControlFlow::Continue(None)
             }
