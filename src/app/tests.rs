@@ -6,12 +6,13 @@ use std::time::Duration;
 use egui::Id;
 use egui::containers::PanelState;
 
+use super::application::Start;
 use super::commands::Command;
 use super::document::{Document, Light, Look, PictureSize};
+use super::edited;
 use super::interface::{Dock, Interface, Tab};
 use super::overlays::Overlay;
 use super::screenshot::{Shot, Studio};
-use super::{Start, edited};
 use crate::environment::{Environment, EnvironmentOptions};
 use crate::image::{ExrPicture, Image, read_picture, write_exr};
 use crate::memory;

@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::Vec3;
 
-use super::{Legend, Overlay, Painted, Range, palette, scaled};
+use super::overlay::Overlay;
+use super::painted::{Legend, Painted, Range, scaled};
+use super::palette;
 use crate::app::document::Look;
 use crate::app::surface_map::{Spot, SurfaceMap};
 use crate::color::srgb_from_linear;
