@@ -10,7 +10,7 @@ use crate::image::check_writable;
 use crate::output::record::write_json;
 use crate::render::gpu::Gpu;
 use crate::report::Device;
-use crate::stability::{Case, Report, Setting, Verdict, cases, run as run_case};
+use crate::stability::{Case, CaseReport, Setting, Verdict, cases, run as run_case};
 use crate::terminal::print;
 
 /// Arguments of `stability`.
@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &StabilityArguments) -> Result<()> {
         reports.push(report);
     }
     if let Some(file) = &arguments.json {
-        let all: Vec<_> = reports.iter().map(Report::to_json).collect();
+        let all: Vec<_> = reports.iter().map(CaseReport::to_json).collect();
         let value = json!({
             "software": concat!("lightgrid ", env!("CARGO_PKG_VERSION")),
             "device": device,
@@ -98,7 +98,7 @@ fn choose(arguments: &StabilityArguments) -> Result<Vec<&'static Case>> {
 }
 
 /// The last line, or the error that names what failed.
-fn conclude(reports: &[Report]) -> Result<()> {
+fn conclude(reports: &[CaseReport]) -> Result<()> {
     let of =
         |verdict: Verdict| reports.iter().filter(move |report| report.outcome.verdict() == verdict);
     let seconds: f64 = reports.iter().map(|report| report.seconds).sum();

@@ -1,4 +1,4 @@
-//! Devices against each other, against f64, lost, and too small.
+//! Devices: compared with each other and with f64, lost, and with too little memory.
 
 use std::sync::atomic::AtomicBool;
 
@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::case::{Case, On, Setting};
 use super::maps::sun;
 use super::outcome::Outcome;
-use super::reference::Reference;
+use super::reference::FloorReference;
 use super::scenes::{
     FIRST_TEXTURE, glass, lambert, light, mean, render, room, sky, view, with_texel,
 };
@@ -32,7 +32,7 @@ pub(super) const CASES: &[Case] = &[
     case("out-of-gpu-memory", On::Gpu, out_of_gpu_memory),
 ];
 
-/// How far apart pixels are, relative to the pixel plus a thousandth of the picture's mean.
+/// Differences of pixels, relative to the pixel plus a thousandth of the picture's mean.
 struct Deviations {
     worst: f64,
     mean: f64,
@@ -57,16 +57,16 @@ fn luminances(film: &Film) -> impl Iterator<Item = f64> {
     film.pixels().iter().map(Pixel::mean_luminance)
 }
 
-/// One sample a pixel, so that nothing averages out, and then many.
+/// One sample per pixel, so that errors do not average out, and then many.
 fn against_f64(setting: &Setting) -> Result<Outcome> {
     let mut outcome = Outcome::new();
     for (name, environment) in [("day", sky("day")?), ("sun of 1e5", light(sun(96, 48, 1e5))?)] {
         let camera = Camera::look_at(Vec3::new(0.3, 1.0, 0.2), Vec3::new(0.0, 0.4, -1.0), 1.2);
         let world = WorldBuilder::default().floor(&lambert(0.5), Vec3::ZERO, 1e4).build();
-        let reference = Reference::new(&environment, 0.5);
+        let reference = FloorReference::new(&environment, 0.5);
         let reference = reference.ok_or_else(|| Error::new("the sky is black"))?;
         for (side, samples) in [(setting.count(96, 512), 1), (16, setting.count(256, 4096))] {
-            // Looking down far enough that no pixel sees the floor's end.
+            // Directed down so that no pixel sees the floor's edge.
             let camera = Camera::look_at(
                 camera.world_from_camera.translation.into(),
                 Vec3::new(0.0, 0.0, -0.5),
@@ -76,8 +76,8 @@ fn against_f64(setting: &Setting) -> Result<Outcome> {
             let film = render(setting, &world, &environment, view.clone(), samples)?;
             let found = Deviations::of(luminances(&film), &reference.picture(&view, samples));
             let what = format!("{name}, {samples} a pixel");
-            // The density jumps from texel to texel, so a sample that rounding sends over an edge
-            // has another weight: such a sample is off by per cents, and there are few.
+            // The density is discontinuous at texel edges: the few samples that rounding moves across an edge are
+            // off by per cents.
             outcome = outcome
                 .sound(&film)
                 .at_most(format!("{what}: mean deviation from f64"), found.mean, 1e-3)
@@ -88,7 +88,7 @@ fn against_f64(setting: &Setting) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// The same seed draws the same paths but for rounding; expectations are the same.
+/// The same seed gives the same paths except for rounding, and the same expectation.
 fn against_cpu(setting: &Setting, (builder, camera): (WorldBuilder, Camera)) -> Result<Outcome> {
     let (world, environment) = (builder.build(), sky("day")?);
     let view = View { width: 32, height: 32, ..view(camera, Sampling::Plain, 3) };
@@ -110,14 +110,15 @@ fn compare(
     let ratio = mean(&gpu).luminance / mean(&cpu).luminance;
     Ok(Outcome::new()
         .sound(&gpu)
-        // Paths that rounding sends to another triangle, texel or side of a lobe.
+        // Paths that rounding moves to another triangle, texel or side of a lobe.
         .at_most("share of pixels off by 0.2 %", found.apart, 0.05)
         .at_most("mean of the picture off, relative", (ratio - 1.0).abs(), 5e-3)
         .info("mean deviation of a pixel", found.mean)
         .info("worst deviation of a pixel", found.worst))
 }
 
-/// The work so far is kept and the CPU goes on. The device is one of its own: the others go on too.
+/// A lost device keeps the film, and the CPU continues. The case opens a device of its own, so that others are not
+/// affected.
 fn device_lost(setting: &Setting) -> Result<Outcome> {
     let Some(known) = &setting.gpu else { return Ok(Outcome::skipped("needs --device gpu")) };
     let gpu = Gpu::open(Some(&known.facts().name))?;
@@ -144,7 +145,7 @@ fn device_lost(setting: &Setting) -> Result<Outcome> {
         .at_least("the CPU goes on", yes(goes_on), 1.0))
 }
 
-/// A picture that the device has no room for is refused with the numbers; a small one still works.
+/// A picture too large for the device's memory is refused with the sizes; a small one still works.
 fn out_of_gpu_memory(setting: &Setting) -> Result<Outcome> {
     let Some(gpu) = &setting.gpu else { return Ok(Outcome::skipped("needs --device gpu")) };
     let allowed = gpu.facts().storage_binding_bytes.min(gpu.facts().buffer_bytes);

@@ -1,4 +1,4 @@
-//! The film: many samples, and large beside small ones.
+//! The film: many samples, and large samples beside small ones.
 
 use std::sync::atomic::AtomicBool;
 
@@ -34,8 +34,8 @@ pub(super) const CASES: &[Case] = &[
 
 const SAMPLES: u32 = 10_000_000;
 
-/// Ten million samples of one pixel; green is always 1e-8, so that a bright channel must not drown
-/// a dark one. Against compensated sums (Neumaier 1974) in f64.
+/// Ten million samples of one pixel against compensated sums (Neumaier 1974) in f64. Green is always 1e-8, to
+/// show that a bright channel does not affect a dark one.
 fn sums(draw: impl Fn(&mut SplitMix) -> f32) -> Outcome {
     const GREEN: f32 = 1e-8;
     let mut random = SplitMix(1);
@@ -59,7 +59,7 @@ fn sums(draw: impl Fn(&mut SplitMix) -> f32) -> Outcome {
         .at_most("variance, relative", relative(pixel.variance_of_mean(), variance), 1e-7)
 }
 
-/// A sum whose lost digits are kept.
+/// A sum with compensation of rounding errors.
 #[derive(Default)]
 struct Compensated {
     sum: f64,
@@ -79,7 +79,7 @@ impl Compensated {
     }
 }
 
-/// One pixel that sees nothing but a map of one radiance.
+/// One pixel that sees only a map of constant radiance.
 fn rendered(setting: &Setting, radiance: f32, samples: u32) -> Result<Outcome> {
     let (world, environment) = (WorldBuilder::default().build(), constant(radiance)?);
     let camera = Camera::look_at(Vec3::ZERO, Vec3::X, 1.0);

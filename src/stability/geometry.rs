@@ -1,4 +1,4 @@
-//! Geometry: no ray leaves a closed room, whatever its triangles and its size.
+//! Geometry: no ray leaves a closed room, for any triangles and any size.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -59,7 +59,7 @@ fn tree(corners: &[Vec3]) -> Bvh {
     Bvh::build(corners, &triangles)
 }
 
-/// How many of `count` rays meet nothing.
+/// Number of rays among `count` that hit nothing.
 fn leaks(tree: &Bvh, count: u64, ray: impl Fn(&mut SplitMix) -> (Vec3, Vec3) + Sync) -> f64 {
     const RUN: u64 = 1 << 16;
     let missed: u64 = (0..count.div_ceil(RUN))
@@ -121,7 +121,7 @@ fn leaks_anywhere(setting: &Setting) -> Outcome {
     outcome
 }
 
-/// Paths that start anew from where they hit, as the renderer's do, never find a way out.
+/// Paths whose rays start at the last hit, as the renderer's do, never leave.
 fn bouncing_leaks(setting: &Setting) -> Outcome {
     let mut outcome = Outcome::new();
     for size in [1e-4_f32, 1.0, 1e4] {
@@ -136,7 +136,7 @@ fn bouncing_leaks(setting: &Setting) -> Outcome {
     outcome
 }
 
-/// Ways out of the box around the origin that a path of `bounces` diffuse reflections found.
+/// Number of times that a path of `bounces` diffuse reflections leaves the box around the origin.
 fn bounce(tree: &Bvh, seed: u64, bounces: u32) -> u32 {
     let mut random = SplitMix(seed);
     let (mut origin, mut direction, mut missed) = (Vec3::ZERO, random.next_direction(), 0);
@@ -168,7 +168,7 @@ fn slivers(setting: &Setting) -> Outcome {
     let mut corners = Vec::new();
     for axis in 0..3 {
         for side in [-1.0, 1.0] {
-            // Cuts at random places, two millionths apart here and there.
+            // Cuts at random places, in pairs two millionths apart.
             let mut cuts = vec![-1.0, 1.0];
             for _ in 0..100 {
                 let at = random.next_f32() * 1.9 - 0.95;
@@ -195,7 +195,7 @@ fn slivers(setting: &Setting) -> Outcome {
     Outcome::new().at_most(format!("leaks of {count} rays between slivers"), missed, 0.0)
 }
 
-/// Triangles without area, twice the same, and with corners that are no numbers change nothing.
+/// Triangles without area, duplicates, and triangles with NaN or infinite corners change nothing.
 fn degenerate(setting: &Setting) -> Result<Outcome> {
     let wall = lambert(0.7);
     let (builder, camera) = room(0.7, 1.0, Vec3::ZERO);
@@ -231,7 +231,7 @@ fn degenerate(setting: &Setting) -> Result<Outcome> {
     ))
 }
 
-/// Two walls at one place: either may be seen, nothing else.
+/// Two coplanar walls: either may be visible, and nothing else.
 fn coplanar(setting: &Setting) -> Result<Outcome> {
     let mut outcome = Outcome::new();
     for tilt in [0.0, 0.3] {
@@ -256,7 +256,7 @@ fn coplanar(setting: &Setting) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// The room looks as the one of 4 m does, and stays dark when it is sealed.
+/// A scaled room has the same picture as the one of 4 m, and stays dark when it is sealed.
 fn scaled_room(setting: &Setting, scale: f32) -> Result<Outcome> {
     let environment = sky("day")?;
     let of = |scale: f32| -> Result<Mean> {
@@ -286,7 +286,7 @@ fn small_beside_large(setting: &Setting) -> Result<Outcome> {
         let world = ground(builder.faces(&lambert(0.8), low, high, [0])).build();
         render(setting, &world, &environment, view(camera, Sampling::Plain, 8), 64)?
     };
-    // The same room at its usual size on a ground that is as much larger.
+    // The same scene at the room's usual size.
     let lit = |factor: f32| -> Result<Mean> {
         let (builder, camera) = room(0.8, factor, Vec3::ZERO);
         let floor = Vec3::new(0.0, -factor, 0.0);

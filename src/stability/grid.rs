@@ -1,7 +1,6 @@
-//! The Light Grid: cells everywhere, odd cameras, little and much learning.
+//! The Light Grid: its cells, extreme cameras, little and much learning.
 //!
-//! Whatever it learned, the picture's expectation is that of the plain sampler: most cases compare
-//! the two.
+//! The picture's expectation does not depend on learning: most cases compare it with the plain sampler's.
 
 use std::sync::atomic::AtomicBool;
 
@@ -50,7 +49,7 @@ pub(super) const CASES: &[Case] = &[
     case("1e8-learning-paths", On::Any, |s| learning_paths(s, s.count(1_000_000, 100_000_000))),
 ];
 
-/// Every cell's middle lies in that cell; nothing leads outside of the grid.
+/// Every cell's middle lies in that cell, and every point has a cell of the grid.
 fn cells() -> Outcome {
     let (mut lost, mut outside) = (0, 0);
     let mut random = SplitMix(3);
@@ -62,7 +61,7 @@ fn cells() -> Outcome {
                 let (face, _, _) = grid.coordinates(cell);
                 let mut normal = Vec3::ZERO;
                 normal[face as usize / 2] = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
-                // As far as the centre: f32 keeps 2^-24 of that.
+                // As far as the centre's coordinates are large, of which f32 resolves 2^-24.
                 let reach = center.length().max(1.0) * 4.0;
                 let position = center + grid.direction_of(cell) * reach;
                 lost += usize::from(grid.cell_of(position, normal) != cell);
@@ -100,7 +99,7 @@ fn cells() -> Outcome {
     )
 }
 
-/// What [`Sampling::Adaptive`] and [`Sampling::Talk`] make of a scene, against the plain sampler.
+/// Pictures by [`Sampling::Adaptive`] and [`Sampling::Talk`] against the plain sampler's.
 fn against_plain(
     setting: &Setting,
     world: &World,
@@ -117,7 +116,7 @@ fn against_plain(
         let what = format!("{sampling:?} against plain: standard errors off");
         outcome = outcome.sound(&film).at_most(what, off, SIGMAS);
     }
-    // Too noisy a pair could not differ.
+    // A limit of noise, so that a difference is detectable.
     let noise = expected.error / expected.luminance;
     Ok(outcome.at_most("noise of the comparison, relative", noise, 0.1))
 }
@@ -181,7 +180,7 @@ fn crack(setting: &Setting, width: f32) -> Result<Outcome> {
     builder = lid(builder, [-half, half], [end, 2.0]);
     let world = builder.build();
     let eye = Vec3::new(0.3, 0.5, 0.2);
-    // Less than the slit's width is seen of the floor.
+    // The pixels cover less of the floor than the slit's width.
     let camera = Camera::look_at(eye, Vec3::new(0.02, 0.0, 0.1), 1e-4);
     let (strips, mut irradiance) = (2000, 0.0);
     let width = f64::from(half) * 2.0;
@@ -207,7 +206,7 @@ fn crack(setting: &Setting, width: f32) -> Result<Outcome> {
         .at_most("noise, relative", found.error / expected, 0.1))
 }
 
-/// A grid that learned one corner is used everywhere else: the whole map's distribution there.
+/// A grid that learned in one corner is used elsewhere: cells without learning use the whole map's distribution.
 fn empty_cells(setting: &Setting) -> Result<Outcome> {
     let (builder, camera) = room(0.7, 1.0, Vec3::ZERO);
     let (world, environment) = (builder.build(), sky("day")?);
@@ -221,7 +220,7 @@ fn empty_cells(setting: &Setting) -> Result<Outcome> {
     Ok(outcome.at_least("share of empty cells", empty as f64 / f64::from(cells), 0.9))
 }
 
-/// Pictures with grids that belong to other places, against the plain sampler.
+/// Pictures with grids that were learned elsewhere, against the plain sampler's.
 fn with_grids(
     setting: &Setting,
     world: &World,
@@ -263,7 +262,7 @@ fn saturation(setting: &Setting) -> Result<Outcome> {
                 counters.record(0, tile, if i % 16 == 1 { MAX_WEIGHT } else { 0.0 });
             }
         } else {
-            // As much as such a pass may add, all at once.
+            // Adds the maximum of a pass at once.
             let (mut visits, _, mut blocks) = counters.words();
             let records = MAX_RECORDS_PER_PASS as u32;
             let mut add = |word: &mut u32, more: u32| match word.checked_add(more) {
@@ -288,7 +287,7 @@ fn saturation(setting: &Setting) -> Result<Outcome> {
         .at_most("visibility ratio off 1/3, relative", (3.0 * ratio - 1.0).abs(), 1e-5))
 }
 
-/// A camera flies through the room; each picture uses the grid of the place before, or garbage.
+/// A camera flies through the room; each picture uses the previous place's grid, or random distributions.
 fn moving_camera(setting: &Setting) -> Result<Outcome> {
     let (world, environment) = (room(0.7, 1.0, Vec3::ZERO).0.build(), sky("sunset")?);
     let mut outcome = Outcome::new();

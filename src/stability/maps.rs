@@ -1,5 +1,5 @@
-//! Maps: each is integrated, sampled, searched for light that cannot be reached, and lights a floor
-//! whose irradiance is known from f64 quadrature.
+//! Maps: densities integrate to 1, samples follow them, every lit point can be sampled, and a floor under the map
+//! has the irradiance of f64 quadrature.
 
 use std::f64::consts::{PI, TAU};
 
@@ -44,7 +44,7 @@ pub(super) const CASES: &[Case] = &[
     case("15000x7500", |s| large(s, "sunset", 15_000, 7500)),
 ];
 
-/// Random pixels, each channel a function of a uniform number.
+/// Random pixels: each channel is `f` of a uniform number.
 fn noise(width: u32, height: u32, f: impl Fn(f32) -> f32) -> Image {
     let mut random = SplitMix(7);
     Image::from_fn(width, height, |_, _| [0; 3].map(|_| f(random.next_f32())))
@@ -60,7 +60,7 @@ fn lit(width: u32, height: u32, texels: &[(u32, u32)]) -> Image {
     )
 }
 
-/// A dim uneven sky with a sun of one texel, above the horizon.
+/// A dim noisy sky with a sun of one texel above the horizon.
 pub(super) fn sun(width: u32, height: u32, radiance: f32) -> Image {
     let mut map = noise(width, height, |u| u);
     map.pixels[(height / 4 * width + width / 3) as usize] = [radiance; 3];
@@ -74,7 +74,7 @@ pub(super) fn scaled(mut map: Image, factor: f64) -> Image {
     map
 }
 
-/// Nothing may be sampled, everything is black, and nothing is divided by zero.
+/// A black map: no tile can be sampled, pictures are black, and no division by zero occurs.
 fn black(setting: &Setting) -> Result<Outcome> {
     let map = Image::filled(40, 20, [0.0; 3]);
     let environment = Environment::new(map, &EnvironmentOptions::default())?;
@@ -88,12 +88,12 @@ fn black(setting: &Setting) -> Result<Outcome> {
     Ok(outcome.sound(&film).at_most("light from a black map", mean(&film).luminance, 0.0))
 }
 
-/// Radiance that f32 holds with few digits.
+/// Subnormal radiance, which f32 holds with few digits.
 fn subnormal(setting: &Setting) -> Result<Outcome> {
     let map = noise(64, 32, |u| f32::from_bits((u * 4e6) as u32 + 1));
     if setting.gpu.is_some() {
-        // WGSL lets a device take subnormal numbers for zero, and the map is packed to 8 bits of
-        // exponent: black is a sound answer there.
+        // WGSL allows devices to flush subnormal numbers to zero, and the map is packed to 8 bits of exponent:
+        // black is correct there.
         let environment = Environment::new(map, &EnvironmentOptions::default())?;
         let film = floor(setting, &environment, 16)?;
         return Ok(Outcome::new().sound(&film).at_most(
@@ -105,7 +105,7 @@ fn subnormal(setting: &Setting) -> Result<Outcome> {
     check(setting, map)
 }
 
-/// What a half-float file makes of a sun beyond 65504: infinity, which is repaired and counted.
+/// Infinite pixels, as a half-float file has for a sun above 65504: they are repaired and counted.
 fn half_overflow(setting: &Setting) -> Result<Outcome> {
     let mut map = scaled(sun(64, 32, 1.0), 65_504.0);
     map.pixels[500] = [f32::INFINITY, 65_504.0, f32::INFINITY];
@@ -121,7 +121,8 @@ fn nan_inf_negative(setting: &Setting) -> Result<Outcome> {
     repaired(setting, map, &["1 NaN", "1 infinite", "2 negative"])
 }
 
-/// The renderer refuses such a map; what reading files does about it is told, and then sound.
+/// The renderer refuses such a map; `sanitise`, which readers of files call, reports its repairs and makes it
+/// valid.
 fn repaired(setting: &Setting, mut map: Image, told: &[&str]) -> Result<Outcome> {
     let refused = Environment::new(map.clone(), &EnvironmentOptions::default()).is_err();
     let notices: Notices = sanitise(&mut map);
@@ -141,10 +142,10 @@ fn large(setting: &Setting, name: &str, width: u32, height: u32) -> Result<Outco
     check(setting, sky::build(name, width, height)?)
 }
 
-/// How far the maps are turned: tile edges, texel edges and the seam must not fall together.
+/// Rotation of the maps, by which tile edges, texel edges and the seam do not coincide.
 const ROTATION: f32 = 1.2345;
 
-/// The four figures.
+/// Checks densities, samples, irradiance and a rendered floor.
 fn check(setting: &Setting, map: Image) -> Result<Outcome> {
     let options = EnvironmentOptions { rotation_radians: ROTATION, ..Default::default() };
     let environment = Environment::new(map, &options)?;
@@ -170,7 +171,7 @@ const LUMINANCE: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
 fn densities(environment: &Environment) -> (f64, usize) {
     const PLACES: [(f32, f32); 5] = [(0.5, 0.5), (0.1, 0.2), (0.9, 0.3), (0.2, 0.8), (0.7, 0.9)];
     let brightest = environment.map().pixels.as_flattened().iter().copied().fold(0.0, f32::max);
-    // Less than what f32 can weigh beside the brightest is left to other samplers.
+    // Radiance too small for f32 beside the brightest is left to other samplers.
     let least = 1e-30 * brightest;
     let tiles = environment.tile_count() as usize;
     let (columns, rows) = environment.patch_grid();
@@ -206,8 +207,8 @@ fn densities(environment: &Environment) -> (f64, usize) {
     (lit.map(|(integral, _)| (integral - 1.0).abs()).fold(0.0, f64::max), unreachable)
 }
 
-/// p-value of samples, as many from each lit tile, against the reported densities. Patches are taken
-/// together where there are more than a test of this size resolves.
+/// p-value of samples against the reported densities, with equally many samples from each lit tile. Patches are
+/// merged to at most 128 x 64 bins.
 fn chi_square(environment: &Environment) -> Result<f64> {
     const SAMPLES: usize = 200_000;
     let (width, height) = environment.patch_grid();
@@ -240,15 +241,15 @@ fn chi_square(environment: &Environment) -> Result<f64> {
         }
     }
     if expected.iter().filter(|count| **count >= 5.0).count() < 2 {
-        // One place to sample: all samples are there or the table is wrong.
+        // A single bin: it must hold all samples.
         let missed: f64 = observed.iter().zip(&expected).map(|(o, e)| (o - e).abs()).sum();
         return Ok(if missed < 1e-3 * SAMPLES as f64 { 1.0 } else { 0.0 });
     }
     Ok(chi_square_test(&observed, &expected, 1e-5)?.p_value)
 }
 
-/// Standard errors by which an estimate of the irradiance on both sides of a tilted surface is off,
-/// in the worst channel.
+/// Error of an estimate of the irradiance on both sides of a tilted surface, in standard errors, in the worst
+/// channel.
 fn irradiance_error(environment: &Environment) -> f64 {
     const SAMPLES: u32 = 50_000;
     let normal = DVec3::new(-0.3, 0.6, -0.75).normalize();
@@ -283,12 +284,12 @@ fn irradiance_error(environment: &Environment) -> f64 {
             let error = variance.sqrt().hypot(5e-4 * exact[c]);
             if mean[c] == exact[c] { 0.0 } else { (mean[c] - exact[c]).abs() / error }
         })
-        // Unlike `max` this keeps what is no number.
+        // Unlike `max`, this keeps NaN.
         .fold(0.0, |worst, x| if x.is_nan() || x > worst { x } else { worst })
 }
 
-/// Irradiance in f64 by the midpoint rule, on one side of a surface or on both together, with some
-/// two million points or one a texel, whichever is more.
+/// Irradiance in f64 by the midpoint rule, on one side of a surface or on both together, with about two million
+/// points, or one for each texel of larger maps.
 fn quadrature(environment: &Environment, normal: DVec3, both_sides: bool) -> DVec3 {
     let map = environment.map();
     let texels = f64::from(map.width) * f64::from(map.height);
@@ -330,7 +331,7 @@ pub(super) fn bilinear(map: &Image, x: f64, y: f64) -> DVec3 {
     let y = y.clamp(0.0, f64::from(map.height - 1));
     let (left, top) = (x.floor(), y.floor());
     let cosine = |row: f64| (PI * (row + 0.5) / f64::from(map.height)).cos();
-    // Below the last row there is none, and its cosine would be the last one's.
+    // There is no row below the last one.
     let is_last = top >= f64::from(map.height - 1);
     let down = (cosine(top) - cosine(y)) / (cosine(top) - cosine(top + 1.0));
     let down = if is_last { 0.0 } else { down };

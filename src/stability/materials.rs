@@ -1,4 +1,5 @@
-//! Materials and paths: in uniform light of 1 no picture is brighter than 1, and every number is finite.
+//! Materials and paths: in uniform light of radiance 1 (a furnace) no picture is brighter than 1, and every value
+//! is finite.
 
 use std::sync::atomic::AtomicBool;
 
@@ -34,7 +35,7 @@ pub(super) const CASES: &[Case] = &[
     case("overflow-is-counted", overflow),
 ];
 
-/// What tabulated albedos may gain: the BSDF's own tests allow it.
+/// Maximum energy gain by tabulated albedos, as in the BSDF's own tests.
 const TABLE_ERROR: f64 = 4e-3;
 
 /// White metal.
@@ -58,13 +59,13 @@ fn ball(material: &Material) -> (World, Camera) {
     (world, Camera::look_at(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, 0.4))
 }
 
-/// A picture of a scene in uniform light of 1.
+/// A picture of a scene in uniform light of radiance 1.
 fn furnace(setting: &Setting, (world, camera): (World, Camera), bounces: u32) -> Result<Film> {
     let view = View { width: 12, height: 12, ..view(camera, Sampling::Plain, bounces) };
     render(setting, &world, &constant(1.0)?, view, setting.count(32, 512))
 }
 
-/// The brightest and the darkest of some furnaces, each beyond doubt.
+/// The brightest and the darkest of several furnaces, beyond their noise.
 struct Furnaces {
     outcome: Outcome,
     brightest: f64,
@@ -89,7 +90,7 @@ impl Furnaces {
     }
 }
 
-/// Mirrors that are nearly perfect, where densities reach 1e16.
+/// Nearly perfect mirrors, whose densities reach 1e16.
 fn nearly_smooth(setting: &Setting) -> Result<Outcome> {
     let all = [0.0, 1e-6, 1e-5, 1e-4, 1e-3, 0.031, 0.032, 0.04];
     // Software Vulkan takes seconds to compile a kernel for each kind of material.
@@ -124,11 +125,11 @@ fn indices(setting: &Setting) -> Result<Outcome> {
     Ok(furnaces.judged("index").at_most("index 1 is visible: standard errors", invisible, SIGMAS))
 }
 
-/// Every path finds the window in the end.
+/// A white room: every path finally leaves through the window.
 fn white_room(setting: &Setting) -> Result<Outcome> {
     let (builder, camera) = room(1.0, 1.0, Vec3::ZERO);
     let (world, view) = (builder.build(), view(camera, Sampling::Plain, 1000));
-    // The block is half as white as the walls; give it back its whiteness.
+    // The block has half the walls' albedo: make it white.
     let mut scene = world.scene;
     scene.materials.iter_mut().for_each(|m| m.base_color = Vec3::ONE.extend(1.0));
     let film = render(setting, &World::new(scene), &constant(1.0)?, view, setting.count(32, 512))?;
@@ -160,7 +161,7 @@ fn buried_normals(setting: &Setting) -> Result<Outcome> {
     Ok(furnaces.judged("buried normals"))
 }
 
-/// A millimetre above a floor of ten kilometres.
+/// A camera a millimetre above a floor of ten kilometres.
 fn grazing(setting: &Setting) -> Result<Outcome> {
     let mut furnaces = Furnaces::new();
     for material in
@@ -192,7 +193,7 @@ fn nested(setting: &Setting) -> Result<Outcome> {
     Ok(furnaces.judged("nested glass"))
 }
 
-/// From nothing is absorbed to nothing is left, and where products leave f32.
+/// Absorption from none to total, and products beyond the range of f32.
 fn optical_depths(setting: &Setting) -> Result<Outcome> {
     let mut furnaces = Furnaces::new();
     let mut clearest: f64 = 0.0;
@@ -211,7 +212,7 @@ fn optical_depths(setting: &Setting) -> Result<Outcome> {
     Ok(furnaces.judged("absorbing glass").at_least("clearest glass", clearest, 0.95))
 }
 
-/// Fog that loses nothing, from hardly there to a wall, around a floor; and milk in a glass ball.
+/// Fog without absorption around a floor, from thin to opaque; and milk in a glass ball.
 fn media(setting: &Setting) -> Result<Outcome> {
     let mut furnaces = Furnaces::new();
     let mut thinnest = 0.0_f64;
@@ -247,7 +248,7 @@ fn media(setting: &Setting) -> Result<Outcome> {
     Ok(furnaces.judged("media").at_most("thinnest fog: standard errors off", thinnest, SIGMAS))
 }
 
-/// Whatever a file may say: a ball of it in a room of it.
+/// Random valid materials: a ball of each in a room of each.
 fn random_materials(setting: &Setting) -> Result<Outcome> {
     let mut random = SplitMix(6);
     let mut furnaces = Furnaces::new();
@@ -278,7 +279,7 @@ fn random_materials(setting: &Setting) -> Result<Outcome> {
     Ok(furnaces.judged("random materials"))
 }
 
-/// Light beyond what f32 holds: samples overflow, are left out, counted, and told.
+/// Light beyond the range of f32: samples overflow, are left out, counted and reported.
 fn overflow(setting: &Setting) -> Result<Outcome> {
     let material = Material { emissive: Vec3::splat(f32::MAX), ..lambert(1.0) };
     let world = WorldBuilder::default().floor(&material, Vec3::ZERO, 10.0).build();

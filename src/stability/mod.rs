@@ -40,18 +40,18 @@ pub fn cases() -> impl Iterator<Item = &'static Case> {
     .flatten()
 }
 
-/// A case that was run.
-pub struct Report {
+/// Result of a case that was run.
+pub struct CaseReport {
     /// `group/name`.
     pub title: String,
-    /// What it found.
+    /// Its figures and verdict.
     pub outcome: Outcome,
-    /// How long it took.
+    /// Seconds that it took.
     pub seconds: f64,
 }
 
-/// Runs a case. An error or a panic in it is a failure, not the end.
-pub fn run(case: &Case, setting: &Setting) -> Report {
+/// Runs a case. An error or a panic in it becomes a failed verdict.
+pub fn run(case: &Case, setting: &Setting) -> CaseReport {
     let start = Instant::now();
     let outcome = if case.on == On::Gpu && setting.gpu.is_none() {
         Outcome::skipped("needs --device gpu")
@@ -62,11 +62,11 @@ pub fn run(case: &Case, setting: &Setting) -> Report {
             Err(_) => Outcome::broken("it panicked"),
         }
     };
-    Report { title: case.title(), outcome, seconds: start.elapsed().as_secs_f64() }
+    CaseReport { title: case.title(), outcome, seconds: start.elapsed().as_secs_f64() }
 }
 
-impl Report {
-    /// One line: case, what decided, figure, limit, verdict, seconds; then the remarks.
+impl CaseReport {
+    /// One line: case, decisive figure, value, limit, verdict, seconds; then the remarks unless it passed.
     pub fn line(&self) -> String {
         let verdict = self.outcome.verdict();
         let (what, value, limit) = match self.outcome.decisive() {

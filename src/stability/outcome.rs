@@ -1,17 +1,17 @@
-//! What a case measured, and whether that is good enough.
+//! Figures of a case, their limits and the verdict.
 
 use std::fmt;
 
 use serde_json::{Value, json};
 
-/// What a figure may be.
+/// Limit of a figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Limit {
-    /// This or less.
+    /// The figure must be at most this.
     AtMost(f64),
-    /// This or more.
+    /// The figure must be at least this.
     AtLeast(f64),
-    /// Anything: it is told, not judged.
+    /// No limit: the figure is information.
     Info,
 }
 
@@ -20,9 +20,9 @@ pub enum Limit {
 pub struct Figure {
     /// What was measured, with its unit.
     pub what: String,
-    /// The number; NaN fails whatever the limit.
+    /// The number; NaN always fails.
     pub value: f64,
-    /// What it may be.
+    /// Its limit.
     pub limit: Limit,
 }
 
@@ -36,24 +36,24 @@ impl Figure {
         }
     }
 
-    /// How much of the limit is used up: above 1 fails, below 0 is not judged.
+    /// Share of the limit that is used: above 1 it fails, below 0 it has no limit.
     fn strain(&self) -> f64 {
         match self.limit {
             _ if !self.holds() => f64::INFINITY,
             Limit::AtMost(most) if most > 0.0 => (self.value / most).max(0.0),
-            // Lower limits mostly say that the case had something to judge.
+            // Lower limits mostly check that the case has measured something.
             Limit::AtMost(_) | Limit::AtLeast(_) => 0.0,
             Limit::Info => -1.0,
         }
     }
 }
 
-/// How a case ended.
+/// Result of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// Every limit is kept.
     Passed,
-    /// Some limit is not, or the case could not be finished.
+    /// A limit is exceeded, or the case could not be finished.
     Failed,
     /// It cannot be run here; the reason is in the outcome's remarks.
     Skipped,
@@ -69,19 +69,19 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// All a case found.
+/// All figures and remarks of a case.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Outcome {
     /// In the order they were measured.
     pub figures: Vec<Figure>,
-    /// What else is to be said: why it was skipped, where a limit was not kept.
+    /// Remarks, such as why the case was skipped.
     pub remarks: Vec<String>,
     skipped: bool,
     broken: bool,
 }
 
 impl Outcome {
-    /// Nothing measured yet.
+    /// An outcome without figures.
     pub(super) fn new() -> Self {
         Self::default()
     }
@@ -128,7 +128,7 @@ impl Outcome {
         self
     }
 
-    /// How the case ended. A case that measured nothing and was not skipped has failed.
+    /// The verdict. A case without figures that was not skipped has failed.
     pub fn verdict(&self) -> Verdict {
         if self.skipped {
             Verdict::Skipped
@@ -140,7 +140,7 @@ impl Outcome {
         }
     }
 
-    /// The figure that decides: the first that fails, else the one nearest to its limit.
+    /// The decisive figure: the first that fails, else the one nearest to its limit.
     pub fn decisive(&self) -> Option<&Figure> {
         self.figures.iter().reduce(|a, b| if b.strain() > a.strain() { b } else { a })
     }

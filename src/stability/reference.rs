@@ -1,8 +1,7 @@
-//! The same picture in f64: direct light on an endless Lambert floor, from the same random numbers.
+//! A reference in f64: direct light on an infinite Lambert floor, from the renderer's random numbers.
 //!
-//! A twin of the path tracer for the one scene in which it stays short. Densities are not read from
-//! the table but follow from the map's own weights; only the choice among integers (tile and texel) is
-//! taken over, for it is exact.
+//! A twin of the path tracer for one simple scene. Densities come from the map's own weights and not from the
+//! table; only the choice of tile and texel, which is exact in integers, uses the table.
 
 use std::f64::consts::{PI, TAU};
 
@@ -17,7 +16,7 @@ use crate::render::View;
 use crate::sampler::Sampler;
 
 /// A floor at height 0 of this reflectance under a map that is neither turned nor scaled.
-pub(super) struct Reference<'a> {
+pub(super) struct FloorReference<'a> {
     pub(super) environment: &'a Environment,
     pub(super) grid: LightGrid,
     pub(super) albedo: f64,
@@ -25,7 +24,7 @@ pub(super) struct Reference<'a> {
     energy: f64,
 }
 
-impl<'a> Reference<'a> {
+impl<'a> FloorReference<'a> {
     /// `None` for a black map.
     pub(super) fn new(environment: &'a Environment, albedo: f64) -> Option<Self> {
         let grid = LightGrid::whole_map(environment.tile_energies())?;

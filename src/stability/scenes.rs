@@ -1,4 +1,4 @@
-//! Small scenes whose answers are known, and pictures of them on the device under test.
+//! Small scenes with known results, and pictures of them on the device under test.
 
 use std::sync::atomic::AtomicBool;
 
@@ -26,7 +26,7 @@ pub(super) fn glass(ior: f32, roughness: f32) -> Material {
     Material { transmission: 1.0, thickness: 1.0, specular: 1.0, ior, roughness, ..lambert(1.0) }
 }
 
-/// Gives everything there is tangents and texture coordinates along X, and a texture of one texel.
+/// Gives all surfaces tangents and texture coordinates along X, and a texture of one texel.
 pub(super) fn with_texel(mut builder: WorldBuilder, texel: [u8; 4]) -> WorldBuilder {
     let scene = &mut builder.scene;
     let count = scene.positions.len();
@@ -159,29 +159,29 @@ pub(super) fn mean(film: &Film) -> Mean {
     }
 }
 
-/// How many standard errors a mean is from what it should be; `rounding` of the latter is allowed
-/// for besides.
+/// Distance of a mean from its expected value, in standard errors; `rounding` is an additional relative error of
+/// the expected value.
 pub(super) fn deviation(found: Mean, expected: f64, rounding: f64) -> f64 {
     let off = (found.luminance - expected).abs();
     let error = found.error.hypot(rounding * expected.abs());
     if off == 0.0 { 0.0 } else { off / error }
 }
 
-/// How many joint standard errors two means differ by.
+/// Difference of two means, in joint standard errors.
 pub(super) fn difference(a: Mean, b: Mean) -> f64 {
     let off = (a.luminance - b.luminance).abs();
     let error = a.error.hypot(b.error).hypot(ROUNDING * a.luminance);
     if off == 0.0 { 0.0 } else { off / error }
 }
 
-/// Rounding a mean may be off by, relative: ray origins are moved by 2^-16.
+/// Relative rounding error of a mean: ray origins are moved by 2^-16.
 pub(super) const ROUNDING: f64 = 1e-4;
 
-/// Standard errors a sound estimate may be off by: it happens once in 150,000 cases.
+/// Limit of errors in standard errors: a correct estimate exceeds it once in 150,000 cases.
 pub(super) const SIGMAS: f64 = 4.5;
 
 impl Outcome {
-    /// Adds that no sample of a film was, and no pixel is, NaN or infinite.
+    /// Adds the number of samples and pixels of a film that are NaN or infinite, with limit 0.
     pub(super) fn sound(self, film: &Film) -> Self {
         let odd = film.pixels().iter().filter(|p| !p.mean().iter().all(|c| c.is_finite())).count();
         let invalid = film.invalid_samples() as f64 + odd as f64;

@@ -1,7 +1,7 @@
-//! Importance tables side by side: where each fails, and by how much.
+//! Errors of each importance table.
 //!
-//! The tile-local table must hold everywhere. The summed-area forms are kept for comparison; what
-//! they lose is told, not judged: it is the talk's finding, and ours.
+//! The tile-local table has limits. Errors of the summed-area tables, which are kept for comparison, are reported
+//! without limits: they are known from the talk and from our own measurements.
 
 use super::case::{Case, On, Setting};
 use super::maps::{scaled, sun};
@@ -35,7 +35,7 @@ fn maps(setting: &Setting) -> Result<[(&'static str, Image); 4]> {
 }
 
 /// A figure of a row.
-type Measure = fn(&SatReportRow) -> f64;
+type FigureOf = fn(&SatReportRow) -> f64;
 
 /// One table on every map; the worst map of each figure is named.
 fn everywhere(setting: &Setting, table: TableKind) -> Result<Outcome> {
@@ -45,7 +45,7 @@ fn everywhere(setting: &Setting, table: TableKind) -> Result<Outcome> {
         let row = report.rows.into_iter().find(|row| row.table == table);
         rows.push((name, row.ok_or_else(|| Error::new("a table is missing from the report"))?));
     }
-    let figures: [(&str, Measure); 4] = [
+    let figures: [(&str, FigureOf); 4] = [
         ("lit texels never sampled", |row| row.missed_share),
         ("falling steps", |row| row.falling_share),
         ("density off what is sampled", |row| row.misreported_share),
@@ -55,12 +55,12 @@ fn everywhere(setting: &Setting, table: TableKind) -> Result<Outcome> {
     for (what, of) in figures {
         let worst = rows.iter().max_by(|a, b| of(&a.1).total_cmp(&of(&b.1)));
         let Some((map, row)) = worst else { continue };
-        let (told, value) = (format!("{what}, worst: {map}"), of(row));
+        let (title, value) = (format!("{what}, worst: {map}"), of(row));
         outcome = match table {
-            // Rounding to integers of 2^-32 of a tile, at most.
-            TableKind::TileLocal if what.contains("error") => outcome.at_most(told, value, 1e-6),
-            TableKind::TileLocal => outcome.at_most(told, value, 0.0),
-            _ => outcome.info(told, value),
+            // Limit: rounding to integers of 2^-32 of a tile.
+            TableKind::TileLocal if what.contains("error") => outcome.at_most(title, value, 1e-6),
+            TableKind::TileLocal => outcome.at_most(title, value, 0.0),
+            _ => outcome.info(title, value),
         };
     }
     Ok(outcome)
