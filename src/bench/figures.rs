@@ -1,4 +1,4 @@
-//! What was measured.
+//! Figures of a bench.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use super::rays::RayFigures;
 use crate::render::gpu::{AdapterFacts, KernelFacts, Schedule};
 use crate::report::Machine;
 
-/// What a machine did.
+/// All figures of a machine.
 #[derive(Debug, Clone, Serialize)]
 pub struct Bench {
     /// The machine.
@@ -15,87 +15,87 @@ pub struct Bench {
     pub size: (u32, u32),
     /// Its devices.
     pub devices: Vec<DeviceFigures>,
-    /// Scene by scene, how alike the pictures of the first two devices are.
+    /// For each scene, the differences between the first two devices.
     pub parity: Vec<Parity>,
 }
 
-/// What a device did.
+/// Figures of a device.
 #[derive(Debug, Clone, Serialize)]
 pub struct DeviceFigures {
     /// Its name.
     pub name: String,
-    /// What it is and allows; `None` for the CPU.
+    /// Properties and limits of the GPU; `None` for the CPU.
     pub adapter: Option<AdapterFacts>,
-    /// Whether its own ray queries find what rays hit.
+    /// Whether its hardware ray queries are used.
     pub has_hardware_rays: bool,
-    /// Scene by scene.
+    /// For each scene.
     pub scenes: Vec<SceneFigures>,
 }
 
-/// What a device did with a scene.
+/// Figures of a scene on a device.
 #[derive(Debug, Clone, Serialize)]
 pub struct SceneFigures {
-    /// What the scene is called.
+    /// The scene's name.
     pub scene: String,
     /// Its triangles.
     pub triangles: usize,
-    /// Why nothing else is known; `None` if it went well.
+    /// The error that ended the measurement, if any.
     pub failure: Option<String>,
-    /// Rays a second, kind by kind.
+    /// Rays per second, by kind.
     pub rays: Vec<RayFigures>,
     /// Figures of whole paths.
     pub paths: Option<PathFigures>,
 }
 
-/// What whole paths took: the defaults of `lightgrid render`.
+/// Figures of whole paths, with the defaults of `lightgrid render`.
 #[derive(Debug, Clone, Serialize)]
 pub struct PathFigures {
-    /// Seconds until scene and map were on the device.
+    /// Seconds of uploading scene and map.
     pub upload_seconds: f64,
-    /// Seconds in which the driver compiled; some compile when a kernel first runs instead.
+    /// Seconds of the driver's compilation before kernels run; some drivers compile at a kernel's first run instead.
     pub compile_seconds: f64,
-    /// Seconds from then to the first distributions, kernels included.
+    /// Seconds from the upload to the first distributions, compilation included.
     pub first_distributions_seconds: f64,
-    /// Seconds from the same moment to the first sample of every pixel.
+    /// Seconds from the upload to the first sample of every pixel.
     pub first_picture_seconds: f64,
-    /// Camera paths a second, all pixels together, without learning and the first pass.
+    /// Camera paths per second over all pixels, without learning and the first pass.
     pub samples_per_second: f64,
-    /// Rays a second, of all kinds.
+    /// Rays per second, of all kinds.
     pub rays_per_second: f64,
-    /// Passes that these figures are of.
+    /// Number of passes of these figures.
     pub passes: u32,
     /// Milliseconds of a pass.
     pub pass_milliseconds: f64,
-    /// Milliseconds a pass kept the device busy; `None` on the CPU.
+    /// Milliseconds per pass in which the device was busy; `None` on the CPU.
     pub device_milliseconds: Option<f64>,
-    /// Whether these are the device's own timestamps.
+    /// Whether `device_milliseconds` comes from the device's timestamps.
     pub has_timestamps: bool,
-    /// Bytes read back from the device a pass.
+    /// Bytes read back from the device per pass.
     pub bytes_read_per_pass: f64,
-    /// Milliseconds that it goes on when told to stop, at most.
+    /// Maximum milliseconds from a request to stop until the session stops.
     pub stop_milliseconds: f64,
     /// Milliseconds from turning the camera to the first sample of every pixel of a small picture, with
     /// scene, map and kernels ready; the median of a few.
     pub turn_milliseconds: f64,
     /// Bytes on the device.
     pub device_bytes: u64,
-    /// How the kernels share the work.
+    /// Schedule of the kernels.
     pub schedule: Option<Schedule>,
-    /// What the kernel holds.
+    /// Features and sizes of the kernel.
     pub kernel: Option<KernelFacts>,
 }
 
-/// How alike the pictures of two devices are: the same seed, few samples, no learning.
+/// Differences of two devices: pictures of the same seed, with few samples and without learning.
 #[derive(Debug, Clone, Serialize)]
 pub struct Parity {
     /// What the scene is called.
     pub scene: String,
-    /// Why it could not be judged.
+    /// The error that prevented the comparison, if any.
     pub failure: Option<String>,
-    /// Mean of the one by that of the other.
+    /// Ratio of the means of both pictures.
     pub mean_ratio: f64,
-    /// Share of pixels that are more than 1 % apart.
+    /// Share of pixels that differ by more than 1 %.
     pub share_apart: f64,
-    /// Share of rays that hit another triangle, or on one device alone none.
+    /// Share of rays that hit different triangles, or that hit one on one device only.
     pub other_triangles: f64,
 }

@@ -1,6 +1,6 @@
-//! What a machine can do, in a few minutes: rays and samples a second, waits, what the host costs.
+//! Speed of a machine, in a few minutes: rays and samples per second, waits, costs of the host.
 //!
-//! For users who choose a device, for bug reports, and for us on machines that we never see.
+//! For users who choose a device, and for bug reports from other machines.
 
 mod figures;
 mod place;
@@ -25,8 +25,8 @@ use place::Place;
 pub use place::{Options, Subject};
 pub use rays::{RayFigures, RayKind};
 
-/// Measures; `progress` is told what is being done. Stops early, with what there is, when `cancel`
-/// becomes true.
+/// Measures the subjects on the devices and calls `progress` with each step. Returns the figures so far when
+/// `cancel` becomes true.
 ///
 /// # Errors
 /// If a device cannot be opened.
@@ -77,7 +77,7 @@ fn is_set(cancel: &AtomicBool) -> bool {
     cancel.load(Ordering::Relaxed)
 }
 
-/// What is compared between devices: a picture, and what rays hit.
+/// Results that are compared between devices: a picture, and hits of rays.
 struct Compared {
     picture: Image,
     hits: rays::Answers,
@@ -118,7 +118,7 @@ impl Place<'_> {
         Ok(Compared { picture: session.film().image(), hits })
     }
 
-    /// Seconds to the first picture of another view with distributions learned before, the median of a few.
+    /// Seconds to the first picture of another view with distributions learned before; the median of five.
     fn turn(
         &self,
         uploaded: Option<&UploadedScene>,
@@ -137,7 +137,7 @@ impl Place<'_> {
             }
             session.advance(1, self.cancel)?;
             session.settle()?;
-            // The first one may compile.
+            // The first round may compile kernels.
             if round > 0 {
                 seconds.push(start.elapsed().as_secs_f64());
             }
@@ -203,10 +203,10 @@ impl Place<'_> {
     }
 }
 
-/// Size of the pictures that a turning camera shows.
+/// Size of the pictures of a turning camera.
 const TURNING: (u32, u32) = (480, 270);
 
-/// Seconds that a session goes on when told to stop, the longest of a few.
+/// Maximum seconds, over a few trials, from a request to stop until a session stops.
 fn slowest_stop(session: &mut Session<'_>) -> Result<f64> {
     let mut slowest = 0.0_f64;
     for round in 0..5_u64 {

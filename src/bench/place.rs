@@ -1,4 +1,4 @@
-//! What is measured: a scene on a device.
+//! A scene on a device: the subject of measurements.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -9,28 +9,28 @@ use crate::render::gpu::{RayChoice, Schedule, UploadedScene};
 use crate::render::{Session, Sharing, View};
 use crate::report::{Device, OpenDevice};
 
-/// What is to be measured.
+/// Options of a bench.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// In this order; parity is judged between the first two.
+    /// The devices, in this order; the first two are compared.
     pub devices: Vec<Device>,
-    /// Part of the name of the GPU to take.
+    /// Part of the GPU's name.
     pub adapter: Option<String>,
-    /// What finds the surfaces that rays hit on it.
+    /// Ray queries of the hardware or our kernels.
     pub rays: RayChoice,
-    /// How its kernels share the work; `None` is what suits it.
+    /// Schedule of the GPU's kernels; `None` for its default.
     pub schedule: Option<Schedule>,
-    /// Whether neighbouring pixels share vertices; then kernels do not take turns.
+    /// Whether neighbouring pixels share second vertices; the schedule is fixed then.
     pub sharing: Sharing,
     /// Width and height of the pictures.
     pub size: (u32, u32),
-    /// Seconds of rendering a scene on a device.
+    /// Seconds of rendering each scene on each device.
     pub seconds: f64,
 }
 
 /// A scene and its map, ready to be measured.
 pub struct Subject {
-    /// What the scene is called.
+    /// The scene's name.
     pub name: String,
     /// The scene.
     pub world: World,
@@ -60,7 +60,7 @@ impl Place<'_> {
         Session::on(world, environment, view, uploaded)
     }
 
-    /// The defaults of `lightgrid render`.
+    /// A view with the defaults of `lightgrid render`.
     pub(super) fn view(&self, (width, height): (u32, u32)) -> View {
         let world = &self.subject.world;
         let camera = world.scene.cameras.first().cloned();

@@ -18,7 +18,7 @@ use crate::render::gpu::{Question, Renderer, UploadedScene};
 use crate::render::{Sampling, View};
 use crate::sampler::Sampler;
 
-/// Which rays.
+/// Kind of ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RayKind {
@@ -51,14 +51,14 @@ impl RayKind {
     }
 }
 
-/// How fast rays of a kind are.
+/// Speed of a kind of ray.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RayFigures {
-    /// Which rays.
+    /// The kind.
     pub kind: RayKind,
     /// Number of different rays.
     pub count: usize,
-    /// Rays a second.
+    /// Rays per second.
     pub per_second: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The talk's table of summed-area tables, and a map that is worse than any of its.
+//! The talk's comparison of summed-area tables, with one more extreme map.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -12,10 +12,10 @@ use crate::error::Result;
 use crate::image::{Image, write_beside_and_rename};
 use crate::math::direction_from_uv;
 
-/// A map and what the talk published for it.
+/// A map with the talk's published errors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Case {
-    /// What to call it.
+    /// Its title.
     pub title: &'static str,
     /// Columns and rows.
     pub size: (u32, u32),
@@ -23,7 +23,7 @@ pub struct Case {
     pub published: Option<[f64; 2]>,
 }
 
-/// The talk's maps, made by our skies, and the extreme one.
+/// The talk's maps, replaced by built-in skies, and the extreme one.
 pub fn cases() -> Vec<Case> {
     let talks =
         TALKS_MAPS.map(|(title, size, mse)| Case { title, size, published: Some(mse) }).to_vec();
@@ -33,11 +33,11 @@ pub fn cases() -> Vec<Case> {
 /// A finished case.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
-    /// What it was.
+    /// Title of the case.
     pub title: String,
-    /// u32 and f32 in the talk.
+    /// Errors of u32 and f32 in the talk.
     pub published: Option<[f64; 2]>,
-    /// Every table.
+    /// Figures of every table.
     pub report: SatReport,
 }
 
@@ -58,8 +58,8 @@ impl Case {
     }
 }
 
-/// A dim grainy sky with a sun of 0.27 degrees that is 10^8 times as bright: nearly all the energy is
-/// in a few texels, and what the others have is less than one of 2^32 parts.
+/// A dim noisy sky with a sun of 0.27 degrees that is 10^8 times as bright: nearly all the energy is in a few
+/// texels, and each other texel has less than 2^-32 of it.
 fn extreme(width: u32, height: u32) -> Image {
     const SUN_RADIUS_RADIANS: f32 = 0.0047;
     let sun = direction_from_uv(glam::Vec2::new(0.3, 0.25));
@@ -73,8 +73,8 @@ fn extreme(width: u32, height: u32) -> Image {
     })
 }
 
-/// Measures all cases, each as soon as the one before is told; those that `folder` has are taken from
-/// there. Writes `sat.json` and `sat.csv` there after each.
+/// Measures all cases and calls `tell` with each. Cases stored in `folder` are reused; `sat.json` and `sat.csv`
+/// are written there after each case.
 ///
 /// # Errors
 /// If a map cannot be made or a file cannot be written.
@@ -138,7 +138,7 @@ fn csv(all: &[Measured]) -> String {
     text
 }
 
-/// All cases as one Markdown table, with what the talk published.
+/// All cases as one Markdown table, with the talk's errors.
 pub fn markdown(all: &[Measured]) -> String {
     let mut text = String::from(
         "| map | table | MSE | the talk's | zero mass | falling steps | build | a sample | memory |\n\
@@ -170,7 +170,7 @@ pub fn markdown(all: &[Measured]) -> String {
     text
 }
 
-/// What must be known to read the talk's figures beside ours.
+/// Differences between the talk's figures and ours.
 pub const REMARK: &str = "MSE: in units of the mean texel density, exact (the search of each table \
     followed for all random numbers at once). The talk does not say its unit, nor are its maps public: \
     compare ratios. Zero mass: share of the lit texels that are never sampled. Falling steps: share of \

@@ -1,4 +1,4 @@
-//! Which part of the error is left: the pixel filter, the first vertex, or later ones.
+//! Sources of the remaining error: pixel filter, first vertex, later vertices.
 //!
 //! The same samples are rendered three times: with all bounces, with one, with none. As a path draws
 //! its random numbers in order, the pictures differ by later vertices and by the first one exactly;
@@ -22,31 +22,31 @@ use crate::render::film::Pixel;
 pub struct Shares {
     /// Name of the method.
     pub method: String,
-    /// Pictures compared.
+    /// Number of pictures.
     pub pictures: u32,
     /// Samples per pixel of each.
     pub samples: u32,
-    /// All of it.
+    /// Total variance.
     pub total: f64,
-    /// What the camera sees of the map and of emitters: left by the pixel filter.
+    /// Variance of directly visible map and emitters, by the pixel filter.
     pub filter: f64,
-    /// Light that the first vertex gets from the map and from lights.
+    /// Variance of light from the map and from lamps at the first vertex.
     pub first_vertex: f64,
-    /// Light that arrives by more than one vertex.
+    /// Variance of light over more than one vertex.
     pub later_vertices: f64,
 }
 
 impl Shares {
-    /// Part of the total that is not any part's own: positive where they err together.
+    /// Twice the covariances of the parts: the total less the sum of the parts.
     pub fn together(&self) -> f64 {
         self.total - self.filter - self.first_vertex - self.later_vertices
     }
 }
 
-/// Pictures that the variances are taken from.
+/// Number of pictures that the variances are computed from.
 const PICTURES: u32 = 8;
 
-/// Seeds of these pictures begin here.
+/// First seed of these pictures.
 const FIRST_SEED: u32 = 0x5368_6100;
 
 /// Sums over pictures of each part's values and squares.
@@ -56,7 +56,7 @@ struct Sums {
     square: [[f64; 3]; 4],
 }
 
-/// Takes a method's error apart at `samples` samples per pixel; `None` if it was cancelled.
+/// Splits a method's error by its sources at `samples` samples per pixel; `None` if it was cancelled.
 pub(super) fn shares(
     place: &Place<'_>,
     (name, settings): (&str, &Settings),
@@ -94,12 +94,12 @@ fn three_depths(
     cancel: &AtomicBool,
 ) -> Result<Option<[Vec<[f64; 3]>; 3]>> {
     let Some(mut session) = place.learned(settings, seed, cancel)? else { return Ok(None) };
-    // Distributions as they are after that many samples.
+    // Distributions of a picture with this many samples.
     if finish(&mut session, samples, cancel)?.is_none() {
         return Ok(None);
     }
     let grid = session.grid().cloned();
-    // Paths of one bounce would not share by themselves, and then draw other numbers.
+    // Paths of one bounce would not share by default, and would then draw other numbers.
     let settings = &Settings { sharing: session.view().sharing, ..settings.clone() };
     let mut pictures = [Vec::new(), Vec::new(), Vec::new()];
     for (picture, bounces) in pictures.iter_mut().zip([u32::MAX, 1, 0]) {
@@ -125,7 +125,7 @@ fn finish(
     Ok(is_whole.then(|| session.film().pixels().iter().map(Pixel::mean).collect()))
 }
 
-/// Variance over pictures of each part, relative, averaged without the worst pixels.
+/// Relative variance over pictures of each part, averaged without the worst pixels.
 fn trimmed(sums: &[Sums], reference: &Image) -> [f64; 4] {
     let count = f64::from(PICTURES);
     let mean = metrics::mean(reference);

@@ -1,4 +1,4 @@
-//! What several independent runs say: means, slopes, time to equal error, and how sure that is.
+//! Statistics of several independent runs: means, slopes, times to equal error, and confidence intervals.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Of at least one finite value.
+    /// The estimate from values; `None` unless there are some and all are finite.
     pub fn of(values: &[f64]) -> Option<Self> {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;
@@ -69,13 +69,13 @@ impl Curve {
         Some(power_law(e0, e1, (seconds / t0).ln() / (t1 / t0).ln()))
     }
 
-    /// When the first error is known.
+    /// Time of the first error.
     pub fn start(&self) -> f64 {
         self.points.first().map_or(f64::INFINITY, |(t, _)| *t)
     }
 }
 
-/// Geometric interpolation, or linear where there is no logarithm.
+/// Geometric interpolation, or linear where a value is not positive.
 fn power_law(a: f64, b: f64, t: f64) -> f64 {
     if a > 0.0 && b > 0.0 { a * (b / a).powf(t) } else { a + (b - a) * t }
 }
@@ -83,18 +83,18 @@ fn power_law(a: f64, b: f64, t: f64) -> f64 {
 /// Error against time of several runs, at common times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bundle {
-    /// When the errors are known: ascending, the last one is the end.
+    /// Times of the errors, ascending; the last one is the end.
     pub seconds: Vec<f64>,
-    /// Runs x times: a row a run, in it an error for each of `seconds`.
+    /// For each run, an error for each of `seconds`.
     pub errors: Vec<Vec<f64>>,
 }
 
-/// Times of a bundle.
+/// Number of times of a bundle.
 const STEPS: u32 = 64;
 
 impl Bundle {
-    /// Brings curves that all last until `end` to common times; `None` if there are none, or none
-    /// is known before the end.
+    /// Interpolates curves that all last until `end` at common times; `None` without curves, or if one begins after
+    /// the end.
     pub fn new(curves: &[Curve], end: f64) -> Option<Self> {
         let start = curves.iter().map(Curve::start).fold(0.0, f64::max);
         if curves.is_empty() || start > end {
@@ -111,7 +111,7 @@ impl Bundle {
         Some(Self { seconds, errors })
     }
 
-    /// Mean error over runs, each as often as `runs` names it, at every time.
+    /// Mean error at every time over the runs of these indices, which may repeat.
     fn mean(&self, runs: &[usize]) -> Vec<f64> {
         let mut mean = vec![0.0; self.seconds.len()];
         for &run in runs {
@@ -128,7 +128,7 @@ impl Bundle {
     }
 }
 
-/// When a falling mean curve is at `error` for good, and whether it was so from its first point on.
+/// Time from which on a falling mean curve stays at or below `error`, and whether that is its first point.
 fn time_to(seconds: &[f64], errors: &[f64], error: f64) -> (f64, bool) {
     let Some(above) = errors.iter().rposition(|e| *e > error) else { return (seconds[0], true) };
     let Some(&after) = seconds.get(above + 1) else { return (seconds[above], false) };
@@ -137,22 +137,21 @@ fn time_to(seconds: &[f64], errors: &[f64], error: f64) -> (f64, bool) {
     (power_law(seconds[above], after, t.clamp(0.0, 1.0)), false)
 }
 
-/// How many times sooner one method is at an error than another.
+/// Ratio of the times in which two methods reach the same error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SpeedUp {
     /// Time of the baseline over time of the method.
     pub ratio: f64,
-    /// Where it is with 95 % confidence, by bootstrap over runs; `None` with a single run.
+    /// Its interval of 95 % confidence, by bootstrap over runs; `None` with a single run.
     pub interval: Option<Interval>,
-    /// The error both are compared at, by the measure that their curves are of: the larger of the mean errors
-    /// that they reach at the end.
+    /// The error at which both are compared: the larger of their mean errors at the end.
     pub error: f64,
-    /// Whether one was there before its first measured point, so that the ratio is a bound only.
+    /// Whether one method reached it before its first measured point, so that the ratio is only a bound.
     pub is_bound: bool,
 }
 
 impl SpeedUp {
-    /// Of `method` over `baseline`, both measured until the same end.
+    /// The speed-up of `method` over `baseline`, both measured until the same end.
     pub fn new(baseline: &Bundle, method: &Bundle) -> Option<Self> {
         let all = |bundle: &Bundle| (0..bundle.errors.len()).collect::<Vec<_>>();
         let (ratio, error, is_bound) = ratio(baseline, method, &all(baseline), &all(method));
@@ -166,7 +165,7 @@ fn ratio_of(baseline: &Bundle, method: &Bundle, [a, b]: [&[usize]; 2]) -> f64 {
     ratio(baseline, method, a, b).0
 }
 
-/// Ratio of the times, the error they are at, and whether it is only a bound.
+/// Ratio of the times, the error at which it is taken, and whether it is only a bound.
 fn ratio(baseline: &Bundle, method: &Bundle, a: &[usize], b: &[usize]) -> (f64, f64, bool) {
     let (plain, ours) = (baseline.mean(a), method.mean(b));
     let last = |errors: &[f64]| errors.last().copied().unwrap_or(f64::NAN);
@@ -176,13 +175,12 @@ fn ratio(baseline: &Bundle, method: &Bundle, a: &[usize], b: &[usize]) -> (f64, 
     (plain_time / our_time, error, plain_bound || our_bound)
 }
 
-/// Resamples of a bootstrap.
+/// Number of resamples of a bootstrap.
 const RESAMPLES: u32 = 2000;
 
 /// Interval of 95 % confidence of a statistic of two groups of runs: the expanded percentile interval
-/// (Hesterberg, *What Teachers Should Know About the Bootstrap*, 2015), whose percentiles are moved
-/// outwards so that it is as wide as Student's for small groups. It is the same for the same runs.
-/// `None` if a group has fewer than two runs, or the statistic is not finite.
+/// (Hesterberg, *What Teachers Should Know About the Bootstrap*, 2015), whose percentiles are widened to match
+/// Student's interval in small groups. It is deterministic. `None` if a group has fewer than two runs, or the statistic is not finite.
 pub fn bootstrap(counts: [usize; 2], statistic: impl Fn([&[usize]; 2]) -> f64) -> Option<Interval> {
     let smaller = counts[0].min(counts[1]);
     if smaller < 2 {
@@ -212,7 +210,7 @@ pub fn bootstrap(counts: [usize; 2], statistic: impl Fn([&[usize]; 2]) -> f64) -
     Some(Interval { low: at(tail), high: at(1.0 - tail) })
 }
 
-/// Chance to leave out at each end, for groups of `count` runs.
+/// Share of resamples to leave out at each end, for groups of `count` runs.
 fn expanded_tail(count: usize) -> f64 {
     let z = student_975(count - 1) * (count as f64 / (count as f64 - 1.0)).sqrt();
     0.5 * two_sided_p(z)
