@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::order::{Order, Shown};
-use super::source::{Prepared, Source};
+use super::source::{Prepared, Source, SourceKey};
 use crate::app::comparison::{Compared, Comparison};
 use crate::app::document::Look;
 use crate::app::overlays::{CellFacts, Label, Legend, Overlay, Sources};
@@ -60,11 +60,11 @@ type OverlayKey = (u64, Overlay, Option<u32>, Option<(Look, f32)>);
 #[derive(Default)]
 struct Uploads {
     developer: Option<Arc<Developer>>,
-    picture: Last<Source, Prepared>,
-    plain: Last<Source, Prepared>,
+    picture: Last<SourceKey, Prepared>,
+    plain: Last<SourceKey, Prepared>,
     /// By the picture that is rendered, too, where that is compared.
-    compared: Last<(Comparison, Option<Source>), Compared>,
-    metered: Last<(Source, WhiteBalance), f32>,
+    compared: Last<(Comparison, Option<SourceKey>), Compared>,
+    metered: Last<(SourceKey, WhiteBalance), f32>,
     overlay: Last<OverlayKey, Option<Painted>>,
 }
 
@@ -88,7 +88,7 @@ impl Memory {
         let source = Source::main(&order);
         let prepare = || Ok(source.prepare(&developer));
         let Prepared { mut picture, image, mut failure } =
-            self.uploads.picture.or_make(source.clone(), prepare)?;
+            self.uploads.picture.or_make(source.key(), prepare)?;
         let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
             if let Some(ev) = self.whole_ev(&order) {
                 return Ok(ev);
@@ -97,7 +97,7 @@ impl Memory {
                 true => Ok(0.0),
                 false => developer.auto_exposure_ev(&picture, white_balance),
             };
-            self.uploads.metered.or_make((source.clone(), white_balance), meter)
+            self.uploads.metered.or_make((source.key(), white_balance), meter)
         })?;
         if order.snapshot.request.view.crop.is_none() {
             self.whole = order.metered.map(|white_balance| Metered {
@@ -121,7 +121,7 @@ impl Memory {
         if let Some(comparison) = &order.compared {
             let own = image.clone().filter(|_| !source.is_resized());
             let now = || own.unwrap_or_else(|| Arc::new(source.session.film.image()));
-            let of = comparison.shows_now().then(|| source.clone());
+            let of = comparison.shows_now().then(|| source.key());
             let compare = || Ok(comparison.prepare(&developer, now));
             let compared = self.uploads.compared.or_make((comparison.clone(), of), compare)?;
             picture = compared.picture.unwrap_or(picture);
@@ -135,7 +135,7 @@ impl Memory {
             });
         } else if let Some(source) = Source::plain(&order) {
             let prepare = || Ok(source.prepare(&developer));
-            let plain = self.uploads.plain.or_make(source.clone(), prepare)?;
+            let plain = self.uploads.plain.or_make(source.key(), prepare)?;
             (other, failure) = (Some(plain.picture), failure.or(plain.failure));
         }
         developer.gpu().check()?;
@@ -143,7 +143,7 @@ impl Memory {
             painted.map(|painted| (painted.colors, (painted.legend, painted.labels))).unzip();
         let (legend, labels) = words.unzip();
         Ok(Shown {
-            order,
+            order: order.presented(),
             picture,
             image,
             other,

@@ -94,7 +94,7 @@ fn run(orders: &Latest<Order>, shown: &Mutex<Option<Arc<Shown>>>, wake: &Wake) {
         })
     };
     while let Some(order) = next(last.as_ref()) {
-        let (start, kept) = (Instant::now(), order.clone());
+        let (start, kept) = (Instant::now(), order.presented());
         let work = Work::start();
         order.snapshot.rest.set_end(start + MAX_WAIT);
         match catch_unwind(AssertUnwindSafe(|| memory.present(order))) {

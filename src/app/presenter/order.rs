@@ -46,6 +46,15 @@ impl PartialEq for Order {
 }
 
 impl Order {
+    /// It once its picture is made: the film beside the picture's own is large, and serves no more.
+    pub(super) fn presented(&self) -> Self {
+        let mut snapshot = (*self.snapshot).clone();
+        if let Some(backdrop) = &mut snapshot.backdrop {
+            backdrop.film = Arc::default();
+        }
+        Self { snapshot: Arc::new(snapshot), ..self.clone() }
+    }
+
     /// Whether what is kept is shown where the picture that is rendered would be.
     pub(in crate::app) fn covers_now(&self) -> bool {
         self.compared.as_ref().is_some_and(Comparison::covers_now)

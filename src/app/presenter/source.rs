@@ -1,6 +1,6 @@
 //! What a picture is made from, and how.
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use super::order::Order;
 use crate::app::worker::{Backdrop, Origin, SessionSnapshot};
@@ -43,8 +43,7 @@ const DOTS_WORTH: u64 = 4;
 /// four as thirty, for what is small is blurred.
 const WHOLE_WORTH: f64 = 0.6;
 
-/// What a linear picture is made from; equal ones give the same picture.
-#[derive(Clone)]
+/// What a linear picture is made from.
 pub(super) struct Source {
     pub(super) session: SessionSnapshot,
     backdrop: Option<Backdrop>,
@@ -53,10 +52,25 @@ pub(super) struct Source {
     is_whole: bool,
 }
 
-impl PartialEq for Source {
+/// Tells sources apart: equal ones give the same picture. It keeps no film in memory.
+#[derive(Clone)]
+pub(super) struct SourceKey {
+    film: Weak<Film>,
+    backdrop: Option<(Weak<Film>, f32, Origin)>,
+    denoiser: Option<Denoiser>,
+    is_whole: bool,
+}
+
+impl PartialEq for SourceKey {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.session.film, &other.session.film)
-            && self.backdrop == other.backdrop
+        let is_alike = match (&self.backdrop, &other.backdrop) {
+            (Some((film, worth, origin)), Some(other)) => {
+                film.ptr_eq(&other.0) && (*worth, *origin) == (other.1, other.2)
+            }
+            (own, other) => own.is_none() && other.is_none(),
+        };
+        is_alike
+            && self.film.ptr_eq(&other.film)
             && (self.denoiser, self.is_whole) == (other.denoiser, other.is_whole)
     }
 }
@@ -76,6 +90,16 @@ impl Source {
         let session = order.snapshot.plain.clone().filter(SessionSnapshot::is_begun)?;
         let is_whole = session.samples > 0;
         Some(Self { session, backdrop: None, denoiser: order.denoiser, is_whole })
+    }
+
+    pub(super) fn key(&self) -> SourceKey {
+        let of_backdrop = |it: &Backdrop| (Arc::downgrade(&it.film), it.worth, it.origin);
+        SourceKey {
+            film: Arc::downgrade(&self.session.film),
+            backdrop: self.backdrop.as_ref().map(of_backdrop),
+            denoiser: self.denoiser,
+            is_whole: self.is_whole,
+        }
     }
 
     /// Whether nothing that it is made from has light enough for an exposure; a film on the device is not

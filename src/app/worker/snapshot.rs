@@ -176,14 +176,6 @@ impl Backdrop {
     }
 }
 
-/// Of the very same film, counting alike.
-impl PartialEq for Backdrop {
-    fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.film, &other.film)
-            && (self.worth, self.origin) == (other.worth, other.origin)
-    }
-}
-
 impl Snapshot {
     /// Samples a pixel of the picture by now, in the mean.
     pub(crate) fn mean_samples(&self) -> f64 {
