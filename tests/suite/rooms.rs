@@ -1,8 +1,15 @@
-//! The walls of the house: which room may use which, and which crate is named where.
+//! Which room uses which, where each crate is named, how the files of a room use each other, and how large types and
+//! rooms are.
 
-use std::collections::BTreeSet;
+mod imports;
+mod source;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use imports::Imports;
+use source::{files, lines, plain, sources};
 
 /// Rooms by floor, from the ground up: each uses those below its own alone.
 const FLOORS: [&[&str]; 14] = [
@@ -56,86 +63,126 @@ const CRATES: [(&str, &[&str]); 30] = [
     ("winit", &["app/desktop", "app/window"]),
 ];
 
-/// A file of the product: its place below `src` without the ending, and its code without tests.
-struct Source {
-    place: String,
-    code: String,
-}
+/// Most methods of a type, over all its `impl` blocks.
+const MAX_METHODS: usize = 40;
 
-impl Source {
-    fn room(&self) -> &str {
-        self.place.split('/').next().unwrap_or_default()
-    }
+/// Types that have more, with how many they may have. The list is to become shorter.
+const LARGE_TYPES: [(&str, usize); 2] =
+    [("render/gpu: Renderer", 41), ("render/session: Session", 58)];
 
-    /// Whether it is this part of the house, or lies in it.
-    fn is_in(&self, part: &str) -> bool {
-        self.place.strip_prefix(part).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
-    }
-}
+/// Files that use each other in a circle. The list is to become shorter.
+const IN_CIRCLES: &[&str] = &[
+    "bsdf",
+    "bsdf/coat",
+    "bsdf/diffuse",
+    "bsdf/interface",
+    "cli",
+    "cli/absent",
+    "cli/generate",
+    "develop",
+    "develop/a_trous",
+    "develop/upload",
+    "environment",
+    "environment/sat_report",
+    "light_grid",
+    "light_grid/learning",
+    "path",
+    "path/gather",
+    "path/learn",
+    "path/light_tree",
+    "path/light_tree/build",
+    "path/lights",
+    "path/sharing",
+    "path/train",
+    "path/world",
+    "radiance_cache",
+    "radiance_cache/cells",
+    "radiance_cache/facts",
+    "radiance_cache/sums",
+    "render/devices",
+    "render/gi",
+    "render/gpu",
+    "render/gpu/flight",
+    "render/gpu/queue",
+    "render/gpu/sharing",
+    "render/session",
+    "render/session/learning",
+    "render/session/noise",
+    "render/session/state",
+    "render/sharing",
+    "render/view",
+    "render/view_probe",
+];
 
-/// All files but those that are tests alone.
-fn sources() -> Vec<Source> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut folders = vec![root.clone()];
-    let (mut sources, mut tests) = (Vec::new(), Vec::new());
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).expect("a folder of the project") {
-            let path = entry.expect("an entry").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
-                let text = fs::read_to_string(&path).expect("a source file");
-                tests.extend(test_modules(&path, &text));
-                let place = path.strip_prefix(&root).expect("below src").with_extension("");
-                let place = place.to_str().expect("plain names").replace('\\', "/");
-                let place = place.trim_end_matches("/mod").to_owned();
-                sources.push((path, Source { place, code: without_tests(&text) }));
-            }
-        }
-    }
-    let is_test = |path: &Path| tests.iter().any(|test| path.with_extension("").starts_with(test));
-    sources.into_iter().filter(|(path, _)| !is_test(path)).map(|(_, source)| source).collect()
-}
+/// Files that use an item that the module above them declares. The list is to become shorter.
+const USE_THEIR_PARENT: &[&str] = &[
+    "bsdf/coat",
+    "bsdf/diffuse",
+    "bsdf/interface",
+    "cli/absent",
+    "cli/generate",
+    "develop/a_trous",
+    "develop/upload",
+    "environment/sat_report",
+    "light_grid/learning",
+    "light_grid/transfer",
+    "path/cached",
+    "path/gather",
+    "path/learn",
+    "path/light_tree/build",
+    "path/sharing",
+    "path/train",
+    "radiance_cache/cells",
+    "radiance_cache/facts",
+    "radiance_cache/sums",
+    "render/gpu/cast",
+    "render/gpu/flight",
+    "render/gpu/learning",
+    "render/gpu/queue",
+    "render/gpu/sharing",
+    "render/session/learning",
+    "render/session/noise",
+    "render/session/state",
+];
 
-/// Paths without endings of the modules that a file declares for tests.
-fn test_modules(path: &Path, text: &str) -> Vec<PathBuf> {
-    let stem = path.file_stem().expect("a name");
-    let is_folder = ["mod", "lib", "main"].iter().any(|name| stem == *name);
-    let folder = if is_folder { path.with_file_name("") } else { path.with_extension("") };
-    let mut found = Vec::new();
-    let mut is_for_tests = false;
-    for line in text.lines().map(str::trim) {
-        let declared = line.split("mod ").nth(1).and_then(|rest| rest.strip_suffix(';'));
-        match declared {
-            _ if line.starts_with("#[cfg(") && line.contains("test") => is_for_tests = true,
-            _ if line.starts_with("#[") => {}
-            Some(name) if is_for_tests => {
-                found.push(folder.join(name));
-                is_for_tests = false;
-            }
-            _ => is_for_tests = false,
-        }
-    }
-    found
-}
-
-/// Lines of code: without comments, and without what follows `#[cfg(test)]` at the left edge.
-fn without_tests(text: &str) -> String {
-    let mut code = String::new();
-    let mut lines = text.lines();
-    while let Some(line) = lines.next() {
-        if line == "#[cfg(test)]" {
-            let item = lines.find(|line| !line.starts_with("#["));
-            if item.is_some_and(|line| line.ends_with('{')) {
-                let _ = lines.find(|line| line.starts_with('}'));
-            }
-        } else if !line.trim_start().starts_with("//") {
-            code += line;
-            code.push('\n');
-        }
-    }
-    code
-}
+/// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
+const BUDGETS: [(&str, usize); 35] = [
+    ("alarm", 49),
+    ("app", 10884),
+    ("bench", 596),
+    ("bsdf", 1158),
+    ("bvh", 1358),
+    ("cli", 3314),
+    ("color", 25),
+    ("denoise", 1258),
+    ("develop", 468),
+    ("digest", 91),
+    ("environment", 1940),
+    ("error", 58),
+    ("huge_pages", 30),
+    ("image", 2307),
+    ("lib", 46),
+    ("light_grid", 896),
+    ("main", 111),
+    ("math", 83),
+    ("medium", 135),
+    ("memory", 119),
+    ("metrics", 193),
+    ("noise", 80),
+    ("output", 555),
+    ("path", 2415),
+    ("prefetch", 15),
+    ("radiance_cache", 348),
+    ("render", 6050),
+    ("report", 3181),
+    ("sampler", 145),
+    ("scene", 9428),
+    ("shaders", 5349),
+    ("sources", 119),
+    ("stability", 1930),
+    ("terminal", 91),
+    ("tone", 188),
+];
 
 /// First names of paths that begin with `prefix`.
 fn named<'a>(code: &'a str, prefix: &'a str) -> impl Iterator<Item = &'a str> {
@@ -204,6 +251,72 @@ fn crates_are_named_in_one_place() {
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
     assert!(unused.is_empty(), "named nowhere: {unused:?}");
+}
+
+/// Compares files, with details, with a list of known exceptions: a new one fails, and so does one that is gone.
+fn assert_known(found: &BTreeMap<&str, BTreeSet<&str>>, known: &[&str], what: &str) {
+    let new: Vec<_> = found.iter().filter(|(file, _)| !known.contains(*file)).collect();
+    assert!(new.is_empty(), "files {what}: {new:#?}");
+    let gone: Vec<_> = known.iter().filter(|file| !found.contains_key(**file)).collect();
+    assert!(gone.is_empty(), "files no longer {what}, take them off the list: {gone:#?}");
+}
+
+#[test]
+fn files_of_a_room_do_not_use_each_other_in_circles() {
+    let sources = sources();
+    let mut found: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for circle in Imports::of(sources).circles() {
+        let places = || circle.iter().map(|&at| &*sources[at].place);
+        places().for_each(|place| found.entry(place).or_default().extend(places()));
+    }
+    assert_known(&found, IN_CIRCLES, "use each other in a circle");
+}
+
+#[test]
+fn files_do_not_use_items_that_the_module_above_declares() {
+    let of_parents = Imports::of(sources()).of_parents;
+    let mut found: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for (at, item) in &of_parents {
+        found.entry(&sources()[*at].place).or_default().insert(item);
+    }
+    assert_known(&found, USE_THEIR_PARENT, "use items that the module above declares");
+}
+
+#[test]
+fn types_have_few_methods() {
+    let methods = imports::methods(sources());
+    let limits: BTreeMap<&str, usize> = LARGE_TYPES.into_iter().collect();
+    for (name, &count) in &methods {
+        let limit = limits.get(&**name).copied().unwrap_or(MAX_METHODS);
+        assert!(count <= limit, "{name} has {count} methods, {limit} are allowed: part it");
+    }
+    for (name, _) in LARGE_TYPES {
+        let count = methods.get(name).copied().unwrap_or(0);
+        assert!(count > MAX_METHODS, "{name} has {count} methods: take it off the list");
+    }
+}
+
+#[test]
+fn rooms_keep_to_their_budgets() {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for source in sources() {
+        *counts.entry(source.room().to_owned()).or_default() += lines(&source.code);
+    }
+    for path in files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders"), "wgsl") {
+        let text = fs::read_to_string(path).expect("a shader");
+        *counts.entry("shaders".to_owned()).or_default() += lines(&plain(&text));
+    }
+    let total: usize = counts.values().sum();
+    let budgets: BTreeMap<&str, usize> = BUDGETS.into_iter().collect();
+    for (room, count) in &counts {
+        let budget = budgets.get(&**room).copied().unwrap_or(0);
+        assert!(
+            *count <= budget,
+            "{room} has {count} lines of code, its budget is {budget}; all rooms together have {total}: {counts:#?}"
+        );
+    }
+    let gone = BUDGETS.iter().find(|(room, _)| !counts.contains_key(*room));
+    assert!(gone.is_none(), "there is no such room: {gone:?}");
 }
 
 /// The picture of the house in CONTRIBUTING.md has every room.

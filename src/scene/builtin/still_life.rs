@@ -99,7 +99,7 @@ fn tea(b: &mut Builder) {
     });
     let on_cloth = 0.003;
     b.scaled(Vec3::new(-0.30, on_cloth, 0.03), -24.0, 1.35, |b| {
-        tableware::teapot(b, lacquer, black)
+        tableware::teapot(b, lacquer, black);
     });
     for (x, z) in [(-0.06, 0.08), (-0.04, 0.195)] {
         b.scaled(Vec3::new(x, on_cloth, z), 0.0, 1.2, |b| {
