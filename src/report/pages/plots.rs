@@ -311,7 +311,7 @@ pub(super) fn speed_up_plot(
     }
     // Without one each group is a single method, which its title names.
     let has_legend = groups.iter().any(|group| group.bars.len() > 1) || names.len() <= 4;
-    let (top, gap) = if has_legend { (64.0, 14.0) } else { (40.0, 5.0) };
+    let (top, gap) = if has_legend { (84.0, 14.0) } else { (40.0, 5.0) };
     let mut bottom = top;
     for group in &mut groups {
         group.place(bottom);
