@@ -73,7 +73,7 @@ const DIFFERENCES: [&str; 7] = [
     "Another renderer: the talk's is V-Ray, where most indirect light comes from a light cache and the \
      noise is that of direct light at a few vertices. Here full paths of at most so many bounces are \
      traced and the indirect light's own noise counts, which no choice of map samples removes: see \
-     where the error is left, row by row. Nearest to the talk's setting is talk cached over plain \
+     the sources of the remaining error, row by row. Nearest to the talk's setting is talk cached over plain \
      cached.",
     "Another measure: the talk says equal noise without a formula. Here it is trimmed relMSE against a \
      reference.",
