@@ -36,8 +36,7 @@ fn body_behind(point: SurfacePoint, before: Body) -> Body {
     return body;
 }
 
-//#if MEDIUM
-//#else
+//#if !MEDIUM
 fn body_transmittance(body: Body, distance: f32) -> vec3f {
     if all(body.absorption == vec3f(0.0)) || distance >= F32_MAX {
         return vec3f(1.0);

@@ -38,8 +38,7 @@ struct Path {
 //#if LAYERS
     first_hit: FirstHit,
 //#end
-//#if LEARNING
-//#else
+//#if !LEARNING
 //#if MAP_SAMPLING
     map_shadow: Shadow,
 //#end
@@ -262,8 +261,7 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
 // What nobody asks for any more, for it comes anew or the path ends: else it would take registers.
 fn forget_arrival(path: ptr<function, Path>) {
     (*path).ray.origin = vec3f(0.0);
-//#if MEDIUM
-//#else
+//#if !MEDIUM
     (*path).ray.direction = vec3f(0.0);
 //#end
     (*path).departure_pdf_solid_angle = 0.0;

@@ -1,6 +1,7 @@
 //! The shaders' source: files, lines and bindings that a scene does not need are left out.
 //!
-//! A line `//#if NAME` keeps what follows, up to `//#else` or `//#end`, only if the feature is on.
+//! A line `//#if NAME` keeps what follows, up to `//#else` or `//#end`, only if the feature is on, and
+//! `//#if !NAME` only if it is off.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -413,10 +414,11 @@ fn bindings(kernel: Kernel, features: Features, places: &ArrayPlaces) -> Vec<Bin
 fn keep_lines(text: &str, features: Features, source: &mut String) {
     let mut conditions = Vec::new();
     for line in text.lines() {
-        if let Some(name) = line.strip_prefix("//#if ") {
-            let is_on = features.by_name().find(|(known, _)| *known == name);
-            debug_assert!(is_on.is_some(), "{name} is no feature");
-            conditions.push(is_on.is_some_and(|(_, is_on)| is_on));
+        if let Some(condition) = line.strip_prefix("//#if ") {
+            let name = condition.trim_start_matches('!');
+            let found = features.by_name().find(|(known, _)| *known == name);
+            debug_assert!(found.is_some(), "{name} is no feature");
+            conditions.push(found.is_some_and(|(_, is_on)| is_on) == (name == condition));
         } else if line == "//#else" {
             if let Some(condition) = conditions.last_mut() {
                 *condition = !*condition;
@@ -437,12 +439,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn conditions_nest_and_have_an_else() {
+    fn conditions_nest_and_have_an_else_and_a_not() {
         let features = Features { view: ViewFeatures::MAP, ..Features::default() };
-        let text = "a\n//#if MAP\nb\n//#if LENS\nc\n//#else\nd\n//#end\n//#else\ne\n//#end\nf";
+        let text = "a\n//#if MAP\nb\n//#if LENS\nc\n//#else\nd\n//#end\n//#else\ne\n//#end\nf\n\
+            //#if !MAP\ng\n//#end\n//#if !LENS\nh\n//#end";
         let mut kept = String::new();
         keep_lines(text, features, &mut kept);
-        assert_eq!(kept, "a\nb\nd\nf\n");
+        assert_eq!(kept, "a\nb\nd\nf\nh\n");
     }
 
     fn validate(kernel: Kernel, features: Features, places: &ArrayPlaces) {
