@@ -14,7 +14,7 @@ use crate::light_grid::LightGrid;
 use crate::math::Frame;
 use crate::path::World;
 use crate::path::camera::{CameraRays, disk_from_square};
-use crate::render::gpu::{Question, Renderer, UploadedScene};
+use crate::render::gpu::{Caster, Question, UploadedScene};
 use crate::render::{Sampling, View};
 use crate::sampler::Sampler;
 
@@ -83,8 +83,7 @@ pub(super) fn measure(
             // Kernels without environment sampling.
             let view = View { sampling: Sampling::Bsdf, ..place.view((TILE, TILE)) };
             let environment = &place.subject.environment;
-            let rays = view.rays();
-            Some(Renderer::new(uploaded, world, environment, &view, &rays, None)?)
+            Some(Caster::new(uploaded, (world, environment), &view)?)
         }
         None => None,
     };
@@ -101,18 +100,18 @@ pub(super) fn measure(
             continue;
         }
         let (mut seconds, mut rounds, mut found) = (0.0, 0, Vec::new());
-        if let Some(renderer) = &mut caster {
-            renderer.put_rays(&rays)?;
+        if let Some(caster) = &mut caster {
+            caster.put_rays(&rays)?;
             // The first cast compiles, and finds how many rays fit into a dispatch.
-            renderer.cast(kind.question(), rays.len() as u32)?;
-            found = renderer.cast_results(rays.len())?;
+            caster.cast(kind.question(), rays.len() as u32)?;
+            found = caster.cast_results(rays.len())?;
         }
         while seconds < SECONDS {
             if place.is_cancelled() {
                 return Err(Error::new("cancelled"));
             }
-            if let Some(renderer) = &mut caster {
-                seconds += renderer.cast(kind.question(), rays.len() as u32)?;
+            if let Some(caster) = &mut caster {
+                seconds += caster.cast(kind.question(), rays.len() as u32)?;
             } else {
                 let start = Instant::now();
                 found = on_cpu(world, kind.question(), &rays);

@@ -125,15 +125,34 @@ pub(crate) enum Renderer {}
 impl Renderer {
     pub(crate) fn new(
         uploaded: &UploadedScene,
-        _: &World,
-        _: &Environment,
+        _: (&World, &Environment),
         _: &View,
         _: &CameraRays,
         _: Option<&Film>,
+        _: bool,
     ) -> Result<Self> {
         match *uploaded {}
     }
 }
+
+/// Traces rays alone on a device.
+pub(crate) enum Caster {}
+
+impl Caster {
+    pub(crate) fn new(
+        uploaded: &UploadedScene,
+        _: (&World, &Environment),
+        _: &View,
+    ) -> Result<Self> {
+        match *uploaded {}
+    }
+}
+
+never! { self; impl Caster {
+    pub(crate) fn put_rays(&mut self, _: &[Ray]) -> Result<()>;
+    pub(crate) fn cast(&mut self, _: Question, _: u32) -> Result<f64>;
+    pub(crate) fn cast_results(&self, _: usize) -> Result<Vec<(f32, u32)>>;
+} }
 
 never! { self; impl Renderer {
     pub(super) fn set_film(&mut self, _: &Film) -> Result<()>;
@@ -153,7 +172,4 @@ never! { self; impl Renderer {
     pub(super) fn rays(&self) -> u64;
     pub(crate) fn film_on_device(&self) -> Option<(Gpu, DeviceFilm)>;
     pub(crate) fn figures(&self) -> GpuFigures;
-    pub(crate) fn put_rays(&mut self, _: &[Ray]) -> Result<()>;
-    pub(crate) fn cast(&mut self, _: Question, _: u32) -> Result<f64>;
-    pub(crate) fn cast_results(&self, _: usize) -> Result<Vec<(f32, u32)>>;
 } }

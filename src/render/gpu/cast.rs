@@ -3,11 +3,17 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use super::dispatcher::Dispatcher;
 use super::kernel::Kernel;
 use super::layout::Work;
-use super::{GROUP, MAX_GROUPS, Question, Renderer};
+use super::progress::{GROUP, MAX_GROUPS};
+use super::uploaded_scene::UploadedScene;
 use crate::bvh::Ray;
+use crate::environment::Environment;
 use crate::error::Result;
+use crate::path::World;
+use crate::render::View;
+use crate::render::gpu_facts::Question;
 
 /// Twin of `CastRay` in `cast.wgsl`.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
@@ -28,7 +34,22 @@ impl Question {
     }
 }
 
-impl Renderer {
+/// Traces rays alone on the device.
+pub(crate) struct Caster(Dispatcher);
+
+impl Caster {
+    /// For what is uploaded. The view says which lights its kernels have; they are compiled when they are needed.
+    ///
+    /// # Errors
+    /// If something does not fit on the device, with the numbers.
+    pub(crate) fn new(
+        uploaded: &UploadedScene,
+        lit: (&World, &Environment),
+        view: &View,
+    ) -> Result<Self> {
+        Dispatcher::new(uploaded, lit, view, &view.rays()).map(Self)
+    }
+
     /// Uploads rays to be traced; they begin where they say, whatever their `t_min`.
     pub(crate) fn put_rays(&mut self, rays: &[Ray]) -> Result<()> {
         let rays: Vec<CastRay> = rays
@@ -40,41 +61,40 @@ impl Renderer {
                 padding: 0,
             })
             .collect();
-        self.buffers.put("cast_rays", bytemuck::cast_slice(&rays), "the list of rays")?;
-        self.buffers.make("cast_results", 8 * rays.len() as u64, "the list of hits")
+        self.0.buffers.put("cast_rays", bytemuck::cast_slice(&rays), "the list of rays")?;
+        self.0.buffers.make("cast_results", 8 * rays.len() as u64, "the list of hits")
     }
 
     /// Traces the first `count` of the uploaded rays; returns the seconds that took on the device.
     pub(crate) fn cast(&mut self, question: Question, count: u32) -> Result<f64> {
         let kernel = question.kernel();
-        self.settle()?;
-        let before = self.flights.figures().device_seconds;
+        self.0.settle()?;
+        let before = self.0.flights.figures().device_seconds;
         let mut first = 0;
         while first < count {
-            let groups = self.flights.units(kernel).min(MAX_GROUPS);
+            let groups = self.0.flights.units(kernel).min(MAX_GROUPS);
             let groups = groups.min(u64::from(count - first).div_ceil(GROUP)) as u32;
             let work = Work { first, count, ..Work::default() };
-            self.dispatch(&[kernel], &work, groups, u64::from(groups))?;
+            self.0.dispatch(&[kernel], &work, groups, u64::from(groups))?;
             first += groups * GROUP as u32;
         }
-        self.settle()?;
-        Ok(self.flights.figures().device_seconds - before)
+        self.0.settle()?;
+        Ok(self.0.flights.figures().device_seconds - before)
     }
 
     /// What came of each of the first `count` rays: the distance (`f32::MAX` without a hit) and the
     /// triangle, or the share of light in `[0,1]` and nothing.
     pub(crate) fn cast_results(&self, count: usize) -> Result<Vec<(f32, u32)>> {
-        let words = self.read_words("cast_results", 2 * count)?;
+        let words = self.0.read_words("cast_results", 2 * count)?;
         Ok(words.as_chunks().0.iter().map(|&[x, i]| (f32::from_bits(x), i)).collect())
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Gpu, RayChoice, UploadedScene};
+    use super::super::{Gpu, RayChoice};
     use super::*;
-    use crate::environment::{Environment, EnvironmentOptions};
-    use crate::path::World;
+    use crate::environment::EnvironmentOptions;
     use crate::render::Sampling;
     use crate::render::gpu::parity::fixture;
     use crate::sampler::Sampler;
@@ -100,13 +120,12 @@ mod tests {
         let environment = Environment::new(map, &EnvironmentOptions::default()).expect("sound");
         let view = fixture::view_of(world, Sampling::Bsdf);
         let uploaded = UploadedScene::new(gpu, world, &environment).expect("it fits");
-        let camera = view.rays();
-        let renderer = Renderer::new(&uploaded, world, &environment, &view, &camera, None);
-        let mut renderer = renderer.expect("it fits");
-        renderer.put_rays(rays).expect("they fit");
+        let caster = Caster::new(&uploaded, (world, &environment), &view);
+        let mut caster = caster.expect("it fits");
+        caster.put_rays(rays).expect("they fit");
         [Question::ClosestHit, Question::Transmittance].map(|question| {
-            renderer.cast(question, rays.len() as u32).expect("it runs");
-            let found = renderer.cast_results(rays.len()).expect("they can be read");
+            caster.cast(question, rays.len() as u32).expect("it runs");
+            let found = caster.cast_results(rays.len()).expect("they can be read");
             let differs = |(ray, (number, triangle)): (&Ray, (f32, u32))| match question {
                 Question::ClosestHit => {
                     let hit = world.closest_hit(ray, false);

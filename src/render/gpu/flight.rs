@@ -6,10 +6,10 @@ use std::time::Instant;
 
 use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
-use super::GROUP;
 use super::device::Gpu;
 use super::kernel::Kernel;
 use super::pacer::{Pacer, TARGET_SECONDS, WINDOW_TARGET_SECONDS};
+use super::progress::GROUP;
 use crate::error::{Error, Result};
 use crate::render::gpu_facts::FlightFigures;
 

@@ -3,98 +3,97 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::dispatcher::Dispatcher;
 use super::kernel::Kernel;
 use super::layout::Work;
-use super::{GROUP, MAX_GROUPS, Renderer};
+use super::progress::{GROUP, MAX_GROUPS};
 use crate::error::Result;
 use crate::light_grid::LearningGrid;
 use crate::radiance_cache::RadianceSums;
 
-impl Renderer {
-    /// Traces the learning paths in `paths`, drawing from the distributions last set; returns the number of
-    /// rays, or `None` if it is cancelled: the counters are then, or if it fails, as before.
-    pub(crate) fn learn(
-        &mut self,
-        paths: Range<u64>,
-        learning: &LearningGrid,
-        cancel: &AtomicBool,
-    ) -> Result<Option<u64>> {
-        self.put_counters(learning)?;
-        let (done, rays) = self.trace_anywhere(Kernel::Learn, paths.clone(), cancel)?;
-        if done < paths.end {
-            return Ok(None);
-        }
-        self.take_counters(learning)?;
-        Ok(Some(rays))
+/// Traces the learning paths in `paths`, drawing from the distributions last set; returns the number of
+/// rays, or `None` if it is cancelled: the counters are then, or if it fails, as before.
+pub(super) fn learn(
+    on: &mut Dispatcher,
+    paths: Range<u64>,
+    learning: &LearningGrid,
+    cancel: &AtomicBool,
+) -> Result<Option<u64>> {
+    put_counters(on, learning)?;
+    let (done, rays) = trace_anywhere(on, Kernel::Learn, paths.clone(), cancel)?;
+    if done < paths.end {
+        return Ok(None);
     }
+    take_counters(on, learning)?;
+    Ok(Some(rays))
+}
 
-    /// Traces paths that train the radiance cache; what was set of it last is what is known by now.
-    /// Returns the first path that was not traced, and the number of rays.
-    pub(crate) fn train(
-        &mut self,
-        paths: Range<u64>,
-        sums: &RadianceSums,
-        cancel: &AtomicBool,
-    ) -> Result<(u64, u64)> {
-        let (words, scale) = sums.words_and_scale();
-        self.globals.set_cells_of_cache(sums.cells(), scale);
-        self.buffers.put("cache_sums", bytemuck::cast_slice(&words), "the radiance cache")?;
-        let done = self.trace_anywhere(Kernel::Train, paths, cancel)?;
-        sums.set_words(&self.read_words("cache_sums", words.len())?);
-        Ok(done)
-    }
+/// Traces paths that train the radiance cache; what was set of it last is what is known by now.
+/// Returns the first path that was not traced, and the number of rays.
+pub(super) fn train(
+    on: &mut Dispatcher,
+    paths: Range<u64>,
+    sums: &RadianceSums,
+    cancel: &AtomicBool,
+) -> Result<(u64, u64)> {
+    let (words, scale) = sums.words_and_scale();
+    on.globals.set_cells_of_cache(sums.cells(), scale);
+    on.buffers.put("cache_sums", bytemuck::cast_slice(&words), "the radiance cache")?;
+    let done = trace_anywhere(on, Kernel::Train, paths, cancel)?;
+    sums.set_words(&on.read_words("cache_sums", words.len())?);
+    Ok(done)
+}
 
-    /// Traces paths that begin anywhere in the picture, as far as `cancel` allows. Returns the first one
-    /// that was not traced, and the number of rays of the others.
-    fn trace_anywhere(
-        &mut self,
-        kernel: Kernel,
-        paths: Range<u64>,
-        cancel: &AtomicBool,
-    ) -> Result<(u64, u64)> {
-        self.globals.seed = self.seed;
-        self.write_globals();
-        self.buffers.put("learning_rays", &[0; 4], "a count")?;
-        let mut first = paths.start;
-        while first < paths.end && !cancel.load(Ordering::Relaxed) {
-            let groups = self.flights.units(kernel).min(MAX_GROUPS);
-            let count = (groups * GROUP).min(paths.end - first);
-            let work = Work {
-                first: first as u32,
-                first_high: (first >> 32) as u32,
-                count: count as u32,
-                ..Work::default()
-            };
-            let groups = count.div_ceil(GROUP);
-            self.dispatch(&[kernel], &work, groups as u32, groups)?;
-            first += count;
-        }
-        self.settle()?;
-        let rays = self.read_words("learning_rays", 1)?.first().copied();
-        Ok((first, rays.map_or(0, u64::from)))
+/// Traces paths that begin anywhere in the picture, as far as `cancel` allows. Returns the first one
+/// that was not traced, and the number of rays of the others.
+fn trace_anywhere(
+    on: &mut Dispatcher,
+    kernel: Kernel,
+    paths: Range<u64>,
+    cancel: &AtomicBool,
+) -> Result<(u64, u64)> {
+    on.globals.seed = on.seed;
+    on.write_globals();
+    on.buffers.put("learning_rays", &[0; 4], "a count")?;
+    let mut first = paths.start;
+    while first < paths.end && !cancel.load(Ordering::Relaxed) {
+        let groups = on.flights.units(kernel).min(MAX_GROUPS);
+        let count = (groups * GROUP).min(paths.end - first);
+        let work = Work {
+            first: first as u32,
+            first_high: (first >> 32) as u32,
+            count: count as u32,
+            ..Work::default()
+        };
+        let groups = count.div_ceil(GROUP);
+        on.dispatch(&[kernel], &work, groups as u32, groups)?;
+        first += count;
     }
+    on.settle()?;
+    let rays = on.read_words("learning_rays", 1)?.first().copied();
+    Ok((first, rays.map_or(0, u64::from)))
+}
 
-    /// Uploads counters, to be counted on.
-    pub(super) fn put_counters(&mut self, learning: &LearningGrid) -> Result<()> {
-        self.globals.set_cells(&learning.grid);
-        self.globals.tries_per_vertex = learning.tries_per_vertex();
-        self.write_globals();
-        let (visits, slots, mut blocks) = learning.counters.words();
-        if blocks.is_empty() {
-            blocks.push(0);
-        }
-        self.buffers.put("visits", bytemuck::cast_slice(&visits), "the light grid's cells")?;
-        self.buffers.put("slot_of_cell", bytemuck::cast_slice(slots), "the light grid's cells")?;
-        self.buffers.put("counters", bytemuck::cast_slice(&blocks), "the learning counters")
+/// Uploads counters, to be counted on.
+pub(super) fn put_counters(on: &mut Dispatcher, learning: &LearningGrid) -> Result<()> {
+    on.globals.set_cells(&learning.grid);
+    on.globals.tries_per_vertex = learning.tries_per_vertex();
+    on.write_globals();
+    let (visits, slots, mut blocks) = learning.counters.words();
+    if blocks.is_empty() {
+        blocks.push(0);
     }
+    on.buffers.put("visits", bytemuck::cast_slice(&visits), "the light grid's cells")?;
+    on.buffers.put("slot_of_cell", bytemuck::cast_slice(slots), "the light grid's cells")?;
+    on.buffers.put("counters", bytemuck::cast_slice(&blocks), "the learning counters")
+}
 
-    /// Takes back the counters that were uploaded.
-    pub(super) fn take_counters(&self, learning: &LearningGrid) -> Result<()> {
-        let (visits, blocks) = learning.counters.word_counts();
-        let visits = self.read_words("visits", visits)?;
-        learning.counters.set_words(&visits, &self.read_words("counters", blocks)?);
-        Ok(())
-    }
+/// Takes back the counters that were uploaded.
+pub(super) fn take_counters(on: &Dispatcher, learning: &LearningGrid) -> Result<()> {
+    let (visits, blocks) = learning.counters.word_counts();
+    let visits = on.read_words("visits", visits)?;
+    learning.counters.set_words(&visits, &on.read_words("counters", blocks)?);
+    Ok(())
 }
 
 #[cfg(test)]
@@ -109,7 +108,7 @@ pub(super) mod tests {
     use crate::render::gi::CacheTraining;
     use crate::render::gi::tests::view;
     use crate::render::gpu::tests::crack;
-    use crate::render::gpu::{Gpu, UploadedScene};
+    use crate::render::gpu::{Gpu, Renderer, UploadedScene};
     use crate::render::{Gi, Pass, View, cpu};
 
     /// Visits of each cell and, cell by cell, tile counters after two learning passes, the second with
@@ -133,7 +132,8 @@ pub(super) mod tests {
         let never = AtomicBool::new(false);
         let mut renderer = gpu.map(|gpu| {
             let uploaded = UploadedScene::new(gpu, &world, &environment).expect("it fits");
-            Renderer::new(&uploaded, &world, &environment, &view, &rays, None).expect("it fits")
+            Renderer::new(&uploaded, (&world, &environment), &view, &rays, None, true)
+                .expect("it fits")
         });
         let mut traced = 0;
         for paths in [Some(0..4096), Some(4096..16384), None] {
@@ -215,7 +215,8 @@ pub(super) mod tests {
         let tracer = view.tracer(&world, &environment, distributions.as_ref());
         let uploaded = UploadedScene::new(&gpu, &world, &environment).expect("it fits");
         let mut renderer =
-            Renderer::new(&uploaded, &world, &environment, &view, &rays, None).expect("it fits");
+            Renderer::new(&uploaded, (&world, &environment), &view, &rays, None, true)
+                .expect("it fits");
         renderer.set_grid(distributions.as_ref()).expect("uploaded");
         let never = AtomicBool::new(false);
         let mut known = None;

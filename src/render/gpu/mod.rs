@@ -12,6 +12,7 @@ mod buffers;
 mod cast;
 pub(crate) mod constants;
 mod device;
+mod dispatcher;
 mod facts;
 mod features;
 mod film;
@@ -24,6 +25,7 @@ mod pacer;
 #[cfg(test)]
 mod parity;
 mod pipeline;
+mod progress;
 mod queue;
 mod read;
 #[cfg(test)]
@@ -32,39 +34,32 @@ pub(crate) mod shader;
 mod sharing;
 mod texels;
 mod uploaded_scene;
+mod whole;
 
-use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::sync::atomic::AtomicBool;
 
 use glam::Vec3;
 
 use super::film::Film;
 use super::{Pass, View};
-use crate::bsdf::{albedo, sheen};
 use crate::environment::Environment;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
 use crate::path::World;
 use crate::path::camera::CameraRays;
-use crate::radiance_cache::RadianceCache;
-use crate::scene::needs::SceneFeatures;
+use crate::radiance_cache::{RadianceCache, RadianceSums};
 #[cfg(feature = "window")]
 pub(crate) use background_compile::MaybeReady;
-use bound::Bound;
-use buffers::Buffers;
-use features::{Features, ViewFeatures};
+use dispatcher::Dispatcher;
+use features::ViewFeatures;
 use film::Sums;
-use flight::{Flights, Job};
 use kernel::Kernel;
 #[cfg(feature = "window")]
 pub(crate) use kernel_cache::CompileGuard;
-use kernel_cache::Pipeline;
-use layout::{Globals, Work};
-use pipeline::Programs;
+use progress::Progress;
 use queue::Queue;
-use shader::{Constants, Program};
 use sharing::Sharing;
 use uploaded_scene::put_array;
 
@@ -73,85 +68,79 @@ pub(crate) use super::gpu_facts::Question;
 pub use super::gpu_facts::{
     AdapterFacts, FlightFigures, GpuFigures, KernelFacts, RayChoice, Schedule,
 };
+pub(crate) use cast::Caster;
 pub(crate) use device::NO_GPU;
 pub use device::{Gpu, adapters};
 pub(crate) use film::DeviceFilm;
+pub(super) use progress::Advance;
 pub use uploaded_scene::UploadedScene;
 
-/// Pixels along a side of a workgroup's tile.
-const TILE: u32 = 8;
-/// Paths of a workgroup.
-const GROUP: u64 = 64;
-/// Most workgroups of one dispatch (WebGPU's limit along an axis).
-const MAX_GROUPS: u64 = 65_535;
-/// Tiles of a dispatch that keep a software device's cores busy.
-const MIN_TILES_ON_SOFTWARE: u64 = 4;
-/// Tiles of a dispatch that keep a small and a large real device busy.
-const MIN_TILES: [u64; 2] = [64, 1024];
-/// Most samples of a pixel in one dispatch.
-const MAX_SAMPLES: u32 = 64;
+/// How kernels share the work of a picture.
+enum Rendering {
+    /// One does all.
+    Whole,
+    /// They take turns.
+    Queue(Queue),
+    /// They take turns, for pixels that share second vertices.
+    Sharing(Sharing),
+}
+
+impl Rendering {
+    /// Makes the buffers it needs.
+    fn new(on: &mut Dispatcher) -> Result<Self> {
+        let tiles = on.tiles().count();
+        let Dispatcher { gpu, buffers, globals, features, constants, .. } = on;
+        if let Some(tile) = constants.shared_tile {
+            let size = [globals.width, globals.height];
+            return Sharing::new(buffers, *features, tile, size).map(Self::Sharing);
+        }
+        let is_cached = features.view.contains(ViewFeatures::RADIANCE_CACHE);
+        match Schedule::of(gpu) {
+            Schedule::Queue if !is_cached => {
+                Queue::new(buffers, gpu, *features, tiles).map(Self::Queue)
+            }
+            _ => Ok(Self::Whole),
+        }
+    }
+
+    /// The kernels that add samples to pixels, in order.
+    fn kernels(&self, on: &Dispatcher) -> &'static [Kernel] {
+        match self {
+            Self::Whole => &[Kernel::Render],
+            Self::Queue(_) => queue::kernels(on.features),
+            Self::Sharing(_) => &Kernel::OF_SHARING,
+        }
+    }
+}
 
 /// What the device holds of a picture in the making.
 pub(crate) struct Renderer {
-    gpu: Gpu,
-    buffers: Buffers,
-    globals: Globals,
-    features: Features,
-    constants: Constants,
-    kernels: BTreeMap<Kernel, Bound>,
-    /// Seconds of waiting for them.
-    compile_seconds: f64,
-    flights: Flights,
-    /// If kernels take turns.
-    queue: Option<Queue>,
-    /// If pixels share second vertices.
-    sharing: Option<Sharing>,
+    dispatcher: Dispatcher,
+    rendering: Rendering,
     film: Sums,
     progress: Progress,
-    /// Samples that the film began with and those that [`Advance`] has reported_samples of.
+    /// Samples that the film began with and those that [`Advance`] has told of.
     reported_samples: u64,
     kernel_facts: KernelFacts,
-    seed: u32,
-}
-
-/// How far the film is, dispatches under way included: tiles before `tile` have `ahead` samples a
-/// pixel, the others at least `least`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-struct Progress {
-    least: u32,
-    ahead: u32,
-    tile: u64,
-    /// How many tiles from there on are under way, and by how many samples they are further.
-    group: u64,
-    group_samples: u32,
-    /// Samples that pixels have beyond that.
-    surplus: u64,
-}
-
-/// What a call of [`Renderer::render`] has set going.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Advance {
-    /// Samples of all pixels together.
-    pub(super) samples: u64,
-    /// Fewest samples of any pixel from now on.
-    pub(super) least: u32,
 }
 
 impl Renderer {
-    /// Builds the kernels for a view of what is uploaded; goes on from `film` if there is one.
+    /// Builds the kernels for a view of what is uploaded, with that for learning if the session `learns`; goes on
+    /// from `film` if there is one.
     ///
     /// # Errors
     /// If something does not fit on the device, with the numbers.
     pub(crate) fn new(
         uploaded: &UploadedScene,
-        world: &World,
-        environment: &Environment,
+        lit: (&World, &Environment),
         view: &View,
         rays: &CameraRays,
         film: Option<&Film>,
+        learns: bool,
     ) -> Result<Self> {
-        let mut renderer = Self::with_buffers(uploaded, (world, environment), view, rays, film)?;
-        renderer.compile(&renderer.own_kernels())?;
+        let mut renderer = Self::without_kernels(uploaded, lit, view, rays, film)?;
+        let kernels = renderer.own_kernels(learns);
+        renderer.dispatcher.compile(&kernels)?;
         Ok(renderer)
     }
 
@@ -163,130 +152,82 @@ impl Renderer {
     #[cfg(feature = "window")]
     pub(crate) fn new_or_held(
         uploaded: &UploadedScene,
-        world: &World,
-        environment: &Environment,
+        lit: (&World, &Environment),
         view: &View,
         rays: &CameraRays,
         film: Option<&Film>,
+        learns: bool,
         until_then: impl FnOnce() -> Arc<CompileGuard>,
     ) -> Result<MaybeReady<Self>> {
         // A film is large, and uploaded when it is wanted.
-        let lit = (world, environment);
-        let mut renderer = Self::with_buffers(uploaded, lit, view, rays, None)?;
-        let kernels = renderer.own_kernels();
-        let programs = renderer.programs(&kernels);
-        match renderer.gpu.pipelines_or_held(programs, until_then)? {
+        let mut renderer = Self::without_kernels(uploaded, lit, view, rays, None)?;
+        let kernels = renderer.own_kernels(learns);
+        let on = &mut renderer.dispatcher;
+        match on.gpu.pipelines_or_held(on.programs(&kernels), until_then)? {
             MaybeReady::CompileGuard(held) => Ok(MaybeReady::CompileGuard(held)),
             MaybeReady::Ready(compiled) => {
-                renderer.take_up(&kernels, compiled);
+                on.take_up(&kernels, compiled);
                 film.map_or(Ok(()), |film| renderer.set_film(film))?;
                 Ok(MaybeReady::Ready(renderer))
             }
         }
     }
 
+    /// [`Self::new`] with the kernel that `compile` makes of the program for rendering.
+    #[cfg(test)]
+    fn with_kernel(
+        uploaded: &UploadedScene,
+        lit: (&World, &Environment),
+        view: &View,
+        rays: &CameraRays,
+        compile: impl FnOnce(&Gpu, shader::Program) -> Result<Arc<kernel_cache::Pipeline>>,
+    ) -> Result<Self> {
+        let mut renderer = Self::without_kernels(uploaded, lit, view, rays, None)?;
+        let on = &mut renderer.dispatcher;
+        let program = on.programs(&[Kernel::Render]).remove(0).1;
+        on.take_up(&[Kernel::Render], vec![compile(&on.gpu, program)?]);
+        Ok(renderer)
+    }
+
     /// All but its kernels.
-    fn with_buffers(
+    fn without_kernels(
         uploaded: &UploadedScene,
         lit: (&World, &Environment),
         view: &View,
         rays: &CameraRays,
         film: Option<&Film>,
     ) -> Result<Self> {
-        let mut renderer = Self::without_kernels(uploaded, lit, view, rays, film)?;
-        let is_queue = Schedule::of(&uploaded.gpu) == Schedule::Queue;
-        let takes_turns = renderer.sharing.is_none()
-            && !renderer.features.view.contains(ViewFeatures::RADIANCE_CACHE);
-        if is_queue && takes_turns {
-            let tiles = renderer.tiles();
-            let Self { buffers, gpu, features, .. } = &mut renderer;
-            let queue = Queue::new(buffers, gpu, *features, tiles)?;
-            renderer.queue = Some(queue);
-        }
-        Ok(renderer)
-    }
-
-    /// [`Self::new`] with the kernel that `compile` makes of the program for rendering.
-    #[cfg(test)]
-    fn with_kernel(
-        uploaded: &UploadedScene,
-        (world, environment): (&World, &Environment),
-        view: &View,
-        rays: &CameraRays,
-        compile: impl FnOnce(&Gpu, Program) -> Result<Arc<Pipeline>>,
-    ) -> Result<Self> {
-        let mut renderer = Self::without_kernels(uploaded, (world, environment), view, rays, None)?;
-        let Self { features, constants, buffers, .. } = &renderer;
-        let places = buffers.array_places();
-        let program = Program::new(Kernel::Render, *features, constants, &places);
-        let pipeline = compile(&renderer.gpu, program)?;
-        renderer.kernels.insert(Kernel::Render, Bound::new(pipeline));
-        Ok(renderer)
-    }
-
-    fn without_kernels(
-        uploaded: &UploadedScene,
-        (world, environment): (&World, &Environment),
-        view: &View,
-        rays: &CameraRays,
-        film: Option<&Film>,
-    ) -> Result<Self> {
-        features::check(view)?;
-        let mut features = Features::of(world, environment, view);
-        if uploaded.gpu.has_hardware_rays() {
-            features = features.with_hardware_rays();
-        }
-        let mut buffers = uploaded.buffers.for_renderer();
-        let mut globals = uploaded.globals;
-        globals.set_view(view, rays);
-        globals.set_fog(view.fog(world).as_ref());
-        let mut constants = uploaded.constants;
-        upload_tables(&mut buffers, view, environment, features, &mut constants)?;
-        let size = [view.width, view.height];
-        globals.film_scale = film::scale_for(world.brightest(environment));
-        let sums = Sums::new(&mut buffers, size, view.layers, globals.film_scale, film)?;
-        let progress = film.map(Progress::of).unwrap_or_default();
-        if features.view.contains(ViewFeatures::COUNTING) {
-            // Until there is something to count.
-            for name in ["visits", "slot_of_cell", "counters"] {
-                buffers.make(name, 4, "the learning counters")?;
-            }
-        }
-        buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
-        let kernel_facts = KernelFacts::of(features);
-        constants.shared_tile = view.shared_tile();
-        let sharing = constants
-            .shared_tile
-            .map(|tile| Sharing::new(&mut buffers, features, tile, size))
-            .transpose()?;
+        let mut on = Dispatcher::new(uploaded, lit, view, rays)?;
+        let (size, scale) = ([view.width, view.height], on.globals.film_scale);
         let mut renderer = Self {
-            kernels: BTreeMap::new(),
-            compile_seconds: 0.0,
-            flights: Flights::new(&uploaded.gpu),
-            queue: None,
-            sharing,
-            film: sums,
-            progress,
+            film: Sums::new(&mut on.buffers, size, view.layers, scale, film)?,
+            rendering: Rendering::new(&mut on)?,
+            progress: film.map(Progress::of).unwrap_or_default(),
             reported_samples: 0,
-            gpu: uploaded.gpu.clone(),
-            buffers,
-            globals,
-            features,
-            constants,
-            kernel_facts,
-            seed: view.seed,
+            kernel_facts: KernelFacts::of(on.features),
+            dispatcher: on,
         };
         renderer.set_cache(None)?;
-        renderer.write_globals();
         renderer.reported_samples = renderer.total_samples();
         Ok(renderer)
+    }
+
+    /// The kernels that it is going to need.
+    fn own_kernels(&self, learns: bool) -> Vec<Kernel> {
+        let Self { dispatcher: on, rendering, .. } = self;
+        let view = on.features.view;
+        let learns = learns && view.contains(ViewFeatures::LIGHT_GRID);
+        let mut kernels = rendering.kernels(on).to_vec();
+        kernels.extend(learns.then_some(Kernel::Learn));
+        kernels.extend(view.contains(ViewFeatures::RADIANCE_CACHE).then_some(Kernel::Train));
+        kernels
     }
 
     /// Goes on from another film of this size.
     pub(super) fn set_film(&mut self, film: &Film) -> Result<()> {
         self.settle()?;
         self.forget_paths()?;
-        self.film.write(&self.buffers, film)?;
+        self.film.write(&self.dispatcher.buffers, film)?;
         self.progress = Progress::of(film);
         self.reported_samples = self.total_samples();
         Ok(())
@@ -294,33 +235,55 @@ impl Renderer {
 
     /// Uploads the distributions paths choose tiles by.
     pub(crate) fn set_grid(&mut self, grid: Option<&LightGrid>) -> Result<()> {
-        let Some(grid) = grid.filter(|_| self.features.view.contains(ViewFeatures::MAP_SAMPLING))
-        else {
-            return Ok(());
-        };
+        let samples_map = self.dispatcher.features.view.contains(ViewFeatures::MAP_SAMPLING);
+        let Some(grid) = grid.filter(|_| samples_map) else { return Ok(()) };
         // Paths remember which distribution they come from.
         self.forget_paths()?;
-        let words = layout::distributions(grid, &mut self.globals);
-        put_array(&mut self.buffers, "distributions", "the light grid", &words)?;
-        self.write_globals();
+        let on = &mut self.dispatcher;
+        let words = layout::distributions(grid, &mut on.globals);
+        put_array(&mut on.buffers, "distributions", "the light grid", &words)?;
+        on.write_globals();
         Ok(())
     }
 
     /// Uploads the cache that paths end in; without one they go on.
     pub(crate) fn set_cache(&mut self, cache: Option<&RadianceCache>) -> Result<()> {
-        if !self.features.view.contains(ViewFeatures::RADIANCE_CACHE) {
+        let on = &mut self.dispatcher;
+        if !on.features.view.contains(ViewFeatures::RADIANCE_CACHE) {
             return Ok(());
         }
         let (slots, mean) = cache.map_or((&[][..], Vec3::ZERO), RadianceCache::slots_and_mean);
-        self.globals.cache_is_known = u32::from(cache.is_some());
-        self.globals.cache_mean = mean;
+        on.globals.cache_is_known = u32::from(cache.is_some());
+        on.globals.cache_mean = mean;
         if let Some(cache) = cache {
-            self.globals.set_cells_of_cache(cache.cells(), self.globals.cache_scale);
+            on.globals.set_cells_of_cache(cache.cells(), on.globals.cache_scale);
         }
         let slots = if slots.is_empty() { &[[0; 4]; 1] } else { slots };
-        put_array(&mut self.buffers, "cache_slots", "the radiance cache", slots)?;
-        self.write_globals();
+        put_array(&mut on.buffers, "cache_slots", "the radiance cache", slots)?;
+        on.write_globals();
         Ok(())
+    }
+
+    /// Traces the learning paths in `paths`, drawing from the distributions last set; returns the number of
+    /// rays, or `None` if it is cancelled: the counters are then, or if it fails, as before.
+    pub(crate) fn learn(
+        &mut self,
+        paths: Range<u64>,
+        learning: &LearningGrid,
+        cancel: &AtomicBool,
+    ) -> Result<Option<u64>> {
+        learning::learn(&mut self.dispatcher, paths, learning, cancel)
+    }
+
+    /// Traces paths that train the radiance cache; what was set of it last is what is known by now.
+    /// Returns the first path that was not traced, and the number of rays.
+    pub(crate) fn train(
+        &mut self,
+        paths: Range<u64>,
+        sums: &RadianceSums,
+        cancel: &AtomicBool,
+    ) -> Result<(u64, u64)> {
+        learning::train(&mut self.dispatcher, paths, sums, cancel)
     }
 
     /// Sets going what brings every pixel of the film to a pass's target, counting in `counts` what its
@@ -332,98 +295,50 @@ impl Renderer {
         counts: Option<&LearningGrid>,
         cancel: &AtomicBool,
     ) -> Result<Advance> {
-        self.gpu.check()?;
-        self.globals.seed = pass.sequence.seed(self.seed);
-        self.globals.first_of_sequence = pass.sequence.first_sample;
-        self.write_globals();
-        if let Some(learning) = counts {
-            self.put_counters(learning)?;
+        let on = &mut self.dispatcher;
+        on.gpu.check()?;
+        on.globals.seed = pass.sequence.seed(on.seed);
+        on.globals.first_of_sequence = pass.sequence.first_sample;
+        on.write_globals();
+        if let Some(counts) = counts {
+            learning::put_counters(on, counts)?;
         }
-        let stride = counts.map_or(0, |_| pass.stride);
-        if self.sharing.is_none() && self.progress.ahead != pass.target {
+        let pass = Pass { stride: counts.map_or(0, |_| pass.stride), ..pass };
+        let is_sharing = matches!(self.rendering, Rendering::Sharing(_));
+        if !is_sharing && self.progress.ahead != pass.target {
             self.forget_paths()?;
-            // Tiles that are ahead of the others take less than those.
-            let Progress { least, .. } = self.progress;
-            let even = u64::from(least) * self.pixels_before(self.tiles());
-            let surplus = self.total_samples().saturating_sub(even);
-            self.progress = Progress { least, ahead: pass.target, surplus, ..Progress::default() };
+            self.progress = self.progress.towards(pass.target, self.dispatcher.tiles());
         }
-        if self.sharing.is_some() {
-            self.render_shared(pass, stride, cancel)?;
-        } else if self.queue.is_some() {
-            self.render_queue(pass, stride, cancel)?;
-        } else {
-            self.render_tiles(pass, stride, cancel)?;
+        let Self { dispatcher: on, rendering, progress, .. } = self;
+        match rendering {
+            Rendering::Whole => whole::advance(on, progress, pass, cancel)?,
+            Rendering::Queue(queue) => queue.advance(on, progress, pass, cancel)?,
+            Rendering::Sharing(sharing) => sharing.advance(on, progress, pass, cancel)?,
         }
-        if let Some(learning) = counts {
-            self.take_counters(learning)?;
+        if let Some(counts) = counts {
+            learning::take_counters(on, counts)?;
         }
         let samples = self.total_samples().saturating_sub(self.reported_samples);
         self.reported_samples += samples;
         Ok(Advance { samples, least: self.progress.least })
     }
 
-    /// How many tiles a dispatch has at least, if the device affords so many units of work: what takes a large
-    /// one no time may take a small one so long that a desktop stutters.
-    fn least_tiles(&self, units: u64) -> u64 {
-        let [small, large] = MIN_TILES;
-        match self.gpu.facts().is_software() {
-            true => MIN_TILES_ON_SOFTWARE,
-            false => units.clamp(small, large),
+    /// Leaves paths in work, if there are any: their samples begin anew.
+    fn forget_paths(&mut self) -> Result<()> {
+        match &mut self.rendering {
+            Rendering::Queue(queue) => queue.forget_paths(&mut self.dispatcher, &mut self.progress),
+            _ => Ok(()),
         }
-    }
-
-    /// Dispatches until all tiles are ahead. Each pixel takes its samples in order, so that its sums do
-    /// not depend on how the work is cut.
-    fn render_tiles(&mut self, pass: Pass, stride: u32, cancel: &AtomicBool) -> Result<()> {
-        let tiles = self.tiles();
-        let missing = pass.target.saturating_sub(self.progress.least);
-        while self.progress.tile < tiles && missing > 0 {
-            let first = self.progress.tile;
-            if self.progress.group == 0 {
-                let units = self.flights.units(Kernel::Render);
-                let affordable = units / u64::from(missing.min(MAX_SAMPLES));
-                let count = affordable.clamp(self.least_tiles(units), MAX_GROUPS);
-                let count = count.min(tiles - first);
-                self.progress.group = count;
-            }
-            let count = self.progress.group;
-            while self.progress.group_samples < missing {
-                if cancel.load(Ordering::Relaxed) {
-                    return Ok(());
-                }
-                let affordable = (self.flights.units(Kernel::Render) / count)
-                    .clamp(1, u64::from(MAX_SAMPLES)) as u32;
-                let samples = affordable.min(missing - self.progress.group_samples);
-                let work = Work {
-                    first: first as u32,
-                    count: count as u32,
-                    samples,
-                    end_sample: pass.target,
-                    stride,
-                    ..Work::default()
-                };
-                let units = count * u64::from(samples);
-                self.dispatch(&[Kernel::Render], &work, count as u32, units)?;
-                self.progress.group_samples += samples;
-            }
-            let tile = first + count;
-            self.progress = Progress { tile, group: 0, group_samples: 0, ..self.progress };
-        }
-        if self.progress.tile >= tiles {
-            self.progress = Progress { least: pass.target, ..Progress::default() };
-        }
-        Ok(())
     }
 
     /// Waits until the device has nothing more to do.
     pub(super) fn settle(&mut self) -> Result<()> {
-        self.flights.land_all(&self.gpu)
+        self.dispatcher.settle()
     }
 
     /// Reads the film back, dispatches under way included.
     pub(super) fn read_film(&self, film: &mut Film) -> Result<()> {
-        self.film.read(&self.buffers, film)
+        self.film.read(&self.dispatcher.buffers, film)
     }
 
     /// Rays traced on this device for the film, when it was read last.
@@ -433,156 +348,35 @@ impl Renderer {
 
     /// The film where it is.
     pub(crate) fn film_on_device(&self) -> Option<(Gpu, DeviceFilm)> {
-        self.film.on_device(&self.buffers).map(|film| (self.gpu.clone(), film))
-    }
-
-    fn tiles(&self) -> u64 {
-        let Globals { width, height, .. } = self.globals;
-        u64::from(width.div_ceil(TILE)) * u64::from(height.div_ceil(TILE))
-    }
-
-    /// Pixels of the first `tiles` tiles.
-    fn pixels_before(&self, tiles: u64) -> u64 {
-        let (width, height) = (u64::from(self.globals.width), u64::from(self.globals.height));
-        let tile = u64::from(TILE);
-        let across = width.div_ceil(tile);
-        let (row, column) = (tiles / across, tiles % across);
-        let rows_before = (row * tile).min(height);
-        let rows = ((row + 1) * tile).min(height) - rows_before;
-        rows_before * width + rows * (column * tile).min(width)
+        let on = &self.dispatcher;
+        self.film.on_device(&on.buffers).map(|film| (on.gpu.clone(), film))
     }
 
     /// Samples of all pixels together, dispatches under way included.
     fn total_samples(&self) -> u64 {
-        let Progress { least, ahead, tile, group, group_samples, surplus } = self.progress;
-        let (before, all) = (self.pixels_before(tile), self.pixels_before(self.tiles()));
-        let under_way = self.pixels_before(tile + group) - before;
-        before * u64::from(ahead)
-            + (all - before) * u64::from(least)
-            + under_way * u64::from(group_samples)
-            + surplus
+        self.progress.total_samples(self.dispatcher.tiles())
     }
 
     /// Figures of the device and of what the kernels leave out.
     pub(crate) fn figures(&self) -> GpuFigures {
+        let on = &self.dispatcher;
+        let is_queue = matches!(self.rendering, Rendering::Queue(_));
         GpuFigures {
-            adapter: self.gpu.facts().clone(),
-            device_bytes: self.buffers.bytes(),
-            bytes_read: self.buffers.bytes_read(),
-            flights: self.flights.figures(),
-            compile_seconds: self.compile_seconds,
-            schedule: if self.queue.is_some() { Schedule::Queue } else { Schedule::Whole },
+            adapter: on.gpu.facts().clone(),
+            device_bytes: on.buffers.bytes(),
+            bytes_read: on.buffers.bytes_read(),
+            flights: on.flights.figures(),
+            compile_seconds: on.compile_seconds,
+            schedule: if is_queue { Schedule::Queue } else { Schedule::Whole },
             kernel: self.kernel_facts.clone(),
         }
     }
-
-    fn write_globals(&self) {
-        self.buffers.write("globals", 0, bytemuck::bytes_of(&self.globals));
-    }
-
-    fn read_words(&self, name: &str, count: usize) -> Result<Vec<u32>> {
-        if count == 0 {
-            return Ok(Vec::new());
-        }
-        self.buffers.read(&[(name, 0, 4 * count as u64)], |read| {
-            bytemuck::cast_slice::<u8, u32>(read[0]).to_vec()
-        })
-    }
-
-    /// The kernels that add samples to pixels, in order.
-    fn render_kernels(&self) -> &'static [Kernel] {
-        if self.sharing.is_some() {
-            return &Kernel::OF_SHARING;
-        }
-        match (&self.queue, self.features.shadow_rays()) {
-            (None, _) => &[Kernel::Render],
-            (Some(_), true) => &Kernel::OF_QUEUE,
-            (Some(_), false) => &Kernel::OF_QUEUE[..2],
-        }
-    }
-
-    /// The kernels that it is going to need.
-    fn own_kernels(&self) -> Vec<Kernel> {
-        let learning = [
-            (Kernel::Learn, ViewFeatures::LIGHT_GRID),
-            (Kernel::Train, ViewFeatures::RADIANCE_CACHE),
-        ];
-        let view = self.features.view;
-        let learning = learning.into_iter().filter(|(_, feature)| view.contains(*feature));
-        let rendering = self.render_kernels().iter().copied();
-        rendering.chain(learning.map(|(kernel, _)| kernel)).collect()
-    }
-
-    fn programs(&self, kernels: &[Kernel]) -> Programs {
-        let places = self.buffers.array_places();
-        let program = |kernel| Program::new(kernel, self.features, &self.constants, &places);
-        kernels.iter().map(|kernel| (*kernel, program(*kernel))).collect()
-    }
-
-    /// Compiles kernels, all of them at once: a real GPU's driver takes seconds for each.
-    fn compile(&mut self, kernels: &[Kernel]) -> Result<()> {
-        let start = Instant::now();
-        let compiled = self.gpu.pipelines(self.programs(kernels))?;
-        self.take_up(kernels, compiled);
-        self.compile_seconds += start.elapsed().as_secs_f64();
-        Ok(())
-    }
-
-    fn take_up(&mut self, kernels: &[Kernel], compiled: Vec<Arc<Pipeline>>) {
-        self.kernels.extend(kernels.iter().copied().zip(compiled.into_iter().map(Bound::new)));
-    }
-
-    /// A kernel, compiled if this is the first time, and what binds the buffers as they are now.
-    fn bound(&mut self, kernel: Kernel) -> Result<(wgpu::ComputePipeline, wgpu::BindGroup)> {
-        if !self.kernels.contains_key(&kernel) {
-            self.compile(&[kernel])?;
-        }
-        let Self { gpu, buffers, kernels, .. } = self;
-        let bound = kernels.get_mut(&kernel).ok_or_else(|| Error::new("a kernel is missing"))?;
-        bound.current(gpu, buffers)
-    }
-
-    /// Sets kernels going, one after another; by the first one's speed the work was sized.
-    fn dispatch(&mut self, order: &[Kernel], work: &Work, groups: u32, units: u64) -> Result<()> {
-        let kernels = order.iter().map(|kernel| self.bound(*kernel)).collect::<Result<Vec<_>>>()?;
-        self.buffers.write("globals", 0, bytemuck::bytes_of(work));
-        let kernel = order[0];
-        let job = Job { kernel, kernels: &kernels, steps: 1, groups, units, report: None };
-        self.flights.start(&self.gpu, &job)
-    }
-}
-
-impl Progress {
-    /// Of a film that somebody else has brought forward.
-    fn of(film: &Film) -> Self {
-        let least = film.min_samples();
-        let even = u64::from(least) * film.pixels().len() as u64;
-        Self { least, surplus: film.total_samples() - even, ..Self::default() }
-    }
-}
-
-/// Uploads the small tables of numbers; says where each begins.
-fn upload_tables(
-    buffers: &mut Buffers,
-    view: &View,
-    environment: &Environment,
-    features: Features,
-    constants: &mut Constants,
-) -> Result<()> {
-    let mut texels = albedo::texels();
-    constants.sheen_at = texels.len() as u32;
-    if features.scene.contains(SceneFeatures::SHEEN) {
-        texels.extend(sheen::texels());
-    }
-    constants.filter_at = texels.len() as u32;
-    texels.extend(view.filter.cumulative().iter().map(|&sum| [sum, 0.0, 0.0, 0.0]));
-    constants.rows_at = texels.len() as u32;
-    texels.extend(layout::map_rows(environment));
-    put_array(buffers, "tables", "the list of constants", &texels)
 }
 
 #[cfg(test)]
 pub(super) mod tests {
+    use std::sync::atomic::Ordering;
+
     use super::*;
     use crate::environment::EnvironmentOptions;
     use crate::light_grid::DistributionOptions;
@@ -614,7 +408,8 @@ pub(super) mod tests {
         let uploaded = UploadedScene::new(gpu, &world, &environment).expect("it fits");
         let grid = LightGrid::whole_map(environment.tile_energies());
         let begin = || {
-            let renderer = Renderer::new(&uploaded, &world, &environment, &view, &rays, None);
+            let renderer =
+                Renderer::new(&uploaded, (&world, &environment), &view, &rays, None, true);
             let mut renderer = renderer.expect("it fits");
             renderer.set_grid(grid.as_ref()).expect("uploaded");
             renderer
@@ -633,7 +428,7 @@ pub(super) mod tests {
             let cut = Arc::clone(&cancel);
             // One group of tiles at a time, or none: the pacer starts small.
             renderer.settle().expect("it runs");
-            renderer.flights.forget_speed();
+            renderer.dispatcher.flights.forget_speed();
             let cutter = std::thread::Builder::new().name("cutter".to_owned()).spawn(move || {
                 std::thread::sleep(std::time::Duration::from_millis(2));
                 cut.store(true, Ordering::Relaxed);

@@ -7,12 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::super::Pass;
 use super::buffers::Buffers;
 use super::device::Gpu;
+use super::dispatcher::Dispatcher;
 use super::features::Features;
-use super::flight::{Job, REPORT_BYTES};
+use super::flight::REPORT_BYTES;
 use super::kernel::Kernel;
 use super::layout::Work;
+use super::progress::{GROUP, Progress};
 use super::texels::SlotTexels;
-use super::{GROUP, Progress, Renderer};
 use crate::error::Result;
 use crate::render::gpu_facts::Schedule;
 
@@ -57,86 +58,84 @@ impl Queue {
         buffers.make("queue", REPORT_BYTES, "a count")?;
         Ok(Self { groups, is_filled: false, samples: 0 })
     }
-}
 
-impl Renderer {
-    /// As [`Self::render_tiles`].
-    pub(super) fn render_queue(
+    /// As [`super::whole::advance`].
+    pub(super) fn advance(
         &mut self,
+        on: &mut Dispatcher,
+        progress: &mut Progress,
         pass: Pass,
-        stride: u32,
         cancel: &AtomicBool,
     ) -> Result<()> {
-        let Some(groups) = self.queue.as_ref().map(|queue| queue.groups) else { return Ok(()) };
-        if self.progress.least >= pass.target {
+        if progress.least >= pass.target {
             return Ok(());
         }
-        let work =
-            Work { count: self.tiles() as u32, end_sample: pass.target, stride, ..Work::default() };
-        self.fill_queue()?;
-        while self.take_report() != Some(0) {
+        let work = Work {
+            count: on.tiles().count() as u32,
+            end_sample: pass.target,
+            stride: pass.stride,
+            ..Work::default()
+        };
+        self.fill(on)?;
+        while self.take_report(on, progress) != Some(0) {
             if cancel.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let steps = (self.flights.units(Kernel::Trace) / groups).clamp(1, MAX_STEPS);
-            let kernels = self.render_kernels().iter().map(|kernel| self.bound(*kernel));
-            let kernels = kernels.collect::<Result<Vec<_>>>()?;
-            self.buffers.write("globals", 0, bytemuck::bytes_of(&work));
-            let job = Job {
-                kernel: Kernel::Trace,
-                kernels: &kernels,
-                steps: steps as u32,
-                groups: groups as u32,
-                units: groups * steps,
-                report: self.buffers.get("queue"),
-            };
-            self.flights.start(&self.gpu, &job)?;
+            let steps = (on.flights.units(Kernel::Trace) / self.groups).clamp(1, MAX_STEPS);
+            let size = (steps as u32, self.groups as u32);
+            on.repeat(kernels(on.features), &work, size, self.groups * steps, Some("queue"))?;
         }
-        self.forget_paths()?;
-        self.progress = Progress { least: pass.target, ..Progress::default() };
+        self.forget_paths(on, progress)?;
+        *progress = Progress::even(pass.target);
         Ok(())
     }
 
     /// Lets slots take pixels from the first one on, unless they go on where they were.
-    fn fill_queue(&mut self) -> Result<()> {
-        let Some(queue) = self.queue.as_mut().filter(|queue| !queue.is_filled) else {
+    fn fill(&mut self, on: &Dispatcher) -> Result<()> {
+        if self.is_filled {
             return Ok(());
-        };
-        queue.is_filled = true;
-        queue.samples = 0;
-        let slots = (queue.groups * GROUP) as u32;
-        self.buffers.clear("slots");
-        self.buffers.write("queue", 0, bytemuck::cast_slice(&[0, slots, 0, 0]));
-        self.gpu.check()
+        }
+        self.is_filled = true;
+        self.samples = 0;
+        let slots = (self.groups * GROUP) as u32;
+        on.buffers.clear("slots");
+        on.buffers.write("queue", 0, bytemuck::cast_slice(&[0, slots, 0, 0]));
+        on.gpu.check()
     }
 
     /// Takes note of the samples that the device has told of; returns how many slots still held a path.
-    fn take_report(&mut self) -> Option<u32> {
-        let queue = self.queue.as_mut().filter(|queue| queue.is_filled)?;
-        let [_, left, samples, _] = self.flights.report()?;
-        self.progress.surplus += u64::from(samples.wrapping_sub(queue.samples));
-        queue.samples = samples;
+    fn take_report(&mut self, on: &Dispatcher, progress: &mut Progress) -> Option<u32> {
+        let [_, left, samples, _] = on.flights.report().filter(|_| self.is_filled)?;
+        progress.surplus += u64::from(samples.wrapping_sub(self.samples));
+        self.samples = samples;
         Some(left)
     }
 
     /// Leaves paths in work, if there are any: their samples begin anew.
-    pub(super) fn forget_paths(&mut self) -> Result<()> {
-        if self.queue.as_ref().is_some_and(|queue| queue.is_filled) {
-            self.settle()?;
-            self.take_report();
-            self.flights.forget_report();
-            if let Some(queue) = &mut self.queue {
-                queue.is_filled = false;
-            }
+    pub(super) fn forget_paths(
+        &mut self,
+        on: &mut Dispatcher,
+        progress: &mut Progress,
+    ) -> Result<()> {
+        if self.is_filled {
+            on.settle()?;
+            self.take_report(on, progress);
+            on.flights.forget_report();
+            self.is_filled = false;
         }
         Ok(())
     }
+}
+
+/// Its kernels, in order.
+pub(super) fn kernels(features: Features) -> &'static [Kernel] {
+    if features.shadow_rays() { &Kernel::OF_QUEUE } else { &Kernel::OF_QUEUE[..2] }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::parity::fixture;
-    use super::super::{Advance, UploadedScene, learning};
+    use super::super::{Advance, Renderer, Rendering, UploadedScene, learning};
     use super::*;
     use crate::environment::{Environment, EnvironmentOptions};
     use crate::light_grid::{DistributionOptions, LightGrid};
@@ -159,9 +158,9 @@ mod tests {
     ) -> Film {
         let uploaded = UploadedScene::new(gpu, world, environment).expect("it fits");
         let rays = view.rays();
-        let renderer = Renderer::new(&uploaded, world, environment, view, &rays, None);
+        let renderer = Renderer::new(&uploaded, (world, environment), view, &rays, None, true);
         let mut renderer = renderer.expect("it fits");
-        if let Some(queue) = &mut renderer.queue {
+        if let Rendering::Queue(queue) = &mut renderer.rendering {
             queue.groups = 7;
         }
         renderer.set_grid(grid).expect("uploaded");

@@ -5,10 +5,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::super::Pass;
 use super::buffers::Buffers;
+use super::dispatcher::Dispatcher;
 use super::features::{Features, ViewFeatures};
 use super::kernel::Kernel;
 use super::layout::{Globals, Work};
-use super::{GROUP, Progress, Renderer};
+use super::progress::{GROUP, Progress};
 use crate::error::Result;
 use crate::path::sharing::SharedTile;
 
@@ -45,59 +46,48 @@ impl Sharing {
         buffers.make("seconds", most_groups * owners * 16 * (2 + 2 * incidents), what)?;
         Ok(Self { tile, most_groups, next_group: 0 })
     }
+
+    /// As [`super::whole::advance`].
+    pub(super) fn advance(
+        &mut self,
+        on: &mut Dispatcher,
+        progress: &mut Progress,
+        pass: Pass,
+        cancel: &AtomicBool,
+    ) -> Result<()> {
+        let Globals { width, height, seed, .. } = on.globals;
+        while progress.least < pass.target {
+            let sample = progress.least;
+            let tiling = self.tile.tiling([width, height], seed, sample);
+            let groups = tiling.count().div_ceil(tiles_of_group(self.tile));
+            while self.next_group < groups {
+                if cancel.load(Ordering::Relaxed) {
+                    return Ok(());
+                }
+                let first = self.next_group;
+                let units = on.flights.units(Kernel::FindSeconds);
+                let affordable = units.max(on.min_tiles(units));
+                let count = affordable.min(self.most_groups).min(groups - first);
+                let work = Work {
+                    first: first as u32,
+                    count: count as u32,
+                    sample,
+                    stride: pass.stride,
+                    ..Work::default()
+                };
+                on.dispatch(&Kernel::OF_SHARING, &work, count as u32, count)?;
+                self.next_group = first + count;
+                let tiles = [first, self.next_group].map(|group| group * tiles_of_group(self.tile));
+                progress.surplus += tiling.pixels(tiles[0]..tiles[1]);
+            }
+            self.next_group = 0;
+            *progress = Progress::even(sample + 1);
+        }
+        Ok(())
+    }
 }
 
 /// Tiles of a workgroup.
 fn tiles_of_group(tile: SharedTile) -> u64 {
     GROUP / u64::from(tile.side * tile.side)
-}
-
-impl Renderer {
-    /// As [`Self::render_tiles`], for pixels that share.
-    pub(super) fn render_shared(
-        &mut self,
-        pass: Pass,
-        stride: u32,
-        cancel: &AtomicBool,
-    ) -> Result<()> {
-        let Globals { width, height, seed, .. } = self.globals;
-        let Some(Sharing { tile, most_groups, next_group: mut first }) = self.sharing else {
-            return Ok(());
-        };
-        while self.progress.least < pass.target {
-            let sample = self.progress.least;
-            let tiling = tile.tiling([width, height], seed, sample);
-            let groups = tiling.count().div_ceil(tiles_of_group(tile));
-            while first < groups {
-                if cancel.load(Ordering::Relaxed) {
-                    return Ok(());
-                }
-                let units = self.flights.units(Kernel::FindSeconds);
-                let affordable = units.max(self.least_tiles(units));
-                let count = affordable.min(most_groups).min(groups - first);
-                let work = Work {
-                    first: first as u32,
-                    count: count as u32,
-                    sample,
-                    stride,
-                    ..Work::default()
-                };
-                self.dispatch(&Kernel::OF_SHARING, &work, count as u32, count)?;
-                let tiles = [first, first + count].map(|group| group * tiles_of_group(tile));
-                self.progress.surplus += tiling.pixels(tiles[0]..tiles[1]);
-                first = self.goes_on_at(first + count);
-            }
-            first = self.goes_on_at(0);
-            self.progress = Progress { least: sample + 1, ..Progress::default() };
-        }
-        Ok(())
-    }
-
-    /// Keeps where the sample in work goes on, should this call end.
-    fn goes_on_at(&mut self, group: u64) -> u64 {
-        if let Some(sharing) = &mut self.sharing {
-            sharing.next_group = group;
-        }
-        group
-    }
 }

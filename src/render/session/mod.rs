@@ -203,9 +203,9 @@ impl<'a> Session<'a> {
     /// # Errors
     /// If it does not fit on the device; the session stays where it is.
     pub fn continue_on_gpu(&mut self, uploaded: &gpu::UploadedScene) -> Result<()> {
-        let (world, environment) = (self.world, self.environment);
+        let (lit, learns) = ((self.world, self.environment), self.phase() == Phase::Learning);
         let (view, rays, film) = (&self.state.view, &self.state.rays, self.film_to_go_on());
-        let renderer = gpu::Renderer::new(uploaded, world, environment, view, rays, film)?;
+        let renderer = gpu::Renderer::new(uploaded, lit, view, rays, film, learns)?;
         self.move_to(renderer)
     }
 
@@ -220,9 +220,9 @@ impl<'a> Session<'a> {
         uploaded: &gpu::UploadedScene,
         until_then: impl FnOnce() -> Arc<gpu::CompileGuard>,
     ) -> Result<Option<Weak<gpu::CompileGuard>>> {
-        let (world, env) = (self.world, self.environment);
+        let (lit, learns) = ((self.world, self.environment), self.phase() == Phase::Learning);
         let (view, rays, film) = (&self.state.view, &self.state.rays, self.film_to_go_on());
-        match gpu::Renderer::new_or_held(uploaded, world, env, view, rays, film, until_then)? {
+        match gpu::Renderer::new_or_held(uploaded, lit, view, rays, film, learns, until_then)? {
             gpu::MaybeReady::CompileGuard(held) => Ok(Some(held)),
             gpu::MaybeReady::Ready(renderer) => self.move_to(renderer).map(|()| None),
         }

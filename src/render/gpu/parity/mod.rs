@@ -27,9 +27,10 @@ use std::collections::BTreeSet;
 use super::features::Features;
 use super::kernel::Kernel;
 use super::kernel_cache::Pipeline;
+use super::layout::Work;
 use super::shader::{ArrayPlaces, Binding, Constants, Program};
 use super::texels::VertexTexels;
-use super::{Gpu, Renderer, UploadedScene, Work};
+use super::{Gpu, Renderer, UploadedScene};
 use fixture::Fixture;
 use twin::Twin;
 
@@ -202,15 +203,13 @@ fn ask(renderer: &mut Renderer, index: usize, probe: &Probe<'_>) -> Vec<u32> {
         words[..case.len()].copy_from_slice(case);
     }
     let untouched = vec![UNTOUCHED; words.len()];
-    renderer.buffers.put("probe_cases", bytemuck::cast_slice(&words), "cases").expect("it fits");
-    renderer
-        .buffers
-        .put("probe_answers", bytemuck::cast_slice(&untouched), "answers")
-        .expect("it fits");
+    let on = &mut renderer.dispatcher;
+    on.buffers.put("probe_cases", bytemuck::cast_slice(&words), "cases").expect("it fits");
+    on.buffers.put("probe_answers", bytemuck::cast_slice(&untouched), "answers").expect("it fits");
     let count = probe.cases.len() as u32;
     let work = Work { first: index as u32, count, ..Work::default() };
-    renderer.dispatch(&[Kernel::Render], &work, count.div_ceil(64), 1).expect("it runs");
-    renderer.read_words("probe_answers", words.len()).expect("it can be read")
+    on.dispatch(&[Kernel::Render], &work, count.div_ceil(64), 1).expect("it runs");
+    on.read_words("probe_answers", words.len()).expect("it can be read")
 }
 
 /// A fixture, what its probes' WGSL shares, and the probes.

@@ -1,0 +1,203 @@
+//! What kernels of a view need on the device, and sending them there.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::super::View;
+use super::bound::Bound;
+use super::buffers::Buffers;
+use super::device::Gpu;
+use super::features::{self, Features, ViewFeatures};
+use super::film;
+use super::flight::{Flights, Job};
+use super::kernel::Kernel;
+use super::kernel_cache::Pipeline;
+use super::layout::{self, Globals, Work};
+use super::pipeline::Programs;
+use super::progress::Tiles;
+use super::shader::{Constants, Program};
+use super::uploaded_scene::{UploadedScene, put_array};
+use crate::bsdf::{albedo, sheen};
+use crate::environment::Environment;
+use crate::error::{Error, Result};
+use crate::path::World;
+use crate::path::camera::CameraRays;
+use crate::scene::needs::SceneFeatures;
+
+/// Tiles of a dispatch that keep a software device's cores busy.
+const MIN_TILES_ON_SOFTWARE: u64 = 4;
+/// Tiles of a dispatch that keep a small and a large real device busy.
+const MIN_TILES: [u64; 2] = [64, 1024];
+
+/// The buffers and kernels of a view, and their dispatches under way.
+pub(super) struct Dispatcher {
+    pub(super) gpu: Gpu,
+    pub(super) buffers: Buffers,
+    pub(super) globals: Globals,
+    pub(super) features: Features,
+    pub(super) constants: Constants,
+    pub(super) flights: Flights,
+    /// Seed of the view.
+    pub(super) seed: u32,
+    kernels: BTreeMap<Kernel, Bound>,
+    /// Seconds of waiting for them.
+    pub(super) compile_seconds: f64,
+}
+
+impl Dispatcher {
+    /// Uploads what a view needs beside scene and map; no kernel is compiled yet.
+    ///
+    /// # Errors
+    /// If something does not fit on the device, with the numbers.
+    pub(super) fn new(
+        uploaded: &UploadedScene,
+        (world, environment): (&World, &Environment),
+        view: &View,
+        rays: &CameraRays,
+    ) -> Result<Self> {
+        features::check(view)?;
+        let mut features = Features::of(world, environment, view);
+        if uploaded.gpu.has_hardware_rays() {
+            features = features.with_hardware_rays();
+        }
+        let mut buffers = uploaded.buffers.for_renderer();
+        let mut globals = uploaded.globals;
+        globals.set_view(view, rays);
+        globals.set_fog(view.fog(world).as_ref());
+        let mut constants = uploaded.constants;
+        upload_tables(&mut buffers, view, environment, features, &mut constants)?;
+        constants.shared_tile = view.shared_tile();
+        globals.film_scale = film::scale_for(world.brightest(environment));
+        if features.view.contains(ViewFeatures::COUNTING) {
+            // Until there is something to count.
+            for name in ["visits", "slot_of_cell", "counters"] {
+                buffers.make(name, 4, "the learning counters")?;
+            }
+        }
+        buffers.make("globals", size_of::<Globals>() as u64, "the view")?;
+        let dispatcher = Self {
+            flights: Flights::new(&uploaded.gpu),
+            gpu: uploaded.gpu.clone(),
+            buffers,
+            globals,
+            features,
+            constants,
+            seed: view.seed,
+            kernels: BTreeMap::new(),
+            compile_seconds: 0.0,
+        };
+        dispatcher.write_globals();
+        Ok(dispatcher)
+    }
+
+    /// The tiles of the view.
+    pub(super) fn tiles(&self) -> Tiles {
+        Tiles::new(self.globals.width, self.globals.height)
+    }
+
+    /// How many tiles a dispatch has at least, if the device affords so many units of work: what takes a large
+    /// one no time may take a small one so long that a desktop stutters.
+    pub(super) fn min_tiles(&self, units: u64) -> u64 {
+        let [small, large] = MIN_TILES;
+        match self.gpu.facts().is_software() {
+            true => MIN_TILES_ON_SOFTWARE,
+            false => units.clamp(small, large),
+        }
+    }
+
+    /// Waits until the device has nothing more to do.
+    pub(super) fn settle(&mut self) -> Result<()> {
+        self.flights.land_all(&self.gpu)
+    }
+
+    pub(super) fn write_globals(&self) {
+        self.buffers.write("globals", 0, bytemuck::bytes_of(&self.globals));
+    }
+
+    pub(super) fn read_words(&self, name: &str, count: usize) -> Result<Vec<u32>> {
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        self.buffers.read(&[(name, 0, 4 * count as u64)], |read| {
+            bytemuck::cast_slice::<u8, u32>(read[0]).to_vec()
+        })
+    }
+
+    pub(super) fn programs(&self, kernels: &[Kernel]) -> Programs {
+        let places = self.buffers.array_places();
+        let program = |kernel| Program::new(kernel, self.features, &self.constants, &places);
+        kernels.iter().map(|kernel| (*kernel, program(*kernel))).collect()
+    }
+
+    /// Compiles kernels, all of them at once: a real GPU's driver takes seconds for each.
+    pub(super) fn compile(&mut self, kernels: &[Kernel]) -> Result<()> {
+        let start = Instant::now();
+        let compiled = self.gpu.pipelines(self.programs(kernels))?;
+        self.take_up(kernels, compiled);
+        self.compile_seconds += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Takes kernels that are compiled.
+    pub(super) fn take_up(&mut self, kernels: &[Kernel], compiled: Vec<Arc<Pipeline>>) {
+        self.kernels.extend(kernels.iter().copied().zip(compiled.into_iter().map(Bound::new)));
+    }
+
+    /// A kernel, compiled if this is the first time, and what binds the buffers as they are now.
+    fn bound(&mut self, kernel: Kernel) -> Result<(wgpu::ComputePipeline, wgpu::BindGroup)> {
+        if !self.kernels.contains_key(&kernel) {
+            self.compile(&[kernel])?;
+        }
+        let Self { gpu, buffers, kernels, .. } = self;
+        let bound = kernels.get_mut(&kernel).ok_or_else(|| Error::new("a kernel is missing"))?;
+        bound.current(gpu, buffers)
+    }
+
+    /// Sets kernels going, one after another; by the first one's speed the work was sized.
+    pub(super) fn dispatch(
+        &mut self,
+        order: &[Kernel],
+        work: &Work,
+        groups: u32,
+        units: u64,
+    ) -> Result<()> {
+        self.repeat(order, work, (1, groups), units, None)
+    }
+
+    /// [`Self::dispatch`] so many times in one submission, after which the first words of a buffer are read.
+    pub(super) fn repeat(
+        &mut self,
+        order: &[Kernel],
+        work: &Work,
+        (steps, groups): (u32, u32),
+        units: u64,
+        report: Option<&str>,
+    ) -> Result<()> {
+        let kernels = order.iter().map(|kernel| self.bound(*kernel)).collect::<Result<Vec<_>>>()?;
+        self.buffers.write("globals", 0, bytemuck::bytes_of(work));
+        let report = report.and_then(|name| self.buffers.get(name));
+        let job = Job { kernel: order[0], kernels: &kernels, steps, groups, units, report };
+        self.flights.start(&self.gpu, &job)
+    }
+}
+
+/// Uploads the small tables of numbers; says where each begins.
+fn upload_tables(
+    buffers: &mut Buffers,
+    view: &View,
+    environment: &Environment,
+    features: Features,
+    constants: &mut Constants,
+) -> Result<()> {
+    let mut texels = albedo::texels();
+    constants.sheen_at = texels.len() as u32;
+    if features.scene.contains(SceneFeatures::SHEEN) {
+        texels.extend(sheen::texels());
+    }
+    constants.filter_at = texels.len() as u32;
+    texels.extend(view.filter.cumulative().iter().map(|&sum| [sum, 0.0, 0.0, 0.0]));
+    constants.rows_at = texels.len() as u32;
+    texels.extend(layout::map_rows(environment));
+    put_array(buffers, "tables", "the list of constants", &texels)
+}
