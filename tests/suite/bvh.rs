@@ -144,7 +144,7 @@ fn agrees_with_brute_force_on_soups() {
     let mut random = SplitMix(1);
     for (count, size) in [(1, 1.0), (7, 1.0), (8, 1.0), (9, 1.0), (60, 0.5), (2000, 0.1)] {
         let mesh = soup(&mut random, count, size);
-        let rays = rays_through(&mut random, 4000, 1.0);
+        let rays = rays_through(&mut random, 8000, 1.0);
         compare_with_brute_force(&mesh, rays.into_iter());
     }
 }
