@@ -67,8 +67,7 @@ const CRATES: [(&str, &[&str]); 30] = [
 const MAX_METHODS: usize = 40;
 
 /// Types that have more, with how many they may have. The list is to become shorter.
-const LARGE_TYPES: [(&str, usize); 2] =
-    [("render/gpu: Renderer", 41), ("render/session: Session", 58)];
+const LARGE_TYPES: [(&str, usize); 1] = [("render/session: Session", 58)];
 
 /// Files that use each other in a circle. The list is to become shorter.
 const IN_CIRCLES: &[&str] = &[
@@ -102,9 +101,6 @@ const IN_CIRCLES: &[&str] = &[
     "render/devices",
     "render/gi",
     "render/gpu",
-    "render/gpu/flight",
-    "render/gpu/queue",
-    "render/gpu/sharing",
     "render/session",
     "render/session/learning",
     "render/session/noise",
@@ -135,11 +131,6 @@ const USE_THEIR_PARENT: &[&str] = &[
     "radiance_cache/cells",
     "radiance_cache/facts",
     "radiance_cache/sums",
-    "render/gpu/cast",
-    "render/gpu/flight",
-    "render/gpu/learning",
-    "render/gpu/queue",
-    "render/gpu/sharing",
     "render/session/learning",
     "render/session/noise",
     "render/session/state",
@@ -148,8 +139,8 @@ const USE_THEIR_PARENT: &[&str] = &[
 /// Most lines of each room that are neither blank nor comments nor tests. Who raises one says why in the commit.
 const BUDGETS: [(&str, usize); 35] = [
     ("alarm", 49),
-    ("app", 10884),
-    ("bench", 596),
+    ("app", 10906),
+    ("bench", 595),
     ("bsdf", 1158),
     ("bvh", 1358),
     ("cli", 3314),
@@ -173,7 +164,7 @@ const BUDGETS: [(&str, usize); 35] = [
     ("path", 2415),
     ("prefetch", 15),
     ("radiance_cache", 348),
-    ("render", 6050),
+    ("render", 6169),
     ("report", 3181),
     ("sampler", 145),
     ("scene", 9428),
