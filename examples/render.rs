@@ -9,7 +9,7 @@ use lightgrid::environment::{Environment, EnvironmentOptions};
 use lightgrid::error::Result;
 use lightgrid::output::{PictureOptions, write_picture};
 use lightgrid::path::{World, framing};
-use lightgrid::render::{Session, StopRule, View};
+use lightgrid::render::{Driver, Session, StopRule, View};
 use lightgrid::sources;
 
 fn main() -> Result<()> {
@@ -25,13 +25,12 @@ fn main() -> Result<()> {
     let size = [320, 180];
     let camera = world.scene.cameras.first().cloned();
     let camera = camera.unwrap_or_else(|| framing::frame(&world, 16.0 / 9.0));
-    let mut session = Session::new(&world, &environment, View::new(camera, size));
+    let session = Session::new(&world, &environment, View::new(camera, size));
 
     // It learns first, then adds samples to every pixel.
-    let (rule, never) =
-        (StopRule { samples: Some(16), ..StopRule::default() }, AtomicBool::new(false));
-    while !session.is_done(&rule) {
-        session.advance(session.next_pass(&rule), &never)?;
-    }
-    write_picture(Path::new(picture), &PictureOptions::default(), session.film(), Vec::new())
+    let rule = StopRule { samples: Some(16), ..StopRule::default() };
+    let mut driver = Driver::new(session, rule);
+    driver.run(&AtomicBool::new(false))?;
+    let film = driver.session.film();
+    write_picture(Path::new(picture), &PictureOptions::default(), film, Vec::new())
 }

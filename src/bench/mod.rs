@@ -17,7 +17,7 @@ use crate::image::Image;
 use crate::light_grid::LightGrid;
 use crate::metrics;
 use crate::render::gpu::{Gpu, UploadedScene};
-use crate::render::{Phase, Sampling, Session, StopRule, View};
+use crate::render::{Driver, Phase, Sampling, StopRule, View};
 use crate::report::{Machine, OpenDevice};
 
 pub use figures::{Bench, DeviceFigures, Parity, PathFigures, SceneFigures};
@@ -146,37 +146,38 @@ impl Place<'_> {
         Ok(seconds[seconds.len() / 2])
     }
 
+    /// One piece of work.
+    fn advance(&self, driver: &mut Driver<'_>) -> Result<()> {
+        driver.advance(self.cancel)?;
+        if self.is_cancelled() { Err(Error::new("cancelled")) } else { Ok(()) }
+    }
+
     fn paths(&self, uploaded: Option<&UploadedScene>, upload_seconds: f64) -> Result<PathFigures> {
         let start = Instant::now();
         let seconds = || start.elapsed().as_secs_f64();
-        let mut session = self.session(uploaded, self.view(self.options.size))?;
+        let session = self.session(uploaded, self.view(self.options.size))?;
+        let mut driver = Driver::new(session, StopRule::default());
         let mut first_distributions = None;
-        while session.samples() == 0 {
-            session.advance(1, self.cancel)?;
-            if self.is_cancelled() {
-                return Err(Error::new("cancelled"));
-            }
+        while driver.session.samples() == 0 {
+            self.advance(&mut driver)?;
+            let session = &driver.session;
             if session.phase() == Phase::Rendering || session.figures().learned_cells > 0 {
                 first_distributions.get_or_insert_with(seconds);
             }
         }
-        session.settle()?;
+        driver.session.settle()?;
         let first_picture_seconds = seconds();
-        let (before, gpu_before) = (session.figures(), session.gpu_figures());
-        let rule = StopRule::default();
+        let (before, gpu_before) = (driver.session.figures(), driver.session.gpu_figures());
+        let end = before.render_seconds + self.options.seconds;
         let mut passes = 0;
-        while session.figures().render_seconds - before.render_seconds < self.options.seconds {
-            session.advance(session.next_pass(&rule), self.cancel)?;
+        while driver.session.figures().render_seconds < end {
+            self.advance(&mut driver)?;
             passes += 1;
-            if self.is_cancelled() {
-                return Err(Error::new("cancelled"));
-            }
         }
-        session.settle()?;
-        let gpu = session.gpu_figures();
-        let after = session.figures();
+        driver.session.settle()?;
+        let (after, gpu) = (driver.session.figures(), driver.session.gpu_figures());
         let elapsed = after.render_seconds - before.render_seconds;
-        let stop_milliseconds = 1e3 * slowest_stop(&mut session)?;
+        let stop_milliseconds = 1e3 * slowest_stop(&mut driver)?;
         let per_pass = |total: f64| total / f64::from(passes);
         let difference = |of: fn(&crate::render::gpu::GpuFigures) -> f64| {
             Some(of(gpu.as_ref()?) - of(gpu_before.as_ref()?))
@@ -195,7 +196,7 @@ impl Place<'_> {
             has_timestamps: gpu.as_ref().is_some_and(|gpu| gpu.flights.has_timestamps),
             bytes_read_per_pass: per_pass(difference(|gpu| gpu.bytes_read as f64).unwrap_or(0.0)),
             stop_milliseconds,
-            turn_milliseconds: 1e3 * self.turn(uploaded, session.grid())?,
+            turn_milliseconds: 1e3 * self.turn(uploaded, driver.session.grid())?,
             device_bytes: gpu.as_ref().map_or(0, |gpu| gpu.device_bytes),
             schedule: gpu.as_ref().map(|gpu| gpu.schedule),
             kernel: gpu.map(|gpu| gpu.kernel),
@@ -207,7 +208,7 @@ impl Place<'_> {
 const TURNING: (u32, u32) = (480, 270);
 
 /// Maximum seconds, over a few trials, from a request to stop until a session stops.
-fn slowest_stop(session: &mut Session<'_>) -> Result<f64> {
+fn slowest_stop(driver: &mut Driver<'_>) -> Result<f64> {
     let mut slowest = 0.0_f64;
     for round in 0..5_u64 {
         let cancel = AtomicBool::new(false);
@@ -218,9 +219,9 @@ fn slowest_stop(session: &mut Session<'_>) -> Result<f64> {
                 Instant::now()
             });
             while !is_set(&cancel) {
-                session.advance(session.next_pass(&StopRule::default()), &cancel)?;
+                driver.advance(&cancel)?;
             }
-            session.settle()?;
+            driver.session.settle()?;
             teller.join().map_err(|_| Error::new("the thread that says stop panicked"))
         })?;
         slowest = slowest.max(told.elapsed().as_secs_f64());

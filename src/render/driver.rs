@@ -107,6 +107,15 @@ impl<'a> Driver<'a> {
         Ok(true)
     }
 
+    /// Works until the rule says stop or, once the picture has a sample, `cancel` becomes true.
+    ///
+    /// # Errors
+    /// As [`Session::advance`].
+    pub fn run(&mut self, cancel: &AtomicBool) -> Result<()> {
+        while !self.step(cancel)? {}
+        Ok(())
+    }
+
     /// Does one piece of work unless the rule says stop; whether the picture is done, with film and figures as they
     /// are now. When `cancel` is true before the call, the picture is done as soon as it has a sample.
     ///

@@ -12,7 +12,7 @@ use crate::image::Image;
 use crate::light_grid::LightGrid;
 use crate::metrics::{Comparison, compare};
 use crate::path::World;
-use crate::render::{Figures, Phase, Session, StopRule, gpu};
+use crate::render::{Driver, Figures, Phase, Session, StopRule, gpu};
 use crate::scene::Camera;
 
 /// The scene, map and device of a run.
@@ -46,21 +46,15 @@ impl<'a> Place<'a> {
         session.advance(1, &never)
     }
 
-    /// A session that has learned; `None` if it was cancelled.
+    /// A session that has learned, with what drives it on; `None` if it was cancelled.
     pub(super) fn learned(
         &self,
         settings: &Settings,
         seed: u32,
         cancel: &AtomicBool,
-    ) -> Result<Option<Session<'a>>> {
-        let mut session = self.session(settings, seed)?;
-        while session.phase() == Phase::Learning {
-            session.advance(0, cancel)?;
-            if cancel.load(Ordering::Relaxed) {
-                return Ok(None);
-            }
-        }
-        Ok(Some(session))
+    ) -> Result<Option<Driver<'a>>> {
+        let mut driver = Driver::new(self.session(settings, seed)?, StopRule::default());
+        Ok(driver.learn(cancel)?.then_some(driver))
     }
 }
 
@@ -141,25 +135,19 @@ pub(super) fn measure(
     seconds: f64,
     cancel: &AtomicBool,
 ) -> Result<Option<Finished>> {
-    let mut session = place.session(method.1, seed)?;
     let rule = StopRule { seconds: Some(seconds), ..StopRule::default() };
-    while session.phase() == Phase::Learning {
-        if session.has_learned_enough(&rule) {
-            session.finish_learning();
-            continue;
-        }
-        session.advance(0, cancel)?;
-        if cancel.load(Ordering::Relaxed) {
-            return Ok(None);
-        }
+    let mut driver = Driver::new(place.session(method.1, seed)?, rule);
+    if !driver.learn(cancel)? {
+        return Ok(None);
     }
     let (mut points, mut films) = (Vec::new(), Vec::new());
     let mut next = seconds * FIRST_SHARE;
     loop {
-        session.advance(session.next_pass(&StopRule::default()), cancel)?;
+        driver.advance(cancel)?;
         if cancel.load(Ordering::Relaxed) {
             return Ok(None);
         }
+        let session = &mut driver.session;
         if place.table_seconds + session.elapsed_seconds() < next.min(seconds) {
             continue;
         }
@@ -179,6 +167,7 @@ pub(super) fn measure(
         }
         next = next.max(elapsed / STEP) * STEP;
     }
+    let session = driver.session;
     let run = Run {
         method: method.0.to_owned(),
         seed,

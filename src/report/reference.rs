@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::image::{Image, read_with_linearity, write_beside_and_rename};
 use crate::metrics::{REL_MSE_EPSILON, trimmed_mean};
 use crate::render::film::Film;
-use crate::render::{Sampling, StopRule};
+use crate::render::{Driver, Sampling};
 
 /// A picture's own expected squared error, in the units of [`crate::metrics::Comparison`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -151,25 +151,21 @@ impl Reference {
     ) -> Result<bool> {
         let seed = FIRST_SEED + self.facts.pictures;
         let settings = Settings::of(Sampling::Adaptive);
-        let Some(mut session) = place.learned(&settings, seed, cancel)? else { return Ok(false) };
+        let Some(mut driver) = place.learned(&settings, seed, cancel)? else { return Ok(false) };
         let limit = self.facts.samples_per_picture;
-        loop {
-            let samples = session.samples();
-            let figures = session.figures();
-            let is_done = if limit > 0 {
-                samples >= limit
-            } else {
-                samples >= 4 && figures.render_seconds >= seconds.max(figures.learning_seconds)
-            };
-            if is_done {
-                break;
-            }
-            let left = if limit > 0 { limit - samples } else { u32::MAX };
-            session.advance(session.next_pass(&StopRule::default()).min(left), cancel)?;
+        driver.rule.samples = (limit > 0).then_some(limit);
+        let is_done = |driver: &Driver<'_>| {
+            let (samples, figures) = (driver.session.samples(), driver.session.figures());
+            let is_long = figures.render_seconds >= seconds.max(figures.learning_seconds);
+            if limit > 0 { driver.is_done() } else { samples >= 4 && is_long }
+        };
+        while !is_done(&driver) {
+            driver.advance(cancel)?;
             if cancel.load(Ordering::Relaxed) {
                 return Ok(false);
             }
         }
+        let mut session = driver.session;
         session.settle()?;
         self.add(session.film());
         self.facts.seconds += session.elapsed_seconds();

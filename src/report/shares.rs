@@ -93,7 +93,8 @@ fn three_depths(
     samples: u32,
     cancel: &AtomicBool,
 ) -> Result<Option<[Vec<[f64; 3]>; 3]>> {
-    let Some(mut session) = place.learned(settings, seed, cancel)? else { return Ok(None) };
+    let Some(driver) = place.learned(settings, seed, cancel)? else { return Ok(None) };
+    let mut session = driver.session;
     // Distributions of a picture with this many samples.
     if finish(&mut session, samples, cancel)?.is_none() {
         return Ok(None);
