@@ -29,8 +29,8 @@ fn main() -> Result<()> {
 
     // It learns first, then adds samples to every pixel.
     let rule = StopRule { samples: Some(16), ..StopRule::default() };
-    let mut driver = Driver::new(session, rule);
-    driver.run(&AtomicBool::new(false))?;
+    let (mut driver, never) = (Driver::new(session, rule), AtomicBool::new(false));
+    while !driver.step(&never)? {}
     let film = driver.session.film();
     write_picture(Path::new(picture), &PictureOptions::default(), film, Vec::new())
 }

@@ -161,8 +161,8 @@ mod tests {
         };
         let mut session = Session::new(world, environment, view);
         let rule = StopRule { samples: Some(samples), ..StopRule::default() };
-        while session.phase() == Phase::Learning || !session.is_done(&rule) {
-            let pass = session.next_pass(&rule);
+        while session.phase() == Phase::Learning || !rule.is_met(&session) {
+            let pass = rule.next_pass(&session);
             session.advance(pass, &AtomicBool::new(false)).expect("no GPU");
         }
         SessionSnapshot {

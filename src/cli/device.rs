@@ -88,7 +88,7 @@ pub(super) fn start<'a>(
     view: View,
     notices: &mut Notices,
 ) -> Result<Session<'a>> {
-    let on_gpu = uploaded.map(|on| Session::on_gpu(world, environment, view.clone(), on));
+    let on_gpu = uploaded.map(|on| Session::on(world, environment, view.clone(), Some(on)));
     let session = or_without(choice, on_gpu.transpose(), notices)?;
     Ok(session.unwrap_or_else(|| Session::new(world, environment, view)))
 }

@@ -114,7 +114,7 @@ fn seconds_left(session: &Session<'_>, rule: &StopRule, noise: f64) -> Option<f6
     let by_samples = rule
         .samples
         .map(|limit| seconds_a_sample * f64::from(limit.saturating_sub(session.samples())));
-    let by_clock = rule.seconds.map(|limit| limit - session.elapsed_seconds());
+    let by_clock = rule.seconds.map(|limit| limit - session.figures().elapsed_seconds());
     let by_noise = rule.noise.map(|limit| rendered * ((noise / limit).powi(2) - 1.0));
     [by_samples, by_clock, by_noise]
         .into_iter()

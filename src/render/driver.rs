@@ -4,7 +4,8 @@ use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use super::film::Film;
+use super::film::{BEGINNINGS, Film};
+use super::session::MIN_SAMPLES_FOR_NOISE;
 use super::{Doubling, Figures, Phase, Session, StopRule};
 use crate::error::Result;
 
@@ -13,17 +14,45 @@ use crate::error::Result;
 /// worth little.
 const RESERVE: f64 = 2.0;
 
-/// What a picture begins with on the CPU. A GPU always begins with a sample of every pixel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Beginning {
-    /// A sample of every pixel.
-    #[default]
-    Whole,
-    /// A sample of some pixels all over the picture, then of others between them, even while it still learns.
-    Coarse,
-    /// As `Coarse` once learning is over. Where the seconds of the rule seem too short for a sample of every
-    /// pixel, pixels share nothing with their neighbours.
-    InTime,
+/// Seconds a pass on a GPU should take: what is told to the user between two is this old at most.
+const GPU_PASS_SECONDS: f64 = 0.1;
+/// Learning takes at most this share of the seconds asked for.
+const LEARNING_TIME_SHARE: f64 = 0.05;
+
+impl StopRule {
+    /// Whether it says to stop. Noise is only asked for from 16 samples on.
+    pub fn is_met(&self, session: &Session<'_>) -> bool {
+        let samples = session.samples();
+        let is_long = |limit| session.figures().elapsed_seconds() >= limit;
+        self.samples.is_some_and(|limit| samples >= limit)
+            || (samples > 0 && self.seconds.is_some_and(is_long))
+            || (samples >= MIN_SAMPLES_FOR_NOISE
+                && self.noise.is_some_and(|limit| session.noise() <= limit))
+    }
+
+    /// Samples per pixel that the next pass should take: growing with what is there, so that few
+    /// passes are needed and none is much longer than those before it. Where noise is asked for, or
+    /// something is learned of what is rendered, it depends on counts alone, so that the picture is
+    /// repeatable; else a GPU takes as many as it can in a moment.
+    pub fn next_pass(&self, session: &Session<'_>) -> u32 {
+        let samples = session.samples();
+        let pass = match session.is_on_gpu() {
+            // Each look at the noise reads the film.
+            true if self.noise.is_some() => (samples / 8).clamp(1, 64),
+            true if !session.is_counting() => {
+                let pixels = session.view().pixels() as f64;
+                let affordable = session
+                    .seconds_per_sample()
+                    .map_or(1, |each| (GPU_PASS_SECONDS / (each * pixels).max(1e-9)) as u32);
+                affordable.max(samples / 16).min(samples).clamp(1, 64)
+            }
+            _ => (samples / 16).clamp(1, 64),
+        };
+        // Where samples are a power of two the radiance cache and the distributions learn, and it is found out
+        // how good the picture is.
+        let pass = pass.min((samples + 1).next_power_of_two() - samples);
+        self.samples.map_or(pass, |limit| pass.min(limit.saturating_sub(samples)).max(1))
+    }
 }
 
 /// A session and what decides its passes.
@@ -32,19 +61,20 @@ pub struct Driver<'a> {
     pub session: Session<'a>,
     /// When to stop. Samples are counted from the picture's first.
     pub rule: StopRule,
-    /// What the picture begins with.
-    pub beginning: Beginning,
+    /// Whether the seconds of the rule may be over before every pixel has a sample: a picture is then begun with a
+    /// sample of some pixels all over it, and where time seems too short, pixels share nothing with their neighbours.
+    pub is_hasty: bool,
     /// Whether passes that are learned from are taken whole, unless seconds end the work: half a pass teaches
     /// something else than the half and the rest later on.
-    is_resumable: bool,
+    pub(crate) is_resumable: bool,
     /// Samples a pixel that the pass under way is to reach.
-    target: u32,
+    pub(crate) target: u32,
+    /// First samples of each pixel that others take.
+    pub(crate) skipped: u32,
+    /// The film to go on from, once the session has learned what belongs to it.
+    pub(crate) awaited: Option<Awaited>,
     /// When the seconds of the rule are over.
     deadline: Option<Instant>,
-    /// First samples of each pixel that others take.
-    skipped: u32,
-    /// The film to go on from, once the session has learned what belongs to it.
-    awaited: Option<Awaited>,
     /// Whether the samples so far are pixels' own, for want of time.
     is_alone: bool,
 }
@@ -66,7 +96,7 @@ impl<'a> Driver<'a> {
         Self {
             session,
             rule,
-            beginning: Beginning::Whole,
+            is_hasty: false,
             is_resumable: false,
             target: 0,
             deadline: None,
@@ -74,18 +104,6 @@ impl<'a> Driver<'a> {
             awaited: None,
             is_alone: false,
         }
-    }
-
-    /// Leaves the first `skipped` samples of each pixel to others, goes on from a film if there is one, whose pass
-    /// under way was to reach `target` samples, and takes care that another process can go on from its own.
-    pub(crate) fn resumable(
-        self,
-        skipped: u32,
-        awaited: Option<Awaited>,
-        target: u32,
-        is_resumable: bool,
-    ) -> Self {
-        Self { skipped, awaited, target, is_resumable, ..self }
     }
 
     /// Learns until there is nothing to learn before rendering, or learning has had its share of the rule's
@@ -107,15 +125,6 @@ impl<'a> Driver<'a> {
         Ok(true)
     }
 
-    /// Works until the rule says stop or, once the picture has a sample, `cancel` becomes true.
-    ///
-    /// # Errors
-    /// As [`Session::advance`].
-    pub fn run(&mut self, cancel: &AtomicBool) -> Result<()> {
-        while !self.step(cancel)? {}
-        Ok(())
-    }
-
     /// Does one piece of work unless the rule says stop; whether the picture is done, with film and figures as they
     /// are now. When `cancel` is true before the call, the picture is done as soon as it has a sample.
     ///
@@ -127,13 +136,14 @@ impl<'a> Driver<'a> {
         if is_stopped || self.has_learned_enough() {
             self.session.finish_learning();
         }
-        if self.has_samples() && (is_stopped || self.is_done()) {
+        // A pass that was cut short says nothing of when noise is looked at.
+        let noise = self.rule.noise.filter(|_| self.session.samples() >= self.target);
+        let is_met = || StopRule { noise, ..self.rule }.is_met(&self.session);
+        if self.has_samples() && (is_stopped || is_met()) {
             self.session.settle()?;
             return Ok(true);
         }
-        let is_counting =
-            self.session.phase() == Phase::Rendering && !self.session.has_final_distributions();
-        let is_whole = self.is_resumable && self.deadline.is_none() && is_counting;
+        let is_whole = self.is_resumable && self.deadline.is_none() && self.session.is_counting();
         let never = AtomicBool::new(false);
         self.advance(if is_stopped || is_whole { &never } else { cancel }).map(|()| false)
     }
@@ -159,18 +169,10 @@ impl<'a> Driver<'a> {
         }
     }
 
-    /// Whether the rule says stop.
-    pub fn is_done(&self) -> bool {
-        // A pass that was cut short says nothing of when noise is looked at.
-        let noise = self.rule.noise.filter(|_| self.session.samples() >= self.target);
-        self.session.is_done(&StopRule { noise, ..self.rule })
-    }
-
     /// Whether there is a picture of this session's own samples.
     pub(crate) fn has_samples(&self) -> bool {
-        let is_hasty = self.beginning == Beginning::InTime;
         self.awaited.is_none()
-            && (self.session.samples() > self.skipped || is_hasty && self.session.is_begun())
+            && (self.session.samples() > self.skipped || self.is_hasty && self.session.is_begun())
     }
 
     /// The session's own samples.
@@ -181,22 +183,12 @@ impl<'a> Driver<'a> {
         }
     }
 
-    /// Samples a pixel that the pass under way is to reach.
-    pub(crate) fn target(&self) -> u32 {
-        self.target
-    }
-
-    /// Whether there is a film to go on from, for which the session still learns.
-    pub(crate) fn is_awaiting(&self) -> bool {
-        self.awaited.is_some()
-    }
-
     /// When the seconds of the rule are over; the same time at each call.
     pub(crate) fn deadline(&mut self) -> Option<Instant> {
         if self.deadline.is_none()
             && let Some(seconds) = self.rule.seconds
         {
-            let left = (seconds - self.session.elapsed_seconds()).max(0.0);
+            let left = (seconds - self.session.figures().elapsed_seconds()).max(0.0);
             let left = Duration::try_from_secs_f64(left).ok();
             self.deadline = left.and_then(|left| Instant::now().checked_add(left));
         }
@@ -214,23 +206,16 @@ impl<'a> Driver<'a> {
         else {
             return Ok(());
         };
-        self.session.add_figures(&figures.unwrap_or_default());
-        self.session.set_noted(noted);
-        self.session.continue_from(film, self.skipped)
+        self.session.continue_from(film, (&figures.unwrap_or_default(), noted), self.skipped)
     }
 
     /// How far apart the pixels are that the picture is to be begun with now, if it is.
-    pub fn next_beginning(&mut self) -> Option<u32> {
+    fn next_beginning(&mut self) -> Option<u32> {
         let session = &self.session;
-        let is_over = match self.beginning {
-            Beginning::Whole => true,
-            Beginning::Coarse => return session.next_beginning(),
-            Beginning::InTime => session.phase() == Phase::Learning,
-        };
-        if is_over {
+        if !self.is_hasty || session.phase() == Phase::Learning {
             return None;
         }
-        let next = session.next_beginning();
+        let next = next_beginning(session);
         if session.view().shared_tile().is_none() {
             return next;
         }
@@ -246,15 +231,21 @@ impl<'a> Driver<'a> {
         let (figures, view) = (self.session.figures(), self.session.view());
         let pixels = f64::from(view.width) * f64::from(view.height);
         let seconds = figures.render_seconds / figures.samples as f64 * pixels;
-        let left = self.rule.seconds.unwrap_or(f64::INFINITY) - self.session.elapsed_seconds();
+        let left =
+            self.rule.seconds.unwrap_or(f64::INFINITY) - self.session.figures().elapsed_seconds();
         figures.samples > 0 && RESERVE * seconds < left
     }
 
-    /// Learning ends where it ended for the film that is awaited, or has had its share of the seconds.
+    /// Learning ends where it ended for the film that is awaited, or where another pass, as long as all before it,
+    /// would take more than its share of the seconds asked for.
     fn has_learned_enough(&self) -> bool {
+        let figures = self.session.figures();
         match self.awaited.as_ref().and_then(|awaited| awaited.figures) {
-            Some(before) => self.session.figures().learning_paths >= before.learning_paths,
-            None => self.session.has_learned_enough(&self.rule),
+            Some(before) => figures.learning_paths >= before.learning_paths,
+            None => self
+                .rule
+                .seconds
+                .is_some_and(|s| 2.0 * figures.learning_seconds >= LEARNING_TIME_SHARE * s),
         }
     }
 
@@ -264,10 +255,10 @@ impl<'a> Driver<'a> {
         let samples = self.session.samples();
         if let Some(awaited) = &self.awaited {
             let missing = (self.skipped + awaited.film.min_samples()).saturating_sub(samples);
-            return self.session.next_pass(&StopRule::default()).min(missing).max(1);
+            return StopRule::default().next_pass(&self.session).min(missing).max(1);
         }
         if self.target <= samples {
-            self.target = samples + self.session.next_pass(&self.rule);
+            self.target = samples + self.rule.next_pass(&self.session);
         }
         self.target.min(self.rule.samples.unwrap_or(u32::MAX)).saturating_sub(samples).max(1)
     }
@@ -280,4 +271,15 @@ fn is_ready(awaited: &Awaited, session: &Session<'_>, rule: &StopRule, skipped: 
     (is_done && !awaited.learns_anyway)
         || session.has_final_distributions()
         || (session.phase() == Phase::Rendering && session.samples() >= samples)
+}
+
+/// How far apart the pixels are that [`Session::begin`] should give their first sample next: nearer and
+/// nearer. `None` when enough have one to go on with all, and on a GPU.
+pub(crate) fn next_beginning(session: &Session<'_>) -> Option<u32> {
+    if session.samples() > 0 || session.is_on_gpu() {
+        return None;
+    }
+    let sides = [session.view().width, session.view().height];
+    let pixels = |every| sides.map(|side| u64::from(side.div_ceil(every))).iter().product();
+    BEGINNINGS.into_iter().find(|every| session.figures().samples < pixels(*every))
 }

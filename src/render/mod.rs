@@ -20,7 +20,9 @@ mod view;
 mod view_probe;
 
 pub(crate) use driver::Awaited;
-pub use driver::{Beginning, Driver};
+pub use driver::Driver;
+#[cfg(feature = "window")]
+pub(crate) use driver::next_beginning;
 pub(crate) use gi::CacheTraining;
 pub use gi::Gi;
 use pass::Pass;

@@ -67,6 +67,18 @@ impl Figures {
         self.learning_seconds + self.render_seconds
     }
 
+    /// Counts what an earlier process did for a film that is gone on from.
+    pub(super) fn add(&mut self, before: &Self) {
+        self.samples += before.samples;
+        // Paths that taught what it was made with, though nothing may have been learned again.
+        self.learning_paths = self.learning_paths.max(before.learning_paths);
+        self.rays += before.rays;
+        self.learning_rays += before.learning_rays;
+        self.learning_seconds += before.learning_seconds;
+        self.distribution_seconds += before.distribution_seconds;
+        self.render_seconds += before.render_seconds;
+    }
+
     /// Estimated root of the relative mean squared error of these figures' film: [`Film::noise`], less what
     /// low-discrepancy samples save.
     pub fn noise_of(&self, film: &Film) -> f64 {

@@ -148,7 +148,7 @@ pub(super) fn measure(
             return Ok(None);
         }
         let session = &mut driver.session;
-        if place.table_seconds + session.elapsed_seconds() < next.min(seconds) {
+        if place.table_seconds + session.figures().elapsed_seconds() < next.min(seconds) {
             continue;
         }
         session.settle()?;

@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::image::{Image, read_with_linearity, write_beside_and_rename};
 use crate::metrics::{REL_MSE_EPSILON, trimmed_mean};
 use crate::render::film::Film;
-use crate::render::{Driver, Sampling};
+use crate::render::{Sampling, Session};
 
 /// A picture's own expected squared error, in the units of [`crate::metrics::Comparison`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -154,12 +154,12 @@ impl Reference {
         let Some(mut driver) = place.learned(&settings, seed, cancel)? else { return Ok(false) };
         let limit = self.facts.samples_per_picture;
         driver.rule.samples = (limit > 0).then_some(limit);
-        let is_done = |driver: &Driver<'_>| {
-            let (samples, figures) = (driver.session.samples(), driver.session.figures());
+        let is_done = |session: &Session<'_>| {
+            let (samples, figures) = (session.samples(), session.figures());
             let is_long = figures.render_seconds >= seconds.max(figures.learning_seconds);
-            if limit > 0 { driver.is_done() } else { samples >= 4 && is_long }
+            if limit > 0 { samples >= limit } else { samples >= 4 && is_long }
         };
-        while !is_done(&driver) {
+        while !is_done(&driver.session) {
             driver.advance(cancel)?;
             if cancel.load(Ordering::Relaxed) {
                 return Ok(false);
@@ -168,7 +168,7 @@ impl Reference {
         let mut session = driver.session;
         session.settle()?;
         self.add(session.film());
-        self.facts.seconds += session.elapsed_seconds();
+        self.facts.seconds += session.figures().elapsed_seconds();
         device.clone_into(&mut self.facts.device);
         self.write()?;
         Ok(true)

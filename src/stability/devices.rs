@@ -127,7 +127,7 @@ fn device_lost(setting: &Setting) -> Result<Outcome> {
     let never = AtomicBool::new(false);
     let on_gpu = UploadedScene::new(&gpu, &world, &environment)?;
     let view = view(camera, Sampling::Plain, 2);
-    let mut session = Session::on_gpu(&world, &environment, view, &on_gpu)?;
+    let mut session = Session::on(&world, &environment, view, Some(&on_gpu))?;
     session.advance(4, &never)?;
     let before = session.film().clone();
     gpu.lose();
@@ -163,10 +163,10 @@ fn out_of_gpu_memory(setting: &Setting) -> Result<Outcome> {
     let camera = Camera::look_at(Vec3::ONE, Vec3::ZERO, 0.5);
     let small = view(camera, Sampling::Plain, 1);
     let large = View { width: side, height: side, ..small.clone() };
-    let refusal = Session::on_gpu(&world, &environment, large, &uploaded).err();
+    let refusal = Session::on(&world, &environment, large, Some(&uploaded)).err();
     let refusal = refusal.map(|e| e.to_string()).unwrap_or_default();
     let clear = refusal.contains("MiB") && !refusal.contains('\n');
-    let mut session = Session::on_gpu(&world, &environment, small, &uploaded)?;
+    let mut session = Session::on(&world, &environment, small, Some(&uploaded))?;
     session.advance(1, &AtomicBool::new(false))?;
     Ok(Outcome::new()
         .at_least("refused with the numbers", f64::from(u8::from(clear)), 1.0)

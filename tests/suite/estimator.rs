@@ -63,8 +63,8 @@ fn environment(map: Image) -> Environment {
 pub(crate) fn render(world: &World, environment: &Environment, view: View, samples: u32) -> Film {
     let mut session = learned(world, environment, view);
     let rule = StopRule { samples: Some(samples), ..StopRule::default() };
-    while !session.is_done(&rule) {
-        let pass = session.next_pass(&rule);
+    while !rule.is_met(&session) {
+        let pass = rule.next_pass(&session);
         session.advance(pass, &AtomicBool::new(false)).expect("the CPU does not fail");
     }
     assert_eq!(session.samples(), samples);

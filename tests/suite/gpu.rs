@@ -38,14 +38,14 @@ fn on_gpu<'a>(
     gpu: &Gpu,
 ) -> Session<'a> {
     let uploaded = UploadedScene::new(gpu, world, environment).expect("it fits");
-    Session::on_gpu(world, environment, view, &uploaded).expect("it fits")
+    Session::on(world, environment, view, Some(&uploaded)).expect("it fits")
 }
 
 /// Learns and renders pass by pass, as [`render`] does.
 fn finish(mut session: Session<'_>, samples: u32) -> Film {
     let rule = StopRule { samples: Some(samples), ..StopRule::default() };
-    while !session.is_done(&rule) {
-        session.advance(session.next_pass(&rule), &AtomicBool::new(false)).expect("no failure");
+    while !rule.is_met(&session) {
+        session.advance(rule.next_pass(&session), &AtomicBool::new(false)).expect("no failure");
     }
     assert_eq!(session.samples(), samples);
     session.film().clone()
@@ -149,7 +149,7 @@ fn what_is_only_measured_is_for_the_cpu_alone() {
         (View { points: Points::Independent, ..view }, "independent points are for the CPU alone"),
         (squared, "learning by the squared cosine is for the CPU alone"),
     ] {
-        let refused = Session::on_gpu(&world, &environment, view, &uploaded).err();
+        let refused = Session::on(&world, &environment, view, Some(&uploaded)).err();
         assert_eq!(refused.expect("it is refused").to_string(), sentence);
     }
 }

@@ -107,8 +107,8 @@ impl Place<'_> {
         let mut before = vec![0.0; (SIZE[0] * SIZE[1]) as usize];
         for stop in stops {
             let rule = StopRule { samples: Some(stop), ..StopRule::default() };
-            while !session.is_done(&rule) {
-                let pass = session.next_pass(&rule);
+            while !rule.is_met(&session) {
+                let pass = rule.next_pass(&session);
                 session.advance(pass, &goes_on).expect("the CPU does not fail");
             }
             let film = session.film();

@@ -68,7 +68,8 @@ impl<'s> CachedPicture<Session<'s>> {
         if self.session().is_some_and(|session| session.samples() >= SAMPLES)
             && let Some(session) = self.end(keep)
         {
-            *self = Self::Complete(session.figures().samples, Arc::new(session.into_film()));
+            *self =
+                Self::Complete(session.figures().samples, Arc::new(session.suspend().into_film()));
         }
     }
 

@@ -80,7 +80,7 @@ impl Inspection {
         let error_to = |image| metrics::relative_rms_error(&film.image(), image);
         let reference = request.reference.as_ref();
         let point = Point {
-            seconds: session.elapsed_seconds(),
+            seconds: session.figures().elapsed_seconds(),
             samples: film.total_samples() as f64 / film.pixels().len().max(1) as f64,
             noise: session.noise(),
             error: reference.and_then(|reference| error_to(&reference.image)),

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::light_grid::LearningGrid;
 use crate::path::World;
 use crate::render::gpu::CompileGuard;
-use crate::render::{Gi, Phase, Session, StopRule, View};
+use crate::render::{Gi, Phase, Session, StopRule, View, next_beginning};
 
 /// Longest piece of rendering between two looks at requests and clocks.
 pub(super) const SLICE: Duration = Duration::from_millis(120);
@@ -146,7 +146,7 @@ impl<'a> Sessions<'a> {
                 Ok(())
             }
             None => {
-                let samples = session.next_pass(&rule.unwrap_or_default());
+                let samples = rule.unwrap_or_default().next_pass(session);
                 session.advance(samples, &self.watch.shared.cancel)
             }
         };
@@ -159,7 +159,7 @@ impl<'a> Sessions<'a> {
     /// for moving pictures, which are small.
     pub(super) fn beginning(&self, session: &Session<'_>) -> Option<u32> {
         let begins = self.watch.request.previews && !self.watch.request.moving;
-        if begins { session.next_beginning() } else { None }
+        if begins { next_beginning(session) } else { None }
     }
 
     /// Lets the session run on the device that is asked for now; whether it does before something else is asked for.

@@ -68,7 +68,7 @@ impl<'s> Pictures<'s> {
         match (plain.comparable_seconds(), main.comparable_seconds()) {
             (None, _) => false,
             (Some(plain), Some(main)) => plain >= main,
-            (Some(_), None) => !main.is_done(rule) || plain.samples() >= main.samples(),
+            (Some(_), None) => !rule.is_met(main) || plain.samples() >= main.samples(),
         }
     }
 }
@@ -360,7 +360,7 @@ impl<'a> PictureTask<'a> {
         } else if main.phase() == Phase::Learning {
             let (done, all) = (main.figures().learning_paths, main.view().learning_paths);
             Activity::Learning(done as f32 / all.max(1) as f32)
-        } else if main.samples() > 0 && main.is_done(&rule) && is_compared {
+        } else if main.samples() > 0 && rule.is_met(main) && is_compared {
             Activity::Done
         } else {
             Activity::Rendering

@@ -19,7 +19,7 @@ use crate::output::record::Record;
 use crate::path::{PathLimits, World};
 use crate::render::film::Film;
 use crate::render::{
-    Awaited, Beginning, Doubling, Driver, Figures, Gi, SAMPLES_VERSION, Session, StopRule, View,
+    Awaited, Doubling, Driver, Figures, Gi, SAMPLES_VERSION, Session, StopRule, View,
 };
 use crate::sources;
 
@@ -164,9 +164,10 @@ impl RenderJob {
         let is_kept = self.checkpoint.is_some();
         // Parts and checkpoints want whole samples.
         let is_hasty = self.rule.seconds.is_some() && self.part == Part::WHOLE && !is_kept;
-        let driver = Driver::new(session, self.rule);
-        let mut driver = driver.resumable(self.first, self.awaited.take(), self.target, is_kept);
-        driver.beginning = if is_hasty { Beginning::InTime } else { Beginning::Whole };
+        let mut driver = Driver::new(session, self.rule);
+        (driver.is_hasty, driver.is_resumable) = (is_hasty, is_kept);
+        (driver.target, driver.skipped) = (self.target, self.first);
+        driver.awaited = self.awaited.take();
         driver
     }
 
@@ -182,7 +183,7 @@ impl RenderJob {
         notices: &mut Notices,
     ) -> Result<bool> {
         driver.take_up()?;
-        if !driver.is_awaiting() {
+        if driver.awaited.is_none() {
             self.look_at_clock(driver, interrupt, alarm, notices);
         }
         if driver.has_samples() {
@@ -229,7 +230,7 @@ impl RenderJob {
     /// If it cannot be written; the one from before is kept.
     pub(super) fn keep(&mut self, driver: &Driver<'_>) -> Result<()> {
         let session = &driver.session;
-        let facts = self.facts(driver.target(), session.figures(), self.metadata.clone());
+        let facts = self.facts(driver.target, session.figures(), self.metadata.clone());
         let facts = FilmFacts { noted: session.noted(), ..facts };
         let Some(checkpoint) = &mut self.checkpoint else { return Ok(()) };
         let written = write_film(&checkpoint.path, &facts, session.film(), self.first);
@@ -256,7 +257,7 @@ impl RenderJob {
                 ..figures
             };
         }
-        let facts = self.facts(driver.target(), figures, record.metadata());
+        let facts = self.facts(driver.target, figures, record.metadata());
         write_film(path, &facts, record.film, 0)
     }
 

@@ -1,25 +1,33 @@
 //! Learning which tiles are seen from where: passes of learning paths, then what rendered paths count.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::ops::Range;
 use std::time::Instant;
 
-use super::Session;
 use crate::environment::Environment;
-use crate::error::Result;
 use crate::light_grid::cells::SphericalGrid;
 use crate::light_grid::{LearningGrid, LightGrid, RenderedPaths};
 use crate::path::World;
 use crate::path::camera::CameraRays;
 use crate::render::view_probe::{ROOM_ENCLOSURE, enclosure, middle_distance};
-use crate::render::{View, cpu};
+use crate::render::{Figures, Sampling, View, cpu};
+
+/// What tiles are chosen by, and what is learned of them.
+pub(super) struct Tiles {
+    /// The distribution of the whole map.
+    whole_map: Option<LightGrid>,
+    /// Distributions of what was counted.
+    learned: Option<LightGrid>,
+    /// `None` if nothing is to be learned, or everything has been by others.
+    learning: Option<Learning>,
+}
 
 /// Learning under way, or over.
 pub(super) struct Learning {
-    pub(super) grid: LearningGrid,
+    grid: LearningGrid,
     pass: u32,
     /// Paths counted since the counters were last looked through.
     paths_of_pass: u64,
-    pub(super) stage: Stage,
+    stage: Stage,
 }
 
 /// How far learning is.
@@ -48,11 +56,6 @@ const LAST_LEARNING_SAMPLE: u32 = 4;
 const MAX_MOVED: f32 = 0.5;
 
 impl Learning {
-    /// Whether nothing is counted any more.
-    pub(super) fn is_over(&self) -> bool {
-        self.stage == Stage::Over
-    }
-
     /// An empty grid, if the view is to learn and the map has anything to learn about.
     pub(super) fn new(
         world: &World,
@@ -74,160 +77,198 @@ impl Learning {
         let grid = LearningGrid::new(grid, environment.tile_count(), options);
         Some(Self { grid, pass: 0, paths_of_pass: 0, stage: Stage::Tracing })
     }
+
+    fn end_pass(&mut self) {
+        self.grid.counters.end_pass();
+        self.paths_of_pass = 0;
+    }
 }
 
-impl Session<'_> {
-    /// Goes on from what paths have counted before in the same world under the same map, for another
-    /// camera near by: it is rendered with what they know, and rendered paths add to it. `false` if it
-    /// does not suit, as where rendered paths add nothing, and nothing has changed.
-    ///
-    /// # Errors
-    /// If it does not fit on the GPU.
-    pub(crate) fn continue_learning(&mut self, counted: &LearningGrid) -> Result<bool> {
-        let goes_on =
-            self.state.view.distribution_options().is_some_and(|options| options.goes_on());
-        let Some(learning) = self.state.learning.as_mut().filter(|_| goes_on) else {
-            return Ok(false);
-        };
-        let moved = self.state.rays.position().distance(counted.grid.center);
-        let is_near = middle_distance(
-            self.world,
-            [self.state.view.width, self.state.view.height],
-            &self.state.rays,
-        )
-        .is_some_and(|distance| moved <= MAX_MOVED * distance);
+/// Whether rendered paths count when learning paths have been traced.
+fn counts_rendered(world: &World, view: &View) -> bool {
+    view.distribution_options().is_some_and(|options| {
+        let is_everywhere = options.rendered_paths == RenderedPaths::Everywhere;
+        let is_room = || enclosure(world, view) >= ROOM_ENCLOSURE;
+        options.goes_on() && (is_everywhere || is_room())
+    })
+}
+
+impl Tiles {
+    /// Nothing learned yet.
+    pub(super) fn new(
+        world: &World,
+        environment: &Environment,
+        view: &View,
+        rays: &CameraRays,
+    ) -> Self {
+        let is_sampled = view.sampling != Sampling::Bsdf && !environment.is_black();
+        let whole_map = is_sampled.then(|| LightGrid::whole_map(environment.tile_energies()));
+        let learning = Learning::new(world, environment, view, rays);
+        Self { whole_map: whole_map.flatten(), learned: None, learning }
+    }
+
+    /// The distributions in use.
+    pub(super) fn grid(&self) -> Option<&LightGrid> {
+        self.learned.as_ref().or(self.whole_map.as_ref())
+    }
+
+    /// What was counted.
+    pub(super) fn counters(&self) -> Option<&LearningGrid> {
+        self.learning.as_ref().map(|learning| &learning.grid)
+    }
+
+    /// What paths are to be counted into; `None` where nothing is counted any more.
+    pub(super) fn counted_into(&self) -> Option<&LearningGrid> {
+        self.counters().filter(|_| self.stage() != Stage::Over)
+    }
+
+    /// Bytes of distributions and counters.
+    #[cfg(feature = "window")]
+    pub(super) fn memory_bytes(&self) -> usize {
+        let grid = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
+        grid + self.counters().map_or(0, |grid| grid.counters.memory_bytes())
+    }
+
+    /// How far learning is.
+    pub(super) fn stage(&self) -> Stage {
+        self.learning.as_ref().map_or(Stage::Over, |learning| learning.stage)
+    }
+
+    /// Takes these distributions and learns no more.
+    pub(super) fn set(&mut self, grid: Option<LightGrid>) {
+        (self.learning, self.learned) = (None, grid);
+    }
+
+    /// Ends the tracing of learning paths.
+    pub(super) fn finish_tracing(&mut self, world: &World, view: &View) {
+        if let Some(learning) = self.learning.as_mut().filter(|l| l.stage == Stage::Tracing) {
+            let counts = counts_rendered(world, view);
+            learning.stage = if counts { Stage::Counting } else { Stage::Over };
+        }
+    }
+
+    /// Goes on from what was counted for a camera near by; `false` if it does not suit, and nothing has changed.
+    pub(super) fn continue_from(
+        &mut self,
+        counted: &LearningGrid,
+        world: &World,
+        view: &View,
+        rays: &CameraRays,
+    ) -> bool {
+        let goes_on = view.distribution_options().is_some_and(|options| options.goes_on());
+        let Some(learning) = self.learning.as_mut().filter(|_| goes_on) else { return false };
+        let moved = rays.position().distance(counted.grid.center);
+        let is_near = middle_distance(world, [view.width, view.height], rays)
+            .is_some_and(|distance| moved <= MAX_MOVED * distance);
         if !is_near || !counted.is_like(&learning.grid) {
-            return Ok(false);
+            return false;
         }
         learning.grid = counted.snapshot();
         learning.stage = Stage::Counting;
-        self.update_distributions();
-        self.take_up_distributions()?;
-        Ok(true)
+        true
     }
 
-    /// Whether rendered paths count when learning paths have been traced.
-    pub(super) fn counts_rendered(&self) -> bool {
-        self.state.view.distribution_options().is_some_and(|options| {
-            let is_everywhere = options.rendered_paths == RenderedPaths::Everywhere;
-            let is_room = || enclosure(self.world, &self.state.view) >= ROOM_ENCLOSURE;
-            options.goes_on() && (is_everywhere || is_room())
-        })
+    /// Learning paths of the next pass, and what they are counted into.
+    pub(super) fn next_pass(&self, view: &View) -> Option<(Range<u64>, &LearningGrid)> {
+        let learning = self.learning.as_ref()?;
+        Some((cpu::learning_range(view, learning.pass), &learning.grid))
     }
 
-    /// One learning pass.
-    pub(super) fn learn(&mut self, cancel: &AtomicBool) -> Result<()> {
-        let Some(learning) = &self.state.learning else { return Ok(()) };
-        let range = cpu::learning_range(&self.state.view, learning.pass);
-        let rays = match &mut self.gpu {
-            None => {
-                let tracer = self.tracer(Some(&learning.grid));
-                let rays =
-                    cpu::learn(&tracer, &self.state.rays, &self.state.view, range.clone(), cancel);
-                if cancel.load(Ordering::Relaxed) {
-                    return self.begin_learning_again();
-                }
-                rays
-            }
-            Some(renderer) => match renderer.learn(range.clone(), &learning.grid, cancel)? {
-                Some(rays) => rays,
-                None => return Ok(()),
-            },
-        };
-        self.state.figures.learning_rays += rays;
-        self.state.figures.learning_paths = range.end;
-        if let Some(learning) = &mut self.state.learning {
+    /// Takes note of a pass of learning paths, the last of which is before `end`.
+    pub(super) fn note_traced(
+        &mut self,
+        end: u64,
+        environment: &Environment,
+        figures: &mut Figures,
+    ) {
+        figures.learning_paths = end;
+        if let Some(learning) = &mut self.learning {
             learning.pass += 1;
         }
-        self.update_distributions();
-        if range.end >= self.state.view.learning_paths {
-            self.finish_learning();
-        }
-        self.take_up_distributions()
+        self.update(environment, figures);
     }
 
-    /// Forgets a pass that was cancelled: which of its paths were counted depends on the threads.
-    fn begin_learning_again(&mut self) -> Result<()> {
-        let state = &mut self.state;
-        state.learned = None;
-        state.learning = Learning::new(self.world, self.environment, &state.view, &state.rays);
-        let figures = &mut state.figures;
+    /// Forgets all, for a pass was cancelled: which of its paths were counted depends on the threads.
+    pub(super) fn begin_again(&mut self, learning: Option<Learning>, figures: &mut Figures) {
+        (self.learned, self.learning) = (None, learning);
         (figures.learning_paths, figures.distribution_paths) = (0, 0);
         (figures.visited_cells, figures.learned_cells, figures.grid_bytes) = (0, 0, 0);
-        self.take_up_distributions()
     }
 
     /// Makes distributions of what all passes so far counted: the next pass draws from them.
-    pub(super) fn update_distributions(&mut self) {
-        let Some(learning) = &mut self.state.learning else { return };
+    pub(super) fn update(&mut self, environment: &Environment, figures: &mut Figures) {
+        let Some(learning) = &mut self.learning else { return };
         let start = Instant::now();
-        learning.grid.counters.end_pass();
-        learning.paths_of_pass = 0;
-        self.state.figures.distribution_paths =
-            self.state.figures.learning_paths + self.state.figures.counted_paths;
+        learning.end_pass();
+        figures.distribution_paths = figures.learning_paths + figures.counted_paths;
         // The old distributions go first: both together would not fit the budget.
-        self.state.learned = None;
-        self.state.learned = learning.grid.distributions(self.environment);
-        let distributions = self.state.learned.as_ref().map_or(0, LightGrid::memory_bytes);
-        let held = learning.grid.counters.memory_bytes() + distributions;
-        self.state.figures.grid_bytes = held;
-        self.state.figures.grid_peak_bytes = self.state.figures.grid_peak_bytes.max(held);
-        self.state.figures.visited_cells = learning.grid.counters.visited_cells();
-        self.state.figures.learned_cells =
-            self.state.learned.as_ref().map_or(0, |grid| grid.distributions().len() as usize - 1);
-        self.state.figures.distribution_seconds += start.elapsed().as_secs_f64();
+        self.learned = None;
+        self.learned = learning.grid.distributions(environment);
+        let counters = &learning.grid.counters;
+        let distributions = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
+        figures.grid_bytes = counters.memory_bytes() + distributions;
+        figures.grid_peak_bytes = figures.grid_peak_bytes.max(figures.grid_bytes);
+        figures.visited_cells = counters.visited_cells();
+        figures.learned_cells =
+            self.learned.as_ref().map_or(0, |grid| grid.distributions().len() as usize - 1);
+        figures.distribution_seconds += start.elapsed().as_secs_f64();
     }
 
     /// Makes room in the counters for a pass of so many samples a pixel; returns of how many one
     /// can be counted.
-    pub(super) fn prepare_counting(&mut self, samples: u32) -> u32 {
-        let most = cpu::most_paths_per_pass(&self.state.view);
-        let paths = self.state.view.pixels() * u64::from(samples);
+    pub(super) fn prepare_counting(&mut self, view: &View, samples: u32) -> u32 {
+        let most = cpu::most_paths_per_pass(view);
+        let paths = view.pixels() * u64::from(samples);
         let stride = paths.div_ceil(most).max(1);
-        if let Some(learning) = self.state.learning.as_mut().filter(|learning| !learning.is_over())
+        if let Some(learning) = self.learning.as_mut().filter(|l| l.stage != Stage::Over)
             && learning.paths_of_pass + paths.div_ceil(stride) > most
         {
-            learning.grid.counters.end_pass();
-            learning.paths_of_pass = 0;
+            learning.end_pass();
         }
         u32::try_from(stride).unwrap_or(u32::MAX)
     }
 
-    /// Takes note that so many rendered paths were counted. There are new distributions of twice as many paths
-    /// as those in use were made of, where each pixel has a power of two of samples: the points of the
+    /// Takes note that so many rendered paths were counted; whether there are new distributions. There are of twice
+    /// as many paths as those in use were made of, where each pixel has a power of two of samples: the points of the
     /// sequences that then end and begin are evenly spread.
-    pub(super) fn learn_from_rendered(&mut self, paths: u64, is_whole: bool) -> Result<()> {
-        let Some(learning) = self.state.learning.as_mut().filter(|learning| !learning.is_over())
-        else {
-            return Ok(());
+    pub(super) fn note_rendered(
+        &mut self,
+        paths: u64,
+        whole_samples: Option<u32>,
+        environment: &Environment,
+        figures: &mut Figures,
+    ) -> bool {
+        let Some(learning) = self.learning.as_mut().filter(|l| l.stage != Stage::Over) else {
+            return false;
         };
-        self.state.figures.counted_paths += paths;
+        figures.counted_paths += paths;
         learning.paths_of_pass += paths;
-        let all = self.state.figures.learning_paths + self.state.figures.counted_paths;
-        let samples = self.state.samples;
-        if !is_whole || !samples.is_power_of_two() {
-            return Ok(());
-        }
+        let all = figures.learning_paths + figures.counted_paths;
+        let Some(samples) = whole_samples.filter(|samples| samples.is_power_of_two()) else {
+            return false;
+        };
         if all >= ENOUGH_PATHS || samples >= LAST_LEARNING_SAMPLE {
             learning.stage = Stage::Over;
         }
-        if all < 2 * self.state.figures.distribution_paths {
-            return Ok(());
+        let is_due = all >= 2 * figures.distribution_paths;
+        if is_due {
+            self.update(environment, figures);
         }
-        self.update_distributions();
-        self.take_up_distributions()
+        is_due
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::AtomicBool;
+
     use glam::Vec3;
 
     use super::*;
     use crate::environment::{EnvironmentOptions, sky};
     use crate::light_grid::DistributionOptions;
     use crate::render::gi::tests::view;
-    use crate::render::{Phase, Sampling};
+    use crate::render::{Phase, Session};
     use crate::scene::builtin;
 
     fn office() -> (World, Environment) {
@@ -291,12 +332,12 @@ mod tests {
         let rule = StopRule { samples: Some(16), ..StopRule::default() };
         // Seconds a pass while there are fewer than three samples, and then.
         let films = [[1e-3, 1e-3], [1e3, 1e-3], [1e3, 1e3]].map(|seconds| {
-            let session = Session::on_gpu(&world, &environment, view.clone(), &uploaded);
+            let session = Session::on(&world, &environment, view.clone(), Some(&uploaded));
             let mut session = session.expect("it fits");
-            while !session.is_done(&rule) {
+            while !rule.is_met(&session) {
                 let seconds = seconds[usize::from(session.samples() > 2)];
                 session.state.here = Spent { seconds, samples: 2000 };
-                let samples = session.next_pass(&rule);
+                let samples = rule.next_pass(&session);
                 session.advance(samples, &AtomicBool::new(false)).expect("rendered");
             }
             session.film().clone()

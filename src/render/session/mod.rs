@@ -5,7 +5,6 @@
 //! sample's random numbers depend on its pixel and index alone, a pixel's samples are added in
 //! order, and learning counts integers.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 #[cfg(feature = "window")]
 use std::sync::{Arc, Weak};
@@ -17,29 +16,25 @@ mod noise;
 mod state;
 
 use host_film::HostFilm;
-use learning::{Learning, Stage};
+use learning::{Learning, Stage, Tiles};
 pub use noise::Doubling;
-use noise::MIN_SAMPLES_FOR_NOISE;
+pub(super) use noise::MIN_SAMPLES_FOR_NOISE;
+use noise::Noise;
 pub(crate) use state::SessionState;
 use state::Spent;
 
-use super::film::{BEGINNINGS, Film};
+use super::film::Film;
 use super::gi::{CacheTraining, PATHS_AT_A_TIME};
 use super::pass::{Coverage, Pass};
-use super::{Figures, Phase, Sampling, StopRule, View, cpu, gpu};
+use super::{Figures, Phase, View, cpu, gpu};
 use crate::environment::Environment;
 use crate::error::Result;
 use crate::light_grid::{LearningGrid, LightGrid};
-use crate::path::{PathTracer, World};
+use crate::path::World;
 use crate::sampler::Sequence;
 
-/// Seconds a pass on a GPU should take: what is told to the user between two is this old at most.
-const GPU_PASS_SECONDS: f64 = 0.1;
 /// A GPU's film is read at least this often: so much work is lost with a device.
 const KEPT_SECONDS: Duration = Duration::from_secs(5);
-/// Learning takes at most this share of the seconds asked for.
-const LEARNING_TIME_SHARE: f64 = 0.05;
-
 /// A picture in the making.
 pub struct Session<'a> {
     world: &'a World,
@@ -54,12 +49,7 @@ impl<'a> Session<'a> {
     pub fn new(world: &'a World, environment: &'a Environment, mut view: View) -> Self {
         view.sharing = view.sharing.decided(world, &view);
         let rays = view.rays();
-        let whole_map = match view.sampling {
-            Sampling::Bsdf => None,
-            _ if environment.is_black() => None,
-            _ => LightGrid::whole_map(environment.tile_energies()),
-        };
-        let learning = Learning::new(world, environment, &view, &rays);
+        let tiles = Tiles::new(world, environment, &view, &rays);
         let training = CacheTraining::new(world, environment, &view, &rays);
         let state = SessionState {
             view,
@@ -67,29 +57,14 @@ impl<'a> Session<'a> {
             film: HostFilm::new(),
             samples: 0,
             skipped: 0,
-            doubling: Mutex::default(),
-            whole_map,
-            learned: None,
+            noise: Noise::default(),
+            tiles,
             sequence: Sequence::default(),
-            learning,
             training,
             figures: Figures::default(),
             here: Spent::default(),
         };
         Self { world, environment, gpu: None, state }
-    }
-
-    /// Starts a session on a GPU, to which this world and this environment are uploaded.
-    ///
-    /// # Errors
-    /// If it does not fit on the device.
-    pub fn on_gpu(
-        world: &'a World,
-        environment: &'a Environment,
-        view: View,
-        uploaded: &gpu::UploadedScene,
-    ) -> Result<Self> {
-        Self::on(world, environment, view, Some(uploaded))
     }
 
     /// Starts a session on the CPU or, if this world and this environment are uploaded to one, on a GPU.
@@ -126,7 +101,7 @@ impl<'a> Session<'a> {
             }
             Phase::Rendering => {
                 self.train(1, cancel)?;
-                self.render_timed(samples, Coverage::All, cancel)
+                self.render(samples, Coverage::All, cancel)
             }
         }
     }
@@ -141,22 +116,8 @@ impl<'a> Session<'a> {
         if (self.state.samples == 0 || every == 1) && !self.is_on_gpu() {
             // Only a GPU fails.
             let _ = self.train(every, cancel);
-            let _ = self.render_timed(1, Coverage::Every(every), cancel);
+            let _ = self.render(1, Coverage::Every(every), cancel);
         }
-    }
-
-    /// How far apart the pixels are that [`Self::begin`] should give their first sample next: nearer and
-    /// nearer. `None` when enough have one to go on with all, and on a GPU.
-    pub fn next_beginning(&self) -> Option<u32> {
-        if self.state.samples > 0 || self.is_on_gpu() {
-            return None;
-        }
-        let pixels = |every| {
-            let [columns, rows] =
-                [self.state.view.width, self.state.view.height].map(|n| n.div_ceil(every));
-            u64::from(columns) * u64::from(rows)
-        };
-        BEGINNINGS.into_iter().find(|every| self.state.figures.samples < pixels(*every))
     }
 
     /// Whether pixels all over the picture have a sample: those that [`Self::begin`] begins with or, on a
@@ -175,7 +136,7 @@ impl<'a> Session<'a> {
         if let Some(renderer) = &mut self.gpu {
             renderer.settle()?;
             self.state.film.update(&self.state.view, |film| renderer.read_film(film))?;
-            self.spend(start.elapsed().as_secs_f64(), 0);
+            self.state.spend(start.elapsed().as_secs_f64(), 0);
         }
         Ok(())
     }
@@ -204,7 +165,8 @@ impl<'a> Session<'a> {
     /// If it does not fit on the device; the session stays where it is.
     pub fn continue_on_gpu(&mut self, uploaded: &gpu::UploadedScene) -> Result<()> {
         let (lit, learns) = ((self.world, self.environment), self.phase() == Phase::Learning);
-        let (view, rays, film) = (&self.state.view, &self.state.rays, self.film_to_go_on());
+        let film = (self.state.figures.samples > 0).then(|| self.film());
+        let (view, rays) = (&self.state.view, &self.state.rays);
         let renderer = gpu::Renderer::new(uploaded, lit, view, rays, film, learns)?;
         self.move_to(renderer)
     }
@@ -221,19 +183,16 @@ impl<'a> Session<'a> {
         until_then: impl FnOnce() -> Arc<gpu::CompileGuard>,
     ) -> Result<Option<Weak<gpu::CompileGuard>>> {
         let (lit, learns) = ((self.world, self.environment), self.phase() == Phase::Learning);
-        let (view, rays, film) = (&self.state.view, &self.state.rays, self.film_to_go_on());
+        let film = (self.state.figures.samples > 0).then(|| self.film());
+        let (view, rays) = (&self.state.view, &self.state.rays);
         match gpu::Renderer::new_or_held(uploaded, lit, view, rays, film, learns, until_then)? {
             gpu::MaybeReady::CompileGuard(held) => Ok(Some(held)),
             gpu::MaybeReady::Ready(renderer) => self.move_to(renderer).map(|()| None),
         }
     }
 
-    fn film_to_go_on(&self) -> Option<&Film> {
-        (self.state.figures.samples > 0).then(|| self.film())
-    }
-
     fn move_to(&mut self, mut renderer: gpu::Renderer) -> Result<()> {
-        renderer.set_grid(self.state.learned.as_ref().or(self.state.whole_map.as_ref()))?;
+        renderer.set_grid(self.state.tiles.grid())?;
         renderer.set_cache(self.state.training.as_ref().and_then(CacheTraining::cache))?;
         self.gpu = Some(Box::new(renderer));
         self.state.here = Spent::default();
@@ -245,32 +204,6 @@ impl<'a> Session<'a> {
         self.gpu.as_ref().map(|renderer| renderer.figures())
     }
 
-    /// Samples per pixel that the next pass should take: growing with what is there, so that few
-    /// passes are needed and none is much longer than those before it. Where noise is asked for, or
-    /// something is learned of what is rendered, it depends on counts alone, so that the picture is
-    /// repeatable; else a GPU takes as many as it can in a moment.
-    pub fn next_pass(&self, rule: &StopRule) -> u32 {
-        let samples = self.state.samples;
-        let is_counting =
-            self.state.learning.as_ref().is_some_and(|learning| learning.stage == Stage::Counting);
-        let pass = match self.gpu {
-            // Each look at the noise reads the film.
-            Some(_) if rule.noise.is_some() => (samples / 8).clamp(1, 64),
-            Some(_) if !is_counting => {
-                let pixels = self.state.view.pixels() as f64;
-                let affordable = self
-                    .seconds_per_sample()
-                    .map_or(1, |each| (GPU_PASS_SECONDS / (each * pixels).max(1e-9)) as u32);
-                affordable.max(samples / 16).min(samples).clamp(1, 64)
-            }
-            _ => (samples / 16).clamp(1, 64),
-        };
-        // Where samples are a power of two the radiance cache and the distributions learn, and it is found out
-        // how good the picture is.
-        let pass = pass.min((samples + 1).next_power_of_two() - samples);
-        rule.samples.map_or(pass, |limit| pass.min(limit.saturating_sub(samples)).max(1))
-    }
-
     /// Fewest samples any pixel has: [`Film::min_samples`] without a film.
     pub fn samples(&self) -> u32 {
         self.state.samples
@@ -278,28 +211,35 @@ impl<'a> Session<'a> {
 
     /// What the next [`Self::advance`] will do.
     pub fn phase(&self) -> Phase {
-        match &self.state.learning {
-            Some(Learning { stage: Stage::Tracing, .. }) => Phase::Learning,
-            _ => Phase::Rendering,
+        match self.state.tiles.stage() {
+            Stage::Tracing => Phase::Learning,
+            Stage::Counting | Stage::Over => Phase::Rendering,
         }
     }
 
-    /// Whether another learning pass, as long as all before it, would take more than its share of the
-    /// seconds asked for.
-    pub fn has_learned_enough(&self, rule: &StopRule) -> bool {
-        let share = |seconds| LEARNING_TIME_SHARE * seconds;
-        rule.seconds.is_some_and(|s| 2.0 * self.state.figures.learning_seconds >= share(s))
+    /// Whether rendered paths are learned from.
+    pub(super) fn is_counting(&self) -> bool {
+        self.state.tiles.stage() == Stage::Counting
     }
 
     /// Goes over to rendering with what was learned so far.
     pub fn finish_learning(&mut self) {
-        if self.phase() == Phase::Rendering {
-            return;
+        self.state.tiles.finish_tracing(self.world, &self.state.view);
+    }
+
+    /// Goes on from what paths have counted before in the same world under the same map, for another
+    /// camera near by: it is rendered with what they know, and rendered paths add to it. `false` if it
+    /// does not suit, as where rendered paths add nothing, and nothing has changed.
+    ///
+    /// # Errors
+    /// If it does not fit on the GPU.
+    pub(crate) fn continue_learning(&mut self, counted: &LearningGrid) -> Result<bool> {
+        let state = &mut self.state;
+        if !state.tiles.continue_from(counted, self.world, &state.view, &state.rays) {
+            return Ok(false);
         }
-        let stage = if self.counts_rendered() { Stage::Counting } else { Stage::Over };
-        if let Some(learning) = &mut self.state.learning {
-            learning.stage = stage;
-        }
+        state.tiles.update(self.environment, &mut state.figures);
+        self.take_up_distributions().map(|()| true)
     }
 
     /// Replaces what was learned; for tests of unbiasedness and for inspection.
@@ -307,8 +247,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// If it does not fit on the GPU.
     pub fn set_grid(&mut self, grid: LightGrid) -> Result<()> {
-        self.state.learning = None;
-        self.state.learned = Some(grid).filter(|_| !self.environment.is_black());
+        self.state.tiles.set(Some(grid).filter(|_| !self.environment.is_black()));
         self.take_up_distributions()
     }
 
@@ -336,17 +275,25 @@ impl<'a> Session<'a> {
     /// Whether no samples to come change what is sampled by: each is then a matter of its pixel and its
     /// index alone.
     pub fn has_final_distributions(&self) -> bool {
-        self.state.learning.as_ref().is_none_or(Learning::is_over)
+        self.state.tiles.stage() == Stage::Over
     }
 
     /// Goes on from another film of this view with what was learned so far, as if its samples were
-    /// this session's. The first `skipped` of each pixel are others': [`Self::film`] counts them without
-    /// their light. Whoever took the rest learned as this session did, so that all films of a view
-    /// together are the one that a single session would have made.
+    /// this session's; `before` is what an earlier process did for it, and what its noise is found by. The
+    /// first `skipped` of each pixel are others': [`Self::film`] counts them without their light. Whoever took
+    /// the rest learned as this session did, so that all films of a view together are the one that a single
+    /// session would have made.
     ///
     /// # Errors
     /// If the GPU fails; [`Self::continue_on_cpu`] goes on from that film.
-    pub(crate) fn continue_from(&mut self, mut film: Film, skipped: u32) -> Result<()> {
+    pub(super) fn continue_from(
+        &mut self,
+        mut film: Film,
+        (before, noted): (&Figures, Doubling),
+        skipped: u32,
+    ) -> Result<()> {
+        self.state.figures.add(before);
+        self.state.noise.set(noted);
         // A GPU counts its rays on its film; if it fails, it will be heard of below.
         let _ = self.settle();
         self.state.figures.rays = self.figures().rays;
@@ -358,22 +305,9 @@ impl<'a> Session<'a> {
         set
     }
 
-    /// Counts what an earlier process did for the film that is gone on from.
-    pub(crate) fn add_figures(&mut self, before: &Figures) {
-        let figures = &mut self.state.figures;
-        figures.samples += before.samples;
-        // Paths that taught what it was made with, though nothing may have been learned again.
-        figures.learning_paths = figures.learning_paths.max(before.learning_paths);
-        figures.rays += before.rays;
-        figures.learning_rays += before.learning_rays;
-        figures.learning_seconds += before.learning_seconds;
-        figures.distribution_seconds += before.distribution_seconds;
-        figures.render_seconds += before.render_seconds;
-    }
-
     /// What was counted, for inspection.
     pub fn counters(&self) -> Option<&LearningGrid> {
-        self.state.learning.as_ref().map(|learning| &learning.grid)
+        self.state.tiles.counters()
     }
 
     /// The film so far. A GPU's is read back at the first call after an [`Self::advance`], which takes
@@ -386,12 +320,6 @@ impl<'a> Session<'a> {
                 let _ = renderer.read_film(film);
             }
         })
-    }
-
-    /// The film, of which nobody needs a copy then.
-    pub(crate) fn into_film(mut self) -> Film {
-        self.film();
-        self.state.film.take(&self.state.view)
     }
 
     /// Whether a GPU is at work.
@@ -411,40 +339,96 @@ impl<'a> Session<'a> {
 
     /// The grid in use, once learning has ended.
     pub fn grid(&self) -> Option<&LightGrid> {
-        self.state.learned.as_ref().or(self.state.whole_map.as_ref())
+        self.state.tiles.grid()
     }
 
     /// What has been done so far. A GPU's rays are those up to the last reading of its film.
     pub fn figures(&self) -> Figures {
         let rays = self.gpu.as_ref().map_or(0, |renderer| renderer.rays());
-        let variance_saved = self.doubling().saved();
+        let variance_saved = self.state.noise.noted().saved();
         Figures { rays: self.state.figures.rays + rays, variance_saved, ..self.state.figures }
     }
 
-    /// Seconds of learning and rendering so far.
-    pub fn elapsed_seconds(&self) -> f64 {
-        self.state.figures.elapsed_seconds()
+    /// Seconds of learning and rendering as if all samples had been taken on the device at work: another may be tens of
+    /// times as fast. `None` while it is not known what they take there: until each pixel has had two, or so.
+    #[cfg(feature = "window")]
+    pub(crate) fn comparable_seconds(&self) -> Option<f64> {
+        self.state.comparable_seconds()
     }
 
     /// Seconds that a sample takes on the device at work; `None` until it has taken a thousand.
     pub(crate) fn seconds_per_sample(&self) -> Option<f64> {
-        let Spent { seconds, samples } = self.state.here;
-        (samples > 1000).then(|| seconds / samples as f64)
+        self.state.here.seconds_per_sample()
     }
 
-    /// Whether a rule says to stop. Noise is only asked for from 16 samples on.
-    pub fn is_done(&self, rule: &StopRule) -> bool {
-        let samples = self.state.samples;
-        rule.samples.is_some_and(|limit| samples >= limit)
-            || (samples > 0 && rule.seconds.is_some_and(|limit| self.elapsed_seconds() >= limit))
-            || (samples >= MIN_SAMPLES_FOR_NOISE
-                && rule.noise.is_some_and(|limit| self.noise() <= limit))
+    /// [`Film::noise`] of [`Self::film`], which looks at every pixel once, less what low-discrepancy samples
+    /// save ([`crate::render::Figures::variance_saved`]); infinite if some of its samples are others'.
+    pub fn noise(&self) -> f64 {
+        let noise = || match self.state.skipped {
+            0 => {
+                let film = self.film();
+                self.state.noise.note(film, self.state.samples, self.is_on_gpu());
+                self.figures().noise_of(film)
+            }
+            _ => f64::INFINITY,
+        };
+        self.state.film.noise(noise)
     }
 
-    fn tracer<'b>(&'b self, counts: Option<&'b LearningGrid>) -> PathTracer<'b> {
-        let cache = self.state.training.as_ref().and_then(CacheTraining::cache);
-        let tracer = self.state.view.tracer(self.world, self.environment, self.grid());
-        PathTracer { counts, cache, ..tracer }
+    /// What noise is found by, for a checkpoint.
+    pub(crate) fn noted(&self) -> Doubling {
+        self.state.noise.noted().clone()
+    }
+
+    /// One learning pass.
+    fn learn(&mut self, cancel: &AtomicBool) -> Result<()> {
+        let (world, environment) = (self.world, self.environment);
+        let state = &mut self.state;
+        let Some((range, counted)) = state.tiles.next_pass(&state.view) else { return Ok(()) };
+        let rays = match &mut self.gpu {
+            None => {
+                let tracer = state.tracer(world, environment, Some(counted));
+                let rays = cpu::learn(&tracer, &state.rays, &state.view, range.clone(), cancel);
+                if cancel.load(Ordering::Relaxed) {
+                    let SessionState { view, rays, figures, .. } = state;
+                    state.tiles.begin_again(Learning::new(world, environment, view, rays), figures);
+                    return self.take_up_distributions();
+                }
+                rays
+            }
+            Some(renderer) => match renderer.learn(range.clone(), counted, cancel)? {
+                Some(rays) => rays,
+                None => return Ok(()),
+            },
+        };
+        state.figures.learning_rays += rays;
+        state.tiles.note_traced(range.end, environment, &mut state.figures);
+        if range.end >= state.view.learning_paths {
+            self.finish_learning();
+        }
+        self.take_up_distributions()
+    }
+
+    /// Puts it aside, with what a GPU has as far as it can still be read.
+    #[cfg(feature = "window")]
+    pub(crate) fn suspend(mut self) -> SessionState {
+        self.continue_on_cpu();
+        self.film();
+        self.state
+    }
+
+    /// Goes on, on the CPU, with what was put aside, in the same world under the same map. A radiance cache that was
+    /// [taken](Self::take_training) is trained anew.
+    #[cfg(feature = "window")]
+    pub(crate) fn resume(
+        world: &'a World,
+        environment: &'a Environment,
+        mut state: SessionState,
+    ) -> Self {
+        if state.training.is_none() {
+            state.training = CacheTraining::new(world, environment, &state.view, &state.rays);
+        }
+        Self { world, environment, gpu: None, state }
     }
 
     /// Trains the radiance cache, if there is one, as far as it is to be before the next pass, which is about
@@ -463,7 +447,7 @@ impl<'a> Session<'a> {
                 None => {
                     let paths = paths.start..paths.end.min(paths.start + PATHS_AT_A_TIME);
                     let rays = cpu::train(
-                        &self.tracer(None),
+                        &self.state.tracer(self.world, self.environment, None),
                         &self.state.rays,
                         &self.state.view,
                         paths.clone(),
@@ -488,7 +472,7 @@ impl<'a> Session<'a> {
     /// Begins the sequence that goes with the distributions in use, and gives them to the GPU, if one is at
     /// work.
     fn take_up_distributions(&mut self) -> Result<()> {
-        let grid = self.state.learned.as_ref().or(self.state.whole_map.as_ref());
+        let grid = self.state.tiles.grid();
         let generation = grid.map_or(0, LightGrid::generation);
         if generation != self.state.sequence.generation {
             // Pixels that are ahead begin later in it.
@@ -497,70 +481,57 @@ impl<'a> Session<'a> {
         self.gpu.as_mut().map_or(Ok(()), |renderer| renderer.set_grid(grid))
     }
 
-    /// [`Self::render`], `samples` further. Making distributions counts as learning.
-    fn render_timed(
-        &mut self,
-        samples: u32,
-        coverage: Coverage,
-        cancel: &AtomicBool,
-    ) -> Result<()> {
+    /// Brings the pixels of a pass `samples` further. Making distributions counts as learning.
+    fn render(&mut self, samples: u32, coverage: Coverage, cancel: &AtomicBool) -> Result<()> {
         let (start, figures) = (Instant::now(), self.state.figures);
-        let result = self.render(self.state.samples.saturating_add(samples), coverage, cancel);
+        let target = self.state.samples.saturating_add(samples);
+        let result = self.pass(target, coverage, cancel);
         let distributions = self.state.figures.distribution_seconds - figures.distribution_seconds;
         self.state.figures.learning_seconds += distributions;
         let samples = self.state.figures.samples - figures.samples;
-        self.spend(start.elapsed().as_secs_f64() - distributions, samples);
+        self.state.spend(start.elapsed().as_secs_f64() - distributions, samples);
         result
     }
 
-    /// Notes seconds of rendering and the samples taken in them.
-    fn spend(&mut self, seconds: f64, samples: u64) {
-        self.state.figures.render_seconds += seconds;
-        self.state.here.seconds += seconds;
-        self.state.here.samples += samples;
-    }
-
-    fn render(&mut self, target: u32, coverage: Coverage, cancel: &AtomicBool) -> Result<()> {
-        let stride = self.prepare_counting(target - self.state.samples);
-        let pass = Pass { target, coverage, stride, sequence: self.state.sequence };
-        let learning = self.state.learning.as_ref().filter(|learning| !learning.is_over());
-        let counts = learning.map(|learning| &learning.grid);
+    fn pass(&mut self, target: u32, coverage: Coverage, cancel: &AtomicBool) -> Result<()> {
+        let is_on_gpu = self.is_on_gpu();
+        let state = &mut self.state;
+        let stride = state.tiles.prepare_counting(&state.view, target - state.samples);
+        let pass = Pass { target, coverage, stride, sequence: state.sequence };
         let samples = match &mut self.gpu {
             None => {
-                let mut film = self.state.film.take(&self.state.view);
-                let tracer = self.tracer(counts);
-                let (samples, rays) = cpu::render(
-                    &tracer,
-                    &self.state.rays,
-                    &self.state.view,
-                    pass,
-                    &mut film,
-                    cancel,
-                );
-                self.state.samples = film.min_samples();
-                self.state.film.put(film);
-                self.state.figures.rays += rays;
+                let mut film = state.film.take(&state.view);
+                let tracer = state.tracer(self.world, self.environment, state.tiles.counted_into());
+                let (samples, rays) =
+                    cpu::render(&tracer, &state.rays, &state.view, pass, &mut film, cancel);
+                state.samples = film.min_samples();
+                state.film.put(film);
+                state.figures.rays += rays;
                 samples
             }
             Some(renderer) => {
-                self.state.film.outdate();
-                let done = renderer.render(pass, counts, cancel)?;
-                self.state.samples = done.least;
-                if self.state.film.is_older_than(KEPT_SECONDS) {
+                state.film.outdate();
+                let done = renderer.render(pass, state.tiles.counted_into(), cancel)?;
+                state.samples = done.least;
+                if state.film.is_older_than(KEPT_SECONDS) {
                     // What is on the host outlives the device; what fails is heard of at the next call.
-                    let _ =
-                        self.state.film.update(&self.state.view, |film| renderer.read_film(film));
+                    let _ = state.film.update(&state.view, |film| renderer.read_film(film));
                 }
                 done.samples
             }
         };
-        self.state.figures.samples += samples;
+        state.figures.samples += samples;
         // A GPU's film may have been read for the clock's sake: noise does not depend on that.
-        let is_noted = self.state.skipped == 0 && !self.is_on_gpu();
-        if let Some(film) = self.state.film.known().filter(|_| is_noted) {
-            self.note_doubling(film);
+        let is_noted = state.skipped == 0 && !is_on_gpu;
+        if let Some(film) = state.film.known().filter(|_| is_noted) {
+            state.noise.note(film, state.samples, is_on_gpu);
         }
-        let is_whole = self.state.samples >= target;
-        self.learn_from_rendered(samples.div_ceil(u64::from(stride)), is_whole)
+        let paths = samples.div_ceil(u64::from(stride));
+        let whole = (state.samples >= target).then_some(state.samples);
+        let (environment, figures) = (self.environment, &mut state.figures);
+        match state.tiles.note_rendered(paths, whole, environment, figures) {
+            true => self.take_up_distributions(),
+            false => Ok(()),
+        }
     }
 }

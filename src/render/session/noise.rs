@@ -9,12 +9,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
-use super::Session;
 use crate::metrics::trimmed_mean;
 use crate::render::film::{Film, Pixel, relative};
 
 /// Fewest samples a pixel with which noise ends a picture.
-pub(super) const MIN_SAMPLES_FOR_NOISE: u32 = 16;
+pub(in crate::render) const MIN_SAMPLES_FOR_NOISE: u32 = 16;
 /// Fewest samples a pixel of a picture on the CPU that a later one is compared with, to find its noise.
 const FIRST_NOTED: u32 = 2;
 /// Of how many pixels at most, spread over the picture.
@@ -65,41 +64,27 @@ impl Doubling {
     }
 }
 
-impl Session<'_> {
-    /// [`Film::noise`] of [`Self::film`], which looks at every pixel once, less what low-discrepancy samples
-    /// save ([`crate::render::Figures::variance_saved`]); infinite if some of its samples are others'.
-    pub fn noise(&self) -> f64 {
-        let noise = || match self.state.skipped {
-            0 => {
-                let film = self.film();
-                self.note_doubling(film);
-                self.figures().noise_of(film)
-            }
-            _ => f64::INFINITY,
-        };
-        self.state.film.noise(noise)
-    }
+/// [`Doubling`] of a film that is rendered.
+#[derive(Default)]
+pub(super) struct Noise(Mutex<Doubling>);
 
-    /// What noise is found by, for a checkpoint.
-    pub(crate) fn noted(&self) -> Doubling {
-        self.doubling().clone()
+impl Noise {
+    /// What noise is found by.
+    pub(super) fn noted(&self) -> MutexGuard<'_, Doubling> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Goes on with what noise was found by.
-    pub(crate) fn set_noted(&mut self, noted: Doubling) {
-        self.state.doubling = Mutex::new(noted);
-    }
-
-    pub(super) fn doubling(&self) -> MutexGuard<'_, Doubling> {
-        self.state.doubling.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(super) fn set(&mut self, noted: Doubling) {
+        self.0 = Mutex::new(noted);
     }
 
     /// Takes note of the film where it has twice the samples of the one noted before. A GPU's is not read for
     /// this: it is noted when somebody asks, which is after equal samples only from those on with which
     /// noise can end a picture.
-    pub(super) fn note_doubling(&self, film: &Film) {
-        let first = if self.is_on_gpu() { MIN_SAMPLES_FOR_NOISE } else { FIRST_NOTED };
-        self.doubling().note(film, self.state.samples, first);
+    pub(super) fn note(&self, film: &Film, samples: u32, is_on_gpu: bool) {
+        let first = if is_on_gpu { MIN_SAMPLES_FOR_NOISE } else { FIRST_NOTED };
+        self.noted().note(film, samples, first);
     }
 }
 
@@ -135,11 +120,11 @@ mod tests {
                 let view = View::new(world.scene.cameras[0].clone(), [48, 27]);
                 let view = View { sampling, sharing, seed, ..view };
                 let mut session = Session::new(&world, &environment, view);
-                while !session.is_done(&rule) {
-                    let samples = session.next_pass(&rule);
+                while !rule.is_met(&session) {
+                    let samples = rule.next_pass(&session);
                     session.advance(samples, &AtomicBool::new(false)).expect("no GPU");
                 }
-                (session.noise(), session.into_film())
+                (session.noise(), session.film().clone())
             })
             .collect();
         let count = pictures.len() as f64;

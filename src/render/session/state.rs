@@ -1,15 +1,13 @@
 //! What a session has of its own: without the world and the map, which it borrows, and without a GPU. It can be put
 //! aside, and gone on with.
 
-use std::sync::Mutex;
-
 use super::host_film::HostFilm;
-use super::learning::Learning;
-use super::{Doubling, Session};
+use super::learning::Tiles;
+use super::noise::Noise;
 use crate::environment::Environment;
-use crate::light_grid::LightGrid;
-use crate::path::World;
+use crate::light_grid::LearningGrid;
 use crate::path::camera::CameraRays;
+use crate::path::{PathTracer, World};
 #[cfg(feature = "window")]
 use crate::radiance_cache::CacheFacts;
 use crate::render::film::Film;
@@ -17,7 +15,7 @@ use crate::render::gi::CacheTraining;
 use crate::render::{Figures, View};
 use crate::sampler::Sequence;
 
-/// All that a [`Session`] has of its own.
+/// All that a [`Session`](super::Session) has of its own.
 pub(crate) struct SessionState {
     pub(super) view: View,
     pub(super) rays: CameraRays,
@@ -27,12 +25,9 @@ pub(crate) struct SessionState {
     /// So many first samples of each pixel are others'.
     pub(super) skipped: u32,
     /// The film with half its samples.
-    pub(super) doubling: Mutex<Doubling>,
-    pub(super) whole_map: Option<LightGrid>,
-    pub(super) learned: Option<LightGrid>,
+    pub(super) noise: Noise,
+    pub(super) tiles: Tiles,
     pub(super) sequence: Sequence,
-    /// `None` if nothing is to be learned, or everything has been by others.
-    pub(super) learning: Option<Learning>,
     pub(super) training: Option<CacheTraining>,
     pub(super) figures: Figures,
     pub(super) here: Spent,
@@ -46,38 +41,30 @@ pub(super) struct Spent {
     pub(super) samples: u64,
 }
 
-#[cfg(feature = "window")]
-impl<'a> Session<'a> {
-    /// [`Session::elapsed_seconds`] as if all samples had been taken on the device at work: another may be tens of
-    /// times as fast. `None` while it is not known what they take there: until each pixel has had two, or so.
-    pub(crate) fn comparable_seconds(&self) -> Option<f64> {
-        let Figures { samples, render_seconds, learning_seconds, .. } = self.state.figures;
-        let rendering = match self.state.here.samples {
-            here if here >= samples => Some(render_seconds),
-            here if here < 2 * self.state.view.pixels() => None,
-            _ => self.seconds_per_sample().map(|seconds| seconds * samples as f64),
-        };
-        rendering.map(|seconds| learning_seconds + seconds)
+impl SessionState {
+    /// What follows paths by the distributions in use, and counts them into `counts`.
+    pub(super) fn tracer<'b>(
+        &'b self,
+        world: &'b World,
+        environment: &'b Environment,
+        counts: Option<&'b LearningGrid>,
+    ) -> PathTracer<'b> {
+        let cache = self.training.as_ref().and_then(CacheTraining::cache);
+        PathTracer { counts, cache, ..self.view.tracer(world, environment, self.tiles.grid()) }
     }
 
-    /// Puts it aside, with what a GPU has as far as it can still be read.
-    pub(crate) fn suspend(mut self) -> SessionState {
-        self.continue_on_cpu();
-        self.film();
-        self.state
+    /// Notes seconds of rendering and the samples taken in them.
+    pub(super) fn spend(&mut self, seconds: f64, samples: u64) {
+        self.figures.render_seconds += seconds;
+        self.here.seconds += seconds;
+        self.here.samples += samples;
     }
+}
 
-    /// Goes on, on the CPU, with what was put aside, in the same world under the same map. A radiance cache that was
-    /// [taken](Self::take_training) is trained anew.
-    pub(crate) fn resume(
-        world: &'a World,
-        environment: &'a Environment,
-        mut state: SessionState,
-    ) -> Self {
-        if state.training.is_none() {
-            state.training = CacheTraining::new(world, environment, &state.view, &state.rays);
-        }
-        Self { world, environment, gpu: None, state }
+impl Spent {
+    /// Seconds of a sample; `None` until there are a thousand.
+    pub(super) fn seconds_per_sample(self) -> Option<f64> {
+        (self.samples > 1000).then(|| self.seconds / self.samples as f64)
     }
 }
 
@@ -98,12 +85,22 @@ impl SessionState {
         self.figures.elapsed_seconds()
     }
 
+    /// [`Self::elapsed_seconds`] as if all samples had been taken on the device at work: another may be tens of
+    /// times as fast. `None` while it is not known what they take there: until each pixel has had two, or so.
+    pub(super) fn comparable_seconds(&self) -> Option<f64> {
+        let Figures { samples, render_seconds, learning_seconds, .. } = self.figures;
+        let rendering = match self.here.samples {
+            here if here >= samples => Some(render_seconds),
+            here if here < 2 * self.view.pixels() => None,
+            _ => self.here.seconds_per_sample().map(|seconds| seconds * samples as f64),
+        };
+        rendering.map(|seconds| learning_seconds + seconds)
+    }
+
     /// Bytes of film, distributions, counters and radiance cache.
     pub(crate) fn memory_bytes(&self) -> usize {
-        let grid = self.learned.as_ref().map_or(0, LightGrid::memory_bytes);
-        let counters = self.learning.as_ref().map_or(0, |l| l.grid.counters.memory_bytes());
         let cache = self.training.as_ref().map_or(0, |_| CacheFacts::memory_bytes());
-        self.film().map_or(0, Film::memory_bytes) + grid + counters + cache
+        self.film().map_or(0, Film::memory_bytes) + self.tiles.memory_bytes() + cache
     }
 }
 
@@ -113,7 +110,7 @@ mod tests {
 
     use super::*;
     use crate::environment::{EnvironmentOptions, sky};
-    use crate::render::{Gi, Sampling};
+    use crate::render::{Gi, Sampling, Session};
     use crate::scene::builtin;
 
     fn lit() -> (World, Environment) {
@@ -129,15 +126,15 @@ mod tests {
         let view = View::new(world.scene.cameras[0].clone(), [24, 16]);
         let mut session = Session::new(&world, &environment, view);
         session.state.figures.learning_seconds = 0.5;
-        session.spend(10.0, 2000);
+        session.state.spend(10.0, 2000);
         session.state.figures.samples = 2000;
         assert_eq!(session.comparable_seconds(), Some(10.5), "all are of this one");
         session.state.here = Spent::default();
         assert_eq!(session.comparable_seconds(), None);
-        session.spend(1.0, 4000);
+        session.state.spend(1.0, 4000);
         session.state.figures.samples = 6000;
         assert_eq!(session.comparable_seconds(), Some(2.0));
-        assert_eq!(session.elapsed_seconds(), 11.5);
+        assert_eq!(session.figures().elapsed_seconds(), 11.5);
     }
 
     #[test]

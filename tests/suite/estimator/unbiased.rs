@@ -163,7 +163,7 @@ fn distributions_made_of_a_pixel_s_own_samples_do_not_bias_it() {
         let finish = |session: &mut Session<'_>| {
             let rule = StopRule { samples: Some(SAMPLES), ..StopRule::default() };
             while session.samples() < SAMPLES {
-                let pass = session.next_pass(&rule);
+                let pass = rule.next_pass(session);
                 session.advance(pass, &AtomicBool::new(false)).expect("the CPU does not fail");
             }
             mean(session.film()).luminance
