@@ -111,24 +111,14 @@ pub fn write_exr(path: &Path, picture: ExrPicture<'_>) -> Result<()> {
 /// Lines of a block in files of [`Compression::ZIP16`].
 const LINES_OF_BLOCK: u64 = 16;
 
-/// Bytes of pixels that are compressed at once, on a machine of many cores.
-const MAX_BATCH_BYTES: u64 = 256 << 20;
-
 /// Copies of a block that exist while it is compressed, with room to spare: raw, reordered twice, and the
 /// compressed bytes, whose list grows by doubling. A debug build of the library also unpacks them again.
 const COPIES_OF_BLOCK: u64 = 8;
 
-/// Blocks that are compressed at once, and the bytes of one.
-fn batch(width: u64, channels: u64) -> (u64, u64) {
-    let bytes = LINES_OF_BLOCK * width * channels * size_of::<f32>() as u64;
-    let threads = rayon::current_num_threads() as u64;
-    ((MAX_BATCH_BYTES / bytes.max(1)).clamp(1, threads), bytes)
-}
-
-/// Bytes that [`write_exr`] takes at most besides the channels' values.
+/// Bytes that [`write_exr`] takes at most besides the channels' values: each thread compresses a block.
 pub(crate) fn exr_encoder_bytes(width: u32, channels: u64) -> u64 {
-    let (blocks, bytes) = batch(width.into(), channels);
-    blocks * bytes * COPIES_OF_BLOCK
+    let block = LINES_OF_BLOCK * u64::from(width) * channels * size_of::<f32>() as u64;
+    block * COPIES_OF_BLOCK * rayon::current_num_threads() as u64
 }
 
 /// Writes all blocks in order, compressed by the threads that there are. The library would start threads of
@@ -142,9 +132,7 @@ fn write_blocks(
     let pixels = layers.create_writer(&headers);
     exr::block::write(file, headers, true, |meta, writer| {
         let blocks: Vec<_> = meta.enumerate_ordered_header_block_indices().collect();
-        let header = &meta.headers[0];
-        let (count, _) = batch(header.layer_size.width() as u64, header.channels.list.len() as u64);
-        for batch in blocks.chunks(count as usize) {
+        for batch in blocks.chunks(rayon::current_num_threads()) {
             let compress = |&(_, index): &(usize, _)| {
                 let data = pixels.extract_uncompressed_block(&meta.headers, index);
                 UncompressedBlock { index, data }.compress_to_chunk(&meta.headers)

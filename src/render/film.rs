@@ -339,19 +339,14 @@ impl Film {
         if self.surfaces.is_empty() {
             return None;
         }
-        let count = self.surfaces.len();
-        let mut layers = SurfaceLayers {
-            albedo: Vec::with_capacity(count),
-            normal: Vec::with_capacity(count),
-            depth: Vec::with_capacity(count),
-        };
-        for (surface, pixel) in self.surfaces.iter().zip(&self.pixels) {
-            let (albedo, normal, depth) = surface.mean(pixel.samples);
-            layers.albedo.push(albedo);
-            layers.normal.push(normal);
-            layers.depth.push(depth);
-        }
-        Some(layers)
+        // Each list gets the room that it takes and no more.
+        let pixels = self.surfaces.iter().zip(&self.pixels);
+        let means = || pixels.clone().map(|(surface, pixel)| surface.mean(pixel.samples));
+        Some(SurfaceLayers {
+            albedo: means().map(|(albedo, _, _)| albedo).collect(),
+            normal: means().map(|(_, normal, _)| normal).collect(),
+            depth: means().map(|(_, _, depth)| depth).collect(),
+        })
     }
 }
 
