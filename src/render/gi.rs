@@ -3,25 +3,13 @@
 use std::ops::Range;
 
 use glam::Vec3;
-use serde::{Deserialize, Serialize};
 
-use super::View;
+use super::view::{Gi, View};
 use super::view_probe::middle_distance;
 use crate::environment::Environment;
 use crate::path::World;
 use crate::path::camera::CameraRays;
 use crate::radiance_cache::{CacheCells, CacheFacts, MAX_PATHS, RadianceCache, RadianceSums};
-
-/// How light that has met several surfaces is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Gi {
-    /// Paths are followed to their end: no error but noise.
-    #[default]
-    Exact,
-    /// Paths end where a radiance cache knows what they would find: less noise, and a few percent of error that stays.
-    Cached,
-}
 
 /// One training path for this many paths rendered; it takes about twice as long as one of them. With
 /// twice as many, means of 8x8 pixels are better for their time by day, pixels worse.

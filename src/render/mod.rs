@@ -24,14 +24,12 @@ pub use driver::Driver;
 #[cfg(feature = "window")]
 pub(crate) use driver::next_beginning;
 pub(crate) use gi::CacheTraining;
-pub use gi::Gi;
 use pass::Pass;
 pub use progress::{Figures, Phase, StopRule};
 #[cfg(feature = "window")]
 pub(crate) use session::SessionState;
 pub use session::{Doubling, Session};
-pub use sharing::Sharing;
-pub use view::{Crop, Sampling, View};
+pub use view::{Crop, Gi, Sampling, Sharing, View};
 
 /// Version of what samples are made of: raised when a picture of the same options and seed is another than before.
 /// Parts and checkpoints of other versions are refused.

@@ -1,28 +1,9 @@
 //! Whether neighbouring pixels share second vertices, and how.
 
-use serde::{Deserialize, Serialize};
-
+use super::view::{Gi, Sampling, Sharing, View};
 use super::view_probe::{ROOM_ENCLOSURE, enclosure};
-use super::{Gi, Sampling, View};
 use crate::path::World;
 use crate::path::sharing::SharedTile;
-
-/// Whether neighbouring pixels share their second vertices ([`crate::path::sharing`]).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Sharing {
-    /// As it suits the scene, the way the map is sampled and the size of the picture.
-    #[default]
-    Auto,
-    /// Each path is one pixel's.
-    Off,
-    /// In tiles of 4x4 pixels, all of which keep their own: less of the noise is shared.
-    #[serde(rename = "4x4")]
-    Small,
-    /// In tiles of 8x8 pixels, of which every fourth keeps its own.
-    #[serde(rename = "8x8")]
-    Large,
-}
 
 /// Least width and height of a picture whose pixels share unasked: in a smaller one a tile is much of
 /// what is seen, and what its pixels have in common shows.

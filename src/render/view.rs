@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use super::filter::PixelFilter;
-use super::{Gi, Sharing};
 use crate::environment::Environment;
 use crate::light_grid::{DistributionOptions, LightGrid};
 use crate::medium::Fog;
@@ -37,6 +36,34 @@ impl Sampling {
             Self::Bsdf => "bsdf",
         }
     }
+}
+
+/// How light that has met several surfaces is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Gi {
+    /// Paths are followed to their end: no error but noise.
+    #[default]
+    Exact,
+    /// Paths end where a radiance cache knows what they would find: less noise, and a few percent of error that stays.
+    Cached,
+}
+
+/// Whether neighbouring pixels share their second vertices ([`crate::path::sharing`]).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sharing {
+    /// As it suits the scene, the way the map is sampled and the size of the picture.
+    #[default]
+    Auto,
+    /// Each path is one pixel's.
+    Off,
+    /// In tiles of 4x4 pixels, all of which keep their own: less of the noise is shared.
+    #[serde(rename = "4x4")]
+    Small,
+    /// In tiles of 8x8 pixels, of which every fourth keeps its own.
+    #[serde(rename = "8x8")]
+    Large,
 }
 
 /// One learning path for this many paths rendered.

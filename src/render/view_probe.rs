@@ -2,7 +2,7 @@
 
 use glam::Vec2;
 
-use super::View;
+use super::view::View;
 use crate::bsdf::cosine_hemisphere;
 use crate::bvh::{Hit, Ray, offset_origin};
 use crate::math::Frame;

@@ -100,9 +100,6 @@ const IN_CIRCLES: &[&str] = &[
     "radiance_cache/sums",
     "render/devices",
     "render/gpu",
-    "render/sharing",
-    "render/view",
-    "render/view_probe",
 ];
 
 /// Files that use an item that the module above them declares. The list is to become shorter.
