@@ -7,7 +7,6 @@ use clap::builder::PossibleValue;
 
 #[cfg(feature = "window")]
 use crate::app::{interface::TileView, overlays::Overlay};
-use crate::denoise::Denoiser;
 use crate::environment::TableKind;
 use crate::output::LayerName;
 use crate::render::filter::PixelFilter;
@@ -133,10 +132,6 @@ choices! {
         Samples = "samples": "Samples per pixel"
         Variance = "variance": "Variance of one sample's luminance"
         All = "all": "All of them"
-    }
-    Denoiser {
-        ATrous = "a-trous": "Our edge-avoiding filter over albedo, normal and depth: fast, always there"
-        Oidn = "oidn": "Intel's Open Image Denoise, if its library is installed"
     }
 }
 

@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<()> {
     for (path, facts) in &parts {
         progress.say(format!("adding part {}", facts.part));
         let (_, film) = read_film(path)?;
-        if picture.wants_surfaces(outputs) && !film.has_layers() {
+        if picture.asks_for_surfaces(outputs) && !film.has_layers() {
             let advice = "render with --layers albedo,normal,depth";
             return Err(Error::at(path, format!("has no albedo, normal and depth: {advice}")));
         }

@@ -20,16 +20,28 @@ pub(super) struct PictureArguments {
     /// Tone curve of .png pictures.
     #[arg(long, default_value = "agx", value_enum, value_name = "CURVE", help_heading = "Picture")]
     tonemap: ToneCurve,
-    /// Takes noise out of .png pictures: a-trous (our own filter) or oidn (Open Image Denoise, if its
-    /// library is installed).
-    #[arg(long, value_enum, value_name = "FILTER", num_args = 0..=1, default_missing_value = "a-trous", help_heading = "Picture")]
-    pub(super) denoise: Option<Denoiser>,
+    /// What takes noise out of .png pictures and videos; unless it is given, the best there is.
+    #[arg(long, value_enum, value_name = "FILTER", num_args = 0..=1, default_missing_value = "best", help_heading = "Picture")]
+    denoise: Option<Denoise>,
     /// The light that looks white in .png pictures: kelvin, and a tint from -1 (green) to 1.
     #[arg(long, value_parser = parse_white, allow_hyphen_values = true, value_name = "K[,TINT]", help_heading = "Picture")]
     white: Option<WhiteBalance>,
     /// Extra layers in .exr pictures: albedo, normal, depth, samples, variance, or all.
     #[arg(long, value_delimiter = ',', value_name = "LAYER", help_heading = "Picture")]
     layers: Vec<LayerName>,
+}
+
+/// What `--denoise` asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Denoise {
+    /// Open Image Denoise where its library is installed, else our own filter.
+    Best,
+    /// Our edge-avoiding filter over albedo, normal and depth: fast, always there.
+    ATrous,
+    /// Intel's Open Image Denoise, or an error.
+    Oidn,
+    /// Nothing: pictures show their noise, and neighbours may share vertices.
+    Off,
 }
 
 /// Stops, or `auto`.
@@ -59,16 +71,37 @@ impl PictureArguments {
     /// Refuses names no picture is written by, and denoisers that are not there.
     pub(super) fn check<'a>(&self, pictures: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
         pictures.into_iter().try_for_each(|path| output::check_extension(path))?;
-        self.denoise.map_or(Ok(()), Denoiser::check)
+        if self.denoise == Some(Denoise::Oidn) { Denoiser::Oidn.check() } else { Ok(()) }
     }
 
-    /// Says what was asked for that none of these pictures holds.
+    /// What takes noise out, where something does.
+    fn denoiser(&self) -> Option<Denoiser> {
+        match self.denoise {
+            None | Some(Denoise::Best) => Some(Denoiser::best()),
+            Some(Denoise::ATrous) => Some(Denoiser::ATrous),
+            Some(Denoise::Oidn) => Some(Denoiser::Oidn),
+            Some(Denoise::Off) => None,
+        }
+    }
+
+    /// Whether a filter was asked for by name.
+    fn asks_for_denoiser(&self) -> bool {
+        self.denoise.is_some_and(|denoise| denoise != Denoise::Off)
+    }
+
+    /// Says what was asked for that none of these pictures holds, and which denoiser was found.
     pub(super) fn say_unused(&self, pictures: &[PathBuf]) {
         if !self.layers.is_empty() && !pictures.iter().any(|path| output::holds_layers(path)) {
             notice("--layers adds nothing: they are written into .exr pictures alone");
         }
-        if self.denoise.is_some() && !self.is_denoised(pictures) {
+        if self.asks_for_denoiser() && !self.is_denoised(pictures) {
             notice("--denoise changes nothing: .exr pictures hold what was rendered");
+        }
+        let is_found = self.denoise != Some(Denoise::Oidn)
+            && self.is_denoised(pictures)
+            && self.denoiser() == Some(Denoiser::Oidn);
+        if is_found {
+            notice("Open Image Denoise takes out the noise (--denoise off keeps it)");
         }
         let is_developed = (self.exposure, self.tonemap) != (Exposure::Auto, ToneCurve::default())
             || self.white.is_some();
@@ -79,9 +112,15 @@ impl PictureArguments {
         }
     }
 
-    /// Whether noise is to be taken out of one of these pictures, or of those that are made of a part.
+    /// Whether noise is to be taken out of one of these pictures or, if a filter was asked for, of those
+    /// that are made of a part.
     pub(super) fn is_denoised<'a>(&self, pictures: impl IntoIterator<Item = &'a PathBuf>) -> bool {
-        self.denoise.is_some() && !pictures.into_iter().all(|path| output::holds_layers(path))
+        let mut pictures = pictures.into_iter();
+        match self.denoise {
+            Some(Denoise::Off) => false,
+            Some(_) => !pictures.all(|path| output::holds_layers(path)),
+            None => pictures.any(|path| output::is_for_display(path)),
+        }
     }
 
     /// Whether albedo, normal and depth are wanted for these pictures.
@@ -89,8 +128,20 @@ impl PictureArguments {
         &self,
         pictures: impl IntoIterator<Item = &'a PathBuf>,
     ) -> bool {
+        self.is_denoised(pictures) || self.asks_for_surface_layers()
+    }
+
+    /// Whether parts that lack albedo, normal and depth cannot make what was asked for.
+    pub(super) fn asks_for_surfaces<'a>(
+        &self,
+        pictures: impl IntoIterator<Item = &'a PathBuf>,
+    ) -> bool {
+        (self.asks_for_denoiser() && self.is_denoised(pictures)) || self.asks_for_surface_layers()
+    }
+
+    fn asks_for_surface_layers(&self) -> bool {
         let is_surface = |l: &LayerName| !matches!(l, LayerName::Samples | LayerName::Variance);
-        self.is_denoised(pictures) || self.layers.iter().any(is_surface)
+        self.layers.iter().any(is_surface)
     }
 
     /// Takes the exposure of a film's picture, to be that of others, too; where noise cannot be taken out, there
@@ -103,7 +154,7 @@ impl PictureArguments {
         if pictures.into_iter().all(|path| output::holds_layers(path)) {
             return;
         }
-        self.exposure = output::exposure_of(&self.options(), film).unwrap_or(self.exposure);
+        self.exposure = output::exposure_of(&self.options(film), film).unwrap_or(self.exposure);
     }
 
     /// The exposure of its pictures.
@@ -116,11 +167,12 @@ impl PictureArguments {
         self.exposure = exposure;
     }
 
-    fn options(&self) -> PictureOptions {
+    /// Without layers a film is denoised only if that was asked for, which then fails with a sentence.
+    fn options(&self, film: &Film) -> PictureOptions {
         PictureOptions {
             exposure: self.exposure,
             tone_curve: self.tonemap,
-            denoiser: self.denoise,
+            denoiser: self.denoiser().filter(|_| film.has_layers() || self.asks_for_denoiser()),
             white_balance: self.white.unwrap_or_default(),
             layers: self.layers.clone(),
         }
@@ -133,7 +185,7 @@ impl PictureArguments {
         film: &Film,
         metadata: &[(String, String)],
     ) -> Result<()> {
-        let options = self.options();
+        let options = self.options(film);
         let Err(failure) = output::write_picture(path, &options, film, metadata.to_vec()) else {
             return Ok(());
         };

@@ -96,6 +96,11 @@ pub fn holds_layers(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
 }
 
+/// Whether a picture's file is made to be looked at, on a display: PNG is.
+pub fn is_for_display(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
+}
+
 /// What a person should know about a finished picture.
 pub fn remarks(film: &Film, environment: &Environment) -> Vec<String> {
     let mut remarks = Vec::new();

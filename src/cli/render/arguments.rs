@@ -416,7 +416,8 @@ mod tests {
             let line = Line::try_parse_from(words.split_whitespace());
             line.map(|line| line.arguments.sharing()).ok()
         };
-        assert_eq!(sharing(""), Some(Sharing::Auto));
+        assert_eq!(sharing("--denoise off"), Some(Sharing::Auto));
+        assert_eq!(sharing(""), Some(Sharing::Off));
         assert_eq!(sharing("--denoise"), Some(Sharing::Off));
         for (name, asked) in
             [("off", Sharing::Off), ("4x4", Sharing::Small), ("8x8", Sharing::Large)]
