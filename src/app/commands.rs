@@ -185,8 +185,14 @@ pub(super) fn asks_for_path(event: &Event) -> bool {
 mod tests {
     use super::*;
 
-    fn key(key: Key, modifiers: Modifiers, repeat: bool) -> Event {
-        Event::Key { key, physical_key: None, pressed: true, repeat, modifiers }
+    fn key(key: Key, modifiers: Modifiers, pressed: bool) -> Event {
+        // egui finds out itself what is a repeat.
+        Event::Key { key, physical_key: None, pressed, repeat: false, modifiers }
+    }
+
+    /// A key pressed and let go.
+    fn tap(code: Key, modifiers: Modifiers) -> [Event; 2] {
+        [true, false].map(|pressed| key(code, modifiers, pressed))
     }
 
     /// What these events of one frame ask for.
@@ -200,25 +206,26 @@ mod tests {
 
     #[test]
     fn a_key_that_is_held_asks_once_but_for_steps_back() {
-        let held = |code, modifiers, repeat| commands_of(&[key(code, modifiers, repeat)]);
-        assert_eq!(held(Key::K, Modifiers::NONE, false), [Command::KeepPicture]);
-        assert_eq!(held(Key::K, Modifiers::NONE, true), []);
-        assert_eq!(held(Key::Z, Modifiers::COMMAND, true), [Command::Undo]);
-        assert_eq!(held(Key::Z, Modifiers::COMMAND | Modifiers::SHIFT, true), [Command::Redo]);
+        let held = |code, modifiers| commands_of(&[(); 2].map(|()| key(code, modifiers, true)));
+        assert_eq!(held(Key::K, Modifiers::NONE), [Command::KeepPicture]);
+        assert_eq!(held(Key::Z, Modifiers::COMMAND), [Command::Undo, Command::Undo]);
+        let redone = held(Key::Z, Modifiers::COMMAND | Modifiers::SHIFT);
+        assert_eq!(redone, [Command::Redo, Command::Redo]);
     }
 
     #[test]
     fn keys_of_one_frame_keep_their_order_and_number() {
-        let plain = |code| key(code, Modifiers::NONE, false);
-        let undo = key(Key::Z, Modifiers::COMMAND, false);
-        assert_eq!(commands_of(&[undo.clone(), undo.clone()]), [Command::Undo, Command::Undo]);
-        let redo = key(Key::Z, Modifiers::COMMAND | Modifiers::SHIFT, false);
-        assert_eq!(commands_of(&[undo, redo]), [Command::Undo, Command::Redo]);
-        let paused = [plain(Key::Space), plain(Key::R)];
+        let plain = |code| tap(code, Modifiers::NONE);
+        let undo = tap(Key::Z, Modifiers::COMMAND);
+        let twice = [undo.clone(), undo.clone()].concat();
+        assert_eq!(commands_of(&twice), [Command::Undo, Command::Undo]);
+        let redo = tap(Key::Z, Modifiers::COMMAND | Modifiers::SHIFT);
+        assert_eq!(commands_of(&[undo, redo].concat()), [Command::Undo, Command::Redo]);
+        let paused = [plain(Key::Space), plain(Key::R)].concat();
         assert_eq!(commands_of(&paused), [Command::TogglePause, Command::Restart]);
-        let twice = [plain(Key::X), plain(Key::X)];
-        assert_eq!(commands_of(&twice), [Command::ToggleRegion, Command::ToggleRegion]);
-        let closed = [plain(Key::Escape), plain(Key::X), key(Key::F, Modifiers::SHIFT, false)];
+        let region = [plain(Key::X), plain(Key::X)].concat();
+        assert_eq!(commands_of(&region), [Command::ToggleRegion, Command::ToggleRegion]);
+        let closed = [plain(Key::Escape), plain(Key::X), tap(Key::F, Modifiers::SHIFT)].concat();
         let expected = [Command::CloseSheets, Command::ToggleRegion, Command::FrameSelected];
         assert_eq!(commands_of(&closed), expected);
     }

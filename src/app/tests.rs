@@ -183,6 +183,10 @@ fn a_paused_picture_goes_on_with_a_map_that_is_read_again() {
         studio.frame().expect("drawn");
         write_picture(&file, &Image::filled(4, 2, [light; 3]));
         studio.asks(asked);
+        // The picture of before may be done meanwhile.
+        while studio.app.assets.loading().next().is_some() {
+            studio.frame().expect("drawn");
+        }
         studio.settle().expect("rendered");
         let snapshot = studio.app.rendering.snapshot.as_ref().expect("it is there");
         assert_eq!(snapshot.request.environment.map().pixels[0], [light; 3]);

@@ -332,7 +332,6 @@ fn cached(ui: &mut Ui, inspected: &Inspected, snapshot: Option<&Snapshot>) {
     };
     let trained = match (cell.samples, cell.samples_around) {
         (0, 0) => "untrained: the global mean is used".to_owned(),
-        (0, around) => format!("untrained: {} samples around it are used", theme::count(around)),
         (own, around) => format!("{} samples, {} around", theme::count(own), theme::count(around)),
     };
     Grid::new("cached").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
