@@ -16,7 +16,8 @@ use builder::{check_consistency, square, textured_material};
 /// File, triangles (instances counted), of which without area, materials used, images used.
 /// The triangles are those the files' index tells; the others were counted from the JSON.
 const FILES: &[(&str, usize, usize, usize, usize)] = &[
-    ("data/interiors/country-kitchen.glb", 1_021_815, 219, 83, 11),
+    // One of its materials of bodies is on a sheet, too.
+    ("data/interiors/country-kitchen.glb", 1_021_815, 219, 84, 11),
     ("data/interiors/home-theater/home-theater.gltf", 7915, 10, 20, 0),
     ("data/interiors/room-anex.glb", 47_402, 0, 16, 15),
     ("data/interiors/white-room-mjp.glb", 132, 4, 1, 0),

@@ -105,6 +105,14 @@ pub(crate) fn square() -> Builder {
     builder
 }
 
+/// The same of a solid: a tetrahedron of four triangles.
+pub(crate) fn solid() -> Builder {
+    let mut builder = Builder::default();
+    builder.floats("VEC3", &[0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1.]);
+    builder.indices(&[0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]);
+    builder
+}
+
 pub(crate) const ONE_MESH: &str =
     r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],"nodes":[{"mesh":0}]"#;
 

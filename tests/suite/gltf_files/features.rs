@@ -9,7 +9,7 @@ use lightgrid::scene::{
     AlphaMode, Medium, Projection, PunctualKind, Scene, TextureSlot, Wrap, gltf,
 };
 
-use super::builder::{Builder, ONE_MESH, SQUARE, square, textured_material};
+use super::builder::{Builder, ONE_MESH, SQUARE, solid, square, textured_material};
 
 fn geometric_normal(scene: &Scene, triangle: usize) -> Vec3 {
     let [a, b, c] = scene.triangles[triangle].map(|v| scene.positions[v as usize]);
@@ -290,13 +290,12 @@ fn morph_targets_move_texture_coordinates_and_colours() {
 #[test]
 fn a_volume_on_a_sheet_is_a_thin_tinted_wall() {
     let mut builder = square();
-    let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]].as_flattened().to_vec();
-    let solid = builder.floats("VEC3", &corners);
+    let corners = builder.floats("VEC3", &[0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1.]);
     let faces = builder.indices(&[0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]);
     let scene = |nodes: &str, transmission: &str| {
         builder.load(&format!(
             r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,"material":0}}]}},
-            {{"primitives":[{{"attributes":{{"POSITION":{solid}}},"indices":{faces},"material":0}}]}}],
+            {{"primitives":[{{"attributes":{{"POSITION":{corners}}},"indices":{faces},"material":0}}]}}],
             "nodes":[{nodes}],"materials":[{{"name":"Syrup","pbrMetallicRoughness":{{"metallicFactor":0}},
             "extensions":{{{transmission},"KHR_materials_volume":{{"thicknessFactor":0.1,
             "attenuationDistance":0.4,"attenuationColor":[0.25,1,0.0625]}}}}}}]"#
@@ -338,7 +337,7 @@ fn extensions_required_used_and_honoured() {
 
 #[test]
 fn material_extensions() {
-    let scene = square().load(
+    let scene = solid().load(
         r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":1}]}],"nodes":[{"mesh":0}],
         "materials":[{"name":"unused"},{"name":"all","emissiveFactor":[1,0.5,0],"extensions":{
         "KHR_materials_emissive_strength":{"emissiveStrength":10},"KHR_materials_ior":{"ior":1.33},
@@ -366,7 +365,7 @@ fn material_extensions() {
 
 #[test]
 fn newer_material_extensions() {
-    let mut builder = square();
+    let mut builder = solid();
     builder.floats("VEC2", &[0., 1., 1., 1., 1., 0., 0., 0.]);
     let load = |extensions: &str| {
         let names = extensions.split('"').filter(|name| name.starts_with("KHR_materials"));
@@ -694,7 +693,7 @@ fn fog_is_read_from_the_scene_a_node_and_a_material() {
     let shape =
         r#""meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}]"#;
     let load = |scene: &str, node: &str, material: &str| {
-        square().load(&format!(
+        solid().load(&format!(
             r#"{shape},"nodes":[{{"mesh":0}},{{"translation":[1,2,3],"scale":[1,2,4]{node}}}],
             "scenes":[{{"nodes":[0,1]{scene}}}],"materials":[{{{material}}}]"#
         ))
