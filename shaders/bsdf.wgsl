@@ -7,6 +7,7 @@ struct Bsdf {
     // The dielectric's largest F0 and its F90.
     f0_f90: vec2f,
     roughness: f32,
+    rescatter: Rescatter,
     sheen: Sheen,
     coat: Coat,
 }
@@ -14,9 +15,12 @@ struct Bsdf {
 // What depends on `wo` alone. All probabilities are zero if nothing is scattered.
 struct Outgoing {
     diffuse_left: f32,
+    // What the interface's single scattering loses.
+    lost: f32,
     coat_probability: f32,
     interface_probability: f32,
     sheen_probability: f32,
+    rescatter_probability: f32,
     diffuse_probability: f32,
 }
 
@@ -61,14 +65,15 @@ fn bsdf_new(p: SurfaceParameters, entering: bool) -> Bsdf {
     if f90 > 0.0 && !diffuse_is_absent(b.diffuse) {
         b.diffuse = diffuse_let_in(b.diffuse, bsdf_let_in(b));
     }
+    b.rescatter = rescatter_new(p, b.interface_);
     b.sheen = sheen_new(p, entering);
     b.coat = coat_new(p, entering);
     return b;
 }
 
 fn bsdf_is_delta_only(b: Bsdf) -> bool {
-    return diffuse_is_absent(b.diffuse) && interface_is_delta_or_absent(b.interface_)
-        && sheen_is_hidden(b.sheen) && coat_is_delta_or_absent(b.coat);
+    return diffuse_is_absent(b.diffuse) && rescatter_is_absent(b.rescatter)
+        && interface_is_delta_or_absent(b.interface_) && sheen_is_hidden(b.sheen) && coat_is_delta_or_absent(b.coat);
 }
 
 // What the interface lets in on average.
@@ -87,6 +92,13 @@ fn bsdf_diffuse_left_at(b: Bsdf, v: vec3f) -> f32 {
     return bsdf_diffuse_left(b, terms_towards(b.interface_.ggx, b.roughness, v));
 }
 
+fn rescatter_lost_or_none(b: Bsdf, v: vec3f) -> f32 {
+    if rescatter_is_absent(b.rescatter) {
+        return 0.0;
+    }
+    return rescatter_lost(b.rescatter, b.interface_, v);
+}
+
 // What coat and sheen leave of the base's light between two directions.
 fn bsdf_left_by_layers(b: Bsdf, wo: vec3f, wi: vec3f) -> f32 {
     return coat_attenuation(b.coat, wo) * coat_attenuation(b.coat, wi)
@@ -100,7 +112,9 @@ fn bsdf_outgoing(b: Bsdf, wo: vec3f) -> Outgoing {
     }
     let has_diffuse = !diffuse_is_absent(b.diffuse);
     let has_interface = !interface_is_absent(b.interface_);
-    if coat_is_absent(b.coat) && sheen_is_absent(b.sheen) && !(has_diffuse && has_interface) {
+    let has_one_lobe = coat_is_absent(b.coat) && sheen_is_absent(b.sheen)
+        && rescatter_is_absent(b.rescatter) && !(has_diffuse && has_interface);
+    if has_one_lobe {
         out.diffuse_left = 1.0;
         out.interface_probability = select(0.0, 1.0, has_interface);
         out.diffuse_probability = select(0.0, 1.0, has_diffuse);
@@ -114,7 +128,9 @@ fn bsdf_outgoing(b: Bsdf, wo: vec3f) -> Outgoing {
     let interface_share = base * importance(interface_albedo(b.interface_, wo.z, terms));
     let sheen = under * importance(sheen_colored_albedo(b.sheen, wo));
     let diffuse = base * diffuse_left * importance(diffuse_sum(b.diffuse));
-    let sum = coat + interface_share + sheen + diffuse;
+    out.lost = rescatter_lost_or_none(b, wo);
+    let rescatter = base * importance(rescatter_sum(b.rescatter)) * out.lost;
+    let sum = coat + interface_share + sheen + rescatter + diffuse;
     if !(sum > 0.0) {
         return out;
     }
@@ -122,6 +138,7 @@ fn bsdf_outgoing(b: Bsdf, wo: vec3f) -> Outgoing {
     out.coat_probability = coat / sum;
     out.interface_probability = interface_share / sum;
     out.sheen_probability = sheen / sum;
+    out.rescatter_probability = rescatter / sum;
     out.diffuse_probability = diffuse / sum;
     return out;
 }
@@ -138,6 +155,11 @@ fn bsdf_eval_pdf_with(b: Bsdf, wo: vec3f, wi: vec3f, out: Outgoing) -> EvalPdf {
         let lobe = interface_eval_pdf(b.interface_, wo, wi);
         result.value += lobe.value;
         result.pdf_solid_angle += out.interface_probability * lobe.pdf_solid_angle;
+    }
+    if !rescatter_is_absent(b.rescatter) {
+        let lobe = rescatter_eval_pdf(b.rescatter, b.interface_, out.lost, wi);
+        result.value += lobe.value;
+        result.pdf_solid_angle += out.rescatter_probability * lobe.pdf_solid_angle;
     }
     if !sheen_is_absent(b.sheen) {
         result.value *= sheen_left(b.sheen, wo, wi);
@@ -175,7 +197,7 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
     var result = BsdfSample(vec3f(0.0), vec3f(0.0), 0.0, false);
     let out = bsdf_outgoing(b, wo);
     let any_probability = out.coat_probability + out.interface_probability
-        + out.sheen_probability + out.diffuse_probability;
+        + out.sheen_probability + out.rescatter_probability + out.diffuse_probability;
     var lobe = NO_SAMPLE;
     let choice = u.x - out.coat_probability;
     if any_probability <= 0.0 {
@@ -190,8 +212,15 @@ fn bsdf_sample(b: Bsdf, wo: vec3f, u: vec3f) -> BsdfSample {
         if !sheen_is_absent(b.sheen) && rest < out.sheen_probability {
             lobe = LobeSample(SPREAD, sheen_sample(u.yz), vec3f(0.0));
         } else {
-            let within = (rest - out.sheen_probability) / out.diffuse_probability;
-            lobe = LobeSample(SPREAD, diffuse_sample(b.diffuse, within, u.yz), vec3f(0.0));
+            let of_two = rest - out.sheen_probability;
+            if !rescatter_is_absent(b.rescatter) && of_two < out.rescatter_probability {
+                let within = of_two / out.rescatter_probability;
+                let wi = rescatter_sample(b.rescatter, within, u.yz);
+                lobe = LobeSample(SPREAD, wi, vec3f(0.0));
+            } else {
+                let within = (of_two - out.rescatter_probability) / out.diffuse_probability;
+                lobe = LobeSample(SPREAD, diffuse_sample(b.diffuse, within, u.yz), vec3f(0.0));
+            }
         }
     }
     if lobe.kind == SPREAD {
@@ -227,7 +256,8 @@ fn bsdf_albedo(b: Bsdf) -> vec3f {
         * (bsdf_diffuse_left(b, terms) * bsdf_let_in(b));
     let interface_share = interface_albedo(b.interface_, 1.0, terms)
         + interface_straight_transmittance(b.interface_, 1.0);
-    let base = (diffuse + interface_share) * sheen_left(b.sheen, up, SHEEN_TYPICAL);
+    let rescattered = rescatter_albedo(b.rescatter, b.interface_) * rescatter_lost_or_none(b, up);
+    let base = (diffuse + interface_share + rescattered) * sheen_left(b.sheen, up, SHEEN_TYPICAL);
     let under = coat_attenuation(b.coat, up);
     let under_coat = under * under * (sheen_colored_albedo(b.sheen, up) + base);
     return saturate(coat_albedo(b.coat, up) + under_coat);

@@ -57,6 +57,15 @@ pub(super) struct Interface {
     under_film: [(Vec3, f32); 2],
 }
 
+/// Glass that spreads what it lets through.
+pub(super) struct RoughGlass {
+    pub(super) thin: bool,
+    /// Index of refraction on the far side over this side.
+    pub(super) eta: f32,
+    /// Reflectance and transmittance at normal incidence.
+    pub(super) normal: (Vec3, f32),
+}
+
 impl Interface {
     /// `f0` and `f90` are the dielectric's at normal and grazing incidence.
     pub(super) fn new(p: &SurfaceParameters, f0: Vec3, f90: f32, entering: bool) -> Self {
@@ -139,6 +148,20 @@ impl Interface {
 
     fn is_smooth(&self) -> bool {
         self.ggx.is_smooth()
+    }
+
+    /// Whether there is metal that is no mirror.
+    pub(super) fn is_rough_metal(&self, p: &SurfaceParameters) -> bool {
+        p.metallic > 0.0 && !self.is_smooth()
+    }
+
+    /// The glass, if it is spread on its way through.
+    pub(super) fn rough_glass(&self) -> Option<RoughGlass> {
+        (self.glass > 0.0 && !self.transmits_delta()).then(|| RoughGlass {
+            thin: self.thin,
+            eta: self.eta,
+            normal: self.glass_at(1.0, self.eta),
+        })
     }
 
     /// The microfacets.

@@ -7,8 +7,8 @@
 //! Where glTF's sample formulas gain energy or are not reciprocal, they are replaced (the
 //! specification allows it): the body gets what the interface leaves over in both directions
 //! (`albedo`), and the coat attenuates what is under it on the way in and on the way out. With
-//! `specular = 0` a dielectric is exactly Lambert's `base_color / pi`; a metal is exactly
-//! `F D G / (4 cos cos)` with Schlick's Fresnel and single scattering.
+//! `specular = 0` a dielectric is exactly Lambert's `base_color / pi`; a metal is `F D G / (4 cos cos)`
+//! with Schlick's Fresnel, and what its microfacets scatter more than once (`rescatter`).
 //!
 //! A point's scattering is `Bsdf::new(&point.parameters, point.front_face)`.
 //!
@@ -23,6 +23,7 @@ pub(crate) mod fresnel;
 pub(crate) mod interface;
 pub(crate) mod iridescence;
 pub(crate) mod microfacet;
+pub(crate) mod rescatter;
 pub(crate) mod sheen;
 
 use glam::{Vec2, Vec3};
@@ -35,6 +36,7 @@ use coat::Coat;
 use diffuse::Diffuse;
 use fresnel::normal_reflectance;
 use interface::Interface;
+use rescatter::Rescatter;
 use sheen::Sheen;
 
 /// A direction drawn by [`Bsdf::sample`].
@@ -88,6 +90,8 @@ impl Hero {
 pub struct Bsdf {
     interface: Interface,
     diffuse: Diffuse,
+    /// `None` if nothing is scattered more than once.
+    rescatter: Option<Rescatter>,
     sheen: Sheen,
     coat: Coat,
     /// There is nothing but Lambert's reflection: what most walls are, and cheap.
@@ -108,9 +112,12 @@ pub(crate) struct ViewedBsdf<'a> {
 #[derive(Debug, Clone, Copy)]
 struct Outgoing {
     diffuse_left: f32,
+    /// What the interface's single scattering loses.
+    lost: f32,
     coat_probability: f32,
     interface_probability: f32,
     sheen_probability: f32,
+    rescatter_probability: f32,
     diffuse_probability: f32,
 }
 
@@ -125,10 +132,11 @@ impl Bsdf {
         let f0_f90 = Vec2::new(interface.largest_f0(p, f0), f90);
         let terms = AlbedoTerms::of(interface.ggx(), p.roughness);
         let diffuse = Diffuse::new(p, f0_f90, terms, &interface);
+        let rescatter = Rescatter::new(p, terms, &interface);
         let (sheen, coat) = (Sheen::new(p, entering), Coat::new(p, entering));
         let is_lambert =
             diffuse.is_lambert() && interface.is_absent() && sheen.is_absent() && coat.is_absent();
-        Self { interface, diffuse, sheen, coat, is_lambert }
+        Self { interface, diffuse, rescatter, sheen, coat, is_lambert }
     }
 
     /// The same for a path of which one channel stands for all if a dispersive solid refracts it.
@@ -188,6 +196,7 @@ impl Bsdf {
     /// sampling lights at this point is useless.
     pub fn is_delta_only(&self) -> bool {
         self.diffuse.is_absent()
+            && self.rescatter.is_none()
             && self.interface.is_delta_or_absent()
             && self.sheen.is_hidden()
             && self.coat.is_delta_or_absent()
@@ -202,7 +211,9 @@ impl Bsdf {
         let diffuse = self.diffuse.albedo(self.diffuse.left_of(terms), scale);
         let interface =
             self.interface.albedo(1.0, terms) + self.interface.straight_transmittance(1.0);
-        let base = self.sheen.left(up, Sheen::TYPICAL) * (diffuse + interface);
+        let rescattered = self.rescatter.as_ref();
+        let rescattered = rescattered.map_or(Vec3::ZERO, |lobe| lobe.albedo(lobe.lost(up), scale));
+        let base = self.sheen.left(up, Sheen::TYPICAL) * (diffuse + interface + rescattered);
         let under = self.coat.attenuation(up);
         let under = under * under * (self.sheen.colored_albedo(up) + base);
         (self.coat.albedo(up) + under).clamp(Vec3::ZERO, Vec3::ONE)
@@ -219,6 +230,11 @@ impl Bsdf {
             let (interface, interface_pdf) = self.interface.eval_pdf(wo, wi);
             value += interface;
             pdf += out.interface_probability * interface_pdf;
+        }
+        if let Some(rescatter) = &self.rescatter {
+            let (rescattered, rescatter_pdf) = rescatter.eval_pdf(out.lost, wi);
+            value += rescattered;
+            pdf += out.rescatter_probability * rescatter_pdf;
         }
         if !self.sheen.is_absent() {
             value *= self.sheen.left(wo, wi);
@@ -250,15 +266,17 @@ impl Bsdf {
         if wo.z.is_nan() || wo.z <= 0.0 {
             return None;
         }
-        if self.coat.is_absent() && self.sheen.is_absent() {
+        if self.coat.is_absent() && self.sheen.is_absent() && self.rescatter.is_none() {
             // One lobe, or none, needs no albedos.
             let (diffuse, interface) = (!self.diffuse.is_absent(), !self.interface.is_absent());
             if !(diffuse && interface) {
                 return (diffuse || interface).then(|| Outgoing {
                     diffuse_left: 1.0,
+                    lost: 0.0,
                     coat_probability: 0.0,
                     interface_probability: f32::from(interface),
                     sheen_probability: 0.0,
+                    rescatter_probability: 0.0,
                     diffuse_probability: f32::from(diffuse),
                 });
             }
@@ -271,12 +289,16 @@ impl Bsdf {
         let interface = base * importance(self.interface.albedo(wo.z, terms));
         let sheen = under * importance(self.sheen.colored_albedo(wo));
         let diffuse = base * diffuse_left * self.diffuse.importance();
-        let sum = coat + interface + sheen + diffuse;
+        let lost = self.rescatter.as_ref().map_or(0.0, |rescatter| rescatter.lost(wo));
+        let rescatter = self.rescatter.as_ref().map_or(0.0, |r| base * r.importance(lost));
+        let sum = coat + interface + sheen + rescatter + diffuse;
         (sum > 0.0).then(|| Outgoing {
             diffuse_left,
+            lost,
             coat_probability: coat / sum,
             interface_probability: interface / sum,
             sheen_probability: sheen / sum,
+            rescatter_probability: rescatter / sum,
             diffuse_probability: diffuse / sum,
         })
     }
@@ -322,8 +344,16 @@ impl<'a> ViewedBsdf<'a> {
             if choice < out.sheen_probability {
                 LobeSample::Spread(Sheen::sample(direction))
             } else {
-                let choice = (choice - out.sheen_probability) / out.diffuse_probability;
-                LobeSample::Spread(bsdf.diffuse.sample(choice, direction))
+                let choice = choice - out.sheen_probability;
+                LobeSample::Spread(match &bsdf.rescatter {
+                    Some(rescatter) if choice < out.rescatter_probability => {
+                        rescatter.sample(choice / out.rescatter_probability, direction)
+                    }
+                    _ => {
+                        let choice = choice - out.rescatter_probability;
+                        bsdf.diffuse.sample(choice / out.diffuse_probability, direction)
+                    }
+                })
             }
         };
         match lobe {

@@ -58,6 +58,10 @@ bitflags::bitflags! {
         const COATED_EMITTERS = 1 << 22;
         /// Meshes that instances share.
         const INSTANCES = 1 << 23;
+        /// Metals that are no mirrors: their microfacets scatter light more than once.
+        const ROUGH_METALS = 1 << 24;
+        /// Glass that spreads what it lets through, likewise.
+        const ROUGH_GLASS = 1 << 25;
     }
 }
 
@@ -85,7 +89,7 @@ pub struct SceneNeeds {
 }
 
 /// A feature of scenes, what it is called, and what is left out without it, with the reason.
-const WORDS: [(SceneFeatures, &str, Option<&str>); 24] = {
+const WORDS: [(SceneFeatures, &str, Option<&str>); 26] = {
     use SceneFeatures as S;
     [
         (S::TEXTURES, "Textures", Some("texture reads: no material has a texture")),
@@ -136,6 +140,16 @@ const WORDS: [(SceneFeatures, &str, Option<&str>); 24] = {
         ),
         (S::COATED_EMITTERS, "Emissive triangles under a clearcoat", None),
         (S::INSTANCES, "Meshes shared by instances", None),
+        (
+            S::ROUGH_METALS,
+            "Multiple scattering of rough metal",
+            Some("multiple scattering of metal: no metal is rough"),
+        ),
+        (
+            S::ROUGH_GLASS,
+            "Multiple scattering of rough glass",
+            Some("multiple scattering of glass: no glass is rough"),
+        ),
     ]
 };
 
@@ -164,6 +178,7 @@ impl SceneNeeds {
             *texture_slots |= 1 << slot;
         }
         let has_inside = m.has_inside();
+        let is_rough = m.roughness > 0.0 || m.anisotropy > 0.0;
         for (feature, is_needed) in [
             (S::TEXTURES, m.textures.iter().any(Option::is_some)),
             (S::SECOND_UV_SET, m.textures.iter().flatten().any(|texture| texture.uv_set == 1)),
@@ -185,6 +200,8 @@ impl SceneNeeds {
             (S::UNLIT, m.unlit),
             (S::EMITTERS, is_emitter(m)),
             (S::COATED_EMITTERS, is_emitter(m) && m.clearcoat > 0.0),
+            (S::ROUGH_METALS, is_rough && m.metallic > 0.0),
+            (S::ROUGH_GLASS, is_rough && m.transmission > 0.0),
         ] {
             features.set(feature, is_needed || features.contains(feature));
         }

@@ -6,7 +6,9 @@ mod sampling;
 mod surfaces;
 mod textures;
 
-use glam::{Vec2, Vec3};
+use std::f64::consts::{FRAC_1_PI, TAU};
+
+use glam::{DVec3, Vec2, Vec3};
 use lightgrid::bsdf::SurfaceParameters;
 use lightgrid::sampler::SplitMix;
 
@@ -143,6 +145,43 @@ fn cases() -> Vec<(&'static str, SurfaceParameters, bool)> {
         cases.push(("brushed glass", brushed(0.4, GLASS), entering));
     }
     cases
+}
+
+/// glTF 2.0 appendix B.3 of a metal with GGX of this squared alpha: `F D V cos i`, written out in f64.
+fn ggx_metal(a2: f64, f0: f64) -> impl Fn(DVec3, DVec3) -> f64 {
+    move |o, i| {
+        let h = (o + i).normalize();
+        let d = FRAC_1_PI * a2 / (h.z * h.z * (a2 - 1.0) + 1.0).powi(2);
+        let visible = |c: f64| 1.0 / (c + (a2 + (1.0 - a2) * c * c).sqrt());
+        (f0 + (1.0 - f0) * (1.0 - o.dot(h)).powi(5)) * d * visible(o.z) * visible(i.z) * i.z
+    }
+}
+
+/// Share of white light that a surface of this `f(o, i) * cos i` sends towards `o` by single scattering.
+fn scattered_once(f: impl Fn(DVec3, DVec3) -> f64, o: DVec3, steps: u32) -> f64 {
+    let mid = |i: u32| (f64::from(i) + 0.5) / f64::from(steps);
+    let places = (0..steps).flat_map(|i| (0..steps).map(move |j| (mid(i), mid(j))));
+    let sum: f64 = places.map(|(cos, turn)| f(o, upper(cos, turn))).sum();
+    sum * TAU / f64::from(steps * steps)
+}
+
+/// What is scattered more than once, times `cos i`, by Kulla and Conty's formula in f64 for the single
+/// scattering `f` of a white metal and the F0 of a coloured one.
+fn scattered_again(f: impl Fn(DVec3, DVec3) -> f64, f0: f64, o: DVec3, i: DVec3) -> f64 {
+    let lost = |v: DVec3, steps: u32| 1.0 - scattered_once(&f, v, steps);
+    let mid = |n: u32| (f64::from(n) + 0.5) / 16.0;
+    let mean: f64 = (0..256)
+        .map(|n| (mid(n / 16), mid(n % 16)))
+        .map(|(cos, turn)| 2.0 * cos * lost(upper(cos, turn), 64) / 256.0)
+        .sum();
+    let fresnel = f0 + (1.0 - f0) / 21.0;
+    let color = fresnel * fresnel * (1.0 - mean) / (1.0 - fresnel * mean);
+    color * lost(o, 128) * lost(i, 128) / mean * i.z * FRAC_1_PI
+}
+
+fn upper(cos: f64, turn: f64) -> DVec3 {
+    let sin = (1.0 - cos * cos).sqrt();
+    DVec3::new(sin * (TAU * turn).cos(), sin * (TAU * turn).sin(), cos)
 }
 
 fn viewers() -> impl Iterator<Item = Vec3> {

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::layout::{DIRECTIONAL_LIGHT, NO_TEXTURE, PUNCTUAL_WORDS, SPOT_LIGHT};
 use super::layout::{material_flags as material, texture_flags};
-use crate::bsdf::{albedo, coat, interface, microfacet, sheen};
+use crate::bsdf::{albedo, coat, interface, microfacet, rescatter, sheen};
 use crate::light_grid::{WHOLE_MAP, cells, counters};
 use crate::path::{self, cached, light_tree, sharing, train};
 use crate::radiance_cache as cache;
@@ -95,6 +95,10 @@ constants! {
     PAIRS_OF_ESTIMATES: sampler::PAIRS_OF_ESTIMATES,
     PARTIAL: material::PARTIAL,
     PUNCTUAL_WORDS: PUNCTUAL_WORDS,
+    RESCATTER_INDEX: rescatter::MAX_INDEX,
+    RESCATTER_INDICES: rescatter::INDICES,
+    RESCATTER_MIN_LOSS: rescatter::MIN_LOSS,
+    RESCATTER_NODES: rescatter::NODES,
     ROULETTE_AFTER: path::ROULETTE_AFTER,
     ROULETTE_MILDNESS: path::ROULETTE_MILDNESS,
     SHADOW_RAY_SHARE: path::SHADOW_RAY_SHARE,

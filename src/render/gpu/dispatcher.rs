@@ -18,7 +18,7 @@ use super::pipeline::Programs;
 use super::progress::Tiles;
 use super::shader::{Constants, Program};
 use super::uploaded_scene::{UploadedScene, put_array};
-use crate::bsdf::{albedo, sheen};
+use crate::bsdf::{albedo, rescatter, sheen};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::path::World;
@@ -194,6 +194,10 @@ fn upload_tables(
     constants.sheen_at = texels.len() as u32;
     if features.scene.contains(SceneFeatures::SHEEN) {
         texels.extend(sheen::texels());
+    }
+    constants.rescatter_at = texels.len() as u32;
+    if features.scene.contains(SceneFeatures::ROUGH_GLASS) {
+        texels.extend(rescatter::texels());
     }
     constants.filter_at = texels.len() as u32;
     texels.extend(view.filter.cumulative().iter().map(|&sum| [sum, 0.0, 0.0, 0.0]));

@@ -254,6 +254,11 @@ impl Features {
         !self.kernel.contains(KernelFeatures::HARDWARE_RAYS)
     }
 
+    /// Microfacets of some surface scatter light more than once.
+    pub(super) fn rescatters(&self) -> bool {
+        self.scene.intersects(SceneFeatures::ROUGH_METALS | SceneFeatures::ROUGH_GLASS)
+    }
+
     /// Tangents of vertices.
     pub(super) fn tangents(&self) -> bool {
         self.scene.intersects(SceneFeatures::ANISOTROPY | SceneFeatures::NORMAL_MAPS)

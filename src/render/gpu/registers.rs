@@ -149,8 +149,9 @@ fn program_of(world: &World, kernel: Kernel, features: Features) -> Program {
         textures_in_scene: world.needs.texture_slots,
         albedo_at: 0,
         sheen_at: 4096,
-        filter_at: 8192,
-        rows_at: 12288,
+        rescatter_at: 8192,
+        filter_at: 12288,
+        rows_at: 16384,
         shared_tile: None,
     };
     let in_buffers = ARRAYS.map(|array| array.name).into();

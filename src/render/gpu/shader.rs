@@ -26,6 +26,7 @@ pub(crate) struct Constants {
     /// Texels of `tables` at which each begins.
     pub(crate) albedo_at: u32,
     pub(crate) sheen_at: u32,
+    pub(crate) rescatter_at: u32,
     pub(crate) filter_at: u32,
     pub(crate) rows_at: u32,
     /// How pixels share, if they do.
@@ -215,6 +216,7 @@ impl Program {
             textures_in_scene,
             albedo_at,
             sheen_at,
+            rescatter_at,
             filter_at,
             rows_at,
             shared_tile,
@@ -229,6 +231,7 @@ impl Program {
             ("TEXTURES_IN_SCENE", textures_in_scene),
             ("ALBEDO_AT", albedo_at),
             ("SHEEN_AT", sheen_at),
+            ("RESCATTER_AT", rescatter_at),
             ("FILTER_AT", filter_at),
             ("ROWS_AT", rows_at),
         ]);
@@ -288,7 +291,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 64] {
+fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 66] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -319,6 +322,8 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 64] {
         (wgsl!("glass"), is_clear),
         (wgsl!("no_glass"), !is_clear),
         (wgsl!("interface"), true),
+        (wgsl!("rescatter"), features.rescatters()),
+        (wgsl!("no_rescatter"), !features.rescatters()),
         (wgsl!("diffuse"), !is_translucent),
         (wgsl!("translucent"), is_translucent),
         (wgsl!("coat"), scene.contains(SceneFeatures::CLEARCOAT)),

@@ -7,7 +7,8 @@ use lightgrid::bsdf::{Bsdf, SurfaceParameters};
 use lightgrid::sampler::SplitMix;
 
 use super::{
-    BLACK, GLASS, METAL, PANE, PLASTIC, Random, WHITE, cases, colored, spherical, viewers,
+    BLACK, GLASS, METAL, PANE, PLASTIC, Random, WHITE, cases, colored, ggx_metal, scattered_again,
+    spherical, viewers,
 };
 
 #[test]
@@ -110,7 +111,20 @@ fn white_surfaces_never_gain_energy() {
         let wo = spherical(pick(&[1.0, 0.6, 0.3, 0.1, 0.01]), 1.0);
         let (energy, error) = furnace(&parameters, entering, wo, 4000);
         worst = worst.max(energy - 4.0 * error);
-        assert!(energy < 1.004 + 4.0 * error, "{energy}+-{error} {entering} {wo} {parameters:?}");
+        // The tables of rough metal and glass are within 1 %, those of stretched ones within 3 %.
+        let rescatters = parameters.metallic > 0.0 || parameters.transmission > 0.0;
+        let stretched = rescatters && parameters.anisotropy > 0.0;
+        let tolerance = if stretched {
+            0.03
+        } else if rescatters {
+            0.01
+        } else {
+            0.004
+        };
+        assert!(
+            energy < 1.0 + tolerance + 4.0 * error,
+            "{energy}+-{error} {entering} {wo} {parameters:?}"
+        );
     }
     println!("most energy beyond doubt: {worst}");
 }
@@ -118,9 +132,28 @@ fn white_surfaces_never_gain_energy() {
 #[test]
 fn lossless_surfaces_lose_nothing() {
     let smooth = |p| SurfaceParameters { roughness: 0.0, ..p };
+    let rough = |roughness, p| SurfaceParameters { roughness, ..p };
+    let brushed = SurfaceParameters { anisotropy: 0.6, ..METAL };
     for wo in viewers() {
         for entering in [true, false] {
             for (name, parameters, count, tolerance) in [
+                ("metal of roughness 0.25", rough(0.25, METAL), 40_000, 0.01),
+                ("metal of roughness 0.5", METAL, 40_000, 0.01),
+                ("metal of roughness 0.75", rough(0.75, METAL), 40_000, 0.01),
+                ("metal of roughness 1", rough(1.0, METAL), 40_000, 0.01),
+                ("brushed metal", brushed, 40_000, 0.03),
+                ("brushed rough metal", rough(0.8, brushed), 40_000, 0.03),
+                ("frosted glass", rough(0.3, GLASS), 40_000, 0.01),
+                ("rough glass", rough(0.6, GLASS), 40_000, 0.01),
+                ("roughest glass", rough(1.0, GLASS), 40_000, 0.01),
+                (
+                    "rough dense glass",
+                    SurfaceParameters { ior: 2.2, ..rough(0.8, GLASS) },
+                    40_000,
+                    0.01,
+                ),
+                ("frosted pane", rough(0.5, PANE), 40_000, 0.01),
+                ("roughest pane", rough(1.0, PANE), 40_000, 0.01),
                 ("lambert", WHITE, 1000, 1e-5),
                 ("glass", smooth(GLASS), 1000, 1e-5),
                 ("pane", smooth(PANE), 1000, 1e-5),
@@ -167,25 +200,23 @@ fn lambert_is_exact() {
     assert_eq!(bsdf.albedo(), color);
 }
 
-/// glTF 2.0 appendix B.3: `F D V`, written out in f64.
+/// glTF 2.0 appendix B.3, `F D V`, and what is scattered more than once, written out in f64.
 #[test]
 fn metal_is_the_specified_formula() {
     let parameters = colored(METAL);
     let bsdf = Bsdf::new(&parameters, true);
     let a2 = f64::from(parameters.roughness).powi(4);
+    let single = |f0| ggx_metal(a2, f0);
+    let f0 = f64::from(parameters.base_color.y);
     let mut random = Random(SplitMix(8));
-    for _ in 0..200 {
+    for _ in 0..40 {
         let [wo, wi] = [random.direction(), random.direction()]
             .map(|d| Vec3::new(d.x, d.y, d.z.abs().max(0.05)).normalize());
-        let h = (wo + wi).normalize();
-        let [o, i, n_h, o_h] = [wo.z, wi.z, h.z, wo.dot(h)].map(f64::from);
-        let d = a2 / (std::f64::consts::PI * (n_h * n_h * (a2 - 1.0) + 1.0).powi(2));
-        let visible = |c: f64| 1.0 / (c + (a2 + (1.0 - a2) * c * c).sqrt());
-        let f0 = f64::from(parameters.base_color.y);
-        let f = f0 + (1.0 - f0) * (1.0 - o_h).powi(5);
-        let expected = f * d * visible(o) * visible(i) * i;
+        let (o, i) = (wo.as_dvec3(), wi.as_dvec3());
+        let (once, again) = (single(f0)(o, i), scattered_again(single(1.0), f0, o, i));
         let value = f64::from(bsdf.eval(wo, wi).y);
-        assert!((value - expected).abs() < 1e-4 * expected + 1e-6, "{value} {expected}");
+        let tolerance = 1e-4 * once + 0.01 * i.z * f64::from(FRAC_1_PI);
+        assert!((value - once - again).abs() < tolerance, "{value} {once} {again}");
     }
 }
 

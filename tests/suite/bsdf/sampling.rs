@@ -2,12 +2,12 @@
 
 use std::f32::consts::TAU;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use lightgrid::bsdf::Bsdf;
 use lightgrid::metrics::hypothesis::chi_square_test;
 use lightgrid::sampler::SplitMix;
 
-use super::{METAL, PANE, Random, WHITE, cases, spherical, viewers};
+use super::{METAL, PANE, Random, WHITE, cases, ggx_metal, scattered_once, spherical, viewers};
 
 const ROWS: usize = 32;
 const COLUMNS: usize = 32;
@@ -94,11 +94,15 @@ fn densities_integrate_to_known_totals() {
         let total: f64 = integrate_cells(|wi| lambert.pdf_solid_angle(wo, wi)).iter().sum();
         assert!((total - 1.0).abs() < 1e-4, "{total}");
     }
-    // Facing GGX, the share of normals beyond 45 degrees mirrors below the horizon.
-    for parameters in [METAL, PANE] {
+    // Facing GGX, the share of normals beyond 45 degrees mirrors below the horizon. A lobe is chosen in
+    // proportion to its albedo: of glass that is all, of metal what single scattering leaves.
+    for (parameters, is_metal) in [(METAL, true), (PANE, false)] {
         let bsdf = Bsdf::new(&parameters, true);
         let total: f64 = integrate_cells(|wi| bsdf.pdf_solid_angle(Vec3::Z, wi)).iter().sum();
-        let expected = 1.0 / (1.0 + f64::from(parameters.roughness).powi(4));
+        let a2 = f64::from(parameters.roughness).powi(4);
+        let lost = 1.0 - scattered_once(ggx_metal(a2, 1.0), DVec3::Z, 256);
+        let again = lost / if is_metal { 1.0 } else { 1.0 + lost };
+        let expected = (1.0 - again) / (1.0 + a2) + again;
         assert!((total - expected).abs() < 1e-3, "{total} {expected}");
     }
 }

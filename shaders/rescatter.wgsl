@@ -1,0 +1,169 @@
+// Light that rough metal and glass scatter more than once: twin of src/bsdf/rescatter.rs.
+
+struct Rescatter {
+    // Share of the lost light that leaves on this side, by colour.
+    reflected: vec3f,
+    // Across the axis of the interface.
+    roughness: f32,
+    // One over the mean of what is lost on this side.
+    inverse_mean: f32,
+//#if ROUGH_GLASS
+    // The same on the far side.
+    inverse_mean_far: f32,
+    transmitted: vec3f,
+    // Probability of choosing the far side.
+    through: f32,
+//#end
+}
+
+fn rescatter_new(p: SurfaceParameters, i: Interface) -> Rescatter {
+    var r: Rescatter;
+    r.roughness = p.roughness;
+    if is_smooth(i.ggx) {
+        return r;
+    }
+    if p.metallic > 0.0 {
+        let terms = terms_mean(i.ggx, p.roughness);
+        r.inverse_mean = 1.0 / max(1.0 - (terms.x + terms.y), RESCATTER_MIN_LOSS);
+        r.reflected = metal_color(p.base_color, terms) * p.metallic;
+    }
+//#if ROUGH_GLASS
+    if i.glass.share > 0.0 && !transmits_delta(i) {
+        let share = (1.0 - p.metallic) * p.transmission;
+        r.inverse_mean = 1.0 / mean_loss(i, p.roughness, false);
+        r.inverse_mean_far = 1.0 / mean_loss(i, p.roughness, true);
+        if i.glass.thin {
+            let normal = glass_at(i, 1.0, i.glass.eta);
+            r.reflected += share * normal.xyz;
+            r.transmitted = p.base_color * (share * normal.w);
+        } else {
+            let squared_index = i.glass.eta * i.glass.eta;
+            let a = 1.0 / r.inverse_mean;
+            let b = squared_index / r.inverse_mean_far;
+            r.reflected += share * vec3f(a / (a + b));
+            r.transmitted = p.base_color * (share * (b / (a + b) / squared_index));
+        }
+    }
+    let through = importance(r.transmitted);
+    r.through = select(0.0, through / (importance(r.reflected) + through), through > 0.0);
+//#end
+    return r;
+}
+
+// What leaves of light that a metal scatters twice or more.
+fn metal_color(f0: vec3f, mean: vec2f) -> vec3f {
+    let escapes = mean.x + mean.y;
+    let fresnel = f0 + (1.0 - f0) * (1.0 / 21.0);
+    return fresnel * fresnel * escapes / (1.0 - fresnel * (1.0 - escapes));
+}
+
+fn rescatter_is_absent(r: Rescatter) -> bool {
+    return all(rescatter_sum(r) == vec3f(0.0));
+}
+
+// What single scattering loses towards `wo`, above the surface.
+fn rescatter_lost(r: Rescatter, i: Interface, wo: vec3f) -> f32 {
+    return loss_at(i, r.roughness, wo, false);
+}
+
+fn rescatter_sum(r: Rescatter) -> vec3f {
+//#if ROUGH_GLASS
+    return r.reflected + r.transmitted;
+//#else
+    return r.reflected;
+//#end
+}
+
+// Of light that is lost.
+fn rescatter_albedo(r: Rescatter, i: Interface) -> vec3f {
+//#if ROUGH_GLASS
+    return r.reflected + r.transmitted / radiance_scale(i);
+//#else
+    return r.reflected;
+//#end
+}
+
+fn rescatter_sample(r: Rescatter, choice: f32, u: vec2f) -> vec3f {
+    let wi = cosine_hemisphere(u);
+//#if ROUGH_GLASS
+    return select(wi, -wi, choice < r.through);
+//#else
+    return wi;
+//#end
+}
+
+fn rescatter_eval_pdf(r: Rescatter, i: Interface, lost: f32, wi: vec3f) -> EvalPdf {
+    let is_near = wi.z > 0.0;
+    let lambert = abs(wi.z) * FRAC_1_PI;
+    var color = r.reflected;
+    var inverse_mean = r.inverse_mean;
+    var probability = select(0.0, 1.0, is_near);
+//#if ROUGH_GLASS
+    color = select(r.transmitted, r.reflected, is_near);
+    inverse_mean = select(r.inverse_mean_far, r.inverse_mean, is_near);
+    probability = select(r.through, 1.0 - r.through, is_near);
+//#end
+    if probability <= 0.0 {
+        return EvalPdf(vec3f(0.0), 0.0);
+    }
+    let loss = loss_at(i, r.roughness, select(-wi, wi, is_near), !is_near);
+    return EvalPdf(color * (lost * loss * inverse_mean * lambert), lambert * probability);
+}
+
+// What single scattering loses towards `v`, above the surface or on its far side.
+fn loss_at(i: Interface, roughness: f32, v: vec3f, is_far: bool) -> f32 {
+//#if ROUGH_GLASS
+    if refracts_rough(i) {
+        var across = sqrt(i.ggx.alpha);
+//#if ANISOTROPY
+        if is_stretched(i.ggx) {
+            across = roughness_towards(i.ggx, v);
+        }
+//#end
+        let column = sqrt(saturate(v.z)) * f32(RESCATTER_NODES - 1u);
+        return max(1.0 - glass_albedo_at(far_index(i, is_far), across, column), 0.0);
+    }
+//#end
+    let terms = terms_towards(i.ggx, roughness, v);
+    return max(1.0 - (terms.x + terms.y), 0.0);
+}
+
+//#if ROUGH_GLASS
+// Whether the surface is that of a solid which refracts.
+fn refracts_rough(i: Interface) -> bool {
+    return i.glass.share > 0.0 && !i.glass.thin && !transmits_delta(i);
+}
+
+fn far_index(i: Interface, is_far: bool) -> f32 {
+    return select(i.glass.eta, 1.0 / i.glass.eta, is_far);
+}
+
+fn mean_loss(i: Interface, roughness: f32, is_far: bool) -> f32 {
+    if !refracts_rough(i) {
+        let terms = terms_mean(i.ggx, roughness);
+        return max(1.0 - (terms.x + terms.y), RESCATTER_MIN_LOSS);
+    }
+    var across = sqrt(i.ggx.alpha);
+//#if ANISOTROPY
+    across = roughness_off_axis(i.ggx, 0.70710678, 0.70710678);
+//#end
+    let mean = glass_albedo_at(far_index(i, is_far), across, f32(RESCATTER_NODES));
+    return max(1.0 - mean, RESCATTER_MIN_LOSS);
+}
+
+// Twin of `glass_at` in src/bsdf/rescatter.rs.
+fn glass_albedo_at(eta: f32, roughness: f32, column: f32) -> f32 {
+    let shifted = clamp((eta - 1.0) / (eta + 1.0), -RESCATTER_INDEX, RESCATTER_INDEX);
+    let z = (shifted + RESCATTER_INDEX) * (f32(RESCATTER_INDICES - 1u) / (2.0 * RESCATTER_INDEX));
+    let index = min(u32(z), RESCATTER_INDICES - 2u);
+    let y = roughness * f32(RESCATTER_NODES - 1u);
+    let row = min(u32(y), RESCATTER_NODES - 2u);
+    let at = min(u32(column), RESCATTER_NODES);
+    let rest = column - f32(at);
+    let start = RESCATTER_AT + (index * (RESCATTER_NODES - 1u) + row) * (RESCATTER_NODES + 1u);
+    let here = tables(start + at);
+    let nodes = mix(here, tables(start + min(at + 1u, RESCATTER_NODES)), rest);
+    let rows = mix(nodes.xz, nodes.yw, y - f32(row));
+    return mix(rows.x, rows.y, z - f32(index));
+}
+//#end
