@@ -365,9 +365,8 @@ fn material_extensions() {
 
 #[test]
 fn newer_material_extensions() {
-    let mut builder = solid();
-    builder.floats("VEC2", &[0., 1., 1., 1., 1., 0., 0., 0.]);
-    let load = |extensions: &str| {
+    let load_of = |mut builder: Builder, extensions: &str| {
+        builder.floats("VEC2", &[0., 1., 1., 1., 1., 0., 0., 0.]);
         let names = extensions.split('"').filter(|name| name.starts_with("KHR_materials"));
         let used: Vec<String> = names.map(|name| format!("\"{name}\"")).collect();
         let used = used.join(",");
@@ -378,6 +377,7 @@ fn newer_material_extensions() {
             textured_material(&format!(r#""extensions":{{{extensions}}}"#), "{}")
         ))
     };
+    let load = |extensions: &str| load_of(square(), extensions);
     let map = |name: &str| format!(r#""{name}":{{"index":0}}"#);
 
     let scene = load(&format!(
@@ -425,7 +425,7 @@ fn newer_material_extensions() {
 
     let glass = r#""KHR_materials_transmission":{"transmissionFactor":1},
         "KHR_materials_volume":{"thicknessFactor":1},"KHR_materials_dispersion":{"dispersion":0.3}"#;
-    let scene = load(glass);
+    let scene = load_of(solid(), glass);
     assert_eq!(scene.materials[0].dispersion, 0.3);
     assert!(SceneNeeds::of(&scene).has(SceneFeatures::DISPERSION));
     let thin = load(&glass.replace(r#""thicknessFactor":1"#, ""));
