@@ -34,8 +34,8 @@ fn the_noise_of_two_to_four_samples_is_told_where_light_is_found_easily() {
             let rule = StopRule { samples: Some(samples), ..StopRule::default() };
             let (mut told, mut found) = (0.0, 0.0);
             for session in &mut sessions {
-                while !rule.is_met(&session) {
-                    let pass = rule.next_pass(&session);
+                while !rule.is_met(session) {
+                    let pass = rule.next_pass(session);
                     session.advance(pass, &AtomicBool::new(false)).expect("no GPU");
                 }
                 told += session.noise().powi(2);
