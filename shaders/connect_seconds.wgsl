@@ -48,10 +48,18 @@ fn connection(path: ptr<function, Path>, vertex: Vertex, index: u32, member: u32
         let way = target_ - origin;
         let distance = length(way);
         (*path).rays += 1u;
+//#if CLEAR_SOLIDS
+        meets_glass = false;
+//#end
         let visible = transmittance_along(Ray(origin, way / distance, distance * SHADOW_RAY_SHARE));
         if any(visible != vec3f(1.0)) {
             return vec4f(0.0);
         }
+//#if CLEAR_SOLIDS
+        if meets_glass {
+            return vec4f(0.0);
+        }
+//#end
     }
     let area = cosine / squared;
     let density = f.pdf_solid_angle * area / f32(OWNER_SIDE * OWNER_SIDE);
@@ -128,6 +136,9 @@ fn connect_seconds(
         path.bounces = 1u;
     }
     if shares {
+//#if PERFECT_INTERFACES
+        path.ray.direction = float3(firsts[at + 192u]);
+//#end
         vertex = vertex_at(&path, hit, path.ray.direction);
         path.sampler.pair = pair_in(hit.w, 2u);
         path.map_samples = f32(MAP_SAMPLES);
@@ -203,8 +214,8 @@ fn connect_seconds(
         }
     }
 //#if LAYERS
-    let albedo = firsts[at + 192u];
-    let normal = firsts[at + 256u];
+    let albedo = firsts[at + 64u * LOOKS_TEXEL];
+    let normal = firsts[at + 64u * (LOOKS_TEXEL + 1u)];
     path.first_hit = FirstHit(
         float3(albedo), bitcast<f32>(albedo.w), float3(normal), bitcast<f32>(normal.w));
 //#end

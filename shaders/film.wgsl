@@ -41,7 +41,22 @@ fn add_to_film(pixel: u32, path: ptr<function, Path>) {
     }
     film_counts[pixel] += vec4u(1u, select(1u, 0u, is_valid), (*path).rays, 0u);
 //#if LAYERS
-    let hit = (*path).first_hit;
+    var hit = (*path).first_hit;
+//#if PERFECT_INTERFACES
+    // Twin of `Surface::add` in src/render/film.rs. A sample that says nothing counts as much as the others on average,
+    // those that come first as much as the first that says something: until then the depth counts them down.
+    let met = surfaces[2u * pixel];
+    let seen = surfaces[2u * pixel + 1u];
+    let waiting = max(-met.w, 0.0);
+    if hit.hits >= 0.0 {
+        let times = hit.hits * (1.0 + waiting);
+        hit = FirstHit(hit.albedo * times, hit.depth * times + waiting, hit.normal * times, times);
+    } else if seen.w > 0.0 {
+        hit = FirstHit(met.xyz / seen.w, met.w / seen.w, seen.xyz / seen.w, 1.0);
+    } else {
+        hit = FirstHit(vec3f(0.0), -1.0, vec3f(0.0), 0.0);
+    }
+//#end
     let albedo = add_to_sum(
         Sum(surfaces[2u * pixel], surfaces_rest[2u * pixel]), vec4f(hit.albedo, hit.depth));
     let normal = add_to_sum(

@@ -4,6 +4,10 @@
 var<private> arrival: Hit;
 // The first vertex of the path, as `firsts` keeps it.
 var<private> first: array<vec4u, 2>;
+//#if PERFECT_INTERFACES
+// The direction in which it was found.
+var<private> first_direction: vec3f;
+//#end
 // The second one, as `seconds` keeps it; there is none if the last word of the first texel is 0.
 var<private> second: array<vec4u, 2>;
 
@@ -50,6 +54,9 @@ fn meet_first(path: ptr<function, Path>, vertex: Vertex) -> bool {
 //#end
     first[0] = packed_vertex(vertex, what);
     first[1] = packed((*path).throughput, 0u);
+//#if PERFECT_INTERFACES
+    first_direction = (*path).ray.direction;
+//#end
     var pairs = 0u;
 //#if MAP_SAMPLING
     pairs += 1u;
@@ -60,6 +67,15 @@ fn meet_first(path: ptr<function, Path>, vertex: Vertex) -> bool {
     (*path).sampler.pair = pair + pairs;
     (*path).map_samples = f32(MAP_SAMPLES);
     return true;
+}
+
+// Whether the path comes from its first vertex that scatters, and has met nothing since.
+fn is_next_to_first(path: ptr<function, Path>) -> bool {
+//#if PERFECT_INTERFACES
+    return (*path).bounces == 1u && (*path).interfaces == 0u;
+//#else
+    return (*path).bounces == 1u;
+//#end
 }
 
 // At the second vertex: whether it is shared, and the path ends.
@@ -104,10 +120,14 @@ fn find_seconds(
     firsts[at] = first[0];
     firsts[at + 64u] = vec4u(first[1].xyz, path.rays);
     firsts[at + 128u] = packed(path.radiance, 0u);
+//#if PERFECT_INTERFACES
+    firsts[at + 192u] = packed(first_direction, 0u);
+//#end
 //#if LAYERS
     let hit = path.first_hit;
-    firsts[at + 192u] = packed(hit.albedo, bitcast<u32>(hit.depth));
-    firsts[at + 256u] = packed(hit.normal, bitcast<u32>(hit.hits));
+    let looks_at = at + 64u * LOOKS_TEXEL;
+    firsts[looks_at] = packed(hit.albedo, bitcast<u32>(hit.depth));
+    firsts[looks_at + 64u] = packed(hit.normal, bitcast<u32>(hit.hits));
 //#end
     if member.is_owner {
         let is_found = second[0].w != 0u;

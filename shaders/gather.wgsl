@@ -84,6 +84,15 @@ fn shadow_of(
     } else {
         shadow.weight = balance_heuristic(arriving.pdf_solid_angle, f.pdf_solid_angle);
     }
+//#if CLEAR_SOLIDS
+    shadow.is_of_map = is_of_map;
+    shadow.carried = (*path).throughput * f.value;
+    shadow.pdf_solid_angle = arriving.pdf_solid_angle;
+    shadow.own_pdf = f.pdf_solid_angle;
+//#if EMITTERS
+    shadow.receiver = receiver_of(vertex);
+//#end
+//#end
 //#if COUNTING
     shadow.visibility = Visibility(
         arriving.counter, visibility_share(vertex, arriving.direction, f.pdf_solid_angle));
@@ -120,8 +129,9 @@ fn gather(path: ptr<function, Path>, vertex: Vertex) {
 }
 
 // Follows a shadow ray and adds what comes along it.
-fn add_light(path: ptr<function, Path>, shadow: Shadow) {
-    let visible = follow_shadow(path, shadow);
+fn add_light(path: ptr<function, Path>, chosen: Shadow) {
+    var shadow = chosen;
+    let visible = follow_shadow(path, &shadow);
     if any(visible != vec3f(0.0)) {
 //#if COUNTING
         count_visible(shadow.visibility, visible);

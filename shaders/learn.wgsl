@@ -18,8 +18,8 @@ fn look_at_map(path: ptr<function, Path>, vertex: Vertex, bits: vec2u) {
     if max_element(f.value) <= 0.0 {
         return;
     }
-    let shadow = shadow_towards(path, vertex, sample.direction, F32_MAX);
-    let visible = follow_shadow(path, shadow);
+    var shadow = shadow_towards(path, vertex, sample.direction, F32_MAX);
+    let visible = follow_shadow(path, &shadow);
 //#if RECORD_RATIO
     let share = visibility_share(vertex, sample.direction, f.pdf_solid_angle);
     count_visible(Visibility(counter, share), visible);

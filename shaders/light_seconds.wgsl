@@ -24,8 +24,9 @@ fn survival(path: ptr<function, Path>) -> f32 {
 
 //#if SHADOW_RAYS
 // What comes along a ray towards a light.
-fn light_along(path: ptr<function, Path>, shadow: Shadow) -> vec3f {
-    let visible = follow_shadow(path, shadow);
+fn light_along(path: ptr<function, Path>, chosen: Shadow) -> vec3f {
+    var shadow = chosen;
+    let visible = follow_shadow(path, &shadow);
 //#if COUNTING
     if any(visible != vec3f(0.0)) {
         count_visible(shadow.visibility, visible);
@@ -43,6 +44,9 @@ fn unscattered_shadow(
 ) -> Shadow {
     var shadow = shadow_of(path, vertex, arriving, is_of_map);
     shadow.light = arriving.light;
+//#if CLEAR_SOLIDS
+    shadow.carried = vec3f(1.0);
+//#end
     return shadow;
 }
 //#end

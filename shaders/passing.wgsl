@@ -38,6 +38,19 @@ fn passes(path: ptr<function, Path>, point: SurfacePoint) -> bool {
 //#if SHARING
     (*path).is_clear = (*path).is_clear && (!goes_on || all(through == vec3f(1.0)));
 //#end
+//#if LAYERS
+//#if PERFECT_INTERFACES
+//#if TRANSMISSION
+    if goes_on && (*path).bounces == 0u && point.parameters.transmission > 0.0 {
+        let bsdf = bsdf_new(point.parameters, point.front_face);
+        if bsdf_is_delta_only(bsdf) {
+            let wo = local_from_world(point.shading_frame, -(*path).ray.direction);
+            goes_by(path, bsdf, wo, true);
+        }
+    }
+//#end
+//#end
+//#end
     if goes_on {
         (*path).throughput *= through / probability;
     } else {
@@ -65,6 +78,12 @@ fn accepts(hit: Hit, from_camera: bool) -> bool {
 //#if PASS_THROUGH
 // Share of light that a surface on a shadow ray's way lets through.
 fn passed(hit: Hit, direction: vec3f) -> vec3f {
+//#if CLEAR_SOLIDS
+    if (hit.flags & CLEAR_SOLID) != 0u {
+        meets_glass = true;
+        return vec3f(1.0);
+    }
+//#end
 //#if PARTIAL
     if (hit.flags & PARTIAL) != 0u {
         return straight_through(surface_at(hit.triangle, hit.barycentric, direction), direction);

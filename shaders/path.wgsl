@@ -1,4 +1,5 @@
-// The path tracing loop, one ray a step: twin of src/path/mod.rs and src/path/vertex.rs, the same random numbers.
+// The path tracing loop, one ray a step: twin of src/path/mod.rs, src/path/looks.rs and src/path/vertex.rs, the same
+// random numbers.
 
 struct Path {
     sampler: Sampler,
@@ -12,12 +13,22 @@ struct Path {
 //#if EMITTERS
     departure_receiver: Receiver,
 //#end
+//#if CLEAR_SOLIDS
+    // The ray as it left, and whether smooth glass has refracted it since.
+    departure_origin: vec3f,
+    departure_direction: vec3f,
+    is_refracted: bool,
+//#end
 //#if SOLID_TRANSMISSION
     body: Body,
 //#end
     travelled: f32,
     passes: u32,
     bounces: u32,
+//#if PERFECT_INTERFACES
+    // Perfect reflections and refractions since the last vertex that scatters.
+    interfaces: u32,
+//#end
     rays: u32,
 //#if CACHED
     // Metres over which surfaces average what the path would find.
@@ -37,6 +48,13 @@ struct Path {
 //#end
 //#if LAYERS
     first_hit: FirstHit,
+//#if PERFECT_INTERFACES
+    // Metres gone to the last mirror or glass before that, albedo that they take from what is seen by way of them, and
+    // what they have on the other way.
+    looks_before: f32,
+    looks_taken: vec3f,
+    looks_added: vec3f,
+//#end
 //#end
 //#if !LEARNING
 //#if MAP_SAMPLING
@@ -52,6 +70,7 @@ struct FirstHit {
     albedo: vec3f,
     depth: f32,
     normal: vec3f,
+    // -1 if the path tells nothing of what is seen first.
     hits: f32,
 }
 
@@ -78,6 +97,10 @@ fn path_new(ray: Ray, sampler: Sampler) -> Path {
     path.throughput = vec3f(1.0);
     path.departure_pdf_solid_angle = F32_MAX;
     path.departure_distribution = WHOLE_MAP;
+//#if CLEAR_SOLIDS
+    path.departure_origin = ray.origin;
+    path.departure_direction = ray.direction;
+//#end
 //#if SOLID_TRANSMISSION
     path.body = body_air();
 //#end
@@ -106,10 +129,19 @@ fn path_pair(path: ptr<function, Path>) -> vec2f {
 // Follows the path along one ray, and the rays towards lights from where it arrives. `false` when it
 // has ended.
 fn path_step(path: ptr<function, Path>) -> bool {
-    let hit = closest_hit((*path).ray, (*path).bounces == 0u);
+    let hit = closest_hit((*path).ray, is_of_camera(path));
     let goes_on = follow(path, hit);
     add_lights(path);
     return goes_on;
+}
+
+// Whether the path has met no vertex yet.
+fn is_of_camera(path: ptr<function, Path>) -> bool {
+//#if PERFECT_INTERFACES
+    return ((*path).bounces | (*path).interfaces) == 0u;
+//#else
+    return (*path).bounces == 0u;
+//#end
 }
 
 // What becomes of the path at the end of its ray. `false` if it ends.
@@ -119,8 +151,9 @@ fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
     let stretch = stretch_ahead(path, (*path).ray.origin, (*path).ray.direction, hit.t);
     if stretch.start < stretch.end {
         if all(stretch.interior.scattering == vec3f(0.0)) {
-            (*path).throughput *=
-                exp(-stretch.interior.extinction * (stretch.end - stretch.start));
+            let left = exp(-stretch.interior.extinction * (stretch.end - stretch.start));
+            (*path).throughput *= left;
+            look_through_body(path, left);
         } else if !has_faded(path) {
             let bits = path_pair_bits(path);
             let flight = fly_through(
@@ -135,7 +168,9 @@ fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
     }
 //#else
 //#if SOLID_TRANSMISSION
-    (*path).throughput *= body_transmittance((*path).body, hit.t);
+    let left = body_transmittance((*path).body, hit.t);
+    (*path).throughput *= left;
+    look_through_body(path, left);
 //#end
 //#end
     if has_faded(path) {
@@ -164,6 +199,24 @@ fn follow(path: ptr<function, Path>, hit: Hit) -> bool {
     return arrive(path, point);
 }
 
+// Takes from the looks of what is behind a body what that absorbs.
+fn look_through_body(path: ptr<function, Path>, left: vec3f) {
+//#if LAYERS
+//#if PERFECT_INTERFACES
+//#if SOLID_TRANSMISSION
+//#if MEDIUM
+    let is_inside = (*path).body.is_solid;
+//#else
+    let is_inside = true;
+//#end
+    if is_inside && (*path).bounces == 0u {
+        (*path).looks_taken = 1.0 - (1.0 - (*path).looks_taken) * left;
+    }
+//#end
+//#end
+//#end
+}
+
 // Whether nothing is left that f32 can weigh.
 fn has_faded(path: ptr<function, Path>) -> bool {
     return max_element((*path).throughput) < 1.17549435e-38;
@@ -182,11 +235,7 @@ fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
 //#end
 //#if LAYERS
     if (*path).bounces == 0u {
-        var albedo = bsdf_albedo(bsdf);
-        if point.parameters.unlit {
-            albedo = point.parameters.base_color;
-        }
-        (*path).first_hit = FirstHit(albedo, (*path).travelled, point.shading_frame.z, 1.0);
+        look_at(path, point, bsdf);
     }
 //#end
 //#if UNLIT
@@ -207,6 +256,42 @@ fn arrive(path: ptr<function, Path>, point: SurfacePoint) -> bool {
     return visit(path, vertex);
 }
 
+//#if LAYERS
+// Keeps what a surface looks like. Mirrors and smooth glass are kept until something is seen in them.
+fn look_at(path: ptr<function, Path>, point: SurfacePoint, bsdf: Bsdf) {
+    var albedo = bsdf_albedo(bsdf);
+    if point.parameters.unlit {
+        albedo = point.parameters.base_color;
+    }
+    var depth = (*path).travelled;
+//#if PERFECT_INTERFACES
+    let hits = (*path).first_hit.hits;
+    let is_interface = bsdf_is_delta_only(bsdf) && !point.parameters.unlit;
+    if hits < 0.0 || (hits > 0.0 && is_interface) {
+        return;
+    }
+    albedo = albedo * (1.0 - (*path).looks_taken) + (*path).looks_added;
+    depth += (*path).looks_before;
+//#end
+    (*path).first_hit = FirstHit(albedo, depth, point.shading_frame.z, 1.0);
+}
+
+//#if PERFECT_INTERFACES
+// Keeps which way it goes at a mirror or smooth glass before the first surface.
+fn goes_by(path: ptr<function, Path>, bsdf: Bsdf, wo: vec3f, is_through: bool) {
+    let facet = interface_facet(bsdf.interface_, abs(wo.z));
+    let transmits_more = importance(facet.transmittance) > importance(facet.reflectance);
+    let left = 1.0 - (*path).looks_taken;
+    (*path).looks_added += left * select(facet.transmittance, facet.reflectance, transmits_more);
+    (*path).looks_taken =
+        1.0 - left * select(facet.reflectance, facet.transmittance, transmits_more);
+    if is_through != transmits_more {
+        (*path).first_hit = FirstHit(vec3f(0.0), 0.0, vec3f(0.0), -1.0);
+    }
+}
+//#end
+//#end
+
 fn most_vertices() -> u32 {
 //#if TRAINING
     // The last that train see as far as the others.
@@ -218,25 +303,49 @@ fn most_vertices() -> u32 {
 
 // Gathers light at a vertex, if the path may have one more, and chooses where the path goes on.
 fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
+//#if PERFECT_INTERFACES
+    let is_perfect = is_perfect_interface(vertex);
+    if !may_meet(path, is_perfect) {
+        return false;
+    }
+//#else
     if (*path).bounces == most_vertices() {
         return false;
     }
+//#end
 //#if CACHED
     if ends_in_cache(path, vertex) {
         return false;
     }
 //#end
 //#if TRAINING
+//#if PERFECT_INTERFACES
+    // What is seen in a mirror belongs to the vertex before.
+    if !is_perfect {
+        meet_training_vertices(path, vertex);
+    }
+//#else
     meet_training_vertices(path, vertex);
 //#end
+//#end
 //#if FINDING
-    if (*path).bounces == 1u && meet_second(path, vertex) {
+    if is_next_to_first(path) && meet_second(path, vertex) {
         return false;
     }
     let waits = (*path).bounces == 0u && meet_first(path, vertex);
 //#end
+//#if PERFECT_INTERFACES
+    (*path).bounces += select(1u, 0u, is_perfect);
+    (*path).interfaces = select(0u, (*path).interfaces + 1u, is_perfect);
+//#else
     (*path).bounces += 1u;
+//#end
     forget_arrival(path);
+//#if LAYERS
+//#if PERFECT_INTERFACES
+    (*path).looks_before += (*path).travelled;
+//#end
+//#end
     (*path).travelled = 0.0;
     (*path).passes = 0u;
     var gathers = !bsdf_is_delta_only(vertex.bsdf);
@@ -258,16 +367,40 @@ fn visit(path: ptr<function, Path>, vertex: Vertex) -> bool {
     return survives(path);
 }
 
+//#if PERFECT_INTERFACES
+// Whether light is only reflected and refracted there, each in one direction.
+fn is_perfect_interface(vertex: Vertex) -> bool {
+//#if MEDIUM
+    if vertex.is_in_medium {
+        return false;
+    }
+//#end
+    return bsdf_is_delta_only(vertex.bsdf);
+}
+
+// Whether the path may have one more of these, or of the vertices that scatter.
+fn may_meet(path: ptr<function, Path>, is_perfect: bool) -> bool {
+    if is_perfect {
+        return (*path).interfaces < MAX_INTERFACES;
+    }
+    return (*path).bounces != most_vertices();
+}
+//#end
+
 // What nobody asks for any more, for it comes anew or the path ends: else it would take registers.
 fn forget_arrival(path: ptr<function, Path>) {
     (*path).ray.origin = vec3f(0.0);
 //#if !MEDIUM
     (*path).ray.direction = vec3f(0.0);
 //#end
+//#if CLEAR_SOLIDS
+    // Refraction keeps the departure.
+//#else
     (*path).departure_pdf_solid_angle = 0.0;
     (*path).departure_distribution = 0u;
 //#if EMITTERS
     (*path).departure_receiver = Receiver();
+//#end
 //#end
 }
 
@@ -275,7 +408,7 @@ fn forget_arrival(path: ptr<function, Path>) {
 fn escape(path: ptr<function, Path>) {
     let direction = (*path).ray.direction;
 //#if BACKGROUND_BLUR
-    if (*path).bounces == 0u {
+    if is_of_camera(path) {
         var sampler = (*path).sampler;
         let blurred = spread(direction, globals.background_concentration, next_pair(&sampler));
         (*path).radiance += (*path).throughput * environment_radiance(blurred);
@@ -283,14 +416,21 @@ fn escape(path: ptr<function, Path>) {
     }
 //#end
 //#if BACKGROUND_COLOR
-    if (*path).bounces == 0u {
+    if is_of_camera(path) {
         (*path).radiance += (*path).throughput * globals.background;
         return;
     }
 //#end
 //#if MAP_SAMPLING
     if (*path).departure_pdf_solid_angle < F32_MAX {
+//#if CLEAR_SOLIDS
+        var seen = radiance_and_tile_pdf((*path).departure_direction);
+        if (*path).is_refracted {
+            seen.radiance = environment_radiance(direction);
+        }
+//#else
         let seen = radiance_and_tile_pdf(direction);
+//#end
 //#if MEDIUM
 //#if SOLID_TRANSMISSION
         if (*path).departure_distribution == NO_ARRAY {
@@ -302,6 +442,11 @@ fn escape(path: ptr<function, Path>) {
         var nee = choice_probability((*path).departure_distribution, seen.tile) * seen.pdf_solid_angle;
 //#if SHARING
         nee *= (*path).departure_map_samples;
+//#end
+//#if CLEAR_SOLIDS
+        if (*path).is_refracted && is_departure_blocked(path) {
+            nee = 0.0;
+        }
 //#end
         let weight = balance_heuristic((*path).departure_pdf_solid_angle, nee);
         (*path).radiance += (*path).throughput * seen.radiance * weight;
@@ -345,6 +490,9 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
         (*path).map_samples = 1.0;
 //#end
         (*path).ray = Ray(vertex.point.position, turned_, F32_MAX);
+//#if CLEAR_SOLIDS
+        keep_departure(path);
+//#end
         return true;
     }
 //#end
@@ -361,6 +509,13 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
     if is_above == is_transmission {
         return false;
     }
+//#if LAYERS
+//#if PERFECT_INTERFACES
+    if (*path).bounces == 0u {
+        goes_by(path, vertex.bsdf, vertex.wo, is_transmission);
+    }
+//#end
+//#end
     (*path).throughput *= sample.weight;
     if max_element((*path).throughput) <= 0.0 || !is_finite3((*path).throughput) {
         return false;
@@ -369,6 +524,16 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
     if is_transmission {
         (*path).body = body_behind(vertex.point, (*path).body);
     }
+//#end
+    let origin = offset_origin(vertex.point.position, select(-normal, normal, is_above));
+    (*path).ray = Ray(origin, direction, F32_MAX);
+//#if CLEAR_SOLIDS
+    if is_transmission && is_clear_solid(vertex.point.material) {
+        // NEE at the vertex before goes the same way.
+        (*path).is_refracted = true;
+        return true;
+    }
+    keep_departure(path);
 //#end
     (*path).departure_pdf_solid_angle = select(sample.pdf_solid_angle, F32_MAX, sample.is_delta);
     (*path).departure_distribution = vertex.distribution;
@@ -379,10 +544,16 @@ fn scatter(path: ptr<function, Path>, vertex: Vertex) -> bool {
     (*path).departure_map_samples = (*path).map_samples;
     (*path).map_samples = 1.0;
 //#end
-    let origin = offset_origin(vertex.point.position, select(-normal, normal, is_above));
-    (*path).ray = Ray(origin, direction, F32_MAX);
     return true;
 }
+
+//#if CLEAR_SOLIDS
+fn keep_departure(path: ptr<function, Path>) {
+    (*path).departure_origin = (*path).ray.origin;
+    (*path).departure_direction = (*path).ray.direction;
+    (*path).is_refracted = false;
+}
+//#end
 
 fn survives(path: ptr<function, Path>) -> bool {
     if !plays_roulette(path) {
@@ -400,7 +571,11 @@ fn survives(path: ptr<function, Path>) -> bool {
 }
 
 fn plays_roulette(path: ptr<function, Path>) -> bool {
-    return globals.russian_roulette != 0u && (*path).bounces >= ROULETTE_AFTER;
+    var vertices = (*path).bounces;
+//#if PERFECT_INTERFACES
+    vertices += (*path).interfaces;
+//#end
+    return globals.russian_roulette != 0u && vertices >= ROULETTE_AFTER;
 }
 
 fn roulette_probability(path: ptr<function, Path>) -> f32 {

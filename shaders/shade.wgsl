@@ -5,6 +5,7 @@ fn shade(
     @builtin(workgroup_id) group: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
+    own_lane = lane;
     let slot = slot_of(group.x, lane);
     let state = slot_state(slot);
     if state.what != GOES_ON {

@@ -10,6 +10,9 @@ fn shadow_rays(
     if index >= globals.work.count {
         return;
     }
-    let share = max_element(transmittance_along(cast_ray(index)));
+    var share = max_element(transmittance_along(cast_ray(index)));
+//#if CLEAR_SOLIDS
+    share = select(share, 0.0, meets_glass);
+//#end
     cast_results[index] = vec2u(bitcast<u32>(share), 0u);
 }

@@ -1,4 +1,4 @@
-// Rays towards lights: twin of `Path::transmittance` in src/path/mod.rs, which src/path/gather.rs asks.
+// Rays towards lights: twin of src/path/shadows.rs, which src/path/gather.rs asks.
 
 // A ray towards a light. It waits until the path has chosen where to go on: so nothing of the vertex
 // takes registers while it is followed.
@@ -14,6 +14,19 @@ struct Shadow {
 //#end
 //#if COUNTING
     visibility: Visibility,
+//#end
+//#if CLEAR_SOLIDS
+    is_of_map: bool,
+    // What `light` is without radiance and density.
+    carried: vec3f,
+    // Densities with which a lamp is chosen, F32_MAX if it has no size, and with which the path goes there.
+    pdf_solid_angle: f32,
+    own_pdf: f32,
+    // What it begins in.
+    body: Body,
+//#if EMITTERS
+    receiver: Receiver,
+//#end
 //#end
 }
 
@@ -57,25 +70,81 @@ fn shadow_towards(
 //#else
     shadow.left = body_transmittance(body, distance);
 //#end
+//#if CLEAR_SOLIDS
+    // It may leave the body by glass.
+    shadow.body = body;
+    shadow.is_of_map = true;
+//#else
     if all(shadow.left == vec3f(0.0)) {
         return shadow;
     }
+//#end
 //#end
     // Stop short of the light's own surface.
     shadow.ray = Ray(origin, direction, distance * SHADOW_RAY_SHARE);
     return shadow;
 }
 
-// Share of light that comes along a shadow ray, if there is one.
-fn follow_shadow(path: ptr<function, Path>, shadow: Shadow) -> vec3f {
-    if shadow.ray.t_max <= 0.0 {
+// Share of light that comes along a shadow ray, if there is one. If glass refracts it, its light is another.
+fn follow_shadow(path: ptr<function, Path>, shadow: ptr<function, Shadow>) -> vec3f {
+    if (*shadow).ray.t_max <= 0.0 {
         return vec3f(0.0);
     }
     (*path).rays += 1u;
-    let visible = transmittance_along(shadow.ray);
+//#if CLEAR_SOLIDS
+    meets_glass = false;
+//#end
+    let visible = transmittance_along((*shadow).ray);
+//#if CLEAR_SOLIDS
+    if meets_glass && any(visible != vec3f(0.0)) {
+        return follow_through_glass(path, shadow);
+    }
+//#end
 //#if SHADOW_MEDIA
-    return visible * shadow.left;
+    return visible * (*shadow).left;
 //#else
     return visible;
 //#end
 }
+
+//#if CLEAR_SOLIDS
+// The same behind glass: twin of `Path::share_of_map` and of part of `Path::light_of_lamps`.
+fn follow_through_glass(path: ptr<function, Path>, shadow: ptr<function, Shadow>) -> vec3f {
+    let is_punctual = !(*shadow).is_of_map && (*shadow).pdf_solid_angle >= F32_MAX;
+    var ray = (*shadow).ray;
+    if !is_punctual || ray.t_max >= F32_MAX * SHADOW_RAY_SHARE {
+        ray.t_max = F32_MAX;
+    }
+    var radiance = vec3f(0.0);
+    var is_straight = is_punctual;
+    // A loop, for the walk is long.
+    loop {
+//#if EMITTERS
+        let walk = walk_glass(path, ray, (*shadow).body, is_straight, (*shadow).receiver);
+//#else
+        let walk = walk_glass(path, ray, (*shadow).body, is_straight);
+//#end
+        if is_punctual {
+            return walk.transmittance;
+        }
+        if (*shadow).is_of_map {
+            radiance = environment_radiance(walk.direction);
+            (*shadow).light = (*shadow).carried * radiance;
+            return walk.transmittance;
+        }
+        if is_straight {
+            // Where a lamp is found through an edge, rounding may lose the one that was chosen.
+            let chosen = max(walk.lamp_pdf, (*shadow).pdf_solid_angle);
+            (*shadow).light = (*shadow).carried * radiance;
+            (*shadow).weight = 1.0 / (chosen + (*shadow).own_pdf);
+            return vec3f(1.0);
+        }
+        radiance = walk.emitted;
+        if all(radiance == vec3f(0.0)) {
+            return vec3f(0.0);
+        }
+        is_straight = true;
+    }
+    return vec3f(0.0);
+}
+//#end

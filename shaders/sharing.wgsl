@@ -43,7 +43,8 @@ fn lane_member(group: u32, lane: u32) -> Member {
 }
 
 // Texels of a first vertex: triangle, barycentric coordinates and what it is; throughput and rays of its
-// path; the radiance that path brought back on its own. Then what the surface looks like.
+// path; the radiance that path brought back on its own; if mirrors or glass may be before it, the direction it was
+// found in. Then what the surface looks like.
 const IS_SHARED = 1u;
 const IS_COUNTED_FIRST = 2u;
 //#if MEDIUM
@@ -51,10 +52,15 @@ const IS_COUNTED_FIRST = 2u;
 // barycentric coordinates.
 const IS_IN_MEDIUM = 0x80000000u;
 //#end
-//#if LAYERS
-const FIRST_TEXELS = 5u;
+//#if PERFECT_INTERFACES
+const LOOKS_TEXEL = 4u;
 //#else
-const FIRST_TEXELS = 3u;
+const LOOKS_TEXEL = 3u;
+//#end
+//#if LAYERS
+const FIRST_TEXELS = LOOKS_TEXEL + 2u;
+//#else
+const FIRST_TEXELS = LOOKS_TEXEL;
 //#end
 
 // Where a lane's first vertex is; texels of a workgroup's lie side by side.

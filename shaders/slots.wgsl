@@ -33,6 +33,9 @@ const SAMPLER = 4u;
 const STATE = 5u;
 const HIT = 6u;
 
+// Of the word that counts vertices.
+const INTERFACES_SHIFT = 24u;
+
 struct State {
     // Which pixel, tile after tile.
     pixel: u32,
@@ -57,6 +60,24 @@ fn slot_state(slot: u32) -> State {
     return State(texel.x, texel.y & 3u);
 }
 
+// How many vertices a path has met.
+fn vertices_of(path: ptr<function, Path>) -> u32 {
+    var vertices = (*path).bounces;
+//#if PERFECT_INTERFACES
+    vertices |= (*path).interfaces << INTERFACES_SHIFT;
+//#end
+    return vertices;
+}
+
+fn read_vertices(vertices: u32, path: ptr<function, Path>) {
+//#if PERFECT_INTERFACES
+    (*path).bounces = vertices & ((1u << INTERFACES_SHIFT) - 1u);
+    (*path).interfaces = vertices >> INTERFACES_SHIFT;
+//#else
+    (*path).bounces = vertices;
+//#end
+}
+
 // The light of a slot's path so far.
 fn read_radiance(slot: u32, path: ptr<function, Path>) {
     let texel = slot_read(slot, RADIANCE);
@@ -74,12 +95,23 @@ fn read_first_hit(slot: u32, path: ptr<function, Path>) {
     let normal = slot_read(slot, FIRST_HIT_TEXEL + 1u);
     (*path).first_hit = FirstHit(
         float3(albedo), bitcast<f32>(albedo.w), float3(normal), bitcast<f32>(normal.w));
+//#if PERFECT_INTERFACES
+    let taken = slot_read(slot, FIRST_HIT_TEXEL + 2u);
+    (*path).looks_before = bitcast<f32>(taken.w);
+    (*path).looks_taken = float3(taken);
+    (*path).looks_added = float3(slot_read(slot, FIRST_HIT_TEXEL + 3u));
+//#end
 }
 
 fn write_first_hit(slot: u32, path: ptr<function, Path>) {
     let hit = (*path).first_hit;
     slot_write(slot, FIRST_HIT_TEXEL, hit.albedo, bitcast<u32>(hit.depth));
     slot_write(slot, FIRST_HIT_TEXEL + 1u, hit.normal, bitcast<u32>(hit.hits));
+//#if PERFECT_INTERFACES
+    let before = bitcast<u32>((*path).looks_before);
+    slot_write(slot, FIRST_HIT_TEXEL + 2u, (*path).looks_taken, before);
+    slot_write(slot, FIRST_HIT_TEXEL + 3u, (*path).looks_added, 0u);
+//#end
 }
 //#end
 
@@ -97,7 +129,7 @@ fn read_path(slot: u32) -> Path {
     path.throughput = float3(throughput);
     path.travelled = bitcast<f32>(throughput.w);
     path.sampler = Sampler(sampler.x, sampler.y, sampler.z);
-    path.bounces = sampler.w;
+    read_vertices(sampler.w, &path);
     path.passes = state.z;
 //#if COUNTING
     path.is_counted = (state.y & IS_COUNTED) != 0u;
@@ -107,6 +139,12 @@ fn read_path(slot: u32) -> Path {
     let position = slot_read(slot, RECEIVER_TEXEL);
     let normal = slot_read(slot, RECEIVER_TEXEL + 1u);
     path.departure_receiver = Receiver(float3(position), float3(normal));
+//#end
+//#if CLEAR_SOLIDS
+    let departure_origin = slot_read(slot, DEPARTURE_TEXEL);
+    path.departure_origin = float3(departure_origin);
+    path.departure_direction = float3(slot_read(slot, DEPARTURE_TEXEL + 1u));
+    path.is_refracted = departure_origin.w != 0u;
 //#end
 //#if SOLID_TRANSMISSION
     path.body.squared_index = bitcast<f32>(state.w);
@@ -133,7 +171,7 @@ fn write_path(slot: u32, pixel: u32, path: ptr<function, Path>) {
     slot_write(slot, THROUGHPUT, (*path).throughput, bitcast<u32>((*path).travelled));
     let sampler = (*path).sampler;
     slots[slot + 64u * SAMPLER] =
-        vec4u(sampler.reversed_index, sampler.pixel_seed, sampler.pair, (*path).bounces);
+        vec4u(sampler.reversed_index, sampler.pixel_seed, sampler.pair, vertices_of(path));
     var what = GOES_ON;
 //#if COUNTING
     what |= select(0u, IS_COUNTED, (*path).is_counted);
@@ -149,6 +187,11 @@ fn write_path(slot: u32, pixel: u32, path: ptr<function, Path>) {
     let receiver = (*path).departure_receiver;
     slot_write(slot, RECEIVER_TEXEL, receiver.position, 0u);
     slot_write(slot, RECEIVER_TEXEL + 1u, receiver.normal, 0u);
+//#end
+//#if CLEAR_SOLIDS
+    let is_refracted = select(0u, 1u, (*path).is_refracted);
+    slot_write(slot, DEPARTURE_TEXEL, (*path).departure_origin, is_refracted);
+    slot_write(slot, DEPARTURE_TEXEL + 1u, (*path).departure_direction, 0u);
 //#end
 //#if SOLID_TRANSMISSION
 //#if MEDIUM
@@ -185,8 +228,57 @@ fn read_shadow(slot: u32, texel: u32) -> Shadow {
     shadow.visibility =
         Visibility(light.w, bitcast<f32>(slot_read(slot, texel + 3u).w));
 //#end
+//#if CLEAR_SOLIDS
+    read_glass_shadow(slot, texel + 4u, &shadow);
+//#end
     return shadow;
 }
+
+//#if CLEAR_SOLIDS
+// What a shadow needs if it meets glass. The map's needs less.
+fn read_glass_shadow(slot: u32, texel: u32, shadow: ptr<function, Shadow>) {
+    let carried = slot_read(slot, texel);
+    let body = slot_read(slot, texel + 1u);
+    (*shadow).is_of_map = (body.w & 2u) != 0u;
+    (*shadow).carried = float3(carried);
+    (*shadow).own_pdf = bitcast<f32>(carried.w);
+    (*shadow).body = body_air();
+//#if MEDIUM
+    (*shadow).body.interior.extinction = float3(body);
+    (*shadow).body.is_solid = (body.w & 1u) != 0u;
+//#else
+    (*shadow).body.absorption = float3(body);
+//#end
+    if (*shadow).is_of_map {
+        return;
+    }
+    let position = slot_read(slot, texel + 2u);
+    (*shadow).pdf_solid_angle = bitcast<f32>(position.w);
+//#if EMITTERS
+    (*shadow).receiver = Receiver(float3(position), float3(slot_read(slot, texel + 3u)));
+//#end
+}
+
+fn write_glass_shadow(slot: u32, texel: u32, shadow: Shadow) {
+    slot_write(slot, texel, shadow.carried, bitcast<u32>(shadow.own_pdf));
+    var what = select(0u, 2u, shadow.is_of_map);
+//#if MEDIUM
+    what |= select(0u, 1u, shadow.body.is_solid);
+    slot_write(slot, texel + 1u, shadow.body.interior.extinction, what);
+//#else
+    slot_write(slot, texel + 1u, shadow.body.absorption, what);
+//#end
+    if shadow.is_of_map {
+        return;
+    }
+    var position = vec3f(0.0);
+//#if EMITTERS
+    position = shadow.receiver.position;
+    slot_write(slot, texel + 3u, shadow.receiver.normal, 0u);
+//#end
+    slot_write(slot, texel + 2u, position, bitcast<u32>(shadow.pdf_solid_angle));
+}
+//#end
 
 fn write_shadow(slot: u32, texel: u32, shadow: Shadow) {
     slot_write(slot, texel, shadow.ray.origin, bitcast<u32>(shadow.ray.t_max));
@@ -206,5 +298,8 @@ fn write_shadow(slot: u32, texel: u32, shadow: Shadow) {
     slot_write(slot, texel + 1u, shadow.ray.direction, bitcast<u32>(shadow.weight));
     slot_write(slot, texel + 2u, shadow.light, counter);
     slot_write(slot, texel + 3u, left, bitcast<u32>(share));
+//#if CLEAR_SOLIDS
+    write_glass_shadow(slot, texel + 4u, shadow);
+//#end
 }
 //#end

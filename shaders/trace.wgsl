@@ -54,8 +54,8 @@ fn trace(
     } else {
         path.ray = Ray(
             float3(slot_read(slot, ORIGIN)), float3(slot_read(slot, DIRECTION)), F32_MAX);
-        path.bounces = slot_read(slot, SAMPLER).w;
+        read_vertices(slot_read(slot, SAMPLER).w, &path);
     }
-    let hit = closest_hit(path.ray, path.bounces == 0u);
+    let hit = closest_hit(path.ray, is_of_camera(&path));
     slot_write(slot, HIT, vec3f(hit.t, hit.barycentric), hit.triangle);
 }

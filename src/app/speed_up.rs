@@ -98,7 +98,7 @@ mod tests {
             // Light falls off from a window; all methods have the same mean.
             let light = 1.0 / (1.0 + 0.1 * (x + y) as f32) * (sigma * (normal - 0.5 * sigma)).exp();
             let radiance = Vec3::splat(light);
-            film.add(x, y, &PathResult { radiance, rays: 1, was_invalid: false, first_hit: None });
+            film.add(x, y, &PathResult { radiance, rays: 1, ..PathResult::default() });
         }
         SessionSnapshot {
             samples,

@@ -266,8 +266,7 @@ impl Interface {
             };
         }
         if self.transmits_delta() {
-            let wi = refract(wo, Vec3::Z, self.eta)?;
-            let radiance = self.scattering_facet(wo.z).transmittance / (self.eta * self.eta);
+            let (wi, radiance) = self.refracted(wo)?;
             return Some(LobeSample::Interface(wi, radiance * self.hero / (1.0 - probability)));
         }
         let wi = if self.thin {
@@ -276,6 +275,19 @@ impl Interface {
             refract(wo, h, self.eta)?
         };
         (wi.z < 0.0).then_some(LobeSample::Spread(wi))
+    }
+
+    /// The direction that a smooth solid refracts light from, and the radiance that comes of it; `None` where
+    /// all is reflected.
+    pub(super) fn refracted(&self, wo: Vec3) -> Option<(Vec3, Vec3)> {
+        let wi = refract(wo, Vec3::Z, self.eta)?;
+        Some((wi, self.scattering_facet(wo.z).transmittance / (self.eta * self.eta)))
+    }
+
+    /// Shares of light that a smooth facet reflects and transmits at this cosine.
+    pub(super) fn smooth_shares(&self, cos: f32) -> [Vec3; 2] {
+        let Facet { reflectance, transmittance } = self.facet(cos);
+        [reflectance, transmittance]
     }
 
     /// `f * |cos wi|` of the lobes, and the density of [`Self::sample`] choosing `wi` from them.

@@ -192,6 +192,12 @@ impl Bsdf {
         self.interface.straight_transmittance(wo.z.abs()) * self.left_by_layers(wo, wo)
     }
 
+    /// The unit direction that smooth glass without coat or sheen refracts light from, and what radiance is
+    /// multiplied with on the way, linear RGB; `None` where all is reflected.
+    pub(crate) fn refracted(&self, wo: Vec3) -> Option<(Vec3, Vec3)> {
+        self.interface.refracted(wo)
+    }
+
     /// Whether all scattering is perfect reflection or refraction (or there is none), so that
     /// sampling lights at this point is useless.
     pub fn is_delta_only(&self) -> bool {
@@ -308,6 +314,11 @@ impl<'a> ViewedBsdf<'a> {
     /// The scattering towards everywhere.
     pub(crate) fn bsdf(&self) -> &'a Bsdf {
         self.bsdf
+    }
+
+    /// Shares of light that its interface, if it is smooth, reflects and transmits, linear RGB in `[0,1]`.
+    pub(crate) fn smooth_shares(&self) -> [Vec3; 2] {
+        self.bsdf.interface.smooth_shares(self.wo.z.abs())
     }
 
     /// See [`Bsdf::eval`].

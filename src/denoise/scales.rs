@@ -338,8 +338,7 @@ mod tests {
             for x in (0..size[0]).step_by(every as usize) {
                 for sample in 0..samples {
                     let radiance = Vec3::splat(light(x, y, sample));
-                    let (rays, was_invalid, first_hit) = (1, false, None);
-                    film.add(x, y, &PathResult { radiance, rays, was_invalid, first_hit });
+                    film.add(x, y, &PathResult { radiance, rays: 1, ..PathResult::default() });
                 }
             }
         }
@@ -445,7 +444,7 @@ mod tests {
                     film.add(
                         x,
                         y,
-                        &PathResult { radiance, first_hit, rays: 1, was_invalid: false },
+                        &PathResult { radiance, first_hit, rays: 1, ..PathResult::default() },
                     );
                 }
             }
@@ -477,7 +476,8 @@ mod tests {
                 let surface = FirstHit { albedo: Vec3::splat(0.05), normal: Vec3::Z, depth: 9.0 };
                 let radiance = Vec3::splat(if is_fog { 1.0 } else { 0.05 });
                 let first_hit = (!is_fog).then_some(surface);
-                film.add(x, y, &PathResult { radiance, first_hit, rays: 1, was_invalid: false });
+                let result = PathResult { radiance, first_hit, rays: 1, ..PathResult::default() };
+                film.add(x, y, &result);
             }
         }
         let truth = |x: u32, _: u32| if x >= 32 { 1.0 } else { 0.3 + 0.7 * 0.05 };

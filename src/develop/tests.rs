@@ -121,8 +121,8 @@ fn film(width: u32, height: u32, samples: u32) -> Film {
                 let result = PathResult {
                     radiance: if is_sky { Vec3::new(0.5, 0.7, 1.0) } else { albedo * light },
                     rays: 1,
-                    was_invalid: false,
                     first_hit: (!is_sky).then_some(first_hit),
+                    ..PathResult::default()
                 };
                 film.add(x, y, &result);
             }

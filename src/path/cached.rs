@@ -25,10 +25,8 @@ impl Path<'_> {
         if self.bounces == 0 || self.bounces == self.tracer.limits.bounces {
             return false;
         }
+        self.widen(vertex);
         let Scatterer::Surface(surface) = &vertex.scatterer else { return false };
-        let cosine = surface.geometric_normal.dot(self.ray.direction).abs();
-        // Of perfect reflections the density is infinite.
-        self.spread += self.travelled / (self.departure.pdf_solid_angle * cosine).sqrt();
         let is_known = self.spread >= cache.cells().edge_at(vertex.position)
             && self.is_in_air()
             && surface.is_cacheable();
@@ -37,5 +35,17 @@ impl Path<'_> {
             self.radiance += self.throughput * surface.bsdf().albedo() * radiance;
         }
         is_known
+    }
+
+    /// Spreads the path over the way to where it has arrived, if anybody asks.
+    pub(super) fn widen(&mut self, vertex: &Vertex<'_>) {
+        if self.tracer.cache.is_none() || self.bounces == 0 {
+            return;
+        }
+        if let Scatterer::Surface(surface) = &vertex.scatterer {
+            let cosine = surface.geometric_normal.dot(self.ray.direction).abs();
+            // Of perfect reflections the density is infinite.
+            self.spread += self.travelled / (self.departure.pdf_solid_angle * cosine).sqrt();
+        }
     }
 }

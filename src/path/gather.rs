@@ -3,8 +3,10 @@
 use glam::Vec3;
 
 use super::Path;
+use super::shadows::{Course, GlassWalk, Sight};
 use super::sharing::SharedTile;
-use super::vertex::Vertex;
+use super::vertex::{Arriving, Vertex};
+use crate::bvh::Ray;
 use crate::environment::TileSearch;
 use crate::light_grid::TileChoice;
 use crate::math::balance_heuristic;
@@ -18,16 +20,6 @@ pub(super) struct ChosenLights {
     of_lamps: Option<[u32; 2]>,
 }
 
-/// Light that next event estimation has found.
-pub(super) struct Arriving {
-    /// Unit, to where it comes from.
-    pub(super) direction: Vec3,
-    /// What of it goes on along the path: BSDF times cosine, or phase function.
-    pub(super) f: Vec3,
-    /// Its radiance over the sum of all densities that it may be found with.
-    pub(super) light: Vec3,
-}
-
 impl Path<'_> {
     /// Next event estimation from the map and, if there are any, one local light.
     pub(super) fn gather(&mut self, vertex: &Vertex<'_>, lights: &ChosenLights) {
@@ -39,9 +31,6 @@ impl Path<'_> {
     /// Draws the random numbers of next event estimation, and chooses tiles of the map by them.
     pub(super) fn choose_lights(&mut self, vertex: &Vertex<'_>) -> ChosenLights {
         let mut chosen = ChosenLights::default();
-        if vertex.scatterer.is_delta_only() {
-            return chosen;
-        }
         debug_assert!(self.map_samples as usize <= chosen.of_map.len(), "all are drawn");
         if let Some(grid) = self.tracer.grid {
             let count = self.map_samples;
@@ -89,7 +78,7 @@ impl Path<'_> {
             return None;
         };
         self.tracer.environment.prefetch_radiance(&sample);
-        let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
+        let (transmittance, refracted) = self.share_of_map(vertex, sample.direction);
         if self.tracer.counts.is_some() {
             let weight = self.visibility(vertex, sample.direction, own_pdf, transmittance);
             self.count(vertex, choice.tile, weight);
@@ -99,7 +88,9 @@ impl Path<'_> {
             return None;
         }
         // Balance heuristic over the density; `weight` is what integers drew it with.
-        let radiance = self.tracer.environment.sampled_radiance(&sample);
+        let environment = self.tracer.environment;
+        let sampled = || environment.sampled_radiance(&sample);
+        let radiance = refracted.map_or_else(sampled, |direction| environment.radiance(direction));
         let light = radiance * transmittance * (sample.weight / all_pdfs);
         Some(Arriving { direction: sample.direction, f, light })
     }
@@ -108,12 +99,37 @@ impl Path<'_> {
         let world = self.tracer.world;
         let sample = world.lights.sample(world, &vertex.receiver(), bits)?;
         let (f, own_pdf) = vertex.scatterer.scattered(sample.direction)?;
-        let transmittance = self.transmittance(vertex, sample.direction, sample.distance);
-        if transmittance == Vec3::ZERO {
+        let is_punctual = sample.pdf_solid_angle.is_infinite();
+        let light = match self.sight(vertex, sample.direction, sample.distance) {
+            Sight::Straight(transmittance) => {
+                let weight = balance_heuristic(sample.pdf_solid_angle, own_pdf);
+                sample.radiance_over_pdf * transmittance * weight
+            }
+            // No path finds a light without size, so none competes.
+            Sight::ThroughGlass(ray, body) if is_punctual => {
+                let walk = GlassWalk::new(self.tracer, ray, body, Course::Straight, None);
+                self.rays += walk.rays;
+                sample.radiance_over_pdf * walk.transmittance
+            }
+            Sight::ThroughGlass(ray, body) => {
+                let endless = Ray { t_max: f32::INFINITY, ..ray };
+                let walk = GlassWalk::new(self.tracer, endless, body, Course::Refracted, None);
+                self.rays += walk.rays;
+                let emitted = walk.emitted;
+                if emitted == Vec3::ZERO {
+                    return None;
+                }
+                let receiver = Some(&vertex.receiver());
+                let straight =
+                    GlassWalk::new(self.tracer, endless, body, Course::Straight, receiver);
+                self.rays += straight.rays;
+                // Where it is found through an edge, rounding may lose the one that was chosen.
+                emitted / (straight.lamp_pdf.max(sample.pdf_solid_angle) + own_pdf)
+            }
+        };
+        if light == Vec3::ZERO {
             return None;
         }
-        let weight = balance_heuristic(sample.pdf_solid_angle, own_pdf);
-        let light = sample.radiance_over_pdf * transmittance * weight;
         Some(Arriving { direction: sample.direction, f, light })
     }
 }

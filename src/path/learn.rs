@@ -23,12 +23,11 @@ impl PathTracer<'_> {
         let mut path = Path::new(self, ray, sampler);
         let mut own_bsdf = None;
         while let Some(vertex) = path.next_vertex(&mut own_bsdf) {
-            if path.bounces == self.limits.bounces {
+            if !path.counts_vertex() {
                 break;
             }
-            path.bounces += 1;
             let counts = vertex.cell.is_some() && path.bounces <= MAX_COUNTED;
-            if !vertex.scatterer.is_delta_only() && counts {
+            if counts {
                 for number in 0..tries {
                     let bits = path.sampler.of_estimate(tries, number).next_pair_bits();
                     path.look_at_map(&vertex, bits);
@@ -97,7 +96,7 @@ impl Path<'_> {
         let weight = match vertex.scatterer.scattered(sample.direction) {
             None => 0.0,
             Some((f, own_pdf)) => {
-                let transmittance = self.transmittance(vertex, sample.direction, f32::INFINITY);
+                let (transmittance, _) = self.share_of_map(vertex, sample.direction);
                 if is_ratio {
                     self.visibility(vertex, sample.direction, own_pdf, transmittance)
                 } else {

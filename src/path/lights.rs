@@ -158,10 +158,11 @@ fn relate(lights: &mut [Light]) {
 
 /// Radiance a surface point sends towards its viewer: as much as alpha covers it, and its coat lets through.
 pub(super) fn emitted(scene: &Scene, point: &SurfacePoint<'_>, to_viewer: Vec3) -> Vec3 {
-    if !(point.front_face || scene.materials[point.material as usize].double_sided) {
+    let parameters = &point.parameters;
+    let is_seen = point.front_face || scene.materials[point.material as usize].double_sided;
+    if parameters.unlit || !is_seen {
         return Vec3::ZERO;
     }
-    let parameters = &point.parameters;
     let emitted = parameters.emissive * parameters.alpha;
     if parameters.clearcoat == 0.0 {
         return emitted;

@@ -28,6 +28,8 @@ pub(super) struct Passing {
     pub(super) masked: bool,
     /// Part of the light may go straight through: blended, or thin and transmissive.
     pub(super) partial: bool,
+    /// Smooth solid glass that shadow rays follow.
+    pub(super) clear: bool,
 }
 
 impl ReadyMaterial {
@@ -51,6 +53,7 @@ impl ReadyMaterial {
                     || (material.transmission > 0.0
                         && material.thickness == 0.0
                         && !material.unlit),
+                clear: material.is_clear_solid(),
             },
             shared,
         }
@@ -63,6 +66,14 @@ impl ReadyMaterial {
             Cow::Borrowed(_) if point.front_face => Cow::Borrowed(&self.front),
             Cow::Borrowed(_) => Cow::Borrowed(self.back.as_deref().unwrap_or(&self.front)),
             Cow::Owned(own) => Cow::Owned(Bsdf::new(own, point.front_face)),
+        }
+    }
+
+    /// The same as if it were seen from the front.
+    pub(super) fn bsdf_in_front(&self, point: &SurfacePoint<'_>) -> Cow<'_, Bsdf> {
+        match &point.parameters {
+            Cow::Borrowed(_) => Cow::Borrowed(&self.front),
+            Cow::Owned(own) => Cow::Owned(Bsdf::new(own, true)),
         }
     }
 

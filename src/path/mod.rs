@@ -3,9 +3,10 @@
 //! A path is a chain of vertices on surfaces and in media. At each of at most `bounces` vertices
 //! light is gathered by next event estimation (NEE) from the environment map, and from local lights
 //! if there are any, and the path goes on in a direction the BSDF or the phase function chooses; what
-//! a path then runs into counts with the balance heuristic. Alpha and smooth thin glass are passed
+//! a path then runs into counts with the balance heuristic. Perfect reflections and refractions scatter
+//! nothing and are not counted among these vertices. Alpha and smooth thin glass are passed
 //! straight through, by paths and shadow rays alike, and are no vertices: so NEE and BSDF sampling see
-//! the same light behind a pane.
+//! the same light behind a pane. Smooth solid glass refracts both (`shadows`).
 
 use std::borrow::Cow;
 
@@ -21,8 +22,10 @@ mod gather;
 mod learn;
 pub(crate) mod light_tree;
 mod lights;
+mod looks;
 mod materials;
 mod ray_clock;
+mod shadows;
 pub mod sharing;
 pub(crate) mod train;
 mod vertex;
@@ -33,11 +36,13 @@ pub use background::Background;
 pub(crate) use learn::MAX_COUNTED;
 pub use light_tree::Receiver;
 pub use lights::{LightSample, LocalLights};
+pub use looks::FirstHit;
 pub(crate) use train::TRAINING_VERTICES;
 pub use world::World;
 pub use world_builder::WorldBuilder;
 
 use self::body::Body;
+use self::looks::Looks;
 use self::vertex::{MediumScatterer, Onward, Scatterer, SurfaceScatterer, Vertex};
 use crate::bsdf::{Bsdf, Hero};
 use crate::bvh::{Hit, Ray, offset_origin};
@@ -55,7 +60,7 @@ use crate::scene::surface::SurfacePoint;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PathLimits {
     /// Most vertices, on surfaces or in a medium, that scatter light; 1 is direct light only, 0 sees emitters
-    /// and the environment alone.
+    /// and the environment alone. Perfect mirrors and smooth glass scatter none.
     pub bounces: u32,
     /// Whether dim paths are ended at random.
     pub russian_roulette: bool,
@@ -100,17 +105,9 @@ pub struct PathResult {
     pub was_invalid: bool,
     /// The first surface, if any was hit and it is asked for.
     pub first_hit: Option<FirstHit>,
-}
-
-/// What the camera sees at the first surface that is not passed through.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FirstHit {
-    /// Directional albedo estimate, linear RGB.
-    pub albedo: Vec3,
-    /// World shading normal towards the camera.
-    pub normal: Vec3,
-    /// Metres along the ray.
-    pub depth: f32,
+    /// Whether it went the way that carries less at a mirror or smooth glass before that surface: then it tells
+    /// nothing of what is seen first, and nothing is in `first_hit`.
+    pub is_minor: bool,
 }
 
 /// Vertices after which Russian roulette may end a path.
@@ -124,6 +121,9 @@ pub(crate) const MIN_SURVIVAL: f32 = 0.05;
 
 /// Share of the way to a light, or to a vertex, that a shadow ray goes: it stops short of that surface.
 pub(crate) const SHADOW_RAY_SHARE: f32 = 1.0 - 1e-4;
+
+/// Most perfect reflections and refractions in a row; only light that is caught in a solid has more.
+pub(crate) const MAX_INTERFACES: u32 = 64;
 
 /// Panes and leaves one ray may pass; only a scene that is broken has more.
 pub(crate) const MAX_PASSES: u32 = 1000;
@@ -153,12 +153,22 @@ impl PathTracer<'_> {
 /// The vertex a ray left from, as far as MIS asks.
 #[derive(Clone, Copy)]
 struct Departure {
+    /// As it left.
+    ray: Ray,
     /// Density in solid angle of the ray's direction; infinite if no NEE competes with it.
     pdf_solid_angle: f32,
     receiver: Receiver,
     distribution: u32,
     /// Samples of the map that compete with it.
     map_samples: u32,
+    /// Whether smooth glass has refracted it since.
+    is_refracted: bool,
+}
+
+/// Where a ray is not passed on straight.
+enum Arrival<'a> {
+    InMedium(Vertex<'static>),
+    AtSurface(SurfacePoint<'a>),
 }
 
 /// A path under construction.
@@ -179,21 +189,26 @@ struct Path<'a> {
     is_clear: bool,
     /// Metres over which surfaces average what the path would find; kept if there is a cache.
     spread: f32,
+    /// Vertices so far that scatter light.
     bounces: u32,
+    /// Perfect reflections and refractions since.
+    interfaces: u32,
     /// Samples of the map that the next vertex takes.
     map_samples: u32,
     rays: u32,
-    first_hit: Option<FirstHit>,
+    looks: Looks,
 }
 
 impl<'a> Path<'a> {
     fn new(tracer: &'a PathTracer<'a>, ray: Ray, sampler: Sampler) -> Self {
         let receiver = Receiver { position: ray.origin, normal: Vec3::ZERO };
         let departure = Departure {
+            ray,
             pdf_solid_angle: f32::INFINITY,
             receiver,
             distribution: WHOLE_MAP,
             map_samples: 1,
+            is_refracted: false,
         };
         Self {
             tracer,
@@ -208,9 +223,10 @@ impl<'a> Path<'a> {
             is_clear: true,
             spread: 0.0,
             bounces: 0,
+            interfaces: 0,
             map_samples: 1,
             rays: 0,
-            first_hit: None,
+            looks: Looks::default(),
         }
     }
 
@@ -227,15 +243,29 @@ impl<'a> Path<'a> {
     /// Gathers light at a vertex, if the path may have one more, and chooses where the path goes on.
     /// `false` if it ends.
     fn visit(&mut self, vertex: &Vertex<'_>) -> bool {
-        if self.bounces == self.tracer.limits.bounces {
+        if !self.counts_vertex() {
             return false;
         }
-        self.bounces += 1;
         let lights = self.choose_lights(vertex);
         // Meanwhile memory is fetched.
         let onward = self.choose_onward(vertex);
         self.gather(vertex, &lights);
         onward.is_some_and(|onward| self.go_on(vertex, &onward)) && self.survives()
+    }
+
+    /// Counts a vertex; `false` if the path may have no more of them.
+    fn counts_vertex(&mut self) -> bool {
+        if self.bounces == self.tracer.limits.bounces {
+            return false;
+        }
+        self.bounces += 1;
+        self.interfaces = 0;
+        true
+    }
+
+    /// Whether nothing has reflected, refracted or scattered it yet.
+    fn is_of_camera(&self) -> bool {
+        self.bounces + self.interfaces == 0
     }
 
     /// What it brought back.
@@ -245,23 +275,67 @@ impl<'a> Path<'a> {
             radiance: if was_invalid { Vec3::ZERO } else { self.radiance },
             rays: self.rays,
             was_invalid,
-            first_hit: self.first_hit,
+            first_hit: self.looks.first_hit(),
+            is_minor: self.looks.is_minor,
         }
     }
 
-    /// Follows the ray to the next place that scatters; adds what is emitted on the way. A BSDF that
-    /// is of that place alone is put into `own_bsdf`.
+    /// Follows the ray to the next place that scatters light, by way of what only reflects and refracts it; adds
+    /// what is emitted on the way. A BSDF that is of that place alone is put into `own_bsdf`.
     fn next_vertex<'v>(&mut self, own_bsdf: &'v mut Option<Bsdf>) -> Option<Vertex<'v>>
     where
         'a: 'v,
     {
+        loop {
+            let point = match self.next_arrival()? {
+                Arrival::InMedium(vertex) => return Some(vertex),
+                Arrival::AtSurface(point) => point,
+            };
+            let bsdf = self.bsdf_at(&point)?;
+            if bsdf.is_delta_only() {
+                let interface = self.vertex_at(&point, &bsdf);
+                if !self.passes_interface(&interface) {
+                    return None;
+                }
+                continue;
+            }
+            let bsdf = match bsdf {
+                Cow::Borrowed(ready) => ready,
+                Cow::Owned(own) => own_bsdf.insert(own),
+            };
+            return Some(self.vertex_at(&point, bsdf));
+        }
+    }
+
+    /// Goes on from a perfect interface; `false` if the path ends.
+    fn passes_interface(&mut self, interface: &Vertex<'_>) -> bool {
+        self.interfaces += 1;
+        self.widen(interface);
+        let onward = self.choose_onward(interface).filter(|_| self.interfaces <= MAX_INTERFACES);
+        let Some(onward) = onward else { return false };
+        self.looks.before += self.travelled;
+        if self.looks_on()
+            && let Scatterer::Surface(surface) = &interface.scatterer
+        {
+            self.looks.go_by(surface.bsdf.smooth_shares(), onward.is_through);
+        }
+        self.go_on(interface, &onward) && self.survives()
+    }
+
+    /// Whether it is asked for what the camera sees, and nothing has scattered the path yet.
+    fn looks_on(&self) -> bool {
+        self.tracer.layers && self.bounces == 0
+    }
+
+    /// Follows the ray to where it is not passed on straight; adds what is emitted on the way.
+    fn next_arrival(&mut self) -> Option<Arrival<'a>> {
         self.travelled = 0.0;
         self.is_clear = true;
         for _ in 0..MAX_PASSES {
             self.rays += 1;
-            let hit = self.tracer.world.closest_hit(&self.ray, self.bounces == 0);
+            let hit = self.tracer.world.closest_hit(&self.ray, self.is_of_camera());
             if let Some(vertex) = self.fly(hit.map_or(f32::INFINITY, |hit| hit.t)) {
-                return Some(vertex);
+                return Some(Arrival::InMedium(vertex));
             }
             if self.has_faded() {
                 return None;
@@ -275,11 +349,10 @@ impl<'a> Path<'a> {
             if self.tracer.world.needs.has(SceneFeatures::EMITTERS) {
                 self.add_emitted(&hit, &point);
             }
-            if self.passes(&point) {
-                self.ray.origin = offset_origin(point.position, -point.geometric_normal);
-                continue;
+            if !self.passes(&point) {
+                return Some(Arrival::AtSurface(point));
             }
-            return self.arrive(&point, own_bsdf);
+            self.ray.origin = offset_origin(point.position, -point.geometric_normal);
         }
         None
     }
@@ -301,7 +374,11 @@ impl<'a> Path<'a> {
         let (origin, direction) = (self.ray.origin, self.ray.direction);
         let (interior, from, to) = self.body.stretch(fog, origin, direction, distance)?;
         if !interior.scatters() {
-            self.throughput *= interior.transmittance(to - from);
+            let left = interior.transmittance(to - from);
+            self.throughput *= left;
+            if self.looks_on() && !self.is_in_air() {
+                self.looks.look_through(left);
+            }
             return None;
         }
         if self.has_faded() {
@@ -332,6 +409,13 @@ impl<'a> Path<'a> {
         }
         let passes = probability >= 1.0 || self.sampler.next_pair()[0] < probability;
         self.is_clear &= !passes || through == Vec3::ONE;
+        if passes && self.looks_on() && point.parameters.transmission > 0.0 {
+            let bsdf = world.material(point.material).bsdf(point);
+            let wo = point.shading_frame.local_from_world(-self.ray.direction);
+            if bsdf.is_delta_only() {
+                self.looks.go_by(bsdf.viewed_from(wo).smooth_shares(), true);
+            }
+        }
         self.throughput *= if passes {
             through / probability
         } else {
@@ -340,38 +424,34 @@ impl<'a> Path<'a> {
         passes
     }
 
-    /// Makes the surface a vertex, unless it is unlit: then it is seen as it is.
-    fn arrive<'v>(
-        &mut self,
-        point: &SurfacePoint<'_>,
-        own_bsdf: &'v mut Option<Bsdf>,
-    ) -> Option<Vertex<'v>>
-    where
-        'a: 'v,
-    {
+    /// How the surface scatters light; `None` if it is unlit: then it is seen as it is.
+    fn bsdf_at(&mut self, point: &SurfacePoint<'_>) -> Option<Cow<'a, Bsdf>> {
         let (world, parameters) = (self.tracer.world, &point.parameters);
-        let cells = self.tracer.cells();
-        let cell = cells.map(|cells| cells.cell_of(point.position, point.geometric_normal));
-        let distribution = self.tracer.distribution(cell);
-        let material = world.material(point.material);
-        let mut bsdf = material.bsdf(point);
+        let mut bsdf = world.material(point.material).bsdf(point);
         if parameters.dispersion > 0.0 {
             let hero = Hero::choose(self.throughput, self.sampler.next_pair()[0]);
             bsdf = Cow::Owned(bsdf.of_hero(hero));
         }
-        let bsdf = match bsdf {
-            Cow::Borrowed(ready) => ready,
-            Cow::Owned(own) => own_bsdf.insert(own),
-        };
-        if self.bounces == 0 && self.tracer.layers {
-            let albedo = if parameters.unlit { parameters.base_color } else { bsdf.albedo() };
-            self.first_hit =
-                Some(FirstHit { albedo, normal: point.shading_frame.z, depth: self.travelled });
+        if self.looks_on() {
+            self.looks.look_at(point, &bsdf, self.travelled);
         }
         if parameters.unlit {
             self.radiance += self.throughput * parameters.emissive;
             return None;
         }
+        Some(bsdf)
+    }
+
+    /// The surface as a place that scatters.
+    fn vertex_at<'v>(&self, point: &SurfacePoint<'_>, bsdf: &'v Bsdf) -> Vertex<'v>
+    where
+        'a: 'v,
+    {
+        let cells = self.tracer.cells();
+        let cell = cells.map(|cells| cells.cell_of(point.position, point.geometric_normal));
+        let distribution = self.tracer.distribution(cell);
+        let parameters = &point.parameters;
+        let material = self.tracer.world.material(point.material);
         let wo = point.shading_frame.local_from_world(-self.ray.direction);
         let scatterer = Scatterer::Surface(SurfaceScatterer {
             geometric_normal: point.geometric_normal,
@@ -379,15 +459,13 @@ impl<'a> Path<'a> {
             bsdf: bsdf.viewed_from(wo),
             behind: material.behind(point),
             transmits: parameters.transmission > 0.0 || parameters.diffuse_transmission > 0.0,
+            is_clear: material.passing.clear,
         });
-        Some(Vertex { position: point.position, cell, distribution, scatterer })
+        Vertex { position: point.position, cell, distribution, scatterer }
     }
 
     /// Adds what a surface emits, whether the ray then passes it or not.
     fn add_emitted(&mut self, hit: &Hit, point: &SurfacePoint<'_>) {
-        if point.parameters.unlit {
-            return;
-        }
         let world = self.tracer.world;
         let emitted = lights::emitted(&world.scene, point, -self.ray.direction);
         if emitted.max_element() <= 0.0 {
@@ -396,6 +474,10 @@ impl<'a> Path<'a> {
         let from = self.departure;
         let weight = if from.pdf_solid_angle.is_infinite() {
             1.0
+        } else if from.is_refracted {
+            let walk = from.straight_walk(self.tracer);
+            self.rays += walk.rays;
+            balance_heuristic(from.pdf_solid_angle, walk.lamp_pdf)
         } else {
             let distance = from.receiver.position.distance(point.position);
             let nee = world.lights.sample_pdf_solid_angle(
@@ -413,7 +495,7 @@ impl<'a> Path<'a> {
     /// The ray leaves the scene: adds the map's radiance.
     fn escape(&mut self) {
         let environment = self.tracer.environment;
-        if self.bounces == 0 && self.tracer.background != Background::Map {
+        if self.is_of_camera() && self.tracer.background != Background::Map {
             let u = Vec2::from(self.sampler.next_pair());
             let background = self.tracer.background;
             self.radiance +=
@@ -425,28 +507,16 @@ impl<'a> Path<'a> {
             self.radiance += self.throughput * environment.radiance(self.ray.direction);
             return;
         };
-        let (radiance, tile, in_tile) = environment.radiance_and_tile_pdf(self.ray.direction);
-        let nee = from.map_samples as f32 * grid.probability(from.distribution, tile) * in_tile;
-        self.radiance += self.throughput * radiance * balance_heuristic(from.pdf_solid_angle, nee);
-    }
-
-    /// Share of light that arrives at a vertex from `distance` metres away.
-    fn transmittance(&mut self, vertex: &Vertex<'_>, direction: Vec3, distance: f32) -> Vec3 {
-        let behind = match &vertex.scatterer {
-            Scatterer::Surface(surface) => surface.behind.filter(|_| !surface.is_above(direction)),
-            Scatterer::Medium(_) => None,
-        };
-        let body = behind.copied().unwrap_or(self.body);
-        let origin = vertex.scatterer.origin_toward(vertex.position, direction);
-        let stretch = body.stretch(self.tracer.fog.as_ref(), origin, direction, distance);
-        let left =
-            stretch.map_or(Vec3::ONE, |(interior, from, to)| interior.transmittance(to - from));
-        if left == Vec3::ZERO {
-            return left;
+        let (mut radiance, tile, in_tile) = environment.radiance_and_tile_pdf(from.ray.direction);
+        let mut nee = from.map_samples as f32 * grid.probability(from.distribution, tile) * in_tile;
+        if from.is_refracted {
+            radiance = environment.radiance(self.ray.direction);
+            self.rays += 1;
+            if from.is_blocked(self.tracer) {
+                nee = 0.0;
+            }
         }
-        self.rays += 1;
-        let ray = Ray { origin, direction, t_min: 0.0, t_max: distance * SHADOW_RAY_SHARE };
-        self.tracer.world.transmittance(&ray) * left
+        self.radiance += self.throughput * radiance * balance_heuristic(from.pdf_solid_angle, nee);
     }
 
     /// Chooses where the path goes on, and goes there. `false` if it ends.
@@ -478,19 +548,30 @@ impl<'a> Path<'a> {
             self.body = surface.behind.copied().unwrap_or(self.body);
         }
         let origin = vertex.scatterer.origin_toward(vertex.position, onward.direction);
+        if onward.is_through
+            && let Scatterer::Surface(surface) = &vertex.scatterer
+            && surface.is_clear
+        {
+            // NEE at the vertex before goes the same way.
+            self.departure.is_refracted = true;
+            self.ray = Ray { origin, direction: onward.direction, ..self.ray };
+            return true;
+        }
         self.depart(vertex, origin, onward.direction, onward.pdf_solid_angle);
         true
     }
 
     fn depart(&mut self, vertex: &Vertex<'_>, origin: Vec3, direction: Vec3, pdf_solid_angle: f32) {
+        self.ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
         self.departure = Departure {
+            ray: self.ray,
             pdf_solid_angle,
             receiver: vertex.receiver(),
             distribution: vertex.distribution,
             map_samples: self.map_samples,
+            is_refracted: false,
         };
         self.map_samples = 1;
-        self.ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
     }
 
     /// Russian roulette.
@@ -503,7 +584,8 @@ impl<'a> Path<'a> {
     /// With which probability the path has survived; `None` if it has not. By throughput, as it would
     /// be in air: refraction into a body is no loss.
     fn survival(&mut self) -> Option<f32> {
-        if !self.tracer.limits.russian_roulette || self.bounces < ROULETTE_AFTER {
+        let is_young = self.bounces + self.interfaces < ROULETTE_AFTER;
+        if !self.tracer.limits.russian_roulette || is_young {
             return Some(1.0);
         }
         let in_air = self.throughput.max_element() * self.body.squared_index;

@@ -16,8 +16,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use super::gather::Arriving;
-use super::vertex::{Scatterer, SurfaceScatterer, Vertex};
+use super::vertex::{Arriving, Scatterer, SurfaceScatterer, Vertex};
 use super::{Path, PathResult, PathTracer, SHADOW_RAY_SHARE};
 use crate::bsdf::Bsdf;
 use crate::bvh::{Ray, offset_origin};
@@ -242,6 +241,7 @@ impl Path<'_> {
     /// Whether the vertex that the path has arrived at is found by other pixels in the same way.
     fn is_found_alike(&self, vertex: &Vertex<'_>) -> bool {
         self.is_clear
+            && self.interfaces == 0
             && self.departure.pdf_solid_angle.is_finite()
             && self.bounces < self.tracer.limits.bounces
             && vertex.scatterer.is_alike_nearby()
@@ -408,6 +408,7 @@ impl Path<'_> {
             }
         };
         self.bounces += 1;
+        self.interfaces = 0;
         self.rays = 0;
         self.throughput_before *= self.throughput.max_element();
         self.throughput = Vec3::ONE;

@@ -30,6 +30,16 @@ impl Vertex<'_> {
     }
 }
 
+/// Light that next event estimation has found.
+pub(super) struct Arriving {
+    /// Unit, to where it comes from.
+    pub(super) direction: Vec3,
+    /// What of it goes on along the path: BSDF times cosine, or phase function.
+    pub(super) f: Vec3,
+    /// Its radiance over the sum of all densities that it may be found with.
+    pub(super) light: Vec3,
+}
+
 /// What scatters light at a vertex.
 pub(super) enum Scatterer<'v> {
     Surface(SurfaceScatterer<'v>),
@@ -52,17 +62,11 @@ pub(super) struct SurfaceScatterer<'v> {
     pub(super) behind: Option<&'v Body>,
     /// Whether light comes through the surface.
     pub(super) transmits: bool,
+    /// Whether it is of smooth solid glass that shadow rays follow.
+    pub(super) is_clear: bool,
 }
 
 impl Scatterer<'_> {
-    /// Whether no light that NEE may find is scattered towards the path.
-    pub(super) fn is_delta_only(&self) -> bool {
-        match self {
-            Self::Surface(surface) => surface.bsdf().is_delta_only(),
-            Self::Medium(_) => false,
-        }
-    }
-
     /// What share of light from `direction` goes on along the path, and the density with which
     /// the path chooses that direction; `None` if it is no light.
     pub(super) fn scattered(&self, direction: Vec3) -> Option<(Vec3, f32)> {
@@ -106,8 +110,7 @@ impl<'v> SurfaceScatterer<'v> {
     /// Whether it scatters much the same to and from places side by side, all on one side: no reflection
     /// narrower than GGX makes it with this alpha.
     pub(super) fn is_broad(&self, least_alpha: f32) -> bool {
-        let bsdf = self.bsdf();
-        !self.transmits && !bsdf.is_delta_only() && bsdf.is_broad(least_alpha)
+        !self.transmits && self.bsdf().is_broad(least_alpha)
     }
 
     /// BSDF times cosine and the BSDF's density for light from `direction`; `None` where it is

@@ -152,6 +152,27 @@ impl World {
         if blocked { Vec3::ZERO } else { transmittance }
     }
 
+    /// The same as if there were no smooth solid glass, and whether there is any.
+    pub(super) fn transmittance_but_for_glass(&self, ray: &Ray) -> (Vec3, bool) {
+        let _running = self.clock.as_ref().map(RayClock::start);
+        let mut transmittance = Vec3::ONE;
+        let mut meets_glass = false;
+        let blocked = self.bvh.any_hit(ray, |hit| {
+            let passing = self.material_of(hit).passing;
+            if passing.clear {
+                meets_glass = true;
+                return false;
+            }
+            if !passing.partial {
+                return self.is_covered(hit);
+            }
+            let point = self.point(hit, ray.direction);
+            transmittance *= self.straight_through(&point, ray.direction);
+            transmittance.max_element() <= 0.0
+        });
+        (if blocked { Vec3::ZERO } else { transmittance }, meets_glass)
+    }
+
     /// The surface that a ray along `direction` has hit.
     #[inline]
     pub fn point(&self, hit: &Hit, direction: Vec3) -> SurfacePoint<'_> {

@@ -25,8 +25,10 @@ pub struct Pixel {
 pub struct Surface {
     albedo: DVec3,
     normal: DVec3,
+    /// Sum over hits. Before the first it counts down from zero samples that say nothing ([`PathResult::is_minor`]).
     depth: f64,
-    hits: u32,
+    /// Those included that count as the mean of the others.
+    hits: f64,
 }
 
 impl Surface {
@@ -34,7 +36,7 @@ impl Surface {
     fn mean(&self, samples: u32) -> ([f32; 3], [f32; 3], f32) {
         let albedo = self.albedo / f64::from(samples.max(1));
         let normal = self.normal.normalize_or_zero();
-        let depth = self.depth / f64::from(self.hits.max(1));
+        let depth = self.depth.max(0.0) / self.hits.max(1.0);
         (albedo.as_vec3().to_array(), normal.as_vec3().to_array(), depth as f32)
     }
 }
@@ -111,25 +113,38 @@ impl Pixel {
 }
 
 impl Surface {
-    /// Adds the first hit of one sample, or that there was none.
+    /// Adds the first hit of one sample, or that there was none. One that says nothing counts as much as the others
+    /// on average, those that come first as much as the first that says something.
     pub fn add(&mut self, result: &PathResult) {
+        let waiting = -self.depth.min(0.0);
         if let Some(hit) = result.first_hit {
-            self.albedo += hit.albedo.as_dvec3();
-            self.normal += hit.normal.as_dvec3();
-            self.depth += f64::from(hit.depth);
-            self.hits += 1;
+            let times = 1.0 + waiting;
+            self.albedo += hit.albedo.as_dvec3() * times;
+            self.normal += hit.normal.as_dvec3() * times;
+            self.depth += f64::from(hit.depth) * times + waiting;
+            self.hits += times;
+        } else if !result.is_minor {
+            self.depth += waiting;
+        } else if self.hits > 0.0 {
+            let mean = 1.0 / self.hits;
+            self.albedo += self.albedo * mean;
+            self.normal += self.normal * mean;
+            self.depth += self.depth * mean;
+            self.hits += 1.0;
+        } else {
+            self.depth -= 1.0;
         }
     }
 
     /// Of sums over first hits: albedo, depth, normal and their number.
     pub(crate) fn of_sums([r, g, b, depth, x, y, z, hits]: [f64; 8]) -> Self {
-        Self { albedo: DVec3::new(r, g, b), normal: DVec3::new(x, y, z), depth, hits: hits as u32 }
+        Self { albedo: DVec3::new(r, g, b), normal: DVec3::new(x, y, z), depth, hits }
     }
 
     /// What [`Self::of_sums`] takes.
     pub(crate) fn sums(&self) -> [f64; 8] {
         let ([r, g, b], [x, y, z]) = (self.albedo.to_array(), self.normal.to_array());
-        [r, g, b, self.depth, x, y, z, f64::from(self.hits)]
+        [r, g, b, self.depth, x, y, z, self.hits]
     }
 }
 
@@ -226,7 +241,7 @@ impl Film {
             surface.albedo += more.albedo;
             surface.normal += more.normal;
             surface.depth += more.depth;
-            surface.hits = surface.hits.saturating_add(more.hits);
+            surface.hits += more.hits;
         }
     }
 
@@ -248,7 +263,7 @@ impl Film {
     /// Mean albedo, unit normal and distance in metres of what a pixel sees; `None` without layers, and where it
     /// has met no surface.
     pub(crate) fn surface_of(&self, index: usize) -> Option<([f32; 3], [f32; 3], f32)> {
-        let surface = self.surfaces.get(index).filter(|surface| surface.hits > 0)?;
+        let surface = self.surfaces.get(index).filter(|surface| surface.hits > 0.0)?;
         Some(surface.mean(self.pixels.get(index)?.samples))
     }
 
@@ -467,7 +482,7 @@ mod tests {
         let sample = |light: f32, depth: f32| {
             let (normal, albedo) = (Vec3::Z, Vec3::splat(0.5));
             let first_hit = Some(crate::path::FirstHit { normal, albedo, depth });
-            PathResult { radiance: Vec3::splat(light), rays: 1, was_invalid: false, first_hit }
+            PathResult { radiance: Vec3::splat(light), rays: 1, first_hit, ..PathResult::default() }
         };
         film.add(0, 0, &sample(5.0, 2.0));
         let mut expected = Film::new(1, 1, true);

@@ -60,8 +60,7 @@ mod tests {
         let sample = |light: f32| PathResult {
             radiance: Vec3::splat(light),
             rays: 1,
-            was_invalid: false,
-            first_hit: None,
+            ..PathResult::default()
         };
         // Every fourth pixel of every fourth row, and one whole row.
         for (x, y) in [(0, 0), (4, 0), (8, 0), (0, 4), (4, 4), (8, 4)] {

@@ -33,4 +33,4 @@ pub use view::{Crop, Gi, Sampling, Sharing, View};
 
 /// Version of what samples are made of: raised when a picture of the same options and seed is another than before.
 /// Parts and checkpoints of other versions are refused.
-pub const SAMPLES_VERSION: u32 = 1;
+pub const SAMPLES_VERSION: u32 = 2;

@@ -70,6 +70,11 @@ pub enum TextureSlot {
     IridescenceThickness,
 }
 
+/// Roughness up to which reflections are perfect, whatever evaluates them.
+const MAX_SMOOTH_ROUGHNESS: f32 = 0.03;
+/// Roughness from which none are.
+const MIN_ROUGHNESS: f32 = 0.035;
+
 /// glTF metallic-roughness material with the extensions lightgrid renders. Factors are linear. Textures, of
 /// which most materials have few or none, are boxed: a file may have a million materials.
 #[derive(Debug, Clone, PartialEq)]
@@ -203,12 +208,39 @@ impl Material {
         (self.transmission > 0.0 || self.diffuse_transmission > 0.0) && self.thickness > 0.0
     }
 
+    /// Whether it is a solid whose surface only reflects and refracts, and whose inside only absorbs, each in one
+    /// way whatever the wavelength.
+    pub fn is_clear_solid(&self) -> bool {
+        let is_glass = self.transmission == 1.0
+            && self.metallic == 0.0
+            && self.diffuse_transmission == 0.0
+            && self.texture(TextureSlot::Transmission).is_none();
+        let is_smooth = self.roughness <= MAX_SMOOTH_ROUGHNESS && self.anisotropy == 0.0;
+        let is_bare = self.clearcoat == 0.0
+            && self.sheen_color == Vec3::ZERO
+            && self.emissive == Vec3::ZERO
+            && self.alpha_mode == AlphaMode::Opaque
+            && !self.unlit;
+        let is_solid =
+            self.thickness > 0.0 && self.scattering == Vec3::ZERO && self.dispersion == 0.0;
+        is_glass && is_smooth && is_bare && is_solid
+    }
+
+    /// Whether its reflections may be perfect somewhere.
+    pub(crate) fn may_be_smooth(&self) -> bool {
+        let varies = self.texture(TextureSlot::MetallicRoughness).is_some();
+        !self.unlit && (varies || self.roughness < MIN_ROUGHNESS)
+    }
+
     /// Whether as much light goes straight through as through another one with the same textures, and as much
     /// is emitted: the colour of glass counts, that of a wall does not.
     pub(crate) fn lets_pass_like(&self, other: &Self) -> bool {
         let opacity =
             |m: &Self| (m.alpha_mode, m.base_color.w, m.double_sided, m.transmission, m.thickness);
-        let glass = |m: &Self| (m.base_color, m.metallic, m.roughness);
+        let glass = |m: &Self| {
+            let inside = (m.attenuation_color, m.attenuation_distance, m.scattering);
+            (m.base_color, m.metallic, m.roughness, m.ior, m.dispersion, inside)
+        };
         opacity(self) == opacity(other)
             && (self.emissive, self.unlit) == (other.emissive, other.unlit)
             && self.diffuse_transmission == other.diffuse_transmission

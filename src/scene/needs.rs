@@ -62,6 +62,10 @@ bitflags::bitflags! {
         const ROUGH_METALS = 1 << 24;
         /// Glass that spreads what it lets through, likewise.
         const ROUGH_GLASS = 1 << 25;
+        /// Solids of smooth glass, whose refraction shadow rays follow.
+        const CLEAR_SOLIDS = 1 << 26;
+        /// Surfaces that may reflect or refract perfectly.
+        const PERFECT_INTERFACES = 1 << 27;
     }
 }
 
@@ -202,6 +206,8 @@ impl SceneNeeds {
             (S::COATED_EMITTERS, is_emitter(m) && m.clearcoat > 0.0),
             (S::ROUGH_METALS, is_rough && m.metallic > 0.0),
             (S::ROUGH_GLASS, is_rough && m.transmission > 0.0),
+            (S::CLEAR_SOLIDS, m.is_clear_solid()),
+            (S::PERFECT_INTERFACES, m.may_be_smooth()),
         ] {
             features.set(feature, is_needed || features.contains(feature));
         }

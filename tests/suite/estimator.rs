@@ -14,6 +14,7 @@ mod many_lights;
 mod repeatable;
 pub(crate) mod scenes;
 mod sharing;
+mod through_glass;
 mod unbiased;
 
 use std::sync::atomic::AtomicBool;

@@ -14,7 +14,7 @@ use lightgrid::render::filter::PixelFilter;
 use lightgrid::render::gpu::{Gpu, UploadedScene};
 use lightgrid::render::{Crop, Gi, Phase, Sampling, Session, Sharing, StopRule, View};
 use lightgrid::sampler::Points;
-use lightgrid::scene::{Camera, Material, Medium, builtin, gltf};
+use lightgrid::scene::{Camera, Material, Medium, PunctualKind, PunctualLight, builtin, gltf};
 
 use crate::estimator::scenes::{self, lambert, lamp, room, smoked_glass};
 use crate::estimator::{MODES, mean, render, view};
@@ -245,6 +245,50 @@ fn fog_and_milk_look_the_same() {
         let mut view = View { medium, ..picture(world, Sampling::Plain) };
         (view.camera, view.limits.bounces) = (camera.clone(), 12);
         compare_views(&gpu, what, world, &sky_map("overcast"), view);
+    }
+}
+
+/// Behind a pane, in a ball of smoked glass and seen in a mirror: the map, an emissive ball and a light without size,
+/// in clear air and in fog, with pixels that share and without.
+#[test]
+fn light_through_solid_glass_looks_the_same() {
+    let Some(gpu) = gpu() else { return };
+    let (open, camera) = room(0.7, None);
+    let clear = Material { attenuation_distance: f32::INFINITY, ..smoked_glass() };
+    let mirror = Material { metallic: 1.0, roughness: 0.0, ..lambert(0.9) };
+    let bulb = Vec3::new(-0.2, 1.5, 0.6);
+    let light = PunctualLight {
+        kind: PunctualKind::Point,
+        position: bulb,
+        ..scenes::sunlight(Vec3::Y, 0.5)
+    };
+    let lit = WorldBuilder { scene: open.scene }
+        .faces(&clear, Vec3::new(2.01, 0.6, -1.2), Vec3::new(2.04, 2.4, 1.2), 0..6)
+        .quad(&mirror, [-1.9, 0.3, -1.4], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0])
+        .sphere(&smoked_glass(), bulb, 0.4);
+    let by_day = lit.clone().light(light).build();
+    let by_lamp = lit.sphere(&lamp(5.0), bulb, 0.15).build();
+    let fog = Medium {
+        scattering: Vec3::new(0.1, 0.2, 0.4),
+        absorption: Vec3::new(0.02, 0.01, 0.0),
+        anisotropy: 0.7,
+        bounds: None,
+    };
+    for (what, world, medium, sampling, sharing) in [
+        ("light", &by_day, None, Sampling::Plain, Sharing::Off),
+        ("learned", &by_day, None, Sampling::Adaptive, Sharing::Large),
+        ("lamp", &by_lamp, None, Sampling::Plain, Sharing::Large),
+        ("lamp in fog", &by_lamp, Some(fog), Sampling::Plain, Sharing::Off),
+    ] {
+        let what = format!("{what}, {sharing:?}");
+        let view = View {
+            camera: camera.clone(),
+            medium,
+            sharing,
+            layers: true,
+            ..picture(world, sampling)
+        };
+        compare_views(&gpu, &what, world, &sky_map("overcast"), view);
     }
 }
 

@@ -106,7 +106,7 @@ const DERIVED: [(&str, Condition); 11] = {
         ("FILTERED_OR_PASSED", Features::filtered_or_passed),
         // Surfaces that take a part of the light of a ray.
         ("PARTIAL", |f| f.scene.intersects(S::ALPHA_BLEND | S::THIN_TRANSMISSION)),
-        ("PASS_THROUGH", |f| f.scene.pass_through()),
+        ("PASS_THROUGH", Features::pass_through),
         ("SCENE_LIGHTS", Features::scene_lights),
         // Shadow rays lose light on their way.
         ("SHADOW_MEDIA", |f| f.view.contains(V::MEDIUM) || f.scene.contains(S::SOLID_TRANSMISSION)),
@@ -236,7 +236,12 @@ impl Features {
 
     /// Some hits of closest-hit rays do not count, or rays pass them.
     pub(super) fn filtered_or_passed(&self) -> bool {
-        self.scene.contains(SceneFeatures::SINGLE_SIDED) || self.scene.pass_through()
+        self.scene.contains(SceneFeatures::SINGLE_SIDED) || self.pass_through()
+    }
+
+    /// A ray may pass a surface without being scattered, or glass whose refraction is followed later.
+    fn pass_through(&self) -> bool {
+        self.scene.contains(SceneFeatures::CLEAR_SOLIDS) || self.scene.pass_through()
     }
 
     /// Lights that are not the map.

@@ -161,6 +161,7 @@ pub(super) mod material_flags {
     pub(in super::super) const THIN: u32 = 16;
     pub(in super::super) const PARTIAL: u32 = 32;
     pub(in super::super) const NORMAL_MAPPED: u32 = 64;
+    pub(in super::super) const CLEAR_SOLID: u32 = 128;
 }
 
 /// Flags of `TextureRef`; `constants.rs` writes them into the shaders.
@@ -358,7 +359,7 @@ pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
 
 fn flags(m: &scene::Material, partial: bool) -> u32 {
     use material_flags::{
-        ALPHA_BLEND, ALPHA_MASK, DOUBLE_SIDED, NORMAL_MAPPED, PARTIAL, THIN, UNLIT,
+        ALPHA_BLEND, ALPHA_MASK, CLEAR_SOLID, DOUBLE_SIDED, NORMAL_MAPPED, PARTIAL, THIN, UNLIT,
     };
     [
         (ALPHA_MASK, matches!(m.alpha_mode, AlphaMode::Mask { .. })),
@@ -368,6 +369,7 @@ fn flags(m: &scene::Material, partial: bool) -> u32 {
         (THIN, m.thickness <= 0.0),
         (PARTIAL, partial),
         (NORMAL_MAPPED, m.has_normal_map()),
+        (CLEAR_SOLID, m.is_clear_solid()),
     ]
     .into_iter()
     .filter(|(_, set)| *set)

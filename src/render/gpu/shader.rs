@@ -236,7 +236,7 @@ impl Program {
             ("ROWS_AT", rows_at),
         ]);
         if kernel.is_of_queue() {
-            let SlotTexels { count, receiver, body, first_hit, map_shadow, lamp_shadow } =
+            let SlotTexels { count, receiver, body, first_hit, map_shadow, lamp_shadow, departure } =
                 SlotTexels::of(features);
             declare(&[
                 ("SLOT_TEXELS", count),
@@ -245,6 +245,7 @@ impl Program {
                 ("FIRST_HIT_TEXEL", first_hit),
                 ("MAP_SHADOW_TEXEL", map_shadow),
                 ("LAMP_SHADOW_TEXEL", lamp_shadow),
+                ("DEPARTURE_TEXEL", departure),
             ]);
         }
         if kernel.shares() {
@@ -291,7 +292,7 @@ impl Program {
 }
 
 /// The files of a kernel, callees before callers.
-fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 66] {
+fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 67] {
     macro_rules! wgsl {
         ($name:literal) => {
             include_str!(concat!("../../../shaders/", $name, ".wgsl"))
@@ -344,6 +345,7 @@ fn files(kernel: Kernel, features: Features) -> [(&'static str, bool); 66] {
         (wgsl!("body"), scene.contains(SceneFeatures::SOLID_TRANSMISSION)),
         (wgsl!("path_medium"), view.contains(ViewFeatures::MEDIUM)),
         (wgsl!("passing"), features.filtered_or_passed()),
+        (wgsl!("through_glass"), scene.contains(SceneFeatures::CLEAR_SOLIDS)),
         (wgsl!("emitted"), scene.contains(SceneFeatures::EMITTERS)),
         (wgsl!("background"), view.contains(ViewFeatures::BACKGROUND_BLUR)),
         (wgsl!("shadows"), has_shadow_rays),
@@ -589,6 +591,7 @@ mod tests {
         }
         for (cause, effect) in [
             (SceneFeatures::SOLID_TRANSMISSION, SceneFeatures::DISPERSION),
+            (SceneFeatures::SOLID_TRANSMISSION, SceneFeatures::CLEAR_SOLIDS),
             (SceneFeatures::TEXTURES, SceneFeatures::NORMAL_MAPS),
         ] {
             if !scene.contains(cause) {

@@ -12,6 +12,7 @@ use super::layout::{Globals, Work};
 use super::progress::{GROUP, Progress};
 use crate::error::Result;
 use crate::path::sharing::SharedTile;
+use crate::scene::needs::SceneFeatures;
 
 /// Most workgroups whose vertices are kept at a time: they keep the largest devices busy.
 const MAX_GROUPS: u64 = 4096;
@@ -36,7 +37,9 @@ impl Sharing {
         // Tiles stick out of the picture on all sides.
         let tiles = size.map(|pixels| u64::from(pixels.div_ceil(tile.side)) + 1);
         let most_groups = (tiles[0] * tiles[1]).div_ceil(tiles_of_group(tile)).min(MAX_GROUPS);
-        let first_texels = if features.view.contains(ViewFeatures::LAYERS) { 5 } else { 3 };
+        let has_layers = features.view.contains(ViewFeatures::LAYERS);
+        let is_behind = features.scene.contains(SceneFeatures::PERFECT_INTERFACES);
+        let first_texels = 3 + u64::from(is_behind) + if has_layers { 2 } else { 0 };
         let lights = [ViewFeatures::MAP_SAMPLING, ViewFeatures::LOCAL_LIGHTS]
             .map(|feature| u64::from(features.view.contains(feature)));
         let incidents = u64::from(tile.continuations) * (1 + lights[0] + lights[1]);

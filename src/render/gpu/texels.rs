@@ -36,6 +36,7 @@ pub(crate) struct SlotTexels {
     pub(super) first_hit: u32,
     pub(super) map_shadow: u32,
     pub(super) lamp_shadow: u32,
+    pub(super) departure: u32,
 }
 
 impl SlotTexels {
@@ -49,9 +50,14 @@ impl SlotTexels {
         let body_texels = if view.contains(ViewFeatures::MEDIUM) { 2 } else { 1 };
         let receiver = next(scene.contains(SceneFeatures::EMITTERS), 2);
         let body = next(scene.contains(SceneFeatures::SOLID_TRANSMISSION), body_texels);
-        let first_hit = next(view.contains(ViewFeatures::LAYERS), 2);
-        let map_shadow = next(view.contains(ViewFeatures::MAP_SAMPLING), 4);
-        let lamp_shadow = next(view.contains(ViewFeatures::LOCAL_LIGHTS), 4);
-        Self { count, receiver, body, first_hit, map_shadow, lamp_shadow }
+        let looks = if scene.contains(SceneFeatures::PERFECT_INTERFACES) { 4 } else { 2 };
+        let first_hit = next(view.contains(ViewFeatures::LAYERS), looks);
+        // What is asked for where a ray meets glass.
+        let is_clear = scene.contains(SceneFeatures::CLEAR_SOLIDS);
+        let [of_map, of_lamp] = if is_clear { [6, 8] } else { [4, 4] };
+        let map_shadow = next(view.contains(ViewFeatures::MAP_SAMPLING), of_map);
+        let lamp_shadow = next(view.contains(ViewFeatures::LOCAL_LIGHTS), of_lamp);
+        let departure = next(is_clear, 2);
+        Self { count, receiver, body, first_hit, map_shadow, lamp_shadow, departure }
     }
 }

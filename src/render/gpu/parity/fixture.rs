@@ -18,7 +18,7 @@ use crate::render::{Sampling, Sharing, View};
 use crate::sampler::Sampler;
 use crate::scene::{
     AlphaMode, Camera, Instance, Instances, Material, Medium, Placing, Projection, PunctualKind,
-    PunctualLight, Scene, Texture, TextureImage, TextureRef, Wrap,
+    PunctualLight, Scene, Texture, TextureImage, TextureRef, TextureSlot, Wrap,
 };
 
 /// A scene, a map, a view and distributions.
@@ -290,8 +290,12 @@ fn add_textures(scene: &mut Scene, random: &mut Random) {
         let transform = Affine2::from_scale_angle_translation(scale, angle, random.unit2());
         random.below(2).eq(&0).then_some(TextureRef { texture, uv_set, transform }.into())
     };
-    for texture in scene.materials.iter_mut().flat_map(|m| &mut m.textures) {
-        *texture = reference();
+    for material in &mut scene.materials {
+        let was_clear = material.is_clear_solid();
+        material.textures.iter_mut().for_each(|texture| *texture = reference());
+        if was_clear {
+            material.textures[TextureSlot::Transmission as usize] = None;
+        }
     }
 }
 

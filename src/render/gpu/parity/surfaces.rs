@@ -254,7 +254,9 @@ fn hits(fixture: &Fixture) -> Vec<Probe<'_>> {
         Probe::new(
             "transmittance_along",
             "let origin = take3(); let direction = take3();
-            put3(transmittance_along(Ray(origin, direction, take())));",
+            meets_glass = false;
+            let share = transmittance_along(Ray(origin, direction, take()));
+            put3(select(share, vec3f(0.0), meets_glass));",
             cases([], |r| {
                 let (origin, direction) = ray(r, scene);
                 case(&[&origin, &direction, &r.magnitude(0.3, 10.0)])
@@ -287,7 +289,8 @@ pub(super) fn path_probes(fixture: &Fixture) -> Vec<Probe<'_>> {
                 let path = fixture.tracer().radiance(ray, sampler);
                 t.same(path.rays);
                 t.near(path.radiance, ulps(8192.0).of(path.radiance.max_element()));
-                t.near(if path.first_hit.is_some() { 1.0 } else { 0.0 }, EXACT);
+                let hits = if path.is_minor { -1.0 } else { 0.0 };
+                t.near(path.first_hit.map_or(hits, |_| 1.0), EXACT);
                 if let Some(hit) = path.first_hit {
                     t.near(hit.albedo, ulps(512.0).of(1.0));
                     t.near(hit.normal, ulps(512.0).of(1.0));
