@@ -18,7 +18,7 @@ fn is_alike_nearby(vertex: Vertex) -> bool {
         return true;
     }
 //#end
-    return is_broad(vertex, MIN_ALPHA);
+    return !refracts(vertex) && is_broad(vertex, MIN_ALPHA);
 }
 
 // The vertex that the path is at, as it is kept.

@@ -80,7 +80,7 @@ fn ends_in_cache(path: ptr<function, Path>, vertex: Vertex) -> bool {
     let position = vertex.point.position;
     let is_known = (*path).spread >= cache_edge(cache_level(position))
         && is_in_air(path)
-        && is_broad(vertex, MIN_CACHED_ALPHA);
+        && !transmits(vertex) && is_broad(vertex, MIN_CACHED_ALPHA);
     if is_known {
         (*path).radiance += (*path).throughput
             * bsdf_albedo(vertex.bsdf)

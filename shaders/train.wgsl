@@ -50,7 +50,7 @@ fn training_vertex_at(path: ptr<function, Path>, vertex: Vertex) -> TrainingVert
     let throughput = (*path).throughput;
     let least = min(min(throughput.x, throughput.y), throughput.z);
     let trains = is_in_air(path)
-        && is_broad(vertex, MIN_CACHED_ALPHA)
+        && !transmits(vertex) && is_broad(vertex, MIN_CACHED_ALPHA)
         && least > MIN_SHARE * max_element(throughput);
     if !trains {
         return trained;

@@ -9,7 +9,7 @@ pub(crate) const MIN_ALPHA: f32 = 0.05;
 impl SurfaceScatterer<'_> {
     /// Whether what it sends back may be kept in a cache.
     pub(super) fn is_cacheable(&self) -> bool {
-        self.is_broad(MIN_ALPHA)
+        !self.transmits && self.bsdf().is_broad(MIN_ALPHA)
     }
 }
 

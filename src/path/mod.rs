@@ -451,6 +451,7 @@ impl<'a> Path<'a> {
         let cell = cells.map(|cells| cells.cell_of(point.position, point.geometric_normal));
         let distribution = self.tracer.distribution(cell);
         let parameters = &point.parameters;
+        let diffuses = parameters.diffuse_transmission > 0.0;
         let material = self.tracer.world.material(point.material);
         let wo = point.shading_frame.local_from_world(-self.ray.direction);
         let scatterer = Scatterer::Surface(SurfaceScatterer {
@@ -458,7 +459,8 @@ impl<'a> Path<'a> {
             shading_frame: point.shading_frame,
             bsdf: bsdf.viewed_from(wo),
             behind: material.behind(point),
-            transmits: parameters.transmission > 0.0 || parameters.diffuse_transmission > 0.0,
+            transmits: parameters.transmission > 0.0 || diffuses,
+            refracts: parameters.transmission > 0.0 || (diffuses && !parameters.thin),
             is_clear: material.passing.clear,
         });
         Vertex { position: point.position, cell, distribution, scatterer }

@@ -223,7 +223,7 @@ impl Scatterer<'_> {
     /// Whether it scatters much the same to and from places side by side.
     fn is_alike_nearby(&self) -> bool {
         match self {
-            Self::Surface(surface) => surface.is_broad(MIN_ALPHA),
+            Self::Surface(surface) => !surface.refracts && surface.bsdf().is_broad(MIN_ALPHA),
             Self::Medium(_) => true,
         }
     }

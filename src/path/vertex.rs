@@ -62,6 +62,8 @@ pub(super) struct SurfaceScatterer<'v> {
     pub(super) behind: Option<&'v Body>,
     /// Whether light comes through the surface.
     pub(super) transmits: bool,
+    /// Whether some of that is refracted or goes on inside of a body.
+    pub(super) refracts: bool,
     /// Whether it is of smooth solid glass that shadow rays follow.
     pub(super) is_clear: bool,
 }
@@ -105,12 +107,6 @@ impl<'v> SurfaceScatterer<'v> {
     /// The scattering towards everywhere.
     pub(super) fn bsdf(&self) -> &'v Bsdf {
         self.bsdf.bsdf()
-    }
-
-    /// Whether it scatters much the same to and from places side by side, all on one side: no reflection
-    /// narrower than GGX makes it with this alpha.
-    pub(super) fn is_broad(&self, least_alpha: f32) -> bool {
-        !self.transmits && self.bsdf().is_broad(least_alpha)
     }
 
     /// BSDF times cosine and the BSDF's density for light from `direction`; `None` where it is

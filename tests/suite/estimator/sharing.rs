@@ -89,9 +89,17 @@ fn changed(world: &World, change: impl FnOnce(&mut Scene)) -> World {
 #[test]
 fn in_a_room_open_glazed_and_behind_leaves() {
     let leaf = |material: Material| Material { double_sided: true, ..material };
-    for (what, window) in
-        [("open", None), ("pane", Some(pane())), ("veil", Some(blended(leaf(lambert(0.6)), 0.4)))]
-    {
+    let cloth = Material {
+        diffuse_transmission: 0.6,
+        diffuse_transmission_color: Vec3::new(0.9, 0.8, 0.6),
+        ..leaf(lambert(0.8))
+    };
+    for (what, window) in [
+        ("open", None),
+        ("pane", Some(pane())),
+        ("veil", Some(blended(leaf(lambert(0.6)), 0.4))),
+        ("cloth", Some(cloth)),
+    ] {
         let (world, camera) = room(0.7, window.as_ref());
         expect_unbiased(what, (&world, &overcast(), &camera), 48, 0.006);
     }
