@@ -7,7 +7,10 @@ struct Rescatter {
     roughness: f32,
     // One over the mean of what is lost on this side.
     inverse_mean: f32,
-//#if ROUGH_GLASS
+//#if SPREADING_GLASS
+    // Index of refraction of a solid's far side over this side, of the green channel; 0 where this
+    // side's losses are those of a mirror.
+    eta: f32,
     // The same on the far side.
     inverse_mean_far: f32,
     transmitted: vec3f,
@@ -27,11 +30,12 @@ fn rescatter_new(p: SurfaceParameters, i: Interface) -> Rescatter {
         r.inverse_mean = 1.0 / max(1.0 - (terms.x + terms.y), RESCATTER_MIN_LOSS);
         r.reflected = metal_color(p.base_color, terms) * p.metallic;
     }
-//#if ROUGH_GLASS
+//#if SPREADING_GLASS
     if i.glass.share > 0.0 && !transmits_delta(i) {
         let share = (1.0 - p.metallic) * p.transmission;
-        r.inverse_mean = 1.0 / mean_loss(i, p.roughness, false);
-        r.inverse_mean_far = 1.0 / mean_loss(i, p.roughness, true);
+        r.eta = select(i.glass.eta, 0.0, i.glass.thin);
+        r.inverse_mean = 1.0 / mean_loss(r, i, false);
+        r.inverse_mean_far = 1.0 / mean_loss(r, i, true);
         if i.glass.thin {
             let normal = glass_at(i, 1.0, i.glass.eta);
             r.reflected += share * normal.xyz;
@@ -40,8 +44,9 @@ fn rescatter_new(p: SurfaceParameters, i: Interface) -> Rescatter {
             let squared_index = i.glass.eta * i.glass.eta;
             let a = 1.0 / r.inverse_mean;
             let b = squared_index / r.inverse_mean_far;
-            r.reflected += share * vec3f(a / (a + b));
-            r.transmitted = p.base_color * (share * (b / (a + b) / squared_index));
+            let part = share * p.specular / (a + b);
+            r.reflected += vec3f(a * part);
+            r.transmitted = p.base_color * (b * part / squared_index);
         }
     }
     let through = importance(r.transmitted);
@@ -63,11 +68,11 @@ fn rescatter_is_absent(r: Rescatter) -> bool {
 
 // What single scattering loses towards `wo`, above the surface.
 fn rescatter_lost(r: Rescatter, i: Interface, wo: vec3f) -> f32 {
-    return loss_at(i, r.roughness, wo, false);
+    return loss_at(r, i, wo, false);
 }
 
 fn rescatter_sum(r: Rescatter) -> vec3f {
-//#if ROUGH_GLASS
+//#if SPREADING_GLASS
     return r.reflected + r.transmitted;
 //#else
     return r.reflected;
@@ -76,7 +81,7 @@ fn rescatter_sum(r: Rescatter) -> vec3f {
 
 // Of light that is lost.
 fn rescatter_albedo(r: Rescatter, i: Interface) -> vec3f {
-//#if ROUGH_GLASS
+//#if SPREADING_GLASS
     return r.reflected + r.transmitted / radiance_scale(i);
 //#else
     return r.reflected;
@@ -85,7 +90,7 @@ fn rescatter_albedo(r: Rescatter, i: Interface) -> vec3f {
 
 fn rescatter_sample(r: Rescatter, choice: f32, u: vec2f) -> vec3f {
     let wi = cosine_hemisphere(u);
-//#if ROUGH_GLASS
+//#if SPREADING_GLASS
     return select(wi, -wi, choice < r.through);
 //#else
     return wi;
@@ -98,7 +103,7 @@ fn rescatter_eval_pdf(r: Rescatter, i: Interface, lost: f32, wi: vec3f) -> EvalP
     var color = r.reflected;
     var inverse_mean = r.inverse_mean;
     var probability = select(0.0, 1.0, is_near);
-//#if ROUGH_GLASS
+//#if SPREADING_GLASS
     color = select(r.transmitted, r.reflected, is_near);
     inverse_mean = select(r.inverse_mean_far, r.inverse_mean, is_near);
     probability = select(r.through, 1.0 - r.through, is_near);
@@ -106,14 +111,14 @@ fn rescatter_eval_pdf(r: Rescatter, i: Interface, lost: f32, wi: vec3f) -> EvalP
     if probability <= 0.0 {
         return EvalPdf(vec3f(0.0), 0.0);
     }
-    let loss = loss_at(i, r.roughness, select(-wi, wi, is_near), !is_near);
+    let loss = loss_at(r, i, select(-wi, wi, is_near), !is_near);
     return EvalPdf(color * (lost * loss * inverse_mean * lambert), lambert * probability);
 }
 
 // What single scattering loses towards `v`, above the surface or on its far side.
-fn loss_at(i: Interface, roughness: f32, v: vec3f, is_far: bool) -> f32 {
-//#if ROUGH_GLASS
-    if refracts_rough(i) {
+fn loss_at(r: Rescatter, i: Interface, v: vec3f, is_far: bool) -> f32 {
+//#if SPREADING_GLASS
+    if r.eta > 0.0 {
         var across = sqrt(i.ggx.alpha);
 //#if ANISOTROPY
         if is_stretched(i.ggx) {
@@ -121,38 +126,33 @@ fn loss_at(i: Interface, roughness: f32, v: vec3f, is_far: bool) -> f32 {
         }
 //#end
         let column = sqrt(saturate(v.z)) * f32(RESCATTER_NODES - 1u);
-        return max(1.0 - glass_albedo_at(far_index(i, is_far), across, column), 0.0);
+        return glass_loss_at(index_towards(r, is_far), across, column);
     }
 //#end
-    let terms = terms_towards(i.ggx, roughness, v);
+    let terms = terms_towards(i.ggx, r.roughness, v);
     return max(1.0 - (terms.x + terms.y), 0.0);
 }
 
-//#if ROUGH_GLASS
-// Whether the surface is that of a solid which refracts.
-fn refracts_rough(i: Interface) -> bool {
-    return i.glass.share > 0.0 && !i.glass.thin && !transmits_delta(i);
+//#if SPREADING_GLASS
+fn index_towards(r: Rescatter, is_far: bool) -> f32 {
+    return select(r.eta, 1.0 / r.eta, is_far);
 }
 
-fn far_index(i: Interface, is_far: bool) -> f32 {
-    return select(i.glass.eta, 1.0 / i.glass.eta, is_far);
-}
-
-fn mean_loss(i: Interface, roughness: f32, is_far: bool) -> f32 {
-    if !refracts_rough(i) {
-        let terms = terms_mean(i.ggx, roughness);
+fn mean_loss(r: Rescatter, i: Interface, is_far: bool) -> f32 {
+    if r.eta == 0.0 {
+        let terms = terms_mean(i.ggx, r.roughness);
         return max(1.0 - (terms.x + terms.y), RESCATTER_MIN_LOSS);
     }
     var across = sqrt(i.ggx.alpha);
 //#if ANISOTROPY
     across = roughness_off_axis(i.ggx, 0.70710678, 0.70710678);
 //#end
-    let mean = glass_albedo_at(far_index(i, is_far), across, f32(RESCATTER_NODES));
-    return max(1.0 - mean, RESCATTER_MIN_LOSS);
+    let mean = glass_loss_at(index_towards(r, is_far), across, f32(RESCATTER_NODES));
+    return max(mean, RESCATTER_MIN_LOSS);
 }
 
-// Twin of `glass_at` in src/bsdf/rescatter.rs.
-fn glass_albedo_at(eta: f32, roughness: f32, column: f32) -> f32 {
+// Twin of `glass_loss_at` in src/bsdf/rescatter.rs.
+fn glass_loss_at(eta: f32, roughness: f32, column: f32) -> f32 {
     let shifted = clamp((eta - 1.0) / (eta + 1.0), -RESCATTER_INDEX, RESCATTER_INDEX);
     let z = (shifted + RESCATTER_INDEX) * (f32(RESCATTER_INDICES - 1u) / (2.0 * RESCATTER_INDEX));
     let index = min(u32(z), RESCATTER_INDICES - 2u);

@@ -23,16 +23,16 @@ use crate::color::importance;
 /// Nodes of the table of solid glass in the square root of the cosine, and in the roughness.
 pub(crate) const NODES: usize = 16;
 /// Its nodes in `(eta - 1) / (eta + 1)`, which goes from `-MAX_INDEX` to `MAX_INDEX`.
-pub(crate) const INDICES: usize = 17;
+pub(crate) const INDICES: usize = 33;
 pub(crate) const MAX_INDEX: f32 = 0.45;
 /// Visible normals per entry.
 const SAMPLES: u32 = 512;
 /// Average losses below this count as none.
 pub(crate) const MIN_LOSS: f32 = 1e-4;
 
-/// Albedos of white glass by index, roughness and square root of the cosine; the last of a row is their
+/// What white glass loses by index, roughness and square root of the cosine; the last of a row is its
 /// cosine-weighted mean.
-static GLASS: LazyLock<Vec<[f32; NODES + 1]>> = LazyLock::new(|| {
+static LOSSES: LazyLock<Vec<[f32; NODES + 1]>> = LazyLock::new(|| {
     let row = |row: usize| glass_row(index_of_node(row / NODES), (row % NODES) as f32 / LAST);
     (0..INDICES * NODES).into_par_iter().map(row).collect()
 });
@@ -96,7 +96,8 @@ impl Rescatter {
                 let sides = [eta, 1.0 / eta].map(|eta| Albedo::Refracts(interface.ggx(), eta));
                 [near, far] = sides.map(Loss::of);
                 let [a, b] = [1.0 / near.inverse_mean, eta * eta / far.inverse_mean];
-                (Vec3::splat(a / (a + b)), b / (a + b) / (eta * eta))
+                let share = p.specular / (a + b);
+                (Vec3::splat(a * share), b * share / (eta * eta))
             };
             reflected += share * back;
             transmitted = p.base_color * (share * through);
@@ -146,25 +147,24 @@ impl Rescatter {
 impl Loss {
     fn of(albedo: Albedo) -> Self {
         let mean = match albedo {
-            Albedo::Mirrors(terms) => terms.mean().element_sum(),
+            Albedo::Mirrors(terms) => 1.0 - terms.mean().element_sum(),
             Albedo::Refracts(ggx, eta) => {
-                glass_at(eta, ggx.roughness_off_axis(FRAC, FRAC), NODES as f32)
+                glass_loss_at(eta, ggx.roughness_off_axis(FRAC, FRAC), NODES as f32)
             }
         };
-        Self { albedo, inverse_mean: 1.0 / (1.0 - mean).max(MIN_LOSS) }
+        Self { albedo, inverse_mean: 1.0 / mean.max(MIN_LOSS) }
     }
 
     /// What is lost towards a unit `v` above the surface.
     fn at(&self, v: Vec3) -> f32 {
-        let albedo = match self.albedo {
-            Albedo::Mirrors(terms) => terms.at(v).element_sum(),
+        match self.albedo {
+            Albedo::Mirrors(terms) => (1.0 - terms.at(v).element_sum()).max(0.0),
             Albedo::Refracts(ggx, eta) => {
                 let roughness =
                     if ggx.is_stretched() { ggx.roughness_towards(v) } else { ggx.alpha().sqrt() };
-                glass_at(eta, roughness, v.z.clamp(0.0, 1.0).sqrt() * LAST)
+                glass_loss_at(eta, roughness, v.z.clamp(0.0, 1.0).sqrt() * LAST)
             }
-        };
-        (1.0 - albedo).max(0.0)
+        }
     }
 }
 
@@ -179,15 +179,15 @@ fn metal_color(f0: Vec3, mean: Vec2) -> Vec3 {
     fresnel * fresnel * escapes / (1.0 - fresnel * (1.0 - escapes))
 }
 
-/// Albedo of white glass in the table, by a place in its row: [`NODES`] is the mean's.
-fn glass_at(eta: f32, roughness: f32, column: f32) -> f32 {
+/// What white glass loses, from the table, by a place in its row: [`NODES`] is the mean's.
+fn glass_loss_at(eta: f32, roughness: f32, column: f32) -> f32 {
     let z = (((eta - 1.0) / (eta + 1.0)).clamp(-MAX_INDEX, MAX_INDEX) + MAX_INDEX)
         * ((INDICES - 1) as f32 / (2.0 * MAX_INDEX));
     let (index, index_rest) = split(z, INDICES - 2);
     let (row, row_rest) = split(roughness * LAST, NODES - 2);
     let (at, rest) = split(column, NODES);
     let last = if rest > 0.0 { at + 1 } else { at };
-    let value = |row: usize| GLASS[row][at] + (GLASS[row][last] - GLASS[row][at]) * rest;
+    let value = |row: usize| LOSSES[row][at] + (LOSSES[row][last] - LOSSES[row][at]) * rest;
     let between = |first: usize, second: usize, rest: f32| {
         let (a, b) = (value(first), value(second));
         a + (b - a) * rest
@@ -212,9 +212,9 @@ fn glass_row(eta: f32, roughness: f32) -> [f32; NODES + 1] {
     let ggx = Ggx::from_roughness(roughness);
     let mut row = [0.0; NODES + 1];
     for (i, entry) in row.iter_mut().take(NODES).enumerate() {
-        *entry = glass_albedo(ggx, eta, (i as f32 / LAST).powi(2).max(1e-5), SAMPLES);
+        *entry = glass_loss(ggx, eta, (i as f32 / LAST).powi(2).max(1e-5), SAMPLES);
     }
-    // The integral of 2 cos E over each piece, linear in x = sqrt(cos): 4 x^3 (offset + slope x).
+    // The integral of 2 cos L over each piece, linear in x = sqrt(cos): 4 x^3 (offset + slope x).
     row[NODES] = (0..NODES - 1)
         .map(|i| {
             let (x0, x1) = (i as f32 / LAST, (i + 1) as f32 / LAST);
@@ -226,11 +226,11 @@ fn glass_row(eta: f32, roughness: f32) -> [f32; NODES + 1] {
     row
 }
 
-/// Share of light that the interface of a solid reflects and refracts by single scattering, from
+/// Share of light that the interface of a solid neither reflects nor refracts by single scattering, from
 /// visible normals at the points of the R2 sequence, as for [`AlbedoTerms`].
-fn glass_albedo(ggx: Ggx, eta: f32, cos: f32, samples: u32) -> f32 {
+fn glass_loss(ggx: Ggx, eta: f32, cos: f32, samples: u32) -> f32 {
     if ggx.is_smooth() {
-        return 1.0;
+        return 0.0;
     }
     let wo = Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos);
     let masking = |wi: Vec3| 2.0 * wi.z * ggx.visibility(wi);
@@ -248,7 +248,7 @@ fn glass_albedo(ggx: Ggx, eta: f32, cos: f32, samples: u32) -> f32 {
             sum += (1.0 - fresnel) * masking(-through);
         }
     }
-    sum / samples as f32
+    (1.0 - sum / samples as f32).max(0.0)
 }
 
 /// The table of solid glass as `shaders/rescatter.wgsl` reads it: each entry with those of the next
@@ -258,7 +258,7 @@ pub(crate) fn texels() -> Vec<[f32; 4]> {
     for index in 0..INDICES - 1 {
         for row in 0..NODES - 1 {
             let at = index * NODES + row;
-            let rows = [at, at + 1, at + NODES, at + NODES + 1].map(|row| &GLASS[row]);
+            let rows = [at, at + 1, at + NODES, at + NODES + 1].map(|row| &LOSSES[row]);
             texels.extend((0..=NODES).map(|column| rows.map(|row| row[column])));
         }
     }
@@ -277,8 +277,8 @@ mod tests {
             .flat_map(|eta| (0..8).flat_map(move |r| (0..8).map(move |c| (eta, r, c))))
         {
             let (roughness, cos) = ((r as f32 + 0.37) / 8.0, (c as f32 + 0.43) / 8.0);
-            let exact = glass_albedo(Ggx::from_roughness(roughness), eta, cos, 1 << 14);
-            worst = worst.max((glass_at(eta, roughness, cos.sqrt() * LAST) - exact).abs());
+            let exact = glass_loss(Ggx::from_roughness(roughness), eta, cos, 1 << 14);
+            worst = worst.max((glass_loss_at(eta, roughness, cos.sqrt() * LAST) - exact).abs());
         }
         assert!(worst < 0.01, "{worst}");
     }

@@ -78,19 +78,19 @@ struct Painted {
 
 impl Memory {
     /// Fails only if the device does.
-    pub(super) fn present(&mut self, order: Order) -> Result<Shown> {
+    pub(super) fn present(&mut self, order: &Order) -> Result<Shown> {
         let developer = Arc::clone(&order.developer);
         if self.uploads.developer.as_ref().is_none_or(|old| !Arc::ptr_eq(old, &developer)) {
             let developer = Some(Arc::clone(&developer));
             self.uploads = Uploads { developer, ..Uploads::default() };
         }
-        self.leave_what_is_not_in(&order);
-        let source = Source::main(&order);
+        self.leave_what_is_not_in(order);
+        let source = Source::main(order);
         let prepare = || Ok(source.prepare(&developer));
         let Prepared { mut picture, image, mut failure } =
             self.uploads.picture.or_make(source.key(), prepare)?;
         let automatic_ev = order.metered.map_or(Ok(0.0), |white_balance| {
-            if let Some(ev) = self.whole_ev(&order) {
+            if let Some(ev) = self.whole_ev(order) {
                 return Ok(ev);
             }
             let meter = || match source.is_dark() {
@@ -113,7 +113,7 @@ impl Memory {
             let mut last = std::mem::take(&mut self.uploads.overlay);
             let look = order.look.map(|look| (look, automatic_ev));
             let key = (order.snapshot.number, overlay, order.tile, look);
-            let painted = last.or_make(key, || Ok(self.paint(&order, overlay, look, &picture)));
+            let painted = last.or_make(key, || Ok(self.paint(order, overlay, look, &picture)));
             self.uploads.overlay = last;
             painted
         })?;
@@ -133,7 +133,7 @@ impl Memory {
                     image.as_ref().map_or((view.width, view.height), |i| (i.width, i.height));
                 order.snapshot.is_whole() && size == (view.width, view.height)
             });
-        } else if let Some(source) = Source::plain(&order) {
+        } else if let Some(source) = Source::plain(order) {
             let prepare = || Ok(source.prepare(&developer));
             let plain = self.uploads.plain.or_make(source.key(), prepare)?;
             (other, failure) = (Some(plain.picture), failure.or(plain.failure));

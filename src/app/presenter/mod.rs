@@ -97,7 +97,7 @@ fn run(orders: &Latest<Order>, shown: &Mutex<Option<Arc<Shown>>>, wake: &Wake) {
         let (start, kept) = (Instant::now(), order.presented());
         let work = Work::start();
         order.snapshot.rest.set_end(start + MAX_WAIT);
-        match catch_unwind(AssertUnwindSafe(|| memory.present(order))) {
+        match catch_unwind(AssertUnwindSafe(|| memory.present(&order))) {
             Ok(Ok(done)) => *lock(shown) = Some(Arc::new(done)),
             // Where the device is lost, the window orders again on another.
             Ok(Err(_)) => {}

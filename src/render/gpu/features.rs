@@ -78,8 +78,8 @@ pub(crate) struct Features {
 }
 
 /// Features of scenes that kernels ask for by what follows from them alone.
-const NOT_ASKED_FOR: [&str; 5] =
-    ["ABSORPTION", "ALPHA_BLEND", "FOG", "SCATTERING_SOLIDS", "THIN_TRANSMISSION"];
+const NOT_ASKED_FOR: [&str; 6] =
+    ["ABSORPTION", "ALPHA_BLEND", "FOG", "ROUGH_GLASS", "SCATTERING_SOLIDS", "THIN_TRANSMISSION"];
 
 /// Refuses what is only measured, and has no kernels.
 ///
@@ -98,7 +98,7 @@ pub(super) fn check(view: &View) -> Result<()> {
 type Condition = fn(&Features) -> bool;
 
 /// What follows from the others, by name.
-const DERIVED: [(&str, Condition); 11] = {
+const DERIVED: [(&str, Condition); 12] = {
     use {SceneFeatures as S, ViewFeatures as V};
     [
         // Some hits of closest-hit rays do not count.
@@ -112,6 +112,8 @@ const DERIVED: [(&str, Condition); 11] = {
         ("SHADOW_MEDIA", |f| f.view.contains(V::MEDIUM) || f.scene.contains(S::SOLID_TRANSMISSION)),
         ("SHADOW_RAYS", Features::shadow_rays),
         ("SOFTWARE_WALK", Features::software_walk),
+        // Glass that spreads what it lets through.
+        ("SPREADING_GLASS", |f| f.scene.contains(S::ROUGH_GLASS) && f.transmission()),
         ("TANGENTS", Features::tangents),
         ("TRANSMISSION", Features::transmission),
         // Textures that few materials have.

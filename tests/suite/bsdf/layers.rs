@@ -47,7 +47,9 @@ fn brushed_metal_is_the_specified_formula() {
         let (o, i) = (wo.as_dvec3(), wi.as_dvec3());
         let (once, again) = (single(f0)(o, i), scattered_again(single(1.0), f0, o, i));
         let value = f64::from(bsdf.eval(wo, wi).y);
-        let tolerance = 1e-4 * once + 0.03 * i.z * std::f64::consts::FRAC_1_PI;
+        // The table of stretched lobes is an approximation, which what it scatters again multiplies.
+        let lambert = i.z * std::f64::consts::FRAC_1_PI;
+        let tolerance = 1e-4 * once + 0.6 * again + 0.01 * lambert;
         assert!((value - once - again).abs() < tolerance, "{value} {once} {again}");
     }
 }

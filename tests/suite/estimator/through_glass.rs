@@ -170,12 +170,26 @@ fn lamps_behind_glass_light_the_same_as_those_that_are_found() {
         let builder = WorldBuilder { scene: world.scene }.sphere(panel, center, 0.2);
         (shell(builder, center, 0.35).build(), camera)
     };
+    // One hides half of the other.
+    let panels = |panel: &Material| {
+        let (world, camera) = room(0.7, None);
+        let (low, high) = (Vec3::new(-1.4, 1.3, 0.3), Vec3::new(-0.9, 1.9, 0.9));
+        let builder = WorldBuilder { scene: world.scene }.faces(&glass(), low, high, 0..6);
+        let quad = |builder: WorldBuilder, x: f32, z: f32| {
+            builder.quad(panel, [x, 1.4, z], [0.0, 0.4, 0.0], [0.0, 0.0, 0.25])
+        };
+        (quad(quad(builder, -1.3, 0.35), -1.05, 0.475).build(), camera)
+    };
     let film = |(world, camera): &(World, Camera), seed, samples| {
         let view = View { seed, ..view(camera.clone(), Sampling::Plain, 3) };
         render(world, &constant(0.1), view, samples)
     };
-    let (found, sampled) = (bulb(&unlit(0.9)), bulb(&lamp(0.9)));
-    expect_agreement("bulb", &film(&found, 1, 4096), &film(&sampled, 2, 1024), 0.05);
+    for (what, place) in
+        [("bulb", &bulb as &dyn Fn(&Material) -> (World, Camera)), ("panels", &panels)]
+    {
+        let [found, sampled] = [unlit(0.9), lamp(0.9)].map(|panel| place(&panel));
+        expect_agreement(what, &film(&found, 1, 4096), &film(&sampled, 2, 1024), 0.05);
+    }
 }
 
 #[test]
