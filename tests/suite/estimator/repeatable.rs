@@ -229,18 +229,18 @@ fn another_seed_gives_another_picture() {
 }
 
 /// The version that [`PICTURES`] are of.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Scene, sampling and sharing of small pictures, and what they come to: their mean, and how they are spread.
 const PICTURES: [(&str, Sampling, Sharing, &str); 8] = [
-    ("open", Sampling::Bsdf, Sharing::Off, "3.761e-1 14.920"),
-    ("open", Sampling::Plain, Sharing::Off, "4.490e-1 14.774"),
+    ("open", Sampling::Bsdf, Sharing::Off, "3.762e-1 14.920"),
+    ("open", Sampling::Plain, Sharing::Off, "4.491e-1 14.772"),
     ("office", Sampling::Talk, Sharing::Off, "2.337e-2 16.746"),
     ("office", Sampling::Adaptive, Sharing::Off, "2.266e-2 17.338"),
-    ("office", Sampling::Adaptive, Sharing::Large, "2.256e-2 17.471"),
-    ("evening", Sampling::Adaptive, Sharing::Off, "2.750e-2 16.591"),
+    ("office", Sampling::Adaptive, Sharing::Large, "2.256e-2 17.472"),
+    ("evening", Sampling::Adaptive, Sharing::Off, "2.737e-2 16.572"),
     ("fog", Sampling::Adaptive, Sharing::Small, "3.775e-2 14.979"),
-    ("materials", Sampling::Adaptive, Sharing::Off, "2.016e-1 15.023"),
+    ("materials", Sampling::Adaptive, Sharing::Off, "2.045e-1 15.074"),
 ];
 
 /// Digits that the sines of another machine leave as they are; other samples change the third.
