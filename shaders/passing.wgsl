@@ -61,11 +61,17 @@ fn passes(path: ptr<function, Path>, point: SurfacePoint) -> bool {
 //#end
 
 //#if FILTERED_HITS
-// Whether a path sees a hit: not where a mask cuts it out, nor, for camera rays, a back side.
+// Whether a path sees a hit: not where a mask cuts it out, nor a back side that
+// has a front in the same place or, for camera rays, any.
 fn accepts(hit: Hit, from_camera: bool) -> bool {
     if from_camera && (hit.flags & (DOUBLE_SIDED | FROM_BEHIND)) == FROM_BEHIND {
         return false;
     }
+//#if BACKED
+    if (hit.flags & (BACKED | FROM_BEHIND)) == (BACKED | FROM_BEHIND) {
+        return false;
+    }
+//#end
 //#if ALPHA_MASK
     if (hit.flags & ALPHA_MASK) != 0u {
         return alpha_at(hit.triangle, hit.barycentric) > 0.0;
@@ -78,6 +84,11 @@ fn accepts(hit: Hit, from_camera: bool) -> bool {
 //#if PASS_THROUGH
 // Share of light that a surface on a shadow ray's way lets through.
 fn passed(hit: Hit, direction: vec3f) -> vec3f {
+//#if BACKED
+    if (hit.flags & (BACKED | FROM_BEHIND)) == (BACKED | FROM_BEHIND) {
+        return vec3f(1.0);
+    }
+//#end
 //#if CLEAR_SOLIDS
     if (hit.flags & CLEAR_SOLID) != 0u {
         meets_glass = true;

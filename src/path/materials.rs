@@ -25,6 +25,8 @@ pub(super) struct ReadyMaterial {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Passing {
     pub(super) single_sided: bool,
+    /// All rays pass it from behind.
+    pub(super) backed: bool,
     pub(super) masked: bool,
     /// Part of the light may go straight through: blended, or thin and transmissive.
     pub(super) partial: bool,
@@ -48,6 +50,7 @@ impl ReadyMaterial {
             inside,
             passing: Passing {
                 single_sided: !material.double_sided,
+                backed: material.backed,
                 masked: matches!(material.alpha_mode, AlphaMode::Mask { .. }),
                 partial: material.alpha_mode == AlphaMode::Blend
                     || (material.transmission > 0.0

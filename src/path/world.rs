@@ -126,6 +126,8 @@ impl World {
         let _running = self.clock.as_ref().map(RayClock::start);
         if from_camera && self.needs.has(SceneFeatures::SINGLE_SIDED) {
             self.bvh.closest_hit(ray, |hit| self.faces(hit, ray) && self.is_covered(hit))
+        } else if self.needs.has(SceneFeatures::BACKED) {
+            self.bvh.closest_hit(ray, |hit| !self.is_backed(hit, ray) && self.is_covered(hit))
         } else if self.needs.has(SceneFeatures::ALPHA_MASK) {
             self.bvh.closest_hit(ray, |hit| self.is_covered(hit))
         } else {
@@ -139,6 +141,9 @@ impl World {
         let mut transmittance = Vec3::ONE;
         let blocked = if self.needs.features.pass_through() {
             self.bvh.any_hit(ray, |hit| {
+                if self.is_backed(hit, ray) {
+                    return false;
+                }
                 if !self.material_of(hit).passing.partial {
                     return self.is_covered(hit);
                 }
@@ -161,6 +166,9 @@ impl World {
             let passing = self.material_of(hit).passing;
             if passing.clear {
                 meets_glass = true;
+                return false;
+            }
+            if self.is_backed(hit, ray) {
                 return false;
             }
             if !passing.partial {
@@ -229,6 +237,11 @@ impl World {
             }
             AlphaMode::Opaque | AlphaMode::Blend => true,
         }
+    }
+
+    /// Whether a ray comes from where another surface of the same place is met.
+    fn is_backed(&self, hit: &Hit, ray: &Ray) -> bool {
+        self.material_of(hit).passing.backed && !self.faces(hit, ray)
     }
 
     fn faces(&self, hit: &Hit, ray: &Ray) -> bool {

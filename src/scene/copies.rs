@@ -20,13 +20,13 @@ const BITS: usize = 8;
 /// Things of one hash that are told apart; what comes after so many is kept.
 const MAX_ALIKE: usize = 16;
 
-/// Numbers of what is a copy of something with a lower number, given how many things there are and a hash that is
-/// the same for copies. Takes little time where there are none.
+/// Each thing that is a copy of something with a lower number, behind that number, given how many things there are
+/// and a hash that is the same for copies. Takes little time where there are none.
 pub(super) fn copies(
     count: usize,
     hash: impl Fn(usize) -> u32 + Sync,
     is_copy: impl Fn(usize, usize) -> bool,
-) -> Vec<usize> {
+) -> Vec<(usize, usize)> {
     let mut candidates: Vec<(u32, usize)> = if count < FEW {
         (0..count).map(|number| (hash(number), number)).collect()
     } else {
@@ -37,8 +37,8 @@ pub(super) fn copies(
     for alike in candidates.chunk_by(|a, b| a.0 == b.0) {
         let mut firsts: Vec<usize> = Vec::new();
         for &(_, number) in alike {
-            if firsts.iter().any(|&first| is_copy(first, number)) {
-                found.push(number);
+            if let Some(&first) = firsts.iter().find(|&&first| is_copy(first, number)) {
+                found.push((first, number));
             } else if firsts.len() < MAX_ALIKE {
                 firsts.push(number);
             }
@@ -75,7 +75,7 @@ fn candidates(count: usize, hash: &(impl Fn(usize) -> u32 + Sync)) -> Vec<(u32, 
 /// The fractional part of the golden ratio: upper bits of products with it depend on all lower ones.
 const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
 
-fn mixed(hash: u64, word: u64) -> u64 {
+pub(super) fn mixed(hash: u64, word: u64) -> u64 {
     let product = (hash ^ word).wrapping_mul(FACTOR);
     product ^ (product >> 32)
 }
@@ -94,10 +94,19 @@ impl Scene {
         let found = copies(self.triangles.len(), hash, |a, b| triangles.are_alike(a, b));
         if !found.is_empty() {
             let mut is_gone = vec![false; self.triangles.len()];
-            found.iter().for_each(|&place| is_gone[place] = true);
+            found.iter().for_each(|&(_, place)| is_gone[place] = true);
             self.retain_triangles(|place| !is_gone[place]);
         }
         found.len()
+    }
+
+    /// The mesh that a triangle is of, counted from 1; 0 is the world.
+    pub(super) fn owner(&self, place: usize) -> usize {
+        let meshes = self.instances.meshes();
+        match place < self.own_triangles().end as usize {
+            true => 0,
+            false => 1 + meshes.partition_point(|mesh| mesh.end as usize <= place),
+        }
     }
 
     /// Removes all other triangles.
@@ -142,15 +151,6 @@ impl<'a> Triangles<'a> {
         bits(self.scene.positions[corner as usize])
     }
 
-    /// The mesh that a triangle is of, counted from 1; 0 is the world.
-    fn owner(&self, place: usize) -> usize {
-        let meshes = self.scene.instances.meshes();
-        match place < self.scene.own_triangles().end as usize {
-            true => 0,
-            false => 1 + meshes.partition_point(|mesh| mesh.end as usize <= place),
-        }
-    }
-
     fn hash(&self, place: usize) -> u32 {
         let pair = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
         // The same wherever it begins.
@@ -159,7 +159,10 @@ impl<'a> Triangles<'a> {
             mixed(pair(x, y), u64::from(z))
         });
         let corners = corners.into_iter().fold(0, u64::wrapping_add);
-        hash_of([corners, pair(self.scene.triangle_materials[place], self.owner(place) as u32)])
+        hash_of([
+            corners,
+            pair(self.scene.triangle_materials[place], self.scene.owner(place) as u32),
+        ])
     }
 
     fn are_alike(&self, first: usize, second: usize) -> bool {
@@ -168,7 +171,7 @@ impl<'a> Triangles<'a> {
         let (one, other) = (self.turned(first), self.turned(second));
         let corners = || one.into_iter().zip(other);
         material == scene.triangle_materials[second]
-            && self.owner(first) == self.owner(second)
+            && scene.owner(first) == scene.owner(second)
             && corners().all(|(a, b)| self.position(a) == self.position(b))
             && (!self.is_clear[material as usize]
                 || corners().all(|(a, b)| {
@@ -183,7 +186,7 @@ fn is_same<T: PartialEq>(values: &[T], a: u32, b: u32) -> bool {
 }
 
 /// A position as numbers that are the same for equal ones; there are two zeros.
-fn bits(position: Vec3) -> [u32; 3] {
+pub(super) fn bits(position: Vec3) -> [u32; 3] {
     (position + Vec3::ZERO).to_array().map(f32::to_bits)
 }
 
@@ -255,7 +258,7 @@ mod tests {
         let value = |number: usize| if number < COUNT { number } else { 3 * (number - COUNT) };
         let hash = |number: usize| hash_of([value(number) as u64]);
         let found = copies(COUNT + COUNT / 3, hash, |a, b| value(a) == value(b));
-        let mut sorted = found.clone();
+        let mut sorted: Vec<usize> = found.into_iter().map(|(_, number)| number).collect();
         sorted.sort_unstable();
         assert_eq!(sorted, (COUNT..COUNT + COUNT / 3).collect::<Vec<_>>());
         // All of one hash, and none a copy: it ends.

@@ -96,6 +96,9 @@ pub struct Material {
     /// Whether camera rays see the back too. All other rays meet both sides of every surface: a wall
     /// modelled single-sided does not leak light.
     pub double_sided: bool,
+    /// Another single-sided surface lies in the same place and faces the other way: all rays pass this one
+    /// from behind.
+    pub backed: bool,
     /// `KHR_materials_unlit`: base colour is emitted as it is, nothing is reflected.
     pub unlit: bool,
     /// `KHR_materials_ior`; 0 means infinitely high (F0 = 1), otherwise at least 1.
@@ -163,6 +166,7 @@ impl Default for Material {
             emissive: Vec3::ZERO,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
+            backed: false,
             unlit: false,
             ior: 1.5,
             specular: 1.0,

@@ -1,6 +1,7 @@
 //! The scene: flat arrays and `u32` indices, everything in world space (metres, +Y up), but for meshes
 //! that instances share.
 
+mod backs;
 pub mod builtin;
 mod camera;
 pub mod camera_path;

@@ -66,13 +66,17 @@ bitflags::bitflags! {
         const CLEAR_SOLIDS = 1 << 26;
         /// Surfaces that may reflect or refract perfectly.
         const PERFECT_INTERFACES = 1 << 27;
+        /// Single-sided surfaces that all rays pass from behind.
+        const BACKED = 1 << 28;
     }
 }
 
 impl SceneFeatures {
     /// Whether a ray may pass a surface without being scattered.
     pub fn pass_through(self) -> bool {
-        self.intersects(Self::ALPHA_MASK | Self::ALPHA_BLEND | Self::THIN_TRANSMISSION)
+        let may_pass =
+            Self::ALPHA_MASK | Self::ALPHA_BLEND | Self::BACKED | Self::THIN_TRANSMISSION;
+        self.intersects(may_pass)
     }
 }
 
@@ -93,7 +97,7 @@ pub struct SceneNeeds {
 }
 
 /// A feature of scenes, what it is called, and what is left out without it, with the reason.
-const WORDS: [(SceneFeatures, &str, Option<&str>); 26] = {
+const WORDS: [(SceneFeatures, &str, Option<&str>); 27] = {
     use SceneFeatures as S;
     [
         (S::TEXTURES, "Textures", Some("texture reads: no material has a texture")),
@@ -107,6 +111,7 @@ const WORDS: [(SceneFeatures, &str, Option<&str>); 26] = {
         (S::ALPHA_MASK, "Alpha tests", Some("alpha tests: no material is masked")),
         (S::ALPHA_BLEND, "Opacity along rays", Some("opacity along rays: no material is blended")),
         (S::SINGLE_SIDED, "Single-sided surfaces", None),
+        (S::BACKED, "Faces in pairs, front and back", None),
         (S::METALS, "Metals", None),
         (
             S::THIN_TRANSMISSION,
@@ -190,6 +195,7 @@ impl SceneNeeds {
             (S::ALPHA_MASK, matches!(m.alpha_mode, AlphaMode::Mask { .. })),
             (S::ALPHA_BLEND, m.alpha_mode == AlphaMode::Blend),
             (S::SINGLE_SIDED, !m.double_sided),
+            (S::BACKED, m.backed),
             (S::METALS, m.metallic > 0.0),
             (S::THIN_TRANSMISSION, m.transmission > 0.0 && m.thickness == 0.0),
             (S::DIFFUSE_TRANSMISSION, m.diffuse_transmission > 0.0),

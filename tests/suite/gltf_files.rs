@@ -5,6 +5,7 @@ mod copies;
 mod features;
 mod ktx2;
 
+mod pairs;
 use std::path::Path;
 
 use lightgrid::sampler::SplitMix;

@@ -8,7 +8,7 @@ use wgpu::{
 
 use super::buffers::PIECE_BYTES;
 use super::device::Gpu;
-use super::layout::material_flags::{ALPHA_MASK, CLEAR_SOLID, PARTIAL};
+use super::layout::material_flags::{ALPHA_MASK, BACKED, CLEAR_SOLID, PARTIAL};
 use crate::bvh::InstanceWords;
 use crate::error::{Error, Result};
 use crate::path::World;
@@ -48,7 +48,7 @@ impl Acceleration {
         let scene = &world.scene;
         let name = &gpu.facts().name;
         let meshes = scene.instances.meshes();
-        let asked = ALPHA_MASK | CLEAR_SOLID | PARTIAL;
+        let asked = ALPHA_MASK | BACKED | CLEAR_SOLID | PARTIAL;
         let is_opaque = |triangle: &u32| flags_of(*triangle) & asked == 0;
         let mut triangles = Vec::with_capacity(scene.triangles.len());
         let mut lower = Vec::with_capacity(1 + meshes.len());

@@ -98,7 +98,7 @@ mod tests {
     use crate::render::Sampling;
     use crate::render::gpu::parity::fixture;
     use crate::sampler::Sampler;
-    use crate::scene::builtin;
+    use crate::scene::{Scene, builtin};
 
     /// Rays from anywhere in a scene to anywhere.
     fn rays(world: &World, count: u32) -> Vec<Ray> {
@@ -111,6 +111,16 @@ mod tests {
             Ray { origin, direction: direction.normalize(), t_min: 0.0, t_max: f32::INFINITY }
         };
         (0..count).map(ray).collect()
+    }
+
+    /// The same with a back behind each face.
+    fn paired(mut scene: Scene) -> Scene {
+        scene.materials.iter_mut().for_each(|material| material.double_sided = false);
+        let backs: Vec<_> = scene.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        scene.triangles.extend(backs);
+        scene.triangle_materials.extend_from_within(..);
+        scene.pair_backs();
+        scene
     }
 
     /// The share of rays of which the device finds another nearest triangle, and of those that it lets
@@ -157,6 +167,7 @@ mod tests {
                 ("exterior", scene("exterior")),
                 ("crack", scene("crack")),
                 ("instances", fixture::instanced(scene("living-room"))),
+                ("pairs", paired(scene("living-room"))),
             ] {
                 let world = World::new(scene);
                 let [hits, shares] = apart(&gpu, &world, &rays(&world, 50_000));

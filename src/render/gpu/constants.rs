@@ -61,6 +61,7 @@ constants! {
     ALBEDO_ONE: cache::ALBEDO_ONE,
     ALPHA_BLEND: material::ALPHA_BLEND,
     ALPHA_MASK: material::ALPHA_MASK,
+    BACKED: material::BACKED,
     CACHE_CHECK_SEED: cache::CHECK_SEED,
     CACHE_PARENT: cache::PARENT,
     CACHE_PROBES: cache::MAX_PROBES,

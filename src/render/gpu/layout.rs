@@ -162,6 +162,7 @@ pub(super) mod material_flags {
     pub(in super::super) const PARTIAL: u32 = 32;
     pub(in super::super) const NORMAL_MAPPED: u32 = 64;
     pub(in super::super) const CLEAR_SOLID: u32 = 128;
+    pub(in super::super) const BACKED: u32 = 256;
 }
 
 /// Flags of `TextureRef`; `constants.rs` writes them into the shaders.
@@ -359,7 +360,8 @@ pub(crate) fn materials(world: &World) -> (Vec<Material>, Vec<TextureRef>) {
 
 fn flags(m: &scene::Material, partial: bool) -> u32 {
     use material_flags::{
-        ALPHA_BLEND, ALPHA_MASK, CLEAR_SOLID, DOUBLE_SIDED, NORMAL_MAPPED, PARTIAL, THIN, UNLIT,
+        ALPHA_BLEND, ALPHA_MASK, BACKED, CLEAR_SOLID, DOUBLE_SIDED, NORMAL_MAPPED, PARTIAL, THIN,
+        UNLIT,
     };
     [
         (ALPHA_MASK, matches!(m.alpha_mode, AlphaMode::Mask { .. })),
@@ -370,6 +372,7 @@ fn flags(m: &scene::Material, partial: bool) -> u32 {
         (PARTIAL, partial),
         (NORMAL_MAPPED, m.has_normal_map()),
         (CLEAR_SOLID, m.is_clear_solid()),
+        (BACKED, m.backed),
     ]
     .into_iter()
     .filter(|(_, set)| *set)

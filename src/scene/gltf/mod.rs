@@ -181,6 +181,7 @@ fn leave_out(scene: &mut Scene, options: &SceneOptions, notices: &mut Notices) -
 }
 
 /// Numbers of the materials that are shown; `None` is the default one.
+    scene.pair_backs();
 fn used_materials(
     document: &Document<'_>,
     placements: &BTreeMap<u32, Vec<Placement>>,

@@ -69,7 +69,7 @@ pub(super) fn drop_copies(placements: &mut BTreeMap<u32, Vec<Placement>>) -> usi
         }
         dropped += copies.len();
         let mut keep = vec![true; all.len()];
-        copies.into_iter().for_each(|copy| keep[copy] = false);
+        copies.into_iter().for_each(|(_, copy)| keep[copy] = false);
         let mut keep = keep.into_iter();
         for placement in placements.iter_mut() {
             placement.instances.retain(|_| keep.next().unwrap_or(true));
