@@ -14,7 +14,7 @@ use crate::render::gpu::{DeviceChoice, RayChoice, Schedule};
 use crate::render::{Gi, Sampling, Sharing};
 #[cfg(feature = "report")]
 use crate::report::Device;
-use crate::scene::{MaterialEdit, Outlines, SceneOptions};
+use crate::scene::{Lamps, MaterialEdit, Outlines, SceneOptions};
 use crate::tone::ToneCurve;
 
 /// What is asked of a scene's file.
@@ -30,6 +30,10 @@ pub(super) struct SceneArguments {
     /// all light.
     #[arg(long, value_enum, default_value = "remove", value_name = "WHAT", help_heading = "Scene")]
     outlines: Outlines,
+    /// Units of the file's point, spot and directional lights: physical (candela, lux), watts (683 times
+    /// weaker, as Blender shows them), or a factor. auto takes Blender's lux for watts.
+    #[arg(long, default_value = "auto", value_parser = str::parse::<Lamps>, value_name = "UNITS", help_heading = "Scene")]
+    lamps: Lamps,
     /// Leaves out all that is of the material of this name; may be given several times.
     #[arg(long, value_name = "NAME", help_heading = "Scene")]
     hide: Vec<String>,
@@ -51,8 +55,8 @@ impl SceneArguments {
 
     /// The same where these files will be written.
     pub(super) fn options_beside(&self, outputs: Vec<PathBuf>) -> SceneOptions {
-        let Self { allow_outside, variant, outlines, hide, edits } = self.clone();
-        SceneOptions { allow_outside, variant, outlines, hide, edits, outputs }
+        let Self { allow_outside, variant, outlines, lamps, hide, edits } = self.clone();
+        SceneOptions { allow_outside, variant, outlines, lamps, hide, edits, outputs }
     }
 }
 

@@ -27,5 +27,5 @@ pub use light::{PunctualKind, PunctualLight};
 pub use material::{AlphaMode, Material, Texture, TextureImage, TextureRef, TextureSlot, Wrap};
 pub use material_edit::MaterialEdit;
 pub use medium::Medium;
-pub use options::{Outlines, SceneOptions};
+pub use options::{Lamps, Outlines, SceneOptions};
 pub use placing::Placing;

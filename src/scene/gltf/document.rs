@@ -57,6 +57,8 @@ pub(super) struct Document<'a> {
     pub(super) scenes: Objects<'a, json::Scene>,
     pub(super) skins: Objects<'a, json::Skin>,
     pub(super) textures: Objects<'a, json::Texture>,
+    /// The program that has written the file, if it says so.
+    pub(super) generator: Option<String>,
     /// The text of the extensions of the whole file.
     pub(super) extensions: &'a str,
 }
@@ -64,6 +66,8 @@ pub(super) struct Document<'a> {
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Asset {
+    #[serde(default)]
+    generator: Option<String>,
     version: Option<String>,
     min_version: Option<String>,
 }
@@ -78,7 +82,7 @@ impl<'a> Document<'a> {
         memory::check(values.saturating_mul(BYTES_OF_OBJECT))?;
         let found = members(text, MEMBERS)?;
         let of = |name: &str| MEMBERS.iter().position(|it| *it == name).and_then(|at| found[at]);
-        check_version(of("asset"))?;
+        let generator = check_version(of("asset"))?;
         let names = |list| Objects::new(of(list), "extension");
         extensions::check(&names("extensionsUsed")?, &names("extensionsRequired")?, notices)?;
         let extensions = of("extensions").unwrap_or("{}");
@@ -101,6 +105,7 @@ impl<'a> Document<'a> {
             nodes: Objects::new(of("nodes"), "node")?,
             samplers: Objects::new(of("samplers"), "sampler")?,
             scene: scene.map_err(|cause| not_gltf(&format!("its scene: {cause}")))?,
+            generator,
             scenes: Objects::new(of("scenes"), "scene")?,
             skins: Objects::new(of("skins"), "skin")?,
             textures: Objects::new(of("textures"), "texture")?,
@@ -121,7 +126,8 @@ pub(super) fn split(bytes: &[u8]) -> Fallible<(&[u8], Option<&[u8]>)> {
     Ok((&text[..text.len() - padding], binary))
 }
 
-fn check_version(asset: Option<&str>) -> Fallible<()> {
+/// Refuses other versions; the program that has written the file, if it says so.
+fn check_version(asset: Option<&str>) -> Fallible<Option<String>> {
     let asset = asset.ok_or("its JSON has no `asset`, so it is not glTF")?;
     let asset: Asset = read(asset).map_err(|cause| not_gltf(&format!("its asset: {cause}")))?;
     let version = asset.version.as_deref().unwrap_or("?");
@@ -132,7 +138,7 @@ fn check_version(asset: Option<&str>) -> Fallible<()> {
         Some(least) if least != "2.0" => {
             Err(format!("it needs a reader for glTF {least}; only 2.0 can be read"))
         }
-        _ => Ok(()),
+        _ => Ok(asset.generator),
     }
 }
 

@@ -10,7 +10,7 @@
 //! joints and meshes, `animation` moves cameras, `materials`, `variants`, `textures` and `medium` read the look, `primitive`, `geometry` and `tangents` read
 //! triangles,
 //! `sheets` finds surfaces of bodies that enclose nothing,
-//! `share` says which are held once for all their instances, `bake` puts the others into the world.
+//! `lamps` chooses the units of lights, `share` says which are held once for all their instances, `bake` puts the others into the world.
 
 mod accessor;
 mod animation;
@@ -20,6 +20,7 @@ mod document;
 mod draco;
 mod extensions;
 mod geometry;
+mod lamps;
 mod lenient;
 mod limits;
 mod materials;
@@ -112,8 +113,10 @@ fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallib
     let file = File::new(document, binary, folder);
     file.check_outputs(&options.outputs)?;
     let document = &file.document;
-    let nodes = Nodes::new(document, &mut notices)?;
-    let (cameras, camera_paths) = viewpoints::cameras(&file, &nodes, &mut notices)?;
+    let nodes = Nodes::new(document, frame.transform(), &mut notices)?;
+    let (cameras, camera_paths) = viewpoints::cameras(&file, &nodes, frame, &mut notices)?;
+    let mut lights = viewpoints::lights(document, &nodes, &mut notices)?;
+    lamps::scale(&mut lights, options.lamps, document.generator.as_deref(), &mut notices);
     let mut scene = Scene {
         cameras,
         camera_paths,
