@@ -45,6 +45,7 @@ struct Guide {
 const REACH = 2;
 const TERMS = 6;
 const TINY = 1.1754944e-38;
+const QUARTER = 7;
 
 fn luminance(rgb: vec3f) -> f32 {
     return dot(rgb, vec3f(0.2126, 0.7152, 0.0722));
@@ -164,6 +165,48 @@ fn survey(@builtin(global_invocation_id) id: vec3u) {
     guides[index].slope = slope;
 }
 
+// The variance of a pixel that shows the map alone, if there is little; otherwise negative.
+fn variance_of_map(centre: vec2i) -> f32 {
+    let index = index_of(centre);
+    if guides[index].coverage > 0.0 {
+        return -1.0;
+    }
+    var smallest = array<f32, QUARTER>();
+    for (var i = 0; i < QUARTER; i++) {
+        smallest[i] = MAX_VARIANCE;
+    }
+    var count = 0;
+    for (var dy = -REACH; dy <= REACH; dy++) {
+        for (var dx = -REACH; dx <= REACH; dx++) {
+            let place = centre + vec2i(dx, dy);
+            if !is_inside(place) {
+                continue;
+            }
+            let other = index_of(place);
+            if guides[other].coverage > 0.0 {
+                continue;
+            }
+            var variance = light[other].w;
+            if variance < 0.0 {
+                let is_last = place.x + 1 == i32(settings.size.x);
+                let next = index_of(place + vec2i(select(1, -min(place.x, 1), is_last), 0));
+                let off = compared_luminance(light[other].xyz) - compared_luminance(light[next].xyz);
+                variance = 0.5 * off * off;
+            }
+            count++;
+            for (var i = 0; i < QUARTER; i++) {
+                let kept = smallest[i];
+                smallest[i] = min(kept, variance);
+                variance = max(kept, variance);
+            }
+        }
+    }
+    let freedom = f32(max(counts[index].x, 2u) - 1u);
+    let variance = smallest[(count - 1) / 4] * (1.0 + 8.85 * pow(freedom, -1.6));
+    let brightness = compared_luminance(light[index].xyz);
+    return select(-1.0, variance, sqrt(variance) <= MAX_MAP_NOISE * brightness);
+}
+
 @compute @workgroup_size(8, 8)
 fn share_errors(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= settings.size) {
@@ -206,7 +249,8 @@ fn share_errors(@builtin(global_invocation_id) id: vec3u) {
         let spread = max(moments.y / all_weights - mean * mean, MIN_SPREAD * mean * mean);
         variance = SINGLE * max(spread, off * off);
     }
-    variance = min(variance, MAX_VARIANCE);
+    let of_map = variance_of_map(centre);
+    variance = min(select(variance, of_map, of_map >= 0.0), MAX_VARIANCE);
     result[index] = vec4f(own.xyz, variance);
     // The pixel itself is its like.
     guides[index].support = support - 1.0;

@@ -12,7 +12,7 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use super::edges;
-use super::guides::Guides;
+use super::guides::{Guides, around};
 use super::light::{Light, MAX_VARIANCE, Row, compared_luminance};
 use super::samples::Samples;
 use crate::image::Image;
@@ -32,6 +32,10 @@ pub(crate) const SINGLE: f32 = 3.0;
 /// How much less likely one sample more makes it that all of a pixel's are off its surroundings by chance: two
 /// that are bright by chance, and agree, seem sure.
 pub(crate) const FEWER: f32 = 0.2;
+/// Noise of the map, relative to it, up to which that tells its error: in thick fog and behind glass there is more.
+pub(crate) const MAX_MAP_NOISE: f32 = 0.2;
+/// Pixels around one that are kept to tell the quarter with the smallest errors.
+const QUARTER: usize = 7;
 /// Weights of a B3 spline.
 const KERNEL: [f32; 3] = [3.0 / 8.0, 1.0 / 4.0, 1.0 / 16.0];
 
@@ -86,10 +90,13 @@ fn share_errors(light: &mut Light, guides: &Guides, samples: &Samples<'_>) -> Ve
             }
         }
         let own = y * width..(y + 1) * width;
-        let own = own.map(|i| (light.variance[i], light.luminance[i], samples.count(i)));
-        let pooled = |(around, (variance, luminance, count)): (Around, (f32, f32, u32))| {
+        let pooled = |(around, index): (Around, usize)| {
+            let count = samples.count(index);
+            let variance = variance_of_map(light, guides, index, count).unwrap_or_else(|| {
+                around.variance_for(light.variance[index], light.luminance[index], count)
+            });
             // The pixel itself is its like.
-            (around.variance_for(variance, luminance, count), around.support - 1.0)
+            (variance, around.support - 1.0)
         };
         sums.into_iter().zip(own).map(pooled).collect::<Vec<_>>()
     };
@@ -98,6 +105,38 @@ fn share_errors(light: &mut Light, guides: &Guides, samples: &Samples<'_>) -> Ve
     let (variance, support) = (0..guides.height).into_par_iter().flat_map(pooled_row).unzip();
     light.variance = variance;
     support
+}
+
+/// The variance of a pixel that shows the map alone, if there is little: what three quarters of the pixels around
+/// exceed, times how much more it is on average. A sun or a lamp, of which edges alone have errors, so keeps its place.
+fn variance_of_map(light: &Light, guides: &Guides, index: usize, samples: u32) -> Option<f32> {
+    let size = [guides.width, guides.height];
+    let shows_map = |other: usize| guides.at(other).coverage == 0.0;
+    if !shows_map(index) {
+        return None;
+    }
+    let mut smallest = [f32::INFINITY; QUARTER];
+    let mut count = 0;
+    for (other, _) in around(index, size, REACH as usize).filter(|(other, _)| shows_map(*other)) {
+        let mut variance = light.variance[other];
+        if variance < 0.0 {
+            // Of single samples neighbours tell.
+            let column = other % size[0];
+            let next = if column + 1 < size[0] { other + 1 } else { other - column.min(1) };
+            variance = 0.5 * (light.luminance[other] - light.luminance[next]).powi(2);
+        }
+        count += 1;
+        for kept in &mut smallest {
+            if variance < *kept {
+                std::mem::swap(kept, &mut variance);
+            }
+        }
+    }
+    // Quartiles of chi-square distributions, fitted.
+    let freedom = samples.max(2) as f32 - 1.0;
+    let variance = smallest[(count - 1) / 4] * (1.0 + 8.85 * freedom.powf(-1.6));
+    let is_little = variance.sqrt() <= MAX_MAP_NOISE * light.luminance[index];
+    is_little.then_some(variance)
 }
 
 impl Around {
@@ -268,6 +307,24 @@ mod tests {
         for x in (4..14).chain(20..30) {
             let (mean, spread) = column(&image, x);
             assert!((mean - 0.01).abs() + spread < 1e-4, "column {x}: {mean} {spread}");
+        }
+    }
+
+    /// A disc 70000 times as bright as the sky, whose edge pixels show some of each, keeps its size.
+    #[test]
+    fn a_sun_stays_where_it_is() {
+        for samples in [1, 2, 4, 64] {
+            let film = film([64, 48], samples, |x, y, [dx, dy, _]| {
+                let [x, y] = [x as f32 + dx - 30.0, y as f32 + dy - 24.0];
+                (if x * x + y * y < 9.0 { 7e4 } else { 1.0 + 0.01 * x }, None)
+            });
+            let (raw, image) = (film.image(), quick(&film, None));
+            for (raw, filtered) in raw.pixels.iter().zip(&image.pixels) {
+                assert!(
+                    (filtered[0] / raw[0] - 1.0).abs() < 0.05,
+                    "{samples}: {raw:?} {filtered:?}"
+                );
+            }
         }
     }
 

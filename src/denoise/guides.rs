@@ -39,7 +39,7 @@ pub(super) struct Guide {
     /// Variance of that normal by what is met.
     doubt: f32,
     /// Share of the samples that met a surface, and its variance.
-    coverage: f32,
+    pub(super) coverage: f32,
     chance: f32,
     /// One over the depth: on a plane it is nearly linear over the picture.
     pub(super) nearness: f32,

@@ -20,6 +20,7 @@ constants::constants! {
     MIN_ALIKE: edges::MIN_ALIKE,
     MIN_LIKENESS: a_trous::MIN_LIKENESS,
     MIN_NEARNESS: guides::MIN_NEARNESS,
+    MAX_MAP_NOISE: a_trous::MAX_MAP_NOISE,
     MIN_SPREAD: a_trous::MIN_SPREAD,
     MIN_VARIANCE: light::MIN_VARIANCE,
     NORMAL_TOLERANCE: guides::NORMAL_TOLERANCE,
