@@ -153,7 +153,7 @@ impl Document {
     pub fn is_sound(&self) -> bool {
         let radiance = |x: &f32| x.is_finite() && *x >= 0.0;
         let background = match self.background {
-            Background::Map => true,
+            Background::Map | Background::None => true,
             Background::Blurred(radians) => radiance(&radians),
             Background::Color(color) => color.iter().all(radiance),
         };

@@ -84,10 +84,13 @@ pub(super) fn frames(text: &str) -> Result<RangeInclusive<u32>, String> {
         .ok_or_else(|| "expected frames like 0..47, the first one not after the last".to_owned())
 }
 
-/// `map`, `blur:DEGREES` or a colour.
+/// `map`, `none`, `blur:DEGREES` or a colour.
 pub(super) fn background(text: &str) -> Result<Background, String> {
     if text == "map" {
         return Ok(Background::Map);
+    }
+    if text == "none" {
+        return Ok(Background::None);
     }
     if let Some(degrees) = text.strip_prefix("blur:") {
         let degrees = finite(degrees)?;
@@ -96,7 +99,8 @@ pub(super) fn background(text: &str) -> Result<Background, String> {
         }
         return Ok(Background::Blurred(degrees.to_radians() as f32));
     }
-    let color = coefficient(text).map_err(|e| format!("map, blur:DEGREES or a colour: {e}"))?;
+    let color =
+        coefficient(text).map_err(|e| format!("map, none, blur:DEGREES or a colour: {e}"))?;
     Ok(Background::Color(color.to_array()))
 }
 

@@ -57,7 +57,10 @@ pub fn write_exr(path: &Path, picture: ExrPicture<'_>) -> Result<()> {
     }
     for layer in layers {
         for (channel, values) in layer.channels {
-            let name = format!("{}.{channel}", layer.name);
+            let name = match layer.name.as_str() {
+                "" => channel,
+                layer => format!("{layer}.{channel}"),
+            };
             if values.len() != image.pixels.len() {
                 return Err(Error::at(
                     path,

@@ -11,7 +11,20 @@ use crate::error::{Error, Result};
 /// # Errors
 /// If a metadata name is not 1 to 79 Latin-1 characters, or the file cannot be written.
 pub fn write_png(path: &Path, picture: &Rgb8, metadata: &[(String, String)]) -> Result<()> {
-    write_beside_and_rename(path, |file| encode(file, picture, metadata))
+    write_beside_and_rename(path, |file| encode(file, picture, None, metadata))
+}
+
+/// The same with an alpha channel, of as many values as there are pixels; colours are not multiplied by it.
+///
+/// # Errors
+/// As [`write_png`].
+pub fn write_png_with_alpha(
+    path: &Path,
+    picture: &Rgb8,
+    alpha: &[u8],
+    metadata: &[(String, String)],
+) -> Result<()> {
+    write_beside_and_rename(path, |file| encode(file, picture, Some(alpha), metadata))
 }
 
 /// The bytes of an 8-bit sRGB PNG without metadata.
@@ -20,13 +33,19 @@ pub fn write_png(path: &Path, picture: &Rgb8, metadata: &[(String, String)]) -> 
 /// If the picture has no pixels.
 pub fn encode_png(picture: &Rgb8) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    encode(&mut bytes, picture, &[]).map_err(|e| Error::new(format!("PNG: {e}")))?;
+    encode(&mut bytes, picture, None, &[]).map_err(|e| Error::new(format!("PNG: {e}")))?;
     Ok(bytes)
 }
 
-fn encode(file: impl Write, picture: &Rgb8, metadata: &[(String, String)]) -> io::Result<()> {
+fn encode(
+    file: impl Write,
+    picture: &Rgb8,
+    alpha: Option<&[u8]>,
+    metadata: &[(String, String)],
+) -> io::Result<()> {
     let mut encoder = png::Encoder::new(file, picture.width, picture.height);
-    encoder.set_color(png::ColorType::Rgb);
+    let color = if alpha.is_some() { png::ColorType::Rgba } else { png::ColorType::Rgb };
+    encoder.set_color(color);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     for (name, value) in metadata {
@@ -39,7 +58,15 @@ fn encode(file: impl Write, picture: &Rgb8, metadata: &[(String, String)]) -> io
         .map_err(into_io)?;
     }
     let mut writer = encoder.write_header().map_err(into_io)?;
-    writer.write_image_data(picture.pixels.as_flattened()).map_err(into_io)?;
+    match alpha {
+        None => writer.write_image_data(picture.pixels.as_flattened()),
+        Some(alpha) => {
+            let pixels = picture.pixels.iter().zip(alpha);
+            let pixels: Vec<u8> = pixels.flat_map(|(&[r, g, b], &a)| [r, g, b, a]).collect();
+            writer.write_image_data(&pixels)
+        }
+    }
+    .map_err(into_io)?;
     writer.finish().map_err(into_io)
 }
 

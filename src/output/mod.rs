@@ -10,7 +10,9 @@ use crate::color::luminance;
 use crate::denoise::{Denoiser, blend};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::image::{ExrPicture, Image, Layer, extension, write_exr, write_png};
+use crate::image::{
+    ExrPicture, Image, Layer, extension, write_exr, write_png, write_png_with_alpha,
+};
 use crate::render::film::{Film, Pixel};
 use crate::tone::{ToneCurve, WhiteBalance, auto_exposure_ev, display_rgb8};
 
@@ -141,7 +143,11 @@ pub fn write_picture(
     check_extension(path)?;
     if holds_layers(path) {
         let whole = film.without_gaps();
-        let (image, layers) = (whole.image(), layers(film, &whole, &options.layers));
+        let (image, mut layers) = (whole.image(), layers(film, &whole, &options.layers));
+        if let Some(alpha) = alpha_of(&whole, &metadata) {
+            // OpenEXR's colours are multiplied by it, as are those of a film.
+            layers.push(Layer { name: String::new(), channels: vec![("A".to_owned(), alpha)] });
+        }
         let picture = ExrPicture { image: &image, layers, metadata: &metadata, preview: None };
         return write_exr(path, picture);
     }
@@ -156,7 +162,12 @@ pub fn write_picture(
         metadata.push(("lightgrid.denoiser".to_owned(), filter.name().to_owned()));
     }
     metadata.push(("lightgrid.tonemap".to_owned(), options.tone_curve.name().to_owned()));
-    write_png(path, &display_rgb8(&image, stops, options.tone_curve), &metadata)
+    let Some(alpha) = alpha_of(&film.without_gaps(), &metadata) else {
+        return write_png(path, &display_rgb8(&image, stops, options.tone_curve), &metadata);
+    };
+    let covered = display_rgb8(&divided(image, &alpha), stops, options.tone_curve);
+    let alpha: Vec<u8> = alpha.iter().map(|share| (255.0 * share).round() as u8).collect();
+    write_png_with_alpha(path, &covered, &alpha, &metadata)
 }
 
 /// The exposure of a film's picture, for that of others, too.
@@ -178,6 +189,21 @@ fn balanced(options: &PictureOptions, film: &Film) -> Result<Image> {
         (None, None) => film.without_gaps().image(),
     };
     Ok(options.white_balance.apply(image))
+}
+
+/// What surfaces show in pixels that they cover in part.
+fn divided(mut image: Image, alpha: &[f32]) -> Image {
+    for (pixel, alpha) in image.pixels.iter_mut().zip(alpha).filter(|(_, alpha)| **alpha > 0.0) {
+        *pixel = pixel.map(|radiance| radiance / alpha);
+    }
+    image
+}
+
+/// The alpha channel of a picture that has nothing behind its surfaces, as its metadata says, if it has layers.
+fn alpha_of(whole: &Film, metadata: &[(String, String)]) -> Option<Vec<f32>> {
+    let is_transparent =
+        metadata.iter().any(|(key, value)| key == "lightgrid.background" && value == "none");
+    is_transparent.then(|| whole.alpha())?
 }
 
 impl PictureOptions {

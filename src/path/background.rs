@@ -20,6 +20,8 @@ pub enum Background {
     Blurred(f32),
     /// One radiance everywhere, linear RGB.
     Color([f32; 3]),
+    /// Nothing: pictures have an alpha channel.
+    None,
 }
 
 impl Background {
@@ -31,6 +33,7 @@ impl Background {
                 environment.radiance(spread(direction, concentration(radians), u))
             }
             Self::Color(rgb) => rgb.into(),
+            Self::None => Vec3::ZERO,
         }
     }
 }

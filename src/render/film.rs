@@ -348,6 +348,16 @@ impl Film {
         (0..self.pixels.len()).into_par_iter().step_by(stride).map(scale).collect()
     }
 
+    /// Share of each pixel's samples that met a surface, in `[0,1]`: what the map does not show behind. `None` unless
+    /// layers were asked for.
+    pub fn alpha(&self) -> Option<Vec<f32>> {
+        let share = |(surface, pixel): (&Surface, &Pixel)| {
+            (surface.hits / f64::from(pixel.samples.max(1))).clamp(0.0, 1.0) as f32
+        };
+        let pixels = self.surfaces.iter().zip(&self.pixels);
+        self.has_layers().then(|| pixels.map(share).collect())
+    }
+
     /// Albedo, normal and depth of each pixel; `None` unless layers were asked for. Where nothing
     /// was hit they are zero.
     pub fn surface_layers(&self) -> Option<SurfaceLayers> {

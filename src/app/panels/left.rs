@@ -291,6 +291,7 @@ fn background(ui: &mut Ui, background: &mut Background) {
     let is_same =
         |a: &Background, b: &Background| std::mem::discriminant(a) == std::mem::discriminant(b);
     let name = kinds.iter().find(|(kind, _)| is_same(kind, background)).map_or("", |(_, n)| n);
+        (Background::None, "Transparent"),
     let hint = "What the camera sees behind the scene, also through panes";
     theme::row(ui, "Background", hint, |ui| {
         theme::choice(ui, "background").selected_text(name).show_ui(ui, |ui| {
@@ -303,7 +304,7 @@ fn background(ui: &mut Ui, background: &mut Background) {
         });
     });
     match background {
-        Background::Map => {}
+        Background::Map | Background::None => {}
         Background::Blurred(radians) => {
             let mut degrees = radians.to_degrees();
             let slider = theme::slider(&mut degrees, 0.1..=90.0).logarithmic(true);

@@ -281,7 +281,7 @@ impl RenderArguments {
 
     /// Whether albedo, normal and depth are to be found.
     pub(super) fn wants_surfaces(&self) -> bool {
-        self.picture.wants_surfaces(self.pictures())
+        self.background == Some(Background::None) || self.picture.wants_surfaces(self.pictures())
     }
 
     pub(super) fn pictures(&self) -> impl Iterator<Item = &PathBuf> {

@@ -144,7 +144,10 @@ impl Features {
         let mut features = Self::of_world(world);
         for (feature, is_needed) in [
             (ViewFeatures::BACKGROUND_BLUR, matches!(view.background, Background::Blurred(_))),
-            (ViewFeatures::BACKGROUND_COLOR, matches!(view.background, Background::Color(_))),
+            (
+                ViewFeatures::BACKGROUND_COLOR,
+                matches!(view.background, Background::Color(_) | Background::None),
+            ),
             (ViewFeatures::COUNTING, samples_map && options.is_some_and(|o| o.goes_on())),
             (ViewFeatures::FACES, options.is_some_and(|options| options.faces)),
             (ViewFeatures::LAYERS, view.layers),

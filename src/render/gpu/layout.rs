@@ -198,7 +198,7 @@ impl Globals {
         (self.width, self.height) = (view.width, view.height);
         self.seed = view.seed;
         match view.background {
-            Background::Map => {}
+            Background::Map | Background::None => {}
             Background::Blurred(radians) => {
                 self.background_concentration = concentration(radians);
             }
