@@ -141,7 +141,8 @@ impl Default for Document {
             },
             size: PictureSize::Viewport(1),
             region: None,
-            stop: StopRule::default(),
+            // Where other renderers end, too: nobody wants a fan all night.
+            stop: StopRule { samples: Some(1024), ..StopRule::default() },
             bookmarks: Vec::new(),
             materials: BTreeMap::new(),
         }

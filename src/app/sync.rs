@@ -57,9 +57,11 @@ impl App {
         self.messages.notices(&scene.world.scene.notices);
         self.library.note_scene(&scene.name);
         let is_first = self.assets.scene.is_none();
-        let before = self.assets.scene.take().filter(|before| before.name == scene.name);
-        if let Some(before) = before {
-            self.renumber(&before, &scene);
+        match self.assets.scene.take() {
+            Some(before) if before.name == scene.name => self.renumber(&before, &scene),
+            // Kept pictures of another scene would lie over this one.
+            Some(_) => self.interface.compared = Chosen::default(),
+            None => {}
         }
         self.assets.scene = Some(scene);
         fill_in_viewpoint(&mut self.edited, &self.assets);

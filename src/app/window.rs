@@ -205,7 +205,8 @@ impl Runner {
         let [width, height] = start.settings.window_size;
         let largest = event_loop.primary_monitor().map_or([width, height], |monitor| {
             let size = monitor.size().to_logical::<f32>(monitor.scale_factor());
-            [size.width, size.height]
+            // Less what a desktop takes for titles and its bar.
+            [size.width, size.height - 90.0]
         });
         let (width, height) = (width.min(largest[0]), height.min(largest[1]));
         let attributes = Window::default_attributes()

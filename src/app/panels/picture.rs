@@ -62,12 +62,18 @@ fn denoiser(ui: &mut Ui, document: &mut Document) {
 
 fn exposure(ui: &mut Ui, document: &mut Document, exposure_ev: Option<f32>) {
     let look = &mut document.look;
-    let slider = theme::slider(&mut look.exposure_ev, -8.0..=8.0).suffix(" EV");
+    let slider = theme::slider(&mut look.exposure_ev, -16.0..=16.0).suffix(" EV");
     let slider = slider.min_decimals(1).max_decimals(2);
     theme::set(ui, "Exposure", "Stops (EV): +1 doubles the brightness", slider);
     theme::row(ui, "", "", |ui| {
-        ui.checkbox(&mut look.auto_exposure, "Automatic")
-            .on_hover_text("Exposes for middle grey, then adds the stops above");
+        let hint = "Exposes for middle grey, then adds the stops above";
+        if ui.checkbox(&mut look.auto_exposure, "Automatic").on_hover_text(hint).changed() {
+            // What is seen stays as bright.
+            look.exposure_ev = match exposure_ev {
+                Some(total) if !look.auto_exposure => total.clamp(-16.0, 16.0),
+                _ => 0.0,
+            };
+        }
         if let Some(exposure_ev) = exposure_ev.filter(|_| look.auto_exposure) {
             ui.label(theme::quiet(format!("{exposure_ev:+.1} EV in total")));
         }
