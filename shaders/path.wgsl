@@ -273,7 +273,7 @@ fn look_at(path: ptr<function, Path>, point: SurfacePoint, bsdf: Bsdf) {
     albedo = albedo * (1.0 - (*path).looks_taken) + (*path).looks_added;
     depth += (*path).looks_before;
 //#end
-    (*path).first_hit = FirstHit(albedo, depth, point.shading_frame.z, 1.0);
+    (*path).first_hit = FirstHit(albedo, depth * METRES, point.shading_frame.z, 1.0);
 }
 
 //#if PERFECT_INTERFACES

@@ -24,12 +24,15 @@ use super::threads::Wakes;
 use super::{panels, theme};
 use crate::error::{Error, Result};
 use crate::render::gpu::RayChoice;
+use crate::scene::CameraPlace;
 
 /// What is shown at the start.
 #[derive(Debug, Clone, Default)]
 pub struct Start {
     /// The picture.
     pub document: Document,
+    /// Where it is taken from, in place of what the document says.
+    pub place: Option<CameraPlace>,
     /// What is open.
     pub interface: Interface,
     /// What earlier windows left.
@@ -105,7 +108,7 @@ impl App {
         tasks.run("small maps", || Ok(TaskResult::SmallMaps(read())));
         let gpu = (start.adapter, start.rays);
         Ok(Self {
-            edited: Edited::new(start.document),
+            edited: Edited::new(start.document, start.place),
             interface: start.interface,
             library: Library::new(start.settings, history, small_maps),
             messages: Messages::default(),

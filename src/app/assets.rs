@@ -10,7 +10,7 @@ use super::surface_map;
 use super::worker::Reference;
 use crate::environment::Environment;
 use crate::path::framing;
-use crate::scene::Material;
+use crate::scene::{CameraPlace, Material};
 use crate::sources;
 
 /// A map turned and scaled.
@@ -161,6 +161,12 @@ impl Assets {
     fn is_like_reference(&self, document: &Document) -> bool {
         self.reference_of.as_ref().is_some_and(|of| of.shows_like(document))
     }
+}
+
+/// From a place that was asked for, which is turned about what it looks at.
+pub(super) fn viewpoint_at(scene: &LoadedScene, place: &CameraPlace) -> Viewpoint {
+    let camera = place.camera(scene.world.scene.frame);
+    Viewpoint::of(&camera, camera.focus_distance)
 }
 
 /// Through the scene's first camera, or of all of it where there is none.

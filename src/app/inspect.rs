@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::interface::Interface;
 use super::surface_map::{Spot, look_at_place};
@@ -24,6 +24,8 @@ const TRUTH_SAMPLES: u32 = 256;
 pub(super) struct Inspected {
     /// The surface.
     pub(super) spot: Spot,
+    /// Where it is in the scene's file, metres.
+    pub(super) in_file: DVec3,
     /// Its material's name.
     pub(super) material: String,
     /// Index of its cell, and that one's face, row and column; `None` without a grid.
@@ -157,6 +159,7 @@ fn inspect(snapshot: &Snapshot, place: Vec2) -> Option<Inspected> {
     let spot = look_at_place(world, &snapshot.view(), place)?;
     let material = world.scene.materials[spot.material as usize].name.clone();
     let mut inspected = Inspected {
+        in_file: world.scene.frame.point_in_file(spot.position),
         spot,
         material,
         cell: None,

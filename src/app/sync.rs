@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::application::App;
-use super::assets::{Assets, first_viewpoint};
+use super::assets::{Assets, first_viewpoint, viewpoint_at};
 use super::comparison::Comparison;
 use super::document::{Document, number_now};
 use super::edited::Edited;
@@ -280,8 +280,12 @@ impl App {
 /// Looks from somewhere, where the document does not say from where.
 fn fill_in_viewpoint(edited: &mut Edited, assets: &Assets) {
     if edited.document.viewpoint.is_none()
-        && let Some(viewpoint) = assets.scene_of(&edited.document).map(first_viewpoint)
+        && let Some(scene) = assets.scene_of(&edited.document)
     {
+        let viewpoint = match edited.place.take() {
+            Some(place) => viewpoint_at(scene, &place),
+            None => first_viewpoint(scene),
+        };
         edited.put_back(|document| document.viewpoint = Some(viewpoint));
     }
 }

@@ -60,13 +60,16 @@ fn scene_facts(name: &str, scene: Scene) -> Value {
         "bvh_bytes": world.bvh.memory_bytes(),
         "emissive_triangles": world.lights.triangle_count(),
         "punctual_lights": scene.lights.len(),
-        "size_metres": (high - low).to_array(),
+        "size_metres": (high - low).to_array().map(|length| scene.frame.length_in_file(length)),
         "cameras": scene.cameras.iter().enumerate().map(|(i, camera)| {
             let view = match camera.projection {
                 Projection::Perspective { fov_y_radians } =>
                     format!("{:.1} degrees", fov_y_radians.to_degrees()),
                 Projection::Orthographic { half_height } =>
-                    format!("orthographic, {:.2} m high", 2.0 * half_height),
+                    format!(
+                        "orthographic, {:.2} m high",
+                        scene.frame.length_in_file(2.0 * half_height)
+                    ),
             };
             format!("{i}: {} ({view})", camera.name)
         }).collect::<Vec<_>>(),

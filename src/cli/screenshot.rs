@@ -177,7 +177,6 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
             seed: arguments.seed,
             ..defaults.light
         },
-        viewpoint: arguments.place.viewpoint()?,
         look: Look { auto_exposure, exposure_ev, denoise: arguments.denoise, ..defaults.look },
         stop: StopRule { samples: Some(arguments.samples), ..StopRule::default() },
         ..defaults
@@ -185,6 +184,7 @@ pub(super) fn run(arguments: &ScreenshotArguments) -> Result<()> {
     let mut studio = Studio::open(Shot {
         start: Start {
             document,
+            place: arguments.place.place_alone()?,
             interface: interface(arguments),
             of_scene: arguments.of_scene.options_beside(vec![arguments.output.clone()]),
             adapter: arguments.adapter.clone(),

@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::output::film_file::Part;
 use crate::path::Background;
@@ -28,8 +28,8 @@ pub(super) fn list<T: FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
 }
 
 /// `X,Y,Z` in metres.
-pub(super) fn vector(text: &str) -> Result<Vec3, String> {
-    let vector = list(text).map(Vec3::from_array).filter(|vector| vector.is_finite());
+pub(super) fn vector(text: &str) -> Result<DVec3, String> {
+    let vector = list(text).map(DVec3::from_array).filter(|vector| vector.is_finite());
     vector.ok_or_else(|| "expected three numbers like 1.5,2,-3".to_owned())
 }
 

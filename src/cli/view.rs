@@ -77,10 +77,8 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<()> {
     let path = arguments.settings.clone().or_else(Settings::default_path);
     let (settings, notice) = path.as_deref().map(Settings::recover).unwrap_or_default();
     let start = Start {
-        document: Document {
-            viewpoint: arguments.place.viewpoint()?,
-            ..document(arguments, &settings)
-        },
+        document: document(arguments, &settings),
+        place: arguments.place.place_alone()?,
         interface: settings.interface(),
         settings,
         of_scene: arguments.of_scene.options(),

@@ -193,7 +193,7 @@ impl Guide {
         }
         let normal = self.normal.dot(other.normal).max(0.0).powi(16);
         let tolerance = DEPTH_TOLERANCE * pixels.min(8.0) * self.depth.min(other.depth);
-        let depth = (self.depth - other.depth) / tolerance.max(1e-6);
+        let depth = (self.depth - other.depth) / tolerance.max(f32::MIN_POSITIVE);
         coverage * coverage * normal / (1.0 + depth * depth)
     }
 }

@@ -3,6 +3,7 @@
 use std::io::Write as _;
 use std::path::Path;
 
+use glam::Vec3;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -126,7 +127,8 @@ impl Record<'_> {
 /// Settings of a view that belong into metadata and JSON, by name.
 pub fn settings_of(view: &View, world: &World) -> Vec<(&'static str, Value)> {
     let camera = &view.camera;
-    let eye = camera.world_from_camera.translation;
+    let frame = world.scene.frame;
+    let point = |point: Vec3| json!(frame.point_in_file(point).to_array());
     let fov_degrees = match camera.projection {
         Projection::Perspective { fov_y_radians } => Some(in_digits(fov_y_radians.to_degrees())),
         Projection::Orthographic { .. } => None,
@@ -134,18 +136,20 @@ pub fn settings_of(view: &View, world: &World) -> Vec<(&'static str, Value)> {
     let fog = view.fog(world).map(|fog| {
         let Fog { interior, bounds: [low, high] } = fog;
         json!({
-            "scattering": interior.scattering.to_array(),
-            "absorption": (interior.extinction - interior.scattering).to_array(),
+            // Of the file's metres.
+            "scattering": interior.scattering.to_array().map(|it| frame.length(it)),
+            "absorption":
+                (interior.extinction - interior.scattering).to_array().map(|it| frame.length(it)),
             "anisotropy": interior.phase.mean_cosine(),
-            "box": [low.to_array(), high.to_array()],
+            "box": [point(low), point(high)],
         })
     });
     let region = view.crop.map(|crop| [crop.corner, [view.width, view.height]].concat());
     vec![
-        ("eye", json!(eye.to_array().map(in_digits))),
-        ("target", json!(camera.target().to_array().map(in_digits))),
+        ("eye", point(camera.world_from_camera.translation.into())),
+        ("target", point(camera.target())),
         ("fov_degrees", json!(fov_degrees)),
-        ("lens_radius", json!(in_digits(camera.lens_radius))),
+        ("lens_radius", json!(in_digits(frame.length_in_file(camera.lens_radius)))),
         ("fog", json!(fog)),
         ("sampling", json!(view.sampling)),
         ("sharing", json!(view.sharing)),

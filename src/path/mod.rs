@@ -268,6 +268,10 @@ impl<'a> Path<'a> {
         self.bounces + self.interfaces == 0
     }
 
+    fn in_metres(&self, hit: FirstHit) -> FirstHit {
+        FirstHit { depth: self.tracer.world.scene.frame.length_in_file(hit.depth), ..hit }
+    }
+
     /// What it brought back.
     fn result(&self) -> PathResult {
         let was_invalid = !self.radiance.is_finite();
@@ -275,7 +279,7 @@ impl<'a> Path<'a> {
             radiance: if was_invalid { Vec3::ZERO } else { self.radiance },
             rays: self.rays,
             was_invalid,
-            first_hit: self.looks.first_hit(),
+            first_hit: self.looks.first_hit().map(|hit| self.in_metres(hit)),
             is_minor: self.looks.is_minor,
         }
     }

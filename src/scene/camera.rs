@@ -1,6 +1,8 @@
 //! Cameras.
 
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, DVec3, Vec3};
+
+use super::Frame;
 
 /// What a camera does with distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +32,24 @@ pub struct Camera {
     pub lens_radius: f32,
     /// Distance in metres along the view axis at which the picture is sharp.
     pub focus_distance: f32,
+}
+
+/// Where a picture is taken from, in a file's coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraPlace {
+    /// Metres.
+    pub eye: DVec3,
+    /// Metres; not the same point.
+    pub target: DVec3,
+    /// Full vertical field of view in radians.
+    pub fov_y_radians: f32,
+}
+
+impl CameraPlace {
+    /// The camera there, in a scene that lies so in its file.
+    pub fn camera(&self, frame: Frame) -> Camera {
+        Camera::look_at(frame.point(self.eye), frame.point(self.target), self.fov_y_radians)
+    }
 }
 
 impl Camera {

@@ -6,6 +6,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::camera::Camera;
 use super::camera_path::CameraPath;
+use super::frame::Frame;
 use super::instances::{Instances, Surface};
 use super::light::PunctualLight;
 use super::material::{Material, Texture, TextureImage};
@@ -19,6 +20,8 @@ use crate::error::Notices;
 pub struct Scene {
     /// What to call it: the file name or the built-in's name.
     pub name: String,
+    /// Where the world lies in the file.
+    pub frame: Frame,
     /// World-space vertex positions in metres; of shared meshes in their own space, as are normals and
     /// tangents.
     pub positions: Vec<Vec3>,

@@ -7,6 +7,7 @@ mod camera;
 pub mod camera_path;
 mod contents;
 mod copies;
+mod frame;
 pub mod gltf;
 mod instances;
 mod light;
@@ -20,8 +21,9 @@ mod placing;
 pub mod surface;
 pub mod texture;
 
-pub use camera::{Camera, Projection};
+pub use camera::{Camera, CameraPlace, Projection};
 pub use contents::Scene;
+pub use frame::Frame;
 pub use instances::{Instance, Instances, MAX_SHOWN};
 pub use light::{PunctualKind, PunctualLight};
 pub use material::{AlphaMode, Material, Texture, TextureImage, TextureRef, TextureSlot, Wrap};

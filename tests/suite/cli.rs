@@ -684,6 +684,85 @@ fn a_region_is_that_part_of_the_picture_and_the_background_is_the_cameras_alone(
     assert!(says.contains("colour"), "{says}");
 }
 
+/// Red, green, blue and alpha of an 8-bit picture.
+fn read_rgba(path: &Path) -> Vec<[u8; 4]> {
+    let file = std::io::BufReader::new(fs::File::open(path).expect("written"));
+    let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
+    assert_eq!(reader.info().color_type, png::ColorType::Rgba);
+    let mut bytes = vec![0; reader.output_buffer_size().expect("small")];
+    reader.next_frame(&mut bytes).expect("pixels");
+    bytes.as_chunks().0.to_vec()
+}
+
+#[test]
+fn a_picture_without_a_background_is_transparent_where_nothing_is() {
+    let bench = Bench::new();
+    let place = "--eye 0,0.6,3 --target 0,0.4,0 --denoise off --seed 3";
+    bench.render(&format!("{place} --background none -o none.png -o none.exr"));
+    bench.render(&format!("{place} --background none --part 1/1 -o all.part"));
+    assert!(bench.run("merge all.part -o merged.png --denoise off").status.success());
+    bench.render(&format!("{place} --background map -o map.exr"));
+    let (pixels, merged) =
+        (read_rgba(&bench.path("none.png")), read_rgba(&bench.path("merged.png")));
+    assert_eq!(pixels, merged);
+    let [seen, with_map] = ["none.exr", "map.exr"]
+        .map(|name| read_picture(&bench.path(name)).expect("written").pixels);
+    let at = |x: usize, y: usize| x + 32 * y;
+    let [sky, ground] = [at(3, 1), at(16, 12)];
+    assert_eq!((pixels[sky][3], seen[sky]), (0, [0.0; 3]));
+    assert_eq!(pixels[ground][3], 255);
+    assert!(seen[ground] == with_map[ground] && seen[ground][0] > 0.0);
+    assert!(pixels.iter().any(|rgba| (1..255).contains(&rgba[3])), "edges are soft");
+    let exr = fs::read(bench.path("none.exr")).expect("written");
+    assert!(exr.windows(3).any(|bytes| bytes == b"\0A\0"), "there is a channel A");
+}
+
+/// The same file, once where it is and once far away and a thousand times smaller.
+#[test]
+fn options_have_the_coordinates_of_the_file() {
+    let bench = Bench::new();
+    let moved = r#""nodes": [{"mesh": 0, "translation": [500000, 10, -4000000],
+        "scale": [0.0009765625, 0.0009765625, 0.0009765625]}]"#;
+    let far = SCENE.replace(r#""nodes": [{"mesh": 0}]"#, moved);
+    assert_ne!(far, SCENE);
+    fs::write(bench.path("far.gltf"), far).expect("written");
+    let in_file = |p: [f64; 3]| {
+        let [x, y, z] = p.map(|it| it / 1024.0);
+        format!("{},{},{}", 500_000.0 + x, 10.0 + y, z - 4_000_000.0)
+    };
+    let (eye, target) = ([0.5, 0.6, 3.0], [0.0, 0.4, 0.0]);
+    let rest = "--env map.exr --size 32x18 --spp 8 --learning-paths 500 --seed 2 --sharing off";
+    let layers = "--layers depth --fov 40";
+    let near = bench.run(&format!(
+        "render scene.gltf {rest} {layers} --eye 0.5,0.6,3 --target 0,0.4,0 --fog 0.125 \
+         --lens-radius 0.0625 --focus 2 -o near.exr"
+    ));
+    assert!(near.status.success(), "{}", text(&near.stderr));
+    let far = bench.run(&format!(
+        "render far.gltf {rest} {layers} --eye {} --target {} --fog 128 \
+         --lens-radius 0.00006103515625 --focus 0.001953125 -o far.exr",
+        in_file(eye),
+        in_file(target)
+    ));
+    assert!(far.status.success(), "{}", text(&far.stderr));
+    let [near, far] = ["near.exr", "far.exr"].map(|name| bench.path(name));
+    let pictures = [&near, &far].map(|path| read_picture(path).expect("written").pixels);
+    let is_off = |(a, b): (&[f32; 3], &[f32; 3])| (a[1] - b[1]).abs() > 0.1 * a[1];
+    let off = pictures[0].iter().zip(&pictures[1]).filter(|pair| is_off(*pair)).count();
+    assert!(off <= 6, "{off} of 576 pixels differ");
+    let metadata = |path: &Path, key: &str| {
+        let metadata = read_exr_metadata(path).expect("written");
+        let value = metadata.into_iter().find(|(name, _)| name == key).expect("it is there").1;
+        serde_json::from_str::<Value>(&value).expect("JSON")
+    };
+    let found = metadata(&far, "lightgrid.eye");
+    for (axis, (center, eye)) in [500_000.0, 10.0, -4_000_000.0].into_iter().zip(eye).enumerate() {
+        let found = found[axis].as_f64().expect("a number");
+        assert!((found - center - eye / 1024.0).abs() < 1e-8, "{axis}: {found}");
+    }
+    assert_eq!(metadata(&far, "lightgrid.fog")["scattering"][0], 128.0);
+}
+
 /// As `| head` does.
 #[test]
 fn a_reader_who_has_seen_enough_is_no_reason_to_panic() {

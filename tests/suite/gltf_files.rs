@@ -2,10 +2,11 @@
 
 pub(crate) mod builder;
 mod copies;
+mod far;
 mod features;
 mod ktx2;
-
 mod pairs;
+
 use std::path::Path;
 
 use lightgrid::sampler::SplitMix;

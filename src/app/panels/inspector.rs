@@ -260,7 +260,7 @@ fn cell(
 }
 
 fn facts(ui: &mut Ui, inspected: &Inspected) {
-    let p = inspected.spot.position;
+    let p = inspected.in_file;
     let cell = match inspected.cell {
         Some((cell, [face, row, column])) => {
             let face = FACES.get(face as usize).copied().unwrap_or("all");

@@ -19,7 +19,7 @@ use crate::app::small_maps::SmallMaps;
 use crate::app::theme;
 use crate::environment::sky;
 use crate::path::Background;
-use crate::scene::{Medium, builtin};
+use crate::scene::{Frame, Medium, Scene, builtin};
 
 /// What the panel is drawn from.
 #[derive(Clone, Copy)]
@@ -71,7 +71,7 @@ pub(in crate::app) fn sections(
     environment(ui, document, interface, sources, commands);
     if let Some(scene) = sources.scene {
         theme::section(ui, "FOG");
-        fog(ui, &mut document.fog, scene.world.scene.medium);
+        fog(ui, &mut document.fog, &scene.world.scene);
         theme::section(ui, "MATERIAL");
         material::show(ui, document, interface, scene);
     }
@@ -169,21 +169,25 @@ fn cameras(
         }
     });
     let Some(viewpoint) = &mut document.viewpoint else { return };
+    let frame = scene.map_or_else(Frame::default, |scene| scene.world.scene.frame);
     if let Some(degrees) = &mut viewpoint.fov_y_degrees {
         let slider = theme::slider(degrees, 1.0..=170.0).suffix("°").max_decimals(1);
         theme::set(ui, "Field of view", "Vertical angle", slider);
     }
-    let mut millimetres = viewpoint.lens_radius * 1000.0;
+    let mut millimetres = frame.length_in_file(viewpoint.lens_radius) * 1000.0;
     let slider = theme::slider(&mut millimetres, 0.0..=100.0).logarithmic(true);
     let slider = slider.smallest_positive(0.1).suffix(" mm").max_decimals(1);
     let hint = "More blurs what is out of focus; 0 keeps everything sharp";
     if theme::set(ui, "Lens radius", hint, slider).changed() {
-        viewpoint.lens_radius = millimetres / 1000.0;
+        viewpoint.lens_radius = frame.length(millimetres / 1000.0);
     }
     if viewpoint.lens_radius > 0.0 {
-        let slider = theme::slider(&mut viewpoint.focus_distance, 0.01..=1000.0);
+        let mut metres = frame.length_in_file(viewpoint.focus_distance);
+        let slider = theme::slider(&mut metres, 0.01..=1000.0).logarithmic(true).suffix(" m");
         let hint = "Distance of what is sharp; Ctrl click in the picture sets it";
-        theme::set(ui, "Focus at", hint, slider.logarithmic(true).suffix(" m"));
+        if theme::set(ui, "Focus at", hint, slider).changed() {
+            viewpoint.focus_distance = frame.length(metres);
+        }
     }
 }
 
@@ -287,11 +291,11 @@ fn background(ui: &mut Ui, background: &mut Background) {
         (Background::Map, "The map"),
         (Background::Blurred(0.1), "The map, blurred"),
         (Background::Color([0.18; 3]), "A colour"),
+        (Background::None, "Transparent"),
     ];
     let is_same =
         |a: &Background, b: &Background| std::mem::discriminant(a) == std::mem::discriminant(b);
     let name = kinds.iter().find(|(kind, _)| is_same(kind, background)).map_or("", |(_, n)| n);
-        (Background::None, "Transparent"),
     let hint = "What the camera sees behind the scene, also through panes";
     theme::row(ui, "Background", hint, |ui| {
         theme::choice(ui, "background").selected_text(name).show_ui(ui, |ui| {
@@ -322,7 +326,8 @@ fn background(ui: &mut Ui, background: &mut Background) {
 }
 
 /// Fog: the scene's own until something is changed.
-fn fog(ui: &mut Ui, fog: &mut Option<Medium>, own: Option<Medium>) {
+fn fog(ui: &mut Ui, fog: &mut Option<Medium>, scene: &Scene) {
+    let (own, frame) = (scene.medium, scene.frame);
     let clear = Medium::default();
     let now = fog.or(own).unwrap_or(clear);
     let mut edited = now;
@@ -335,7 +340,7 @@ fn fog(ui: &mut Ui, fog: &mut Option<Medium>, own: Option<Medium>) {
     ui.horizontal(|ui| {
         let hint = "Participating medium (scatters and absorbs light)";
         if ui.checkbox(&mut is_on, "Fill the air").on_hover_text(hint).changed() {
-            let thick = Medium { scattering: Vec3::splat(FIRST_FOG), ..clear };
+            let thick = frame.medium(Medium { scattering: Vec3::splat(FIRST_FOG), ..clear });
             edited = match (is_on, own) {
                 (false, _) => clear,
                 (true, Some(own)) if own != clear => own,
@@ -345,14 +350,15 @@ fn fog(ui: &mut Ui, fog: &mut Option<Medium>, own: Option<Medium>) {
     });
     if is_on {
         let mut coefficient = |ui: &mut Ui, value: &mut Vec3| {
-            let mut mean = value.element_sum() / 3.0;
+            // Of the file's metres.
+            let mut mean = frame.length(value.element_sum() / 3.0);
             let slider = theme::slider(&mut mean, 0.0..=10.0).logarithmic(true);
             let slider = slider.smallest_positive(1e-5).suffix(" /m").max_decimals(5);
             let response = ui.add(slider);
             holds |= response.dragged() || response.has_focus();
             if response.changed() {
                 // The colour stays, if there is one.
-                let old = value.element_sum() / 3.0;
+                let (old, mean) = (value.element_sum() / 3.0, frame.length_in_file(mean));
                 *value = if old > 0.0 { *value * (mean / old) } else { Vec3::splat(mean) };
             }
         };

@@ -52,7 +52,8 @@ pub(in crate::cli) struct RenderArguments {
     /// Turns the map about the vertical, in degrees.
     #[arg(long, default_value = "0", value_parser = values::finite, value_name = "DEG", help_heading = "Environment")]
     pub(super) env_rotation: f64,
-    /// What the camera sees of the map: `map`, `blur:DEGREES`, or a colour R,G,B (linear radiance).
+    /// What the camera sees of the map: `map`, `none` (pictures have an alpha channel), `blur:DEGREES`, or a
+    /// colour R,G,B (linear radiance).
     #[arg(long, value_parser = values::background, allow_hyphen_values = true, value_name = "WHAT", help_heading = "Environment")]
     pub(super) background: Option<Background>,
     /// Multiplies the map's radiance.
@@ -330,24 +331,32 @@ impl RenderArguments {
         {
             return None;
         }
+        let frame = scene.frame;
+        let asked = frame.medium(Medium {
+            scattering: fog.unwrap_or_default(),
+            absorption: fog_absorption.unwrap_or_default(),
+            anisotropy: 0.0,
+            bounds: *fog_box,
+        });
         let of_scene = scene.medium.unwrap_or_default();
         let cleared = *fog == Some(Vec3::ZERO) && fog_absorption.is_none();
         Some(Medium {
-            scattering: fog.unwrap_or(of_scene.scattering),
-            absorption: fog_absorption.unwrap_or(if cleared {
+            scattering: fog.map_or(of_scene.scattering, |_| asked.scattering),
+            absorption: fog_absorption.map(|_| asked.absorption).unwrap_or(if cleared {
                 Vec3::ZERO
             } else {
                 of_scene.absorption
             }),
             anisotropy: fog_anisotropy.unwrap_or(of_scene.anisotropy),
-            bounds: fog_box.or(of_scene.bounds),
+            bounds: asked.bounds.or(of_scene.bounds),
         })
     }
 
     pub(super) fn camera(&self, world: &World, notices: &mut Notices) -> Result<Camera> {
         let cameras = &world.scene.cameras;
-        let camera = if let Some(camera) = self.place.placed()? {
-            camera
+        let frame = world.scene.frame;
+        let camera = if let Some(place) = self.place.placed()? {
+            place.camera(frame)
         } else if let Some(index) = self.camera {
             cameras.get(index).cloned().ok_or_else(|| {
                 let there_are = match cameras.len() {
@@ -361,8 +370,8 @@ impl RenderArguments {
             camera.clone()
         } else {
             let chosen = framing::frame(world, self.size.0 as f32 / self.size.1 as f32);
-            let eye = chosen.world_from_camera.translation;
-            let target = chosen.target();
+            let eye = frame.point_in_file(chosen.world_from_camera.translation.into());
+            let target = frame.point_in_file(chosen.target());
             notices.add(format!(
                 "{} has no camera; the view is --eye {},{},{} --target {},{},{} --fov {}",
                 self.scene,
@@ -377,8 +386,9 @@ impl RenderArguments {
             chosen
         };
         let mut camera = self.place.with_fov(camera)?;
-        camera.lens_radius = self.lens_radius.unwrap_or(camera.lens_radius);
-        camera.focus_distance = self.focus.map_or(camera.focus_distance, |f| f as f32);
+        let length = |metres: f32| frame.length(metres);
+        camera.lens_radius = self.lens_radius.map_or(camera.lens_radius, length);
+        camera.focus_distance = self.focus.map_or(camera.focus_distance, |f| length(f as f32));
         if self.focus.is_some() && camera.lens_radius == 0.0 {
             notices.add("--focus changes nothing: the lens has no radius (--lens-radius)");
         }

@@ -41,7 +41,8 @@ impl<'a> Frames<'a> {
         let (motion, all) = match (&arguments.frames, arguments.turntable) {
             (None, None) => return Ok(None),
             (_, Some(count)) => {
-                let about = arguments.place.target.unwrap_or_else(|| centre(world, camera));
+                let target = arguments.place.target.map(|at| world.scene.frame.point(at));
+                let about = target.unwrap_or_else(|| centre(world, camera));
                 (Motion::Turn { about, count }, 0..=count - 1)
             }
             (Some(frames), None) => {

@@ -152,6 +152,7 @@ fn program_of(world: &World, kernel: Kernel, features: Features) -> Program {
         rescatter_at: 8192,
         filter_at: 12288,
         rows_at: 16384,
+        metres: 1.0_f32.to_bits(),
         shared_tile: None,
     };
     let in_buffers = ARRAYS.map(|array| array.name).into();

@@ -29,6 +29,8 @@ pub(crate) struct Constants {
     pub(crate) rescatter_at: u32,
     pub(crate) filter_at: u32,
     pub(crate) rows_at: u32,
+    /// Bits of the length of the scene's unit in metres of its file.
+    pub(crate) metres: u32,
     /// How pixels share, if they do.
     pub(crate) shared_tile: Option<SharedTile>,
 }
@@ -204,6 +206,7 @@ impl Program {
             source.push_str("enable wgpu_ray_query;\n");
         }
         source.push_str(&constants::shared());
+        let _ = writeln!(source, "const METRES = {:?}f;", f32::from_bits(constants.metres));
         let mut declare = |constants: &[(&str, u32)]| {
             for (name, value) in constants {
                 let _ = writeln!(source, "const {name} = {value}u;");
@@ -219,6 +222,7 @@ impl Program {
             rescatter_at,
             filter_at,
             rows_at,
+            metres: _,
             shared_tile,
         } = *constants;
         declare(&[

@@ -129,6 +129,7 @@ fn upload_world(
         shared_stack_size: stack_size.min(SHARED_STACK_SIZE),
         vertex,
         textures_in_scene,
+        metres: world.scene.frame.length_in_file(1.0).to_bits(),
         ..Constants::default()
     })
 }

@@ -14,6 +14,7 @@ use super::accessor::Elements;
 use super::buffers::File;
 use super::limits::Fallible;
 use super::pose::{Nodes, local_transform, own_mirror};
+use crate::scene::Frame;
 use crate::scene::camera_path::{CameraPath, Interpolation, Link, Track};
 
 /// Members of an animation. Channels are read one by one, for some are of no node: those of
@@ -63,6 +64,7 @@ impl<'a> Channels<'a> {
     pub(super) fn camera_path(
         &self,
         nodes: &Nodes,
+        frame: Frame,
         node: Index<json::Node>,
     ) -> Fallible<Option<CameraPath>> {
         let mut links = Vec::new();
@@ -77,7 +79,7 @@ impl<'a> Channels<'a> {
             }
             next = nodes.parent(node);
         }
-        links.push(Link::Fixed(fixed));
+        links.push(Link::Fixed(frame.transform() * fixed));
         links.reverse();
         Ok(CameraPath::new(links))
     }

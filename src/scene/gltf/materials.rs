@@ -71,6 +71,15 @@ impl Materials {
         Ok(Self { materials, textures, images, places, sheets: BTreeMap::new() })
     }
 
+    /// Makes insides of bodies as dense as they are at another scale.
+    pub(super) fn scale(&mut self, scale: f64) {
+        for material in &mut self.materials {
+            material.attenuation_distance =
+                (f64::from(material.attenuation_distance) * scale) as f32;
+            material.scattering = (material.scattering.as_dvec3() / scale).as_vec3();
+        }
+    }
+
     /// Place of the material of a sheet, so thick in metres, given that of a body: a thin wall of the colour that
     /// the body's inside has at that thickness.
     pub(super) fn sheet(&mut self, body: u32, thickness: f32) -> u32 {

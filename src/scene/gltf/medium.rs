@@ -18,12 +18,13 @@ use super::document::Document;
 use super::limits::Fallible;
 use super::pose::{EXTRAS, Nodes, Tops};
 use crate::error::Notices;
-use crate::scene::Medium;
+use crate::scene::{Frame, Medium};
 
 /// The medium of the shown scene or, without one, of its first node that has one.
 pub(super) fn medium(
     document: &Document<'_>,
     nodes: &Nodes,
+    frame: Frame,
     notices: &mut Notices,
 ) -> Fallible<Option<Medium>> {
     let scene = document.scene.unwrap_or(json::Index::new(0));
@@ -31,7 +32,7 @@ pub(super) fn medium(
     if document.scenes.len() > 0 {
         let scene: Tops = document.scenes.get_as(scene)?;
         let medium = fog(&scene.extras).and_then(|keys| read(&keys, "the scene", notices));
-        media.extend(medium);
+        media.extend(medium.map(|medium| frame.medium(medium)));
     }
     for node in nodes.showing(EXTRAS) {
         let Some(keys) = fog(&document.nodes.get(node)?.extras) else { continue };
@@ -44,7 +45,7 @@ pub(super) fn medium(
         let (low, high) = corners.fold((Vec3::MAX, Vec3::MIN), |(low, high), corner| {
             (low.min(corner), high.max(corner))
         });
-        media.push(Medium { bounds: Some([low, high]), ..medium });
+        media.push(Medium { bounds: Some([low, high]), ..frame.thinned(medium) });
     }
     if media.len() > 1 {
         notices.add(format!("the file has {} media; only the first is rendered", media.len()));

@@ -49,7 +49,7 @@ use gltf::json;
 use crate::error::{Error, Notices, Result};
 use crate::image::{IS_A_FILM, looks_like_film, looks_like_picture, read_file};
 use crate::scene::needs::is_emitter;
-use crate::scene::{Outlines, Scene, SceneOptions};
+use crate::scene::{Frame, Outlines, Scene, SceneOptions};
 
 use buffers::File;
 use document::Document;
@@ -87,7 +87,7 @@ pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
     }
     let base_dir = path.parent().unwrap_or(Path::new(""));
     let mut scene =
-        read(&bytes, Some(base_dir), options).map_err(|cause| Error::at(path, cause))?;
+        read_suited(&bytes, Some(base_dir), options).map_err(|cause| Error::at(path, cause))?;
     scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok(scene)
 }
@@ -98,12 +98,30 @@ pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
 /// As [`load`], with `name` in place of the path.
 pub fn load_slice(bytes: &[u8], base_dir: Option<&Path>, name: &str) -> Result<Scene> {
     let options = SceneOptions::default();
-    let mut scene = read(bytes, base_dir, &options).map_err(|cause| Error::at(name, cause))?;
+    let mut scene =
+        read_suited(bytes, base_dir, &options).map_err(|cause| Error::at(name, cause))?;
     name.clone_into(&mut scene.name);
     Ok(scene)
 }
 
-fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallible<Scene> {
+/// Reads a file once, and again if f32 is too coarse for where it puts the scene.
+fn read_suited(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallible<Scene> {
+    let scene = read(bytes, base_dir, options, Frame::default())?;
+    match Frame::suiting(&scene) {
+        frame if frame.is_identity() => Ok(scene),
+        frame => {
+            drop(scene);
+            read(bytes, base_dir, options, frame)
+        }
+    }
+}
+
+fn read(
+    bytes: &[u8],
+    base_dir: Option<&Path>,
+    options: &SceneOptions,
+    frame: Frame,
+) -> Fallible<Scene> {
     let mut notices = Notices::default();
     let (text, binary) = document::split(bytes)?;
     // Names in other encodings are no reason to refuse a file.
@@ -120,15 +138,17 @@ fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallib
     let mut scene = Scene {
         cameras,
         camera_paths,
-        lights: viewpoints::lights(document, &nodes, &mut notices)?,
-        medium: medium::medium(document, &nodes, &mut notices)?,
+        lights: lights.into_iter().map(|light| viewpoints::placed(light, frame)).collect(),
+        medium: medium::medium(document, &nodes, frame, &mut notices)?,
+        frame,
         ..Scene::default()
     };
     let mut placements = placements(&file, &nodes)?;
     let mut tally = Tally { copied_instances: drop_copies(&mut placements), ..Tally::default() };
     let look = Look::choose(document, options.variant.as_deref(), &mut notices)?;
     let used = used_materials(document, &placements, &look)?;
-    let materials = Materials::load(&file, &used, &mut notices)?;
+    let mut materials = Materials::load(&file, &used, &mut notices)?;
+    materials.scale(frame.scale);
     let is_lamp = |primitive: &json::mesh::Primitive| {
         let material = materials.places[&look.material(primitive)];
         is_emitter(&materials.materials[material as usize])
@@ -161,6 +181,7 @@ fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallib
         notices.add(repair);
     }
     leave_out(&mut scene, options, &mut notices)?;
+    scene.pair_backs();
     scene.notices = notices;
     Ok(scene)
 }
@@ -184,7 +205,6 @@ fn leave_out(scene: &mut Scene, options: &SceneOptions, notices: &mut Notices) -
 }
 
 /// Numbers of the materials that are shown; `None` is the default one.
-    scene.pair_backs();
 fn used_materials(
     document: &Document<'_>,
     placements: &BTreeMap<u32, Vec<Placement>>,

@@ -74,8 +74,12 @@ struct Skin {
 }
 
 impl Nodes {
-    /// Walks the hierarchy; loops, shared children and missing nodes are errors.
-    pub(super) fn new(document: &Document<'_>, notices: &mut Notices) -> Fallible<Self> {
+    /// Walks the hierarchy; loops, shared children and missing nodes are errors. `world` is world from file.
+    pub(super) fn new(
+        document: &Document<'_>,
+        world: DAffine3,
+        notices: &mut Notices,
+    ) -> Fallible<Self> {
         let (hierarchy, skins) = Hierarchy::new(&document.nodes)?;
         let count = document.nodes.len();
         let mut marks = vec![0; count];
@@ -96,7 +100,7 @@ impl Nodes {
                 is_new
             });
         }
-        let places = places(document, &hierarchy, &mut marks)?;
+        let places = places(document, &hierarchy, world, &mut marks)?;
         let mut shown = Vec::new();
         for root in &roots {
             hierarchy.walk(root.value() as u32, |node, _| {
@@ -178,6 +182,7 @@ impl Hierarchy {
 fn places(
     document: &Document<'_>,
     hierarchy: &Hierarchy,
+    world: DAffine3,
     marks: &mut [u8],
 ) -> Fallible<Vec<(u32, DAffine3)>> {
     let (mut places, mut visited) = (Vec::new(), 0);
@@ -196,8 +201,7 @@ fn places(
             };
             above.truncate(depth);
             let local = local_transform(&node);
-            let (parent, is_below_hidden) =
-                above.last().copied().unwrap_or((DAffine3::IDENTITY, false));
+            let (parent, is_below_hidden) = above.last().copied().unwrap_or((world, false));
             let (world, is_hidden) = (parent * local, is_below_hidden || is_hidden(&node));
             above.push((world, is_hidden));
             let mark = &mut marks[number];

@@ -15,7 +15,7 @@ use super::materials::BRIGHTEST;
 use super::pose::{CAMERA, LIGHT, Nodes, own_mirror};
 use crate::error::Notices;
 use crate::scene::camera_path::{CameraPath, unmirrored};
-use crate::scene::{Camera, Projection, PunctualKind, PunctualLight};
+use crate::scene::{Camera, Frame, Projection, PunctualKind, PunctualLight};
 
 /// Field of view where the file's is unusable.
 const DEFAULT_FOV_Y_RADIANS: f32 = 0.8;
@@ -27,6 +27,7 @@ const MAX_MOVING: usize = 64;
 pub(super) fn cameras(
     file: &File<'_>,
     nodes: &Nodes,
+    frame: Frame,
     notices: &mut Notices,
 ) -> Fallible<(Vec<Camera>, Vec<Option<CameraPath>>)> {
     let document = &file.document;
@@ -39,7 +40,9 @@ pub(super) fn cameras(
         let name = source.name.clone().or_else(|| node.name.clone());
         let name = name.unwrap_or_else(|| format!("camera {index}"));
         let path = match cameras.len() < MAX_MOVING {
-            true => channels.get_or_insert_with(|| Channels::new(file)).camera_path(nodes, number),
+            true => channels
+                .get_or_insert_with(|| Channels::new(file))
+                .camera_path(nodes, frame, number),
             false => Ok(None),
         };
         let path = path.unwrap_or_else(|cause| {
@@ -47,7 +50,12 @@ pub(super) fn cameras(
             None
         });
         let world_from_camera = unmirrored(nodes.world(number) * own_mirror(&node));
-        cameras.push((index.value(), camera(&source, name, world_from_camera, notices), path));
+        let mut camera = camera(&source, name, world_from_camera, notices);
+        if let Projection::Orthographic { half_height } = &mut camera.projection {
+            *half_height = frame.length(*half_height);
+        }
+        camera.focus_distance = frame.length(camera.focus_distance);
+        cameras.push((index.value(), camera, path));
     }
     cameras.sort_by_key(|&(index, ..)| index);
     Ok(cameras.into_iter().map(|(_, camera, path)| (camera, path)).unzip())
@@ -115,6 +123,19 @@ pub(super) fn lights(
         }
     }
     Ok(lights)
+}
+
+/// A light that lights as much at another scale.
+pub(super) fn placed(light: PunctualLight, frame: Frame) -> PunctualLight {
+    let squared = match light.kind {
+        PunctualKind::Directional => 1.0,
+        PunctualKind::Point | PunctualKind::Spot { .. } => frame.scale * frame.scale,
+    };
+    PunctualLight {
+        intensity: (light.intensity.as_dvec3() * squared).as_vec3(),
+        range: frame.length(light.range),
+        ..light
+    }
 }
 
 fn light(
