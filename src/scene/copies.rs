@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::needs::is_emitter;
 use super::{AlphaMode, Material, Scene};
 
 /// So few are all compared.
@@ -87,7 +88,8 @@ pub(super) fn hash_of(words: impl IntoIterator<Item = u64>) -> u32 {
 
 impl Scene {
     /// Removes all but the first of triangles that have the same corners, front and material and, if that lets
-    /// light straight through, the same texture coordinates and colours. Returns how many there were.
+    /// light straight through, the same texture coordinates and colours. Of opaque ones that emit nothing the first
+    /// alone is ever met, whatever their materials. Returns how many there were.
     pub(super) fn remove_copies(&mut self) -> usize {
         let triangles = Triangles::of(self);
         let hash = |place: usize| triangles.hash(place);
@@ -125,12 +127,19 @@ struct Triangles<'a> {
     scene: &'a Scene,
     /// Whether light may go straight through, by material.
     is_clear: Vec<bool>,
+    /// Whether only the first of several in one place is ever met, by material.
+    is_opaque: Vec<bool>,
 }
 
 impl<'a> Triangles<'a> {
     fn of(scene: &'a Scene) -> Self {
         let is_clear = |m: &Material| m.alpha_mode != AlphaMode::Opaque || m.transmission > 0.0;
-        Self { scene, is_clear: scene.materials.iter().map(is_clear).collect() }
+        let is_opaque = |m: &Material| !is_clear(m) && !is_emitter(m);
+        Self {
+            scene,
+            is_clear: scene.materials.iter().map(is_clear).collect(),
+            is_opaque: scene.materials.iter().map(is_opaque).collect(),
+        }
     }
 
     /// The corners, beginning with that of the lowest coordinates.
@@ -159,21 +168,21 @@ impl<'a> Triangles<'a> {
             mixed(pair(x, y), u64::from(z))
         });
         let corners = corners.into_iter().fold(0, u64::wrapping_add);
-        hash_of([
-            corners,
-            pair(self.scene.triangle_materials[place], self.scene.owner(place) as u32),
-        ])
+        let material = self.scene.triangle_materials[place];
+        let material = if self.is_opaque[material as usize] { u32::MAX } else { material };
+        hash_of([corners, pair(material, self.scene.owner(place) as u32)])
     }
 
     fn are_alike(&self, first: usize, second: usize) -> bool {
         let scene = self.scene;
-        let material = scene.triangle_materials[first];
+        let materials = [first, second].map(|place| scene.triangle_materials[place]);
+        let are_opaque = materials.map(|it| self.is_opaque[it as usize]);
         let (one, other) = (self.turned(first), self.turned(second));
         let corners = || one.into_iter().zip(other);
-        material == scene.triangle_materials[second]
+        (materials[0] == materials[1] || are_opaque == [true; 2])
             && scene.owner(first) == scene.owner(second)
             && corners().all(|(a, b)| self.position(a) == self.position(b))
-            && (!self.is_clear[material as usize]
+            && (!self.is_clear[materials[0] as usize]
                 || corners().all(|(a, b)| {
                     is_same(&scene.colors, a, b) && scene.uvs.iter().all(|uvs| is_same(uvs, a, b))
                 }))
@@ -228,7 +237,9 @@ mod tests {
         assert_eq!(left(&opaque, ([b, c, a], 0, 0.0)), 1);
         assert_eq!(left(&opaque, ([-a, b, c], 0, 7.0)), 1, "who comes second is never seen");
         assert_eq!(left(&opaque, ([a, c, b], 0, 0.0)), 2, "the back is another surface");
-        assert_eq!(left(&opaque, (CORNERS, 1, 0.0)), 2);
+        assert_eq!(left(&opaque, (CORNERS, 1, 0.0)), 1, "of another material, but never met");
+        let lamp = Material { emissive: Vec3::ONE, ..opaque.clone() };
+        assert_eq!(left(&lamp, (CORNERS, 1, 0.0)), 2, "both shine");
         assert_eq!(left(&opaque, ([a, b, c * 1.000_001], 0, 0.0)), 2);
         for clear in [
             Material { alpha_mode: AlphaMode::Blend, ..opaque.clone() },

@@ -176,11 +176,11 @@ fn read(
     scene.materials = materials.materials;
     scene.textures = materials.textures;
     scene.images = materials.images;
+    leave_out(&mut scene, options, &mut notices)?;
     tally.copied_triangles = scene.remove_copies();
     for repair in repairs(&tally) {
         notices.add(repair);
     }
-    leave_out(&mut scene, options, &mut notices)?;
     scene.pair_backs();
     scene.notices = notices;
     Ok(scene)
@@ -359,10 +359,7 @@ fn repairs(tally: &Tally) -> Vec<String> {
         (bad_normals, "unusable vertex normals were ignored: shading is flat there"),
         (bad_values, "texture coordinates or colours that are not finite were replaced"),
         (copied_instances, "instances were left out: each is a copy of another in the same place"),
-        (
-            copied_triangles,
-            "triangles were left out: each is a copy of another in the same place, of the same material",
-        ),
+        (copied_triangles, "triangles were left out: each is a copy of another in the same place"),
     ] {
         if *count > 0 {
             repairs.push(format!("{count} {what}"));
