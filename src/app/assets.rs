@@ -61,7 +61,7 @@ impl Assets {
 
     /// Whether scene and map are there as the document wants them.
     pub(super) fn are_as_in(&self, document: &Document) -> bool {
-        self.scene_of(document).is_some_and(|scene| scene.edits == document.materials)
+        self.scene_of(document).is_some_and(|scene| scene.is_edited_as(document))
             && self.map_of(document).is_some_and(|map| map.sun_factor == document.sun)
     }
 
@@ -81,8 +81,8 @@ impl Assets {
     pub(super) fn load(&mut self, document: &Document) {
         match self.scene.as_ref().filter(|scene| scene.name == document.scene) {
             None => self.loader.load_scene(&document.scene),
-            Some(scene) if scene.edits != document.materials => {
-                self.loader.edit_scene(scene, &document.materials);
+            Some(scene) if !scene.is_edited_as(document) => {
+                self.loader.edit_scene(scene, &document.materials, document.lamps);
             }
             Some(_) => {}
         }

@@ -27,6 +27,9 @@ pub struct Document {
     pub intensity: f32,
     /// Factor on the radiance of the map's sun alone.
     pub sun: f32,
+    /// Factor on the scene's point, spot and directional lights.
+    #[serde(default = "one")]
+    pub lamps: f32,
     /// What the camera sees of the map.
     pub background: Background,
     /// Fog in place of the scene's own; `None` keeps that.
@@ -121,6 +124,7 @@ impl Default for Document {
             rotation_degrees: 0.0,
             intensity: 1.0,
             sun: 1.0,
+            lamps: one(),
             background: Background::default(),
             fog: None,
             viewpoint: None,
@@ -149,6 +153,10 @@ impl Default for Document {
     }
 }
 
+fn one() -> f32 {
+    1.0
+}
+
 impl Document {
     /// Whether all numbers of it that no settings file has are in range: it may come from a file.
     pub fn is_sound(&self) -> bool {
@@ -160,7 +168,7 @@ impl Document {
         };
         background
             && (0.0..=360.0).contains(&self.rotation_degrees)
-            && [self.intensity, self.sun].iter().all(radiance)
+            && [self.intensity, self.sun, self.lamps].iter().all(radiance)
             && self.fog.is_none_or(|fog| fog.is_sound())
             && self.viewpoint.iter().chain(&self.bookmarks).all(Viewpoint::is_sound)
             && self.region.iter().flatten().all(|share| (-MAX_ASIDE..=MAX_ASIDE).contains(share))
@@ -169,7 +177,8 @@ impl Document {
 
     /// Whether both show the same from the same place, whatever is made of it.
     pub(super) fn shows_like(&self, other: &Self) -> bool {
-        let light = |of: &Self| (of.rotation_degrees, of.intensity, of.sun, of.light.bounces);
+        let light =
+            |of: &Self| (of.rotation_degrees, of.intensity, of.sun, of.lamps, of.light.bounces);
         let things = |of: &Self| (of.background, of.fog);
         let cameras = [self, other].map(|of| of.viewpoint.as_ref().map(Viewpoint::camera));
         let is_seen_alike = match &cameras {

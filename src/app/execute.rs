@@ -192,6 +192,7 @@ impl App {
             scene: name,
             map,
             materials: BTreeMap::new(),
+            lamps: 1.0,
             region: None,
             fog: None,
             ..document.clone()

@@ -14,7 +14,7 @@ use crate::image::{Image, catch_panic};
 use crate::memory;
 use crate::path::World;
 use crate::render::gpu::KernelFacts;
-use crate::scene::{Material, MaterialEdit, SceneOptions};
+use crate::scene::{Material, MaterialEdit, PunctualLight, SceneOptions};
 use crate::sources;
 
 /// A scene ready for rays.
@@ -26,8 +26,12 @@ pub struct LoadedScene {
     pub world: Arc<World>,
     /// Changes to its materials, by their number.
     pub edits: BTreeMap<u32, MaterialEdit>,
+    /// Factor on its point, spot and directional lights.
+    pub lamps: f32,
     /// Its materials without them.
     pub materials: Arc<[Material]>,
+    /// Its lights without the factor.
+    lights: Arc<[PunctualLight]>,
     /// What a GPU's kernel for it holds.
     pub kernel: KernelFacts,
     /// Seconds of reading and of building the BVH.
@@ -35,19 +39,28 @@ pub struct LoadedScene {
 }
 
 impl LoadedScene {
-    /// The same with these changes in place of those that there are.
-    fn edited(self, edits: BTreeMap<u32, MaterialEdit>) -> Result<Self> {
+    /// Whether its materials and lights are as the document wants them.
+    pub(super) fn is_edited_as(&self, document: &Document) -> bool {
+        (&self.edits, self.lamps) == (&document.materials, document.lamps)
+    }
+
+    /// The same with these changes and this factor in place of those that there are.
+    fn edited(self, edits: BTreeMap<u32, MaterialEdit>, lamps: f32) -> Result<Self> {
         let mut materials = self.materials.to_vec();
         for (number, edit) in &edits {
             if let Some(material) = materials.get_mut(*number as usize) {
                 *material = edit.apply(material);
             }
         }
-        let world = self.world.with_materials(materials);
+        let scaled = |light: &PunctualLight| PunctualLight {
+            intensity: light.intensity * lamps,
+            ..light.clone()
+        };
+        let world = self.world.with_looks(materials, self.lights.iter().map(scaled).collect());
         let world =
             world.map_err(|cause| Error::at(&self.name, format!("to change it {cause}")))?;
         let world = Arc::new(world);
-        Ok(Self { kernel: KernelFacts::of_scene(&world), world, edits, ..self })
+        Ok(Self { kernel: KernelFacts::of_scene(&world), world, edits, lamps, ..self })
     }
 }
 
@@ -185,10 +198,17 @@ impl Loader {
         self.spawn(Kind::Scene, name, false, move || Loaded::Scene(load_scene(&own, &options)));
     }
 
-    /// Starts to change the materials of a scene that is there, unless something is being done to it.
-    pub fn edit_scene(&mut self, scene: &LoadedScene, edits: &BTreeMap<u32, MaterialEdit>) {
+    /// Starts to change the materials and lights of a scene that is there, unless something is being done to it.
+    pub fn edit_scene(
+        &mut self,
+        scene: &LoadedScene,
+        edits: &BTreeMap<u32, MaterialEdit>,
+        lamps: f32,
+    ) {
         let (own, edits) = (scene.clone(), edits.clone());
-        self.spawn(Kind::Scene, &scene.name, true, move || Loaded::Edited(own.edited(edits)));
+        self.spawn(Kind::Scene, &scene.name, true, move || {
+            Loaded::Edited(own.edited(edits, lamps))
+        });
     }
 
     /// Starts to load a map unless it is being loaded; a change to its sun is given up.
@@ -262,6 +282,7 @@ fn load_scene(name: &str, options: &SceneOptions) -> Result<LoadedScene> {
     let seconds = [read, start.elapsed().as_secs_f64() - read];
     let kernel = KernelFacts::of_scene(&world);
     let materials = world.scene.materials.clone().into();
-    let edits = BTreeMap::new();
-    Ok(LoadedScene { name: name.to_owned(), world, edits, materials, kernel, seconds })
+    let lights = world.scene.lights.clone().into();
+    let (name, edits, lamps) = (name.to_owned(), BTreeMap::new(), 1.0);
+    Ok(LoadedScene { name, world, edits, lamps, materials, lights, kernel, seconds })
 }

@@ -31,9 +31,12 @@ impl App {
                 }
                 Loaded::Edited(Err(error)) => {
                     self.messages.error(error.to_string());
-                    let edits = self.assets.scene.as_ref().map(|scene| scene.edits.clone());
-                    let edits = edits.unwrap_or_default();
-                    self.edited.put_back(|document| document.materials = edits);
+                    if let Some(scene) = &self.assets.scene {
+                        let (edits, lamps) = (scene.edits.clone(), scene.lamps);
+                        self.edited.put_back(|document| {
+                            (document.materials, document.lamps) = (edits, lamps);
+                        });
+                    }
                 }
                 Loaded::Map(Ok(map)) => self.take_map(map),
                 Loaded::Map(Err(error)) => self.refuse_map(&error),
@@ -310,7 +313,7 @@ pub(super) fn stay_in_scene(edited: &mut Edited, assets: &Assets, library: &Libr
         document.viewpoint = before.viewpoint;
         document.bookmarks = before.bookmarks;
         (document.region, document.fog) = (before.region, before.fog);
-        document.materials = before.materials;
+        (document.materials, document.lamps) = (before.materials, before.lamps);
     } else {
         // Somebody went back to a file that is no longer there.
         edited.amend(|document| {
@@ -318,6 +321,7 @@ pub(super) fn stay_in_scene(edited: &mut Edited, assets: &Assets, library: &Libr
             document.viewpoint = Some(first_viewpoint(scene));
             document.bookmarks = library.settings.viewpoints_of(&scene.name);
             document.materials.clone_from(&scene.edits);
+            document.lamps = scene.lamps;
         });
     }
 }

@@ -236,6 +236,31 @@ fn a_scene_is_read_again_while_a_material_of_it_changes() {
 }
 
 #[test]
+fn lamps_are_scaled_apart_from_the_map() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("lit.gltf");
+    let lit = TRIANGLE.replace(
+        r#"{"mesh": 0}"#,
+        r#"{"mesh": 0, "extensions": {"KHR_lights_punctual": {"light": 0}}}"#,
+    );
+    let light = r#""extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 8}]}}, "#;
+    std::fs::write(&file, lit.replacen(r#""asset""#, &format!(r#"{light}"asset""#), 1))
+        .expect("written");
+    let Some(mut studio) = studio(&file.display().to_string()) else { return };
+    let candela = |studio: &mut Studio, lamps: f32| {
+        studio.app.edited.document.lamps = lamps;
+        studio.settle().expect("rendered");
+        let scene = &studio.app.assets.scene.as_ref().expect("it is there").world.scene;
+        scene.lights[0].intensity.x
+    };
+    assert_eq!([1.0, 0.25, 2.0].map(|lamps| candela(&mut studio, lamps)), [8.0, 2.0, 16.0]);
+    // A change of a material keeps the factor.
+    let edit = MaterialEdit { roughness: Some(0.25), ..MaterialEdit::default() };
+    studio.app.edited.document.materials.insert(0, edit);
+    assert_eq!(candela(&mut studio, 2.0), 16.0);
+}
+
+#[test]
 fn a_tile_that_a_smaller_map_does_not_have_is_shown_nowhere() {
     let Some(mut studio) = studio("open") else { return };
     let interface =

@@ -245,7 +245,8 @@ mod tests {
         let changed = |name: &str, edit: MaterialEdit| {
             let materials = before.scene.materials.iter();
             let change = |m: &Material| if m.name == name { edit.apply(m) } else { m.clone() };
-            let world = before.with_materials(materials.map(change).collect());
+            let world =
+                before.with_looks(materials.map(change).collect(), before.scene.lights.clone());
             world.expect("there is memory").has_same_visibility(&before)
         };
         let red = MaterialEdit { color: Some(Vec3::X), ..MaterialEdit::default() };
@@ -270,7 +271,8 @@ mod tests {
         let materials: Vec<Material> = scene.materials.iter().map(change).collect();
         let loaded = World::new(Scene { materials: materials.clone(), ..scene.clone() });
         let before = World::new(scene);
-        let changed = before.with_materials(materials).expect("there is memory");
+        let changed =
+            before.with_looks(materials, before.scene.lights.clone()).expect("there is memory");
         assert_eq!(changed.needs, loaded.needs);
         assert_ne!(changed.needs, before.needs, "nothing was cut out before");
         let mut sees_more = 0;

@@ -45,13 +45,17 @@ impl World {
         Self { needs, scene, bvh, lights, materials, geometry, clock: None }
     }
 
-    /// The same scene with other materials, as many as it has.
+    /// The same scene with other materials, as many as it has, and other lights.
     ///
     /// # Errors
     /// If there is no memory for another copy of it: the cause.
-    pub(crate) fn with_materials(&self, materials: Vec<Material>) -> Decoded<Self> {
+    pub(crate) fn with_looks(
+        &self,
+        materials: Vec<Material>,
+        lights: Vec<PunctualLight>,
+    ) -> Decoded<Self> {
         memory::check(self.memory_bytes())?;
-        let scene = Scene { materials, ..self.scene.clone() };
+        let scene = Scene { materials, lights, ..self.scene.clone() };
         let ready = scene.materials.iter().map(ReadyMaterial::new).collect();
         let lights = LocalLights::new(&scene, self.bvh.bounds());
         let (needs, bvh) = (SceneNeeds::of(&scene), self.bvh.clone());

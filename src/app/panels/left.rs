@@ -252,7 +252,13 @@ fn environment(
     if theme::set(ui, "Intensity", "Brightness of the map", slider).dragged() || is_turned {
         interface.keep_moving(ui.ctx());
     }
-    sun(ui, &mut document.sun);
+    let hint =
+        "Brightness of the map's sun alone; its sky stays as it is. The picture starts again";
+    late_factor(ui, "Sun", hint, &mut document.sun);
+    if sources.scene.is_some_and(|scene| !scene.world.scene.lights.is_empty()) {
+        let hint = "Brightness of the file's point, spot and directional lights";
+        late_factor(ui, "Lamps", hint, &mut document.lamps);
+    }
     background(ui, &mut document.background);
     if (document.rotation_degrees, document.intensity, document.sun) != (0.0, 1.0, 1.0) {
         let text = RichText::new("Reset rotation, intensity and sun").size(12.0);
@@ -262,19 +268,17 @@ fn environment(
     }
 }
 
-/// The sun's light is taken up when the slider is let go: the map's tables are built anew.
-fn sun(ui: &mut Ui, sun: &mut f32) {
-    let hint =
-        "Brightness of the map's sun alone; its sky stays as it is. The picture starts again";
-    theme::row(ui, "Sun", hint, |ui| {
-        let id = ui.scope_id().with("sun");
-        let mut value = ui.data(|data| data.get_temp(id)).unwrap_or(*sun);
+/// A factor that is taken up when the slider is let go: what it changes is built anew.
+fn late_factor(ui: &mut Ui, name: &str, hint: &str, result: &mut f32) {
+    theme::row(ui, name, hint, |ui| {
+        let id = ui.scope_id().with(name);
+        let mut value = ui.data(|data| data.get_temp(id)).unwrap_or(*result);
         let response = ui.add(factor(&mut value));
         if response.dragged() || response.has_focus() {
             ui.data_mut(|data| data.insert_temp(id, value));
         } else {
             ui.data_mut(|data| data.remove::<f32>(id));
-            *sun = value;
+            *result = value;
         }
     });
 }

@@ -210,7 +210,10 @@ mod tests {
         device.give_up(&Error::new("it takes too much"), &first);
         assert_eq!(device.take_failure().as_deref(), Some("it takes too much; the CPU renders"));
         let materials = first.world.scene.materials.clone();
-        let edited = first.world.with_materials(materials).expect("there is memory");
+        let edited = first
+            .world
+            .with_looks(materials, first.world.scene.lights.clone())
+            .expect("there is memory");
         let mut turned = (*first.environment).clone();
         turned.set_rotation(1.0);
         let (world, environment) = (Arc::new(edited), Arc::new(turned));

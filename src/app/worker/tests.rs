@@ -91,7 +91,12 @@ fn what_was_learned_outlives_a_change_of_colour() {
     let changed = |change: &dyn Fn(&mut crate::scene::Material)| {
         let mut materials = request.world.scene.materials.clone();
         materials.iter_mut().for_each(change);
-        Arc::new(request.world.with_materials(materials).expect("there is memory"))
+        Arc::new(
+            request
+                .world
+                .with_looks(materials, request.world.scene.lights.clone())
+                .expect("there is memory"),
+        )
     };
     assert!(done(&request.world).now.learning_paths > 0);
     let darker = changed(&|material| material.base_color *= glam::Vec4::new(0.5, 0.5, 0.5, 1.0));
