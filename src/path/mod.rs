@@ -268,18 +268,16 @@ impl<'a> Path<'a> {
         self.bounces + self.interfaces == 0
     }
 
-    fn in_metres(&self, hit: FirstHit) -> FirstHit {
-        FirstHit { depth: self.tracer.world.scene.frame.length_in_file(hit.depth), ..hit }
-    }
-
     /// What it brought back.
     fn result(&self) -> PathResult {
         let was_invalid = !self.radiance.is_finite();
+        let frame = self.tracer.world.scene.frame;
+        let in_metres = |hit: FirstHit| FirstHit { depth: frame.length_in_file(hit.depth), ..hit };
         PathResult {
             radiance: if was_invalid { Vec3::ZERO } else { self.radiance },
             rays: self.rays,
             was_invalid,
-            first_hit: self.looks.first_hit().map(|hit| self.in_metres(hit)),
+            first_hit: self.looks.first_hit().map(in_metres),
             is_minor: self.looks.is_minor,
         }
     }

@@ -3,13 +3,13 @@
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::{Medium, Scene};
+use super::Medium;
 
 /// Extents in metres that are rendered as they are.
 const MIN_EXTENT: f64 = 0.5;
-const MAX_EXTENT: f64 = 2e4;
+const MAX_EXTENT: f64 = 1e6;
 /// How far from the origin, in extents of the scene, its centre may lie.
-const MAX_DISTANCE: f64 = 2.0;
+const MAX_DISTANCE: f64 = 16.0;
 /// Extent that others are scaled to, within a factor of 2.
 const EXTENT: f64 = 10.0;
 
@@ -29,11 +29,8 @@ impl Default for Frame {
 }
 
 impl Frame {
-    /// The one that a scene is best rendered in, given it as it is in its file.
-    pub(in crate::scene) fn suiting(scene: &Scene) -> Self {
-        let points = scene.hull_points(|_| true).map(Vec3::as_dvec3);
-        let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let (low, high) = points.fold(none, |(low, high), p| (low.min(p), high.max(p)));
+    /// The one that a scene is best rendered in, given the box around it in its file.
+    pub(in crate::scene) fn suiting([low, high]: [DVec3; 2]) -> Self {
         let (center, extent) = (0.5 * (low + high), (high - low).max_element());
         let mut frame = Self::default();
         if extent > 0.0 && !(MIN_EXTENT..=MAX_EXTENT).contains(&extent) {
@@ -113,29 +110,22 @@ fn in_digits(x: f32) -> f64 {
 mod tests {
     use super::*;
 
-    fn triangle(center: DVec3, extent: f64) -> Scene {
-        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
-        let positions = corners.map(|c| (center + extent * (c - 0.5)).as_vec3());
-        Scene {
-            positions: positions.to_vec(),
-            triangles: vec![[0, 1, 2]],
-            triangle_materials: vec![0],
-            ..Scene::default()
-        }
+    fn suiting(center: DVec3, extent: f64) -> Frame {
+        Frame::suiting([-0.5, 0.5].map(|side| center + side * extent))
     }
 
     #[test]
     fn only_far_tiny_and_huge_scenes_are_moved() {
         for (center, extent, is_moved) in [
             (DVec3::ZERO, 10.0, false),
-            (DVec3::new(19.0, 0.0, -19.0), 10.0, false),
-            (DVec3::ZERO, 1e4, false),
-            (DVec3::new(0.0, 0.0, 21.0), 10.0, true),
+            (DVec3::new(150.0, 0.0, -150.0), 10.0, false),
+            (DVec3::ZERO, 3e5, false),
+            (DVec3::new(0.0, 0.0, 170.0), 10.0, true),
             (DVec3::new(512_000.0, 0.0, -5_173_000.0), 10.0, true),
             (DVec3::ZERO, 0.02, true),
             (DVec3::ZERO, 1e7, true),
         ] {
-            let frame = Frame::suiting(&triangle(center, extent));
+            let frame = suiting(center, extent);
             assert_eq!(!frame.is_identity(), is_moved, "{center} {extent}: {frame:?}");
             if is_moved {
                 let size = extent * frame.scale;
@@ -143,8 +133,8 @@ mod tests {
                 assert!(frame.point(center).length() < 5.0, "{center}: {frame:?}");
             }
         }
-        assert!(Frame::suiting(&triangle(DVec3::ZERO, 0.0)).is_identity(), "a point");
-        assert!(Frame::suiting(&Scene::default()).is_identity(), "nothing");
+        let nothing = Frame::suiting([DVec3::INFINITY, DVec3::NEG_INFINITY]);
+        assert!(suiting(DVec3::ZERO, 0.0).is_identity() && nothing.is_identity());
     }
 
     #[test]

@@ -701,11 +701,11 @@ fn a_picture_without_a_background_is_transparent_where_nothing_is() {
     bench.render(&format!("{place} --background none -o none.png -o none.exr"));
     bench.render(&format!("{place} --background none --part 1/1 -o all.part"));
     assert!(bench.run("merge all.part -o merged.png --denoise off").status.success());
-    bench.render(&format!("{place} --background map -o map.exr"));
+    bench.render(&format!("{place} --background map -o seen.exr"));
     let (pixels, merged) =
         (read_rgba(&bench.path("none.png")), read_rgba(&bench.path("merged.png")));
     assert_eq!(pixels, merged);
-    let [seen, with_map] = ["none.exr", "map.exr"]
+    let [seen, with_map] = ["none.exr", "seen.exr"]
         .map(|name| read_picture(&bench.path(name)).expect("written").pixels);
     let at = |x: usize, y: usize| x + 32 * y;
     let [sky, ground] = [at(3, 1), at(16, 12)];

@@ -23,7 +23,7 @@ const FILES: &[(&str, usize, usize, usize, usize)] = &[
     ("data/interiors/home-theater/home-theater.gltf", 7915, 10, 20, 0),
     ("data/interiors/room-anex.glb", 47_402, 0, 16, 15),
     ("data/interiors/white-room-mjp.glb", 132, 4, 1, 0),
-    ("data/interiors/zdm2-arena.glb", 58_772, 1134, 1, 0),
+    ("data/interiors/zdm2-arena.glb", 58_772, 1134, 2, 0),
     ("data/exteriors/camp/camp.gltf", 6285, 16, 12, 0),
     ("data/exteriors/spaceship.glb", 255_852, 8, 11, 0),
     ("data/objects/01_alpha_mask/01_alpha_mask.gltf", 2, 0, 1, 1),

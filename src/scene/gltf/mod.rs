@@ -57,7 +57,7 @@ use geometry::Needs;
 use limits::{Fallible, MAX_TRIANGLES, check_count, check_growth};
 use materials::Materials;
 use part::{Part, Tally};
-use placement::{Placement, drop_copies, placements};
+use placement::{Placement, bounds, drop_copies, placements};
 use pose::Nodes;
 use primitive::Mesh;
 use share::Sharing;
@@ -87,7 +87,7 @@ pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
     }
     let base_dir = path.parent().unwrap_or(Path::new(""));
     let mut scene =
-        read_suited(&bytes, Some(base_dir), options).map_err(|cause| Error::at(path, cause))?;
+        read(&bytes, Some(base_dir), options).map_err(|cause| Error::at(path, cause))?;
     scene.name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok(scene)
 }
@@ -98,30 +98,12 @@ pub fn load_with(path: &Path, options: &SceneOptions) -> Result<Scene> {
 /// As [`load`], with `name` in place of the path.
 pub fn load_slice(bytes: &[u8], base_dir: Option<&Path>, name: &str) -> Result<Scene> {
     let options = SceneOptions::default();
-    let mut scene =
-        read_suited(bytes, base_dir, &options).map_err(|cause| Error::at(name, cause))?;
+    let mut scene = read(bytes, base_dir, &options).map_err(|cause| Error::at(name, cause))?;
     name.clone_into(&mut scene.name);
     Ok(scene)
 }
 
-/// Reads a file once, and again if f32 is too coarse for where it puts the scene.
-fn read_suited(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallible<Scene> {
-    let scene = read(bytes, base_dir, options, Frame::default())?;
-    match Frame::suiting(&scene) {
-        frame if frame.is_identity() => Ok(scene),
-        frame => {
-            drop(scene);
-            read(bytes, base_dir, options, frame)
-        }
-    }
-}
-
-fn read(
-    bytes: &[u8],
-    base_dir: Option<&Path>,
-    options: &SceneOptions,
-    frame: Frame,
-) -> Fallible<Scene> {
+fn read(bytes: &[u8], base_dir: Option<&Path>, options: &SceneOptions) -> Fallible<Scene> {
     let mut notices = Notices::default();
     let (text, binary) = document::split(bytes)?;
     // Names in other encodings are no reason to refuse a file.
@@ -131,7 +113,14 @@ fn read(
     let file = File::new(document, binary, folder);
     file.check_outputs(&options.outputs)?;
     let document = &file.document;
-    let nodes = Nodes::new(document, frame.transform(), &mut notices)?;
+    let mut nodes = Nodes::new(document, DAffine3::IDENTITY, &mut notices)?;
+    let mut placements = placements(&file, &nodes)?;
+    let frame = Frame::suiting(bounds(&file, &nodes, &placements)?);
+    if !frame.is_identity() {
+        // Again, from where f32 is exact enough; what there was to be said has been said.
+        nodes = Nodes::new(document, frame.transform(), &mut Notices::default())?;
+        placements = placement::placements(&file, &nodes)?;
+    }
     let (cameras, camera_paths) = viewpoints::cameras(&file, &nodes, frame, &mut notices)?;
     let mut lights = viewpoints::lights(document, &nodes, &mut notices)?;
     lamps::scale(&mut lights, options.lamps, document.generator.as_deref(), &mut notices);
@@ -143,7 +132,6 @@ fn read(
         frame,
         ..Scene::default()
     };
-    let mut placements = placements(&file, &nodes)?;
     let mut tally = Tally { copied_instances: drop_copies(&mut placements), ..Tally::default() };
     let look = Look::choose(document, options.variant.as_deref(), &mut notices)?;
     let used = used_materials(document, &placements, &look)?;

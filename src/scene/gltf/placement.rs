@@ -2,12 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use gltf::json;
+use json::accessor::{ComponentType, GenericComponentType};
+use json::validation::Checked;
+use serde_json::Value;
 
 use super::buffers::File;
 use super::limits::{Fallible, MAX_TRIANGLES, check_count};
 use super::pose::{self, MESH, Nodes};
+use super::primitive::Mesh;
 use crate::scene::copies::{copies, hash_of};
 
 /// A node that shows a mesh.
@@ -40,6 +44,62 @@ pub(super) fn placements(
         placements.entry(mesh.value() as u32).or_default().push(placement);
     }
     Ok(placements)
+}
+
+/// Low and high corner of a box around all that is shown, by what the file says of its positions; infinite the wrong
+/// way round where it says nothing.
+pub(super) fn bounds(
+    file: &File<'_>,
+    nodes: &Nodes,
+    placements: &BTreeMap<u32, Vec<Placement>>,
+) -> Fallible<[DVec3; 2]> {
+    let [mut low, mut high] = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    for (&number, placements) in placements {
+        let mesh: Mesh = file.document.meshes.get_as(json::Index::new(number))?;
+        let boxes: Vec<[DVec3; 2]> =
+            mesh.primitives().filter_map(|primitive| own_box(file, &primitive.ok()?)).collect();
+        for placement in placements {
+            // What is wrong with a skin is said where its mesh is read.
+            let skin = placement.skin;
+            let joints = skin.and_then(|skin| pose::joint_transforms(file, nodes, skin).ok());
+            let transforms = joints.unwrap_or_else(|| placement.instances.clone());
+            for (transform, sides) in
+                transforms.iter().flat_map(|it| boxes.iter().map(move |sides| (it, sides)))
+            {
+                for corner in 0..8 {
+                    let at = |axis: usize| sides[corner >> axis & 1][axis];
+                    let point = transform.transform_point3(DVec3::new(at(0), at(1), at(2)));
+                    if point.is_finite() {
+                        (low, high) = (low.min(point), high.max(point));
+                    }
+                }
+            }
+        }
+    }
+    Ok([low, high])
+}
+
+/// Bounds of a primitive's positions in its own space, if the file has them.
+fn own_box(file: &File<'_>, primitive: &json::mesh::Primitive) -> Option<[DVec3; 2]> {
+    let position = Checked::Valid(json::mesh::Semantic::Positions);
+    let accessor = file.document.accessors.get(*primitive.attributes.get(&position)?).ok()?;
+    let Checked::Valid(GenericComponentType(component)) = accessor.component_type else {
+        return None;
+    };
+    let unit = match component {
+        _ if !accessor.normalized => 1.0,
+        ComponentType::I8 => 127.0,
+        ComponentType::U8 => 255.0,
+        ComponentType::I16 => 32_767.0,
+        ComponentType::U16 => 65_535.0,
+        ComponentType::U32 | ComponentType::F32 => 1.0,
+    };
+    let corner = |value: &Option<Value>| -> Option<DVec3> {
+        let numbers: Vec<f64> =
+            value.as_ref()?.as_array()?.iter().filter_map(Value::as_f64).collect();
+        Some(DVec3::from(<[f64; 3]>::try_from(numbers).ok()?) / unit)
+    };
+    Some([corner(&accessor.min)?, corner(&accessor.max)?])
 }
 
 /// Leaves out instances of a mesh in the place of another one, as after a doubled import; how many there were.

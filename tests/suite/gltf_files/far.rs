@@ -39,11 +39,12 @@ fn lengths(scene: &Scene) -> Vec<f64> {
     let Projection::Orthographic { half_height } = camera.projection else { panic!("it is not") };
     let fog = scene.medium.expect("there is one");
     let corners = fog.bounds.expect("a box");
-    let points = scene.positions.iter().copied().chain(corners).chain([
-        light.position,
-        camera.world_from_camera.translation.into(),
-        camera.target(),
-    ]);
+    let points = scene
+        .positions
+        .iter()
+        .copied()
+        .chain(corners)
+        .chain([light.position, camera.world_from_camera.translation.into()]);
     points
         .flat_map(point)
         .chain([light.range, half_height].map(|length| f64::from(frame.length_in_file(length))))
